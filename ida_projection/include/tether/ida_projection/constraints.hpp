@@ -1,0 +1,127 @@
+// Tether: constraint projection for SUNDIALS IDA. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <sundials/sundials_nvector.h>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace tether::ida_projection {
+
+/// Read-only view of the N unknowns y.
+using ConstVector = Eigen::Map<const Eigen::VectorXd>;
+/// Writable view of the m constraint values g.
+using Vector = Eigen::Map<Eigen::VectorXd>;
+/// Writable view of the m x N constraint Jacobian C = dg/dy; each row is contiguous.
+using Matrix = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
+
+/// A callable that returns either nothing (success) or an int with SUNDIALS' contract:
+/// 0 success, > 0 recoverable (IDA retries with a smaller step), < 0 fatal.
+/// An exception that leaves the callable counts as fatal; its text becomes the status message.
+template <class... Arguments>
+class Callable {
+ public:
+  Callable() = default;
+  Callable(std::nullptr_t) {}
+
+  template <class F, class = std::enable_if_t<!std::is_same_v<std::decay_t<F>, Callable> &&
+                                              std::is_invocable_v<std::decay_t<F>&, Arguments...>>>
+  Callable(F&& f) {
+    if constexpr (std::is_void_v<std::invoke_result_t<std::decay_t<F>&, Arguments...>>)
+      call_ = [f = std::forward<F>(f)](Arguments... arguments) mutable -> int {
+        f(std::forward<Arguments>(arguments)...);
+        return 0;
+      };
+    else
+      call_ = std::forward<F>(f);
+  }
+
+  explicit operator bool() const { return static_cast<bool>(call_); }
+  int operator()(Arguments... arguments) const {
+    return call_(std::forward<Arguments>(arguments)...);
+  }
+
+ private:
+  std::function<int(Arguments...)> call_;
+};
+
+/// C by forward differences: increment sqrt(eps) max(|y_j|, WT_j) in each column, WT_j the error
+/// weight rtol |y_j| + atol_j. Costs N evaluations of g for each C.
+struct FiniteDifferences {};
+
+/// C written by the caller. C is zero on entry, so only the non-zero entries need be set.
+struct DenseJacobian {
+  Callable<double, ConstVector, Matrix> fill;
+
+  DenseJacobian() = default;
+  template <class F, class = std::enable_if_t<!std::is_same_v<std::decay_t<F>, DenseJacobian>>>
+  DenseJacobian(F&& f) : fill(std::forward<F>(f)) {}
+};
+
+/// Few constraints on any vector type (MPI, GPU, a framework's own): values and gradients through
+/// N_Vectors only. `value` fills g[0..m-1] with the same numbers on every process; `fill` writes
+/// the m gradients dg_i/dy, each an N_Vector like y. Replaces Constraints::value.
+struct Gradients {
+  Callable<double, N_Vector, double*> value;
+  Callable<double, N_Vector, N_Vector*> fill;
+};
+
+/// The projection done by the caller, in the shape of CVODE's CVProjFn: from y at time t compute
+/// corr with y + corr on the constraints, to accuracy eps_proj in the WRMS norm of IDA's error
+/// weights. err holds a copy of the corrector's accumulated correction; IDA uses the projected
+/// correction for its error test, so whatever is written to err is ignored.
+struct UserProjection {
+  using Function = int (*)(sunrealtype t, N_Vector y, N_Vector corr, sunrealtype eps_proj,
+                           N_Vector err, void* user_data);
+  Function function = nullptr;
+  void* user_data = nullptr;
+};
+
+/// The set { y : g(t, y) = 0 } on which the solution is kept, m rows, g in the caller's own units.
+/// Join sets with `+`. Rows may be redundant, but they must not contradict each other.
+struct Constraints {
+  int count = 0;                                             ///< m, rows of this set
+  Callable<double, ConstVector, Vector> value;               ///< g(t, y)
+  std::variant<FiniteDifferences, DenseJacobian, Gradients, UserProjection> jacobian;  ///< dg/dy
+  std::vector<std::string> names;  ///< optional, one for each row; used in messages
+  std::vector<Constraints> joined;  ///< sets added with `+`, their rows after those of this one
+
+  /// m over this set and everything joined to it.
+  int total_count() const {
+    int total = count;
+    for (const Constraints& part : joined) total += part.total_count();
+    return total;
+  }
+  /// The name given to a row, or "row i".
+  std::string name(int row) const;
+};
+
+/// The rows of `a` followed by those of `b`. Gradients join only Gradients, and a UserProjection
+/// joins nothing: std::invalid_argument otherwise.
+Constraints operator+(Constraints a, const Constraints& b);
+
+/// What check_jacobian found.
+struct JacobianReport {
+  bool correct = true;
+  double worst = 0.0;     ///< largest relative difference |C - C_difference| / (column scale)
+  int row = -1;           ///< of the worst entry; -1 when C is correct
+  int column = -1;        ///< of the worst entry; -1 when C is correct
+  double given = 0.0;     ///< the caller's entry there
+  double expected = 0.0;  ///< central differences with extrapolation there
+  std::string message;    ///< "row 2 (energy), column 3: given 1.0, differences give 2.0"
+};
+
+/// Compares the caller's Jacobian with extrapolated central differences at (t, y), entry by entry.
+/// Works for DenseJacobian; FiniteDifferences pass trivially. An entry is wrong when it differs by
+/// more than `tolerance` times the larger of its own size and its row's largest entry, both in
+/// the scale max(|y_j|, 1).
+JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,
+                              double tolerance = 1e-5);
+JacobianReport check_jacobian(const Constraints& constraints, double t,
+                              const std::vector<double>& y, double tolerance = 1e-5);
+
+}  // namespace tether::ida_projection

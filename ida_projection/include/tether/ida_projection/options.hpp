@@ -1,0 +1,92 @@
+// Tether: constraint projection for SUNDIALS IDA. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <sundials/sundials_nonlinearsolver.h>
+#include <sundials/sundials_nvector.h>
+#include <vector>
+
+namespace tether::ida_projection {
+
+/// The metric D in which the move is shortest: min sum_i (dy_i / D_i)^2 subject to C dy = g.
+enum class Metric {
+  /// D_i = max(s_i, 1e-3 WT_i), where s_i <- max(0.8 s_i, |correction_i|) follows the size of the
+  /// corrector's own change of component i and WT_i = rtol |y_i| + atol_i. A minimum-variance
+  /// update: what the corrector changes most absorbs the repair.
+  local_correction,
+  /// D_i = WT_i, the weights of the error test (Hanson and Krogh).
+  error_weights,
+};
+
+/// What happens when a move is longer than Options::largest_move allows.
+enum class LongMove {
+  reject,  ///< recoverable failure: IDA retries with a smaller step
+  cap,     ///< scale the move down to the allowed length, as DASSLX does
+};
+
+/// One report of the progress callback.
+struct Progress {
+  double t = 0.0;      ///< time of the step that was just corrected
+  double step = 0.0;   ///< step size of that attempt
+  int order = 0;       ///< BDF order of that attempt
+  double drift = 0.0;  ///< largest |g| that the corrector left
+  double move = 0.0;   ///< length of the projection's move, in tolerances (WRMS)
+  long steps = 0;      ///< accepted steps so far
+};
+
+/// Every knob of the projection. "Tolerances" below are units of the error test: the WRMS norm
+/// sqrt(sum (dy_i / WT_i)^2 / N) with WT_i = rtol |y_i| + atol_i, in which IDA accepts about 1.
+struct Options {
+  Metric metric = Metric::local_correction;
+
+  /// Estimated distance left to the constraints is at most this many tolerances; > 0.
+  double tolerance = 1e-4;
+
+  /// Newton moves at most in one step; >= 1.
+  int maximum_iterations = 5;
+
+  /// Project at accepted steps n, 2n, 3n, ...; >= 1.
+  int frequency = 1;
+
+  /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in
+  /// tolerances; > 0.
+  double largest_move = 10.0;
+  LongMove long_move = LongMove::reject;
+
+  /// IDA's id vector: 1 differential, 0 algebraic. Copied at attach. Null: derived at the first
+  /// step from the columns of dF/dy' that are exactly zero (N evaluations of F, serial vectors up
+  /// to `derive_id_limit` unknowns); Projection::message() tells when it cannot be derived.
+  N_Vector id = nullptr;
+  int derive_id_limit = 2000;
+
+  /// Keep algebraic variables out of IDA's error test (IDASetId and IDASetSuppressAlg).
+  bool suppress_algebraic = true;
+
+  /// After a move, solve F's linearisation once for the algebraic variables (one F, one back
+  /// substitution with IDA's own factors).
+  bool refresh_algebraic = true;
+
+  /// Newton iterations added after IDA's corrector has converged; 0 or 1.
+  int extra_iterations = 1;
+
+  /// Components that a move must not change: true = held. Empty, or one entry for each unknown
+  /// (serial vectors). For other vectors use `hold_vector`: 1 free, 0 held.
+  std::vector<bool> hold;
+  N_Vector hold_vector = nullptr;
+
+  /// Groups of components that share one scale in Metric::local_correction (rms over the group,
+  /// in tolerances): group[i] >= 0 is the group of component i, -1 none. Keeps symmetries, such as
+  /// the rotational one of a point's x, y, z. Empty, or one entry for each unknown.
+  std::vector<int> group;
+
+  /// The nonlinear solver to decorate; must be of root-finding type. Null: SUNDIALS' Newton
+  /// solver, made and owned by the Projection. IDASetNonlinearSolver must not be called by the
+  /// host afterwards.
+  SUNNonlinearSolver nonlinear_solver = nullptr;
+
+  /// Called after every `progress_interval`-th accepted step; must not throw.
+  std::function<void(const Progress&)> progress;
+  int progress_interval = 1;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,113 @@
+// Tether: constraint projection for SUNDIALS IDA. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ida/ida.h>
+#include <memory>
+#include <string>
+#include <tether/ida_projection/constraints.hpp>
+#include <tether/ida_projection/options.hpp>
+#include <tether/ida_projection/statistics.hpp>
+#include <vector>
+
+namespace tether::ida_projection {
+
+/// Outcome of the last thing that the plugin did. Negative values end the run.
+enum class Status {
+  unused = 0,            ///< attached, IDA has not called yet
+  success,
+  not_converged,         ///< moves did not shrink, or too many of them
+  move_too_long,
+  inconsistent,          ///< rows contradict each other; message names them
+  not_finite,            ///< NaN or infinity in g, C or y
+  callback_recoverable,
+  corrector_failed,      ///< the decorated solver failed; nothing was projected
+  callback_fatal = -1,
+  late_attach = -2,      ///< attached after IDA was initialised: call IDAReInit
+  simultaneous_sensitivities = -3,  ///< IDA_SIMULTANEOUS bypasses the plugin: use IDA_STAGGERED
+  never_called = -4,     ///< IDA took steps without the plugin: another solver was attached later
+  internal_error = -5,
+};
+
+const char* to_string(Status status);
+
+/// How far make_consistent or project moved things.
+struct ConsistencyReport {
+  Status status = Status::unused;
+  std::string message;
+  int iterations = 0;           ///< Gauss-Newton steps of the projection of y
+  double move = 0.0;            ///< length of the change of y, in tolerances (WRMS)
+  double largest_change = 0.0;  ///< largest |change| of a component of y
+  int changed_component = -1;   ///< which one (serial vectors)
+  double derivative_change = 0.0;  ///< largest |change| of a component of y'
+  double drift_before = 0.0;    ///< largest |g_i|
+  double drift_after = 0.0;
+  double residual_before = -1.0;  ///< largest |F_i| at the given values; -1 when not known
+  double residual_after = -1.0;   ///< largest |F_i| after; -1 when not known
+  int rank = 0;                 ///< of C at the end
+  bool slow_convergence = false;  ///< gradients vanish on the set: |g| says little about distance
+  std::vector<int> contradicting_rows;
+
+  explicit operator bool() const { return status == Status::success; }
+};
+
+/// How make_consistent finds y'.
+struct Consistency {
+  enum class Derivative {
+    automatic,      ///< IDACalcIC; if that fails and `residual` is given, least squares
+    calc_ic,        ///< IDACalcIC (IDA_YA_YDP_INIT) with the id vector
+    least_squares,  ///< Gauss-Newton on (y' differential, y algebraic), serial vectors
+    keep,           ///< leave y' as it is
+  };
+  Derivative derivative = Derivative::automatic;
+  double direction = 0.0;  ///< time of a first output, as IDACalcIC wants; 0 = t0 + 1e-3 max(1,|t0|)
+  IDAResFn residual = nullptr;  ///< F, for least squares and for the residuals in the report
+  void* user_data = nullptr;
+  int maximum_iterations = 30;
+  std::vector<bool> hold;  ///< components of y to leave as they are (in addition to Options::hold)
+};
+
+/// Constraint projection inside IDA: decorates IDA's nonlinear solver, so that every candidate
+/// y = ypred + ycor is moved onto g(t, y) = 0 before IDA tests its error and accepts it
+/// (Hanson and Krogh). The object must live until IDAFree or the last IDASolve, whichever is first.
+///
+/// One call to add, after IDAInit and before IDACalcIC and the first IDASolve:
+///
+///     tether::ida_projection::Projection projection(ida_mem, constraints);
+class Projection {
+ public:
+  /// ida_mem: from IDACreate, after IDAInit; tolerances and linear solver may come later.
+  /// Throws std::invalid_argument, naming the argument and its value, and leaves IDA as it was.
+  Projection(void* ida_mem, Constraints constraints, Options options = {});
+  ~Projection();
+  Projection(Projection&&) noexcept;
+  Projection& operator=(Projection&&) noexcept;
+  Projection(const Projection&) = delete;
+  Projection& operator=(const Projection&) = delete;
+
+  /// Initial values onto the constraints, then y' (and the algebraic variables) consistent with F.
+  /// Damped Gauss-Newton in the error weights. Restarts IDA (IDAReInit) at the result. On failure yy
+  /// and yp are unchanged. Call it after tolerances and linear solver are set.
+  ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp,
+                                    const Consistency& how = {});
+
+  /// A point between steps (interpolated output, a root, a restart) onto the constraints; yp (may
+  /// be null) onto their tangent C y' + g_t = 0. On failure both are unchanged.
+  ConsistencyReport project(double t, N_Vector yy, N_Vector yp = nullptr);
+
+  /// IDASolve, then project() of what it returns. Returns IDASolve's flag; a failed projection of
+  /// the returned point leaves that point as IDA gave it and shows in status().
+  int solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
+
+  Statistics statistics() const;
+  void reset_statistics();
+  Status status() const;              ///< of the last call by IDA, or of the last call above
+  const std::string& message() const; ///< what to do about it; empty when all is well
+  const Constraints& constraints() const;
+
+  class Impl;  // the decorator; see src/
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tether::ida_projection

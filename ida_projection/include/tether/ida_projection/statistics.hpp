@@ -1,0 +1,51 @@
+// Tether: constraint projection for SUNDIALS IDA. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <iosfwd>
+#include <string>
+
+namespace tether::ida_projection {
+
+/// Work counts and sizes since attach (or Projection::reset_statistics). A value: copy it freely.
+struct Statistics {
+  long solver_calls = 0;          ///< calls of the decorated nonlinear solver by IDA
+  long projections = 0;           ///< steps (attempts) that were projected
+  long skipped = 0;               ///< attempts already on the constraints, nothing moved
+  long iterations = 0;            ///< Newton moves
+  long value_evaluations = 0;     ///< calls of g
+  long jacobian_evaluations = 0;  ///< C, however formed
+  long factorizations = 0;
+  long extra_iterations = 0;   ///< corrector iterations added
+  long refreshes = 0;          ///< refreshes of the algebraic variables
+  long residual_evaluations = 0;  ///< F called by the plugin itself (also in IDA's own count)
+  long rank_drops = 0;         ///< factorisations that dropped redundant rows
+
+  // Failures by kind; each makes IDA retry with a smaller step unless noted.
+  long not_converged = 0;       ///< too many moves, stagnation or divergence
+  long move_too_long = 0;       ///< longer than Options::largest_move (rejected)
+  long moves_capped = 0;        ///< shortened by LongMove::cap; not a failure
+  long inconsistent = 0;        ///< rows contradict each other
+  long not_finite = 0;          ///< NaN or infinity in g, C or y
+  long callback_recoverable = 0;  ///< a callback returned > 0
+  long callback_fatal = 0;        ///< a callback returned < 0 or threw; ends the run
+  long corrector_failures = 0;    ///< the decorated solver itself failed; not projected
+
+  double largest_drift_before = 0.0;  ///< largest |g_i| that the corrector left
+  double largest_drift_after = 0.0;   ///< largest |g_i| at the last evaluation of a projection
+  double largest_move = 0.0;          ///< in tolerances (WRMS)
+  double mean_move = 0.0;             ///< in tolerances (WRMS)
+  double seconds = 0.0;  ///< wall time in the projection; measured on every 16th and scaled up
+
+  long failures() const {
+    return not_converged + move_too_long + inconsistent + not_finite + callback_recoverable +
+           callback_fatal;
+  }
+  /// Two columns, one quantity a line.
+  std::string table() const;
+  static std::string csv_header();
+  std::string csv_row() const;
+};
+
+std::ostream& operator<<(std::ostream& out, const Statistics& statistics);
+
+}  // namespace tether::ida_projection
