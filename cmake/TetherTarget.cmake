@@ -1,4 +1,10 @@
-# tether_library(name): target tether_<name>, alias tether::<name>, C++17, warnings of the project.
+# What every target of the project has in common: C++17, warnings, sanitizers, and for a library its
+# alias and install rules. No global flags: a project that adds Tether as a subdirectory keeps its own.
+# SPDX-License-Identifier: BSD-3-Clause
+#
+#   tether_warnings(<target>)    warnings and instrumentation of the project
+#   tether_executable(<target> SOURCES ... LIBRARIES ...)
+#   tether_library(<name>)       target tether_<name>, alias tether::<name>
 include(GNUInstallDirs)
 
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES AND PROJECT_IS_TOP_LEVEL)
@@ -9,6 +15,24 @@ function(tether_warnings target)
   target_compile_options(${target} PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow>
     $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${TETHER_WARNINGS_AS_ERRORS}>>:-Werror>)
+  if(TETHER_SANITIZERS)
+    target_compile_options(${target} PRIVATE
+      -fsanitize=${TETHER_SANITIZERS} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(${target} PRIVATE -fsanitize=${TETHER_SANITIZERS})
+  endif()
+  if(TETHER_COVERAGE)
+    target_compile_options(${target} PRIVATE --coverage)
+    target_link_options(${target} PRIVATE --coverage)
+  endif()
+endfunction()
+
+function(tether_executable target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LIBRARIES")
+  add_executable(${target} ${arg_SOURCES})
+  target_link_libraries(${target} PRIVATE ${arg_LIBRARIES})
+  target_compile_features(${target} PRIVATE cxx_std_17)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
+  tether_warnings(${target})
 endfunction()
 
 function(tether_library name)
@@ -17,6 +41,8 @@ function(tether_library name)
   target_compile_features(tether_${name} PUBLIC cxx_std_17)
   set_target_properties(tether_${name} PROPERTIES
     EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON CXX_EXTENSIONS OFF
+    VERIFY_INTERFACE_HEADER_SETS ON
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   tether_warnings(tether_${name})
+  set_property(GLOBAL APPEND PROPERTY TETHER_LIBRARIES ${name})
 endfunction()

@@ -1,0 +1,62 @@
+# Install rules: one component for each library, a package config, a version file, pkg-config files.
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Components: linalg (with the package files that all need), ida_projection, contact. Each library
+# builds alone (TETHER_BUILD_*) and installs alone on top of linalg:
+#
+#   cmake --install build --component linalg
+#   cmake --install build --component contact
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(tether_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tether)
+get_property(tether_libraries GLOBAL PROPERTY TETHER_LIBRARIES)
+
+foreach(library IN LISTS tether_libraries)
+  install(TARGETS tether_${library} EXPORT tether-${library}-targets
+    RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ${library}
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${library} NAMELINK_COMPONENT ${library}
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${library}
+    FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${library})
+  install(EXPORT tether-${library}-targets NAMESPACE tether::
+    DESTINATION ${tether_cmake_dir} COMPONENT ${library})
+endforeach()
+
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/tether-config.cmake.in
+  ${PROJECT_BINARY_DIR}/package/tether-config.cmake INSTALL_DESTINATION ${tether_cmake_dir}
+  NO_CHECK_REQUIRED_COMPONENTS_MACRO)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/package/tether-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES
+    ${PROJECT_BINARY_DIR}/package/tether-config.cmake
+    ${PROJECT_BINARY_DIR}/package/tether-config-version.cmake
+  DESTINATION ${tether_cmake_dir} COMPONENT linalg)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
+  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT linalg)
+
+# pkg-config: paths relative to the .pc file, so that an installed tree can be moved.
+file(RELATIVE_PATH tether_pc_prefix
+  ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+function(tether_pkg_config library description requires)
+  if(NOT TARGET tether_${library})
+    return()
+  endif()
+  cmake_parse_arguments(PARSE_ARGV 3 arg "" "" "CFLAGS")
+  string(REPLACE "_" "-" name tether-${library})
+  string(JOIN " " cflags ${arg_CFLAGS})
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/tether.pc.in ${PROJECT_BINARY_DIR}/package/${name}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/package/${name}.pc
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT ${library})
+endfunction()
+
+tether_pkg_config(linalg "Minimum-norm solves shared by Tether's libraries" "eigen3 >= 3.4")
+tether_pkg_config(contact "Rigid-body contact with the exact friction cone" "tether-linalg = ${PROJECT_VERSION}")
+if(TARGET tether_ida_projection)
+  install(FILES ${PROJECT_SOURCE_DIR}/cmake/TetherSundials.cmake
+    DESTINATION ${tether_cmake_dir} COMPONENT ida_projection)
+  # Debian has no sundials.pc, so the include directory is named; the host links its own IDA or IDAS.
+  get_target_property(sundials_include tether::sundials_headers INTERFACE_INCLUDE_DIRECTORIES)
+  list(TRANSFORM sundials_include PREPEND "-I")
+  tether_pkg_config(ida_projection "Constraint projection for SUNDIALS IDA and IDAS"
+    "tether-linalg = ${PROJECT_VERSION}" CFLAGS ${sundials_include})
+endif()

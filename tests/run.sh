@@ -1,0 +1,12 @@
+#!/bin/sh
+# All tests: installs what is missing, builds everything in build/release and runs ctest.
+# Arguments go to ctest, e.g. -R projection. SPDX-License-Identifier: BSD-3-Clause
+set -eu
+
+root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
+cd "$root"
+
+sh cmake/install_packages.sh
+cmake --preset release
+cmake --build --preset release --parallel "$(nproc)"
+exec ctest --preset release --parallel "$(nproc)" "$@"
