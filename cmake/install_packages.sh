@@ -27,7 +27,7 @@ fi
 
 echo "tether: installing $missing"
 export DEBIAN_FRONTEND=noninteractive
-# $missing is a list of names. shellcheck disable=SC2086
+# shellcheck disable=SC2086  # $missing is a list of names
 if ! { apt-get update -q && apt-get install -q -y --no-install-recommends $missing; }; then
   echo "tether: apt-get could not install: $missing" >&2
   exit 1

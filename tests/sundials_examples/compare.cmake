@@ -1,0 +1,47 @@
+# Runs PLAIN and ATTACHED with ARGUMENTS in a folder each and compares all that they write.
+# SPDX-License-Identifier: BSD-3-Clause
+file(REMOVE_RECURSE ${WORK})
+set(calls_file ${WORK}/solver_calls)
+set(ENV{TETHER_CALLS_FILE} ${calls_file})
+
+foreach(run IN ITEMS plain attached)
+  string(TOUPPER ${run} program)
+  file(MAKE_DIRECTORY ${WORK}/${run})
+  execute_process(COMMAND ${${program}} ${ARGUMENTS} WORKING_DIRECTORY ${WORK}/${run}
+    OUTPUT_FILE ${WORK}/${run}/stdout ERROR_FILE ${WORK}/${run}/stderr RESULT_VARIABLE result_${run})
+  file(GLOB files_${run} RELATIVE ${WORK}/${run} ${WORK}/${run}/*)
+endforeach()
+
+file(SIZE ${WORK}/plain/stdout size)
+if(size EQUAL 0)
+  message(FATAL_ERROR "The plain program wrote nothing (exit code ${result_plain}).")
+endif()
+if(NOT result_plain STREQUAL result_attached)
+  file(READ ${WORK}/attached/stderr text)
+  message(FATAL_ERROR "Exit codes differ: ${result_plain} plain, ${result_attached} attached.\n${text}")
+endif()
+if(NOT files_plain STREQUAL files_attached)
+  message(FATAL_ERROR "Files differ: ${files_plain} plain, ${files_attached} attached.")
+endif()
+foreach(file IN LISTS files_plain)
+  execute_process(COMMAND ${CMAKE_COMMAND} -E compare_files ${WORK}/plain/${file} ${WORK}/attached/${file}
+    RESULT_VARIABLE different)
+  if(different)
+    execute_process(COMMAND diff ${WORK}/plain/${file} ${WORK}/attached/${file})
+    message(FATAL_ERROR "${file} differs in ${WORK}.")
+  endif()
+endforeach()
+
+# The plugin was in use.
+if(NOT EXISTS ${calls_file})
+  message(FATAL_ERROR "The attached program left no call count.")
+endif()
+file(STRINGS ${calls_file} calls)
+set(total 0)
+foreach(count IN LISTS calls)
+  math(EXPR total "${total} + ${count}")
+endforeach()
+if(total EQUAL 0)
+  message(FATAL_ERROR "The decorated solver was never called.")
+endif()
+message(STATUS "${files_plain}: identical; calls of the decorated solver, for each integrator: ${calls}")
