@@ -6,18 +6,29 @@
 #include <exception>
 #include <memory>
 #include <tether/ida_projection.hpp>
+#include <utility>
 #include <vector>
 
 namespace {
 
-using tether::ida_projection::Projection;
+namespace tp = tether::ida_projection;
 
 /// Keeps every projection until the program ends, after its IDAFree and SUNContext_Free.
 class Registry {
  public:
-  void add(void* ida_mem) {
-    projections_.push_back(
-        std::make_unique<Projection>(ida_mem, tether::ida_projection::Constraints{}));
+  /// A solver that is handed over replaces the one that was attached at IDAInit.
+  int attach(void* ida_mem, SUNNonlinearSolver solver) {
+    try {
+      tp::Options options;
+      options.nonlinear_solver = solver;
+      auto projection = std::make_unique<tp::Projection>(ida_mem, tp::Constraints{}, options);
+      if (solver) projections_.pop_back();
+      projections_.push_back(std::move(projection));
+      return IDA_SUCCESS;
+    } catch (const std::exception& e) {
+      std::fprintf(stderr, "attach: %s\n", e.what());
+      std::_Exit(70);
+    }
   }
 
   ~Registry() {
@@ -30,7 +41,7 @@ class Registry {
   }
 
  private:
-  std::vector<std::unique_ptr<Projection>> projections_;
+  std::vector<std::unique_ptr<tp::Projection>> projections_;
 };
 
 Registry registry;
@@ -40,12 +51,9 @@ Registry registry;
 extern "C" int tether_init_and_attach(void* ida_mem, IDAResFn res, sunrealtype t0, N_Vector yy0,
                                       N_Vector yp0) {
   const int flag = IDAInit(ida_mem, res, t0, yy0, yp0);
-  if (flag != IDA_SUCCESS) return flag;
-  try {
-    registry.add(ida_mem);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "attach: %s\n", e.what());
-    std::_Exit(70);
-  }
-  return flag;
+  return flag == IDA_SUCCESS ? registry.attach(ida_mem, nullptr) : flag;
+}
+
+extern "C" int tether_attach_with_solver(void* ida_mem, SUNNonlinearSolver solver) {
+  return registry.attach(ida_mem, solver);
 }
