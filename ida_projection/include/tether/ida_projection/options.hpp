@@ -84,6 +84,9 @@ struct Options {
   /// host afterwards.
   SUNNonlinearSolver nonlinear_solver = nullptr;
 
+  /// Print the message of a failure that ends the run to stderr, once, as SUNDIALS does with its own.
+  bool print_fatal = true;
+
   /// Called after every `progress_interval`-th accepted step; must not throw.
   std::function<void(const Progress&)> progress;
   int progress_interval = 1;

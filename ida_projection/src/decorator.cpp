@@ -1,0 +1,216 @@
+// Tether: the decorator of IDA's nonlinear solver. SPDX-License-Identifier: BSD-3-Clause
+//
+// IDA asks its nonlinear solver for the correction ycor with y = ypred + ycor, then rebuilds y and
+// y' = yppred + cj ycor, and bases its error test, order choice and history on that ycor. Moving
+// ycor here, after the decorated solver has converged, therefore is the method of Hanson and
+// Krogh: the accepted y lies on the constraints, and so do the points that predict the next step.
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "impl.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
+constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
+constexpr long kTimeEvery = 16;
+
+bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
+
+}  // namespace
+
+// Called by IDA once tolerances, linear solver and sensitivities are known.
+int Projection::Impl::initialize() {
+  // IDASetMaxNonlinIters reaches the state's solver unless IDAS solves states and sensitivities
+  // together; there is no getter for that. Ask, and see whether the question arrives here.
+  heard_ = false;
+  IDASetMaxNonlinIters(ida_mem_, maximum_iterations_);
+  if (!heard_) {
+    finish(Status::simultaneous_sensitivities,
+           "IDAS with IDA_SIMULTANEOUS does not use the state's nonlinear solver, so nothing would be projected; use IDA_STAGGERED in IDASensInit");
+    return kFatal;
+  }
+  initialized_ = true;
+  engaged_ = false;
+  pending_ = false;
+  last_steps_ = last_setups_ = -1;
+  if (mover_) mover_->reset();
+  return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
+}
+
+int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights,
+                            double tolerance, bool call_setup, void* mem) {
+  ++statistics_.solver_calls;
+  extra_iterations_of_last_solve_ = 0;
+  if (!initialized_)
+    return finish(Status::late_attach,
+                  "the Projection was made after IDA had been initialised, so IDA never handed its linear solver over; make it before IDACalcIC and the first IDASolve, or call IDAReInit");
+
+  const Candidate candidate{0.0, y_predicted, ycor, weights};
+  if (probing_) {  // make_consistent wants to look around, not to step
+    N_VScale(1.0, weights, weights_);
+    if (!id_) derive_id(candidate, mem);
+    return 0;
+  }
+
+  const int flag =
+      SUNNonlinSolSolve(inner_, y_predicted, ycor, weights, tolerance, call_setup, mem);
+  if (!mover_) return flag;
+  if (flag != 0) {
+    ++statistics_.corrector_failures;
+    status = Status::corrector_failed;
+    return flag;
+  }
+
+  const StepData step = step_data();
+  account_for_previous_attempt(step);
+  if (options_.frequency > 1 && (last_steps_ + 1) % options_.frequency != 0) return 0;
+
+  using Clock = std::chrono::steady_clock;
+  const bool timed = statistics_.projections % kTimeEvery == 0;
+  const Clock::time_point begin = timed ? Clock::now() : Clock::time_point();
+
+  const Candidate at{step.t, y_predicted, ycor, weights};
+  Move move;
+  if (!engaged_) {
+    move = mover_->measure(at);
+    if (move.status != Status::unused && move.status != Status::success)
+      // Before the first step a smaller step cannot cure contradicting rows.
+      return last_steps_ == 0 && move.status == Status::inconsistent
+                 ? (finish(move.status, mover_->message()), kFatal)
+                 : finish(move.status, mover_->message());
+    if (move.length <= options_.tolerance) {  // the corrector kept the constraints by itself
+      ++statistics_.skipped;
+      statistics_.largest_drift_before =
+          std::max(statistics_.largest_drift_before, move.drift_before);
+      statistics_.largest_drift_after =
+          std::max(statistics_.largest_drift_after, move.drift_before);
+      status = Status::success;
+      return 0;
+    }
+    const Status engaged = engage(at, mem);
+    if (engaged != Status::success) return finish(engaged, mover_->message());
+  }
+
+  if (options_.extra_iterations > 0) iterate_once_more(at, tolerance, mem);
+  const bool refresh = has_algebraic_ && options_.refresh_algebraic && !mover_->covers_algebraic();
+  if (refresh) N_VScale(1.0, ycor, newton_);
+  move = mover_->move(at);
+  if (move.status == Status::success && refresh) refresh_algebraic(at, mem);
+
+  if (timed) {
+    timed_seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
+    ++timed_;
+  }
+  account(move, step);
+  return finish(move.status, mover_->message());
+}
+
+StepData Projection::Impl::step_data() const {
+  StepData step;
+  N_Vector yppred, yyn, ypn, res;
+  void* user_data;
+  sunrealtype t, cj;
+  IDAGetNonlinearSystemData(ida_mem_, &t, &step.y_predicted, &yppred, &yyn, &ypn, &res, &cj,
+                            &user_data);
+  step.t = t;
+  step.cj = cj;
+  return step;
+}
+
+// IDA does not tell whether it accepted an attempt; the count of steps does, at the next one.
+void Projection::Impl::account_for_previous_attempt(const StepData& step) {
+  long steps = 0, setups = 0;
+  IDAGetNumSteps(ida_mem_, &steps);
+  IDAGetNumLinSolvSetups(ida_mem_, &setups);
+  if (setups != last_setups_) cj_at_setup_ = step.cj;
+  last_setups_ = setups;
+  if (steps != last_steps_ && pending_) {
+    mover_->accept();
+    if (options_.progress && ++progress_count_ % options_.progress_interval == 0) {
+      progress_.steps = steps;
+      std::string ignored;
+      guarded([&] { return options_.progress(progress_), 0; }, ignored);
+    }
+  }
+  last_steps_ = steps;
+  pending_ = false;
+}
+
+// The first move that is needed switches the policy on; until then IDA runs as it would alone.
+Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
+  engaged_ = true;
+  if (options_.id == nullptr && !id_) {
+    const Status derived = derive_id(candidate, mem);
+    if (derived != Status::success) return derived;
+  }
+  if (id_ && has_algebraic_ && options_.suppress_algebraic) {
+    IDASetId(ida_mem_, id_);
+    IDASetSuppressAlg(ida_mem_, 1);
+  }
+  return mover_->set_algebraic(candidate, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr);
+}
+
+// One more Newton iteration with the factors at hand. It removes the noise that IDA's convergence
+// test leaves in the correction, which the projection would otherwise spread (README, "Order").
+void Projection::Impl::iterate_once_more(const Candidate& candidate, double tolerance, void* mem) {
+  if (linear_solve_ == nullptr) return;
+  if (system_(candidate.correction, delta_, mem) != 0) return;
+  N_VScale(-1.0, delta_, delta_);
+  if (linear_solve_(delta_, mem) != 0) return;
+  ++statistics_.extra_iterations;
+  ++statistics_.residual_evaluations;
+  extra_iterations_of_last_solve_ = 1;
+  // A change larger than IDA's own stopping test allows is no refinement; keep what IDA had.
+  const double change = N_VWrmsNorm(delta_, candidate.weights);
+  if (change <= 10.0 * tolerance)
+    N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
+}
+
+void Projection::Impl::account(const Move& move, const StepData& step) {
+  Statistics& s = statistics_;
+  ++s.projections;
+  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
+  if (move.capped) ++s.moves_capped;
+  if (move.status != Status::success) return;
+  s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
+  s.largest_move = std::max(s.largest_move, move.length);
+  move_sum_ += move.length;
+  pending_ = true;
+  if (options_.progress) {
+    sunrealtype h = 0.0;
+    int order = 0;
+    IDAGetCurrentStep(ida_mem_, &h);
+    IDAGetCurrentOrder(ida_mem_, &order);
+    progress_ = {step.t, h, order, move.drift_before, move.length, 0};
+  }
+}
+
+// Status, text and count of the outcome; the code that IDA wants.
+int Projection::Impl::finish(Status outcome, const std::string& text) {
+  status = outcome;
+  if (outcome == Status::success) {
+    if (!message.empty()) message.clear();
+    return 0;
+  }
+  message = text;
+  switch (outcome) {
+    case Status::not_converged: ++statistics_.not_converged; break;
+    case Status::move_too_long: ++statistics_.move_too_long; break;
+    case Status::inconsistent: ++statistics_.inconsistent; break;
+    case Status::not_finite: ++statistics_.not_finite; break;
+    case Status::callback_recoverable: ++statistics_.callback_recoverable; break;
+    case Status::callback_fatal: ++statistics_.callback_fatal; break;
+    default: break;
+  }
+  if (is_fatal(outcome) && options_.print_fatal && !printed_) {
+    printed_ = true;  // once: IDA reports the failure of the run by itself
+    std::fprintf(stderr, "tether: %s: %s\n", to_string(outcome), text.c_str());
+  }
+  return is_fatal(outcome) ? kFatal : kRecoverable;
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,291 @@
+// Tether: the move onto the constraints on contiguous vectors, dense C.
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Notation as in ida_projection/README.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w
+// the error weights, s the size of the corrector's changes.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mover.hpp"
+#include "row_blocks.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kMetricFloor = 1e-3;  // D_i >= kMetricFloor WT_i
+constexpr double kMetricDecay = 0.8;   // per accepted step
+
+class DenseMover final : public Mover {
+ public:
+  DenseMover(const Constraints& constraints, const Options& options, Statistics& statistics,
+             int size)
+      : options_(options),
+        statistics_(statistics),
+        evaluator_(constraints, statistics),
+        monitor_(options),
+        n_(size),
+        m_(evaluator_.rows()),
+        inverse_n_(1.0 / size),
+        blocks_(constraints, m_, size) {
+    const auto n = static_cast<std::size_t>(n_);
+    const auto m = static_cast<std::size_t>(m_);
+    scale_.assign(n, 0.0);
+    trial_scale_.assign(n, 0.0);
+    y_.assign(n, 0.0);
+    WT_.assign(n, 0.0);
+    g_.assign(m, 0.0);
+    C_.assign(m * n, 0.0);
+    rank_tolerance_ = evaluator_.uses_differences() ? 1e-6 : std::max(m_, n_) * 1e-13;
+  }
+
+  Move measure(const Candidate& candidate) override;
+  Move move(const Candidate& candidate) override;
+  Status set_algebraic(const Candidate& candidate, N_Vector id) override;
+  bool covers_algebraic() const override { return !blocks_.a.rows.empty(); }
+  void accept() override { std::swap(scale_, trial_scale_); }
+  void reset() override {
+    std::fill(scale_.begin(), scale_.end(), 0.0);
+    std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
+    monitor_.reset();
+  }
+
+ private:
+  void load(const Candidate& candidate);
+  void set_metric();
+  Status structure(const Candidate& candidate, const double* id);
+  Status value(double t);
+  Status factor(double t);
+  double solve();
+  bool contradicts();
+  void apply(double factor, double* correction);
+  double drift() const;
+
+  const Options& options_;
+  Statistics& statistics_;
+  Evaluator evaluator_;
+  Monitor monitor_;
+  int n_, m_;
+  double inverse_n_;
+  double rank_tolerance_;
+  RowBlocks blocks_;
+  std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
+  std::vector<double> y_, WT_, g_, C_;
+  const double* w_ = nullptr;
+  const double* ycor_ = nullptr;
+};
+
+// y = base + correction, WT = 1/w, s <- max(0.8 s, |correction|).
+void DenseMover::load(const Candidate& candidate) {
+  const double* base = N_VGetArrayPointer(candidate.base);
+  ycor_ = N_VGetArrayPointer(candidate.correction);
+  w_ = N_VGetArrayPointer(candidate.weights);
+  for (std::size_t i = 0; i < y_.size(); ++i) {
+    y_[i] = base[i] + ycor_[i];
+    // A weight of zero means that the error of this component does not count at all.
+    WT_[i] = w_[i] > 0.0 ? 1.0 / w_[i] : 0.0;
+    trial_scale_[i] = std::max(kMetricDecay * scale_[i], std::abs(ycor_[i]));
+  }
+}
+
+void DenseMover::set_metric() {
+  if (options_.metric == Metric::local_correction && !options_.group.empty()) {
+    // One scale for each group: rms of |correction| in tolerances over its members.
+    const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());
+    std::vector<double> sum(static_cast<std::size_t>(groups), 0.0);
+    std::vector<int> members(static_cast<std::size_t>(groups), 0);
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      if (options_.group[i] < 0) continue;
+      const auto k = static_cast<std::size_t>(options_.group[i]);
+      sum[k] += trial_scale_[i] * w_[i] * trial_scale_[i] * w_[i];
+      ++members[k];
+    }
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      if (options_.group[i] < 0) continue;
+      const auto k = static_cast<std::size_t>(options_.group[i]);
+      trial_scale_[i] = WT_[i] * std::sqrt(sum[k] / members[k]);
+    }
+  }
+  const bool local = options_.metric == Metric::local_correction;
+  for (Block* block : {&blocks_.d, &blocks_.a})
+    for (std::size_t k = 0; k < block->columns.size(); ++k) {
+      const auto i = static_cast<std::size_t>(block->columns[k]);
+      // WT = 0 (unweighted): such a component moves freely by what the corrector moved it.
+      const double weight = WT_[i] > 0.0 ? WT_[i] : trial_scale_[i];
+      block->D[k] = local ? std::max(trial_scale_[i], kMetricFloor * weight) : weight;
+    }
+}
+
+Status DenseMover::structure(const Candidate& candidate, const double* id) {
+  const Status status =
+      blocks_.structure(evaluator_, candidate.t, y_, WT_, options_.hold, id, C_);
+  if (status != Status::success) message_ = blocks_.message;
+  return status;
+}
+
+Status DenseMover::set_algebraic(const Candidate& candidate, N_Vector id) {
+  load(candidate);
+  const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
+  return structure(candidate, mask);
+}
+
+Status DenseMover::value(double t) {
+  const Status status = evaluator_.value(t, y_.data(), n_, g_.data());
+  if (status != Status::success) message_ = evaluator_.message();
+  return status;
+}
+
+Status DenseMover::factor(double t) {
+  const Status status =
+      evaluator_.jacobian(t, y_.data(), n_, WT_.data(), blocks_.columns, C_.data());
+  if (status != Status::success) {
+    message_ = evaluator_.message();
+    return status;
+  }
+  ++statistics_.factorizations;
+  if (!blocks_.factor(C_, rank_tolerance_)) {
+    message_ = "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
+    return Status::not_finite;
+  }
+  if (blocks_.dropped_rows()) ++statistics_.rank_drops;
+  return Status::success;
+}
+
+// Returns the WRMS length of dy in the error norm. Algebraic columns do not count there: they
+// follow the others.
+double DenseMover::solve() {
+  ++statistics_.iterations;
+  blocks_.solve(g_, C_);
+  const Block& counted = blocks_.d.rows.empty() ? blocks_.a : blocks_.d;
+  double sum = 0.0;
+  for (std::size_t k = 0; k < counted.columns.size(); ++k) {
+    const double move = counted.dy[k] * w_[counted.columns[k]];
+    sum += move * move;
+  }
+  return std::sqrt(sum * inverse_n_);
+}
+
+bool DenseMover::contradicts() {
+  if (!blocks_.dropped_rows() || !blocks_.contradict(C_, WT_)) return false;
+  message_ = blocks_.message;
+  contradicting_rows_ = blocks_.rows();
+  return true;
+}
+
+void DenseMover::apply(double factor, double* correction) {
+  for (const Block* block : {&blocks_.d, &blocks_.a}) {
+    if (block->rows.empty()) continue;
+    for (std::size_t k = 0; k < block->columns.size(); ++k) {
+      const auto i = static_cast<std::size_t>(block->columns[k]);
+      correction[i] -= factor * block->dy[k];
+      y_[i] -= factor * block->dy[k];
+    }
+  }
+}
+
+double DenseMover::drift() const {
+  double largest = 0.0;
+  for (double g : g_) largest = std::max(largest, std::abs(g));
+  return largest;
+}
+
+Move DenseMover::measure(const Candidate& candidate) {
+  Move result;
+  load(candidate);
+  if (!blocks_.structured() && (result.status = structure(candidate, nullptr)) != Status::success)
+    return result;
+  if ((result.status = value(candidate.t)) != Status::success) return result;
+  result.drift_before = result.drift_after = drift();
+  if (result.drift_before == 0.0) return result;
+  set_metric();
+  if ((result.status = factor(candidate.t)) != Status::success) return result;
+  result.length = solve();
+  if (contradicts()) result.status = Status::inconsistent;
+  return result;
+}
+
+Move DenseMover::move(const Candidate& candidate) {
+  Move result;
+  load(candidate);
+  set_metric();
+  double* correction = N_VGetArrayPointer(candidate.correction);
+  const std::size_t n = y_.size();
+
+  if ((result.status = value(candidate.t)) != Status::success) return result;
+  result.drift_before = result.drift_after = drift();
+
+  monitor_.start();
+  double size_of_y = -1.0;  // WRMS |y| in tolerances, computed when first wanted
+  bool fresh = false;       // factors belong to the present y
+  bool have_factors = false;
+  for (;;) {
+    if (!have_factors) {
+      if ((result.status = factor(candidate.t)) != Status::success) return result;
+      have_factors = fresh = true;
+    }
+    const double length = solve();
+    ++result.moves;
+
+    if (result.moves == 1) {
+      result.length = length;
+      // Only a long first move can be too long: the limit is at least largest_move.
+      if (!(length <= options_.largest_move)) {
+        double sum = 0.0;
+        for (int j : blocks_.d.columns) {
+          const double change = ycor_[j] * w_[j];
+          sum += change * change;
+        }
+        const double limit =
+            options_.largest_move * std::max(1.0, std::sqrt(sum * inverse_n_));
+        if (!(length <= limit)) {
+          if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
+            result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
+            message_ = "the move onto the constraints is " + std::to_string(length) +
+                       " tolerances long, the limit is " + std::to_string(limit) +
+                       " (Options::largest_move); start closer with make_consistent, or use a smaller step";
+            return result;
+          }
+          apply(limit / length, correction);
+          result.length = limit;
+          result.capped = true;
+          result.status = Status::success;
+          return result;
+        }
+      }
+    }
+    apply(1.0, correction);
+
+    if (size_of_y < 0.0) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < n; ++i) sum += (y_[i] * w_[i]) * (y_[i] * w_[i]);
+      size_of_y = std::sqrt(sum * inverse_n_);
+    }
+    const double floor = std::min(0.1, 1e3 * kEpsilon * size_of_y);
+    const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
+    if (verdict == Monitor::Verdict::done) break;
+    if (verdict == Monitor::Verdict::failed) {
+      result.status = Status::not_converged;
+      message_ = "move " + std::to_string(result.moves) + " onto the constraints still is " +
+                 std::to_string(length) + " tolerances long; check the constraint Jacobian with check_jacobian, or whether the rows have a common solution here";
+      return result;
+    }
+    if ((result.status = value(candidate.t)) != Status::success) return result;
+    result.drift_after = drift();
+    fresh = false;
+    have_factors = verdict != Monitor::Verdict::refactor;
+  }
+
+  result.status = contradicts() ? Status::inconsistent : Status::success;
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
+                                        Statistics& statistics, int size) {
+  return std::make_unique<DenseMover>(constraints, options, statistics, size);
+}
+
+}  // namespace tether::ida_projection

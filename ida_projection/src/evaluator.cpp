@@ -1,0 +1,115 @@
+// Tether: evaluation of joined constraint sets on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evaluator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::ida_projection {
+
+namespace {
+
+/// Index of the first entry that is not finite, or -1. The sum is finite only if all entries are
+/// (or if huge entries of both signs overflow, which the search then sorts out).
+long first_not_finite(const double* a, long n) {
+  double sum = 0.0;
+  for (long i = 0; i < n; ++i) sum += a[i];
+  if (std::isfinite(sum)) return -1;
+  for (long i = 0; i < n; ++i)
+    if (!std::isfinite(a[i])) return i;
+  return -1;
+}
+
+}  // namespace
+
+Evaluator::Evaluator(const Constraints& constraints, Statistics& statistics)
+    : constraints_(constraints), statistics_(statistics) {
+  flatten(constraints);
+  g_base_.resize(static_cast<std::size_t>(rows_));
+  g_shifted_.resize(static_cast<std::size_t>(rows_));
+}
+
+void Evaluator::flatten(const Constraints& set) {
+  if (set.count > 0) {
+    parts_.push_back({&set, rows_});
+    rows_ += set.count;
+    if (std::holds_alternative<FiniteDifferences>(set.jacobian)) uses_differences_ = true;
+  }
+  for (const Constraints& part : set.joined) flatten(part);
+}
+
+Status Evaluator::checked(int flag, const char* what, const Part& part) {
+  if (flag == 0) return Status::success;
+  message_ = std::string(what) + " of " + constraints_.name(part.first_row) +
+             (thrown_.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown_);
+  thrown_.clear();
+  return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
+}
+
+Status Evaluator::value(double t, const double* y, int n, double* g) {
+  ++statistics_.value_evaluations;
+  const ConstVector state(y, n);
+  for (const Part& part : parts_) {
+    const int flag = guarded(
+        [&] { return part.set->value(t, state, Vector(g + part.first_row, part.set->count)); },
+        thrown_);
+    if (flag != 0) return checked(flag, "value", part);
+  }
+  const long bad = first_not_finite(g, rows_);
+  if (bad < 0) return Status::success;
+  message_ = "g of " + constraints_.name(static_cast<int>(bad)) + " is not finite at t = " +
+             std::to_string(t);
+  return Status::not_finite;
+}
+
+Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
+                           const std::vector<int>& columns, double* C) {
+  ++statistics_.jacobian_evaluations;
+  std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
+  const ConstVector state(y, n);
+  for (const Part& part : parts_) {
+    double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
+    if (const auto* dense = std::get_if<DenseJacobian>(&part.set->jacobian)) {
+      const int flag =
+          guarded([&] { return dense->fill(t, state, Matrix(block, part.set->count, n)); }, thrown_);
+      if (flag != 0) return checked(flag, "jacobian", part);
+    } else {
+      const Status status = differences(part, t, y, n, scale, columns, block);
+      if (status != Status::success) return status;
+    }
+  }
+  // Entries that are not finite are found by MinimumNorm::factor, which scans them anyway.
+  return Status::success;
+}
+
+Status Evaluator::differences(const Part& part, double t, const double* y, int n,
+                              const double* scale, const std::vector<int>& columns, double* C) {
+  const int m = part.set->count;
+  const auto evaluate = [&](const double* at, double* g) {
+    ++statistics_.value_evaluations;
+    const int flag =
+        guarded([&] { return part.set->value(t, ConstVector(at, n), Vector(g, m)); }, thrown_);
+    return checked(flag, "value (differences)", part);
+  };
+
+  y_shifted_.assign(y, y + n);
+  Status status = evaluate(y, g_base_.data());
+  for (std::size_t k = 0; k < columns.size() && status == Status::success; ++k) {
+    const auto j = static_cast<std::size_t>(columns[k]);
+    double increment =
+        std::sqrt(std::numeric_limits<double>::epsilon()) * std::max(std::abs(y[j]), scale[j]);
+    if (increment == 0.0) increment = std::sqrt(std::numeric_limits<double>::epsilon());
+    y_shifted_[j] = y[j] + increment;
+    increment = y_shifted_[j] - y[j];  // what the machine really added
+    status = evaluate(y_shifted_.data(), g_shifted_.data());
+    y_shifted_[j] = y[j];
+    for (int i = 0; i < m; ++i)
+      C[static_cast<std::size_t>(i) * static_cast<std::size_t>(n) + j] =
+          (g_shifted_[static_cast<std::size_t>(i)] - g_base_[static_cast<std::size_t>(i)]) /
+          increment;
+  }
+  return status;
+}
+
+}  // namespace tether::ida_projection

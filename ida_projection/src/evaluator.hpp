@@ -1,0 +1,68 @@
+// Tether: evaluation of joined constraint sets on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tether/ida_projection/constraints.hpp>
+#include <tether/ida_projection/projection.hpp>
+#include <tether/ida_projection/statistics.hpp>
+#include <vector>
+
+namespace tether::ida_projection {
+
+/// Runs a user callback: no exception leaves it. Returns the callback's int; `message` receives
+/// the text of an exception, which counts as fatal.
+template <class Call>
+int guarded(Call&& call, std::string& message) noexcept {
+  try {
+    return call();
+  } catch (const std::exception& e) {
+    try {
+      message = e.what();
+    } catch (...) {
+    }
+    return -1;
+  } catch (...) {
+    return -1;
+  }
+}
+
+/// g and C of a set and of everything joined to it, as one system of m rows.
+class Evaluator {
+ public:
+  explicit Evaluator(const Constraints& constraints, Statistics& statistics);
+
+  int rows() const { return rows_; }
+  bool uses_differences() const { return uses_differences_; }
+
+  /// g(t, y), m entries. success, not_finite, callback_recoverable or callback_fatal.
+  Status value(double t, const double* y, int n, double* g);
+
+  /// C(t, y), m x n row-major. `scale` (n entries, > 0) are the error weights WT for the difference
+  /// increments. `columns`: those that differences need to visit, all others stay zero.
+  Status jacobian(double t, const double* y, int n, const double* scale,
+                  const std::vector<int>& columns, double* C);
+
+  /// Which row the last not_finite or failing callback belongs to, or what it threw.
+  const std::string& message() const { return message_; }
+
+ private:
+  struct Part {
+    const Constraints* set;
+    int first_row;
+  };
+  void flatten(const Constraints& set);
+  Status checked(int flag, const char* what, const Part& part);
+  Status differences(const Part& part, double t, const double* y, int n, const double* scale,
+                     const std::vector<int>& columns, double* C);
+
+  const Constraints& constraints_;
+  Statistics& statistics_;
+  std::vector<Part> parts_;
+  std::vector<double> y_shifted_, g_base_, g_shifted_;
+  std::string message_, thrown_;
+  int rows_ = 0;
+  bool uses_differences_ = false;
+};
+
+}  // namespace tether::ida_projection

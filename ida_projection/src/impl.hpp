@@ -1,0 +1,138 @@
+// Tether: the decorator of IDA's nonlinear solver. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <sundials/sundials_nonlinearsolver.h>
+#include <tether/ida_projection/projection.hpp>
+#include <vector>
+
+#include "mover.hpp"
+
+namespace tether::ida_projection {
+
+/// An N_Vector owned by the plugin; null when empty.
+class OwnedVector {
+ public:
+  OwnedVector() = default;
+  explicit OwnedVector(N_Vector like) : v_(like != nullptr ? N_VClone(like) : nullptr) {}
+  ~OwnedVector() {
+    if (v_ != nullptr) N_VDestroy(v_);
+  }
+  OwnedVector(OwnedVector&& other) noexcept : v_(std::exchange(other.v_, nullptr)) {}
+  OwnedVector& operator=(OwnedVector&& other) noexcept {
+    std::swap(v_, other.v_);
+    return *this;
+  }
+  OwnedVector(const OwnedVector&) = delete;
+  OwnedVector& operator=(const OwnedVector&) = delete;
+  operator N_Vector() const { return v_; }
+
+ private:
+  N_Vector v_ = nullptr;
+};
+
+/// What IDA's public getters tell inside a solve.
+struct StepData {
+  double t = 0.0, cj = 0.0;
+  N_Vector y_predicted = nullptr;
+};
+
+/// Is this vector contiguous and whole in this process's memory?
+bool is_contiguous(N_Vector v);
+/// Throws std::invalid_argument("Projection: " + text).
+[[noreturn]] void reject(const std::string& text);
+/// The nonlinear solver that IDA sees; its operations call `implementation`.
+SUNNonlinearSolver make_solver(Projection::Impl& implementation, SUNNonlinearSolver inner,
+                               SUNContext context);
+/// Rejects what cannot work, naming the option, its value and what would be right.
+void validate(const Constraints& constraints, const Options& options, N_Vector like);
+
+class Projection::Impl {
+ public:
+  Impl(void* ida_mem, Constraints constraints, Options options);
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp, const Consistency& how);
+  ConsistencyReport project(double t, N_Vector yy, N_Vector yp);
+  int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
+
+  Statistics statistics() const;
+  void reset_statistics();
+
+  // The operations of SUNNonlinearSolver that IDA calls (decorator.cpp).
+  int initialize();
+  int solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights, double tolerance,
+            bool call_setup, void* mem);
+  SUNNonlinearSolver inner() const { return inner_; }
+  void set_system(SUNNonlinSolSysFn f) { system_ = f; }
+  void set_linear_solve(SUNNonlinSolLSolveFn f) { linear_solve_ = f; }
+  void note_maximum_iterations(int n) {
+    maximum_iterations_ = n;
+    heard_ = true;
+  }
+  long extra_iterations_of_last_solve() const { return extra_iterations_of_last_solve_; }
+  long extra_iterations() const { return statistics_.extra_iterations; }
+
+  Status status = Status::unused;
+  std::string message;
+  Constraints constraints;
+
+ private:
+  // decorator.cpp: the stages of a projected step
+  StepData step_data() const;
+  void account_for_previous_attempt(const StepData& step);
+  Status engage(const Candidate& candidate, void* mem);
+  void iterate_once_more(const Candidate& candidate, double tolerance, void* mem);
+  void refresh_algebraic(const Candidate& candidate, void* mem);
+  void account(const Move& move, const StepData& step);
+  int finish(Status outcome, const std::string& text);
+
+  // algebraic.cpp
+  Status derive_id(const Candidate& candidate, void* mem);
+  void set_id(N_Vector id);
+
+  // consistency.cpp
+  bool probe(double t0, N_Vector yy, N_Vector yp);
+  bool current_weights(N_Vector y);
+  void project_point(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id,
+                     ConsistencyReport& report);
+  Status make_tangent(double t, N_Vector y, N_Vector yp, ConsistencyReport& report);
+
+  void* ida_mem_;
+  Options options_;
+  Statistics statistics_;
+  double move_sum_ = 0.0;
+  long timed_ = 0;
+  double timed_seconds_ = 0.0;
+
+  SUNNonlinearSolver solver_ = nullptr;  // ours, the one that IDA sees
+  SUNNonlinearSolver inner_ = nullptr;   // decorated
+  bool owns_inner_ = false;
+  SUNNonlinSolSysFn system_ = nullptr;
+  SUNNonlinSolLSolveFn linear_solve_ = nullptr;
+  bool initialized_ = false;
+  int maximum_iterations_ = 4;
+  bool heard_ = false;  // IDASetMaxNonlinIters reached us
+
+  std::unique_ptr<Mover> mover_;
+  bool contiguous_ = false;
+  int size_ = 0;
+  OwnedVector id_, delta_, newton_, saved_, weights_;
+  std::vector<int> algebraic_;  // indices, contiguous vectors
+  bool has_algebraic_ = false;
+  bool engaged_ = false;  // the policy acts from the first move that was needed
+  bool probing_ = false;
+  bool printed_ = false;
+
+  long last_steps_ = -1, last_setups_ = -1;
+  double cj_at_setup_ = 0.0;
+  long extra_iterations_of_last_solve_ = 0;
+  bool pending_ = false;  // a projected attempt that IDA has not yet judged
+  Progress progress_;
+  long progress_count_ = 0;
+};
+
+}  // namespace tether::ida_projection

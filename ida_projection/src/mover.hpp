@@ -1,0 +1,100 @@
+// Tether: the move of a point onto the constraints, whatever way they are given.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tether/ida_projection/options.hpp>
+#include <tether/ida_projection/projection.hpp>
+#include <tether/ida_projection/statistics.hpp>
+#include <vector>
+
+#include "evaluator.hpp"
+
+namespace tether::ida_projection {
+
+/// The candidate y = base + correction at time t, and IDA's reciprocal error weights 1/WT.
+struct Candidate {
+  double t;
+  N_Vector base;        ///< IDA's prediction
+  N_Vector correction;  ///< the corrector's ycor; the move is subtracted from it
+  N_Vector weights;
+};
+
+struct Move {
+  Status status = Status::unused;
+  double length = 0.0;        ///< WRMS length of the whole move, in tolerances
+  double drift_before = 0.0;  ///< largest |g_i| at the candidate
+  double drift_after = 0.0;   ///< largest |g_i| at the last point where g was evaluated
+  int moves = 0;              ///< Newton moves made
+  bool capped = false;
+};
+
+/// Moves candidates onto the constraints and remembers what the metric needs.
+class Mover {
+ public:
+  virtual ~Mover() = default;
+
+  /// Length of the first Newton move from the candidate; the candidate is not changed.
+  virtual Move measure(const Candidate& candidate) = 0;
+
+  /// Moves the candidate: correction <- correction - dy.
+  virtual Move move(const Candidate& candidate) = 0;
+
+  /// Says which components are algebraic (1 differential, 0 algebraic; null: none). Called once,
+  /// before the first move() of a run, with the candidate at which the structure is looked at.
+  virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;
+
+  /// Component i is algebraic and fixed by the rows themselves, so F need not be asked.
+  virtual bool covers_algebraic() const { return false; }
+
+  /// The attempt that used the last candidate was accepted: keep what it taught the metric.
+  virtual void accept() {}
+  /// A new run starts: forget what the last one taught.
+  virtual void reset() {}
+
+  const std::string& message() const { return message_; }
+  const std::vector<int>& contradicting_rows() const { return contradicting_rows_; }
+
+ protected:
+  std::string message_;
+  std::vector<int> contradicting_rows_;
+};
+
+/// Factories; `size` is N. The options and statistics outlive the mover.
+std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size);
+std::unique_ptr<Mover> make_gradient_mover(const Constraints&, const Options&, Statistics&,
+                                           N_Vector like);
+std::unique_ptr<Mover> make_user_mover(const Constraints&, const Options&, Statistics&,
+                                       N_Vector like);
+
+/// Watches a sequence of Newton moves: is it done, still converging, or broken?
+/// Lengths are in tolerances. Rates below are squares of distances: theta bounds d_{k+1}/d_k^2.
+class Monitor {
+ public:
+  enum class Verdict { done, go_on, refactor, failed };
+
+  explicit Monitor(const Options& options) : options_(&options) {}
+  void reset() { *this = Monitor(*options_); }
+
+  /// A new candidate.
+  void start() {
+    previous_ = -1.0;
+    moves_ = 0;
+    ++candidates_;
+  }
+
+  /// After a move of this length; `fresh`: the factors belong to the point that was left;
+  /// `floor`: length below which rounding of y rules.
+  Verdict judge(double length, bool fresh, double floor);
+
+ private:
+  const Options* options_;
+  double theta_ = -1.0;  // largest d_2 / d_1^2 seen; < 0: not measured yet
+  double previous_ = -1.0;
+  int moves_ = 0;
+  long candidates_ = 0;
+  static constexpr long kMeasureEvery = 64;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,117 @@
+// Tether: attaching the projection to IDA. SPDX-License-Identifier: BSD-3-Clause
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <tether/ida_projection/projection.hpp>
+
+#include "impl.hpp"
+
+namespace tether::ida_projection {
+
+const char* to_string(Status status) {
+  switch (status) {
+    case Status::unused: return "unused";
+    case Status::success: return "success";
+    case Status::not_converged: return "not converged";
+    case Status::move_too_long: return "move too long";
+    case Status::inconsistent: return "inconsistent constraints";
+    case Status::not_finite: return "not finite";
+    case Status::callback_recoverable: return "callback failed, recoverable";
+    case Status::corrector_failed: return "corrector failed";
+    case Status::callback_fatal: return "callback failed";
+    case Status::late_attach: return "attached too late";
+    case Status::simultaneous_sensitivities: return "simultaneous sensitivities";
+    case Status::never_called: return "never called";
+    case Status::internal_error: return "internal error";
+  }
+  return "unknown";
+}
+
+Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
+    : constraints(std::move(set)), ida_mem_(ida_mem), options_(std::move(options)) {
+  if (ida_mem == nullptr) reject("ida_mem is null; pass what IDACreate returned");
+  N_Vector like = nullptr, yppred, yyn, ypn, res;
+  void* user_data;
+  sunrealtype t, cj;
+  if (IDAGetNonlinearSystemData(ida_mem, &t, &like, &yppred, &yyn, &ypn, &res, &cj, &user_data) != 0 ||
+      like == nullptr)
+    reject("ida_mem is not initialised; call IDAInit before");
+  validate(constraints, options_, like);
+
+  contiguous_ = is_contiguous(like);
+  size_ = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
+  if (std::holds_alternative<UserProjection>(constraints.jacobian))
+    mover_ = make_user_mover(constraints, options_, statistics_, like);
+  else if (constraints.total_count() > 0)
+    mover_ = std::holds_alternative<Gradients>(constraints.jacobian)
+                 ? make_gradient_mover(constraints, options_, statistics_, like)
+                 : make_dense_mover(constraints, options_, statistics_, size_);
+  if (mover_) {
+    delta_ = OwnedVector(like);
+    newton_ = OwnedVector(like);
+    saved_ = OwnedVector(like);
+    weights_ = OwnedVector(like);
+    if (options_.id != nullptr) {
+      set_id(options_.id);
+      options_.id = id_;  // the caller's vector may go
+    }
+    if (contiguous_ && options_.hold_vector != nullptr && options_.hold.empty()) {
+      const double* free = N_VGetArrayPointer(options_.hold_vector);
+      for (int j = 0; j < size_; ++j) options_.hold.push_back(free[j] == 0.0);
+    }
+  }
+
+  inner_ = options_.nonlinear_solver;
+  if (inner_ == nullptr) {
+    inner_ = SUNNonlinSol_Newton(like, like->sunctx);
+    owns_inner_ = true;
+  }
+  solver_ = inner_ != nullptr ? make_solver(*this, inner_, like->sunctx) : nullptr;
+  if (inner_ == nullptr || solver_ == nullptr) reject("out of memory");
+  const int flag = IDASetNonlinearSolver(ida_mem, solver_);
+  if (flag != 0)
+    reject("IDASetNonlinearSolver returned " + std::to_string(flag) + "; call IDAInit before");
+}
+
+Projection::Impl::~Impl() {
+  if (solver_ != nullptr) SUNNonlinSolFreeEmpty(solver_);
+  if (owns_inner_ && inner_ != nullptr) SUNNonlinSolFree(inner_);
+}
+
+Statistics Projection::Impl::statistics() const {
+  Statistics s = statistics_;
+  const long moved = s.projections - s.failures();
+  s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
+  s.seconds = timed_ > 0 ? timed_seconds_ / static_cast<double>(timed_) *
+                               static_cast<double>(s.projections)
+                         : 0.0;
+  return s;
+}
+
+void Projection::Impl::reset_statistics() {
+  statistics_ = Statistics{};
+  move_sum_ = timed_seconds_ = 0.0;
+  timed_ = 0;
+}
+
+Projection::Projection(void* ida_mem, Constraints constraints, Options options)
+    : impl_(std::make_unique<Impl>(ida_mem, std::move(constraints), std::move(options))) {}
+Projection::~Projection() = default;
+Projection::Projection(Projection&&) noexcept = default;
+Projection& Projection::operator=(Projection&&) noexcept = default;
+
+ConsistencyReport Projection::make_consistent(double t0, N_Vector yy, N_Vector yp,
+                                              const Consistency& how) {
+  return impl_->make_consistent(t0, yy, yp, how);
+}
+ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
+  return impl_->project(t, yy, yp);
+}
+int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask) {
+  return impl_->solve_and_project(tout, tret, yret, ypret, itask);
+}
+Statistics Projection::statistics() const { return impl_->statistics(); }
+void Projection::reset_statistics() { impl_->reset_statistics(); }
+Status Projection::status() const { return impl_->status; }
+const std::string& Projection::message() const { return impl_->message; }
+const Constraints& Projection::constraints() const { return impl_->constraints; }
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,94 @@
+// Tether: printing of the projection's work counts. SPDX-License-Identifier: BSD-3-Clause
+#include <iomanip>
+#include <ostream>
+#include <sstream>
+#include <tether/ida_projection/statistics.hpp>
+#include <vector>
+
+namespace tether::ida_projection {
+
+namespace {
+
+struct Entry {
+  const char* label;   // of the table
+  const char* column;  // of the CSV file
+  double value;
+  bool integer;
+};
+
+std::vector<Entry> entries(const Statistics& s) {
+  const auto count = [](const char* label, const char* column, long value) {
+    return Entry{label, column, static_cast<double>(value), true};
+  };
+  return {
+      count("solver calls", "solver_calls", s.solver_calls),
+      count("projections", "projections", s.projections),
+      count("already on the constraints", "skipped", s.skipped),
+      count("Newton moves", "iterations", s.iterations),
+      count("evaluations of g", "value_evaluations", s.value_evaluations),
+      count("evaluations of C", "jacobian_evaluations", s.jacobian_evaluations),
+      count("factorizations of C", "factorizations", s.factorizations),
+      count("extra corrector iterations", "extra_iterations", s.extra_iterations),
+      count("refreshes of algebraic variables", "refreshes", s.refreshes),
+      count("evaluations of F by the plugin", "residual_evaluations", s.residual_evaluations),
+      count("factorizations with dropped rows", "rank_drops", s.rank_drops),
+      count("failures: not converged", "not_converged", s.not_converged),
+      count("failures: move too long", "move_too_long", s.move_too_long),
+      count("moves capped", "moves_capped", s.moves_capped),
+      count("failures: rows contradict", "inconsistent", s.inconsistent),
+      count("failures: not finite", "not_finite", s.not_finite),
+      count("failures: callback, recoverable", "callback_recoverable", s.callback_recoverable),
+      count("failures: callback, fatal", "callback_fatal", s.callback_fatal),
+      count("failures of the corrector", "corrector_failures", s.corrector_failures),
+      {"largest |g| before", "largest_drift_before", s.largest_drift_before, false},
+      {"largest |g| after", "largest_drift_after", s.largest_drift_after, false},
+      {"largest move (tolerances)", "largest_move", s.largest_move, false},
+      {"mean move (tolerances)", "mean_move", s.mean_move, false},
+      {"time in the projection (s)", "seconds", s.seconds, false},
+  };
+}
+
+void write(std::ostream& out, const Entry& entry) {
+  if (entry.integer)
+    out << static_cast<long>(entry.value);
+  else
+    out << std::setprecision(6) << std::scientific << entry.value << std::defaultfloat;
+}
+
+}  // namespace
+
+std::string Statistics::table() const {
+  std::ostringstream out;
+  for (const Entry& entry : entries(*this)) {
+    out << std::left << std::setw(34) << entry.label << " = ";
+    write(out, entry);
+    out << '\n';
+  }
+  if (solver_calls == 0)
+    out << "IDA has not called the plugin. If IDASolve was called, another nonlinear solver was "
+           "attached after it.\n";
+  return out.str();
+}
+
+std::string Statistics::csv_header() {
+  std::string line;
+  for (const Entry& entry : entries(Statistics{})) line += (line.empty() ? "" : ",") + std::string(entry.column);
+  return line;
+}
+
+std::string Statistics::csv_row() const {
+  std::ostringstream out;
+  const char* separator = "";
+  for (const Entry& entry : entries(*this)) {
+    out << separator;
+    write(out, entry);
+    separator = ",";
+  }
+  return out.str();
+}
+
+std::ostream& operator<<(std::ostream& out, const Statistics& statistics) {
+  return out << statistics.table();
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,5 @@
+// Tether: linear algebra shared by the projection and the contact solvers.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/linalg/minimum_norm.hpp>

@@ -1,0 +1,83 @@
+// Tether: minimum-norm solution of C dy = g in a diagonal metric.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <vector>
+
+namespace tether::linalg {
+
+/// Factors of an m x n matrix C in the metric D, kept until the next factor():
+///
+///     min sum_j (dy_j / D_j)^2   subject to   C dy = g.
+///
+/// With A = S C D, S = diag(1 / |row_i(C D)|), the columns of A^T are unit vectors, and
+/// A^T P = Q [R11 R12; 0 0] by Householder reflections with column pivoting (Golub and Van Loan,
+/// section 5.4 and 5.6.2). Then dy = D Q [R11^-T (P^T S g)_1..r; 0]. Because the rows are unit
+/// vectors, the rank decision |R_kk| > rank_tolerance does not depend on the units of g.
+/// A A^T is never formed.
+///
+/// Up to 16 x 32 everything lives inside the object; beyond that Eigen's ColPivHouseholderQR is
+/// used on storage that resize() allocates. factor() and solve() do not allocate.
+class MinimumNorm {
+ public:
+  static constexpr int kSmallRows = 16;
+  static constexpr int kSmallColumns = 32;
+
+  MinimumNorm() = default;
+  MinimumNorm(int rows, int columns) { resize(rows, columns); }
+
+  /// Sets m and n. The only member that allocates.
+  void resize(int rows, int columns);
+
+  int rows() const { return m_; }
+  int columns() const { return n_; }
+
+  /// Writable storage for C, row i at row(i)[0 .. n-1]; factor() overwrites it.
+  double* row(int i);
+
+  /// Factors S C D. D_j >= 0, D_j = 0 keeps dy_j = 0. Returns false if C D has an entry that is
+  /// not finite; the factors are then unusable. Rows that vanish are dropped (rank 0 for them).
+  bool factor(const double* D, double rank_tolerance = 1e-12);
+
+  /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
+  /// Dropped rows take no part; see inconsistency().
+  void solve(const double* g, double* dy);
+
+  int rank() const { return rank_; }
+  int dropped() const { return m_ - rank_; }
+  /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
+  int pivot(int k) const { return pivot_[static_cast<std::size_t>(k)]; }
+  /// |row_i(C D)|; 0 for a row that vanishes.
+  double row_norm(int i) const { return row_norm_[static_cast<std::size_t>(i)]; }
+  /// After solve(): the part of dropped row k (k in rank()..m-1, pivot order) that the solution
+  /// leaves unsolved, as a distance in the metric: |S g - R12^T R11^-T (P^T S g)_1..r|. A vanished
+  /// row has no distance; its |g| itself is returned.
+  double inconsistency(int k) const { return inconsistency_[static_cast<std::size_t>(k)]; }
+  /// Coefficients over the kept rows (pivot order, rank() entries) that give dropped row k.
+  std::vector<double> dependence(int k) const;
+  /// Ratio of the largest to the smallest kept |R_kk|: a cheap estimate of the condition of S C D.
+  double condition() const;
+
+ private:
+  bool factor_small(double rank_tolerance);
+  void solve_small(const double* g, double* dy);
+  bool scale_rows();
+
+  int m_ = 0, n_ = 0, rank_ = 0;
+  bool small_ = true;
+  // Small path: rows of A with the reflectors in place; R's diagonal and the factors tau apart.
+  std::array<double, kSmallRows * kSmallColumns> a_;
+  std::array<double, kSmallRows> diagonal_small_, tau_small_;
+  std::vector<double> metric_;
+
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> large_;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr_;
+  Eigen::VectorXd work_, rhs_;
+
+  std::vector<int> pivot_;
+  std::vector<double> row_norm_, inconsistency_;
+};
+
+}  // namespace tether::linalg
