@@ -1,0 +1,24 @@
+# The programs of a consumer: one for each Tether library that the including project brought.
+# SPDX-License-Identifier: BSD-3-Clause
+enable_testing()
+
+foreach(library IN ITEMS linalg contact)
+  if(TARGET tether::${library})
+    add_executable(use_${library} ${CMAKE_CURRENT_LIST_DIR}/${library}.cpp)
+    target_link_libraries(use_${library} PRIVATE tether::${library})
+    add_test(NAME ${library} COMMAND use_${library})
+  endif()
+endforeach()
+
+if(TARGET tether::ida_projection)
+  # The host brings its own SUNDIALS: here once IDA, once IDAS.
+  find_package(SUNDIALS REQUIRED)
+  add_library(pendulum OBJECT ${CMAKE_CURRENT_LIST_DIR}/pendulum.cpp)
+  target_link_libraries(pendulum PRIVATE tether::ida_projection)
+  foreach(solver IN ITEMS ida idas)
+    add_executable(pendulum_${solver} $<TARGET_OBJECTS:pendulum>)
+    target_link_libraries(pendulum_${solver} PRIVATE tether::ida_projection SUNDIALS::${solver})
+    set_target_properties(pendulum_${solver} PROPERTIES LINKER_LANGUAGE CXX)
+    add_test(NAME pendulum_${solver} COMMAND pendulum_${solver})
+  endforeach()
+endif()

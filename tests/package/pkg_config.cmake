@@ -1,0 +1,30 @@
+# Builds the consumers with nothing but a compiler and pkg-config. SPDX-License-Identifier: BSD-3-Clause
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK})
+set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${LIBDIR}/pkgconfig)
+set(ENV{LD_LIBRARY_PATH} ${PREFIX}/${LIBDIR})
+
+function(compile_and_run program source package)
+  execute_process(COMMAND ${PKG_CONFIG} --cflags --libs ${package}
+    OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+  separate_arguments(flags)
+  execute_process(COMMAND ${COMPILER} -std=c++17 ${CMAKE_CURRENT_LIST_DIR}/${source} -o ${WORK}/${program}
+    ${flags} ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
+  execute_process(COMMAND ${WORK}/${program} COMMAND_ERROR_IS_FATAL ANY)
+endfunction()
+
+foreach(component IN LISTS COMPONENTS)
+  if(component STREQUAL "ida_projection")
+    # The host's own SUNDIALS, in the library folder beside its headers where that is not /usr.
+    set(where "")
+    if(NOT SUNDIALS STREQUAL "/usr/include")
+      get_filename_component(where ${SUNDIALS} DIRECTORY)
+      set(where -L${where}/lib -Wl,-rpath,${where}/lib -lsundials_core)
+    endif()
+    foreach(solver IN ITEMS ida idas)
+      compile_and_run(pendulum_${solver} pendulum.cpp tether-ida-projection ${where} -lsundials_${solver})
+    endforeach()
+  else()
+    compile_and_run(${component} ${component}.cpp tether-${component})
+  endif()
+endforeach()
