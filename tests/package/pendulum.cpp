@@ -1,5 +1,6 @@
-// Smallest user of tether::ida_projection: a unit pendulum in index-1 form, its length kept by one
-// attached constraint. The same source links IDA or IDAS. SPDX-License-Identifier: BSD-3-Clause
+// Smallest user of tether::ida_projection: a unit pendulum in index-1 form, kept on its length and
+// on the velocity that goes with it. The same source links IDA or IDAS.
+// SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <cstdio>
 #include <ida/ida.h>
@@ -43,12 +44,13 @@ int main() {
   SUNLinearSolver linear_solver = SUNLinSol_Dense(yy, matrix, context);
   IDASetLinearSolver(ida_mem, linear_solver, matrix);
 
-  tp::Constraints length;
-  length.count = 1;
-  length.value = [](double, tp::ConstVector y, tp::Vector g) {
+  tp::Constraints constraints;
+  constraints.count = 2;
+  constraints.value = [](double, tp::ConstVector y, tp::Vector g) {
     g[0] = 0.5 * (y[0] * y[0] + y[1] * y[1] - 1.0);
+    g[1] = y[0] * y[2] + y[1] * y[3];
   };
-  tp::Projection projection(ida_mem, length);
+  tp::Projection projection(ida_mem, constraints);
 
   double t = 0.0, drift = 0.0;
   int flag = 0;
