@@ -3,30 +3,37 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <array>
+#include <memory>
 #include <vector>
 
 namespace tether::linalg {
+
+namespace small {
+struct Storage;
+struct Kernel;
+}  // namespace small
 
 /// Factors of an m x n matrix C in the metric D, kept until the next factor():
 ///
 ///     min sum_j (dy_j / D_j)^2   subject to   C dy = g.
 ///
-/// With A = S C D, S = diag(1 / |row_i(C D)|), the columns of A^T are unit vectors, and
-/// A^T P = Q [R11 R12; 0 0] by Householder reflections with column pivoting (Golub and Van Loan,
-/// section 5.4 and 5.6.2). Then dy = D Q [R11^-T (P^T S g)_1..r; 0]. Because the rows are unit
-/// vectors, the rank decision |R_kk| > rank_tolerance does not depend on the units of g.
-/// A A^T is never formed.
+/// With A = S C D, S = diag(1 / |row_i(C D)|), the columns of A^T are unit vectors. They are made
+/// orthogonal with pivoting, A^T P = Q [R11 R12; 0 0] (Golub and Van Loan, sections 5.4 and 5.6.2);
+/// then dy = D Q [R11^-T (P^T S g)_1..r; 0]. Because the rows are unit vectors, the rank decision
+/// |R_kk| > rank_tolerance does not depend on the units of g. A A^T is never formed.
 ///
-/// Up to 16 x 32 everything lives inside the object; beyond that Eigen's ColPivHouseholderQR is
-/// used on storage that resize() allocates. factor() and solve() do not allocate.
+/// Up to 16 x 32: Gram-Schmidt with reorthogonalisation in loops of fixed length; beyond that
+/// Eigen's ColPivHouseholderQR. resize() allocates, factor() and solve() do not.
 class MinimumNorm {
  public:
   static constexpr int kSmallRows = 16;
   static constexpr int kSmallColumns = 32;
 
-  MinimumNorm() = default;
-  MinimumNorm(int rows, int columns) { resize(rows, columns); }
+  MinimumNorm();
+  MinimumNorm(int rows, int columns);
+  ~MinimumNorm();
+  MinimumNorm(MinimumNorm&&) noexcept;
+  MinimumNorm& operator=(MinimumNorm&&) noexcept;
 
   /// Sets m and n. The only member that allocates.
   void resize(int rows, int columns);
@@ -48,9 +55,9 @@ class MinimumNorm {
   int rank() const { return rank_; }
   int dropped() const { return m_ - rank_; }
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
-  int pivot(int k) const { return pivot_[static_cast<std::size_t>(k)]; }
+  int pivot(int k) const;
   /// |row_i(C D)|; 0 for a row that vanishes.
-  double row_norm(int i) const { return row_norm_[static_cast<std::size_t>(i)]; }
+  double row_norm(int i) const;
   /// After solve(): the part of dropped row k (k in rank()..m-1, pivot order) that the solution
   /// leaves unsolved, as a distance in the metric: |S g - R12^T R11^-T (P^T S g)_1..r|. A vanished
   /// row has no distance; its |g| itself is returned.
@@ -61,22 +68,20 @@ class MinimumNorm {
   double condition() const;
 
  private:
-  bool factor_small(double rank_tolerance);
+  bool factor_large(double rank_tolerance);
+  void solve_large(const double* g, double* dy);
   void solve_small(const double* g, double* dy);
-  bool scale_rows();
+  double scaled(const double* g, int i) const;
 
   int m_ = 0, n_ = 0, rank_ = 0;
-  bool small_ = true;
-  // Small path: rows of A with the reflectors in place; R's diagonal and the factors tau apart.
-  std::array<double, kSmallRows * kSmallColumns> a_;
-  std::array<double, kSmallRows> diagonal_small_, tau_small_;
-  std::vector<double> metric_;
+  const small::Kernel* kernel_ = nullptr;  // null: beyond the small sizes
+  std::unique_ptr<small::Storage> small_;
+  std::vector<double> metric_;  // D, padded with zeros to the kernel's stride
 
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> large_;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr_;
   Eigen::VectorXd work_, rhs_;
 
-  std::vector<int> pivot_;
   std::vector<double> row_norm_, inconsistency_;
 };
 
