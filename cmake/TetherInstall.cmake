@@ -34,9 +34,17 @@ install(FILES
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT linalg)
 
-# pkg-config: paths relative to the .pc file, so that an installed tree can be moved.
+# pkg-config: paths relative to the .pc file, so that an installed tree can be moved; absolute only
+# where the caller made them so.
 file(RELATIVE_PATH tether_pc_prefix
   ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+string(REGEX REPLACE "/$" "" tether_pc_prefix "${tether_pc_prefix}")
+foreach(kind IN ITEMS LIB INCLUDE)
+  set(tether_pc_${kind} ${CMAKE_INSTALL_${kind}DIR})
+  if(NOT IS_ABSOLUTE "${tether_pc_${kind}}")
+    string(PREPEND tether_pc_${kind} "\${prefix}/")
+  endif()
+endforeach()
 function(tether_pkg_config library description requires)
   if(NOT TARGET tether_${library})
     return()

@@ -43,6 +43,9 @@ function(tether_library name)
     EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON CXX_EXTENSIONS OFF
     VERIFY_INTERFACE_HEADER_SETS ON
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  # Installed shared libraries find each other in their own folder.
+  set_target_properties(tether_${name} PROPERTIES
+    INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>)
   tether_warnings(tether_${name})
   set_property(GLOBAL APPEND PROPERTY TETHER_LIBRARIES ${name})
 endfunction()
