@@ -1,0 +1,38 @@
+// Tether: short ways to write groups of rows. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <problems/problem.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tether::problems {
+
+/// value(t, y, g) writes the m values, gradient(t, y, C) the non-zero entries of the m x N Jacobian
+/// (row-major, leading dimension N, zero on entry); m = row_names.size().
+template <class Value, class Gradient>
+Rows make_rows(std::string name, std::vector<std::string> row_names, Value value,
+               Gradient gradient) {
+  Rows rows;
+  rows.name = std::move(name);
+  rows.constraints.count = static_cast<int>(row_names.size());
+  rows.constraints.names = std::move(row_names);
+  rows.constraints.value = [value](double t, ida_projection::ConstVector y,
+                                   ida_projection::Vector g) { value(t, y.data(), g.data()); };
+  rows.constraints.jacobian = ida_projection::DenseJacobian(
+      [gradient](double t, ida_projection::ConstVector y, ida_projection::Matrix C) {
+        gradient(t, y.data(), C.data());
+      });
+  return rows;
+}
+
+/// Throws std::invalid_argument that lists what there is.
+[[noreturn]] inline void unknown_form(const std::string& problem, const std::string& form,
+                                      const std::vector<std::string>& forms) {
+  std::string message = problem + ": no form \"" + form + "\"; there are";
+  for (const std::string& known : forms) message += " \"" + known + "\"";
+  throw std::invalid_argument(message);
+}
+
+}  // namespace tether::problems

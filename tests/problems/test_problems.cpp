@@ -1,0 +1,358 @@
+// Tether: are the test problems what they say? SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <problems/andrews.hpp>
+#include <problems/car_axis.hpp>
+#include <problems/pendulum.hpp>
+#include <problems/slider_crank.hpp>
+
+#include "oracle.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::problems;
+using namespace tether::problems::test;
+
+namespace {
+
+constexpr double g = 9.81;
+
+std::vector<Problem> everything() {
+  std::vector<Problem> all;
+  for (const std::string& form : pendulum_forms()) {
+    all.push_back(pendulum(1.0, g, 10.0, form));
+    all.push_back(pendulum(2.5, kPendulumPeriodTwo, 3.0, form));
+  }
+  for (const std::string& form : car_axis_forms()) all.push_back(car_axis(form));
+  for (const std::string& form : andrews_forms()) all.push_back(andrews(form));
+  for (const std::string& form : slider_crank_forms())
+    for (const bool consistent : {true, false}) all.push_back(slider_crank(form, consistent));
+  return all;
+}
+
+Eigen::VectorXd vector(const std::vector<double>& from) {
+  return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<int>(from.size()));
+}
+
+const Rows* find(const Problem& problem, const std::string& name) {
+  for (const Rows& rows : problem.rows)
+    if (rows.name == name) return &rows;
+  return nullptr;
+}
+
+std::string label(const Problem& problem) { return problem.name + ", " + problem.form; }
+
+bool published_start(const Problem& problem) {
+  return problem.name == "slider crank" && std::abs(problem.y0[1]) == 0.0;
+}
+
+// Size of the terms that cancel in F: its entries' scale for round-off.
+Eigen::VectorXd residual_scale(const Problem& p, double t, const Eigen::VectorXd& y,
+                               const Eigen::VectorXd& yp) {
+  const Eigen::MatrixXd dy = residual_differences(p, t, 0.0, y, yp);
+  const Eigen::MatrixXd both = residual_differences(p, t, 1.0, y, yp);
+  return dy.cwiseAbs() * y.cwiseAbs() + (both - dy).cwiseAbs() * yp.cwiseAbs() +
+         Eigen::VectorXd::Constant(p.size, 1e-3);
+}
+
+}  // namespace
+
+TEST_CASE("sizes fit together") {
+  for (const Problem& p : everything()) {
+    INFO(label(p));
+    const auto N = static_cast<std::size_t>(p.size);
+    CHECK(p.y0.size() == N);
+    CHECK(p.yp0.size() == N);
+    CHECK(p.id.size() == N);
+    CHECK(p.reference.size() == N);
+    CHECK((p.atol_scale.empty() || p.atol_scale.size() == N));
+    CHECK(p.error_components <= p.size);
+    CHECK(p.t_end > p.t0);
+    int rows = 0;
+    for (const std::string& name : p.recommended) {
+      REQUIRE(find(p, name) != nullptr);
+      rows += find(p, name)->constraints.count;
+    }
+    CHECK(p.recommended_constraints().total_count() == rows);
+    for (const Rows& group : p.rows)
+      CHECK(group.constraints.names.size() == static_cast<std::size_t>(group.constraints.count));
+    CHECK_THROWS_AS(p.select({"no such rows"}), std::invalid_argument);
+    CHECK(p.error(p.reference.data()) == 0.0);
+  }
+}
+
+TEST_CASE("the start satisfies F") {
+  for (const Problem& p : everything()) {
+    INFO(label(p));
+    const Eigen::VectorXd y = vector(p.y0), yp = vector(p.yp0);
+    const Eigen::VectorXd r = residual(p, p.t0, y, yp);
+    // Published start: its velocity rows are wrong by 1.2e-8, and the index-2 form contains them.
+    const double slack = published_start(p) && p.form == "index 2" ? 2e-8 : 0.0;
+    const Eigen::VectorXd scale = residual_scale(p, p.t0, y, yp);
+    for (int i = 0; i < p.size; ++i) {
+      INFO("equation " << i);
+      CHECK(std::abs(r[i]) <= 2e-14 * scale[i] + slack);
+    }
+  }
+}
+
+TEST_CASE("the start and the reference satisfy every row") {
+  for (const Problem& p : everything()) {
+    for (const Rows& rows : p.rows) {
+      INFO(label(p) << ", " << rows.name);
+      const Eigen::VectorXd y = vector(p.y0);
+      const RowMajor C = jacobian(rows, p.t0, y);
+      const Eigen::VectorXd at_start = value(rows, p.t0, y);
+      const double slack = published_start(p) ? 2e-8 : 0.0;
+      for (int i = 0; i < at_start.size(); ++i) {
+        const double scale = C.row(i).cwiseAbs().dot(y.cwiseAbs()) + 1e-3;
+        CHECK(std::abs(at_start[i]) <= 1e-14 * scale + slack);
+      }
+    }
+  }
+}
+
+TEST_CASE("row Jacobians agree with differences") {
+  std::mt19937 random(1);
+  for (const Problem& p : everything()) {
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      const double t = p.t0 + (p.t_end - p.t0) * 0.37 * repeat;
+      const Eigen::VectorXd y = random_state(p, random);
+      const Eigen::VectorXd weight = y.cwiseAbs().cwiseMax(1.0);
+      for (const Rows& rows : p.rows) {
+        INFO(label(p) << ", " << rows.name);
+        const RowMajor given = jacobian(rows, t, y), expected = differences(rows, t, y);
+        for (int i = 0; i < given.rows(); ++i) {
+          const double scale =
+              expected.row(i).cwiseAbs().cwiseProduct(weight.transpose()).maxCoeff();
+          for (int j = 0; j < given.cols(); ++j) {
+            INFO("row " << i << ", column " << j << ": given " << given(i, j) << ", differences "
+                        << expected(i, j));
+            CHECK(std::abs(given(i, j) - expected(i, j)) * weight[j] <= 2e-9 * scale);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("Jacobians of F agree with differences") {
+  std::mt19937 random(2);
+  for (const Problem& p : everything()) {
+    if (!p.jacobian) continue;
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      const double t = p.t0 + (p.t_end - p.t0) * 0.37 * repeat;
+      const double cj = repeat == 0 ? 0.0 : repeat == 1 ? 1.7 : 400.0;
+      const Eigen::VectorXd y = random_state(p, random);
+      const Eigen::VectorXd yp = derivative(p, t, y);
+      Eigen::MatrixXd given = Eigen::MatrixXd::Constant(p.size, p.size, std::nan(""));
+      p.jacobian(t, cj, y.data(), yp.data(), given.data());
+      const Eigen::MatrixXd expected = residual_differences(p, t, cj, y, yp);
+      const Eigen::VectorXd weight = y.cwiseAbs().cwiseMax(1.0);
+      for (int i = 0; i < p.size; ++i) {
+        const double scale =
+            expected.row(i).cwiseAbs().cwiseProduct(weight.transpose()).maxCoeff() +
+            1e-3 * std::abs(residual(p, t, y, yp)[i]);
+        for (int j = 0; j < p.size; ++j) {
+          INFO(label(p) << ", cj " << cj << ", entry " << i << " " << j << ": given " << given(i, j)
+                        << ", differences " << expected(i, j));
+          CHECK(std::abs(given(i, j) - expected(i, j)) * weight[j] <= 1e-8 * scale);
+        }
+      }
+    }
+  }
+}
+
+// d/dt position = velocity and d/dt velocity = acceleration, along y' of the equations of motion,
+// whatever the velocities and multipliers are.
+TEST_CASE("each group is the derivative of the one below") {
+  std::mt19937 random(3);
+  for (const Problem& p : everything()) {
+    for (const auto& pair :
+         {std::make_pair("position", "velocity"), std::make_pair("velocity", "acceleration")}) {
+      const Rows* lower = find(p, pair.first);
+      const Rows* upper = find(p, pair.second);
+      if (!lower || !upper) continue;
+      for (int repeat = 0; repeat < 3; ++repeat) {
+        const double t = p.t0 + (p.t_end - p.t0) * 0.37 * repeat;
+        Eigen::VectorXd y = project(p, t, random_state(p, random), {"position"});
+        if (p.form == "GGL") y[5] = 0.0;
+        const Eigen::VectorXd yp = derivative(p, t, y);
+        const RowMajor C = jacobian(*lower, t, y);
+        const Eigen::VectorXd rate = C * yp + time_differences(*lower, t, y);
+        const Eigen::VectorXd expected = value(*upper, t, y);
+        for (int i = 0; i < rate.size(); ++i) {
+          INFO(label(p) << ", " << pair.first << ", row " << i);
+          const double scale =
+              C.row(i).cwiseAbs().dot(yp.cwiseAbs()) + std::abs(expected[i]) + 1e-2;
+          CHECK(std::abs(rate[i] - expected[i]) <= 2e-10 * scale);
+        }
+      }
+    }
+  }
+}
+
+// C y' + g_t = 0 on the constraints, for the groups that contain differential unknowns only.
+TEST_CASE("invariants stay constant along the motion") {
+  std::mt19937 random(4);
+  for (const Problem& p : everything()) {
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      const double t = p.t0 + (p.t_end - p.t0) * 0.37 * repeat;
+      const Eigen::VectorXd y = project(p, t, random_state(p, random));
+      const Eigen::VectorXd yp = derivative(p, t, y);
+      for (const Rows& rows : p.rows) {
+        const RowMajor C = jacobian(rows, t, y);
+        const Eigen::Map<const Eigen::VectorXd> id(p.id.data(), p.size);
+        const bool algebraic =
+            (C.array().abs().rowwise() * (1.0 - id.transpose().array())).maxCoeff() > 0.0;
+        if (algebraic) continue;
+        const Eigen::VectorXd at = value(rows, t, y);
+        const Eigen::VectorXd rate = C * yp + time_differences(rows, t, y);
+        for (int i = 0; i < rate.size(); ++i) {
+          INFO(label(p) << ", " << rows.name << ", row " << i << ", t " << t);
+          const double scale = C.row(i).cwiseAbs().dot(yp.cwiseAbs()) + 1e-2;
+          CHECK(std::abs(at[i]) <= 1e-12 * (1.0 + C.row(i).cwiseAbs().dot(y.cwiseAbs())));
+          CHECK(std::abs(rate[i]) <= 2e-10 * scale);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("copies work alone") {
+  Problem copy;
+  {
+    const Problem original = andrews("index 1");
+    copy = original;
+  }
+  CHECK(residual(copy, 0.0, vector(copy.y0), vector(copy.yp0)).cwiseAbs().maxCoeff() < 1e-10);
+}
+
+TEST_CASE("pendulum_exact against published digits") {
+  struct Row {
+    double t, x, y;
+  };
+  // 40-digit values for g = 9.81; the double nearest to 9.81 moves t = 2000 by 2e-13.
+  for (const Row& row : {Row{0.5, 0.391048791550546, -0.920369948785192},
+                         Row{1.0, -0.986291751131875, -0.165010853125541},
+                         Row{10.0, 0.2750874625761168600543914, -0.9614192050991250642651351},
+                         Row{100.0, 0.181513351427031, -0.983388480334058},
+                         Row{1000.0, -0.6832301885523148554574465, -0.7302030604227623275486221},
+                         Row{2000.0, -0.814603068589032, -0.580018827836935}}) {
+    double y[5];
+    pendulum_exact(1.0, g, row.t, y);
+    const double bound = 1e-15 + 1.2e-16 * row.t;
+    INFO(row.t);
+    CHECK(std::abs(y[0] - row.x) < bound);
+    CHECK(std::abs(y[1] - row.y) < bound);
+  }
+  double y[5];
+  pendulum_exact(1.0, g, 10.0, y);
+  CHECK(y[2] == Approx(-4.17559810095172883646052).epsilon(3e-15));
+  CHECK(y[3] == Approx(-1.194749054560475271647513).epsilon(1e-14));
+  CHECK(y[4] == Approx(2.0 * 14.14728360303362532066).epsilon(2e-15));
+  pendulum_exact(1.0, g, 1000.0, y);
+  CHECK(y[2] == Approx(-2.763853217052379217832877).epsilon(2e-13));
+  CHECK(y[3] == Approx(2.586058669110933151661269).epsilon(2e-13));
+  CHECK(pendulum_period(1.0, g) == Approx(2.3678419475762374493).epsilon(2e-16));
+  CHECK(pendulum_period(1.0, kPendulumPeriodTwo) == Approx(2.0).epsilon(2e-16));
+  pendulum_exact(1.0, kPendulumPeriodTwo, 30.0, y);
+  CHECK(y[0] == Approx(1.0).epsilon(1e-15));
+  CHECK(std::abs(y[3]) < 1e-13);
+}
+
+TEST_CASE("pendulum_exact solves the equations") {
+  for (const double t : {0.3, 1.1, 7.0}) {
+    const double L = 2.5;
+    double y[5], up[5], down[5], h = 1e-5;
+    pendulum_exact(L, g, t, y);
+    pendulum_exact(L, g, t + h, up);
+    pendulum_exact(L, g, t - h, down);
+    const double a[2] = {-y[0] * y[4], -y[1] * y[4] - g};
+    for (int i = 0; i < 2; ++i) {
+      CHECK((up[i] - down[i]) / (2.0 * h) == Approx(y[2 + i]).margin(1e-8));
+      CHECK((up[2 + i] - down[2 + i]) / (2.0 * h) == Approx(a[i]).margin(1e-8));
+    }
+    CHECK(y[0] * y[0] + y[1] * y[1] == Approx(L * L).epsilon(1e-15));
+    CHECK((y[2] * y[2] + y[3] * y[3]) / 2.0 + g * y[1] == Approx(0.0).margin(1e-13));
+  }
+}
+
+TEST_CASE("andrews: published start and energy of the converged end") {
+  const Problem p = andrews("index 1 w");
+  const double w[2] = {14222.4439199541138705911625887, -10666.8329399655854029433719415};
+  const double lam[2] = {98.5668703962410896057654982170, -6.12268834425566265503114393122};
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(p.y0[14 + i] == Approx(w[i]).epsilon(1e-14));
+    CHECK(p.y0[21 + i] == Approx(lam[i]).epsilon(1e-14));
+  }
+  for (std::size_t i = 2; i < 6; ++i) CHECK(std::abs(p.y0[21 + i]) < 1e-12);
+
+  const Eigen::VectorXd end = vector(p.reference);
+  CHECK(value(*find(p, "position"), p.t_end, end).cwiseAbs().maxCoeff() < 1e-15);
+  CHECK(value(*find(p, "velocity"), p.t_end, end).cwiseAbs().maxCoeff() < 1e-13);
+  CHECK(std::abs(value(*find(p, "energy"), p.t_end, end)[0]) < 2e-13);
+  // Published values are good to nine digits in q and v, six in the accelerations and multipliers:
+  // those do not even belong to the published q and v.
+  CHECK(p.reference[8] == Approx(-0.1424379294994111e4).epsilon(1e-8));
+  CHECK(p.reference[11] == Approx(0.5735699284790808).epsilon(1e-8));
+  CHECK(p.reference[14] == Approx(-0.2463176316945196e5).epsilon(1e-8));
+  CHECK(p.reference[17] == Approx(0.5667493645176213e6).epsilon(2e-6));
+  CHECK(p.reference[21] == Approx(0.1991753333731910e3).epsilon(2e-6));
+  CHECK(p.reference[26] == Approx(0.1161740700019673e2).epsilon(2e-6));
+}
+
+TEST_CASE("slider crank: published start and end") {
+  const Problem p = slider_crank("index 1 w", false);
+  // The published accelerations and multipliers carry the start's inconsistency of 1e-8 in v.
+  const double w[7] = {0.0,
+                       -1.344541576008661e-3,
+                       -5.062194923138079e3,
+                       -6.833142732779555e-5,
+                       1.449382650173157e-8,
+                       -4.268463211410861,
+                       2.098334687947376e-1};
+  const double lam[3] = {-6.397251492537153e-8, 382.4589508329281, -4.376060460948886e-9};
+  for (std::size_t i = 0; i < 7; ++i) CHECK(p.y0[14 + i] == Approx(w[i]).margin(5e-7));
+  for (std::size_t i = 0; i < 3; ++i) CHECK(p.y0[21 + i] == Approx(lam[i]).margin(3e-8));
+  const double w_end[7] = {0.0,
+                           0.6488737541276957e4,
+                           0.2167938629509884e4,
+                           0.3391137060286523e2,
+                           0.1715134772216488,
+                           -0.1422449408912512e1,
+                           0.1003946428124810e1};
+  for (std::size_t i = 0; i < 7; ++i)
+    CHECK(p.reference[14 + i] == Approx(w_end[i]).epsilon(1e-7).margin(1e-10));
+
+  // The nearest consistent start: 1e-10 away in q, 1.4e-8 in v.
+  const Problem nearest = slider_crank("index 1 w");
+  const Eigen::VectorXd change = (vector(nearest.y0) - vector(p.y0)).head(14);
+  CHECK(change.head(7).cwiseAbs().maxCoeff() == Approx(1.0e-10).epsilon(0.1));
+  CHECK(change.tail(7).cwiseAbs().maxCoeff() == Approx(1.4e-8).epsilon(0.1));
+}
+
+TEST_CASE("the references satisfy the rows to their own accuracy") {
+  for (const Problem& p : everything()) {
+    const Eigen::VectorXd end = vector(p.reference);
+    if (!end.allFinite()) continue;
+    const double slack = published_start(p) ? 1e-7 : 1e-14;
+    for (const Rows& rows : p.rows) {
+      INFO(label(p) << ", " << rows.name);
+      const RowMajor C = jacobian(rows, p.t_end, end);
+      const Eigen::VectorXd at_end = value(rows, p.t_end, end);
+      for (int i = 0; i < at_end.size(); ++i)
+        CHECK(std::abs(at_end[i]) <= slack * (C.row(i).cwiseAbs().dot(end.cwiseAbs()) + 1.0));
+    }
+  }
+}
+
+TEST_CASE("plain IDA reaches the references") {
+  for (const Problem& p : everything()) {
+    long steps = 0;
+    const Eigen::VectorXd end = integrate(p, 1e-8, 1e-8, &steps);
+    const double error = p.error(end.data());
+    INFO(label(p) << ": error " << error << " in " << steps << " steps");
+    WARN(label(p) << ": error " << error << " in " << steps << " steps");
+    CHECK(error < 1e-4);
+  }
+}
