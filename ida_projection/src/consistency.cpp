@@ -1,6 +1,238 @@
+// Tether: consistent starts and projected output points. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "gauss_newton.hpp"
 #include "impl.hpp"
+#include "least_squares.hpp"
+
 namespace tether::ida_projection {
-ConsistencyReport Projection::Impl::make_consistent(double, N_Vector, N_Vector, const Consistency&) { return {}; }
-ConsistencyReport Projection::Impl::project(double, N_Vector, N_Vector) { return {}; }
-int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector y, N_Vector yp, int itask) { return IDASolve(ida_mem_, tout, tret, y, yp, itask); }
+
+namespace {
+
+double largest_difference(const double* a, const double* b, int n, int* where) {
+  double largest = 0.0;
+  for (int i = 0; i < n; ++i)
+    if (std::abs(a[i] - b[i]) > largest) {
+      largest = std::abs(a[i] - b[i]);
+      if (where != nullptr) *where = i;
+    }
+  return largest;
 }
+
+double largest_residual(IDAResFn residual, void* user_data, double t, N_Vector y, N_Vector yp) {
+  if (residual == nullptr) return -1.0;
+  OwnedVector r(y);
+  return residual(t, y, yp, r, user_data) == 0 ? N_VMaxNorm(r) : -1.0;
+}
+
+}  // namespace
+
+// One step of IDA that goes nowhere: the decorated solver answers "no correction" and, on the way,
+// notes the error weights and which variables are algebraic. IDA must be reinitialised afterwards.
+bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
+  OwnedVector y(yy), ydot(yp);
+  N_VScale(1.0, yy, y);
+  N_VScale(1.0, yp, ydot);
+  probing_ = true;
+  probed_ = false;
+  sunrealtype reached = t0;
+  const double tiny = 1e-8 * std::max(1.0, std::abs(t0));
+  IDASolve(ida_mem_, t0 + tiny, &reached, y, ydot, IDA_ONE_STEP);
+  probing_ = false;
+  return probed_;
+}
+
+ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Vector yp,
+                                                    const Consistency& how) {
+  ConsistencyReport report;
+  const auto fail = [&](Status why, const std::string& text) {
+    IDAReInit(ida_mem_, t0, yy, yp);  // as the caller had it
+    report.status = status = why;
+    report.message = message = text;
+    return report;
+  };
+  if (yy == nullptr || yp == nullptr) reject("make_consistent: yy and yp must not be null");
+  if (!how.hold.empty() && static_cast<int>(how.hold.size()) != size_)
+    reject("make_consistent: hold has " + std::to_string(how.hold.size()) + " entries for " +
+           std::to_string(size_) + " unknowns");
+  if (!mover_) return report.status = status = Status::success, report;
+
+  if (IDAReInit(ida_mem_, t0, yy, yp) != 0 || !probe(t0, yy, yp))
+    return fail(Status::internal_error,
+                "IDA could not be started at the given values; set tolerances and the linear solver before make_consistent, and look at IDA's own message");
+  report.residual_before = largest_residual(how.residual, how.user_data, t0, yy, yp);
+
+  // y onto the constraints, algebraic variables only where rows fix them.
+  OwnedVector y(yy), ydot(yp);
+  N_VScale(1.0, yy, y);
+  N_VScale(1.0, yp, ydot);
+  project_point(t0, y, how.hold, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr, report);
+  if (report.status != Status::success) return fail(report.status, report.message);
+
+  // y' (and the algebraic variables) consistent with F.
+  using Derivative = Consistency::Derivative;
+  bool found = how.derivative == Derivative::keep;
+  if (how.derivative == Derivative::automatic || how.derivative == Derivative::calc_ic) {
+    IDAReInit(ida_mem_, t0, y, ydot);
+    if (id_) {
+      IDASetId(ida_mem_, id_);
+      const double direction =
+          how.direction != 0.0 ? how.direction : t0 + 1e-3 * std::max(1.0, std::abs(t0));
+      found = IDACalcIC(ida_mem_, IDA_YA_YDP_INIT, direction) == 0 &&
+              IDAGetConsistentIC(ida_mem_, y, ydot) == 0;
+    }
+  }
+  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr && contiguous_)
+    found = consistent_derivative(how.residual, how.user_data, t0, y, ydot, id_, weights_,
+                                  how.maximum_iterations);
+  if (!found)
+    return fail(Status::not_converged,
+                "y' consistent with F was not found; give Options::id and Consistency::residual, or keep y' with Consistency::Derivative::keep");
+
+  // Rows that contain algebraic variables may have moved a little with them.
+  ConsistencyReport again;
+  project_point(t0, y, how.hold, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr, again);
+  if (again.status == Status::success) report.drift_after = again.drift_after;
+
+  N_VLinearSum(1.0, y, -1.0, yy, delta_);
+  report.move = N_VWrmsNorm(delta_, weights_);
+  if (contiguous_) {
+    report.largest_change =
+        largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy), size_,
+                           &report.changed_component);
+    report.derivative_change = largest_difference(N_VGetArrayPointer(ydot),
+                                                  N_VGetArrayPointer(yp), size_, nullptr);
+  } else if (delta_ && static_cast<N_Vector>(delta_)->ops->nvmaxnorm != nullptr) {
+    report.largest_change = N_VMaxNorm(delta_);
+    N_VLinearSum(1.0, ydot, -1.0, yp, delta_);
+    report.derivative_change = N_VMaxNorm(delta_);
+  }
+  report.residual_after = largest_residual(how.residual, how.user_data, t0, y, ydot);
+  N_VScale(1.0, y, yy);
+  N_VScale(1.0, ydot, yp);
+  IDAReInit(ida_mem_, t0, yy, yp);
+  reset_statistics();
+  status = report.status = Status::success;
+  message = report.message;
+  return report;
+}
+
+// The nearest point on the constraints in the error weights; y changes only on success.
+void Projection::Impl::project_point(double t, N_Vector y, const std::vector<bool>& hold,
+                                     N_Vector id, ConsistencyReport& report) {
+  const bool dense = std::holds_alternative<FiniteDifferences>(constraints.jacobian) ||
+                     std::holds_alternative<DenseJacobian>(constraints.jacobian);
+  if (dense) {
+    const auto n = static_cast<std::size_t>(size_);
+    double* values = N_VGetArrayPointer(y);
+    const double* w = N_VGetArrayPointer(weights_);
+    std::vector<double> point(values, values + size_), WT(n);
+    std::vector<bool> held = options_.hold;
+    for (std::size_t i = 0; i < n; ++i) {
+      WT[i] = w[i] > 0.0 ? 1.0 / w[i] : std::max(1.0, std::abs(point[i]));
+      if (!hold.empty() && hold[i]) {
+        held.resize(n, false);
+        held[i] = true;
+      }
+    }
+    if (!point_) point_ = std::make_unique<GaussNewton>(constraints, size_);
+    point_->project(t, point, WT, held, id != nullptr ? N_VGetArrayPointer(id) : nullptr, report);
+    if (report.status == Status::success) std::copy(point.begin(), point.end(), values);
+    return;
+  }
+  if (!point_mover_) {
+    point_options_ = options_;
+    point_options_.metric = Metric::error_weights;
+    point_options_.largest_move = 1e300;
+    point_options_.maximum_iterations = 50;
+    point_options_.tolerance = 1e-8;
+    point_mover_ = std::holds_alternative<Gradients>(constraints.jacobian)
+                       ? make_gradient_mover(constraints, point_options_, point_statistics_, y)
+                       : make_user_mover(constraints, point_options_, point_statistics_, y);
+  }
+  OwnedVector correction(y);
+  N_VConst(0.0, correction);
+  const Candidate candidate{t, y, correction, weights_};
+  const Move move = point_mover_->move(candidate);
+  report.status = move.status;
+  report.iterations = move.moves;
+  report.drift_before = move.drift_before;
+  report.drift_after = move.drift_after;
+  if (move.status != Status::success) {
+    report.message = point_mover_->message();
+    report.contradicting_rows = point_mover_->contradicting_rows();
+    return;
+  }
+  N_VLinearSum(1.0, y, 1.0, correction, y);
+}
+
+ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) {
+  if (yy == nullptr) reject("project: yy must not be null");
+  ConsistencyReport report;
+  if (!mover_) {
+    report.status = status = Status::success;
+    return report;
+  }
+  current_weights(yy);
+  OwnedVector y(yy);
+  N_VScale(1.0, yy, y);
+  project_point(t, y, {}, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr, report);
+  if (report.status == Status::success && yp != nullptr && point_) {
+    OwnedVector ydot(yp);
+    N_VScale(1.0, yp, ydot);
+    const double* values = N_VGetArrayPointer(y);
+    if (point_->tangent(t, {values, values + size_}, N_VGetArrayPointer(ydot))) {
+      report.derivative_change = largest_difference(N_VGetArrayPointer(ydot),
+                                                    N_VGetArrayPointer(yp), size_, nullptr);
+      N_VScale(1.0, ydot, yp);
+    }
+  }
+  if (report.status == Status::success) {
+    N_VLinearSum(1.0, y, -1.0, yy, delta_);
+    report.move = N_VWrmsNorm(delta_, weights_);
+    if (contiguous_)
+      report.largest_change =
+          largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy), size_,
+                             &report.changed_component);
+    N_VScale(1.0, y, yy);
+  }
+  status = report.status;
+  message = report.message;
+  return report;
+}
+
+// IDA's present error weights once it has some; before that, weights of relative size.
+void Projection::Impl::current_weights(N_Vector y) {
+  if (initialized_ && IDAGetErrWeights(ida_mem_, weights_) == 0) return;
+  N_VAbs(y, weights_);
+  N_VAddConst(weights_, 1.0, weights_);
+  N_VInv(weights_, weights_);
+  N_VScale(1e6, weights_, weights_);
+}
+
+int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret,
+                                        int itask) {
+  const long calls = statistics_.solver_calls;
+  long before = 0, after = 0;
+  IDAGetNumSteps(ida_mem_, &before);
+  const int flag = IDASolve(ida_mem_, tout, tret, yret, ypret, itask);
+  if (flag < 0 || !mover_) return flag;
+  IDAGetNumSteps(ida_mem_, &after);
+  if (after > before && statistics_.solver_calls == calls) {
+    status = Status::never_called;
+    message = "IDA took steps without the plugin: another nonlinear solver was attached after it; make the Projection last, or hand that solver over in Options::nonlinear_solver";
+    return flag;
+  }
+  // A step that IDA returns as it is has been projected; what it interpolates has not.
+  const Status of_step = status;
+  const std::string text = message;
+  project(*tret, yret, ypret);
+  if (status == Status::success) {
+    status = of_step;
+    message = text;
+  }
+  return flag;
+}
+
+}  // namespace tether::ida_projection

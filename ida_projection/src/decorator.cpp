@@ -53,6 +53,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (probing_) {  // make_consistent wants to look around, not to step
     N_VScale(1.0, weights, weights_);
     if (!id_) derive_id(candidate, mem);
+    probed_ = true;
     return 0;
   }
 

@@ -7,6 +7,7 @@
 #include <tether/ida_projection/projection.hpp>
 #include <vector>
 
+#include "gauss_newton.hpp"
 #include "mover.hpp"
 
 namespace tether::ida_projection {
@@ -96,10 +97,9 @@ class Projection::Impl {
 
   // consistency.cpp
   bool probe(double t0, N_Vector yy, N_Vector yp);
-  bool current_weights(N_Vector y);
+  void current_weights(N_Vector y);
   void project_point(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id,
                      ConsistencyReport& report);
-  Status make_tangent(double t, N_Vector y, N_Vector yp, ConsistencyReport& report);
 
   void* ida_mem_;
   Options options_;
@@ -124,7 +124,11 @@ class Projection::Impl {
   std::vector<int> algebraic_;  // indices, contiguous vectors
   bool has_algebraic_ = false;
   bool engaged_ = false;  // the policy acts from the first move that was needed
-  bool probing_ = false;
+  bool probing_ = false, probed_ = false;
+  std::unique_ptr<GaussNewton> point_;   // for points between steps and initial values
+  std::unique_ptr<Mover> point_mover_;   // the same for gradients and user projections
+  Options point_options_;
+  Statistics point_statistics_;
   bool printed_ = false;
 
   long last_steps_ = -1, last_setups_ = -1;
