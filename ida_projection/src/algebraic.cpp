@@ -1,4 +1,4 @@
-// Tether: which variables are algebraic, and their refresh after a move.
+// Tether: which variables are algebraic.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
@@ -76,40 +76,6 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
   }
   set_id(id);
   return Status::success;
-}
-
-// After the differential variables moved by dy, the algebraic ones follow by -F_a^-1 F_d dy: one
-// Newton iteration on F at (moved y_d, y_a, y' as the corrector left it), applied to y_a alone.
-// This is the step of IDACalcIC's IDA_YA_YDP_INIT with the factors that IDA has.
-void Projection::Impl::refresh_algebraic(const Candidate& candidate, void* mem) {
-  if (linear_solve_ == nullptr) return;
-  // F(t, ypred - dy + ycor, yppred + cj ycor) with the corrector's ycor: shift ypred by -dy.
-  N_VScale(1.0, candidate.base, saved_);
-  N_VLinearSum(1.0, candidate.correction, -1.0, newton_, delta_);
-  N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
-  const bool evaluated = system_(newton_, delta_, mem) == 0;
-  N_VScale(1.0, saved_, candidate.base);
-  if (!evaluated) return;
-  N_VScale(-1.0, delta_, delta_);
-  if (linear_solve_(delta_, mem) != 0) return;
-  ++statistics_.refreshes;
-  ++statistics_.residual_evaluations;
-
-  // IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
-  // equations contain y'; algebraic ones take the plain solution.
-  const double unscale =
-      cj_at_setup_ != 0.0 ? 0.5 * (1.0 + step_data().cj / cj_at_setup_) : 1.0;
-  if (contiguous_) {
-    double* ycor = N_VGetArrayPointer(candidate.correction);
-    const double* change = N_VGetArrayPointer(delta_);
-    for (int j : algebraic_)
-      if (std::isfinite(change[j])) ycor[j] += unscale * change[j];
-  } else {
-    // (1 - id) * change, with vector operations only.
-    N_VProd(id_, delta_, newton_);
-    N_VLinearSum(1.0, delta_, -1.0, newton_, delta_);
-    N_VLinearSum(1.0, candidate.correction, unscale, delta_, candidate.correction);
-  }
 }
 
 }  // namespace tether::ida_projection

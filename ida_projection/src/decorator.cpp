@@ -96,11 +96,10 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
     if (engaged != Status::success) return finish(engaged, mover_->message());
   }
 
-  if (options_.extra_iterations > 0) iterate_once_more(at, tolerance, mem);
-  const bool refresh = has_algebraic_ && options_.refresh_algebraic && !mover_->covers_algebraic();
-  if (refresh) N_VScale(1.0, ycor, newton_);
+  const bool polish = wants_polish();
+  if (polish) N_VScale(1.0, ycor, newton_);
   move = mover_->move(at);
-  if (move.status == Status::success && refresh) refresh_algebraic(at, mem);
+  if (polish && move.status == Status::success) move.status = this->polish(at, tolerance, mem);
 
   if (timed) {
     timed_seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
@@ -153,22 +152,6 @@ Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
     IDASetSuppressAlg(ida_mem_, 1);
   }
   return mover_->set_algebraic(candidate, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr);
-}
-
-// One more Newton iteration with the factors at hand. It removes the noise that IDA's convergence
-// test leaves in the correction, which the projection would otherwise spread (README, "Order").
-void Projection::Impl::iterate_once_more(const Candidate& candidate, double tolerance, void* mem) {
-  if (linear_solve_ == nullptr) return;
-  if (system_(candidate.correction, delta_, mem) != 0) return;
-  N_VScale(-1.0, delta_, delta_);
-  if (linear_solve_(delta_, mem) != 0) return;
-  ++statistics_.extra_iterations;
-  ++statistics_.residual_evaluations;
-  extra_iterations_of_last_solve_ = 1;
-  // A change larger than IDA's own stopping test allows is no refinement; keep what IDA had.
-  const double change = N_VWrmsNorm(delta_, candidate.weights);
-  if (change <= 10.0 * tolerance)
-    N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
 }
 
 void Projection::Impl::account(const Move& move, const StepData& step) {

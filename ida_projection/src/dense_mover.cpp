@@ -44,7 +44,7 @@ class DenseMover final : public Mover {
   Move measure(const Candidate& candidate) override;
   Move move(const Candidate& candidate) override;
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
-  bool covers_algebraic() const override { return !blocks_.a.rows.empty(); }
+  Status settle(const Candidate& candidate, N_Vector change) override;
   void accept() override { std::swap(scale_, trial_scale_); }
   void reset() override {
     std::fill(scale_.begin(), scale_.end(), 0.0);
@@ -279,6 +279,30 @@ Move DenseMover::move(const Candidate& candidate) {
 
   result.status = contradicts() ? Status::inconsistent : Status::success;
   return result;
+}
+
+// C change is what the rows notice of it to first order; g itself is asked only where that order
+// may not be enough.
+Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
+  const double* e = N_VGetArrayPointer(change);
+  double* correction = N_VGetArrayPointer(candidate.correction);
+  double sum = 0.0;
+  for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
+  for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
+  if (monitor_.linear_enough(std::sqrt(sum * inverse_n_))) {
+    for (int i = 0; i < m_; ++i) {
+      const double* c = C_.data() + static_cast<std::ptrdiff_t>(i) * n_;
+      double notice = 0.0;
+      for (int j : blocks_.columns) notice += c[j] * e[j];
+      g_[static_cast<std::size_t>(i)] = notice;
+    }
+  } else {
+    const Status status = value(candidate.t);
+    if (status != Status::success) return status;
+  }
+  solve();
+  apply(1.0, correction);
+  return Status::success;
 }
 
 }  // namespace

@@ -71,6 +71,15 @@ class GradientMover final : public Mover {
     return Status::success;
   }
 
+  Status settle(const Candidate& candidate, N_Vector change) override {
+    N_VLinearSum(1.0, y_, 1.0, change, y_);
+    const Status status = value(candidate.t);
+    if (status != Status::success) return status;
+    solve(candidate.weights);
+    N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
+    return Status::success;
+  }
+
   Move measure(const Candidate& candidate) override {
     Move result;
     load(candidate);

@@ -86,8 +86,8 @@ class Projection::Impl {
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   Status engage(const Candidate& candidate, void* mem);
-  void iterate_once_more(const Candidate& candidate, double tolerance, void* mem);
-  void refresh_algebraic(const Candidate& candidate, void* mem);
+  bool wants_polish() const;  // polish.cpp
+  Status polish(const Candidate& candidate, double tolerance, void* mem);
   void account(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
 
@@ -122,6 +122,7 @@ class Projection::Impl {
   int size_ = 0;
   OwnedVector id_, delta_, newton_, saved_, weights_;
   std::vector<int> algebraic_;  // indices, contiguous vectors
+  std::vector<double> saved_algebraic_;
   bool has_algebraic_ = false;
   bool engaged_ = false;  // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;

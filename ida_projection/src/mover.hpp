@@ -45,8 +45,9 @@ class Mover {
   /// before the first move() of a run, with the candidate at which the structure is looked at.
   virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;
 
-  /// Component i is algebraic and fixed by the rows themselves, so F need not be asked.
-  virtual bool covers_algebraic() const { return false; }
+  /// The correction was changed by `change` after a successful move(): takes back what leaves the
+  /// constraints, with the factors at hand.
+  virtual Status settle(const Candidate& candidate, N_Vector change) = 0;
 
   /// The attempt that used the last candidate was accepted: keep what it taught the metric.
   virtual void accept() {}
@@ -87,6 +88,11 @@ class Monitor {
   /// After a move of this length; `fresh`: the factors belong to the point that was left;
   /// `floor`: length below which rounding of y rules.
   Verdict judge(double length, bool fresh, double floor);
+
+  /// Is what curvature adds to a linearised change of this length below the tolerance?
+  bool linear_enough(double length) const {
+    return theta_ >= 0.0 && 4.0 * theta_ * length * length <= options_->tolerance;
+  }
 
  private:
   const Options* options_;

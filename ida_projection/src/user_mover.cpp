@@ -68,6 +68,13 @@ class UserMover final : public Mover {
     return result;
   }
 
+  Status settle(const Candidate& candidate, N_Vector) override {
+    const Move again = measure(candidate);
+    if (again.status != Status::unused) return again.status;
+    N_VLinearSum(1.0, candidate.correction, 1.0, change_, candidate.correction);
+    return Status::success;
+  }
+
   Status set_algebraic(const Candidate&, N_Vector) override { return Status::success; }
 
  private:
