@@ -12,12 +12,13 @@ endforeach()
 
 if(TARGET tether::ida_projection)
   # The host brings its own SUNDIALS: here once IDA, once IDAS.
-  find_package(SUNDIALS REQUIRED)
+  find_package(SUNDIALS)
   add_library(pendulum OBJECT ${CMAKE_CURRENT_LIST_DIR}/pendulum.cpp)
   target_link_libraries(pendulum PRIVATE tether::ida_projection)
   foreach(solver IN ITEMS ida idas)
     add_executable(pendulum_${solver} $<TARGET_OBJECTS:pendulum>)
-    target_link_libraries(pendulum_${solver} PRIVATE tether::ida_projection SUNDIALS::${solver})
+    target_link_libraries(pendulum_${solver} PRIVATE tether::ida_projection
+      $<IF:$<BOOL:${SUNDIALS_FOUND}>,SUNDIALS::${solver},sundials_${solver}>)
     set_target_properties(pendulum_${solver} PROPERTIES LINKER_LANGUAGE CXX)
     add_test(NAME pendulum_${solver} COMMAND pendulum_${solver})
   endforeach()
