@@ -1,0 +1,27 @@
+// Tether: residuals of any answer to a contact problem. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+#include <tether/contact/problem.hpp>
+
+namespace tether::contact {
+
+/// All in the units of a velocity (impulses are multiplied by A_nn) unless said; NaN: not computed.
+struct Residuals {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  double signorini = kNone;    ///< max |min(A_nn x_n, w_n)|
+  double cone = kNone;         ///< max A_nn (|x_t| - mu x_n)+
+  double alignment = kNone;    ///< max over contacts of |w_t - target|: target 0 inside the cone,
+                               ///< on it the nearest -s (u + gamma), s >= 0, gamma of the law
+  double dissipation = kNone;  ///< sum of x_i . w_i (energy): <= 0 at a solution
+  double energy_change = kNone;  ///< 1/2 x'Ax - b'x: kinetic energy gained by the impulses
+  double fixed_point = kNone;  ///< (sum |D_i (x_i - block(x_i))|^2)^1/2 / |b|
+  double natural_map = kNone;  ///< |x - P_K(x - w - De Saxce term)| / max(|b|, |x|, |w|)
+  double natural_map_data = kNone;  ///< the same / |b|
+};
+
+/// The same yardstick for every solver. natural_map is the law's own (README, section 6); for
+/// Law::coulomb it is the one that Siconos reports. `impulses` has dimension * contacts entries.
+Residuals evaluate(const Problem& problem, Law law, const Eigen::VectorXd& impulses);
+
+}  // namespace tether::contact

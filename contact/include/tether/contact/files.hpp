@@ -1,0 +1,25 @@
+// Tether: contact problems in files. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tether/contact/problem.hpp>
+
+namespace tether::contact {
+
+/// Readers throw std::runtime_error with the file and what is wrong with it: missing, truncated,
+/// oversized, not finite, sizes that do not match. Files hold q = -b and W = A.
+///
+/// Siconos .dat: dense (storage 0) and block-sparse (storage 1).
+Problem read_dat(const std::string& path);
+/// fclib HDF5 (local problems; triplets, compressed columns, compressed rows). Throws when the
+/// library was built without HDF5.
+Problem read_fclib(const std::string& path);
+/// By the first bytes of the file.
+Problem read_problem(const std::string& path);
+
+enum class DatStorage { dense, blocks };
+void write_dat(const Problem& problem, const std::string& path, DatStorage storage = DatStorage::blocks);
+void write_fclib(const Problem& problem, const std::string& path);
+bool has_fclib();
+
+}  // namespace tether::contact

@@ -1,0 +1,74 @@
+// Tether: the one-contact problem and its friction laws. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+namespace tether::contact {
+
+/// What an impulse x = (x_n, x_t) and the relative velocity after it, w = A x - b, must satisfy.
+/// Derivations: contact/README.md.
+enum class Law : std::uint8_t {
+  /// Preclik and Ruede's MPCC: min 1/2 x'Ax - b'x over x_n >= 0, |x_t| <= mu x_n with
+  /// (Ax - b)_n >= 0 complementary to x_n and (Ax)_n >= 0. One solution for every A.
+  maximum_dissipation,
+  /// Classical law: friction opposes slip, -(w_n + mu |w_t|, w_t) in the normal cone of K at x.
+  coulomb,
+  /// x_t = 0, x_n >= 0 complementary to w_n >= 0.
+  frictionless
+};
+
+enum class Regime : std::uint8_t { separating, sticking, sliding };
+
+const char* name(Law law);
+const char* name(Regime regime);
+
+/// Factors of one symmetric 3x3 block A = [a c'; c T] and its friction coefficient, in the frame in
+/// which B = T - c c'/a is diagonal: B = V diag(beta) V', g = V' mu c / a, e = |g| (eccentricity of
+/// the conic section). beta is kept >= 1e-12 trace(A), which makes singular blocks solvable.
+struct LocalBlock {
+  double a, inv_a, mu, e;
+  double c[2], g[2], beta[2], cosine, sine;
+  double T[3];  ///< T00, T01, T11, with the raised beta
+
+  LocalBlock() = default;
+  /// Uses (A + A')/2. Throws std::invalid_argument unless A is finite, A_nn > 0, the matrix is
+  /// positive semidefinite up to round-off (1e-8 trace) and 0 <= mu < infinity.
+  LocalBlock(const Eigen::Matrix3d& A, double mu);
+  Eigen::Matrix3d matrix() const;
+};
+
+/// An impulse that is being improved. In: x (start and, for `coulomb` at e > 0.8 where several
+/// solutions may exist, the point whose nearest solution is wanted). Out: the solution.
+struct LocalState {
+  double x[3] = {0, 0, 0};
+  double lambda = -1;  ///< |w_t| / |x_t| of the last sliding `coulomb` solve; < 0: none
+  Regime regime = Regime::separating;
+  int evaluations = 0;  ///< of the scalar equation, in this solve
+};
+
+/// Exact solution of the one-contact problem with right-hand side b, warm-started from `state`.
+void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, LocalState& state);
+
+struct OneContact {
+  Eigen::Vector3d impulse = Eigen::Vector3d::Zero();
+  Regime regime = Regime::separating;
+  int evaluations = 0;
+};
+
+/// The same, cold, from A, b and mu.
+OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b, double mu);
+
+/// `maximum_dissipation` by golden section on the visible arc, the method of the paper: stops when
+/// the angle is known to `angle_tolerance` (radian); function values limit it to about 1e-8.
+OneContact solve_one_golden_section(const LocalBlock& block, const Eigen::Vector3d& b,
+                                    double angle_tolerance = 1e-10);
+
+/// Planar contact (x_n, x_t), A = [a c; c t]: closed form of each law.
+struct PlanarContact {
+  Eigen::Vector2d impulse = Eigen::Vector2d::Zero();
+  Regime regime = Regime::separating;
+};
+PlanarContact solve_planar(Law law, const Eigen::Matrix2d& A, const Eigen::Vector2d& b, double mu);
+
+}  // namespace tether::contact

@@ -1,0 +1,76 @@
+// Tether: a frictional contact problem given by its Delassus matrix. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <tether/contact/one_contact.hpp>
+#include <vector>
+
+namespace tether::contact {
+
+/// One 3x3 block as three columns of four doubles (the fourth is 0): a vector register each.
+struct alignas(32) PackedBlock {
+  double column[12] = {};
+};
+/// Three components of one contact and a zero.
+struct alignas(32) PackedVector {
+  double v[4] = {};
+};
+
+struct MatrixBlock {
+  int row = 0, column = 0;
+  Eigen::Matrix3d value = Eigen::Matrix3d::Zero();  ///< planar: the upper left 2x2 part counts
+};
+
+/// Contacts i = 0 .. n-1 with components (normal, tangent, tangent) or, in the plane,
+/// (normal, tangent): relative velocities w = A x - b after impulses x, friction coefficients mu_i.
+/// A = J M^-1 J' may be singular and slightly unsymmetric: residuals use it as given, one-contact
+/// solves use the symmetric part of its diagonal blocks. A value; fixed once made.
+class Problem {
+ public:
+  Problem() = default;
+  /// d n x d n matrix, d n vector, n coefficients; d = 2 or 3 follows from the sizes.
+  /// Throws std::invalid_argument (here and below) on sizes that do not match, values that are not
+  /// finite, A_nn <= 0, indefinite diagonal blocks, mu < 0.
+  static Problem dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
+                       const Eigen::VectorXd& mu);
+  /// Blocks in any order; equal positions are summed.
+  static Problem sparse(int dimension, std::vector<MatrixBlock> blocks, const Eigen::VectorXd& b,
+                        const Eigen::VectorXd& mu);
+
+  int contacts() const { return static_cast<int>(local_.size()); }
+  int dimension() const { return dimension_; }
+  const Eigen::VectorXd& b() const { return b_; }
+  double mu(int contact) const { return local_[static_cast<std::size_t>(contact)].mu; }
+  const LocalBlock& local(int contact) const { return local_[static_cast<std::size_t>(contact)]; }
+  Eigen::MatrixXd dense_matrix() const;
+
+  /// Identity of each contact, by which a Solver finds its impulse of the previous problem.
+  /// Default: 0 .. n-1.
+  void set_ids(std::vector<std::uint64_t> ids);
+  std::uint64_t id(int contact) const {
+    return ids_.empty() ? static_cast<std::uint64_t>(contact)
+                        : ids_[static_cast<std::size_t>(contact)];
+  }
+
+  /// Block rows, columns ascending, pattern symmetric, diagonal present.
+  const std::vector<int>& row_start() const { return row_start_; }
+  const std::vector<int>& columns() const { return columns_; }
+  const std::vector<PackedBlock>& blocks() const { return blocks_; }
+  const std::vector<LocalBlock>& locals() const { return local_; }
+  const std::vector<PackedVector>& packed_b() const { return packed_b_; }
+
+  std::vector<PackedVector> pack(const Eigen::VectorXd& x) const;
+  void unpack(const std::vector<PackedVector>& x, Eigen::VectorXd& out) const;
+
+ private:
+  int dimension_ = 3;
+  Eigen::VectorXd b_;
+  std::vector<LocalBlock> local_;
+  std::vector<int> row_start_, columns_;
+  std::vector<PackedBlock> blocks_;
+  std::vector<PackedVector> packed_b_;
+  std::vector<std::uint64_t> ids_;
+};
+
+}  // namespace tether::contact

@@ -1,0 +1,106 @@
+// Tether: solver of contact problems. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <tether/contact/evaluate.hpp>
+#include <tether/contact/problem.hpp>
+#include <vector>
+
+namespace tether::contact {
+
+/// The number that is compared with Options::tolerance; see Residuals.
+enum class Measure : std::uint8_t {
+  automatic,         ///< fixed_point for maximum_dissipation, natural_map for the other laws
+  natural_map,
+  natural_map_data,
+  fixed_point
+};
+
+enum class Method : std::uint8_t {
+  automatic,          ///< sweeps, Anderson, ADMM and proximal Newton in rotation
+  gauss_seidel,       ///< plain sweeps
+  sor,                ///< x <- clip((1 - omega) x + omega sweep)
+  jacobi,             ///< all blocks from the old x, damped
+  anderson,           ///< Gauss-Seidel with safeguarded Anderson acceleration
+  admm,               ///< alternating directions only
+  proximal_newton,    ///< one sweep, then proximal semismooth Newton only
+  convex_relaxation   ///< min 1/2 x'Ax - b'x over the cones: never without being asked for
+};
+
+enum class Status : std::uint8_t {
+  unsolved,
+  solved,     ///< measure <= tolerance
+  stalled,    ///< no progress any more
+  cycling,    ///< the iteration repeats without progress; often no solution of the law is near
+  work_limit, ///< max_work or max_sweeps reached while there was progress
+  relaxed     ///< convex_relaxation converged, but its answer violates the law (see error)
+};
+
+const char* name(Measure measure);
+const char* name(Method method);
+const char* name(Status status);
+
+struct Options {
+  Law law = Law::maximum_dissipation;
+  double tolerance = 1e-9;  ///< measure <= tolerance ends the solve; > 0
+  Measure measure = Measure::automatic;
+  Method method = Method::automatic;
+  /// true: the law is never replaced. false: where maximum_dissipation does not converge, contacts
+  /// with eccentricity > 0.98 get the Coulomb rule in a second attempt; Solution::replaced lists them.
+  bool strict = false;
+  double relaxation = 1.0;    ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
+  int max_sweeps = 200000;    ///< of the plain methods and anderson
+  double max_work = 5e9;      ///< automatic: estimated nanoseconds, counted from operations
+  int anderson_depth = 10;    ///< 1 .. 20
+  bool warm_start = false;    ///< start from the impulses of the previous solve, found by contact id
+  bool history = false;       ///< record Solution::history
+};
+
+struct HistoryEntry {
+  Method stage = Method::automatic;
+  int iteration = 0;   ///< sweeps, ADMM iterations or factorisations so far
+  double error = 0;    ///< best measure so far
+};
+
+struct Counts {
+  int sweeps = 0, admm_iterations = 0, factorisations = 0, tests = 0, newton_phases = 0;
+  double work = 0;  ///< estimated nanoseconds
+};
+
+struct Solution {
+  Status status = Status::unsolved;
+  Eigen::VectorXd impulses, velocities;  ///< x and w = A x - b
+  std::vector<Regime> regimes;
+  std::vector<int> replaced;  ///< contacts with the Coulomb rule instead of maximum_dissipation
+  double error = Residuals::kNone;  ///< the measure that was compared with the tolerance
+  std::vector<HistoryEntry> history;
+  Counts counts;
+  std::string advice;  ///< what to try when it is not solved
+};
+
+/// Iterates on a Problem and keeps its workspace between solves; results depend only on the problem,
+/// the options and, with warm_start, the previous solution: never on the clock. Not for use by two
+/// threads at once.
+class Solver {
+ public:
+  explicit Solver(const Options& options = {});  ///< throws std::invalid_argument on illegal values
+  ~Solver();
+  Solver(Solver&&) noexcept;
+  Solver& operator=(Solver&&) noexcept;
+
+  Solution solve(const Problem& problem);
+  /// Start from the given impulses (dimension * contacts entries).
+  Solution solve(const Problem& problem, const Eigen::VectorXd& start);
+  /// The same, into storage that is used again.
+  void solve(const Problem& problem, Solution& solution);
+
+  const Options& options() const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace tether::contact

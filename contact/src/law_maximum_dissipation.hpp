@@ -1,0 +1,149 @@
+// Tether: Preclik and Ruede's one-contact MPCC. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+
+#include "local_geometry.hpp"
+
+namespace tether::contact::detail {
+
+// Sliding minimises the energy on the arc of the conic that sees the unconstrained minimum
+// y* = h / beta. With u at angle phi from u0 = y*/|y*| and t = tan(phi/2), the derivative along
+// the arc is a quartic in t that is negative at the near and positive at the far end (README,
+// section 3). Newton with bisection as safeguard on [0, 1], after reflection (root at phi < 0)
+// and inversion (root beyond 90 degrees). No trigonometric function is called.
+struct MaximumDissipation {
+  static constexpr Law kLaw = Law::maximum_dissipation;
+  static constexpr int kMaxEvaluations = 80;
+
+  static TETHER_INLINE Regime solve(const LocalBlock& L, double bn, double b0, double b1, double* x,
+                                    double& /*lambda*/, int& evaluations) {
+    if (!(bn > 0)) return separate(x);
+    if (L.mu == 0) {
+      x[0] = bn * L.inv_a;
+      x[1] = x[2] = 0;
+      return Regime::sliding;
+    }
+    const LocalRhs r = to_local(L, bn, b0, b1);
+    const double s0 = L.beta[1] * r.h0, s1 = L.beta[0] * r.h1;  // |B| y*
+    const double length = std::sqrt(s0 * s0 + s1 * s1);
+    if (sticks(L, r, s0, s1, length)) return stick(L, r, bn, x);
+
+    const double il = 1 / length, u0 = s0 * il, u1 = s1 * il;
+    // Cosine of half the visible arc, from the conic's tangents through y*.
+    const double kappa = (r.k * L.beta[0] * L.beta[1] - L.g[0] * s0 - L.g[1] * s1) * il;
+    // Frame (u0, R90 u0): h, g and M = k B - h g'.
+    const double h1 = u0 * r.h0 + u1 * r.h1, h2 = u0 * r.h1 - u1 * r.h0;
+    const double g1 = u0 * L.g[0] + u1 * L.g[1];
+    double g2 = u0 * L.g[1] - u1 * L.g[0];
+    const double kb0 = r.k * L.beta[0], kb1 = r.k * L.beta[1];
+    const double B12 = u0 * u1 * (kb1 - kb0);
+    const double M11 = kb0 * u0 * u0 + kb1 * u1 * u1 - h1 * g1, M12 = B12 - h1 * g2;
+    const double M21 = B12 - h2 * g1, M22 = kb0 * u1 * u1 + kb1 * u0 * u0 - h2 * g2;
+    const double S = h1 + M22 * g1 - M12 * g2, C = M21 * g1 - M11 * g2 - h2;
+    const double K = h1 * g2 - h2 * g1, dM = M22 - M11;
+    double q0 = M21 + C + K, q1 = 2 * (S + dM), q2 = 2 * (K - M21) - 4 * M12, q3 = 2 * (S - dM);
+    double q4 = M21 - C + K;
+    double side = 1;
+    if (q0 > 0) {  // the root lies at phi < 0: reflect
+      side = -1;
+      q0 = -q0;
+      q2 = -q2;
+      q4 = -q4;
+      g2 = -g2;
+    }
+    // Far end of the arc: T^2 = (1 - kappa) / (1 + kappa), and before the asymptote for e >= 1.
+    double far2 = kappa > -1 ? (1 - kappa) / (1 + kappa) : std::numeric_limits<double>::infinity();
+    double far = far2 < 1 ? std::sqrt(far2) : (far2 > 1e300 ? 1e150 : std::sqrt(far2));
+    if (L.e >= 1) {
+      // (1 - g1) t^2 + 2 g2 t + (1 + g1) > 0, positive at t = 0
+      const double A = 1 - g1, D = g2 * g2 - A * (1 + g1);
+      if (D >= 0) {
+        const double root = std::sqrt(D);
+        double cut = -1;
+        if (g2 < 0) {
+          cut = (1 + g1) / (-g2 + root);
+        } else if (A < 0) {
+          cut = (-g2 - root) / A;
+        }
+        if (cut > 0 && cut < far) far = cut;
+      }
+    }
+    // Warm start: the direction of the present tangential impulse.
+    double t = 0;
+    {
+      const double w0 = L.cosine * x[1] + L.sine * x[2], w1 = L.cosine * x[2] - L.sine * x[1];
+      const double w = std::sqrt(w0 * w0 + w1 * w1);
+      const double down = w + u0 * w0 + u1 * w1;
+      if (down > 1e-12 * w) t = side * (u0 * w1 - u1 * w0) / down;
+    }
+    bool inverted = false;
+    double lo = 0, hi = far;
+    if (far > 1) {
+      ++evaluations;
+      if (q0 + q1 + q2 + q3 + q4 < 0) {
+        inverted = true;
+        const double p0 = q0, p1 = q1;
+        q0 = -q4;
+        q1 = -q3;
+        q2 = -q2;
+        q3 = -p1;
+        q4 = -p0;
+        lo = 1 / far;
+        hi = 1;
+        t = t > 0 ? 1 / t : 1;
+      } else {
+        hi = 1;
+      }
+    }
+    if (!(t > lo)) t = lo;
+    if (t > hi) t = hi;
+    for (int n = 0; n < kMaxEvaluations; ++n) {
+      ++evaluations;
+      const double f = (((q4 * t + q3) * t + q2) * t + q1) * t + q0;
+      const double d = ((4 * q4 * t + 3 * q3) * t + 2 * q2) * t + q1;
+      if (f < 0) {
+        lo = t;
+      } else {
+        hi = t;
+      }
+      const double step = -f / d;
+      double next = t + step;
+      // Quadratic convergence: a Newton step of 1e-8 leaves 1e-16 or so.
+      if (std::abs(step) <= 1e-8 && d > 0) {
+        t = next < lo ? lo : (next > hi ? hi : next);
+        if (std::abs(step) <= 1e-8 * t || std::abs(step) <= 1e-12) break;
+        continue;
+      }
+      if (!(next > lo && next < hi) || !(d > 0)) next = 0.5 * (lo + hi);
+      if (next == t || hi - lo <= 4e-17) break;
+      t = next;
+    }
+    double co = 1 - t * t, si = 2 * t * side;
+    if (inverted) co = -co;
+    const double in = 1 / (1 + t * t);
+    co *= in;
+    si *= in;
+    const double v0 = co * u0 - si * u1, v1 = co * u1 + si * u0;
+    double denominator = 1 + L.g[0] * v0 + L.g[1] * v1;
+    const double floor = 1e-16 * (1 + L.e);
+    if (denominator < floor) denominator = floor;
+    const double radius = r.k / denominator;
+    const double opening = L.e * L.e - 1;
+    if (opening > 0 && denominator < 1e-3 * opening) {
+      return near_asymptote(L, r, radius * v0, radius * v1, x);
+    }
+    from_local(L, bn * L.inv_a / denominator, radius * v0, radius * v1, x);
+    return Regime::sliding;
+  }
+
+  // Far out on a hyperbola the angle says little about the radius. There y = c0 + p s + q / s,
+  // s >= 1, with p and q along the asymptotes, and dE/ds is almost linear (README, section 3).
+  static Regime near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0, double y1,
+                               double* x);
+
+  static void derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
+                         Regime regime, LocalDerivative& out);
+};
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,213 @@
+// Tether: the public one-contact solves. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/one_contact.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "law_coulomb.hpp"
+#include "law_frictionless.hpp"
+#include "law_maximum_dissipation.hpp"
+
+namespace tether::contact {
+
+const char* name(Law law) {
+  switch (law) {
+    case Law::maximum_dissipation: return "maximum_dissipation";
+    case Law::coulomb: return "coulomb";
+    case Law::frictionless: return "frictionless";
+  }
+  return "?";
+}
+
+const char* name(Regime regime) {
+  switch (regime) {
+    case Regime::separating: return "separating";
+    case Regime::sticking: return "sticking";
+    case Regime::sliding: return "sliding";
+  }
+  return "?";
+}
+
+LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
+  if (!(friction >= 0) || !std::isfinite(friction)) {
+    throw std::invalid_argument("friction coefficient must be finite and >= 0");
+  }
+  // Entry by entry: sums may overflow, comparisons with NaN are false.
+  double trace = A.trace();
+  if (!A.allFinite() || !std::isfinite(trace)) {
+    throw std::invalid_argument("contact matrix has an entry that is not finite");
+  }
+  a = A(0, 0);
+  if (!(a > 0)) throw std::invalid_argument("contact matrix needs A_nn > 0");
+  inv_a = 1 / a;
+  mu = friction;
+  c[0] = 0.5 * (A(0, 1) + A(1, 0));
+  c[1] = 0.5 * (A(0, 2) + A(2, 0));
+  // B = T - c c'/a and its rotation V, tan(2 theta) = 2 B01 / (B00 - B11).
+  const double B00 = A(1, 1) - c[0] * c[0] * inv_a, B11 = A(2, 2) - c[1] * c[1] * inv_a;
+  const double B01 = 0.5 * (A(1, 2) + A(2, 1)) - c[0] * c[1] * inv_a;
+  cosine = 1;
+  sine = 0;
+  beta[0] = B00;
+  beta[1] = B11;
+  if (B01 != 0) {
+    // Jacobi rotation with |theta| <= pi/4.
+    const double theta = (B11 - B00) / (2 * B01);
+    const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+    cosine = 1 / std::sqrt(t * t + 1);
+    sine = -t * cosine;
+    beta[0] = B00 - t * B01;
+    beta[1] = B11 + t * B01;
+  }
+  if (std::min(beta[0], beta[1]) < -1e-8 * trace) {
+    throw std::invalid_argument("contact matrix is not positive semidefinite");
+  }
+  const double floor = 1e-12 * trace;
+  beta[0] = std::max(beta[0], floor);
+  beta[1] = std::max(beta[1], floor);
+  const double cc = cosine * cosine, ss = sine * sine, cs = cosine * sine;
+  T[0] = cc * beta[0] + ss * beta[1] + c[0] * c[0] * inv_a;
+  T[1] = cs * (beta[0] - beta[1]) + c[0] * c[1] * inv_a;
+  T[2] = ss * beta[0] + cc * beta[1] + c[1] * c[1] * inv_a;
+  g[0] = mu * inv_a * (cosine * c[0] + sine * c[1]);
+  g[1] = mu * inv_a * (cosine * c[1] - sine * c[0]);
+  e = std::sqrt(g[0] * g[0] + g[1] * g[1]);
+}
+
+Eigen::Matrix3d LocalBlock::matrix() const {
+  Eigen::Matrix3d A;
+  A << a, c[0], c[1], c[0], T[0], T[1], c[1], T[1], T[2];
+  return A;
+}
+
+namespace {
+
+// The kernels are inlined here once more, so that they are cloned for the machine.
+TETHER_CLONES Regime solve_dissipation(const LocalBlock& L, const double* b, double* x,
+                                       double& lambda, int& evaluations) {
+  return detail::MaximumDissipation::solve(L, b[0], b[1], b[2], x, lambda, evaluations);
+}
+TETHER_CLONES Regime solve_coulomb(const LocalBlock& L, const double* b, double* x, double& lambda,
+                                   int& evaluations) {
+  return detail::Coulomb::solve(L, b[0], b[1], b[2], x, lambda, evaluations);
+}
+
+}  // namespace
+
+void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, LocalState& s) {
+  s.evaluations = 0;
+  switch (law) {
+    case Law::maximum_dissipation:
+      s.regime = solve_dissipation(block, b.data(), s.x, s.lambda, s.evaluations);
+      return;
+    case Law::coulomb:
+      s.regime = solve_coulomb(block, b.data(), s.x, s.lambda, s.evaluations);
+      return;
+    case Law::frictionless:
+      s.regime = detail::Frictionless::solve(block, b[0], b[1], b[2], s.x, s.lambda, s.evaluations);
+      return;
+  }
+}
+
+OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b, double mu) {
+  if (!b.allFinite()) throw std::invalid_argument("right-hand side has an entry that is not finite");
+  LocalState state;
+  solve_local(law, LocalBlock(A, mu), b, state);
+  return {Eigen::Vector3d(state.x[0], state.x[1], state.x[2]), state.regime, state.evaluations};
+}
+
+OneContact solve_one_golden_section(const LocalBlock& L, const Eigen::Vector3d& b,
+                                    double angle_tolerance) {
+  OneContact out;
+  if (!(b[0] > 0)) return out;
+  double x[3];
+  const detail::LocalRhs r = detail::to_local(L, b[0], b[1], b[2]);
+  const double s0 = L.beta[1] * r.h0, s1 = L.beta[0] * r.h1, length = std::hypot(s0, s1);
+  if (L.mu == 0) {
+    out.impulse << b[0] * L.inv_a, 0, 0;
+    out.regime = Regime::sliding;
+    return out;
+  }
+  if (detail::sticks(L, r, s0, s1, length)) {
+    out.regime = detail::stick(L, r, b[0], x);
+    out.impulse << x[0], x[1], x[2];
+    return out;
+  }
+  const double pi = 3.14159265358979323846;
+  const double center = std::atan2(s1, s0);
+  const double kappa = (r.k * L.beta[0] * L.beta[1] - L.g[0] * s0 - L.g[1] * s1) / length;
+  const double reach = kappa <= -1 ? pi : std::acos(std::min(1.0, kappa));
+  double lo = center - reach, hi = center + reach;
+  if (L.e >= 1) {  // stay between the asymptotes
+    const double d = std::remainder(std::atan2(L.g[1], L.g[0]) - center, 2 * pi);
+    const double open = std::acos(-1 / L.e);
+    lo = std::max(lo, center + d - open);
+    hi = std::min(hi, center + d + open);
+  }
+  const auto radius = [&](double angle) {
+    const double q = 1 + L.g[0] * std::cos(angle) + L.g[1] * std::sin(angle);
+    return q > 0 ? r.k / q : std::numeric_limits<double>::infinity();
+  };
+  const auto energy = [&](double angle) {
+    ++out.evaluations;
+    const double p = radius(angle);
+    if (!std::isfinite(p)) return std::numeric_limits<double>::infinity();
+    const double y0 = p * std::cos(angle), y1 = p * std::sin(angle);
+    return (0.5 * L.beta[0] * y0 - r.h0) * y0 + (0.5 * L.beta[1] * y1 - r.h1) * y1;
+  };
+  const double ratio = 0.6180339887498948482;
+  double left = hi - ratio * (hi - lo), right = lo + ratio * (hi - lo);
+  double at_left = energy(left), at_right = energy(right);
+  while (hi - lo > angle_tolerance && left < right) {
+    if (at_left < at_right) {
+      hi = right;
+      right = left;
+      at_right = at_left;
+      left = hi - ratio * (hi - lo);
+      at_left = energy(left);
+    } else {
+      lo = left;
+      left = right;
+      at_left = at_right;
+      right = lo + ratio * (hi - lo);
+      at_right = energy(right);
+    }
+  }
+  const double angle = at_left < at_right ? left : right, p = radius(angle);
+  detail::from_local(L, p / L.mu, p * std::cos(angle), p * std::sin(angle), x);
+  out.impulse << x[0], x[1], x[2];
+  out.regime = Regime::sliding;
+  return out;
+}
+
+PlanarContact solve_planar(Law law, const Eigen::Matrix2d& A, const Eigen::Vector2d& b, double mu) {
+  const double a = A(0, 0), c = 0.5 * (A(0, 1) + A(1, 0));
+  if (!A.allFinite() || !b.allFinite() || !(a > 0)) {
+    throw std::invalid_argument("planar contact needs finite A and b with A_nn > 0");
+  }
+  if (!(mu >= 0) || !std::isfinite(mu)) {
+    throw std::invalid_argument("friction coefficient must be finite and >= 0");
+  }
+  PlanarContact out;
+  if (!(b[0] > 0)) return out;
+  if (law == Law::frictionless || mu == 0) {
+    out.impulse << b[0] / a, 0;
+    out.regime = Regime::sliding;
+    return out;
+  }
+  const double B = std::max(A(1, 1) - c * c / a, 1e-12 * A.trace()), h = b[1] - c * b[0] / a;
+  // Interval of admissible x_t; a nonpositive denominator is an end at infinity. In the plane both
+  // laws pick the same point of it.
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double lower = a - mu * c > 0 ? -mu * b[0] / (a - mu * c) : -infinity;
+  const double upper = a + mu * c > 0 ? mu * b[0] / (a + mu * c) : infinity;
+  const double free = h / B, xt = std::clamp(free, lower, upper);
+  out.regime = xt == free ? Regime::sticking : Regime::sliding;
+  out.impulse << (out.regime == Regime::sliding ? std::abs(xt) / mu : (b[0] - c * xt) / a), xt;
+  return out;
+}
+
+}  // namespace tether::contact

@@ -1,0 +1,145 @@
+// Tether: storage of contact problems. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/problem.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace tether::contact {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+int dimension_of(const Eigen::VectorXd& b, const Eigen::VectorXd& mu) {
+  for (int d : {3, 2}) {
+    if (b.size() == d * mu.size()) return d;
+  }
+  throw std::invalid_argument("b has " + std::to_string(b.size()) + " entries, which is neither 3 nor 2 for each of " +
+                              std::to_string(mu.size()) + " friction coefficients");
+}
+
+}  // namespace
+
+Problem Problem::dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
+                       const Eigen::VectorXd& mu) {
+  const int d = dimension_of(b, mu), n = static_cast<int>(mu.size());
+  if (A.rows() != b.size() || A.cols() != b.size()) {
+    throw std::invalid_argument("A is " + std::to_string(A.rows()) + " x " +
+                                std::to_string(A.cols()) + ", b has " + std::to_string(b.size()) +
+                                " entries");
+  }
+  std::vector<MatrixBlock> blocks;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const auto part = A.block(d * i, d * j, d, d);
+      if (i != j && (part.array() == 0).all()) continue;
+      MatrixBlock block{i, j, Eigen::Matrix3d::Zero()};
+      block.value.topLeftCorner(d, d) = part;
+      blocks.push_back(block);
+    }
+  }
+  return sparse(d, std::move(blocks), b, mu);
+}
+
+Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const Eigen::VectorXd& b,
+                        const Eigen::VectorXd& mu) {
+  const int n = static_cast<int>(mu.size()), d = dimension;
+  if (d != 2 && d != 3) throw std::invalid_argument("dimension must be 2 or 3");
+  if (b.size() != d * mu.size()) {
+    throw std::invalid_argument("b needs " + std::to_string(d * n) + " entries, it has " +
+                                std::to_string(b.size()));
+  }
+  if (!b.allFinite()) throw std::invalid_argument("b has an entry that is not finite");
+  const std::size_t given = blocks.size();
+  for (std::size_t k = 0; k < given; ++k) {
+    const MatrixBlock& block = blocks[k];
+    if (block.row < 0 || block.row >= n || block.column < 0 || block.column >= n) {
+      throw std::invalid_argument("block (" + std::to_string(block.row) + ", " +
+                                  std::to_string(block.column) + ") lies outside of " +
+                                  std::to_string(n) + " contacts");
+    }
+    if (!block.value.topLeftCorner(d, d).allFinite()) {
+      throw std::invalid_argument("A has an entry that is not finite in block (" +
+                                  std::to_string(block.row) + ", " + std::to_string(block.column) +
+                                  ")");
+    }
+    // A zero on the other side keeps the pattern symmetric.
+    if (block.row != block.column) {
+      blocks.push_back({blocks[k].column, blocks[k].row, Eigen::Matrix3d::Zero()});
+    }
+  }
+  for (int i = 0; i < n; ++i) blocks.push_back({i, i, Eigen::Matrix3d::Zero()});
+  std::stable_sort(blocks.begin(), blocks.end(), [](const MatrixBlock& p, const MatrixBlock& q) {
+    return p.row != q.row ? p.row < q.row : p.column < q.column;
+  });
+
+  Problem out;
+  out.dimension_ = d;
+  out.b_ = b;
+  out.row_start_.assign(at(n + 1), 0);
+  for (std::size_t k = 0; k < blocks.size();) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    const int row = blocks[k].row, column = blocks[k].column;
+    for (; k < blocks.size() && blocks[k].row == row && blocks[k].column == column; ++k) {
+      sum.topLeftCorner(d, d) += blocks[k].value.topLeftCorner(d, d);
+    }
+    // The plane is a 3-D contact whose second tangent is decoupled and at rest.
+    if (d == 2 && row == column) sum(2, 2) = sum(1, 1) > 0 ? sum(1, 1) : sum(0, 0);
+    PackedBlock packed;
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r) packed.column[4 * c + r] = sum(r, c);
+    out.columns_.push_back(column);
+    out.blocks_.push_back(packed);
+    ++out.row_start_[at(row + 1)];
+    if (row == column) {
+      try {
+        out.local_.emplace_back(sum, mu[row]);
+      } catch (const std::invalid_argument& e) {
+        throw std::invalid_argument("contact " + std::to_string(row) + ": " + e.what());
+      }
+    }
+  }
+  for (int i = 0; i < n; ++i) out.row_start_[at(i + 1)] += out.row_start_[at(i)];
+  out.packed_b_ = out.pack(b);
+  return out;
+}
+
+void Problem::set_ids(std::vector<std::uint64_t> ids) {
+  if (ids.size() != local_.size()) throw std::invalid_argument("one id for each contact is needed");
+  ids_ = std::move(ids);
+}
+
+Eigen::MatrixXd Problem::dense_matrix() const {
+  const int n = contacts(), d = dimension_;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(d * n, d * n);
+  for (int i = 0; i < n; ++i) {
+    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k) {
+      for (int c = 0; c < d; ++c)
+        for (int r = 0; r < d; ++r)
+          A(d * i + r, d * columns_[at(k)] + c) = blocks_[at(k)].column[4 * c + r];
+    }
+  }
+  return A;
+}
+
+std::vector<PackedVector> Problem::pack(const Eigen::VectorXd& x) const {
+  const int n = contacts(), d = dimension_;
+  if (x.size() != d * n) {
+    throw std::invalid_argument("vector needs " + std::to_string(d * n) + " entries, it has " +
+                                std::to_string(x.size()));
+  }
+  std::vector<PackedVector> out(at(n));
+  for (int i = 0; i < n; ++i)
+    for (int r = 0; r < d; ++r) out[at(i)].v[r] = x[d * i + r];
+  return out;
+}
+
+void Problem::unpack(const std::vector<PackedVector>& x, Eigen::VectorXd& out) const {
+  const int n = contacts(), d = dimension_;
+  out.resize(d * n);
+  for (int i = 0; i < n; ++i)
+    for (int r = 0; r < d; ++r) out[d * i + r] = x[at(i)].v[r];
+}
+
+}  // namespace tether::contact

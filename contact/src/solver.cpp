@@ -1,0 +1,415 @@
+// Tether: solver of contact problems: the order of the stages. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/solver.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <unordered_map>
+
+#include "accelerated_sweeps.hpp"
+#include "admm.hpp"
+#include "convex_relaxation.hpp"
+#include "proximal_newton.hpp"
+
+namespace tether::contact {
+
+using detail::at;
+using detail::Packed;
+
+const char* name(Measure measure) {
+  switch (measure) {
+    case Measure::automatic: return "automatic";
+    case Measure::natural_map: return "natural_map";
+    case Measure::natural_map_data: return "natural_map_data";
+    case Measure::fixed_point: return "fixed_point";
+  }
+  return "?";
+}
+
+const char* name(Method method) {
+  switch (method) {
+    case Method::automatic: return "automatic";
+    case Method::gauss_seidel: return "gauss_seidel";
+    case Method::sor: return "sor";
+    case Method::jacobi: return "jacobi";
+    case Method::anderson: return "anderson";
+    case Method::admm: return "admm";
+    case Method::proximal_newton: return "proximal_newton";
+    case Method::convex_relaxation: return "convex_relaxation";
+  }
+  return "?";
+}
+
+const char* name(Status status) {
+  switch (status) {
+    case Status::unsolved: return "unsolved";
+    case Status::solved: return "solved";
+    case Status::stalled: return "stalled";
+    case Status::cycling: return "cycling";
+    case Status::work_limit: return "work_limit";
+    case Status::relaxed: return "relaxed";
+  }
+  return "?";
+}
+
+namespace {
+
+// Contacts with e above this may have no solution near under maximum_dissipation: the block map
+// jumps at b_n = 0 when e > 1.
+constexpr double kStronglyCoupled = 0.98;
+constexpr double kCoupled = 0.8;
+
+void check(const Options& o) {
+  if (!(o.tolerance > 0)) throw std::invalid_argument("tolerance must be > 0");
+  if (!(o.relaxation > 0 && o.relaxation < 2)) {
+    throw std::invalid_argument("relaxation must lie between 0 and 2");
+  }
+  if (o.method == Method::jacobi && o.relaxation > 1) {
+    throw std::invalid_argument("relaxation of jacobi must not exceed 1");
+  }
+  if (o.max_sweeps < 1) throw std::invalid_argument("max_sweeps must be >= 1");
+  if (!(o.max_work > 0)) throw std::invalid_argument("max_work must be > 0");
+  if (o.anderson_depth < 1 || o.anderson_depth > detail::Anderson::kMaxDepth) {
+    throw std::invalid_argument("anderson_depth must lie in 1 .. 20");
+  }
+}
+
+}  // namespace
+
+struct Solver::Implementation {
+  Options options;
+  detail::Search search;
+  detail::AcceleratedSweeps sweeps;
+  detail::Admm admm;
+  detail::ProximalNewton newton;
+  Packed x, z;
+  std::unordered_map<std::uint64_t, PackedVector> memory;
+  bool stages_ready = false;
+
+  void solve(const Problem& problem, const Eigen::VectorXd* start, Solution& out);
+  void prepare_stages(int n);
+  Status automatic();
+  Status rotate();
+  Status plain();
+  Status give_up();
+  bool replace_contacts(double eccentricity, bool only_unconverged);
+  void finish(const Problem& problem, Status status, Solution& out);
+};
+
+void Solver::Implementation::prepare_stages(int n) {
+  if (stages_ready) return;
+  sweeps.reset(n, options.anderson_depth);
+  newton.reset(n);
+  admm.reset(n);
+  stages_ready = true;
+}
+
+// What the failed iteration looks like: plain sweeps from the best point that keep moving are a
+// cycle (or a wander), those that come to rest above the tolerance are a stall.
+Status Solver::Implementation::give_up() {
+  if (search.exhausted()) return Status::work_limit;
+  x = search.best;
+  double change = 0, size = 0;
+  for (int k = 0; k < 100; ++k) {
+    z = x;
+    search.system.sweep(x.data());
+    search.count_sweep();
+  }
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      change += (x[i].v[c] - z[i].v[c]) * (x[i].v[c] - z[i].v[c]);
+      size += x[i].v[c] * x[i].v[c];
+    }
+  return change > 1e-8 * size ? Status::cycling : Status::stalled;
+}
+
+// Stages in rotation (README, section 9).
+Status Solver::Implementation::rotate() {
+  constexpr int kPhases = 2;      // Newton phases before a rescue
+  constexpr int kPatience = 3;    // rotations without halving the error
+  prepare_stages(search.system.size());
+  sweeps.start(search.best.data());
+  double kappa = 1, halved = search.best_error, tenth = search.best_error;
+  int phases = 0, bursts = 4, burst = 500, patience = 0, outers = 12;
+  for (;;) {
+    detail::AcceleratedSweeps::Leave leave;
+    leave.other_cost = newton.cost(search);
+    leave.least_work = kappa * leave.other_cost;
+    sweeps.run(search, leave);
+    if (search.solved()) return Status::solved;
+    if (search.exhausted()) return Status::work_limit;
+
+    const double before = search.best_error;
+    admm.start(search, search.best.data());
+    admm.run(search, 200, true, true);
+    if (search.solved()) return Status::solved;
+    newton.run(search, search.best.data(), 12);
+    if (search.solved()) return Status::solved;
+    if (search.exhausted()) return Status::work_limit;
+    if (search.best_error < 0.9 * before) sweeps.start(search.best.data());
+    kappa = std::min(64.0, 2 * kappa);
+    if (search.best_error < 0.1 * tenth) {
+      tenth = search.best_error;
+      kappa = 1;
+    }
+    if (++phases < kPhases) continue;
+
+    // Rescue: long plain alternating directions identify the active set, Newton finishes.
+    phases = 0;
+    for (int k = 0; k < bursts; ++k) {
+      if (!admm.started()) admm.start(search, search.best.data());
+      if (!admm.started()) break;
+      admm.run(search, burst, false, false);
+      if (search.solved()) return Status::solved;
+      newton.run(search, admm.point(), outers);
+      if (search.solved()) return Status::solved;
+      if (search.exhausted()) return Status::work_limit;
+      burst = std::min(20000, burst + burst / 2);
+      outers = std::min(60, outers + 12);
+    }
+    bursts = std::min(16, bursts + 2);
+    sweeps.start(search.best.data());
+    if (search.best_error > 0.5 * halved) {
+      if (++patience >= kPatience) return give_up();
+    } else {
+      patience = 0;
+      halved = search.best_error;
+    }
+  }
+}
+
+bool Solver::Implementation::replace_contacts(double eccentricity, bool only_unconverged) {
+  detail::System& system = search.system;
+  bool any = false;
+  system.blocks(search.best.data(), z.data());
+  double worst = 0;
+  std::vector<double> defect(z.size());
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      const double d = z[i].v[c] - search.best[i].v[c];
+      defect[i] += d * d;
+    }
+    defect[i] = system.weight(static_cast<int>(i)) * std::sqrt(defect[i]);
+    worst = std::max(worst, defect[i]);
+  }
+  for (int i = 0; i < system.size(); ++i) {
+    if (system.problem().local(i).e <= eccentricity || system.replaced(i)) continue;
+    if (only_unconverged && defect[at(i)] < 1e-2 * worst) continue;
+    system.replace(i);
+    any = true;
+  }
+  return any;
+}
+
+Status Solver::Implementation::automatic() {
+  // Nothing is allocated before a first sweep has failed.
+  search.test(x.data(), Method::gauss_seidel);
+  if (search.solved()) return Status::solved;
+  search.system.sweep(x.data());
+  search.count_sweep();
+  search.test(x.data(), Method::gauss_seidel);
+  if (search.solved()) return Status::solved;
+  Status status = rotate();
+  if (options.law != Law::maximum_dissipation || options.strict) return status;
+  z.resize(x.size());
+  for (int attempt = 0; attempt < 3 && status != Status::solved && status != Status::work_limit; ++attempt) {
+    if (!replace_contacts(attempt < 2 ? kStronglyCoupled : kCoupled, attempt == 0)) continue;
+    x = search.best;
+    search.best_error = std::numeric_limits<double>::infinity();
+    search.test(x.data(), Method::gauss_seidel);
+    stages_ready = false;
+    status = search.solved() ? Status::solved : rotate();
+  }
+  return status;
+}
+
+// gauss_seidel, sor, jacobi
+Status Solver::Implementation::plain() {
+  detail::System& system = search.system;
+  const Problem& problem = system.problem();
+  double damping = 1;
+  if (options.method == Method::jacobi) {
+    // Largest eigenvalue of D^-1 A <= most blocks in a row for A = J M^-1 J'.
+    int most = 1;
+    for (int i = 0; i < system.size(); ++i)
+      most = std::max(most, problem.row_start()[at(i + 1)] - problem.row_start()[at(i)]);
+    damping = options.relaxation * std::min(1.0, 1.8 / most);
+  } else if (options.method == Method::sor) {
+    damping = options.relaxation;
+  }
+  z.resize(x.size());
+  search.test(x.data(), options.method);
+  int next_test = 1, window = 2000, window_end = 2000;
+  double window_error = search.best_error;
+  for (int sweep = 1; sweep <= options.max_sweeps && !search.solved(); ++sweep) {
+    search.count_sweep();
+    if (options.method == Method::gauss_seidel) {
+      system.sweep(x.data());
+    } else {
+      if (options.method == Method::jacobi) {
+        system.blocks(x.data(), z.data());
+      } else {
+        z = x;
+        system.sweep(z.data());
+      }
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        for (int c = 0; c < 3; ++c) x[i].v[c] += damping * (z[i].v[c] - x[i].v[c]);
+        detail::clip_cone(problem.locals()[i].mu, x[i].v);
+      }
+    }
+    if (sweep >= next_test || sweep == options.max_sweeps) {
+      search.test(x.data(), options.method);
+      next_test = sweep + 1 + sweep / 8;
+    }
+    if (search.exhausted()) return Status::work_limit;
+    if (sweep >= window_end) {
+      if (search.best_error > 0.999 * window_error) return give_up();
+      window_error = search.best_error;
+      window *= 2;
+      window_end = sweep + window;
+    }
+  }
+  return search.solved() ? Status::solved : Status::work_limit;
+}
+
+void Solver::Implementation::finish(const Problem& problem, Status status, Solution& out) {
+  detail::System& system = search.system;
+  const std::size_t n = x.size();
+  out.status = status;
+  out.error = search.best_error;
+  out.counts = search.counts;
+  out.history.swap(search.history);
+  problem.unpack(search.best, out.impulses);
+  system.velocities(search.best.data(), x.data());
+  problem.unpack(x, out.velocities);
+  out.regimes.resize(n);
+  out.replaced.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double* r = search.best[i].v;
+    const double reach = problem.locals()[i].mu * r[0];
+    const double t2 = r[1] * r[1] + r[2] * r[2];
+    out.regimes[i] = !(r[0] > 0) ? Regime::separating
+                     : (options.law == Law::frictionless || t2 >= reach * reach * (1 - 1e-9))
+                         ? Regime::sliding
+                         : Regime::sticking;
+    if (system.any_replaced() && system.replaced(static_cast<int>(i))) {
+      out.replaced.push_back(static_cast<int>(i));
+    }
+  }
+  switch (status) {
+    case Status::solved: out.advice.clear(); break;
+    case Status::cycling:
+      out.advice = options.law == Law::maximum_dissipation && options.strict
+                       ? "no fixed point was found; try strict = false, or Law::coulomb"
+                       : "no fixed point was found; try another start, a shorter time step or Method::convex_relaxation";
+      break;
+    case Status::stalled: out.advice = "round-off or ill-conditioned data; try a larger tolerance or Method::automatic"; break;
+    case Status::work_limit: out.advice = "raise max_work or max_sweeps, or use Method::automatic"; break;
+    case Status::relaxed: out.advice = "the convex relaxation is solved; error is the residual of the law"; break;
+    case Status::unsolved: break;
+  }
+}
+
+void Solver::Implementation::solve(const Problem& problem, const Eigen::VectorXd* start,
+                                   Solution& out) {
+  const std::size_t n = static_cast<std::size_t>(problem.contacts());
+  Measure measure = options.measure;
+  if (measure == Measure::automatic) {
+    measure = options.law == Law::maximum_dissipation ? Measure::fixed_point : Measure::natural_map;
+  }
+  search.reset(problem, options, measure);
+  stages_ready = false;
+  if (start) {
+    if (!start->allFinite()) throw std::invalid_argument("start has an entry that is not finite");
+    x = problem.pack(*start);
+  } else {
+    x.assign(n, PackedVector());
+    if (options.warm_start) {
+      for (std::size_t i = 0; i < n; ++i) {
+        const auto found = memory.find(problem.id(static_cast<int>(i)));
+        if (found != memory.end()) x[i] = found->second;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (options.law == Law::frictionless) {
+      x[i].v[1] = x[i].v[2] = 0;
+      x[i].v[0] = std::max(x[i].v[0], 0.0);
+    } else {
+      detail::clip_cone(problem.locals()[i].mu, x[i].v);
+    }
+  }
+  Status status = Status::unsolved;
+  switch (options.method) {
+    case Method::automatic: status = automatic(); break;
+    case Method::gauss_seidel:
+    case Method::sor:
+    case Method::jacobi: status = plain(); break;
+    case Method::anderson: {
+      search.test(x.data(), Method::anderson);
+      if (search.solved()) {
+        status = Status::solved;
+        break;
+      }
+      prepare_stages(problem.contacts());
+      sweeps.start(x.data());
+      detail::AcceleratedSweeps::Leave leave;
+      leave.most_sweeps = options.max_sweeps;
+      sweeps.run(search, leave);
+      status = search.solved() ? Status::solved : give_up();
+      break;
+    }
+    case Method::admm:
+      search.test(x.data(), Method::admm);
+      prepare_stages(problem.contacts());
+      admm.start(search, x.data());
+      if (!search.solved()) admm.run(search, options.max_sweeps, true, false);
+      status = search.solved() ? Status::solved : give_up();
+      break;
+    case Method::proximal_newton:
+      search.test(x.data(), Method::gauss_seidel);
+      prepare_stages(problem.contacts());
+      search.system.sweep(x.data());
+      search.count_sweep();
+      search.test(x.data(), Method::gauss_seidel);
+      if (!search.solved()) newton.run(search, x.data(), 60);
+      status = search.solved() ? Status::solved : give_up();
+      break;
+    case Method::convex_relaxation: {
+      const bool done = detail::solve_convex_relaxation(search, x);
+      search.test(x.data(), Method::convex_relaxation);
+      status = search.solved() ? Status::solved : done ? Status::relaxed : Status::work_limit;
+      break;
+    }
+  }
+  if (options.warm_start) {
+    memory.clear();
+    for (std::size_t i = 0; i < n; ++i) memory[problem.id(static_cast<int>(i))] = search.best[i];
+  }
+  finish(problem, status, out);
+}
+
+Solver::Solver(const Options& options) : implementation_(new Implementation) {
+  check(options);
+  implementation_->options = options;
+}
+Solver::~Solver() = default;
+Solver::Solver(Solver&&) noexcept = default;
+Solver& Solver::operator=(Solver&&) noexcept = default;
+
+Solution Solver::solve(const Problem& problem) {
+  Solution out;
+  implementation_->solve(problem, nullptr, out);
+  return out;
+}
+Solution Solver::solve(const Problem& problem, const Eigen::VectorXd& start) {
+  Solution out;
+  implementation_->solve(problem, &start, out);
+  return out;
+}
+void Solver::solve(const Problem& problem, Solution& solution) {
+  implementation_->solve(problem, nullptr, solution);
+}
+const Options& Solver::options() const { return implementation_->options; }
+
+}  // namespace tether::contact

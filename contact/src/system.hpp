@@ -1,0 +1,115 @@
+// Tether: what the stages of the solver share: kernels on a problem under a law.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/solver.hpp>
+
+#include "local_geometry.hpp"
+
+namespace tether::contact::detail {
+
+using Packed = std::vector<PackedVector>;
+
+inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Norms that a test leaves behind.
+struct Test {
+  double natural = 0, fixed = 0, x = 0, w = 0;
+};
+
+// Proximal term (tau / 2) |x - anchor|^2 in the metric of the diagonal blocks; none if anchor = null.
+struct Proximal {
+  double tau = 0;
+  const PackedVector* anchor = nullptr;
+};
+
+// A problem together with the law for each contact. Kernels are built for the machine at hand.
+class System {
+ public:
+  void reset(const Problem& problem, Law law);
+
+  const Problem& problem() const { return *problem_; }
+  Law law() const { return law_; }
+  int size() const { return n_; }
+  double norm_b() const { return norm_b_; }
+  bool replaced(int i) const { return any_replaced_ && rule_[at(i)] != 0; }
+  bool any_replaced() const { return any_replaced_; }
+  // The Coulomb rule at contact i instead of maximum_dissipation.
+  void replace(int i);
+  double weight(int i) const { return weight_[at(i)]; }
+  const std::vector<double>& weights() const { return weight_; }
+  double lambda(int i) const { return lambda_[at(i)]; }
+
+  // One Gauss-Seidel sweep on x in place, contacts in the given order.
+  void sweep(PackedVector* x, const Proximal& proximal = {});
+  // out_i = block solution of contact i with all others as in x (Jacobi). Regimes and, if asked
+  // for, derivatives dx/db of each block; returns (sum weight^2 |out - x|^2)^1/2.
+  double blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal = {},
+                Regime* regimes = nullptr, LocalDerivative* derivatives = nullptr);
+  // w = A x - b
+  void velocities(const PackedVector* x, PackedVector* w) const;
+  // Natural map with the norms of x and w, or the block fixed point alone. scratch is overwritten.
+  Test natural_map(const PackedVector* x, PackedVector* scratch);
+  Test fixed_point(const PackedVector* x, PackedVector* scratch);
+  double measure(const Test& test, Measure measure) const;
+
+  // gamma of contact i in its own frame: mu c / a for maximum_dissipation, 0 for the Coulomb rule.
+  void gamma(int i, double* out) const;
+
+  int sweeps = 0;
+
+ private:
+  const Problem* problem_ = nullptr;
+  Law law_ = Law::coulomb;
+  int n_ = 0;
+  double norm_b_ = 0;
+  bool any_replaced_ = false;
+  std::vector<char> rule_;
+  std::vector<double> weight_, lambda_;
+};
+
+// |x_t| <= mu x_n, the nearest point (Euclid).
+TETHER_INLINE void project_cone(double mu, double* v) {
+  const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
+  if (t <= mu * v[0]) return;
+  if (mu * t <= -v[0]) {
+    v[0] = v[1] = v[2] = 0;
+    return;
+  }
+  const double n = (v[0] + mu * t) / (1 + mu * mu), f = t > 0 ? mu * n / t : 0;
+  v[0] = n;
+  v[1] *= f;
+  v[2] *= f;
+}
+
+// Radially: keeps x_n.
+TETHER_INLINE void clip_cone(double mu, double* v) {
+  if (!(v[0] > 0)) {
+    v[0] = v[1] = v[2] = 0;
+    return;
+  }
+  const double t2 = v[1] * v[1] + v[2] * v[2], r = mu * v[0];
+  if (t2 <= r * r) return;
+  const double f = r / std::sqrt(t2);
+  v[1] *= f;
+  v[2] *= f;
+}
+
+// s >= 0 with s = |w_t + s gamma|, the slip variable of the law; 0 for e >= 1 without such s.
+TETHER_INLINE double slip(double w0, double w1, double g0, double g1) {
+  const double ww = w0 * w0 + w1 * w1, gg = g0 * g0 + g1 * g1;
+  if (gg == 0) return std::sqrt(ww);
+  const double wg = w0 * g0 + w1 * g1, q = 1 - gg;
+  const double D = wg * wg + q * ww;
+  if (!(D >= 0)) return std::sqrt(ww);
+  const double root = std::sqrt(D);
+  // q s^2 - 2 wg s - ww = 0
+  if (wg + root > 0 && q > 0) return (wg + root) / q;
+  if (root - wg > 0) return ww / (root - wg);
+  return std::sqrt(ww);
+}
+
+double dot(const double* p, const double* q, int n);
+void axpy(double a, const double* p, double* q, int n);  // q += a p
+
+}  // namespace tether::contact::detail
