@@ -56,6 +56,8 @@ struct Coulomb {
   // Root of s(l) = k in [lo, hi], s decreasing through it.
   static TETHER_INLINE void refine(const LocalBlock& L, const LocalRhs& r, double beta_min,
                                    double lo, double hi, double& l, int& evaluations) {
+    // A Newton step of 3e-8 leaves round-off unless the two beta are far apart.
+    const double stop = L.beta[0] + L.beta[1] < 1e3 * beta_min ? 3e-8 : 1e-12;
     for (int n = 0; n < kMaxEvaluations; ++n) {
       ++evaluations;
       const double d0 = 1 / (L.beta[0] + l), d1 = 1 / (L.beta[1] + l);
@@ -70,7 +72,7 @@ struct Coulomb {
       }
       const double step = s * (r.k - s) / (r.k * ds);
       double next = l + step;
-      if (std::abs(step) <= 3e-8 * (l + beta_min) && ds * s * r.k < 0) {
+      if (std::abs(step) <= stop * (l + beta_min) && ds * s * r.k < 0) {
         l = next < lo ? lo : (next > hi ? hi : next);
         return;
       }

@@ -92,7 +92,8 @@ Regime Coulomb::nearest(const LocalBlock& L, double bn, double b0, double b1, do
     stick(L, r, bn, z);
     offer(z, Regime::sticking, lambda);
   }
-  // Sign changes of s - k on a logarithmic grid, 8 decades around beta.
+  // Sign changes of s - k on a logarithmic grid, 6 decades around beta, and beyond it up to the
+  // asymptote lambda ~ (|h| + g.h) / k.
   const double beta_min = std::min(L.beta[0], L.beta[1]), beta_max = std::max(L.beta[0], L.beta[1]);
   const auto excess = [&](double l) {
     ++evaluations;
@@ -100,18 +101,21 @@ Regime Coulomb::nearest(const LocalBlock& L, double bn, double b0, double b1, do
     return std::sqrt(y0 * y0 + y1 * y1) + L.g[0] * y0 + L.g[1] * y1 - r.k;
   };
   constexpr int kGrid = 40;
-  const double first = 1e-6 * beta_min;
-  double last = 1e6 * beta_max;
+  const double first = 1e-6 * beta_min, last = 1e6 * beta_max;
   const double h = std::sqrt(r.h0 * r.h0 + r.h1 * r.h1);
-  if (r.k > 0) last = std::max(10 * beta_min, std::min(1e3 * last, 2 * (1 + L.e) * h / r.k));
+  const double end = 2 * (1 + L.e) * h / std::abs(r.k);
   const double factor = std::pow(last / first, 1.0 / (kGrid - 1));
   double left = 0, value = excess(0), right = first;
   for (int n = 0; n <= kGrid; ++n, right *= factor) {
+    if (n == kGrid) {
+      if (!(end > left && end < 1e300)) break;
+      right = end;
+    }
     const double at = excess(right);
     if ((value > 0) != (at > 0)) {
       // Either direction: bisection to a few digits, then Newton on s - k with the bracket kept.
       double lo = left, hi = right, l = 0.5 * (lo + hi);
-      for (int m = 0; m < 100; ++m) {
+      for (int m = 0; m < 200; ++m) {
         const double d0 = 1 / (L.beta[0] + l), d1 = 1 / (L.beta[1] + l);
         const double y0 = r.h0 * d0, y1 = r.h1 * d1, length = std::sqrt(y0 * y0 + y1 * y1);
         const double f = length + L.g[0] * y0 + L.g[1] * y1 - r.k;
@@ -121,11 +125,11 @@ Regime Coulomb::nearest(const LocalBlock& L, double bn, double b0, double b1, do
         ((f > 0) == (value > 0) ? lo : hi) = l;
         const double step = -f / d;
         double next = l + step;
-        if (std::abs(step) <= 1e-9 * (l + beta_min)) {
+        if (std::abs(step) <= 1e-12 * (l + beta_min)) {
           if (next >= lo && next <= hi) l = next;
           break;
         }
-        if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
+        if (!(next > lo && next < hi)) next = hi > 1e3 * lo && lo > 0 ? std::sqrt(lo * hi) : 0.5 * (lo + hi);
         if (next == l) break;
         l = next;
       }

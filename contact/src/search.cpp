@@ -10,6 +10,7 @@ void Search::reset(const Problem& problem, const Options& o, Measure m) {
   measure = m;
   system.reset(problem, o.law);
   counts = Counts();
+  work_end = o.max_work;
   history.clear();
   best_error = std::numeric_limits<double>::infinity();
   const std::size_t n = at(problem.contacts());

@@ -17,13 +17,14 @@ struct Search {
   std::vector<HistoryEntry> history;
   Packed best;
   double best_error = std::numeric_limits<double>::infinity();
+  double work_end = 0;                   // of the present attempt
   double sweep_cost = 0, test_cost = 0;  // estimated ns
 
   void reset(const Problem& problem, const Options& o, Measure m);
   // Measures x, keeps it if it is the best.
   double test(const PackedVector* x, Method stage);
   bool solved() const { return best_error <= options.tolerance; }
-  bool exhausted() const { return counts.work > options.max_work; }
+  bool exhausted() const { return counts.work > work_end; }
   void count_sweep(double factor = 1) {
     ++counts.sweeps;
     counts.work += factor * sweep_cost;

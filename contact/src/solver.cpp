@@ -89,7 +89,7 @@ struct Solver::Implementation {
   void solve(const Problem& problem, const Eigen::VectorXd* start, Solution& out);
   void prepare_stages(int n);
   Status automatic();
-  Status rotate();
+  Status rotate(bool last);
   Status plain();
   Status give_up();
   bool replace_contacts(double eccentricity, bool only_unconverged);
@@ -124,9 +124,10 @@ Status Solver::Implementation::give_up() {
 }
 
 // Stages in rotation (README, section 9).
-Status Solver::Implementation::rotate() {
-  constexpr int kPhases = 2;      // Newton phases before a rescue
-  constexpr int kPatience = 3;    // rotations without halving the error
+Status Solver::Implementation::rotate(bool last) {
+  constexpr int kPhases = 2;  // Newton phases before a rescue
+  // Rotations without halving the error; one if the law may be replaced afterwards.
+  const int most_patience = last ? 3 : 1;
   prepare_stages(search.system.size());
   sweeps.start(search.best.data());
   double kappa = 1, halved = search.best_error, tenth = search.best_error;
@@ -170,7 +171,7 @@ Status Solver::Implementation::rotate() {
     bursts = std::min(16, bursts + 2);
     sweeps.start(search.best.data());
     if (search.best_error > 0.5 * halved) {
-      if (++patience >= kPatience) return give_up();
+      if (++patience >= most_patience) return give_up();
     } else {
       patience = 0;
       halved = search.best_error;
@@ -209,16 +210,24 @@ Status Solver::Implementation::automatic() {
   search.count_sweep();
   search.test(x.data(), Method::gauss_seidel);
   if (search.solved()) return Status::solved;
-  Status status = rotate();
-  if (options.law != Law::maximum_dissipation || options.strict) return status;
+  bool replaceable = false;
+  if (options.law == Law::maximum_dissipation && !options.strict) {
+    for (int i = 0; i < search.system.size(); ++i)
+      replaceable = replaceable || search.system.problem().local(i).e > kCoupled;
+  }
+  if (replaceable) search.work_end = 0.05 * options.max_work;
+  Status status = rotate(!replaceable);
+  search.work_end = options.max_work;
+  // First the strongly coupled contacts that do not converge, then all of them, then coupled ones.
   z.resize(x.size());
-  for (int attempt = 0; attempt < 3 && status != Status::solved && status != Status::work_limit; ++attempt) {
+  for (int attempt = 0; replaceable && attempt < 3 && status != Status::solved; ++attempt) {
+    if (search.exhausted()) return Status::work_limit;
     if (!replace_contacts(attempt < 2 ? kStronglyCoupled : kCoupled, attempt == 0)) continue;
     x = search.best;
     search.best_error = std::numeric_limits<double>::infinity();
     search.test(x.data(), Method::gauss_seidel);
     stages_ready = false;
-    status = search.solved() ? Status::solved : rotate();
+    status = search.solved() ? Status::solved : rotate(attempt == 2);
   }
   return status;
 }

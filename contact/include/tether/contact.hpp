@@ -1,6 +1,7 @@
 // Tether: everything of the contact library. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/contact/bodies.hpp>
 #include <tether/contact/evaluate.hpp>
 #include <tether/contact/one_contact.hpp>
 #include <tether/contact/problem.hpp>

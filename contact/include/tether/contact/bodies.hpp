@@ -1,0 +1,46 @@
+// Tether: contact problems given by bodies. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <tether/contact/problem.hpp>
+#include <vector>
+
+namespace tether::contact {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix36d = Eigen::Matrix<double, 3, 6>;
+
+/// Inverse mass matrix and velocity (linear, angular) before the impulses. Zero inverse: fixed.
+struct Body {
+  Matrix6d inverse_mass = Matrix6d::Zero();
+  Vector6d velocity = Vector6d::Zero();
+};
+
+/// Relative velocity J1 v1 + J2 v2 in the contact frame (normal, tangent, tangent), positive normal:
+/// the bodies separate. `bias` is added to it before the solve: w = J v + bias.
+struct BodyContact {
+  int first = 0, second = -1;  ///< indices of bodies; -1: the fixed world
+  Matrix36d J1 = Matrix36d::Zero(), J2 = Matrix36d::Zero();
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  double mu = 0;
+
+  /// Touching at r1 from the centre of `first` and r2 from that of `second`; the unit normal
+  /// points from `second` to `first`. The first tangent is chosen; see tangent_frame.
+  static BodyContact at_point(int first, int second, const Eigen::Vector3d& r1,
+                              const Eigen::Vector3d& r2, const Eigen::Vector3d& normal, double mu);
+};
+
+/// Rows: normal, tangent, tangent (right-handed).
+Eigen::Matrix3d tangent_frame(const Eigen::Vector3d& normal);
+
+/// Forms A = J M^-1 J' and b = -(J v + bias). Throws std::invalid_argument on indices that do not
+/// exist, values that are not finite, and contacts between fixed bodies.
+Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts);
+
+/// Velocities after the impulses: v + M^-1 J' x.
+std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
+                                       const std::vector<BodyContact>& contacts,
+                                       const Eigen::VectorXd& impulses);
+
+}  // namespace tether::contact

@@ -1,0 +1,114 @@
+// Tether: the Delassus matrix of bodies in contact. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/bodies.hpp>
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace tether::contact {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    if (!bodies[k].inverse_mass.allFinite() || !bodies[k].velocity.allFinite()) {
+      throw std::invalid_argument("body " + std::to_string(k) + " has a value that is not finite");
+    }
+  }
+  const int n = static_cast<int>(bodies.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const BodyContact& c = contacts[k];
+    if (c.first < 0 || c.first >= n || c.second < -1 || c.second >= n || c.first == c.second) {
+      throw std::invalid_argument("contact " + std::to_string(k) + " names bodies " +
+                                  std::to_string(c.first) + " and " + std::to_string(c.second) +
+                                  " of " + std::to_string(n));
+    }
+    if (!c.J1.allFinite() || !c.J2.allFinite() || !c.bias.allFinite()) {
+      throw std::invalid_argument("contact " + std::to_string(k) + " has a value that is not finite");
+    }
+  }
+}
+
+}  // namespace
+
+Eigen::Matrix3d tangent_frame(const Eigen::Vector3d& n) {
+  // Duff et al., Building an orthonormal basis, revisited: no branch, no loss of accuracy.
+  const double sign = std::copysign(1.0, n[2]), a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
+  Eigen::Matrix3d F;
+  F.row(0) = n.transpose();
+  F.row(1) << 1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0];
+  F.row(2) << b, sign + n[1] * n[1] * a, -n[1];
+  return F;
+}
+
+BodyContact BodyContact::at_point(int first, int second, const Eigen::Vector3d& r1,
+                                  const Eigen::Vector3d& r2, const Eigen::Vector3d& normal,
+                                  double mu) {
+  if (!(std::abs(normal.norm() - 1) < 1e-6)) throw std::invalid_argument("the normal must have length 1");
+  BodyContact c;
+  c.first = first;
+  c.second = second;
+  c.mu = mu;
+  const Eigen::Matrix3d F = tangent_frame(normal);
+  c.J1.leftCols<3>() = F;
+  for (int r = 0; r < 3; ++r) c.J1.block<1, 3>(r, 3) = r1.cross(F.row(r).transpose()).transpose();
+  if (second >= 0) {
+    c.J2.leftCols<3>() = -F;
+    for (int r = 0; r < 3; ++r) c.J2.block<1, 3>(r, 3) = -r2.cross(F.row(r).transpose()).transpose();
+  }
+  return c;
+}
+
+Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
+  check(bodies, contacts);
+  const int n = static_cast<int>(contacts.size());
+  struct Side {
+    int contact;
+    const Matrix36d* J;
+  };
+  std::vector<std::vector<Side>> sides(bodies.size());
+  Eigen::VectorXd b(3 * n), mu(n);
+  for (int i = 0; i < n; ++i) {
+    const BodyContact& c = contacts[at(i)];
+    Eigen::Vector3d u = c.bias + c.J1 * bodies[at(c.first)].velocity;
+    sides[at(c.first)].push_back({i, &c.J1});
+    if (c.second >= 0) {
+      u += c.J2 * bodies[at(c.second)].velocity;
+      sides[at(c.second)].push_back({i, &c.J2});
+    }
+    b.segment<3>(3 * i) = -u;
+    mu[i] = c.mu;
+  }
+  std::vector<MatrixBlock> blocks;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    if (bodies[k].inverse_mass.isZero(0)) continue;
+    for (const Side& p : sides[k]) {
+      const Matrix36d JM = *p.J * bodies[k].inverse_mass;
+      for (const Side& q : sides[k]) blocks.push_back({p.contact, q.contact, JM * q.J->transpose()});
+    }
+  }
+  return Problem::sparse(3, std::move(blocks), b, mu);
+}
+
+std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
+                                       const std::vector<BodyContact>& contacts,
+                                       const Eigen::VectorXd& impulses) {
+  check(bodies, contacts);
+  if (impulses.size() != 3 * static_cast<Eigen::Index>(contacts.size())) {
+    throw std::invalid_argument("three impulses for each contact are needed");
+  }
+  std::vector<Vector6d> v;
+  for (const Body& body : bodies) v.push_back(body.velocity);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const BodyContact& c = contacts[i];
+    const Eigen::Vector3d x = impulses.segment<3>(3 * static_cast<Eigen::Index>(i));
+    v[at(c.first)] += bodies[at(c.first)].inverse_mass * (c.J1.transpose() * x);
+    if (c.second >= 0) v[at(c.second)] += bodies[at(c.second)].inverse_mass * (c.J2.transpose() * x);
+  }
+  return v;
+}
+
+}  // namespace tether::contact

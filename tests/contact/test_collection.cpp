@@ -1,0 +1,60 @@
+// Tether: contact problems of other projects. SPDX-License-Identifier: BSD-3-Clause
+#include <cstdlib>
+#include <filesystem>
+#include <set>
+#include <tether/contact.hpp>
+#include <tether/contact/files.hpp>
+
+#include "support/catch.hpp"
+
+using namespace tether::contact;
+
+namespace {
+
+std::set<std::string> collection() {
+  const char* folder = std::getenv("TETHER_CONTACT_DATA");
+  const std::filesystem::path path = folder ? folder : TETHER_CONTACT_DATA;
+  std::set<std::string> out;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(path, none)) {
+    const std::string kind = entry.path().extension();
+    if (kind == ".dat" || (kind == ".hdf5" && has_fclib())) out.insert(entry.path());
+  }
+  if (out.empty()) WARN("no contact problems in " << path << ": set TETHER_CONTACT_DATA");
+  return out;
+}
+
+bool open_problem(const std::string& path) { return path.find("RockPile") != std::string::npos; }
+
+}  // namespace
+
+TEST_CASE("the collection under coulomb") {
+  for (const std::string& path : collection()) {
+    const Problem p = read_problem(path);
+    for (Measure measure : {Measure::natural_map, Measure::natural_map_data}) {
+      Options o;
+      o.law = Law::coulomb;
+      o.measure = measure;
+      o.tolerance = open_problem(path) ? 1e-6 : 1e-9;
+      const Solution s = Solver(o).solve(p);
+      const Residuals r = evaluate(p, o.law, s.impulses);
+      INFO(path << ", " << name(measure) << ": " << name(s.status) << " " << s.error);
+      CHECK(s.status == Status::solved);
+      CHECK((measure == Measure::natural_map ? r.natural_map : r.natural_map_data) <= o.tolerance);
+      CHECK(r.cone <= 1e-12 * (1 + s.impulses.norm()));
+    }
+  }
+}
+
+TEST_CASE("the collection under maximum dissipation") {
+  for (const std::string& path : collection()) {
+    const Problem p = read_problem(path);
+    Options o;
+    o.tolerance = open_problem(path) ? 1e-6 : 1e-9;
+    const Solution s = Solver(o).solve(p);
+    INFO(path << ": " << name(s.status) << " " << s.error << ", replaced " << s.replaced.size());
+    CHECK(s.status == Status::solved);
+    if (s.replaced.empty()) CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1.001 * o.tolerance);
+    if (!open_problem(path)) CHECK(s.replaced.empty());
+  }
+}

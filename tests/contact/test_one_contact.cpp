@@ -1,0 +1,183 @@
+// Tether: the one-contact laws against an independent reference. SPDX-License-Identifier: BSD-3-Clause
+#include <cstdlib>
+#include <tether/contact.hpp>
+
+#include "random_contacts.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::contact;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+int samples() {
+  const char* text = std::getenv("TETHER_CONTACT_SAMPLES");
+  return text ? std::atoi(text) : 20000;
+}
+
+}  // namespace
+
+TEST_CASE("maximum dissipation is the least energy in every class") {
+  for (const std::string& kind : random::classes()) {
+    random::Generator generator(7);
+    int failures = 0, most = 0;
+    std::string first;
+    for (int k = 0; k < samples(); ++k) {
+      const random::Contact p = generator(kind);
+      const OneContact s = solve_one(Law::maximum_dissipation, p.A, p.b, p.mu);
+      most = std::max(most, s.evaluations);
+      const char* failure = random::failure(p, s.impulse, 180);
+      if (failure) {
+        ++failures;
+        if (first.empty()) first = failure;
+      }
+    }
+    INFO(kind << ": " << failures << " failures, first: " << first);
+    CHECK(failures == 0);
+    CHECK(most <= 60);
+  }
+}
+
+TEST_CASE("coulomb: friction opposes slip, cone and plane hold") {
+  for (const std::string& kind : random::classes()) {
+    random::Generator generator(11);
+    int failures = 0;
+    for (int k = 0; k < samples(); ++k) {
+      const random::Contact p = generator(kind);
+      const LocalBlock block(p.A, p.mu);
+      LocalState s;
+      solve_local(Law::coulomb, block, p.b, s);
+      const Vector3d x(s.x[0], s.x[1], s.x[2]);
+      const Vector3d w = block.matrix() * x - p.b;
+      const double scale = block.matrix().cwiseAbs().maxCoeff() * x.norm() + p.b.norm();
+      const double t = std::hypot(x[1], x[2]), tol = 1e-11 * scale;
+      bool good = x.allFinite() && x[0] >= 0 && t <= p.mu * x[0] * (1 + 1e-12) + 1e-300;
+      if (x[0] > 0) {
+        good = good && std::abs(w[0]) <= tol;
+        if (s.regime == Regime::sticking) good = good && w.tail<2>().norm() <= tol;
+        if (s.regime == Regime::sliding && t > 0) {
+          const Eigen::Vector2d u = x.tail<2>() / t;
+          const double along = w.tail<2>().dot(u), across = w[2] * u[0] - w[1] * u[1];
+          good = good && along <= tol && std::abs(across) <= tol &&
+                 t >= p.mu * x[0] * (1 - 1e-9);
+        }
+      } else {
+        good = good && w[0] >= -tol;
+      }
+      if (!good) ++failures;
+    }
+    INFO(kind << ": " << failures);
+    CHECK(failures == 0);
+  }
+}
+
+TEST_CASE("the solution does not depend on the start") {
+  random::Generator generator(3);
+  for (const std::string kind : {"boxes", "hyperbolic", "condition_1e4"}) {
+    for (int k = 0; k < 3000; ++k) {
+      const random::Contact p = generator(kind);
+      const LocalBlock block(p.A, p.mu);
+      LocalState cold, warm;
+      solve_local(Law::maximum_dissipation, block, p.b, cold);
+      const Vector3d start = generator.vector();
+      for (int c = 0; c < 3; ++c) warm.x[c] = start[c];
+      solve_local(Law::maximum_dissipation, block, p.b, warm);
+      REQUIRE(cold.regime == warm.regime);
+      const random::Reduced r(p);
+      const Eigen::Vector2d y(cold.x[1], cold.x[2]), z(warm.x[1], warm.x[2]);
+      REQUIRE(std::abs(r.energy(y) - r.energy(z)) <= 1e-9 * (r.scale(y) + 1e-300));
+    }
+  }
+}
+
+TEST_CASE("rotating the tangents and scaling the units changes nothing else") {
+  random::Generator generator(5);
+  for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
+    for (int k = 0; k < 5000; ++k) {
+      const random::Contact p = generator(k % 2 ? "boxes" : "rods");
+      if (law == Law::coulomb && LocalBlock(p.A, p.mu).e > 0.8) continue;
+      const double angle = generator.uniform(0, 6.28), s = std::exp(generator.uniform(-5, 5));
+      Matrix3d R = Matrix3d::Identity();
+      R.bottomRightCorner<2, 2>() << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+      const Vector3d x = solve_one(law, p.A, p.b, p.mu).impulse;
+      const Vector3d y = solve_one(law, s * (R * p.A * R.transpose()), R * p.b, p.mu).impulse;
+      REQUIRE((s * y - R * x).norm() <= 1e-9 * x.norm() + 1e-300);
+    }
+  }
+}
+
+TEST_CASE("golden section and Newton agree") {
+  random::Generator generator(13);
+  for (const std::string kind : {"condition_1e1", "boxes", "rods"}) {
+    for (int k = 0; k < 5000; ++k) {
+      const random::Contact p = generator(kind);
+      const LocalBlock block(p.A, p.mu);
+      const Vector3d x = solve_one(Law::maximum_dissipation, p.A, p.b, p.mu).impulse;
+      const OneContact g = solve_one_golden_section(block, p.b);
+      const random::Reduced r(p);
+      REQUIRE(std::abs(r.energy(x.tail<2>()) - r.energy(g.impulse.tail<2>())) <=
+              1e-9 * (r.scale(x.tail<2>()) + 1e-300));
+    }
+  }
+}
+
+TEST_CASE("a sphere: both laws are radial return") {
+  random::Generator generator(17);
+  for (int k = 0; k < 1000; ++k) {
+    const double a = generator.uniform(0.1, 10), t = a * 3.5, mu = generator.uniform(0, 2);
+    const Matrix3d A = Vector3d(a, t, t).asDiagonal();
+    const Vector3d b = generator.vector();
+    Vector3d expected = Vector3d::Zero();
+    if (b[0] > 0) {
+      expected << b[0] / a, b[1] / t, b[2] / t;
+      const double length = expected.tail<2>().norm(), most = mu * expected[0];
+      if (length > most) expected.tail<2>() *= most / length;
+    }
+    for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
+      REQUIRE((solve_one(law, A, b, mu).impulse - expected).norm() <= 1e-12 * (expected.norm() + 1e-300));
+    }
+  }
+}
+
+TEST_CASE("planar contacts: closed form equals the contact in space") {
+  random::Generator generator(19);
+  for (int k = 0; k < 5000; ++k) {
+    const double c = generator.uniform(-1, 1), mu = generator.uniform(0, 4);
+    Eigen::Matrix2d A;
+    A << 1, c, c, c * c + generator.uniform(0.01, 2);
+    const Eigen::Vector2d b(generator.normal(), generator.normal());
+    Matrix3d A3 = Matrix3d::Identity();
+    A3.topLeftCorner<2, 2>() = A;
+    for (Law law : {Law::maximum_dissipation, Law::coulomb, Law::frictionless}) {
+      const PlanarContact flat = solve_planar(law, A, b, mu);
+      if (law == Law::coulomb && mu * std::abs(c) > 0.8) continue;  // several solutions
+      const Vector3d x = solve_one(law, A3, Vector3d(b[0], b[1], 0), mu).impulse;
+      REQUIRE(std::abs(x[2]) <= 1e-12 * (1 + x.norm()));
+      REQUIRE((x.head<2>() - flat.impulse).norm() <= 1e-9 * (flat.impulse.norm() + 1e-300));
+    }
+  }
+}
+
+TEST_CASE("tangential impact at the Painleve limit: the map jumps at b_n = 0") {
+  // Rod at tan(theta) = 2: |c|/a = 3/4, so e = 1 at mu = 4/3.
+  const double mu = 4.0 / 3.0;
+  Matrix3d A;
+  A << 1.6, 1.2, 0, 1.2, 3.4, 0, 0, 0, 1;
+  for (double factor : {1 - 1e-6, 1 + 1e-6}) {
+    const Vector3d down(1e-12, -1, 0), up(-1e-12, -1, 0);
+    CHECK(solve_one(Law::maximum_dissipation, A, up, mu * factor).impulse.isZero(0));
+    const Vector3d x = solve_one(Law::maximum_dissipation, A, down, mu * factor).impulse;
+    CHECK(random::failure({A, down, mu * factor}, x, 2000) == nullptr);
+  }
+}
+
+TEST_CASE("waLBerla's case: b_n > 0 while the unconstrained normal impulse is negative") {
+  Matrix3d A;
+  A << 1, 0.9, 0, 0.9, 1, 0, 0, 0, 1;
+  const Vector3d b(0.1, 1, 0.3);
+  REQUIRE(A.inverse().row(0).dot(b) < 0);
+  for (double mu : {0.0, 0.3, 1.0, 2.0, 1e3}) {
+    CHECK(random::failure({A, b, mu}, solve_one(Law::maximum_dissipation, A, b, mu).impulse, 2000) == nullptr);
+  }
+}
