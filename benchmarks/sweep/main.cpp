@@ -30,6 +30,8 @@ const std::map<std::string, tp::Options> kVariants = [] {
   variants["no refresh"].refresh_algebraic = false;
   variants["error weights"].metric = tp::Metric::error_weights;
   variants["algebraic tested"].suppress_algebraic = false;
+  variants["error weights, no extra"].metric = tp::Metric::error_weights;
+  variants["error weights, no extra"].extra_iterations = 0;
   return variants;
 }();
 

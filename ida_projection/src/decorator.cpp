@@ -4,6 +4,7 @@
 // y' = yppred + cj ycor, and bases its error test, order choice and history on that ycor. Moving
 // ycor here, after the decorated solver has converged, therefore is the method of Hanson and
 // Krogh: the accepted y lies on the constraints, and so do the points that predict the next step.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -17,6 +18,7 @@ namespace {
 constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
 constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
 constexpr long kTimeEvery = 16;
+constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
 
@@ -83,7 +85,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
       return last_steps_ == 0 && move.status == Status::inconsistent
                  ? (finish(move.status, mover_->message()), kFatal)
                  : finish(move.status, mover_->message());
-    if (move.length <= options_.tolerance) {  // the corrector kept the constraints by itself
+    if (move.length <= std::max(kOnConstraints, move.floor)) {  // the corrector kept the constraints by itself
       ++statistics_.skipped;
       statistics_.largest_drift_before =
           std::max(statistics_.largest_drift_before, move.drift_before);
@@ -97,9 +99,9 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   }
 
   const bool polish = wants_polish();
-  if (polish) N_VScale(1.0, ycor, newton_);
+  if (polish) keep_corrector(ycor);
   move = mover_->move(at);
-  if (polish && move.status == Status::success) move.status = this->polish(at, tolerance, mem);
+  if (polish && move.status == Status::success) move.status = this->polish(at, step.cj, tolerance, mem);
 
   if (timed) {
     timed_seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
@@ -107,6 +109,14 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   }
   account(move, step);
   return finish(move.status, mover_->message());
+}
+
+// The corrector's ycor, before the move.
+void Projection::Impl::keep_corrector(N_Vector ycor) {
+  if (contiguous_)
+    std::copy_n(N_VGetArrayPointer(ycor), size_, N_VGetArrayPointer(newton_));
+  else
+    N_VScale(1.0, ycor, newton_);
 }
 
 StepData Projection::Impl::step_data() const {

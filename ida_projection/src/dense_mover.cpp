@@ -62,6 +62,7 @@ class DenseMover final : public Mover {
   bool contradicts();
   void apply(double factor, double* correction);
   double drift() const;
+  double size_of_y() const;
 
   const Options& options_;
   Statistics& statistics_;
@@ -74,6 +75,7 @@ class DenseMover final : public Mover {
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
   std::vector<double> y_, WT_, g_, C_;
   const double* w_ = nullptr;
+  double last_length_ = 0.0;  // of the last move()'s first Newton move
   const double* ycor_ = nullptr;
 };
 
@@ -185,6 +187,13 @@ void DenseMover::apply(double factor, double* correction) {
   }
 }
 
+// WRMS |y| in tolerances.
+double DenseMover::size_of_y() const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < y_.size(); ++i) sum += (y_[i] * w_[i]) * (y_[i] * w_[i]);
+  return std::sqrt(sum * inverse_n_);
+}
+
 double DenseMover::drift() const {
   double largest = 0.0;
   for (double g : g_) largest = std::max(largest, std::abs(g));
@@ -202,6 +211,7 @@ Move DenseMover::measure(const Candidate& candidate) {
   set_metric();
   if ((result.status = factor(candidate.t)) != Status::success) return result;
   result.length = solve();
+  result.floor = 4.0 * kEpsilon * size_of_y();
   if (contradicts()) result.status = Status::inconsistent;
   return result;
 }
@@ -211,13 +221,10 @@ Move DenseMover::move(const Candidate& candidate) {
   load(candidate);
   set_metric();
   double* correction = N_VGetArrayPointer(candidate.correction);
-  const std::size_t n = y_.size();
-
   if ((result.status = value(candidate.t)) != Status::success) return result;
   result.drift_before = result.drift_after = drift();
 
   monitor_.start();
-  double size_of_y = -1.0;  // WRMS |y| in tolerances, computed when first wanted
   bool fresh = false;       // factors belong to the present y
   bool have_factors = false;
   for (;;) {
@@ -227,6 +234,7 @@ Move DenseMover::move(const Candidate& candidate) {
     }
     const double length = solve();
     ++result.moves;
+    last_length_ = result.moves == 1 ? length : last_length_;
 
     if (result.moves == 1) {
       result.length = length;
@@ -257,12 +265,7 @@ Move DenseMover::move(const Candidate& candidate) {
     }
     apply(1.0, correction);
 
-    if (size_of_y < 0.0) {
-      double sum = 0.0;
-      for (std::size_t i = 0; i < n; ++i) sum += (y_[i] * w_[i]) * (y_[i] * w_[i]);
-      size_of_y = std::sqrt(sum * inverse_n_);
-    }
-    const double floor = std::min(0.1, 1e3 * kEpsilon * size_of_y);
+    const double floor = std::min(0.1, 1e3 * kEpsilon * size_of_y());
     const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
     if (verdict == Monitor::Verdict::done) break;
     if (verdict == Monitor::Verdict::failed) {
@@ -289,7 +292,7 @@ Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
   double sum = 0.0;
   for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
   for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
-  if (monitor_.linear_enough(std::sqrt(sum * inverse_n_))) {
+  if (monitor_.linear_enough(last_length_ + std::sqrt(sum * inverse_n_))) {
     for (int i = 0; i < m_; ++i) {
       const double* c = C_.data() + static_cast<std::ptrdiff_t>(i) * n_;
       double notice = 0.0;

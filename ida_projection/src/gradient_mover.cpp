@@ -89,6 +89,7 @@ class GradientMover final : public Mover {
     set_metric();
     if ((result.status = factor(candidate.t)) != Status::success) return result;
     result.length = solve(candidate.weights);
+    result.floor = 4.0 * kEpsilon * N_VWrmsNorm(y_, candidate.weights);
     if (contradicts()) result.status = Status::inconsistent;
     return result;
   }

@@ -86,8 +86,12 @@ class Projection::Impl {
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   Status engage(const Candidate& candidate, void* mem);
+  void keep_corrector(N_Vector ycor);
   bool wants_polish() const;  // polish.cpp
-  Status polish(const Candidate& candidate, double tolerance, void* mem);
+  Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
+  bool newton_step_at_moved_point(const Candidate& candidate, void* mem);
+  double differential_length(N_Vector weights);
+  void scale_delta(double differential, double algebraic);
   void account(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
 
@@ -122,7 +126,6 @@ class Projection::Impl {
   int size_ = 0;
   OwnedVector id_, delta_, newton_, saved_, weights_;
   std::vector<int> algebraic_;  // indices, contiguous vectors
-  std::vector<double> saved_algebraic_;
   bool has_algebraic_ = false;
   bool engaged_ = false;  // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;

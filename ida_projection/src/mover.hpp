@@ -27,6 +27,7 @@ struct Move {
   double drift_before = 0.0;  ///< largest |g_i| at the candidate
   double drift_after = 0.0;   ///< largest |g_i| at the last point where g was evaluated
   int moves = 0;              ///< Newton moves made
+  double floor = 0.0;         ///< measure(): length that rounding of y alone explains
   bool capped = false;
 };
 

@@ -27,55 +27,97 @@ bool Projection::Impl::wants_polish() const {
   return iterations <= 1;
 }
 
-Status Projection::Impl::polish(const Candidate& candidate, double tolerance, void* mem) {
-  // F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N): shift ypred by -dy, put it back bit for bit.
+// F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N) through IDA's own callback, which adds ycor to
+// IDA's ypred and yppred: ypred is shifted by -dy for the call and put back bit for bit.
+bool Projection::Impl::newton_step_at_moved_point(const Candidate& candidate, void* mem) {
+  if (contiguous_) {
+    double* base = N_VGetArrayPointer(candidate.base);
+    double* saved = N_VGetArrayPointer(saved_);
+    const double* moved = N_VGetArrayPointer(candidate.correction);
+    const double* corrected = N_VGetArrayPointer(newton_);
+    for (int j = 0; j < size_; ++j) {
+      saved[j] = base[j];
+      base[j] += moved[j] - corrected[j];
+    }
+    const bool evaluated = system_(newton_, delta_, mem) == 0;
+    double* delta = N_VGetArrayPointer(delta_);
+    for (int j = 0; j < size_; ++j) {
+      base[j] = saved[j];
+      delta[j] = -delta[j];
+    }
+    return evaluated && linear_solve_(delta_, mem) == 0;
+  }
   N_VScale(1.0, candidate.base, saved_);
   N_VLinearSum(1.0, candidate.correction, -1.0, newton_, delta_);
   N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
   const bool evaluated = system_(newton_, delta_, mem) == 0;
   N_VScale(1.0, saved_, candidate.base);
-  if (!evaluated) return Status::success;  // a refinement; the move itself stands
   N_VScale(-1.0, delta_, delta_);
-  if (linear_solve_(delta_, mem) != 0) return Status::success;
+  return evaluated && linear_solve_(delta_, mem) == 0;
+}
+
+Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance,
+                                void* mem) {
+  // A refinement: where F or the linear solver fails here, the move itself stands.
+  if (!newton_step_at_moved_point(candidate, mem)) return Status::success;
   ++statistics_.residual_evaluations;
   extra_iterations_of_last_solve_ = 1;
 
   // IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
   // equations contain y'; algebraic ones take the plain solution.
-  const double unscale =
-      cj_at_setup_ != 0.0 ? 0.5 * (1.0 + step_data().cj / cj_at_setup_) : 1.0;
-  const double algebraic = options_.refresh_algebraic ? unscale : 0.0;
-  double differential = options_.extra_iterations > 0 ? 1.0 : 0.0;
+  const double plain = cj_at_setup_ != 0.0 ? 0.5 * (1.0 + cj / cj_at_setup_) : 1.0;
+  const double algebraic = options_.refresh_algebraic ? plain : 0.0;
+  const bool differential = options_.extra_iterations > 0 &&
+                            differential_length(candidate.weights) <= 10.0 * tolerance;
+  // A longer change than IDA's stopping test allows is no refinement: keep what IDA had.
+  scale_delta(differential ? 1.0 : 0.0, algebraic);
+  if (differential) ++statistics_.extra_iterations;
+  if (has_algebraic_ && algebraic > 0.0) ++statistics_.refreshes;
+
+  if (contiguous_) {
+    double* ycor = N_VGetArrayPointer(candidate.correction);
+    const double* delta = N_VGetArrayPointer(delta_);
+    for (int j = 0; j < size_; ++j) ycor[j] += delta[j];
+  } else {
+    N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
+  }
+  return mover_->settle(candidate, delta_);
+}
+
+// WRMS length of delta over the differential variables.
+double Projection::Impl::differential_length(N_Vector weights) {
+  if (!contiguous_) {
+    if (!has_algebraic_) return N_VWrmsNorm(delta_, weights);
+    N_VProd(id_, delta_, newton_);
+    return N_VWrmsNorm(newton_, weights);
+  }
+  const double* delta = N_VGetArrayPointer(delta_);
+  const double* w = N_VGetArrayPointer(weights);
+  const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
+  double sum = 0.0;
+  for (int j = 0; j < size_; ++j) {
+    const double change = delta[j] * w[j];
+    sum += id == nullptr || id[j] != 0.0 ? change * change : 0.0;
+  }
+  return std::sqrt(sum / size_);
+}
+
+// delta_d <- differential * delta_d, delta_a <- algebraic * delta_a; a factor of 0 also removes
+// what is not finite.
+void Projection::Impl::scale_delta(double differential, double algebraic) {
   if (contiguous_) {
     double* delta = N_VGetArrayPointer(delta_);
-    const double* w = N_VGetArrayPointer(candidate.weights);
-    for (const int j : algebraic_) delta[j] *= algebraic;
-    double sum = 0.0;
-    for (int j = 0; j < size_; ++j) sum += (delta[j] * w[j]) * (delta[j] * w[j]);
-    for (const int j : algebraic_) sum -= (delta[j] * w[j]) * (delta[j] * w[j]);
-    // A change larger than IDA's own stopping test allows is no refinement: keep what IDA had.
-    if (!(sum <= 100.0 * tolerance * tolerance * size_)) differential = 0.0;
-    if (differential == 0.0) {
-      saved_algebraic_.clear();
-      for (const int j : algebraic_) saved_algebraic_.push_back(delta[j]);
-      N_VConst(0.0, delta_);
-      for (std::size_t k = 0; k < algebraic_.size(); ++k)
-        if (std::isfinite(saved_algebraic_[k])) delta[algebraic_[k]] = saved_algebraic_[k];
+    const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
+    for (int j = 0; j < size_; ++j) {
+      const double factor = id == nullptr || id[j] != 0.0 ? differential : algebraic;
+      delta[j] = factor == 0.0 || !std::isfinite(delta[j]) ? 0.0 : factor * delta[j];
     }
+  } else if (has_algebraic_) {
+    N_VProd(id_, delta_, newton_);
+    N_VLinearSum(algebraic, delta_, differential - algebraic, newton_, delta_);
   } else {
-    if (has_algebraic_) {
-      // delta = differential id delta + algebraic (1 - id) delta, with vector operations only.
-      N_VProd(id_, delta_, newton_);
-      if (!(N_VWrmsNorm(newton_, candidate.weights) <= 10.0 * tolerance)) differential = 0.0;
-      N_VLinearSum(algebraic, delta_, differential - algebraic, newton_, delta_);
-    } else if (!(N_VWrmsNorm(delta_, candidate.weights) <= 10.0 * tolerance)) {
-      return Status::success;
-    }
+    N_VScale(differential, delta_, delta_);
   }
-  if (differential > 0.0) ++statistics_.extra_iterations;
-  if (has_algebraic_ && algebraic > 0.0) ++statistics_.refreshes;
-  N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
-  return mover_->settle(candidate, delta_);
 }
 
 }  // namespace tether::ida_projection
