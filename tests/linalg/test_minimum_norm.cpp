@@ -1,0 +1,190 @@
+// Tether: minimum-norm solves where the rank is clear. SPDX-License-Identifier: BSD-3-Clause
+#include <limits>
+
+#include "cases.hpp"
+#include "support/catch.hpp"
+#include "thrown.hpp"
+
+using namespace tether::test;
+using tether::linalg::MinimumNorm;
+
+namespace {
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+std::string label(int m, int n) { return std::to_string(m) + " x " + std::to_string(n); }
+}  // namespace
+
+TEST_CASE("full rank: equal to a complete orthogonal decomposition") {
+  for (const auto& [m, n] : sizes())
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      INFO(label(m, n) << ", seed " << seed);
+      const Case c = random_case(m, n, seed);
+      MinimumNorm solver(m, n);
+      load(solver, c.C);
+      REQUIRE(solver.factor(c.D.data()));
+      REQUIRE(solver.rank() == m);
+      CHECK(solver.dropped() == 0);
+      const Eigen::VectorXd dy = solve(solver, c.g), expected = oracle(c);
+      const double condition = solver.condition();
+      CHECK(distance(dy, expected, c.D) <=
+            20.0 * n * kEpsilon * condition * condition * length(expected, c.D));
+      const Eigen::VectorXd left = c.C * dy - c.g;
+      const RowMajor A = c.C * c.D.asDiagonal();
+      for (int i = 0; i < m; ++i) {
+        CHECK(std::abs(left[i]) <= 10.0 * n * kEpsilon * A.row(i).norm() * length(dy, c.D));
+        CHECK(solver.row_norm(i) == Approx(A.row(i).norm()).epsilon(1e-14));
+      }
+    }
+}
+
+TEST_CASE("redundant rows: dropped, explained, and the rest still solved") {
+  for (const auto& [m, n] : sizes()) {
+    if (m < 3) continue;
+    INFO(label(m, n));
+    Case c = random_case(m, n, 11);
+    // Row 1 is a copy of row 0 in other units; the last one a combination of rows 0 and 2.
+    c.C.row(1) = -1e3 * c.C.row(0);
+    if (m > 3) c.C.row(m - 1) = 0.5 * c.C.row(0) + 2.0 * c.C.row(2);
+    const int rank = m > 3 ? m - 2 : m - 1;
+    std::mt19937 random(5);
+    const Eigen::VectorXd x = c.D.cwiseProduct(random_vector(n, random));
+    c.g = c.C * x;
+
+    MinimumNorm solver(m, n);
+    load(solver, c.C);
+    REQUIRE(solver.factor(c.D.data()));
+    REQUIRE(solver.rank() == rank);
+    CHECK(solver.dropped() == m - rank);
+    const Eigen::VectorXd dy = solve(solver, c.g);
+    CHECK(distance(dy, oracle(c), c.D) <= 1e-9 * length(dy, c.D));
+    CHECK(length(dy, c.D) <= length(x, c.D) * (1.0 + 1e-12));
+
+    RowMajor A = c.C * c.D.asDiagonal();
+    A = A.rowwise().normalized();
+    for (int k = rank; k < m; ++k) {
+      CHECK(solver.inconsistency(k) <= 1e-12 * length(x, c.D));
+      const std::vector<double> share = solver.dependence(k);
+      REQUIRE(static_cast<int>(share.size()) == rank);
+      Eigen::RowVectorXd combined = Eigen::RowVectorXd::Zero(n);
+      for (int i = 0; i < rank; ++i)
+        combined += share[static_cast<std::size_t>(i)] * A.row(solver.pivot(i));
+      CHECK((combined - A.row(solver.pivot(k))).norm() <= 1e-11);
+    }
+  }
+}
+
+TEST_CASE("pivots are a permutation of the rows") {
+  for (const auto& [m, n] : sizes()) {
+    const Case c = random_case(m, n, 3);
+    MinimumNorm solver(m, n);
+    load(solver, c.C);
+    REQUIRE(solver.factor(c.D.data()));
+    std::vector<int> seen(static_cast<std::size_t>(m), 0);
+    for (int k = 0; k < m; ++k) ++seen.at(static_cast<std::size_t>(solver.pivot(k)));
+    CHECK(seen == std::vector<int>(static_cast<std::size_t>(m), 1));
+  }
+}
+
+TEST_CASE("a vanished row is dropped and reports its own value") {
+  for (const auto& [m, n] : {std::pair<int, int>{4, 6}, {17, 40}}) {
+    INFO(label(m, n));
+    Case c = random_case(m, n, 21);
+    c.C.row(2).setZero();
+    MinimumNorm solver(m, n);
+    load(solver, c.C);
+    REQUIRE(solver.factor(c.D.data()));
+    CHECK(solver.rank() == m - 1);
+    CHECK(solver.pivot(m - 1) == 2);
+    CHECK(solver.row_norm(2) == 0.0);
+    c.g[2] = -0.25;
+    const Eigen::VectorXd dy = solve(solver, c.g);
+    CHECK(solver.inconsistency(m - 1) == 0.25);
+    CHECK(distance(dy, oracle(c), c.D) <= 1e-10 * length(dy, c.D));
+  }
+}
+
+TEST_CASE("nothing but vanished rows: no move") {
+  for (const auto& [m, n] : {std::pair<int, int>{2, 3}, {20, 40}}) {
+    MinimumNorm solver(m, n);
+    load(solver, RowMajor::Zero(m, n));
+    const Eigen::VectorXd D = Eigen::VectorXd::Ones(n);
+    REQUIRE(solver.factor(D.data()));
+    CHECK(solver.rank() == 0);
+    CHECK(solve(solver, Eigen::VectorXd::Ones(m)).isZero(0.0));
+  }
+}
+
+TEST_CASE("components with a zero metric entry do not move") {
+  for (const auto& [m, n] : {std::pair<int, int>{2, 5}, {4, 12}, {18, 40}}) {
+    INFO(label(m, n));
+    Case c = random_case(m, n, 31);
+    c.D[1] = c.D[n - 1] = 0.0;
+    MinimumNorm solver(m, n);
+    load(solver, c.C);
+    REQUIRE(solver.factor(c.D.data()));
+    CHECK(solver.rank() == m);
+    const Eigen::VectorXd dy = solve(solver, c.g);
+    CHECK(dy[1] == 0.0);
+    CHECK(dy[n - 1] == 0.0);
+    CHECK((c.C * dy - c.g).norm() <= 1e-11 * c.g.norm());
+    CHECK(distance(dy, oracle(c), c.D) <= 1e-10 * length(dy, c.D));
+  }
+}
+
+TEST_CASE("an inconsistent right-hand side: distance in the metric, kept rows solved") {
+  // x = 0 and x = 1e-6 as 2 x and -5 x + 5e-6, far from the border and beyond it.
+  for (const int n : {2, 40}) {
+    Case c{RowMajor::Zero(2, n), Eigen::VectorXd::Constant(n, 1e-3), Eigen::VectorXd(2)};
+    c.C(0, 0) = 2.0;
+    c.C(1, 0) = -5.0;
+    c.g << 0.0, 5e-6;
+    MinimumNorm solver(2, n);
+    load(solver, c.C);
+    REQUIRE(solver.factor(c.D.data()));
+    REQUIRE(solver.rank() == 1);
+    const Eigen::VectorXd dy = solve(solver, c.g);
+    CHECK(solver.inconsistency(1) == Approx(1e-6 / 1e-3).epsilon(1e-12));
+    const int kept = solver.pivot(0);
+    CHECK(c.C(kept, 0) * dy[0] == Approx(c.g[kept]).margin(1e-18));
+  }
+}
+
+TEST_CASE("more rows than columns") {
+  for (const auto& [m, n] : {std::pair<int, int>{3, 2}, {16, 4}, {20, 3}, {50, 40}}) {
+    INFO(label(m, n));
+    Case c = random_case(m, n, 41);
+    std::mt19937 random(6);
+    const Eigen::VectorXd x = c.D.cwiseProduct(random_vector(n, random));
+    c.g = c.C * x;
+    MinimumNorm solver(m, n);
+    load(solver, c.C);
+    REQUIRE(solver.factor(c.D.data()));
+    REQUIRE(solver.rank() == n);
+    CHECK(distance(solve(solver, c.g), x, c.D) <= 1e-9 * length(x, c.D));
+    for (int k = n; k < m; ++k) CHECK(solver.inconsistency(k) <= 1e-10 * length(x, c.D));
+
+    const int last = solver.pivot(m - 1);
+    const double norm = (c.C.row(last).transpose().cwiseProduct(c.D)).norm();
+    c.g[last] += 0.125 * norm;
+    solve(solver, c.g);
+    CHECK(solver.inconsistency(m - 1) == Approx(0.125).epsilon(1e-8));
+  }
+}
+
+TEST_CASE("no rows, no columns, and sizes that make no sense") {
+  MinimumNorm none(0, 4);
+  const Eigen::VectorXd D = Eigen::VectorXd::Ones(4);
+  REQUIRE(none.factor(D.data()));
+  CHECK(none.rank() == 0);
+  Eigen::VectorXd dy = Eigen::VectorXd::Constant(4, 3.0);
+  none.solve(nullptr, dy.data());
+  CHECK(dy.isZero(0.0));
+
+  MinimumNorm no_columns(2, 0);
+  REQUIRE(no_columns.factor(nullptr));
+  CHECK(no_columns.rank() == 0);
+  CHECK(no_columns.dropped() == 2);
+
+  REQUIRE_THROWS_AS(MinimumNorm(-1, 2), std::invalid_argument);
+  CHECK(contains(thrown([] { MinimumNorm(2, -3); }), "columns = -3"));
+}

@@ -1,0 +1,25 @@
+// Tether: the text of an expected exception. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace tether::test {
+
+/// What std::invalid_argument says that `call` throws; empty if it throws nothing. (Catch2 v2 and
+/// v3 name their string matchers differently.)
+template <class Call>
+std::string thrown(Call&& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return {};
+}
+
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace tether::test
