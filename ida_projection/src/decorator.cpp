@@ -43,6 +43,28 @@ int Projection::Impl::initialize() {
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
+// Times every 16th projection: reading the clock costs as much as a small projection.
+class Projection::Impl::Stopwatch {
+ public:
+  explicit Stopwatch(Impl& owner)
+      : owner_(owner), running_(owner.statistics_.projections % kTimeEvery == 0) {
+    if (running_) begin_ = Clock::now();
+  }
+  ~Stopwatch() {
+    if (!running_) return;
+    owner_.timed_seconds_ += std::chrono::duration<double>(Clock::now() - begin_).count();
+    ++owner_.timed_;
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Impl& owner_;
+  bool running_;
+  Clock::time_point begin_;
+};
+
 int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights,
                             double tolerance, bool call_setup, void* mem) {
   ++statistics_.solver_calls;
@@ -59,56 +81,71 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
     return 0;
   }
 
-  const int flag =
-      SUNNonlinSolSolve(inner_, y_predicted, ycor, weights, tolerance, call_setup, mem);
+  int flag = SUNNonlinSolSolve(inner_, y_predicted, ycor, weights, tolerance, call_setup, mem);
   if (!mover_) return flag;
-  if (flag != 0) {
-    ++statistics_.corrector_failures;
-    status = Status::corrector_failed;
-    return flag;
-  }
+  if (flag != 0) return corrector_failed(flag);
 
   const StepData step = step_data();
   account_for_previous_attempt(step);
   if (options_.frequency > 1 && (last_steps_ + 1) % options_.frequency != 0) return 0;
 
-  using Clock = std::chrono::steady_clock;
-  const bool timed = statistics_.projections % kTimeEvery == 0;
-  const Clock::time_point begin = timed ? Clock::now() : Clock::time_point();
-
   const Candidate at{step.t, y_predicted, ycor, weights};
-  Move move;
+  const Stopwatch stopwatch(*this);
   if (!engaged_) {
-    move = mover_->measure(at);
-    if (move.status != Status::unused && move.status != Status::success)
-      // Before the first step a smaller step cannot cure contradicting rows.
-      return last_steps_ == 0 && move.status == Status::inconsistent
-                 ? (finish(move.status, mover_->message()), kFatal)
-                 : finish(move.status, mover_->message());
-    if (move.length <= std::max(kOnConstraints, move.floor)) {  // the corrector kept the constraints by itself
-      ++statistics_.skipped;
-      statistics_.largest_drift_before =
-          std::max(statistics_.largest_drift_before, move.drift_before);
-      statistics_.largest_drift_after =
-          std::max(statistics_.largest_drift_after, move.drift_before);
-      status = Status::success;
-      return 0;
-    }
-    const Status engaged = engage(at, mem);
-    if (engaged != Status::success) return finish(engaged, mover_->message());
+    bool done = false;
+    const int outcome = look_before_moving(at, mem, done);
+    if (done) return outcome;
   }
 
-  const bool polish = wants_polish();
-  if (polish) keep_corrector(ycor);
-  move = mover_->move(at);
-  if (polish && move.status == Status::success) move.status = this->polish(at, step.cj, tolerance, mem);
-
-  if (timed) {
-    timed_seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
-    ++timed_;
+  Move move = move_and_polish(at, step.cj, tolerance, mem);
+  if (move.status == Status::success && !corrector_was_right_ && !call_setup) {
+    // Old factors fooled IDA's convergence test: correct again, with fresh ones.
+    ++statistics_.corrections_repeated;
+    N_VConst(0.0, ycor);
+    flag = SUNNonlinSolSolve(inner_, y_predicted, ycor, weights, tolerance, 1, mem);
+    if (flag != 0) return corrector_failed(flag);
+    cj_at_setup_ = step.cj;
+    move = move_and_polish(at, step.cj, tolerance, mem);
   }
   account(move, step);
   return finish(move.status, mover_->message());
+}
+
+int Projection::Impl::corrector_failed(int flag) {
+  ++statistics_.corrector_failures;
+  status = Status::corrector_failed;
+  return flag;
+}
+
+// Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
+int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, bool& done) {
+  const Move first = mover_->measure(candidate);
+  done = true;
+  if (first.status != Status::success) {
+    const int code = finish(first.status, mover_->message());
+    // Before the first step a smaller step cannot cure rows that contradict each other.
+    return last_steps_ == 0 && first.status == Status::inconsistent ? kFatal : code;
+  }
+  if (first.length <= std::max(kOnConstraints, first.floor)) {
+    ++statistics_.skipped;
+    note_drift(first);
+    return finish(Status::success, "");
+  }
+  const Status engaged = engage(candidate, mem);
+  if (engaged != Status::success) return finish(engaged, mover_->message());
+  done = false;
+  return 0;
+}
+
+Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
+                                       void* mem) {
+  corrector_was_right_ = true;
+  const bool polishes = wants_polish();
+  if (polishes) keep_corrector(candidate.correction);
+  Move move = mover_->move(candidate);
+  if (polishes && move.status == Status::success)
+    move.status = polish(candidate, cj, tolerance, mem);
+  return move;
 }
 
 // The corrector's ycor, before the move.
@@ -167,10 +204,9 @@ Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
 void Projection::Impl::account(const Move& move, const StepData& step) {
   Statistics& s = statistics_;
   ++s.projections;
-  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
-  s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
+  note_drift(move);
   s.largest_move = std::max(s.largest_move, move.length);
   move_sum_ += move.length;
   pending_ = true;
@@ -181,6 +217,12 @@ void Projection::Impl::account(const Move& move, const StepData& step) {
     IDAGetCurrentOrder(ida_mem_, &order);
     progress_ = {step.t, h, order, move.drift_before, move.length, 0};
   }
+}
+
+void Projection::Impl::note_drift(const Move& move) {
+  Statistics& s = statistics_;
+  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
+  s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
 }
 
 // Status, text and count of the outcome; the code that IDA wants.

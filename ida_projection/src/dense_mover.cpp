@@ -75,7 +75,6 @@ class DenseMover final : public Mover {
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
   std::vector<double> y_, WT_, g_, C_;
   const double* w_ = nullptr;
-  double last_length_ = 0.0;  // of the last move()'s first Newton move
   const double* ycor_ = nullptr;
 };
 
@@ -234,7 +233,6 @@ Move DenseMover::move(const Candidate& candidate) {
     }
     const double length = solve();
     ++result.moves;
-    last_length_ = result.moves == 1 ? length : last_length_;
 
     if (result.moves == 1) {
       result.length = length;
@@ -284,27 +282,13 @@ Move DenseMover::move(const Candidate& candidate) {
   return result;
 }
 
-// C change is what the rows notice of it to first order; g itself is asked only where that order
-// may not be enough.
 Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
-  double* correction = N_VGetArrayPointer(candidate.correction);
-  double sum = 0.0;
-  for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
   for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
-  if (monitor_.linear_enough(last_length_ + std::sqrt(sum * inverse_n_))) {
-    for (int i = 0; i < m_; ++i) {
-      const double* c = C_.data() + static_cast<std::ptrdiff_t>(i) * n_;
-      double notice = 0.0;
-      for (int j : blocks_.columns) notice += c[j] * e[j];
-      g_[static_cast<std::size_t>(i)] = notice;
-    }
-  } else {
-    const Status status = value(candidate.t);
-    if (status != Status::success) return status;
-  }
+  const Status status = value(candidate.t);
+  if (status != Status::success) return status;
   solve();
-  apply(1.0, correction);
+  apply(1.0, N_VGetArrayPointer(candidate.correction));
   return Status::success;
 }
 

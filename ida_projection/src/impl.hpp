@@ -82,10 +82,15 @@ class Projection::Impl {
   Constraints constraints;
 
  private:
+  class Stopwatch;
   // decorator.cpp: the stages of a projected step
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
+  int corrector_failed(int flag);
+  int look_before_moving(const Candidate& candidate, void* mem, bool& done);
   Status engage(const Candidate& candidate, void* mem);
+  Move move_and_polish(const Candidate& candidate, double cj, double tolerance, void* mem);
+  void note_drift(const Move& move);
   void keep_corrector(N_Vector ycor);
   bool wants_polish() const;  // polish.cpp
   Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
@@ -127,6 +132,7 @@ class Projection::Impl {
   OwnedVector id_, delta_, newton_, saved_, weights_;
   std::vector<int> algebraic_;  // indices, contiguous vectors
   bool has_algebraic_ = false;
+  bool corrector_was_right_ = true;  // the polish found what IDA's convergence test promised
   bool engaged_ = false;  // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;
   std::unique_ptr<GaussNewton> point_;   // for points between steps and initial values

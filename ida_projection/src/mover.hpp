@@ -90,11 +90,6 @@ class Monitor {
   /// `floor`: length below which rounding of y rules.
   Verdict judge(double length, bool fresh, double floor);
 
-  /// Is what curvature adds to a linearised change of this length below the tolerance?
-  bool linear_enough(double length) const {
-    return theta_ >= 0.0 && 4.0 * theta_ * length * length <= options_->tolerance;
-  }
-
  private:
   const Options* options_;
   double theta_ = -1.0;  // largest d_2 / d_1^2 seen; < 0: not measured yet

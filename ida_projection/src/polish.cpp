@@ -67,9 +67,10 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
   // equations contain y'; algebraic ones take the plain solution.
   const double plain = cj_at_setup_ != 0.0 ? 0.5 * (1.0 + cj / cj_at_setup_) : 1.0;
   const double algebraic = options_.refresh_algebraic ? plain : 0.0;
-  const bool differential = options_.extra_iterations > 0 &&
-                            differential_length(candidate.weights) <= 10.0 * tolerance;
-  // A longer change than IDA's stopping test allows is no refinement: keep what IDA had.
+  // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
+  const double length = differential_length(candidate.weights);
+  corrector_was_right_ = length <= tolerance;
+  const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
   scale_delta(differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (has_algebraic_ && algebraic > 0.0) ++statistics_.refreshes;

@@ -29,6 +29,7 @@ std::vector<Entry> entries(const Statistics& s) {
       count("evaluations of C", "jacobian_evaluations", s.jacobian_evaluations),
       count("factorizations of C", "factorizations", s.factorizations),
       count("extra corrector iterations", "extra_iterations", s.extra_iterations),
+      count("corrections repeated", "corrections_repeated", s.corrections_repeated),
       count("refreshes of algebraic variables", "refreshes", s.refreshes),
       count("evaluations of F by the plugin", "residual_evaluations", s.residual_evaluations),
       count("factorizations with dropped rows", "rank_drops", s.rank_drops),

@@ -36,6 +36,7 @@ class UserMover final : public Mover {
       result.status = flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
       return result;
     }
+    result.status = Status::success;
     result.moves = 1;
     result.length = N_VWrmsNorm(change_, candidate.weights);
     return result;
@@ -43,7 +44,7 @@ class UserMover final : public Mover {
 
   Move move(const Candidate& candidate) override {
     Move result = measure(candidate);
-    if (result.status != Status::unused) return result;
+    if (result.status != Status::success) return result;
     result.status = Status::success;
     double factor = 1.0;
     if (!(result.length <= options_.largest_move)) {
@@ -70,7 +71,7 @@ class UserMover final : public Mover {
 
   Status settle(const Candidate& candidate, N_Vector) override {
     const Move again = measure(candidate);
-    if (again.status != Status::unused) return again.status;
+    if (again.status != Status::success) return again.status;
     N_VLinearSum(1.0, candidate.correction, 1.0, change_, candidate.correction);
     return Status::success;
   }

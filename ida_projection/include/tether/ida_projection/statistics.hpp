@@ -16,6 +16,7 @@ struct Statistics {
   long jacobian_evaluations = 0;  ///< C, however formed
   long factorizations = 0;
   long extra_iterations = 0;   ///< corrector iterations added
+  long corrections_repeated = 0;  ///< corrections redone with fresh factors: the old ones misled IDA
   long refreshes = 0;          ///< refreshes of the algebraic variables
   long residual_evaluations = 0;  ///< F called by the plugin itself (also in IDA's own count)
   long rank_drops = 0;         ///< factorisations that dropped redundant rows
