@@ -17,6 +17,13 @@
 
 namespace tether::ida_projection {
 
+namespace {
+
+// IDA's own test promises that one more iteration changes y by at most its tolerance.
+constexpr double kMisled = 2.0;
+
+}  // namespace
+
 bool Projection::Impl::wants_polish() const {
   if (linear_solve_ == nullptr) return false;
   if (has_algebraic_ && options_.refresh_algebraic) return true;
@@ -69,7 +76,7 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
   const double algebraic = options_.refresh_algebraic ? plain : 0.0;
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
   const double length = differential_length(candidate.weights);
-  corrector_was_right_ = length <= tolerance;
+  corrector_was_right_ = length <= kMisled * tolerance;
   const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
   scale_delta(differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
