@@ -98,15 +98,18 @@ Eigen::MatrixXd residual_differences(const Problem& problem, double t, double cj
   return J;
 }
 
-Eigen::VectorXd random_state(const Problem& problem, std::mt19937& random) {
+Eigen::VectorXd random_state(const Problem& problem, std::mt19937& random, double* t) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const double mix = (1.0 + uniform(random)) / 2.0;
+  const double mix = uniform(random) > 0.0 ? 1.0 : 0.0;
+  *t = (mix == 1.0 ? problem.t0 : problem.t_end) +
+       0.01 * (problem.t_end - problem.t0) * uniform(random);
   Eigen::VectorXd y(problem.size);
   for (int i = 0; i < problem.size; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const double end = std::isfinite(problem.reference[k]) ? problem.reference[k] : problem.y0[k];
     const double middle = mix * problem.y0[k] + (1.0 - mix) * end;
-    const double size = 1e-6 + 0.1 * (std::abs(problem.y0[k]) + std::abs(end));
+    const double typical = std::abs(problem.y0[k]) + std::abs(end);
+    const double size = 1e-6 + std::min(0.05, 0.05 * typical) + 1e-3 * std::abs(middle);
     y[i] = middle + size * uniform(random);
   }
   return y;
@@ -165,6 +168,27 @@ Eigen::VectorXd derivative(const Problem& problem, double t, const Eigen::Vector
   for (int refinement = 0; refinement < 3; ++refinement) {
     const Eigen::VectorXd step = factor.solve(-residual(problem, t, y, yp).head(count));
     for (int j = 0; j < count; ++j) yp[differential[static_cast<std::size_t>(j)]] += step[j];
+  }
+  return yp;
+}
+
+Eigen::VectorXd motion(const Problem& problem, double t, Eigen::VectorXd* y) {
+  const int N = problem.size;
+  Eigen::VectorXd yp = derivative(problem, t, *y);
+  Eigen::MatrixXd A(N, N);
+  for (int iteration = 0; iteration < 4; ++iteration) {
+    for (int j = 0; j < N; ++j) {
+      const bool differential = problem.id[static_cast<std::size_t>(j)] == 1.0;
+      const auto along = [&](double x) {
+        Eigen::VectorXd moved = *y, rate = yp;
+        (differential ? rate : moved)[j] += x;
+        return residual(problem, t, moved, rate);
+      };
+      A.col(j) = slope(along, 0.0, 1.0);
+    }
+    const Eigen::VectorXd step = A.fullPivLu().solve(-residual(problem, t, *y, yp));
+    for (int j = 0; j < N; ++j)
+      (problem.id[static_cast<std::size_t>(j)] == 1.0 ? yp : *y)[j] += step[j];
   }
   return yp;
 }

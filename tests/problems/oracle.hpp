@@ -25,8 +25,8 @@ Eigen::VectorXd residual(const Problem& problem, double t, const Eigen::VectorXd
 Eigen::MatrixXd residual_differences(const Problem& problem, double t, double cj,
                                      const Eigen::VectorXd& y, const Eigen::VectorXd& yp);
 
-/// A state near the motion, not on any constraint.
-Eigen::VectorXd random_state(const Problem& problem, std::mt19937& random);
+/// A time and a state near the start or near the end, not on any constraint.
+Eigen::VectorXd random_state(const Problem& problem, std::mt19937& random, double* t);
 
 /// Gauss-Newton onto the named groups (all when empty), minimum norm, rank deficient or not.
 Eigen::VectorXd project(const Problem& problem, double t, Eigen::VectorXd y,
@@ -35,6 +35,10 @@ Eigen::VectorXd project(const Problem& problem, double t, Eigen::VectorXd y,
 /// y' of the differential unknowns from the differential equations, which come first in F and are
 /// linear in them; zero for the others.
 Eigen::VectorXd derivative(const Problem& problem, double t, const Eigen::VectorXd& y);
+
+/// Both y' of the differential and the values of the algebraic unknowns from F = 0, index 1, where
+/// F is affine in them.
+Eigen::VectorXd motion(const Problem& problem, double t, Eigen::VectorXd* y);
 
 /// Plain IDA from t0 to t_end, dense LU, difference Jacobian, algebraic variables out of the error
 /// test. Throws std::runtime_error with IDA's flag.
