@@ -60,6 +60,7 @@ class DenseMover final : public Mover {
   Status factor(double t);
   double solve();
   bool contradicts();
+  bool rounding_only() const;
   void apply(double factor, double* correction);
   double drift() const;
   double size_of_y() const;
@@ -199,6 +200,18 @@ double DenseMover::drift() const {
   return largest;
 }
 
+// Does the rounding of its own terms explain every g_i? Then there is nothing to enforce, however
+// short the tolerances are that the metric would make of it.
+bool DenseMover::rounding_only() const {
+  for (int i = 0; i < m_; ++i) {
+    const double* c = C_.data() + static_cast<std::ptrdiff_t>(i) * n_;
+    double terms = 0.0;
+    for (std::size_t j = 0; j < y_.size(); ++j) terms += std::abs(c[j] * y_[j]);
+    if (!(std::abs(g_[static_cast<std::size_t>(i)]) <= 64.0 * kEpsilon * terms)) return false;
+  }
+  return true;
+}
+
 Move DenseMover::measure(const Candidate& candidate) {
   Move result;
   load(candidate);
@@ -209,6 +222,7 @@ Move DenseMover::measure(const Candidate& candidate) {
   if (result.drift_before == 0.0) return result;
   set_metric();
   if ((result.status = factor(candidate.t)) != Status::success) return result;
+  if (rounding_only()) return result;
   result.length = solve();
   result.floor = 4.0 * kEpsilon * size_of_y();
   if (contradicts()) result.status = Status::inconsistent;
