@@ -255,6 +255,9 @@ Problem build(const std::string& name, const LinkagePointer& linkage, const std:
     p.y0.insert(p.y0.end(), lam.data(), lam.data() + m);
     p.yp0.insert(p.yp0.end(), a.data(), a.data() + n);
     p.yp0.resize(N, 0.0);
+    // Redundant rows determine the multipliers to round-off / epsilon only.
+    p.atol_scale.assign(static_cast<std::size_t>(2 * n), 1.0);
+    p.atol_scale.resize(N, 1e4);
     p.residual = [linkage, n, m, epsilon](double, const double* y, const double* yp, double* r) {
       for (int i = 0; i < n; ++i) r[i] = yp[i] - y[n + i];
       linkage->dynamics(y, yp + n, y + 2 * n, r + n);

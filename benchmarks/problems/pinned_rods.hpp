@@ -11,6 +11,8 @@ namespace tether::problems {
 /// - "index 1": M v' = f - G^T lam, 0 = g'' - epsilon lam. Where rows are redundant or the rank
 /// drops,
 ///   epsilon > 0 picks the multipliers of least norm and moves the accelerations by O(epsilon).
+///   The multipliers are then known to round-off / epsilon only: their absolute tolerance is scaled
+///   by 1e4. Without projection the turning parallelogram leaves its branch at the flat position.
 /// - "index 0": q' = v, v' = a with a from Gauss' principle (least constraint) by a complete
 ///   orthogonal decomposition that drops singular values below 1e-6 of the largest.
 ///
@@ -20,13 +22,13 @@ std::vector<std::string> pinned_rods_forms();
 /// N-four-bar: N + 1 vertical and N horizontal rods (1 m, 1 kg) between pins (i, 0) and (i, 1),
 /// gravity 9.81; it starts upright and the tops move with 1 m/s in x. 6N + 3 coordinates, 6N + 2
 /// rows; they lose rank by N whenever the vertical rods lie flat, about twice a second.
-Problem n_four_bar(int N, double t_end, const std::string& form, double epsilon = 1e-9);
+Problem n_four_bar(int N, double t_end, const std::string& form, double epsilon = 1e-8);
 
 /// Three parallel cranks (1 m, 1 kg; pivots at x = 0, 1, 2) with a coupler of 2 m and 2 kg: 12
 /// coordinates and 12 rows of rank 11, 10 when flat. `angle` from downward in rad, `speed` in
 /// rad/s, gravity 9.81.
 Problem parallelogram(double angle, double speed, double t_end, const std::string& form,
-                      double epsilon = 1e-9);
+                      double epsilon = 1e-8);
 
 /// Angle from the upward vertical and its rate: the exact motion of the N-four-bar.
 void n_four_bar_exact(int N, double t, double* angle, double* speed);

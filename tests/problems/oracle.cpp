@@ -42,6 +42,13 @@ int ida_residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data)
   return 0;
 }
 
+int ida_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J,
+                 void* data, N_Vector, N_Vector, N_Vector) {
+  const auto* problem = static_cast<const Problem*>(data);
+  problem->jacobian(t, cj, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), SUNDenseMatrix_Data(J));
+  return 0;
+}
+
 }  // namespace
 
 Eigen::VectorXd value(const Rows& rows, double t, const Eigen::VectorXd& y) {
@@ -193,7 +200,8 @@ Eigen::VectorXd motion(const Problem& problem, double t, Eigen::VectorXd* y) {
   return yp;
 }
 
-Eigen::VectorXd integrate(const Problem& problem, double rtol, double atol, long* steps) {
+Eigen::VectorXd integrate(const Problem& problem, double rtol, double atol, long* steps,
+                          bool analytic) {
   SUNContext context = nullptr;
   SUNContext_Create(nullptr, &context);
   const int N = problem.size;
@@ -217,6 +225,7 @@ Eigen::VectorXd integrate(const Problem& problem, double rtol, double atol, long
   IDASetId(ida, id);
   IDASetSuppressAlg(ida, SUNTRUE);
   IDASetLinearSolver(ida, solver, matrix);
+  if (analytic) IDASetJacFn(ida, ida_jacobian);
   IDASetMaxNumSteps(ida, 5000000);
   if (problem.initial_step > 0.0) IDASetInitStep(ida, problem.initial_step);
   IDASetStopTime(ida, problem.t_end);

@@ -40,8 +40,9 @@ Eigen::VectorXd derivative(const Problem& problem, double t, const Eigen::Vector
 /// F is affine in them.
 Eigen::VectorXd motion(const Problem& problem, double t, Eigen::VectorXd* y);
 
-/// Plain IDA from t0 to t_end, dense LU, difference Jacobian, algebraic variables out of the error
-/// test. Throws std::runtime_error with IDA's flag.
-Eigen::VectorXd integrate(const Problem& problem, double rtol, double atol, long* steps = nullptr);
+/// Plain IDA from t0 to t_end, dense LU, difference Jacobian or the problem's own, algebraic
+/// variables out of the error test. Throws std::runtime_error with IDA's flag.
+Eigen::VectorXd integrate(const Problem& problem, double rtol, double atol, long* steps = nullptr,
+                          bool analytic = false);
 
 }  // namespace tether::problems::test
