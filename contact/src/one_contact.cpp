@@ -75,6 +75,9 @@ LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
   g[0] = mu * inv_a * (cosine * c[0] + sine * c[1]);
   g[1] = mu * inv_a * (cosine * c[1] - sine * c[0]);
   e = std::sqrt(g[0] * g[0] + g[1] * g[1]);
+  // Kantorovich: the angle between y and E y, E = diag(1 / (beta + lambda)), has at least this cosine.
+  const double q = std::min(beta[0], beta[1]) / std::max(beta[0], beta[1]);
+  unique = e * (1 + q) <= 2 * std::sqrt(q) && e < 1;
 }
 
 Eigen::Matrix3d LocalBlock::matrix() const {

@@ -30,6 +30,8 @@ struct LocalBlock {
   double a, inv_a, mu, e;
   double c[2], g[2], beta[2], cosine, sine;
   double T[3];  ///< T00, T01, T11, with the raised beta
+  /// e <= 2 sqrt(q) / (1 + q), q = beta_min / beta_max: the Coulomb law has one solution (README).
+  bool unique;
 
   LocalBlock() = default;
   /// Uses (A + A')/2. Throws std::invalid_argument unless A is finite, A_nn > 0, the matrix is

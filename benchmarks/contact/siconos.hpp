@@ -1,0 +1,27 @@
+// Tether: Siconos' solvers on a contact problem. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <tether/contact/problem.hpp>
+#include <vector>
+
+namespace tether::contact {
+
+struct SiconosRun {
+  std::string solver;
+  bool finished = false;  // the solver returned within the time limit
+  int info = -1, iterations = 0;
+  double milliseconds = 0;  // CPU, median
+  double error = -1;        // fc3d_compute_error's
+  Eigen::VectorXd impulses;
+};
+
+bool has_siconos();
+// Solvers that the comparison covers.
+std::vector<std::string> siconos_solvers();
+// Cold solve of the problem in its native block or dense storage, in a process of its own.
+SiconosRun run_siconos(const std::string& solver, const Problem& problem, bool dense, double tolerance,
+                       double time_limit);
+
+}  // namespace tether::contact
