@@ -1,0 +1,35 @@
+// Tether: command line of the main job. SPDX-License-Identifier: BSD-3-Clause
+#include "settings.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <functional>
+
+namespace pendulum {
+
+std::optional<int> parse(int argc, char** argv, Settings& settings) {
+  CLI::App app("A pendulum on its constraints: what accuracy costs in time, with and without projection");
+  const CLI::Option* given =
+      app.add_option("--tolerances", settings.tolerances,
+                     "Tolerances (rtol = atol) between 1e-12 and 1e-1; default 1e-3 to 1e-10, in long runs 1e-4 to 1e-8")
+          ->check(CLI::Range(1e-12, 1e-1));
+  const CLI::Option* long_given =
+      app.add_flag("--long,!--no-long", settings.long_runs, "Runs of 1000 s as well; the default");
+  app.add_flag("--quick", settings.quick,
+               "A look in a second: 1e-4, 1e-6 and 1e-8, timed once, no long runs");
+  app.add_option("--output", settings.output, "Folder of the CSV and SVG files; default: output");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e);
+  }
+
+  if (settings.quick && given->empty()) settings.tolerances = {1e-4, 1e-6, 1e-8};
+  if (settings.quick && long_given->empty()) settings.long_runs = false;
+  if (!given->empty()) settings.long_tolerances = settings.tolerances;
+  for (std::vector<double>* list : {&settings.tolerances, &settings.long_tolerances})
+    std::sort(list->begin(), list->end(), std::greater<>());
+  return std::nullopt;
+}
+
+}  // namespace pendulum
