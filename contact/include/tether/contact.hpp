@@ -2,6 +2,7 @@
 #pragma once
 
 #include <tether/contact/bodies.hpp>
+#include <tether/contact/body_solver.hpp>
 #include <tether/contact/evaluate.hpp>
 #include <tether/contact/one_contact.hpp>
 #include <tether/contact/problem.hpp>

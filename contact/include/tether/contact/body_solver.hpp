@@ -1,0 +1,66 @@
+// Tether: many contacts between bodies, the Delassus matrix never formed. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/bodies.hpp>
+#include <tether/contact/solver.hpp>
+#include <vector>
+
+namespace tether::contact {
+
+/// Rigid body: mass and inertia about its centre, in world axes. Zero inverse mass and inertia: fixed.
+struct RigidBody {
+  double inverse_mass = 0;  // 1/kg
+  Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          // of the centre, m/s
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  // rad/s
+};
+
+/// Contact at r1 from the centre of `first`, r2 from that of `second` (-1: the fixed world); the unit
+/// normal points from `second` to `first`. bias: velocity along the normal that is added.
+struct PointContact {
+  int first = 0, second = -1;
+  Eigen::Vector3d r1 = Eigen::Vector3d::Zero(), r2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double mu = 0, bias = 0;
+};
+
+struct BodyOptions {
+  Law law = Law::maximum_dissipation;
+  double tolerance = 1e-6;  ///< (sum |D_i (x_i - block(x_i))|^2)^1/2 <= tolerance * |b|
+  int max_sweeps = 1000;
+  int threads = 1;  ///< results have the same bits for every number of threads
+};
+
+struct BodySolution {
+  Status status = Status::unsolved;
+  double error = Residuals::kNone;  ///< as in BodyOptions::tolerance
+  int sweeps = 0, colours = 0;
+  bool spheres = false;  ///< closed form in use: every contact is without coupling
+  std::size_t bytes = 0;  ///< of the workspace that grows with the contacts
+  std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`
+  std::vector<Eigen::Vector3d> velocities, angular_velocities;
+};
+
+/// Gauss-Seidel on the velocities of the bodies, contacts coloured so that no moving body occurs
+/// twice in a colour. For tight tolerances of stiff assemblies use delassus() and Solver.
+class BodySolver {
+ public:
+  explicit BodySolver(const BodyOptions& options = {});  ///< throws std::invalid_argument
+  ~BodySolver();
+  BodySolver(BodySolver&&) noexcept;
+  BodySolver& operator=(BodySolver&&) noexcept;
+
+  /// Throws std::invalid_argument on values that are not finite and indices that do not exist.
+  BodySolution solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts);
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// The same assembly for delassus() and Solver.
+std::vector<Body> to_bodies(const std::vector<RigidBody>& bodies);
+std::vector<BodyContact> to_contacts(const std::vector<PointContact>& contacts);
+
+}  // namespace tether::contact
