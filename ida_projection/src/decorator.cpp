@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
 constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
-constexpr long kTimeEvery = 16;
+constexpr long kSampleEvery = 16;
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
@@ -43,11 +43,12 @@ int Projection::Impl::initialize() {
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
-// Times every 16th projection: reading the clock costs as much as a small projection.
+// Times every 16th projection: reading the clock costs as much as a small projection. What drift is
+// left is looked at on the same ones.
 class Projection::Impl::Stopwatch {
  public:
   explicit Stopwatch(Impl& owner)
-      : owner_(owner), running_(owner.statistics_.projections % kTimeEvery == 0) {
+      : owner_(owner), running_(owner.statistics_.projections % kSampleEvery == 0) {
     if (running_) begin_ = Clock::now();
   }
   ~Stopwatch() {
@@ -55,6 +56,7 @@ class Projection::Impl::Stopwatch {
     owner_.timed_seconds_ += std::chrono::duration<double>(Clock::now() - begin_).count();
     ++owner_.timed_;
   }
+  bool running() const { return running_; }
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
@@ -107,7 +109,8 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
     cj_at_setup_ = step.cj;
     move = move_and_polish(at, step.cj, tolerance, mem);
   }
-  account(move, step);
+  if (stopwatch.running()) move.drift_after = mover_->remaining_drift(at);
+  account(move, step, stopwatch.running());
   return finish(move.status, mover_->message());
 }
 
@@ -128,7 +131,10 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, 
   }
   if (first.length <= std::max(kOnConstraints, first.floor)) {
     ++statistics_.skipped;
-    note_drift(first);
+    statistics_.largest_drift_before =
+        std::max(statistics_.largest_drift_before, first.drift_before);
+    statistics_.largest_drift_after =
+        std::max(statistics_.largest_drift_after, first.drift_before);
     return finish(Status::success, "");
   }
   const Status engaged = engage(candidate, mem);
@@ -201,12 +207,13 @@ Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
   return mover_->set_algebraic(candidate, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr);
 }
 
-void Projection::Impl::account(const Move& move, const StepData& step) {
+void Projection::Impl::account(const Move& move, const StepData& step, bool sampled) {
   Statistics& s = statistics_;
   ++s.projections;
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
-  note_drift(move);
+  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
+  if (sampled) s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
   s.largest_move = std::max(s.largest_move, move.length);
   move_sum_ += move.length;
   pending_ = true;
@@ -217,12 +224,6 @@ void Projection::Impl::account(const Move& move, const StepData& step) {
     IDAGetCurrentOrder(ida_mem_, &order);
     progress_ = {step.t, h, order, move.drift_before, move.length, 0};
   }
-}
-
-void Projection::Impl::note_drift(const Move& move) {
-  Statistics& s = statistics_;
-  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
-  s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
 }
 
 // Status, text and count of the outcome; the code that IDA wants.

@@ -45,6 +45,12 @@ class DenseMover final : public Mover {
   Move move(const Candidate& candidate) override;
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
   Status settle(const Candidate& candidate, N_Vector change) override;
+  double remaining_drift(const Candidate& candidate) override {
+    const double* base = N_VGetArrayPointer(candidate.base);
+    const double* ycor = N_VGetArrayPointer(candidate.correction);
+    for (std::size_t i = 0; i < y_.size(); ++i) y_[i] = base[i] + ycor[i];
+    return value(candidate.t) == Status::success ? drift() : -1.0;
+  }
   void accept() override { std::swap(scale_, trial_scale_); }
   void reset() override {
     std::fill(scale_.begin(), scale_.end(), 0.0);

@@ -93,13 +93,16 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
     return checked(flag, "value (differences)", part);
   };
 
+  const double kRootEpsilon = std::sqrt(std::numeric_limits<double>::epsilon());
+  double largest = 0.0;
+  for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(y[j]));
   y_shifted_.assign(y, y + n);
   Status status = evaluate(y, g_base_.data());
   for (std::size_t k = 0; k < columns.size() && status == Status::success; ++k) {
     const auto j = static_cast<std::size_t>(columns[k]);
-    double increment =
-        std::sqrt(std::numeric_limits<double>::epsilon()) * std::max(std::abs(y[j]), scale[j]);
-    if (increment == 0.0) increment = std::sqrt(std::numeric_limits<double>::epsilon());
+    // About one tolerance: less would drown in the rounding of g where y_j passes zero.
+    double increment = std::max(kRootEpsilon * std::abs(y[j]), std::min(scale[j], 1e-4 * largest));
+    if (increment == 0.0) increment = kRootEpsilon;
     y_shifted_[j] = y[j] + increment;
     increment = y_shifted_[j] - y[j];  // what the machine really added
     status = evaluate(y_shifted_.data(), g_shifted_.data());
@@ -110,6 +113,37 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
           increment;
   }
   return status;
+}
+
+void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
+                          std::vector<char>& filled) {
+  double largest = 0.0;
+  for (int j = 0; j < n; ++j) largest = std::max({largest, std::abs(y[j]), scale[j]});
+  for (const Part& part : parts_) {
+    if (!std::holds_alternative<FiniteDifferences>(part.set->jacobian)) continue;
+    const int m = part.set->count;
+    const auto evaluate = [&](double* g) {
+      ++statistics_.value_evaluations;
+      std::string ignored;
+      return guarded([&] { return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(g, m)); },
+                     ignored) == 0;
+    };
+    y_shifted_.assign(y, y + n);
+    const bool known = evaluate(g_base_.data());
+    for (std::size_t j = 0; j < y_shifted_.size(); ++j) {
+      bool same = known;
+      for (const double change : {1e-2, -3e-2}) {
+        y_shifted_[j] = y[j] + change * (largest > 0.0 ? largest : 1.0);
+        same = same && evaluate(g_shifted_.data());
+        for (int i = 0; i < m; ++i) {
+          const auto k = static_cast<std::size_t>(i);
+          if (same && g_shifted_[k] == g_base_[k]) continue;
+          filled[(static_cast<std::size_t>(part.first_row) + k) * static_cast<std::size_t>(n) + j] = 1;
+        }
+      }
+      y_shifted_[j] = y[j];
+    }
+  }
 }
 
 }  // namespace tether::ida_projection

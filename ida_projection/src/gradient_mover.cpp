@@ -80,6 +80,11 @@ class GradientMover final : public Mover {
     return Status::success;
   }
 
+  double remaining_drift(const Candidate& candidate) override {
+    N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
+    return value(candidate.t) == Status::success ? drift() : -1.0;
+  }
+
   Move measure(const Candidate& candidate) override {
     Move result;
     load(candidate);

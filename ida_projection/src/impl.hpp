@@ -90,14 +90,13 @@ class Projection::Impl {
   int look_before_moving(const Candidate& candidate, void* mem, bool& done);
   Status engage(const Candidate& candidate, void* mem);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance, void* mem);
-  void note_drift(const Move& move);
   void keep_corrector(N_Vector ycor);
   bool wants_polish() const;  // polish.cpp
   Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
   bool newton_step_at_moved_point(const Candidate& candidate, void* mem);
   double differential_length(N_Vector weights);
   void scale_delta(double differential, double algebraic);
-  void account(const Move& move, const StepData& step);
+  void account(const Move& move, const StepData& step, bool sampled);
   int finish(Status outcome, const std::string& text);
 
   // algebraic.cpp

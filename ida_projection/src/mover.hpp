@@ -25,7 +25,7 @@ struct Move {
   Status status = Status::unused;
   double length = 0.0;        ///< WRMS length of the whole move, in tolerances
   double drift_before = 0.0;  ///< largest |g_i| at the candidate
-  double drift_after = 0.0;   ///< largest |g_i| at the last point where g was evaluated
+  double drift_after = 0.0;   ///< the same where g was evaluated last; see remaining_drift()
   int moves = 0;              ///< Newton moves made
   double floor = 0.0;         ///< measure(): length that rounding of y alone explains
   bool capped = false;
@@ -41,6 +41,9 @@ class Mover {
 
   /// Moves the candidate: correction <- correction - dy.
   virtual Move move(const Candidate& candidate) = 0;
+
+  /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
+  virtual double remaining_drift(const Candidate& candidate) = 0;
 
   /// Says which components are algebraic (1 differential, 0 algebraic; null: none). Called once,
   /// before the first move() of a run, with the candidate at which the structure is looked at.

@@ -39,6 +39,8 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
       for (std::size_t e = 0; e < filled.size(); ++e) filled[e] |= C[e] != 0.0;
   }
 
+  evaluator.sensitive(t, y0.data(), n_, WT.data(), filled);
+
   const auto held = [&](std::size_t j) { return !hold.empty() && hold[j]; };
   const auto algebraic = [&](std::size_t j) { return id != nullptr && id[j] == 0.0; };
   const auto fills = [&](int i, std::size_t j) {

@@ -76,6 +76,8 @@ class UserMover final : public Mover {
     return Status::success;
   }
 
+  double remaining_drift(const Candidate&) override { return -1.0; }
+
   Status set_algebraic(const Candidate&, N_Vector) override { return Status::success; }
 
  private:

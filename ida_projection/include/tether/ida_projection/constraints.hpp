@@ -49,8 +49,8 @@ class Callable {
   std::function<int(Arguments...)> call_;
 };
 
-/// C by forward differences: increment sqrt(eps) max(|y_j|, WT_j) in each column, WT_j the error
-/// weight rtol |y_j| + atol_j. Costs N evaluations of g for each C.
+/// C by forward differences: increment max(sqrt(eps) |y_j|, min(WT_j, 1e-4 max_i |y_i|)) in each
+/// column, WT_j the error weight rtol |y_j| + atol_j. Costs N evaluations of g for each C.
 struct FiniteDifferences {};
 
 /// C written by the caller. C is zero on entry, so only the non-zero entries need be set.

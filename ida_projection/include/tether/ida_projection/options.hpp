@@ -62,11 +62,12 @@ struct Options {
   /// Keep algebraic variables out of IDA's error test (IDASetId and IDASetSuppressAlg).
   bool suppress_algebraic = true;
 
-  /// After a move, solve F's linearisation once for the algebraic variables (one F, one back
-  /// substitution with IDA's own factors).
+  /// After a move, the algebraic variables follow by one Newton iteration on F at the moved point
+  /// (one F, one back substitution with IDA's own factors).
   bool refresh_algebraic = true;
 
-  /// Newton iterations added after IDA's corrector has converged; 0 or 1.
+  /// The same iteration also removes what IDA's convergence test left of the correction in the
+  /// differential variables; without algebraic variables it is done where IDA iterated once. 0 or 1.
   int extra_iterations = 1;
 
   /// Components that a move must not change: true = held. Empty, or one entry for each unknown

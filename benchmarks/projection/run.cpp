@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <ctime>
 
-namespace tether::sweep {
+namespace tether::bench {
 
 namespace {
 
@@ -90,4 +90,4 @@ Run integrate(const problems::Problem& problem, double tolerance,
   return run;
 }
 
-}  // namespace tether::sweep
+}  // namespace tether::bench

@@ -18,8 +18,8 @@
 
 namespace tp = tether::ida_projection;
 using tether::problems::Problem;
-using tether::sweep::integrate;
-using tether::sweep::Run;
+using tether::bench::integrate;
+using tether::bench::Run;
 
 namespace {
 

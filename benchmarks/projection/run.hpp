@@ -7,7 +7,7 @@
 #include <string>
 #include <tether/ida_projection.hpp>
 
-namespace tether::sweep {
+namespace tether::bench {
 
 struct Run {
   bool failed = false;
@@ -26,4 +26,4 @@ Run integrate(const problems::Problem& problem, double tolerance,
               ida_projection::Options options = {}, bool suppress = false, bool give_id = false,
               long maximum_steps = 2000000);
 
-}  // namespace tether::sweep
+}  // namespace tether::bench
