@@ -299,6 +299,8 @@ Problem build(const std::string& name, const LinkagePointer& linkage, const std:
         }
       }));
   p.recommended = {"position", "velocity", "energy"};
+  // The plugin takes at most as many rows as unknowns, redundant or not.
+  if (2 * m + 1 > p.size) p.recommended.pop_back();
   return p;
 }
 

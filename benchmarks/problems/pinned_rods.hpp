@@ -8,15 +8,16 @@ namespace tether::problems {
 /// "index 1" (q, v, lam) and "index 0" (q, v), where q holds x, y of the centre and the angle of
 /// each rod.
 ///
-/// - "index 1": M v' = f - G^T lam, 0 = g'' - epsilon lam. Where rows are redundant or the rank
-/// drops,
-///   epsilon > 0 picks the multipliers of least norm and moves the accelerations by O(epsilon).
+/// - "index 1": M v' = f - G^T lam, 0 = g'' - epsilon lam. Where rows are redundant or rank
+///   drops, epsilon > 0 picks the multipliers of least norm and moves the accelerations by O(epsilon).
 ///   The multipliers are then known to round-off / epsilon only: their absolute tolerance is scaled
 ///   by 1e4. Without projection the turning parallelogram leaves its branch at the flat position.
 /// - "index 0": q' = v, v' = a with a from Gauss' principle (least constraint) by a complete
 ///   orthogonal decomposition that drops singular values below 1e-6 of the largest.
 ///
-/// Rows: "position", "velocity" (two for each pin), "energy". The error is taken over q.
+/// Rows: "position", "velocity" (two for each pin), "energy"; recommended are all, but
+/// for the parallelogram in form "index 0" not the energy: 25 rows would exceed its 24 unknowns.
+/// The error is taken over q.
 std::vector<std::string> pinned_rods_forms();
 
 /// N-four-bar: N + 1 vertical and N horizontal rods (1 m, 1 kg) between pins (i, 0) and (i, 1),
