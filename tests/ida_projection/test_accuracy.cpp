@@ -1,0 +1,168 @@
+// Tether: what the slides claim, and the order of the method. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <problems/pendulum.hpp>
+
+#include "host.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+const std::vector<double> kTolerances = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
+
+Run pendulum_run(const std::string& form, double tolerance,
+                 const std::vector<std::string>& rows, double t_end = 30.0) {
+  const Problem problem = pendulum(1.0, 1.0, t_end, form);
+  return integrate(problem, tolerance, rows.empty() ? tp::Constraints{} : problem.select(rows), {},
+                   false);
+}
+
+/// Geometric mean over the tolerances of a / b.
+template <class A, class B>
+double mean_ratio(A a, B b) {
+  double sum = 0.0;
+  for (const double tolerance : kTolerances) sum += std::log(a(tolerance) / b(tolerance));
+  return std::exp(sum / static_cast<double>(kTolerances.size()));
+}
+
+/// Least-squares slope of log f over log tolerance.
+template <class F>
+double slope(F f) {
+  double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+  const auto n = static_cast<double>(kTolerances.size());
+  for (const double tolerance : kTolerances) {
+    const double u = std::log(tolerance), v = std::log(f(tolerance));
+    x += u;
+    y += v;
+    xx += u * u;
+    xy += u * v;
+  }
+  return (n * xy - x * y) / (n * xx - x * x);
+}
+
+const std::vector<std::string> kIndex1 = {"position", "velocity", "energy"};
+const std::vector<std::string> kIndex0 = {"position", "velocity", "acceleration", "energy"};
+
+}  // namespace
+
+TEST_CASE("slides: index 0 with all invariants beats index 1") {
+  // At equal work: an order-5 error times steps^5. The slides' method: distances in tolerances,
+  // every variable in the error test, no iteration after the move.
+  tp::Options slides;
+  slides.metric = tp::Metric::error_weights;
+  slides.suppress_algebraic = slides.refresh_algebraic = false;
+  slides.extra_iterations = 0;
+  const auto cost = [](const std::string& form, const std::vector<std::string>& rows,
+                       const tp::Options& options) {
+    return [=](double tolerance) {
+      const Problem problem = pendulum(1.0, 1.0, 30.0, form);
+      const Run run = integrate(problem, tolerance, problem.select(rows), options, false);
+      REQUIRE(run.flag >= 0);
+      return run.error * std::pow(static_cast<double>(run.steps), 5);
+    };
+  };
+  CHECK(mean_ratio(cost("index 0", kIndex0, slides), cost("index 1", kIndex1, slides)) < 0.05);
+  // Multipliers that follow the move let index 1 catch up, and cost index 0 nothing.
+  CHECK(mean_ratio(cost("index 0", kIndex0, {}), cost("index 1", kIndex1, {})) < 2.5);
+  CHECK(mean_ratio(cost("index 0", kIndex0, {}), cost("index 0", kIndex0, slides)) < 1.2);
+  CHECK(mean_ratio(cost("index 1", kIndex1, {}), cost("index 1", kIndex1, slides)) < 0.05);
+}
+
+TEST_CASE("slides: energy is needed, in both forms") {
+  CHECK(mean_ratio(
+            [](double tolerance) { return pendulum_run("index 1", tolerance, kIndex1).error; },
+            [](double tolerance) {
+              return pendulum_run("index 1", tolerance, {"position", "velocity"}).error;
+            }) < 0.1);
+  CHECK(mean_ratio(
+            [](double tolerance) { return pendulum_run("index 0", tolerance, kIndex0).error; },
+            [](double tolerance) {
+              return pendulum_run("index 0", tolerance, {"position", "velocity", "acceleration"})
+                  .error;
+            }) < 0.1);
+}
+
+TEST_CASE("slides: projection beats plain IDA of the same form") {
+  CHECK(mean_ratio(
+            [](double tolerance) { return pendulum_run("index 0", tolerance, kIndex0).error; },
+            [](double tolerance) { return pendulum_run("index 0", tolerance, {}).error; }) < 1e-3);
+}
+
+TEST_CASE("order, tolerances: error and steps scale as an order-5 method's") {
+  for (const auto& [form, rows] :
+       {std::make_pair("index 1", kIndex1), std::make_pair("index 0", kIndex0)}) {
+    INFO(form);
+    const std::string name = form;
+    const std::vector<std::string> set = rows;
+    CHECK(slope([&](double tolerance) { return pendulum_run(name, tolerance, set).error; }) > 0.75);
+    const double growth = slope([&](double tolerance) {
+      return static_cast<double>(pendulum_run(name, tolerance, set).steps);
+    });
+    CHECK(growth < -0.10);
+    CHECK(growth > -1.0 / 5.0);
+  }
+}
+
+TEST_CASE("order, tolerances: no collapse to order 2 at tight tolerances") {
+  // Without the cure of findings.md 1 half of the steps of this run have order 2.
+  for (const double tolerance : {1e-7, 1e-8, 1e-9}) {
+    INFO("tolerance " << tolerance);
+    const Run run = pendulum_run("index 1", tolerance, kIndex1, 60.0);
+    const Run plain = pendulum_run("index 1", tolerance, {}, 60.0);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.at_order[1] + run.at_order[2] < 0.05 * static_cast<double>(run.steps));
+    CHECK(run.at_order[5] > 0.5 * static_cast<double>(run.steps));
+    CHECK(run.steps < plain.steps);
+  }
+}
+
+TEST_CASE("order, fixed steps: BDF k stays of order k") {
+  // phi = t^7 / 7 is so flat at the start that the first steps, of order 1, cost nothing.
+  const double t_end = 1.6;
+  Problem problem = ode({1.0, 0.0}, t_end, [](double t, const double* y, double* f) {
+    const double rate = std::pow(t, 6);
+    f[0] = -rate * y[1];
+    f[1] = rate * y[0];
+  });
+  const double angle = std::pow(t_end, 7) / 7.0;
+  problem.reference = {std::cos(angle), std::sin(angle)};
+  problem.error_components = 2;
+
+  const auto error = [&](int order, int steps) {
+    Host host(problem, 1.0);  // the error test accepts every step
+    tp::Options options;
+    options.tolerance = 1e-12;  // of these tolerances
+    host.attach(on_circle(), options);
+    const double h = t_end / steps;
+    IDASetMaxOrd(host.ida, order);
+    IDASetInitStep(host.ida, h);
+    IDASetMinStep(host.ida, h * (1.0 - 1e-9));
+    IDASetMaxStep(host.ida, h);
+    IDASetNonlinConvCoef(host.ida, 1e-11);
+    double radial = 0.0;
+    long at_order = 0;
+    for (int i = 0; i < steps; ++i) {
+      REQUIRE(host.step() >= 0);
+      radial = std::max(radial, std::abs(std::hypot(host.data()[0], host.data()[1]) - 1.0));
+      int last = 0;
+      IDAGetLastOrder(host.ida, &last);
+      at_order += last == order;
+    }
+    CHECK(host.t == Approx(t_end).epsilon(1e-9));
+    CHECK(radial < 1e-11);
+    return std::make_pair(host.error(), at_order);
+  };
+  for (int order = 1; order <= 5; ++order) {
+    INFO("order " << order);
+    const auto coarse = error(order, 160), fine = error(order, 320), finest = error(order, 640);
+    CHECK(coarse.second > 140);
+    const double rate = std::log2(coarse.first / fine.first);
+    const double rate_fine = std::log2(fine.first / finest.first);
+    INFO("errors " << coarse.first << " " << fine.first << " " << finest.first);
+    CHECK(rate > order - 0.3);
+    CHECK(rate_fine > order - 0.2);
+    CHECK(rate_fine < order + 0.5);
+  }
+}

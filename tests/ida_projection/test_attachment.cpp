@@ -1,0 +1,211 @@
+// Tether: when and to what the projection is attached. SPDX-License-Identifier: BSD-3-Clause
+#include <memory>
+#include <nvector/nvector_serial.h>
+#include <problems/pendulum.hpp>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <utility>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+Problem swing() { return pendulum(1.0, 1.0, 20.0, "index 1"); }
+
+}  // namespace
+
+TEST_CASE("attached late: refused with the cure, and the cure works") {
+  Host host(swing(), 1e-6);
+  REQUIRE(host.to(5.0) >= 0);
+  host.attach(host.problem.recommended_constraints());
+  CHECK(host.to(6.0) < 0);
+  CHECK(host.projection().status() == tp::Status::late_attach);
+  CHECK(contains(host.projection().message(), "IDAReInit"));
+  CHECK(host.projection().statistics().projections == 0);
+
+  REQUIRE(host.restart() == 0);
+  REQUIRE(host.finish() >= 0);
+  CHECK(host.projection().status() == tp::Status::success);
+  CHECK(host.projection().statistics().projections > 0);
+  CHECK(host.error() < 2e-5);
+}
+
+TEST_CASE("IDAReInit: the second run is the first one, bit for bit") {
+  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 0");
+  Host host(problem, 1e-6);
+  host.attach(problem.recommended_constraints());
+  std::vector<double> first;
+  long first_steps = 0;
+  for (int repeat = 0; repeat < 3; ++repeat) {
+    INFO("repeat " << repeat);
+    if (repeat > 0) REQUIRE(host.restart() == 0);
+    host.projection().reset_statistics();
+    REQUIRE(host.finish() >= 0);
+    if (repeat == 0) {
+      first = host.state();
+      first_steps = host.steps();
+    }
+    CHECK(same_bits(host.state(), first));
+    CHECK(host.steps() == first_steps);
+    CHECK(host.projection().statistics().solver_calls >= first_steps);
+  }
+}
+
+TEST_CASE("IDAReInit with algebraic variables") {
+  Host host(swing(), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  REQUIRE(host.finish() >= 0);
+  const long steps = host.steps();
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    REQUIRE(host.restart() == 0);
+    REQUIRE(host.finish() >= 0);
+    CHECK(host.error() < 2e-5);
+    CHECK(host.steps() < 1.1 * static_cast<double>(steps));
+  }
+}
+
+TEST_CASE("several ida_mem at once do not know of each other") {
+  const Problem a = swing(), b = pendulum(1.1, 9.80665, 20.0, "index 0");
+  const auto alone = [](const Problem& problem, double tolerance) {
+    Host host(problem, tolerance);
+    host.attach(problem.recommended_constraints());
+    REQUIRE(host.finish() >= 0);
+    return host.state();
+  };
+  Host first(a, 1e-6), second(b, 1e-7), third(a, 1e-6);
+  first.attach(a.recommended_constraints());
+  second.attach(b.recommended_constraints());
+  third.attach(a.recommended_constraints());
+  while (first.t < 20.0 || second.t < 20.0 || third.t < 20.0)
+    for (Host* host : {&first, &second, &third})
+      if (host->t < 20.0) REQUIRE(host->step() >= 0);
+  for (Host* host : {&first, &second, &third}) IDAGetDky(host->ida, 20.0, 0, host->y);
+  CHECK(same_bits(first.state(), alone(a, 1e-6)));
+  CHECK(same_bits(third.state(), first.state()));
+  CHECK(same_bits(second.state(), alone(b, 1e-7)));
+}
+
+TEST_CASE("a nonlinear solver handed over is decorated, and stays the caller's") {
+  const Problem problem = swing();
+  Host own(problem, 1e-6), given(problem, 1e-6);
+  own.attach(problem.recommended_constraints());
+  SUNNonlinearSolver newton = SUNNonlinSol_Newton(given.y, given.context);
+  tp::Options options;
+  options.nonlinear_solver = newton;
+  given.attach(problem.recommended_constraints(), options);
+  REQUIRE(own.finish() >= 0);
+  REQUIRE(given.finish() >= 0);
+  CHECK(same_bits(own.state(), given.state()));
+  long iterations = 0;
+  SUNNonlinSolGetNumIters(newton, &iterations);  // of its last solve
+  CHECK(iterations >= 1);
+  given.restart();
+  REQUIRE(given.finish() >= 0);
+  SUNNonlinSolFree(newton);  // ours to free: nobody else did
+}
+
+TEST_CASE("a fixed-point solver is refused") {
+  Host host(swing(), 1e-6);
+  SUNNonlinearSolver fixed = SUNNonlinSol_FixedPoint(host.y, 0, host.context);
+  tp::Options options;
+  options.nonlinear_solver = fixed;
+  const std::string text =
+      thrown([&] { host.attach(host.problem.recommended_constraints(), options); });
+  CHECK(contains(text, "nonlinear_solver"));
+  CHECK(contains(text, "root-finding"));
+  // IDA is as it was.
+  CHECK(host.to(1.0) >= 0);
+  SUNNonlinSolFree(fixed);
+}
+
+TEST_CASE("never called: another solver was attached afterwards") {
+  Host host(swing(), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  SUNNonlinearSolver newton = SUNNonlinSol_Newton(host.y, host.context);
+  REQUIRE(IDASetNonlinearSolver(host.ida, newton) == 0);
+  CHECK(host.projection().solve(5.0, &host.t, host.y, host.yp, IDA_NORMAL) >= 0);
+  CHECK(host.projection().status() == tp::Status::never_called);
+  CHECK(contains(host.projection().message(), "another nonlinear solver"));
+  CHECK(host.projection().statistics().solver_calls == 0);
+  CHECK(contains(host.projection().statistics().table(), "not called the plugin"));
+  SUNNonlinSolFree(newton);
+}
+
+TEST_CASE("IDA's own settings reach the decorated solver") {
+  Host host(swing(), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  REQUIRE(IDASetMaxNonlinIters(host.ida, 1) == 0);
+  host.finish();
+  long impatient = 0, failures = 0;
+  IDAGetNumNonlinSolvConvFails(host.ida, &impatient);
+
+  Host normal(swing(), 1e-6);
+  normal.attach(normal.problem.recommended_constraints());
+  REQUIRE(normal.finish() >= 0);
+  IDAGetNumNonlinSolvConvFails(normal.ida, &failures);
+  CHECK(failures <= 4);
+  CHECK(impatient > 10 * (failures + 1));
+}
+
+TEST_CASE("IDA counts the plugin's extra iterations") {
+  Host host(swing(), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  REQUIRE(host.finish() >= 0);
+  const tp::Statistics s = host.projection().statistics();
+  long iterations = 0;
+  IDAGetNumNonlinSolvIters(host.ida, &iterations);
+  CHECK(s.extra_iterations + s.refreshes > 0);
+  CHECK(iterations >= host.steps() + s.extra_iterations);
+}
+
+TEST_CASE("IDACalcIC works with the plugin attached") {
+  Host host(swing(), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  N_Vector id = host.vector(host.problem.id);
+  REQUIRE(IDASetId(host.ida, id) == 0);
+  host.data()[4] = 0.3;  // a wrong multiplier
+  N_VGetArrayPointer(host.yp)[3] = 0.0;
+  REQUIRE(IDAReInit(host.ida, 0.0, host.y, host.yp) == 0);
+  REQUIRE(IDACalcIC(host.ida, IDA_YA_YDP_INIT, 0.01) == 0);
+  REQUIRE(IDAGetConsistentIC(host.ida, host.y, host.yp) == 0);
+  CHECK(std::abs(host.data()[4]) < 1e-8);
+  CHECK(N_VGetArrayPointer(host.yp)[3] == Approx(-1.0));
+  REQUIRE(host.finish() >= 0);
+  CHECK(host.error() < 2e-5);
+}
+
+TEST_CASE("a Projection can be moved while IDA holds it") {
+  Host host(swing(), 1e-6);
+  auto first = std::make_unique<tp::Projection>(host.ida, host.problem.recommended_constraints());
+  REQUIRE(host.to(1.0) >= 0);
+  tp::Projection second(std::move(*first));
+  first.reset();
+  REQUIRE(host.to(20.0) >= 0);
+  CHECK(second.status() == tp::Status::success);
+  CHECK(second.statistics().projections >= host.steps() - 10);
+  CHECK(host.error() < 2e-5);
+  IDAFree(&host.ida);  // before `second` ends
+}
+
+TEST_CASE("ida_mem that cannot be attached to is refused, and says why") {
+  CHECK(contains(thrown([] { tp::Projection(nullptr, on_circle()); }), "ida_mem is null"));
+  Context context;
+  void* fresh = IDACreate(context);
+  CHECK(contains(thrown([&] { tp::Projection(fresh, on_circle()); }), "IDAInit"));
+  IDAFree(&fresh);
+}
+
+TEST_CASE("status and message before the first step") {
+  Host host(swing(), 1e-6);
+  const tp::Projection& projection = host.attach(host.problem.recommended_constraints());
+  CHECK(projection.status() == tp::Status::unused);
+  CHECK(projection.message().empty());
+  CHECK(projection.constraints().total_count() == 3);
+  CHECK(projection.statistics().solver_calls == 0);
+  CHECK(std::string(tp::to_string(tp::Status::late_attach)) == "attached too late");
+}

@@ -1,0 +1,283 @@
+// Tether: constraint functions that fail, and projections written by the caller.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <limits>
+#include <nvector/nvector_serial.h>
+#include <stdexcept>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// on_circle() whose value does `misbehave(call, g)` at its n-th call; a non-zero int is returned.
+template <class Misbehave>
+tp::Constraints spoilt(Misbehave misbehave) {
+  tp::Constraints set = on_circle();
+  set.value = [misbehave, n = 0](double, tp::ConstVector y, tp::Vector g) mutable {
+    g[0] = (y.squaredNorm() - 1.0) / 2.0;
+    return static_cast<int>(misbehave(++n, g));
+  };
+  return set;
+}
+
+struct Ended {
+  int flag;
+  tp::Status status;
+  std::string message;
+  tp::Statistics statistics;
+  long steps;
+  double error;
+};
+
+Ended run(const tp::Constraints& set) {
+  Host host(tether::test::circle(20.0), 1e-6);
+  host.attach(set);
+  const int flag = host.finish();
+  return {flag,         host.projection().status(), host.projection().message(),
+          host.projection().statistics(), host.steps(), host.error()};
+}
+
+}  // namespace
+
+TEST_CASE("a recoverable failure now and then costs a step, not the run") {
+  const Ended clean = run(on_circle());
+  const Ended end = run(spoilt([](int n, tp::Vector) { return n % 60 == 59 ? 1 : 0; }));
+  REQUIRE(end.flag >= 0);
+  CHECK(end.status == tp::Status::success);
+  CHECK(end.message.empty());
+  CHECK(end.statistics.callback_recoverable >= 2);
+  CHECK(end.statistics.failures() == end.statistics.callback_recoverable);
+  CHECK(end.error < 2e-5);
+  CHECK(end.steps < clean.steps + 30 * end.statistics.callback_recoverable);
+}
+
+TEST_CASE("a recoverable failure at every call ends in IDA's convergence failure") {
+  const Ended end = run(spoilt([](int, tp::Vector) { return 1; }));
+  CHECK(end.flag < 0);
+  CHECK(end.steps == 0);
+  CHECK(end.status == tp::Status::callback_recoverable);
+  CHECK(contains(end.message, "circle"));
+  CHECK(contains(end.message, "returned 1"));
+  CHECK(end.statistics.callback_recoverable <= 20);
+}
+
+TEST_CASE("a fatal failure ends the run at once") {
+  const Ended end = run(spoilt([](int n, tp::Vector) { return n >= 30 ? -3 : 0; }));
+  CHECK(end.flag == IDA_NLS_FAIL);
+  CHECK(end.status == tp::Status::callback_fatal);
+  CHECK(contains(end.message, "circle"));
+  CHECK(contains(end.message, "returned -3"));
+  CHECK(end.statistics.callback_fatal == 1);
+  CHECK(end.statistics.value_evaluations == 30);
+}
+
+TEST_CASE("an exception does not pass through IDA") {
+  const Ended end = run(spoilt([](int n, tp::Vector) -> int {
+    if (n >= 30) throw std::runtime_error("the table ends here");
+    return 0;
+  }));
+  CHECK(end.flag == IDA_NLS_FAIL);
+  CHECK(end.status == tp::Status::callback_fatal);
+  CHECK(contains(end.message, "the table ends here"));
+  CHECK(end.statistics.value_evaluations == 30);
+
+  const Ended odd = run(spoilt([](int n, tp::Vector) -> int {
+    if (n >= 30) throw 42;
+    return 0;
+  }));
+  CHECK(odd.flag == IDA_NLS_FAIL);
+  CHECK(odd.status == tp::Status::callback_fatal);
+}
+
+TEST_CASE("a Jacobian that fails or throws") {
+  tp::Constraints set = on_circle();
+  set.jacobian = tp::DenseJacobian([n = 0](double, tp::ConstVector y, tp::Matrix C) mutable {
+    C.row(0) = y.transpose();
+    return ++n == 25 ? 1 : 0;
+  });
+  const Ended once = run(set);
+  REQUIRE(once.flag >= 0);
+  CHECK(once.statistics.callback_recoverable == 1);
+
+  set.jacobian = tp::DenseJacobian([](double, tp::ConstVector, tp::Matrix) -> int {
+    throw std::logic_error("no derivative");
+  });
+  const Ended thrown_out = run(set);
+  CHECK(thrown_out.flag == IDA_NLS_FAIL);
+  CHECK(thrown_out.status == tp::Status::callback_fatal);
+  CHECK(contains(thrown_out.message, "no derivative"));
+}
+
+TEST_CASE("NaN once: the step is tried again; NaN always: refused by name") {
+  const Ended once = run(spoilt([](int n, tp::Vector g) {
+    if (n == 40) g[0] = kNaN;
+    return 0;
+  }));
+  REQUIRE(once.flag >= 0);
+  CHECK(once.statistics.not_finite == 1);
+  CHECK(once.statistics.failures() == 1);
+  CHECK(once.error < 2e-5);
+
+  const Ended always = run(spoilt([](int, tp::Vector g) {
+    g[0] = kNaN;
+    return 0;
+  }));
+  CHECK(always.flag < 0);
+  CHECK(always.status == tp::Status::not_finite);
+  CHECK(contains(always.message, "circle"));
+  CHECK(always.steps == 0);
+
+  const Ended infinite = run(spoilt([](int n, tp::Vector g) {
+    if (n > 40) g[0] = std::numeric_limits<double>::infinity();
+    return 0;
+  }));
+  CHECK(infinite.flag < 0);
+  CHECK(infinite.status == tp::Status::not_finite);
+}
+
+TEST_CASE("NaN in the Jacobian") {
+  tp::Constraints set = on_circle();
+  set.jacobian = tp::DenseJacobian([n = 0](double, tp::ConstVector y, tp::Matrix C) mutable {
+    C.row(0) = y.transpose();
+    if (++n == 25) C(0, 1) = kNaN;
+  });
+  const Ended once = run(set);
+  REQUIRE(once.flag >= 0);
+  CHECK(once.statistics.not_finite == 1);
+
+  set.jacobian =
+      tp::DenseJacobian([](double, tp::ConstVector, tp::Matrix C) { C.setConstant(kNaN); });
+  const Ended always = run(set);
+  CHECK(always.flag < 0);
+  CHECK(always.status == tp::Status::not_finite);
+  CHECK_FALSE(always.message.empty());
+}
+
+TEST_CASE("differences: the same motion as with the Jacobian written out") {
+  tp::Constraints set = on_circle();
+  set.jacobian = tp::FiniteDifferences{};
+  const Ended differences = run(set), given = run(on_circle());
+  REQUIRE(differences.flag >= 0);
+  CHECK(std::abs(differences.error - given.error) < 1e-8);
+  CHECK(std::abs(differences.steps - given.steps) <= 3);
+  CHECK(differences.statistics.failures() == 0);
+  // N + 1 evaluations for each C and one for g.
+  CHECK(differences.statistics.value_evaluations <= 5 * differences.statistics.projections + 10);
+}
+
+namespace {
+
+/// Radial projection in CVProjFn's shape, with a record of how it was called.
+struct Record {
+  long calls = 0;
+  int fail_at = 0, answer = 0;
+  double eps = 0.0, largest_error = 0.0, largest_change_on_entry = 0.0;
+};
+
+int radial(sunrealtype, N_Vector y, N_Vector corr, sunrealtype eps, N_Vector err, void* data) {
+  auto& record = *static_cast<Record*>(data);
+  if (++record.calls == record.fail_at || (record.fail_at < 0 && record.calls >= -record.fail_at)) {
+    if (record.answer == 99) throw std::runtime_error("projection gave up");
+    return record.answer;
+  }
+  record.eps = eps;
+  const double* p = N_VGetArrayPointer(y);
+  const double r = std::hypot(p[0], p[1]);
+  for (int i = 0; i < 2; ++i) {
+    record.largest_change_on_entry =
+        std::max(record.largest_change_on_entry, std::abs(N_VGetArrayPointer(corr)[i]));
+    record.largest_error = std::max(record.largest_error, std::abs(N_VGetArrayPointer(err)[i]));
+    N_VGetArrayPointer(corr)[i] = p[i] * (1.0 / r - 1.0);
+  }
+  N_VConst(1e30, err);  // ignored
+  return 0;
+}
+
+tp::Constraints by_user(Record& record) {
+  tp::Constraints set;
+  set.count = 1;
+  set.jacobian = tp::UserProjection{radial, &record};
+  return set;
+}
+
+}  // namespace
+
+TEST_CASE("a projection written by the caller") {
+  Record record;
+  const tether::problems::Problem problem = tether::test::circle(20.0);
+  const Run run = integrate(problem, 1e-6, by_user(record), {}, false);
+  tp::Options options;
+  options.metric = tp::Metric::error_weights;  // the nearest point, as the radial projection
+  const Run ours = integrate(problem, 1e-6, on_circle(), options, false);
+  REQUIRE(run.flag >= 0);
+  CHECK(record.calls >= run.steps);
+  CHECK(record.calls == run.statistics.value_evaluations);
+  CHECK(record.eps == tp::Options().tolerance);
+  CHECK(record.largest_change_on_entry == 0.0);
+  CHECK(record.largest_error > 0.0);  // a copy of the corrector's change
+  CHECK(record.largest_error < 1e-2);
+  CHECK(run.error < 2.0 * ours.error + 1e-7);
+  CHECK(std::abs(run.steps - ours.steps) < 10);
+  CHECK(std::abs(std::hypot(run.y[0], run.y[1]) - 1.0) < 1e-7);  // interpolated to t_end
+}
+
+TEST_CASE("a caller's projection that fails") {
+  const tether::problems::Problem problem = tether::test::circle(20.0);
+  Record now_and_then;
+  now_and_then.fail_at = 40;
+  now_and_then.answer = 1;
+  const Run once = integrate(problem, 1e-6, by_user(now_and_then), {}, false);
+  REQUIRE(once.flag >= 0);
+  CHECK(once.statistics.callback_recoverable == 1);
+
+  Record fatal;
+  fatal.fail_at = -40;
+  fatal.answer = -1;
+  const Run ended = integrate(problem, 1e-6, by_user(fatal), {}, false);
+  CHECK(ended.flag == IDA_NLS_FAIL);
+  CHECK(ended.status == tp::Status::callback_fatal);
+  CHECK(fatal.calls == 40);
+
+  Record thrower;
+  thrower.fail_at = -40;
+  thrower.answer = 99;
+  const Run thrown_out = integrate(problem, 1e-6, by_user(thrower), {}, false);
+  CHECK(thrown_out.flag == IDA_NLS_FAIL);
+  CHECK(contains(thrown_out.message, "projection gave up"));
+}
+
+TEST_CASE("progress: every n-th accepted step, in order, and harmless when it throws") {
+  for (const int interval : {1, 7}) {
+    std::vector<tp::Progress> reports;
+    tp::Options options;
+    options.progress = [&](const tp::Progress& p) { reports.push_back(p); };
+    options.progress_interval = interval;
+    const Run run = integrate(tether::test::circle(20.0), 1e-6, on_circle(), options, false);
+    REQUIRE(run.flag >= 0);
+    const long projected = run.statistics.projections;
+    CHECK(static_cast<long>(reports.size()) >= (projected - 20) / interval);
+    CHECK(static_cast<long>(reports.size()) <= projected / interval);
+    for (std::size_t k = 0; k < reports.size(); ++k) {
+      const tp::Progress& p = reports[k];
+      if (k > 0) {
+        CHECK(p.t > reports[k - 1].t);
+        CHECK(p.steps >= reports[k - 1].steps + interval);
+      }
+      CHECK(p.order >= 1);
+      CHECK(p.order <= 5);
+      CHECK(p.step > 0.0);
+      CHECK(p.move <= run.statistics.largest_move);
+      CHECK(p.drift <= run.statistics.largest_drift_before);
+    }
+  }
+  tp::Options options;
+  options.progress = [](const tp::Progress&) { throw std::runtime_error("display gone"); };
+  const Run run = integrate(tether::test::circle(20.0), 1e-6, on_circle(), options, false);
+  CHECK(run.flag >= 0);
+}

@@ -1,0 +1,296 @@
+// Tether: consistent starts, projected points, and solve() in every mode.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <nvector/nvector_serial.h>
+#include <problems/car_axis.hpp>
+#include <problems/pendulum.hpp>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+int pendulum_residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
+  static_cast<const Problem*>(data)->residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp),
+                                              N_VGetArrayPointer(r));
+  return 0;
+}
+
+/// x' = y' = 0: a point that stays, to look at projections alone.
+Problem still(std::vector<double> y0) {
+  return ode(std::move(y0), 1.0,
+             [n = y0.size()](double, const double*, double* f) { std::fill(f, f + n, 0.0); });
+}
+
+tp::Constraints circle_of(double square, const std::string& name) {
+  return row(
+      name, [square](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - square; },
+      [](double, const double* y, double* c) {
+        c[0] = 2.0 * y[0];
+        c[1] = 2.0 * y[1];
+      });
+}
+
+/// project() must refuse, name `why`, and leave the point as it was.
+void refused(const std::vector<double>& point, double tolerance, const tp::Constraints& set,
+             tp::Status why) {
+  Problem problem = still(point);
+  Host host(problem, tolerance);
+  host.attach(set);
+  N_Vector velocity = host.vector(std::vector<double>(point.size(), 0.25));
+  const tp::ConsistencyReport report = host.projection().project(0.0, host.y, velocity);
+  INFO(report.message);
+  CHECK_FALSE(report);
+  CHECK(report.status == why);
+  CHECK_FALSE(report.message.empty());
+  CHECK(report.iterations <= 60);
+  CHECK(same_bits(host.state(), point));
+  CHECK(N_VGetArrayPointer(velocity)[0] == 0.25);
+  CHECK(host.projection().status() == why);
+
+  const tp::ConsistencyReport start = host.projection().make_consistent(0.0, host.y, host.yp);
+  CHECK_FALSE(start);
+  CHECK(start.status == why);
+  CHECK(same_bits(host.state(), point));
+}
+
+}  // namespace
+
+TEST_CASE("make_consistent: pendulum off its rod, both forms") {
+  for (const char* form : {"index 1", "index 0"}) {
+    INFO(form);
+    Problem problem = pendulum(1.0, 9.81, 1.0, form);
+    const tp::Constraints rows = problem.recommended_constraints();
+    problem.y0[0] += 3e-3;
+    problem.y0[3] += 2e-3;
+    problem.y0[2] -= 1e-3;
+    Host host(problem, 1e-6);
+    tp::Options options;
+    options.id = host.vector(problem.id);
+    host.attach(rows, options);
+    tp::Consistency how;
+    how.residual = pendulum_residual;
+    how.user_data = &host.problem;
+    const tp::ConsistencyReport report =
+        host.projection().make_consistent(0.0, host.y, host.yp, how);
+    INFO(report.message);
+    REQUIRE(report);
+    CHECK(report.status == tp::Status::success);
+    CHECK(value(rows, 0.0, host.data(), 5).cwiseAbs().maxCoeff() < 1e-13);
+    CHECK(report.drift_before > 1e-3);
+    CHECK(report.drift_after < 1e-13);
+    CHECK(report.largest_change > 9e-4);
+    CHECK(report.largest_change < 2e-2);
+    CHECK(report.changed_component >= 0);
+    CHECK(report.move > 100.0);
+    CHECK(report.rank == rows.total_count());
+    CHECK(report.iterations <= 6);
+    CHECK(report.residual_before > 1e-4);
+    CHECK(report.residual_after >= 0.0);
+    CHECK(report.residual_after < 1e-6);
+    // x'' = -x lam and so on hold with the new values.
+    std::vector<double> r(5);
+    problem.residual(0.0, host.data(), N_VGetArrayPointer(host.yp), r.data());
+    for (const double x : r) CHECK(std::abs(x) < 1e-6);
+    REQUIRE(host.finish() >= 0);
+    CHECK(host.projection().status() == tp::Status::success);
+    CHECK(host.projection().statistics().failures() == 0);
+  }
+}
+
+TEST_CASE("make_consistent: the id of algebraic variables is derived") {
+  Problem problem = car_axis("index 1");
+  problem.y0[1] += 1e-3;
+  problem.y0[8] = 0.7;  // a wrong multiplier
+  Host host(problem, 1e-6);
+  host.attach(problem.recommended_constraints());
+  const tp::ConsistencyReport report = host.projection().make_consistent(0.0, host.y, host.yp);
+  INFO(report.message);
+  REQUIRE(report);
+  CHECK(report.drift_after < 1e-13);
+  std::vector<double> r(static_cast<std::size_t>(problem.size));
+  problem.residual(0.0, host.data(), N_VGetArrayPointer(host.yp), r.data());
+  for (const double x : r) CHECK(std::abs(x) < 1e-6);
+  CHECK(host.finish() >= 0);
+}
+
+TEST_CASE("make_consistent: ways to y'") {
+  using Derivative = tp::Consistency::Derivative;
+  for (const Derivative way : {Derivative::automatic, Derivative::calc_ic,
+                               Derivative::least_squares, Derivative::keep}) {
+    INFO("way " << static_cast<int>(way));
+    Problem problem = pendulum(1.0, 9.81, 1.0, "index 1");
+    problem.y0[0] += 1e-3;
+    const double slope = problem.yp0[3];
+    Host host(problem, 1e-6);
+    host.attach(problem.recommended_constraints());
+    tp::Consistency how;
+    how.derivative = way;
+    how.residual = pendulum_residual;
+    how.user_data = &host.problem;
+    const tp::ConsistencyReport report =
+        host.projection().make_consistent(0.0, host.y, host.yp, how);
+    INFO(report.message);
+    REQUIRE(report);
+    CHECK(report.drift_after < 1e-13);
+    if (way == Derivative::keep) {
+      CHECK(N_VGetArrayPointer(host.yp)[3] == slope);
+    } else {
+      CHECK(report.residual_after < 1e-6);
+    }
+  }
+}
+
+TEST_CASE("make_consistent: held components stay") {
+  Problem problem = still({1.1, 0.2});
+  Host host(problem, 1e-6);
+  host.attach(circle_of(1.0, "circle"));
+  tp::Consistency how;
+  how.hold = {false, true};
+  const tp::ConsistencyReport report = host.projection().make_consistent(0.0, host.y, host.yp, how);
+  REQUIRE(report);
+  CHECK(host.data()[1] == 0.2);
+  CHECK(host.data()[0] == Approx(std::sqrt(0.96)).epsilon(1e-13));
+  how.hold = {true};
+  CHECK(contains(
+      thrown([&] { host.projection().make_consistent(0.0, host.y, host.yp, how); }), "hold"));
+}
+
+TEST_CASE("refused: rows without a common point") {
+  refused({1.1, 0.2}, 1e-6, circle_of(1.0, "unit") + circle_of(2.0, "other"),
+          tp::Status::inconsistent);
+  const auto plane = [](double x) {
+    return row(
+        "x = " + std::to_string(x), [x](double, const double* y) { return y[0] - x; },
+        [](double, const double*, double* c) { c[0] = 1.0; });
+  };
+  refused({0.0, 1.0}, 1e-9, plane(0.0) + plane(1e-6), tp::Status::inconsistent);
+  refused({0.1, 0.2}, 1e-6,
+          row(
+              "no point at all",
+              [](double, const double* y) { return y[0] * y[0] + y[1] * y[1] + 1.0; },
+              [](double, const double* y, double* c) {
+                c[0] = 2.0 * y[0];
+                c[1] = 2.0 * y[1];
+              }),
+          tp::Status::not_converged);
+  // Below the tolerance the two planes are one.
+  Problem problem = still({0.0, 1.0});
+  Host host(problem, 1e-3);
+  host.attach(plane(0.0) + plane(1e-6));
+  CHECK(host.projection().make_consistent(0.0, host.y, host.yp));
+}
+
+TEST_CASE("refused: the rows are named") {
+  Problem problem = still({1.1, 0.2});
+  Host host(problem, 1e-6);
+  host.attach(circle_of(1.0, "unit") + circle_of(2.0, "other"));
+  const tp::ConsistencyReport report = host.projection().project(0.0, host.y);
+  CHECK(contains(report.message, "unit"));
+  CHECK(contains(report.message, "other"));
+  CHECK(report.contradicting_rows == std::vector<int>{0, 1});
+}
+
+TEST_CASE("vanishing gradient: accepted with a warning, or refused, never wild") {
+  for (const std::vector<double>& start : {std::vector<double>{1.1, 0.2}, {1.3, 0.0}}) {
+    Problem problem = still(start);
+    Host host(problem, 1e-6);
+    host.attach(row(
+        "squared",
+        [](double, const double* y) { return std::pow(y[0] * y[0] + y[1] * y[1] - 1.0, 2); },
+        [](double, const double* y, double* c) {
+          const double r = 4.0 * (y[0] * y[0] + y[1] * y[1] - 1.0);
+          c[0] = r * y[0];
+          c[1] = r * y[1];
+        }));
+    const tp::ConsistencyReport report = host.projection().project(0.0, host.y);
+    INFO(report.message << ", " << report.iterations << " iterations");
+    CHECK(report.slow_convergence);
+    CHECK_FALSE(report.message.empty());
+    if (report) {
+      CHECK(std::abs(std::hypot(host.data()[0], host.data()[1]) - 1.0) < 1e-6);
+    } else {
+      CHECK(same_bits(host.state(), start));
+    }
+  }
+}
+
+TEST_CASE("project: nearest point, tangent velocity, report") {
+  Problem problem = still({3.0, 4.0});
+  Host host(problem, 1e-6);
+  host.attach(circle_of(1.0, "circle"));
+  N_Vector velocity = host.vector({2.0, 1.0});
+  const tp::ConsistencyReport report = host.projection().project(0.0, host.y, velocity);
+  REQUIRE(report);
+  CHECK(std::abs(std::hypot(host.data()[0], host.data()[1]) - 1.0) < 1e-14);
+  const double* v = N_VGetArrayPointer(velocity);
+  CHECK(std::abs(host.data()[0] * v[0] + host.data()[1] * v[1]) < 1e-9);
+  CHECK(report.derivative_change > 0.5);
+  CHECK(report.drift_before == 24.0);
+  CHECK(report.rank == 1);
+  CHECK(report.iterations <= 10);
+  // A second time nothing moves.
+  const std::vector<double> there = host.state();
+  CHECK(host.projection().project(0.0, host.y).largest_change < 1e-15);
+  CHECK(std::abs(host.data()[0] - there[0]) < 1e-15);
+  CHECK(contains(thrown([&] { host.projection().project(0.0, nullptr); }), "yy"));
+}
+
+TEST_CASE("project: tangent of a constraint that moves") {
+  // x = sin t: x' must be cos t.
+  Problem problem = still({0.0, 0.0});
+  Host host(problem, 1e-6);
+  host.attach(row(
+      "dragged", [](double t, const double* y) { return y[0] - std::sin(t); },
+      [](double, const double*, double* c) { c[0] = 1.0; }));
+  N_Vector velocity = host.vector({0.0, 7.0});
+  REQUIRE(host.projection().project(0.8, host.y, velocity));
+  CHECK(host.data()[0] == Approx(std::sin(0.8)).epsilon(1e-14));
+  CHECK(N_VGetArrayPointer(velocity)[0] == Approx(std::cos(0.8)).epsilon(1e-8));
+  CHECK(N_VGetArrayPointer(velocity)[1] == 7.0);
+}
+
+TEST_CASE("solve: what IDASolve returns, on the constraints, in every mode") {
+  for (const char* form : {"index 1", "index 0"}) {
+    INFO(form);
+    const Problem problem = pendulum(1.0, 1.0, 20.0, form);
+    const tp::Constraints rows = problem.recommended_constraints();
+    const auto on_constraints = [&](Host& host) {
+      return value(rows, host.t, host.data(), 5).cwiseAbs().maxCoeff() < 1e-13;
+    };
+    const auto tangent = [&](Host& host) {
+      const Eigen::VectorXd rate =
+          jacobian(rows, host.t, host.data(), 5) *
+          Eigen::Map<const Eigen::VectorXd>(N_VGetArrayPointer(host.yp), 5);
+      return rate.cwiseAbs().maxCoeff() < 1e-8;
+    };
+    Host normal(problem, 1e-5), plain(problem, 1e-5), one(problem, 1e-5), stop(problem, 1e-5);
+    for (Host* host : {&normal, &plain, &one, &stop}) host->attach(rows);
+    double interpolated_drift = 0.0;
+    for (int k = 1; k <= 40; ++k) {
+      const double t = 0.5 * k;
+      REQUIRE(normal.projection().solve(t, &normal.t, normal.y, normal.yp, IDA_NORMAL) >= 0);
+      REQUIRE(plain.to(t) >= 0);
+      CHECK(normal.t == t);
+      CHECK(on_constraints(normal));
+      CHECK(tangent(normal));
+      interpolated_drift =
+          std::max(interpolated_drift, value(rows, t, plain.data(), 5).cwiseAbs().maxCoeff());
+      for (int i = 0; i < 4; ++i) CHECK(std::abs(normal.data()[i] - plain.data()[i]) < 1e-4);
+    }
+    CHECK(interpolated_drift > 1e-10);  // what solve() took away
+    CHECK(normal.steps() == plain.steps());  // and it does not disturb the integration
+    while (one.t < 20.0) {
+      REQUIRE(one.projection().solve(20.0, &one.t, one.y, one.yp, IDA_ONE_STEP) >= 0);
+      CHECK(on_constraints(one));
+    }
+    REQUIRE(IDASetStopTime(stop.ida, 7.3) == 0);
+    CHECK(stop.projection().solve(20.0, &stop.t, stop.y, stop.yp, IDA_NORMAL) == IDA_TSTOP_RETURN);
+    CHECK(stop.t == 7.3);
+    CHECK(on_constraints(stop));
+  }
+}

@@ -1,0 +1,219 @@
+// Tether: constraints as gradients in N_Vectors of any kind. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#ifdef TETHER_TEST_OPENMP
+#include <nvector/nvector_openmp.h>
+#endif
+#include <nvector/nvector_serial.h>
+#include <problems/pendulum.hpp>
+#include <problems/rigid_body.hpp>
+#include <sunlinsol/sunlinsol_spgmr.h>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+// Reading works for every kind of vector here; the plugin must not know that.
+double* entries(N_Vector v) {
+#ifdef TETHER_TEST_OPENMP
+  if (N_VGetVectorID(v) == SUNDIALS_NVEC_OPENMP) return NV_DATA_OMP(v);
+#endif
+  return NV_DATA_S(v);
+}
+
+/// The same rows as `dense`, as gradients.
+tp::Constraints as_gradients(const tp::Constraints& dense, int n) {
+  tp::Constraints set;
+  set.count = dense.total_count();
+  for (int i = 0; i < set.count; ++i) set.names.push_back(dense.name(i));
+  tp::Gradients gradients;
+  gradients.value = [dense, n](double t, N_Vector y, double* g) {
+    const Eigen::VectorXd values = value(dense, t, entries(y), n);
+    std::copy(values.data(), values.data() + values.size(), g);
+  };
+  gradients.fill = [dense, n](double t, N_Vector y, N_Vector* rows) {
+    const Eigen::MatrixXd C = jacobian(dense, t, entries(y), n);
+    for (Eigen::Index i = 0; i < C.rows(); ++i)
+      for (int j = 0; j < n; ++j) entries(rows[i])[j] = C(i, j);
+  };
+  set.jacobian = gradients;
+  return set;
+}
+
+int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
+  static_cast<const Problem*>(data)->residual(t, entries(y), entries(yp), entries(r));
+  return 0;
+}
+
+enum class Kind { serial, open_mp, custom };
+
+/// A serial vector that hides its array, as a framework's own vector type would.
+N_Vector make_vector(Kind kind, const std::vector<double>& values, SUNContext context) {
+  const auto n = static_cast<sunindextype>(values.size());
+#ifdef TETHER_TEST_OPENMP
+  N_Vector v = kind == Kind::open_mp ? N_VNew_OpenMP(n, 1, context) : N_VNew_Serial(n, context);
+#else
+  N_Vector v = N_VNew_Serial(n, context);
+#endif
+  std::copy(values.begin(), values.end(), entries(v));
+  if (kind == Kind::custom) {
+    v->ops->nvgetvectorid = [](N_Vector) { return SUNDIALS_NVEC_CUSTOM; };
+    v->ops->nvgetarraypointer = nullptr;  // clones inherit the table
+  }
+  return v;
+}
+
+struct End {
+  int flag;
+  long steps;
+  std::vector<double> y;
+  tp::Statistics statistics;
+};
+
+/// With the matrix-free GMRES solver, which any vector type can use.
+End run(Kind kind, Problem problem, double tolerance, const tp::Constraints& set) {
+  Context context;
+  N_Vector y = make_vector(kind, problem.y0, context), yp = make_vector(kind, problem.yp0, context);
+  N_Vector id = make_vector(kind, problem.id, context);
+  void* ida = IDACreate(context);
+  IDAInit(ida, residual, 0.0, y, yp);
+  IDASetUserData(ida, &problem);
+  IDASStolerances(ida, tolerance, tolerance);
+  IDASetMaxNumSteps(ida, 100000);
+  SUNLinearSolver solver = SUNLinSol_SPGMR(y, SUN_PREC_NONE, 10, context);
+  IDASetLinearSolver(ida, solver, nullptr);
+  IDASetEpsLin(ida, 1e-3);
+  End end{};
+  {
+    tp::Options options;
+    options.id = id;
+    tp::Projection projection(ida, set, options);
+    sunrealtype t = 0.0;
+    while (t < problem.t_end && end.flag >= 0)
+      end.flag = IDASolve(ida, problem.t_end, &t, y, yp, IDA_ONE_STEP);
+    if (end.flag >= 0) IDAGetDky(ida, problem.t_end, 0, y);
+    IDAGetNumSteps(ida, &end.steps);
+    end.statistics = projection.statistics();
+    end.y.assign(entries(y), entries(y) + problem.size);
+    IDAFree(&ida);
+  }
+  SUNLinSolFree(solver);
+  for (N_Vector v : {y, yp, id}) N_VDestroy(v);
+  return end;
+}
+
+void close(const End& a, const End& b, double tolerance) {
+  REQUIRE(a.flag >= 0);
+  REQUIRE(b.flag >= 0);
+  for (std::size_t i = 0; i < a.y.size(); ++i) CHECK(std::abs(a.y[i] - b.y[i]) < tolerance);
+  CHECK(std::abs(a.steps - b.steps) <= 0.02 * static_cast<double>(b.steps) + 2.0);
+}
+
+}  // namespace
+
+TEST_CASE("gradients: the same motion as the dense path, dense LU") {
+  for (const char* form : {"index 1", "index 0"})
+    for (const tp::Metric metric : {tp::Metric::local_correction, tp::Metric::error_weights}) {
+      const Problem problem = pendulum(1.0, 1.0, 20.0, form);
+      INFO(form << ", metric " << static_cast<int>(metric));
+      const tp::Constraints rows =
+          std::string(form) == "index 1" ? problem.recommended_constraints()
+                                         : problem.select({"position", "velocity", "energy"});
+      tp::Options options;
+      options.metric = metric;
+      const Run dense = integrate(problem, 1e-6, rows, options, false);
+      const Run gradients = integrate(problem, 1e-6, as_gradients(rows, 5), options, false);
+      REQUIRE(gradients.flag >= 0);
+      CHECK(std::abs(gradients.steps - dense.steps) <= 0.02 * static_cast<double>(dense.steps));
+      for (std::size_t i = 0; i < 5; ++i) CHECK(std::abs(gradients.y[i] - dense.y[i]) < 2e-5);
+      CHECK(gradients.statistics.failures() == 0);
+    }
+}
+
+TEST_CASE("gradients: redundant rows, inconsistent rows") {
+  const Problem body = rigid_body("regular", 10.0);
+  const tp::Constraints once = body.recommended_constraints();
+  const tp::Constraints twice = once + body.select({"energy"}) + body.select({"quaternion norm"});
+  const Run full = integrate(body, 1e-7, as_gradients(once, 7), {}, false);
+  const Run redundant = integrate(body, 1e-7, as_gradients(twice, 7), {}, false);
+  REQUIRE(redundant.flag >= 0);
+  CHECK(redundant.statistics.rank_drops == redundant.statistics.factorizations);
+  CHECK(redundant.statistics.failures() == 0);
+  for (std::size_t i = 0; i < 7; ++i) CHECK(std::abs(full.y[i] - redundant.y[i]) < 1e-6);
+
+  const tp::Constraints other = row(
+      "other circle",
+      [](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - 2.0; },
+      [](double, const double* y, double* c) {
+        c[0] = 2.0 * y[0];
+        c[1] = 2.0 * y[1];
+      });
+  const Run refused =
+      integrate(tether::test::circle(5.0), 1e-6, as_gradients(on_circle() + other, 2), {}, false);
+  CHECK(refused.flag < 0);
+  CHECK(refused.status == tp::Status::inconsistent);
+  CHECK(contains(refused.message, "other circle"));
+  CHECK(refused.steps == 0);
+}
+
+TEST_CASE("gradients on serial, OpenMP and custom vectors") {
+  const Problem problem = pendulum(1.0, 1.0, 10.0, "index 0");
+  const tp::Constraints dense = problem.recommended_constraints();
+  const tp::Constraints gradients = as_gradients(dense, 5);
+  const End reference = run(Kind::serial, problem, 1e-7, dense);
+  const End serial = run(Kind::serial, problem, 1e-7, gradients);
+  const End open_mp = run(Kind::open_mp, problem, 1e-7, gradients);
+  const End custom = run(Kind::custom, problem, 1e-7, gradients);
+  close(serial, reference, 1e-6);
+  close(custom, serial, 1e-6);
+  // One thread: the same operations in the same order.
+  CHECK(same_bits(open_mp.y, serial.y));
+  CHECK(open_mp.steps == serial.steps);
+  CHECK(custom.statistics.projections >= custom.steps - 5);
+  CHECK(custom.statistics.extra_iterations > 0);
+  for (const End* end : {&serial, &open_mp, &custom}) {
+    CHECK(value(dense, 10.0, end->y.data(), 5).cwiseAbs().maxCoeff() < 1e-6);
+    for (std::size_t i = 0; i < 4; ++i) CHECK(std::abs(end->y[i] - problem.reference[i]) < 1e-5);
+  }
+}
+
+TEST_CASE("gradients on custom vectors with algebraic variables") {
+  const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
+  const tp::Constraints gradients = as_gradients(problem.recommended_constraints(), 5);
+  const End serial = run(Kind::serial, problem, 1e-7, gradients);
+  const End custom = run(Kind::custom, problem, 1e-7, gradients);
+  close(custom, serial, 1e-5);
+  CHECK(custom.statistics.refreshes > 0);
+}
+
+TEST_CASE("dense constraints on OpenMP vectors: the same bits as on serial ones") {
+  const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
+  const End serial = run(Kind::serial, problem, 1e-7, problem.recommended_constraints());
+  const End open_mp = run(Kind::open_mp, problem, 1e-7, problem.recommended_constraints());
+  REQUIRE(serial.flag >= 0);
+  CHECK(same_bits(serial.y, open_mp.y));
+}
+
+TEST_CASE("vectors without an array, or without operations, are refused by name") {
+  Problem problem = tether::test::circle(1.0);
+  Context context;
+  N_Vector y = make_vector(Kind::custom, problem.y0, context);
+  N_Vector yp = make_vector(Kind::custom, problem.yp0, context);
+  void* ida = IDACreate(context);
+  REQUIRE(IDAInit(ida, residual, 0.0, y, yp) == 0);
+  CHECK(contains(thrown([&] { tp::Projection(ida, on_circle()); }), "Gradients"));
+  IDAFree(&ida);
+
+  y->ops->nvdotprod = nullptr;
+  ida = IDACreate(context);
+  REQUIRE(IDAInit(ida, residual, 0.0, y, yp) == 0);
+  CHECK(contains(thrown([&] { tp::Projection(ida, as_gradients(on_circle(), 2)); }),
+                 "N_VDotProd"));
+  IDAFree(&ida);
+  N_VDestroy(y);
+  N_VDestroy(yp);
+}

@@ -1,0 +1,295 @@
+// Tether: every knob does what it says, and bad values are refused by name.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <limits>
+#include <nvector/nvector_serial.h>
+#include <problems/pendulum.hpp>
+#include <utility>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+/// The text with which the option is refused; it must leave IDA usable.
+std::string refusal(const tp::Options& options, tp::Constraints set = on_circle()) {
+  Host host(tether::test::circle(1.0), 1e-6);
+  const std::string text = thrown([&] { host.attach(std::move(set), options); });
+  CHECK(host.finish() >= 0);
+  return text;
+}
+
+template <class Change>
+std::string refusal_of(Change change) {
+  tp::Options options;
+  change(options);
+  return refusal(options);
+}
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+TEST_CASE("bad values: the message names the option and the value") {
+  const auto check = [](const std::string& text, const std::string& name, const std::string& value) {
+    INFO(text);
+    CHECK(contains(text, name));
+    CHECK(contains(text, value));
+  };
+  using O = tp::Options;
+  check(refusal_of([](O& o) { o.tolerance = -1e-3; }), "tolerance", "-0.001");
+  check(refusal_of([](O& o) { o.tolerance = 0.0; }), "tolerance", "0.0");
+  check(refusal_of([](O& o) { o.tolerance = kNaN; }), "tolerance", "nan");
+  check(refusal_of([](O& o) { o.maximum_iterations = 0; }), "maximum_iterations", "0");
+  check(refusal_of([](O& o) { o.frequency = 0; }), "frequency", "0");
+  check(refusal_of([](O& o) { o.frequency = -5; }), "frequency", "-5");
+  check(refusal_of([](O& o) { o.largest_move = 0.0; }), "largest_move", "0.0");
+  check(refusal_of([](O& o) { o.largest_move = kNaN; }), "largest_move", "nan");
+  check(refusal_of([](O& o) { o.extra_iterations = 2; }), "extra_iterations", "2");
+  check(refusal_of([](O& o) { o.extra_iterations = -1; }), "extra_iterations", "-1");
+  check(refusal_of([](O& o) { o.progress_interval = 0; }), "progress_interval", "0");
+  check(refusal_of([](O& o) { o.derive_id_limit = -7; }), "derive_id_limit", "-7");
+  check(refusal_of([](O& o) { o.hold = {true, false, false}; }), "hold", "3 entries for 2");
+  check(refusal_of([](O& o) { o.group = {0}; }), "group", "1 entries for 2");
+}
+
+TEST_CASE("bad groups are refused") {
+  const std::string text = refusal_of([](tp::Options& o) { o.group = {0, -2}; });
+  INFO(text);
+  CHECK(contains(text, "group"));
+  CHECK(contains(text, "-2"));
+}
+
+TEST_CASE("bad vectors: id and hold_vector") {
+  Host host(tether::test::circle(1.0), 1e-6);
+  tp::Options options;
+  options.id = host.vector({1.0, 1.0, 0.0});
+  CHECK(contains(refusal(options), "options.id"));
+  options.id = host.vector({1.0, 0.5});
+  CHECK(contains(refusal(options), "options.id[1] = 0.5"));
+  options.id = nullptr;
+  options.hold_vector = host.vector({1.0});
+  CHECK(contains(refusal(options), "hold_vector"));
+}
+
+TEST_CASE("bad constraints are refused by name") {
+  tp::Constraints set = on_circle();
+  set.count = -1;
+  set.names.clear();
+  CHECK(contains(refusal({}, set), "constraints.count = -1"));
+  set = on_circle();
+  set.names = {"a", "b"};
+  CHECK(contains(refusal({}, set), "names has 2 entries for 1"));
+  set = on_circle();
+  set.value = nullptr;
+  CHECK(contains(refusal({}, set), "constraints.value"));
+  set = on_circle();
+  set.jacobian = tp::DenseJacobian{};
+  CHECK(contains(refusal({}, set), "DenseJacobian"));
+  set.jacobian = tp::Gradients{};
+  CHECK(contains(refusal({}, set), "Gradients"));
+  set.jacobian = tp::UserProjection{};
+  CHECK(contains(refusal({}, set), "UserProjection"));
+  set = on_circle() + on_circle() + on_circle();
+  CHECK(contains(refusal({}, set), "3 rows for 2 unknowns"));
+}
+
+TEST_CASE("frequency: really every n-th accepted step") {
+  for (const int n : {1, 2, 3, 10}) {
+    INFO("every " << n);
+    const Problem problem = tether::test::circle(20.0);
+    long calls = 0;
+    tp::Constraints set = on_circle();
+    const auto g = set.value;
+    set.value = [&calls, g](double t, tp::ConstVector y, tp::Vector out) {
+      ++calls;
+      return g(t, y, out);
+    };
+    tp::Options options;
+    options.frequency = n;
+    Host host(problem, 1e-6);
+    host.attach(set, options);
+    while (host.t < problem.t_end) {
+      const long before = calls;
+      REQUIRE(host.step() >= 0);
+      CHECK((calls > before) == (host.steps() % n == 0));
+      if (host.steps() % n == 0 && host.steps() > 20)
+        CHECK(distance(host, on_circle()) <= tp::Options().tolerance);
+    }
+    CHECK(host.projection().statistics().projections <= host.steps() / n + 10);
+  }
+}
+
+TEST_CASE("hold: a held component is never moved") {
+  // z follows x^2 in the equations; x is held, so only z may move.
+  const Problem problem = ode({0.5, 0.25, 0.0}, 10.0, [](double t, const double* y, double* f) {
+    f[0] = std::cos(t);
+    f[1] = 2.0 * y[0] * f[0];
+    f[2] = y[1];
+  });
+  for (const bool by_vector : {false, true}) {
+    double t_last = -1.0, x_last = 0.0, z_last = 0.0;
+    bool x_moved = false, z_moved = false;
+    const tp::Constraints parabola = row(
+        "parabola",
+        [&](double t, const double* y) {
+          // Calls at the same time belong to one attempt: before and after a move.
+          if (t == t_last) {
+            x_moved = x_moved || y[0] != x_last;
+            z_moved = z_moved || y[1] != z_last;
+          }
+          t_last = t;
+          x_last = y[0];
+          z_last = y[1];
+          return y[1] - y[0] * y[0];
+        },
+        [](double, const double* y, double* c) {
+          c[0] = -2.0 * y[0];
+          c[1] = 1.0;
+        });
+    tp::Options options;
+    options.extra_iterations = 0;
+    options.tolerance = 1e-12;  // makes it look twice
+    Host host(problem, 1e-5);
+    if (by_vector)
+      options.hold_vector = host.vector({0.0, 1.0, 1.0});
+    else
+      options.hold = {true, false, false};
+    host.attach(parabola, options);
+    REQUIRE(host.finish() >= 0);
+    CHECK_FALSE(x_moved);
+    CHECK(z_moved);
+    CHECK(host.projection().statistics().projections > 20);
+
+    x_moved = false;
+    Host free(problem, 1e-5);
+    options.hold.clear();
+    options.hold_vector = nullptr;
+    free.attach(parabola, options);
+    REQUIRE(free.finish() >= 0);
+    CHECK(x_moved);  // without the mask it would have been
+  }
+}
+
+TEST_CASE("largest_move: a start too far away is rejected, or approached in capped moves") {
+  Problem far = tether::test::circle(20.0);
+  far.y0 = {1.0 + 1e-4, 0.0};  // about 35 tolerances at 1e-6
+  far.yp0 = {0.0, 1.0 + 1e-4};
+  {
+    Host host(far, 1e-6);
+    host.attach(on_circle());
+    CHECK(host.finish() < 0);
+    CHECK(host.projection().status() == tp::Status::move_too_long);
+    CHECK(contains(host.projection().message(), "largest_move"));
+    CHECK(host.projection().statistics().move_too_long > 0);
+    CHECK(host.projection().statistics().solver_calls <= 40);
+    CHECK(host.steps() == 0);
+  }
+  {
+    tp::Options options;
+    options.long_move = tp::LongMove::cap;
+    options.largest_move = 0.5;
+    Host host(far, 1e-6);
+    host.attach(on_circle(), options);
+    REQUIRE(host.finish() >= 0);
+    const tp::Statistics s = host.projection().statistics();
+    CHECK(s.moves_capped >= 5);
+    CHECK(s.move_too_long == 0);
+    CHECK(std::abs(std::hypot(host.data()[0], host.data()[1]) - 1.0) < 1e-8);
+    CHECK(host.steps() < 600);
+  }
+  {
+    tp::Options options;
+    options.largest_move = 1e6;  // one jump is allowed, but IDA's error test must like it
+    Host host(far, 1e-3);
+    host.attach(on_circle(), options);
+    REQUIRE(host.finish() >= 0);
+    CHECK(host.projection().statistics().failures() == 0);
+  }
+}
+
+TEST_CASE("tolerance: what is asked for is what is left") {
+  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
+  const tp::Constraints rows = problem.recommended_constraints();
+  for (const double tolerance : {1e-1, 1e-2, 1e-4, 1e-7}) {
+    tp::Options options;
+    options.tolerance = tolerance;
+    const Run run = integrate(problem, 1e-5, rows, options);
+    INFO("tolerance " << tolerance);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.distance <= tolerance);
+  }
+}
+
+TEST_CASE("maximum_iterations = 1 with a tight tolerance fails by name, not silently") {
+  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
+  tp::Options options;
+  options.maximum_iterations = 1;
+  options.tolerance = 1e-13;
+  Host host(problem, 1e-3);
+  host.attach(problem.recommended_constraints(), options);
+  const int flag = host.finish();
+  CHECK(host.projection().statistics().not_converged > 0);
+  if (flag < 0) {
+    CHECK(host.projection().status() == tp::Status::not_converged);
+    CHECK(contains(host.projection().message(), "check_jacobian"));
+  }
+}
+
+TEST_CASE("a wrong Jacobian is noticed while projecting") {
+  tp::Constraints wrong = on_circle();
+  wrong.jacobian = tp::DenseJacobian([](double, tp::ConstVector y, tp::Matrix C) {
+    C(0, 0) = y[1];  // turned by a right angle: moves along the circle
+    C(0, 1) = -y[0];
+  });
+  Host host(tether::test::circle(20.0), 1e-6);
+  host.attach(wrong);
+  CHECK(host.finish() < 0);
+  CHECK(host.projection().statistics().failures() > 0);
+  CHECK(contains(host.projection().message(), "check"));
+}
+
+TEST_CASE("groups: a point's components share one scale") {
+  // Two points on spheres; with a group for each, the motion keeps its rotational symmetry.
+  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
+  tp::Options options;
+  options.group = {0, 0, 1, 1, -1};
+  const Run run = integrate(problem, 1e-6, problem.recommended_constraints(), options);
+  const Run without = integrate(problem, 1e-6, problem.recommended_constraints());
+  REQUIRE(run.flag >= 0);
+  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(run.error < 2e-5);
+  CHECK_FALSE(same_bits(run.y, without.y));
+}
+
+TEST_CASE("treatment of algebraic variables") {
+  const Problem problem = pendulum(1.0, 1.0, 30.0, "index 1");
+  const tp::Constraints rows = problem.recommended_constraints();
+  const auto run = [&](auto change) {
+    tp::Options options;
+    change(options);
+    return integrate(problem, 1e-7, rows, options, false);
+  };
+  const Run derived = run([](tp::Options&) {});
+  const Run plain_test = run([](tp::Options& o) { o.suppress_algebraic = false; });
+  const Run stale = run([](tp::Options& o) { o.refresh_algebraic = false; });
+  for (const Run* r : {&derived, &plain_test, &stale}) REQUIRE(r->flag >= 0);
+  CHECK(derived.statistics.refreshes > 0);
+  CHECK(stale.statistics.refreshes == 0);
+  CHECK(derived.steps <= plain_test.steps);
+  // The multiplier belongs to the moved point only when it is refreshed.
+  Host given(problem, 1e-7);
+  tp::Options options;
+  options.id = given.vector(problem.id);
+  given.attach(rows, options);
+  REQUIRE(given.finish() >= 0);
+  CHECK(same_bits(given.state(), derived.y));  // the derived id is the right one
+
+  const Run none = run([](tp::Options& o) { o.derive_id_limit = 0; });
+  REQUIRE(none.flag >= 0);
+  CHECK(none.statistics.refreshes == 0);
+}

@@ -1,0 +1,232 @@
+// Tether: constraints of every rank, consistent or not. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <problems/kepler.hpp>
+#include <problems/pendulum.hpp>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+  return largest;
+}
+
+/// x^2 + y^2 = square, another way of saying on_circle() when square = 1.
+tp::Constraints circle_of(double square, const std::string& name) {
+  return row(
+      name, [square](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - square; },
+      [](double, const double* y, double* c) {
+        c[0] = 2.0 * y[0];
+        c[1] = 2.0 * y[1];
+      });
+}
+
+}  // namespace
+
+TEST_CASE("full rank: two evaluations, one factorisation for most steps") {
+  const Problem problem = pendulum(1.0, 1.0, 30.0, "index 1");
+  const Run run = integrate(problem, 1e-6, problem.recommended_constraints());
+  REQUIRE(run.flag >= 0);
+  CHECK(run.statistics.rank_drops == 0);
+  CHECK(run.statistics.failures() == 0);
+  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(run.statistics.factorizations <= run.statistics.projections + 15);
+  CHECK(static_cast<double>(run.statistics.value_evaluations) <
+        2.5 * static_cast<double>(run.statistics.projections));
+}
+
+TEST_CASE("redundant rows: the same motion as without them") {
+  const Problem problem = pendulum(1.0, 1.0, 30.0, "index 1");
+  const tp::Constraints once = problem.recommended_constraints();
+  // Length and energy a second time, in other units.
+  const tp::Constraints position = problem.select({"position"});
+  tp::Constraints copies;
+  copies.count = 2;
+  copies.value = [](double, tp::ConstVector y, tp::Vector g) {
+    g[0] = 1e4 * (y[0] * y[0] + y[1] * y[1] - 1.0);
+    g[1] = -1e-3 * ((y[2] * y[2] + y[3] * y[3]) / 2.0 + y[1]);
+  };
+  copies.jacobian = tp::DenseJacobian([](double, tp::ConstVector y, tp::Matrix C) {
+    C(0, 0) = 2e4 * y[0];
+    C(0, 1) = 2e4 * y[1];
+    C(1, 1) = -1e-3;
+    C(1, 2) = -1e-3 * y[2];
+    C(1, 3) = -1e-3 * y[3];
+  });
+  const Run full = integrate(problem, 1e-6, once);
+  const Run redundant = integrate(problem, 1e-6, once + copies);
+  REQUIRE(redundant.flag >= 0);
+  CHECK(redundant.statistics.failures() == 0);
+  CHECK(redundant.statistics.rank_drops == redundant.statistics.factorizations);
+  CHECK(redundant.distance <= tp::Options().tolerance);
+  CHECK(std::abs(redundant.steps - full.steps) <= 10);
+  CHECK(largest_difference(full.y, redundant.y) < 1e-7);
+}
+
+TEST_CASE("redundant everywhere: Kepler's four invariants have rank 3") {
+  const Problem problem = kepler(0.6, 50.0);
+  const Run run = integrate(problem, 1e-8, problem.recommended_constraints());
+  const Run plain = integrate_plain(problem, 1e-8);
+  REQUIRE(run.flag >= 0);
+  CHECK(run.statistics.rank_drops == run.statistics.factorizations);
+  CHECK(run.statistics.failures() == 0);
+  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(run.error < 0.1 * plain.error);
+  CHECK(run.steps < 1.2 * static_cast<double>(plain.steps));
+}
+
+TEST_CASE("inconsistent rows: refused at once, by name") {
+  for (const double square : {2.0, 1.0 + 1e-3}) {
+    INFO("second circle: " << square);
+    Host host(circle(10.0), 1e-6);
+    host.attach(circle_of(1.0, "unit circle") + circle_of(square, "other circle"));
+    CHECK(host.finish() < 0);
+    CHECK(host.steps() == 0);
+    CHECK(host.projection().status() == tp::Status::inconsistent);
+    CHECK(contains(host.projection().message(), "unit circle"));
+    CHECK(contains(host.projection().message(), "other circle"));
+    CHECK(host.projection().statistics().inconsistent >= 1);
+    CHECK(host.projection().statistics().solver_calls <= 20);
+  }
+}
+
+TEST_CASE("inconsistent rows: only those that contradict are named") {
+  const Problem p = ode({1.0, 0.0, 3.0}, 10.0, [](double, const double* y, double* f) {
+    f[0] = -y[1];
+    f[1] = y[0];
+    f[2] = 0.0;
+  });
+  const tp::Constraints third = row(
+      "third stays", [](double, const double* y) { return y[2] - 3.0; },
+      [](double, const double*, double* c) { c[2] = 1.0; });
+  Host host(p, 1e-6);
+  host.attach(circle_of(1.0, "unit circle") + third + circle_of(2.0, "other circle"));
+  CHECK(host.finish() < 0);
+  CHECK(contains(host.projection().message(), "0 (unit circle)"));
+  CHECK(contains(host.projection().message(), "2 (other circle)"));
+  CHECK_FALSE(contains(host.projection().message(), "third stays"));
+}
+
+TEST_CASE("rows that differ by less than a tolerance are taken as redundant") {
+  const Problem problem = circle(10.0);
+  const Run run = integrate(
+      problem, 1e-6, circle_of(1.0, "unit circle") + circle_of(1.0 + 1e-8, "nearly"), {}, false);
+  REQUIRE(run.flag >= 0);
+  CHECK(run.statistics.rank_drops > 0);
+  CHECK(run.error < 1e-5);
+}
+
+TEST_CASE("a row that depends on nothing free to move is refused") {
+  tp::Options options;
+  options.hold = {true, true};
+  Host host(circle(10.0), 1e-6);
+  host.attach(on_circle(), options);
+  CHECK(host.finish() < 0);
+  CHECK(host.projection().status() == tp::Status::inconsistent);
+  CHECK(contains(host.projection().message(), "circle"));
+}
+
+TEST_CASE("vanishing gradient: (x^2 + y^2 - 1)^2 never divides by nothing") {
+  const tp::Constraints squared = row(
+      "squared",
+      [](double, const double* y) { return std::pow(y[0] * y[0] + y[1] * y[1] - 1.0, 2); },
+      [](double, const double* y, double* c) {
+        const double r = 4.0 * (y[0] * y[0] + y[1] * y[1] - 1.0);
+        c[0] = r * y[0];
+        c[1] = r * y[1];
+      });
+  for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+    INFO("tolerance " << tolerance);
+    const Problem problem = circle(20.0);
+    const Run run = integrate(problem, tolerance, squared, {}, false);
+    const Run plain = integrate_plain(problem, tolerance);
+    // Accepted, with moves that only halve the distance, or refused with a reason.
+    if (run.flag < 0) {
+      CHECK_FALSE(run.message.empty());
+    } else {
+      CHECK(run.error <= 3.0 * plain.error);
+    }
+    for (const double x : run.y) CHECK(std::isfinite(x));
+    CHECK(run.steps <= 15 * plain.steps);  // repeated small moves are noise to IDA
+    CHECK(run.statistics.largest_move < 10.0);
+  }
+}
+
+TEST_CASE("vanishing gradient: an isolated point and a crossing, where the solution stays") {
+  const Problem still = ode({0.0, 0.0, 1.0}, 10.0, [](double, const double* y, double* f) {
+    f[0] = -y[0];
+    f[1] = -2.0 * y[1];
+    f[2] = -0.3 * y[2];
+  });
+  const tp::Constraints point = row(
+      "point", [](double, const double* y) { return y[0] * y[0] + y[1] * y[1]; },
+      [](double, const double* y, double* c) {
+        c[0] = 2.0 * y[0];
+        c[1] = 2.0 * y[1];
+      });
+  const tp::Constraints crossing = row(
+      "crossing", [](double, const double* y) { return y[0] * y[1]; },
+      [](double, const double* y, double* c) {
+        c[0] = y[1];
+        c[1] = y[0];
+      });
+  for (const tp::Constraints& set : {point, crossing}) {
+    const Run run = integrate(still, 1e-6, set, {}, false);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.y[0] == 0.0);
+    CHECK(run.y[1] == 0.0);
+    CHECK(std::abs(run.y[2] - std::exp(-3.0)) < 1e-5);
+  }
+}
+
+TEST_CASE("a vanished gradient with g not zero is named") {
+  const tp::Constraints impossible = row(
+      "impossible", [](double, const double*) { return 0.5; },
+      [](double, const double*, double*) {});
+  Host host(circle(10.0), 1e-6);
+  host.attach(impossible);
+  CHECK(host.finish() < 0);
+  CHECK(host.projection().status() == tp::Status::inconsistent);
+  CHECK(contains(host.projection().message(), "impossible"));
+}
+
+TEST_CASE("close to rest: length and energy rows almost parallel") {
+  // A swing of 1e-4 rad: the sine of the angle between the two rows is about 1e-4.
+  const double g = 9.80665, start = 1e-4;
+  Problem problem = pendulum(1.0, g, 20.0, "index 1");
+  problem.y0 = {std::sin(start), -std::cos(start), 0.0, 0.0, g * std::cos(start)};
+  problem.yp0 = {0.0, 0.0, -problem.y0[0] * problem.y0[4],
+                 -problem.y0[1] * problem.y0[4] - g, 0.0};
+  const double frequency = std::sqrt(g) * (1.0 - start * start / 16.0);
+  const double angle = start * std::cos(frequency * 20.0);
+  problem.reference = {std::sin(angle), -std::cos(angle)};
+  problem.error_components = 2;
+  const tp::Constraints rows =
+      problem.select({"position", "velocity"}) +
+      tp::energy(
+          [g](tp::ConstVector y) { return (y[2] * y[2] + y[3] * y[3]) / 2.0 + g * y[1]; },
+          [g](tp::ConstVector y, tp::Vector gradient) {
+            gradient[1] = g;
+            gradient[2] = y[2];
+            gradient[3] = y[3];
+          },
+          -g * std::cos(start));
+  for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
+    INFO("tolerance " << tolerance);
+    const Run run = integrate(problem, tolerance, rows);
+    const Run plain = integrate_plain(problem, tolerance);
+    INFO("plain: " << plain.flag << ", " << plain.steps << " steps, error " << plain.error);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.distance <= 0.1);  // the floor of rounding, amplified by the angle
+    CHECK(run.error < 2e-4);     // the swing itself is that large at 1e-6
+    CHECK(run.error <= 1e3 * tolerance);
+    CHECK(run.steps <= 1.5 * static_cast<double>(plain.steps));
+  }
+}

@@ -1,0 +1,177 @@
+// Tether: time-dependent constraints, odd weights, roots and stops. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <cmath>
+#include <problems/car_axis.hpp>
+#include <problems/pendulum.hpp>
+
+#include "host.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+/// 1 / (rtol |y| + atol) as IDA computes it, times a factor for each component.
+int weights(N_Vector y, N_Vector ewt, void* data) {
+  // IDA hands over its user_data, the host's problem: factors and tolerance travel in there.
+  const auto& problem = *static_cast<Problem*>(data);
+  for (int i = 0; i < problem.size; ++i)
+    N_VGetArrayPointer(ewt)[i] =
+        problem.atol_scale[static_cast<std::size_t>(i)] /
+        (problem.initial_step * std::abs(N_VGetArrayPointer(y)[i]) + problem.initial_step);
+  return 0;
+}
+
+/// rtol = atol = tolerance by IDAWFtolerances, each weight times a factor.
+void set_weights(Host& host, double tolerance, std::vector<double> factor) {
+  host.problem.atol_scale = std::move(factor);
+  host.problem.initial_step = tolerance;
+  REQUIRE(IDAWFtolerances(host.ida, weights) == 0);
+}
+
+}  // namespace
+
+TEST_CASE("time-dependent constraint: kept at the time of every step") {
+  // A point dragged along x = sin t, y free: y' = x.
+  const Problem problem = ode({0.0, 0.0}, 20.0, [](double t, const double* y, double* f) {
+    f[0] = std::cos(t);
+    f[1] = y[0];
+  });
+  const tp::Constraints dragged = row(
+      "dragged", [](double t, const double* y) { return y[0] - std::sin(t); },
+      [](double, const double*, double* c) { c[0] = 1.0; });
+  const Run run = integrate(problem, 1e-6, dragged);
+  REQUIRE(run.flag >= 0);
+  CHECK(run.drift < 1e-14);
+  CHECK(std::abs(run.y[1] - (1.0 - std::cos(20.0))) < 1e-5);
+  CHECK(run.steps < 300);
+
+  const Problem car = car_axis("index 1");
+  const Run on_road = integrate(car, 1e-6, car.recommended_constraints());
+  REQUIRE(on_road.flag >= 0);
+  CHECK(on_road.distance <= tp::Options().tolerance);
+}
+
+TEST_CASE("a constraint that the equations do not keep is enforced all the same") {
+  // The equations only drift along; g asks for a circle that grows slowly.
+  const Problem problem = circle(5.0);
+  const tp::Constraints growing = row(
+      "growing",
+      [](double t, const double* y) {
+        return y[0] * y[0] + y[1] * y[1] - (1.0 + 1e-4 * t) * (1.0 + 1e-4 * t);
+      },
+      [](double, const double* y, double* c) {
+        c[0] = 2.0 * y[0];
+        c[1] = 2.0 * y[1];
+      });
+  const Run run = integrate(problem, 1e-4, growing);
+  REQUIRE(run.flag >= 0);
+  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(std::hypot(run.y[0], run.y[1]) == Approx(1.0005).epsilon(1e-6));
+}
+
+TEST_CASE("user weights equal to IDA's own: the same bits") {
+  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
+  Host scalar(problem, 1e-6), user(problem, 1e-6);
+  set_weights(user, 1e-6, std::vector<double>(5, 1.0));
+  scalar.attach(problem.recommended_constraints());
+  user.attach(problem.recommended_constraints());
+  REQUIRE(scalar.finish() >= 0);
+  REQUIRE(user.finish() >= 0);
+  CHECK(scalar.steps() == user.steps());
+  CHECK(same_bits(scalar.state(), user.state()));
+}
+
+TEST_CASE("zero weights: a component without error control is still projected") {
+  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
+  const tp::Constraints rows = problem.recommended_constraints();
+  for (const int without : {4, 1, 3}) {  // the multiplier, a position, a velocity
+    for (const tp::Metric metric : {tp::Metric::local_correction, tp::Metric::error_weights}) {
+      INFO("component " << without << ", metric " << static_cast<int>(metric));
+      Host host(problem, 1e-6);
+      std::vector<double> factor(5, 1.0);
+      factor[static_cast<std::size_t>(without)] = 0.0;
+      set_weights(host, 1e-6, factor);
+      tp::Options options;
+      options.metric = metric;
+      host.attach(rows, options);
+      double drift = 0.0;
+      while (host.t < problem.t_end) {
+        REQUIRE(host.step() >= 0);
+        drift = std::max(drift, value(rows, host.t, host.data(), 5).cwiseAbs().maxCoeff());
+      }
+      CHECK(drift < 1e-8);
+      CHECK(host.finish() >= 0);
+      CHECK(host.steps() < 1200);
+      CHECK(host.error() < 1e-3);
+    }
+  }
+}
+
+TEST_CASE("loose weight on a multiplier: nothing is dumped there") {
+  // Index 0: the multiplier takes part in the projection. Its tolerance is a million times larger.
+  Problem loose = pendulum(1.0, 1.0, 20.0, "index 0");
+  const tp::Constraints rows = loose.recommended_constraints();
+  const Run tight = integrate(loose, 1e-7, rows);
+  loose.atol_scale = {1.0, 1.0, 1.0, 1.0, 1e6};
+  for (const tp::Metric metric : {tp::Metric::local_correction, tp::Metric::error_weights}) {
+    tp::Options options;
+    options.metric = metric;
+    const Run run = integrate(loose, 1e-7, rows, options);
+    INFO("metric " << static_cast<int>(metric) << ", tight: " << tight.error);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.drift < 1e-9);
+    CHECK(run.error < 1e-5);
+    CHECK(std::abs(run.y[4] - loose.reference[4]) < 1e-5);
+    CHECK(run.steps < 2 * tight.steps);
+  }
+  // Index 1, suppressed or not.
+  Problem index1 = pendulum(1.0, 1.0, 20.0, "index 1");
+  index1.atol_scale = {1.0, 1.0, 1.0, 1.0, 1e4};
+  for (const bool suppress : {true, false}) {
+    tp::Options options;
+    options.suppress_algebraic = suppress;
+    const Run run = integrate(index1, 1e-7, index1.recommended_constraints(), options);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.error < 1e-5);
+    CHECK(std::abs(run.y[4] - index1.reference[4]) < 1e-5);
+  }
+}
+
+TEST_CASE("root finding: times of the lowest point, returned on the constraints") {
+  const Problem problem = pendulum(1.0, 9.80665, 20.0, "index 1");
+  const tp::Constraints rows = problem.recommended_constraints();
+  Host host(problem, 1e-8);
+  host.attach(rows);
+  const IDARootFn lowest = [](sunrealtype, N_Vector y, N_Vector, sunrealtype* out, void*) {
+    out[0] = N_VGetArrayPointer(y)[0];
+    return 0;
+  };
+  REQUIRE(IDARootInit(host.ida, 1, lowest) == 0);
+  const double quarter = pendulum_period(1.0, 9.80665) / 4.0;
+  for (int k = 0; k < 10; ++k) {
+    REQUIRE(host.projection().solve(20.0, &host.t, host.y, host.yp, IDA_NORMAL) == IDA_ROOT_RETURN);
+    CHECK(std::abs(host.t - (2 * k + 1) * quarter) < 1e-6);
+    CHECK(value(rows, host.t, host.data(), 5).cwiseAbs().maxCoeff() < 1e-14);
+    CHECK(host.projection().status() == tp::Status::success);
+  }
+  CHECK(host.steps() < 5200);
+}
+
+TEST_CASE("stop time: reached exactly, on the constraints, and left again") {
+  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
+  const tp::Constraints rows = problem.recommended_constraints();
+  Host host(problem, 1e-7);
+  host.attach(rows);
+  for (const double stop : {0.1, 3.0, 3.0000001, 11.7, 20.0}) {
+    REQUIRE(IDASetStopTime(host.ida, stop) == 0);
+    REQUIRE(host.to(25.0) == IDA_TSTOP_RETURN);
+    CHECK(host.t == stop);
+    double exact[5];
+    pendulum_exact(1.0, 1.0, stop, exact);
+    for (int i = 0; i < 4; ++i) CHECK(std::abs(host.data()[i] - exact[i]) < 1e-5);
+    CHECK(distance(host, rows) < 2.0 * tp::Options().tolerance);
+  }
+  CHECK(host.steps() < 1000);
+}

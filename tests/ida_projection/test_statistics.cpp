@@ -1,0 +1,133 @@
+// Tether: work counts that agree with each other and with IDA's. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <chrono>
+#include <problems/pendulum.hpp>
+#include <sstream>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> fields;
+  std::istringstream in(line);
+  for (std::string field; std::getline(in, field, ',');) fields.push_back(field);
+  return fields;
+}
+
+}  // namespace
+
+TEST_CASE("counts agree with each other") {
+  for (const char* form : {"index 1", "index 0"})
+    for (const double tolerance : {1e-4, 1e-8}) {
+      INFO(form << ", tolerance " << tolerance);
+      const Problem problem = pendulum(1.0, 1.0, 30.0, form);
+      Host host(problem, tolerance);
+      long values = 0, jacobians = 0;
+      tp::Constraints set = problem.recommended_constraints();
+      const auto g = set.value;
+      const auto C = std::get<tp::DenseJacobian>(set.jacobian).fill;
+      set.value = [&, g](double t, tp::ConstVector y, tp::Vector out) {
+        ++values;
+        return g(t, y, out);
+      };
+      set.jacobian = tp::DenseJacobian([&, C](double t, tp::ConstVector y, tp::Matrix out) {
+        ++jacobians;
+        return C(t, y, out);
+      });
+      host.attach(set);
+      using Clock = std::chrono::steady_clock;
+      const auto begin = Clock::now();
+      REQUIRE(host.finish() >= 0);
+      const double elapsed = std::chrono::duration<double>(Clock::now() - begin).count();
+      const tp::Statistics s = host.projection().statistics();
+      CHECK(s.solver_calls == s.projections + s.skipped + s.corrector_failures);
+      CHECK(s.solver_calls >= host.steps());
+      CHECK(s.projections >= host.steps() - s.skipped);
+      CHECK(s.value_evaluations == values);
+      CHECK(s.jacobian_evaluations == jacobians);
+      CHECK(s.value_evaluations >= s.projections);
+      CHECK(s.factorizations >= s.projections);
+      CHECK(s.factorizations <= s.jacobian_evaluations);
+      CHECK(s.iterations >= s.projections);
+      CHECK(s.failures() == 0);
+      CHECK(s.extra_iterations <= s.projections);
+      CHECK(s.refreshes <= s.projections);
+      CHECK((s.refreshes > 0) == (std::string(form) == "index 1"));
+      CHECK(s.largest_drift_before > 0.0);
+      CHECK(s.largest_drift_after <= s.largest_drift_before);
+      CHECK(s.mean_move > 0.0);
+      CHECK(s.mean_move <= s.largest_move);
+      CHECK(s.seconds > 0.0);
+      CHECK(s.seconds < 20.0 * elapsed);  // it is extrapolated from a sample
+
+      // F called by the plugin is part of IDA's own count.
+      long residuals = 0;
+      IDAGetNumResEvals(host.ida, &residuals);
+      CHECK(s.residual_evaluations > 0);
+      CHECK(s.residual_evaluations < residuals);
+    }
+}
+
+TEST_CASE("reset") {
+  const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
+  Host host(problem, 1e-6);
+  host.attach(problem.recommended_constraints());
+  REQUIRE(host.to(5.0) >= 0);
+  const long calls = host.projection().statistics().solver_calls;
+  host.projection().reset_statistics();
+  const tp::Statistics zero = host.projection().statistics();
+  CHECK(zero.solver_calls == 0);
+  CHECK(zero.mean_move == 0.0);
+  CHECK(zero.largest_move == 0.0);
+  CHECK(zero.seconds == 0.0);
+  REQUIRE(host.to(10.0) >= 0);
+  CHECK(host.projection().statistics().solver_calls > 0);
+  CHECK(host.projection().statistics().solver_calls + calls >= host.steps());
+}
+
+TEST_CASE("table and CSV hold the same numbers") {
+  tp::Statistics s;
+  s.solver_calls = 1234567;
+  s.projections = 7;
+  s.rank_drops = 3;
+  s.corrector_failures = 2;
+  s.largest_move = 0.125;
+  s.mean_move = 2.5e-7;
+  s.seconds = 1.5e-3;
+  const std::vector<std::string> names = split(tp::Statistics::csv_header());
+  const std::vector<std::string> values = split(s.csv_row());
+  REQUIRE(names.size() == values.size());
+  CHECK(names.size() >= 24);
+  const auto field = [&](const std::string& name) {
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (names[i] == name) return std::stod(values[i]);
+    return -1.0;
+  };
+  CHECK(field("solver_calls") == 1234567);
+  CHECK(field("projections") == 7);
+  CHECK(field("rank_drops") == 3);
+  CHECK(field("corrector_failures") == 2);
+  CHECK(field("largest_move") == 0.125);
+  CHECK(field("mean_move") == 2.5e-7);
+  CHECK(field("seconds") == 1.5e-3);
+  CHECK(field("moves_capped") == 0.0);
+
+  std::ostringstream streamed;
+  streamed << s;
+  CHECK(streamed.str() == s.table());
+  std::istringstream lines(s.table());
+  std::size_t count = 0;
+  for (std::string line; std::getline(lines, line);) {
+    CHECK(contains(line, " = "));
+    ++count;
+  }
+  CHECK(count == names.size());
+  CHECK(contains(s.table(), "1234567"));
+  CHECK(contains(tp::Statistics{}.table(), "not called the plugin"));
+}
