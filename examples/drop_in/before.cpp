@@ -45,7 +45,8 @@ int main() {
   for (int n = 1; n <= NPERIODS; n *= 10) {
     sunrealtype t;
     if (check(IDASolve(ida_mem, n * PERIOD, &t, yy, yp, IDA_NORMAL), "IDASolve")) return 1;
-    printf("%7d  %13.1e %12.1e %11.1e\n", n, std::hypot(std::hypot(y[0] - 1, y[1]), std::hypot(y[2], y[3])),
+    printf("%7d  %13.1e %12.1e %11.1e\n", n,
+           std::hypot(std::hypot(y[0] - 1, y[1]), std::hypot(y[2], y[3])),
            std::hypot(y[0], y[1]) - 1, (y[2] * y[2] + y[3] * y[3]) / 2 + y[1]);
   }
   long steps;

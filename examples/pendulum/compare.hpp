@@ -14,7 +14,9 @@ struct Curve {
   Invariants invariants = Invariants::none;
   std::vector<const Result*> points;  ///< those that did not fail, loosest tolerance first
 
-  std::string constraints() const { return points.empty() ? "" : points.front()->what.constraints(); }
+  std::string constraints() const {
+    return points.empty() ? "" : points.front()->what.constraints();
+  }
 };
 
 std::vector<Curve> curves(const Results& results);

@@ -3,8 +3,6 @@
 
 #include <fmt/os.h>
 
-#include <cmath>
-
 namespace pendulum {
 
 namespace {
@@ -27,8 +25,7 @@ std::string identity(const Experiment& experiment, const Case& what) {
                      what.tolerance);
 }
 
-constexpr const char* kIdentity =
-    "pendulum,L_m,g_m_per_s2,duration_s,form,constraints,tolerance";
+constexpr const char* kIdentity = "pendulum,L_m,g_m_per_s2,duration_s,form,constraints,tolerance";
 
 // Numbers of a failed run would look like results: they stay empty.
 std::string measured(const Result& run) {
@@ -65,7 +62,6 @@ void write_drift(const std::filesystem::path& file, const std::vector<Results>& 
 }  // namespace
 
 Files write_csv(const std::filesystem::path& folder, const std::vector<Results>& all) {
-  std::filesystem::create_directories(folder);
   const Files files = {folder / "pendulum.csv", folder / "pendulum_drift.csv"};
   write_runs(files[0], all);
   write_drift(files[1], all);

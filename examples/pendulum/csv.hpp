@@ -10,7 +10,7 @@ namespace pendulum {
 
 using Files = std::vector<std::filesystem::path>;
 
-/// pendulum.csv, one line for each run, and pendulum_drift.csv, drift over time. Makes the folder.
+/// pendulum.csv, one line for each run, and pendulum_drift.csv, drift over time.
 Files write_csv(const std::filesystem::path& folder, const std::vector<Results>& all);
 
 void print_names(const Files& files);

@@ -14,7 +14,7 @@ set style line 3 lc rgb energy    lw 1.8
 
 sets_1 = 'none length+velocity length+velocity+energy'
 sets_0 = 'none length+velocity+tension length+velocity+tension+energy'
-legend = "'plain IDA' 'constraints without energy' 'constraints with energy'"
+legend = "'plain IDA' 'without energy' 'with energy'"
 
 smallest = 1e-17  # stands for zero on a logarithmic axis
 of(form, set) = strcol(1) eq p && strcol(4) eq d && strcol(5) eq form && strcol(6) eq set && \
@@ -61,12 +61,12 @@ plot for [i=1:3] csv skip 1 using (at('index 0', word(sets_0, i))):(drift(10)) w
 
 set lmargin at screen 0.04
 set rmargin at screen 0.98
-set tmargin at screen 0.075
+set tmargin at screen 0.055
 set bmargin at screen 0.0
 unset border; unset tics; unset xlabel; unset grid; unset logscale
 set xrange [0:1]; set yrange [0:1]
 set key center center horizontal maxrows 1 Left reverse samplen 2.5 width 1
-set label 1 sprintf("%s pendulum, %s s, tolerance %s: drift, the largest in each window of time", \
+set label 1 sprintf("%s pendulum, %s s, tolerance %s: largest drift in each window of time", \
   p eq 'seed' ? "The seed's" : 'Unit', d, tolerance) at screen 0.5,0.972 center
 plot for [i=1:3] NaN with lines ls i title word(legend, i)
 unset multiplot

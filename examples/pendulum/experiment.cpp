@@ -59,7 +59,8 @@ std::string Case::constraints(const char* separator) const {
 }
 
 std::vector<Experiment> plan(const Settings& settings) {
-  const auto experiment = [&](const char* pendulum, double L, double g, double duration, int repeats) {
+  const auto experiment = [&](const char* pendulum, double L, double g, double duration,
+                              int repeats) {
     Experiment e;
     e.pendulum = pendulum;
     e.length = L;

@@ -13,9 +13,9 @@ enum class Invariants { none, without_energy, with_energy };
 
 /// One run: which equations, which constraints, how accurate.
 struct Case {
-  std::string form;                         ///< "index 1" or "index 0"
+  std::string form;  ///< "index 1" or "index 0"
   Invariants invariants = Invariants::none;
-  double tolerance = 0.0;                   ///< rtol = atol
+  double tolerance = 0.0;  ///< rtol = atol
 
   bool plain() const { return invariants == Invariants::none; }
   /// Names of the rows as tether_problems knows them.
@@ -26,11 +26,11 @@ struct Case {
 
 /// A pendulum that starts horizontally at rest, watched for some time.
 struct Experiment {
-  std::string pendulum;    ///< "seed" or "unit"
-  double length = 1.0;     ///< L, m
-  double gravity = 1.0;    ///< g, m/s^2
-  double duration = 10.0;  ///< s
-  int repeats = 1;         ///< timed runs of each case, of which the fastest counts
+  std::string pendulum;           ///< "seed" or "unit"
+  double length = 1.0;            ///< L, m
+  double gravity = 1.0;           ///< g, m/s^2
+  double duration = 10.0;         ///< s
+  int repeats = 1;                ///< timed runs of each case, of which the fastest counts
   double drift_tolerance = 1e-6;  ///< whose drift is recorded over time
   std::vector<Case> cases;
 };

@@ -56,7 +56,9 @@ void draw(const std::filesystem::path& folder, const std::vector<Results>& all, 
     files.push_back(error_svg);
     files.push_back(drift_svg);
   } else {
-    fmt::print(stderr, "pendulum: gnuplot is missing or failed, so there are no pictures; the CSV files are complete\n");
+    fmt::print(stderr,
+               "pendulum: gnuplot is missing or failed, so there are no pictures; the CSV files "
+               "are complete\n");
   }
 }
 

@@ -97,9 +97,8 @@ int solve(Ida& ida, double end, double& t) {
 int solve(Ida& ida, double end, double& t, const Observer& observer) {
   int flag = IDA_SUCCESS;
   while (flag == IDA_SUCCESS && t < end) {
-    flag = ida.steps() < kMaximumSteps
-               ? IDASolve(ida.memory, end, &t, ida.y, ida.yp, IDA_ONE_STEP)
-               : IDA_TOO_MUCH_WORK;
+    flag = ida.steps() < kMaximumSteps ? IDASolve(ida.memory, end, &t, ida.y, ida.yp, IDA_ONE_STEP)
+                                       : IDA_TOO_MUCH_WORK;
     if (flag >= 0) observer(t, N_VGetArrayPointer(ida.y));
   }
   return flag;
@@ -110,7 +109,8 @@ double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC
 }  // namespace
 
 Problem problem_of(const Experiment& experiment, const std::string& form) {
-  return tether::problems::pendulum(experiment.length, experiment.gravity, experiment.duration, form);
+  return tether::problems::pendulum(experiment.length, experiment.gravity, experiment.duration,
+                                    form);
 }
 
 Outcome integrate(const Problem& problem, const Case& what, const Observer& observer) {

@@ -11,12 +11,12 @@ namespace pendulum {
 
 /// What a run ended with.
 struct Outcome {
-  std::string failure;     ///< IDA's name of the failure; empty when the end was reached
-  double reached = 0.0;    ///< time of the last accepted step, s
-  double error = 0.0;      ///< at the end, see problems::Problem::error
-  long steps = 0;          ///< accepted
-  long residuals = 0;      ///< evaluations of F
-  double cpu_ms = 0.0;     ///< process CPU time in IDASolve
+  std::string failure;   ///< IDA's name of the failure; empty when the end was reached
+  double reached = 0.0;  ///< time of the last accepted step, s
+  double error = 0.0;    ///< at the end, see problems::Problem::error
+  long steps = 0;        ///< accepted
+  long residuals = 0;    ///< evaluations of F
+  double cpu_ms = 0.0;   ///< process CPU time in IDASolve
 };
 
 /// Called after every accepted step.

@@ -7,6 +7,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <vector>
 
 #include "compare.hpp"
@@ -21,6 +22,7 @@
 namespace {
 
 void run(const pendulum::Settings& settings) {
+  std::filesystem::create_directories(settings.output);
   const std::vector<pendulum::Experiment> experiments = pendulum::plan(settings);
   pendulum::Progress progress(pendulum::expected_work(experiments));
 

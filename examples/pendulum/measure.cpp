@@ -20,10 +20,11 @@ Result observe(const Experiment& experiment, const Case& what, Progress& progres
   result.what = what;
   DriftHistory history(experiment);
   progress.start(title(experiment, what), experiment.duration, expected_work(experiment, what));
-  result.outcome = integrate(problem_of(experiment, what.form), what, [&](double t, const double* y) {
-    history.add(t, y);
-    progress.at(t);
-  });
+  result.outcome =
+      integrate(problem_of(experiment, what.form), what, [&](double t, const double* y) {
+        history.add(t, y);
+        progress.at(t);
+      });
   progress.finish();
   result.drift = history.largest();
   if (what.tolerance == experiment.drift_tolerance) result.history = history.windows();

@@ -24,8 +24,8 @@ struct Ratio {
 
 struct Result {
   Case what;
-  Outcome outcome;  ///< cpu_ms: the fastest of the timed runs
-  Drift drift;      ///< largest over all accepted steps
+  Outcome outcome;             ///< cpu_ms: the fastest of the timed runs
+  Drift drift;                 ///< largest over all accepted steps
   std::vector<Drift> history;  ///< only at Experiment::drift_tolerance
   Ratio same_tolerance;        ///< against plain IDA in the same form
   Ratio same_error;            ///< against plain IDA in the form that is faster there

@@ -26,8 +26,9 @@ std::string text(const Ratio& ratio) {
 }
 
 std::string milliseconds(double ms) {
-  return ms < 9.995 ? fmt::format("{:.2f}", ms) : ms < 99.95 ? fmt::format("{:.1f}", ms)
-                                                            : fmt::format("{:.0f}", ms);
+  return ms < 9.995   ? fmt::format("{:.2f}", ms)
+         : ms < 99.95 ? fmt::format("{:.1f}", ms)
+                      : fmt::format("{:.0f}", ms);
 }
 
 void print_run(const Result& run) {
@@ -92,14 +93,16 @@ void print_costs(const Results& results) {
 
 void print_explanation() {
   fmt::print(
-      "A pendulum in Cartesian coordinates, from the horizontal at rest; index 1: v^2 - g y = L^2 lambda,\n"
+      "A pendulum in Cartesian coordinates, from the horizontal at rest; index 1: v^2 - g y = L^2 "
+      "lambda,\n"
       "index 0: L^2 lambda' = -3 g vy. Each run is one call of IDASolve with rtol = atol = tol.\n\n"
       "end error    max |y_i - exact_i| / (1 + |exact_i|) over position and velocity at the end\n"
       "drift        largest over all accepted steps: | |r| - L | and | v^2/2 + g y |\n"
       "CPU time     process time in IDASolve, the fastest of several interleaved runs\n"
       "same tol     CPU time / that of plain IDA in the same form at the same tolerance\n"
       "same error   CPU time / that of plain IDA in the faster form for the same end error\n"
-      "             (interpolated; for this plain IDA is run down to tol = 1e-13, and 1e-12 over 1000 s)\n"
+      "             (interpolated; for this plain IDA is run down to tol = 1e-13, and 1e-12 over "
+      "1000 s)\n"
       "never        plain IDA fails, or is not that accurate at any tolerance\n");
 }
 
@@ -107,15 +110,16 @@ void print_runs(const Results& results) {
   fmt::print("\n{}\n\n", title(results.experiment));
   fmt::print("{:>77} {:>36}\n", "largest drift of", "CPU time / plain IDA's");
   fmt::print("{:<8} {:<34} {:>6} {:>9} {:>9} {:>9} {:>8} {:>8} {:>9} {:>10}\n", "form",
-             "constraints", "tol", "end error", "length/m", "E/(J/kg)", "steps", "CPU/ms", "same tol",
-             "same error");
+             "constraints", "tol", "end error", "length/m", "E/(J/kg)", "steps", "CPU/ms",
+             "same tol", "same error");
   for (const Result& run : results.runs) print_run(run);
   std::fflush(stdout);
 }
 
 void print_costs(const std::vector<Results>& all) {
   fmt::print(
-      "\nWhat accuracy costs: CPU time in ms for an end error, interpolated between the runs above;\n"
+      "\nWhat accuracy costs: CPU time in ms for an end error, interpolated between the runs "
+      "above;\n"
       "<: already the loosest run is more accurate; -: tighter than the runs above\n");
   for (const Results& results : all) print_costs(results);
   std::fflush(stdout);
