@@ -53,7 +53,9 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
     }
     if (search.exhausted()) return;
     if (leave.most_sweeps > 0 && sweep >= leave.most_sweeps) return;
-    if (leave.other_cost > 0 && search.counts.work - begin >= leave.least_work) {
+    // Near the tolerance sweeps get more time: their rate is irregular, a Newton phase has a fixed cost.
+    const double patience = last_error < 30 * search.options.tolerance ? 10 : 1;
+    if (leave.other_cost > 0 && search.counts.work - begin >= patience * leave.least_work) {
       // Predicted sweeps to the tolerance from the rate of |f| over the last ten.
       double left = std::numeric_limits<double>::infinity();
       if (sweep > kRecent) {

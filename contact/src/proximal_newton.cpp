@@ -88,7 +88,6 @@ bool ProximalNewton::direction(Search& search, double tau) {
 
 int ProximalNewton::inner(Search& search, double tau) {
   const Proximal proximal{tau, anchor_.data()};
-  const auto& locals = search.system.problem().locals();
   double res = residual(search, x_, z_, proximal, true);
   const double target = 0.1 * res;
   if (res == 0) return 1;
@@ -99,7 +98,6 @@ int ProximalNewton::inner(Search& search, double tau) {
     for (double t : {1.0, 0.4, 0.16, 0.064}) {
       for (int i = 0; i < n_; ++i) {
         for (int c = 0; c < 3; ++c) trial_[at(i)].v[c] = x_[at(i)].v[c] + t * dx_[at(i)].v[c];
-        clip_cone(locals[at(i)].mu, trial_[at(i)].v);
       }
       double found = residual(search, trial_, trial_z_, proximal, false);
       if (!(found <= target)) {
@@ -128,7 +126,6 @@ int ProximalNewton::inner(Search& search, double tau) {
         }
         for (int i = 0; i < n_; ++i) {
           for (int c = 0; c < 3; ++c) x_[at(i)].v[c] += dx_[at(i)].v[c];
-          clip_cone(locals[at(i)].mu, x_[at(i)].v);
         }
         search.system.sweep(x_.data(), proximal);
         search.count_sweep();
@@ -153,7 +150,7 @@ void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
   ++search.counts.newton_phases;
   std::copy(x, x + n_, x_.begin());
   const auto& locals = search.system.problem().locals();
-  double tau = 1e-3, tau_failed = 0;
+  double tau = 1e-4, tau_failed = 0;
   double least_step = std::numeric_limits<double>::infinity();
   double reference = search.best_error;
   int since_gain = 0, failures = 0;
