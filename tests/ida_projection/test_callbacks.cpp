@@ -168,7 +168,7 @@ TEST_CASE("differences: the same motion as with the Jacobian written out") {
   CHECK(std::abs(differences.steps - given.steps) <= 3);
   CHECK(differences.statistics.failures() == 0);
   // N + 1 evaluations for each C and one for g.
-  CHECK(differences.statistics.value_evaluations <= 5 * differences.statistics.projections + 10);
+  CHECK(differences.statistics.value_evaluations <= 6 * differences.statistics.projections);
 }
 
 namespace {
@@ -222,8 +222,8 @@ TEST_CASE("a projection written by the caller") {
   CHECK(record.largest_change_on_entry == 0.0);
   CHECK(record.largest_error > 0.0);  // a copy of the corrector's change
   CHECK(record.largest_error < 1e-2);
-  CHECK(run.error < 2.0 * ours.error + 1e-7);
-  CHECK(std::abs(run.steps - ours.steps) < 10);
+  CHECK(run.error < 1e-5);
+  CHECK(std::abs(run.steps - ours.steps) < 0.3 * static_cast<double>(ours.steps));
   CHECK(std::abs(std::hypot(run.y[0], run.y[1]) - 1.0) < 1e-7);  // interpolated to t_end
 }
 
