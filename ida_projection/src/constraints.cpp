@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <tether/ida_projection/constraints.hpp>
@@ -69,9 +70,9 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
 
   std::vector<int> columns(static_cast<std::size_t>(n));
   for (int j = 0; j < n; ++j) columns[static_cast<std::size_t>(j)] = j;
-  const Eigen::VectorXd scale = y.cwiseAbs().cwiseMax(1.0);
+  const Eigen::VectorXd scale = y.cwiseAbs().cwiseMax(1.0), increments = 1e-7 * scale;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> given(m, n), expected(m, n);
-  require(evaluator.jacobian(t, y.data(), n, scale.data(), columns, given.data()));
+  require(evaluator.jacobian(t, y.data(), n, increments.data(), columns, given.data()));
 
   // Central differences with steps h and h/2, extrapolated: error O(h^4).
   Eigen::VectorXd at = y, plus(m), minus(m);
@@ -96,8 +97,9 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
     for (int j = 0; j < n; ++j) {
       const double size = std::max(largest, std::abs(given(i, j)) * scale[j]);
       const double difference = std::abs(given(i, j) - expected(i, j)) * scale[j];
-      const double relative = size > 0.0 ? difference / size : 0.0;
-      if (!(relative <= report.worst)) {
+      double relative = size > 0.0 ? difference / size : 0.0;
+      if (std::isnan(difference)) relative = std::numeric_limits<double>::infinity();
+      if (relative > report.worst) {
         report.worst = relative;
         report.row = i;
         report.column = j;

@@ -17,6 +17,7 @@ namespace {
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kMetricFloor = 1e-3;  // D_i >= kMetricFloor WT_i
 constexpr double kMetricDecay = 0.8;   // per accepted step
+constexpr long kMeasureEvery = 64;
 
 class DenseMover final : public Mover {
  public:
@@ -56,6 +57,8 @@ class DenseMover final : public Mover {
     std::fill(scale_.begin(), scale_.end(), 0.0);
     std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
     monitor_.reset();
+    staleness_ = -1.0;
+    settles_ = 0;
   }
 
  private:
@@ -81,7 +84,12 @@ class DenseMover final : public Mover {
   RowBlocks blocks_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
   std::vector<double> y_, WT_, g_, C_;
+  std::vector<double> group_sum_;
+  std::vector<int> group_members_;
   const double* w_ = nullptr;
+  double move_length_ = 0.0;  // of the last first move, in tolerances
+  double staleness_ = -1.0;   // of factors, for each tolerance of distance; < 0: not measured
+  long settles_ = 0;
   const double* ycor_ = nullptr;
 };
 
@@ -102,8 +110,10 @@ void DenseMover::set_metric() {
   if (options_.metric == Metric::local_correction && !options_.group.empty()) {
     // One scale for each group: rms of |correction| in tolerances over its members.
     const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());
-    std::vector<double> sum(static_cast<std::size_t>(groups), 0.0);
-    std::vector<int> members(static_cast<std::size_t>(groups), 0);
+    std::vector<double>& sum = group_sum_;  // no allocation after the first step
+    std::vector<int>& members = group_members_;
+    sum.assign(static_cast<std::size_t>(groups), 0.0);
+    members.assign(static_cast<std::size_t>(groups), 0);
     for (std::size_t i = 0; i < y_.size(); ++i) {
       if (options_.group[i] < 0) continue;
       const auto k = static_cast<std::size_t>(options_.group[i]);
@@ -255,7 +265,7 @@ Move DenseMover::move(const Candidate& candidate) {
     ++result.moves;
 
     if (result.moves == 1) {
-      result.length = length;
+      result.length = move_length_ = length;
       // Only a long first move can be too long: the limit is at least largest_move.
       if (!(length <= options_.largest_move)) {
         double sum = 0.0;
@@ -305,10 +315,23 @@ Move DenseMover::move(const Candidate& candidate) {
 Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
   for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
-  const Status status = value(candidate.t);
-  if (status != Status::success) return status;
-  solve();
-  apply(1.0, N_VGetArrayPointer(candidate.correction));
+  double sum = 0.0;
+  for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
+  const double reach = move_length_ + std::sqrt(sum * inverse_n_);
+  // The factors belong to a point `reach` away: each move leaves about staleness_ reach of itself.
+  const bool measure = staleness_ < 0.0 || ++settles_ % kMeasureEvery == 0;
+  double previous = 0.0;
+  for (int k = 0; k < options_.maximum_iterations; ++k) {
+    const Status status = value(candidate.t);
+    if (status != Status::success) return status;
+    const double length = solve();
+    apply(1.0, N_VGetArrayPointer(candidate.correction));
+    const double floor = 1e2 * kEpsilon * size_of_y();
+    if (k > 0) staleness_ = std::max({staleness_, 0.0, length > floor ? length / (reach * previous) : 0.0});
+    if (length <= floor) break;
+    if ((k > 0 || !measure) && 4.0 * staleness_ * reach * length <= options_.tolerance) break;
+    previous = length;
+  }
   return Status::success;
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <tether/linalg/minimum_norm.hpp>
 #include <vector>
@@ -15,19 +16,25 @@ struct Block {
   std::vector<int> rows, columns;
   linalg::MinimumNorm solver;
   std::vector<double> D, g, dy;
+  bool adjacent = false;  // columns follow each other without a gap
 
   void resize() {
     solver.resize(static_cast<int>(rows.size()), static_cast<int>(columns.size()));
     D.assign(columns.size(), 0.0);
     g.assign(rows.size(), 0.0);
     dy.assign(columns.size(), 0.0);
+    adjacent = !columns.empty() &&
+               columns.back() - columns.front() + 1 == static_cast<int>(columns.size());
   }
 
   bool factor(const std::vector<double>& C, int n, double rank_tolerance) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       double* a = solver.row(static_cast<int>(i));
       const double* c = C.data() + static_cast<std::ptrdiff_t>(rows[i]) * n;
-      for (std::size_t k = 0; k < columns.size(); ++k) a[k] = c[columns[k]];
+      if (adjacent)
+        std::copy_n(c + columns.front(), columns.size(), a);
+      else
+        for (std::size_t k = 0; k < columns.size(); ++k) a[k] = c[columns[k]];
     }
     return solver.factor(D.data(), rank_tolerance);
   }

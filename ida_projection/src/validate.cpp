@@ -107,9 +107,6 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   if (std::holds_alternative<Gradients>(constraints.jacobian))
     if (const char* missing = missing_gradient_operation(like))
       reject(std::string("the vector type lacks ") + missing + ", which constraints given as Gradients need");
-  if (length >= 0 && rows > length)
-    reject("constraints.count = " + std::to_string(rows) + " rows for " + std::to_string(length) +
-           " unknowns; there must be no more rows than unknowns");
   const auto check_size = [&](std::size_t size, const char* name) {
     if (size == 0) return;
     if (!contiguous)
@@ -120,6 +117,10 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   };
   check_size(options.hold.size(), "hold");
   check_size(options.group.size(), "group");
+  for (std::size_t j = 0; j < options.group.size(); ++j)
+    if (options.group[j] < -1)
+      reject("options.group[" + std::to_string(j) + "] = " + std::to_string(options.group[j]) +
+             "; it must be a group >= 0, or -1 for none");
   const auto check_vector = [&](N_Vector v, const char* name) {
     if (v == nullptr) return;
     if (N_VGetVectorID(v) != N_VGetVectorID(like) ||

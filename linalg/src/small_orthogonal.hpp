@@ -32,7 +32,7 @@ struct Storage {
   }
 };
 
-constexpr double kReorthogonalise = 1e-2;  // of the squared length
+constexpr double kReorthogonalise = 1e-4;  // of the squared length: at most two digits are lost
 
 template <int Length>
 using Row = Eigen::Map<Eigen::Matrix<double, Length, 1>, Eigen::Aligned16>;
