@@ -58,6 +58,7 @@ class DenseMover final : public Mover {
     std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
     monitor_.reset();
     staleness_ = -1.0;
+    measured_ = 0.0;
     settles_ = 0;
   }
 
@@ -89,6 +90,7 @@ class DenseMover final : public Mover {
   const double* w_ = nullptr;
   double move_length_ = 0.0;  // of the last first move, in tolerances
   double staleness_ = -1.0;   // of factors, for each tolerance of distance; < 0: not measured
+  double measured_ = 0.0;     // longest distance at which it was looked for
   long settles_ = 0;
   const double* ycor_ = nullptr;
 };
@@ -294,7 +296,11 @@ Move DenseMover::move(const Candidate& candidate) {
     apply(1.0, correction);
 
     const double floor = std::min(0.1, 1e3 * kEpsilon * size_of_y());
-    const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
+    Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
+    // Almost parallel rows magnify rounding: a move that it explains has converged.
+    if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
+        length <= std::min(0.1, 10.0 * blocks_.condition() * kEpsilon * size_of_y()))
+      verdict = Monitor::Verdict::done;
     if (verdict == Monitor::Verdict::done) break;
     if (verdict == Monitor::Verdict::failed) {
       result.status = Status::not_converged;
@@ -319,7 +325,7 @@ Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
   for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
   const double reach = move_length_ + std::sqrt(sum * inverse_n_);
   // The factors belong to a point `reach` away: each move leaves about staleness_ reach of itself.
-  const bool measure = staleness_ < 0.0 || ++settles_ % kMeasureEvery == 0;
+  const bool measure = staleness_ < 0.0 || reach > 4.0 * measured_ || ++settles_ % kMeasureEvery == 0;
   double previous = 0.0;
   for (int k = 0; k < options_.maximum_iterations; ++k) {
     const Status status = value(candidate.t);
@@ -327,8 +333,12 @@ Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
     const double length = solve();
     apply(1.0, N_VGetArrayPointer(candidate.correction));
     const double floor = 1e2 * kEpsilon * size_of_y();
-    if (k > 0) staleness_ = std::max({staleness_, 0.0, length > floor ? length / (reach * previous) : 0.0});
-    if (length <= floor) break;
+    const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
+    if (k > 0) {
+      measured_ = std::max(measured_, reach);
+      staleness_ = std::max({staleness_, 0.0, rounding ? 0.0 : length / (reach * previous)});
+    }
+    if (rounding) break;
     if ((k > 0 || !measure) && 4.0 * staleness_ * reach * length <= options_.tolerance) break;
     previous = length;
   }

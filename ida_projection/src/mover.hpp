@@ -96,6 +96,7 @@ class Monitor {
  private:
   const Options* options_;
   double theta_ = -1.0;  // largest d_2 / d_1^2 seen; < 0: not measured yet
+  double measured_ = 0.0;  // longest first move at which theta was looked for: no rounding there
   double previous_ = -1.0;
   int moves_ = 0;
   long candidates_ = 0;
