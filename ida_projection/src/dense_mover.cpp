@@ -71,6 +71,7 @@ class DenseMover final : public Mover {
   double solve();
   bool contradicts();
   bool rounding_only() const;
+  double rounding_length();
   void apply(double factor, double* correction);
   double drift() const;
   double size_of_y() const;
@@ -230,6 +231,23 @@ bool DenseMover::rounding_only() const {
   return true;
 }
 
+// Length of the move that the rounding of g asks for in the worst case, with the present factors.
+double DenseMover::rounding_length() {
+  const std::vector<double> g = g_;
+  double total = 0.0;
+  for (std::size_t i = 0; i < g.size(); ++i) {
+    const double* c = C_.data() + i * y_.size();
+    double terms = 0.0;
+    for (std::size_t j = 0; j < y_.size(); ++j) terms += std::abs(c[j] * y_[j]);
+    std::fill(g_.begin(), g_.end(), 0.0);
+    g_[i] = 8.0 * kEpsilon * terms;
+    total += solve();
+    --statistics_.iterations;
+  }
+  g_ = g;
+  return total;
+}
+
 Move DenseMover::measure(const Candidate& candidate) {
   Move result;
   load(candidate);
@@ -299,7 +317,7 @@ Move DenseMover::move(const Candidate& candidate) {
     Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
     // Almost parallel rows magnify rounding: a move that it explains has converged.
     if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
-        length <= std::min(0.1, 10.0 * blocks_.condition() * kEpsilon * size_of_y()))
+        length <= std::min(0.1, rounding_length()))
       verdict = Monitor::Verdict::done;
     if (verdict == Monitor::Verdict::done) break;
     if (verdict == Monitor::Verdict::failed) {

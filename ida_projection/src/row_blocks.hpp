@@ -67,14 +67,6 @@ class RowBlocks {
   /// d.dy and a.dy for the values g, with the C that was factored.
   void solve(const std::vector<double>& g, const std::vector<double>& C);
   int rank() const { return d.solver.rank() + a.solver.rank(); }
-  /// Estimate of the factors' condition; 1 where there are no rows.
-  double condition() const {
-    double largest = 1.0;
-    for (const Block* block : {&d, &a})
-      if (!block->rows.empty() && block->solver.rank() > 0)
-        largest = largest > block->solver.condition() ? largest : block->solver.condition();
-    return largest;
-  }
   bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
 
   /// After solve(): do dropped rows ask for what the kept ones exclude? Up to what a tolerance-size
