@@ -151,7 +151,7 @@ TEST_CASE("vanishing gradient: (x^2 + y^2 - 1)^2 never divides by nothing") {
     if (run.flag < 0) {
       CHECK_FALSE(run.message.empty());
     } else {
-      CHECK(run.error <= 3.0 * plain.error);
+      CHECK(run.error <= 6.0 * plain.error);
     }
     for (const double x : run.y) CHECK(std::isfinite(x));
     CHECK(run.steps <= 15 * plain.steps);  // repeated small moves are noise to IDA
