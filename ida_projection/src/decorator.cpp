@@ -28,9 +28,10 @@ bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
 int Projection::Impl::initialize() {
   // IDASetMaxNonlinIters reaches the state's solver unless IDAS solves states and sensitivities
   // together; there is no getter for that. Ask, and see whether the question arrives here.
+  // Without constraints nothing would be lost.
   heard_ = false;
-  IDASetMaxNonlinIters(ida_mem_, maximum_iterations_);
-  if (!heard_) {
+  if (mover_) IDASetMaxNonlinIters(ida_mem_, maximum_iterations_);
+  if (mover_ && !heard_) {
     finish(Status::simultaneous_sensitivities,
            "IDAS with IDA_SIMULTANEOUS does not use the state's nonlinear solver, so nothing would be projected; use IDA_STAGGERED in IDASensInit");
     return kFatal;
