@@ -1,0 +1,82 @@
+// Tether: what moves a scene. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <iosfwd>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+namespace tether::scene {
+
+/// World axes; position of the centre of mass.
+struct BodyState {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+};
+
+struct ContactState {
+  int first = -1, second = -1;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< of the last step on `first`, N s
+  double gap = 0;                                     ///< m; < 0: penetration
+};
+
+struct Diagnostics {
+  double kinetic_energy = 0, potential_energy = 0;  ///< J; potential: gravity and springs
+  Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
+  double drift = 0;  ///< largest violation of a joint or an invariant that is kept (SI)
+  int contacts = 0;
+  double penetration = 0;  ///< m, deepest
+  double residual = 0;     ///< of the last contact problem
+};
+
+struct Counts {
+  long steps = 0, residual_evaluations = 0, jacobian_evaluations = 0, projections = 0;
+  long contact_problems = 0, sweeps = 0, unsolved = 0, error_test_failures = 0;
+};
+
+/// Seconds spent on one effect since the start.
+struct EffectCost {
+  std::string effect;
+  double seconds = 0;
+};
+
+/// A run that cannot go on: what happened, when, and what to try.
+class SimulationError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One run of one scene. Not copied; a state can be saved and restored.
+class Engine {
+ public:
+  virtual ~Engine() = default;
+  virtual const char* name() const = 0;
+  virtual double time() const = 0;
+  /// Moves to time t >= time(); stepping ends at the first step boundary not before t (to
+  /// round-off). Throws SimulationError.
+  virtual void advance(double t) = 0;
+  virtual const std::vector<BodyState>& bodies() const = 0;
+  virtual Diagnostics diagnostics() const = 0;
+  virtual const std::vector<ContactState>& contacts() const = 0;
+  virtual Counts counts() const = 0;
+  virtual std::vector<EffectCost> costs() const = 0;
+  /// After save(), this run and one that restores the state go on with the same bits (a multistep
+  /// method starts anew at that point in both).
+  virtual void save(std::ostream& out) = 0;
+  virtual void restore(
+      std::istream& in) = 0;  ///< throws std::runtime_error on a state of another scene
+};
+
+/// Each throws std::invalid_argument, naming what the scene asks for and the engine does not have.
+std::unique_ptr<Engine> make_smooth_engine(const Scene& scene);
+std::unique_ptr<Engine> make_stepping_engine(const Scene& scene);
+
+}  // namespace tether::scene

@@ -1,0 +1,191 @@
+// Tether: a scene as a value. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tether::scene {
+
+/// Where in a file something was written; line 0: made by a program.
+struct Place {
+  std::string file;
+  int line = 0, column = 0;
+};
+
+enum class ShapeKind : std::uint8_t { sphere, plane, box, capsule, convex, points };
+
+/// In the axes of its body, moved by `position` and turned by `orientation`.
+struct Shape {
+  ShapeKind kind = ShapeKind::sphere;
+  double radius = 0;  ///< sphere, capsule: m
+  double length = 0;  ///< capsule: between the centres of its caps (axis z), m
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box: full edges, m
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the solid half-space
+  std::vector<Eigen::Vector3d> points;                ///< convex: vertices; points: touching points
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+};
+
+/// s(t) = rate t + amplitude sin(2 pi frequency t + phase) - amplitude sin(phase), so that s(0) =
+/// 0.
+struct Motion {
+  double rate = 0, amplitude = 0, frequency = 0, phase = 0;  // m/s or rad/s; m or rad; Hz; rad
+};
+
+struct Drag {
+  double linear = 0, quadratic = 0;  ///< force -(linear + quadratic |v|) v: N s/m, N s^2/m^2
+  double rotational = 0;             ///< torque -rotational w: N m s
+};
+
+/// Position of the centre of mass and orientation (body to world) at t = 0, velocities in world
+/// axes.
+struct Body {
+  std::string name;
+  std::vector<Shape> shapes;
+  bool fixed = false;
+  double mass = 0;                                    ///< kg
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre, body axes, kg m^2
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+  std::string material;
+  std::optional<Drag> drag;
+  Place place;
+};
+
+/// How two materials meet. A pair that no table names is an error when bodies of it can touch.
+struct Pair {
+  std::string first, second;
+  double friction = 0;
+  double restitution = 0;  ///< 0 .. 1
+  Place place;
+};
+
+enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed };
+
+/// `first` and `second` are indices of bodies, -1 the world. Points and axes in world coordinates
+/// at t = 0. A motion prescribes the angle of a hinge (rad, of first against second about axis),
+/// the displacement of a slider (m, of first along axis) or the change of a distance (m).
+struct Joint {
+  JointKind kind = JointKind::ball;
+  std::string name;
+  int first = -1, second = -1;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  Eigen::Vector3d at_second = Eigen::Vector3d::Zero();  ///< distance only: the point on `second`
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();      ///< hinge, slider
+  std::optional<double> length;                         ///< distance: default the one at t = 0
+  std::optional<Motion> motion;
+  Place place;
+};
+
+/// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points; torsional: about
+/// axis.
+struct Spring {
+  std::string name;
+  int first = -1, second = -1;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero(), at_second = Eigen::Vector3d::Zero();
+  double stiffness = 0, damping = 0;  ///< N/m, N s/m
+  std::optional<double> rest;         ///< m; default the distance at t = 0
+  Place place;
+};
+
+/// A constant force at the centre and torque on one body, world axes.
+struct Load {
+  int body = 0;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
+  Place place;
+};
+
+enum class InvariantKind : std::uint8_t { energy, momentum, angular_momentum };
+
+struct Invariant {
+  InvariantKind kind = InvariantKind::energy;
+  bool project = true;  ///< false: only recorded
+  Place place;
+};
+
+enum class Formulation : std::uint8_t { index1, index0, stabilised_index2 };
+enum class Gyroscopic : std::uint8_t { none, explicit_step, implicit_step, momentum };
+enum class ContactLaw : std::uint8_t { coulomb, maximum_dissipation, frictionless };
+enum class OnFailure : std::uint8_t { stop, warn };
+
+/// Scenes without contact: IDA with projection.
+struct SmoothOptions {
+  double tolerance = 1e-6;  ///< rtol and atol (SI) of IDA
+  Formulation formulation = Formulation::index1;
+  bool projection = true;  ///< false: plain IDA
+  double max_step = 0;     ///< s; 0: free
+};
+
+/// Scenes with contact: impulse-velocity steps.
+struct SteppingOptions {
+  double step = 1e-3;  ///< s
+  ContactLaw law = ContactLaw::coulomb;
+  double tolerance = 1e-9;
+  Gyroscopic gyroscopic = Gyroscopic::momentum;
+  double error_reduction = 0.2;         ///< part of a penetration that one step removes
+  double max_depenetration_speed = 1;   ///< m/s
+  double restitution_threshold = 0.01;  ///< m/s: slower approaches do not bounce
+  OnFailure on_failure = OnFailure::stop;
+  int threads = 1;
+};
+
+struct Output {
+  std::string csv, vtk, svg, state;  ///< file names; empty: not written
+  double every = 0;                  ///< s between records; 0: end / 1000
+  double checkpoint = 0;             ///< s between saved states; 0: only at the end
+};
+
+enum class Quantity : std::uint8_t {
+  position,
+  velocity,
+  orientation,
+  angular_velocity,
+  distance_moved,  // of a body
+  speed,
+  kinetic_energy,
+  potential_energy,
+  energy,
+  energy_change,
+  momentum,
+  angular_momentum,
+  drift,
+  contacts,
+  penetration,
+  residual
+};
+
+/// The scene as its own test: |quantity(time) - value| <= within in every component, or, with
+/// `at_most` / `at_least`, a one-sided bound on its norm.
+struct Expect {
+  double time = 0;
+  Quantity quantity = Quantity::position;
+  int body = -1;
+  std::vector<double> value;
+  double within = 0;
+  std::optional<double> at_most, at_least;
+  Place place;
+};
+
+struct Scene {
+  std::string name, file;
+  double end = 1;                          ///< s
+  std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: none
+  std::vector<Body> bodies;
+  std::vector<Pair> pairs;  ///< none: bodies do not touch
+  std::vector<Joint> joints;
+  std::vector<Spring> springs;
+  std::vector<Load> loads;
+  std::vector<Invariant> invariants;
+  std::optional<SmoothOptions> smooth;      ///< at most one of the two is given;
+  std::optional<SteppingOptions> stepping;  ///< neither: the plan chooses with defaults
+  Output output;
+  std::vector<Expect> expect;
+};
+
+}  // namespace tether::scene

@@ -1,0 +1,13 @@
+// Tether: scenes. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/scene/engine.hpp>
+#include <tether/scene/words.hpp>
+
+// Every value has a word: the last one of each enumeration is found.
+namespace tether::scene {
+static_assert(word(ShapeKind::points) == "points" && word(JointKind::fixed) == "fixed" &&
+              word(InvariantKind::angular_momentum) == "angular_momentum" &&
+              word(Formulation::stabilised_index2) == "stabilised_index2" &&
+              word(Gyroscopic::momentum) == "momentum" &&
+              word(ContactLaw::frictionless) == "frictionless" && word(OnFailure::warn) == "warn" &&
+              word(Quantity::residual) == "residual");
+}  // namespace tether::scene
