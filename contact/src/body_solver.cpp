@@ -10,14 +10,16 @@
 #include <string>
 #include <thread>
 
+#include "impulse_memory.hpp"
 #include "law_coulomb.hpp"
 #include "law_frictionless.hpp"
 #include "law_maximum_dissipation.hpp"
+#include "system.hpp"
 
 namespace tether::contact {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using detail::at;
 
 struct alignas(64) State {  // linear and angular velocity
   double v[3], pad, w[3], pad2;
@@ -54,6 +56,20 @@ TETHER_INLINE void push(State& s, const Inertia& I, const double* p, const doubl
   s.w[0] += I.xx * q[0] + I.xy * q[1] + I.xz * q[2];
   s.w[1] += I.xy * q[0] + I.yy * q[1] + I.yz * q[2];
   s.w[2] += I.xz * q[0] + I.yz * q[1] + I.zz * q[2];
+}
+
+Eigen::Matrix3d skew(const Eigen::Vector3d& r) {
+  Eigen::Matrix3d X;
+  X << 0, -r[2], r[1], r[2], 0, -r[0], -r[1], r[0], 0;
+  return X;
+}
+
+// Diagonal block of A in world axes.
+Eigen::Matrix3d local_matrix(const RigidBody& A, const RigidBody& B, const Eigen::Vector3d& r1,
+                             const Eigen::Vector3d& r2) {
+  const Eigen::Matrix3d X1 = skew(r1), X2 = skew(r2);
+  return (A.inverse_mass + B.inverse_mass) * Eigen::Matrix3d::Identity() -
+         X1 * A.inverse_inertia * X1 - X2 * B.inverse_inertia * X2;
 }
 
 TETHER_INLINE void cross(const double* a, const double* b, double* c) {
@@ -219,6 +235,11 @@ struct BodySolver::Implementation {
   std::vector<int> colour_end;   // in places
   std::vector<double> chunk_sum;
   std::vector<int> chunk_begin;  // first chunk of each colour
+  std::vector<char> isotropic;
+  std::vector<std::uint64_t> used;
+  std::vector<int> chosen;
+  detail::ImpulseMemory memory;
+  int warm_started = 0;
   bool all_spheres = false;
 
   void setup(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts);
@@ -236,9 +257,9 @@ struct BodySolver::Implementation {
 void BodySolver::Implementation::colour(const std::vector<RigidBody>& bodies,
                                         const std::vector<PointContact>& contacts) {
   const int n = static_cast<int>(contacts.size());
-  std::vector<std::uint64_t> used(bodies.size() + 1, 0);
-  std::vector<int> chosen(at(n));
-  std::vector<int> count(64, 0);
+  used.assign(bodies.size() + 1, 0);
+  chosen.resize(at(n));
+  int count[64] = {}, place[64];
   const auto moves = [&](int b) {
     return b >= 0 && (bodies[at(b)].inverse_mass > 0 || !bodies[at(b)].inverse_inertia.isZero(0));
   };
@@ -250,22 +271,21 @@ void BodySolver::Implementation::colour(const std::vector<RigidBody>& bodies,
     int colour = 0;
     while (colour < 63 && (taken >> colour & 1)) ++colour;
     chosen[at(i)] = colour;
-    ++count[at(colour)];
+    ++count[colour];
     if (colour == 63) continue;
     if (moves(c.first)) used[at(c.first)] |= std::uint64_t{1} << colour;
     if (moves(c.second)) used[at(c.second)] |= std::uint64_t{1} << colour;
   }
-  std::vector<int> place(64, 0);
   colour_end.clear();
   int total = 0;
   for (int k = 0; k < 64; ++k) {
-    place[at(k)] = total;
-    total += count[at(k)];
-    if (k < 63 && count[at(k)] > 0) colour_end.push_back(total);
+    place[k] = total;
+    total += count[k];
+    if (k < 63 && count[k] > 0) colour_end.push_back(total);
   }
   for (int k = 0; k < count[63]; ++k) colour_end.push_back(total - count[63] + k + 1);
   order.resize(at(n));
-  for (int i = 0; i < n; ++i) order[at(place[at(chosen[at(i)])]++)] = i;
+  for (int i = 0; i < n; ++i) order[at(place[chosen[at(i)]]++)] = i;
   chunk_begin.assign(1, 0);
   int begin = 0;
   for (int end : colour_end) {
@@ -280,7 +300,7 @@ void BodySolver::Implementation::setup(const std::vector<RigidBody>& bodies,
   const int n = static_cast<int>(contacts.size()), m = static_cast<int>(bodies.size());
   state.resize(at(m + 1));
   inertia.resize(at(m + 1));
-  std::vector<char> isotropic(at(m + 1), 1);
+  isotropic.assign(at(m + 1), 1);
   for (int k = 0; k < m; ++k) {
     const RigidBody& b = bodies[at(k)];
     const Eigen::Matrix3d& I = b.inverse_inertia;
@@ -315,6 +335,24 @@ void BodySolver::Implementation::setup(const std::vector<RigidBody>& bodies,
     all_spheres = all_spheres && along(c.first, c.r1) && along(c.second, c.r2);
   }
   colour(bodies, contacts);
+  memory.rewind();
+  warm_started = 0;
+  // The impulse of the previous solve, on the cone of the present frame, also applied to the bodies.
+  const auto start = [&](const PointContact& c, double mu, const auto& set) {
+    const Eigen::Vector3d* found = options.warm_start ? memory.find(c.id) : nullptr;
+    if (!found) return;
+    ++warm_started;
+    const double xn = found->dot(c.normal);
+    if (!(xn > 0)) return;
+    Eigen::Vector3d t = *found - xn * c.normal;
+    const double most = options.law == Law::frictionless ? 0 : mu * xn, length = t.norm();
+    if (length > most) t *= most / length;
+    const Eigen::Vector3d p = xn * c.normal + t, q = -p;
+    const Eigen::Vector3d m1 = c.r1.cross(p), m2 = c.r2.cross(q);
+    set(p);
+    push(state[at(c.first)], inertia[at(c.first)], p.data(), m1.data());
+    if (c.second >= 0) push(state[at(c.second)], inertia[at(c.second)], q.data(), m2.data());
+  };
   packed.resize(all_spheres ? 0 : at(n));
   spheres.resize(all_spheres ? at(n) : 0);
   for (int k = 0; k < n; ++k) {
@@ -330,12 +368,12 @@ void BodySolver::Implementation::setup(const std::vector<RigidBody>& bodies,
       if (!(inverse > 0)) throw std::invalid_argument("contact " + std::to_string(order[at(k)]) + " joins fixed bodies");
       PackedSphere& p = spheres[at(k)];
       p = {c.first, second, {c.normal[0], c.normal[1], c.normal[2]}, s1, s2, 1 / inverse, 1 / t, c.mu, c.bias, {0, 0, 0}};
+      start(c, p.mu, [&](const Eigen::Vector3d& x) {
+        for (int r = 0; r < 3; ++r) p.p[r] = x[r];
+      });
       continue;
     }
-    Eigen::Matrix3d X1, X2;
-    X1 << 0, -c.r1[2], c.r1[1], c.r1[2], 0, -c.r1[0], -c.r1[1], c.r1[0], 0;
-    X2 << 0, -c.r2[2], c.r2[1], c.r2[2], 0, -c.r2[0], -c.r2[1], c.r2[0], 0;
-    const Eigen::Matrix3d W = inverse * Eigen::Matrix3d::Identity() - X1 * A.inverse_inertia * X1 - X2 * B.inverse_inertia * X2;
+    const Eigen::Matrix3d W = local_matrix(A, B, c.r1, c.r2);
     const Eigen::Matrix3d F = tangent_frame(c.normal);
     LocalBlock L;
     try {
@@ -367,6 +405,11 @@ void BodySolver::Implementation::setup(const std::vector<RigidBody>& bodies,
     }
     p.bias = c.bias;
     p.lambda = -1;
+    start(c, p.mu, [&](const Eigen::Vector3d& x) {
+      p.x[0] = x.dot(c.normal);
+      p.x[1] = x.dot(t);
+      p.x[2] = x.dot(c.normal.cross(t));
+    });
   }
 }
 
@@ -385,20 +428,50 @@ double BodySolver::Implementation::run_chunk(bool test, int begin, int end) {
   return 0;
 }
 
+namespace {
+
+void check(const BodyOptions& o) {
+  if (!(o.tolerance > 0)) throw std::invalid_argument("tolerance must be > 0");
+  if (o.max_sweeps < 1) throw std::invalid_argument("max_sweeps must be >= 1");
+  if (o.threads < 1 || o.threads > 256) {
+    throw std::invalid_argument("threads must lie in 1 .. 256");
+  }
+}
+
+}  // namespace
+
 BodySolver::BodySolver(const BodyOptions& options) : implementation_(new Implementation) {
-  if (!(options.tolerance > 0)) throw std::invalid_argument("tolerance must be > 0");
-  if (options.max_sweeps < 1) throw std::invalid_argument("max_sweeps must be >= 1");
-  if (options.threads < 1 || options.threads > 256) throw std::invalid_argument("threads must lie in 1 .. 256");
-  implementation_->options = options;
+  set_options(options);
 }
 BodySolver::~BodySolver() = default;
 BodySolver::BodySolver(BodySolver&&) noexcept = default;
 BodySolver& BodySolver::operator=(BodySolver&&) noexcept = default;
 
-BodySolution BodySolver::solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts) {
+const BodyOptions& BodySolver::options() const { return implementation_->options; }
+void BodySolver::set_options(const BodyOptions& options) {
+  check(options);
+  implementation_->options = options;
+}
+void BodySolver::scale_warm_start(double factor) {
+  if (!(factor >= 0) || !std::isfinite(factor)) {
+    throw std::invalid_argument("factor must be finite and >= 0");
+  }
+  implementation_->memory.scale(factor);
+}
+void BodySolver::forget() { implementation_->memory.clear(); }
+
+BodySolution BodySolver::solve(const std::vector<RigidBody>& bodies,
+                               const std::vector<PointContact>& contacts) {
+  BodySolution out;
+  solve(bodies, contacts, out);
+  return out;
+}
+
+void BodySolver::solve(const std::vector<RigidBody>& bodies,
+                       const std::vector<PointContact>& contacts, BodySolution& out) {
   Implementation& s = *implementation_;
   s.setup(bodies, contacts);
-  BodySolution out;
+  out.warm_started = s.warm_started;
   out.colours = static_cast<int>(s.colour_end.size());
   out.spheres = s.all_spheres;
   out.bytes = s.packed.size() * sizeof(Packed) + s.spheres.size() * sizeof(PackedSphere) + s.order.size() * sizeof(int);
@@ -455,22 +528,130 @@ BodySolution BodySolver::solve(const std::vector<RigidBody>& bodies, const std::
   work(0);
   for (std::thread& t : others) t.join();
 
-  out.impulses.assign(contacts.size(), Eigen::Vector3d::Zero());
+  out.impulses.resize(contacts.size());
+  out.regimes.resize(contacts.size());
+  const bool friction = s.options.law != Law::frictionless;
+  const auto set = [&](std::size_t k, const Eigen::Vector3d& p, double xn, double tt, double mu) {
+    const double most = friction ? mu * xn : 0;
+    out.impulses[at(s.order[k])] = p;
+    out.regimes[at(s.order[k])] = !(xn > 0)                                  ? Regime::separating
+                                  : tt >= most * most * (1 - 1e-9) ? Regime::sliding
+                                                                             : Regime::sticking;
+  };
   for (std::size_t k = 0; k < contacts.size(); ++k) {
-    Eigen::Vector3d& p = out.impulses[at(s.order[k])];
     if (s.all_spheres) {
-      p << s.spheres[k].p[0], s.spheres[k].p[1], s.spheres[k].p[2];
+      const PackedSphere& c = s.spheres[k];
+      const Eigen::Vector3d n(c.n[0], c.n[1], c.n[2]), p(c.p[0], c.p[1], c.p[2]);
+      const double xn = p.dot(n);
+      set(k, p, xn, (p - xn * n).squaredNorm(), c.mu);
     } else {
       const Packed& c = s.packed[k];
       const Eigen::Vector3d n(c.n[0], c.n[1], c.n[2]), t(c.t[0], c.t[1], c.t[2]);
-      p = c.x[0] * n + c.x[1] * t + c.x[2] * n.cross(t);
+      set(k, c.x[0] * n + c.x[1] * t + c.x[2] * n.cross(t), c.x[0],
+          c.x[1] * c.x[1] + c.x[2] * c.x[2], c.mu);
     }
   }
+  out.velocities.resize(bodies.size());
+  out.angular_velocities.resize(bodies.size());
   for (std::size_t k = 0; k < bodies.size(); ++k) {
-    out.velocities.emplace_back(s.state[k].v[0], s.state[k].v[1], s.state[k].v[2]);
-    out.angular_velocities.emplace_back(s.state[k].w[0], s.state[k].w[1], s.state[k].w[2]);
+    out.velocities[k] << s.state[k].v[0], s.state[k].v[1], s.state[k].v[2];
+    out.angular_velocities[k] << s.state[k].w[0], s.state[k].w[1], s.state[k].w[2];
   }
-  return out;
+  if (s.options.warm_start) {
+    s.memory.begin(contacts.size());
+    for (std::size_t k = 0; k < contacts.size(); ++k) s.memory.add(contacts[k].id, out.impulses[k]);
+  }
+}
+
+Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+                   Law law, const std::vector<Eigen::Vector3d>& impulses) {
+  if (impulses.size() != contacts.size()) {
+    throw std::invalid_argument("one impulse for each contact is needed");
+  }
+  const int m = static_cast<int>(bodies.size());
+  std::vector<Eigen::Vector3d> v(bodies.size()), w(bodies.size());
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    v[k] = bodies[k].velocity;
+    w[k] = bodies[k].angular_velocity;
+  }
+  const RigidBody none;
+  const auto relative = [&](const PointContact& c) {
+    Eigen::Vector3d u = v[at(c.first)] + w[at(c.first)].cross(c.r1) + c.bias * c.normal;
+    if (c.second >= 0) u -= v[at(c.second)] + w[at(c.second)].cross(c.r2);
+    return u;
+  };
+  double bb = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    if (c.first < 0 || c.first >= m || c.second < -1 || c.second >= m || c.first == c.second) {
+      throw std::invalid_argument("contact " + std::to_string(i) + " names bodies that do not exist");
+    }
+    bb += relative(c).squaredNorm();
+  }
+  std::vector<Eigen::Vector3d> before;
+  for (const PointContact& c : contacts) before.push_back(relative(c));
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    const Eigen::Vector3d& p = impulses[i];
+    v[at(c.first)] += bodies[at(c.first)].inverse_mass * p;
+    w[at(c.first)] += bodies[at(c.first)].inverse_inertia * c.r1.cross(p);
+    if (c.second < 0) continue;
+    v[at(c.second)] -= bodies[at(c.second)].inverse_mass * p;
+    w[at(c.second)] -= bodies[at(c.second)].inverse_inertia * c.r2.cross(p);
+  }
+  Residuals r;
+  r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
+  double fixed = 0, map = 0, xx = 0, ww = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    const RigidBody& A = bodies[at(c.first)];
+    const RigidBody& B = c.second < 0 ? none : bodies[at(c.second)];
+    const Eigen::Matrix3d F = tangent_frame(c.normal);
+    const LocalBlock L(F * local_matrix(A, B, c.r1, c.r2) * F.transpose(), c.mu);
+    const Eigen::Vector3d x = F * impulses[i], u = F * relative(c);
+    const double mu = law == Law::frictionless ? 0 : c.mu, t = x.tail<2>().norm();
+    r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], u[0])));
+    r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
+    r.dissipation += x.dot(u);
+    r.energy_change += 0.5 * x.dot(u + F * before[i]);
+    // Block fixed point.
+    const Eigen::Matrix3d D = L.matrix();
+    LocalState state;
+    for (int k = 0; k < 3; ++k) state.x[k] = x[k];
+    solve_local(law, L, D * x - u, state);
+    fixed += (D * (x - Eigen::Vector3d(state.x[0], state.x[1], state.x[2]))).squaredNorm();
+    // Natural map, and the nearest slip that the law allows.
+    double gamma[2] = {0, 0};
+    if (law == Law::maximum_dissipation) {
+      gamma[0] = mu * L.inv_a * L.c[0];
+      gamma[1] = mu * L.inv_a * L.c[1];
+    }
+    Eigen::Vector3d z = x - u;
+    if (law == Law::frictionless) {
+      z << std::max(z[0], 0.0), 0, 0;
+    } else {
+      const double slip = detail::slip(u[1], u[2], gamma[0], gamma[1]);
+      z -= slip * Eigen::Vector3d(mu, gamma[0], gamma[1]);
+      detail::project_cone(mu, z.data());
+    }
+    map += (x - z).squaredNorm();
+    xx += x.squaredNorm();
+    ww += u.squaredNorm();
+    if (mu == 0 || !(x[0] > 0)) continue;
+    double misfit = u.tail<2>().norm();
+    if (t > 0 && t >= mu * x[0] * (1 - 1e-9)) {
+      const Eigen::Vector2d d = -(x.tail<2>() / t + Eigen::Vector2d(gamma[0], gamma[1]));
+      const double dd = d.squaredNorm();
+      const double s = dd > 0 ? std::max(0.0, u.tail<2>().dot(d) / dd) : 0;
+      misfit = (u.tail<2>() - s * d).norm();
+    }
+    r.alignment = std::max(r.alignment, misfit);
+  }
+  const auto over = [](double p, double q) { return q > 0 ? p / q : p; };
+  r.fixed_point = over(std::sqrt(fixed), std::sqrt(bb));
+  r.natural_map = over(std::sqrt(map), std::sqrt(std::max({bb, xx, ww})));
+  r.natural_map_data = over(std::sqrt(map), std::sqrt(bb));
+  return r;
 }
 
 std::vector<Body> to_bodies(const std::vector<RigidBody>& bodies) {

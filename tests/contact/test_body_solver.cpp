@@ -1,4 +1,6 @@
 // Tether: sweeps on body velocities. SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <tether/contact.hpp>
@@ -43,6 +45,97 @@ TEST_CASE("body form and Delassus form judge alike") {
       }
     }
   }
+}
+
+TEST_CASE("evaluate of bodies is evaluate of the Delassus problem") {
+  random::Generator g(5);
+  for (bool spheres : {true, false}) {
+    random::Packing p = random::packing(3, spheres);
+    for (PointContact& c : p.contacts) {
+      c.bias = g.uniform(-0.1, 0.1);
+      c.mu = g.uniform(0, 1) < 0.3 ? 0 : g.uniform(0, 1);
+    }
+    const Problem problem = delassus(to_bodies(p.bodies), to_contacts(p.contacts));
+    for (Law law : {Law::coulomb, Law::maximum_dissipation, Law::frictionless}) {
+      const BodySolution s = run(p, law, 1, 1e-3);
+      Eigen::VectorXd x(problem.b().size());
+      for (std::size_t k = 0; k < p.contacts.size(); ++k) {
+        x.segment<3>(3 * static_cast<Eigen::Index>(k)) =
+            tangent_frame(p.contacts[k].normal) * s.impulses[k];
+      }
+      const Residuals a = evaluate(problem, law, x);
+      const Residuals b = evaluate(p.bodies, p.contacts, law, s.impulses);
+      const auto near = [](double u, double v) { return std::abs(u - v) <= 1e-11 * (1 + std::abs(u)); };
+      CHECK(near(a.signorini, b.signorini));
+      CHECK(near(a.cone, b.cone));
+      CHECK(near(a.alignment, b.alignment));
+      CHECK(near(a.dissipation, b.dissipation));
+      CHECK(near(a.energy_change, b.energy_change));
+      CHECK(near(a.fixed_point, b.fixed_point));
+      CHECK(near(a.natural_map, b.natural_map));
+      CHECK(near(a.natural_map_data, b.natural_map_data));
+      CHECK(near(s.error, b.fixed_point));
+    }
+  }
+}
+
+TEST_CASE("warm start: contacts are found by id, in any order and frame") {
+  for (bool spheres : {true, false}) {
+    random::Packing p = random::packing(4, spheres);
+    for (std::size_t k = 0; k < p.contacts.size(); ++k) p.contacts[k].id = 7 * k + 3;
+    BodyOptions o;
+    o.tolerance = 1e-9;
+    o.max_sweeps = 20000;
+    BodySolver solver(o);
+    BodySolution s;
+    solver.solve(p.bodies, p.contacts, s);
+    REQUIRE(s.status == Status::solved);
+    CHECK(s.warm_started == 0);
+    const int cold = s.sweeps;
+    std::reverse(p.contacts.begin(), p.contacts.end());
+    o.tolerance = 1e-8;
+    solver.set_options(o);
+    solver.solve(p.bodies, p.contacts, s);
+    CHECK(s.warm_started == static_cast<int>(p.contacts.size()));
+    CHECK(s.sweeps == 1);
+    // Bodies and normals turned a little; every other contact is new.
+    const Eigen::Matrix3d R = Eigen::AngleAxisd(1e-3, Eigen::Vector3d(1, 2, 3).normalized()).matrix();
+    for (std::size_t k = 0; k < p.contacts.size(); ++k) {
+      p.contacts[k].normal = R * p.contacts[k].normal;
+      if (k % 2 == 0) p.contacts[k].id += 1000000;
+    }
+    solver.solve(p.bodies, p.contacts, s);
+    REQUIRE(s.status == Status::solved);
+    CHECK(s.warm_started == static_cast<int>(p.contacts.size() / 2));
+    CHECK(evaluate(p.bodies, p.contacts, o.law, s.impulses).fixed_point <= 1.1e-8);
+    solver.forget();
+    solver.solve(p.bodies, p.contacts, s);
+    CHECK(s.warm_started == 0);
+    CHECK(s.sweeps >= cold / 2);
+  }
+}
+
+TEST_CASE("warm start: scaled for another time step") {
+  random::Packing p = random::packing(3, false);
+  for (std::size_t k = 0; k < p.contacts.size(); ++k) p.contacts[k].id = k;
+  BodyOptions o;
+  o.tolerance = 1e-9;
+  o.max_sweeps = 20000;
+  BodySolver solver(o);
+  BodySolution s;
+  solver.solve(p.bodies, p.contacts, s);
+  // Half the velocities: half the impulses, found at once.
+  for (RigidBody& b : p.bodies) {
+    b.velocity *= 0.5;
+    b.angular_velocity *= 0.5;
+  }
+  solver.scale_warm_start(0.5);
+  o.tolerance = 1e-8;
+  solver.set_options(o);
+  solver.solve(p.bodies, p.contacts, s);
+  CHECK(s.status == Status::solved);
+  CHECK(s.sweeps == 1);
+  CHECK_THROWS_AS(solver.scale_warm_start(-1), std::invalid_argument);
 }
 
 TEST_CASE("threads do not change a bit") {

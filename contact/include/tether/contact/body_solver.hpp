@@ -1,6 +1,7 @@
 // Tether: many contacts between bodies, the Delassus matrix never formed. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <tether/contact/bodies.hpp>
 #include <tether/contact/solver.hpp>
@@ -8,7 +9,8 @@
 
 namespace tether::contact {
 
-/// Rigid body: mass and inertia about its centre, in world axes. Zero inverse mass and inertia: fixed.
+/// Rigid body: mass and inertia about its centre, in world axes. Zero inverse mass and inertia: fixed
+/// (its velocity may be prescribed and is not changed).
 struct RigidBody {
   double inverse_mass = 0;  // 1/kg
   Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();
@@ -17,33 +19,46 @@ struct RigidBody {
 };
 
 /// Contact at r1 from the centre of `first`, r2 from that of `second` (-1: the fixed world); the unit
-/// normal points from `second` to `first`. bias: velocity along the normal that is added.
+/// normal points from `second` to `first`. One of the two bodies must be able to move.
 struct PointContact {
+  static constexpr std::uint64_t kNoId = ~std::uint64_t{0};
+
   int first = 0, second = -1;
   Eigen::Vector3d r1 = Eigen::Vector3d::Zero(), r2 = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  double mu = 0, bias = 0;
+  double mu = 0;  ///< 0: solved as one equation, the tangents cost nothing
+  /// Added to the normal velocity, w_n = n . (J v) + bias >= 0; a time stepper gives gap / time_step.
+  double bias = 0;
+  /// Identity from one solve to the next (with `first` and `second` in the same order), unique
+  /// within a solve; kNoId: never warm-started.
+  std::uint64_t id = kNoId;
 };
 
 struct BodyOptions {
   Law law = Law::maximum_dissipation;
   double tolerance = 1e-6;  ///< (sum |D_i (x_i - block(x_i))|^2)^1/2 <= tolerance * |b|
   int max_sweeps = 1000;
-  int threads = 1;  ///< results have the same bits for every number of threads
+  int threads = 1;         ///< results have the same bits for every number of threads
+  bool warm_start = true;  ///< contacts with an id start from their impulse of the previous solve
 };
 
 struct BodySolution {
   Status status = Status::unsolved;
   double error = Residuals::kNone;  ///< as in BodyOptions::tolerance
   int sweeps = 0, colours = 0;
-  bool spheres = false;  ///< closed form in use: every contact is without coupling
+  int warm_started = 0;   ///< contacts whose id was found
+  bool spheres = false;   ///< closed form in use: every contact is without coupling
   std::size_t bytes = 0;  ///< of the workspace that grows with the contacts
   std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`
-  std::vector<Eigen::Vector3d> velocities, angular_velocities;
+  std::vector<Regime> regimes;            ///< of each contact
+  std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
 };
 
 /// Gauss-Seidel on the velocities of the bodies, contacts coloured so that no moving body occurs
 /// twice in a colour. For tight tolerances of stiff assemblies use delassus() and Solver.
+///
+/// Keep one for a run of time steps: it holds the workspace, the threads and the impulses by id. Not
+/// for use by two threads at once.
 class BodySolver {
  public:
   explicit BodySolver(const BodyOptions& options = {});  ///< throws std::invalid_argument
@@ -53,11 +68,26 @@ class BodySolver {
 
   /// Throws std::invalid_argument on values that are not finite and indices that do not exist.
   BodySolution solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts);
+  /// The same, into storage that is used again: nothing is allocated once all has grown.
+  void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+             BodySolution& solution);
+
+  const BodyOptions& options() const;
+  void set_options(const BodyOptions& options);  ///< throws std::invalid_argument; keeps the memory
+
+  /// Multiplies the impulses that the next warm start will find, as for a changed time step.
+  void scale_warm_start(double factor);
+  /// Forgets them.
+  void forget();
 
  private:
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
+
+/// evaluate() of a Problem, without forming it. Impulses in world axes, on `first`.
+Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+                   Law law, const std::vector<Eigen::Vector3d>& impulses);
 
 /// The same assembly for delassus() and Solver.
 std::vector<Body> to_bodies(const std::vector<RigidBody>& bodies);
