@@ -41,7 +41,8 @@ void measure(const Problem& problem, int batches, int moves) {
   const tp::Options options;
   tp::Statistics statistics;
   const auto mover = tp::make_dense_mover(constraints, options, statistics, problem.size);
-  const tp::Candidate candidate{problem.t0, base, correction, weights};
+  tp::Candidate candidate{problem.t0, base, correction, weights};
+  candidate.with_entries();
   perturb();
   mover->set_algebraic(candidate, id);
 

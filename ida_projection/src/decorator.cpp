@@ -33,7 +33,8 @@ int Projection::Impl::initialize() {
   if (mover_) IDASetMaxNonlinIters(ida_mem_, maximum_iterations_);
   if (mover_ && !heard_) {
     finish(Status::simultaneous_sensitivities,
-           "IDAS with IDA_SIMULTANEOUS does not use the state's nonlinear solver, so nothing would be projected; use IDA_STAGGERED in IDASensInit");
+           "IDAS with IDA_SIMULTANEOUS does not use the state's nonlinear solver, so nothing would "
+           "be projected; use IDA_STAGGERED in IDASensInit");
     return kFatal;
   }
   initialized_ = true;
@@ -68,15 +69,18 @@ class Projection::Impl::Stopwatch {
   Clock::time_point begin_;
 };
 
-int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights,
-                            double tolerance, bool call_setup, void* mem) {
+int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights, double tolerance,
+                            bool call_setup, void* mem) {
   ++statistics_.solver_calls;
   extra_iterations_of_last_solve_ = 0;
   if (!initialized_)
-    return finish(Status::late_attach,
-                  "the Projection was made after IDA had been initialised, so IDA never handed its linear solver over; make it before IDACalcIC and the first IDASolve, or call IDAReInit");
+    return finish(
+        Status::late_attach,
+        "the Projection was made after IDA had been initialised, so IDA never handed its linear "
+        "solver over; make it before IDACalcIC and the first IDASolve, or call IDAReInit");
 
-  const Candidate candidate{0.0, y_predicted, ycor, weights};
+  Candidate candidate{0.0, y_predicted, ycor, weights};
+  if (contiguous_) candidate.with_entries();
   if (probing_) {  // make_consistent wants to look around, not to step
     N_VScale(1.0, weights, weights_);
     if (!id_) derive_id(candidate, mem);
@@ -92,7 +96,8 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   account_for_previous_attempt(step);
   if (options_.frequency > 1 && (last_steps_ + 1) % options_.frequency != 0) return 0;
 
-  const Candidate at{step.t, y_predicted, ycor, weights};
+  candidate.t = step.t;
+  const Candidate& at = candidate;
   const Stopwatch stopwatch(*this);
   if (!engaged_) {
     bool done = false;
@@ -134,8 +139,7 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, 
     ++statistics_.skipped;
     statistics_.largest_drift_before =
         std::max(statistics_.largest_drift_before, first.drift_before);
-    statistics_.largest_drift_after =
-        std::max(statistics_.largest_drift_after, first.drift_before);
+    statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, first.drift_before);
     return finish(Status::success, "");
   }
   const Status engaged = engage(candidate, mem);
@@ -148,7 +152,7 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
                                        void* mem) {
   corrector_was_right_ = true;
   const bool polishes = wants_polish();
-  if (polishes) keep_corrector(candidate.correction);
+  if (polishes) keep_corrector(candidate);
   Move move = mover_->move(candidate);
   if (polishes && move.status == Status::success)
     move.status = polish(candidate, cj, tolerance, mem);
@@ -156,11 +160,11 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 }
 
 // The corrector's ycor, before the move.
-void Projection::Impl::keep_corrector(N_Vector ycor) {
+void Projection::Impl::keep_corrector(const Candidate& candidate) {
   if (contiguous_)
-    std::copy_n(N_VGetArrayPointer(ycor), size_, N_VGetArrayPointer(newton_));
+    for (int j = 0; j < size_; ++j) newton_entries_[j] = candidate.correction_entries[j];
   else
-    N_VScale(1.0, ycor, newton_);
+    N_VScale(1.0, candidate.correction, newton_);
 }
 
 StepData Projection::Impl::step_data() const {
@@ -236,13 +240,26 @@ int Projection::Impl::finish(Status outcome, const std::string& text) {
   }
   message = text;
   switch (outcome) {
-    case Status::not_converged: ++statistics_.not_converged; break;
-    case Status::move_too_long: ++statistics_.move_too_long; break;
-    case Status::inconsistent: ++statistics_.inconsistent; break;
-    case Status::not_finite: ++statistics_.not_finite; break;
-    case Status::callback_recoverable: ++statistics_.callback_recoverable; break;
-    case Status::callback_fatal: ++statistics_.callback_fatal; break;
-    default: break;
+    case Status::not_converged:
+      ++statistics_.not_converged;
+      break;
+    case Status::move_too_long:
+      ++statistics_.move_too_long;
+      break;
+    case Status::inconsistent:
+      ++statistics_.inconsistent;
+      break;
+    case Status::not_finite:
+      ++statistics_.not_finite;
+      break;
+    case Status::callback_recoverable:
+      ++statistics_.callback_recoverable;
+      break;
+    case Status::callback_fatal:
+      ++statistics_.callback_fatal;
+      break;
+    default:
+      break;
   }
   if (is_fatal(outcome) && options_.print_fatal && !printed_) {
     printed_ = true;  // once: IDA reports the failure of the run by itself

@@ -18,6 +18,7 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kMetricFloor = 1e-3;  // D_i >= kMetricFloor WT_i
 constexpr double kMetricDecay = 0.8;   // per accepted step
 constexpr long kMeasureEvery = 64;
+constexpr double kLargestFloor = 0.1;  // tolerances
 
 class DenseMover final : public Mover {
  public:
@@ -47,9 +48,8 @@ class DenseMover final : public Mover {
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
   Status settle(const Candidate& candidate, N_Vector change) override;
   double remaining_drift(const Candidate& candidate) override {
-    const double* base = N_VGetArrayPointer(candidate.base);
-    const double* ycor = N_VGetArrayPointer(candidate.correction);
-    for (std::size_t i = 0; i < y_.size(); ++i) y_[i] = base[i] + ycor[i];
+    for (int i = 0; i < n_; ++i)
+      y_[static_cast<std::size_t>(i)] = candidate.base_entries[i] + candidate.correction_entries[i];
     return value(candidate.t) == Status::success ? drift() : -1.0;
   }
   void accept() override { std::swap(scale_, trial_scale_); }
@@ -64,7 +64,9 @@ class DenseMover final : public Mover {
 
  private:
   void load(const Candidate& candidate);
+  const std::vector<double>& WT();
   void set_metric();
+  void set_group_metric();
   Status structure(const Candidate& candidate, const double* id);
   Status value(double t);
   Status factor(double t);
@@ -94,54 +96,82 @@ class DenseMover final : public Mover {
   double measured_ = 0.0;     // longest distance at which it was looked for
   long settles_ = 0;
   const double* ycor_ = nullptr;
+  bool WT_known_ = false;
 };
 
-// y = base + correction, WT = 1/w, s <- max(0.8 s, |correction|).
+// y = base + correction.
 void DenseMover::load(const Candidate& candidate) {
-  const double* base = N_VGetArrayPointer(candidate.base);
-  ycor_ = N_VGetArrayPointer(candidate.correction);
-  w_ = N_VGetArrayPointer(candidate.weights);
-  for (std::size_t i = 0; i < y_.size(); ++i) {
-    y_[i] = base[i] + ycor_[i];
-    // A weight of zero means that the error of this component does not count at all.
-    WT_[i] = w_[i] > 0.0 ? 1.0 / w_[i] : 0.0;
-    trial_scale_[i] = std::max(kMetricDecay * scale_[i], std::abs(ycor_[i]));
-  }
+  const double* base = candidate.base_entries;
+  ycor_ = candidate.correction_entries;
+  w_ = candidate.weight_entries;
+  double* y = y_.data();
+  for (int i = 0; i < n_; ++i) y[i] = base[i] + ycor_[i];
+  WT_known_ = false;
 }
 
+// WT = 1/w. A weight of zero means that the error of this component does not count at all.
+const std::vector<double>& DenseMover::WT() {
+  if (!WT_known_)
+    for (std::size_t i = 0; i < WT_.size(); ++i) WT_[i] = w_[i] > 0.0 ? 1.0 / w_[i] : 0.0;
+  WT_known_ = true;
+  return WT_;
+}
+
+// s <- max(0.8 s, |correction|), D = s or, where the error weights are asked for, WT.
 void DenseMover::set_metric() {
-  if (options_.metric == Metric::local_correction && !options_.group.empty()) {
-    // One scale for each group: rms of |correction| in tolerances over its members.
-    const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());
-    std::vector<double>& sum = group_sum_;  // no allocation after the first step
-    std::vector<int>& members = group_members_;
-    sum.assign(static_cast<std::size_t>(groups), 0.0);
-    members.assign(static_cast<std::size_t>(groups), 0);
-    for (std::size_t i = 0; i < y_.size(); ++i) {
+  const bool local = options_.metric == Metric::local_correction;
+  const bool grouped = local && !options_.group.empty();
+  for (Block* block : {&blocks_.d, &blocks_.a}) {
+    if (block->rows.empty()) continue;
+    double* __restrict D = block->D();
+    double* __restrict trial = trial_scale_.data();
+    const double* __restrict scale = scale_.data();
+    const double* __restrict w = w_;
+    const double* __restrict ycor = ycor_;
+    block->for_columns([=](int k, int i) {
+      const double s = std::max(kMetricDecay * scale[i], std::abs(ycor[i]));
+      trial[i] = s;
+      // WT = 0 (unweighted): such a component moves freely by what the corrector moved it.
+      const double weighted = 1.0 / (w[i] > 0.0 ? w[i] : 1.0);
+      const double weight = w[i] > 0.0 ? weighted : s;
+      D[k] = local ? std::max(s, kMetricFloor * weight) : weight;
+    });
+  }
+  if (grouped) set_group_metric();
+}
+
+// One scale for each group: rms of |correction| in tolerances over its members.
+void DenseMover::set_group_metric() {
+  const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());
+  std::vector<double>& sum = group_sum_;  // no allocation after the first step
+  std::vector<int>& members = group_members_;
+  sum.assign(static_cast<std::size_t>(groups), 0.0);
+  members.assign(static_cast<std::size_t>(groups), 0);
+  for (std::size_t i = 0; i < y_.size(); ++i) {
+    if (options_.group[i] < 0) continue;
+    const auto k = static_cast<std::size_t>(options_.group[i]);
+    const double s = std::max(kMetricDecay * scale_[i], std::abs(ycor_[i]));
+    sum[k] += s * w_[i] * s * w_[i];
+    ++members[k];
+  }
+  const std::vector<double>& WT = this->WT();
+  for (std::size_t i = 0; i < y_.size(); ++i) {
+    if (options_.group[i] < 0) continue;
+    const auto k = static_cast<std::size_t>(options_.group[i]);
+    trial_scale_[i] = WT[i] * std::sqrt(sum[k] / members[k]);
+  }
+  for (Block* block : {&blocks_.d, &blocks_.a}) {
+    double* D = block->D();
+    for (std::size_t c = 0; c < block->columns.size(); ++c) {
+      const auto i = static_cast<std::size_t>(block->columns[c]);
       if (options_.group[i] < 0) continue;
-      const auto k = static_cast<std::size_t>(options_.group[i]);
-      sum[k] += trial_scale_[i] * w_[i] * trial_scale_[i] * w_[i];
-      ++members[k];
-    }
-    for (std::size_t i = 0; i < y_.size(); ++i) {
-      if (options_.group[i] < 0) continue;
-      const auto k = static_cast<std::size_t>(options_.group[i]);
-      trial_scale_[i] = WT_[i] * std::sqrt(sum[k] / members[k]);
+      D[c] = std::max(trial_scale_[i], kMetricFloor * (WT[i] > 0.0 ? WT[i] : trial_scale_[i]));
     }
   }
-  const bool local = options_.metric == Metric::local_correction;
-  for (Block* block : {&blocks_.d, &blocks_.a})
-    for (std::size_t k = 0; k < block->columns.size(); ++k) {
-      const auto i = static_cast<std::size_t>(block->columns[k]);
-      // WT = 0 (unweighted): such a component moves freely by what the corrector moved it.
-      const double weight = WT_[i] > 0.0 ? WT_[i] : trial_scale_[i];
-      block->D[k] = local ? std::max(trial_scale_[i], kMetricFloor * weight) : weight;
-    }
 }
 
 Status DenseMover::structure(const Candidate& candidate, const double* id) {
-  const Status status =
-      blocks_.structure(evaluator_, candidate.t, y_, WT_, options_.hold, id, C_);
+  const Status status = blocks_.structure(evaluator_, candidate.t, y_, WT(), options_.hold, id, C_);
   if (status != Status::success) message_ = blocks_.message;
   return status;
 }
@@ -159,15 +189,17 @@ Status DenseMover::value(double t) {
 }
 
 Status DenseMover::factor(double t) {
-  const Status status =
-      evaluator_.jacobian(t, y_.data(), n_, WT_.data(), blocks_.columns, C_.data());
+  // Only differences need to know how large a tolerance is.
+  const double* WT = evaluator_.uses_differences() ? this->WT().data() : nullptr;
+  const Status status = evaluator_.jacobian(t, y_.data(), n_, WT, blocks_.columns, C_.data());
   if (status != Status::success) {
     message_ = evaluator_.message();
     return status;
   }
   ++statistics_.factorizations;
   if (!blocks_.factor(C_, rank_tolerance_)) {
-    message_ = "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
+    message_ =
+        "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
     return Status::not_finite;
   }
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
@@ -181,15 +213,16 @@ double DenseMover::solve() {
   blocks_.solve(g_, C_);
   const Block& counted = blocks_.d.rows.empty() ? blocks_.a : blocks_.d;
   double sum = 0.0;
-  for (std::size_t k = 0; k < counted.columns.size(); ++k) {
-    const double move = counted.dy[k] * w_[counted.columns[k]];
+  const double* dy = counted.dy.data();
+  counted.for_columns([&sum, dy, w = w_](int k, int i) {
+    const double move = dy[k] * w[i];
     sum += move * move;
-  }
+  });
   return std::sqrt(sum * inverse_n_);
 }
 
 bool DenseMover::contradicts() {
-  if (!blocks_.dropped_rows() || !blocks_.contradict(C_, WT_)) return false;
+  if (!blocks_.dropped_rows() || !blocks_.contradict(C_, WT())) return false;
   message_ = blocks_.message;
   contradicting_rows_ = blocks_.rows();
   return true;
@@ -198,11 +231,14 @@ bool DenseMover::contradicts() {
 void DenseMover::apply(double factor, double* correction) {
   for (const Block* block : {&blocks_.d, &blocks_.a}) {
     if (block->rows.empty()) continue;
-    for (std::size_t k = 0; k < block->columns.size(); ++k) {
-      const auto i = static_cast<std::size_t>(block->columns[k]);
-      correction[i] -= factor * block->dy[k];
-      y_[i] -= factor * block->dy[k];
-    }
+    double* __restrict y = y_.data();
+    double* __restrict ycor = correction;
+    const double* __restrict dy = block->dy.data();
+    block->for_columns([=](int k, int i) {
+      const double move = factor * dy[k];
+      ycor[i] -= move;
+      y[i] -= move;
+    });
   }
 }
 
@@ -269,12 +305,12 @@ Move DenseMover::move(const Candidate& candidate) {
   Move result;
   load(candidate);
   set_metric();
-  double* correction = N_VGetArrayPointer(candidate.correction);
+  double* correction = candidate.correction_entries;
   if ((result.status = value(candidate.t)) != Status::success) return result;
   result.drift_before = result.drift_after = drift();
 
   monitor_.start();
-  bool fresh = false;       // factors belong to the present y
+  bool fresh = false;  // factors belong to the present y
   bool have_factors = false;
   for (;;) {
     if (!have_factors) {
@@ -293,14 +329,14 @@ Move DenseMover::move(const Candidate& candidate) {
           const double change = ycor_[j] * w_[j];
           sum += change * change;
         }
-        const double limit =
-            options_.largest_move * std::max(1.0, std::sqrt(sum * inverse_n_));
+        const double limit = options_.largest_move * std::max(1.0, std::sqrt(sum * inverse_n_));
         if (!(length <= limit)) {
           if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
             result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
             message_ = "the move onto the constraints is " + std::to_string(length) +
                        " tolerances long, the limit is " + std::to_string(limit) +
-                       " (Options::largest_move); start closer with make_consistent, or use a smaller step";
+                       " (Options::largest_move); start closer with make_consistent, or use a "
+                       "smaller step";
             return result;
           }
           apply(limit / length, correction);
@@ -313,17 +349,22 @@ Move DenseMover::move(const Candidate& candidate) {
     }
     apply(1.0, correction);
 
-    const double floor = std::min(0.1, 1e3 * kEpsilon * size_of_y());
+    // A first move longer than the largest floor need not know it.
+    const double floor = result.moves == 1 && length > kLargestFloor
+                             ? 0.0
+                             : std::min(kLargestFloor, 1e3 * kEpsilon * size_of_y());
     Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
     // Almost parallel rows magnify rounding: a move that it explains has converged.
     if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
-        length <= std::min(0.1, rounding_length()))
+        length <= std::min(kLargestFloor, rounding_length()))
       verdict = Monitor::Verdict::done;
     if (verdict == Monitor::Verdict::done) break;
     if (verdict == Monitor::Verdict::failed) {
       result.status = Status::not_converged;
       message_ = "move " + std::to_string(result.moves) + " onto the constraints still is " +
-                 std::to_string(length) + " tolerances long; check the constraint Jacobian with check_jacobian, or whether the rows have a common solution here";
+                 std::to_string(length) +
+                 " tolerances long; check the constraint Jacobian with check_jacobian, or whether "
+                 "the rows have a common solution here";
       return result;
     }
     if ((result.status = value(candidate.t)) != Status::success) return result;
@@ -343,13 +384,14 @@ Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
   for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
   const double reach = move_length_ + std::sqrt(sum * inverse_n_);
   // The factors belong to a point `reach` away: each move leaves about staleness_ reach of itself.
-  const bool measure = staleness_ < 0.0 || reach > 4.0 * measured_ || ++settles_ % kMeasureEvery == 0;
+  const bool measure =
+      staleness_ < 0.0 || reach > 4.0 * measured_ || ++settles_ % kMeasureEvery == 0;
   double previous = 0.0;
   for (int k = 0; k < options_.maximum_iterations; ++k) {
     const Status status = value(candidate.t);
     if (status != Status::success) return status;
     const double length = solve();
-    apply(1.0, N_VGetArrayPointer(candidate.correction));
+    apply(1.0, candidate.correction_entries);
     const double floor = 1e2 * kEpsilon * size_of_y();
     const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
     if (k > 0) {

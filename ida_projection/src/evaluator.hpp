@@ -43,8 +43,9 @@ class Evaluator {
   Status jacobian(double t, const double* y, int n, const double* scale,
                   const std::vector<int>& columns, double* C);
 
-  /// Which entries g can fill as a function of y (m x n, row-major, added to `filled`), for the sets
-  /// that leave C to differences: those where g notices a large change of y_j, or cannot take it.
+  /// Which entries g can fill as a function of y (m x n, row-major, added to `filled`), for the
+  /// sets that leave C to differences: those where g notices a large change of y_j, or cannot take
+  /// it.
   void sensitive(double t, const double* y, int n, const double* scale, std::vector<char>& filled);
 
   /// Which row the last not_finite or failing callback belongs to, or what it threw.

@@ -64,7 +64,7 @@ void GaussNewton::project(double t, std::vector<double>& y0, const std::vector<d
   }
   for (Block* block : {&blocks_.d, &blocks_.a})
     for (std::size_t k = 0; k < block->columns.size(); ++k)
-      block->D[k] = WT_[static_cast<std::size_t>(block->columns[k])];
+      block->D()[k] = WT_[static_cast<std::size_t>(block->columns[k])];
 
   if (!evaluate(t, y, report)) return;
   report.drift_before = report.drift_after = largest(g_);

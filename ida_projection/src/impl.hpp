@@ -90,12 +90,12 @@ class Projection::Impl {
   int look_before_moving(const Candidate& candidate, void* mem, bool& done);
   Status engage(const Candidate& candidate, void* mem);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance, void* mem);
-  void keep_corrector(N_Vector ycor);
+  void keep_corrector(const Candidate& candidate);
   bool wants_polish() const;  // polish.cpp
   Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
   bool newton_step_at_moved_point(const Candidate& candidate, void* mem);
-  double differential_length(N_Vector weights);
-  void scale_delta(double differential, double algebraic);
+  double differential_length(const Candidate& candidate);
+  void apply_delta(const Candidate& candidate, double differential, double algebraic);
   void account(const Move& move, const StepData& step, bool sampled);
   int finish(Status outcome, const std::string& text);
 
@@ -129,13 +129,14 @@ class Projection::Impl {
   bool contiguous_ = false;
   int size_ = 0;
   OwnedVector id_, delta_, newton_, saved_, weights_;
+  double *delta_entries_ = nullptr, *newton_entries_ = nullptr, *saved_entries_ = nullptr;
   std::vector<int> algebraic_;  // indices, contiguous vectors
   bool has_algebraic_ = false;
   bool corrector_was_right_ = true;  // the polish found what IDA's convergence test promised
-  bool engaged_ = false;  // the policy acts from the first move that was needed
+  bool engaged_ = false;             // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;
-  std::unique_ptr<GaussNewton> point_;   // for points between steps and initial values
-  std::unique_ptr<Mover> point_mover_;   // the same for gradients and user projections
+  std::unique_ptr<GaussNewton> point_;  // for points between steps and initial values
+  std::unique_ptr<Mover> point_mover_;  // the same for gradients and user projections
   Options point_options_;
   Statistics point_statistics_;
   bool printed_ = false;

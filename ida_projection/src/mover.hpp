@@ -19,6 +19,17 @@ struct Candidate {
   N_Vector base;        ///< IDA's prediction
   N_Vector correction;  ///< the corrector's ycor; the move is subtracted from it
   N_Vector weights;
+  /// The entries of the three, for contiguous vectors; see with_entries().
+  double* base_entries = nullptr;
+  double* correction_entries = nullptr;
+  const double* weight_entries = nullptr;
+
+  Candidate& with_entries() {
+    base_entries = N_VGetArrayPointer(base);
+    correction_entries = N_VGetArrayPointer(correction);
+    weight_entries = N_VGetArrayPointer(weights);
+    return *this;
+  }
 };
 
 struct Move {
@@ -95,7 +106,7 @@ class Monitor {
 
  private:
   const Options* options_;
-  double theta_ = -1.0;  // largest d_2 / d_1^2 seen; < 0: not measured yet
+  double theta_ = -1.0;    // largest d_2 / d_1^2 seen; < 0: not measured yet
   double measured_ = 0.0;  // longest first move at which theta was looked for: no rounding there
   double previous_ = -1.0;
   int moves_ = 0;

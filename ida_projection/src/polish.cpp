@@ -38,19 +38,15 @@ bool Projection::Impl::wants_polish() const {
 // IDA's ypred and yppred: ypred is shifted by -dy for the call and put back bit for bit.
 bool Projection::Impl::newton_step_at_moved_point(const Candidate& candidate, void* mem) {
   if (contiguous_) {
-    double* base = N_VGetArrayPointer(candidate.base);
-    double* saved = N_VGetArrayPointer(saved_);
-    const double* moved = N_VGetArrayPointer(candidate.correction);
-    const double* corrected = N_VGetArrayPointer(newton_);
+    double* base = candidate.base_entries;
     for (int j = 0; j < size_; ++j) {
-      saved[j] = base[j];
-      base[j] += moved[j] - corrected[j];
+      saved_entries_[j] = base[j];
+      base[j] += candidate.correction_entries[j] - newton_entries_[j];
     }
     const bool evaluated = system_(newton_, delta_, mem) == 0;
-    double* delta = N_VGetArrayPointer(delta_);
     for (int j = 0; j < size_; ++j) {
-      base[j] = saved[j];
-      delta[j] = -delta[j];
+      base[j] = saved_entries_[j];
+      delta_entries_[j] = -delta_entries_[j];
     }
     return evaluated && linear_solve_(delta_, mem) == 0;
   }
@@ -75,57 +71,52 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
   const double plain = cj_at_setup_ != 0.0 ? 0.5 * (1.0 + cj / cj_at_setup_) : 1.0;
   const double algebraic = options_.refresh_algebraic ? plain : 0.0;
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
-  const double length = differential_length(candidate.weights);
+  const double length = differential_length(candidate);
   corrector_was_right_ = length <= kMisled * tolerance;
   const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
-  scale_delta(differential ? 1.0 : 0.0, algebraic);
+  apply_delta(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (has_algebraic_ && algebraic > 0.0) ++statistics_.refreshes;
-
-  if (contiguous_) {
-    double* ycor = N_VGetArrayPointer(candidate.correction);
-    const double* delta = N_VGetArrayPointer(delta_);
-    for (int j = 0; j < size_; ++j) ycor[j] += delta[j];
-  } else {
-    N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
-  }
   return mover_->settle(candidate, delta_);
 }
 
 // WRMS length of delta over the differential variables.
-double Projection::Impl::differential_length(N_Vector weights) {
+double Projection::Impl::differential_length(const Candidate& candidate) {
   if (!contiguous_) {
-    if (!has_algebraic_) return N_VWrmsNorm(delta_, weights);
+    if (!has_algebraic_) return N_VWrmsNorm(delta_, candidate.weights);
     N_VProd(id_, delta_, newton_);
-    return N_VWrmsNorm(newton_, weights);
+    return N_VWrmsNorm(newton_, candidate.weights);
   }
-  const double* delta = N_VGetArrayPointer(delta_);
-  const double* w = N_VGetArrayPointer(weights);
   const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
   double sum = 0.0;
   for (int j = 0; j < size_; ++j) {
-    const double change = delta[j] * w[j];
+    const double change = delta_entries_[j] * candidate.weight_entries[j];
     sum += id == nullptr || id[j] != 0.0 ? change * change : 0.0;
   }
   return std::sqrt(sum / size_);
 }
 
-// delta_d <- differential * delta_d, delta_a <- algebraic * delta_a; a factor of 0 also removes
-// what is not finite.
-void Projection::Impl::scale_delta(double differential, double algebraic) {
+// delta_d <- differential * delta_d, delta_a <- algebraic * delta_a, ycor <- ycor + delta; a factor
+// of 0 also removes what is not finite.
+void Projection::Impl::apply_delta(const Candidate& candidate, double differential,
+                                   double algebraic) {
   if (contiguous_) {
-    double* delta = N_VGetArrayPointer(delta_);
     const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
     for (int j = 0; j < size_; ++j) {
       const double factor = id == nullptr || id[j] != 0.0 ? differential : algebraic;
-      delta[j] = factor == 0.0 || !std::isfinite(delta[j]) ? 0.0 : factor * delta[j];
+      double& delta = delta_entries_[j];
+      delta = factor == 0.0 || !std::isfinite(delta) ? 0.0 : factor * delta;
+      candidate.correction_entries[j] += delta;
     }
-  } else if (has_algebraic_) {
+    return;
+  }
+  if (has_algebraic_) {
     N_VProd(id_, delta_, newton_);
     N_VLinearSum(algebraic, delta_, differential - algebraic, newton_, delta_);
   } else {
     N_VScale(differential, delta_, delta_);
   }
+  N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
 }
 
 }  // namespace tether::ida_projection

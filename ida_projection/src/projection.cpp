@@ -49,6 +49,11 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
     newton_ = OwnedVector(like);
     saved_ = OwnedVector(like);
     weights_ = OwnedVector(like);
+    if (contiguous_) {
+      delta_entries_ = N_VGetArrayPointer(delta_);
+      newton_entries_ = N_VGetArrayPointer(newton_);
+      saved_entries_ = N_VGetArrayPointer(saved_);
+    }
     if (options_.id != nullptr) {
       set_id(options_.id);
       options_.id = id_;  // the caller's vector may go

@@ -28,9 +28,8 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
     if (pass == 1)
       for (std::size_t i = 0; i < n; ++i)
         y[i] += (0.7 + 0.6 * std::sin(1.0 + 3.7 * static_cast<double>(i))) *
-                 std::max(1e-3 * std::abs(y[i]), 10.0 * (WT[i] > 0.0 ? WT[i] : 1e-6));
-    const Status status =
-        evaluator.jacobian(t, y.data(), n_, WT.data(), all, C.data());
+                std::max(1e-3 * std::abs(y[i]), 10.0 * (WT[i] > 0.0 ? WT[i] : 1e-6));
+    const Status status = evaluator.jacobian(t, y.data(), n_, WT.data(), all, C.data());
     if (status != Status::success && pass == 0) {
       message = evaluator.message();
       return status;
@@ -97,9 +96,12 @@ bool RowBlocks::factor(const std::vector<double>& C, double rank_tolerance) {
 }
 
 void RowBlocks::solve(const std::vector<double>& g, const std::vector<double>& C) {
+  if (a.rows.empty()) {  // then d has every row, in order
+    d.solver.solve(g.data(), d.dy.data());
+    return;
+  }
   for (std::size_t i = 0; i < d.rows.size(); ++i) d.g[i] = g[static_cast<std::size_t>(d.rows[i])];
   d.solve();
-  if (a.rows.empty()) return;
   for (std::size_t i = 0; i < a.rows.size(); ++i) {
     const double* c = C.data() + static_cast<std::ptrdiff_t>(a.rows[i]) * n_;
     double rest = g[static_cast<std::size_t>(a.rows[i])];
@@ -118,20 +120,21 @@ bool RowBlocks::contradict(const std::vector<double>& C, const std::vector<doubl
       double row_in_tolerances = 0.0;
       for (int j : block->columns) {
         const double c = C[static_cast<std::size_t>(row) * static_cast<std::size_t>(n_) +
-                            static_cast<std::size_t>(j)] * WT[static_cast<std::size_t>(j)];
+                           static_cast<std::size_t>(j)] *
+                         WT[static_cast<std::size_t>(j)];
         row_in_tolerances += c * c;
       }
       const bool vanished = !(norm > std::numeric_limits<double>::min());
       const double left = solver.inconsistency(k) * (vanished ? 1.0 : norm);
-      const double allowed = vanished ? 1e-12
-                                      : kContradiction * std::sqrt(n_ * row_in_tolerances) +
-                                            1e2 * kEpsilon * norm;
+      const double allowed =
+          vanished ? 1e-12
+                   : kContradiction * std::sqrt(n_ * row_in_tolerances) + 1e2 * kEpsilon * norm;
       if (left <= allowed) continue;
 
       contradicting_ = {row};
       if (vanished) {
-        message = constraints_.name(row) + ": the gradient vanishes although g = " +
-                   std::to_string(left);
+        message =
+            constraints_.name(row) + ": the gradient vanishes although g = " + std::to_string(left);
         return true;
       }
       const std::vector<double> share = solver.dependence(k);
@@ -143,8 +146,8 @@ bool RowBlocks::contradict(const std::vector<double>& C, const std::vector<doubl
       for (int i : contradicting_)
         message += " " + std::to_string(i) + " (" + constraints_.name(i) + ")";
       message += "; a distance of " +
-                  std::to_string(left / std::sqrt(n_ * std::max(row_in_tolerances, 1e-300))) +
-                  " tolerances stays unsolved";
+                 std::to_string(left / std::sqrt(n_ * std::max(row_in_tolerances, 1e-300))) +
+                 " tolerances stays unsolved";
       return true;
     }
   }

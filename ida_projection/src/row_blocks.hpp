@@ -15,31 +15,36 @@ namespace tether::ida_projection {
 struct Block {
   std::vector<int> rows, columns;
   linalg::MinimumNorm solver;
-  std::vector<double> D, g, dy;
-  bool adjacent = false;  // columns follow each other without a gap
+  std::vector<double> g, dy;
+  int first = -1;  // of columns that follow each other without a gap; -1: they do not
 
   void resize() {
     solver.resize(static_cast<int>(rows.size()), static_cast<int>(columns.size()));
-    D.assign(columns.size(), 0.0);
     g.assign(rows.size(), 0.0);
     dy.assign(columns.size(), 0.0);
-    adjacent = !columns.empty() &&
-               columns.back() - columns.front() + 1 == static_cast<int>(columns.size());
+    const bool adjacent = !columns.empty() &&
+                          columns.back() - columns.front() + 1 == static_cast<int>(columns.size());
+    first = adjacent ? columns.front() : -1;
   }
 
+  double* D() { return solver.metric(); }
   bool factor(const std::vector<double>& C, int n, double rank_tolerance) {
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      double* a = solver.row(static_cast<int>(i));
-      const double* c = C.data() + static_cast<std::ptrdiff_t>(rows[i]) * n;
-      if (adjacent)
-        std::copy_n(c + columns.front(), columns.size(), a);
-      else
-        for (std::size_t k = 0; k < columns.size(); ++k) a[k] = c[columns[k]];
-    }
-    return solver.factor(D.data(), rank_tolerance);
+    return solver.factor(C.data(), n, rows.data(), columns.data(), rank_tolerance);
   }
 
   void solve() { solver.solve(g.data(), dy.data()); }
+
+  /// body(k, j) for each column j = columns[k]. Adjacent columns make a plain loop, which the
+  /// compiler can turn into vector code.
+  template <class Body>
+  void for_columns(Body&& body) const {
+    const int count = static_cast<int>(columns.size());
+    if (first >= 0) {
+      for (int k = 0; k < count; ++k) body(k, first + k);
+    } else {
+      for (int k = 0; k < count; ++k) body(k, columns[static_cast<std::size_t>(k)]);
+    }
+  }
 };
 
 /// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
@@ -62,7 +67,7 @@ class RowBlocks {
                    std::vector<double>& C);
   bool structured() const { return structured_; }
 
-  /// From C (m x n, row-major) and the metric in d.D and a.D. False: an entry is not finite.
+  /// From C (m x n, row-major) and the metric in d.D() and a.D(). False: an entry is not finite.
   bool factor(const std::vector<double>& C, double rank_tolerance);
   /// d.dy and a.dy for the values g, with the C that was factored.
   void solve(const std::vector<double>& g, const std::vector<double>& C);

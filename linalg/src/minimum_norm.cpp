@@ -53,6 +53,22 @@ bool MinimumNorm::factor(const double* D, double rank_tolerance) {
   return true;
 }
 
+bool MinimumNorm::factor(const double* wide, int width, const int* rows, const int* columns,
+                         double rank_tolerance) {
+  rank_ = 0;
+  if (kernel_ != nullptr) {
+    if (!kernel_->gather_rows(*small_, m_, n_, wide, width, rows, columns, metric_.data()))
+      return false;
+    rank_ = kernel_->factor(*small_, m_, n_, rank_tolerance);
+    return true;
+  }
+  for (int i = 0; i < m_; ++i) {
+    const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
+    for (int j = 0; j < n_; ++j) large_(i, j) = c[columns[j]];
+  }
+  return factor_large(rank_tolerance);
+}
+
 bool MinimumNorm::factor_large(double rank_tolerance) {
   const Eigen::Map<const Eigen::VectorXd> D(metric_.data(), n_);
   for (int i = 0; i < m_; ++i) {
@@ -118,7 +134,8 @@ void MinimumNorm::solve_large(const double* g, double* dy) {
 }
 
 int MinimumNorm::pivot(int k) const {
-  return kernel_ != nullptr ? small_->pivot[k] : static_cast<int>(qr_.colsPermutation().indices()[k]);
+  return kernel_ != nullptr ? small_->pivot[k]
+                            : static_cast<int>(qr_.colsPermutation().indices()[k]);
 }
 
 double MinimumNorm::row_norm(int i) const {
@@ -132,7 +149,9 @@ std::vector<double> MinimumNorm::dependence(int k) const {
   if (kernel_ != nullptr) {
     // a_k = L_k U and the kept rows are (I + L) U: x = (I + L)^-T L_k^T, then to unit rows.
     const small::Storage& s = *small_;
-    const auto L = [&](int row, int step) { return s.L[s.pivot[row] * small::Storage::kRows + step]; };
+    const auto L = [&](int row, int step) {
+      return s.L[s.pivot[row] * small::Storage::kRows + step];
+    };
     for (int j = r - 1; j >= 0; --j) {
       x[j] = L(k, j);
       for (int i = j + 1; i < r; ++i) x[j] -= L(i, j) * x[i];

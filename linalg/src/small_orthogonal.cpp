@@ -7,7 +7,7 @@ namespace {
 
 template <int Stride>
 constexpr Kernel make_kernel() {
-  return {Stride, form_rows<Stride>, factor<Stride>, combine<Stride>};
+  return {Stride, form_rows<Stride>, gather_rows<Stride>, factor<Stride>, combine<Stride>};
 }
 
 constexpr Kernel kKernels[] = {
@@ -17,6 +17,21 @@ constexpr Kernel kKernels[] = {
 };
 
 }  // namespace
+
+bool rescale_row(Storage& s, double* a, int stride, int i) {
+  const double largest = largest_entry(a, stride);
+  if (!std::isfinite(largest)) return false;
+  double& square = s.square[i];
+  square = 0.0;
+  // A row below the normal range has no direction worth following.
+  const bool vanishes = largest <= std::numeric_limits<double>::min();
+  if (!vanishes) s.scale[i] = 1.0 / largest;
+  for (int j = 0; j < stride; ++j) {
+    a[j] = vanishes ? 0.0 : a[j] * s.scale[i];
+    square += a[j] * a[j];
+  }
+  return true;
+}
 
 const Kernel& kernel_for(int n) {
   for (const Kernel& kernel : kKernels)

@@ -56,29 +56,45 @@ inline double careful_norm(const double* a, int n) {
   return largest * std::sqrt(sum);
 }
 
-/// Squared lengths of the rows of C D, which is formed in place. Rows whose squared length leaves
-/// the safe range are scaled by their largest entry. False if an entry is not finite.
+/// A row whose squared length leaves the safe range is scaled by its largest entry. False if an
+/// entry is not finite.
+bool rescale_row(Storage& s, double* a, int stride, int i);
+
+/// Squared length of row i.
+template <int Stride>
+inline bool measure_row(Storage& s, int i) {
+  Row<Stride> a(s.u + i * Stride);
+  const double square = a.squaredNorm();
+  s.scale[i] = 1.0;
+  s.square[i] = square;
+  return (square > 1e-280 && square < 1e280) || rescale_row(s, a.data(), Stride, i);
+}
+
+/// C D, formed in place, and the squared lengths of its rows.
 template <int Stride>
 bool form_rows(Storage& s, int m, const double* D) {
-  double* square = s.square;
   const Row<Stride> metric(const_cast<double*>(D));
   for (int i = 0; i < m; ++i) {
     Row<Stride> a(s.u + i * Stride);
     a = a.cwiseProduct(metric);
-    s.scale[i] = 1.0;
-    square[i] = a.squaredNorm();
-    if (square[i] > 1e-280 && square[i] < 1e280) continue;
-    const double largest = largest_entry(a.data(), Stride);
-    if (!std::isfinite(largest)) return false;
-    // A row below the normal range has no direction worth following.
-    if (largest <= std::numeric_limits<double>::min()) {
-      a.setZero();
-      square[i] = 0.0;
-      continue;
-    }
-    s.scale[i] = 1.0 / largest;
-    a *= s.scale[i];
-    square[i] = a.squaredNorm();
+    if (!measure_row<Stride>(s, i)) return false;
+  }
+  return true;
+}
+
+/// The same from rows and columns of a wider row-major array.
+template <int Stride>
+bool gather_rows(Storage& s, int m, int n, const double* wide, int width, const int* rows,
+                 const int* columns, const double* D) {
+  const bool whole = n == Stride && columns[Stride - 1] - columns[0] == Stride - 1;
+  for (int i = 0; i < m; ++i) {
+    const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
+    double* a = s.u + i * Stride;
+    if (whole)
+      for (int j = 0; j < Stride; ++j) a[j] = c[columns[0] + j] * D[j];
+    else
+      for (int j = 0; j < n; ++j) a[j] = c[columns[j]] * D[j];
+    if (!measure_row<Stride>(s, i)) return false;
   }
   return true;
 }
@@ -145,8 +161,8 @@ template <int Stride>
 void combine(const Storage& s, int rank, const double* z, const double* D, double* dy, int n) {
   Eigen::Matrix<double, Stride, 1> du = Eigen::Matrix<double, Stride, 1>::Zero();
   for (int k = 0; k < rank; ++k)
-    du += (z[k] * s.inverse_square[k]) *
-          Row<Stride>(const_cast<double*>(s.u) + s.pivot[k] * Stride);
+    du +=
+        (z[k] * s.inverse_square[k]) * Row<Stride>(const_cast<double*>(s.u) + s.pivot[k] * Stride);
   for (int j = 0; j < n; ++j) dy[j] = du[j] * D[j];
 }
 
@@ -154,6 +170,8 @@ void combine(const Storage& s, int rank, const double* z, const double* D, doubl
 struct Kernel {
   int stride;
   bool (*form_rows)(Storage&, int m, const double* D);
+  bool (*gather_rows)(Storage&, int m, int n, const double* wide, int width, const int* rows,
+                      const int* columns, const double* D);
   int (*factor)(Storage&, int m, int n, double rank_tolerance);
   void (*combine)(const Storage&, int rank, const double* z, const double* D, double* dy, int n);
 };

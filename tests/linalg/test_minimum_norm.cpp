@@ -37,6 +37,32 @@ TEST_CASE("full rank: equal to a complete orthogonal decomposition") {
     }
 }
 
+TEST_CASE("rows and columns of a wider array: the same bits as the rows by themselves") {
+  for (const auto& [m, n] : sizes())
+    for (const int gap : {1, 2}) {  // neighbouring columns, and every second one
+      INFO(label(m, n) << ", gap " << gap);
+      const Case c = random_case(m, n, 7);
+      const int width = gap * n + 3;
+      RowMajor wide = RowMajor::Constant(2 * m, width, 1e30);  // must not be looked at
+      std::vector<int> rows, columns;
+      for (int i = 0; i < m; ++i) rows.push_back(2 * (m - 1 - i));
+      for (int j = 0; j < n; ++j) columns.push_back(2 + gap * j);
+      for (int i = 0; i < m; ++i)
+        for (int j = 0; j < n; ++j)
+          wide(rows[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]) = c.C(i, j);
+      MinimumNorm part(m, n), whole(m, n);
+      load(whole, c.C);
+      REQUIRE(whole.factor(c.D.data(), 1e-12));
+      std::copy_n(c.D.data(), n, part.metric());
+      REQUIRE(part.factor(wide.data(), width, rows.data(), columns.data(), 1e-12));
+      CHECK(part.rank() == whole.rank());
+      CHECK((solve(part, c.g) - solve(whole, c.g)).cwiseAbs().maxCoeff() == 0.0);
+
+      wide(rows[0], columns[0]) = std::numeric_limits<double>::quiet_NaN();
+      CHECK_FALSE(part.factor(wide.data(), width, rows.data(), columns.data(), 1e-12));
+    }
+}
+
 TEST_CASE("redundant rows: dropped, explained, and the rest still solved") {
   for (const auto& [m, n] : sizes()) {
     if (m < 3) continue;

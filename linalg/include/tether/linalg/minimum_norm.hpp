@@ -48,6 +48,14 @@ class MinimumNorm {
   /// not finite; the factors are then unusable. Rows that vanish are dropped (rank 0 for them).
   bool factor(const double* D, double rank_tolerance = 1e-12);
 
+  /// Writable storage for D, n entries, that the next factor() reads.
+  double* metric() { return metric_.data(); }
+
+  /// The same for C(i, j) = wide[rows[i] * width + columns[j]], with D from metric(): nothing is
+  /// copied twice. rows has m entries, columns n, ascending.
+  bool factor(const double* wide, int width, const int* rows, const int* columns,
+              double rank_tolerance);
+
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
   /// Dropped rows take no part; see inconsistency().
   void solve(const double* g, double* dy);
