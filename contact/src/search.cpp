@@ -32,7 +32,7 @@ double Search::test(const PackedVector* x, Method stage) {
   }
   if (options.history) {
     const int iteration = stage == Method::admm              ? counts.admm_iterations
-                          : stage == Method::proximal_newton ? counts.factorisations
+                          : stage == Method::proximal_newton || stage == Method::interior_point ? counts.factorisations
                                                              : counts.sweeps;
     history.push_back({stage, iteration, best_error});
   }

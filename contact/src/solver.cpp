@@ -9,6 +9,7 @@
 #include "accelerated_sweeps.hpp"
 #include "admm.hpp"
 #include "convex_relaxation.hpp"
+#include "interior_point.hpp"
 #include "proximal_newton.hpp"
 
 namespace tether::contact {
@@ -35,6 +36,7 @@ const char* name(Method method) {
     case Method::anderson: return "anderson";
     case Method::admm: return "admm";
     case Method::proximal_newton: return "proximal_newton";
+    case Method::interior_point: return "interior_point";
     case Method::convex_relaxation: return "convex_relaxation";
   }
   return "?";
@@ -82,6 +84,7 @@ struct Solver::Implementation {
   detail::AcceleratedSweeps sweeps;
   detail::Admm admm;
   detail::ProximalNewton newton;
+  detail::InteriorPoint interior;
   Packed x, z;
   std::unordered_map<std::uint64_t, PackedVector> memory;
   bool stages_ready = false;
@@ -101,6 +104,7 @@ void Solver::Implementation::prepare_stages(int n) {
   sweeps.reset(n, options.anderson_depth);
   newton.reset(n);
   admm.reset(n);
+  interior.reset(n);
   stages_ready = true;
 }
 
@@ -143,6 +147,8 @@ Status Solver::Implementation::rotate(bool last) {
     const double before = search.best_error;
     admm.start(search, search.best.data());
     admm.run(search, 200, true, true);
+    if (search.solved()) return Status::solved;
+    interior.run(search, 40);
     if (search.solved()) return Status::solved;
     newton.run(search, search.best.data(), 12);
     if (search.solved()) return Status::solved;
@@ -382,6 +388,12 @@ void Solver::Implementation::solve(const Problem& problem, const Eigen::VectorXd
       search.count_sweep();
       search.test(x.data(), Method::gauss_seidel);
       if (!search.solved()) newton.run(search, x.data(), 60);
+      status = search.solved() ? Status::solved : give_up();
+      break;
+    case Method::interior_point:
+      search.test(x.data(), Method::interior_point);
+      prepare_stages(problem.contacts());
+      if (!search.solved()) interior.run(search, options.max_sweeps);
       status = search.solved() ? Status::solved : give_up();
       break;
     case Method::convex_relaxation: {

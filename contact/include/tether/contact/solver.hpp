@@ -19,13 +19,14 @@ enum class Measure : std::uint8_t {
 };
 
 enum class Method : std::uint8_t {
-  automatic,          ///< sweeps, Anderson, ADMM and proximal Newton in rotation
+  automatic,          ///< sweeps, Anderson, ADMM, interior points and proximal Newton in rotation
   gauss_seidel,       ///< plain sweeps
   sor,                ///< x <- clip((1 - omega) x + omega sweep)
   jacobi,             ///< all blocks from the old x, damped
   anderson,           ///< Gauss-Seidel with safeguarded Anderson acceleration
   admm,               ///< alternating directions only
   proximal_newton,    ///< one sweep, then proximal semismooth Newton only
+  interior_point,     ///< interior points of the exact cones only
   convex_relaxation   ///< min 1/2 x'Ax - b'x over the cones: never without being asked for
 };
 
@@ -65,7 +66,7 @@ struct HistoryEntry {
 };
 
 struct Counts {
-  int sweeps = 0, admm_iterations = 0, factorisations = 0, tests = 0, newton_phases = 0;
+  int sweeps = 0, admm_iterations = 0, factorisations = 0, interior_steps = 0, tests = 0, newton_phases = 0;
   double work = 0;  ///< estimated nanoseconds
 };
 
