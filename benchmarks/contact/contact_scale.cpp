@@ -1,6 +1,10 @@
 // Tether: many packed contacts: time and memory of a sweep. SPDX-License-Identifier: BSD-3-Clause
 //
-//   contact_scale [--most N] [--sweeps S]
+//   contact_scale [--least N] [--most N] [--sweeps S] [--rounds R] [--threads T] [--shuffle 1]
+//
+// ns: per contact and sweep, the least of R rounds, from the difference of S and 3 S sweeps, so
+// that set-up and results cancel; "setup" is what remains for S sweeps. One and T threads
+// alternate.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -38,63 +42,75 @@ unsigned long hash(const BodySolution& s) {
   return h;
 }
 
+struct Timing {
+  double wall[2] = {1e9, 1e9}, work[2] = {1e9, 1e9};
+  unsigned long bits = 0;
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  double most = 1e6;
-  int sweeps = 30;
+  double least = 0, most = 1e6;
+  int sweeps = 20, rounds = 0, many = 2;
+  bool shuffle = false;
   for (int i = 1; i + 1 < argc; i += 2) {
-    if (std::string(argv[i]) == "--most") most = std::atof(argv[i + 1]);
-    if (std::string(argv[i]) == "--sweeps") sweeps = std::atoi(argv[i + 1]);
+    const std::string name = argv[i];
+    if (name == "--least") least = std::atof(argv[i + 1]);
+    if (name == "--most") most = std::atof(argv[i + 1]);
+    if (name == "--sweeps") sweeps = std::atoi(argv[i + 1]);
+    if (name == "--rounds") rounds = std::atoi(argv[i + 1]);
+    if (name == "--threads") many = std::atoi(argv[i + 1]);
+    if (name == "--shuffle") shuffle = std::atoi(argv[i + 1]) != 0;
   }
-  std::printf("%-9s %-20s %8s %3s %8s %14s %7s %10s %8s %s\n", "bodies", "law", "contacts", "thr", "colours", "ns/contact/sweep", "CPU ns", "B/contact", "speed-up", "same bits");
+  std::printf("%-8s %-19s %8s %3s %4s %6s %7s %6s %6s %6s %8s %s\n", "bodies", "law", "contacts",
+              "thr", "col", "ns", "CPU ns", "setup", "B/con", "B/body", "speed-up", "same bits");
   for (int side : {7, 15, 32, 69}) {
     for (bool spheres : {false, true}) {
-      if (3.0 * side * side * side > 1.3 * most) continue;
-      const random::Packing p = random::packing(side, spheres);
+      const double expected = 3.0 * side * side * side;
+      if (expected > 1.3 * most || expected < 0.7 * least) continue;
+      const random::Packing p = random::packing(side, spheres, 1, shuffle);
+      const double n = static_cast<double>(p.contacts.size());
       for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
         if (spheres && law == Law::coulomb) continue;
-        double alone = 0;
-        unsigned long bits = 0;
-        for (int threads : {1, 2}) {
-          // Time of (many - few) sweeps: set-up and tests cancel.
-          double wall[2] = {1e9, 1e9}, work[2] = {1e9, 1e9};
-          BodySolution last;
-          for (int round = 0; round < (side < 10 ? 40 : side < 40 ? 6 : 2); ++round) {
+        Timing timing[2];
+        BodySolution last;
+        BodyOptions o;
+        o.law = law;
+        o.tolerance = 1e-300;
+        o.max_assembled = 0;
+        BodySolver solver[2] = {BodySolver(o), BodySolver(o)};
+        const int repeat = rounds > 0  ? rounds
+                           : side < 10 ? 40
+                           : side < 20 ? 12
+                           : side < 40 ? 5
+                                       : 3;
+        for (int round = 0; round < repeat; ++round) {
+          for (int t = 0; t < 2; ++t) {
             for (int k = 0; k < 2; ++k) {
-              BodyOptions o;
-              o.law = law;
-              o.tolerance = 1e-300;
-              o.threads = threads;
+              o.threads = t == 0 ? 1 : many;
               o.max_sweeps = k == 0 ? sweeps : 3 * sweeps;
-              BodySolver solver(o);
+              solver[t].set_options(o);
               const double begin = seconds(), used = cpu();
-              last = solver.solve(p.bodies, p.contacts);
-              wall[k] = std::min(wall[k], seconds() - begin);
-              work[k] = std::min(work[k], cpu() - used);
+              solver[t].solve(p.bodies, p.contacts, last);
+              timing[t].wall[k] = std::min(timing[t].wall[k], seconds() - begin);
+              timing[t].work[k] = std::min(timing[t].work[k], cpu() - used);
             }
+            timing[t].bits = hash(last);
           }
-          // Test passes come at sweeps 1, 5, 10, 16, ...: counted as sweeps.
-          const auto passes = [](int n) {
-            int count = n, next = 1;
-            for (int k = 1; k <= n; ++k) {
-              if (k >= next || k == n) {
-                ++count;
-                next = k + 4 + k / 4;
-              }
-            }
-            return count;
-          };
-          const double scale = 1e9 / (static_cast<double>(p.contacts.size()) * (passes(3 * sweeps) - passes(sweeps)));
-          const double ns = scale * (wall[1] - wall[0]), cpu_ns = scale * (work[1] - work[0]);
-          if (threads == 1) {
-            alone = ns;
-            bits = hash(last);
-          }
-          std::printf("%-9s %-20s %8zu %3d %8d %14.1f %7.1f %10.0f %8.2f %s\n", spheres ? "spheres" : "general", name(law), p.contacts.size(), threads, last.colours, ns, cpu_ns,
-                      static_cast<double>(last.bytes) / static_cast<double>(p.contacts.size()), alone / ns, hash(last) == bits ? "yes" : "NO");
-          std::fflush(stdout);
         }
+        const double scale = 1e9 / (n * 2 * sweeps);
+        for (int t = 0; t < 2; ++t) {
+          const double* wall = timing[t].wall;
+          const double ns = scale * (wall[1] - wall[0]);
+          std::printf("%-8s %-19s %8.0f %3d %4d %6.1f %7.1f %6.0f %6.0f %6.0f %8.2f %s\n",
+                      spheres ? "spheres" : "general", name(law), n, t == 0 ? 1 : many,
+                      last.colours, ns, scale * (timing[t].work[1] - timing[t].work[0]),
+                      1e9 * wall[0] / n - (sweeps + 1) * ns, static_cast<double>(last.bytes) / n,
+                      static_cast<double>(last.body_bytes) / static_cast<double>(p.bodies.size()),
+                      (timing[0].wall[1] - timing[0].wall[0]) / (wall[1] - wall[0]),
+                      timing[t].bits == timing[0].bits ? "yes" : "NO");
+        }
+        std::fflush(stdout);
       }
     }
   }

@@ -5,430 +5,154 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdint>
+#include <exception>
+#include <limits>
 #include <stdexcept>
 #include <string>
-#include <thread>
 
+#include "body_kernels.hpp"
+#include "contact_graph.hpp"
 #include "impulse_memory.hpp"
-#include "law_coulomb.hpp"
-#include "law_frictionless.hpp"
-#include "law_maximum_dissipation.hpp"
-#include "system.hpp"
+#include "worker_team.hpp"
 
 namespace tether::contact {
 namespace {
 
-using detail::at;
+using detail::BodyArrays;
+using detail::BodyInertia;
+using detail::BodyState;
+using detail::Chunk;
+using detail::GeneralContact;
+using detail::Island;
+using detail::Kind;
+using detail::SmoothContact;
+using detail::SphereContact;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
 
-struct alignas(64) State {  // linear and angular velocity
-  double v[3], pad, w[3], pad2;
-};
-struct alignas(64) Inertia {  // 1/m and the inverse inertia (symmetric)
-  double m, xx, xy, xz, yy, yz, zz, pad;
-};
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// Tangents such that the tangential block is diagonal: no rotation in the sweep.
-struct Packed {
-  int first, second;
-  double n[3], t[3], r1[3], r2[3];
-  double a, inv_a, e, mu, c[2], g[2], beta[2];
-  double bias, x[3], lambda;
-};
-static_assert(sizeof(Packed) <= 256, "a contact is promised to take at most 256 bytes");
+// Islands from this size on are swept by all threads together, others by one thread each.
+constexpr int kTogether = 1500;
+// An island is assembled as soon as more than this many further sweeps are expected.
+constexpr double kPatience = 100;
+constexpr int kFirstForecast = 20;
 
-// Contacts without coupling (spheres): r1 = s1 n, r2 = s2 n; impulse p in world axes.
-struct PackedSphere {
-  int first, second;
-  double n[3], s1, s2, inv_a, inv_t, mu, bias, p[3];
-};
+bool moves(const RigidBody& b) { return b.inverse_mass > 0 || !b.inverse_inertia.isZero(0); }
 
-constexpr int kChunk = 256;  // contacts summed together; fixes the order of sums
-
-struct Arrays {
-  State* state;
-  const Inertia* inertia;
-};
-
-TETHER_INLINE void push(State& s, const Inertia& I, const double* p, const double* q) {
-  // v += p / m, w += I^-1 q
-  for (int k = 0; k < 3; ++k) s.v[k] += I.m * p[k];
-  s.w[0] += I.xx * q[0] + I.xy * q[1] + I.xz * q[2];
-  s.w[1] += I.xy * q[0] + I.yy * q[1] + I.yz * q[2];
-  s.w[2] += I.xz * q[0] + I.yz * q[1] + I.zz * q[2];
-}
-
-Eigen::Matrix3d skew(const Eigen::Vector3d& r) {
-  Eigen::Matrix3d X;
+Matrix3d skew(const Vector3d& r) {
+  Matrix3d X;
   X << 0, -r[2], r[1], r[2], 0, -r[0], -r[1], r[0], 0;
   return X;
 }
 
+// A contact from the side of a body that moves: `second` is null if the other one does not.
+struct Side {
+  const RigidBody* first;
+  const RigidBody* second;
+  Vector3d r1, r2, n;
+  Vector3d fixed;  // velocity of the fixed partner at the contact
+  double sign;     // of the caller's impulse
+};
+
+Side side(const std::vector<RigidBody>& bodies, const PointContact& c, bool turned) {
+  Side s{&bodies[at(c.first)], nullptr, c.r1, c.r2, c.normal, Vector3d::Zero(), 1};
+  const RigidBody* other = c.second < 0 ? nullptr : &bodies[at(c.second)];
+  if (turned) {
+    std::swap(s.first, other);
+    s.r1.swap(s.r2);
+    s.n = -s.n;
+    s.sign = -1;
+  }
+  if (other && moves(*other)) {
+    s.second = other;
+  } else if (other) {
+    s.fixed = other->velocity + other->angular_velocity.cross(s.r2);
+  }
+  return s;
+}
+
+// Velocity of the contact before the impulses, bias included.
+Vector3d velocity_before(const Side& s, double bias) {
+  Vector3d u = s.first->velocity + s.first->angular_velocity.cross(s.r1) - s.fixed + bias * s.n;
+  if (s.second) u -= s.second->velocity + s.second->angular_velocity.cross(s.r2);
+  return u;
+}
+
 // Diagonal block of A in world axes.
-Eigen::Matrix3d local_matrix(const RigidBody& A, const RigidBody& B, const Eigen::Vector3d& r1,
-                             const Eigen::Vector3d& r2) {
-  const Eigen::Matrix3d X1 = skew(r1), X2 = skew(r2);
-  return (A.inverse_mass + B.inverse_mass) * Eigen::Matrix3d::Identity() -
-         X1 * A.inverse_inertia * X1 - X2 * B.inverse_inertia * X2;
-}
-
-TETHER_INLINE void cross(const double* a, const double* b, double* c) {
-  c[0] = a[1] * b[2] - a[2] * b[1];
-  c[1] = a[2] * b[0] - a[0] * b[2];
-  c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-// One pass over contacts [begin, end); returns sum |D dx|^2. Test: nothing is changed.
-template <class L0, bool kTest>
-TETHER_INLINE double pass(const Arrays& s, Packed* contacts, int begin, int end) {
-  double sum = 0;
-  int count = 0;
-  for (int i = begin; i < end; ++i) {
-    Packed& c = contacts[i];
-    State& A = s.state[c.first];
-    State& B = s.state[c.second];
-    double u[3], a1[3], a2[3];
-    cross(A.w, c.r1, a1);
-    cross(B.w, c.r2, a2);
-    for (int k = 0; k < 3; ++k) u[k] = A.v[k] - B.v[k] + a1[k] - a2[k];
-    double o[3];
-    cross(c.n, c.t, o);
-    const double w0 = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2] + c.bias;
-    const double w1 = u[0] * c.t[0] + u[1] * c.t[1] + u[2] * c.t[2];
-    const double w2 = u[0] * o[0] + u[1] * o[1] + u[2] * o[2];
-    LocalBlock L;
-    L.a = c.a;
-    L.inv_a = c.inv_a;
-    L.mu = c.mu;
-    L.c[0] = c.c[0];
-    L.c[1] = c.c[1];
-    L.g[0] = c.g[0];
-    L.g[1] = c.g[1];
-    L.beta[0] = c.beta[0];
-    L.beta[1] = c.beta[1];
-    L.cosine = 1;
-    L.sine = 0;
-    L.e = c.e;
-    L.unique = false;
-    // D x with T = diag(beta) + c c'/a
-    const double cx = c.c[0] * c.x[1] + c.c[1] * c.x[2], dn = c.a * c.x[0] + cx, f = dn * L.inv_a;
-    double x[3] = {c.x[0], c.x[1], c.x[2]}, lambda = c.lambda;
-    L0::solve(L, dn - w0, c.c[0] * f + c.beta[0] * c.x[1] - w1,
-              c.c[1] * f + c.beta[1] * c.x[2] - w2, x, lambda, count);
-    const double d0 = x[0] - c.x[0], d1 = x[1] - c.x[1], d2 = x[2] - c.x[2];
-    const double e0 = c.a * d0 + c.c[0] * d1 + c.c[1] * d2, ef = e0 * L.inv_a;
-    const double e1 = c.c[0] * ef + c.beta[0] * d1, e2 = c.c[1] * ef + c.beta[1] * d2;
-    sum += e0 * e0 + e1 * e1 + e2 * e2;
-    if (!kTest) {
-      double p[3], q[3];
-      for (int k = 0; k < 3; ++k) p[k] = d0 * c.n[k] + d1 * c.t[k] + d2 * o[k];
-      c.x[0] = x[0];
-      c.x[1] = x[1];
-      c.x[2] = x[2];
-      c.lambda = lambda;
-      cross(c.r1, p, q);
-      push(A, s.inertia[c.first], p, q);
-      for (int k = 0; k < 3; ++k) p[k] = -p[k];
-      cross(c.r2, p, q);
-      push(B, s.inertia[c.second], p, q);
-    }
+Matrix3d diagonal_block(const Side& s) {
+  const Matrix3d X = skew(s.r1);
+  Matrix3d D = s.first->inverse_mass * Matrix3d::Identity() - X * s.first->inverse_inertia * X;
+  if (s.second) {
+    const Matrix3d Y = skew(s.r2);
+    D += s.second->inverse_mass * Matrix3d::Identity() - Y * s.second->inverse_inertia * Y;
   }
-  return sum;
+  return D;
 }
 
-template <bool kTest>
-TETHER_INLINE double pass_spheres(const Arrays& s, PackedSphere* contacts, int begin, int end, bool friction) {
-  double sum = 0;
-  for (int i = begin; i < end; ++i) {
-    PackedSphere& c = contacts[i];
-    State& A = s.state[c.first];
-    State& B = s.state[c.second];
-    // u = v1 - v2 + (s1 w1 - s2 w2) x n
-    double w[3], u[3];
-    for (int k = 0; k < 3; ++k) w[k] = c.s1 * A.w[k] - c.s2 * B.w[k];
-    cross(w, c.n, u);
-    for (int k = 0; k < 3; ++k) u[k] += A.v[k] - B.v[k];
-    const double un = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2];
-    const double pn = c.p[0] * c.n[0] + c.p[1] * c.n[1] + c.p[2] * c.n[2];
-    double xn = pn - (un + c.bias) * c.inv_a;
-    xn = xn > 0 ? xn : 0;
-    double t[3], tt = 0;
-    for (int k = 0; k < 3; ++k) {
-      t[k] = c.p[k] - pn * c.n[k] - (u[k] - un * c.n[k]) * c.inv_t;
-      tt += t[k] * t[k];
-    }
-    const double most = friction ? c.mu * xn : 0;
-    const double scale = tt > most * most ? most / std::sqrt(tt) : 1;
-    double p[3], dn = 0, dd = 0;
-    for (int k = 0; k < 3; ++k) {
-      p[k] = xn * c.n[k] + scale * t[k] - c.p[k];
-      dn += p[k] * c.n[k];
-      dd += p[k] * p[k];
-    }
-    sum += dn * dn / (c.inv_a * c.inv_a) + (dd - dn * dn) / (c.inv_t * c.inv_t);
-    if (!kTest) {
-      double q[3], q1[3], q2[3];
-      cross(c.n, p, q);
-      for (int k = 0; k < 3; ++k) {
-        c.p[k] += p[k];
-        q1[k] = c.s1 * q[k];
-        q2[k] = -c.s2 * q[k];
-      }
-      // Isotropic inertia: xx is all of it.
-      const Inertia& I = s.inertia[c.first];
-      const Inertia& J = s.inertia[c.second];
-      for (int k = 0; k < 3; ++k) {
-        A.v[k] += I.m * p[k];
-        A.w[k] += I.xx * q1[k];
-        B.v[k] -= J.m * p[k];
-        B.w[k] += J.xx * q2[k];
-      }
-    }
-  }
-  return sum;
+void store(const Vector3d& v, double* out) { Eigen::Map<Vector3d>{out} = v; }
+Vector3d load(const double* v) { return Eigen::Map<const Vector3d>(v); }
+
+// An impulse on the friction cone of its contact, normal part kept.
+Vector3d on_cone(const Vector3d& p, const Vector3d& n, double mu) {
+  const double xn = p.dot(n);
+  if (!(xn > 0)) return Vector3d::Zero();
+  Vector3d t = p - xn * n;
+  const double most = mu * xn, length = t.norm();
+  if (length > most) t *= most / length;
+  return xn * n + t;
 }
 
-using detail::Coulomb;
-using detail::Frictionless;
-using detail::MaximumDissipation;
-
-TETHER_CLONES double sweep_dissipation(const Arrays& s, Packed* c, int b, int e) { return pass<MaximumDissipation, false>(s, c, b, e); }
-TETHER_CLONES double test_dissipation(const Arrays& s, Packed* c, int b, int e) { return pass<MaximumDissipation, true>(s, c, b, e); }
-TETHER_CLONES double sweep_coulomb(const Arrays& s, Packed* c, int b, int e) { return pass<Coulomb, false>(s, c, b, e); }
-TETHER_CLONES double test_coulomb(const Arrays& s, Packed* c, int b, int e) { return pass<Coulomb, true>(s, c, b, e); }
-TETHER_CLONES double sweep_frictionless(const Arrays& s, Packed* c, int b, int e) { return pass<Frictionless, false>(s, c, b, e); }
-TETHER_CLONES double test_frictionless(const Arrays& s, Packed* c, int b, int e) { return pass<Frictionless, true>(s, c, b, e); }
-TETHER_CLONES double sweep_spheres(const Arrays& s, PackedSphere* c, int b, int e, bool f) { return pass_spheres<false>(s, c, b, e, f); }
-TETHER_CLONES double test_spheres(const Arrays& s, PackedSphere* c, int b, int e, bool f) { return pass_spheres<true>(s, c, b, e, f); }
-
-// All threads meet; the last one to come lets the others go.
-class Barrier {
- public:
-  explicit Barrier(int threads) : threads_(threads) {}
-  void wait() {
-    if (threads_ == 1) return;
-    const int round = round_.load(std::memory_order_acquire);
-    if (come_.fetch_add(1, std::memory_order_acq_rel) + 1 == threads_) {
-      come_.store(0, std::memory_order_relaxed);
-      round_.store(round + 1, std::memory_order_release);
-      return;
-    }
-    for (int spins = 0; round_.load(std::memory_order_acquire) == round; ++spins) {
-      if (spins > 4000) std::this_thread::yield();
-    }
-  }
-
- private:
-  const int threads_;
-  std::atomic<int> come_{0}, round_{0};
+struct IslandResult {
+  Status status = Status::unsolved;
+  int sweeps = 0;
+  double norm = 0, error = 0;
+  bool assembled = false;
 };
 
-}  // namespace
+// What each thread has of its own.
+struct Worker {
+  alignas(64) BodyState fixed = {};
+  std::unique_ptr<Solver> solver;
+  Solution solution;
+  std::vector<Body> bodies;
+  std::vector<BodyContact> contacts;
+  std::vector<int> replaced;
+  std::exception_ptr failure;
+  int bad_contact = std::numeric_limits<int>::max();
+  std::string bad_reason;
+};
 
-struct BodySolver::Implementation {
-  BodyOptions options;
-  std::vector<State> state;
-  std::vector<Inertia> inertia;
-  std::vector<Packed> packed;
-  std::vector<PackedSphere> spheres;
-  std::vector<int> order;        // place in the sweep -> contact
-  std::vector<int> colour_end;   // in places
-  std::vector<double> chunk_sum;
-  std::vector<int> chunk_begin;  // first chunk of each colour
-  std::vector<char> isotropic;
-  std::vector<std::uint64_t> used;
-  std::vector<int> chosen;
-  detail::ImpulseMemory memory;
-  int warm_started = 0;
-  bool all_spheres = false;
-
-  void setup(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts);
-  void colour(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts);
-  double run_chunk(bool test, int begin, int end);
-  double sum() const {
-    double s = 0;
-    for (double v : chunk_sum) s += v;
-    return std::sqrt(s);
+// Who works on an island: all threads, or one.
+struct Team {
+  int thread, threads;
+  detail::Barrier* barrier;
+  Worker* worker;
+  void meet() const {
+    if (threads > 1) barrier->wait();
+  }
+  int from(int begin, int end) const { return part(begin, end, thread); }
+  int to(int begin, int end) const { return part(begin, end, thread + 1); }
+  int part(int begin, int end, int k) const {
+    return begin + static_cast<int>(static_cast<long long>(end - begin) * k / threads);
   }
 };
 
-// Greedy: the smallest colour that neither moving body has. Fixed bodies take no part. A body with
-// more than 63 contacts fills the colours; the rest goes to colours of one contact each.
-void BodySolver::Implementation::colour(const std::vector<RigidBody>& bodies,
-                                        const std::vector<PointContact>& contacts) {
-  const int n = static_cast<int>(contacts.size());
-  used.assign(bodies.size() + 1, 0);
-  chosen.resize(at(n));
-  int count[64] = {}, place[64];
-  const auto moves = [&](int b) {
-    return b >= 0 && (bodies[at(b)].inverse_mass > 0 || !bodies[at(b)].inverse_inertia.isZero(0));
-  };
-  for (int i = 0; i < n; ++i) {
-    const PointContact& c = contacts[at(i)];
-    std::uint64_t taken = 0;
-    if (moves(c.first)) taken |= used[at(c.first)];
-    if (moves(c.second)) taken |= used[at(c.second)];
-    int colour = 0;
-    while (colour < 63 && (taken >> colour & 1)) ++colour;
-    chosen[at(i)] = colour;
-    ++count[colour];
-    if (colour == 63) continue;
-    if (moves(c.first)) used[at(c.first)] |= std::uint64_t{1} << colour;
-    if (moves(c.second)) used[at(c.second)] |= std::uint64_t{1} << colour;
-  }
-  colour_end.clear();
-  int total = 0;
-  for (int k = 0; k < 64; ++k) {
-    place[k] = total;
-    total += count[k];
-    if (k < 63 && count[k] > 0) colour_end.push_back(total);
-  }
-  for (int k = 0; k < count[63]; ++k) colour_end.push_back(total - count[63] + k + 1);
-  order.resize(at(n));
-  for (int i = 0; i < n; ++i) order[at(place[chosen[at(i)]]++)] = i;
-  chunk_begin.assign(1, 0);
-  int begin = 0;
-  for (int end : colour_end) {
-    chunk_begin.push_back(chunk_begin.back() + (end - begin + kChunk - 1) / kChunk);
-    begin = end;
-  }
-  chunk_sum.assign(at(chunk_begin.back()), 0);
-}
-
-void BodySolver::Implementation::setup(const std::vector<RigidBody>& bodies,
-                                       const std::vector<PointContact>& contacts) {
-  const int n = static_cast<int>(contacts.size()), m = static_cast<int>(bodies.size());
-  state.resize(at(m + 1));
-  inertia.resize(at(m + 1));
-  isotropic.assign(at(m + 1), 1);
-  for (int k = 0; k < m; ++k) {
-    const RigidBody& b = bodies[at(k)];
-    const Eigen::Matrix3d& I = b.inverse_inertia;
-    if (!std::isfinite(b.inverse_mass) || b.inverse_mass < 0 || !I.allFinite() ||
-        !b.velocity.allFinite() || !b.angular_velocity.allFinite()) {
-      throw std::invalid_argument("body " + std::to_string(k) + " has a value that is not finite or a negative mass");
-    }
-    for (int r = 0; r < 3; ++r) {
-      state[at(k)].v[r] = b.velocity[r];
-      state[at(k)].w[r] = b.angular_velocity[r];
-    }
-    inertia[at(k)] = {b.inverse_mass, I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2), 0};
-    isotropic[at(k)] = (I - I(0, 0) * Eigen::Matrix3d::Identity()).isZero(0);
-  }
-  state[at(m)] = State();  // the world
-  for (int r = 0; r < 3; ++r) state[at(m)].v[r] = state[at(m)].w[r] = 0;
-  inertia[at(m)] = Inertia{0, 0, 0, 0, 0, 0, 0, 0};
-  all_spheres = true;
-  for (int i = 0; i < n; ++i) {
-    const PointContact& c = contacts[at(i)];
-    if (c.first < 0 || c.first >= m || c.second < -1 || c.second >= m || c.first == c.second) {
-      throw std::invalid_argument("contact " + std::to_string(i) + " names bodies that do not exist");
-    }
-    if (!c.r1.allFinite() || !c.r2.allFinite() || !std::isfinite(c.mu) || c.mu < 0 || !std::isfinite(c.bias) ||
-        !(std::abs(c.normal.norm() - 1) < 1e-6)) {
-      throw std::invalid_argument("contact " + std::to_string(i) + " has a value that is not finite, mu < 0, or a normal that is not a unit vector");
-    }
-    const auto along = [&](int b, const Eigen::Vector3d& r) {
-      if (b < 0 || bodies[at(b)].inverse_inertia.isZero(0)) return true;
-      return isotropic[at(b)] && (r - c.normal * c.normal.dot(r)).norm() <= 1e-14 * r.norm();
-    };
-    all_spheres = all_spheres && along(c.first, c.r1) && along(c.second, c.r2);
-  }
-  colour(bodies, contacts);
-  memory.rewind();
-  warm_started = 0;
-  // The impulse of the previous solve, on the cone of the present frame, also applied to the bodies.
-  const auto start = [&](const PointContact& c, double mu, const auto& set) {
-    const Eigen::Vector3d* found = options.warm_start ? memory.find(c.id) : nullptr;
-    if (!found) return;
-    ++warm_started;
-    const double xn = found->dot(c.normal);
-    if (!(xn > 0)) return;
-    Eigen::Vector3d t = *found - xn * c.normal;
-    const double most = options.law == Law::frictionless ? 0 : mu * xn, length = t.norm();
-    if (length > most) t *= most / length;
-    const Eigen::Vector3d p = xn * c.normal + t, q = -p;
-    const Eigen::Vector3d m1 = c.r1.cross(p), m2 = c.r2.cross(q);
-    set(p);
-    push(state[at(c.first)], inertia[at(c.first)], p.data(), m1.data());
-    if (c.second >= 0) push(state[at(c.second)], inertia[at(c.second)], q.data(), m2.data());
-  };
-  packed.resize(all_spheres ? 0 : at(n));
-  spheres.resize(all_spheres ? at(n) : 0);
-  for (int k = 0; k < n; ++k) {
-    const PointContact& c = contacts[at(order[at(k)])];
-    const int second = c.second < 0 ? m : c.second;
-    const RigidBody none;
-    const RigidBody& A = bodies[at(c.first)];
-    const RigidBody& B = c.second < 0 ? none : bodies[at(c.second)];
-    const double inverse = A.inverse_mass + B.inverse_mass;
-    if (all_spheres) {
-      const double s1 = c.normal.dot(c.r1), s2 = c.normal.dot(c.r2);
-      const double t = inverse + s1 * s1 * A.inverse_inertia(0, 0) + s2 * s2 * B.inverse_inertia(0, 0);
-      if (!(inverse > 0)) throw std::invalid_argument("contact " + std::to_string(order[at(k)]) + " joins fixed bodies");
-      PackedSphere& p = spheres[at(k)];
-      p = {c.first, second, {c.normal[0], c.normal[1], c.normal[2]}, s1, s2, 1 / inverse, 1 / t, c.mu, c.bias, {0, 0, 0}};
-      start(c, p.mu, [&](const Eigen::Vector3d& x) {
-        for (int r = 0; r < 3; ++r) p.p[r] = x[r];
-      });
-      continue;
-    }
-    const Eigen::Matrix3d W = local_matrix(A, B, c.r1, c.r2);
-    const Eigen::Matrix3d F = tangent_frame(c.normal);
-    LocalBlock L;
-    try {
-      L = LocalBlock(F * W * F.transpose(), c.mu);
-    } catch (const std::invalid_argument& e) {
-      throw std::invalid_argument("contact " + std::to_string(order[at(k)]) + ": " + e.what());
-    }
-    // Turn the tangents by V.
-    const Eigen::Vector3d t = L.cosine * F.row(1) + L.sine * F.row(2);
-    Packed& p = packed[at(k)];
-    p.first = c.first;
-    p.second = second;
-    for (int r = 0; r < 3; ++r) {
-      p.n[r] = c.normal[r];
-      p.t[r] = t[r];
-      p.r1[r] = c.r1[r];
-      p.r2[r] = c.second < 0 ? 0 : c.r2[r];
-      p.x[r] = 0;
-    }
-    p.a = L.a;
-    p.inv_a = L.inv_a;
-    p.e = L.e;
-    p.mu = L.mu;
-    p.c[0] = L.cosine * L.c[0] + L.sine * L.c[1];
-    p.c[1] = L.cosine * L.c[1] - L.sine * L.c[0];
-    for (int r = 0; r < 2; ++r) {
-      p.g[r] = L.g[r];
-      p.beta[r] = L.beta[r];
-    }
-    p.bias = c.bias;
-    p.lambda = -1;
-    start(c, p.mu, [&](const Eigen::Vector3d& x) {
-      p.x[0] = x.dot(c.normal);
-      p.x[1] = x.dot(t);
-      p.x[2] = x.dot(c.normal.cross(t));
-    });
+// The status of all is that of the worst island.
+int severity(Status s) {
+  switch (s) {
+    case Status::solved:
+      return 0;
+    case Status::work_limit:
+      return 1;
+    case Status::stalled:
+      return 2;
+    case Status::cycling:
+      return 3;
+    default:
+      return 4;
   }
 }
-
-double BodySolver::Implementation::run_chunk(bool test, int begin, int end) {
-  const Arrays s{state.data(), inertia.data()};
-  if (all_spheres) {
-    const bool friction = options.law != Law::frictionless;
-    return test ? test_spheres(s, spheres.data(), begin, end, friction) : sweep_spheres(s, spheres.data(), begin, end, friction);
-  }
-  Packed* c = packed.data();
-  switch (options.law) {
-    case Law::maximum_dissipation: return test ? test_dissipation(s, c, begin, end) : sweep_dissipation(s, c, begin, end);
-    case Law::coulomb: return test ? test_coulomb(s, c, begin, end) : sweep_coulomb(s, c, begin, end);
-    case Law::frictionless: return test ? test_frictionless(s, c, begin, end) : sweep_frictionless(s, c, begin, end);
-  }
-  return 0;
-}
-
-namespace {
 
 void check(const BodyOptions& o) {
   if (!(o.tolerance > 0)) throw std::invalid_argument("tolerance must be > 0");
@@ -436,9 +160,620 @@ void check(const BodyOptions& o) {
   if (o.threads < 1 || o.threads > 256) {
     throw std::invalid_argument("threads must lie in 1 .. 256");
   }
+  if (o.max_assembled < 0) throw std::invalid_argument("max_assembled must be >= 0");
+  if (!(o.max_work > 0)) throw std::invalid_argument("max_work must be > 0");
 }
 
 }  // namespace
+
+struct BodySolver::Implementation {
+  BodyOptions options;
+  detail::WorkerTeam threads_;
+  detail::ContactGraph graph;
+  detail::ImpulseMemory memory;
+  std::vector<std::unique_ptr<Worker>> workers;
+
+  // The present problem; the caller's.
+  const std::vector<RigidBody>* bodies = nullptr;
+  const std::vector<PointContact>* contacts = nullptr;
+  BodySolution* out = nullptr;
+
+  // For each contact.
+  std::vector<int> first, second;  // moving bodies; second -1: fixed
+  std::vector<Kind> kind;
+  std::vector<char> turned;            // first and second of the caller exchanged
+  std::vector<const Vector3d*> start;  // impulse of the previous solve
+  std::vector<GeneralContact> general;
+  std::vector<SphereContact> spheres;
+  std::vector<SmoothContact> smooth;
+  // For each body, slot, chunk, island.
+  std::vector<char> body_kind;
+  std::vector<BodyState> state;
+  std::vector<BodyInertia> inertia;
+  std::vector<double> chunk_sum[2];  // in turns: a thread may still read those of the last pass
+  std::vector<IslandResult> results;
+
+  enum class Pass { pack, sweep, test, unpack };
+
+  void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
+  void read_bodies();
+  void read_contacts();
+  void find_starts();
+  void finish();
+
+  void together(int k, const Team& team);
+  void alone(int k, Worker& worker);
+  void unpack(const Island& island, const Team& team);
+  bool assemblable(int k) const {
+    return results[at(k)].status != Status::solved &&
+           graph.islands[at(k)].contacts <= options.max_assembled;
+  }
+  void iterate(int k, const Team& team);
+  void assemble(int k, Worker& worker);
+
+  template <class Operation>
+  double pass(const Island& island, const Team& team, int& turn, const Operation& operation);
+  double sweep(int chunk, const Team& team);
+  double test(int chunk, const Team& team);
+  double pack(int chunk, Worker& worker);
+  void unpack(int chunk);
+  template <class Visit>
+  void visit(int chunk, const Visit& visit);
+  double pack_contact(int contact, Kind k, int place);
+  Vector3d impulse(Kind k, int place) const;
+  void set_impulse(Kind k, int place, const Vector3d& p);
+  void apply(int contact, const Vector3d& p);
+  void load_body(int slot);
+};
+
+void BodySolver::Implementation::read_bodies() {
+  body_kind.resize(bodies->size());
+  for (std::size_t k = 0; k < bodies->size(); ++k) {
+    const RigidBody& b = (*bodies)[k];
+    if (!std::isfinite(b.inverse_mass) || b.inverse_mass < 0 || !b.inverse_inertia.allFinite() ||
+        !b.velocity.allFinite() || !b.angular_velocity.allFinite()) {
+      throw std::invalid_argument("body " + std::to_string(k) +
+                                  " has a value that is not finite or a negative mass");
+    }
+    const Matrix3d& I = b.inverse_inertia;
+    const bool isotropic = I(0, 1) == 0 && I(0, 2) == 0 && I(1, 2) == 0 && I(1, 0) == 0 &&
+                           I(2, 0) == 0 && I(2, 1) == 0 && I(0, 0) == I(1, 1) && I(0, 0) == I(2, 2);
+    body_kind[k] = static_cast<char>((moves(b) ? 1 : 0) + (isotropic ? 2 : 0));
+  }
+}
+
+void BodySolver::Implementation::read_contacts() {
+  const std::size_t n = contacts->size();
+  const int m = static_cast<int>(bodies->size());
+  first.resize(n);
+  second.resize(n);
+  kind.resize(n);
+  turned.resize(n);
+  // The closed form needs arms along the normal.
+  const auto round = [&](int b, const Vector3d& r, const Vector3d& normal) {
+    if (b < 0 || !(body_kind[at(b)] & 1)) return true;
+    if (!(body_kind[at(b)] & 2)) return false;
+    const double s = normal.dot(r);
+    return (r - s * normal).squaredNorm() <= 1e-28 * r.squaredNorm() ||
+           (*bodies)[at(b)].inverse_inertia(0, 0) == 0;
+  };
+  for (std::size_t i = 0; i < n; ++i) {
+    const PointContact& c = (*contacts)[i];
+    if (c.first < 0 || c.first >= m || c.second < -1 || c.second >= m || c.first == c.second) {
+      throw std::invalid_argument("contact " + std::to_string(i) +
+                                  " names bodies that do not exist");
+    }
+    if (!c.r1.allFinite() || !c.r2.allFinite() || !std::isfinite(c.mu) || c.mu < 0 ||
+        !std::isfinite(c.bias) || !(std::abs(c.normal.squaredNorm() - 1) < 2e-6)) {
+      throw std::invalid_argument("contact " + std::to_string(i) +
+                                  " has a value that is not finite, mu < 0, or a normal that is "
+                                  "not a unit vector");
+    }
+    const bool a = body_kind[at(c.first)] & 1, b = c.second >= 0 && body_kind[at(c.second)] & 1;
+    if (!a && !b)
+      throw std::invalid_argument("contact " + std::to_string(i) + " joins fixed bodies");
+    turned[i] = !a;
+    first[i] = a ? c.first : c.second;
+    second[i] = a && b ? c.second : -1;
+    kind[i] = options.law == Law::frictionless || c.mu == 0                       ? Kind::smooth
+              : round(c.first, c.r1, c.normal) && round(c.second, c.r2, c.normal) ? Kind::sphere
+                                                                                  : Kind::general;
+  }
+}
+
+void BodySolver::Implementation::find_starts() {
+  out->warm_started = 0;
+  start.clear();
+  if (!options.warm_start || memory.empty()) return;
+  start.resize(contacts->size());
+  memory.rewind();
+  for (std::size_t i = 0; i < contacts->size(); ++i) {
+    start[i] = memory.find((*contacts)[i].id);
+    out->warm_started += start[i] != nullptr;
+  }
+}
+
+void BodySolver::Implementation::load_body(int slot) {
+  const RigidBody& b = (*bodies)[at(graph.body[at(slot)])];
+  const Matrix3d& I = b.inverse_inertia;
+  BodyState& s = state[at(slot)];
+  store(b.velocity, s.v);
+  store(b.angular_velocity, s.w);
+  s.m = b.inverse_mass;
+  s.i = I(0, 0);
+  inertia[at(slot)] = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2), {0, 0}};
+}
+
+// visit(contact, kind, place among the contacts of this kind)
+template <class Visit>
+void BodySolver::Implementation::visit(int chunk, const Visit& visit) {
+  const Chunk &c = graph.chunks[at(chunk)], &next = graph.chunks[at(chunk + 1)];
+  int place = c.place;
+  for (int k = 0; k < detail::kKinds; ++k) {
+    for (int i = c.begin[k]; i < next.begin[k]; ++i) {
+      visit(graph.order[at(place++)], static_cast<Kind>(k), i);
+    }
+  }
+}
+
+// Returns |b|^2 of the contact.
+double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) {
+  const PointContact& c = (*contacts)[at(contact)];
+  const Side s = side(*bodies, c, turned[at(contact)] != 0);
+  const int a = graph.slot[at(first[at(contact)])];
+  const int b = second[at(contact)] < 0 ? -1 : graph.slot[at(second[at(contact)])];
+  const Vector3d before = velocity_before(s, c.bias);
+  const Vector3d bias = c.bias * s.n - s.fixed;
+  const double mass = s.first->inverse_mass + (s.second ? s.second->inverse_mass : 0);
+  switch (k) {
+    case Kind::sphere: {
+      const double s1 = s.n.dot(s.r1), s2 = s.second ? s.n.dot(s.r2) : 0;
+      double t = mass + s1 * s1 * s.first->inverse_inertia(0, 0);
+      if (s.second) t += s2 * s2 * s.second->inverse_inertia(0, 0);
+      if (!(mass > 0)) throw std::invalid_argument("the bodies cannot move along the normal");
+      SphereContact& p = spheres[at(place)];
+      p.first = a;
+      p.second = b;
+      store(s.n, p.n);
+      p.s1 = s1;
+      p.s2 = s2;
+      p.inv_a = 1 / mass;
+      p.inv_t = 1 / t;
+      p.mu = c.mu;
+      store(bias, p.bias);
+      break;
+    }
+    case Kind::smooth: {
+      SmoothContact& p = smooth[at(place)];
+      p.first = a;
+      p.second = b;
+      const Vector3d q1 = s.r1.cross(s.n), q2 = s.r2.cross(s.n);
+      const Vector3d column = diagonal_block(s) * s.n;
+      const double D = column.dot(s.n);
+      if (!(D > 0)) throw std::invalid_argument("the bodies cannot move along the normal");
+      store(s.n, p.n);
+      store(q1, p.q1);
+      store(q2, p.q2);
+      p.inv_a = 1 / D;
+      p.weight = column.norm();
+      p.bias = bias.dot(s.n);
+      break;
+    }
+    case Kind::general: {
+      const Matrix3d F = tangent_frame(s.n);
+      const LocalBlock L(F * diagonal_block(s) * F.transpose(), c.mu);
+      // Tangents turned by V, in which the tangential block is diagonal.
+      const Vector3d t = L.cosine * F.row(1) + L.sine * F.row(2), o = s.n.cross(t);
+      GeneralContact& p = general[at(place)];
+      p.first = a;
+      p.second = b;
+      store(s.n, p.n);
+      store(t, p.t);
+      store(s.r1, p.r1);
+      store(s.second ? s.r2 : Vector3d(Vector3d::Zero()), p.r2);
+      p.a = L.a;
+      p.inv_a = L.inv_a;
+      p.mu = L.mu;
+      p.c[0] = L.cosine * L.c[0] + L.sine * L.c[1];
+      p.c[1] = L.cosine * L.c[1] - L.sine * L.c[0];
+      p.beta[0] = L.beta[0];
+      p.beta[1] = L.beta[1];
+      p.bias[0] = bias.dot(s.n);
+      p.bias[1] = bias.dot(t);
+      p.bias[2] = bias.dot(o);
+      p.lambda = -1;
+      break;
+    }
+  }
+  Vector3d p = Vector3d::Zero();
+  if (!start.empty() && start[at(contact)]) {
+    p = on_cone(s.sign * *start[at(contact)], s.n, k == Kind::smooth ? 0 : c.mu);
+  }
+  set_impulse(k, place, p);
+  if (!p.isZero(0)) apply(contact, p);
+  return before.squaredNorm();
+}
+
+// In world axes, on the moving body `first`.
+Vector3d BodySolver::Implementation::impulse(Kind k, int place) const {
+  switch (k) {
+    case Kind::sphere:
+      return load(spheres[at(place)].p);
+    case Kind::smooth:
+      return smooth[at(place)].x * load(smooth[at(place)].n);
+    case Kind::general:
+      break;
+  }
+  const GeneralContact& c = general[at(place)];
+  const Vector3d n = load(c.n), t = load(c.t);
+  return c.x[0] * n + c.x[1] * t + c.x[2] * n.cross(t);
+}
+
+void BodySolver::Implementation::set_impulse(Kind k, int place, const Vector3d& p) {
+  switch (k) {
+    case Kind::sphere:
+      store(p, spheres[at(place)].p);
+      return;
+    case Kind::smooth:
+      smooth[at(place)].x = p.dot(load(smooth[at(place)].n));
+      return;
+    case Kind::general:
+      break;
+  }
+  GeneralContact& c = general[at(place)];
+  const Vector3d n = load(c.n), t = load(c.t);
+  store({p.dot(n), p.dot(t), p.dot(n.cross(t))}, c.x);
+}
+
+void BodySolver::Implementation::apply(int contact, const Vector3d& p) {
+  const PointContact& c = (*contacts)[at(contact)];
+  const bool t = turned[at(contact)] != 0;
+  const Vector3d q = (t ? c.r2 : c.r1).cross(p);
+  const int a = graph.slot[at(first[at(contact)])];
+  detail::push(state[at(a)], inertia[at(a)], p.data(), q.data());
+  if (second[at(contact)] < 0) return;
+  const int b = graph.slot[at(second[at(contact)])];
+  const Vector3d minus = -p, r = c.r2.cross(minus);
+  detail::push(state[at(b)], inertia[at(b)], minus.data(), r.data());
+}
+
+double BodySolver::Implementation::pack(int chunk, Worker& worker) {
+  double sum = 0;
+  visit(chunk, [&](int contact, Kind k, int place) {
+    // Other threads wait at the next barrier: a failure is reported after the run.
+    try {
+      sum += pack_contact(contact, k, place);
+    } catch (const std::invalid_argument& e) {
+      if (contact >= worker.bad_contact) return;
+      worker.bad_contact = contact;
+      worker.bad_reason = e.what();
+    }
+  });
+  return sum;
+}
+
+void BodySolver::Implementation::unpack(int chunk) {
+  visit(chunk, [&](int contact, Kind k, int place) {
+    const PointContact& c = (*contacts)[at(contact)];
+    const Vector3d p = impulse(k, place);
+    out->impulses[at(contact)] = turned[at(contact)] ? Vector3d(-p) : p;
+    const Vector3d n = turned[at(contact)] ? Vector3d(-c.normal) : c.normal;
+    const double xn = p.dot(n), tt = (p - xn * n).squaredNorm();
+    const double most = k == Kind::smooth ? 0 : c.mu * xn;
+    out->regimes[at(contact)] = !(xn > 0)                        ? Regime::separating
+                                : tt >= most * most * (1 - 1e-9) ? Regime::sliding
+                                                                 : Regime::sticking;
+  });
+}
+
+double BodySolver::Implementation::sweep(int chunk, const Team& team) {
+  const BodyArrays s{state.data(), inertia.data(), &team.worker->fixed};
+  const Chunk &c = graph.chunks[at(chunk)], &next = graph.chunks[at(chunk + 1)];
+  double sum = 0;
+  if (c.begin[0] < next.begin[0]) {
+    sum +=
+        detail::sweep(s, options.law, general.data() + c.begin[0], general.data() + next.begin[0]);
+  }
+  if (c.begin[1] < next.begin[1]) {
+    sum += detail::sweep(s, spheres.data() + c.begin[1], spheres.data() + next.begin[1]);
+  }
+  if (c.begin[2] < next.begin[2]) {
+    sum += detail::sweep(s, smooth.data() + c.begin[2], smooth.data() + next.begin[2]);
+  }
+  return sum;
+}
+
+double BodySolver::Implementation::test(int chunk, const Team& team) {
+  const BodyArrays s{state.data(), inertia.data(), &team.worker->fixed};
+  const Chunk &c = graph.chunks[at(chunk)], &next = graph.chunks[at(chunk + 1)];
+  double sum = 0;
+  if (c.begin[0] < next.begin[0]) {
+    sum +=
+        detail::test(s, options.law, general.data() + c.begin[0], general.data() + next.begin[0]);
+  }
+  if (c.begin[1] < next.begin[1]) {
+    sum += detail::test(s, spheres.data() + c.begin[1], spheres.data() + next.begin[1]);
+  }
+  if (c.begin[2] < next.begin[2]) {
+    sum += detail::test(s, smooth.data() + c.begin[2], smooth.data() + next.begin[2]);
+  }
+  return sum;
+}
+
+// operation(chunk) for all chunks of the island, colour by colour; the sum of what it returns, in
+// an order that no thread count changes.
+template <class Operation>
+double BodySolver::Implementation::pass(const Island& island, const Team& team, int& turn,
+                                        const Operation& operation) {
+  turn = 1 - turn;
+  std::vector<double>& sums = chunk_sum[turn];
+  for (int k = island.colour_begin; k < island.colour_end; ++k) {
+    const int begin = graph.colours[at(k)], end = graph.colours[at(k + 1)];
+    // Each thread keeps to the same bodies as far as possible.
+    for (int c = team.from(begin, end); c < team.to(begin, end); ++c) sums[at(c)] = operation(c);
+    team.meet();
+  }
+  double sum = 0;
+  for (int c = island.chunk_begin; c < island.chunk_end; ++c) sum += sums[at(c)];
+  return sum;
+}
+
+// Sweeps until the island is solved, max_sweeps are reached, or it should be assembled.
+void BodySolver::Implementation::iterate(int k, const Team& team) {
+  const Island& island = graph.islands[at(k)];
+  const bool small = island.contacts <= options.max_assembled;
+  int turn = 0;
+  IslandResult r;
+  r.norm = std::sqrt(pass(island, team, turn, [&](int c) { return pack(c, *team.worker); }));
+  const double norm = r.norm > 0 ? r.norm : 1,
+               bound = options.tolerance * options.tolerance * norm * norm;
+  double sum = 0, earlier = std::numeric_limits<double>::infinity();
+  int forecast = kFirstForecast, next_test = 0, failed_tests = 0;
+  for (;;) {
+    sum = pass(island, team, turn, [&](int c) { return sweep(c, team); });
+    ++r.sweeps;
+    const bool last = r.sweeps >= options.max_sweeps;
+    // What a sweep changes is close to the residual, which costs another pass.
+    if ((sum <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
+      const double residual = pass(island, team, turn, [&](int c) { return test(c, team); });
+      r.error = std::sqrt(residual) / norm;
+      if (residual <= bound) {
+        r.status = Status::solved;
+        break;
+      }
+      next_test = r.sweeps + ++failed_tests;
+    }
+    if (last) {
+      r.status = sum > 0.998 * earlier ? Status::cycling : Status::work_limit;
+      break;
+    }
+    if (r.sweeps < forecast) continue;
+    // Linear convergence as since half as many sweeps: how many more?
+    const double rate = std::log(sum / earlier) / (0.5 * r.sweeps);
+    const double more =
+        rate < 0 ? std::log(bound / sum) / rate : std::numeric_limits<double>::infinity();
+    if (small && r.sweeps > kFirstForecast && more > kPatience) break;
+    earlier = sum;
+    forecast *= 2;
+  }
+  if (team.thread == 0) results[at(k)] = r;
+}
+
+// The island as a Problem, for the stages of Solver; from the present impulses.
+void BodySolver::Implementation::assemble(int k, Worker& worker) {
+  const Island& island = graph.islands[at(k)];
+  IslandResult& r = results[at(k)];
+  r.assembled = true;
+  worker.bodies.resize(at(island.body_end - island.body_begin));
+  for (int s = island.body_begin; s < island.body_end; ++s) {
+    const RigidBody& b = (*bodies)[at(graph.body[at(s)])];
+    Body& body = worker.bodies[at(s - island.body_begin)];
+    body.inverse_mass.setZero();
+    body.inverse_mass.topLeftCorner<3, 3>() = b.inverse_mass * Matrix3d::Identity();
+    body.inverse_mass.bottomRightCorner<3, 3>() = b.inverse_inertia;
+    body.velocity << b.velocity, b.angular_velocity;
+  }
+  worker.contacts.clear();
+  Eigen::VectorXd x(3 * island.contacts);
+  for (int chunk = island.chunk_begin; chunk < island.chunk_end; ++chunk) {
+    visit(chunk, [&](int contact, Kind kind_, int place) {
+      const PointContact& c = (*contacts)[at(contact)];
+      const Side s = side(*bodies, c, turned[at(contact)] != 0);
+      const auto local = [&](int b) { return b < 0 ? -1 : graph.slot[at(b)] - island.body_begin; };
+      const Matrix3d F = tangent_frame(s.n);
+      x.segment<3>(3 * static_cast<Eigen::Index>(worker.contacts.size())) =
+          F * impulse(kind_, place);
+      worker.contacts.push_back(BodyContact::at_point(
+          local(first[at(contact)]), local(second[at(contact)]), s.r1, s.r2, s.n, c.mu));
+      worker.contacts.back().bias = F * (c.bias * s.n - s.fixed);
+    });
+  }
+  const Problem problem = delassus(worker.bodies, worker.contacts);
+  Options o;
+  o.law = options.law;
+  o.measure = Measure::fixed_point;
+  o.tolerance = 0.9 * options.tolerance;  // the two forms round differently
+  o.strict = options.strict;
+  o.max_work = options.max_work;
+  worker.solver = std::make_unique<Solver>(o);
+  worker.solution = worker.solver->solve(problem, x);
+  r.status = worker.solution.status;
+  r.error = worker.solution.error;
+
+  // Back to the bodies.
+  for (int s = island.body_begin; s < island.body_end; ++s) load_body(s);
+  int i = 0;
+  double residual = 0;
+  for (int chunk = island.chunk_begin; chunk < island.chunk_end; ++chunk) {
+    visit(chunk, [&](int contact, Kind kind_, int place) {
+      const Vector3d n = turned[at(contact)] ? Vector3d(-(*contacts)[at(contact)].normal)
+                                             : (*contacts)[at(contact)].normal;
+      const Vector3d p =
+          tangent_frame(n).transpose() * worker.solution.impulses.segment<3>(3 * i++);
+      set_impulse(kind_, place, p);
+      apply(contact, p);
+    });
+  }
+  for (int replaced : worker.solution.replaced) {
+    worker.replaced.push_back(graph.order[at(island.contact_begin + replaced)]);
+  }
+  if (!worker.solution.replaced.empty()) return;  // the sweeps do not know the other rule
+  const Team one{0, 1, nullptr, &worker};
+  for (int c = island.chunk_begin; c < island.chunk_end; ++c) residual += test(c, one);
+  r.error = std::sqrt(residual) / (r.norm > 0 ? r.norm : 1);
+  if (r.error <= options.tolerance) {
+    r.status = Status::solved;
+  } else if (r.status == Status::solved) {
+    r.status = Status::stalled;
+  }
+}
+
+void BodySolver::Implementation::unpack(const Island& island, const Team& team) {
+  int turn = 0;
+  pass(island, team, turn, [&](int chunk) { return unpack(chunk), 0.0; });
+  const int begin = island.body_begin, end = island.body_end;
+  for (int s = team.from(begin, end); s < team.to(begin, end); ++s) {
+    const int b = graph.body[at(s)];
+    out->velocities[at(b)] = load(state[at(s)].v);
+    out->angular_velocities[at(b)] = load(state[at(s)].w);
+  }
+}
+
+// A large island by all threads; what has to be assembled is left to alone().
+void BodySolver::Implementation::together(int k, const Team& team) {
+  const Island& island = graph.islands[at(k)];
+  const int begin = island.body_begin, end = island.body_end;
+  for (int s = team.from(begin, end); s < team.to(begin, end); ++s) load_body(s);
+  team.meet();
+  iterate(k, team);
+  team.meet();
+  if (!assemblable(k)) unpack(island, team);
+}
+
+void BodySolver::Implementation::alone(int k, Worker& worker) {
+  const Island& island = graph.islands[at(k)];
+  const Team team{0, 1, nullptr, &worker};
+  if (results[at(k)].sweeps == 0) {
+    for (int s = island.body_begin; s < island.body_end; ++s) load_body(s);
+    iterate(k, team);
+  }
+  if (assemblable(k)) assemble(k, worker);
+  unpack(island, team);
+}
+
+void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
+                                       const std::vector<PointContact>& c, BodySolution& o) {
+  bodies = &b;
+  contacts = &c;
+  out = &o;
+  read_bodies();
+  read_contacts();
+  find_starts();
+  graph.build(static_cast<int>(b.size()), first, second, kind);
+
+  const Chunk& end = graph.chunks.back();
+  general.resize(at(end.begin[0]));
+  spheres.resize(at(end.begin[1]));
+  smooth.resize(at(end.begin[2]));
+  state.resize(graph.body.size());
+  inertia.resize(graph.body.size());
+  for (std::vector<double>& sums : chunk_sum) sums.resize(graph.chunks.size());
+  results.assign(graph.islands.size(), {});
+  o.impulses.resize(c.size());
+  o.regimes.resize(c.size());
+  o.velocities.resize(b.size());
+  o.angular_velocities.resize(b.size());
+
+  // Few contacts are not worth waking a thread; the bits are the same.
+  const int threads = c.size() < at(kTogether) ? 1 : options.threads;
+  while (static_cast<int>(workers.size()) < threads) workers.push_back(std::make_unique<Worker>());
+  for (auto& worker : workers) {
+    worker->replaced.clear();
+    worker->failure = nullptr;
+    worker->bad_contact = std::numeric_limits<int>::max();
+  }
+  const int islands = static_cast<int>(graph.islands.size());
+  const auto large = [&](int k) {
+    return threads > 1 && graph.islands[at(k)].contacts >= kTogether;
+  };
+  std::atomic<int> next{0};
+  auto work = [&](int thread) {
+    Worker& worker = *workers[at(thread)];
+    const Team all{thread, threads, &threads_.barrier, &worker};
+    for (int k = 0; k < islands; ++k) {
+      if (large(k)) together(k, all);
+    }
+    all.meet();
+    // The others one by one, whoever is free.
+    constexpr int kBatch = 16;
+    try {
+      for (int k = next.fetch_add(kBatch); k < islands; k = next.fetch_add(kBatch)) {
+        for (int i = k; i < std::min(k + kBatch, islands); ++i) {
+          if (!large(i) || assemblable(i)) alone(i, worker);
+        }
+      }
+    } catch (...) {
+      worker.failure = std::current_exception();
+    }
+  };
+  threads_.run(threads, work);
+  finish();
+}
+
+// Everything that is about more than one island.
+void BodySolver::Implementation::finish() {
+  int bad = std::numeric_limits<int>::max();
+  const Worker* by = nullptr;
+  for (const auto& worker : workers) {
+    if (worker->bad_contact >= bad) continue;
+    bad = worker->bad_contact;
+    by = worker.get();
+  }
+  if (by) throw std::invalid_argument("contact " + std::to_string(bad) + ": " + by->bad_reason);
+  for (const auto& worker : workers) {
+    if (worker->failure) std::rethrow_exception(worker->failure);
+  }
+
+  for (std::size_t k = 0; k < bodies->size(); ++k) {
+    if (graph.slot[k] >= 0) continue;
+    out->velocities[k] = (*bodies)[k].velocity;
+    out->angular_velocities[k] = (*bodies)[k].angular_velocity;
+  }
+  out->status = Status::solved;
+  out->error = 0;
+  out->sweeps = out->colours = out->assembled_islands = out->failed_islands = 0;
+  out->islands = static_cast<int>(results.size());
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    const IslandResult& r = results[k];
+    out->error = std::max(out->error, r.error);
+    out->sweeps = std::max(out->sweeps, r.sweeps);
+    out->colours =
+        std::max(out->colours, graph.islands[k].colour_end - graph.islands[k].colour_begin);
+    out->assembled_islands += r.assembled;
+    if (r.status == Status::solved) continue;
+    ++out->failed_islands;
+    if (severity(r.status) > severity(out->status)) out->status = r.status;
+  }
+  out->replaced.clear();
+  for (const auto& worker : workers) {
+    out->replaced.insert(out->replaced.end(), worker->replaced.begin(), worker->replaced.end());
+  }
+  std::sort(out->replaced.begin(), out->replaced.end());
+  out->spheres = general.empty();
+
+  if (options.warm_start) {
+    memory.clear();
+    for (std::size_t i = 0; i < contacts->size(); ++i)
+      memory.add((*contacts)[i].id, out->impulses[i]);
+  }
+  const auto bytes = [](const auto&... list) {
+    return (... + (list.capacity() * sizeof(list[0])));
+  };
+  out->bytes = graph.contact_bytes() + memory.bytes() +
+               bytes(first, second, kind, turned, start, general, spheres, smooth, chunk_sum[0],
+                     chunk_sum[1], results);
+  out->body_bytes = graph.body_bytes() + bytes(body_kind, state, inertia);
+}
 
 BodySolver::BodySolver(const BodyOptions& options) : implementation_(new Implementation) {
   set_options(options);
@@ -468,196 +803,15 @@ BodySolution BodySolver::solve(const std::vector<RigidBody>& bodies,
 }
 
 void BodySolver::solve(const std::vector<RigidBody>& bodies,
-                       const std::vector<PointContact>& contacts, BodySolution& out) {
-  Implementation& s = *implementation_;
-  s.setup(bodies, contacts);
-  out.warm_started = s.warm_started;
-  out.colours = static_cast<int>(s.colour_end.size());
-  out.spheres = s.all_spheres;
-  out.bytes = s.packed.size() * sizeof(Packed) + s.spheres.size() * sizeof(PackedSphere) + s.order.size() * sizeof(int);
-
-  const int threads = s.options.threads;
-  Barrier barrier(threads);
-  const auto pass = [&](bool test, int thread) {
-    int begin = 0;
-    for (std::size_t colour = 0; colour < s.colour_end.size(); ++colour) {
-      const int end = s.colour_end[colour];
-      const int chunks = s.chunk_begin[colour + 1] - s.chunk_begin[colour];
-      // Whole runs of chunks for each thread: bodies stay in one cache.
-      const int from = static_cast<int>(static_cast<long>(chunks) * thread / threads);
-      const int to = static_cast<int>(static_cast<long>(chunks) * (thread + 1) / threads);
-      for (int k = from; k < to; ++k) {
-        const int b = begin + k * kChunk, e = std::min(end, b + kChunk);
-        s.chunk_sum[at(s.chunk_begin[colour] + k)] = s.run_chunk(test, b, e);
-      }
-      begin = end;
-      barrier.wait();
-    }
-  };
-  // |b|: relative velocities before the impulses.
-  double norm = 0;
-  const auto relative = [&](const PointContact& c) {
-    Eigen::Vector3d u = bodies[at(c.first)].velocity + bodies[at(c.first)].angular_velocity.cross(c.r1);
-    if (c.second >= 0) u -= bodies[at(c.second)].velocity + bodies[at(c.second)].angular_velocity.cross(c.r2);
-    return Eigen::Vector3d(u + c.bias * c.normal);
-  };
-  for (const PointContact& c : contacts) norm += relative(c).squaredNorm();
-  norm = norm > 0 ? std::sqrt(norm) : 1;
-
-  std::atomic<bool> done{false};
-  const auto work = [&](int thread) {
-    int next_test = 1;
-    for (int sweep = 1;; ++sweep) {
-      pass(false, thread);
-      if (sweep >= next_test || sweep >= s.options.max_sweeps) {
-        pass(true, thread);
-        if (thread == 0) {
-          out.sweeps = sweep;
-          out.error = s.sum() / norm;
-          out.status = out.error <= s.options.tolerance ? Status::solved : Status::work_limit;
-          done.store(out.status == Status::solved || sweep >= s.options.max_sweeps);
-        }
-        barrier.wait();
-        if (done.load()) return;
-        next_test = sweep + 4 + sweep / 4;
-      }
-    }
-  };
-  std::vector<std::thread> others;
-  for (int t = 1; t < threads; ++t) others.emplace_back(work, t);
-  work(0);
-  for (std::thread& t : others) t.join();
-
-  out.impulses.resize(contacts.size());
-  out.regimes.resize(contacts.size());
-  const bool friction = s.options.law != Law::frictionless;
-  const auto set = [&](std::size_t k, const Eigen::Vector3d& p, double xn, double tt, double mu) {
-    const double most = friction ? mu * xn : 0;
-    out.impulses[at(s.order[k])] = p;
-    out.regimes[at(s.order[k])] = !(xn > 0)                                  ? Regime::separating
-                                  : tt >= most * most * (1 - 1e-9) ? Regime::sliding
-                                                                             : Regime::sticking;
-  };
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    if (s.all_spheres) {
-      const PackedSphere& c = s.spheres[k];
-      const Eigen::Vector3d n(c.n[0], c.n[1], c.n[2]), p(c.p[0], c.p[1], c.p[2]);
-      const double xn = p.dot(n);
-      set(k, p, xn, (p - xn * n).squaredNorm(), c.mu);
-    } else {
-      const Packed& c = s.packed[k];
-      const Eigen::Vector3d n(c.n[0], c.n[1], c.n[2]), t(c.t[0], c.t[1], c.t[2]);
-      set(k, c.x[0] * n + c.x[1] * t + c.x[2] * n.cross(t), c.x[0],
-          c.x[1] * c.x[1] + c.x[2] * c.x[2], c.mu);
-    }
-  }
-  out.velocities.resize(bodies.size());
-  out.angular_velocities.resize(bodies.size());
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    out.velocities[k] << s.state[k].v[0], s.state[k].v[1], s.state[k].v[2];
-    out.angular_velocities[k] << s.state[k].w[0], s.state[k].w[1], s.state[k].w[2];
-  }
-  if (s.options.warm_start) {
-    s.memory.begin(contacts.size());
-    for (std::size_t k = 0; k < contacts.size(); ++k) s.memory.add(contacts[k].id, out.impulses[k]);
-  }
-}
-
-Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
-                   Law law, const std::vector<Eigen::Vector3d>& impulses) {
-  if (impulses.size() != contacts.size()) {
-    throw std::invalid_argument("one impulse for each contact is needed");
-  }
-  const int m = static_cast<int>(bodies.size());
-  std::vector<Eigen::Vector3d> v(bodies.size()), w(bodies.size());
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    v[k] = bodies[k].velocity;
-    w[k] = bodies[k].angular_velocity;
-  }
-  const RigidBody none;
-  const auto relative = [&](const PointContact& c) {
-    Eigen::Vector3d u = v[at(c.first)] + w[at(c.first)].cross(c.r1) + c.bias * c.normal;
-    if (c.second >= 0) u -= v[at(c.second)] + w[at(c.second)].cross(c.r2);
-    return u;
-  };
-  double bb = 0;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PointContact& c = contacts[i];
-    if (c.first < 0 || c.first >= m || c.second < -1 || c.second >= m || c.first == c.second) {
-      throw std::invalid_argument("contact " + std::to_string(i) + " names bodies that do not exist");
-    }
-    bb += relative(c).squaredNorm();
-  }
-  std::vector<Eigen::Vector3d> before;
-  for (const PointContact& c : contacts) before.push_back(relative(c));
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PointContact& c = contacts[i];
-    const Eigen::Vector3d& p = impulses[i];
-    v[at(c.first)] += bodies[at(c.first)].inverse_mass * p;
-    w[at(c.first)] += bodies[at(c.first)].inverse_inertia * c.r1.cross(p);
-    if (c.second < 0) continue;
-    v[at(c.second)] -= bodies[at(c.second)].inverse_mass * p;
-    w[at(c.second)] -= bodies[at(c.second)].inverse_inertia * c.r2.cross(p);
-  }
-  Residuals r;
-  r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
-  double fixed = 0, map = 0, xx = 0, ww = 0;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PointContact& c = contacts[i];
-    const RigidBody& A = bodies[at(c.first)];
-    const RigidBody& B = c.second < 0 ? none : bodies[at(c.second)];
-    const Eigen::Matrix3d F = tangent_frame(c.normal);
-    const LocalBlock L(F * local_matrix(A, B, c.r1, c.r2) * F.transpose(), c.mu);
-    const Eigen::Vector3d x = F * impulses[i], u = F * relative(c);
-    const double mu = law == Law::frictionless ? 0 : c.mu, t = x.tail<2>().norm();
-    r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], u[0])));
-    r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
-    r.dissipation += x.dot(u);
-    r.energy_change += 0.5 * x.dot(u + F * before[i]);
-    // Block fixed point.
-    const Eigen::Matrix3d D = L.matrix();
-    LocalState state;
-    for (int k = 0; k < 3; ++k) state.x[k] = x[k];
-    solve_local(law, L, D * x - u, state);
-    fixed += (D * (x - Eigen::Vector3d(state.x[0], state.x[1], state.x[2]))).squaredNorm();
-    // Natural map, and the nearest slip that the law allows.
-    double gamma[2] = {0, 0};
-    if (law == Law::maximum_dissipation) {
-      gamma[0] = mu * L.inv_a * L.c[0];
-      gamma[1] = mu * L.inv_a * L.c[1];
-    }
-    Eigen::Vector3d z = x - u;
-    if (law == Law::frictionless) {
-      z << std::max(z[0], 0.0), 0, 0;
-    } else {
-      const double slip = detail::slip(u[1], u[2], gamma[0], gamma[1]);
-      z -= slip * Eigen::Vector3d(mu, gamma[0], gamma[1]);
-      detail::project_cone(mu, z.data());
-    }
-    map += (x - z).squaredNorm();
-    xx += x.squaredNorm();
-    ww += u.squaredNorm();
-    if (mu == 0 || !(x[0] > 0)) continue;
-    double misfit = u.tail<2>().norm();
-    if (t > 0 && t >= mu * x[0] * (1 - 1e-9)) {
-      const Eigen::Vector2d d = -(x.tail<2>() / t + Eigen::Vector2d(gamma[0], gamma[1]));
-      const double dd = d.squaredNorm();
-      const double s = dd > 0 ? std::max(0.0, u.tail<2>().dot(d) / dd) : 0;
-      misfit = (u.tail<2>() - s * d).norm();
-    }
-    r.alignment = std::max(r.alignment, misfit);
-  }
-  const auto over = [](double p, double q) { return q > 0 ? p / q : p; };
-  r.fixed_point = over(std::sqrt(fixed), std::sqrt(bb));
-  r.natural_map = over(std::sqrt(map), std::sqrt(std::max({bb, xx, ww})));
-  r.natural_map_data = over(std::sqrt(map), std::sqrt(bb));
-  return r;
+                       const std::vector<PointContact>& contacts, BodySolution& solution) {
+  implementation_->solve(bodies, contacts, solution);
 }
 
 std::vector<Body> to_bodies(const std::vector<RigidBody>& bodies) {
   std::vector<Body> out(bodies.size());
   for (std::size_t k = 0; k < bodies.size(); ++k) {
-    out[k].inverse_mass.topLeftCorner<3, 3>() = bodies[k].inverse_mass * Eigen::Matrix3d::Identity();
+    out[k].inverse_mass.topLeftCorner<3, 3>() =
+        bodies[k].inverse_mass * Eigen::Matrix3d::Identity();
     out[k].inverse_mass.bottomRightCorner<3, 3>() = bodies[k].inverse_inertia;
     out[k].velocity << bodies[k].velocity, bodies[k].angular_velocity;
   }

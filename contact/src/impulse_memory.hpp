@@ -1,4 +1,5 @@
-// Tether: impulses of the previous solve, found by contact id. SPDX-License-Identifier: BSD-3-Clause
+// Tether: impulses of the previous solve, found by contact id. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <Eigen/Core>
@@ -23,6 +24,12 @@ class ImpulseMemory {
     for (Eigen::Vector3d& p : impulses_) p *= factor;
   }
 
+  bool empty() const { return ids_.empty(); }
+  std::size_t bytes() const {
+    return ids_.capacity() * sizeof(ids_[0]) + impulses_.capacity() * sizeof(impulses_[0]) +
+           table_.capacity() * sizeof(table_[0]);
+  }
+
   // Before a run of find().
   void rewind() {
     next_ = 0;
@@ -42,12 +49,7 @@ class ImpulseMemory {
     }
   }
 
-  // A new list.
-  void begin(std::size_t contacts) {
-    clear();
-    ids_.reserve(contacts);
-    impulses_.reserve(contacts);
-  }
+  // After clear(): a new list.
   void add(std::uint64_t id, const Eigen::Vector3d& impulse) {
     if (id == kNoId) return;
     ids_.push_back(id);

@@ -1,4 +1,5 @@
-// Tether: many contacts between bodies, the Delassus matrix never formed. SPDX-License-Identifier: BSD-3-Clause
+// Tether: many contacts between bodies, the Delassus matrix never formed. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <cstdint>
@@ -9,8 +10,8 @@
 
 namespace tether::contact {
 
-/// Rigid body: mass and inertia about its centre, in world axes. Zero inverse mass and inertia: fixed
-/// (its velocity may be prescribed and is not changed).
+/// Rigid body: mass and inertia about its centre, in world axes. Zero inverse mass and inertia:
+/// fixed (its velocity may be prescribed and is not changed).
 struct RigidBody {
   double inverse_mass = 0;  // 1/kg
   Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();
@@ -18,8 +19,8 @@ struct RigidBody {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  // rad/s
 };
 
-/// Contact at r1 from the centre of `first`, r2 from that of `second` (-1: the fixed world); the unit
-/// normal points from `second` to `first`. One of the two bodies must be able to move.
+/// Contact at r1 from the centre of `first`, r2 from that of `second` (-1: the fixed world); the
+/// unit normal points from `second` to `first`. One of the two bodies must be able to move.
 struct PointContact {
   static constexpr std::uint64_t kNoId = ~std::uint64_t{0};
 
@@ -27,7 +28,8 @@ struct PointContact {
   Eigen::Vector3d r1 = Eigen::Vector3d::Zero(), r2 = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double mu = 0;  ///< 0: solved as one equation, the tangents cost nothing
-  /// Added to the normal velocity, w_n = n . (J v) + bias >= 0; a time stepper gives gap / time_step.
+  /// Added to the normal velocity, w_n = n . (J v) + bias >= 0; a time stepper gives gap /
+  /// time_step.
   double bias = 0;
   /// Identity from one solve to the next (with `first` and `second` in the same order), unique
   /// within a solve; kNoId: never warm-started.
@@ -36,29 +38,39 @@ struct PointContact {
 
 struct BodyOptions {
   Law law = Law::maximum_dissipation;
-  double tolerance = 1e-6;  ///< (sum |D_i (x_i - block(x_i))|^2)^1/2 <= tolerance * |b|
-  int max_sweeps = 1000;
+  /// Of each island: (sum |D_i (x_i - block(x_i))|^2)^1/2 <= tolerance * |b|, D_i the diagonal
+  /// block of contact i, b the relative velocities before the impulses.
+  double tolerance = 1e-6;
+  int max_sweeps = 1000;   ///< of an island
   int threads = 1;         ///< results have the same bits for every number of threads
   bool warm_start = true;  ///< contacts with an id start from their impulse of the previous solve
+  /// Islands of at most so many contacts that sweeps do not soon finish are assembled and given to
+  /// Solver, whose stages also serve stacks and large mass ratios. 0: never.
+  int max_assembled = 1000;
+  bool strict = false;    ///< as Options::strict, for assembled islands
+  double max_work = 5e9;  ///< as Options::max_work, for each assembled island
 };
 
 struct BodySolution {
-  Status status = Status::unsolved;
-  double error = Residuals::kNone;  ///< as in BodyOptions::tolerance
-  int sweeps = 0, colours = 0;
-  int warm_started = 0;   ///< contacts whose id was found
-  bool spheres = false;   ///< closed form in use: every contact is without coupling
-  std::size_t bytes = 0;  ///< of the workspace that grows with the contacts
+  Status status = Status::unsolved;  ///< solved if all islands are, else that of the worst
+  double error = Residuals::kNone;   ///< as in BodyOptions::tolerance, of the worst island
+  int islands = 0, assembled_islands = 0, failed_islands = 0;
+  int sweeps = 0, colours = 0;  ///< the most of any island
+  int warm_started = 0;         ///< contacts whose id was found
+  std::vector<int> replaced;    ///< as Solution::replaced
+  bool spheres = false;  ///< no contact needed the general block: all spheres or frictionless
+  std::size_t bytes = 0, body_bytes = 0;  ///< workspace that grows with the contacts, the bodies
   std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`
   std::vector<Regime> regimes;            ///< of each contact
   std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
 };
 
-/// Gauss-Seidel on the velocities of the bodies, contacts coloured so that no moving body occurs
-/// twice in a colour. For tight tolerances of stiff assemblies use delassus() and Solver.
+/// Islands of bodies in contact, one by one: Gauss-Seidel on the velocities of the bodies, and
+/// Solver where that does not soon converge. What is found for an island does not depend on others,
+/// nor on the number of threads.
 ///
-/// Keep one for a run of time steps: it holds the workspace, the threads and the impulses by id. Not
-/// for use by two threads at once.
+/// Keep one for a run of time steps: it holds the workspace, the threads and the impulses by id.
+/// Not for use by two threads at once.
 class BodySolver {
  public:
   explicit BodySolver(const BodyOptions& options = {});  ///< throws std::invalid_argument
@@ -67,8 +79,10 @@ class BodySolver {
   BodySolver& operator=(BodySolver&&) noexcept;
 
   /// Throws std::invalid_argument on values that are not finite and indices that do not exist.
-  BodySolution solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts);
-  /// The same, into storage that is used again: nothing is allocated once all has grown.
+  BodySolution solve(const std::vector<RigidBody>& bodies,
+                     const std::vector<PointContact>& contacts);
+  /// The same, into storage that is used again: nothing is allocated once all has grown, unless an
+  /// island has to be assembled.
   void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& solution);
 

@@ -1,0 +1,71 @@
+// Tether: contacts between bodies as the sweeps see them. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <tether/contact/one_contact.hpp>
+
+#include "vector.hpp"
+
+namespace tether::contact::detail {
+
+// One cache line each. Spheres need only the first.
+struct alignas(64) BodyState {
+  double v[3], m, w[3],
+      i;  // velocity, 1/mass, angular velocity, 1/inertia if that is a multiple of 1
+};
+struct alignas(64) BodyInertia {
+  double xx, xy, xz, yy, yz, zz, pad[2];  // inverse, world axes
+};
+
+// `first` always moves; second = -1: it does not, its velocity is in `bias`.
+// Tangents such that the tangential block is diagonal: no rotation in the sweep.
+struct GeneralContact {
+  int first, second;
+  double n[3], t[3], r1[3], r2[3];
+  double a, inv_a, mu, c[2], beta[2];
+  double bias[3];  // in the frame n, t, n x t
+  double x[3], lambda;
+};
+static_assert(sizeof(GeneralContact) == 216, "memory for a contact is a promise (README)");
+
+// Spheres: r1 = s1 n, r2 = s2 n, no coupling. bias and impulse p in world axes.
+struct SphereContact {
+  int first, second;
+  double n[3], s1, s2, inv_a, inv_t, mu, bias[3], p[3];
+};
+
+// No friction: one equation. q = r x n; weight = |D e_n|.
+struct SmoothContact {
+  int first, second;
+  double n[3], q1[3], q2[3], inv_a, weight, bias, x;
+};
+
+struct BodyArrays {
+  BodyState* state;
+  const BodyInertia* inertia;
+  BodyState* fixed;  // all zero, one for each thread
+};
+
+// One pass of Gauss-Seidel; returns sum |D dx|^2, D the diagonal block. Tests change nothing.
+double sweep(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end);
+double test(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end);
+double sweep(const BodyArrays& s, SphereContact* begin, SphereContact* end);
+double test(const BodyArrays& s, SphereContact* begin, SphereContact* end);
+double sweep(const BodyArrays& s, SmoothContact* begin, SmoothContact* end);
+double test(const BodyArrays& s, SmoothContact* begin, SmoothContact* end);
+
+// v += p / m, w += I^-1 q
+TETHER_INLINE void push(BodyState& s, const BodyInertia& I, const double* p, const double* q) {
+  for (int k = 0; k < 3; ++k) s.v[k] += s.m * p[k];
+  s.w[0] += I.xx * q[0] + I.xy * q[1] + I.xz * q[2];
+  s.w[1] += I.xy * q[0] + I.yy * q[1] + I.yz * q[2];
+  s.w[2] += I.xz * q[0] + I.yz * q[1] + I.zz * q[2];
+}
+
+TETHER_INLINE void cross(const double* a, const double* b, double* c) {
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+}  // namespace tether::contact::detail

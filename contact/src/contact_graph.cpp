@@ -1,0 +1,257 @@
+// Tether: islands of bodies in contact, and the order in which their contacts are swept.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "contact_graph.hpp"
+
+#include <algorithm>
+
+namespace tether::contact::detail {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Up to this an island is one chunk. Larger ones get chunks of about 1/128 of the island, so that a
+// colour holds several for each thread, within limits: call overhead below, first-level cache
+// above.
+constexpr int kOneChunk = 256, kLeast = 64, kMost = 384;
+
+// Colours of chunks that are found by bit masks; what does not fit gets a colour of its own.
+constexpr int kMasked = 63;
+
+}  // namespace
+
+int ContactGraph::root(int b) {
+  while (parent_[at(b)] != b) b = parent_[at(b)] = parent_[at(parent_[at(b)])];
+  return b;
+}
+
+void ContactGraph::build(int bodies, const std::vector<int>& first, const std::vector<int>& second,
+                         const std::vector<Kind>& kind) {
+  first_ = &first;
+  second_ = &second;
+  kind_ = &kind;
+  const std::size_t n = first.size();
+  find_islands(bodies);
+
+  order.resize(n);
+  key_.resize(n);
+  slot.assign(at(bodies), -1);
+  body.clear();
+  chunks.clear();
+  colours.clear();
+  used_.assign(at(bodies), 0);
+  bool large = false;
+  for (const Island& island : islands) large = large || island.contacts > kOneChunk;
+  if (large) {
+    mark_.assign(at(bodies), -1);
+    adjacent_start_.assign(at(bodies) + 1, 0);
+    const auto count = [&](int b) {
+      if (b >= 0) ++adjacent_start_[at(b)];
+    };
+    for (std::size_t i = 0; i < n; ++i) count(first[i]), count(second[i]);
+    int sum = 0;
+    for (int& start : adjacent_start_) sum += start, start = sum;
+    adjacent_.resize(at(sum));
+    for (std::size_t i = n; i-- > 0;) {
+      adjacent_[at(--adjacent_start_[at(first[i])])] = static_cast<int>(i);
+      if (second[i] >= 0) adjacent_[at(--adjacent_start_[at(second[i])])] = static_cast<int>(i);
+    }
+  }
+  // Places of each kind: running counts over the chunks, filled by order_within.
+  chunks.push_back({0, {0, 0, 0}});
+  for (Island& island : islands) {
+    island.body_begin = static_cast<int>(body.size());
+    island.chunk_begin = static_cast<int>(chunks.size()) - 1;
+    island.colour_begin = static_cast<int>(colours.size());
+    if (island.contacts <= kOneChunk) {
+      one_chunk(island);
+    } else {
+      cluster(island);
+      colour_chunks(island);
+    }
+    island.body_end = static_cast<int>(body.size());
+    island.chunk_end = static_cast<int>(chunks.size()) - 1;
+    island.colour_end = static_cast<int>(colours.size());
+    colours.push_back(island.chunk_end);
+  }
+}
+
+void ContactGraph::find_islands(int bodies) {
+  const std::vector<int>&first = *first_, &second = *second_;
+  const std::size_t n = first.size();
+  parent_.resize(at(bodies));
+  for (int b = 0; b < bodies; ++b) parent_[at(b)] = b;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (second[i] < 0) continue;
+    const int a = root(first[i]), b = root(second[i]);
+    // The smaller index wins: the result depends on nothing else.
+    (a < b ? parent_[at(b)] : parent_[at(a)]) = std::min(a, b);
+  }
+  island_of_.assign(at(bodies), -1);
+  chunk_of_.resize(n);  // here: contact -> island
+  islands.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    int& island = island_of_[at(root(first[i]))];
+    if (island < 0) {
+      island = static_cast<int>(islands.size());
+      islands.push_back({});
+    }
+    ++islands[at(island)].contacts;
+    chunk_of_[i] = island;
+  }
+  int begin = 0;
+  for (Island& island : islands) {
+    island.contact_begin = begin;
+    begin += island.contacts;
+  }
+  sorted_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    sorted_[at(islands[at(chunk_of_[i])].contact_begin++)] = static_cast<int>(i);
+  }
+  for (Island& island : islands) island.contact_begin -= island.contacts;
+}
+
+void ContactGraph::one_chunk(Island& island) {
+  int* contacts = sorted_.data() + island.contact_begin;
+  for (int k = 0; k < island.contacts; ++k) {
+    for (int b : {(*first_)[at(contacts[k])], (*second_)[at(contacts[k])]}) {
+      if (b < 0 || slot[at(b)] >= 0) continue;
+      slot[at(b)] = static_cast<int>(body.size());
+      body.push_back(b);
+    }
+  }
+  colours.push_back(island.chunk_begin);
+  order_within(contacts, contacts + island.contacts, island.contact_begin);
+}
+
+// Breadth-first balls: a cluster grows from its seed until it has enough contacts; bodies that it
+// leaves at its rim become seeds. A contact belongs to the first cluster that reaches it.
+void ContactGraph::cluster(Island& island) {
+  const std::vector<int>&first = *first_, &second = *second_;
+  const int size = std::max(kLeast, std::min(kMost, island.contacts / 128));
+  int* contacts = sorted_.data() + island.contact_begin;
+  for (int k = 0; k < island.contacts; ++k) chunk_of_[at(contacts[k])] = -1;
+  chunk_start_.clear();
+  far_.clear();
+  far_.push_back(first[at(contacts[0])]);
+  int taken = 0;  // contacts are written back in the order of the clusters
+  for (std::size_t seed = 0; seed < far_.size(); ++seed) {
+    if (slot[at(far_[seed])] >= 0) continue;
+    const int chunk = static_cast<int>(chunk_start_.size()), start = taken;
+    near_.clear();
+    near_.push_back(far_[seed]);
+    mark_[at(far_[seed])] = chunk + island.chunk_begin;
+    std::size_t next = 0;
+    while (next < near_.size() && taken - start < size) {
+      const int b = near_[next++];
+      slot[at(b)] = static_cast<int>(body.size());
+      body.push_back(b);
+      for (int k = adjacent_start_[at(b)]; k < adjacent_start_[at(b + 1)]; ++k) {
+        const int c = adjacent_[at(k)];
+        if (chunk_of_[at(c)] < 0) {
+          chunk_of_[at(c)] = chunk;
+          contacts[taken++] = c;
+        }
+        const int other = first[at(c)] == b ? second[at(c)] : first[at(c)];
+        if (other < 0 || slot[at(other)] >= 0 || mark_[at(other)] == chunk + island.chunk_begin)
+          continue;
+        mark_[at(other)] = chunk + island.chunk_begin;
+        near_.push_back(other);
+      }
+    }
+    far_.insert(far_.end(), near_.begin() + static_cast<std::ptrdiff_t>(next), near_.end());
+    if (taken > start) chunk_start_.push_back(start);
+  }
+  chunk_start_.push_back(taken);
+}
+
+// Greedy: the first colour that none of the chunk's bodies has.
+void ContactGraph::colour_chunks(Island& island) {
+  const int n = static_cast<int>(chunk_start_.size()) - 1;
+  const int* contacts = sorted_.data() + island.contact_begin;
+  chunk_colour_.resize(at(n));
+  int extra = kMasked;
+  for (int c = 0; c < n; ++c) {
+    std::uint64_t taken = 0;
+    const auto over_bodies = [&](auto&& f) {
+      for (int k = chunk_start_[at(c)]; k < chunk_start_[at(c + 1)]; ++k) {
+        f(used_[at((*first_)[at(contacts[k])])]);
+        const int b = (*second_)[at(contacts[k])];
+        if (b >= 0) f(used_[at(b)]);
+      }
+    };
+    over_bodies([&](std::uint64_t& used) { taken |= used; });
+    int colour = 0;
+    while (colour < kMasked && (taken >> colour & 1)) ++colour;
+    chunk_colour_[at(c)] = colour < kMasked ? colour : extra++;
+    if (colour < kMasked)
+      over_bodies([&](std::uint64_t& used) { used |= std::uint64_t{1} << colour; });
+  }
+  // Colour by colour, chunks in their order.
+  by_colour_.assign(at(extra + 1), 0);
+  for (int c = 0; c < n; ++c) ++by_colour_[at(chunk_colour_[at(c)] + 1)];
+  for (int colour = 0; colour < extra; ++colour)
+    by_colour_[at(colour + 1)] += by_colour_[at(colour)];
+  sequence_.resize(at(n));
+  for (int c = 0; c < n; ++c) sequence_[at(by_colour_[at(chunk_colour_[at(c)])]++)] = c;
+  int place = island.contact_begin, colour = -1;
+  for (int c : sequence_) {
+    if (chunk_colour_[at(c)] != colour) {
+      colour = chunk_colour_[at(c)];
+      colours.push_back(static_cast<int>(chunks.size()) - 1);
+    }
+    order_within(contacts + chunk_start_[at(c)], contacts + chunk_start_[at(c + 1)], place);
+    place += chunk_start_[at(c + 1)] - chunk_start_[at(c)];
+  }
+}
+
+// Sorted by kind, then by a greedy colour of the contacts of this chunk.
+void ContactGraph::order_within(const int* begin, const int* end, int place) {
+  const std::vector<int>&first = *first_, &second = *second_;
+  const int n = static_cast<int>(end - begin);
+  Chunk next = chunks.back();
+  if (n == 1) {
+    order[at(place)] = *begin;
+    ++next.begin[static_cast<int>((*kind_)[at(*begin)])];
+    next.place = place + 1;
+    chunks.push_back(next);
+    return;
+  }
+  for (int k = 0; k < n; ++k) {
+    const int c = begin[k];
+    used_[at(first[at(c)])] = 0;
+    if (second[at(c)] >= 0) used_[at(second[at(c)])] = 0;
+  }
+  int count[kKinds * 64 + 1] = {};
+  for (int k = 0; k < n; ++k) {
+    const int c = begin[k];
+    std::uint64_t taken = used_[at(first[at(c)])];
+    if (second[at(c)] >= 0) taken |= used_[at(second[at(c)])];
+    int colour = 0;
+    while (colour < 63 && (taken >> colour & 1)) ++colour;
+    used_[at(first[at(c)])] |= std::uint64_t{1} << colour;
+    if (second[at(c)] >= 0) used_[at(second[at(c)])] |= std::uint64_t{1} << colour;
+    const int kind = static_cast<int>((*kind_)[at(c)]);
+    key_[at(c)] = static_cast<std::uint8_t>(64 * kind + colour);
+    ++count[key_[at(c)] + 1];
+    ++next.begin[kind];
+  }
+  for (int k = 0; k < kKinds * 64; ++k) count[k + 1] += count[k];
+  for (int k = 0; k < n; ++k) order[at(place + count[key_[at(begin[k])]]++)] = begin[k];
+  next.place = place + n;
+  chunks.push_back(next);
+}
+
+std::size_t ContactGraph::contact_bytes() const {
+  return sizeof(int) *
+             (order.capacity() + sorted_.capacity() + adjacent_.capacity() + chunk_of_.capacity()) +
+         key_.capacity() + sizeof(Chunk) * chunks.capacity() + sizeof(Island) * islands.capacity();
+}
+
+std::size_t ContactGraph::body_bytes() const {
+  return sizeof(int) *
+             (slot.capacity() + body.capacity() + parent_.capacity() + island_of_.capacity() +
+              adjacent_start_.capacity() + mark_.capacity() + near_.capacity() + far_.capacity()) +
+         sizeof(std::uint64_t) * used_.capacity();
+}
+
+}  // namespace tether::contact::detail
