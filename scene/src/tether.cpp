@@ -3,19 +3,35 @@
 #include <iostream>
 
 #include "contact_command.hpp"
+#include "program/commands.hpp"
+
+namespace {
+
+/// A message of several problems starts each of them on its line.
+void complain(const std::exception& e) { std::cerr << "tether: " << e.what() << "\n"; }
+
+}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"Keeps a computed motion on the constraints that it must obey", "tether"};
   app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 good; 1 an expectation is not met or a contact problem not solved; 2 a file, "
+      "a "
+      "scene or an option is wrong; 3 a run could not go on.");
   int status = 0;
+#ifdef TETHER_SCENE_FILES
+  tether::scene::add_check_command(app, &status);
+  tether::scene::add_plan_command(app, &status);
+#endif
   tether::scene::add_contact_command(app, &status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e);
+    return app.exit(e) == 0 ? tether::scene::kGood : tether::scene::kWrong;
   } catch (const std::exception& e) {
-    std::cerr << "tether: " << e.what() << "\n";
-    return 2;
+    complain(e);
+    return tether::scene::kWrong;
   }
   return status;
 }

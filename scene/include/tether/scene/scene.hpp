@@ -59,6 +59,7 @@ struct Body {
 };
 
 /// How two materials meet. A pair that no table names is an error when bodies of it can touch.
+/// A zero names no friction, no restitution.
 struct Pair {
   std::string first, second;
   double friction = 0;
@@ -160,10 +161,31 @@ enum class Quantity : std::uint8_t {
   residual
 };
 
-/// The scene as its own test: |quantity(time) - value| <= within in every component, or, with
-/// `at_most` / `at_least`, a one-sided bound on its norm.
+/// Numbers that a quantity has.
+constexpr int components(Quantity q) {
+  switch (q) {
+    case Quantity::position:
+    case Quantity::velocity:
+    case Quantity::angular_velocity:
+    case Quantity::momentum:
+    case Quantity::angular_momentum:
+      return 3;
+    case Quantity::orientation:
+      return 4;
+    default:
+      return 1;
+  }
+}
+
+/// Of one body; the others are of the scene.
+constexpr bool is_of_body(Quantity q) { return q <= Quantity::speed; }
+
+/// The scene as its own test: |quantity(time) - value| <= within in every component (orientation:
+/// wxyz, of either sign), and `at_most` / `at_least` bound the number itself or the norm of a
+/// vector. distance_moved is |x(time) - x(0)|, energy_change E(time) - E(0).
 struct Expect {
-  double time = 0;
+  double time = 0;          ///< s; stepping: the first step boundary not before it
+  bool throughout = false;  ///< holds at every record up to `time`, too
   Quantity quantity = Quantity::position;
   int body = -1;
   std::vector<double> value;

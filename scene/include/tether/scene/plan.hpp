@@ -1,0 +1,44 @@
+// Tether: what a scene asks for, and which engine moves it. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <memory>
+#include <string>
+#include <tether/scene/engine.hpp>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+namespace tether::scene {
+
+enum class EngineKind : std::uint8_t { smooth, stepping };
+
+struct Effect {
+  std::string name;    ///< e.g. "gravity"
+  std::string detail;  ///< e.g. "[0, 0, -9.81] m/s^2"
+};
+
+/// Exactly what the scene names is on. Sizes that do not apply are zero.
+struct Plan {
+  EngineKind engine = EngineKind::smooth;
+  std::string why;  ///< the engine
+  std::vector<Effect> effects;
+
+  int bodies = 0, moving = 0, shapes = 0;
+  int rows = 0;        ///< constraints of joints on positions
+  int unknowns = 0;    ///< smooth: of IDA; stepping: velocities
+  int invariants = 0;  ///< rows that the projection keeps beside those of the joints
+  long pairs = 0;      ///< of bodies whose materials meet
+};
+
+/// Throws std::invalid_argument, naming what no engine has.
+Plan make_plan(const Scene& scene);
+std::ostream& operator<<(std::ostream& out, const Plan& plan);
+
+/// The engine that the plan names. Throws std::invalid_argument.
+std::unique_ptr<Engine> make_engine(const Scene& scene);
+
+/// Rows of a joint on positions and orientations.
+int joint_rows(const Joint& joint);
+
+}  // namespace tether::scene

@@ -1,0 +1,196 @@
+// Tether: volume, centre and inertia of shapes. SPDX-License-Identifier: BSD-3-Clause
+#include "mass.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace tether::scene::files {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// |d|^2 1 - d d^T: the inertia of a unit point mass at d (parallel axes).
+Matrix3d point_inertia(const Vector3d& d) {
+  return d.squaredNorm() * Matrix3d::Identity() - d * d.transpose();
+}
+
+MassProperties sphere(double r) {
+  const double volume = 4.0 / 3.0 * kPi * r * r * r;
+  return {volume, Vector3d::Zero(), 0.4 * volume * r * r * Matrix3d::Identity()};
+}
+
+MassProperties box(const Vector3d& a) {
+  const double volume = a.prod();
+  const Vector3d s = a.cwiseProduct(a) / 12;
+  return {volume, Vector3d::Zero(),
+          volume * Vector3d(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal()};
+}
+
+// Cylinder of length L and two half spheres, axis z.
+MassProperties capsule(double r, double L) {
+  const double cylinder = kPi * r * r * L, caps = 4.0 / 3.0 * kPi * r * r * r;
+  const double along = cylinder * r * r / 2 + caps * 0.4 * r * r;
+  const double across =
+      cylinder * (r * r / 4 + L * L / 12) + caps * (0.4 * r * r + L * L / 4 + 3.0 / 8.0 * L * r);
+  return {cylinder + caps, Vector3d::Zero(), Vector3d(across, across, along).asDiagonal()};
+}
+
+// Sums over tetrahedra with one corner at the origin: volume, first and second moments.
+struct Moments {
+  double volume = 0;
+  Vector3d first = Vector3d::Zero();
+  Matrix3d second = Matrix3d::Zero();
+
+  void add(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+    const double v = a.dot(b.cross(c)) / 6;
+    const Vector3d s = a + b + c;
+    volume += v;
+    first += v / 4 * s;
+    second +=
+        v / 20 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + s * s.transpose());
+  }
+};
+
+// Corners of the convex polygon of points in a plane, counter-clockwise (Andrew's monotone chain).
+std::vector<Vector2d> polygon(std::vector<Vector2d> q) {
+  const auto less = [](const Vector2d& a, const Vector2d& b) {
+    return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+  };
+  const auto left_turn = [](const Vector2d& a, const Vector2d& b, const Vector2d& c) {
+    const Vector2d d = b - a, e = c - a;
+    return d.x() * e.y() - d.y() * e.x() > 0;
+  };
+  std::sort(q.begin(), q.end(), less);
+  std::vector<Vector2d> out;
+  for (int side = 0; side < 2; ++side) {
+    const std::size_t start = out.size();
+    for (const Vector2d& each : q) {
+      while (out.size() >= start + 2 && !left_turn(out[out.size() - 2], out.back(), each))
+        out.pop_back();
+      out.push_back(each);
+    }
+    out.pop_back();  // the first of the other side
+    std::reverse(q.begin(), q.end());
+  }
+  return out;
+}
+
+// The faces of the hull found so far, each by the points that lie in it.
+using Faces = std::set<std::vector<std::size_t>>;
+
+// Adds the face in the plane of three points, unless the plane cuts the hull or was met before.
+void add_face(const std::vector<Vector3d>& p, std::size_t i, std::size_t j, std::size_t k,
+              Faces& faces, Moments& sum) {
+  constexpr double kFlat = 1e-10;  // of the hull's size
+  Vector3d n = (p[j] - p[i]).cross(p[k] - p[i]);
+  if (n.norm() <= kFlat) return;
+  n.normalize();
+  bool above = false, below = false;
+  std::vector<std::size_t> in_plane;
+  for (std::size_t m = 0; m < p.size(); ++m) {
+    const double height = n.dot(p[m] - p[i]);
+    above = above || height > kFlat;
+    below = below || height < -kFlat;
+    if (std::abs(height) <= kFlat) in_plane.push_back(m);
+  }
+  if (above == below) return;
+  if (above) n = -n;  // out of the hull
+  if (!faces.insert(in_plane).second) return;
+
+  const Vector3d u = (p[j] - p[i]).normalized(), v = n.cross(u);
+  std::vector<Vector2d> q;
+  for (const std::size_t m : in_plane) q.emplace_back(u.dot(p[m] - p[i]), v.dot(p[m] - p[i]));
+  q = polygon(std::move(q));
+  for (std::size_t m = 1; m + 1 < q.size(); ++m) {
+    const auto point = [&](const Vector2d& x) { return Vector3d(p[i] + x.x() * u + x.y() * v); };
+    sum.add(point(q[0]), point(q[m]), point(q[m + 1]));
+  }
+}
+
+MassProperties convex(const std::vector<Vector3d>& points) {
+  if (points.size() < 4 || points.size() > kMostHullPoints) return {};
+  Vector3d origin = Vector3d::Zero();
+  for (const Vector3d& p : points) origin += p / static_cast<double>(points.size());
+  std::vector<Vector3d> p;
+  double size = 0;
+  for (const Vector3d& each : points) {
+    p.emplace_back(each - origin);
+    size = std::max(size, p.back().norm());
+  }
+  if (!(size > 0) || !std::isfinite(size)) return {};
+  for (Vector3d& each : p) each /= size;  // nothing below overflows
+
+  Faces faces;
+  Moments sum;
+  for (std::size_t i = 0; i < p.size(); ++i)
+    for (std::size_t j = i + 1; j < p.size(); ++j)
+      for (std::size_t k = j + 1; k < p.size(); ++k) add_face(p, i, j, k, faces, sum);
+  if (!(sum.volume > 1e-12)) return {};
+  MassProperties out;
+  const double cube = size * size * size;
+  const Vector3d centre = sum.first / sum.volume;
+  const Matrix3d second = sum.second - sum.volume * centre * centre.transpose();
+  out.volume = sum.volume * cube;
+  out.centre = origin + centre * size;
+  out.inertia = (second.trace() * Matrix3d::Identity() - second) * (cube * size * size);
+  return out;
+}
+
+}  // namespace
+
+MassProperties mass_properties(const Shape& shape) {
+  MassProperties out;
+  switch (shape.kind) {
+    case ShapeKind::sphere:
+      out = sphere(shape.radius);
+      break;
+    case ShapeKind::box:
+      out = box(shape.size);
+      break;
+    case ShapeKind::capsule:
+      out = capsule(shape.radius, shape.length);
+      break;
+    case ShapeKind::convex:
+      out = convex(shape.points);
+      break;
+    case ShapeKind::plane:
+    case ShapeKind::points:
+      return {};
+  }
+  // Turning by the identity would only add rounding.
+  if (shape.orientation.coeffs() != Eigen::Quaterniond::Identity().coeffs()) {
+    const Matrix3d R = shape.orientation.toRotationMatrix();
+    const Matrix3d turned = R * out.inertia * R.transpose();
+    out.inertia = (turned + turned.transpose()) / 2;
+    out.centre = R * out.centre;
+  }
+  out.centre += shape.position;
+  return out;
+}
+
+MassProperties mass_properties(const std::vector<Shape>& shapes) {
+  MassProperties all;
+  std::vector<MassProperties> parts;
+  for (const Shape& shape : shapes) {
+    const MassProperties part = mass_properties(shape);
+    if (!(part.volume > 0)) continue;
+    parts.push_back(part);
+    all.volume += part.volume;
+    all.centre += part.volume * part.centre;
+  }
+  if (parts.empty()) return all;
+  if (parts.size() == 1) return parts.front();
+  all.centre /= all.volume;
+  for (const MassProperties& part : parts)
+    all.inertia += part.inertia + part.volume * point_inertia(part.centre - all.centre);
+  return all;
+}
+
+}  // namespace tether::scene::files

@@ -1,0 +1,24 @@
+// Tether: volume, centre and inertia of shapes. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+namespace tether::scene::files {
+
+/// Of a uniform solid of density 1: mass = volume, m^3; inertia about the centre, m^5.
+struct MassProperties {
+  double volume = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+};
+
+constexpr std::size_t kMostHullPoints = 64;  ///< the hull is found by trying all triples
+
+/// A plane and points have none. A convex shape must have at most kMostHullPoints points.
+MassProperties mass_properties(const Shape& shape);
+/// Of shapes that do not overlap, in the axes of their body.
+MassProperties mass_properties(const std::vector<Shape>& shapes);
+
+}  // namespace tether::scene::files

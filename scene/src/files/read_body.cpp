@@ -1,0 +1,225 @@
+// Tether: bodies of a scene file. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "mass.hpp"
+#include "read.hpp"
+
+namespace tether::scene::files {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr std::size_t kMostPoints = 4096;
+
+void required(Fields& in, std::string_view key, std::string_view allowed) {
+  if (!in.has(key)) in.missing(key, std::string(allowed));
+}
+
+// The fields of a shape; `in` is the body itself for a body's only shape.
+Shape read_shape(Fields& in) {
+  Shape shape;
+  required(in, "shape", "it is a sphere, plane, box, capsule, convex or points");
+  const std::optional<ShapeKind> kind = in.word_of<ShapeKind>("shape");
+  if (!kind) {
+    in.pass_over({"radius", "length", "size", "normal", "points"});
+    shape.radius = 1;
+    return shape;
+  }
+  shape.kind = *kind;
+  // Keys of other kinds stay unknown: a box with a radius is a mistake.
+  switch (shape.kind) {
+    case ShapeKind::capsule:
+      required(in, "length", "between the centres of the caps, m, > 0");
+      shape.length = in.number("length", 1, kPositive, "m");
+      [[fallthrough]];
+    case ShapeKind::sphere:
+      required(in, "radius", "m, > 0");
+      shape.radius = in.number("radius", 1, kPositive, "m");
+      break;
+    case ShapeKind::plane:
+      shape.normal = in.direction("normal", Vector3d::UnitZ());
+      break;
+    case ShapeKind::box:
+      required(in, "size", "the full edges [x, y, z], m, > 0");
+      shape.size = in.vector("size", Vector3d::Ones(), kPositive, "m (full edges)");
+      break;
+    case ShapeKind::convex:
+      required(in, "points", "its corners [[x, y, z], ...], m");
+      shape.points = in.points("points", 4, kMostPoints);
+      break;
+    case ShapeKind::points:
+      required(in, "points", "the points that touch [[x, y, z], ...], m");
+      shape.points = in.points("points", 1, kMostPoints);
+      break;
+  }
+  return shape;
+}
+
+std::vector<Shape> read_shapes(Fields& in, const std::string& file, Report& report) {
+  std::vector<Shape> shapes;
+  const bool several = in.has("shapes");
+  if (several && in.has("shape")) in.wrong("shape", "give shape or shapes, not both");
+  if (!several) {
+    if (in.has("shape")) shapes.push_back(read_shape(in));
+    return shapes;
+  }
+  for (const Value* each : in.tables("shapes")) {
+    Fields fields(each, fmt::format("{}: shape {}", in.path(), shapes.size() + 1), file, report);
+    Shape shape = read_shape(fields);
+    shape.position = fields.vector("position", Vector3d::Zero(), kAny, "m");
+    shape.orientation = read_orientation(fields, file, report);
+    fields.finish();
+    shapes.push_back(std::move(shape));
+  }
+  return shapes;
+}
+
+// Principal moments of anything solid are positive and each at most the sum of the others.
+bool is_inertia(const Matrix3d& inertia) {
+  if (!inertia.allFinite()) return false;
+  const double scale = inertia.cwiseAbs().maxCoeff();
+  if (!(scale > 0)) return false;
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(inertia / scale, Eigen::EigenvaluesOnly);
+  const Vector3d moment = solver.eigenvalues();  // ascending
+  return solver.info() == Eigen::Success && moment[0] > 0 &&
+         moment[2] <= (moment[0] + moment[1]) * (1 + 1e-9);
+}
+
+void read_mass(Fields& in, Body& body) {
+  const bool by_mass = in.has("mass"), by_density = in.has("density"),
+             by_inertia = in.has("inertia");
+  body.mass =
+      in.number("mass", body.fixed || by_mass ? 0 : 1, body.fixed ? kNotNegative : kPositive, "kg");
+  const double density = in.number("density", 1, kPositive, "kg/m^3");
+  if (by_mass && by_density) in.wrong("density", "give mass or density, not both");
+  if (!by_mass && !by_density && !body.fixed)
+    in.missing("mass", "give mass (kg) or density (kg/m^3), or fixed = true");
+
+  const std::vector<double> moments = in.numbers("inertia", {3, 6}, "kg m^2");
+  if (by_inertia && !moments.empty()) {
+    Matrix3d inertia = Vector3d(moments[0], moments[1], moments[2]).asDiagonal();
+    if (moments.size() == 6) {
+      inertia(0, 1) = inertia(1, 0) = moments[3];
+      inertia(0, 2) = inertia(2, 0) = moments[4];
+      inertia(1, 2) = inertia(2, 1) = moments[5];
+    }
+    const bool none = body.fixed && inertia.isZero(0);
+    if (!none && !is_inertia(inertia))
+      in.wrong("inertia",
+               "principal moments must be > 0 and each at most the sum of the other two (triangle "
+               "inequality), kg m^2");
+    body.inertia = inertia;
+  }
+  const bool from_shapes = by_density || (by_mass && !by_inertia && body.mass > 0);
+  if (!from_shapes) return;
+
+  const char* const advice = by_density ? "density" : "inertia";
+  for (const Shape& shape : body.shapes)
+    if (shape.kind == ShapeKind::convex && shape.points.size() > kMostHullPoints) {
+      if (by_density)
+        in.wrong("density", fmt::format("a convex shape of more than {} points needs mass and "
+                                        "inertia",
+                                        kMostHullPoints));
+      else
+        in.missing("inertia", fmt::format("a convex shape of more than {} points has no default",
+                                          kMostHullPoints));
+      return;
+    }
+  const MassProperties solid = mass_properties(body.shapes);
+  if (!(solid.volume > 0) || !std::isfinite(solid.volume)) {
+    const std::string why = body.shapes.empty() ? "there is no shape to take it from"
+                                                : "the shapes have no (finite) volume";
+    if (by_density)
+      in.wrong(advice, why + "; give mass and inertia");
+    else
+      in.missing(advice, "[xx, yy, zz] about the centre, body axes, kg m^2: " + why);
+    return;
+  }
+  if (by_density) body.mass = density * solid.volume;
+  if (by_inertia) return;
+  body.inertia = body.mass / solid.volume * solid.inertia;
+  double size = 0;
+  for (const Shape& shape : body.shapes) {
+    size = std::max({size, shape.radius, shape.length, shape.size.maxCoeff()});
+    for (const Vector3d& p : shape.points) size = std::max(size, p.norm());
+  }
+  if (!(solid.centre.norm() <= 1e-6 * size)) {
+    const Vector3d& c = solid.centre;
+    in.missing("inertia",
+               fmt::format("the body's origin must be its centre of mass, but the shapes' centre "
+                           "is [{}, {}, {}]; move the shapes by its negative, or give mass and "
+                           "inertia",
+                           c.x(), c.y(), c.z()));
+    return;
+  }
+  if (!is_inertia(body.inertia))
+    in.missing("inertia", "that of the shapes is not a finite number > 0");
+}
+
+std::optional<Drag> read_drag(Fields& in, const std::string& file, Report& report) {
+  const Value* table = in.table("drag");
+  if (table == nullptr) return std::nullopt;
+  Fields fields(table, in.path() + ": drag", file, report);
+  Drag drag;
+  drag.linear = fields.number("linear", drag.linear, kNotNegative, "N s/m");
+  drag.quadratic = fields.number("quadratic", drag.quadratic, kNotNegative, "N s^2/m^2");
+  drag.rotational = fields.number("rotational", drag.rotational, kNotNegative, "N m s");
+  fields.finish();
+  return drag;
+}
+
+}  // namespace
+
+Eigen::Quaterniond read_orientation(Fields& in, const std::string& file, Report& report) {
+  const Value* table = in.table("orientation");
+  if (table == nullptr) return Eigen::Quaterniond::Identity();
+  Fields fields(table, in.path() + ": orientation", file, report);
+  Eigen::Quaterniond out = Eigen::Quaterniond::Identity();
+  if (fields.has("wxyz")) {
+    const std::vector<double> q = fields.numbers("wxyz", {4}, "");
+    if (!q.empty()) {
+      const Eigen::Quaterniond read(q[0], q[1], q[2], q[3]);
+      const double length = read.coeffs().stableNorm();
+      // Digits cut off are mended; anything else is a mistake.
+      if (std::abs(length - 1) <= 1e-15)
+        out = read;
+      else if (std::abs(length - 1) <= 1e-3)
+        out.coeffs() = read.coeffs() / length;
+      else
+        fields.wrong("wxyz", "must have length 1 (unit quaternion, scalar first)");
+    }
+  } else {
+    if (!fields.has("axis"))
+      fields.missing("axis", "give axis and deg (or rad), or wxyz (scalar first)");
+    const Vector3d axis = fields.direction("axis", Vector3d::UnitZ());
+    if (!fields.has("deg") && !fields.has("rad")) fields.missing("deg", "give deg or rad");
+    out = Eigen::AngleAxisd(fields.angle("", 0), axis);
+  }
+  fields.finish();
+  return out;
+}
+
+Body read_body(Fields& in, const std::string& file, Report& report) {
+  Body body;
+  body.place = in.place();
+  body.name = in.text("name", in.path());
+  if (in.has("name")) in.rename(fmt::format("body \"{}\"", body.name));
+  body.fixed = in.flag("fixed", false);
+  body.shapes = read_shapes(in, file, report);
+  read_mass(in, body);
+  body.position = in.vector("position", Vector3d::Zero(), kAny, "m");
+  body.orientation = read_orientation(in, file, report);
+  body.velocity = in.vector("velocity", Vector3d::Zero(), kAny, "m/s");
+  body.angular_velocity = in.vector("angular_velocity", Vector3d::Zero(), kAny, "rad/s");
+  body.material = in.text("material", "");
+  body.drag = read_drag(in, file, report);
+  return body;
+}
+
+}  // namespace tether::scene::files

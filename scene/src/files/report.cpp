@@ -1,0 +1,114 @@
+// Tether: what is wrong in a scene file. SPDX-License-Identifier: BSD-3-Clause
+#include "report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+
+namespace tether::scene {
+
+namespace {
+
+constexpr std::size_t kShown = 20;
+
+std::string all_messages(const std::vector<Problem>& problems) {
+  std::string text;
+  for (const Problem& problem : problems) {
+    if (!text.empty()) text += '\n';
+    text += problem.message();
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string Problem::message() const {
+  std::string text = place.file;
+  if (place.line > 0) text += fmt::format(":{}:{}", place.line, place.column);
+  text += ": ";
+  if (!field.empty()) text += value.empty() ? field + ": " : fmt::format("{} = {}: ", field, value);
+  return text + allowed;
+}
+
+SceneError::SceneError(std::vector<Problem> problems)
+    : std::runtime_error(all_messages(problems)), problems_(std::move(problems)) {}
+
+namespace files {
+
+void Report::add(const Place& place, std::string field, std::string value, std::string allowed) {
+  // A file of garbage may have a problem on each of a million lines.
+  if (problems_.size() >= kShown) return;
+  problems_.push_back({place, std::move(field), std::move(value), std::move(allowed)});
+}
+
+void Report::finish() {
+  if (problems_.empty()) return;
+  std::stable_sort(problems_.begin(), problems_.end(), [](const Problem& a, const Problem& b) {
+    return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
+  });
+  throw SceneError(std::move(problems_));
+}
+
+void refuse(const Place& place, std::string why) {
+  std::vector<Problem> one(1);
+  one.front().place = place;
+  one.front().allowed = std::move(why);
+  throw SceneError(std::move(one));
+}
+
+namespace {
+
+/// Levenshtein's distance: insertions, deletions and replacements from a to b.
+std::size_t distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, replaced});
+    }
+  }
+  return row.back();
+}
+
+bool is_prefix(std::string_view a, std::string_view b) { return b.substr(0, a.size()) == a; }
+
+}  // namespace
+
+std::string nearest(std::string_view text, const std::vector<std::string>& candidates) {
+  constexpr std::size_t kLongest = 64;  // nobody misspells a longer key; bounds the work
+  if (text.empty() || text.size() > kLongest) return "";
+  std::string best;
+  std::size_t least = 1 + std::max<std::size_t>(1, text.size() / 2);
+  for (const std::string& candidate : candidates) {
+    if (candidate.size() > kLongest) continue;
+    const bool shortened = text.size() > 1 && is_prefix(text, candidate);  // pos, vel
+    const std::size_t away = shortened ? 0 : distance(text, candidate);
+    if (away < least) {
+      least = away;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+std::string list(const std::vector<std::string>& words) {
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+std::string hint(std::string_view text, const std::vector<std::string>& candidates) {
+  const std::string near = nearest(text, candidates);
+  if (!near.empty()) return fmt::format("; did you mean \"{}\"?", near);
+  if (candidates.empty()) return "";
+  constexpr std::size_t kMost = 30;
+  if (candidates.size() > kMost) return "";
+  return "; known: " + list(candidates);
+}
+
+}  // namespace files
+}  // namespace tether::scene

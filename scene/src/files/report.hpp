@@ -1,0 +1,33 @@
+// Tether: what is wrong in a scene file. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <tether/scene/files.hpp>
+#include <vector>
+
+namespace tether::scene::files {
+
+/// Collects problems, so that a user sees them in one go; the reader goes on with a default.
+class Report {
+ public:
+  void add(const Place& place, std::string field, std::string value, std::string allowed);
+  bool clean() const { return problems_.empty(); }
+  /// Throws SceneError if there is a problem.
+  void finish();
+
+ private:
+  std::vector<Problem> problems_;
+};
+
+/// Throws a SceneError of one problem.
+[[noreturn]] void refuse(const Place& place, std::string why);
+
+/// The candidate that somebody who wrote `text` probably meant; empty: none is near.
+std::string nearest(std::string_view text, const std::vector<std::string>& candidates);
+/// a, b, c
+std::string list(const std::vector<std::string>& words);
+/// `; did you mean "x"?` or, where nothing is near, `; known: a, b, c`
+std::string hint(std::string_view text, const std::vector<std::string>& candidates);
+
+}  // namespace tether::scene::files

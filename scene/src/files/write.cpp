@@ -1,0 +1,255 @@
+// Tether: a scene as TOML, every default spelt out. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+#include <tether/scene/files.hpp>
+#include <tether/scene/words.hpp>
+
+namespace tether::scene {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// fmt prints the shortest digits that give the same number again.
+std::string toml(double x) { return fmt::format("{}", x); }
+std::string toml(bool x) { return x ? "true" : "false"; }
+std::string toml(int x) { return fmt::format("{}", x); }
+std::string toml(const Vector3d& v) { return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z()); }
+std::string toml(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\')
+      out += std::string("\\") + c;
+    else if (code < 0x20 || code == 0x7f)
+      out += fmt::format("\\u{:04x}", code);
+    else
+      out += c;
+  }
+  return out + '"';
+}
+std::string toml(const std::string& text) { return toml(std::string_view(text)); }
+std::string toml(const Eigen::Quaterniond& q) {
+  return fmt::format("{{ wxyz = [{}, {}, {}, {}] }}", q.w(), q.x(), q.y(), q.z());
+}
+std::string toml(const std::vector<Vector3d>& points) {
+  std::string out = "[";
+  for (const Vector3d& p : points) out += (out.size() > 1 ? ", " : "") + toml(p);
+  return out + "]";
+}
+template <class E>
+std::string toml_word(E value) {
+  return toml(word(value));
+}
+
+/// Writes tables line by line.
+class Writer {
+ public:
+  void table(std::string_view name) { text_ += fmt::format("\n[{}]\n", name); }
+  void item(std::string_view name) { text_ += fmt::format("\n[[{}]]\n", name); }
+  template <class T>
+  void field(std::string_view key, const T& value, std::string_view comment = "") {
+    raw(key, toml(value), comment);
+  }
+  void raw(std::string_view key, const std::string& value, std::string_view comment = "") {
+    text_ += fmt::format("{} = {}", key, value);
+    if (!comment.empty()) text_ += fmt::format("  # {}", comment);
+    text_ += '\n';
+  }
+  std::string take() { return std::move(text_); }
+
+ private:
+  std::string text_;
+};
+
+using Keys = std::vector<std::pair<std::string, std::string>>;
+
+Keys shape_keys(const Shape& shape) {
+  Keys keys{{"shape", toml_word(shape.kind)}};
+  switch (shape.kind) {
+    case ShapeKind::sphere:
+      keys.emplace_back("radius", toml(shape.radius));
+      break;
+    case ShapeKind::capsule:
+      keys.emplace_back("radius", toml(shape.radius));
+      keys.emplace_back("length", toml(shape.length));
+      break;
+    case ShapeKind::box:
+      keys.emplace_back("size", toml(shape.size));
+      break;
+    case ShapeKind::plane:
+      keys.emplace_back("normal", toml(shape.normal));
+      break;
+    case ShapeKind::convex:
+    case ShapeKind::points:
+      keys.emplace_back("points", toml(shape.points));
+      break;
+  }
+  return keys;
+}
+
+bool at_origin(const Shape& shape) {
+  return shape.position.isZero(0) &&
+         shape.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs();
+}
+
+void write_shapes(const Body& body, Writer& out) {
+  if (body.shapes.size() == 1 && at_origin(body.shapes.front())) {
+    for (const auto& [key, value] : shape_keys(body.shapes.front())) out.raw(key, value);
+    return;
+  }
+  if (body.shapes.empty()) return;
+  std::string text = "[\n";
+  for (const Shape& shape : body.shapes) {
+    text += "  { ";
+    for (const auto& [key, value] : shape_keys(shape)) text += fmt::format("{} = {}, ", key, value);
+    text += fmt::format("position = {}, orientation = {} }},\n", toml(shape.position),
+                        toml(shape.orientation));
+  }
+  out.raw("shapes", text + "]");
+}
+
+void write_body(const Body& body, Writer& out) {
+  out.item("body");
+  out.field("name", body.name);
+  write_shapes(body, out);
+  out.field("fixed", body.fixed);
+  const Eigen::Matrix3d& J = body.inertia;
+  const bool massless = body.fixed && J.isZero(0);
+  out.field("mass", body.mass, "kg");
+  if (!massless || body.mass > 0)
+    out.raw("inertia",
+            fmt::format("[{}, {}, {}, {}, {}, {}]", J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2),
+                        J(1, 2)),
+            "xx, yy, zz, xy, xz, yz; kg m^2, body axes");
+  out.field("position", body.position, "m");
+  out.field("orientation", body.orientation);
+  out.field("velocity", body.velocity, "m/s");
+  out.field("angular_velocity", body.angular_velocity, "rad/s, world axes");
+  if (!body.material.empty()) out.field("material", body.material);
+  if (body.drag)
+    out.raw("drag", fmt::format("{{ linear = {}, quadratic = {}, rotational = {} }}",
+                                body.drag->linear, body.drag->quadratic, body.drag->rotational));
+}
+
+/// Names of bodies for joints and springs.
+std::string two_names(const Scene& scene, int first, int second) {
+  const auto name = [&](int body) {
+    return toml(body < 0 ? std::string("world")
+                         : scene.bodies[static_cast<std::size_t>(body)].name);
+  };
+  return fmt::format("[{}, {}]", name(first), name(second));
+}
+
+void write_joint(const Scene& scene, const Joint& joint, Writer& out) {
+  const bool turns = joint.kind == JointKind::hinge;
+  out.item("joint");
+  out.field("name", joint.name);
+  out.raw("kind", toml_word(joint.kind));
+  out.raw("bodies", two_names(scene, joint.first, joint.second));
+  if (joint.kind == JointKind::distance)
+    out.raw("at", toml(std::vector<Vector3d>{joint.at, joint.at_second}), "m");
+  else
+    out.field("at", joint.at, "m");
+  if (turns || joint.kind == JointKind::slider) out.field("axis", joint.axis);
+  if (joint.length) out.field("length", *joint.length, "m");
+  if (!joint.motion) return;
+  const Motion& m = *joint.motion;
+  const char* const unit = turns ? "_rad" : "";
+  out.raw("motion",
+          fmt::format("{{ rate{} = {}, amplitude{} = {}, frequency = {}, phase_rad = {} }}", unit,
+                      m.rate, unit, m.amplitude, m.frequency, m.phase));
+}
+
+void write_spring(const Scene& scene, const Spring& spring, Writer& out) {
+  out.item("spring");
+  out.field("name", spring.name);
+  out.raw("bodies", two_names(scene, spring.first, spring.second));
+  out.raw("at", toml(std::vector<Vector3d>{spring.at, spring.at_second}), "m");
+  out.field("stiffness", spring.stiffness, "N/m");
+  out.field("damping", spring.damping, "N s/m");
+  if (spring.rest) out.field("rest", *spring.rest, "m");
+}
+
+void write_smooth(const SmoothOptions& o, Writer& out) {
+  out.table("smooth");
+  out.field("tolerance", o.tolerance);
+  out.raw("formulation", toml_word(o.formulation));
+  out.field("projection", o.projection);
+  out.field("max_step", o.max_step, "s; 0: free");
+}
+
+void write_stepping(const SteppingOptions& o, Writer& out) {
+  out.table("stepping");
+  out.field("step", o.step, "s");
+  out.raw("law", toml_word(o.law));
+  out.field("tolerance", o.tolerance);
+  out.raw("gyroscopic", toml_word(o.gyroscopic));
+  out.field("error_reduction", o.error_reduction);
+  out.field("max_depenetration_speed", o.max_depenetration_speed, "m/s");
+  out.field("restitution_threshold", o.restitution_threshold, "m/s");
+  out.raw("on_failure", toml_word(o.on_failure));
+  out.field("threads", o.threads);
+}
+
+void write_output(const Output& o, Writer& out) {
+  out.table("output");
+  out.field("csv", o.csv);
+  out.field("vtk", o.vtk);
+  out.field("svg", o.svg);
+  out.field("state", o.state);
+  out.field("every", o.every, "s; 0: end / 1000");
+  out.field("checkpoint", o.checkpoint, "s; 0: only at the end");
+}
+
+void write_expect(const Scene& scene, const Expect& e, Writer& out) {
+  out.item("expect");
+  out.field("time", e.time, "s");
+  out.field("throughout", e.throughout);
+  out.raw("quantity", toml_word(e.quantity));
+  if (e.body >= 0) out.field("body", scene.bodies[static_cast<std::size_t>(e.body)].name);
+  if (e.value.size() == 1) out.field("value", e.value.front());
+  if (e.value.size() > 1) out.raw("value", fmt::format("[{}]", fmt::join(e.value, ", ")));
+  if (!e.value.empty()) out.field("within", e.within);
+  if (e.at_most) out.field("at_most", *e.at_most);
+  if (e.at_least) out.field("at_least", *e.at_least);
+}
+
+}  // namespace
+
+std::string write_scene(const Scene& scene) {
+  Writer out;
+  out.table("scene");
+  out.field("name", scene.name);
+  out.field("end", scene.end, "s");
+  if (scene.gravity) out.field("gravity", *scene.gravity, "m/s^2");
+  if (scene.smooth) write_smooth(*scene.smooth, out);
+  if (scene.stepping) write_stepping(*scene.stepping, out);
+  write_output(scene.output, out);
+  for (const Body& body : scene.bodies) write_body(body, out);
+  for (const Pair& pair : scene.pairs) {
+    out.item("pair");
+    out.raw("between", fmt::format("[{}, {}]", toml(pair.first), toml(pair.second)));
+    out.field("friction", pair.friction);
+    out.field("restitution", pair.restitution);
+  }
+  for (const Joint& joint : scene.joints) write_joint(scene, joint, out);
+  for (const Spring& spring : scene.springs) write_spring(scene, spring, out);
+  for (const Load& load : scene.loads) {
+    out.item("load");
+    out.field("body", scene.bodies[static_cast<std::size_t>(load.body)].name);
+    out.field("force", load.force, "N");
+    out.field("torque", load.torque, "N m");
+  }
+  for (const Invariant& each : scene.invariants) {
+    out.item("invariant");
+    out.raw("kind", toml_word(each.kind));
+    out.field("project", each.project);
+  }
+  for (const Expect& each : scene.expect) write_expect(scene, each, out);
+  return out.take().substr(1);
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,16 @@
+// Tether: the engine of a scene. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/scene/plan.hpp>
+
+namespace tether::scene {
+
+std::unique_ptr<Engine> make_engine(const Scene& scene) {
+  switch (make_plan(scene).engine) {
+    case EngineKind::smooth:
+      return make_smooth_engine(scene);
+    case EngineKind::stepping:
+      return make_stepping_engine(scene);
+  }
+  return nullptr;
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,22 @@
+// Tether: the subcommands of the program that work on scene files. SPDX-License-Identifier:
+// BSD-3-Clause
+//
+// Each sets *status to what the program exits with.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace tether::scene {
+
+/// What `tether` exits with.
+enum ExitCode : int {
+  kGood = 0,
+  kNotMet = 1,  ///< an [[expect]] does not hold, a contact problem is not solved
+  kWrong = 2,   ///< a file, a scene or an option is wrong; nothing was run
+  kFailed = 3,  ///< the run could not go on
+};
+
+void add_check_command(CLI::App& app, int* status);
+void add_plan_command(CLI::App& app, int* status);
+
+}  // namespace tether::scene
