@@ -13,6 +13,8 @@
 #include <problems/car_axis.hpp>
 #include <problems/pendulum.hpp>
 
+#include "context.hpp"
+
 namespace tp = tether::ida_projection;
 using tether::problems::Problem;
 
@@ -20,8 +22,7 @@ namespace {
 
 /// The problem's rows at its start, whose algebraic columns are empty and therefore not moved.
 void measure(const Problem& problem, int batches, int moves) {
-  SUNContext context;
-  SUNContext_Create(nullptr, &context);
+  SUNContext context = tether::bench::make_context();
   N_Vector base = N_VNew_Serial(problem.size, context);
   N_Vector correction = N_VClone(base), weights = N_VClone(base), id = N_VClone(base);
   const double tolerance = 1e-6;

@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <ctime>
 
+#include "context.hpp"
+
 namespace tether::bench {
 
 namespace {
@@ -26,25 +28,22 @@ N_Vector vector_of(const std::vector<double>& values, SUNContext context) {
   return v;
 }
 
-void silent(int, const char*, const char*, char*, void*) {}
+[[maybe_unused]] void silent(int, const char*, const char*, char*, void*) {}
 
 }  // namespace
 
 Run integrate(const problems::Problem& problem, double tolerance,
               const std::optional<ida_projection::Constraints>& constraints,
               ida_projection::Options options, bool suppress, bool give_id, long maximum_steps) {
-  SUNContext context;
-  SUNContext_Create(nullptr, &context);
+  SUNContext context = make_context();
   N_Vector y = vector_of(problem.y0, context), yp = vector_of(problem.yp0, context);
   N_Vector id = vector_of(problem.id, context), atol = N_VClone(y);
   for (int i = 0; i < problem.size; ++i)
     N_VGetArrayPointer(atol)[i] =
         tolerance * (problem.atol_scale.empty() ? 1.0 : problem.atol_scale[static_cast<std::size_t>(i)]);
   void* ida = IDACreate(context);
-#if SUNDIALS_VERSION_MAJOR < 7
+#ifndef SUN_COMM_NULL
   IDASetErrHandlerFn(ida, silent, nullptr);
-#else
-  (void)silent;
 #endif
   IDAInit(ida, residual, problem.t0, y, yp);
   IDASVtolerances(ida, tolerance, atol);

@@ -203,7 +203,11 @@ Eigen::VectorXd motion(const Problem& problem, double t, Eigen::VectorXd* y) {
 Eigen::VectorXd integrate(const Problem& problem, double rtol, double atol, long* steps,
                           bool analytic) {
   SUNContext context = nullptr;
+#ifdef SUN_COMM_NULL  // SUNDIALS 7
+  SUNContext_Create(SUN_COMM_NULL, &context);
+#else
   SUNContext_Create(nullptr, &context);
+#endif
   const int N = problem.size;
   const auto vector = [&](const std::vector<double>& from) {
     N_Vector v = N_VNew_Serial(N, context);
