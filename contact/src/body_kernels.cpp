@@ -196,9 +196,9 @@ double sweep(S s, Law law, G b, G e) {
 double test(S s, Law law, G b, G e) {
   return law == Law::coulomb ? test_coulomb(s, b, e) : test_dissipation(s, b, e);
 }
-double sweep(S s, SphereContact* b, SphereContact* e) { return sweep_spheres(s, b, e); }
-double test(S s, SphereContact* b, SphereContact* e) { return test_spheres(s, b, e); }
-double sweep(S s, SmoothContact* b, SmoothContact* e) { return sweep_smooth(s, b, e); }
-double test(S s, SmoothContact* b, SmoothContact* e) { return test_smooth(s, b, e); }
+double sweep(S s, Law, SphereContact* b, SphereContact* e) { return sweep_spheres(s, b, e); }
+double test(S s, Law, SphereContact* b, SphereContact* e) { return test_spheres(s, b, e); }
+double sweep(S s, Law, SmoothContact* b, SmoothContact* e) { return sweep_smooth(s, b, e); }
+double test(S s, Law, SmoothContact* b, SmoothContact* e) { return test_smooth(s, b, e); }
 
 }  // namespace tether::contact::detail

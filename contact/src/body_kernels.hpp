@@ -6,6 +6,13 @@
 
 #include "vector.hpp"
 
+// Vector code for four contacts at a time, chosen when the program runs.
+#if defined(__GNUC__) && defined(__x86_64__)
+#define TETHER_GROUPS 1
+#else
+#define TETHER_GROUPS 0
+#endif
+
 namespace tether::contact::detail {
 
 // One cache line each. Spheres need only the first.
@@ -40,19 +47,42 @@ struct SmoothContact {
   double n[3], q1[3], q2[3], inv_a, weight, bias, x;
 };
 
+// Four contacts without a common body that moves.
+struct alignas(32) GeneralGroup {
+  int first[4], second[4];
+  double n[3][4], t[3][4], r1[3][4], r2[3][4];
+  double a[4], inv_a[4], mu[4], c[2][4], beta[2][4], bias[3][4];
+  double x[3][4], lambda[4];
+};
+struct alignas(32) SphereGroup {
+  int first[4], second[4];
+  double n[3][4], s1[4], s2[4], inv_a[4], inv_t[4], mu[4], bias[3][4], p[3][4];
+};
+static_assert(sizeof(GeneralGroup) == 4 * sizeof(GeneralContact) &&
+                  sizeof(SphereGroup) == 4 * sizeof(SphereContact),
+              "a group takes what its contacts take");
+
 struct BodyArrays {
   BodyState* state;
   const BodyInertia* inertia;
   BodyState* fixed;  // all zero, one for each thread
+  const BodyInertia* no_inertia;
 };
 
 // One pass of Gauss-Seidel; returns sum |D dx|^2, D the diagonal block. Tests change nothing.
 double sweep(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end);
 double test(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end);
-double sweep(const BodyArrays& s, SphereContact* begin, SphereContact* end);
-double test(const BodyArrays& s, SphereContact* begin, SphereContact* end);
-double sweep(const BodyArrays& s, SmoothContact* begin, SmoothContact* end);
-double test(const BodyArrays& s, SmoothContact* begin, SmoothContact* end);
+double sweep(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end);
+double test(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end);
+double sweep(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end);
+double test(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end);
+
+// Groups of four; false: this machine has no code for them.
+bool groups_are_served();
+double sweep(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end);
+double test(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end);
+double sweep(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end);
+double test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end);
 
 // v += p / m, w += I^-1 q
 TETHER_INLINE void push(BodyState& s, const BodyInertia& I, const double* p, const double* q) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <exception>
 #include <limits>
 #include <stdexcept>
@@ -23,10 +24,12 @@ using detail::BodyInertia;
 using detail::BodyState;
 using detail::Chunk;
 using detail::GeneralContact;
+using detail::GeneralGroup;
 using detail::Island;
 using detail::Kind;
 using detail::SmoothContact;
 using detail::SphereContact;
+using detail::SphereGroup;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -92,6 +95,30 @@ Matrix3d diagonal_block(const Side& s) {
 
 void store(const Vector3d& v, double* out) { Eigen::Map<Vector3d>{out} = v; }
 Vector3d load(const double* v) { return Eigen::Map<const Vector3d>(v); }
+
+constexpr BodyInertia kNoInertia = {};
+
+// A contact is two ints and doubles, a group four times the same side by side.
+template <class Contact, class Group>
+void to_lane(const Contact& c, Group& g, int lane) {
+  g.first[lane] = c.first;
+  g.second[lane] = c.second;
+  const char* from = reinterpret_cast<const char*>(&c) + 8;
+  char* to = reinterpret_cast<char*>(&g) + 32 + 8 * lane;
+  for (std::size_t k = 8; k < sizeof(Contact); k += 8)
+    std::memcpy(to + 4 * (k - 8), from + k - 8, 8);
+}
+template <class Contact, class Group>
+Contact from_lane(const Group& g, int lane) {
+  Contact c;
+  c.first = g.first[lane];
+  c.second = g.second[lane];
+  const char* from = reinterpret_cast<const char*>(&g) + 32 + 8 * lane;
+  char* to = reinterpret_cast<char*>(&c) + 8;
+  for (std::size_t k = 8; k < sizeof(Contact); k += 8)
+    std::memcpy(to + k - 8, from + 4 * (k - 8), 8);
+  return c;
+}
 
 // An impulse on the friction cone of its contact, normal part kept.
 Vector3d on_cone(const Vector3d& p, const Vector3d& n, double mu) {
@@ -183,6 +210,8 @@ struct BodySolver::Implementation {
   std::vector<Kind> kind;
   std::vector<char> turned;            // first and second of the caller exchanged
   std::vector<const Vector3d*> start;  // impulse of the previous solve
+  std::vector<GeneralGroup> general4;
+  std::vector<SphereGroup> spheres4;
   std::vector<GeneralContact> general;
   std::vector<SphereContact> spheres;
   std::vector<SmoothContact> smooth;
@@ -213,6 +242,8 @@ struct BodySolver::Implementation {
 
   template <class Operation>
   double pass(const Island& island, const Team& team, int& turn, const Operation& operation);
+  template <class Operation>
+  double over_kinds(int chunk, const Team& team, const Operation& operation);
   double sweep(int chunk, const Team& team);
   double test(int chunk, const Team& team);
   double pack(int chunk, Worker& worker);
@@ -220,6 +251,10 @@ struct BodySolver::Implementation {
   template <class Visit>
   void visit(int chunk, const Visit& visit);
   double pack_contact(int contact, Kind k, int place);
+  GeneralContact general_contact(Kind k, int place) const;
+  SphereContact sphere_contact(Kind k, int place) const;
+  void put(const GeneralContact& c, Kind k, int place);
+  void put(const SphereContact& c, Kind k, int place);
   Vector3d impulse(Kind k, int place) const;
   void set_impulse(Kind k, int place, const Vector3d& p);
   void apply(int contact, const Vector3d& p);
@@ -326,12 +361,13 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
   const Vector3d bias = c.bias * s.n - s.fixed;
   const double mass = s.first->inverse_mass + (s.second ? s.second->inverse_mass : 0);
   switch (k) {
-    case Kind::sphere: {
+    case Kind::sphere:
+    case Kind::sphere4: {
       const double s1 = s.n.dot(s.r1), s2 = s.second ? s.n.dot(s.r2) : 0;
       double t = mass + s1 * s1 * s.first->inverse_inertia(0, 0);
       if (s.second) t += s2 * s2 * s.second->inverse_inertia(0, 0);
       if (!(mass > 0)) throw std::invalid_argument("the bodies cannot move along the normal");
-      SphereContact& p = spheres[at(place)];
+      SphereContact p = {};
       p.first = a;
       p.second = b;
       store(s.n, p.n);
@@ -341,6 +377,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       p.inv_t = 1 / t;
       p.mu = c.mu;
       store(bias, p.bias);
+      put(p, k, place);
       break;
     }
     case Kind::smooth: {
@@ -359,12 +396,13 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       p.bias = bias.dot(s.n);
       break;
     }
-    case Kind::general: {
+    case Kind::general:
+    case Kind::general4: {
       const Matrix3d F = tangent_frame(s.n);
       const LocalBlock L(F * diagonal_block(s) * F.transpose(), c.mu);
       // Tangents turned by V, in which the tangential block is diagonal.
       const Vector3d t = L.cosine * F.row(1) + L.sine * F.row(2), o = s.n.cross(t);
-      GeneralContact& p = general[at(place)];
+      GeneralContact p = {};
       p.first = a;
       p.second = b;
       store(s.n, p.n);
@@ -382,6 +420,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       p.bias[1] = bias.dot(t);
       p.bias[2] = bias.dot(o);
       p.lambda = -1;
+      put(p, k, place);
       break;
     }
   }
@@ -394,35 +433,51 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
   return before.squaredNorm();
 }
 
+GeneralContact BodySolver::Implementation::general_contact(Kind k, int place) const {
+  if (k == Kind::general) return general[at(place)];
+  return from_lane<GeneralContact>(general4[at(place / 4)], place % 4);
+}
+SphereContact BodySolver::Implementation::sphere_contact(Kind k, int place) const {
+  if (k == Kind::sphere) return spheres[at(place)];
+  return from_lane<SphereContact>(spheres4[at(place / 4)], place % 4);
+}
+void BodySolver::Implementation::put(const GeneralContact& c, Kind k, int place) {
+  if (k == Kind::general) {
+    general[at(place)] = c;
+  } else {
+    to_lane(c, general4[at(place / 4)], place % 4);
+  }
+}
+void BodySolver::Implementation::put(const SphereContact& c, Kind k, int place) {
+  if (k == Kind::sphere) {
+    spheres[at(place)] = c;
+  } else {
+    to_lane(c, spheres4[at(place / 4)], place % 4);
+  }
+}
+
 // In world axes, on the moving body `first`.
 Vector3d BodySolver::Implementation::impulse(Kind k, int place) const {
-  switch (k) {
-    case Kind::sphere:
-      return load(spheres[at(place)].p);
-    case Kind::smooth:
-      return smooth[at(place)].x * load(smooth[at(place)].n);
-    case Kind::general:
-      break;
-  }
-  const GeneralContact& c = general[at(place)];
+  if (k == Kind::smooth) return smooth[at(place)].x * load(smooth[at(place)].n);
+  if (k == Kind::sphere || k == Kind::sphere4) return load(sphere_contact(k, place).p);
+  const GeneralContact c = general_contact(k, place);
   const Vector3d n = load(c.n), t = load(c.t);
   return c.x[0] * n + c.x[1] * t + c.x[2] * n.cross(t);
 }
 
 void BodySolver::Implementation::set_impulse(Kind k, int place, const Vector3d& p) {
-  switch (k) {
-    case Kind::sphere:
-      store(p, spheres[at(place)].p);
-      return;
-    case Kind::smooth:
-      smooth[at(place)].x = p.dot(load(smooth[at(place)].n));
-      return;
-    case Kind::general:
-      break;
+  if (k == Kind::smooth) {
+    smooth[at(place)].x = p.dot(load(smooth[at(place)].n));
+  } else if (k == Kind::sphere || k == Kind::sphere4) {
+    SphereContact c = sphere_contact(k, place);
+    store(p, c.p);
+    put(c, k, place);
+  } else {
+    GeneralContact c = general_contact(k, place);
+    const Vector3d n = load(c.n), t = load(c.t);
+    store({p.dot(n), p.dot(t), p.dot(n.cross(t))}, c.x);
+    put(c, k, place);
   }
-  GeneralContact& c = general[at(place)];
-  const Vector3d n = load(c.n), t = load(c.t);
-  store({p.dot(n), p.dot(t), p.dot(n.cross(t))}, c.x);
 }
 
 void BodySolver::Implementation::apply(int contact, const Vector3d& p) {
@@ -466,38 +521,34 @@ void BodySolver::Implementation::unpack(int chunk) {
   });
 }
 
-double BodySolver::Implementation::sweep(int chunk, const Team& team) {
-  const BodyArrays s{state.data(), inertia.data(), &team.worker->fixed};
-  const Chunk &c = graph.chunks[at(chunk)], &next = graph.chunks[at(chunk + 1)];
+template <class Operation>
+double BodySolver::Implementation::over_kinds(int chunk, const Team& team,
+                                              const Operation& operation) {
+  const BodyArrays s{state.data(), inertia.data(), &team.worker->fixed, &kNoInertia};
+  const auto &from = graph.chunks[at(chunk)].begin, &to = graph.chunks[at(chunk + 1)].begin;
   double sum = 0;
-  if (c.begin[0] < next.begin[0]) {
-    sum +=
-        detail::sweep(s, options.law, general.data() + c.begin[0], general.data() + next.begin[0]);
-  }
-  if (c.begin[1] < next.begin[1]) {
-    sum += detail::sweep(s, spheres.data() + c.begin[1], spheres.data() + next.begin[1]);
-  }
-  if (c.begin[2] < next.begin[2]) {
-    sum += detail::sweep(s, smooth.data() + c.begin[2], smooth.data() + next.begin[2]);
-  }
+  const auto kind_range = [&](auto& list, Kind k, int width) {
+    const int begin = from[static_cast<int>(k)] / width, end = to[static_cast<int>(k)] / width;
+    if (begin < end) sum += operation(s, list.data() + begin, list.data() + end);
+  };
+  kind_range(general4, Kind::general4, 4);
+  kind_range(spheres4, Kind::sphere4, 4);
+  kind_range(general, Kind::general, 1);
+  kind_range(spheres, Kind::sphere, 1);
+  kind_range(smooth, Kind::smooth, 1);
   return sum;
 }
 
+double BodySolver::Implementation::sweep(int chunk, const Team& team) {
+  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end) {
+    return detail::sweep(s, options.law, begin, end);
+  });
+}
+
 double BodySolver::Implementation::test(int chunk, const Team& team) {
-  const BodyArrays s{state.data(), inertia.data(), &team.worker->fixed};
-  const Chunk &c = graph.chunks[at(chunk)], &next = graph.chunks[at(chunk + 1)];
-  double sum = 0;
-  if (c.begin[0] < next.begin[0]) {
-    sum +=
-        detail::test(s, options.law, general.data() + c.begin[0], general.data() + next.begin[0]);
-  }
-  if (c.begin[1] < next.begin[1]) {
-    sum += detail::test(s, spheres.data() + c.begin[1], spheres.data() + next.begin[1]);
-  }
-  if (c.begin[2] < next.begin[2]) {
-    sum += detail::test(s, smooth.data() + c.begin[2], smooth.data() + next.begin[2]);
-  }
-  return sum;
+  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end) {
+    return detail::test(s, options.law, begin, end);
+  });
 }
 
 // operation(chunk) for all chunks of the island, colour by colour; the sum of what it returns, in
@@ -643,6 +694,7 @@ void BodySolver::Implementation::unpack(const Island& island, const Team& team) 
 void BodySolver::Implementation::together(int k, const Team& team) {
   const Island& island = graph.islands[at(k)];
   const int begin = island.body_begin, end = island.body_end;
+  team.worker->fixed = {};
   for (int s = team.from(begin, end); s < team.to(begin, end); ++s) load_body(s);
   team.meet();
   iterate(k, team);
@@ -653,6 +705,7 @@ void BodySolver::Implementation::together(int k, const Team& team) {
 void BodySolver::Implementation::alone(int k, Worker& worker) {
   const Island& island = graph.islands[at(k)];
   const Team team{0, 1, nullptr, &worker};
+  worker.fixed = {};
   if (results[at(k)].sweeps == 0) {
     for (int s = island.body_begin; s < island.body_end; ++s) load_body(s);
     iterate(k, team);
@@ -669,12 +722,15 @@ void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
   read_bodies();
   read_contacts();
   find_starts();
-  graph.build(static_cast<int>(b.size()), first, second, kind);
+  graph.build(static_cast<int>(b.size()), first, second, kind, detail::groups_are_served());
 
   const Chunk& end = graph.chunks.back();
-  general.resize(at(end.begin[0]));
-  spheres.resize(at(end.begin[1]));
-  smooth.resize(at(end.begin[2]));
+  const auto total = [&](Kind k) { return at(end.begin[static_cast<int>(k)]); };
+  general4.resize(total(Kind::general4) / 4);
+  spheres4.resize(total(Kind::sphere4) / 4);
+  general.resize(total(Kind::general));
+  spheres.resize(total(Kind::sphere));
+  smooth.resize(total(Kind::smooth));
   state.resize(graph.body.size());
   inertia.resize(graph.body.size());
   for (std::vector<double>& sums : chunk_sum) sums.resize(graph.chunks.size());
@@ -759,7 +815,7 @@ void BodySolver::Implementation::finish() {
     out->replaced.insert(out->replaced.end(), worker->replaced.begin(), worker->replaced.end());
   }
   std::sort(out->replaced.begin(), out->replaced.end());
-  out->spheres = general.empty();
+  out->spheres = general.empty() && general4.empty();
 
   if (options.warm_start) {
     memory.clear();
@@ -770,8 +826,8 @@ void BodySolver::Implementation::finish() {
     return (... + (list.capacity() * sizeof(list[0])));
   };
   out->bytes = graph.contact_bytes() + memory.bytes() +
-               bytes(first, second, kind, turned, start, general, spheres, smooth, chunk_sum[0],
-                     chunk_sum[1], results);
+               bytes(first, second, kind, turned, start, general4, spheres4, general, spheres,
+                     smooth, chunk_sum[0], chunk_sum[1], results);
   out->body_bytes = graph.body_bytes() + bytes(body_kind, state, inertia);
 }
 

@@ -25,7 +25,8 @@ int ContactGraph::root(int b) {
 }
 
 void ContactGraph::build(int bodies, const std::vector<int>& first, const std::vector<int>& second,
-                         const std::vector<Kind>& kind) {
+                         const std::vector<Kind>& kind, bool in_fours) {
+  in_fours_ = in_fours;
   first_ = &first;
   second_ = &second;
   kind_ = &kind;
@@ -33,7 +34,6 @@ void ContactGraph::build(int bodies, const std::vector<int>& first, const std::v
   find_islands(bodies);
 
   order.resize(n);
-  key_.resize(n);
   slot.assign(at(bodies), -1);
   body.clear();
   chunks.clear();
@@ -57,7 +57,7 @@ void ContactGraph::build(int bodies, const std::vector<int>& first, const std::v
     }
   }
   // Places of each kind: running counts over the chunks, filled by order_within.
-  chunks.push_back({0, {0, 0, 0}});
+  chunks.push_back({});
   for (Island& island : islands) {
     island.body_begin = static_cast<int>(body.size());
     island.chunk_begin = static_cast<int>(chunks.size()) - 1;
@@ -204,47 +204,81 @@ void ContactGraph::colour_chunks(Island& island) {
   }
 }
 
-// Sorted by kind, then by a greedy colour of the contacts of this chunk.
+// Every contact joins the first open group of its kind that none of its bodies is in.
 void ContactGraph::order_within(const int* begin, const int* end, int place) {
-  const std::vector<int>&first = *first_, &second = *second_;
-  const int n = static_cast<int>(end - begin);
   Chunk next = chunks.back();
-  if (n == 1) {
-    order[at(place)] = *begin;
-    ++next.begin[static_cast<int>((*kind_)[at(*begin)])];
-    next.place = place + 1;
-    chunks.push_back(next);
-    return;
+  next.place = place + static_cast<int>(end - begin);
+  for (std::vector<int>& list : by_kind_) list.clear();
+  const auto kind_of = [&](int c) { return static_cast<int>((*kind_)[at(c)]); };
+  if (!in_fours_ || end - begin < 4) {
+    for (const int* c = begin; c < end; ++c) by_kind_[kind_of(*c)].push_back(*c);
+  } else {
+    group(begin, end);
   }
-  for (int k = 0; k < n; ++k) {
-    const int c = begin[k];
-    used_[at(first[at(c)])] = 0;
-    if (second[at(c)] >= 0) used_[at(second[at(c)])] = 0;
+  for (int k = 0; k < kKinds; ++k) {
+    for (int c : by_kind_[k]) order[at(place++)] = c;
+    next.begin[k] += static_cast<int>(by_kind_[k].size());
   }
-  int count[kKinds * 64 + 1] = {};
-  for (int k = 0; k < n; ++k) {
-    const int c = begin[k];
+  chunks.push_back(next);
+}
+
+void ContactGraph::group(const int* begin, const int* end) {
+  constexpr int kOpen = 16;  // groups of each kind that wait for members
+  const std::vector<int>&first = *first_, &second = *second_;
+  int members[2][kOpen][4], size[2][kOpen] = {};
+  for (const int* c = begin; c < end; ++c) {
+    used_[at(first[at(*c)])] = 0;
+    if (second[at(*c)] >= 0) used_[at(second[at(*c)])] = 0;
+  }
+  const auto mark = [&](int c, std::uint64_t bit, bool in) {
+    for (int b : {first[at(c)], second[at(c)]}) {
+      if (b < 0) continue;
+      std::uint64_t& used = used_[at(b)];
+      used = in ? used | bit : used & ~bit;
+    }
+  };
+  for (const int* p = begin; p < end; ++p) {
+    const int c = *p;
+    const Kind kind = (*kind_)[at(c)];
+    std::vector<int>& single = by_kind_[static_cast<int>(kind)];
+    if (kind == Kind::smooth) {
+      single.push_back(c);
+      continue;
+    }
+    const int type = kind == Kind::sphere ? 1 : 0, shift = type * kOpen;
     std::uint64_t taken = used_[at(first[at(c)])];
     if (second[at(c)] >= 0) taken |= used_[at(second[at(c)])];
-    int colour = 0;
-    while (colour < 63 && (taken >> colour & 1)) ++colour;
-    used_[at(first[at(c)])] |= std::uint64_t{1} << colour;
-    if (second[at(c)] >= 0) used_[at(second[at(c)])] |= std::uint64_t{1} << colour;
-    const int kind = static_cast<int>((*kind_)[at(c)]);
-    key_[at(c)] = static_cast<std::uint8_t>(64 * kind + colour);
-    ++count[key_[at(c)] + 1];
-    ++next.begin[kind];
+    int g = 0;
+    while (g < kOpen && (taken >> (shift + g) & 1)) ++g;
+    if (g == kOpen) {
+      single.push_back(c);
+      continue;
+    }
+    const std::uint64_t bit = std::uint64_t{1} << (shift + g);
+    members[type][g][size[type][g]++] = c;
+    if (size[type][g] < 4) {
+      mark(c, bit, true);
+      continue;
+    }
+    std::vector<int>& full = by_kind_[static_cast<int>(type ? Kind::sphere4 : Kind::general4)];
+    for (int m : members[type][g]) {
+      full.push_back(m);
+      mark(m, bit, false);
+    }
+    size[type][g] = 0;
   }
-  for (int k = 0; k < kKinds * 64; ++k) count[k + 1] += count[k];
-  for (int k = 0; k < n; ++k) order[at(place + count[key_[at(begin[k])]]++)] = begin[k];
-  next.place = place + n;
-  chunks.push_back(next);
+  for (int type = 0; type < 2; ++type) {
+    std::vector<int>& single = by_kind_[static_cast<int>(type ? Kind::sphere : Kind::general)];
+    for (int g = 0; g < kOpen; ++g) {
+      for (int m = 0; m < size[type][g]; ++m) single.push_back(members[type][g][m]);
+    }
+  }
 }
 
 std::size_t ContactGraph::contact_bytes() const {
   return sizeof(int) *
              (order.capacity() + sorted_.capacity() + adjacent_.capacity() + chunk_of_.capacity()) +
-         key_.capacity() + sizeof(Chunk) * chunks.capacity() + sizeof(Island) * islands.capacity();
+         sizeof(Chunk) * chunks.capacity() + sizeof(Island) * islands.capacity();
 }
 
 std::size_t ContactGraph::body_bytes() const {

@@ -8,9 +8,10 @@
 
 namespace tether::contact::detail {
 
-// How a contact is solved; within a chunk contacts are grouped by this.
-enum class Kind : std::uint8_t { general, sphere, smooth };
-constexpr int kKinds = 3;
+// How a contact is solved: alone, or in fours that have no moving body in common. A chunk holds its
+// contacts in this order.
+enum class Kind : std::uint8_t { general4, sphere4, general, sphere, smooth };
+constexpr int kKinds = 5;
 
 // Contacts that one thread sweeps in one go: place .. place of the next chunk. Bodies of a chunk
 // are near each other, so that they stay in the cache.
@@ -31,13 +32,12 @@ struct Island {
 //
 // Order: islands one after the other; chunks by colour, such that chunks of a colour have no moving
 // body in common: they may be swept at the same time and give the same bits as one after the other.
-// Within a chunk neighbours in the order share no body where that is possible, so that one contact
-// need not wait for the result of the one before.
+// Within a chunk, contacts that share no body are put together in fours where that is possible.
 class ContactGraph {
  public:
-  // first[i] moves, second[i] moves or is -1.
+  // first[i] moves, second[i] moves or is -1; kind[i] is general, sphere or smooth.
   void build(int bodies, const std::vector<int>& first, const std::vector<int>& second,
-             const std::vector<Kind>& kind);
+             const std::vector<Kind>& kind, bool in_fours);
 
   std::vector<int> order;     // place -> contact
   std::vector<int> slot;      // body -> slot; -1: fixed or without contact
@@ -57,6 +57,7 @@ class ContactGraph {
   void cluster(Island& island);
   void colour_chunks(Island& island);
   void order_within(const int* begin, const int* end, int place);
+  void group(const int* begin, const int* end);
 
   const std::vector<int>* first_ = nullptr;
   const std::vector<int>* second_ = nullptr;
@@ -68,10 +69,11 @@ class ContactGraph {
   std::vector<int> chunk_of_;                   // contact -> chunk of the island
   std::vector<int> chunk_start_;                // chunk -> contacts
   std::vector<int> chunk_colour_, by_colour_, sequence_;
-  std::vector<int> mark_;            // body -> last cluster that has seen it
-  std::vector<int> near_, far_;      // queues of bodies
-  std::vector<std::uint64_t> used_;  // body -> colours
-  std::vector<std::uint8_t> key_;    // contact -> kind and colour within its chunk
+  std::vector<int> mark_;             // body -> last cluster that has seen it
+  std::vector<int> near_, far_;       // queues of bodies
+  std::vector<std::uint64_t> used_;   // body -> colours
+  std::vector<int> by_kind_[kKinds];  // contacts of one chunk
+  bool in_fours_ = false;
 };
 
 }  // namespace tether::contact::detail
