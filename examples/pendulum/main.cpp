@@ -24,7 +24,7 @@ namespace {
 void run(const pendulum::Settings& settings) {
   std::filesystem::create_directories(settings.output);
   const std::vector<pendulum::Experiment> experiments = pendulum::plan(settings);
-  pendulum::Progress progress(pendulum::expected_work(experiments));
+  tether::Progress progress(pendulum::expected_work(experiments));
 
   pendulum::print_explanation();
   std::vector<pendulum::Results> all;

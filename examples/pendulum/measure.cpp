@@ -15,7 +15,7 @@ std::string title(const Experiment& experiment, const Case& what) {
                      what.form, what.constraints(), what.tolerance);
 }
 
-Result observe(const Experiment& experiment, const Case& what, Progress& progress) {
+Result observe(const Experiment& experiment, const Case& what, tether::Progress& progress) {
   Result result;
   result.what = what;
   DriftHistory history(experiment);
@@ -32,7 +32,7 @@ Result observe(const Experiment& experiment, const Case& what, Progress& progres
   return result;
 }
 
-void time(const Experiment& experiment, Result& result, Progress& progress) {
+void time(const Experiment& experiment, Result& result, tether::Progress& progress) {
   progress.start(title(experiment, result.what), experiment.duration,
                  expected_work(experiment, result.what));
   if (!result.failed()) {
@@ -44,7 +44,7 @@ void time(const Experiment& experiment, Result& result, Progress& progress) {
 
 }  // namespace
 
-Results measure(const Experiment& experiment, Progress& progress) {
+Results measure(const Experiment& experiment, tether::Progress& progress) {
   Results results{experiment, {}};
   for (const Case& what : experiment.cases)
     results.runs.push_back(observe(experiment, what, progress));

@@ -40,6 +40,6 @@ struct Results {
 
 /// Every case once with a look at every step, then the timed runs in rounds over all cases, so that
 /// a busy machine disturbs all of them alike. What fails is not timed.
-Results measure(const Experiment& experiment, Progress& progress);
+Results measure(const Experiment& experiment, tether::Progress& progress);
 
 }  // namespace pendulum

@@ -21,8 +21,10 @@ int main(int argc, char** argv) {
       "scene or an option is wrong; 3 a run could not go on.");
   int status = 0;
 #ifdef TETHER_SCENE_FILES
-  tether::scene::add_check_command(app, &status);
+  tether::scene::add_run_command(app, &status);
   tether::scene::add_plan_command(app, &status);
+  tether::scene::add_check_command(app, &status);
+  tether::scene::add_cost_command(app, &status);
 #endif
   tether::scene::add_contact_command(app, &status);
   try {

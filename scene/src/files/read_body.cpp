@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mass.hpp"
+#include "geometry/hull.hpp"
+#include "geometry/mass.hpp"
 #include "read.hpp"
 
 namespace tether::scene::files {

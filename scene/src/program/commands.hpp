@@ -17,6 +17,8 @@ enum ExitCode : int {
 };
 
 void add_check_command(CLI::App& app, int* status);
+void add_cost_command(CLI::App& app, int* status);
 void add_plan_command(CLI::App& app, int* status);
+void add_run_command(CLI::App& app, int* status);
 
 }  // namespace tether::scene

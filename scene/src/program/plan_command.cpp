@@ -5,8 +5,10 @@
 #include <memory>
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
+#include <tether/scene/run.hpp>
 
 #include "commands.hpp"
+#include "report_run.hpp"
 
 namespace tether::scene {
 
@@ -14,12 +16,19 @@ namespace {
 
 struct Arguments {
   std::string file;
+  bool run = false;
 };
 
 int plan(const Arguments& arguments) {
   const Scene scene = read_scene(arguments.file);
-  std::cout << make_plan(scene);
-  return kGood;
+  std::cout << make_plan(scene) << std::flush;
+  if (!arguments.run) return kGood;
+  Scene silent = scene;
+  silent.output = Output{};
+  const RunResult result = run(silent);
+  print_costs(result);
+  if (!result.failure.empty()) fmt::print("stopped at {:g} s: {}\n", result.time, result.failure);
+  return result.failure.empty() ? kGood : kFailed;
 }
 
 }  // namespace
@@ -29,6 +38,9 @@ void add_plan_command(CLI::App& app, int* status) {
   CLI::App* command = app.add_subcommand(
       "plan", "Tells which effects a scene asks for, which engine moves it, and how large it is");
   command->add_option("scene", arguments->file, "Scene file (TOML)")->required();
+  command->add_flag("--run", arguments->run, "Run it, and tell what each effect cost");
+  command->footer(
+      "Exit code: 0, 2 the scene is wrong or no engine has it, 3 --run could not go on.");
   command->callback([arguments, status] { *status = plan(*arguments); });
 }
 

@@ -5,7 +5,7 @@
 #include <tether/scene/scene.hpp>
 #include <vector>
 
-namespace tether::scene::files {
+namespace tether::scene {
 
 /// Of a uniform solid of density 1: mass = volume, m^3; inertia about the centre, m^5.
 struct MassProperties {
@@ -14,11 +14,10 @@ struct MassProperties {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
 };
 
-constexpr std::size_t kMostHullPoints = 64;  ///< the hull is found by trying all triples
-
-/// A plane and points have none. A convex shape must have at most kMostHullPoints points.
+/// A plane and points have none, and none is found for a convex shape of more than kMostHullPoints
+/// points (hull.hpp).
 MassProperties mass_properties(const Shape& shape);
 /// Of shapes that do not overlap, in the axes of their body.
 MassProperties mass_properties(const std::vector<Shape>& shapes);
 
-}  // namespace tether::scene::files
+}  // namespace tether::scene

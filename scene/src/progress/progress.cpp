@@ -1,4 +1,4 @@
-// Tether: tells on stderr how far the main job is. SPDX-License-Identifier: BSD-3-Clause
+// Tether: tells on stderr how far a long job is. SPDX-License-Identifier: BSD-3-Clause
 #include "progress.hpp"
 
 #include <fmt/core.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 
-namespace pendulum {
+namespace tether {
 
 namespace {
 
@@ -57,4 +57,4 @@ void Progress::hide() {
   visible_ = false;
 }
 
-}  // namespace pendulum
+}  // namespace tether

@@ -1,10 +1,10 @@
-// Tether: tells on stderr how far the main job is. SPDX-License-Identifier: BSD-3-Clause
+// Tether: tells on stderr how far a long job is. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <chrono>
 #include <string>
 
-namespace pendulum {
+namespace tether {
 
 /// On a terminal a bar, redrawn a few times a second; otherwise a line every ten seconds.
 class Progress {
@@ -33,4 +33,4 @@ class Progress {
   bool visible_ = false;
 };
 
-}  // namespace pendulum
+}  // namespace tether

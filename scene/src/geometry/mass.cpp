@@ -4,14 +4,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <set>
 
-namespace tether::scene::files {
+#include "hull.hpp"
+
+namespace tether::scene {
 
 namespace {
 
 using Eigen::Matrix3d;
-using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
@@ -58,64 +58,8 @@ struct Moments {
   }
 };
 
-// Corners of the convex polygon of points in a plane, counter-clockwise (Andrew's monotone chain).
-std::vector<Vector2d> polygon(std::vector<Vector2d> q) {
-  const auto less = [](const Vector2d& a, const Vector2d& b) {
-    return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
-  };
-  const auto left_turn = [](const Vector2d& a, const Vector2d& b, const Vector2d& c) {
-    const Vector2d d = b - a, e = c - a;
-    return d.x() * e.y() - d.y() * e.x() > 0;
-  };
-  std::sort(q.begin(), q.end(), less);
-  std::vector<Vector2d> out;
-  for (int side = 0; side < 2; ++side) {
-    const std::size_t start = out.size();
-    for (const Vector2d& each : q) {
-      while (out.size() >= start + 2 && !left_turn(out[out.size() - 2], out.back(), each))
-        out.pop_back();
-      out.push_back(each);
-    }
-    out.pop_back();  // the first of the other side
-    std::reverse(q.begin(), q.end());
-  }
-  return out;
-}
-
-// The faces of the hull found so far, each by the points that lie in it.
-using Faces = std::set<std::vector<std::size_t>>;
-
-// Adds the face in the plane of three points, unless the plane cuts the hull or was met before.
-void add_face(const std::vector<Vector3d>& p, std::size_t i, std::size_t j, std::size_t k,
-              Faces& faces, Moments& sum) {
-  constexpr double kFlat = 1e-10;  // of the hull's size
-  Vector3d n = (p[j] - p[i]).cross(p[k] - p[i]);
-  if (n.norm() <= kFlat) return;
-  n.normalize();
-  bool above = false, below = false;
-  std::vector<std::size_t> in_plane;
-  for (std::size_t m = 0; m < p.size(); ++m) {
-    const double height = n.dot(p[m] - p[i]);
-    above = above || height > kFlat;
-    below = below || height < -kFlat;
-    if (std::abs(height) <= kFlat) in_plane.push_back(m);
-  }
-  if (above == below) return;
-  if (above) n = -n;  // out of the hull
-  if (!faces.insert(in_plane).second) return;
-
-  const Vector3d u = (p[j] - p[i]).normalized(), v = n.cross(u);
-  std::vector<Vector2d> q;
-  for (const std::size_t m : in_plane) q.emplace_back(u.dot(p[m] - p[i]), v.dot(p[m] - p[i]));
-  q = polygon(std::move(q));
-  for (std::size_t m = 1; m + 1 < q.size(); ++m) {
-    const auto point = [&](const Vector2d& x) { return Vector3d(p[i] + x.x() * u + x.y() * v); };
-    sum.add(point(q[0]), point(q[m]), point(q[m + 1]));
-  }
-}
-
 MassProperties convex(const std::vector<Vector3d>& points) {
-  if (points.size() < 4 || points.size() > kMostHullPoints) return {};
+  if (points.empty()) return {};
   Vector3d origin = Vector3d::Zero();
   for (const Vector3d& p : points) origin += p / static_cast<double>(points.size());
   std::vector<Vector3d> p;
@@ -127,11 +71,10 @@ MassProperties convex(const std::vector<Vector3d>& points) {
   if (!(size > 0) || !std::isfinite(size)) return {};
   for (Vector3d& each : p) each /= size;  // nothing below overflows
 
-  Faces faces;
   Moments sum;
-  for (std::size_t i = 0; i < p.size(); ++i)
-    for (std::size_t j = i + 1; j < p.size(); ++j)
-      for (std::size_t k = j + 1; k < p.size(); ++k) add_face(p, i, j, k, faces, sum);
+  for (const std::vector<std::size_t>& face : hull_faces(p))
+    for (std::size_t m = 1; m + 1 < face.size(); ++m)
+      sum.add(p[face[0]], p[face[m]], p[face[m + 1]]);
   if (!(sum.volume > 1e-12)) return {};
   MassProperties out;
   const double cube = size * size * size;
@@ -193,4 +136,4 @@ MassProperties mass_properties(const std::vector<Shape>& shapes) {
   return all;
 }
 
-}  // namespace tether::scene::files
+}  // namespace tether::scene

@@ -1,0 +1,62 @@
+// Tether: runs a scene, records it, and judges it by its expectations. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <tether/scene/engine.hpp>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+namespace tether::scene {
+
+/// What became of an [[expect]]. Of one that holds `throughout`, the worst moment.
+struct Judgement {
+  bool beyond = false;  ///< the scene ends before it (--end): it does not count
+  bool judged = false;  ///< the run came that far
+  bool met = false;
+  double time = 0;            ///< s
+  std::vector<double> value;  ///< what was found
+  double error = 0;           ///< largest difference to the value expected, 0 without one
+};
+
+/// Over all records.
+struct Summary {
+  double start_energy = 0, end_energy = 0;       ///< J
+  double lowest_change = 0, largest_change = 0;  ///< J, of the energy since the start
+  double drift = 0, penetration = 0, residual = 0;
+  int contacts = 0;
+};
+
+struct RunOptions {
+  std::string restart;                        ///< a saved state to go on from; empty: from t = 0
+  std::function<void(double time)> progress;  ///< called at each record
+  std::vector<double> stops;                  ///< further times at which `record` is called, s
+  std::function<void(const Engine&)> record;  ///< called at each record and stop
+};
+
+struct RunResult {
+  std::string engine;
+  double time = 0;      ///< s, reached
+  double seconds = 0;   ///< processor time of the engine
+  std::string failure;  ///< why the run could not go on; empty: it reached the end
+  Summary summary;
+  Counts counts;
+  std::vector<EffectCost> costs;
+  std::vector<Judgement> judgements;  ///< one for each Scene::expect
+  std::vector<std::string> written;   ///< files
+  std::vector<std::string> remarks;   ///< what could not be written, and why
+
+  bool met() const;  ///< every expectation that counts was judged and holds
+};
+
+/// Runs the scene to its end and writes what Scene::output names. Throws std::invalid_argument for
+/// a scene that no engine has and std::runtime_error for files; a run that cannot go on is a
+/// result.
+RunResult run(const Scene& scene, const RunOptions& options = {});
+
+/// The value of a quantity now; `start` is the state and `start_energy` the energy at t = 0.
+std::vector<double> measure(const Scene& scene, Quantity quantity, int body, const Engine& engine,
+                            double start_energy);
+
+}  // namespace tether::scene

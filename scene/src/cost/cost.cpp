@@ -1,0 +1,193 @@
+// Tether: what accuracy costs in time. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+#include <tether/scene/cost.hpp>
+#include <tether/scene/plan.hpp>
+
+namespace tether::scene {
+
+namespace {
+
+/// Poses of the moving bodies at the sampled times.
+struct Samples {
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<Eigen::Quaterniond> orientations;
+};
+
+struct Measured {
+  RunResult result;
+  Samples samples;
+};
+
+Measured measure_once(const Scene& scene, int samples) {
+  Measured out;
+  RunOptions options;
+  for (int k = 1; k <= samples; ++k) options.stops.push_back(scene.end * k / samples);
+  // Records and expectations stop the run at other times, too.
+  std::size_t next = 0;
+  options.record = [&](const Engine& engine) {
+    while (next < options.stops.size() && engine.time() >= options.stops[next] * (1 - 1e-12)) {
+      for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+        if (scene.bodies[b].fixed) continue;
+        // A time step ends at its boundary; the way to it is straight.
+        const double late = engine.time() - options.stops[next];
+        out.samples.positions.push_back(engine.bodies()[b].position -
+                                        late * engine.bodies()[b].velocity);
+        out.samples.orientations.push_back(engine.bodies()[b].orientation);
+      }
+      ++next;
+    }
+  };
+  out.result = run(scene, options);
+  return out;
+}
+
+double distance(const Samples& a, const Samples& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < std::min(a.positions.size(), b.positions.size()); ++i) {
+    largest = std::max(largest, (a.positions[i] - b.positions[i]).norm());
+    largest = std::max(largest, a.orientations[i].angularDistance(b.orientations[i]));
+  }
+  return largest;
+}
+
+/// The scene with one setting, and nothing written.
+Scene with_setting(const Scene& scene, bool smooth, double setting) {
+  Scene out = scene;
+  out.output = Output{};
+  out.output.every = out.end;  // records cost time
+  if (smooth) {
+    out.smooth = scene.smooth.value_or(SmoothOptions{});
+    out.smooth->tolerance = setting;
+  } else {
+    out.stepping = scene.stepping.value_or(SteppingOptions{});
+    out.stepping->step = setting;
+  }
+  return out;
+}
+
+std::vector<double> default_settings(const Scene& scene, bool smooth) {
+  if (smooth) return {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
+  const double step = scene.stepping.value_or(SteppingOptions{}).step;
+  return {8 * step, 4 * step, 2 * step, step, step / 2, step / 4};
+}
+
+/// Plain IDA in the form that differentiates everything, which drifts least at tight tolerances.
+Scene plain_reference(const Scene& scene, double tolerance) {
+  Scene out = with_setting(scene, true, tolerance);
+  out.smooth->projection = false;
+  out.smooth->formulation = Formulation::index0;
+  for (Invariant& each : out.invariants) each.project = false;
+  return out;
+}
+
+struct Reference {
+  Samples samples;
+  std::string what;
+  double error = 0;
+};
+
+// Two that have little in common: where they agree, both are right.
+Reference smooth_reference(const Scene& scene, double tolerance, int samples) {
+  Reference out;
+  const Measured kept = measure_once(with_setting(scene, true, tolerance), samples);
+  const Measured plain = measure_once(plain_reference(scene, tolerance), samples);
+  if (!plain.result.failure.empty() && !kept.result.failure.empty())
+    throw std::runtime_error(
+        fmt::format("no reference: at tolerance {:g} plain IDA fails ({}) and "
+                    "so does the scene ({})",
+                    tolerance, plain.result.failure, kept.result.failure));
+  const bool both = plain.result.failure.empty() && kept.result.failure.empty();
+  if (plain.result.failure.empty()) {
+    out.samples = plain.samples;
+    out.what = fmt::format("plain IDA, index 0, tolerance {:g}", tolerance);
+  } else {
+    out.samples = kept.samples;
+    out.what = fmt::format("the scene at tolerance {:g} (plain IDA fails there)", tolerance);
+  }
+  out.error = both ? distance(plain.samples, kept.samples) : 0;
+  return out;
+}
+
+// Half the step once more tells how far the reference itself is off.
+Reference stepping_reference(const Scene& scene, double step, int samples) {
+  Reference out;
+  const Measured fine = measure_once(with_setting(scene, false, step), samples);
+  if (!fine.result.failure.empty())
+    throw std::runtime_error(
+        fmt::format("no reference: at a step of {:g} s {}", step, fine.result.failure));
+  const Measured coarser = measure_once(with_setting(scene, false, 2 * step), samples);
+  out.samples = fine.samples;
+  out.what = fmt::format("the scene at a step of {:g} s", step);
+  out.error = coarser.result.failure.empty() ? distance(fine.samples, coarser.samples) : 0;
+  return out;
+}
+
+CostRow measure_row(const Scene& scene, double setting, int samples, const Samples& reference) {
+  CostRow row;
+  row.setting = setting;
+  // The least of several: everything else on the machine only adds.
+  double spent = 0;
+  for (int repeat = 0; repeat < 5 && (repeat == 0 || spent < 0.3); ++repeat) {
+    const Measured m = measure_once(scene, samples);
+    const RunResult& r = m.result;
+    spent += r.seconds;
+    row.seconds = repeat == 0 ? r.seconds : std::min(row.seconds, r.seconds);
+    row.failure = r.failure;
+    row.error = distance(m.samples, reference);
+    row.drift = r.summary.drift;
+    row.penetration = r.summary.penetration;
+    row.steps = r.counts.steps;
+    row.met = static_cast<int>(std::count_if(r.judgements.begin(), r.judgements.end(),
+                                             [](const Judgement& j) { return j.judged && j.met; }));
+    if (!r.failure.empty()) break;
+  }
+  return row;
+}
+
+}  // namespace
+
+const CostRow* CostTable::cheapest(double wanted) const {
+  const CostRow* best = nullptr;
+  for (const CostRow& row : rows)
+    if (row.failure.empty() && row.error <= wanted &&
+        (best == nullptr || row.seconds < best->seconds))
+      best = &row;
+  return best;
+}
+
+CostTable cost(const Scene& scene, const CostOptions& options) {
+  CostTable table;
+  table.smooth = make_plan(scene).engine == EngineKind::smooth;
+  std::vector<double> settings =
+      options.settings.empty() ? default_settings(scene, table.smooth) : options.settings;
+  std::sort(settings.begin(), settings.end(), std::greater<>());
+  for (const double each : settings)
+    if (!(each > 0) || !std::isfinite(each))
+      throw std::invalid_argument(
+          fmt::format("a tolerance or time step must be > 0, not {}", each));
+  const auto tell = [&](const std::string& what, double share) {
+    if (options.progress) options.progress(what, share);
+  };
+
+  tell("reference", 0);
+  const Reference reference =
+      table.smooth ? smooth_reference(scene, options.reference.value_or(1e-12), options.samples)
+                   : stepping_reference(scene, options.reference.value_or(settings.back() / 4),
+                                        options.samples);
+  table.reference = reference.what;
+  table.reference_error = reference.error;
+  for (const double setting : settings) {
+    tell(fmt::format("{:g}", setting),
+         static_cast<double>(1 + table.rows.size()) / static_cast<double>(1 + settings.size()));
+    table.rows.push_back(measure_row(with_setting(scene, table.smooth, setting), setting,
+                                     options.samples, reference.samples));
+  }
+  return table;
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,21 @@
+// Tether: shapes as polygons, for files and pictures. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+namespace tether::scene {
+
+/// In the axes of the body. Faces are convex, counter-clockwise from outside; single points where
+/// a shape has no faces.
+struct Mesh {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<std::vector<std::size_t>> faces;
+  std::vector<std::size_t> single;
+};
+
+/// `around`: segments of a circle. A plane is cut to a square of the given half edge.
+Mesh mesh(const Shape& shape, int around, double half_plane);
+
+}  // namespace tether::scene

@@ -1,0 +1,133 @@
+// Tether: prints what a run gave. SPDX-License-Identifier: BSD-3-Clause
+#include "report_run.hpp"
+
+#include <fmt/core.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <tether/scene/words.hpp>
+#include <vector>
+
+#include "commands.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+/// Rows under a heading, columns as wide as they must be.
+class Table {
+ public:
+  explicit Table(std::vector<std::string> heading) : rows_{std::move(heading)} {}
+  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+  void print() const {
+    std::vector<std::size_t> widths(rows_.front().size());
+    for (const auto& row : rows_)
+      for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+    for (const auto& row : rows_) {
+      std::string line = " ";
+      for (std::size_t i = 0; i < row.size(); ++i)
+        line += fmt::format(" {:<{}} ", row[i], widths[i]);
+      line.erase(line.find_last_not_of(' ') + 1);
+      fmt::print("{}\n", line);
+    }
+  }
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+std::string text(const std::vector<double>& value) {
+  if (value.empty()) return "-";
+  if (value.size() == 1) return fmt::format("{:.9g}", value.front());
+  std::string out = "[";
+  for (const double x : value) out += fmt::format("{}{:.6g}", out.size() > 1 ? ", " : "", x);
+  return out + "]";
+}
+
+std::string verdict(const Judgement& j) {
+  if (j.beyond) return "beyond";
+  if (!j.judged) return "NOT REACHED";
+  return j.met ? "met" : "NOT MET";
+}
+
+std::string bound(const Expect& e) {
+  std::string out;
+  if (!e.value.empty()) out += fmt::format("{} within {:g}", text(e.value), e.within);
+  if (e.at_least) out += fmt::format("{}>= {:g}", out.empty() ? "" : ", ", *e.at_least);
+  if (e.at_most) out += fmt::format("{}<= {:g}", out.empty() ? "" : ", ", *e.at_most);
+  return out;
+}
+
+}  // namespace
+
+void print_summary(const Scene& scene, const RunResult& r) {
+  const Summary& s = r.summary;
+  const Counts& c = r.counts;
+  fmt::print("{}: {} engine, {:g} s in {:.3g} s of processor time\n",
+             scene.name.empty() ? scene.file : scene.name, r.engine, r.time, r.seconds);
+  fmt::print(
+      "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
+      s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
+  if (c.contact_problems > 0) {
+    fmt::print("  contacts     at most {}; penetration {:.2e} m; residual {:.2e}\n", s.contacts,
+               s.penetration, s.residual);
+    fmt::print("  work         {} steps, {} contact problems, {} sweeps, {} unsolved\n", c.steps,
+               c.contact_problems, c.sweeps, c.unsolved);
+  } else if (c.residual_evaluations > 0) {
+    fmt::print("  drift        {:.2e} (largest violation of a joint or a kept invariant)\n",
+               s.drift);
+    fmt::print(
+        "  work         {} steps, {} residuals, {} Jacobians, {} projections, {} failed "
+        "error tests\n",
+        c.steps, c.residual_evaluations, c.jacobian_evaluations, c.projections,
+        c.error_test_failures);
+  } else {
+    fmt::print("  work         {} steps\n", c.steps);
+  }
+  if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, r.failure);
+}
+
+void print_judgements(const Scene& scene, const RunResult& r) {
+  if (scene.expect.empty()) return;
+  const auto met = std::count_if(r.judgements.begin(), r.judgements.end(),
+                                 [](const Judgement& j) { return j.judged && j.met; });
+  const auto beyond = std::count_if(r.judgements.begin(), r.judgements.end(),
+                                    [](const Judgement& j) { return j.beyond; });
+  fmt::print("expectations: {} of {} met{}\n", met, scene.expect.size(),
+             beyond > 0 ? fmt::format(", {} beyond the end", beyond) : "");
+  Table table({"", "t / s", "quantity", "body", "found", "expected", "error"});
+  for (std::size_t i = 0; i < scene.expect.size(); ++i) {
+    const Expect& e = scene.expect[i];
+    const Judgement& j = r.judgements[i];
+    table.add({verdict(j),
+               e.throughout ? fmt::format("to {:g}", e.time) : fmt::format("{:g}", e.time),
+               std::string(word(e.quantity)),
+               e.body >= 0 ? scene.bodies[static_cast<std::size_t>(e.body)].name : "",
+               text(j.value), bound(e), e.value.empty() ? "" : fmt::format("{:.1e}", j.error)});
+  }
+  table.print();
+}
+
+void print_costs(const RunResult& r) {
+  double sum = 0;
+  for (const EffectCost& each : r.costs) sum += each.seconds;
+  fmt::print("cost: {:.3g} s of processor time for {:g} s\n", r.seconds, r.time);
+  Table table({"effect", "s", "share"});
+  for (const EffectCost& each : r.costs)
+    table.add({each.effect, fmt::format("{:.3g}", each.seconds),
+               fmt::format("{:.1f} %", 100 * each.seconds / std::max(sum, 1e-300))});
+  table.print();
+}
+
+void print_files(const RunResult& r) {
+  for (const std::string& file : r.written) fmt::print("written: {}\n", file);
+  for (const std::string& remark : r.remarks) fmt::print(stderr, "{}\n", remark);
+}
+
+int exit_code(const RunResult& r) {
+  if (!r.failure.empty()) return kFailed;
+  return r.met() ? kGood : kNotMet;
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,19 @@
+// Tether: prints what a run gave. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/scene/run.hpp>
+
+namespace tether::scene {
+
+/// Energies, errors and work.
+void print_summary(const Scene& scene, const RunResult& result);
+/// Each [[expect]] with what was found.
+void print_judgements(const Scene& scene, const RunResult& result);
+/// What each effect cost.
+void print_costs(const RunResult& result);
+/// Files that were written, and remarks on those that were not.
+void print_files(const RunResult& result);
+/// kGood, kNotMet or kFailed.
+int exit_code(const RunResult& result);
+
+}  // namespace tether::scene

@@ -1,0 +1,81 @@
+// Tether: `tether run`: moves a scene. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <progress.hpp>
+#include <tether/scene/files.hpp>
+#include <tether/scene/run.hpp>
+
+#include "commands.hpp"
+#include "report_run.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+struct Arguments {
+  std::string file, restart, folder;
+  std::optional<std::string> csv, vtk, svg, state;
+  std::optional<double> end, every;
+  bool quiet = false;
+};
+
+/// What the command line says goes before what the scene says.
+void overlay(const Arguments& arguments, Scene& scene) {
+  Output& o = scene.output;
+  if (arguments.csv) o.csv = *arguments.csv;
+  if (arguments.vtk) o.vtk = *arguments.vtk;
+  if (arguments.svg) o.svg = *arguments.svg;
+  if (arguments.state) o.state = *arguments.state;
+  if (arguments.every) o.every = *arguments.every;
+  if (!arguments.folder.empty())
+    for (std::string* file : {&o.csv, &o.vtk, &o.svg, &o.state})
+      if (!file->empty()) *file = (std::filesystem::path(arguments.folder) / *file).string();
+  if (!arguments.end) return;
+  // Records stay where they were, so that runs in parts make one table.
+  if (o.every == 0) o.every = scene.end / 1000;
+  scene.end = *arguments.end;
+}
+
+int run_scene(const Arguments& arguments) {
+  Scene scene = read_scene(arguments.file);
+  overlay(arguments, scene);
+  tether::Progress bar(1);
+  RunOptions options;
+  options.restart = arguments.restart;
+  bar.start(scene.name, scene.end, 1);
+  if (!arguments.quiet) options.progress = [&](double t) { bar.at(t); };
+  const RunResult result = run(scene, options);
+  bar.hide();
+  print_summary(scene, result);
+  print_judgements(scene, result);
+  print_files(result);
+  return exit_code(result);
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app, int* status) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "run", "Moves a scene, records what its [output] names, and judges it by its [[expect]]");
+  command->add_option("scene", a->file, "Scene file (TOML)")->required();
+  command->add_option("--restart", a->restart,
+                      "Go on from a saved state; the bits are those of a run in one piece");
+  command->add_option("--output", a->folder, "Folder of all files written");
+  command->add_option("--csv", a->csv, "Table: energies, momenta, errors, states of the bodies");
+  command->add_option("--vtk", a->vtk, "Film for ParaView (.pvd, with a folder of .vtp)");
+  command->add_option("--svg", a->svg, "Picture (needs gnuplot)");
+  command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
+  command->add_option("--every", a->every, "Time between records, s")->check(CLI::PositiveNumber);
+  command->add_option("--end", a->end, "End of the run, s")->check(CLI::PositiveNumber);
+  command->add_flag("--quiet", a->quiet, "No progress bar");
+  command->footer(
+      "Exit code: 0 every expectation is met, 1 one is not, 2 the scene, a file or an option is\n"
+      "wrong, 3 the run could not go on. Options go before what the scene says in [output].");
+  command->callback([a, status] { *status = run_scene(*a); });
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,14 @@
+// Tether: runs gnuplot. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+namespace tether::scene {
+
+/// Runs a script that writes `file`; empty on success, else why there is no picture.
+std::string gnuplot(const std::string& script, const std::string& file);
+
+/// What all pictures have in common: terminal, output, axes, colours.
+std::string picture_head(const std::string& file, int width, int height);
+
+}  // namespace tether::scene

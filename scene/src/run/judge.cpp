@@ -1,0 +1,152 @@
+// Tether: holds a run against the expectations of its scene. SPDX-License-Identifier: BSD-3-Clause
+#include "judge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "binary.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::vector<double> list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+/// Largest difference of a component; quaternions stand for the same orientation in both signs.
+double difference(Quantity quantity, const std::vector<double>& a, const std::vector<double>& b) {
+  double same = 0, opposite = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    // Written so that nan stays nan.
+    const double plus = std::abs(a[i] - b[i]), minus = std::abs(a[i] + b[i]);
+    same = plus <= same ? same : plus;
+    opposite = minus <= opposite ? opposite : minus;
+  }
+  return quantity == Quantity::orientation ? std::min(same, opposite) : same;
+}
+
+/// The number that one-sided bounds apply to.
+double size(const std::vector<double>& value) {
+  if (value.size() == 1) return value.front();
+  double square = 0;
+  for (const double x : value) square += x * x;
+  return std::sqrt(square);
+}
+
+}  // namespace
+
+std::vector<double> measure(const Scene& scene, Quantity quantity, int body, const Engine& engine,
+                            double start_energy) {
+  const auto index = static_cast<std::size_t>(std::max(body, 0));
+  const auto state = [&]() -> const BodyState& { return engine.bodies()[index]; };
+  const auto diagnostics = [&] { return engine.diagnostics(); };
+  const auto energy = [&] {
+    const Diagnostics d = engine.diagnostics();
+    return d.kinetic_energy + d.potential_energy;
+  };
+  switch (quantity) {
+    case Quantity::position:
+      return list(state().position);
+    case Quantity::velocity:
+      return list(state().velocity);
+    case Quantity::orientation: {
+      const Eigen::Quaterniond& q = state().orientation;
+      return {q.w(), q.x(), q.y(), q.z()};
+    }
+    case Quantity::angular_velocity:
+      return list(state().angular_velocity);
+    case Quantity::distance_moved:
+      return {(state().position - scene.bodies[index].position).norm()};
+    case Quantity::speed:
+      return {state().velocity.norm()};
+    case Quantity::kinetic_energy:
+      return {diagnostics().kinetic_energy};
+    case Quantity::potential_energy:
+      return {diagnostics().potential_energy};
+    case Quantity::energy:
+      return {energy()};
+    case Quantity::energy_change:
+      return {energy() - start_energy};
+    case Quantity::momentum:
+      return list(diagnostics().momentum);
+    case Quantity::angular_momentum:
+      return list(diagnostics().angular_momentum);
+    case Quantity::drift:
+      return {diagnostics().drift};
+    case Quantity::contacts:
+      return {static_cast<double>(diagnostics().contacts)};
+    case Quantity::penetration:
+      return {diagnostics().penetration};
+    case Quantity::residual:
+      return {diagnostics().residual};
+  }
+  throw std::invalid_argument("unknown quantity");
+}
+
+Judge::Judge(const Scene& scene)
+    : scene_(scene), judgements_(scene.expect.size()), excess_(scene.expect.size(), -kInfinity) {
+  for (std::size_t i = 0; i < scene.expect.size(); ++i)
+    judgements_[i].beyond = scene.expect[i].time > scene.end;
+}
+
+void Judge::look(double event, const Engine& engine, double start_energy) {
+  for (std::size_t i = 0; i < scene_.expect.size(); ++i) {
+    const Expect& expect = scene_.expect[i];
+    const bool now = expect.time == event || (expect.throughout && event < expect.time);
+    if (!now) continue;
+    const std::vector<double> value =
+        measure(scene_, expect.quantity, expect.body, engine, start_energy);
+    double error = 0, excess = -kInfinity;
+    const auto over = [&](double by) { excess = by <= excess ? excess : by; };
+    if (!expect.value.empty()) {
+      error = difference(expect.quantity, value, expect.value);
+      over(error - expect.within);
+    }
+    if (expect.at_most) over(size(value) - *expect.at_most);
+    if (expect.at_least) over(*expect.at_least - size(value));
+
+    Judgement& judgement = judgements_[i];
+    if (!(excess <= excess_[i]) || judgement.value.empty()) {
+      excess_[i] = excess;
+      judgement.time = engine.time();
+      judgement.value = value;
+      judgement.error = error;
+    }
+    if (expect.time == event) judgement.judged = true;
+    judgement.met = judgement.judged && excess_[i] <= 0;
+  }
+}
+
+void Judge::save(std::ostream& out) const {
+  binary::put(out, judgements_.size());
+  for (std::size_t i = 0; i < judgements_.size(); ++i) {
+    const Judgement& j = judgements_[i];
+    binary::put(out, j.judged, j.met, j.time, j.error, excess_[i], j.value.size());
+    for (const double x : j.value) binary::put(out, x);
+  }
+}
+
+void Judge::restore(std::istream& in) {
+  std::size_t count = 0;
+  binary::get(in, count);
+  // A scene may have gained or lost expectations: what was judged is kept only if none has.
+  const bool same = count == judgements_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    Judgement j;
+    double excess = 0;
+    std::size_t size = 0;
+    binary::get(in, j.judged, j.met, j.time, j.error, excess, size);
+    if (size > 4) throw std::runtime_error("the saved state is damaged");
+    j.value.resize(size);
+    for (double& x : j.value) binary::get(in, x);
+    if (!same) continue;
+    j.beyond = judgements_[i].beyond;
+    judgements_[i] = j;
+    excess_[i] = excess;
+  }
+}
+
+}  // namespace tether::scene

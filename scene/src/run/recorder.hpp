@@ -1,0 +1,36 @@
+// Tether: something that records a run. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tether/scene/run.hpp>
+#include <vector>
+
+namespace tether::scene {
+
+/// Where a run goes on from: recorders keep what they wrote up to then and drop what came later.
+struct Resume {
+  bool restarted = false;
+  double time = 0;  // s
+};
+
+class Recorder {
+ public:
+  virtual ~Recorder() = default;
+  virtual void record(const Engine& engine, const Diagnostics& diagnostics) = 0;
+  /// The run is over; says which files there are and what went wrong.
+  virtual void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) = 0;
+};
+
+/// Each may throw std::runtime_error where the file cannot be written.
+std::unique_ptr<Recorder> make_csv_recorder(const Scene& scene, const std::string& file,
+                                            double start_energy, const Resume& resume);
+std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::string& file,
+                                            const Resume& resume);
+std::unique_ptr<Recorder> make_picture_recorder(const Scene& scene, const std::string& file,
+                                                double start_energy);
+
+/// Makes the folder of a file. Throws std::runtime_error.
+void make_folder_of(const std::string& file);
+
+}  // namespace tether::scene

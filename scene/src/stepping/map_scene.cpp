@@ -1,0 +1,131 @@
+// Tether: a scene as bodies, surfaces and meetings of the contact library.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map_scene.hpp"
+
+#include <map>
+#include <stdexcept>
+#include <string>
+
+namespace tether::scene::stepping {
+
+namespace {
+
+contact::ShapeKind kind(ShapeKind k) {
+  switch (k) {
+    case ShapeKind::sphere:
+      return contact::ShapeKind::sphere;
+    case ShapeKind::plane:
+      return contact::ShapeKind::plane;
+    case ShapeKind::box:
+      return contact::ShapeKind::box;
+    case ShapeKind::capsule:
+      return contact::ShapeKind::capsule;
+    case ShapeKind::convex:
+      return contact::ShapeKind::convex;
+    case ShapeKind::points:
+      return contact::ShapeKind::points;
+  }
+  throw std::invalid_argument("unknown kind of shape");
+}
+
+contact::Law law(ContactLaw l) {
+  switch (l) {
+    case ContactLaw::coulomb:
+      return contact::Law::coulomb;
+    case ContactLaw::maximum_dissipation:
+      return contact::Law::maximum_dissipation;
+    case ContactLaw::frictionless:
+      return contact::Law::frictionless;
+  }
+  throw std::invalid_argument("unknown contact law");
+}
+
+contact::Gyroscopic gyroscopic(Gyroscopic g) {
+  switch (g) {
+    case Gyroscopic::none:
+      return contact::Gyroscopic::none;
+    case Gyroscopic::explicit_step:
+      return contact::Gyroscopic::explicit_step;
+    case Gyroscopic::implicit_step:
+      return contact::Gyroscopic::implicit_step;
+    case Gyroscopic::momentum:
+      return contact::Gyroscopic::momentum;
+  }
+  throw std::invalid_argument("unknown gyroscopic step");
+}
+
+void refuse(const Scene& scene) {
+  if (!scene.joints.empty())
+    throw std::invalid_argument(
+        "the stepping engine has no joints yet (the scene has " +
+        std::to_string(scene.joints.size()) +
+        "): leave out the pairs, then the smooth engine takes the joints, or replace the joints by "
+        "springs");
+  for (const Invariant& each : scene.invariants)
+    if (each.project)
+      throw std::invalid_argument(
+          "the stepping engine projects no invariants: give them project = false, or, without "
+          "contacts, use the smooth engine");
+}
+
+// Materials that no pair names get none, so that their bodies have no surfaces at all.
+std::map<std::string, int> materials(const Scene& scene) {
+  std::map<std::string, int> index;
+  for (const Pair& pair : scene.pairs) {
+    index.emplace(pair.first, static_cast<int>(index.size()));
+    index.emplace(pair.second, static_cast<int>(index.size()));
+  }
+  return index;
+}
+
+}  // namespace
+
+Mapped map_scene(const Scene& scene) {
+  refuse(scene);
+  Mapped out;
+  const std::map<std::string, int> material = materials(scene);
+  for (const Body& body : scene.bodies) {
+    const std::string where = "body \"" + body.name + "\": ";
+    int index = 0;
+    try {
+      index = body.fixed ? out.bodies.add_fixed(body.position, body.orientation)
+                         : out.bodies.add(body.mass, body.inertia, body.position, body.orientation,
+                                          body.velocity, body.angular_velocity);
+    } catch (const std::invalid_argument& problem) {
+      throw std::invalid_argument(where + problem.what());
+    }
+    const auto found = material.find(body.material);
+    if (found == material.end()) continue;
+    for (const Shape& shape : body.shapes) {
+      contact::Surface surface;
+      surface.body = index;
+      surface.material = found->second;
+      surface.shape.kind = kind(shape.kind);
+      surface.shape.radius = shape.radius;
+      surface.shape.length = shape.length;
+      surface.shape.size = shape.size;
+      surface.shape.normal = shape.normal;
+      surface.shape.points = shape.points;
+      surface.shape.position = shape.position;
+      surface.shape.orientation = shape.orientation;
+      out.surfaces.push_back(std::move(surface));
+    }
+  }
+  for (const Pair& pair : scene.pairs)
+    out.meetings.push_back(
+        {material.at(pair.first), material.at(pair.second), pair.friction, pair.restitution});
+
+  const SteppingOptions options = scene.stepping.value_or(SteppingOptions{});
+  out.options.step = options.step;
+  out.options.gravity = scene.gravity;
+  out.options.law = law(options.law);
+  out.options.tolerance = options.tolerance;
+  out.options.gyroscopic = gyroscopic(options.gyroscopic);
+  out.options.error_reduction = options.error_reduction;
+  out.options.max_depenetration_speed = options.max_depenetration_speed;
+  out.options.restitution_threshold = options.restitution_threshold;
+  out.options.threads = options.threads;
+  return out;
+}
+
+}  // namespace tether::scene::stepping

@@ -1,0 +1,43 @@
+// Tether: the engine that steps with impulses. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/stepping.hpp>
+#include <tether/scene/engine.hpp>
+#include <vector>
+
+#include "forces.hpp"
+#include "map_scene.hpp"
+
+namespace tether::scene::stepping {
+
+class SteppingEngine final : public Engine {
+ public:
+  explicit SteppingEngine(const Scene& scene);
+
+  const char* name() const override { return "stepping"; }
+  double time() const override { return stepper_.time(); }
+  void advance(double t) override;
+  const std::vector<BodyState>& bodies() const override { return bodies_; }
+  Diagnostics diagnostics() const override;
+  const std::vector<ContactState>& contacts() const override;
+  Counts counts() const override;
+  std::vector<EffectCost> costs() const override;
+  void save(std::ostream& out) override;
+  void restore(std::istream& in) override;
+
+ private:
+  SteppingEngine(const Scene& scene, Mapped mapped);
+  void report_failure() const;
+  void read_bodies();
+
+  std::optional<Eigen::Vector3d> gravity_;
+  std::vector<AttachedSpring> springs_;
+  OnFailure on_failure_;
+  contact::Stepper stepper_;
+  std::uint64_t fingerprint_;  // of the scene, in saved states
+  std::vector<BodyState> bodies_;
+  mutable std::vector<ContactState> contacts_;
+  mutable long contacts_of_ = -1;  // step that contacts_ belongs to
+};
+
+}  // namespace tether::scene::stepping
