@@ -42,6 +42,7 @@ int Projection::Impl::initialize() {
   pending_ = false;
   last_steps_ = last_setups_ = -1;
   if (mover_) mover_->reset();
+  if (smoother_) smoother_->reset();
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
@@ -88,7 +89,15 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
     return 0;
   }
 
-  int flag = SUNNonlinSolSolve(inner_, y_predicted, ycor, weights, tolerance, call_setup, mem);
+  const int flag = correct_and_move(candidate, tolerance, call_setup, mem);
+  if (flag == 0 && smoother_) control_step(candidate);
+  return flag;
+}
+
+int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup,
+                                       void* mem) {
+  int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, candidate.weights,
+                               tolerance, call_setup, mem);
   if (!mover_) return flag;
   if (flag != 0) return corrector_failed(flag);
 
@@ -109,8 +118,8 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (move.status == Status::success && !corrector_was_right_ && !call_setup) {
     // Old factors fooled IDA's convergence test: correct again, with fresh ones.
     ++statistics_.corrections_repeated;
-    N_VConst(0.0, ycor);
-    flag = SUNNonlinSolSolve(inner_, y_predicted, ycor, weights, tolerance, 1, mem);
+    N_VConst(0.0, at.correction);
+    flag = SUNNonlinSolSolve(inner_, at.base, at.correction, at.weights, tolerance, 1, mem);
     if (flag != 0) return corrector_failed(flag);
     cj_at_setup_ = step.cj;
     move = move_and_polish(at, step.cj, tolerance, mem);
@@ -118,6 +127,16 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (stopwatch.running()) move.drift_after = mover_->remaining_drift(at);
   account(move, step, stopwatch.running());
   return finish(move.status, mover_->message());
+}
+
+// |ycor| in the norm of IDA's error test decides the next step size.
+void Projection::Impl::control_step(const Candidate& candidate) {
+  long steps = 0;
+  IDAGetNumSteps(ida_mem_, &steps);
+  const bool suppressed = engaged_ && id_ && has_algebraic_ && options_.suppress_algebraic;
+  smoother_->control(steps, suppressed
+                                ? N_VWrmsNormMask(candidate.correction, candidate.weights, id_)
+                                : N_VWrmsNorm(candidate.correction, candidate.weights));
 }
 
 int Projection::Impl::corrector_failed(int flag) {

@@ -9,6 +9,7 @@
 
 #include "gauss_newton.hpp"
 #include "mover.hpp"
+#include "step_smoothing.hpp"
 
 namespace tether::ida_projection {
 
@@ -84,6 +85,8 @@ class Projection::Impl {
  private:
   class Stopwatch;
   // decorator.cpp: the stages of a projected step
+  int correct_and_move(Candidate& candidate, double tolerance, bool call_setup, void* mem);
+  void control_step(const Candidate& candidate);
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   int corrector_failed(int flag);
@@ -126,6 +129,7 @@ class Projection::Impl {
   bool heard_ = false;  // IDASetMaxNonlinIters reached us
 
   std::unique_ptr<Mover> mover_;
+  std::unique_ptr<StepSmoother> smoother_;
   bool contiguous_ = false;
   int size_ = 0;
   OwnedVector id_, delta_, newton_, saved_, weights_;

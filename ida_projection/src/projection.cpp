@@ -64,6 +64,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
     }
   }
 
+  if (options_.step_smoothing) smoother_ = std::make_unique<StepSmoother>(ida_mem, options_);
+
   inner_ = options_.nonlinear_solver;
   if (inner_ == nullptr) {
     inner_ = SUNNonlinSol_Newton(like, like->sunctx);

@@ -87,6 +87,11 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations, ">= 1");
   require(options.frequency >= 1, "frequency", options.frequency, ">= 1 (every n-th step)");
   require(options.largest_move > 0.0, "largest_move", options.largest_move, "> 0 (tolerances)");
+  require(options.smoothing_setpoint > 0.0 && std::isfinite(options.smoothing_setpoint),
+          "smoothing_setpoint", options.smoothing_setpoint, "> 0");
+  require(options.maximum_step >= 0.0, "maximum_step", options.maximum_step, ">= 0 (0: no limit)");
+  require(options.maximum_order >= 1 && options.maximum_order <= 5, "maximum_order",
+          options.maximum_order, "1 .. 5 (as IDASetMaxOrd)");
   require(options.extra_iterations == 0 || options.extra_iterations == 1, "extra_iterations",
           options.extra_iterations, "0 or 1");
   require(options.progress_interval >= 1, "progress_interval", options.progress_interval, ">= 1");

@@ -53,6 +53,9 @@ TEST_CASE("bad values: the message names the option and the value") {
   check(refusal_of([](O& o) { o.extra_iterations = 2; }), "extra_iterations", "2");
   check(refusal_of([](O& o) { o.extra_iterations = -1; }), "extra_iterations", "-1");
   check(refusal_of([](O& o) { o.progress_interval = 0; }), "progress_interval", "0");
+  check(refusal_of([](O& o) { o.smoothing_setpoint = 0.0; }), "smoothing_setpoint", "0.0");
+  check(refusal_of([](O& o) { o.maximum_step = -0.5; }), "maximum_step", "-0.5");
+  check(refusal_of([](O& o) { o.maximum_order = 6; }), "maximum_order", "6");
   check(refusal_of([](O& o) { o.derive_id_limit = -7; }), "derive_id_limit", "-7");
   check(refusal_of([](O& o) { o.hold = {true, false, false}; }), "hold", "3 entries for 2");
   check(refusal_of([](O& o) { o.group = {0}; }), "group", "1 entries for 2");

@@ -70,6 +70,16 @@ struct Options {
   /// differential variables; without algebraic variables it is done where IDA iterated once. 0 or 1.
   int extra_iterations = 1;
 
+  /// Choose step sizes with Soederlind's filter H211b instead of IDA's rule "keep h until it can be
+  /// doubled": end errors and step counts then vary smoothly with the tolerance. Error estimates are
+  /// steered to 1 / smoothing_setpoint of what the error test allows (> 0; formulas and limits:
+  /// ida_projection/README.md). Owns IDA's IDASetEta... settings and IDASetMaxStep: give the
+  /// longest step here (0: none), and IDASetMaxOrd's order, if it was called.
+  bool step_smoothing = false;
+  double smoothing_setpoint = 4.0;
+  double maximum_step = 0.0;
+  int maximum_order = 5;
+
   /// Components that a move must not change: true = held. Empty, or one entry for each unknown
   /// (serial vectors). For other vectors use `hold_vector`: 1 free, 0 held.
   std::vector<bool> hold;

@@ -1,0 +1,56 @@
+// Tether: smooth step sizes through IDA's public settings. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <tether/ida_projection/options.hpp>
+
+namespace tether::ida_projection {
+
+/// Soederlind's filter H211b (ACM TOMS 29 (2003) 1-26), p = k + 1, k the order:
+///
+///     r_n = (c_n c_{n-1})^(1 / (b p)) rho_{n-1}^(-1/b),   c = 1 / (s err + 1e-4),
+///     h_{n+1} / h_n = rho_n = 1 + atan(r_n - 1),          b = 4,
+///
+/// with err IDA's estimate sigma_k |ycor| and rho_{n-1} the ratio that was really used. IDA raises
+/// its order only after k + 2 steps of one size, so a ratio for every step is asked for at the
+/// largest order only; below it the step is held for k + 2 steps and then changed once, by the
+/// geometric mean of c over them. A rejected step or a new order starts the filter anew.
+class StepSmoother {
+ public:
+  StepSmoother(void* ida_mem, const Options& options);
+
+  void reset();
+  /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
+  /// norm of IDA's error test.
+  void control(long steps, double norm);
+
+ private:
+  static constexpr int kMaximumOrder = 5;
+
+  void attempt_was_accepted();
+  double error_constant(double h, int order) const;
+  double filter(double log_c, int order) const;
+  void hold();
+  void request(double ratio, double h, double own_ratio);
+  void set(double lowest_fixed, double highest_fixed, double largest, double low, double max_step);
+
+  void* ida_mem_;
+  double setpoint_, max_step_;
+  int max_order_;
+
+  // the attempt that IDA has not yet judged
+  bool pending_ = false;
+  double h_ = 0.0, log_c_ = 0.0;
+  int order_ = 0;
+  // accepted steps
+  long steps_ = -1;
+  std::array<double, kMaximumOrder> past_{};  // sizes, the latest first
+  int known_ = 0;
+  double ratio_ = 1.0;     // of the last change of h
+  double previous_ = 0.0;  // log c before the present step or block
+  bool has_previous_ = false;
+  double block_sum_ = 0.0;  // of log c over the steps of one size and order
+  int block_ = 0;
+};
+
+}  // namespace tether::ida_projection
