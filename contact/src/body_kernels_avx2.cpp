@@ -96,6 +96,19 @@ TETHER_AVX2 v4 halves(const double* low, const double* high) {
   return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_load_pd(low)), _mm_load_pd(high), 1);
 }
 
+// Bodies of a group to come.
+template <bool kInertia, class Group>
+TETHER_AVX2 void fetch(const BodyArrays& s, const Group& g) {
+  for (int k = 0; k < 4; ++k) {
+    const int a = g.first[k], b = g.second[k] < 0 ? a : g.second[k];
+    __builtin_prefetch(s.state + a, 1);
+    __builtin_prefetch(s.state + b, 1);
+    if (!kInertia) continue;
+    __builtin_prefetch(s.inertia + a);
+    __builtin_prefetch(s.inertia + b);
+  }
+}
+
 // dw = I^-1 q for four bodies.
 TETHER_AVX2 Vector turn(const BodyInertia* const* I, const Vector& q) {
   v4 xx = load(&I[0]->xx), xy = load(&I[1]->xx), xz = load(&I[2]->xx), yy = load(&I[3]->xx);
@@ -278,10 +291,7 @@ TETHER_AVX2 double pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* 
   v4 sum = all(0);
   for (GeneralGroup* it = begin; it < end; ++it) {
     GeneralGroup& c = *it;
-    for (int k = 0; it + 1 < end && k < 4; ++k) {
-      __builtin_prefetch(s.state + it[1].first[k], 1);
-      __builtin_prefetch(s.state + (it[1].second[k] < 0 ? 0 : it[1].second[k]), 1);
-    }
+    if (it + 2 < end) fetch<true>(s, it[2]);
     Bodies A, B;
     find(s, c, A, B);
     read(A);
@@ -384,10 +394,7 @@ TETHER_AVX2 double pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* en
   const v4 zero = all(0), one = all(1);
   for (SphereGroup* it = begin; it < end; ++it) {
     SphereGroup& c = *it;
-    for (int k = 0; it + 1 < end && k < 4; ++k) {
-      __builtin_prefetch(s.state + it[1].first[k], 1);
-      __builtin_prefetch(s.state + (it[1].second[k] < 0 ? 0 : it[1].second[k]), 1);
-    }
+    if (it + 2 < end) fetch<false>(s, it[2]);
     Bodies A, B;
     find(s, c, A, B);
     read(A);

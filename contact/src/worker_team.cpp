@@ -3,6 +3,19 @@
 
 namespace tether::contact::detail {
 
+void Barrier::wake() {
+  // A sleeper has either seen the new round or waits already: it holds the lock in between.
+  { const std::lock_guard<std::mutex> lock(mutex_); }
+  woken_.notify_all();
+}
+
+void Barrier::sleep(int round) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  sleepers_.fetch_add(1);
+  woken_.wait(lock, [&] { return round_.load() != round; });
+  sleepers_.fetch_sub(1);
+}
+
 WorkerTeam::~WorkerTeam() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);

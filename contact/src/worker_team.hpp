@@ -9,34 +9,40 @@
 
 namespace tether::contact::detail {
 
-// All threads meet; the last one to come lets the others go. Waiting spins for a few microseconds,
-// about the time of a colour, and then lets other processes run.
+// All threads meet; the last one to come lets the others go. Waiting spins for about the time by which
+// the shares of a colour differ, then sleeps: a thread that only yields may share a core with the one
+// that it waits for, while a sleeping one is woken on a core that is free.
 class Barrier {
  public:
   void reset(int threads) { threads_ = threads; }
   void wait() {
     if (threads_ == 1) return;
-    const int round = round_.load(std::memory_order_acquire);
-    if (come_.fetch_add(1, std::memory_order_acq_rel) + 1 == threads_) {
-      come_.store(0, std::memory_order_relaxed);
-      round_.store(round + 1, std::memory_order_release);
+    const int round = round_.load();
+    if (come_.fetch_add(1) + 1 == threads_) {
+      come_.store(0);
+      round_.store(round + 1);
+      if (sleepers_.load() > 0) wake();
       return;
     }
-    for (int spins = 0; round_.load(std::memory_order_acquire) == round; ++spins) {
-      if (spins > 4000) {
-        std::this_thread::yield();
-      } else {
+    for (int spins = 0; spins < 400; ++spins) {
+      if (round_.load(std::memory_order_acquire) != round) return;
 #if defined(__x86_64__) || defined(__i386__)
-        __builtin_ia32_pause();
+      __builtin_ia32_pause();
 #endif
-      }
     }
+    sleep(round);
   }
 
  private:
+  void wake();
+  void sleep(int round);
+
   int threads_ = 1;
   alignas(64) std::atomic<int> come_{0};
   alignas(64) std::atomic<int> round_{0};
+  std::atomic<int> sleepers_{0};
+  std::mutex mutex_;
+  std::condition_variable woken_;
 };
 
 // Threads are started when they are first needed and sleep between runs.
