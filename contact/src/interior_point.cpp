@@ -65,7 +65,8 @@ double mean_diagonal(const LocalBlock& L) { return (L.a + L.T[0] + L.T[2]) / 3; 
 
 void InteriorPoint::reset(int contacts) {
   n_ = contacts;
-  for (Packed* p : {&x_, &u_, &dx_, &du_, &affine_x_, &affine_u_, &r_, &w_, &z_, &swept_}) p->resize(at(n_));
+  for (Packed* p : {&x_, &u_, &dx_, &du_, &affine_x_, &affine_u_, &r_, &w_, &z_, &swept_, &anchor_})
+    p->resize(at(n_));
   scaling_.resize(at(n_));
   flat_.resize(at(n_));
   ordered_ = false;
@@ -74,7 +75,7 @@ void InteriorPoint::reset(int contacts) {
 double InteriorPoint::cost(const Search& search) const {
   const double blocks = static_cast<double>(search.system.problem().blocks().size());
   const double operations = ordered_ ? lu_.operations() : blocks * blocks / std::max(1, n_);
-  return 4 * operations + 3 * search.sweep_cost + 25 * blocks;
+  return 4 * operations + 3 * search.sweep_cost + 25 * blocks + 150.0 * n_;
 }
 
 // The point where everything sticks, A x = b, shifted into the cone; false if it is the solution
@@ -146,6 +147,59 @@ bool InteriorPoint::start(Search& search) {
   return true;
 }
 
+// x and the u that belongs to its velocity, both kept off the cone as far as x.u = nu asks for,
+// nu = near * (mean size of x) * (mean size of u).
+bool InteriorPoint::start_near(Search& search, const PackedVector* start, double near) {
+  System& system = search.system;
+  const Problem& p = system.problem();
+  if (!ordered_) {
+    lu_.order(p);
+    lu_.analyse(p, nullptr);
+    ordered_ = true;
+  }
+  system.velocities(start, w_.data());
+  double x_size = 0, u_size = 0;
+  for (int i = 0; i < n_; ++i) {
+    const double mu = p.local(i).mu;
+    const double* w = w_[at(i)].v;
+    double* x = x_[at(i)].v;
+    double* u = u_[at(i)].v;
+    flat_[at(i)] = system.law() == Law::frictionless || !(mu > 0);
+    if (flat_[at(i)]) {
+      x[0] = std::max(start[i].v[0], 0.0);
+      u[0] = std::max(w[0], 0.0);
+      x[1] = x[2] = u[1] = u[2] = 0;
+    } else {
+      x[0] = mu * start[i].v[0];
+      for (int c = 1; c < 3; ++c) x[c] = start[i].v[c];
+      double gamma[2];
+      system.gamma(i, gamma);
+      const double s = slip(w[1], w[2], gamma[0], gamma[1]);
+      for (int c = 1; c < 3; ++c) u[c] = w[c] + s * gamma[c - 1];
+      // u_n - s(u) = w_n / mu
+      const double v = std::max(w[0], 0.0) / mu, q = 1 - kSmooth, uu = u[1] * u[1] + u[2] * u[2];
+      u[0] = (v + std::sqrt(std::max(0.0, v * v - q * (v * v - q * uu)))) / q;
+    }
+    x[3] = std::max(0.0, x[0] - tangent(x));
+    u[3] = std::max(0.0, u[0] - tangent(u));
+    x_size += tangent(x) + x[3];
+    u_size += tangent(u) + u[3];
+  }
+  if (!(x_size > 0 && u_size > 0)) return false;
+  const double nu = near * (x_size / n_) * (u_size / n_), ratio = u_size / x_size;
+  for (int i = 0; i < n_; ++i) {
+    double* x = x_[at(i)].v;
+    double* u = u_[at(i)].v;
+    const double x0 = x[3] + tangent(x), u0 = u[3] + tangent(u);
+    x[3] = std::max(x[3], nu / (u0 + std::sqrt(nu * ratio)));
+    u[3] = std::max(u[3], nu / (x0 + std::sqrt(nu / ratio)));
+    x[0] = x[3] + tangent(x);
+    u[0] = u[3] + tangent(u);
+  }
+  residual(system);
+  return true;
+}
+
 // r = P^-1 (A x - b) - (u - s (1, gamma)), P = diag(mu, 1, 1)
 void InteriorPoint::residual(const System& system) {
   const Problem& p = system.problem();
@@ -154,6 +208,12 @@ void InteriorPoint::residual(const System& system) {
     z_[at(i)] = {{flat_[at(i)] ? x[0] : x[0] / p.local(i).mu, x[1], x[2], 0}};
   }
   system.velocities(z_.data(), w_.data());
+  if (tau_ > 0) {
+    for (int i = 0; i < n_; ++i) {
+      const double f = tau_ * mean_diagonal(p.local(i));
+      for (int c = 0; c < 3; ++c) w_[at(i)].v[c] += f * (z_[at(i)].v[c] - anchor_[at(i)].v[c]);
+    }
+  }
   for (int i = 0; i < n_; ++i) {
     const double* u = u_[at(i)].v;
     const double* w = w_[at(i)].v;
@@ -225,7 +285,7 @@ bool InteriorPoint::factor(Search& search) {
       PackedBlock block = p.blocks()[at(k)];
       if (i == j) {
         for (int c = 0; c < 12; ++c) block.column[c] += diagonal[c];
-        for (int c = 0; c < 3; ++c) block.column[5 * c] += kProximal * mean_diagonal(p.local(i));
+        for (int c = 0; c < 3; ++c) block.column[5 * c] += std::max(kProximal, tau_) * mean_diagonal(p.local(i));
       }
       // No tangential unknowns where mu = 0.
       if (flat_[at(i)])
@@ -310,8 +370,10 @@ void InteriorPoint::direction(const System& system, double centre, bool correct)
     const double* u = u_[at(i)].v;
     const double* b = p.packed_b()[at(i)].v;
     const double* r = r_[at(i)].v;
-    const double y[3] = {(w_[at(i)].v[0] + b[0]) / mu + r[0], w_[at(i)].v[1] + b[1] + r[1],
-                         w_[at(i)].v[2] + b[2] + r[2]};
+    const double f0 = tau_ * mean_diagonal(p.local(i));
+    const double y[3] = {(w_[at(i)].v[0] + b[0] + f0 * d[0] / mu) / mu + r[0],
+                         w_[at(i)].v[1] + b[1] + f0 * d[1] + r[1],
+                         w_[at(i)].v[2] + b[2] + f0 * d[2] + r[2]};
     double gamma[2];
     system.gamma(i, gamma);
     const double slip = slip_of(u), column[3] = {1, gamma[0], gamma[1]};
@@ -356,37 +418,104 @@ void InteriorPoint::advance(double step) {
   }
 }
 
-void InteriorPoint::run(Search& search, int most) {
-  if (!start(search)) return;
+// Of the (proximal) problem at z, whose velocities residual() has left in w_.
+double InteriorPoint::natural_map(const System& system) const {
+  double sum = 0;
+  for (int i = 0; i < n_; ++i) {
+    const double* z = z_[at(i)].v;
+    const double* w = w_[at(i)].v;
+    double v[3] = {std::max(z[0] - w[0], 0.0), 0, 0};
+    if (!flat_[at(i)]) {
+      double gamma[2];
+      system.gamma(i, gamma);
+      const double mu = system.problem().local(i).mu, s = slip(w[1], w[2], gamma[0], gamma[1]);
+      v[0] = z[0] - w[0] - mu * s;
+      for (int c = 1; c < 3; ++c) v[c] = z[c] - w[c] - s * gamma[c - 1];
+      project_cone(mu, v);
+    }
+    for (int c = 0; c < 3; ++c) sum += (z[c] - v[c]) * (z[c] - v[c]);
+  }
+  return std::sqrt(sum);
+}
+
+double InteriorPoint::follow(Search& search, int most, double target) {
   System& system = search.system;
   const double speed = system.norm_b() / std::sqrt(n_);
   double least = std::numeric_limits<double>::infinity(), least_mean = least;
   int idle = 0;
   for (int iteration = 0; iteration < most; ++iteration) {
     const double mean = complementarity();
-    if (!factor(search)) return;
+    if (!factor(search)) break;
     direction(system, 0, false);
     const double affine = std::min(1.0, longest_step());
     affine_x_ = dx_;
     affine_u_ = du_;
     direction(system, std::max(kLeastCentre, std::pow(1 - affine, 3)) * mean, true);
     const double longest = longest_step();
-    if (!(longest > 1e-8)) return;
+    if (!(longest > 1e-8)) break;
     // Close to the cone only with nearly full steps: blocked ones would spoil the centring.
     const double fraction = longest > 0.9 ? std::max(0.9, 1 - mean / (speed * speed)) : 0.8;
     advance(std::min(1.0, fraction * longest));
     residual(system);
-    double error = search.test(z_.data(), Method::interior_point);
-    swept_ = z_;
-    system.sweep(swept_.data());
-    search.count_sweep();
-    error = std::min(error, search.test(swept_.data(), Method::interior_point));
-    if (search.solved() || search.exhausted()) return;
+    double error;
+    if (tau_ > 0) {
+      error = natural_map(system);
+      if (error <= target) return error;
+    } else {
+      error = search.test(z_.data(), Method::interior_point);
+      swept_ = z_;
+      system.sweep(swept_.data());
+      search.count_sweep();
+      error = std::min(error, search.test(swept_.data(), Method::interior_point));
+      if (search.solved()) return error;
+    }
+    if (search.exhausted()) return error;
     if (error < 0.9 * least || mean < 0.8 * least_mean) {
       least = std::min(least, error);
       least_mean = std::min(least_mean, mean);
       idle = 0;
     } else if (++idle >= 6) {
+      break;
+    }
+  }
+  return least;
+}
+
+void InteriorPoint::run(Search& search, int most) {
+  tau_ = 0;
+  if (start(search)) follow(search, most, 0);
+}
+
+void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most) {
+  System& system = search.system;
+  std::copy(x, x + n_, anchor_.begin());
+  constexpr int kPatience = 600;
+  double tau = 1e-2, near = 1e-4, reference = search.best_error;
+  int since_gain = 0;
+  tau_ = 0;
+  for (int outer = 0; outer < most; ++outer) {
+    // The natural map of the problem itself at the anchor sets the accuracy.
+    if (!start_near(search, anchor_.data(), near)) return;
+    z_ = anchor_;
+    system.velocities(z_.data(), w_.data());
+    const double before = natural_map(system);
+    tau_ = tau;
+    residual(system);
+    const double after = follow(search, 40, 0.1 * before);
+    tau_ = 0;
+    search.test(z_.data(), Method::interior_point);
+    if (search.solved() || search.exhausted()) return;
+    if (after <= 0.5 * before) {
+      anchor_ = z_;
+      tau = std::max(1e-7, 0.5 * tau);
+    } else {
+      tau = std::min(1.0, 3 * tau);
+      near = near < 5e-5 ? 1e-3 : near > 5e-4 ? 1e-4 : 1e-5;  // another way to the same point
+    }
+    if (search.best_error < 0.97 * reference) {
+      reference = search.best_error;
+      since_gain = 0;
+    } else if (++since_gain >= kPatience) {
       return;
     }
   }

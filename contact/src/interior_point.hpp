@@ -12,8 +12,11 @@ namespace tether::contact::detail {
 class InteriorPoint {
  public:
   void reset(int contacts);
-  // A start of its own; at most `most` steps. The result is search.best.
+  // From the point where everything sticks; at most `most` steps. The result is search.best.
   void run(Search& search, int most);
+  // Proximal point iteration from x: each of at most `most` problems A + tau D, b + tau D x, which a
+  // small tau D makes solvable where the path of the problem itself ends, starts near its anchor.
+  void run_proximal(Search& search, const PackedVector* x, int most);
   // Estimated ns of one step.
   double cost(const Search& search) const;
 
@@ -24,6 +27,11 @@ class InteriorPoint {
     double omega[3], root[3], lambda[3], lambda_det, theta, root_theta;
   };
   bool start(Search& search);
+  bool start_near(Search& search, const PackedVector* x, double near);
+  // Steps until nothing is gained or, for a proximal problem, until its natural map is <= target;
+  // returns that map.
+  double follow(Search& search, int most, double target);
+  double natural_map(const System& system) const;
   bool scale(int i);
   bool factor(Search& search);
   void direction(const System& system, double centre, bool correct);
@@ -33,6 +41,7 @@ class InteriorPoint {
   void residual(const System& system);
 
   int n_ = 0;
+  double tau_ = 0;  // of the proximal term, D: mean diagonal of each block
   bool ordered_ = false;
   BlockLu lu_;
   std::vector<Scaling> scaling_;
@@ -40,7 +49,7 @@ class InteriorPoint {
   // x and u in the frame where the cone is its own dual, (mu x_n, x_t) and (u_n / mu, u_t), with
   // their distance from the cone, |.|_n - |.|_t, as fourth component: close to it the difference
   // has lost its digits. r: residual of w(u) = A x - b; z: x as impulses.
-  Packed x_, u_, dx_, du_, affine_x_, affine_u_, r_, w_, z_, swept_;
+  Packed x_, u_, dx_, du_, affine_x_, affine_u_, r_, w_, z_, swept_, anchor_;
 };
 
 }  // namespace tether::contact::detail

@@ -142,6 +142,12 @@ struct MaximumDissipation {
   static Regime near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0, double y1,
                                double* x);
 
+  // Singular block: where b lies in the range, E does not depend on the null direction, and the
+  // admissible point of least |y| that minimises it is taken. (solve() weighs the null direction
+  // with the raised beta; |y| may be so large that this costs energy.) false: not such a case.
+  static bool singular(const LocalBlock& L, double bn, double b0, double b1, double* x,
+                       Regime& regime, int& evaluations);
+
   static void derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
                          Regime regime, LocalDerivative& out);
 };

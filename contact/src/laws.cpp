@@ -65,6 +65,57 @@ Regime MaximumDissipation::near_asymptote(const LocalBlock& L, const LocalRhs& r
   return Regime::sliding;
 }
 
+bool MaximumDissipation::singular(const LocalBlock& L, double bn, double b0, double b1, double* x,
+                                  Regime& regime, int& evaluations) {
+  if (!(bn > 0) || L.mu == 0) return false;
+  const LocalRhs r = to_local(L, bn, b0, b1);
+  const double h[2] = {r.h0, r.h1};
+  const double s = bn * L.inv_a;
+  const double noise = 1e-14 * (std::abs(b0) + std::abs(b1) + (std::abs(L.c[0]) + std::abs(L.c[1])) * s);
+  for (int i = 0; i < 2; ++i)
+    if (L.null[i] && std::abs(h[i]) > noise) return false;
+  double y[2] = {0, 0};
+  if (!(L.null[0] && L.null[1])) {
+    const int j = L.null[0] ? 0 : 1, i = 1 - j;
+    y[i] = h[i] / L.beta[i];
+    const double left = r.k - L.g[i] * y[i];
+    if (std::abs(y[i]) > left) {
+      // On the conic: (1 - g_j^2) y_j^2 + 2 g_j left y_j + y_i^2 - left^2 = 0, left >= g_j y_j.
+      const double A = 1 - L.g[j] * L.g[j], H = L.g[j] * left, C = (y[i] - left) * (y[i] + left);
+      const double D = H * H - A * C;
+      bool found = false;
+      if (D >= 0) {
+        const double q = -(H + std::copysign(std::sqrt(D), H));
+        for (double z : {q / A, C / q}) {
+          if (!std::isfinite(z) || L.g[j] * z > left || (found && std::abs(z) > std::abs(y[j]))) continue;
+          y[j] = z;
+          found = true;
+        }
+      }
+      if (!found) {  // out of reach: on the arc, where the null direction hardly counts
+        LocalBlock weak = L;
+        weak.beta[j] = 1e-4 * L.beta[j];
+        double none = -1;
+        regime = solve(weak, bn, b0, b1, x, none, evaluations);
+        return true;
+      }
+      // Scaled onto the conic: cone and plane hold to round-off.
+      const double length = std::sqrt(y[0] * y[0] + y[1] * y[1]);
+      const double f = 1 / (length + L.g[0] * y[0] + L.g[1] * y[1]);
+      if (f > 0 && std::isfinite(f)) {
+        from_local(L, s * length * f, r.k * y[0] * f, r.k * y[1] * f, x);
+        regime = Regime::sliding;
+        return true;
+      }
+      return false;
+    }
+  }
+  from_local(L, 0, y[0], y[1], x);
+  x[0] = (bn - L.c[0] * x[1] - L.c[1] * x[2]) * L.inv_a;
+  regime = Regime::sticking;
+  return true;
+}
+
 void Coulomb::derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
                          Regime regime, LocalDerivative& out) {
   detail::derivative(L, bn, b0, b1, x, regime, false, out);

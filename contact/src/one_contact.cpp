@@ -66,8 +66,10 @@ LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
     throw std::invalid_argument("contact matrix is not positive semidefinite");
   }
   const double floor = 1e-12 * trace;
-  beta[0] = std::max(beta[0], floor);
-  beta[1] = std::max(beta[1], floor);
+  for (int i = 0; i < 2; ++i) {
+    null[i] = !(beta[i] >= floor);
+    if (null[i]) beta[i] = floor;
+  }
   const double cc = cosine * cosine, ss = sine * sine, cs = cosine * sine;
   T[0] = cc * beta[0] + ss * beta[1] + c[0] * c[0] * inv_a;
   T[1] = cs * (beta[0] - beta[1]) + c[0] * c[1] * inv_a;
@@ -104,6 +106,10 @@ void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, Loc
   s.evaluations = 0;
   switch (law) {
     case Law::maximum_dissipation:
+      if ((block.null[0] || block.null[1]) &&
+          detail::MaximumDissipation::singular(block, b[0], b[1], b[2], s.x, s.regime, s.evaluations)) {
+        return;
+      }
       s.regime = solve_dissipation(block, b.data(), s.x, s.lambda, s.evaluations);
       return;
     case Law::coulomb:

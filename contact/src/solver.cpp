@@ -135,6 +135,12 @@ Status Solver::Implementation::rotate(bool last) {
   prepare_stages(search.system.size());
   sweeps.start(search.best.data());
   double kappa = 1, halved = search.best_error, tenth = search.best_error;
+  bool first = true, regular = true;
+  for (int i = 0; i < search.system.size(); ++i) {
+    double gamma[2];
+    search.system.gamma(i, gamma);
+    regular = regular && std::hypot(gamma[0], gamma[1]) < kStronglyCoupled;
+  }
   int phases = 0, bursts = 4, burst = 500, patience = 0, outers = 12;
   for (;;) {
     detail::AcceleratedSweeps::Leave leave;
@@ -148,7 +154,8 @@ Status Solver::Implementation::rotate(bool last) {
     admm.start(search, search.best.data());
     admm.run(search, 200, true, true);
     if (search.solved()) return Status::solved;
-    interior.run(search, 40);
+    if (first && regular) interior.run(search, 40);
+    first = false;
     if (search.solved()) return Status::solved;
     newton.run(search, search.best.data(), 12);
     if (search.solved()) return Status::solved;
@@ -169,6 +176,8 @@ Status Solver::Implementation::rotate(bool last) {
       admm.run(search, burst, false, false);
       if (search.solved()) return Status::solved;
       newton.run(search, admm.point(), outers);
+      if (search.solved()) return Status::solved;
+      if (regular) interior.run_proximal(search, admm.point(), 3000);
       if (search.solved()) return Status::solved;
       if (search.exhausted()) return Status::work_limit;
       burst = std::min(20000, burst + burst / 2);
@@ -223,10 +232,11 @@ Status Solver::Implementation::automatic() {
   }
   if (replaceable) search.work_end = 0.05 * options.max_work;
   Status status = rotate(!replaceable);
-  search.work_end = options.max_work;
   // First the strongly coupled contacts that do not converge, then all of them, then coupled ones.
   z.resize(x.size());
   for (int attempt = 0; replaceable && attempt < 3 && status != Status::solved; ++attempt) {
+    search.work_end = attempt == 0 ? std::min(search.counts.work + 0.05 * options.max_work, options.max_work)
+                                   : options.max_work;
     if (search.exhausted()) return Status::work_limit;
     if (!replace_contacts(attempt < 2 ? kStronglyCoupled : kCoupled, attempt == 0)) continue;
     x = search.best;

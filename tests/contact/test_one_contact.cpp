@@ -35,7 +35,7 @@ TEST_CASE("maximum dissipation is the least energy in every class") {
     }
     INFO(kind << ": " << failures << " failures, first: " << first);
     CHECK(failures == 0);
-    CHECK(most <= 60);
+    CHECK(most <= 40);
   }
 }
 

@@ -32,7 +32,7 @@ TEST_CASE("every method reaches the same velocities of a small stack") {
     const Solution reference = Solver(with(law, 1e-11)).solve(p);
     REQUIRE(reference.status == Status::solved);
     for (Method method : {Method::gauss_seidel, Method::sor, Method::jacobi, Method::anderson,
-                          Method::admm, Method::proximal_newton}) {
+                          Method::admm, Method::proximal_newton, Method::interior_point}) {
       Options o = with(law, 1e-9, method);
       if (method == Method::sor) o.relaxation = 1.3;
       const Solution s = Solver(o).solve(p);
@@ -195,19 +195,24 @@ TEST_CASE("a wedge that slides without friction") {
 }
 
 TEST_CASE("high mass ratios") {
-  for (int n : {2, 5, 10, 20}) {
-    for (double ratio : {1.0, 100.0, 1000.0}) {
-      for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
-        Options o = with(law);
-        o.max_work = 3e8;
-        const Solution s = Solver(o).solve(random::stack(n, ratio).problem());
-        INFO(n << " boxes, ratio " << ratio << ", " << name(law) << ": " << name(s.status) << " " << s.error);
-        if (n == 20 && ratio == 1000) {  // open: honest, whatever the end
-          CHECK((s.status == Status::solved) == (s.error <= o.tolerance));
-        } else {
-          CHECK(s.status == Status::solved);
+  // push: at rest; a lean; every box with another velocity and spin.
+  for (int push : {0, 1, 2}) {
+    for (int n : {2, 5, 10, 20}) {
+      for (double ratio : {1.0, 100.0, 1000.0, 1e4}) {
+        random::Assembly a = random::stack(n, ratio);
+        for (int i = 0; i < n; ++i) {
+          Vector6d& v = a.bodies[static_cast<std::size_t>(i)].velocity;
+          if (push == 1) v[0] = 0.02 * (i + 1) / n, v[3] = 0.01 * i / n;
+          if (push == 2) v[0] = 0.2 * (7 * i % 5), v[5] = 0.3 * (3 * i % 4);
         }
-        CHECK(s.replaced.empty());
+        for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
+          const Solution s = Solver(with(law)).solve(a.problem());
+          INFO(n << " boxes, ratio " << ratio << ", push " << push << ", " << name(law) << ": " << name(s.status)
+                 << " " << s.error);
+          CHECK(s.status == Status::solved);
+          CHECK(s.counts.work < 2e7);  // 20 ms
+          CHECK(s.replaced.empty());
+        }
       }
     }
   }
@@ -215,6 +220,7 @@ TEST_CASE("high mass ratios") {
     const Solution s = Solver(with(Law::coulomb)).solve(random::stack(2, ratio).problem());
     INFO("ratio " << ratio << ": " << name(s.status) << " " << s.error);
     CHECK(s.status == Status::solved);
+    CHECK(s.counts.work < 1e5);  // 0.1 ms
   }
 }
 
@@ -301,7 +307,7 @@ TEST_CASE("random clusters: honest statuses, hardly any failure with defaults") 
     }
   }
   INFO(unsolved << " of " << total);
-  CHECK(unsolved <= 0.03 * total);
+  CHECK(unsolved <= 0.015 * total);
 }
 
 TEST_CASE("a slightly unsymmetric matrix is solved as it is given") {

@@ -25,13 +25,15 @@ const char* name(Regime regime);
 
 /// Factors of one symmetric 3x3 block A = [a c'; c T] and its friction coefficient, in the frame in
 /// which B = T - c c'/a is diagonal: B = V diag(beta) V', g = V' mu c / a, e = |g| (eccentricity of
-/// the conic section). beta is kept >= 1e-12 trace(A), which makes singular blocks solvable.
+/// the conic section). beta is kept >= 1e-12 trace(A), which makes singular blocks solvable; a null
+/// direction is marked.
 struct LocalBlock {
   double a, inv_a, mu, e;
   double c[2], g[2], beta[2], cosine, sine;
   double T[3];  ///< T00, T01, T11, with the raised beta
   /// e <= 2 sqrt(q) / (1 + q), q = beta_min / beta_max: the Coulomb law has one solution (README).
   bool unique;
+  bool null[2];  ///< beta was below 1e-12 trace(A)
 
   LocalBlock() = default;
   /// Uses (A + A')/2. Throws std::invalid_argument unless A is finite, A_nn > 0, the matrix is
