@@ -6,4 +6,6 @@
 #include <tether/contact/evaluate.hpp>
 #include <tether/contact/one_contact.hpp>
 #include <tether/contact/problem.hpp>
+#include <tether/contact/shapes.hpp>
 #include <tether/contact/solver.hpp>
+#include <tether/contact/stepping.hpp>

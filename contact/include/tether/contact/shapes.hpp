@@ -1,0 +1,73 @@
+// Tether: shapes of rigid bodies, and where they touch. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+namespace tether::contact {
+
+enum class ShapeKind : std::uint8_t { sphere, plane, box, capsule, convex, points };
+
+const char* name(ShapeKind kind);
+
+/// In the axes of its body, moved by `position` and turned by `orientation`.
+struct Shape {
+  ShapeKind kind = ShapeKind::sphere;
+  double radius = 0;  ///< sphere, capsule: m
+  double length = 0;  ///< capsule: between the centres of its caps (axis z), m
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box: full edges, m
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the half-space
+  std::vector<Eigen::Vector3d> points;                ///< convex: vertices; points: touching points
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+
+  static Shape sphere(double radius);
+  static Shape plane(const Eigen::Vector3d& normal);
+  static Shape box(const Eigen::Vector3d& size);
+  static Shape capsule(double radius, double length);
+  static Shape convex(std::vector<Eigen::Vector3d> vertices);
+  static Shape touching_points(std::vector<Eigen::Vector3d> points);
+};
+
+/// World position and orientation of a shape.
+struct Pose {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+};
+
+/// One point at which two shapes are near. World coordinates.
+struct NearPoint {
+  Eigen::Vector3d on_first, on_second;
+  Eigen::Vector3d normal;     ///< unit, from second to first
+  double gap = 0;             ///< along the normal; < 0: penetration
+  std::uint16_t feature = 0;  ///< the same from step to step while the same features touch
+};
+
+/// Storage for the points of one pair. Further points are left out.
+struct NearPoints {
+  static constexpr int kMost = 64;
+  NearPoint point[kMost];
+  int count = 0;
+  void add(const Eigen::Vector3d& on_first, const Eigen::Vector3d& on_second,
+           const Eigen::Vector3d& normal, double gap, int feature) {
+    if (count < kMost)
+      point[count++] = {on_first, on_second, normal, gap, static_cast<std::uint16_t>(feature)};
+  }
+};
+
+/// Collision of shapes that the contact library does not treat by itself (box or convex against
+/// box, convex, capsule; sphere against convex): see polyhedra.hpp of contact_collision.
+class PairCollision {
+ public:
+  virtual ~PairCollision() = default;
+  virtual bool serves(ShapeKind first, ShapeKind second) const = 0;
+  /// Called once for each surface that may take part in such a pair, ascending.
+  virtual void add(int surface, const Shape& shape) = 0;
+  /// All points with a gap below `margin`.
+  virtual void collide(int first, const Pose& first_pose, int second, const Pose& second_pose,
+                       double margin, NearPoints& out) = 0;
+};
+
+}  // namespace tether::contact

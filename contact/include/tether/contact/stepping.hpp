@@ -1,0 +1,158 @@
+// Tether: rigid bodies in motion, by impulses and velocities. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tether/contact/body_solver.hpp>
+#include <tether/contact/shapes.hpp>
+#include <vector>
+
+namespace tether::contact {
+
+/// How the angular velocity of a body without torque changes (README, section 12). Spheres skip it.
+enum class Gyroscopic : std::uint8_t {
+  none,           ///< not at all: keeps energy, never flips
+  explicit_step,  ///< w += -dt I^-1 (w x I w)
+  implicit_step,  ///< one Newton step of the implicit equation in body axes
+  momentum        ///< keeps angular momentum and energy to round-off
+};
+
+const char* name(Gyroscopic gyroscopic);
+
+/// Bodies as contiguous data; index i everywhere is body i. World axes but for `inertia`.
+struct BodySet {
+  std::vector<Eigen::Vector3d> position;        ///< of the centre of mass, m
+  std::vector<Eigen::Quaterniond> orientation;  ///< unit; body to world
+  std::vector<RigidBody> motion;  ///< velocities, inverse mass, inverse inertia in world axes
+  std::vector<double> mass;       ///< kg; 0: fixed
+  std::vector<Eigen::Matrix3d> inertia;          ///< about the centre, body axes, kg m^2
+  std::vector<Eigen::Matrix3d> inverse_inertia;  ///< body axes
+
+  int size() const { return static_cast<int>(position.size()); }
+  /// Returns the index. Throws std::invalid_argument unless mass and inertia are positive
+  /// (definite) and all values finite.
+  int add(double body_mass, const Eigen::Matrix3d& body_inertia, const Eigen::Vector3d& at,
+          const Eigen::Quaterniond& turned = Eigen::Quaterniond::Identity(),
+          const Eigen::Vector3d& velocity = Eigen::Vector3d::Zero(),
+          const Eigen::Vector3d& angular_velocity = Eigen::Vector3d::Zero());
+  int add_fixed(const Eigen::Vector3d& at,
+                const Eigen::Quaterniond& turned = Eigen::Quaterniond::Identity());
+};
+
+/// A shape on a body, of a material.
+struct Surface {
+  int body = 0;
+  Shape shape;
+  int material = 0;
+};
+
+/// How two materials meet. Materials that no Meeting names pass through each other.
+struct Meeting {
+  int first = 0, second = 0;
+  double friction = 0;
+  double restitution = 0;  ///< 0 .. 1
+};
+
+/// Velocities changed by forces during a step of length dt that starts at `time`.
+using Force = std::function<void(BodySet& bodies, double time, double dt)>;
+
+struct SteppingOptions {
+  double step = 1e-3;                      ///< dt, s
+  std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: not evaluated
+  Law law = Law::coulomb;
+  /// Of the contact problem; see BodyOptions::tolerance.
+  double tolerance = 1e-9;
+  Gyroscopic gyroscopic = Gyroscopic::momentum;
+  /// A penetration of depth d is reduced by the speed min(error_reduction d / dt,
+  /// max_depenetration_speed). That speed moves bodies but is no velocity of theirs: it enters no
+  /// energy. 0: penetrations stay.
+  double error_reduction = 0.2;
+  double max_depenetration_speed = 1;   ///< m/s
+  double restitution_threshold = 0.01;  ///< m/s: slower approaches do not bounce
+  /// Points closer than this part of the size of the smaller shape, beyond what the velocities
+  /// cover within the step, are contacts.
+  double near_part = 1e-3;
+  int max_sweeps = 1000;  ///< see BodyOptions
+  int max_assembled = 1000;
+  double max_work = 5e9;
+  int threads = 1;
+};
+
+/// Contacts of the last step, side by side.
+struct StepContacts {
+  std::vector<PointContact> points;       ///< id: see contact_id
+  std::vector<double> gaps;               ///< m, at the start of the step
+  std::vector<Eigen::Vector3d> impulses;  ///< on `first`, world axes, N s
+};
+
+/// Identity of a contact: surfaces (ascending) and feature.
+constexpr std::uint64_t contact_id(int first_surface, int second_surface, int feature) {
+  return (static_cast<std::uint64_t>(first_surface) << 40) |
+         (static_cast<std::uint64_t>(second_surface) << 16) | static_cast<std::uint64_t>(feature);
+}
+
+struct StepCounts {
+  long steps = 0, contact_problems = 0, sweeps = 0, unsolved = 0, assembled_islands = 0,
+       bounces = 0;
+};
+
+struct StageCost {
+  const char* effect;
+  double seconds;
+};
+
+/// Advances a set of bodies by steps of fixed length (README, section 12):
+///
+///     v* = v + dt M^-1 f,   v+ = v* + M^-1 J' x,   x+ = x + dt v+,   q+ = exp(dt w / 2) q
+///
+/// with impulses x of the contact problem w = J v+ + bias, bias_n = gap / dt for gaps >= 0.
+/// What is not asked for is not in the list of stages that a step runs through: no gravity, no
+/// force, no meeting of materials, no friction, no restitution, no gyroscopic term.
+///
+/// Nothing is allocated once all storage has grown, unless an island has to be assembled
+/// (BodyOptions::max_assembled). Not for use by two threads at once.
+class Stepper {
+ public:
+  /// Throws std::invalid_argument on indices that do not exist, values outside their range, planes
+  /// on bodies that move, and pairs of shapes that nobody serves (`polyhedra` absent).
+  Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
+          const SteppingOptions& options, std::unique_ptr<PairCollision> polyhedra = nullptr);
+  ~Stepper();
+  Stepper(Stepper&&) noexcept;
+  Stepper& operator=(Stepper&&) noexcept;
+
+  /// Forces act in the order in which they were added, after gravity. `effect` must outlive this.
+  void add_force(const char* effect, Force force);
+
+  void step();
+
+  double time() const;  ///< steps * dt
+  const BodySet& bodies() const;
+  BodySet& bodies();  ///< to set positions and velocities between steps
+  const StepContacts& contacts() const;
+  double penetration() const;  ///< deepest at the start of the last step, m
+  double residual() const;     ///< of its contact problem
+  /// Of its contact problem; solved if there were no contacts.
+  Status status() const;
+  const StepCounts& counts() const;
+  std::vector<StageCost> costs() const;
+  const SteppingOptions& options() const;
+
+  /// To go on from a saved state: forgets what warm starts remember, sets the number of steps.
+  void start_anew(long steps);
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+double kinetic_energy(const BodySet& bodies);
+Eigen::Vector3d momentum(const BodySet& bodies);
+Eigen::Vector3d angular_momentum(const BodySet& bodies);  ///< about the origin
+
+}  // namespace tether::contact

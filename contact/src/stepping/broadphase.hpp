@@ -1,0 +1,61 @@
+// Tether: which balls are near each other. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace tether::contact::detail {
+
+/// Balls around shapes, as a sorted uniform grid. The cell is as wide as the largest ball of the
+/// common size; the few that are much larger are compared with all others.
+class Broadphase {
+ public:
+  /// Visits each pair of balls that overlap once, in an order that depends on positions only.
+  /// `still` marks balls of bodies that do not move: two of them are no pair.
+  template <class Visit>
+  void pairs(const std::vector<Eigen::Vector3d>& centre, const std::vector<double>& radius,
+             const std::vector<char>& still, const Visit& visit) {
+    build(centre, radius);
+    const auto meet = [&](int a, int b) {
+      const double sum = radius[static_cast<std::size_t>(a)] + radius[static_cast<std::size_t>(b)];
+      if ((centre[static_cast<std::size_t>(a)] - centre[static_cast<std::size_t>(b)])
+                  .squaredNorm() < sum * sum &&
+          !(still[static_cast<std::size_t>(a)] && still[static_cast<std::size_t>(b)]))
+        a < b ? visit(a, b) : visit(b, a);
+    };
+    for (std::size_t k = 0; k < large_.size(); ++k) {
+      for (std::size_t l = k + 1; l < large_.size(); ++l) meet(large_[k], large_[l]);
+      for (const Cell& c : cells_) meet(large_[k], c.ball);
+    }
+    // Half of the neighbours: the rest of the own column of cells and four other columns. Keys
+    // ascend, so each column's window only moves on.
+    constexpr std::uint64_t kX = std::uint64_t{1} << 42, kY = std::uint64_t{1} << 21;
+    const std::uint64_t column[4] = {kY, kX - kY, kX, kX + kY};
+    std::size_t window[4] = {0, 0, 0, 0};
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const std::uint64_t key = cells_[i].key;
+      for (std::size_t j = i + 1; j < cells_.size() && cells_[j].key <= key + 1; ++j)
+        meet(cells_[i].ball, cells_[j].ball);
+      for (int c = 0; c < 4; ++c) {
+        std::size_t& w = window[c];
+        while (w < cells_.size() && cells_[w].key < key + column[c] - 1) ++w;
+        for (std::size_t j = w; j < cells_.size() && cells_[j].key <= key + column[c] + 1; ++j)
+          meet(cells_[i].ball, cells_[j].ball);
+      }
+    }
+  }
+
+ private:
+  struct Cell {
+    std::uint64_t key;  // x, y, z of the cell, 21 bits each
+    int ball;
+  };
+  void build(const std::vector<Eigen::Vector3d>& centre, const std::vector<double>& radius);
+
+  std::vector<Cell> cells_;
+  std::vector<int> large_;
+  std::vector<double> sorted_;
+};
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,181 @@
+// Tether: contacts of a set of bodies. SPDX-License-Identifier: BSD-3-Clause
+#include "near_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "collide.hpp"
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; }
+
+}  // namespace
+
+NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
+                           std::vector<Meeting> meetings, Law law, double near_part,
+                           std::unique_ptr<PairCollision> polyhedra)
+    : surfaces_(std::move(surfaces)),
+      meetings_(std::move(meetings)),
+      law_(law),
+      near_part_(near_part),
+      polyhedra_(std::move(polyhedra)) {
+  if (surfaces_.size() >= (1u << 24))
+    throw std::invalid_argument("more than 16777215 surfaces");  // contact_id has 24 bits
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+    const Surface& s = surfaces_[k];
+    const std::string where = "surface " + std::to_string(k) + ": ";
+    if (s.body < 0 || s.body >= bodies.size())
+      throw std::invalid_argument(where + "names a body that does not exist");
+    if (s.material < 0) throw std::invalid_argument(where + "material must be >= 0");
+    check(s.shape);
+    const bool plane = s.shape.kind == ShapeKind::plane;
+    if (plane && moves(bodies, s.body))
+      throw std::invalid_argument(where + "a plane belongs to a fixed body");
+    (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
+    materials_ = std::max(materials_, s.material + 1);
+  }
+  for (const Meeting& m : meetings_) {
+    if (m.first < 0 || m.second < 0 || !(m.friction >= 0) || !std::isfinite(m.friction) ||
+        !(m.restitution >= 0 && m.restitution <= 1))
+      throw std::invalid_argument(
+          "meeting: materials must be >= 0, friction >= 0 and finite, restitution 0 .. 1");
+    materials_ = std::max({materials_, m.first + 1, m.second + 1});
+  }
+  table_.assign(at(materials_) * at(materials_), -1);
+  for (std::size_t k = 0; k < meetings_.size(); ++k) {
+    const Meeting& m = meetings_[k];
+    table_[at(m.first * materials_ + m.second)] = static_cast<int>(k);
+    table_[at(m.second * materials_ + m.first)] = static_cast<int>(k);
+  }
+
+  // Kinds by material, of bodies that move and of all: who may meet, and who serves it.
+  std::set<std::pair<int, ShapeKind>> kinds, moving_kinds;
+  for (const Surface& s : surfaces_) {
+    kinds.insert({s.material, s.shape.kind});
+    if (moves(bodies, s.body)) moving_kinds.insert({s.material, s.shape.kind});
+  }
+  std::set<std::pair<int, ShapeKind>> foreign;
+  for (const auto& a : moving_kinds)
+    for (const auto& b : kinds) {
+      if (table_[at(a.first * materials_ + b.first)] < 0) continue;
+      if (has_own_collision(a.second, b.second)) continue;
+      // One body alone meets nobody of its own kind.
+      if (a == b && std::count_if(surfaces_.begin(), surfaces_.end(), [&](const Surface& s) {
+                      return s.material == a.first && s.shape.kind == a.second;
+                    }) < 2)
+        continue;
+      if (!polyhedra_ || !polyhedra_->serves(a.second, b.second))
+        throw std::invalid_argument(
+            std::string("contact of ") + name(a.second) + " and " + name(b.second) +
+            (polyhedra_ ? " is not supported"
+                        : " needs the collision of polyhedra (target tether_contact_collision, "
+                          "built where Bullet is installed: Debian libbullet-dev)"));
+      foreign.insert(a);
+      foreign.insert(b);
+    }
+  if (polyhedra_)
+    for (std::size_t k = 0; k < surfaces_.size(); ++k)
+      if (foreign.count({surfaces_[k].material, surfaces_[k].shape.kind}) > 0)
+        polyhedra_->add(static_cast<int>(k), surfaces_[k].shape);
+
+  pose_.resize(surfaces_.size());
+  reach_.resize(bounded_.size());
+  centre_.resize(bounded_.size());
+  ball_.resize(bounded_.size());
+  still_.resize(bounded_.size());
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    const Surface& s = surface(bounded_[k]);
+    reach_[k] = reach(s.shape);
+    still_[k] = !moves(bodies, s.body);
+  }
+}
+
+int NearContacts::meeting_of(int a, int b) const {
+  return table_[at(surface(a).material * materials_ + surface(b).material)];
+}
+
+const Meeting& NearContacts::meeting(const PointContact& c) const {
+  const int a = static_cast<int>(c.id >> 40), b = static_cast<int>(c.id >> 16 & 0xffffff);
+  return meetings_[at(meeting_of(a, b))];
+}
+
+bool NearContacts::any_restitution() const {
+  return std::any_of(meetings_.begin(), meetings_.end(),
+                     [](const Meeting& m) { return m.restitution > 0; });
+}
+
+void NearContacts::place(const BodySet& bodies, double dt) {
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+    const Surface& s = surfaces_[k];
+    const Eigen::Quaterniond& q = bodies.orientation[at(s.body)];
+    pose_[k].position = bodies.position[at(s.body)];
+    if (!s.shape.position.isZero(0)) pose_[k].position += q * s.shape.position;
+    if (s.shape.kind != ShapeKind::sphere)
+      pose_[k].rotation = (q * s.shape.orientation).toRotationMatrix();
+  }
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    const Surface& s = surface(bounded_[k]);
+    const RigidBody& b = bodies.motion[at(s.body)];
+    const double arm = reach_[k] + s.shape.position.norm();
+    centre_[k] = pose_[at(bounded_[k])].position;
+    ball_[k] = reach_[k] + near_part_ * reach_[k] +
+               dt * (b.velocity.norm() + arm * b.angular_velocity.norm());
+  }
+}
+
+void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) {
+  const int i = bounded_[at(a)];
+  // b < 0: plane ~b.
+  const int j = b < 0 ? planes_[at(~b)] : bounded_[at(b)];
+  const Surface &s = surface(i), &t = surface(j);
+  if (s.body == t.body) return;
+  const int m = meeting_of(i, j);
+  if (m < 0) return;
+  double margin = ball_[at(a)] - reach_[at(a)];
+  if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
+  near_.count = 0;
+  if (has_own_collision(s.shape.kind, t.shape.kind))
+    collide(s.shape, pose_[at(i)], t.shape, pose_[at(j)], margin, near_);
+  else
+    polyhedra_->collide(i, pose_[at(i)], j, pose_[at(j)], margin, near_);
+  for (int k = 0; k < near_.count; ++k) {
+    const NearPoint& p = near_.point[k];
+    PointContact c;
+    c.first = s.body;
+    c.second = t.body;
+    c.r1 = p.on_first - bodies.position[at(s.body)];
+    c.r2 = p.on_second - bodies.position[at(t.body)];
+    c.normal = p.normal;
+    c.mu = law_ == Law::frictionless ? 0 : meetings_[at(m)].friction;
+    c.id = contact_id(i, j, p.feature);
+    out.points.push_back(c);
+    out.gaps.push_back(p.gap);
+  }
+}
+
+void NearContacts::find(const BodySet& bodies, double dt, StepContacts& out) {
+  out.points.clear();
+  out.gaps.clear();
+  place(bodies, dt);
+  for (int p = 0; p < static_cast<int>(planes_.size()); ++p) {
+    const Pose& plane = pose_[at(planes_[at(p)])];
+    const Vector3d n = plane.rotation * surface(planes_[at(p)]).shape.normal;
+    for (int k = 0; k < static_cast<int>(bounded_.size()); ++k)
+      if (!still_[at(k)] && n.dot(centre_[at(k)] - plane.position) < ball_[at(k)])
+        pair(bodies, k, ~p, out);
+  }
+  broadphase_.pairs(centre_, ball_, still_, [&](int a, int b) { pair(bodies, a, b, out); });
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,49 @@
+// Tether: contacts of a set of bodies. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "broadphase.hpp"
+
+namespace tether::contact::detail {
+
+/// Finds the points at which bodies are or, by their velocities, may come into contact in a step.
+class NearContacts {
+ public:
+  /// Throws std::invalid_argument; see Stepper.
+  NearContacts(const BodySet& bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
+               Law law, double near_part, std::unique_ptr<PairCollision> polyhedra);
+
+  /// Fills points and gaps.
+  void find(const BodySet& bodies, double dt, StepContacts& out);
+
+  const Surface& surface(int k) const { return surfaces_[static_cast<std::size_t>(k)]; }
+  const Meeting& meeting(const PointContact& c) const;
+  bool any_restitution() const;
+
+ private:
+  int meeting_of(int a, int b) const;
+  void place(const BodySet& bodies, double dt);
+  void pair(const BodySet& bodies, int a, int b, StepContacts& out);
+
+  std::vector<Surface> surfaces_;
+  std::vector<Meeting> meetings_;
+  std::vector<int> table_;  // of two materials: index in meetings_, -1: pass through each other
+  int materials_ = 0;
+  Law law_;
+  double near_part_;
+  std::unique_ptr<PairCollision> polyhedra_;
+  Broadphase broadphase_;
+  std::vector<int> planes_, bounded_;  // surfaces
+  // For each surface: its pose; for each bounded one: reach with and without what it may move.
+  std::vector<Pose> pose_;
+  std::vector<double> reach_;
+  std::vector<Eigen::Vector3d> centre_;
+  std::vector<double> ball_;
+  std::vector<char> still_;
+  NearPoints near_;
+};
+
+}  // namespace tether::contact::detail
