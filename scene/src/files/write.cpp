@@ -12,11 +12,16 @@ namespace {
 
 using Eigen::Vector3d;
 
-// fmt prints the shortest digits that give the same number again.
-std::string toml(double x) { return fmt::format("{}", x); }
+// fmt prints the shortest digits that give the same number again; "-0" would be an integer.
+std::string toml(double x) { return x == 0 && std::signbit(x) ? "-0.0" : fmt::format("{}", x); }
+std::string toml(const std::vector<double>& numbers) {
+  std::string out = "[";
+  for (const double x : numbers) out += (out.size() > 1 ? ", " : "") + toml(x);
+  return out + "]";
+}
 std::string toml(bool x) { return x ? "true" : "false"; }
 std::string toml(int x) { return fmt::format("{}", x); }
-std::string toml(const Vector3d& v) { return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z()); }
+std::string toml(const Vector3d& v) { return toml(std::vector<double>{v.x(), v.y(), v.z()}); }
 std::string toml(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -32,7 +37,7 @@ std::string toml(std::string_view text) {
 }
 std::string toml(const std::string& text) { return toml(std::string_view(text)); }
 std::string toml(const Eigen::Quaterniond& q) {
-  return fmt::format("{{ wxyz = [{}, {}, {}, {}] }}", q.w(), q.x(), q.y(), q.z());
+  return fmt::format("{{ wxyz = {} }}", toml(std::vector<double>{q.w(), q.x(), q.y(), q.z()}));
 }
 std::string toml(const std::vector<Vector3d>& points) {
   std::string out = "[";
@@ -121,8 +126,7 @@ void write_body(const Body& body, Writer& out) {
   out.field("mass", body.mass, "kg");
   if (!massless || body.mass > 0)
     out.raw("inertia",
-            fmt::format("[{}, {}, {}, {}, {}, {}]", J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2),
-                        J(1, 2)),
+            toml(std::vector<double>{J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2)}),
             "xx, yy, zz, xy, xz, yz; kg m^2, body axes");
   out.field("position", body.position, "m");
   out.field("orientation", body.orientation);
@@ -131,7 +135,8 @@ void write_body(const Body& body, Writer& out) {
   if (!body.material.empty()) out.field("material", body.material);
   if (body.drag)
     out.raw("drag", fmt::format("{{ linear = {}, quadratic = {}, rotational = {} }}",
-                                body.drag->linear, body.drag->quadratic, body.drag->rotational));
+                                toml(body.drag->linear), toml(body.drag->quadratic),
+                                toml(body.drag->rotational)));
 }
 
 /// Names of bodies for joints and springs.
@@ -160,7 +165,7 @@ void write_joint(const Scene& scene, const Joint& joint, Writer& out) {
   const char* const unit = turns ? "_rad" : "";
   out.raw("motion",
           fmt::format("{{ rate{} = {}, amplitude{} = {}, frequency = {}, phase_rad = {} }}", unit,
-                      m.rate, unit, m.amplitude, m.frequency, m.phase));
+                      toml(m.rate), unit, toml(m.amplitude), toml(m.frequency), toml(m.phase)));
 }
 
 void write_spring(const Scene& scene, const Spring& spring, Writer& out) {
@@ -211,7 +216,7 @@ void write_expect(const Scene& scene, const Expect& e, Writer& out) {
   out.raw("quantity", toml_word(e.quantity));
   if (e.body >= 0) out.field("body", scene.bodies[static_cast<std::size_t>(e.body)].name);
   if (e.value.size() == 1) out.field("value", e.value.front());
-  if (e.value.size() > 1) out.raw("value", fmt::format("[{}]", fmt::join(e.value, ", ")));
+  if (e.value.size() > 1) out.field("value", e.value);
   if (!e.value.empty()) out.field("within", e.within);
   if (e.at_most) out.field("at_most", *e.at_most);
   if (e.at_least) out.field("at_least", *e.at_least);

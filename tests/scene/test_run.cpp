@@ -1,0 +1,243 @@
+// Runs: expectations, files, restarts, effects of no strength. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+#include <tether/scene/cost.hpp>
+#include <tether/scene/files.hpp>
+#include <tether/scene/plan.hpp>
+#include <tether/scene/run.hpp>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "texts.hpp"
+
+using namespace tether::scene;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A swinging rod on a hinge, with more text.
+std::string rod(const std::string& more) {
+  return R"([scene]
+name = "rod"
+end = 0.5
+gravity = [0, 0, -9.81]
+[smooth]
+tolerance = 1e-7
+[[body]]
+name = "rod"
+shape = "box"
+size = [1, 0.1, 0.1]
+mass = 1
+position = [0.5, 0, 0]
+[[joint]]
+kind = "hinge"
+bodies = ["rod", "world"]
+at = [0, 0, 0]
+axis = [0, 1, 0]
+)" + more;
+}
+
+/// A block that slides on a table, with more text.
+std::string block(const std::string& more, const std::string& pair = "friction = 0.3\n") {
+  return R"([scene]
+name = "block"
+end = 0.5
+gravity = [0, 0, -9.81]
+[stepping]
+step = 2e-3
+[[body]]
+name = "table"
+shape = "plane"
+fixed = true
+material = "wood"
+[[pair]]
+between = ["steel", "wood"]
+)" + pair +
+         R"(
+[[body]]
+name = "block"
+shape = "box"
+size = [0.4, 0.3, 0.1]
+mass = 2
+position = [0, 0, 0.05]
+velocity = [1, 0.5, 0]
+material = "steel"
+)" + more;
+}
+
+std::string content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+/// A folder of this test's own, empty.
+fs::path folder(const std::string& name) {
+  const fs::path path = fs::temp_directory_path() / ("tether_test_run_" + name);
+  fs::remove_all(path);
+  fs::create_directories(path);
+  return path;
+}
+
+/// The bits of all bodies at the end.
+std::vector<double> end_state(const std::string& text) {
+  const Scene scene = parse_scene(text, "test.toml");
+  const auto engine = make_engine(scene);
+  engine->advance(scene.end);
+  std::vector<double> out;
+  for (const BodyState& b : engine->bodies()) {
+    const auto add = [&](const auto& v) { out.insert(out.end(), v.data(), v.data() + v.size()); };
+    add(b.position), add(b.orientation.coeffs()), add(b.velocity), add(b.angular_velocity);
+  }
+  return out;
+}
+
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  REQUIRE(a.size() == b.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+  return largest;
+}
+
+}  // namespace
+
+TEST_CASE("expectations that hold and that do not") {
+  const std::string expect =
+      "[[expect]]\nquantity = \"drift\"\nat_most = 1e-6\n"                  // holds
+      "[[expect]]\nquantity = \"speed\"\nbody = \"rod\"\nat_least = 100\n"  // not
+      "[[expect]]\ntime = 0\nquantity = \"position\"\nbody = \"rod\"\nvalue = [0.5, 0, 0]\nwithin "
+      "= 0\n"  // holds
+      "[[expect]]\nthroughout = true\nquantity = \"distance_moved\"\nbody = \"rod\"\nat_most = "
+      "1e-3\n"                                                                 // not
+      "[[expect]]\nquantity = \"energy_change\"\nvalue = 0\nwithin = 1e-4\n";  // holds
+  const Scene scene = parse_scene(rod(expect), "test.toml");
+  const RunResult result = run(scene);
+  REQUIRE(result.failure.empty());
+  REQUIRE(result.judgements.size() == 5);
+  CHECK(result.judgements[0].met);
+  CHECK_FALSE(result.judgements[1].met);
+  CHECK(result.judgements[2].met);
+  CHECK_FALSE(result.judgements[3].met);
+  CHECK(result.judgements[4].met);
+  for (const Judgement& each : result.judgements) CHECK(each.judged);
+  CHECK_FALSE(result.met());
+  CHECK(result.time == Approx(0.5));
+}
+
+TEST_CASE("a run in two parts has the bits and the files of one") {
+  for (const std::string& text : {rod(""), block("")}) {
+    Scene scene = parse_scene(text, "test.toml");
+    INFO(scene.name);
+    const fs::path all = folder(scene.name + "_all"), parts = folder(scene.name + "_parts");
+    const auto outputs = [&](const fs::path& path) {
+      scene.output.csv = (path / "a.csv").string();
+      scene.output.vtk = (path / "a.pvd").string();
+      scene.output.state = (path / "a.state").string();
+      scene.output.every = 0.05;
+      scene.output.checkpoint = 0.2;
+    };
+    outputs(all);
+    REQUIRE(run(scene).failure.empty());
+
+    // The part up to 0.2 s; a run that ends there leaves the same state as one that passes.
+    outputs(parts);
+    scene.end = 0.2;
+    REQUIRE(run(scene).failure.empty());
+    scene.end = 0.5;
+    RunOptions options;
+    options.restart = scene.output.state;
+    REQUIRE(run(scene, options).failure.empty());
+
+    CHECK(content(all / "a.csv") == content(parts / "a.csv"));
+    CHECK(content(all / "a.state") == content(parts / "a.state"));
+    CHECK(content(all / "a.pvd") == content(parts / "a.pvd"));
+    CHECK(content(all / "a.csv").size() > 1000);
+    long films = 0;
+    for (const auto& entry : fs::directory_iterator(all / "a")) {
+      const fs::path name = entry.path().filename();
+      CHECK(content(entry.path()) == content(parts / "a" / name));
+      films += name.string().rfind("bodies", 0) == 0;
+    }
+    CHECK(films == 11);  // t = 0 and ten records
+
+    // Nothing is left to run; and a state of another scene is refused.
+    CHECK_THROWS_AS(run(scene, options), std::runtime_error);
+    const Scene other = parse_scene(scene.name == "rod" ? block("") : rod(""), "other.toml");
+    CHECK_THROWS_AS(run(other, options), std::runtime_error);
+    std::ofstream(scene.output.state, std::ios::binary) << "tether state 1\nshort";
+    CHECK_THROWS_AS(run(scene, options), std::runtime_error);
+    fs::remove_all(all);
+    fs::remove_all(parts);
+  }
+}
+
+TEST_CASE("an effect without strength changes nothing") {
+  const std::string spring =
+      "[[spring]]\nbodies = [\"rod\", \"world\"]\nat = [[1, 0, 0], [0, 0, 2]]\nstiffness = ";
+  const std::vector<double> plain = end_state(rod(""));
+  CHECK(end_state(rod(spring + "0\n")) == plain);
+  CHECK(end_state(rod("[[load]]\nbody = \"rod\"\nforce = [0, 0, 0]\n")) == plain);
+  CHECK(largest_difference(end_state(rod(spring + "1\n")), plain) > 1e-3);  // and with it something
+
+  const std::vector<double> sliding = end_state(block(""));
+  CHECK(end_state(block("drag = { linear = 0 }\n")) == sliding);
+  CHECK(end_state(block("[[load]]\nbody = \"block\"\nforce = [0, 0, 0]\n")) == sliding);
+  CHECK(end_state(block("", "friction = 0.3\nrestitution = 0\n")) == sliding);
+  CHECK(largest_difference(end_state(block("drag = { linear = 1 }\n")), sliding) > 1e-3);
+  const std::vector<double> icy = end_state(block("", ""));
+  CHECK(end_state(block("", "friction = 0\n")) == icy);
+  CHECK(largest_difference(icy, sliding) > 1e-2);
+
+  // No gravity, and one of no strength.
+  const std::string free =
+      "[[body]]\nmass = 1\nshape = \"box\"\nsize = [1, 2, 3]\nvelocity = [1, 2, "
+      "3]\nangular_velocity = [3, 2, 1]\n";
+  for (const char* engine : {"[smooth]\n", "[stepping]\n"})
+    CHECK(end_state(engine + free) ==
+          end_state(std::string("[scene]\ngravity = [0, 0, 0]\n") + engine + free));
+}
+
+TEST_CASE("what accuracy costs: tighter settings have smaller errors and take more steps") {
+  CostOptions options;
+  options.settings = {1e-4, 1e-6, 1e-8};
+  const CostTable smooth = cost(parse_scene(rod(""), "test.toml"), options);
+  REQUIRE(smooth.rows.size() == 3);
+  CHECK(smooth.smooth);
+  for (std::size_t i = 0; i < 3; ++i) {
+    INFO(smooth.rows[i].setting << " " << smooth.rows[i].error);
+    CHECK(smooth.rows[i].failure.empty());
+    CHECK(smooth.rows[i].error < 1e3 * smooth.rows[i].setting);
+    if (i == 0) continue;
+    CHECK(smooth.rows[i].error < smooth.rows[i - 1].error);
+    CHECK(smooth.rows[i].steps > smooth.rows[i - 1].steps);
+  }
+  CHECK(smooth.reference_error < smooth.rows[2].error);
+  REQUIRE(smooth.cheapest(1e-3) != nullptr);
+  CHECK(smooth.cheapest(smooth.rows[2].error)->error <= smooth.rows[2].error);
+  CHECK(smooth.cheapest(0) == nullptr);
+
+  options.settings = {1e-3, 8e-3, 4e-3, 2e-3};
+  const CostTable stepping = cost(parse_scene(block(""), "test.toml"), options);
+  REQUIRE(stepping.rows.size() == 4);
+  CHECK_FALSE(stepping.smooth);
+  for (std::size_t i = 1; i < 4; ++i) {
+    const double ratio = stepping.rows[i - 1].error / stepping.rows[i].error;
+    INFO(ratio);
+    CHECK(stepping.rows[i].setting == Approx(stepping.rows[i - 1].setting / 2));
+    CHECK(ratio > 1.5);  // first order, measured against a step that is not zero either
+    CHECK(ratio < 3);
+  }
+  options.settings = {0};
+  CHECK_THROWS_AS(cost(parse_scene(block(""), "test.toml"), options), std::invalid_argument);
+}
+
+TEST_CASE("files that cannot be written are reported") {
+  Scene scene = parse_scene(rod(""), "test.toml");
+  scene.output.csv = "/proc/nowhere/a.csv";
+  CHECK_THROWS_AS(run(scene), std::runtime_error);
+}
