@@ -1,0 +1,205 @@
+// Tether: the engine of scenes without contact. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <istream>
+#include <ostream>
+
+#include "integrator.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+using namespace smooth;
+
+constexpr char kMagic[8] = {'s', 'm', 'o', 'o', 't', 'h', ' ', '1'};
+
+// Figures of a file are rounded, so a start may be off the joints by this much, relative to the
+// scene's size and speed (at least 1 m, 1 m/s). It is moved onto them.
+constexpr double kStartTolerance = 1e-4;
+
+class SmoothEngine : public Engine {
+ public:
+  explicit SmoothEngine(const Scene& scene)
+      : options_(scene.smooth.value_or(SmoothOptions{})), system_(scene) {
+    bodies_.resize(scene.bodies.size());
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+      bodies_[b].position = scene.bodies[b].position;
+      bodies_[b].orientation = scene.bodies[b].orientation.normalized();
+    }
+    y_ = system_.start_state();
+    check_start();
+    system_.complete(0.0, y_, yp_);
+    if (system_.constraint_count() > 0) {
+      SmoothOptions with = options_;
+      with.projection = true;
+      // Invariants keep the values of the start once it is consistent.
+      system_.keep_invariants_of(0.0, y_);
+      for (int pass = 0; pass < 2; ++pass) {
+        Integrator start(system_, with, 0.0, y_, yp_);
+        const ida_projection::ConsistencyReport report = start.make_consistent(0.0);
+        if (!report)
+          throw std::invalid_argument("the start of the scene contradicts its joints: " +
+                                      report.message);
+        y_ = start.y();
+        system_.keep_invariants_of(0.0, y_);
+      }
+    }
+    restart(0.0);
+  }
+
+  const char* name() const override { return "smooth"; }
+  double time() const override { return integrator_->time(); }
+
+  void advance(double t) override {
+    integrator_->advance(t);
+    system_.bodies(integrator_->y().data(), bodies_);
+  }
+
+  const std::vector<BodyState>& bodies() const override { return bodies_; }
+  Diagnostics diagnostics() const override {
+    return system_.diagnostics(time(), integrator_->y().data());
+  }
+  const std::vector<ContactState>& contacts() const override { return no_contacts_; }
+
+  Counts counts() const override {
+    Counts sum = before_;
+    const Counts now = integrator_->counts();
+    sum.steps += now.steps;
+    sum.residual_evaluations += now.residual_evaluations;
+    sum.jacobian_evaluations += now.jacobian_evaluations;
+    sum.projections += now.projections;
+    sum.error_test_failures += now.error_test_failures;
+    return sum;
+  }
+
+  std::vector<EffectCost> costs() const override {
+    std::vector<EffectCost> costs;
+    const std::vector<std::string> names = system_.effect_names();
+    Integrator::Seconds s = integrator_->seconds();
+    if (!seconds_before_.effects.empty()) add(seconds_before_, s);
+    double rest = s.total - s.jacobian - s.projection;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      rest -= s.effects[i];
+      if (names[i] != "joints" || system_.rows() > 0) costs.push_back({names[i], s.effects[i]});
+    }
+    costs.push_back({"Jacobian", s.jacobian});
+    if (options_.projection) costs.push_back({"projection", s.projection});
+    costs.push_back({"IDA and linear algebra", std::max(0.0, rest)});
+    return costs;
+  }
+
+  void save(std::ostream& out) override {
+    const Eigen::VectorXd y = integrator_->y();
+    const double t = time();
+    const std::vector<double>& kept = system_.kept();
+    out.write(kMagic, sizeof kMagic);
+    write_number(out, static_cast<double>(y.size()));
+    write_number(out, static_cast<double>(kept.size()));
+    write_number(out, t);
+    for (const double value : y) write_number(out, value);
+    for (const double value : kept) write_number(out, value);
+    y_ = y;
+    restart(t);
+  }
+
+  void restore(std::istream& in) override {
+    char magic[sizeof kMagic];
+    in.read(magic, sizeof magic);
+    if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
+      throw std::runtime_error("this is not a state of the smooth engine");
+    std::vector<double>& kept = system_.kept();
+    const double size = read_number(in), invariants = read_number(in);
+    if (size != static_cast<double>(y_.size()) || invariants != static_cast<double>(kept.size()))
+      throw std::runtime_error("the saved state is of another scene: it has " +
+                               std::to_string(static_cast<long>(size)) +
+                               " unknowns, this scene has " + std::to_string(y_.size()));
+    const double t = read_number(in);
+    for (double& value : y_) value = read_number(in);
+    for (double& value : kept) value = read_number(in);
+    restart(t);
+  }
+
+ private:
+  static void write_number(std::ostream& out, double value) {
+    out.write(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  static double read_number(std::istream& in) {
+    double value = 0;
+    if (!in.read(reinterpret_cast<char*>(&value), sizeof value))
+      throw std::runtime_error("the saved state ends too early");
+    return value;
+  }
+  static void add(const Integrator::Seconds& from, Integrator::Seconds& to) {
+    for (std::size_t i = 0; i < to.effects.size(); ++i) to.effects[i] += from.effects[i];
+    to.jacobian += from.jacobian;
+    to.projection += from.projection;
+    to.total += from.total;
+  }
+
+  // A new IDA at t, from y_ alone: whoever has these bits goes on with the same ones.
+  void restart(double t) {
+    if (integrator_) {
+      before_ = counts();
+      Integrator::Seconds s = integrator_->seconds();
+      if (!seconds_before_.effects.empty()) add(seconds_before_, s);
+      seconds_before_ = s;
+    }
+    system_.complete(t, y_, yp_);
+    integrator_ = std::make_unique<Integrator>(system_, options_, t, y_, yp_);
+    system_.bodies(y_.data(), bodies_);
+  }
+
+  void check_start() {
+    const int m = system_.rows();
+    if (m == 0) return;
+    Eigen::VectorXd g(system_.constraint_count());
+    system_.constraint_values(0.0, y_.data(), g.data());
+    double size = 1, speed = 1;
+    for (int k = 0; k < system_.moving(); ++k) {
+      size = std::max(size, y_.segment<3>(kBody * k + kPosition).norm());
+      speed = std::max({speed, y_.segment<3>(kBody * k + kVelocity).norm(),
+                        y_.segment<3>(kBody * k + kSpin).norm()});
+    }
+    int worst = 0;
+    for (const int half : {0, 1}) {
+      const double value = g.segment(half * m, m).cwiseAbs().maxCoeff(&worst);
+      const double allowed = kStartTolerance * (half == 0 ? size : speed);
+      if (value <= allowed) continue;
+      char text[300];
+      std::snprintf(text, sizeof text,
+                    ": its bodies are off by %.3g %s at t = 0 (at most %.3g is taken for rounding)",
+                    g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s", allowed);
+      throw std::invalid_argument(
+          "the start of the scene contradicts the " +
+          system_.constraint_names()[static_cast<std::size_t>(half * m + worst)] + text +
+          (half == 0 ? ""
+                     : "; give both bodies velocities and angular velocities that the joint "
+                       "allows, and those of a prescribed motion"));
+    }
+  }
+
+  SmoothOptions options_;
+  mutable System system_;  // its workspace changes in a look, too
+  Eigen::VectorXd y_, yp_;
+  std::unique_ptr<Integrator> integrator_;
+  std::vector<BodyState> bodies_;
+  std::vector<ContactState> no_contacts_;
+  Counts before_;
+  Integrator::Seconds seconds_before_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_smooth_engine(const Scene& scene) {
+  if (!scene.pairs.empty())
+    throw std::invalid_argument(
+        "the smooth engine has no contacts, but the scene has [[pair]] tables: use [stepping]");
+  const SmoothOptions options = scene.smooth.value_or(SmoothOptions{});
+  if (!(options.tolerance > 0 && options.tolerance < 1))
+    throw std::invalid_argument("[smooth] tolerance must be between 0 and 1");
+  return std::make_unique<SmoothEngine>(scene);
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,249 @@
+// Tether: a smooth system in the hands of IDA and the projection. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "integrator.hpp"
+
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_context.h>
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_dense.h>
+#ifdef TETHER_SCENE_KLU
+#include <sunlinsol/sunlinsol_klu.h>
+#include <sunmatrix/sunmatrix_sparse.h>
+#endif
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+namespace tether::scene::smooth {
+
+namespace {
+
+// Unknowns from which KLU is faster than the dense solver.
+constexpr int kSparseFrom = 80;
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+#ifdef SUN_COMM_NULL  // SUNDIALS 7
+void remember(int, const char*, const char*, const char* message, SUNErrCode, void* data,
+              SUNContext) {
+  *static_cast<std::string*>(data) = message ? message : "";
+}
+#else
+void remember(int, const char*, const char*, char* message, void* data) {
+  *static_cast<std::string*>(data) = message ? message : "";
+}
+#endif
+
+SUNContext make_context() {
+  SUNContext context = nullptr;
+#ifdef SUN_COMM_NULL
+  SUNContext_Create(SUN_COMM_NULL, &context);
+  SUNContext_ClearErrHandlers(context);
+#else
+  SUNContext_Create(nullptr, &context);
+#endif
+  return context;
+}
+
+}  // namespace
+
+Integrator::Integrator(System& system, const SmoothOptions& options, double t,
+                       const Eigen::VectorXd& y, const Eigen::VectorXd& yp)
+    : system_(system),
+      options_(options),
+      t_(t),
+      context_(make_context()),
+      watch_(system.effect_names().size()) {
+  const int N = system.size();
+  y_ = N_VNew_Serial(N, context_);
+  yp_ = N_VClone(y_);
+  id_ = N_VClone(y_);
+  atol_ = N_VClone(y_);
+  for (int i = 0; i < N; ++i) {
+    N_VGetArrayPointer(y_)[i] = y[i];
+    N_VGetArrayPointer(yp_)[i] = yp[i];
+    N_VGetArrayPointer(id_)[i] = system.id(i);
+    N_VGetArrayPointer(atol_)[i] = system.absolute_tolerance(i, options.tolerance);
+  }
+  ida_ = IDACreate(context_);
+  catch_messages();
+  IDAInit(ida_, residual, t, y_, yp_);
+  IDASetUserData(ida_, this);
+  IDASVtolerances(ida_, options.tolerance, atol_);
+  IDASetMaxNumSteps(ida_, -1);
+  if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
+  prepare_matrix();
+  IDASetLinearSolver(ida_, solver_, matrix_);
+  IDASetJacFn(ida_, jacobian);
+  IDASetId(ida_, id_);
+  // Multipliers are derived quantities in every form: IDA judges the motion.
+  IDASetSuppressAlg(ida_, 1);
+  if (options.projection) {
+    ida_projection::Options projection;
+    projection.id = id_;
+    projection.print_fatal = false;
+    projection_.emplace(ida_, system.constraints(), projection);
+  }
+}
+
+Integrator::~Integrator() {
+  IDAFree(&ida_);
+  projection_.reset();
+  SUNLinSolFree(solver_);
+  SUNMatDestroy(matrix_);
+  for (N_Vector v : {y_, yp_, id_, atol_}) N_VDestroy(v);
+  SUNContext_Free(&context_);
+}
+
+void Integrator::catch_messages() {
+#ifdef SUN_COMM_NULL
+  SUNContext_PushErrHandler(context_, remember, &last_message_);
+#else
+  IDASetErrHandlerFn(ida_, remember, &last_message_);
+#endif
+}
+
+void Integrator::prepare_matrix() {
+  const int N = system_.size();
+  entries_.record();
+  system_.jacobian(t_, 1.0, N_VGetArrayPointer(y_), N_VGetArrayPointer(yp_), entries_);
+  const auto& places = entries_.places;
+  std::vector<int> slots(places.size());
+#ifdef TETHER_SCENE_KLU
+  if (N >= kSparseFrom) {
+    std::vector<std::size_t> order(places.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto column_first = [&](std::size_t a, std::size_t b) {
+      return std::pair(places[a].second, places[a].first) <
+             std::pair(places[b].second, places[b].first);
+    };
+    std::sort(order.begin(), order.end(), column_first);
+    column_starts_.assign(static_cast<std::size_t>(N) + 1, 0);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      const auto [row, column] = places[order[k]];
+      if (k == 0 || places[order[k - 1]] != places[order[k]]) {
+        row_indices_.push_back(row);
+        ++column_starts_[static_cast<std::size_t>(column) + 1];
+      }
+      slots[order[k]] = static_cast<int>(row_indices_.size()) - 1;
+    }
+    std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
+    matrix_ =
+        SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context_);
+    solver_ = SUNLinSol_KLU(y_, matrix_, context_);
+    entries_.finish(std::move(slots));
+    return;
+  }
+#endif
+  for (std::size_t k = 0; k < places.size(); ++k) slots[k] = places[k].first + N * places[k].second;
+  matrix_ = SUNDenseMatrix(N, N, context_);
+  solver_ = SUNLinSol_Dense(y_, matrix_, context_);
+  entries_.finish(std::move(slots));
+}
+
+int Integrator::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
+  Integrator& me = *static_cast<Integrator*>(self);
+  // Reading clocks costs as much as a small effect, so few evaluations are timed.
+  const bool timed = (me.residuals_++ & 31) == 0;
+  me.timed_ += timed;
+  me.system_.residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), N_VGetArrayPointer(r),
+                      timed ? &me.watch_ : nullptr);
+  const double* out = N_VGetArrayPointer(r);
+  double sum = 0;
+  for (int i = 0; i < me.system_.size(); ++i) sum += out[i];
+  return std::isfinite(sum) ? 0 : 1;  // IDA tries a smaller step
+}
+
+int Integrator::jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J,
+                         void* self, N_Vector, N_Vector, N_Vector) {
+  Integrator& me = *static_cast<Integrator*>(self);
+  const double begin = now();
+  double* values = nullptr;
+#ifdef TETHER_SCENE_KLU
+  if (!me.row_indices_.empty()) {
+    std::copy(me.column_starts_.begin(), me.column_starts_.end(), SUNSparseMatrix_IndexPointers(J));
+    std::copy(me.row_indices_.begin(), me.row_indices_.end(), SUNSparseMatrix_IndexValues(J));
+    values = SUNSparseMatrix_Data(J);
+    std::fill(values, values + me.row_indices_.size(), 0.0);
+  }
+#endif
+  if (!values) {
+    SUNMatZero(J);
+    values = SUNDenseMatrix_Data(J);
+  }
+  me.entries_.begin(values);
+  me.system_.jacobian(t, cj, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), me.entries_);
+  me.jacobian_seconds_ += now() - begin;
+  return 0;
+}
+
+ida_projection::ConsistencyReport Integrator::make_consistent(double t) {
+  ida_projection::Consistency how;
+  how.derivative = ida_projection::Consistency::Derivative::keep;  // System::complete knows it
+  return projection_->make_consistent(t, y_, yp_, how);
+}
+
+void Integrator::advance(double t) {
+  if (t - t_ <= 1e-13 * std::max(1.0, std::abs(t))) return;
+  const double begin = now();
+  double reached = t_;
+  last_message_.clear();
+  const int flag = projection_ ? projection_->solve(t, &reached, y_, yp_, IDA_NORMAL)
+                               : IDASolve(ida_, t, &reached, y_, yp_, IDA_NORMAL);
+  total_seconds_ += now() - begin;
+  t_ = reached;
+  if (flag < 0) throw SimulationError(failure(flag));
+}
+
+std::string Integrator::failure(int flag) const {
+  double h = 0;
+  IDAGetLastStep(ida_, &h);
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "the smooth engine stopped at t = %.6g s (last step %.3g s): ", t_, h);
+  char* name = IDAGetReturnFlagName(flag);
+  std::string message = text + std::string(name) + ". ";
+  std::free(name);
+  if (!last_message_.empty()) message += "IDA: " + last_message_ + " ";
+  if (projection_ && projection_->status() != ida_projection::Status::success &&
+      !projection_->message().empty())
+    message += "Projection: " + projection_->message() + " ";
+  message +=
+      "Try a smaller [smooth] tolerance or max_step; look whether the joints let the bodies reach "
+      "a position from which they cannot go on, and whether a spring or a motion is too stiff or "
+      "too fast.";
+  if (!projection_) message += " With projection = true the joints and invariants are kept.";
+  return message;
+}
+
+Eigen::Map<const Eigen::VectorXd> Integrator::y() const {
+  return {N_VGetArrayPointer(y_), system_.size()};
+}
+
+Counts Integrator::counts() const {
+  Counts c;
+  IDAGetNumSteps(ida_, &c.steps);
+  IDAGetNumResEvals(ida_, &c.residual_evaluations);
+  IDAGetNumJacEvals(ida_, &c.jacobian_evaluations);
+  IDAGetNumErrTestFails(ida_, &c.error_test_failures);
+  if (projection_) c.projections = projection_->statistics().projections;
+  return c;
+}
+
+Integrator::Seconds Integrator::seconds() const {
+  Seconds s;
+  s.effects = watch_.seconds;
+  if (timed_ > 0)
+    for (double& each : s.effects)
+      each *= static_cast<double>(residuals_) / static_cast<double>(timed_);
+  s.jacobian = jacobian_seconds_;
+  s.total = total_seconds_;
+  if (projection_) s.projection = projection_->statistics().seconds;
+  return s;
+}
+
+}  // namespace tether::scene::smooth

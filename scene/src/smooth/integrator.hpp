@@ -1,0 +1,66 @@
+// Tether: a smooth system in the hands of IDA and the projection. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <ida/ida.h>
+#include <memory>
+#include <optional>
+#include <string>
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+#include <tether/ida_projection.hpp>
+
+#include "system.hpp"
+
+namespace tether::scene::smooth {
+
+/// One uninterrupted run of IDA. A restart is a new object.
+class Integrator {
+ public:
+  /// `y` and `yp` are consistent, but for what `make_consistent` repairs.
+  Integrator(System& system, const SmoothOptions& options, double t, const Eigen::VectorXd& y,
+             const Eigen::VectorXd& yp);
+  ~Integrator();
+  Integrator(const Integrator&) = delete;
+  Integrator& operator=(const Integrator&) = delete;
+
+  /// Moves y onto the constraints. Only with the projection.
+  ida_projection::ConsistencyReport make_consistent(double t);
+  void advance(double t);  ///< throws SimulationError
+  double time() const { return t_; }
+  Eigen::Map<const Eigen::VectorXd> y() const;
+  Counts counts() const;
+
+  struct Seconds {
+    std::vector<double> effects;  ///< as System::effect_names()
+    double jacobian = 0, projection = 0, total = 0;
+  };
+  Seconds seconds() const;
+
+ private:
+  static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
+  static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
+                      void* self, N_Vector, N_Vector, N_Vector);
+  void prepare_matrix();
+  void catch_messages();
+  std::string failure(int flag) const;
+
+  System& system_;
+  SmoothOptions options_;
+  double t_;
+  SUNContext context_ = nullptr;
+  N_Vector y_ = nullptr, yp_ = nullptr, id_ = nullptr, atol_ = nullptr;
+  SUNMatrix matrix_ = nullptr;
+  SUNLinearSolver solver_ = nullptr;
+  void* ida_ = nullptr;
+  std::optional<ida_projection::Projection> projection_;
+  Entries entries_;
+  std::vector<sunindextype> column_starts_, row_indices_;  // sparse: the pattern
+  std::string last_message_;                               // IDA's
+
+  Stopwatch watch_;
+  double jacobian_seconds_ = 0, total_seconds_ = 0;
+  long residuals_ = 0, timed_ = 0;
+};
+
+}  // namespace tether::scene::smooth

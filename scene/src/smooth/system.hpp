@@ -1,0 +1,131 @@
+// Tether: the equations of motion of a smooth scene. SPDX-License-Identifier: BSD-3-Clause
+//
+// Unknowns: for each moving body x, q (wxyz, body to world), v, w (body axes); then the work of
+// forces without potential if energy is kept with them; then the multipliers lambda and, in the
+// stabilised form, eta.
+//
+//   index 1        x' = v, q' = q (0, w) / 2, M (v', w') = f + G^T lambda, g'' + eps lambda = 0
+//   index 0        the same with lambda eliminated: G M^-1 G^T lambda = -(gamma + G M^-1 f)
+//   stabilised 2   x', q' with (v, w) + M^-1 G^T eta, G v + g_t + eps lambda = 0, g + eps eta = 0
+//
+// eps makes redundant rows (planar linkages of 3-D hinges) and dead points solvable: it chooses
+// multipliers of least norm and changes accelerations by about eps relative to what the joints
+// carry, across the constraints, where the projection removes it.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <memory>
+#include <string>
+#include <tether/ida_projection.hpp>
+#include <tether/scene/engine.hpp>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "effects.hpp"
+#include "rows.hpp"
+#include "stopwatch.hpp"
+
+namespace tether::scene::smooth {
+
+class System {
+ public:
+  explicit System(const Scene& scene);
+
+  int size() const { return size_; }
+  int rows() const { return m_; }
+  int moving() const { return bodies_.moving; }
+  /// 1 differential, 0 algebraic.
+  double id(int i) const { return i < first_multiplier() ? 1.0 : 0.0; }
+  double absolute_tolerance(int i, double tolerance) const;
+
+  /// y and y' at t = 0 from the scene.
+  Eigen::VectorXd start_state() const;
+  /// y' and the multipliers from the rest of y.
+  void complete(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp);
+  /// The values of the invariants that are kept are those of this state from now on.
+  void keep_invariants_of(double t, const Eigen::VectorXd& y);
+  std::vector<double>& kept() { return kept_; }
+
+  void residual(double t, const double* y, const double* yp, double* r, Stopwatch* watch);
+  /// Adds dF/dy + cj dF/dy'.
+  void jacobian(double t, double cj, const double* y, const double* yp, Entries& entries);
+
+  ida_projection::Constraints constraints();
+  int constraint_count() const;
+  void constraint_values(double t, const double* y, double* g);
+  using Rows = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
+  void constraint_jacobian(double t, const double* y, Rows C);
+  std::vector<std::string> constraint_names() const;
+
+  void bodies(const double* y, std::vector<BodyState>& out) const;
+  Diagnostics diagnostics(double t, const double* y);
+  std::vector<std::string> effect_names() const;
+
+ private:
+  int first_work() const { return kBody * moving(); }
+  int first_multiplier() const { return first_work() + (has_work_ ? 1 : 0); }
+  int first_eta() const { return first_multiplier() + m_; }
+
+  void add_joints(const Scene& scene);
+  void add_invariants(const Scene& scene);
+  template <class F>
+  void each_row(F f) const;
+  void update(double t, const double* y);  // frames, without accelerations
+  void update_accelerations(const double* yp);
+  void add_multipliers(const double* lambda, std::vector<Load6>& loads) const;
+  void sum_forces(Stopwatch* watch);
+  void torques_to_body_axes(std::vector<Load6>& loads) const;
+  void form_gradient();      // G_, GM_, S_
+  void solve_multipliers();  // lambda_, a_ of forces_ at the present state
+  void add_motion_jacobian(JacobianBlocks& J, const double* lambda, int first_lambda);
+  template <int order>
+  void add_row_jacobian(JacobianBlocks& J, int first_row, bool accelerations, double cj);
+  void index0_jacobian(double cj, const double* y, const double* yp, Entries& entries);
+  double power(const double* lambda) const;
+  double energy() const;
+  Vector3d momentum() const;
+  Vector3d angular_momentum() const;
+  void invariant_values(double t, const double* y, double* g) const;
+  void invariant_jacobian(Rows C, int row) const;
+
+  Formulation form_;
+  std::vector<std::string> joint_names_;
+  std::vector<int> body_of_slot_;
+  Bodies bodies_;
+  std::vector<double> start_;  // of the moving bodies
+  std::vector<std::unique_ptr<Effect>> effects_;
+
+  int m_ = 0, size_ = 0;
+  std::vector<Coincidence> coincidences_;
+  std::vector<RightAngle> right_angles_;
+  std::vector<Angle> angles_;
+  std::vector<Plane> planes_;
+  std::vector<Distance> distances_;
+  std::vector<Motion> motions_;
+  std::vector<Now> now_;  // of the motions; rows point into it
+
+  bool has_work_ = false, has_motion_ = false;
+  bool keeps_energy_ = false, keeps_momentum_ = false;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> kept_axes_;  // of angular momentum about the origin
+  Vector3d steady_force_ = Vector3d::Zero();            // momentum grows by it
+  std::vector<double> kept_;
+
+  // Workspace.
+  std::vector<Load6> loads_, pulls_;
+  Eigen::VectorXd epsilon_, lambda_, a_, gamma_, free_, right_, row_values_, scratch_;
+  Eigen::MatrixXd G_, GM_, S_, left_, dense_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Entries dense_entries_;
+  bool dense_recorded_ = false;
+};
+
+template <class F>
+void System::each_row(F f) const {
+  for (const Coincidence& each : coincidences_) f(each);
+  for (const RightAngle& each : right_angles_) f(each);
+  for (const Angle& each : angles_) f(each);
+  for (const Plane& each : planes_) f(each);
+  for (const Distance& each : distances_) f(each);
+}
+
+}  // namespace tether::scene::smooth
