@@ -2,6 +2,7 @@
 #pragma once
 
 #include <tether/contact/bodies.hpp>
+#include <tether/contact/body_solver.hpp>
 
 #include "random_contacts.hpp"
 
@@ -16,7 +17,8 @@ struct Assembly {
 inline Body box(double mass, const Eigen::Vector3d& half) {
   Body body;
   const Eigen::Vector3d s = half.cwiseProduct(half) * (mass / 3);
-  body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 1 / (s[1] + s[2]), 1 / (s[0] + s[2]), 1 / (s[0] + s[1]);
+  body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 1 / (s[1] + s[2]),
+      1 / (s[0] + s[2]), 1 / (s[0] + s[1]);
   return body;
 }
 
@@ -37,8 +39,52 @@ inline Assembly stack(int n, double ratio, double mu = 0.5) {
     out.bodies.push_back(body);
     for (double x : {-0.5, 0.5})
       for (double y : {-0.5, 0.5})
-        out.contacts.push_back(BodyContact::at_point(k, k - 1, {x, y, -0.5}, {x, y, 0.5}, {0, 0, 1}, mu));
+        out.contacts.push_back(
+            BodyContact::at_point(k, k - 1, {x, y, -0.5}, {x, y, 0.5}, {0, 0, 1}, mu));
   }
+  return out;
+}
+
+struct RigidAssembly {
+  std::vector<RigidBody> bodies;
+  std::vector<PointContact> contacts;
+  // Another assembly beside this one; ids continue.
+  void add(const RigidAssembly& other) {
+    const int b = static_cast<int>(bodies.size());
+    const std::uint64_t ids = contacts.size();
+    bodies.insert(bodies.end(), other.bodies.begin(), other.bodies.end());
+    for (PointContact c : other.contacts) {
+      c.first += b;
+      if (c.second >= 0) c.second += b;
+      if (c.id != PointContact::kNoId) c.id += ids;
+      contacts.push_back(c);
+    }
+  }
+};
+
+// stack() for BodySolver; contacts have ids 0, 1, ...
+inline RigidAssembly rigid_stack(int n, double ratio, double mu = 0.5) {
+  RigidAssembly out;
+  const Assembly from = stack(n, ratio, mu);
+  for (const Body& b : from.bodies) {
+    RigidBody body;
+    body.inverse_mass = b.inverse_mass(0, 0);
+    body.inverse_inertia = b.inverse_mass.bottomRightCorner<3, 3>();
+    body.velocity = b.velocity.head<3>();
+    out.bodies.push_back(body);
+  }
+  for (int k = 0; k < n; ++k)
+    for (double x : {-0.5, 0.5})
+      for (double y : {-0.5, 0.5}) {
+        PointContact c;
+        c.first = k;
+        c.second = k - 1;
+        c.r1 << x, y, -0.5;
+        c.r2 << x, y, 0.5;
+        c.mu = mu;
+        c.id = out.contacts.size();
+        out.contacts.push_back(c);
+      }
   return out;
 }
 
@@ -46,7 +92,8 @@ inline Assembly stack(int n, double ratio, double mu = 0.5) {
 inline Assembly cluster(Generator& g, double mu, int bodies = 5, int contacts = 12) {
   Assembly out;
   for (int k = 0; k < bodies; ++k) {
-    Body body = box(std::exp(g.uniform(-1, 1)), {g.uniform(0.2, 1), g.uniform(0.2, 1), g.uniform(0.2, 1)});
+    Body body =
+        box(std::exp(g.uniform(-1, 1)), {g.uniform(0.2, 1), g.uniform(0.2, 1), g.uniform(0.2, 1)});
     const Eigen::Matrix3d R = g.rotation();
     body.inverse_mass.bottomRightCorner<3, 3>() =
         (R * body.inverse_mass.bottomRightCorner<3, 3>() * R.transpose()).eval();
@@ -70,7 +117,9 @@ inline Problem shuffled(const Problem& p, Generator& g, std::vector<int>* order 
   const int n = p.contacts(), d = p.dimension();
   std::vector<int> to(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) to[static_cast<std::size_t>(i)] = i;
-  for (int i = n - 1; i > 0; --i) std::swap(to[static_cast<std::size_t>(i)], to[static_cast<std::size_t>(static_cast<int>(g.uniform(0, i + 1)))]);
+  for (int i = n - 1; i > 0; --i)
+    std::swap(to[static_cast<std::size_t>(i)],
+              to[static_cast<std::size_t>(static_cast<int>(g.uniform(0, i + 1)))]);
   std::vector<Eigen::Matrix3d> R;
   for (int i = 0; i < n; ++i) {
     Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
@@ -86,7 +135,8 @@ inline Problem shuffled(const Problem& p, Generator& g, std::vector<int>* order 
       const std::size_t j = static_cast<std::size_t>(p.columns()[static_cast<std::size_t>(k)]);
       Eigen::Matrix3d value;
       for (int c = 0; c < 3; ++c)
-        for (int r = 0; r < 3; ++r) value(r, c) = p.blocks()[static_cast<std::size_t>(k)].column[4 * c + r];
+        for (int r = 0; r < 3; ++r)
+          value(r, c) = p.blocks()[static_cast<std::size_t>(k)].column[4 * c + r];
       blocks.push_back({to[si], to[j], R[si] * value * R[j].transpose()});
     }
     b.segment(d * to[si], d) = R[si].topLeftCorner(d, d) * p.b().segment(d * i, d);

@@ -48,7 +48,7 @@ struct BodyOptions {
   /// Solver, whose stages also serve stacks and large mass ratios. 0: never.
   int max_assembled = 1000;
   bool strict = false;    ///< as Options::strict, for assembled islands
-  double max_work = 5e9;  ///< as Options::max_work, for each assembled island
+  double max_work = 1e9;  ///< as Options::max_work, for each assembled island
 };
 
 struct BodySolution {
