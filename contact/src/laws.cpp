@@ -1,5 +1,6 @@
 // Tether: derivatives and branches of the friction laws. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <limits>
 
 #include "law_coulomb.hpp"
 #include "law_frictionless.hpp"
@@ -121,7 +122,75 @@ void Coulomb::derivative(const LocalBlock& L, double bn, double b0, double b1, c
   detail::derivative(L, bn, b0, b1, x, regime, false, out);
 }
 
-Regime Coulomb::nearest(const LocalBlock& L, double bn, double b0, double b1, double* x,
+namespace {
+
+// f = k p - g.z - |z| of the Coulomb law and its derivatives; z = z(0) + lambda h. |z| is convex with
+// second derivative d^2 / |z|^3, d = h_0 h_1 (beta_0 - beta_1), and grows, so f'' grows with lambda.
+struct Secular {
+  double k, sum, product, gh, gs, h0, h1, s0, s1, hh, sh, ss, dd;
+  int evaluations = 0;
+  double f = 0, slope = 0, length = 0;
+
+  Secular(const LocalBlock& L, const LocalRhs& r)
+      : k(r.k), sum(L.beta[0] + L.beta[1]), product(L.beta[0] * L.beta[1]),
+        gh(L.g[0] * r.h0 + L.g[1] * r.h1), gs(0), h0(r.h0), h1(r.h1), s0(L.beta[1] * r.h0),
+        s1(L.beta[0] * r.h1), hh(h0 * h0 + h1 * h1), sh(s0 * h0 + s1 * h1), ss(s0 * s0 + s1 * s1) {
+    gs = L.g[0] * s0 + L.g[1] * s1;
+    const double d = h0 * h1 * (L.beta[0] - L.beta[1]);
+    dd = d * d;
+  }
+  void at(double l) {
+    ++evaluations;
+    const double z0 = s0 + l * h0, z1 = s1 + l * h1;
+    length = std::sqrt(z0 * z0 + z1 * z1);
+    f = k * (product + l * (sum + l)) - gs - l * gh - length;
+    slope = k * (sum + 2 * l) - gh - (sh + l * hh) / length;
+  }
+  double curvature() const { return 2 * k - dd / (length * length * length); }
+
+  // Newton for f = 0 from a point where f and f'' have one sign, or the limit of such a sequence.
+  double zero(double l, double least) {
+    for (int n = 0; n < 200; ++n) {
+      at(l);
+      const double step = -f / slope;
+      if (!std::isfinite(step)) return l;
+      l += step;
+      if (std::abs(step) <= 1e-13 * (l + least)) break;
+    }
+    return l;
+  }
+  // The zero in the concave part that f rises through, where f(0) < 0; -1: none.
+  double first(double warm, double least) {
+    double l = warm > 0 ? warm : 0;
+    for (int n = 0; n < 60; ++n) {
+      at(l);
+      if (n == 0 && l > 0 && !(slope > 0 && curvature() < 0 && l * slope > f)) {
+        l = 0;
+        at(l);
+      }
+      if ((l == 0 && f >= 0) || !(slope > 0) || !(curvature() < 0)) return -1;
+      const double step = -f / slope;
+      l += step;
+      if (std::abs(step) <= 1e-12 * (l + least)) return l;
+    }
+    return -1;
+  }
+  // f' = 0 likewise; stops where `until` (sign of f) is reached.
+  double turn(double l, double least, double until) {
+    for (int n = 0; n < 100; ++n) {
+      at(l);
+      if (f * until > 0) break;
+      const double step = -slope / curvature();
+      if (!std::isfinite(step) || std::abs(step) <= 1e-10 * (l + least)) break;
+      l += step;
+    }
+    return l;
+  }
+};
+
+}  // namespace
+
+Regime Coulomb::nearest(const LocalBlock& L, const LocalRhs& r, double bn, double* x,
                         double& lambda, int& evaluations) {
   double best[3] = {0, 0, 0}, distance = -1, best_lambda = lambda;
   Regime regime = Regime::separating;
@@ -137,60 +206,85 @@ Regime Coulomb::nearest(const LocalBlock& L, double bn, double b0, double b1, do
   };
   double z[3];
   if (!(bn > 0)) offer(best, Regime::separating, lambda);
-  const LocalRhs r = to_local(L, bn, b0, b1);
-  const double s0 = L.beta[1] * r.h0, s1 = L.beta[0] * r.h1;
-  if (sticks(L, r, s0, s1, std::sqrt(s0 * s0 + s1 * s1))) {
+  const auto slides = [&](double l) {
+    if (!(l >= 0) || !std::isfinite(l)) return;
+    slide(L, r, l, z);
+    if (z[0] > 0 && std::isfinite(z[0])) offer(z, Regime::sliding, l);
+  };
+  Secular e(L, r);
+  const double least = std::min(L.beta[0], L.beta[1]);
+  if (bn > 0) {
+    const double l = e.first(lambda, least);
+    // f' >= k (sum + 2 l) - g.h - |h| beyond l: nothing else follows.
+    const double straight = e.k * (e.sum + 2 * l) - e.gh;
+    if (l > 0 && straight > 0 && straight * straight >= e.hh) {
+      evaluations += e.evaluations;
+      slides(l);
+      std::copy(best, best + 3, x);
+      lambda = l;
+      return regime;
+    }
+  }
+  const double infinity = std::numeric_limits<double>::infinity();
+  e.at(0);
+  const bool static_ = sticks(L, r, e.s0, e.s1, e.length);
+  if (static_) {
     stick(L, r, bn, z);
     offer(z, Regime::sticking, lambda);
   }
-  // Sign changes of s - k on a logarithmic grid, 6 decades around beta, and beyond it up to the
-  // asymptote lambda ~ (|h| + g.h) / k.
-  const double beta_min = std::min(L.beta[0], L.beta[1]), beta_max = std::max(L.beta[0], L.beta[1]);
-  const auto excess = [&](double l) {
-    ++evaluations;
-    const double y0 = r.h0 / (L.beta[0] + l), y1 = r.h1 / (L.beta[1] + l);
-    return std::sqrt(y0 * y0 + y1 * y1) + L.g[0] * y0 + L.g[1] * y1 - r.k;
-  };
-  constexpr int kGrid = 40;
-  const double first = 1e-6 * beta_min, last = 1e6 * beta_max;
-  const double h = std::sqrt(r.h0 * r.h0 + r.h1 * r.h1);
-  const double end = 2 * (1 + L.e) * h / std::abs(r.k);
-  const double factor = std::pow(last / first, 1.0 / (kGrid - 1));
-  double left = 0, value = excess(0), right = first;
-  for (int n = 0; n <= kGrid; ++n, right *= factor) {
-    if (n == kGrid) {
-      if (!(end > left && end < 1e300)) break;
-      right = end;
+  if (e.hh > 0) {
+    const double rise = e.slope;
+    // End of the concave part, |z|^3 = d^2 / 2k. At k <= 0 there is no other.
+    double bend = infinity;
+    if (r.k > 0) {
+      const double t = std::cbrt(e.dd / (2 * r.k)), c = t * t - e.ss;
+      bend = c > 0 ? c / (e.sh + std::sqrt(e.sh * e.sh + e.hh * c)) : 0;
     }
-    const double at = excess(right);
-    if ((value > 0) != (at > 0)) {
-      // Either direction: bisection to a few digits, then Newton on s - k with the bracket kept.
-      double lo = left, hi = right, l = 0.5 * (lo + hi);
-      for (int m = 0; m < 200; ++m) {
-        const double d0 = 1 / (L.beta[0] + l), d1 = 1 / (L.beta[1] + l);
-        const double y0 = r.h0 * d0, y1 = r.h1 * d1, length = std::sqrt(y0 * y0 + y1 * y1);
-        const double f = length + L.g[0] * y0 + L.g[1] * y1 - r.k;
-        ++evaluations;
-        const double d =
-            -((y0 / length + L.g[0]) * y0 * d0 + (y1 / length + L.g[1]) * y1 * d1);
-        ((f > 0) == (value > 0) ? lo : hi) = l;
-        const double step = -f / d;
-        double next = l + step;
-        if (std::abs(step) <= 1e-12 * (l + beta_min)) {
-          if (next >= lo && next <= hi) l = next;
-          break;
-        }
-        if (!(next > lo && next < hi)) next = hi > 1e3 * lo && lo > 0 ? std::sqrt(lo * hi) : 0.5 * (lo + hi);
-        if (next == l) break;
-        l = next;
+    // Beyond this f > 0 (k > 0) or f < 0 (k < 0).
+    const double h = std::sqrt(e.hh), far = std::max(0.0, (1 + L.e) * h / std::abs(r.k) - least);
+    const bool limit = far < infinity;  // k = 0: straight lines in the end
+    bool positive_at_bend = !static_;
+    if (bend > 0) {
+      double end = bend;
+      if (bend < infinity) {
+        e.at(bend);
+        positive_at_bend = e.f >= 0;
+      } else {
+        end = limit ? 2 * far + least : 1e15 * (e.sum + 1);
+        e.at(end);
+        positive_at_bend = e.f >= 0;
       }
-      const double y0 = r.h0 / (L.beta[0] + l), y1 = r.h1 / (L.beta[1] + l);
-      from_local(L, std::sqrt(y0 * y0 + y1 * y1) / L.mu, y0, y1, z);
-      offer(z, Regime::sliding, l);
+      if (static_ && !positive_at_bend) {
+        slides(e.zero(end, least));
+      } else if (!static_ && positive_at_bend) {
+        slides(e.zero(0, least));
+      } else if (!static_ && rise > 0 && e.slope < 0) {
+        const double top = e.turn(0, least, 1);
+        e.at(top);
+        if (e.f >= 0) {
+          slides(e.zero(0, least));
+          slides(e.zero(end, least));
+        }
+      }
+    } else {
+      positive_at_bend = static_;
     }
-    left = right;
-    value = at;
+    if (bend < infinity) {
+      e.at(bend);
+      const double fall = e.slope, from = std::max(far, bend);
+      if (!positive_at_bend) {
+        slides(e.zero(from + least, least));
+      } else if (fall < 0) {
+        const double bottom = e.turn(from + least, least, -1);
+        e.at(bottom);
+        if (e.f <= 0) {
+          slides(e.zero(bend, least));
+          slides(e.zero(from + least, least));
+        }
+      }
+    }
   }
+  evaluations += e.evaluations;
   std::copy(best, best + 3, x);
   lambda = best_lambda;
   return regime;

@@ -72,6 +72,55 @@ TEST_CASE("coulomb: friction opposes slip, cone and plane hold") {
   }
 }
 
+TEST_CASE("coulomb: started at any of its solutions, a strongly coupled contact stays there") {
+  // Solutions from sign changes of |y| + g.y - k on a fine logarithmic grid of lambda; they share
+  // nothing with the count by curvature that the library relies on.
+  int several = 0;
+  for (const std::string kind : {"condition_1e1", "condition_1e4", "condition_1e8", "rods", "hyperbolic", "mu_1000", "singular"}) {
+    random::Generator generator(23);
+    for (int k = 0; k < std::min(samples() / 10, 2000); ++k) {
+      random::Contact p = generator(kind);
+      if (k % 3 == 0) p.b[0] = -std::abs(p.b[0]);  // jams
+      const LocalBlock L(p.A, p.mu);
+      if (L.e <= 0.8 || p.mu == 0) continue;
+      const Eigen::Vector2d beta(L.beta[0], L.beta[1]), g(L.g[0], L.g[1]);
+      Eigen::Matrix2d V;
+      V << L.cosine, -L.sine, L.sine, L.cosine;
+      const Eigen::Vector2d h = V.transpose() * (p.b.tail<2>() - Eigen::Vector2d(L.c[0], L.c[1]) * (p.b[0] / L.a));
+      const double limit = p.mu * p.b[0] / L.a;
+      const auto y = [&](double l) -> Eigen::Vector2d { return h.array() / (beta.array() + l); };
+      const auto excess = [&](double l) { return y(l).norm() + g.dot(y(l)) - limit; };
+      const double first = 1e-7 * beta.minCoeff(), last = std::max(1e6 * beta.maxCoeff(), 4 * (1 + L.e) * h.norm() / std::abs(limit));
+      double left = 0, at_left = excess(0);
+      int found = (at_left <= 0) + (p.b[0] <= 0);
+      const double factor = std::pow(last / first, 1e-3);
+      for (double right = first; right <= last; right *= factor) {
+        const double at_right = excess(right);
+        if ((at_left > 0) != (at_right > 0)) {
+          double lo = left, hi = right;
+          for (int n = 0; n < 200; ++n) {
+            const double middle = 0.5 * (lo + hi);
+            ((excess(middle) > 0) == (at_left > 0) ? lo : hi) = middle;
+          }
+          const Eigen::Vector2d yt = V * y(lo);
+          const Vector3d x(yt.norm() / p.mu, yt[0], yt[1]);
+          LocalState s;
+          for (int c = 0; c < 3; ++c) s.x[c] = x[c];
+          solve_local(Law::coulomb, L, p.b, s);
+          INFO(kind << " " << k << " lambda " << lo << " e " << L.e);
+          CHECK((Vector3d(s.x[0], s.x[1], s.x[2]) - x).norm() <= 1e-5 * x.norm());
+          CHECK(s.evaluations <= 500);
+          ++found;
+        }
+        left = right;
+        at_left = at_right;
+      }
+      several += found > 1;
+    }
+  }
+  CHECK(several > 100);
+}
+
 TEST_CASE("the solution does not depend on the start") {
   random::Generator generator(3);
   for (const std::string kind : {"boxes", "hyperbolic", "condition_1e4"}) {
