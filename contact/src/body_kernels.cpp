@@ -22,8 +22,8 @@ TETHER_INLINE void fetch(const BodyArrays& s, const Contact* c, const Contact* e
 }
 
 template <class Contact>
-TETHER_INLINE BodyState& second(const BodyArrays& s, const Contact& c) {
-  return *(c.second < 0 ? s.fixed : s.state + c.second);
+TETHER_INLINE const BodyState& second(const BodyArrays& s, const Contact& c) {
+  return *(c.second < 0 ? s.fixed - 1 - c.second : s.state + c.second);
 }
 
 template <class L0, bool kTest>
@@ -34,16 +34,16 @@ TETHER_INLINE double pass(const BodyArrays& s, GeneralContact* begin, GeneralCon
     GeneralContact& c = *it;
     fetch(s, it, end);
     BodyState& A = s.state[c.first];
-    BodyState& B = second(s, c);
+    const BodyState& B = second(s, c);
     double u[3], a1[3], a2[3];
     cross(A.w, c.r1, a1);
     cross(B.w, c.r2, a2);
     for (int k = 0; k < 3; ++k) u[k] = A.v[k] - B.v[k] + a1[k] - a2[k];
     double o[3];
     cross(c.n, c.t, o);
-    const double w0 = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2] + c.bias[0];
-    const double w1 = u[0] * c.t[0] + u[1] * c.t[1] + u[2] * c.t[2] + c.bias[1];
-    const double w2 = u[0] * o[0] + u[1] * o[1] + u[2] * o[2] + c.bias[2];
+    const double w0 = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2] + c.bias;
+    const double w1 = u[0] * c.t[0] + u[1] * c.t[1] + u[2] * c.t[2];
+    const double w2 = u[0] * o[0] + u[1] * o[1] + u[2] * o[2];
     LocalBlock L;
     L.a = c.a;
     L.inv_a = c.inv_a;
@@ -80,7 +80,7 @@ TETHER_INLINE double pass(const BodyArrays& s, GeneralContact* begin, GeneralCon
     if (c.second < 0) continue;
     for (int k = 0; k < 3; ++k) p[k] = -p[k];
     cross(c.r2, p, q);
-    push(B, s.inertia[c.second], p, q);
+    push(s.state[c.second], s.inertia[c.second], p, q);
   }
   return sum;
 }
@@ -92,15 +92,15 @@ TETHER_INLINE double pass(const BodyArrays& s, SphereContact* begin, SphereConta
     SphereContact& c = *it;
     fetch(s, it, end);
     BodyState& A = s.state[c.first];
-    BodyState& B = second(s, c);
+    const BodyState& B = second(s, c);
     // u = v1 - v2 + (s1 w1 - s2 w2) x n
     double w[3], u[3];
     for (int k = 0; k < 3; ++k) w[k] = c.s1 * A.w[k] - c.s2 * B.w[k];
     cross(w, c.n, u);
-    for (int k = 0; k < 3; ++k) u[k] += A.v[k] - B.v[k] + c.bias[k];
-    const double un = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2];
+    for (int k = 0; k < 3; ++k) u[k] += A.v[k] - B.v[k];
+    const double un = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2];  // without bias
     const double pn = c.p[0] * c.n[0] + c.p[1] * c.n[1] + c.p[2] * c.n[2];
-    double xn = pn - un * c.inv_a;
+    double xn = pn - (un + c.bias) * c.inv_a;
     xn = xn > 0 ? xn : 0;
     double t[3], tt = 0;
     for (int k = 0; k < 3; ++k) {
@@ -124,8 +124,12 @@ TETHER_INLINE double pass(const BodyArrays& s, SphereContact* begin, SphereConta
       c.p[k] += p[k];
       A.v[k] += A.m * p[k];
       A.w[k] += i1 * q[k];
-      B.v[k] -= B.m * p[k];
-      B.w[k] -= i2 * q[k];
+    }
+    if (c.second < 0) continue;
+    BodyState& C = s.state[c.second];
+    for (int k = 0; k < 3; ++k) {
+      C.v[k] -= C.m * p[k];
+      C.w[k] -= i2 * q[k];
     }
   }
   return sum;
@@ -138,7 +142,7 @@ TETHER_INLINE double pass(const BodyArrays& s, SmoothContact* begin, SmoothConta
     SmoothContact& c = *it;
     fetch(s, it, end);
     BodyState& A = s.state[c.first];
-    BodyState& B = second(s, c);
+    const BodyState& B = second(s, c);
     double w = c.bias;
     for (int k = 0; k < 3; ++k) {
       w += (A.v[k] - B.v[k]) * c.n[k] + A.w[k] * c.q1[k] - B.w[k] * c.q2[k];
@@ -160,7 +164,7 @@ TETHER_INLINE double pass(const BodyArrays& s, SmoothContact* begin, SmoothConta
       p[k] = -d * c.n[k];
       q[k] = -d * c.q2[k];
     }
-    push(B, s.inertia[c.second], p, q);
+    push(s.state[c.second], s.inertia[c.second], p, q);
   }
   return sum;
 }

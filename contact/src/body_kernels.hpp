@@ -24,21 +24,20 @@ struct alignas(64) BodyInertia {
   double xx, xy, xz, yy, yz, zz, pad[2];  // inverse, world axes
 };
 
-// `first` always moves; second = -1: it does not, its velocity is in `bias`.
+// `first` always moves; second < 0: body -1 - second of those that do not.
 // Tangents such that the tangential block is diagonal: no rotation in the sweep.
 struct GeneralContact {
   int first, second;
   double n[3], t[3], r1[3], r2[3];
   double a, inv_a, mu, c[2], beta[2];
-  double bias[3];  // in the frame n, t, n x t
-  double x[3], lambda;
+  double bias, x[3], lambda;
 };
-static_assert(sizeof(GeneralContact) == 216, "memory for a contact is a promise (README)");
+static_assert(sizeof(GeneralContact) == 200, "memory for a contact is a promise (README)");
 
-// Spheres: r1 = s1 n, r2 = s2 n, no coupling. bias and impulse p in world axes.
+// Spheres: r1 = s1 n, r2 = s2 n, no coupling. Impulse p in world axes.
 struct SphereContact {
   int first, second;
-  double n[3], s1, s2, inv_a, inv_t, mu, bias[3], p[3];
+  double n[3], s1, s2, inv_a, inv_t, mu, bias, p[3];
 };
 
 // No friction: one equation. q = r x n; weight = |D e_n|.
@@ -51,12 +50,12 @@ struct SmoothContact {
 struct alignas(32) GeneralGroup {
   int first[4], second[4];
   double n[3][4], t[3][4], r1[3][4], r2[3][4];
-  double a[4], inv_a[4], mu[4], c[2][4], beta[2][4], bias[3][4];
+  double a[4], inv_a[4], mu[4], c[2][4], beta[2][4], bias[4];
   double x[3][4], lambda[4];
 };
 struct alignas(32) SphereGroup {
   int first[4], second[4];
-  double n[3][4], s1[4], s2[4], inv_a[4], inv_t[4], mu[4], bias[3][4], p[3][4];
+  double n[3][4], s1[4], s2[4], inv_a[4], inv_t[4], mu[4], bias[4], p[3][4];
 };
 static_assert(sizeof(GeneralGroup) == 4 * sizeof(GeneralContact) &&
                   sizeof(SphereGroup) == 4 * sizeof(SphereContact),
@@ -65,7 +64,8 @@ static_assert(sizeof(GeneralGroup) == 4 * sizeof(GeneralContact) &&
 struct BodyArrays {
   BodyState* state;
   const BodyInertia* inertia;
-  BodyState* fixed;  // all zero, one for each thread
+  const BodyState* fixed;  // bodies that do not move; the first one is the world
+  BodyState* nowhere;      // takes what is written to them, one for each thread
   const BodyInertia* no_inertia;
 };
 

@@ -55,7 +55,8 @@ TETHER_AVX2 void transpose(v4& a, v4& b, v4& c, v4& d) {
 
 // Four bodies: velocity and 1/m, angular velocity and 1/inertia.
 struct Bodies {
-  BodyState* at[4];
+  const BodyState* at[4];
+  BodyState* to[4];
   Vector v, w;
   v4 m, i;
 };
@@ -72,23 +73,25 @@ TETHER_AVX2 void read(Bodies& b) {
 TETHER_AVX2 void write(const Bodies& b) {
   v4 p = b.v.x, q = b.v.y, r = b.v.z, s = b.m;
   transpose(p, q, r, s);
-  _mm256_store_pd(b.at[0]->v, p);
-  _mm256_store_pd(b.at[1]->v, q);
-  _mm256_store_pd(b.at[2]->v, r);
-  _mm256_store_pd(b.at[3]->v, s);
+  _mm256_store_pd(b.to[0]->v, p);
+  _mm256_store_pd(b.to[1]->v, q);
+  _mm256_store_pd(b.to[2]->v, r);
+  _mm256_store_pd(b.to[3]->v, s);
   p = b.w.x, q = b.w.y, r = b.w.z, s = b.i;
   transpose(p, q, r, s);
-  _mm256_store_pd(b.at[0]->w, p);
-  _mm256_store_pd(b.at[1]->w, q);
-  _mm256_store_pd(b.at[2]->w, r);
-  _mm256_store_pd(b.at[3]->w, s);
+  _mm256_store_pd(b.to[0]->w, p);
+  _mm256_store_pd(b.to[1]->w, q);
+  _mm256_store_pd(b.to[2]->w, r);
+  _mm256_store_pd(b.to[3]->w, s);
 }
 
 template <class Group>
 TETHER_AVX2 void find(const BodyArrays& s, const Group& g, Bodies& A, Bodies& B) {
   for (int k = 0; k < 4; ++k) {
-    A.at[k] = s.state + g.first[k];
-    B.at[k] = g.second[k] < 0 ? s.fixed : s.state + g.second[k];
+    const int b = g.second[k];
+    A.at[k] = A.to[k] = s.state + g.first[k];
+    B.to[k] = b < 0 ? s.nowhere : s.state + b;
+    B.at[k] = b < 0 ? s.fixed - 1 - b : B.to[k];
   }
 }
 
@@ -300,8 +303,7 @@ TETHER_AVX2 double pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* 
     const Vector a1 = cross(A.w, r1), a2 = cross(B.w, r2);
     const Vector u = {A.v.x - B.v.x + a1.x - a2.x, A.v.y - B.v.y + a1.y - a2.y,
                       A.v.z - B.v.z + a1.z - a2.z};
-    const v4 w0 = dot(u, n) + load(c.bias[0]), w1 = dot(u, t) + load(c.bias[1]);
-    const v4 w2 = dot(u, o) + load(c.bias[2]);
+    const v4 w0 = dot(u, n) + load(c.bias), w1 = dot(u, t), w2 = dot(u, o);
     Blocks L;
     L.a = load(c.a);
     L.inv_a = load(c.inv_a);
@@ -399,13 +401,12 @@ TETHER_AVX2 double pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* en
     find(s, c, A, B);
     read(A);
     read(B);
-    const Vector n = load(c.n), p = load(c.p), bias = load(c.bias);
+    const Vector n = load(c.n), p = load(c.p);
     const v4 s1 = load(c.s1), s2 = load(c.s2), inv_a = load(c.inv_a), inv_t = load(c.inv_t);
     const Vector w = {s1 * A.w.x - s2 * B.w.x, s1 * A.w.y - s2 * B.w.y, s1 * A.w.z - s2 * B.w.z};
     const Vector wn = cross(w, n);
-    const Vector u = {wn.x + (A.v.x - B.v.x + bias.x), wn.y + (A.v.y - B.v.y + bias.y),
-                      wn.z + (A.v.z - B.v.z + bias.z)};
-    const v4 un = dot(u, n), pn = dot(p, n), xn = most(pn - un * inv_a, zero);
+    const Vector u = {wn.x + (A.v.x - B.v.x), wn.y + (A.v.y - B.v.y), wn.z + (A.v.z - B.v.z)};
+    const v4 un = dot(u, n), pn = dot(p, n), xn = most(pn - (un + load(c.bias)) * inv_a, zero);
     const Vector t = {p.x - pn * n.x - (u.x - un * n.x) * inv_t,
                       p.y - pn * n.y - (u.y - un * n.y) * inv_t,
                       p.z - pn * n.z - (u.z - un * n.z) * inv_t};

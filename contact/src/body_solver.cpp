@@ -57,7 +57,7 @@ struct Side {
   const RigidBody* first;
   const RigidBody* second;
   Vector3d r1, r2, n;
-  Vector3d fixed;  // velocity of the fixed partner at the contact
+  Vector3d fixed;  // velocity of the partner at the contact if it does not move
   double sign;     // of the caller's impulse
 };
 
@@ -142,7 +142,7 @@ struct IslandResult {
 
 // What each thread has of its own.
 struct Worker {
-  alignas(64) BodyState fixed = {};
+  alignas(64) BodyState nowhere = {};
   std::unique_ptr<Solver> solver;
   Solution solution;
   std::vector<Body> bodies;
@@ -220,6 +220,8 @@ struct BodySolver::Implementation {
   std::vector<SmoothContact> smooth;
   // For each body, slot, chunk, island.
   std::vector<char> body_kind;
+  std::vector<int> fixed_slot;  // 0: at rest, as the world
+  std::vector<BodyState> fixed;
   std::vector<BodyState> state;
   std::vector<BodyInertia> inertia;
   std::vector<double> chunk_sum[2];  // in turns: a thread may still read those of the last pass
@@ -268,6 +270,8 @@ struct BodySolver::Implementation {
 
 void BodySolver::Implementation::read_bodies() {
   body_kind.resize(bodies->size());
+  fixed_slot.assign(bodies->size(), 0);
+  fixed.assign(1, {});
   for (std::size_t k = 0; k < bodies->size(); ++k) {
     const RigidBody& b = (*bodies)[k];
     if (!std::isfinite(b.inverse_mass) || b.inverse_mass < 0 || !b.inverse_inertia.allFinite() ||
@@ -278,6 +282,12 @@ void BodySolver::Implementation::read_bodies() {
     const Matrix3d& I = b.inverse_inertia;
     const bool isotropic = I(0, 1) == 0 && I(0, 2) == 0 && I(1, 2) == 0 && I(1, 0) == 0 &&
                            I(2, 0) == 0 && I(2, 1) == 0 && I(0, 0) == I(1, 1) && I(0, 0) == I(2, 2);
+    if (!moves(b) && !(b.velocity.isZero(0) && b.angular_velocity.isZero(0))) {
+      fixed_slot[k] = static_cast<int>(fixed.size());
+      fixed.push_back({});
+      store(b.velocity, fixed.back().v);
+      store(b.angular_velocity, fixed.back().w);
+    }
     body_kind[k] = static_cast<char>((moves(b) ? 1 : 0) + (isotropic ? 2 : 0));
   }
 }
@@ -291,11 +301,12 @@ void BodySolver::Implementation::read_contacts() {
   turned.resize(n);
   // The closed form needs arms along the normal.
   const auto round = [&](int b, const Vector3d& r, const Vector3d& normal) {
-    if (b < 0 || !(body_kind[at(b)] & 1)) return true;
-    if (!(body_kind[at(b)] & 2)) return false;
+    if (b < 0 || !(body_kind[at(b)] & 2)) return b < 0;
+    const RigidBody& body = (*bodies)[at(b)];
+    // A body that cannot turn has no arm to speak of.
+    if (body.inverse_inertia(0, 0) == 0 && body.angular_velocity.isZero(0)) return true;
     const double s = normal.dot(r);
-    return (r - s * normal).squaredNorm() <= 1e-28 * r.squaredNorm() ||
-           (*bodies)[at(b)].inverse_inertia(0, 0) == 0;
+    return (r - s * normal).squaredNorm() <= 1e-28 * r.squaredNorm();
   };
   for (std::size_t i = 0; i < n; ++i) {
     const PointContact& c = (*contacts)[i];
@@ -361,14 +372,16 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
   const PointContact& c = (*contacts)[at(contact)];
   const Side s = side(*bodies, c, turned[at(contact)] != 0);
   const int a = graph.slot[at(first[at(contact)])];
-  const int b = second[at(contact)] < 0 ? -1 : graph.slot[at(second[at(contact)])];
+  const int partner = turned[at(contact)] ? c.first : c.second;
+  const int b = second[at(contact)] >= 0 ? graph.slot[at(second[at(contact)])]
+                : partner < 0            ? -1
+                                         : -1 - fixed_slot[at(partner)];
   const Vector3d before = velocity_before(s, c.bias);
-  const Vector3d bias = c.bias * s.n - s.fixed;
   const double mass = s.first->inverse_mass + (s.second ? s.second->inverse_mass : 0);
   switch (k) {
     case Kind::sphere:
     case Kind::sphere4: {
-      const double s1 = s.n.dot(s.r1), s2 = s.second ? s.n.dot(s.r2) : 0;
+      const double s1 = s.n.dot(s.r1), s2 = s.n.dot(s.r2);
       double t = mass + s1 * s1 * s.first->inverse_inertia(0, 0);
       if (s.second) t += s2 * s2 * s.second->inverse_inertia(0, 0);
       if (!(mass > 0)) throw std::invalid_argument("the bodies cannot move along the normal");
@@ -381,7 +394,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       p.inv_a = 1 / mass;
       p.inv_t = 1 / t;
       p.mu = c.mu;
-      store(bias, p.bias);
+      p.bias = c.bias;
       put(p, k, place);
       break;
     }
@@ -398,7 +411,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       store(q2, p.q2);
       p.inv_a = 1 / D;
       p.weight = column.norm();
-      p.bias = bias.dot(s.n);
+      p.bias = c.bias;
       break;
     }
     case Kind::general:
@@ -406,14 +419,14 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       const Matrix3d F = tangent_frame(s.n);
       const LocalBlock L(F * diagonal_block(s) * F.transpose(), c.mu);
       // Tangents turned by V, in which the tangential block is diagonal.
-      const Vector3d t = L.cosine * F.row(1) + L.sine * F.row(2), o = s.n.cross(t);
+      const Vector3d t = L.cosine * F.row(1) + L.sine * F.row(2);
       GeneralContact p = {};
       p.first = a;
       p.second = b;
       store(s.n, p.n);
       store(t, p.t);
       store(s.r1, p.r1);
-      store(s.second ? s.r2 : Vector3d(Vector3d::Zero()), p.r2);
+      store(s.r2, p.r2);
       p.a = L.a;
       p.inv_a = L.inv_a;
       p.mu = L.mu;
@@ -421,9 +434,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       p.c[1] = L.cosine * L.c[1] - L.sine * L.c[0];
       p.beta[0] = L.beta[0];
       p.beta[1] = L.beta[1];
-      p.bias[0] = bias.dot(s.n);
-      p.bias[1] = bias.dot(t);
-      p.bias[2] = bias.dot(o);
+      p.bias = c.bias;
       p.lambda = -1;
       put(p, k, place);
       break;
@@ -529,7 +540,8 @@ void BodySolver::Implementation::unpack(int chunk) {
 template <class Operation>
 double BodySolver::Implementation::over_kinds(int chunk, const Team& team,
                                               const Operation& operation) {
-  const BodyArrays s{state.data(), inertia.data(), &team.worker->fixed, &kNoInertia};
+  const BodyArrays s{state.data(), inertia.data(), fixed.data(), &team.worker->nowhere,
+                     &kNoInertia};
   const auto &from = graph.chunks[at(chunk)].begin, &to = graph.chunks[at(chunk + 1)].begin;
   double sum = 0;
   const auto kind_range = [&](auto& list, Kind k, int width) {
@@ -770,7 +782,7 @@ void BodySolver::Implementation::unpack(const Island& island, const Team& team) 
 void BodySolver::Implementation::together(int k, const Team& team) {
   const Island& island = graph.islands[at(k)];
   const int begin = island.body_begin, end = island.body_end;
-  team.worker->fixed = {};
+  team.worker->nowhere = {};
   for (int s = team.from(begin, end); s < team.to(begin, end); ++s) load_body(s);
   team.meet();
   iterate(k, team);
@@ -781,7 +793,7 @@ void BodySolver::Implementation::together(int k, const Team& team) {
 void BodySolver::Implementation::alone(int k, Worker& worker) {
   const Island& island = graph.islands[at(k)];
   const Team team{0, 1, nullptr, &worker};
-  worker.fixed = {};
+  worker.nowhere = {};
   if (results[at(k)].sweeps == 0) {
     for (int s = island.body_begin; s < island.body_end; ++s) load_body(s);
     iterate(k, team);
@@ -906,7 +918,8 @@ void BodySolver::Implementation::finish() {
   out->bytes = graph.contact_bytes() + memory.bytes() +
                bytes(first, second, kind, turned, start, general4, spheres4, general, spheres,
                      smooth, chunk_sum[0], chunk_sum[1], results);
-  out->body_bytes = graph.body_bytes() + bytes(body_kind, state, inertia, previous_velocity);
+  out->body_bytes =
+      graph.body_bytes() + bytes(body_kind, state, inertia, fixed_slot, fixed, previous_velocity);
 }
 
 BodySolver::BodySolver(const BodyOptions& options) : implementation_(new Implementation) {

@@ -33,7 +33,6 @@ void ContactGraph::build(int bodies, const std::vector<int>& first, const std::v
   const std::size_t n = first.size();
   find_islands(bodies);
 
-  order.resize(n);
   slot.assign(at(bodies), -1);
   body.clear();
   chunks.clear();
@@ -43,6 +42,7 @@ void ContactGraph::build(int bodies, const std::vector<int>& first, const std::v
   for (const Island& island : islands) large = large || island.contacts > kOneChunk;
   if (large) {
     mark_.assign(at(bodies), -1);
+    taken_.resize(n);
     adjacent_start_.assign(at(bodies) + 1, 0);
     const auto count = [&](int b) {
       if (b >= 0) ++adjacent_start_[at(b)];
@@ -87,7 +87,7 @@ void ContactGraph::find_islands(int bodies) {
     (a < b ? parent_[at(b)] : parent_[at(a)]) = std::min(a, b);
   }
   island_of_.assign(at(bodies), -1);
-  chunk_of_.resize(n);  // here: contact -> island
+  order.resize(n);  // here: contact -> island
   islands.clear();
   for (std::size_t i = 0; i < n; ++i) {
     int& island = island_of_[at(root(first[i]))];
@@ -96,7 +96,7 @@ void ContactGraph::find_islands(int bodies) {
       islands.push_back({});
     }
     ++islands[at(island)].contacts;
-    chunk_of_[i] = island;
+    order[i] = island;
   }
   int begin = 0;
   for (Island& island : islands) {
@@ -105,7 +105,7 @@ void ContactGraph::find_islands(int bodies) {
   }
   sorted_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    sorted_[at(islands[at(chunk_of_[i])].contact_begin++)] = static_cast<int>(i);
+    sorted_[at(islands[at(order[i])].contact_begin++)] = static_cast<int>(i);
   }
   for (Island& island : islands) island.contact_begin -= island.contacts;
 }
@@ -129,7 +129,7 @@ void ContactGraph::cluster(Island& island) {
   const std::vector<int>&first = *first_, &second = *second_;
   const int size = std::max(kLeast, std::min(kMost, island.contacts / 128));
   int* contacts = sorted_.data() + island.contact_begin;
-  for (int k = 0; k < island.contacts; ++k) chunk_of_[at(contacts[k])] = -1;
+  for (int k = 0; k < island.contacts; ++k) taken_[at(contacts[k])] = 0;
   chunk_start_.clear();
   far_.clear();
   far_.push_back(first[at(contacts[0])]);
@@ -147,8 +147,8 @@ void ContactGraph::cluster(Island& island) {
       body.push_back(b);
       for (int k = adjacent_start_[at(b)]; k < adjacent_start_[at(b + 1)]; ++k) {
         const int c = adjacent_[at(k)];
-        if (chunk_of_[at(c)] < 0) {
-          chunk_of_[at(c)] = chunk;
+        if (!taken_[at(c)]) {
+          taken_[at(c)] = 1;
           contacts[taken++] = c;
         }
         const int other = first[at(c)] == b ? second[at(c)] : first[at(c)];
@@ -276,9 +276,9 @@ void ContactGraph::group(const int* begin, const int* end) {
 }
 
 std::size_t ContactGraph::contact_bytes() const {
-  return sizeof(int) *
-             (order.capacity() + sorted_.capacity() + adjacent_.capacity() + chunk_of_.capacity()) +
-         sizeof(Chunk) * chunks.capacity() + sizeof(Island) * islands.capacity();
+  return sizeof(int) * (order.capacity() + sorted_.capacity() + adjacent_.capacity()) +
+         taken_.capacity() + sizeof(Chunk) * chunks.capacity() +
+         sizeof(Island) * islands.capacity();
 }
 
 std::size_t ContactGraph::body_bytes() const {

@@ -66,7 +66,7 @@ class ContactGraph {
   std::vector<int> island_of_;                  // body (root) -> island
   std::vector<int> sorted_;                     // contacts by island, later by chunk
   std::vector<int> adjacent_start_, adjacent_;  // body -> contacts, of one large island
-  std::vector<int> chunk_of_;                   // contact -> chunk of the island
+  std::vector<char> taken_;                     // contact -> in a cluster
   std::vector<int> chunk_start_;                // chunk -> contacts
   std::vector<int> chunk_colour_, by_colour_, sequence_;
   std::vector<int> mark_;             // body -> last cluster that has seen it
