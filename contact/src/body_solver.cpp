@@ -917,7 +917,7 @@ void BodySolver::Implementation::finish() {
   };
   out->bytes = graph.contact_bytes() + memory.bytes() +
                bytes(first, second, kind, turned, start, general4, spheres4, general, spheres,
-                     smooth, chunk_sum[0], chunk_sum[1], results);
+                     smooth, chunk_sum[0], chunk_sum[1], results, previous_impulse);
   out->body_bytes =
       graph.body_bytes() + bytes(body_kind, state, inertia, fixed_slot, fixed, previous_velocity);
 }
