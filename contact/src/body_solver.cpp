@@ -625,17 +625,21 @@ void BodySolver::Implementation::extrapolate(const Island& island, const Team& t
   team.meet();
 }
 
-// Nesterov's momentum on the sweeps. The sweep is no gradient step, but the same rule serves: where
-// a sweep changes more than the one before, the momentum is dropped and its growth set back by
-// half.
+// Nesterov's momentum on the sweeps. A sweep is no gradient step, but the same rule serves: where a
+// sweep changes more than the one before, the momentum is dropped and its growth set back by half.
+// Where contacts toggle between stick and slip that happens all the time: as long as it does not
+// get on, a little more change is allowed in every other window.
 class Momentum {
  public:
   void start() { on_ = true; }
   bool on() const { return on_; }
+  // beta, given the sum of squares that the last sweep changed.
   double next(double change) {
+    best_ = std::min(best_, change);
+    if (++count_ == window_end_) look_back();
     const double grown = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
     double beta = (t_ - 1) / grown;
-    if (change > last_) {
+    if (change > allowed_ * last_) {
       t_ = std::max(1.0, 0.5 * t_);
       beta = 0;
     } else {
@@ -646,8 +650,22 @@ class Momentum {
   }
 
  private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+
+  void look_back() {
+    if (best_ > 0.25 * best_before_) {  // of squares: not halved
+      allowed_ = allowed_ > 1 ? 1 : 1.2;
+      t_ = 1;
+      last_ = kNone;
+    }
+    best_before_ = best_;
+    window_ += window_ / 2;
+    window_end_ = count_ + window_;
+  }
+
   bool on_ = false;
-  double t_ = 1, last_ = std::numeric_limits<double>::infinity();
+  double t_ = 1, last_ = kNone, allowed_ = 1, best_ = kNone, best_before_ = kNone;
+  int count_ = 0, window_ = 100, window_end_ = 100;
 };
 
 // Sweeps until the island is solved, max_sweeps are reached, or it should be assembled.
