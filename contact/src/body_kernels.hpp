@@ -6,11 +6,13 @@
 
 #include "vector.hpp"
 
-// Vector code for four contacts at a time, chosen when the program runs.
+// Vector code for four contacts at a time, chosen when the program runs. -DTETHER_GROUPS=0: none.
+#ifndef TETHER_GROUPS
 #if defined(__GNUC__) && defined(__x86_64__)
 #define TETHER_GROUPS 1
 #else
 #define TETHER_GROUPS 0
+#endif
 #endif
 
 namespace tether::contact::detail {
