@@ -170,11 +170,12 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
     if (!(each > 0) || !std::isfinite(each))
       throw std::invalid_argument(
           fmt::format("a tolerance or time step must be > 0, not {}", each));
-  const auto tell = [&](const std::string& what, double share) {
-    if (options.progress) options.progress(what, share);
+  int done = 0;
+  const auto tell = [&](const std::string& what) {
+    if (options.progress) options.progress(what, done++, 1 + static_cast<int>(settings.size()));
   };
 
-  tell("reference", 0);
+  tell("reference");
   const Reference reference =
       table.smooth ? smooth_reference(scene, options.reference.value_or(1e-12), options.samples)
                    : stepping_reference(scene, options.reference.value_or(settings.back() / 4),
@@ -182,8 +183,7 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
   table.reference = reference.what;
   table.reference_error = reference.error;
   for (const double setting : settings) {
-    tell(fmt::format("{:g}", setting),
-         static_cast<double>(1 + table.rows.size()) / static_cast<double>(1 + settings.size()));
+    tell(fmt::format("{:g}", setting));
     table.rows.push_back(measure_row(with_setting(scene, table.smooth, setting), setting,
                                      options.samples, reference.samples));
   }

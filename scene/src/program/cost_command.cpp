@@ -85,17 +85,19 @@ int run_cost(const Arguments& arguments) {
     throw std::invalid_argument(has_tolerance
                                     ? "the scene runs on the smooth engine: use --tolerances"
                                     : "the scene runs on the stepping engine: use --time-steps");
-  tether::Progress bar(1);
-  bar.start("", 1, 1);
   CostOptions options;
   options.settings = smooth ? arguments.tolerances : arguments.steps;
   options.reference = arguments.reference;
-  options.progress = [&](const std::string& what, double share) {
-    bar.start(what, 1, 1);
-    bar.at(share);
+  std::optional<tether::Progress> bar;
+  options.progress = [&](const std::string& what, int done, int all) {
+    if (done == 0)
+      bar.emplace(all);
+    else
+      bar->finish();
+    bar->start(what, 1, 1);
   };
   const CostTable table = cost(scene, options);
-  bar.hide();
+  bar.reset();
   print(scene, table);
   if (!arguments.csv.empty()) write_csv(arguments.csv, table);
   if (!arguments.svg.empty()) {

@@ -17,7 +17,9 @@ constexpr std::chrono::milliseconds kRedraw(200), kLine(10000);
 }  // namespace
 
 Progress::Progress(double work)
-    : all_work_(work), terminal_(isatty(STDERR_FILENO) != 0), next_(Clock::now() + kRedraw) {}
+    : all_work_(work),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      next_(Clock::now() + (terminal_ ? kRedraw : kLine)) {}
 
 void Progress::start(const std::string& what, double duration, double work) {
   run_work_ = work;

@@ -209,6 +209,8 @@ class PictureRecorder : public Recorder {
         if (towards > 1e-9)
           polygon(points, face, shade(colour, 0.55 + 0.2 * towards - 0.15 * up), colour, text);
       }
+      if (m.single.size() > 2)  // feet: the plate that stands on them
+        polygon(points, hull_corners(points), shade(colour, 0.4), colour, text);
       for (const std::size_t k : m.single) dot(points[k], colour, text);
     }
     if (body.shapes.empty()) dot(flat(eye_, pose.position), colour, text);
@@ -357,9 +359,9 @@ class PictureRecorder : public Recorder {
     if (plots.empty()) plots = "plot NaN notitle";
     text +=
         "set tmargin at screen 0.46\nset bmargin at screen 0.12\nset logscale y\nset format y "
-        "'10^{%T}'\nset format x '%g'\nset ylabel 'error'\nset xlabel 't / s' offset 0,0.4\n"
-        "set ytics 1e-16,1e4 nomirror; unset mytics\nset yrange [1e-17:*]\nset key at graph "
-        "1,1.14\n";
+        "'10^{%T}'\nset format x '%g'\nunset ylabel\nset xlabel 't / s' offset 0,0.4\n"
+        "set ytics 1e-16,1e4 nomirror; unset mytics\nset yrange [1e-17:*]\nset key at graph 1,1.16 "
+        "horizontal right samplen 1.2 width -5 font ',11'\n";
     return text + fmt::format("set xrange [0:{:.6g}]\n", std::max(instants_.back().time, 1e-300)) +
            plots + "\n";
   }

@@ -27,7 +27,8 @@ struct CostOptions {
   std::vector<double> settings;     ///< empty: a range around that of the scene
   std::optional<double> reference;  ///< its tolerance or step; default 1e-12, or the finest / 4
   int samples = 20;
-  std::function<void(const std::string& what, double share)> progress;
+  /// Before each part of the work: its name, and how many of all parts are done.
+  std::function<void(const std::string& what, int done, int all)> progress;
 };
 
 struct CostTable {
