@@ -486,6 +486,11 @@ void InteriorPoint::run(Search& search, int most) {
   if (start(search)) follow(search, most, 0);
 }
 
+void InteriorPoint::run_near(Search& search, const PackedVector* x, int most) {
+  tau_ = 0;
+  if (start_near(search, x, 1e-3)) follow(search, most, 0);
+}
+
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most) {
   System& system = search.system;
   std::copy(x, x + n_, anchor_.begin());

@@ -14,6 +14,8 @@ class InteriorPoint {
   void reset(int contacts);
   // From the point where everything sticks; at most `most` steps. The result is search.best.
   void run(Search& search, int most);
+  // From near x.
+  void run_near(Search& search, const PackedVector* x, int most);
   // Proximal point iteration from x: each of at most `most` problems A + tau D, b + tau D x, which a
   // small tau D makes solvable where the path of the problem itself ends, starts near its anchor.
   void run_proximal(Search& search, const PackedVector* x, int most);

@@ -129,6 +129,7 @@ Status Solver::Implementation::give_up() {
 
 // Stages in rotation (README, section 9).
 Status Solver::Implementation::rotate(bool last) {
+  constexpr double kRough = 1e-2;
   constexpr int kPhases = 2;  // Newton phases before a rescue
   // Rotations without halving the error; one if the law may be replaced afterwards.
   const int most_patience = last ? 3 : 1;
@@ -145,18 +146,24 @@ Status Solver::Implementation::rotate(bool last) {
   for (;;) {
     detail::AcceleratedSweeps::Leave leave;
     leave.other_cost = newton.cost(search);
-    leave.least_work = kappa * leave.other_cost;
+    leave.least_work = 2 * kappa * leave.other_cost;
     sweeps.run(search, leave);
     if (search.solved()) return Status::solved;
     if (search.exhausted()) return Status::work_limit;
 
     const double before = search.best_error;
+    // Started near a rough answer, interior points take ten steps or so; far from one, alternating
+    // directions do first what they can.
+    if (first && regular && before < kRough) {
+      interior.run_near(search, search.best.data(), 20);
+      if (search.solved()) return Status::solved;
+    }
     admm.start(search, search.best.data());
     admm.run(search, 200, true, true);
     if (search.solved()) return Status::solved;
     if (first && regular) interior.run(search, 40);
-    first = false;
     if (search.solved()) return Status::solved;
+    first = false;
     newton.run(search, search.best.data(), 12);
     if (search.solved()) return Status::solved;
     if (search.exhausted()) return Status::work_limit;
