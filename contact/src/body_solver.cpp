@@ -247,6 +247,7 @@ struct BodySolver::Implementation {
   void extrapolate(const Island& island, const Team& team, double beta);
   void assemble(int k, Worker& worker);
 
+  int cut(int begin, int end, int k, int parts) const;
   template <class Operation>
   double pass(const Island& island, const Team& team, int& turn, const Operation& operation);
   template <class Operation>
@@ -568,6 +569,19 @@ double BodySolver::Implementation::test(int chunk, const Team& team) {
   });
 }
 
+// The first chunk of part k of `parts` with about the same number of contacts.
+int BodySolver::Implementation::cut(int begin, int end, int k, int parts) const {
+  if (k == 0) return begin;
+  if (k == parts) return end;
+  const Chunk* chunks = graph.chunks.data();
+  const long long first_place = chunks[begin].place;
+  const long long place = first_place + (chunks[end].place - first_place) * k / parts;
+  const Chunk* c = std::partition_point(chunks + begin, chunks + end, [&](const Chunk& chunk) {
+    return static_cast<long long>(chunk.place) + (&chunk)[1].place < 2 * place;
+  });
+  return static_cast<int>(c - chunks);
+}
+
 // operation(chunk) for all chunks of the island, colour by colour; the sum of what it returns, in
 // an order that no thread count changes.
 template <class Operation>
@@ -576,9 +590,11 @@ double BodySolver::Implementation::pass(const Island& island, const Team& team, 
   turn = 1 - turn;
   std::vector<double>& sums = chunk_sum[turn];
   for (int k = island.colour_begin; k < island.colour_end; ++k) {
-    const int begin = graph.colours[at(k)], end = graph.colours[at(k + 1)];
-    // Each thread keeps to the same bodies as far as possible.
-    for (int c = team.from(begin, end); c < team.to(begin, end); ++c) sums[at(c)] = operation(c);
+    const int begin =
+        cut(graph.colours[at(k)], graph.colours[at(k + 1)], team.thread, team.threads);
+    const int end =
+        cut(graph.colours[at(k)], graph.colours[at(k + 1)], team.thread + 1, team.threads);
+    for (int c = begin; c < end; ++c) sums[at(c)] = operation(c);
     team.meet();
   }
   double sum = 0;

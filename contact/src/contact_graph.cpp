@@ -164,12 +164,13 @@ void ContactGraph::cluster(Island& island) {
   chunk_start_.push_back(taken);
 }
 
-// Greedy: the first colour that none of the chunk's bodies has.
+// Greedy: of the colours that none of the chunk's bodies has, the one with the fewest contacts, so
+// that no colour is too small to be shared among threads.
 void ContactGraph::colour_chunks(Island& island) {
   const int n = static_cast<int>(chunk_start_.size()) - 1;
   const int* contacts = sorted_.data() + island.contact_begin;
   chunk_colour_.resize(at(n));
-  int extra = kMasked;
+  int extra = kMasked, used_colours = 0, load[kMasked] = {};
   for (int c = 0; c < n; ++c) {
     std::uint64_t taken = 0;
     const auto over_bodies = [&](auto&& f) {
@@ -180,11 +181,15 @@ void ContactGraph::colour_chunks(Island& island) {
       }
     };
     over_bodies([&](std::uint64_t& used) { taken |= used; });
-    int colour = 0;
-    while (colour < kMasked && (taken >> colour & 1)) ++colour;
-    chunk_colour_[at(c)] = colour < kMasked ? colour : extra++;
-    if (colour < kMasked)
-      over_bodies([&](std::uint64_t& used) { used |= std::uint64_t{1} << colour; });
+    int colour = -1;
+    for (int k = 0; k < used_colours; ++k) {
+      if (!(taken >> k & 1) && (colour < 0 || load[k] < load[colour])) colour = k;
+    }
+    if (colour < 0) colour = used_colours < kMasked ? used_colours++ : extra++;
+    chunk_colour_[at(c)] = colour;
+    if (colour >= kMasked) continue;
+    load[colour] += chunk_start_[at(c + 1)] - chunk_start_[at(c)];
+    over_bodies([&](std::uint64_t& used) { used |= std::uint64_t{1} << colour; });
   }
   // Colour by colour, chunks in their order.
   by_colour_.assign(at(extra + 1), 0);
