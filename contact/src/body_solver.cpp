@@ -761,6 +761,7 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
       worker.contacts.back().bias = F * (c.bias * s.n - s.fixed);
     });
   }
+  if (!x.allFinite()) x.setZero();  // sweeps have overflowed
   const Problem problem = delassus(worker.bodies, worker.contacts);
   Options o;
   o.law = options.law;

@@ -164,6 +164,35 @@ TEST_CASE("threads do not change a bit") {
   }
 }
 
+TEST_CASE("a moving plate under a heap: same bits for all threads") {
+  random::Packing p = random::packing(12, false, 3);
+  RigidBody plate;
+  plate.inverse_mass = 1e-3;
+  plate.inverse_inertia = 1e-4 * Eigen::Matrix3d::Identity();
+  const int index = static_cast<int>(p.bodies.size());
+  p.bodies.push_back(plate);
+  for (std::size_t k = 0; k < p.contacts.size(); ++k) {
+    PointContact& c = p.contacts[k];
+    if (c.second >= 0) continue;
+    c.second = index;
+    c.r2 << static_cast<double>(k % 11), static_cast<double>(k % 7), 0.5;
+  }
+  BodyOptions o;
+  o.tolerance = 1e-7;
+  o.max_sweeps = 200;
+  const BodySolution one = BodySolver(o).solve(p.bodies, p.contacts);
+  CHECK(one.islands == 1);
+  CHECK(one.error < 1e-2);
+  for (int threads : {2, 4}) {
+    o.threads = threads;
+    const BodySolution more = BodySolver(o).solve(p.bodies, p.contacts);
+    REQUIRE(more.sweeps == one.sweeps);
+    CHECK(more.error == one.error);
+    for (std::size_t k = 0; k < p.contacts.size(); ++k)
+      REQUIRE(more.impulses[k] == one.impulses[k]);
+  }
+}
+
 TEST_CASE("a body with more contacts than colours") {
   random::Packing p;
   RigidBody floor;
