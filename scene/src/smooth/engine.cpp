@@ -152,10 +152,10 @@ class SmoothEngine : public Engine {
   }
 
   void check_start() {
-    const int m = system_.rows();
+    const int m = system_.all_rows();
     if (m == 0) return;
-    Eigen::VectorXd g(system_.constraint_count());
-    system_.constraint_values(0.0, y_.data(), g.data());
+    Eigen::VectorXd g(2 * m);
+    system_.joint_values(0.0, y_.data(), g.data());
     double size = 1, speed = 1;
     for (int k = 0; k < system_.moving(); ++k) {
       size = std::max(size, y_.segment<3>(kBody * k + kPosition).norm());
@@ -172,8 +172,9 @@ class SmoothEngine : public Engine {
                     ": its bodies are off by %.3g %s at t = 0 (at most %.3g is taken for rounding)",
                     g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s", allowed);
       throw std::invalid_argument(
-          "the start of the scene contradicts the " +
-          system_.constraint_names()[static_cast<std::size_t>(half * m + worst)] + text +
+          std::string("the start of the scene contradicts the ") +
+          (half == 0 ? "position" : "velocity") + " of joint \"" + system_.joint_of_row(worst) +
+          "\"" + text +
           (half == 0 ? ""
                      : "; give both bodies velocities and angular velocities that the joint "
                        "allows, and those of a prescribed motion"));

@@ -23,6 +23,11 @@ namespace {
 // Unknowns from which KLU is faster than the dense solver.
 constexpr int kSparseFrom = 80;
 
+// IDA bounds the error of each step. A tenth of the wanted error keeps slider-crank, four-bar and
+// Bricard's linkage below ten times the tolerance after 10 s, for about 1.4 times the steps.
+constexpr double kLocal = 0.1, kSmallest = 1e-13;
+double local_tolerance(double tolerance) { return std::max(kLocal * tolerance, kSmallest); }
+
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -67,13 +72,13 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     N_VGetArrayPointer(y_)[i] = y[i];
     N_VGetArrayPointer(yp_)[i] = yp[i];
     N_VGetArrayPointer(id_)[i] = system.id(i);
-    N_VGetArrayPointer(atol_)[i] = system.absolute_tolerance(i, options.tolerance);
+    N_VGetArrayPointer(atol_)[i] = system.absolute_tolerance(i, local_tolerance(options.tolerance));
   }
   ida_ = IDACreate(context_);
   catch_messages();
   IDAInit(ida_, residual, t, y_, yp_);
   IDASetUserData(ida_, this);
-  IDASVtolerances(ida_, options.tolerance, atol_);
+  IDASVtolerances(ida_, local_tolerance(options.tolerance), atol_);
   IDASetMaxNumSteps(ida_, -1);
   if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
   prepare_matrix();
@@ -86,6 +91,8 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     ida_projection::Options projection;
     projection.id = id_;
     projection.print_fatal = false;
+    projection.progress = [&system](const ida_projection::Progress&) { system.look_at_rows(); };
+    system.choose_rows(t, y.data());
     projection_.emplace(ida_, system.constraints(), projection);
   }
 }

@@ -207,13 +207,29 @@ void System::invariant_jacobian(Rows C, int row) const {
 
 int System::constraint_count() const { return 2 * m_ + moving() + static_cast<int>(kept_.size()); }
 
-void System::constraint_values(double t, const double* y, double* g) {
+void System::joint_values(double t, const double* y, double* g) {
   update(t, y);
   each_row([&](const auto& row) {
     const Frame<double>&A = bodies_.frames[at(row.first)], &B = bodies_.frames[at(row.second)];
     row.template rows<0>(A, B, g + row.row);
-    row.template rows<1>(A, B, g + m_ + row.row);
+    row.template rows<1>(A, B, g + all_ + row.row);
   });
+}
+
+std::string System::joint_of_row(int row) const {
+  std::string name;
+  each_row([&](const auto& each) {
+    if (each.row <= row && row < each.row + each.count) name = joint_names_[at(each.joint)];
+  });
+  return name;
+}
+
+void System::constraint_values(double t, const double* y, double* g) {
+  joint_values(t, y, values_.data());
+  for (int k = 0; k < m_; ++k) {
+    g[k] = values_[used_[at(k)]];
+    g[m_ + k] = values_[all_ + used_[at(k)]];
+  }
   double* norms = g + 2 * m_;
   for (int k = 0; k < moving(); ++k)
     norms[k] =
@@ -241,12 +257,20 @@ void System::constraint_jacobian(double t, const double* y, Rows C) {
     row.template rows<0>(A, B, g);
     row.template rows<1>(A, B, rate);
     for (int i = 0; i < row.count; ++i) {
-      put(row.row + i, ia, g[i].derivatives(), 0);
-      put(row.row + i, ib, g[i].derivatives(), kBodyDirections);
-      put(m_ + row.row + i, ia, rate[i].derivatives(), 0);
-      put(m_ + row.row + i, ib, rate[i].derivatives(), kBodyDirections);
+      const int place = place_of_used_[at(row.row + i)];
+      if (place < 0) continue;
+      put(place, ia, g[i].derivatives(), 0);
+      put(place, ib, g[i].derivatives(), kBodyDirections);
+      put(m_ + place, ia, rate[i].derivatives(), 0);
+      put(m_ + place, ib, rate[i].derivatives(), kBodyDirections);
     }
   });
+  for (int k = 0; k < m_; ++k) {
+    const int place = place_of_used_[at(used_[at(k)])];
+    if (place == k) continue;
+    C.row(k) = C.row(place);
+    C.row(m_ + k) = C.row(m_ + place);
+  }
   for (int k = 0; k < moving(); ++k)
     C.row(2 * m_ + k).segment<4>(kBody * k + kQuaternion) =
         Eigen::Map<const Eigen::RowVector4d>(y + kBody * k + kQuaternion);
@@ -257,8 +281,10 @@ std::vector<std::string> System::constraint_names() const {
   std::vector<std::string> names(at(2 * m_));
   each_row([&](const auto& row) {
     for (int i = 0; i < row.count; ++i) {
-      names[at(row.row + i)] = "position of joint \"" + joint_names_[at(row.joint)] + "\"";
-      names[at(m_ + row.row + i)] = "velocity of joint \"" + joint_names_[at(row.joint)] + "\"";
+      const int place = place_[at(row.row + i)];
+      if (place < 0) continue;
+      names[at(place)] = "position of joint \"" + joint_names_[at(row.joint)] + "\"";
+      names[at(m_ + place)] = "velocity of joint \"" + joint_names_[at(row.joint)] + "\"";
     }
   });
   for (int k = 0; k < moving(); ++k) names.emplace_back("quaternion norm");
@@ -286,7 +312,7 @@ Diagnostics System::diagnostics(double t, const double* y) {
   Diagnostics d;
   Eigen::VectorXd g(constraint_count());
   constraint_values(t, y, g.data());
-  d.drift = g.lpNorm<Eigen::Infinity>();
+  d.drift = std::max(g.lpNorm<Eigen::Infinity>(), values_.lpNorm<Eigen::Infinity>());
   for (const auto& effect : effects_) d.potential_energy += effect->potential(bodies_);
   d.kinetic_energy = energy() - d.potential_energy;
   d.momentum = momentum();
