@@ -120,6 +120,22 @@ std::vector<Effect> effects(const Scene& s, EngineKind engine) {
   return on;
 }
 
+// Of IDA: position, quaternion and velocities of each body, the work of forces if energy is kept in
+// spite of them, and multipliers as the formulation has them.
+int smooth_unknowns(const Scene& s, const Plan& plan) {
+  const bool keeps_energy = std::any_of(
+      s.invariants.begin(), s.invariants.end(),
+      [](const Invariant& each) { return each.project && each.kind == InvariantKind::energy; });
+  const bool works = std::any_of(s.springs.begin(), s.springs.end(), damps) ||
+                     std::any_of(s.joints.begin(), s.joints.end(), is_driven) ||
+                     std::any_of(s.bodies.begin(), s.bodies.end(),
+                                 [](const Body& b) { return b.drag.has_value(); }) ||
+                     !s.loads.empty();
+  const Formulation form = s.smooth.value_or(SmoothOptions{}).formulation;
+  const int multipliers = form == Formulation::index0 ? 0 : form == Formulation::index1 ? 1 : 2;
+  return 13 * plan.moving + (keeps_energy && works ? 1 : 0) + multipliers * plan.rows;
+}
+
 EngineKind choose(const Scene& s, std::string& why) {
   std::string refusal;
   const auto refuse = [&](bool wrong, const std::string& text) {
@@ -181,7 +197,7 @@ Plan make_plan(const Scene& scene) {
   for (const Invariant& each : scene.invariants)
     if (each.project) plan.invariants += each.kind == InvariantKind::energy ? 1 : 3;
   plan.unknowns =
-      plan.engine == EngineKind::stepping ? 6 * plan.moving : 13 * plan.moving + plan.rows;
+      plan.engine == EngineKind::stepping ? 6 * plan.moving : smooth_unknowns(scene, plan);
   plan.pairs = contact_pairs(scene);
   return plan;
 }
@@ -192,8 +208,8 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan) {
   out << fmt::format("bodies    {}, {} of them moving; {}\n", plan.bodies, plan.moving,
                      number(plan.shapes, "shape"));
   if (smooth)
-    out << fmt::format("unknowns  {}, with {} and {}\n", plan.unknowns,
-                       number(plan.rows, "row") + " of joints",
+    out << fmt::format("unknowns  {}{}, with {} and {}\n", plan.rows > 0 ? "up to " : "",
+                       plan.unknowns, number(plan.rows, "row") + " of joints",
                        number(plan.invariants, "invariant") + " kept");
   else
     out << fmt::format("unknowns  {} velocities; {} of bodies can touch\n", plan.unknowns,

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "geometry/hull.hpp"
 #include "geometry/mesh.hpp"
@@ -140,6 +142,7 @@ class PictureRecorder : public Recorder {
         "unset object\nunset label\nset border 3\nset xtics nomirror out\nset ytics nomirror "
         "out\nset grid\nset "
         "autoscale\n";
+    text += fmt::format("set xrange [0:{:.6g}]\n", std::max(instants_.back().time, 1e-300));
     text += energies();
     text += errors();
     return text + "unset multiplot\n";
@@ -269,19 +272,8 @@ class PictureRecorder : public Recorder {
     std::size_t drawn = 0;
     for (const std::size_t b : order) {
       if (drawn == kMostPaths) break;
-      std::string path;
-      Vector2d before = Vector2d::Constant(std::numeric_limits<double>::infinity());
-      double length = 0;
-      const double pixel = (high_ - low_).x() / 400;
-      for (const Instant& now : instants_) {
-        const Vector2d p = flat(eye_, now.bodies[b].position);
-        const double step = (p - before).norm();
-        if (step < pixel) continue;  // the eye sees no more
-        if (std::isfinite(step)) length += step;
-        path += fmt::format("{:.5g} {:.5g}\n", p.x(), p.y());
-        before = p;
-      }
-      if (length < 3 * pixel) continue;
+      const std::string path = path_of(b);
+      if (path.empty()) continue;
       paths += fmt::format("$path{} << EOD\n{}EOD\n", drawn, path);
       plots += fmt::format("{} $path{} with lines lc rgb '{}' lw 1", plots.empty() ? "plot" : ",",
                            drawn, kColours[b % kColours.size()]);
@@ -291,12 +283,44 @@ class PictureRecorder : public Recorder {
     return paths + text + plots + "\n";
   }
 
+  /// Where the centre of a body went, without what is drawn already; empty if it hardly moved.
+  std::string path_of(std::size_t b) const {
+    const double pixel = (high_ - low_).x() / 400;
+    std::map<std::pair<long, long>, std::size_t> visited;  // cells of the picture, and when first
+    std::string path;
+    Vector2d before = Vector2d::Constant(std::numeric_limits<double>::infinity());
+    double length = 0;
+    bool broken = false;
+    std::size_t count = 0;
+    for (const Instant& now : instants_) {
+      const Vector2d p = flat(eye_, now.bodies[b].position), cell = (p - low_) / (2 * pixel);
+      const double step = (p - before).norm();
+      if (!(step >= pixel) || !cell.allFinite() || cell.cwiseAbs().maxCoeff() > 1e6) continue;
+      const auto [first, fresh] =
+          visited.emplace(std::pair(std::lround(cell.x()), std::lround(cell.y())), count);
+      const bool again = !fresh && first->second + 5 < count;
+      if (std::isfinite(step)) length += step;
+      ++count;
+      before = p;
+      if (again && broken) continue;
+      path += fmt::format("{:.4g} {:.4g}\n{}", p.x(), p.y(), again ? "\n" : "");
+      broken = again;
+    }
+    return length < 3 * pixel ? "" : path;
+  }
+
   template <class Value>
-  std::string column(const char* name, Value value) const {
+  std::string column(const char* name, Value value, bool peaks = false) const {
     std::string text = fmt::format("${} << EOD\n", name);
     const std::size_t step = 1 + instants_.size() / 200;
-    for (std::size_t i = 0; i < instants_.size(); i += step)
-      text += fmt::format("{:.5g} {:.5g}\n", instants_[i].time, value(instants_[i].d));
+    for (std::size_t i = 0; i < instants_.size(); i += step) {
+      // Of errors the largest between two points; else what is there.
+      double shown = value(instants_[i].d);
+      if (peaks)
+        for (std::size_t k = i; k < std::min(i + step, instants_.size()); ++k)
+          shown = std::max(shown, value(instants_[k].d));
+      text += fmt::format("{:.5g} {:.5g}\n", instants_[i].time, shown);
+    }
     return text + "EOD\n";
   }
 
@@ -341,17 +365,20 @@ class PictureRecorder : public Recorder {
       largest = std::max(largest, c);
       return std::max(c, 1e-17);
     };
-    const std::string energy = column("change", change);
+    const std::string energy = column("change", change, true);
     if (largest > 0) {
       text += energy;
       plot("change", "energy change / J", "#202020");
     }
     for (const Curve& curve : curves) {
       double most = 0;
-      const std::string data = column(curve.name, [&](const Diagnostics& d) {
-        most = std::max(most, curve.value(d));
-        return std::max(curve.value(d), 1e-17);
-      });
+      const std::string data = column(
+          curve.name,
+          [&](const Diagnostics& d) {
+            most = std::max(most, curve.value(d));
+            return std::max(curve.value(d), 1e-17);
+          },
+          true);
       if (!(most > 0)) continue;
       text += data;
       plot(curve.name, curve.title, curve.colour);
@@ -360,10 +387,10 @@ class PictureRecorder : public Recorder {
     text +=
         "set tmargin at screen 0.46\nset bmargin at screen 0.12\nset logscale y\nset format y "
         "'10^{%T}'\nset format x '%g'\nunset ylabel\nset xlabel 't / s' offset 0,0.4\n"
-        "set ytics 1e-16,1e4 nomirror; unset mytics\nset yrange [1e-17:*]\nset key at graph 1,1.16 "
+        "set ytics 1e-16,1e4 nomirror; unset mytics\nset yrange [1e-17:1e-12<*]\nset key at graph "
+        "1,1.16 "
         "horizontal right samplen 1.2 width -5 font ',11'\n";
-    return text + fmt::format("set xrange [0:{:.6g}]\n", std::max(instants_.back().time, 1e-300)) +
-           plots + "\n";
+    return text + plots + "\n";
   }
 
   const Scene& scene_;

@@ -26,7 +26,8 @@ struct Plan {
 
   int bodies = 0, moving = 0, shapes = 0;
   int rows = 0;        ///< constraints of joints on positions
-  int unknowns = 0;    ///< smooth: of IDA; stepping: velocities
+  int unknowns = 0;    ///< smooth: of IDA, at most (rows that others imply are left out there);
+                       ///< stepping: velocities
   int invariants = 0;  ///< rows that the projection keeps beside those of the joints
   long pairs = 0;      ///< of bodies whose materials meet
 };
