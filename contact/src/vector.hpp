@@ -3,10 +3,15 @@
 
 // Inner loops are built twice where the compiler can choose at run time (GCC, x86-64): once for
 // the base architecture and once with AVX2 and FMA. No global -march flag is needed. Sanitizers
-// cannot run the resolvers, so they get the base version.
+// cannot run the resolvers, so they get the base version. A level or a feature is asked for, not a
+// processor: "arch=haswell" is chosen on Intel's Haswell line only, never on AMD's.
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__linux__) && \
     !defined(TETHER_CONTACT_NO_CLONES)
-#define TETHER_CLONES __attribute__((target_clones("arch=haswell", "default")))
+#if __GNUC__ >= 12
+#define TETHER_CLONES __attribute__((target_clones("arch=x86-64-v3", "default")))
+#else
+#define TETHER_CLONES __attribute__((target_clones("fma", "default")))
+#endif
 #else
 #define TETHER_CLONES
 #endif
