@@ -79,7 +79,7 @@ struct SteppingOptions {
   double near_part = 1e-3;
   int max_sweeps = 1000;  ///< see BodyOptions
   int max_assembled = 1000;
-  double max_work = 5e9;
+  double max_work = 2e8;  ///< see BodyOptions: bounds the time of a step
   int threads = 1;
 };
 

@@ -1,0 +1,32 @@
+// Tether: convex polyhedra. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <tether/contact/shapes.hpp>
+#include <vector>
+
+namespace tether::contact::detail {
+
+struct Polyhedron {
+  struct Face {
+    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // outwards
+    double offset = 0;                                  // normal . x on the face
+    std::vector<int> loop;  // vertices, counterclockwise seen from outside
+  };
+  struct Edge {
+    int from, to;
+    int left, right;  // faces
+  };
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Face> faces;
+  std::vector<Edge> edges;
+  double size = 0;  // smallest width across a face, m: the scale of its tolerances
+};
+
+/// Of a box or a convex shape. Throws std::invalid_argument if the points are flat.
+Polyhedron make_polyhedron(const Shape& shape);
+
+/// The same at a pose, into storage that is used again.
+void place(const Polyhedron& from, const Pose& pose, const Eigen::Vector3d& origin, Polyhedron& to);
+
+}  // namespace tether::contact::detail
