@@ -51,6 +51,7 @@ TEST_CASE("every field of a scene is read") {
   CHECK(s.smooth->formulation == Formulation::stabilised_index2);
   CHECK_FALSE(s.smooth->projection);
   CHECK(s.smooth->max_step == 0.01);
+  CHECK(s.smooth->max_steps == 5000);
   CHECK(s.output.csv == "a.csv");
   CHECK(s.output.checkpoint == 0.5);
 

@@ -16,6 +16,7 @@ tolerance = 1e-8
 formulation = "stabilised_index2"
 projection = false
 max_step = 0.01
+max_steps = 5000
 
 [output]
 csv = "a.csv"

@@ -224,6 +224,7 @@ void read_engine(Fields& root, Reader& r) {
     o.formulation = in.word("formulation", o.formulation);
     o.projection = in.flag("projection", o.projection);
     o.max_step = in.number("max_step", o.max_step, kNotNegative, "s; 0: free");
+    o.max_steps = in.count("max_steps", o.max_steps, 1, 2000000000);
     in.finish();
     r.scene.smooth = o;
   }

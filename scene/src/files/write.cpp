@@ -184,6 +184,7 @@ void write_smooth(const SmoothOptions& o, Writer& out) {
   out.raw("formulation", toml_word(o.formulation));
   out.field("projection", o.projection);
   out.field("max_step", o.max_step, "s; 0: free");
+  out.field("max_steps", o.max_steps, "between two stops");
 }
 
 void write_stepping(const SteppingOptions& o, Writer& out) {

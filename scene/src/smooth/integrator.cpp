@@ -79,7 +79,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   IDAInit(ida_, residual, t, y_, yp_);
   IDASetUserData(ida_, this);
   IDASVtolerances(ida_, local_tolerance(options.tolerance), atol_);
-  IDASetMaxNumSteps(ida_, -1);
+  IDASetMaxNumSteps(ida_, options.max_steps);
   if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
   prepare_matrix();
   IDASetLinearSolver(ida_, solver_, matrix_);

@@ -33,9 +33,10 @@ struct CostOptions {
 
 struct CostTable {
   bool smooth = true;
-  std::string reference;       ///< what the errors are measured against
-  double reference_error = 0;  ///< how far two references differ: smaller errors mean nothing
-  std::vector<CostRow> rows;   ///< in the order of the settings, loosest first
+  std::string reference;  ///< what the errors are measured against
+  double reference_error =
+      0;  ///< its change from the next looser setting: smaller errors mean little
+  std::vector<CostRow> rows;  ///< in the order of the settings, loosest first
   /// The cheapest row with an error of at most `wanted`; null: there is none.
   const CostRow* cheapest(double wanted) const;
 };

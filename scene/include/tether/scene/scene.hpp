@@ -119,8 +119,9 @@ enum class OnFailure : std::uint8_t { stop, warn };
 struct SmoothOptions {
   double tolerance = 1e-6;  ///< of the motion (SI); IDA's rtol and atol are a tenth of it
   Formulation formulation = Formulation::index1;
-  bool projection = true;  ///< false: plain IDA
-  double max_step = 0;     ///< s; 0: free
+  bool projection = true;   ///< false: plain IDA
+  double max_step = 0;      ///< s; 0: free
+  int max_steps = 1000000;  ///< between two stops (records, expectations); then the run is given up
 };
 
 /// Scenes with contact: impulse-velocity steps.
