@@ -152,7 +152,7 @@ class SmoothEngine : public Engine {
   }
 
   void check_start() {
-    const int m = system_.all_rows();
+    const int m = system_.rows();
     if (m == 0) return;
     Eigen::VectorXd g(2 * m);
     system_.joint_values(0.0, y_.data(), g.data());

@@ -92,7 +92,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     projection.id = id_;
     projection.print_fatal = false;
     projection.progress = [&system](const ida_projection::Progress&) { system.look_at_rows(); };
-    system.choose_rows(t, y.data());
+    system.choose_rows(t, y.data(), local_tolerance(options.tolerance));
     projection_.emplace(ida_, system.constraints(), projection);
   }
 }

@@ -205,14 +205,14 @@ void System::invariant_jacobian(Rows C, int row) const {
   }
 }
 
-int System::constraint_count() const { return 2 * m_ + moving() + static_cast<int>(kept_.size()); }
+int System::constraint_count() const { return 2 * p_ + moving() + static_cast<int>(kept_.size()); }
 
 void System::joint_values(double t, const double* y, double* g) {
   update(t, y);
   each_row([&](const auto& row) {
     const Frame<double>&A = bodies_.frames[at(row.first)], &B = bodies_.frames[at(row.second)];
     row.template rows<0>(A, B, g + row.row);
-    row.template rows<1>(A, B, g + all_ + row.row);
+    row.template rows<1>(A, B, g + m_ + row.row);
   });
 }
 
@@ -226,11 +226,11 @@ std::string System::joint_of_row(int row) const {
 
 void System::constraint_values(double t, const double* y, double* g) {
   joint_values(t, y, values_.data());
-  for (int k = 0; k < m_; ++k) {
+  for (int k = 0; k < p_; ++k) {
     g[k] = values_[used_[at(k)]];
-    g[m_ + k] = values_[all_ + used_[at(k)]];
+    g[p_ + k] = values_[m_ + used_[at(k)]];
   }
-  double* norms = g + 2 * m_;
+  double* norms = g + 2 * p_;
   for (int k = 0; k < moving(); ++k)
     norms[k] =
         0.5 * (Eigen::Map<const Eigen::Vector4d>(y + kBody * k + kQuaternion).squaredNorm() - 1.0);
@@ -261,30 +261,30 @@ void System::constraint_jacobian(double t, const double* y, Rows C) {
       if (place < 0) continue;
       put(place, ia, g[i].derivatives(), 0);
       put(place, ib, g[i].derivatives(), kBodyDirections);
-      put(m_ + place, ia, rate[i].derivatives(), 0);
-      put(m_ + place, ib, rate[i].derivatives(), kBodyDirections);
+      put(p_ + place, ia, rate[i].derivatives(), 0);
+      put(p_ + place, ib, rate[i].derivatives(), kBodyDirections);
     }
   });
-  for (int k = 0; k < m_; ++k) {
+  for (int k = 0; k < p_; ++k) {
     const int place = place_of_used_[at(used_[at(k)])];
     if (place == k) continue;
     C.row(k) = C.row(place);
-    C.row(m_ + k) = C.row(m_ + place);
+    C.row(p_ + k) = C.row(p_ + place);
   }
   for (int k = 0; k < moving(); ++k)
-    C.row(2 * m_ + k).segment<4>(kBody * k + kQuaternion) =
+    C.row(2 * p_ + k).segment<4>(kBody * k + kQuaternion) =
         Eigen::Map<const Eigen::RowVector4d>(y + kBody * k + kQuaternion);
-  if (!kept_.empty()) invariant_jacobian(C, 2 * m_ + moving());
+  if (!kept_.empty()) invariant_jacobian(C, 2 * p_ + moving());
 }
 
 std::vector<std::string> System::constraint_names() const {
-  std::vector<std::string> names(at(2 * m_));
+  std::vector<std::string> names(at(2 * p_));
   each_row([&](const auto& row) {
     for (int i = 0; i < row.count; ++i) {
-      const int place = place_[at(row.row + i)];
+      const int place = place_of_used_[at(row.row + i)];
       if (place < 0) continue;
       names[at(place)] = "position of joint \"" + joint_names_[at(row.joint)] + "\"";
-      names[at(m_ + place)] = "velocity of joint \"" + joint_names_[at(row.joint)] + "\"";
+      names[at(p_ + place)] = "velocity of joint \"" + joint_names_[at(row.joint)] + "\"";
     }
   });
   for (int k = 0; k < moving(); ++k) names.emplace_back("quaternion norm");

@@ -104,7 +104,7 @@ System::System(const Scene& scene) : form_(scene.smooth.value_or(SmoothOptions{}
   bodies_.turns.resize(at(bodies_.moving));
 
   add_joints(scene);
-  leave_out_redundant_rows();
+  count_independent_rows();
   effects_ = make_effects(scene, bodies_);
   add_invariants(scene);
   size_ = first_multiplier();
@@ -170,8 +170,8 @@ void System::add_joints(const Scene& scene) {
     const Vector3d x = perpendicular(z), y = z.cross(x);
     const auto place = [&](auto each) {
       static_cast<Row&>(each) = row;
-      each.row = all_;
-      all_ += each.count;
+      each.row = m_;
+      m_ += each.count;
       return each;
     };
     const auto coincide = [&] {
@@ -244,8 +244,9 @@ void System::add_joints(const Scene& scene) {
 }
 
 double System::absolute_tolerance(int i, double tolerance) const {
-  // Multipliers follow the state; in redundant rows they are known to round-off / eps only.
-  return i < first_multiplier() ? tolerance : 1e4 * tolerance;
+  // Multipliers follow the state; where rows depend on each other they are known to round-off / eps
+  // only, and at a dead point they have a pole. Newton's test is left to the state.
+  return i < first_multiplier() ? tolerance : 1e10 * tolerance;
 }
 
 Eigen::VectorXd System::start_state() const {
@@ -307,19 +308,9 @@ void System::sum_forces(Stopwatch* watch) {
   }
 }
 
-void System::gather(const double* all, double* rows) const {
-  for (int i = 0; i < all_; ++i)
-    if (place_[at(i)] >= 0) rows[place_[at(i)]] = all[i];
-}
-
-const double* System::spread(const double* rows) {
-  if (all_ == m_) return rows;
-  for (int i = 0; i < all_; ++i) spread_[i] = place_[at(i)] < 0 ? 0.0 : rows[place_[at(i)]];
-  return spread_.data();
-}
-
-void System::all_gradients() {
-  all_G_.setZero(all_, 6 * moving());
+void System::form_gradient() {
+  G_.setZero(m_, 6 * moving());
+  GM_.resize(m_, 6 * moving());
   each_row([&](const auto& row) {
     const Frame<double>&A = bodies_.frames[at(row.first)], &B = bodies_.frames[at(row.second)];
     double unit[3] = {0, 0, 0};
@@ -331,22 +322,13 @@ void System::all_gradients() {
       const auto put = [&](int body, const Frame<double>& f, const Wrench<double>& wrench) {
         const int slot = bodies_.inertia[at(body)].slot;
         if (slot < 0) return;
-        all_G_.block<1, 3>(row.row + i, 6 * slot) += wrench.force.transpose();
-        all_G_.block<1, 3>(row.row + i, 6 * slot + 3) +=
-            (f.R.transpose() * wrench.torque).transpose();
+        G_.block<1, 3>(row.row + i, 6 * slot) += wrench.force.transpose();
+        G_.block<1, 3>(row.row + i, 6 * slot + 3) += (f.R.transpose() * wrench.torque).transpose();
       };
       put(row.first, A, a);
       put(row.second, B, b);
     }
   });
-}
-
-void System::form_gradient() {
-  all_gradients();
-  G_.resize(m_, 6 * moving());
-  GM_.resize(m_, 6 * moving());
-  for (int i = 0; i < all_; ++i)
-    if (place_[at(i)] >= 0) G_.row(place_[at(i)]) = all_G_.row(i);
   for (int k = 0; k < moving(); ++k) {
     const Inertia& inertia = bodies_.inertia[at(body_of_slot_[at(k)])];
     GM_.middleCols<3>(6 * k) = G_.middleCols<3>(6 * k) / inertia.mass;
@@ -369,9 +351,8 @@ void System::solve_multipliers() {
   form_gradient();
   each_row([&](const auto& row) {
     row.template rows<2>(bodies_.frames[at(row.first)], bodies_.frames[at(row.second)],
-                         values_.data() + row.row);
+                         gamma_.data() + row.row);
   });
-  gather(values_.data(), gamma_.data());
   right_ = -gamma_;
   right_.noalias() -= G_ * free_;
   factor_.compute(S_ + Eigen::MatrixXd(epsilon_.asDiagonal()));
@@ -394,8 +375,7 @@ double System::power(const double* lambda) const {
     each_row([&](const auto& row) {
       double g_t[3];
       row.rate_by_time(g_t);
-      for (int i = 0; i < row.count; ++i)
-        if (place_[at(row.row + i)] >= 0) sum -= lambda[place_[at(row.row + i)]] * g_t[i];
+      for (int i = 0; i < row.count; ++i) sum -= lambda[row.row + i] * g_t[i];
     });
   return sum;
 }
@@ -436,12 +416,12 @@ void System::residual(double t, const double* y, const double* yp, double* r, St
     lambda = lambda_.data();
     if (watch) watch->lap(joints);
   } else {
-    if (m_ > 0) add_multipliers(spread(lambda), loads_);
+    if (m_ > 0) add_multipliers(lambda, loads_);
     torques_to_body_axes(loads_);
     if (index2) {
       for (Load6& pull : pulls_)
         pull.force = pull.torque_body = pull.torque_world = Vector3d::Zero();
-      add_multipliers(spread(y + first_eta()), pulls_);
+      add_multipliers(y + first_eta(), pulls_);
       torques_to_body_axes(pulls_);
     }
     if (watch) watch->lap(joints);
@@ -479,19 +459,16 @@ void System::residual(double t, const double* y, const double* yp, double* r, St
     double* positions = r + first_eta();
     each_row([&](const auto& row) {
       const Frame<double>&A = bodies_.frames[at(row.first)], &B = bodies_.frames[at(row.second)];
-      row.template rows<1>(A, B, values_.data() + row.row);
-      row.template rows<0>(A, B, values_.data() + all_ + row.row);
+      row.template rows<1>(A, B, out + row.row);
+      row.template rows<0>(A, B, positions + row.row);
     });
-    gather(values_.data(), out);
-    gather(values_.data() + all_, positions);
     for (int i = 0; i < m_; ++i) positions[i] += epsilon_[i] * y[first_eta() + i];
   } else {
     update_accelerations(yp);
     each_row([&](const auto& row) {
       row.template rows<2>(bodies_.frames[at(row.first)], bodies_.frames[at(row.second)],
-                           values_.data() + row.row);
+                           out + row.row);
     });
-    gather(values_.data(), out);
   }
   for (int i = 0; i < m_; ++i) out[i] += epsilon_[i] * lambda[i];
   if (watch) watch->lap(joints);
@@ -499,14 +476,13 @@ void System::residual(double t, const double* y, const double* yp, double* r, St
 
 // Derivatives of the equations of motion (and of the work) to y and lambda, y' fixed.
 void System::add_motion_jacobian(JacobianBlocks& J, const double* lambda, int first_lambda) {
-  const double* pulling = spread(lambda);
   for (const auto& effect : effects_) effect->add_jacobian(bodies_, J);
   each_row([&](const auto& row) {
     const Inertia &ia = bodies_.inertia[at(row.first)], &ib = bodies_.inertia[at(row.second)];
     const Frame<Dual> A = seed(bodies_.frames[at(row.first)], ia.slot >= 0, 0);
     const Frame<Dual> B = seed(bodies_.frames[at(row.second)], ib.slot >= 0, kBodyDirections);
     Wrench<Dual> a = no_wrench<Dual>(), b = no_wrench<Dual>();
-    row.pull(A, B, pulling + row.row, a, b);
+    row.pull(A, B, lambda + row.row, a, b);
     const auto put = [&](const Inertia& inertia, const Frame<Dual>& f, const Wrench<Dual>& wrench) {
       if (inertia.slot < 0) return;
       const Vector3<Dual> torque = transposed_times(f.R, wrench.torque);
@@ -523,8 +499,6 @@ void System::add_motion_jacobian(JacobianBlocks& J, const double* lambda, int fi
     // -G^T
     double unit[3] = {0, 0, 0};
     for (int i = 0; i < row.count; ++i) {
-      const int place = place_[at(row.row + i)];
-      if (place < 0) continue;
       unit[i] = 1.0;
       Wrench<double> on_a = no_wrench<double>(), on_b = no_wrench<double>();
       row.pull(bodies_.frames[at(row.first)], bodies_.frames[at(row.second)], unit, on_a, on_b);
@@ -534,8 +508,8 @@ void System::add_motion_jacobian(JacobianBlocks& J, const double* lambda, int fi
         if (slot < 0) return;
         const Vector3d torque = bodies_.frames[at(body)].R.transpose() * wrench.torque;
         for (int k = 0; k < 3; ++k) {
-          J.add(J.motion_row(slot, k), first_lambda + place, -wrench.force[k]);
-          J.add(J.motion_row(slot, 3 + k), first_lambda + place, -torque[k]);
+          J.add(J.motion_row(slot, k), first_lambda + row.row + i, -wrench.force[k]);
+          J.add(J.motion_row(slot, 3 + k), first_lambda + row.row + i, -torque[k]);
         }
       };
       column(row.first, on_a);
@@ -555,16 +529,14 @@ void System::add_row_jacobian(JacobianBlocks& J, int first_row, bool acceleratio
     row.template rows<order>(A, B, g);
     if (accelerations) row.template rows<1>(A, B, rate);
     for (int i = 0; i < row.count; ++i) {
-      const int place = place_[at(row.row + i)];
-      if (place < 0) continue;
       Derivatives d = g[i].derivatives();
       // g'' depends on accelerations as g' does on velocities.
       if (accelerations) {
         d.segment<6>(6) += cj * rate[i].derivatives().template segment<6>(6);
         d.segment<6>(18) += cj * rate[i].derivatives().template segment<6>(18);
       }
-      if (ia.slot >= 0) J.add_directions(first_row + place, ia.slot, d, 0, 1.0);
-      if (ib.slot >= 0) J.add_directions(first_row + place, ib.slot, d, kBodyDirections, 1.0);
+      if (ia.slot >= 0) J.add_directions(first_row + row.row + i, ia.slot, d, 0, 1.0);
+      if (ib.slot >= 0) J.add_directions(first_row + row.row + i, ib.slot, d, kBodyDirections, 1.0);
     }
   });
 }
@@ -610,8 +582,7 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
         double g_t[3];
         row.rate_by_time(g_t);
         for (int i = 0; i < row.count; ++i)
-          if (place_[at(row.row + i)] >= 0)
-            J.add(first_work(), first_multiplier() + place_[at(row.row + i)], g_t[i]);
+          J.add(first_work(), first_multiplier() + row.row + i, g_t[i]);
       });
   }
   for (int i = 0; i < m_; ++i) J.add(first_multiplier() + i, first_multiplier() + i, epsilon_[i]);
@@ -626,8 +597,6 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
   each_row([&](const auto& row) {
     double unit[3] = {0, 0, 0};
     for (int i = 0; i < row.count; ++i) {
-      const int place = place_[at(row.row + i)];
-      if (place < 0) continue;
       unit[i] = 1.0;
       Wrench<double> on_a = no_wrench<double>(), on_b = no_wrench<double>();
       row.pull(bodies_.frames[at(row.first)], bodies_.frames[at(row.second)], unit, on_a, on_b);
@@ -640,8 +609,9 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
             inertia.inverse * (bodies_.frames[at(body)].R.transpose() * wrench.torque);
         const Eigen::Vector4d turn = quaternion_rate(y + first + kQuaternion, spin);
         for (int k = 0; k < 3; ++k)
-          J.add(first + k, first_eta() + place, -wrench.force[k] / inertia.mass);
-        for (int k = 0; k < 4; ++k) J.add(first + kQuaternion + k, first_eta() + place, -turn[k]);
+          J.add(first + k, first_eta() + row.row + i, -wrench.force[k] / inertia.mass);
+        for (int k = 0; k < 4; ++k)
+          J.add(first + kQuaternion + k, first_eta() + row.row + i, -turn[k]);
       };
       column(row.first, on_a);
       column(row.second, on_b);
@@ -721,8 +691,7 @@ void System::index0_jacobian(double cj, const double* y, const double*, Entries&
     each_row([&](const auto& row) {
       double g_t[3];
       row.rate_by_time(g_t);
-      for (int i = 0; i < row.count; ++i)
-        if (place_[at(row.row + i)] >= 0) sum += g_t[i] * dense_.row(place_[at(row.row + i)]);
+      for (int i = 0; i < row.count; ++i) sum += g_t[i] * dense_.row(row.row + i);
     });
     for (int column = 0; column < columns; ++column) J.add(first_work(), column, sum[column]);
   }

@@ -8,10 +8,10 @@
 //   index 0        the same with lambda eliminated: G M^-1 G^T lambda = -(gamma + G M^-1 f)
 //   stabilised 2   x', q' with (v, w) + M^-1 G^T eta, G v + g_t + eps lambda = 0, g + eps eta = 0
 //
-// Rows that the others imply all along the motion (planar linkages of 3-D hinges, Bricard's) are
-// left out, see redundant.cpp. At a dead point rows become dependent for a moment: eps keeps the
-// equations solvable there, choosing multipliers of least norm. It changes accelerations by about
-// eps relative to what the joints carry, across the constraints, where the projection removes it.
+// Rows may depend on each other, everywhere (planar linkages of 3-D hinges, Bricard's) or at a dead
+// point. eps keeps the equations solvable, choosing multipliers of least norm. It changes
+// accelerations by about eps relative to what the joints carry, across the constraints, where the
+// projection removes it. The projection uses independent rows only, see redundant.cpp.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -34,8 +34,7 @@ class System {
   explicit System(const Scene& scene);
 
   int size() const { return size_; }
-  int rows() const { return m_; }        ///< of the equations
-  int all_rows() const { return all_; }  ///< with those that the others imply
+  int rows() const { return m_; }
   int moving() const { return bodies_.moving; }
   /// 1 differential, 0 algebraic.
   double id(int i) const { return i < first_multiplier() ? 1.0 : 0.0; }
@@ -55,16 +54,16 @@ class System {
 
   ida_projection::Constraints constraints();
   /// Chooses the rows of the joints that the projection uses from here on, see redundant.cpp.
-  void choose_rows(double t, const double* y);
+  void choose_rows(double t, const double* y, double tolerance);
   void look_at_rows();  ///< after a step
   int constraint_count() const;
   void constraint_values(double t, const double* y, double* g);
   using Rows = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
   void constraint_jacobian(double t, const double* y, Rows C);
   std::vector<std::string> constraint_names() const;
-  /// Position and velocity of every row of the joints, 2 all_rows().
+  /// Position and velocity of every row of the joints, 2 rows().
   void joint_values(double t, const double* y, double* g);
-  std::string joint_of_row(int row) const;  ///< of all rows
+  std::string joint_of_row(int row) const;
 
   void bodies(const double* y, std::vector<BodyState>& out) const;
   Diagnostics diagnostics(double t, const double* y);
@@ -76,11 +75,8 @@ class System {
   int first_eta() const { return first_multiplier() + m_; }
 
   void add_joints(const Scene& scene);
-  void leave_out_redundant_rows();
-  void all_gradients();  // all_G_
+  void count_independent_rows();
   void choose_rows();
-  void gather(const double* all, double* rows) const;
-  const double* spread(const double* rows);  // multipliers of all rows
   void add_invariants(const Scene& scene);
   template <class F>
   void each_row(F f) const;
@@ -109,9 +105,10 @@ class System {
   std::vector<double> start_;  // of the moving bodies
   std::vector<std::unique_ptr<Effect>> effects_;
 
-  int all_ = 0, m_ = 0, size_ = 0;
-  std::vector<int> place_;          // of each row among the m_ of the equations, -1: left out
-  std::vector<int> used_;           // m_ of all rows: those that the projection uses now
+  int m_ = 0, size_ = 0;
+  double weak_ = 0;                 // pivot below which a row is not used
+  int p_ = 0;                       // rows that the projection uses
+  std::vector<int> used_;           // these, now
   std::vector<int> place_of_used_;  // of each row the first place in used_, or -1
   int wait_ = 0;                    // steps until they are looked at again
   std::vector<Coincidence> coincidences_;
@@ -130,8 +127,8 @@ class System {
 
   // Workspace.
   std::vector<Load6> loads_, pulls_;
-  Eigen::VectorXd epsilon_, lambda_, a_, gamma_, free_, right_, values_, spread_, scratch_;
-  Eigen::MatrixXd all_G_, G_, GM_, S_, left_, dense_;
+  Eigen::VectorXd epsilon_, lambda_, a_, gamma_, free_, right_, values_, scratch_;
+  Eigen::MatrixXd G_, GM_, S_, left_, dense_;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> row_choice_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Entries dense_entries_;
