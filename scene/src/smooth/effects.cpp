@@ -155,6 +155,9 @@ class Loads : public Effect {
         J.add(J.work_row, kBody * slot + kVelocity + k, -each.force[k]);
         J.add(J.work_row, kBody * slot + kSpin + k, -torque[k]);
       }
+      const Vector3d turn = bodies.w[at(each.body)].cross(torque);
+      const Eigen::RowVector4d q = turn.transpose() * bodies.turns[at(slot)];
+      for (int k = 0; k < 4; ++k) J.add(J.work_row, kBody * slot + kQuaternion + k, -q[k]);
     }
   }
 
