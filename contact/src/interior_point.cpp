@@ -494,23 +494,24 @@ void InteriorPoint::run_near(Search& search, const PackedVector* x, int most) {
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most) {
   System& system = search.system;
   std::copy(x, x + n_, anchor_.begin());
-  constexpr int kPatience = 600;
+  constexpr int kPatience = 1000;
   double tau = 1e-2, near = 1e-4, reference = search.best_error;
   int since_gain = 0;
   tau_ = 0;
   for (int outer = 0; outer < most; ++outer) {
-    // The natural map of the problem itself at the anchor sets the accuracy.
+    // Half the natural map of the problem itself at the anchor is enough: with more accuracy the
+    // iteration is no better, with more steps each.
     if (!start_near(search, anchor_.data(), near)) return;
     z_ = anchor_;
     system.velocities(z_.data(), w_.data());
     const double before = natural_map(system);
     tau_ = tau;
     residual(system);
-    const double after = follow(search, 40, 0.1 * before);
+    const double after = follow(search, 20, 0.5 * before);
     tau_ = 0;
     search.test(z_.data(), Method::interior_point);
     if (search.solved() || search.exhausted()) return;
-    if (after <= 0.5 * before) {
+    if (after <= 0.8 * before) {
       anchor_ = z_;
       tau = std::max(1e-7, 0.5 * tau);
     } else {

@@ -146,7 +146,7 @@ Status Solver::Implementation::rotate(bool last) {
   for (;;) {
     detail::AcceleratedSweeps::Leave leave;
     leave.other_cost = newton.cost(search);
-    leave.least_work = 2 * kappa * leave.other_cost;
+    leave.least_work = 3 * kappa * leave.other_cost;
     sweeps.run(search, leave);
     if (search.solved()) return Status::solved;
     if (search.exhausted()) return Status::work_limit;
@@ -184,7 +184,7 @@ Status Solver::Implementation::rotate(bool last) {
       if (search.solved()) return Status::solved;
       newton.run(search, admm.point(), outers);
       if (search.solved()) return Status::solved;
-      if (regular) interior.run_proximal(search, admm.point(), 3000);
+      if (regular) interior.run_proximal(search, admm.point(), 1000);
       if (search.solved()) return Status::solved;
       if (search.exhausted()) return Status::work_limit;
       burst = std::min(20000, burst + burst / 2);
@@ -237,12 +237,12 @@ Status Solver::Implementation::automatic() {
     for (int i = 0; i < search.system.size(); ++i)
       replaceable = replaceable || search.system.problem().local(i).e > kCoupled;
   }
-  if (replaceable) search.work_end = 0.05 * options.max_work;
+  if (replaceable) search.work_end = 0.025 * options.max_work;
   Status status = rotate(!replaceable);
   // First the strongly coupled contacts that do not converge, then all of them, then coupled ones.
   z.resize(x.size());
   for (int attempt = 0; replaceable && attempt < 3 && status != Status::solved; ++attempt) {
-    search.work_end = attempt == 0 ? std::min(search.counts.work + 0.05 * options.max_work, options.max_work)
+    search.work_end = attempt == 0 ? std::min(search.counts.work + 0.025 * options.max_work, options.max_work)
                                    : options.max_work;
     if (search.exhausted()) return Status::work_limit;
     if (!replace_contacts(attempt < 2 ? kStronglyCoupled : kCoupled, attempt == 0)) continue;

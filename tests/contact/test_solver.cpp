@@ -1,4 +1,5 @@
 // Tether: problems with many contacts. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cstring>
 #include <tether/contact.hpp>
 
@@ -230,6 +231,66 @@ TEST_CASE("the order of the contacts changes impulses, not the judgement") {
   for (int k = 0; k < 20; ++k) {
     const Solution s = Solver(with(Law::coulomb)).solve(random::shuffled(p, g));
     CHECK(s.status == Status::solved);
+  }
+}
+
+TEST_CASE("reversed order: the same velocities where everything sticks") {
+  for (double ratio : {1.0, 1000.0}) {
+    random::Assembly a = random::stack(5, ratio), r = a;
+    std::reverse(r.contacts.begin(), r.contacts.end());
+    for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
+      const Solution s = Solver(with(law, 1e-11)).solve(a.problem()), t = Solver(with(law, 1e-11)).solve(r.problem());
+      REQUIRE(s.status == Status::solved);
+      REQUIRE(t.status == Status::solved);
+      const auto v = velocities_after(a.bodies, a.contacts, s.impulses), w = velocities_after(r.bodies, r.contacts, t.impulses);
+      for (std::size_t k = 0; k < v.size(); ++k) CHECK((v[k] - w[k]).norm() < 1e-7);
+    }
+  }
+}
+
+TEST_CASE("turned tangents and other units change nothing else") {
+  random::Generator g(12);
+  for (int k = 0; k < 10; ++k) {
+    const Problem p = random::cluster(g, 0.3).problem();
+    const Solution s = Solver(with(Law::coulomb, 1e-11)).solve(p);
+    VectorXd mu(p.contacts());
+    for (int i = 0; i < p.contacts(); ++i) mu[i] = p.mu(i);
+    // Kilograms to grams, metres to millimetres.
+    const Solution t = Solver(with(Law::coulomb, 1e-11)).solve(Problem::dense(1e-3 * p.dense_matrix(), 1e3 * p.b(), mu));
+    REQUIRE(s.status == Status::solved);
+    REQUIRE(t.status == Status::solved);
+    CHECK(evaluate(p, Law::coulomb, 1e-6 * t.impulses).natural_map_data < 1e-8);
+    std::vector<int> order;
+    const Problem q = random::shuffled(p, g, &order);
+    const Solution u = Solver(with(Law::coulomb, 1e-11)).solve(q);
+    REQUIRE(u.status == Status::solved);
+    CHECK(std::abs(evaluate(q, Law::coulomb, u.impulses).energy_change - evaluate(p, Law::coulomb, s.impulses).energy_change) <=
+          1e-2 * std::abs(evaluate(p, Law::coulomb, s.impulses).energy_change));
+  }
+}
+
+TEST_CASE("a stack over time: most warm steps need no iteration") {
+  const double gravity = 9.81, step = 0.01;
+  for (double ratio : {1.0, 1000.0, 1e4}) {
+    random::Assembly a = random::stack(20, ratio);
+    for (Body& body : a.bodies) body.velocity.setZero();
+    Options o = with(Law::coulomb);
+    o.warm_start = true;
+    Solver solver(o);
+    double first = 0, later = 0;
+    for (int k = 0; k < 20; ++k) {
+      for (Body& body : a.bodies) body.velocity[2] -= gravity * step;
+      const Solution s = solver.solve(a.problem());
+      INFO("ratio " << ratio << ", step " << k << ": " << name(s.status) << " " << s.error);
+      REQUIRE(s.status == Status::solved);
+      if (k == 0) first = s.counts.work;
+      if (k > 0) later += s.counts.work / 19;
+      const auto v = velocities_after(a.bodies, a.contacts, s.impulses);
+      for (std::size_t i = 0; i < v.size(); ++i) a.bodies[i].velocity = v[i];
+    }
+    CHECK(later <= first);
+    // It rests: only errors of the solves remain.
+    for (const Body& body : a.bodies) CHECK(body.velocity.norm() < 1e-4);
   }
 }
 

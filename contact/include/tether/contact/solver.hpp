@@ -53,7 +53,7 @@ struct Options {
   bool strict = false;
   double relaxation = 1.0;    ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
   int max_sweeps = 200000;    ///< of the plain methods and anderson
-  double max_work = 5e9;      ///< automatic: estimated nanoseconds, counted from operations
+  double max_work = 1e10;     ///< automatic: estimated nanoseconds, counted from operations
   int anderson_depth = 10;    ///< 1 .. 20
   bool warm_start = false;    ///< start from the impulses of the previous solve, found by contact id
   bool history = false;       ///< record Solution::history
