@@ -21,9 +21,9 @@ double normal_velocity(const std::vector<RigidBody>& motion, const PointContact&
                       b.angular_velocity.cross(c.r2));
 }
 
-void push(RigidBody& body, const RigidBody& inertia, const Vector3d& r, const Vector3d& p) {
-  body.velocity += inertia.inverse_mass * p;
-  body.angular_velocity += inertia.inverse_inertia * r.cross(p);
+void push(RigidBody& body, const Vector3d& r, const Vector3d& p) {
+  body.velocity += body.inverse_mass * p;
+  body.angular_velocity += body.inverse_inertia * r.cross(p);
 }
 
 BodyOptions cold(BodyOptions options) {
@@ -73,6 +73,7 @@ void Restitution::limit_energy(const BodySet& bodies, const StepContacts& contac
   constant_.assign(n, 0);
   linear_.assign(n, 0);
   square_.assign(n, 0);
+  scale_.assign(n, 1);
   for (std::size_t i = 0; i < n; ++i) {
     const double m = bodies.mass[i];
     if (m == 0) continue;
@@ -91,12 +92,12 @@ void Restitution::limit_energy(const BodySet& bodies, const StepContacts& contac
   for (std::size_t i = 0; i < n; ++i) {
     const double a = square_[i], b = linear_[i], c = std::min(constant_[i], 0.0);
     if (!(a > 0) || a + b + c <= 1e-14 * a) {
-      linear_[i] = 1;  // from here on: the scale
+      scale_[i] = 1;
       continue;
     }
     const double root_of = std::sqrt(b * b - 4 * a * c);
     const double s = b > 0 ? -2 * c / (b + root_of) : (root_of - b) / (2 * a);
-    linear_[i] = std::clamp(s, 0.0, 1.0);
+    scale_[i] = std::clamp(s, 0.0, 1.0);
   }
 }
 
@@ -107,33 +108,37 @@ int Restitution::apply(BodySet& bodies, StepContacts& contacts) {
       bounces_.end());
   if (bounces_.empty()) return 0;
 
-  change_.assign(bodies.motion.size(), RigidBody{});
+  // change_: first the velocities without restitution, at the end what restitution adds to them.
+  change_ = bodies.motion;
   for (const Bounce& b : bounces_) {
     const PointContact& c = contacts.points[at(b.contact)];
     const Vector3d p = b.part * contacts.impulses[at(b.contact)];
-    push(change_[at(c.first)], bodies.motion[at(c.first)], c.r1, p);
-    push(change_[at(c.second)], bodies.motion[at(c.second)], c.r2, -p);
+    push(bodies.motion[at(c.first)], c.r1, p);
+    push(bodies.motion[at(c.second)], c.r2, -p);
   }
+  solver_.solve(bodies.motion, contacts.points, solution_);
+  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
+    bodies.motion[i].velocity = change_[i].velocity;
+    bodies.motion[i].angular_velocity = change_[i].angular_velocity;
+    change_[i].velocity = solution_.velocities[i] - change_[i].velocity;
+    change_[i].angular_velocity = solution_.angular_velocities[i] - change_[i].angular_velocity;
+  }
+
+  // Both ends obey the contacts and the cones; so does everything between them.
   limit_energy(bodies, contacts);
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
     if (bodies.mass[i] == 0) continue;
-    const double s = linear_[at(root(static_cast<int>(i)))];
+    const double s = scale_[at(root(static_cast<int>(i)))];
     bodies.motion[i].velocity += s * change_[i].velocity;
     bodies.motion[i].angular_velocity += s * change_[i].angular_velocity;
   }
-  for (const Bounce& b : bounces_) {
-    const PointContact& c = contacts.points[at(b.contact)];
+  for (const Bounce& b : bounces_)
+    solution_.impulses[at(b.contact)] += b.part * contacts.impulses[at(b.contact)];
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = contacts.points[k];
     const int moving = bodies.mass[at(c.first)] > 0 ? c.first : c.second;
-    contacts.impulses[at(b.contact)] *= 1 + b.part * linear_[at(root(moving))];
+    contacts.impulses[k] += scale_[at(root(moving))] * solution_.impulses[k];
   }
-
-  solver_.solve(bodies.motion, contacts.points, solution_);
-  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
-    bodies.motion[i].velocity = solution_.velocities[i];
-    bodies.motion[i].angular_velocity = solution_.angular_velocities[i];
-  }
-  for (std::size_t k = 0; k < contacts.points.size(); ++k)
-    contacts.impulses[k] += solution_.impulses[k];
   return static_cast<int>(bounces_.size());
 }
 

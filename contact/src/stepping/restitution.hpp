@@ -10,7 +10,7 @@ namespace tether::contact::detail {
 
 /// README, section 13. First the contact problem without restitution, impulses x; then epsilon x at
 /// the contacts that bounce; then the contact problem once more, for contacts which that pressed
-/// together. The second of the three is scaled down where it would give an island of bodies more
+/// together. What the last two add is scaled down where an island of bodies would end with more
 /// energy than it had before the impulses.
 class Restitution {
  public:
@@ -35,7 +35,7 @@ class Restitution {
   std::vector<Bounce> bounces_;
   std::vector<RigidBody> coming_, before_, change_;
   std::vector<int> parent_;
-  std::vector<double> constant_, linear_, square_;  // of each island's energy in the scale
+  std::vector<double> constant_, linear_, square_, scale_;  // of each island; see limit_energy
   BodySolver solver_;
   BodySolution solution_;
 };

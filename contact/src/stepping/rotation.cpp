@@ -96,11 +96,16 @@ Vector3d gyroscopic_implicit(const Matrix3d& inertia, const Quaterniond& q, cons
   return -(q * (slope.inverse() * (dt * W.cross(M))));
 }
 
-void turn_with_momentum(const Matrix3d& inertia, double dt, Quaterniond& q, Vector3d& w) {
-  Vector3d W = q.conjugate() * w;
-  if (W.isZero(0)) return;
+void turn_with_momentum(const Matrix3d& inertia, const Matrix3d& inverse_inertia, double dt,
+                        Quaterniond& q, Vector3d& w, FreeSpin& free) {
+  if (w.isZero(0)) return;
+  const bool same = w == free.w && q.coeffs() == free.q.coeffs();
+  if (!same) free.L = spin(inertia, q, w);
+  Vector3d W = inverse_inertia * (q.conjugate() * free.L);
   turn(inertia, dt, 8, q, W);
-  w = q * W;
+  w = q * (inverse_inertia * (q.conjugate() * free.L));
+  free.w = w;
+  free.q = q;
 }
 
 }  // namespace tether::contact::detail

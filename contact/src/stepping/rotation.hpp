@@ -26,10 +26,17 @@ Eigen::Vector3d gyroscopic_explicit(const Eigen::Matrix3d& inertia,
 Eigen::Vector3d gyroscopic_implicit(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q,
                                     const Eigen::Vector3d& w, double dt);
 
+/// The momentum of a body that nothing acts upon: taken over from step to step as long as its state
+/// is the one that was left, since the round-off of computing it anew has a sign and would add up.
+struct FreeSpin {
+  Eigen::Vector3d L = Eigen::Vector3d::Zero(), w = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+};
+
 /// Turns the body by dt with its angular momentum kept: with body angular velocities W before and
 /// W1 after, q1 = q exp(dt (W + W1) / 2) and I W1 = R1' R I W. Then R1'L - R'L is a rotation about
 /// W + W1, so (W1 - W).I (W1 + W) = 0: the energy is kept, too, whatever dt.
-void turn_with_momentum(const Eigen::Matrix3d& inertia, double dt, Eigen::Quaterniond& q,
-                        Eigen::Vector3d& w);
+void turn_with_momentum(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse_inertia,
+                        double dt, Eigen::Quaterniond& q, Eigen::Vector3d& w, FreeSpin& free);
 
 }  // namespace tether::contact::detail

@@ -89,6 +89,8 @@ struct Stepper::Implementation {
   std::vector<Force> force;
   std::vector<int> moving, round_bodies, long_bodies;  // of inertia 1 or not
 
+  std::vector<detail::FreeSpin> free_spin;  // of long_bodies
+
   // Only with meetings.
   std::unique_ptr<NearContacts> near;
   std::unique_ptr<BodySolver> solver;
@@ -150,6 +152,7 @@ void Stepper::Implementation::make_stages() {
   add_stage("motion", &I::move);
   if (!round_bodies.empty()) add_stage("motion", &I::turn_round);
   if (!long_bodies.empty()) {
+    if (options.gyroscopic == Gyroscopic::momentum) free_spin.resize(long_bodies.size());
     if (options.gyroscopic == Gyroscopic::momentum)
       add_stage("gyroscopic term", &I::turn_keeping_momentum);
     else
@@ -258,10 +261,12 @@ void Stepper::Implementation::turn_plain() {
 }
 
 void Stepper::Implementation::turn_keeping_momentum() {
-  for (const int i : long_bodies) {
+  for (std::size_t k = 0; k < long_bodies.size(); ++k) {
+    const int i = long_bodies[k];
     RigidBody& b = bodies.motion[at(i)];
     Eigen::Quaterniond& q = bodies.orientation[at(i)];
-    detail::turn_with_momentum(bodies.inertia[at(i)], options.step, q, b.angular_velocity);
+    detail::turn_with_momentum(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)], options.step,
+                               q, b.angular_velocity, free_spin[k]);
     b.inverse_inertia = detail::turned(bodies.inverse_inertia[at(i)], q);
   }
 }
@@ -344,6 +349,7 @@ std::vector<StageCost> Stepper::costs() const {
 void Stepper::start_anew(long steps) {
   Implementation& s = *implementation_;
   s.counts.steps = steps;
+  s.free_spin.assign(s.free_spin.size(), {});
   for (const int i : s.long_bodies)
     s.bodies.motion[at(i)].inverse_inertia =
         detail::turned(s.bodies.inverse_inertia[at(i)], s.bodies.orientation[at(i)]);

@@ -1,0 +1,275 @@
+// Spheres that settle in a box: time of a step and how exactly it is solved, beside Bullet's
+// dynamics where it is installed. SPDX-License-Identifier: BSD-3-Clause
+//
+//   settling [spheres = 10000] [seconds = 3] [tolerance ...]
+//
+// Both are judged by the same evaluate(): the fixed-point residual of the Coulomb law with exact
+// cones on the contacts, velocities and impulses of the solver's own step. Times are of whole
+// steps, collision included, of the processor (one thread).
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <string>
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#if defined(TETHER_HAVE_BULLET)
+#include <btBulletDynamicsCommon.h>
+
+#include <memory>
+#include <unordered_map>
+#endif
+
+namespace tc = tether::contact;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kRadius = 0.5, kMass = 1, kFriction = 0.3, kGravity = 9.81, kStep = 5e-3;
+
+// Processor time: others may use the machine.
+double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+struct Start {
+  std::vector<Vector3d> position;
+  double width = 0;
+};
+
+// A loose jittered lattice in a box as wide as the heap will be high.
+Start start_of(int spheres) {
+  Start out;
+  const int side = std::max(2, static_cast<int>(std::cbrt(static_cast<double>(spheres))));
+  const double pitch = 2.15 * kRadius;
+  out.width = side * pitch;
+  unsigned long long state = 1;
+  const auto jitter = [&] {
+    state = state * 6364136223846793005ull + 1442695040888963407ull;
+    return 0.07 * kRadius * (static_cast<double>(state >> 33) / 2147483648.0 * 2 - 1);
+  };
+  for (int k = 0; k < spheres; ++k) {
+    const int x = k % side, y = k / side % side, z = k / (side * side);
+    out.position.emplace_back((x + 0.5) * pitch + jitter(), (y + 0.5) * pitch + jitter(),
+                              (z + 0.5) * pitch + jitter());
+  }
+  return out;
+}
+
+struct Row {
+  std::string name;
+  double ms_per_step = 0, us_per_contact = 0, residual = 0, penetration = 0, speed = 0;
+  long contacts = 0;
+};
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void print(const Row& r) {
+  std::printf("%-28s %9.2f %9.3f %10.1e %9.2f %10.1e %9ld\n", r.name.c_str(), r.ms_per_step,
+              r.us_per_contact, r.residual, 100 * r.penetration / kRadius, r.speed, r.contacts);
+  std::fflush(stdout);
+}
+
+Row tether_run(const Start& start, double duration, double tolerance) {
+  tc::BodySet bodies;
+  std::vector<tc::Surface> surfaces;
+  const auto wall = [&](const Vector3d& at, const Vector3d& normal) {
+    surfaces.push_back({bodies.add_fixed(at), tc::Shape::plane(normal), 1});
+  };
+  wall(Vector3d::Zero(), Vector3d::UnitZ());
+  wall(Vector3d::Zero(), Vector3d::UnitX());
+  wall(Vector3d::Zero(), Vector3d::UnitY());
+  wall(Vector3d(start.width, 0, 0), -Vector3d::UnitX());
+  wall(Vector3d(0, start.width, 0), -Vector3d::UnitY());
+  for (const Vector3d& p : start.position)
+    surfaces.push_back(
+        {bodies.add(kMass, 0.4 * kMass * kRadius * kRadius * Eigen::Matrix3d::Identity(), p),
+         tc::Shape::sphere(kRadius), 0});
+  tc::SteppingOptions options;
+  options.step = kStep;
+  options.gravity = Vector3d(0, 0, -kGravity);
+  options.tolerance = tolerance;
+  tc::Stepper s(std::move(bodies), std::move(surfaces),
+                {{0, 0, kFriction, 0}, {0, 1, kFriction, 0}}, options);
+
+  Row row;
+  char name[64];
+  std::snprintf(name, sizeof name, "Tether, tolerance %.0e", tolerance);
+  row.name = name;
+  double seconds = 0;
+  std::vector<double> residuals;
+  const long steps = std::lround(duration / kStep);
+  for (long k = 0; k < steps; ++k) {
+    const double begin = now();
+    s.step();
+    seconds += now() - begin;
+    row.contacts += static_cast<long>(s.contacts().points.size());
+    row.penetration = std::max(row.penetration, s.penetration());
+    if (s.residual() >= 0 && k > steps / 3) residuals.push_back(s.residual());
+  }
+  row.ms_per_step = 1e3 * seconds / static_cast<double>(steps);
+  row.us_per_contact = 1e6 * seconds / static_cast<double>(row.contacts);
+  row.contacts /= steps;
+  row.residual = median(residuals);
+  for (const tc::RigidBody& b : s.bodies().motion)
+    row.speed = std::max(row.speed, b.velocity.norm());
+  print(row);
+  for (const tc::StageCost& c : s.costs())
+    std::printf("    %-24s %9.2f ms\n", c.effect, 1e3 * c.seconds / static_cast<double>(steps));
+  std::printf("    %ld sweeps, %ld assembled islands, %ld steps not to tolerance\n",
+              s.counts().sweeps, s.counts().assembled_islands, s.counts().unsolved);
+  return row;
+}
+
+#if defined(TETHER_HAVE_BULLET)
+btVector3 to_bullet(const Vector3d& v) { return {v[0], v[1], v[2]}; }
+Vector3d from_bullet(const btVector3& v) { return {v[0], v[1], v[2]}; }
+
+// The contact problem of the step that Bullet has just made: velocities before it plus gravity.
+double bullet_residual(btDispatcher& dispatcher, std::vector<tc::RigidBody>& bodies) {
+  std::vector<tc::PointContact> contacts;
+  std::vector<Vector3d> impulses;
+  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+    const btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
+    const int a = manifold->getBody0()->getUserIndex(), b = manifold->getBody1()->getUserIndex();
+    for (int k = 0; k < manifold->getNumContacts(); ++k) {
+      const btManifoldPoint& p = manifold->getContactPoint(k);
+      tc::PointContact c;
+      c.first = a;
+      c.second = b;
+      c.normal = from_bullet(p.m_normalWorldOnB).normalized();
+      // Arms along the normal: all are balls or planes.
+      c.r1 = -kRadius * c.normal;
+      c.r2 = kRadius * c.normal;
+      Vector3d impulse = p.m_appliedImpulse * c.normal +
+                         p.m_appliedImpulseLateral1 * from_bullet(p.m_lateralFrictionDir1) +
+                         p.m_appliedImpulseLateral2 * from_bullet(p.m_lateralFrictionDir2);
+      if (a < 0) {
+        std::swap(c.first, c.second);
+        c.normal = -c.normal;
+        c.r1 = -kRadius * c.normal;
+        impulse = -impulse;
+      }
+      c.mu = kFriction;
+      c.bias = std::max(0.0, p.getDistance()) / kStep;
+      contacts.push_back(c);
+      impulses.push_back(impulse);
+    }
+  }
+  if (contacts.empty()) return -1;
+  return tc::evaluate(bodies, contacts, tc::Law::coulomb, impulses).fixed_point;
+}
+
+Row bullet_run(const Start& start, double duration, int iterations, bool two_directions) {
+  btDefaultCollisionConfiguration configuration;
+  btCollisionDispatcher dispatcher(&configuration);
+  btDbvtBroadphase broadphase;
+  btSequentialImpulseConstraintSolver solver;
+  btDiscreteDynamicsWorld world(&dispatcher, &broadphase, &solver, &configuration);
+  world.setGravity(btVector3(0, 0, -kGravity));
+  world.getSolverInfo().m_numIterations = iterations;
+  // Penetrations by split impulses only, so that the velocity problem is ours.
+  world.getSolverInfo().m_splitImpulsePenetrationThreshold = 0;
+  if (two_directions) world.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+
+  std::vector<std::unique_ptr<btCollisionShape>> shapes;
+  std::vector<std::unique_ptr<btRigidBody>> all;
+  const auto add = [&](btCollisionShape* shape, double mass, const Vector3d& at, int index) {
+    btVector3 inertia(0, 0, 0);
+    if (mass > 0) shape->calculateLocalInertia(mass, inertia);
+    btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, inertia);
+    info.m_startWorldTransform.setIdentity();
+    info.m_startWorldTransform.setOrigin(to_bullet(at));
+    info.m_friction = std::sqrt(kFriction);  // Bullet multiplies
+    auto body = std::make_unique<btRigidBody>(info);
+    body->setUserIndex(index);
+    body->setActivationState(DISABLE_DEACTIVATION);
+    world.addRigidBody(body.get());
+    all.push_back(std::move(body));
+  };
+  const auto wall = [&](const Vector3d& normal, double offset) {
+    shapes.push_back(std::make_unique<btStaticPlaneShape>(to_bullet(normal), offset));
+    add(shapes.back().get(), 0, Vector3d::Zero(), -1);
+  };
+  wall(Vector3d::UnitZ(), 0);
+  wall(Vector3d::UnitX(), 0);
+  wall(Vector3d::UnitY(), 0);
+  wall(-Vector3d::UnitX(), -start.width);
+  wall(-Vector3d::UnitY(), -start.width);
+  shapes.push_back(std::make_unique<btSphereShape>(kRadius));
+  btCollisionShape* sphere = shapes.back().get();
+  for (std::size_t k = 0; k < start.position.size(); ++k)
+    add(sphere, kMass, start.position[k], static_cast<int>(k));
+
+  std::vector<tc::RigidBody> before(start.position.size());
+  Row row;
+  row.name =
+      "Bullet, " + std::to_string(iterations) + " iterations" + (two_directions ? ", 2 dir." : "");
+  double seconds = 0;
+  std::vector<double> residuals;
+  const long steps = std::lround(duration / kStep);
+  for (long k = 0; k < steps; ++k) {
+    const bool sample = k > steps / 3 && k % 10 == 0;
+    if (sample)
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        const btRigidBody& b = *all[i + 5];
+        before[i].inverse_mass = 1 / kMass;
+        before[i].inverse_inertia = 2.5 / (kMass * kRadius * kRadius) * Eigen::Matrix3d::Identity();
+        before[i].velocity = from_bullet(b.getLinearVelocity()) - Vector3d(0, 0, kGravity * kStep);
+        before[i].angular_velocity = from_bullet(b.getAngularVelocity());
+      }
+    const double begin = now();
+    world.stepSimulation(kStep, 0);
+    seconds += now() - begin;
+    for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+      const btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
+      row.contacts += manifold->getNumContacts();
+      for (int j = 0; j < manifold->getNumContacts(); ++j)
+        row.penetration = std::max(row.penetration, -manifold->getContactPoint(j).getDistance());
+    }
+    if (!sample) continue;
+    const double residual = bullet_residual(dispatcher, before);
+    if (residual >= 0) residuals.push_back(residual);
+  }
+  row.ms_per_step = 1e3 * seconds / static_cast<double>(steps);
+  row.us_per_contact = 1e6 * seconds / static_cast<double>(std::max(1L, row.contacts));
+  row.contacts /= steps;
+  row.residual = median(residuals);
+  for (const auto& b : all) row.speed = std::max(row.speed, b->getLinearVelocity().length());
+  print(row);
+  for (const auto& b : all) world.removeRigidBody(b.get());
+  return row;
+}
+#endif
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int spheres = argc > 1 ? std::atoi(argv[1]) : 10000;
+  const double duration = argc > 2 ? std::atof(argv[2]) : 3;
+  std::vector<double> tolerances;
+  for (int k = 3; k < argc; ++k) tolerances.push_back(std::atof(argv[k]));
+  if (tolerances.empty()) tolerances = {1e-1, 1e-2, 1e-3};
+  if (spheres < 1 || !(duration > 0)) {
+    std::fprintf(stderr, "settling [spheres] [seconds] [tolerance ...]\n");
+    return 2;
+  }
+  const Start start = start_of(spheres);
+  std::printf("%d spheres, %g s, step %g s, friction %g\n\n", spheres, duration, kStep, kFriction);
+  std::printf("%-28s %9s %9s %10s %9s %10s %9s\n", "", "ms/step", "us/cont.", "residual",
+              "depth %R", "speed m/s", "contacts");
+  for (const double tolerance : tolerances) tether_run(start, duration, tolerance);
+#if defined(TETHER_HAVE_BULLET)
+  bullet_run(start, duration, 10, false);
+  bullet_run(start, duration, 10, true);
+  bullet_run(start, duration, 50, true);
+#else
+  std::printf("Bullet: not installed (libbullet-dev)\n");
+#endif
+  return 0;
+}
