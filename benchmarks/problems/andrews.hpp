@@ -6,7 +6,7 @@
 
 namespace tether::problems {
 
-/// "index 1", "index 1 w", "index 2"; see mechanism.hpp.
+/// All forms of mechanism.hpp.
 std::vector<std::string> andrews_forms();
 
 /// Seven bodies driven by a constant torque, t in [0, 0.03]: 7 angles, 6 multipliers.

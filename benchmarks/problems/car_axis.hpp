@@ -5,7 +5,7 @@
 
 namespace tether::problems {
 
-/// "index 1", "index 1 w", "index 2"; see mechanism.hpp.
+/// All forms of mechanism.hpp.
 std::vector<std::string> car_axis_forms();
 
 /// Car axis on a bumpy road, t in [0, 3]: q = (xl, yl, xr, yr), two multipliers; constraints and

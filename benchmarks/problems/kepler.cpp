@@ -31,6 +31,7 @@ Problem kepler(double e, double t_end) {
   Problem p;
   p.name = "kepler";
   p.form = "index 0";
+  p.index = 0;
   p.size = 4;
   p.t_end = t_end;
   p.y0 = exact(e, 0.0L);

@@ -12,6 +12,7 @@ Problem lotka_volterra(double x0, double y0, double t_end) {
   Problem p;
   p.name = "lotka volterra";
   p.form = "index 0";
+  p.index = 0;
   p.size = 2;
   p.t_end = t_end;
   p.y0 = {x0, y0};

@@ -33,8 +33,14 @@ namespace tether::problems {
 ///   "index 1"    (q, v, lam):    q' = v, M v' = f - s G^T lam, 0 = g'' with v' for a
 ///   "index 1 w"  (q, v, w, lam): q' = v, v' = w, M w = f - s G^T lam, 0 = g'' with w for a
 ///   "index 2"    (q, v, lam):    q' = v, M v' = f - s G^T lam, 0 = g'
+///   "index 3"    (q, v, lam):    the same with 0 = g
+///   "GGL"        (q, v, lam, mu): q' = v - G^T mu, M v' = f - s G^T lam, 0 = g', 0 = g
+///                (stabilised index 2 after Gear, Gupta and Leimkuhler)
+///   "index 0"    (q, v):         q' = v, v' = a with M a = f - s G^T lam, g'' = 0 solved together
+///   "index 2 w", "index 3 w", "GGL w" (w after v): as "index 1 w"; their dF/dy' is constant
 ///
-/// Rows: "position", "velocity", "acceleration" (without w: with a from the equations of motion).
+/// Rows: "position", "velocity", "acceleration" (without w: with a from the equations of motion;
+/// none for index 0).
 template <class System>
 class Mechanism {
  public:
@@ -44,7 +50,10 @@ class Mechanism {
   using VectorN = Eigen::Matrix<double, n, 1>;
   using VectorM = Eigen::Matrix<double, m, 1>;
 
-  static std::vector<std::string> forms() { return {"index 1", "index 1 w", "index 2"}; }
+  static std::vector<std::string> forms() {
+    return {"index 1",   "index 1 w", "index 2", "index 0",  "GGL",
+            "index 2 w", "GGL w",     "index 3", "index 3 w"};
+  }
 
   /// Everything but name, times and reference. Accelerations and multipliers of the start are
   /// computed from q0 and v0; row_names has m entries.
@@ -53,50 +62,52 @@ class Mechanism {
                       const std::vector<std::string>& row_names) {
     const std::vector<std::string> known = forms();
     if (std::find(known.begin(), known.end(), form) == known.end()) unknown_form(name, form, known);
-    const bool with_w = form == "index 1 w", index2 = form == "index 2";
-    const int lam = with_w ? 3 * n : 2 * n;
-    const int N = lam + m;
+    const Layout at(form);
 
     Problem p;
     p.name = name;
     p.form = form;
-    p.size = N;
+    p.index = at.index;
+    p.size = at.size;
     p.error_components = n;
     VectorN a;
     VectorM multipliers;
     solve_motion(system, 0.0, q0.data(), v0.data(), a.data(), multipliers.data());
-    p.y0 =
-        join(q0, v0, with_w ? std::vector<double>(a.data(), a.data() + n) : std::vector<double>{},
-             std::vector<double>(multipliers.data(), multipliers.data() + m));
-    p.yp0.assign(static_cast<std::size_t>(N), 0.0);
+    const auto N = static_cast<std::size_t>(at.size);
+    p.y0 = join(at, q0, v0, a.data(), multipliers.data());
+    p.yp0.assign(N, 0.0);
     std::copy(v0.begin(), v0.end(), p.yp0.begin());
     std::copy(a.data(), a.data() + n, p.yp0.begin() + n);
-    p.id.assign(static_cast<std::size_t>(N), 0.0);
+    p.id.assign(N, 0.0);
     std::fill(p.id.begin(), p.id.begin() + 2 * n, 1.0);
+    if (at.ggl) {
+      // mu is round-off of g times 1/(step |G|^2): with a tolerance of its own IDA's Newton
+      // iteration never meets it (Andrews: |G| is 0.01).
+      p.atol_scale.assign(N, 1.0);
+      std::fill(p.atol_scale.begin() + at.lam, p.atol_scale.end(), 1e15);
+    }
+    if (at.index > 1) {
+      p.variable_index.assign(N, at.index);
+      std::fill(p.variable_index.begin(), p.variable_index.begin() + n, 1);
+      std::fill(p.variable_index.begin() + n, p.variable_index.begin() + 2 * n, at.index - 1);
+    }
 
-    if (with_w) {
+    if (at.index == 0) {
       p.residual = [system](double t, const double* y, const double* yp, double* r) {
         kinematics(y, yp, r);
-        for (int i = 0; i < n; ++i) r[n + i] = yp[n + i] - y[2 * n + i];
-        dynamics(system, t, y, y + n, y + 2 * n, y + 3 * n, r + 2 * n);
-        system.acceleration(t, y, y + n, y + 2 * n, r + 3 * n);
-      };
-      p.jacobian = [system](double t, double cj, const double* y, const double*, double* J) {
-        jacobian_w(system, t, cj, y, J);
+        double acceleration[n];
+        motion(system, t, y, y + n, acceleration);
+        for (int i = 0; i < n; ++i) r[n + i] = yp[n + i] - acceleration[i];
       };
     } else {
-      p.residual = [system, index2](double t, const double* y, const double* yp, double* r) {
-        kinematics(y, yp, r);
-        dynamics(system, t, y, y + n, yp + n, y + 2 * n, r + n);
-        if (index2)
-          system.velocity(t, y, y + n, r + 2 * n);
-        else
-          system.acceleration(t, y, y + n, yp + n, r + 2 * n);
+      p.residual = [system, at](double t, const double* y, const double* yp, double* r) {
+        equations(system, at, t, y, yp, r);
       };
-      p.jacobian = [system, index2](double t, double cj, const double* y, const double* yp,
-                                    double* J) { jacobian_lam(system, index2, t, cj, y, yp, J); };
+      p.jacobian = [system, at](double t, double cj, const double* y, const double* yp, double* J) {
+        derivatives(system, at, t, cj, y, yp, J);
+      };
     }
-    add_rows(system, with_w, N, row_names, p);
+    add_rows(system, at, row_names, p);
     p.recommended = {"position", "velocity"};
     return p;
   }
@@ -105,13 +116,10 @@ class Mechanism {
   static void set_reference(const System& system, const std::vector<double>& q,
                             const std::vector<double>& v, const std::vector<double>& lam,
                             Problem& p) {
-    std::vector<double> a;
-    if (p.size == 3 * n + m) {
-      a.resize(n);
-      VectorM multipliers;
-      solve_motion(system, p.t_end, q.data(), v.data(), a.data(), multipliers.data());
-    }
-    p.reference = join(q, v, a, lam);
+    VectorN a;
+    VectorM multipliers;
+    solve_motion(system, p.t_end, q.data(), v.data(), a.data(), multipliers.data());
+    p.reference = join(Layout(p.form), q, v, a.data(), lam.data());
   }
 
   /// a and lam of the motion through (q, v), in long double from the double values of M, f, G,
@@ -153,11 +161,71 @@ class Mechanism {
   }
 
  private:
-  static std::vector<double> join(const std::vector<double>& a, const std::vector<double>& b,
-                                  const std::vector<double>& c, const std::vector<double>& d) {
-    std::vector<double> all = a;
-    for (const auto* part : {&b, &c, &d}) all.insert(all.end(), part->begin(), part->end());
+  // Where the unknowns of a form stand.
+  struct Layout {
+    int index;  // 0 .. 3
+    bool with_w, ggl;
+    int lam, mu, size;  // lam, mu: where they begin; as large as size when they are absent
+
+    explicit Layout(const std::string& form)
+        : index(form.rfind("index ", 0) == 0 ? form[6] - '0' : 2),
+          with_w(form.size() > 2 && form.compare(form.size() - 2, 2, " w") == 0),
+          ggl(form.rfind("GGL", 0) == 0),
+          lam(with_w ? 3 * n : 2 * n),
+          mu(index == 0 ? lam : lam + m),
+          size(ggl ? mu + m : mu) {}
+  };
+
+  static std::vector<double> join(const Layout& at, const std::vector<double>& q,
+                                  const std::vector<double>& v, const double* a,
+                                  const double* lam) {
+    std::vector<double> all = q;
+    all.insert(all.end(), v.begin(), v.end());
+    if (at.with_w) all.insert(all.end(), a, a + n);
+    if (at.index > 0) all.insert(all.end(), lam, lam + m);
+    all.resize(static_cast<std::size_t>(at.size), 0.0);  // mu
     return all;
+  }
+
+  // a with M a = f - s G^T lam, G a = -gamma, in double.
+  static void motion(const System& system, double t, const double* q, const double* v, double* a) {
+    using Square = Eigen::Matrix<double, n + m, n + m, Eigen::RowMajor>;
+    MatrixN M = MatrixN::Zero();
+    MatrixG G = MatrixG::Zero();
+    const VectorN none = VectorN::Zero();
+    Eigen::Matrix<double, n + m, 1> right;
+    system.mass(q, M.data());
+    system.gradient(t, q, G.data());
+    system.force(t, q, v, right.data());
+    system.acceleration(t, q, v, none.data(), right.data() + n);
+    Square K = Square::Zero();
+    K.template topLeftCorner<n, n>() = M;
+    K.template topRightCorner<n, m>() = System::sign * G.transpose();
+    K.template bottomLeftCorner<m, n>() = G;
+    right.template tail<m>() *= -1.0;
+    const Eigen::Matrix<double, n + m, 1> solution = K.partialPivLu().solve(right);
+    std::copy(solution.data(), solution.data() + n, a);
+  }
+
+  static void equations(const System& system, const Layout& at, double t, const double* y,
+                        const double* yp, double* r) {
+    const double* a = at.with_w ? y + 2 * n : yp + n;
+    kinematics(y, yp, r);
+    if (at.with_w)
+      for (int i = 0; i < n; ++i) r[n + i] = yp[n + i] - a[i];
+    dynamics(system, t, y, y + n, a, y + at.lam, r + at.lam - n);
+    if (at.index == 1)
+      system.acceleration(t, y, y + n, a, r + at.lam);
+    else if (at.index == 2)
+      system.velocity(t, y, y + n, r + at.lam);
+    else
+      system.position(t, y, r + at.lam);
+    if (at.ggl) {
+      MatrixG G = MatrixG::Zero();
+      system.gradient(t, y, G.data());
+      Eigen::Map<VectorN>(r).noalias() += G.transpose() * Eigen::Map<const VectorM>(y + at.mu);
+      system.position(t, y, r + at.mu);
+    }
   }
 
   static void move(const System& system, double t, const double* q, const VectorM& r, double* x) {
@@ -203,40 +271,49 @@ class Mechanism {
     }
   };
 
-  static void jacobian_lam(const System& system, bool index2, double t, double cj, const double* y,
-                           const double* yp, double* J) {
-    const Blocks b(system, t, y, y + n, yp + n, y + 2 * n);
-    constexpr int N = 2 * n + m;
-    Eigen::Map<Eigen::Matrix<double, N, N>> out(J);
+  static void derivatives(const System& system, const Layout& at, double t, double cj,
+                          const double* y, const double* yp, double* J) {
+    const Blocks b(system, t, y, y + n, at.with_w ? y + 2 * n : yp + n, y + at.lam);
+    Eigen::Map<Eigen::MatrixXd> out(J, at.size, at.size);
     out.setZero();
+    const int row = at.lam - n;  // of the dynamics
     out.template block<n, n>(0, 0).diagonal().setConstant(cj);
     out.template block<n, n>(0, n).diagonal().setConstant(-1.0);
-    out.template block<n, n>(n, 0) = b.Dq;
-    out.template block<n, n>(n, n) = b.Dv + cj * b.M;
-    out.template block<n, m>(n, 2 * n) = System::sign * b.G.transpose();
-    if (index2) {
-      out.template block<m, n>(2 * n, 0) = b.H;
-      out.template block<m, n>(2 * n, n) = b.G;
-    } else {
-      out.template block<m, n>(2 * n, 0) = b.K;
-      out.template block<m, n>(2 * n, n) = 2.0 * b.H + cj * b.G;
+    if (at.with_w) {
+      out.template block<n, n>(n, n).diagonal().setConstant(cj);
+      out.template block<n, n>(n, 2 * n).diagonal().setConstant(-1.0);
     }
-  }
-
-  static void jacobian_w(const System& system, double t, double cj, const double* y, double* J) {
-    const Blocks b(system, t, y, y + n, y + 2 * n, y + 3 * n);
-    constexpr int N = 3 * n + m;
-    Eigen::Map<Eigen::Matrix<double, N, N>> out(J);
-    out.setZero();
-    out.template block<2 * n, 2 * n>(0, 0).diagonal().setConstant(cj);
-    out.template block<2 * n, 2 * n>(0, n).diagonal().setConstant(-1.0);
-    out.template block<n, n>(2 * n, 0) = b.Dq;
-    out.template block<n, n>(2 * n, n) = b.Dv;
-    out.template block<n, n>(2 * n, 2 * n) = b.M;
-    out.template block<n, m>(2 * n, 3 * n) = System::sign * b.G.transpose();
-    out.template block<m, n>(3 * n, 0) = b.K;
-    out.template block<m, n>(3 * n, n) = 2.0 * b.H;
-    out.template block<m, n>(3 * n, 2 * n) = b.G;
+    out.template block<n, n>(row, 0) = b.Dq;
+    out.template block<n, n>(row, n) += b.Dv;
+    // v' stands for the acceleration where w is absent.
+    const int a = at.with_w ? 2 * n : n;
+    const double rate = at.with_w ? 1.0 : cj;
+    out.template block<n, n>(row, a) += rate * b.M;
+    out.template block<n, m>(row, at.lam) = System::sign * b.G.transpose();
+    if (at.index == 1) {
+      out.template block<m, n>(at.lam, 0) = b.K;
+      out.template block<m, n>(at.lam, n) = 2.0 * b.H;
+      out.template block<m, n>(at.lam, a) += rate * b.G;
+    } else if (at.index == 2) {
+      out.template block<m, n>(at.lam, 0) = b.H;
+      out.template block<m, n>(at.lam, n) = b.G;
+    } else {
+      out.template block<m, n>(at.lam, 0) = b.G;
+    }
+    if (!at.ggl) return;
+    out.template block<n, m>(0, at.mu) = b.G.transpose();
+    out.template block<m, n>(at.mu, 0) = b.G;
+    // d(G^T mu)/dq column by column: H is linear in v up to its part from explicit time.
+    MatrixG still = MatrixG::Zero();
+    const VectorN none = VectorN::Zero();
+    system.velocity_gradient(t, y, none.data(), still.data());
+    for (int j = 0; j < n; ++j) {
+      MatrixG along = MatrixG::Zero();
+      const VectorN unit = VectorN::Unit(j);
+      system.velocity_gradient(t, y, unit.data(), along.data());
+      out.template block<n, 1>(0, j) +=
+          (along - still).transpose() * Eigen::Map<const VectorM>(y + at.mu);
+    }
   }
 
   static std::vector<std::string> labels(const std::vector<std::string>& row_names,
@@ -259,8 +336,9 @@ class Mechanism {
     factor->solveInPlace(*a);
   }
 
-  static void add_rows(const System& system, bool with_w, int N,
+  static void add_rows(const System& system, const Layout& at,
                        const std::vector<std::string>& row_names, Problem& p) {
+    const int N = at.size;
     using Map = Eigen::Map<MatrixG, 0, Eigen::OuterStride<>>;
     p.rows.push_back(make_rows(
         "position", row_names,
@@ -280,7 +358,8 @@ class Mechanism {
           Map(C, Eigen::OuterStride<>(N)) = H;
           Map(C + n, Eigen::OuterStride<>(N)) = G;
         }));
-    if (with_w) {
+    if (at.index == 0) return;
+    if (at.with_w) {
       p.rows.push_back(make_rows(
           "acceleration", labels(row_names, " second rate"),
           [system](double t, const double* y, double* r) {

@@ -68,7 +68,7 @@ double pendulum_period(double L, double g) {
 }
 
 std::vector<std::string> pendulum_forms() {
-  return {"index 1", "index 1 x2", "index 1 w", "index 0", "GGL", "index 2"};
+  return {"index 1", "index 1 x2", "index 1 w", "index 0", "GGL", "index 2", "index 3"};
 }
 
 Problem pendulum(double L, double g, double t_end, const std::string& form) {
@@ -85,6 +85,7 @@ Problem pendulum(double L, double g, double t_end, const std::string& form) {
   Problem p;
   p.name = "pendulum";
   p.form = form;
+  p.index = index0 ? 0 : form == "index 3" ? 3 : ggl || form == "index 2" ? 2 : 1;
   p.size = N;
   p.t_end = t_end;
   p.y0.assign(static_cast<std::size_t>(N), 0.0);
@@ -95,6 +96,9 @@ Problem pendulum(double L, double g, double t_end, const std::string& form) {
   if (with_w) p.y0[5] = -g;
   for (std::size_t i = 0; i < 4; ++i) p.id[i] = 1.0;
   if (index0) p.id[4] = 1.0;
+  if (p.index == 2) p.variable_index = {1, 1, 1, 1, 2};
+  if (p.index == 3) p.variable_index = {1, 1, 2, 2, 3};
+  if (ggl) p.variable_index.push_back(2);
   p.error_components = 4;
 
   double exact[5];
@@ -133,10 +137,11 @@ Problem pendulum(double L, double g, double t_end, const std::string& form) {
       }
     };
   } else {
-    enum class Last { fixed_length, squares, rate, velocity };
+    enum class Last { fixed_length, squares, rate, velocity, position };
     const Last last = index0                 ? Last::rate
                       : form == "index 1"    ? Last::fixed_length
                       : form == "index 1 x2" ? Last::squares
+                      : form == "index 3"    ? Last::position
                                              : Last::velocity;
     p.residual = [g, L2, ggl, last](double, const double* y, const double* yp, double* r) {
       r[0] = yp[0] - y[2];
@@ -156,6 +161,9 @@ Problem pendulum(double L, double g, double t_end, const std::string& form) {
           break;
         case Last::velocity:
           r[4] = y[0] * y[2] + y[1] * y[3];
+          break;
+        case Last::position:
+          r[4] = (y[0] * y[0] + y[1] * y[1] - L2) / 2.0;
           break;
       }
       if (ggl) {
@@ -202,6 +210,9 @@ Problem pendulum(double L, double g, double t_end, const std::string& form) {
             set(4, i, y[2 + i]);
             set(4, 2 + i, y[i]);
           }
+          break;
+        case Last::position:
+          for (int i = 0; i < 2; ++i) set(4, i, y[i]);
           break;
       }
     };

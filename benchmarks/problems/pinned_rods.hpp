@@ -9,9 +9,10 @@ namespace tether::problems {
 /// each rod.
 ///
 /// - "index 1": M v' = f - G^T lam, 0 = g'' - epsilon lam. Where rows are redundant or rank
-///   drops, epsilon > 0 picks the multipliers of least norm and moves the accelerations by O(epsilon).
-///   The multipliers are then known to round-off / epsilon only: their absolute tolerance is scaled
-///   by 1e4. Without projection the turning parallelogram leaves its branch at the flat position.
+///   drops, epsilon > 0 picks the multipliers of least norm and moves the accelerations by
+///   O(epsilon). The multipliers are then known to round-off / epsilon only: their absolute
+///   tolerance is scaled by 1e4. Without projection the turning parallelogram leaves its branch at
+///   the flat position.
 /// - "index 0": q' = v, v' = a with a from Gauss' principle (least constraint) by a complete
 ///   orthogonal decomposition that drops singular values below 1e-6 of the largest.
 ///
@@ -30,6 +31,12 @@ Problem n_four_bar(int N, double t_end, const std::string& form, double epsilon 
 /// rad/s, gravity 9.81.
 Problem parallelogram(double angle, double speed, double t_end, const std::string& form,
                       double epsilon = 1e-8);
+
+/// Five rods (1 m, 1 kg), or ten (0.1 m, 0.1 kg), in a row from a pin at the origin, released at
+/// rest along the x axis. No redundant rows; E = 0. Small differences grow fast: 3600-fold by t = 5
+/// for the five rods. Reference at any t_end from the absolute angles in long double.
+Problem five_link_chain(double t_end, const std::string& form);
+Problem ten_link_chain(double t_end, const std::string& form);
 
 /// Angle from the upward vertical and its rate: the exact motion of the N-four-bar.
 void n_four_bar_exact(int N, double t, double* angle, double* speed);

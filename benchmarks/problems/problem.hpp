@@ -20,6 +20,7 @@ struct Rows {
 struct Problem {
   std::string name;  ///< "pendulum"
   std::string form;  ///< "index 1"
+  int index = 1;     ///< differentiation index of the form (0: solved for y')
   int size = 0;      ///< N, number of unknowns
   double t0 = 0.0;
   double t_end = 0.0;
@@ -36,6 +37,9 @@ struct Problem {
   std::vector<double> reference;         ///< y(t_end); NaN where unknown
   int error_components = 0;              ///< the first so many components are compared
   std::vector<double> atol_scale;        ///< factors of the absolute tolerance; empty: all 1
+  /// Index of each unknown in Hairer and Wanner's sense (1, 2 or 3; not decreasing), by which RADAU5
+  /// scales errors; empty: all 1.
+  std::vector<int> variable_index;
   double initial_step = 0.0;             ///< for IDASetInitStep; 0: the integrator's choice
 
   /// The named groups joined with `+`; std::invalid_argument for a name that is not there.

@@ -73,6 +73,7 @@ Problem rigid_body(const std::string& motion, double t_end) {
   Problem p;
   p.name = "rigid body, " + motion;
   p.form = "index 0";
+  p.index = 0;
   p.size = 7;
   p.t_end = t_end;
   p.y0 = {1.0, 0.0, 0.0, 0.0, w0[0], w0[1], w0[2]};

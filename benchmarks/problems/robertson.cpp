@@ -15,6 +15,7 @@ Problem robertson(double t_end, const std::string& form) {
   Problem p;
   p.name = "robertson";
   p.form = form;
+  p.index = index0 ? 0 : 1;
   p.size = 3;
   p.t_end = t_end;
   p.y0 = {1.0, 0.0, 0.0};

@@ -6,7 +6,7 @@
 
 namespace tether::problems {
 
-/// "index 1", "index 1 w", "index 2"; see mechanism.hpp.
+/// All forms of mechanism.hpp.
 std::vector<std::string> slider_crank_forms();
 
 /// Crank turned at 150 rad/s, flexible connecting rod, slider; t in [0, 0.1]. Unknowns: two angles,

@@ -14,12 +14,12 @@
 #include <problems/pendulum.hpp>
 #include <problems/slider_crank.hpp>
 
+#include "curve.hpp"
 #include "run.hpp"
 
 namespace tp = tether::ida_projection;
 using tether::problems::Problem;
-using tether::bench::integrate;
-using tether::bench::Run;
+using namespace tether::bench;
 
 namespace {
 
@@ -37,25 +37,17 @@ const std::map<std::string, tp::Options> kVariants = [] {
 
 std::vector<Problem> all_problems() {
   using namespace tether::problems;
-  return {pendulum(1, 1, 100, "index 1"), pendulum(1, 1, 100, "index 0"),
-          pendulum(1, 9.81, 10, "index 1"), pendulum(1, 9.81, 10, "index 1 w"),
-          car_axis("index 1"),           car_axis("index 1 w"),
-          andrews("index 1"),            andrews("index 1 w"),
-          slider_crank("index 1"),       slider_crank("index 1 w")};
+  return {pendulum(1, 1, 100, "index 1"),
+          pendulum(1, 1, 100, "index 0"),
+          pendulum(1, 9.81, 10, "index 1"),
+          pendulum(1, 9.81, 10, "index 1 w"),
+          car_axis("index 1"),
+          car_axis("index 1 w"),
+          andrews("index 1"),
+          andrews("index 1 w"),
+          slider_crank("index 1"),
+          slider_crank("index 1 w")};
 }
-
-/// Geometric mean of ratios, with the largest one.
-struct Ratio {
-  double sum = 0.0, largest = 0.0;
-  int count = 0;
-  void add(double a, double b) {
-    if (!(a > 0.0 && b > 0.0)) return;
-    sum += std::log(a / b);
-    largest = std::max(largest, a / b);
-    ++count;
-  }
-  double mean() const { return count > 0 ? std::exp(sum / count) : std::nan(""); }
-};
 
 Run fastest(int repeats, const std::function<Run()>& run) {
   Run best = run();
@@ -75,7 +67,8 @@ int main(int argc, char** argv) {
   app.add_option("--count", count, "Number of tolerances")->check(CLI::Range(1, 1000));
   app.add_option("--loose", loose, "Largest tolerance")->check(CLI::PositiveNumber);
   app.add_option("--tight", tight, "Smallest tolerance")->check(CLI::PositiveNumber);
-  app.add_option("--repeats", repeats, "Runs of which the fastest counts")->check(CLI::Range(1, 100));
+  app.add_option("--repeats", repeats, "Runs of which the fastest counts")
+      ->check(CLI::Range(1, 100));
   app.add_option("--problem", only, "Only problems whose name and form contain this");
   std::vector<std::string> known;
   for (const auto& [name, options] : kVariants) known.push_back(name);
@@ -84,38 +77,42 @@ int main(int argc, char** argv) {
   app.add_flag("--verbose", verbose, "A line for each run");
   CLI11_PARSE(app, argc, argv);
 
-  fmt::print("{:<24} {:<22} {:>6} {:>6} {:>9} {:>6} {:>6}  {}\n", "problem, form", "variant", "steps",
-             "worst", "error", "CPU", "worst", "failures of plain, of ours");
+  fmt::print("{:<24} {:<22} {:>6} {:>6} {:>9} {:>6} {:>6}  {}\n", "problem, form", "variant",
+             "steps", "worst", "error", "CPU", "worst", "failures of plain, of ours");
   for (const Problem& problem : all_problems()) {
     const std::string title = problem.name + ", " + problem.form;
     if (title.find(only) == std::string::npos) continue;
-    std::map<std::string, Ratio> steps, error, cpu;
+    std::map<std::string, GeometricMean> steps, error, cpu;
     std::map<std::string, int> failures;
-    for (int k = 0; k < count; ++k) {
-      const double share = count > 1 ? static_cast<double>(k) / (count - 1) : 0.0;
-      const double tolerance = loose * std::pow(tight / loose, share);
-      const Run plain = fastest(repeats, [&] { return integrate(problem, tolerance, std::nullopt); });
+    for (const double tolerance : tolerance_ladder(loose, tight, count)) {
+      const Run plain = fastest(repeats, [&] { return integrate(problem, tolerance); });
       if (plain.failed) ++failures["plain"];
       for (const std::string& variant : variants) {
         const Run run = fastest(repeats, [&] {
-          return integrate(problem, tolerance, problem.recommended_constraints(),
-                           kVariants.at(variant), false, give_id);
+          Settings settings;
+          settings.constraints = problem.recommended_constraints();
+          settings.options = kVariants.at(variant);
+          settings.give_id = give_id;
+          return integrate(problem, tolerance, settings);
         });
         if (verbose)
-          fmt::print("  {:.3e} {:<22} flag {} error {:.2e} ({:.2e}) steps {} ({}) F {} CPU {:.2f} ({:.2f}) {}\n",
-                     tolerance, variant, run.flag, run.error, plain.error, run.steps, plain.steps,
-                     run.residuals, run.cpu_ms, plain.cpu_ms, run.message);
+          fmt::print(
+              "  {:.3e} {:<22} flag {} error {:.2e} ({:.2e}) steps {} ({}) F {} CPU {:.2f} "
+              "({:.2f}) {}\n",
+              tolerance, variant, run.flag, run.error, plain.error, run.steps, plain.steps,
+              run.residuals, run.cpu_ms, plain.cpu_ms, run.message);
         if (run.failed) ++failures[variant];
         if (run.failed || plain.failed) continue;
-        steps[variant].add(run.steps, plain.steps);
-        error[variant].add(run.error, plain.error);
-        cpu[variant].add(run.cpu_ms, plain.cpu_ms);
+        steps[variant].add(static_cast<double>(run.steps) / static_cast<double>(plain.steps));
+        error[variant].add(run.error / plain.error);
+        cpu[variant].add(run.cpu_ms / plain.cpu_ms);
       }
     }
     for (const std::string& variant : variants)
-      fmt::print("{:<24} {:<22} {:>6.3f} {:>6.2f} {:>9.2e} {:>6.3f} {:>6.2f}  {} {}\n", title, variant,
-                 steps[variant].mean(), steps[variant].largest, error[variant].mean(),
-                 cpu[variant].mean(), cpu[variant].largest, failures["plain"], failures[variant]);
+      fmt::print("{:<24} {:<22} {:>6.3f} {:>6.2f} {:>9.2e} {:>6.3f} {:>6.2f}  {} {}\n", title,
+                 variant, steps[variant].value(), steps[variant].largest(), error[variant].value(),
+                 cpu[variant].value(), cpu[variant].largest(), failures["plain"],
+                 failures[variant]);
     std::fflush(stdout);
   }
 }

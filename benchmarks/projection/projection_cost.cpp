@@ -1,4 +1,5 @@
-// Tether: nanoseconds of one projection, without IDA around it. SPDX-License-Identifier: BSD-3-Clause
+// Tether: nanoseconds of one projection, without IDA around it. SPDX-License-Identifier:
+// BSD-3-Clause
 //
 // A candidate half a tolerance off the constraints is moved onto them, again and again: metric, g,
 // C, factorisation, solution and update of the candidate. Best of several batches.
@@ -54,15 +55,17 @@ void measure(const Problem& problem, int batches, int moves) {
     for (int k = 0; k < moves; ++k) {
       perturb();
       const auto begin = std::chrono::steady_clock::now();
-      constexpr int kRepeat = 16;  // the second to sixteenth start on the constraints: the same work
+      constexpr int kRepeat =
+          16;  // the second to sixteenth start on the constraints: the same work
       for (int repeat = 0; repeat < kRepeat; ++repeat)
         success = mover->move(candidate).status == tp::Status::success && success;
-      spent += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / kRepeat;
+      spent +=
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / kRepeat;
     }
     best = std::min(best, spent / moves);
   }
-  fmt::print("{:<12} {:<10} rows {:>2}  {:>7.0f} ns per projection, {:.2f} moves each{}\n", problem.name,
-             problem.form, constraints.total_count(), 1e9 * best,
+  fmt::print("{:<12} {:<10} rows {:>2}  {:>7.0f} ns per projection, {:.2f} moves each{}\n",
+             problem.name, problem.form, constraints.total_count(), 1e9 * best,
              static_cast<double>(statistics.iterations) / (16.0 * batches * moves),
              success ? "" : "  FAILED");
   for (N_Vector v : {base, correction, weights, id}) N_VDestroy(v);
@@ -74,8 +77,10 @@ void measure(const Problem& problem, int batches, int moves) {
 int main(int argc, char** argv) {
   CLI::App app("Nanoseconds of one projection");
   int batches = 50, moves = 500;
-  app.add_option("--batches", batches, "Batches of which the fastest counts")->check(CLI::Range(1, 10000));
-  app.add_option("--moves", moves, "Perturbed candidates in a batch")->check(CLI::Range(1, 1000000));
+  app.add_option("--batches", batches, "Batches of which the fastest counts")
+      ->check(CLI::Range(1, 10000));
+  app.add_option("--moves", moves, "Perturbed candidates in a batch")
+      ->check(CLI::Range(1, 1000000));
   CLI11_PARSE(app, argc, argv);
   using namespace tether::problems;
   measure(pendulum(1, 1, 100, "index 1"), batches, moves);

@@ -8,6 +8,7 @@
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <ctime>
 
 #include "context.hpp"
@@ -16,9 +17,21 @@ namespace tether::bench {
 
 namespace {
 
+struct Host {
+  const problems::Problem* problem;
+  double deadline;
+  unsigned calls = 0;
+  bool late = false;
+};
+
 int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
-  static_cast<const problems::Problem*>(data)->residual(
-      t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), N_VGetArrayPointer(r));
+  auto* host = static_cast<Host*>(data);
+  // Reading the clock costs as much as a small F.
+  if (++host->calls % 1024 == 0 && cpu_seconds() > host->deadline) {
+    host->late = true;
+    return -1;
+  }
+  host->problem->residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), N_VGetArrayPointer(r));
   return 0;
 }
 
@@ -30,30 +43,63 @@ N_Vector vector_of(const std::vector<double>& values, SUNContext context) {
 
 [[maybe_unused]] void silent(int, const char*, const char*, char*, void*) {}
 
+int watched_solve(void* ida, const problems::Problem& problem, const Watch& watch, N_Vector y,
+                  N_Vector yp, sunrealtype* t) {
+  int flag = IDA_SUCCESS;
+  while (flag >= 0 && *t < problem.t_end) {
+    flag = IDASolve(ida, problem.t_end, t, y, yp, IDA_ONE_STEP);
+    if (flag < 0) break;
+    int order = 0;
+    IDAGetLastOrder(ida, &order);
+    watch(*t, N_VGetArrayPointer(y), order);
+  }
+  return flag;
+}
+
+void read_counts(void* ida, Run& run) {
+  long differences = 0;
+  IDAGetNumSteps(ida, &run.steps);
+  IDAGetNumResEvals(ida, &run.residuals);
+  IDAGetNumLinResEvals(ida, &differences);
+  run.residuals += differences;
+  IDAGetNumErrTestFails(ida, &run.error_failures);
+  IDAGetNumNonlinSolvConvFails(ida, &run.solver_failures);
+  IDAGetNumJacEvals(ida, &run.jacobians);
+  IDAGetNumLinSolvSetups(ida, &run.factorizations);
+}
+
 }  // namespace
 
-Run integrate(const problems::Problem& problem, double tolerance,
-              const std::optional<ida_projection::Constraints>& constraints,
-              ida_projection::Options options, bool suppress, bool give_id, long maximum_steps) {
+double cpu_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+Run integrate(const problems::Problem& problem, double tolerance, Settings settings) {
   SUNContext context = make_context();
   N_Vector y = vector_of(problem.y0, context), yp = vector_of(problem.yp0, context);
   N_Vector id = vector_of(problem.id, context), atol = N_VClone(y);
   for (int i = 0; i < problem.size; ++i)
     N_VGetArrayPointer(atol)[i] =
-        tolerance * (problem.atol_scale.empty() ? 1.0 : problem.atol_scale[static_cast<std::size_t>(i)]);
+        tolerance *
+        (problem.atol_scale.empty() ? 1.0 : problem.atol_scale[static_cast<std::size_t>(i)]);
   void* ida = IDACreate(context);
 #ifndef SUN_COMM_NULL
   IDASetErrHandlerFn(ida, silent, nullptr);
 #endif
   IDAInit(ida, residual, problem.t0, y, yp);
   IDASVtolerances(ida, tolerance, atol);
-  IDASetUserData(ida, const_cast<problems::Problem*>(&problem));
+  Host host{&problem, cpu_seconds() + settings.limits.cpu_seconds};
+  IDASetUserData(ida, &host);
   SUNMatrix matrix = SUNDenseMatrix(problem.size, problem.size, context);
   SUNLinearSolver solver = SUNLinSol_Dense(y, matrix, context);
   IDASetLinearSolver(ida, solver, matrix);
-  IDASetMaxNumSteps(ida, maximum_steps);
+  // One-step mode counts each call: the limit then holds for one step only.
+  IDASetMaxNumSteps(ida, settings.limits.steps);
   IDASetStopTime(ida, problem.t_end);
-  if (suppress) {
+  if (problem.initial_step > 0.0) IDASetInitStep(ida, problem.initial_step);
+  if (settings.suppress) {
     IDASetId(ida, id);
     IDASetSuppressAlg(ida, 1);
   }
@@ -61,24 +107,28 @@ Run integrate(const problems::Problem& problem, double tolerance,
   Run run;
   {
     std::optional<ida_projection::Projection> projection;
-    if (constraints) {
-      if (give_id) options.id = id;
-      projection.emplace(ida, *constraints, options);
+    if (settings.constraints) {
+      if (settings.give_id) settings.options.id = id;
+      projection.emplace(ida, *settings.constraints, settings.options);
     }
     sunrealtype t = problem.t0;
-    const std::clock_t begin = std::clock();
-    run.flag = IDASolve(ida, problem.t_end, &t, y, yp, IDA_NORMAL);
-    run.cpu_ms = 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    const double begin = cpu_seconds();
+    run.flag = settings.watch ? watched_solve(ida, problem, settings.watch, y, yp, &t)
+                              : IDASolve(ida, problem.t_end, &t, y, yp, IDA_NORMAL);
+    run.cpu_ms = 1e3 * (cpu_seconds() - begin);
     run.failed = run.flag < 0;
     run.error = problem.error(N_VGetArrayPointer(y));
-    IDAGetNumSteps(ida, &run.steps);
-    IDAGetNumResEvals(ida, &run.residuals);
-    IDAGetNumErrTestFails(ida, &run.error_failures);
-    IDAGetNumNonlinSolvConvFails(ida, &run.solver_failures);
-    IDAGetNumLinSolvSetups(ida, &run.jacobians);
+    run.y.assign(N_VGetArrayPointer(y), N_VGetArrayPointer(y) + problem.size);
+    read_counts(ida, run);
     if (projection) {
       run.projection = projection->statistics();
+      run.projections = run.projection.projections;
       run.message = projection->message();
+    }
+    if (run.failed && run.message.empty()) {
+      char* name = IDAGetReturnFlagName(run.flag);
+      run.message = host.late ? "time limit" : std::string(name);
+      std::free(name);
     }
     IDAFree(&ida);
   }

@@ -48,6 +48,8 @@ std::vector<Problem> everything() {
   }
   for (const std::string& form : pinned_rods_forms()) {
     all.push_back(n_four_bar(2, 1.0, form));
+    all.push_back(five_link_chain(1.0, form));
+    all.push_back(ten_link_chain(0.3, form));
     all.push_back(parallelogram(kThirdTurn / 2.0, 0.0, 1.0, form));
     all.push_back(parallelogram(0.0, 8.0, 1.0, form));
   }
@@ -73,6 +75,12 @@ bool regularised(const Problem& problem) {
 
 bool published_start(const Problem& problem) {
   return problem.name == "slider crank" && std::abs(problem.y0[1]) == 0.0;
+}
+
+// The second multipliers of the stabilised forms, which stand last, are 0 on solutions.
+void without_mu(const Problem& problem, Eigen::VectorXd& y) {
+  if (problem.form.rfind("GGL", 0) == 0)
+    y.tail(find(problem, "position")->constraints.count).setZero();
 }
 
 // Size of the terms that cancel in F: its entries' scale for round-off.
@@ -119,7 +127,10 @@ TEST_CASE("the start satisfies F") {
     const Eigen::VectorXd y = vector(p.y0), yp = vector(p.yp0);
     const Eigen::VectorXd r = residual(p, p.t0, y, yp);
     // Published start: its velocity rows are wrong by 1.2e-8, and the index-2 form contains them.
-    const double slack = published_start(p) && p.form == "index 2" ? 2e-8 : 0.0;
+    // Solved for the accelerations in double, the start in long double.
+    const double solved =
+        p.index == 0 && p.name == "andrews" ? 1e-9 * yp.cwiseAbs().maxCoeff() : 0.0;
+    const double slack = published_start(p) && p.index >= 2 ? 2e-8 : solved;
     const Eigen::VectorXd scale = residual_scale(p, p.t0, y, yp);
     for (int i = 0; i < p.size; ++i) {
       INFO("equation " << i);
@@ -184,7 +195,7 @@ TEST_CASE("Jacobians of F agree with differences") {
       for (int i = 0; i < p.size; ++i) {
         const double scale =
             expected.row(i).cwiseAbs().cwiseProduct(weight.transpose()).maxCoeff() +
-            1e-3 * std::abs(residual(p, t, y, yp)[i]);
+            1e-3 * std::abs(residual(p, t, y, yp)[i]) + 1e-3;  // differences have round-off, too
         for (int j = 0; j < p.size; ++j) {
           INFO(label(p) << ", cj " << cj << ", entry " << i << " " << j << ": given " << given(i, j)
                         << ", differences " << expected(i, j));
@@ -209,7 +220,7 @@ TEST_CASE("each group is the derivative of the one below") {
         double t;
         Eigen::VectorXd y = random_state(p, random, &t);
         y = project(p, t, y, {"position"});
-        if (p.form == "GGL") y[5] = 0.0;
+        without_mu(p, y);
         const Eigen::VectorXd yp = derivative(p, t, y);
         const RowMajor C = jacobian(*lower, t, y);
         const Eigen::VectorXd rate = C * yp + time_differences(*lower, t, y);
@@ -230,11 +241,13 @@ TEST_CASE("invariants stay constant along the motion") {
   std::mt19937 random(4);
   for (const Problem& p : everything()) {
     if (p.name == "transistor amplifier") continue;  // its rows are equations of F, with all ids 1
+    // Here w is an unknown that only the equations of motion, not solved here, tie to the rest.
+    if (p.index > 1 && p.form.back() == 'w') continue;
     for (int repeat = 0; repeat < 3; ++repeat) {
       double t;
       Eigen::VectorXd y = random_state(p, random, &t);
       y = project(p, t, y);
-      if (p.form == "GGL") y[5] = 0.0;
+      without_mu(p, y);
       const bool index1 = p.form.rfind("index 1", 0) == 0;
       const Eigen::VectorXd yp = index1 ? motion(p, t, &y) : derivative(p, t, y);
       for (const Rows& rows : p.rows) {
@@ -443,6 +456,17 @@ TEST_CASE("published digits of the ordinary differential equations") {
   top(2, 20.0, 0.839746574306844, 0.542978536352885, 3.38544255642929);
   top(40, 1.0, -0.115356880632110, -0.993324111300450, 6.71481488072356);
   top(40, 20.0, 0.410901153762945, 0.911679900971981, 1.71856961005574);
+  // Tip of the five-link chain.
+  const auto tip = [](double t, double x, double y, double bound) {
+    const Problem p = five_link_chain(t, "index 0");
+    const double* last = p.reference.data() + 12;
+    INFO("chain, t " << t);
+    CHECK(std::abs(last[0] + 0.5 * std::cos(last[2]) - x) < bound);
+    CHECK(std::abs(last[1] + 0.5 * std::sin(last[2]) - y) < bound);
+  };
+  tip(0.5, 4.562046198086, -1.232748571441, 1e-12);
+  tip(1.0, 0.533569475142432, -4.919709597570844, 1e-13);
+  tip(2.0, -4.596001576614814, -0.756076430632311, 1e-12);
   for (const auto& known :
        {std::make_pair(1.0, -1.04713983399093), std::make_pair(10.0, 1.04142900981959),
         std::make_pair(100.0, 0.506915291660435)}) {
@@ -517,11 +541,13 @@ double plain_ida_bound(const Problem& p) {
   if (p.name == "robertson") return 2e-8;
   if (p.name == "akzo nobel") return 1e-7;
   if (p.name == "transistor amplifier") return 5e-8;
+  if (p.name.rfind("chain", 0) == 0) return 1e-5;
   return 1e-6;
 }
 
 TEST_CASE("plain IDA reaches the references") {
   for (const Problem& p : everything()) {
+    if (p.index > 2) continue;  // not what IDA is made for
     // Turning through the flat position, without projection, the multiplier form leaves the branch.
     if (p.name == "parallelogram" && p.form == "index 1" && p.y0[14] != 0.0) continue;
     for (const bool analytic : {false, true}) {

@@ -1,0 +1,59 @@
+// Tether: the problems of the comparison. SPDX-License-Identifier: BSD-3-Clause
+#include "catalogue.hpp"
+
+#include <problems/akzo_nobel.hpp>
+#include <problems/andrews.hpp>
+#include <problems/car_axis.hpp>
+#include <problems/kepler.hpp>
+#include <problems/lotka_volterra.hpp>
+#include <problems/pendulum.hpp>
+#include <problems/pinned_rods.hpp>
+#include <problems/rigid_body.hpp>
+#include <problems/robertson.hpp>
+#include <problems/slider_crank.hpp>
+#include <problems/transistor_amplifier.hpp>
+
+namespace tether::bench {
+
+namespace {
+
+template <class Make>
+std::vector<problems::Problem> in_forms(const std::vector<std::string>& names, Make make) {
+  std::vector<problems::Problem> forms;
+  for (const std::string& name : names) forms.push_back(make(name));
+  return forms;
+}
+
+}  // namespace
+
+std::vector<Case> catalogue() {
+  using namespace problems;
+  const double g = 9.81;
+  return {
+      {"pendulum", "t = 10, four swings, energy kept",
+       in_forms(pendulum_forms(), [&](auto& form) { return pendulum(1, g, 10, form); })},
+      {"long pendulum", "t = 100, 42 swings: errors of phase add up",
+       in_forms(pendulum_forms(), [&](auto& form) { return pendulum(1, g, 100, form); })},
+      {"car axis", "constraints move with the road; nothing else is kept",
+       in_forms(car_axis_forms(), [](auto& form) { return car_axis(form); })},
+      {"andrews", "seven bodies, large accelerations, energy with a motor's work",
+       in_forms(andrews_forms(), [](auto& form) { return andrews(form); })},
+      {"slider crank", "stiff, weakly excited elastic modes without damping",
+       in_forms(slider_crank_forms(), [](auto& form) { return slider_crank(form); })},
+      {"robertson", "chemistry over six decades of rates; mass kept",
+       in_forms(robertson_forms(), [](auto& form) { return robertson(40.0, form); })},
+      {"transistor amplifier", "singular constant mass matrix", {transistor_amplifier()}},
+      {"akzo nobel", "chemistry with one equilibrium", {akzo_nobel()}},
+      {"rigid body",
+       "free rotation: quaternion, energy, angular momentum",
+       {rigid_body("dzhanibekov", 100.0)}},
+      {"kepler", "eccentricity 0.6, t = 100: four invariants of rank three", {kepler(0.6, 100.0)}},
+      {"lotka volterra", "one invariant that is no polynomial", {lotka_volterra(2, 0.5, 100)}},
+      {"four bar", "two linked four-bars: rank drops twice a turn",
+       in_forms(pinned_rods_forms(), [](auto& form) { return n_four_bar(2, 10.0, form); })},
+      {"five-link chain", "chaotic: falls from the horizontal, t = 2",
+       in_forms(pinned_rods_forms(), [](auto& form) { return five_link_chain(2.0, form); })},
+  };
+}
+
+}  // namespace tether::bench

@@ -1,0 +1,71 @@
+// Tether: plain IDA and IDA with the projection. SPDX-License-Identifier: BSD-3-Clause
+#include <sundials/sundials_version.h>
+
+#include <algorithm>
+
+#include "code.hpp"
+
+namespace tether::bench {
+
+namespace {
+
+enum class Variant { tested, suppressed, projected, smooth };
+
+class IdaCode : public Code {
+ public:
+  explicit IdaCode(Variant variant) : variant_(variant) {}
+
+  std::string name() const override {
+    switch (variant_) {
+      case Variant::tested:
+        return "IDA";
+      case Variant::suppressed:
+        return "IDA suppressed";
+      case Variant::projected:
+        return "Tether";
+      case Variant::smooth:
+        break;
+    }
+    return "Tether smooth";
+  }
+
+  std::string version() const override {
+    char text[32] = "";
+    SUNDIALSGetVersion(text, sizeof text);
+    return std::string("SUNDIALS ") + text;
+  }
+
+  std::string refuses(const problems::Problem& problem) const override {
+    if (problem.index > 2) return "IDA is made for index 0, 1 and, with care, 2";
+    const bool algebraic = std::count(problem.id.begin(), problem.id.end(), 0.0) > 0;
+    if (variant_ == Variant::suppressed && !algebraic) return "no algebraic variables";
+    return {};
+  }
+
+  Run run(const problems::Problem& problem, double tolerance, const Limits& limits,
+          const Watch& watch) const override {
+    Settings settings;
+    settings.limits = limits;
+    settings.watch = watch;
+    settings.suppress = variant_ == Variant::suppressed;
+    if (variant_ == Variant::projected || variant_ == Variant::smooth) {
+      settings.constraints = problem.recommended_constraints();
+      settings.options.step_smoothing = variant_ == Variant::smooth;
+      settings.options.print_fatal = false;
+    }
+    return integrate(problem, tolerance, settings);
+  }
+
+ private:
+  Variant variant_;
+};
+
+}  // namespace
+
+void add_ida_codes(Codes& codes) {
+  for (const Variant variant :
+       {Variant::tested, Variant::suppressed, Variant::projected, Variant::smooth})
+    codes.push_back(std::make_unique<IdaCode>(variant));
+}
+
+}  // namespace tether::bench

@@ -1,0 +1,49 @@
+// Tether: runs of all codes on one problem. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catalogue.hpp"
+#include "code.hpp"
+#include "projection/curve.hpp"
+
+namespace tether::bench {
+
+/// One code on one form at one tolerance.
+struct Point {
+  std::string problem, form, code;
+  double tolerance = 0.0;
+  Run run;           ///< CPU: median of the repeats
+  double scd = 0.0;  ///< -log10 of the largest relative error of a compared component
+  /// Largest |g| over all steps, for every group of rows; empty when not watched.
+  std::vector<std::pair<std::string, double>> drift;
+  std::array<long, 13> orders{};  ///< steps taken with each order; all 0 when not watched
+  /// Why its error is not within 100 tolerances; empty when it is.
+  std::string mark;
+
+  bool usable() const { return !run.failed && run.error == run.error; }
+};
+
+struct Plan {
+  std::vector<double> tolerances;
+  int repeats = 3;
+  bool watch = true;         ///< second, untimed run: drift and orders
+  double run_seconds = 2.0;  ///< CPU limit of one run
+  long steps = 300000;
+};
+
+/// Timed runs are interleaved: every repeat goes once through all codes and forms, so that what
+/// else happens on the machine meets all of them. Runs longer than 0.1 s are not repeated.
+std::vector<Point> measure(const Case& which, const Codes& codes, const Plan& plan);
+
+/// One curve for each code and form.
+struct Family {
+  std::string code;
+  std::vector<Curve> forms;
+};
+std::vector<Family> families(const std::vector<Point>& points);
+
+}  // namespace tether::bench

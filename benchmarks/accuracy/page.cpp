@@ -1,0 +1,176 @@
+// Tether: pictures and tables of a comparison as text. SPDX-License-Identifier: BSD-3-Clause
+#include "page.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+
+namespace tether::bench {
+
+namespace {
+
+// Colour-blind safe (Okabe, Ito).
+const char* const kColours[] = {"#000000", "#7f7f7f", "#d55e00", "#e69f00", "#0072b2",
+                                "#009e73", "#cc79a7", "#56b4e9", "#f0e442"};
+
+constexpr double kWidth = 640, kHeight = 400, kLeft = 64, kRight = 150, kTop = 30, kBottom = 46;
+
+struct Axis {
+  double low = 1e300, high = -1e300;
+  void add(double value) {
+    if (!(value > 0.0) || !std::isfinite(value)) return;
+    low = std::min(low, std::log10(value));
+    high = std::max(high, std::log10(value));
+  }
+  void round() {
+    if (low > high) low = -1.0, high = 0.0;
+    low = std::floor(low);
+    high = std::max(low + 1.0, std::ceil(high));
+  }
+  double share(double value) const { return (std::log10(value) - low) / (high - low); }
+};
+
+}  // namespace
+
+std::string svg(const std::string& title, const std::string& x_label, const std::string& y_label,
+                const std::vector<Line>& lines) {
+  Axis ax, ay;
+  for (const Line& line : lines) {
+    for (const double x : line.x) ax.add(x);
+    for (const double y : line.y) ay.add(y);
+  }
+  ax.round();
+  ay.round();
+  const double w = kWidth - kLeft - kRight, h = kHeight - kTop - kBottom;
+  const auto px = [&](double x) { return kLeft + w * ax.share(x); };
+  const auto py = [&](double y) { return kTop + h * (1.0 - ay.share(y)); };
+
+  std::string out = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" width=\"{}\" "
+      "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" "
+      "fill=\"white\"/>\n<text x=\"{}\" y=\"18\" font-size=\"14\">{}</text>\n",
+      kWidth, kHeight, kWidth, kLeft, html_escape(title));
+  const auto grid = [&](const Axis& axis, bool vertical) {
+    const int stride = axis.high - axis.low > 9.0 ? 2 : 1;
+    for (int k = static_cast<int>(axis.low); k <= static_cast<int>(axis.high); k += stride) {
+      const double value = std::pow(10.0, k);
+      const double x1 = vertical ? px(value) : kLeft, x2 = vertical ? x1 : kLeft + w;
+      const double y1 = vertical ? kTop : py(value), y2 = vertical ? kTop + h : y1;
+      out += fmt::format(
+          "<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\" stroke=\"#ddd\"/><text x=\"{:.1f}\" "
+          "y=\"{:.1f}\" text-anchor=\"{}\">1e{}</text>\n",
+          x1, y1, x2, y2, vertical ? x1 : kLeft - 6, vertical ? kTop + h + 16 : y1 + 4,
+          vertical ? "middle" : "end", k);
+    }
+  };
+  grid(ax, true);
+  grid(ay, false);
+  out += fmt::format(
+      "<text x=\"{:.0f}\" y=\"{:.0f}\" text-anchor=\"middle\">{}</text><text "
+      "text-anchor=\"middle\" "
+      "transform=\"translate(16 {:.0f}) rotate(-90)\">{}</text>\n",
+      kLeft + w / 2, kHeight - 8, html_escape(x_label), kTop + h / 2, html_escape(y_label));
+
+  std::vector<std::string> names;
+  for (const Line& line : lines) {
+    auto found = std::find(names.begin(), names.end(), line.name);
+    if (found == names.end()) found = names.insert(names.end(), line.name);
+    const char* colour = kColours[static_cast<std::size_t>(found - names.begin()) % 9];
+    out += fmt::format("<g fill=\"{}\"><title>{}</title>", colour, html_escape(line.hint));
+    std::string path;
+    for (std::size_t i = 0; i < line.x.size(); ++i) {
+      if (!(line.x[i] > 0.0) || !(line.y[i] > 0.0)) continue;
+      const double x = px(line.x[i]), y = py(line.y[i]);
+      path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : "L", x, y);
+      out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"/>", x, y,
+                         line.points_only ? 1.6 : 2.6);
+    }
+    if (!line.points_only)
+      out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"/>", path,
+                         colour);
+    out += "</g>\n";
+  }
+  for (std::size_t k = 0; k < names.size(); ++k)
+    out += fmt::format(
+        "<circle cx=\"{0:.0f}\" cy=\"{1:.0f}\" r=\"4\" fill=\"{2}\"/><text x=\"{3:.0f}\" "
+        "y=\"{4:.0f}\">{5}</text>\n",
+        kLeft + w + 14, kTop + 12 + 18.0 * static_cast<double>(k), kColours[k % 9], kLeft + w + 24,
+        kTop + 16 + 18.0 * static_cast<double>(k), html_escape(names[k]));
+  return out + "</svg>\n";
+}
+
+std::string Table::text() const {
+  std::vector<std::size_t> width(head.size(), 0);
+  const auto widen = [&](const std::vector<std::string>& row) {
+    for (std::size_t k = 0; k < row.size() && k < width.size(); ++k)
+      width[k] = std::max(width[k], row[k].size());
+  };
+  widen(head);
+  for (const auto& row : rows) widen(row);
+  std::string out;
+  const auto line = [&](const std::vector<std::string>& row) {
+    std::string one;
+    for (std::size_t k = 0; k < row.size(); ++k)
+      one += k == 0 ? fmt::format("{:<{}}", row[k], width[k])
+                    : fmt::format("  {:>{}}", row[k], width[k]);
+    out += one + "\n";
+  };
+  line(head);
+  for (const auto& row : rows) line(row);
+  return out;
+}
+
+std::string Table::html() const {
+  std::string out = "<table><tr>";
+  for (const std::string& cell : head) out += "<th>" + html_escape(cell) + "</th>";
+  out += "</tr>\n";
+  for (const auto& row : rows) {
+    out += "<tr>";
+    for (const std::string& cell : row) out += "<td>" + html_escape(cell) + "</td>";
+    out += "</tr>\n";
+  }
+  return out + "</table>\n";
+}
+
+std::string html_escape(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else
+      out += c;
+  }
+  return out;
+}
+
+std::string json_string(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20)
+      out += ' ';
+    else
+      out += c;
+  }
+  return out + "\"";
+}
+
+std::string json_number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.6g}", value) : "null";
+}
+
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text;
+  file.flush();
+  if (!file) throw std::runtime_error("cannot write " + path);
+}
+
+}  // namespace tether::bench

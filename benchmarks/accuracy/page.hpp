@@ -1,0 +1,36 @@
+// Tether: pictures and tables of a comparison as text. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace tether::bench {
+
+/// A line of a picture; both axes are logarithmic.
+struct Line {
+  std::string name;  ///< the legend shows each name once, in the order of first use
+  std::string hint;  ///< shown when the mouse rests on a point
+  std::vector<double> x, y;
+  bool points_only = false;
+};
+
+/// An SVG picture that needs nothing from outside.
+std::string svg(const std::string& title, const std::string& x_label, const std::string& y_label,
+                const std::vector<Line>& lines);
+
+/// A table; printed aligned, as HTML, and kept as strings so that all outputs agree.
+struct Table {
+  std::vector<std::string> head;
+  std::vector<std::vector<std::string>> rows;
+  std::string text() const;
+  std::string html() const;
+};
+
+std::string html_escape(const std::string& text);
+std::string json_string(const std::string& text);
+std::string json_number(double value);  ///< null for NaN and infinities
+
+/// Throws std::runtime_error naming the file.
+void write_file(const std::string& path, const std::string& text);
+
+}  // namespace tether::bench
