@@ -92,8 +92,9 @@ Run CpodesCode::run(const problems::Problem& problem, double tolerance, const Li
   cpodes.setErrHandlerFn();
   cpodes.init(system, problem.t0, y, yp, CPodes::ScalarScalar, tolerance, &atol);
   cpodes.lapackDense(N);
+  // In its other norm, ErrorNorm, every projection fails (return code -55).
   // Rows may depend on each other: QR with pivoting is the choice that its guide gives for that.
-  cpodes.projInit(CPodes::ErrorNorm, CPodes::Nonlinear, ctol);
+  cpodes.projInit(CPodes::L2Norm, CPodes::Nonlinear, ctol);
   cpodes.lapackDenseProj(system.count(), N, CPodes::ProjectWithQRPivot);
   cpodes.setMaxNumSteps(static_cast<int>(limits.steps));
   cpodes.setStopTime(problem.t_end);

@@ -1,0 +1,120 @@
+#!/bin/sh
+# What accuracy costs, side by side with every peer that the machine has: installs what is missing,
+# builds in build/release, runs all comparisons and writes one folder. SPDX-License-Identifier: BSD-3-Clause
+#
+#   sh benchmarks/run.sh [--quick] [--output DIR] [--contact FOLDER] [--build DIR]
+#
+#   --quick     fewer problems and tolerances: under 2 minutes instead of under 15
+#   --output    where index.html, results.json and the tables go (default build/benchmarks)
+#   --contact   folder of contact problems (fclib files) for contact_collection
+#   --build     an existing build directory instead of build/release
+set -eu
+
+root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
+cd "$root"
+quick=no output=build/benchmarks contact=${TETHER_CONTACT_DATA:-} build=
+usage() { sed -n '5,10s/^# *//p' "$0" >&2; exit 2; }
+while [ $# -gt 0 ]; do
+  case $1 in
+    --quick) quick=yes ;;
+    --output) [ $# -gt 1 ] || usage; output=$2; shift ;;
+    --contact) [ $# -gt 1 ] || usage; contact=$2; shift ;;
+    --build) [ $# -gt 1 ] || usage; build=$2; shift ;;
+    *) usage ;;
+  esac
+  shift
+done
+
+sh cmake/install_packages.sh
+if [ -z "$build" ]; then
+  cmake --preset release >/dev/null
+  build=build/release
+fi
+cmake --build "$build" --parallel "$(nproc)" --target accuracy_cost stability contact_collection >/dev/null
+mkdir -p "$output"
+programs=$build/benchmarks
+started=$(date +%s)
+
+# One thread for everybody.
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+if [ "$quick" = yes ]; then
+  accuracy='--count 6 --repeats 1 --seconds 0.2 --no-drift'
+  sweep='--count 20'
+else
+  accuracy='--count 15 --repeats 3 --seconds 2'
+  sweep='--count 100'
+fi
+
+# shellcheck disable=SC2086  # lists of options
+"$programs/accuracy/accuracy_cost" $accuracy --csv "$output/accuracy.csv" --svg "$output" \
+  --json "$output/accuracy.json" --html "$output/accuracy.part" | tee "$output/accuracy.txt"
+echo
+echo 'Computational stability'
+: >"$output/stability.part"
+stability_json=
+for problem in pendulum 'car axis' andrews; do
+  # shellcheck disable=SC2086
+  "$programs/accuracy/stability" --problem "$problem" $sweep --json "$output/stability.json" \
+    --html "$output/one.part" | tee -a "$output/stability.txt.new"
+  cat "$output/one.part" >>"$output/stability.part"
+  stability_json="$stability_json${stability_json:+,}\"$problem\":$(cat "$output/stability.json")"
+done
+mv "$output/stability.txt.new" "$output/stability.txt"
+rm -f "$output/one.part" "$output/stability.json"
+
+echo
+contact_text='contact_collection left out: no data folder (--contact FOLDER or TETHER_CONTACT_DATA)'
+if [ -n "$contact" ] && [ -d "$contact" ]; then
+  limit=10
+  [ "$quick" = no ] || limit=1
+  "$programs/contact/contact_collection" "$contact" --time-limit $limit --csv "$output/contact.csv" \
+    >"$output/contact.txt"
+  contact_text=$(cat "$output/contact.txt")
+fi
+echo "$contact_text"
+
+# Facts without which times mean nothing.
+one_line() { tr '\n' ' ' | tr -d '"\\' | sed 's/  */ /g; s/ *$//'; }
+cpu=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1 | one_line)
+system=$(uname -srm | one_line)
+load=$(cut -d' ' -f1-3 /proc/loadavg 2>/dev/null || echo unknown)
+compiler=$(${CXX:-c++} --version 2>/dev/null | head -n 1 | one_line)
+commit=$(git rev-parse HEAD 2>/dev/null || echo unknown)
+[ -z "$(git status --porcelain 2>/dev/null)" ] || commit="$commit with local changes"
+version() { dpkg-query -W -f='${Version}' "$1" 2>/dev/null || echo absent; }
+packages=
+for package in libsundials-dev libeigen3-dev r-cran-desolve libsimbody-dev libsiconos-numerics-dev; do
+  packages="$packages${packages:+, }\"$package\": \"$(version $package)\""
+done
+seconds=$(($(date +%s) - started))
+
+{
+  printf '{"machine": {"cpu": "%s", "cores": %s, "system": "%s", "load": "%s"},\n' \
+    "$cpu" "$(nproc)" "$system" "$load"
+  printf '"compiler": "%s", "packages": {%s},\n' "$compiler" "$packages"
+  printf '"commit": "%s", "date": "%s", "quick": "%s", "seconds": %s,\n' \
+    "$commit" "$(date -u +%Y-%m-%dT%H:%M:%SZ)" "$quick" "$seconds"
+  printf '"accuracy": %s,\n"stability": {%s}}\n' "$(cat "$output/accuracy.json")" "$stability_json"
+} >"$output/results.json"
+rm -f "$output/accuracy.json"
+
+{
+  cat <<'HEAD'
+<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>Tether: what accuracy costs</title>
+<style>body{font-family:sans-serif;max-width:75em;margin:1em auto;padding:0 1em}
+table{border-collapse:collapse;font-size:85%;margin:.5em 0}td,th{border:1px solid #ccc;padding:2px 6px;
+text-align:right}td:first-child,th:first-child{text-align:left}pre{font-size:80%;overflow:auto}</style>
+<h1>What accuracy costs</h1>
+HEAD
+  printf '<p>%s, %s cores, %s, load %s; %s; commit %s; %s; %s s.</p>\n' "$cpu" "$(nproc)" "$system" \
+    "$load" "$compiler" "$commit" "$(date -u +%Y-%m-%d)" "$seconds"
+  printf '<p>CPU of one process, dense LU and difference Jacobians in every code. '
+  printf 'What each column means: benchmarks/README.md.</p>\n'
+  cat "$output/accuracy.part" "$output/stability.part"
+  printf '<h2>Contact</h2><pre>%s</pre></html>\n' \
+    "$(printf '%s\n' "$contact_text" | sed 's/&/\&amp;/g; s/</\&lt;/g')"
+} >"$output/index.html"
+rm -f "$output/accuracy.part" "$output/stability.part"
+echo
+echo "$seconds s; $output/index.html, $output/results.json, $output/accuracy.csv"
