@@ -35,6 +35,7 @@ mkdir -p "$output"
 programs=$build/benchmarks
 started=$(date +%s)
 
+cores=$(nproc)  # asked before OMP_NUM_THREADS changes its answer
 # One thread for everybody.
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -91,7 +92,7 @@ seconds=$(($(date +%s) - started))
 
 {
   printf '{"machine": {"cpu": "%s", "cores": %s, "system": "%s", "load": "%s"},\n' \
-    "$cpu" "$(nproc)" "$system" "$load"
+    "$cpu" "$cores" "$system" "$load"
   printf '"compiler": "%s", "packages": {%s},\n' "$compiler" "$packages"
   printf '"commit": "%s", "date": "%s", "quick": "%s", "seconds": %s,\n' \
     "$commit" "$(date -u +%Y-%m-%dT%H:%M:%SZ)" "$quick" "$seconds"
@@ -107,7 +108,7 @@ table{border-collapse:collapse;font-size:85%;margin:.5em 0}td,th{border:1px soli
 text-align:right}td:first-child,th:first-child{text-align:left}pre{font-size:80%;overflow:auto}</style>
 <h1>What accuracy costs</h1>
 HEAD
-  printf '<p>%s, %s cores, %s, load %s; %s; commit %s; %s; %s s.</p>\n' "$cpu" "$(nproc)" "$system" \
+  printf '<p>%s, %s cores, %s, load %s; %s; commit %s; %s; %s s.</p>\n' "$cpu" "$cores" "$system" \
     "$load" "$compiler" "$commit" "$(date -u +%Y-%m-%d)" "$seconds"
   printf '<p>CPU of one process, dense LU and difference Jacobians in every code. '
   printf 'What each column means: benchmarks/README.md.</p>\n'
