@@ -1,7 +1,7 @@
 // Spheres that settle in a box: time of a step and how exactly it is solved, beside Bullet's
 // dynamics where it is installed. SPDX-License-Identifier: BSD-3-Clause
 //
-//   settling [spheres = 10000] [seconds = 3] [tolerance ...]
+//   settling [spheres = 10000] [seconds = 3] [tolerance ...] [alone]
 //
 // Both are judged by the same evaluate(): the fixed-point residual of the Coulomb law with exact
 // cones on the contacts, velocities and impulses of the solver's own step. Times are of whole
@@ -253,10 +253,16 @@ int main(int argc, char** argv) {
   const int spheres = argc > 1 ? std::atoi(argv[1]) : 10000;
   const double duration = argc > 2 ? std::atof(argv[2]) : 3;
   std::vector<double> tolerances;
-  for (int k = 3; k < argc; ++k) tolerances.push_back(std::atof(argv[k]));
+  bool alone = false;
+  for (int k = 3; k < argc; ++k) {
+    if (std::string(argv[k]) == "alone")
+      alone = true;
+    else
+      tolerances.push_back(std::atof(argv[k]));
+  }
   if (tolerances.empty()) tolerances = {1e-1, 1e-2, 1e-3};
   if (spheres < 1 || !(duration > 0)) {
-    std::fprintf(stderr, "settling [spheres] [seconds] [tolerance ...]\n");
+    std::fprintf(stderr, "settling [spheres] [seconds] [tolerance ...] [alone]\n");
     return 2;
   }
   const Start start = start_of(spheres);
@@ -264,6 +270,7 @@ int main(int argc, char** argv) {
   std::printf("%-28s %9s %9s %10s %9s %10s %9s\n", "", "ms/step", "us/cont.", "residual",
               "depth %R", "speed m/s", "contacts");
   for (const double tolerance : tolerances) tether_run(start, duration, tolerance);
+  if (alone) return 0;
 #if defined(TETHER_HAVE_BULLET)
   bullet_run(start, duration, 10, false);
   bullet_run(start, duration, 10, true);

@@ -8,7 +8,7 @@
 
 namespace tether::contact::detail {
 
-/// README, section 13. First the contact problem without restitution, impulses x; then epsilon x at
+/// README, section 14. First the contact problem without restitution, impulses x; then epsilon x at
 /// the contacts that bounce; then the contact problem once more, for contacts which that pressed
 /// together. What the last two add is scaled down where an island of bodies would end with more
 /// energy than it had before the impulses.

@@ -50,8 +50,8 @@ BodyOptions solver_options(const SteppingOptions& o) {
 BodyOptions correction_options(const SteppingOptions& o) {
   BodyOptions b = solver_options(o);
   b.law = Law::frictionless;
-  b.tolerance = 1e-3;
-  b.max_sweeps = 20;
+  b.tolerance = 1e-2;
+  b.max_sweeps = 10;
   b.max_assembled = 0;
   return b;
 }

@@ -10,7 +10,7 @@ namespace tether::contact {
 /// Boxes and convex hulls against each other, capsules against both, spheres against hulls.
 ///
 /// Touching faces are found to round-off and without any margin or skin: the separating axis is
-/// chosen among all face normals and edge products (README, section 14), then the face that lies
+/// chosen among all face normals and edge products (README, section 15), then the face that lies
 /// against the reference face is clipped to it. Hulls come from Bullet.
 ///
 /// Normals. A face gives its normal. Crossing edges: their product. Where an edge lies along an

@@ -14,7 +14,7 @@
 
 namespace tether::contact {
 
-/// How the angular velocity of a body without torque changes (README, section 12). Spheres skip it.
+/// How the angular velocity of a body without torque changes (README, section 13). Spheres skip it.
 enum class Gyroscopic : std::uint8_t {
   none,           ///< not at all: keeps energy, never flips
   explicit_step,  ///< w += -dt I^-1 (w x I w)
@@ -106,7 +106,7 @@ struct StageCost {
   double seconds;
 };
 
-/// Advances a set of bodies by steps of fixed length (README, section 12):
+/// Advances a set of bodies by steps of fixed length (README, section 13):
 ///
 ///     v* = v + dt M^-1 f,   v+ = v* + M^-1 J' x,   x+ = x + dt v+,   q+ = exp(dt w / 2) q
 ///
