@@ -355,7 +355,9 @@ void System::solve_multipliers() {
   });
   right_ = -gamma_;
   right_.noalias() -= G_ * free_;
-  factor_.compute(S_ + Eigen::MatrixXd(epsilon_.asDiagonal()));
+  regular_ = S_;
+  regular_.diagonal() += epsilon_;
+  factor_.compute(regular_);
   // Refined, so that eps decides only where the rows do not.
   lambda_.setZero();
   for (int pass = 0; pass < 3; ++pass) {

@@ -128,7 +128,7 @@ class System {
   // Workspace.
   std::vector<Load6> loads_, pulls_;
   Eigen::VectorXd epsilon_, lambda_, a_, gamma_, free_, right_, values_, scratch_;
-  Eigen::MatrixXd G_, GM_, S_, left_, dense_;
+  Eigen::MatrixXd G_, GM_, S_, regular_, left_, dense_;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> row_choice_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Entries dense_entries_;
