@@ -27,13 +27,15 @@ const char* setting_name(const CostTable& table) { return table.smooth ? "tolera
 void print(const Scene& scene, const CostTable& table) {
   fmt::print("{}: errors against {}\n", scene.name.empty() ? scene.file : scene.name,
              table.reference);
-  fmt::print("  (ten times looser, or at twice the step, the reference changes by {:.1e})\n", table.reference_error);
+  fmt::print("  (ten times looser, or at twice the step, the reference changes by {:.1e})\n",
+             table.reference_error);
   fmt::print("  {:>9}  {:>10}  {:>10}  {:>9}  {:>9}  {:>11}{}\n", setting_name(table), "error",
              "time / ms", "steps", table.smooth ? "drift" : "depth / m", "us per step",
              scene.expect.empty() ? "" : "  expectations met");
   for (const CostRow& row : table.rows) {
     if (!row.failure.empty()) {
-      fmt::print("  {:>9.3g}  fails: {}\n", row.setting, row.failure);
+      fmt::print("  {:>9.3g}  fails: {}\n", row.setting,
+                 row.failure.substr(0, row.failure.find(". ")));
       continue;
     }
     fmt::print("  {:>9.3g}  {:>10.2e}  {:>10.4g}  {:>9}  {:>9.1e}  {:>11.3g}{}\n", row.setting,
