@@ -335,9 +335,8 @@ void BodySolver::Implementation::read_contacts() {
 
 void BodySolver::Implementation::find_starts() {
   out->warm_started = 0;
-  start.clear();
-  if (!options.warm_start || memory.empty()) return;
-  start.resize(contacts->size());
+  if (!options.warm_start || memory.empty()) return start.clear();
+  start.resize(contacts->size());  // cleared before, it would grow without reserve
   memory.rewind();
   for (std::size_t i = 0; i < contacts->size(); ++i) {
     start[i] = memory.find((*contacts)[i].id);
@@ -857,7 +856,8 @@ void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
   state.resize(graph.body.size());
   inertia.resize(graph.body.size());
   for (std::vector<double>& sums : chunk_sum) sums.resize(graph.chunks.size());
-  results.assign(graph.islands.size(), {});
+  results.resize(graph.islands.size());  // assign() would grow without reserve
+  std::fill(results.begin(), results.end(), IslandResult{});
   previous_impulse.resize(3 * c.size());
   previous_velocity.resize(6 * graph.body.size());
   o.impulses.resize(c.size());

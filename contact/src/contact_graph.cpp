@@ -192,7 +192,8 @@ void ContactGraph::colour_chunks(Island& island) {
     over_bodies([&](std::uint64_t& used) { used |= std::uint64_t{1} << colour; });
   }
   // Colour by colour, chunks in their order.
-  by_colour_.assign(at(extra + 1), 0);
+  by_colour_.resize(at(extra + 1));
+  std::fill(by_colour_.begin(), by_colour_.end(), 0);
   for (int c = 0; c < n; ++c) ++by_colour_[at(chunk_colour_[at(c)] + 1)];
   for (int colour = 0; colour < extra; ++colour)
     by_colour_[at(colour + 1)] += by_colour_[at(colour)];

@@ -90,6 +90,8 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
         polyhedra_->add(static_cast<int>(k), surfaces_[k].shape);
 
   pose_.resize(surfaces_.size());
+  for (const Surface& s : surfaces_)
+    centred_.push_back(s.shape.kind == ShapeKind::sphere && s.shape.position.isZero(0));
   reach_.resize(bounded_.size());
   centre_.resize(bounded_.size());
   ball_.resize(bounded_.size());
@@ -149,13 +151,20 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
     collide(s.shape, pose_[at(i)], t.shape, pose_[at(j)], margin, near_);
   else
     polyhedra_->collide(i, pose_[at(i)], j, pose_[at(j)], margin, near_);
+  // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
+  // would change their common angular momentum.
+  const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;
   for (int k = 0; k < near_.count; ++k) {
     const NearPoint& p = near_.point[k];
+    const Vector3d half = part * (p.on_second - p.on_first);
     PointContact c;
     c.first = s.body;
     c.second = t.body;
-    c.r1 = p.on_first - bodies.position[at(s.body)];
-    c.r2 = p.on_second - bodies.position[at(t.body)];
+    // Centred spheres: along the normal to the last bit, however far from the origin.
+    c.r1 = centred_[at(i)] ? Vector3d(-(s.shape.radius + part * p.gap) * p.normal)
+                           : Vector3d(p.on_first + half - bodies.position[at(s.body)]);
+    c.r2 = centred_[at(j)] ? Vector3d((t.shape.radius + part * p.gap) * p.normal)
+                           : Vector3d(p.on_second - half - bodies.position[at(t.body)]);
     c.normal = p.normal;
     c.mu = law_ == Law::frictionless ? 0 : meetings_[at(m)].friction;
     c.id = contact_id(i, j, p.feature);

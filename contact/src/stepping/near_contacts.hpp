@@ -39,6 +39,7 @@ class NearContacts {
   std::vector<int> planes_, bounded_;  // surfaces
   // For each surface: its pose; for each bounded one: reach with and without what it may move.
   std::vector<Pose> pose_;
+  std::vector<char> centred_;  // a sphere about the centre of its body
   std::vector<double> reach_;
   std::vector<Eigen::Vector3d> centre_;
   std::vector<double> ball_;

@@ -192,7 +192,8 @@ void Stepper::Implementation::find_contacts() {
 }
 
 void Stepper::Implementation::solve_contacts() {
-  contacts.impulses.assign(contacts.points.size(), Vector3d::Zero());
+  contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
+  std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
   if (contacts.points.empty()) {
     solution.status = Status::solved;
     solution.error = 0;

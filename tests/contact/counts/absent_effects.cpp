@@ -1,0 +1,57 @@
+// Takes the place of what a frictionless scene of spheres does not name: friction (all kernels but
+// the frictionless one, and the stages for assembled islands, which contain the laws), restitution,
+// gyroscopic terms. Whoever calls one of them fails. SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+#include <cstdlib>
+
+#include "../../../contact/src/body_kernels.hpp"
+#include "../../../contact/src/stepping/restitution.hpp"
+#include "../../../contact/src/stepping/rotation.hpp"
+
+namespace tether::contact {
+namespace {
+[[noreturn]] void absent(const char* what) {
+  std::fprintf(stderr, "called though the scene does not name it: %s\n", what);
+  std::abort();
+}
+}  // namespace
+
+struct Solver::Implementation {};
+Solver::Solver(const Options&) { absent("assembled islands"); }
+Solver::~Solver() = default;
+Solution Solver::solve(const Problem&, const Eigen::VectorXd&) { absent("assembled islands"); }
+Problem delassus(const std::vector<Body>&, const std::vector<BodyContact>&) {
+  absent("assembled islands");
+}
+
+namespace detail {
+using S = const BodyArrays&;
+double sweep(S, Law, GeneralContact*, GeneralContact*) { absent("friction"); }
+double test(S, Law, GeneralContact*, GeneralContact*) { absent("friction"); }
+double sweep(S, Law, SphereContact*, SphereContact*) { absent("friction"); }
+double test(S, Law, SphereContact*, SphereContact*) { absent("friction"); }
+double sweep(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
+double test(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
+double sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
+double test(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
+
+Restitution::Restitution(double, const BodyOptions&) { absent("restitution"); }
+void Restitution::remember(const BodySet&) { absent("restitution"); }
+void Restitution::choose(const NearContacts&, const BodySet&, double, StepContacts&) {
+  absent("restitution");
+}
+int Restitution::apply(BodySet&, StepContacts&) { absent("restitution"); }
+
+using M = const Eigen::Matrix3d&;
+using V = const Eigen::Vector3d&;
+Eigen::Vector3d gyroscopic_explicit(M, M, const Eigen::Quaterniond&, V, double) {
+  absent("gyroscopic term");
+}
+Eigen::Vector3d gyroscopic_implicit(M, const Eigen::Quaterniond&, V, double) {
+  absent("gyroscopic term");
+}
+void turn_with_momentum(M, M, double, Eigen::Quaterniond&, Eigen::Vector3d&, FreeSpin&) {
+  absent("gyroscopic term");
+}
+}  // namespace detail
+}  // namespace tether::contact
