@@ -30,7 +30,7 @@ if [ -z "$build" ]; then
   cmake --preset release >/dev/null
   build=build/release
 fi
-cmake --build "$build" --parallel "$(nproc)" --target accuracy_cost stability contact_collection >/dev/null
+cmake --build "$build" --parallel "$(nproc)" --target accuracy_cost stability contact_collection contact_cost >/dev/null
 mkdir -p "$output"
 programs=$build/benchmarks
 started=$(date +%s)
@@ -75,6 +75,17 @@ if [ -n "$contact" ] && [ -d "$contact" ]; then
 fi
 echo "$contact_text"
 
+# Scenes quick to run; the full comparison takes all.
+scenes='examples/scenes/*.toml' cost='--count 5 --limit 0.3'
+[ "$quick" = no ] || scenes='examples/scenes/sliding_block.toml examples/scenes/bouncing_ball.toml
+  examples/scenes/icy_wedge.toml' cost='--count 2 --tolerances 1e-3:1e-9 --limit 0.03'
+folder=
+[ -z "$contact" ] || [ ! -d "$contact" ] || folder=$contact
+# shellcheck disable=SC2086  # lists of options and files
+"$programs/contact_cost/contact_cost" ${folder:+"$folder"} --scenes $scenes $cost \
+  --csv "$output/contact_cost.csv" --svg "$output" --json "$output/contact_cost.json" \
+  --html "$output/contact_cost.part" | tee "$output/contact_cost.txt"
+
 # Facts without which times mean nothing.
 one_line() { tr '\n' ' ' | tr -d '"\\' | sed 's/  */ /g; s/ *$//'; }
 cpu=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1 | one_line)
@@ -96,9 +107,10 @@ seconds=$(($(date +%s) - started))
   printf '"compiler": "%s", "packages": {%s},\n' "$compiler" "$packages"
   printf '"commit": "%s", "date": "%s", "quick": "%s", "seconds": %s,\n' \
     "$commit" "$(date -u +%Y-%m-%dT%H:%M:%SZ)" "$quick" "$seconds"
-  printf '"accuracy": %s,\n"stability": {%s}}\n' "$(cat "$output/accuracy.json")" "$stability_json"
+  printf '"accuracy": %s,\n"stability": {%s},\n' "$(cat "$output/accuracy.json")" "$stability_json"
+  printf '"contact": %s}\n' "$(cat "$output/contact_cost.json")"
 } >"$output/results.json"
-rm -f "$output/accuracy.json"
+rm -f "$output/accuracy.json" "$output/contact_cost.json"
 
 {
   cat <<'HEAD'
@@ -113,9 +125,11 @@ HEAD
   printf '<p>CPU of one process, dense LU and difference Jacobians in every code. '
   printf 'What each column means: benchmarks/README.md.</p>\n'
   cat "$output/accuracy.part" "$output/stability.part"
-  printf '<h2>Contact</h2><pre>%s</pre></html>\n' \
+  printf '<h2>Contact</h2><pre>%s</pre>\n' \
     "$(printf '%s\n' "$contact_text" | sed 's/&/\&amp;/g; s/</\&lt;/g')"
+  cat "$output/contact_cost.part"
+  echo '</html>'
 } >"$output/index.html"
-rm -f "$output/accuracy.part" "$output/stability.part"
+rm -f "$output/accuracy.part" "$output/stability.part" "$output/contact_cost.part"
 echo
 echo "$seconds s; $output/index.html, $output/results.json, $output/accuracy.csv"

@@ -11,7 +11,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <set>
 #include <sstream>
@@ -21,34 +20,11 @@
 
 #include "assemblies.hpp"
 #include "siconos.hpp"
+#include "timing.hpp"
 
 using namespace tether::contact;
 
 namespace {
-
-double cpu_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-double timed(const Options& options, const Problem& problem, Solution& solution) {
-  Solver solver(options);
-  double begin = cpu_seconds();
-  solver.solve(problem, solution);
-  const double once = cpu_seconds() - begin;
-  const int batch = once > 1e-4 ? 1 : static_cast<int>(2e-4 / (once + 1e-7));
-  std::vector<double> times{once};
-  for (double sum = once; times.size() < 51 && sum < 0.05;) {
-    begin = cpu_seconds();
-    for (int k = 0; k < batch; ++k) solver.solve(problem, solution);
-    times.push_back((cpu_seconds() - begin) / batch);
-    sum += times.back() * batch;
-  }
-  if (times.size() > 1) times.erase(times.begin());
-  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
-  return 1e3 * times[times.size() / 2];
-}
 
 int usage(const char* why) {
   std::fprintf(stderr, "contact_collection: %s\nusage: contact_collection FOLDER [--law LAW] "
@@ -141,8 +117,7 @@ int main(int argc, char** argv) {
       if (siconos && problem.dimension() == 3) {
         for (const std::string& solver : siconos_solvers()) {
           for (bool dense : {false, true}) {
-            if (dense && (problem.contacts() > 60 || solver.rfind("NSGS", 0) != 0) && solver != "NSN_AC") continue;
-            if (dense && problem.contacts() > 300) continue;
+            if (dense && !siconos_is_tried_dense(solver, problem.contacts())) continue;
             const SiconosRun run = run_siconos(solver, problem, dense, tolerance, time_limit);
             if (!run.finished) continue;
             const Residuals r = evaluate(problem, law, run.impulses);

@@ -2,6 +2,7 @@
 #include "siconos.hpp"
 
 #ifdef TETHER_HAVE_SICONOS
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,6 +22,11 @@
 #endif
 
 namespace tether::contact {
+
+bool siconos_is_tried_dense(const std::string& solver, int contacts) {
+  if (contacts > 300) return false;
+  return solver == "NSN_AC" || (contacts <= 60 && solver.rfind("NSGS", 0) == 0);
+}
 
 #ifndef TETHER_HAVE_SICONOS
 
@@ -135,7 +141,11 @@ SiconosRun run_siconos(const std::string& name, const Problem& problem, bool den
   if (pid == 0) {
     close(ends[0]);
     if (!std::freopen("/dev/null", "w", stdout) || !std::freopen("/dev/null", "w", stderr)) _exit(4);
-    alarm(static_cast<unsigned>(std::ceil(time_limit)));
+    itimerval limit = {};
+    limit.it_value.tv_sec = static_cast<time_t>(time_limit);
+    limit.it_value.tv_usec = static_cast<suseconds_t>(1e6 * (time_limit - std::floor(time_limit)));
+    // Wall time: a timer of processor time would coarsen the clock of processor time to ticks.
+    setitimer(ITIMER_REAL, &limit, nullptr);
     child(ends[1], name, file, size, problem.contacts(), tolerance, time_limit);
   }
   close(ends[1]);

@@ -20,7 +20,10 @@ struct SiconosRun {
 bool has_siconos();
 // Solvers that the comparison covers.
 std::vector<std::string> siconos_solvers();
-// Cold solve of the problem in its native block or dense storage, in a process of its own.
+// Dense storage is the faster one for small problems in some of them.
+bool siconos_is_tried_dense(const std::string& solver, int contacts);
+// Cold solve of the problem in its native block or dense storage, in a process of its own that may
+// take time_limit seconds.
 SiconosRun run_siconos(const std::string& solver, const Problem& problem, bool dense, double tolerance,
                        double time_limit);
 
