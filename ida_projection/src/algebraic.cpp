@@ -1,11 +1,42 @@
 // Tether: which variables are algebraic.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "impl.hpp"
 
 namespace tether::ida_projection {
+
+namespace {
+
+constexpr int kRankLimit = 200;      // unknowns; a full QR of F_y' beyond would take too long
+constexpr double kDependent = 1e-6;  // of the largest pivot; difference quotients are this good
+
+// Whether the differential columns of F_y' depend on each other: then combinations of variables
+// that are differential one by one are algebraic. Rows and columns are scaled to 1.
+bool has_dependent_columns(Eigen::MatrixXd slopes, const double* id) {
+  int count = 0;
+  for (int j = 0; j < slopes.cols(); ++j)
+    if (id[j] != 0.0) slopes.col(count++) = slopes.col(j);
+  Eigen::MatrixXd scaled = slopes.leftCols(count);
+  if (!scaled.allFinite()) return false;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int i = 0; i < scaled.rows(); ++i) {
+      const double largest = scaled.row(i).lpNorm<Eigen::Infinity>();
+      if (largest > 0.0) scaled.row(i) /= largest;
+    }
+    for (int j = 0; j < count; ++j) {
+      const double largest = scaled.col(j).lpNorm<Eigen::Infinity>();
+      if (largest > 0.0) scaled.col(j) /= largest;
+    }
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
+  qr.setThreshold(kDependent);
+  return qr.rank() < count;
+}
+
+}  // namespace
 
 void Projection::Impl::set_id(N_Vector id) {
   if (!id_) id_ = OwnedVector(id);
@@ -26,8 +57,11 @@ void Projection::Impl::set_id(N_Vector id) {
 // shifted by -ycor (and put back bit for bit) so that only y' feels ycor.
 Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
   if (!contiguous_ || size_ > options_.derive_id_limit) {
-    message = contiguous_ ? "more unknowns than Options::derive_id_limit" : "vectors without contiguous memory";
-    message += ": algebraic variables were not derived and stay in the error test; give IDA's id vector in Options::id";
+    message = contiguous_ ? "more unknowns than Options::derive_id_limit"
+                          : "vectors without contiguous memory";
+    message +=
+        ": algebraic variables were not derived and stay in the error test; give IDA's id vector "
+        "in Options::id";
     return Status::success;
   }
   const double cj = step_data().cj;
@@ -47,6 +81,8 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
   double* mask = N_VGetArrayPointer(id);
   const double* before = N_VGetArrayPointer(base);
   const double* after = N_VGetArrayPointer(shifted);
+  Eigen::MatrixXd slopes;  // F_y', a column for each y'_j
+  if (size_ <= kRankLimit) slopes.setZero(size_, size_);
   bool known = true;
   for (int j = 0; j < size_ && known; ++j) {
     bool moves = false, answered = false;
@@ -65,16 +101,21 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
       if (!ok) continue;  // F refuses this y'; the other size decides
       answered = true;
       moves = moves || !std::equal(before, before + size_, after);
+      if (slopes.size() > 0)
+        for (int i = 0; i < size_; ++i) slopes(i, j) = (after[i] - before[i]) / change;
     }
     known = answered;
     mask[j] = moves ? 1.0 : 0.0;
   }
   N_VScale(1.0, saved_, candidate.base);
   if (!known) {
-    message = "F could not be evaluated while algebraic variables were looked for; give IDA's id vector in Options::id";
+    message =
+        "F could not be evaluated while algebraic variables were looked for; give IDA's id vector "
+        "in Options::id";
     return Status::success;
   }
   set_id(id);
+  hidden_algebraic_ = slopes.size() > 0 && has_dependent_columns(std::move(slopes), mask);
   return Status::success;
 }
 

@@ -6,12 +6,13 @@ namespace tether::ida_projection {
 
 Constraints quaternion_norm(int first, std::string name) {
   if (first < 0)
-    throw std::invalid_argument("quaternion_norm: first = " + std::to_string(first) + "; it must be >= 0");
+    throw std::invalid_argument("quaternion_norm: first = " + std::to_string(first) +
+                                "; it must be >= 0");
   Constraints set;
   set.count = 1;
   set.names = {std::move(name)};
   set.value = [first](double, ConstVector y, Vector g) {
-    const double *q = y.data() + first;
+    const double* q = y.data() + first;
     g[0] = 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0);
   };
   set.jacobian = DenseJacobian([first](double, ConstVector y, Matrix C) {
@@ -32,13 +33,11 @@ Constraints linear_invariant(std::vector<double> coefficients, double value, std
                                   " coefficients for " + std::to_string(y.size()) + " unknowns");
     g[0] = a.dot(y) - value;
   };
-  set.jacobian =
-      DenseJacobian([a](double, ConstVector, Matrix C) { C.row(0) = a.transpose(); });
+  set.jacobian = DenseJacobian([a](double, ConstVector, Matrix C) { C.row(0) = a.transpose(); });
   return set;
 }
 
-Constraints invariant(ScalarFunction H, GradientFunction gradient, double value,
-                      std::string name) {
+Constraints invariant(ScalarFunction H, GradientFunction gradient, double value, std::string name) {
   return energy(std::move(H), std::move(gradient), value, -1, std::move(name));
 }
 
@@ -55,10 +54,11 @@ Constraints energy(ScalarFunction H, GradientFunction gradient, double value, in
   set.value = [H = std::move(H), value, work](double, ConstVector y, Vector g) {
     g[0] = H(y) - value - (work >= 0 ? y[work] : 0.0);
   };
-  set.jacobian = DenseJacobian([gradient = std::move(gradient), work](double, ConstVector y, Matrix C) {
-    gradient(y, Vector(C.data(), C.cols()));
-    if (work >= 0) C(0, work) -= 1.0;
-  });
+  set.jacobian =
+      DenseJacobian([gradient = std::move(gradient), work](double, ConstVector y, Matrix C) {
+        gradient(y, Vector(C.data(), C.cols()));
+        if (work >= 0) C(0, work) -= 1.0;
+      });
   return set;
 }
 

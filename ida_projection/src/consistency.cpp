@@ -60,7 +60,8 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
 
   if (IDAReInit(ida_mem_, t0, yy, yp) != 0 || !probe(t0, yy, yp))
     return fail(Status::internal_error,
-                "IDA could not be started at the given values; set tolerances and the linear solver before make_consistent, and look at IDA's own message");
+                "IDA could not be started at the given values; set tolerances and the linear "
+                "solver before make_consistent, and look at IDA's own message");
   report.residual_before = largest_residual(how.residual, how.user_data, t0, yy, yp);
 
   // y onto the constraints, algebraic variables only where rows fix them.
@@ -88,7 +89,8 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
                                   how.maximum_iterations);
   if (!found)
     return fail(Status::not_converged,
-                "y' consistent with F was not found; give Options::id and Consistency::residual, or keep y' with Consistency::Derivative::keep");
+                "y' consistent with F was not found; give Options::id and Consistency::residual, "
+                "or keep y' with Consistency::Derivative::keep");
 
   // Rows that contain algebraic variables may have moved a little with them.
   ConsistencyReport again;
@@ -98,11 +100,10 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
   N_VLinearSum(1.0, y, -1.0, yy, delta_);
   report.move = N_VWrmsNorm(delta_, weights_);
   if (contiguous_) {
-    report.largest_change =
-        largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy), size_,
-                           &report.changed_component);
-    report.derivative_change = largest_difference(N_VGetArrayPointer(ydot),
-                                                  N_VGetArrayPointer(yp), size_, nullptr);
+    report.largest_change = largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy), size_,
+                                               &report.changed_component);
+    report.derivative_change =
+        largest_difference(N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp), size_, nullptr);
   } else if (delta_ && static_cast<N_Vector>(delta_)->ops->nvmaxnorm != nullptr) {
     report.largest_change = N_VMaxNorm(delta_);
     N_VLinearSum(1.0, ydot, -1.0, yp, delta_);
@@ -183,8 +184,8 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
     N_VScale(1.0, yp, ydot);
     const double* values = N_VGetArrayPointer(y);
     if (point_->tangent(t, {values, values + size_}, N_VGetArrayPointer(ydot))) {
-      report.derivative_change = largest_difference(N_VGetArrayPointer(ydot),
-                                                    N_VGetArrayPointer(yp), size_, nullptr);
+      report.derivative_change =
+          largest_difference(N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp), size_, nullptr);
       N_VScale(1.0, ydot, yp);
     }
   }
@@ -192,9 +193,8 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
     N_VLinearSum(1.0, y, -1.0, yy, delta_);
     report.move = N_VWrmsNorm(delta_, weights_);
     if (contiguous_)
-      report.largest_change =
-          largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy), size_,
-                             &report.changed_component);
+      report.largest_change = largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy),
+                                                 size_, &report.changed_component);
     N_VScale(1.0, y, yy);
   }
   status = report.status;
@@ -221,7 +221,9 @@ int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret
   IDAGetNumSteps(ida_mem_, &after);
   if (after > before && statistics_.solver_calls == calls) {
     status = Status::never_called;
-    message = "IDA took steps without the plugin: another nonlinear solver was attached after it; make the Projection last, or hand that solver over in Options::nonlinear_solver";
+    message =
+        "IDA took steps without the plugin: another nonlinear solver was attached after it; make "
+        "the Projection last, or hand that solver over in Options::nonlinear_solver";
     return flag;
   }
   // A step that IDA returns as it is has been projected; what it interpolates has not.

@@ -45,9 +45,12 @@ Constraints operator+(Constraints a, const Constraints& b) {
   if (empty(a)) return b;
   const std::string left = kind(a), right = kind(b);
   if (left == "UserProjection" || right == "UserProjection")
-    throw std::invalid_argument("Constraints +: a UserProjection cannot be joined; it must project onto all rows itself");
+    throw std::invalid_argument(
+        "Constraints +: a UserProjection cannot be joined; it must project onto all rows itself");
   if (left != right)
-    throw std::invalid_argument("Constraints +: rows given as Gradients join only rows given as Gradients; give both sets the same kind of Jacobian");
+    throw std::invalid_argument(
+        "Constraints +: rows given as Gradients join only rows given as Gradients; give both sets "
+        "the same kind of Jacobian");
   a.joined.push_back(b);
   return a;
 }
@@ -55,9 +58,11 @@ Constraints operator+(Constraints a, const Constraints& b) {
 JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,
                               double tolerance) {
   if (!(tolerance > 0.0))
-    throw std::invalid_argument("check_jacobian: tolerance = " + std::to_string(tolerance) + "; it must be > 0");
+    throw std::invalid_argument("check_jacobian: tolerance = " + std::to_string(tolerance) +
+                                "; it must be > 0");
   if (kind(constraints)[0] != '\0')
-    throw std::invalid_argument(std::string("check_jacobian: rows are given as ") + kind(constraints) +
+    throw std::invalid_argument(std::string("check_jacobian: rows are given as ") +
+                                kind(constraints) +
                                 "; it works for DenseJacobian and FiniteDifferences");
   Statistics counts;
   Evaluator evaluator(constraints, counts);
@@ -71,7 +76,8 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
   std::vector<int> columns(static_cast<std::size_t>(n));
   for (int j = 0; j < n; ++j) columns[static_cast<std::size_t>(j)] = j;
   const Eigen::VectorXd scale = y.cwiseAbs().cwiseMax(1.0), increments = 1e-7 * scale;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> given(m, n), expected(m, n);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> given(m, n),
+      expected(m, n);
   require(evaluator.jacobian(t, y.data(), n, increments.data(), columns, given.data()));
 
   // Central differences with steps h and h/2, extrapolated: error O(h^4).
@@ -92,8 +98,7 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
 
   JacobianReport report;
   for (int i = 0; i < m; ++i) {
-    const double largest =
-        (expected.row(i).transpose().cwiseProduct(scale)).cwiseAbs().maxCoeff();
+    const double largest = (expected.row(i).transpose().cwiseProduct(scale)).cwiseAbs().maxCoeff();
     for (int j = 0; j < n; ++j) {
       const double size = std::max(largest, std::abs(given(i, j)) * scale[j]);
       const double difference = std::abs(given(i, j) - expected(i, j)) * scale[j];

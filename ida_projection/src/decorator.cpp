@@ -18,6 +18,7 @@ namespace {
 constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
 constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
 constexpr long kSampleEvery = 16;
+constexpr int kTrapped = 10;             // steps in a row with failed error tests
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
@@ -42,7 +43,9 @@ int Projection::Impl::initialize() {
   pending_ = false;
   last_steps_ = last_setups_ = -1;
   if (mover_) mover_->reset();
-  if (smoother_) smoother_->reset();
+  smoother_.reset();
+  refused_in_row_ = 0;
+  last_error_failures_ = 0;
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
@@ -90,7 +93,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   }
 
   const int flag = correct_and_move(candidate, tolerance, call_setup, mem);
-  if (flag == 0 && smoother_) control_step(candidate);
+  if (flag == 0 && smoother_.on()) control_step(candidate);
   return flag;
 }
 
@@ -134,9 +137,9 @@ void Projection::Impl::control_step(const Candidate& candidate) {
   long steps = 0;
   IDAGetNumSteps(ida_mem_, &steps);
   const bool suppressed = engaged_ && id_ && has_algebraic_ && options_.suppress_algebraic;
-  smoother_->control(steps, suppressed
-                                ? N_VWrmsNormMask(candidate.correction, candidate.weights, id_)
-                                : N_VWrmsNorm(candidate.correction, candidate.weights));
+  smoother_.control(steps, suppressed
+                               ? N_VWrmsNormMask(candidate.correction, candidate.weights, id_)
+                               : N_VWrmsNorm(candidate.correction, candidate.weights));
 }
 
 int Projection::Impl::corrector_failed(int flag) {
@@ -205,6 +208,7 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   IDAGetNumLinSolvSetups(ida_mem_, &setups);
   if (setups != last_setups_) cj_at_setup_ = step.cj;
   last_setups_ = setups;
+  if (steps != last_steps_) look_for_refusals();
   if (steps != last_steps_ && pending_) {
     mover_->accept();
     if (options_.progress && ++progress_count_ % options_.progress_interval == 0) {
@@ -215,6 +219,22 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   }
   last_steps_ = steps;
   pending_ = false;
+}
+
+// IDA may double its step right after a doubling was refused. Where algebraic combinations of
+// variables stand in the error test (no component of id can take them out), the estimate grows with
+// the change of h instead of h^(k+1): IDA doubles h after every step, is refused every time, and
+// stays at order 1 with tiny steps, since it raises the order only after k + 2 steps of one size.
+// Smooth steps do not get there, and must take over before.
+void Projection::Impl::look_for_refusals() {
+  if (smoother_.on()) return;
+  long failures = 0;
+  IDAGetNumErrTestFails(ida_mem_, &failures);
+  refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;
+  last_error_failures_ = failures;
+  if (!engaged_ || refused_in_row_ < (hidden_algebraic_ ? 1 : kTrapped)) return;
+  smoother_.begin();
+  ++statistics_.smoothing_begun;
 }
 
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.

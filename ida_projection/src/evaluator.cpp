@@ -58,8 +58,8 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
   }
   const long bad = first_not_finite(g, rows_);
   if (bad < 0) return Status::success;
-  message_ = "g of " + constraints_.name(static_cast<int>(bad)) + " is not finite at t = " +
-             std::to_string(t);
+  message_ = "g of " + constraints_.name(static_cast<int>(bad)) +
+             " is not finite at t = " + std::to_string(t);
   return Status::not_finite;
 }
 
@@ -71,8 +71,8 @@ Status Evaluator::jacobian(double t, const double* y, int n, const double* scale
   for (const Part& part : parts_) {
     double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
     if (const auto* dense = std::get_if<DenseJacobian>(&part.set->jacobian)) {
-      const int flag =
-          guarded([&] { return dense->fill(t, state, Matrix(block, part.set->count, n)); }, thrown_);
+      const int flag = guarded(
+          [&] { return dense->fill(t, state, Matrix(block, part.set->count, n)); }, thrown_);
       if (flag != 0) return checked(flag, "jacobian", part);
     } else {
       const Status status = differences(part, t, y, n, scale, columns, block);
@@ -125,8 +125,11 @@ void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
     const auto evaluate = [&](double* g) {
       ++statistics_.value_evaluations;
       std::string ignored;
-      return guarded([&] { return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(g, m)); },
-                     ignored) == 0;
+      return guarded(
+                 [&] {
+                   return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(g, m));
+                 },
+                 ignored) == 0;
     };
     y_shifted_.assign(y, y + n);
     const bool known = evaluate(g_base_.data());
@@ -138,7 +141,8 @@ void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
         for (int i = 0; i < m; ++i) {
           const auto k = static_cast<std::size_t>(i);
           if (same && g_shifted_[k] == g_base_[k]) continue;
-          filled[(static_cast<std::size_t>(part.first_row) + k) * static_cast<std::size_t>(n) + j] = 1;
+          filled[(static_cast<std::size_t>(part.first_row) + k) * static_cast<std::size_t>(n) + j] =
+              1;
         }
       }
       y_shifted_[j] = y[j];

@@ -141,7 +141,9 @@ void GaussNewton::project(double t, std::vector<double>& y0, const std::vector<d
                        "; the rows may have no common solution, or the start is too far away";
     }
   } else if (report.slow_convergence) {
-    report.message = "gradients vanish on the constraints: Newton's method only halves the distance, and |g| says little about it; write the rows without squares";
+    report.message =
+        "gradients vanish on the constraints: Newton's method only halves the distance, and |g| "
+        "says little about it; write the rows without squares";
   }
   if (report.status == Status::success) y0 = y;
 }
@@ -159,7 +161,8 @@ bool GaussNewton::tangent(double t, const std::vector<double>& y, double* yp) {
   for (std::size_t i = 0; i < g_.size(); ++i) {
     // Differences of a g that does not contain t are exactly zero.
     defect[i] = (plus[i] - minus[i]) / (2.0 * h);
-    for (int j = 0; j < n_; ++j) defect[i] += C_[i * static_cast<std::size_t>(n_) + static_cast<std::size_t>(j)] * yp[j];
+    for (int j = 0; j < n_; ++j)
+      defect[i] += C_[i * static_cast<std::size_t>(n_) + static_cast<std::size_t>(j)] * yp[j];
   }
   blocks_.solve(defect, C_);
   for (const Block* block : {&blocks_.d, &blocks_.a})

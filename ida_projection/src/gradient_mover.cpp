@@ -137,8 +137,7 @@ class GradientMover final : public Mover {
       }
       N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
       N_VLinearSum(1.0, y_, -1.0, dy_, y_);
-      const double floor =
-          std::min(0.1, 1e3 * kEpsilon * N_VWrmsNorm(y_, candidate.weights));
+      const double floor = std::min(0.1, 1e3 * kEpsilon * N_VWrmsNorm(y_, candidate.weights));
       const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
       if (verdict == Monitor::Verdict::done) break;
       if (verdict == Monitor::Verdict::failed) {
@@ -199,8 +198,8 @@ class GradientMover final : public Mover {
   }
 
   Status failed(int flag, const char* what, const std::string& thrown) {
-    message_ = std::string(what) + (thrown.empty() ? " returned " + std::to_string(flag)
-                                                   : " threw: " + thrown);
+    message_ = std::string(what) +
+               (thrown.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown);
     return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
   }
 
@@ -295,7 +294,8 @@ class GradientMover final : public Mover {
     N_VConst(0.0, dy_);
     for (int k = 0; k < m_; ++k) {
       const auto row = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(k)]);
-      double left = norm_[row] > std::numeric_limits<double>::min() ? g_[row] / norm_[row] : g_[row];
+      double left =
+          norm_[row] > std::numeric_limits<double>::min() ? g_[row] / norm_[row] : g_[row];
       for (int i = 0; i < std::min(k, rank_); ++i)
         left -= R(static_cast<int>(row), i) * z_[static_cast<std::size_t>(i)];
       if (k < rank_) {
@@ -315,7 +315,8 @@ class GradientMover final : public Mover {
       const auto r = static_cast<std::size_t>(row);
       const double left = z_[static_cast<std::size_t>(k)] *
                           (norm_[r] > std::numeric_limits<double>::min() ? norm_[r] : 1.0);
-      if (left <= 0.5 * std::sqrt(length_) * tolerance_norm_[r] + 1e2 * kEpsilon * norm_[r]) continue;
+      if (left <= 0.5 * std::sqrt(length_) * tolerance_norm_[r] + 1e2 * kEpsilon * norm_[r])
+        continue;
       contradicting_rows_ = {row};
       for (int i = 0; i < rank_; ++i)
         if (std::abs(R(row, i)) > 1e-3)

@@ -89,6 +89,7 @@ class Projection::Impl {
   void control_step(const Candidate& candidate);
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
+  void look_for_refusals();
   int corrector_failed(int flag);
   int look_before_moving(const Candidate& candidate, void* mem, bool& done);
   Status engage(const Candidate& candidate, void* mem);
@@ -114,6 +115,9 @@ class Projection::Impl {
 
   void* ida_mem_;
   Options options_;
+  StepSmoother smoother_;
+  int refused_in_row_ = 0;  // accepted steps that needed more than one attempt
+  long last_error_failures_ = 0;
   Statistics statistics_;
   double move_sum_ = 0.0;
   long timed_ = 0;
@@ -129,13 +133,13 @@ class Projection::Impl {
   bool heard_ = false;  // IDASetMaxNonlinIters reached us
 
   std::unique_ptr<Mover> mover_;
-  std::unique_ptr<StepSmoother> smoother_;
   bool contiguous_ = false;
   int size_ = 0;
   OwnedVector id_, delta_, newton_, saved_, weights_;
   double *delta_entries_ = nullptr, *newton_entries_ = nullptr, *saved_entries_ = nullptr;
   std::vector<int> algebraic_;  // indices, contiguous vectors
   bool has_algebraic_ = false;
+  bool hidden_algebraic_ = false;    // F_y' is singular though each variable's rate appears in F
   bool corrector_was_right_ = true;  // the polish found what IDA's convergence test promised
   bool engaged_ = false;             // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;

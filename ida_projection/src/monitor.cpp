@@ -16,7 +16,8 @@ Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
     previous_ = length;
     // Newton's second move is about theta d^2. Ask for it only when it could matter; the factor 4
     // pays for theta being measured now and then, not at every step.
-    const bool measure = theta_ < 0.0 || length > 4.0 * measured_ || candidates_ % kMeasureEvery == 0;
+    const bool measure =
+        theta_ < 0.0 || length > 4.0 * measured_ || candidates_ % kMeasureEvery == 0;
     if (length <= floor) return Verdict::done;
     if (!measure && 4.0 * theta_ * length * length <= options_->tolerance) return Verdict::done;
     if (last) return length <= options_->tolerance ? Verdict::done : Verdict::failed;
@@ -38,7 +39,8 @@ Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
     return last ? Verdict::failed : Verdict::go_on;
   }
   // No longer halving: rounding (then nothing can be gained) or a broken iteration.
-  if (length <= std::max({floor, 1e-5, 0.1 * std::min(1.0, options_->tolerance)})) return Verdict::done;
+  if (length <= std::max({floor, 1e-5, 0.1 * std::min(1.0, options_->tolerance)}))
+    return Verdict::done;
   if (!fresh && !last) return Verdict::refactor;
   return Verdict::failed;
 }

@@ -13,7 +13,9 @@ Projection::Impl& self(SUNNonlinearSolver solver) {
 }
 
 // The operations that IDA calls on us; the rest goes to the decorated solver.
-SUNNonlinearSolver_Type get_type(SUNNonlinearSolver s) { return SUNNonlinSolGetType(self(s).inner()); }
+SUNNonlinearSolver_Type get_type(SUNNonlinearSolver s) {
+  return SUNNonlinSolGetType(self(s).inner());
+}
 int initialize(SUNNonlinearSolver s) { return self(s).initialize(); }
 int setup(SUNNonlinearSolver s, N_Vector y, void* mem) {
   return SUNNonlinSolSetup(self(s).inner(), y, mem);

@@ -30,7 +30,7 @@ bool Projection::Impl::wants_polish() const {
   if (options_.extra_iterations == 0) return false;
   // After two iterations of its own the corrector leaves nothing worth another one; but whether it
   // made them varies from run to run, which smooth step sizes are not meant to.
-  if (smoother_) return true;
+  if (smoother_.on()) return true;
   long iterations = 0;
   SUNNonlinSolGetNumIters(inner_, &iterations);
   return iterations <= 1;

@@ -8,30 +8,47 @@ namespace tether::ida_projection {
 
 const char* to_string(Status status) {
   switch (status) {
-    case Status::unused: return "unused";
-    case Status::success: return "success";
-    case Status::not_converged: return "not converged";
-    case Status::move_too_long: return "move too long";
-    case Status::inconsistent: return "inconsistent constraints";
-    case Status::not_finite: return "not finite";
-    case Status::callback_recoverable: return "callback failed, recoverable";
-    case Status::corrector_failed: return "corrector failed";
-    case Status::callback_fatal: return "callback failed";
-    case Status::late_attach: return "attached too late";
-    case Status::simultaneous_sensitivities: return "simultaneous sensitivities";
-    case Status::never_called: return "never called";
-    case Status::internal_error: return "internal error";
+    case Status::unused:
+      return "unused";
+    case Status::success:
+      return "success";
+    case Status::not_converged:
+      return "not converged";
+    case Status::move_too_long:
+      return "move too long";
+    case Status::inconsistent:
+      return "inconsistent constraints";
+    case Status::not_finite:
+      return "not finite";
+    case Status::callback_recoverable:
+      return "callback failed, recoverable";
+    case Status::corrector_failed:
+      return "corrector failed";
+    case Status::callback_fatal:
+      return "callback failed";
+    case Status::late_attach:
+      return "attached too late";
+    case Status::simultaneous_sensitivities:
+      return "simultaneous sensitivities";
+    case Status::never_called:
+      return "never called";
+    case Status::internal_error:
+      return "internal error";
   }
   return "unknown";
 }
 
 Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
-    : constraints(std::move(set)), ida_mem_(ida_mem), options_(std::move(options)) {
+    : constraints(std::move(set)),
+      ida_mem_(ida_mem),
+      options_(std::move(options)),
+      smoother_(ida_mem, options_) {
   if (ida_mem == nullptr) reject("ida_mem is null; pass what IDACreate returned");
   N_Vector like = nullptr, yppred, yyn, ypn, res;
   void* user_data;
   sunrealtype t, cj;
-  if (IDAGetNonlinearSystemData(ida_mem, &t, &like, &yppred, &yyn, &ypn, &res, &cj, &user_data) != 0 ||
+  if (IDAGetNonlinearSystemData(ida_mem, &t, &like, &yppred, &yyn, &ypn, &res, &cj, &user_data) !=
+          0 ||
       like == nullptr)
     reject("ida_mem is not initialised; call IDAInit before");
   validate(constraints, options_, like);
@@ -64,8 +81,6 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
     }
   }
 
-  if (options_.step_smoothing) smoother_ = std::make_unique<StepSmoother>(ida_mem, options_);
-
   inner_ = options_.nonlinear_solver;
   if (inner_ == nullptr) {
     inner_ = SUNNonlinSol_Newton(like, like->sunctx);
@@ -87,9 +102,9 @@ Statistics Projection::Impl::statistics() const {
   Statistics s = statistics_;
   const long moved = s.projections - s.failures();
   s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
-  s.seconds = timed_ > 0 ? timed_seconds_ / static_cast<double>(timed_) *
-                               static_cast<double>(s.projections)
-                         : 0.0;
+  s.seconds =
+      timed_ > 0 ? timed_seconds_ / static_cast<double>(timed_) * static_cast<double>(s.projections)
+                 : 0.0;
   return s;
 }
 

@@ -33,6 +33,7 @@ std::vector<Entry> entries(const Statistics& s) {
       count("refreshes of algebraic variables", "refreshes", s.refreshes),
       count("evaluations of F by the plugin", "residual_evaluations", s.residual_evaluations),
       count("factorizations with dropped rows", "rank_drops", s.rank_drops),
+      count("step smoothing begun by refusals", "smoothing_begun", s.smoothing_begun),
       count("failures: not converged", "not_converged", s.not_converged),
       count("failures: move too long", "move_too_long", s.move_too_long),
       count("moves capped", "moves_capped", s.moves_capped),
@@ -73,7 +74,8 @@ std::string Statistics::table() const {
 
 std::string Statistics::csv_header() {
   std::string line;
-  for (const Entry& entry : entries(Statistics{})) line += (line.empty() ? "" : ",") + std::string(entry.column);
+  for (const Entry& entry : entries(Statistics{}))
+    line += (line.empty() ? "" : ",") + std::string(entry.column);
   return line;
 }
 

@@ -29,18 +29,20 @@ constexpr double kLowestFixed = 1.0, kHighestFixed = 2.0, kLargest = 2.0, kLow =
 
 StepSmoother::StepSmoother(void* ida_mem, const Options& options)
     : ida_mem_(ida_mem),
+      wanted_(options.step_smoothing),
       setpoint_(options.smoothing_setpoint),
       max_step_(options.maximum_step),
-      max_order_(options.maximum_order) {
-  set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
-}
+      max_order_(options.maximum_order) {}
 
 void StepSmoother::reset() {
+  const bool was_on = on_;
+  on_ = owns_max_step_ = wanted_;
   pending_ = has_previous_ = false;
   steps_ = -1;
   known_ = block_ = 0;
+  block_sum_ = 0.0;
   ratio_ = 1.0;
-  set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
+  if (on_ || was_on) set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
 }
 
 // sigma_k = prod_i i h / (h + h_{-1} + .. + h_{-i}), i = 1 .. k (Brenan, Campbell and
@@ -135,6 +137,8 @@ void StepSmoother::request(double ratio, double h, double own_ratio) {
       set(0.0, kAnyRatio, kLargest, 0.0, max_step_);
   } else if (ratio > 1.0) {
     set(kLowestFixed, 1.0, ratio, 0.0, max_step_);
+  } else if (!owns_max_step_) {
+    hold();
   } else {
     const double longest = h * ratio;
     set(kLowestFixed, 1.0, kLargest, 0.0, max_step_ > 0.0 ? std::min(max_step_, longest) : longest);
@@ -147,7 +151,7 @@ void StepSmoother::set(double lowest_fixed, double highest_fixed, double largest
   IDASetEtaMax(ida_mem_, largest);
   IDASetEtaLow(ida_mem_, low > 0.0 ? low : kLow);
   IDASetEtaMin(ida_mem_, low > 0.0 ? low : kMin);
-  IDASetMaxStep(ida_mem_, max_step);
+  if (owns_max_step_) IDASetMaxStep(ida_mem_, max_step);
 }
 
 }  // namespace tether::ida_projection

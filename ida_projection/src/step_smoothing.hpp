@@ -19,7 +19,12 @@ class StepSmoother {
  public:
   StepSmoother(void* ida_mem, const Options& options);
 
+  /// Before the first step: on only if Options::step_smoothing says so.
   void reset();
+  /// From here on, in the middle of a run; leaves IDASetMaxStep alone, which the host may have
+  /// used.
+  void begin() { on_ = true; }
+  bool on() const { return on_; }
   /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
   /// norm of IDA's error test.
   void control(long steps, double norm);
@@ -35,6 +40,7 @@ class StepSmoother {
   void set(double lowest_fixed, double highest_fixed, double largest, double low, double max_step);
 
   void* ida_mem_;
+  bool wanted_, on_ = false, owns_max_step_ = false;
   double setpoint_, max_step_;
   int max_order_;
 

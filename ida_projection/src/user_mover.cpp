@@ -48,13 +48,11 @@ class UserMover final : public Mover {
     result.status = Status::success;
     double factor = 1.0;
     if (!(result.length <= options_.largest_move)) {
-      const double limit =
-          options_.largest_move *
-          std::max(1.0, N_VWrmsNorm(candidate.correction, candidate.weights));
+      const double limit = options_.largest_move *
+                           std::max(1.0, N_VWrmsNorm(candidate.correction, candidate.weights));
       if (!(result.length <= limit)) {
         if (options_.long_move == LongMove::reject || !std::isfinite(result.length)) {
-          result.status =
-              std::isfinite(result.length) ? Status::move_too_long : Status::not_finite;
+          result.status = std::isfinite(result.length) ? Status::move_too_long : Status::not_finite;
           message_ = "the user's projection moved by " + std::to_string(result.length) +
                      " tolerances, the limit is " + std::to_string(limit) +
                      " (Options::largest_move)";

@@ -35,7 +35,8 @@ const char* missing_gradient_operation(N_Vector v) {
 }
 
 void check_rows(const Constraints& set) {
-  if (set.count < 0) reject("constraints.count = " + std::to_string(set.count) + "; it must be >= 0");
+  if (set.count < 0)
+    reject("constraints.count = " + std::to_string(set.count) + "; it must be >= 0");
   if (!set.names.empty() && static_cast<int>(set.names.size()) != set.count)
     reject("constraints.names has " + std::to_string(set.names.size()) + " entries for " +
            std::to_string(set.count) + " rows; give one for each row, or none");
@@ -56,7 +57,8 @@ void check_rows(const Constraints& set) {
 
 void require(bool condition, const char* name, double value, const char* right) {
   if (!condition)
-    reject(std::string("options.") + name + " = " + std::to_string(value) + "; it must be " + right);
+    reject(std::string("options.") + name + " = " + std::to_string(value) + "; it must be " +
+           right);
 }
 
 }  // namespace
@@ -66,9 +68,12 @@ bool is_contiguous(N_Vector v) {
   switch (N_VGetVectorID(v)) {
     case SUNDIALS_NVEC_SERIAL:
     case SUNDIALS_NVEC_OPENMP:
-    case SUNDIALS_NVEC_PTHREADS: return true;
-    case SUNDIALS_NVEC_CUSTOM: break;
-    default: return false;  // distributed or on a device
+    case SUNDIALS_NVEC_PTHREADS:
+      return true;
+    case SUNDIALS_NVEC_CUSTOM:
+      break;
+    default:
+      return false;  // distributed or on a device
   }
   if (v->ops->nvgetlength == nullptr) return false;
 #if SUNDIALS_VERSION_MAJOR >= 7
@@ -84,7 +89,8 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   check_rows(constraints);
 
   require(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0 (tolerances)");
-  require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations, ">= 1");
+  require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,
+          ">= 1");
   require(options.frequency >= 1, "frequency", options.frequency, ">= 1 (every n-th step)");
   require(options.largest_move > 0.0, "largest_move", options.largest_move, "> 0 (tolerances)");
   require(options.smoothing_setpoint > 0.0 && std::isfinite(options.smoothing_setpoint),
@@ -111,7 +117,8 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
     reject("the vectors are not contiguous in this process; give the constraints as Gradients");
   if (std::holds_alternative<Gradients>(constraints.jacobian))
     if (const char* missing = missing_gradient_operation(like))
-      reject(std::string("the vector type lacks ") + missing + ", which constraints given as Gradients need");
+      reject(std::string("the vector type lacks ") + missing +
+             ", which constraints given as Gradients need");
   const auto check_size = [&](std::size_t size, const char* name) {
     if (size == 0) return;
     if (!contiguous)
@@ -130,8 +137,9 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
     if (v == nullptr) return;
     if (N_VGetVectorID(v) != N_VGetVectorID(like) ||
         (v->ops->nvgetlength != nullptr && N_VGetLength(v) != length))
-      reject(std::string("options.") + name + " is of another vector type or length than the unknowns (" +
-             std::to_string(length) + ")");
+      reject(std::string("options.") + name +
+             " is of another vector type or length than the unknowns (" + std::to_string(length) +
+             ")");
   };
   check_vector(options.id, "id");
   check_vector(options.hold_vector, "hold_vector");

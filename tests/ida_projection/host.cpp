@@ -248,9 +248,8 @@ Run integrate(const Problem& problem, double tolerance, const tp::Constraints& r
     ++run.at_order[order];
     if (projected && watch) {
       run.distance = std::max(run.distance, distance(host, rows));
-      run.drift = std::max(run.drift, value(rows, host.t, host.data(), problem.size)
-                                          .cwiseAbs()
-                                          .maxCoeff());
+      run.drift =
+          std::max(run.drift, value(rows, host.t, host.data(), problem.size).cwiseAbs().maxCoeff());
     }
   }
   if (run.flag >= 0 && host.t >= problem.t_end) IDAGetDky(host.ida, problem.t_end, 0, host.y);

@@ -41,11 +41,11 @@ class Host {
   tp::Projection& attach(tp::Constraints constraints, tp::Options options = {});
   tp::Projection& projection() { return *projection_; }
 
-  int step();                         ///< one accepted step
-  int to(double t_out);               ///< IDA_NORMAL; the result is interpolated
-  int finish();                       ///< steps until t_end, then the interpolated y(t_end)
-  void use_linear_solver();           ///< dense LU for the present `ida`
-  int restart();                      ///< IDAReInit at the problem's start
+  int step();                ///< one accepted step
+  int to(double t_out);      ///< IDA_NORMAL; the result is interpolated
+  int finish();              ///< steps until t_end, then the interpolated y(t_end)
+  void use_linear_solver();  ///< dense LU for the present `ida`
+  int restart();             ///< IDAReInit at the problem's start
   long steps() const;
   std::vector<double> state() const;  ///< y as a vector
   double* data() const;
@@ -88,7 +88,7 @@ double distance(const Host& host, const tp::Constraints& set);
 
 struct Run {
   int flag = 0;
-  double error = 0.0;     ///< at t_end
+  double error = 0.0;  ///< at t_end
   long steps = 0;
   double distance = 0.0;  ///< largest over the accepted steps, in tolerances
   double drift = 0.0;     ///< largest |g_i| over the accepted steps
@@ -99,7 +99,8 @@ struct Run {
   std::string message;
 };
 
-/// From t0 to t_end with the projection; `rows` empty: plain IDA. `watch` measures distances (slow).
+/// From t0 to t_end with the projection; `rows` empty: plain IDA. `watch` measures distances
+/// (slow).
 Run integrate(const Problem& problem, double tolerance, const tp::Constraints& rows,
               const tp::Options& options = {}, bool watch = true);
 Run integrate_plain(const Problem& problem, double tolerance);

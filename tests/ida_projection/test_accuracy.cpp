@@ -12,8 +12,8 @@ namespace {
 
 const std::vector<double> kTolerances = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
 
-Run pendulum_run(const std::string& form, double tolerance,
-                 const std::vector<std::string>& rows, double t_end = 30.0) {
+Run pendulum_run(const std::string& form, double tolerance, const std::vector<std::string>& rows,
+                 double t_end = 30.0) {
   const Problem problem = pendulum(1.0, 1.0, t_end, form);
   return integrate(problem, tolerance, rows.empty() ? tp::Constraints{} : problem.select(rows), {},
                    false);
@@ -71,11 +71,11 @@ TEST_CASE("slides: index 0 with all invariants beats index 1") {
 }
 
 TEST_CASE("slides: energy is needed, in both forms") {
-  CHECK(mean_ratio(
-            [](double tolerance) { return pendulum_run("index 1", tolerance, kIndex1).error; },
-            [](double tolerance) {
-              return pendulum_run("index 1", tolerance, {"position", "velocity"}).error;
-            }) < 0.1);
+  CHECK(
+      mean_ratio([](double tolerance) { return pendulum_run("index 1", tolerance, kIndex1).error; },
+                 [](double tolerance) {
+                   return pendulum_run("index 1", tolerance, {"position", "velocity"}).error;
+                 }) < 0.1);
   CHECK(mean_ratio(
             [](double tolerance) { return pendulum_run("index 0", tolerance, kIndex0).error; },
             [](double tolerance) {

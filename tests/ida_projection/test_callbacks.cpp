@@ -39,8 +39,12 @@ Ended run(const tp::Constraints& set) {
   Host host(tether::test::circle(20.0), 1e-6);
   host.attach(set);
   const int flag = host.finish();
-  return {flag,         host.projection().status(), host.projection().message(),
-          host.projection().statistics(), host.steps(), host.error()};
+  return {flag,
+          host.projection().status(),
+          host.projection().message(),
+          host.projection().statistics(),
+          host.steps(),
+          host.error()};
 }
 
 }  // namespace
@@ -105,9 +109,8 @@ TEST_CASE("a Jacobian that fails or throws") {
   REQUIRE(once.flag >= 0);
   CHECK(once.statistics.callback_recoverable == 1);
 
-  set.jacobian = tp::DenseJacobian([](double, tp::ConstVector, tp::Matrix) -> int {
-    throw std::logic_error("no derivative");
-  });
+  set.jacobian = tp::DenseJacobian(
+      [](double, tp::ConstVector, tp::Matrix) -> int { throw std::logic_error("no derivative"); });
   const Ended thrown_out = run(set);
   CHECK(thrown_out.flag == IDA_NLS_FAIL);
   CHECK(thrown_out.status == tp::Status::callback_fatal);

@@ -120,8 +120,8 @@ TEST_CASE("make_consistent: the id of algebraic variables is derived") {
 
 TEST_CASE("make_consistent: ways to y'") {
   using Derivative = tp::Consistency::Derivative;
-  for (const Derivative way : {Derivative::automatic, Derivative::calc_ic,
-                               Derivative::least_squares, Derivative::keep}) {
+  for (const Derivative way :
+       {Derivative::automatic, Derivative::calc_ic, Derivative::least_squares, Derivative::keep}) {
     INFO("way " << static_cast<int>(way));
     Problem problem = pendulum(1.0, 9.81, 1.0, "index 1");
     problem.y0[0] += 1e-3;
@@ -156,8 +156,8 @@ TEST_CASE("make_consistent: held components stay") {
   CHECK(host.data()[1] == 0.2);
   CHECK(host.data()[0] == Approx(std::sqrt(0.96)).epsilon(1e-13));
   how.hold = {true};
-  CHECK(contains(
-      thrown([&] { host.projection().make_consistent(0.0, host.y, host.yp, how); }), "hold"));
+  CHECK(contains(thrown([&] { host.projection().make_consistent(0.0, host.y, host.yp, how); }),
+                 "hold"));
 }
 
 TEST_CASE("refused: rows without a common point") {
@@ -282,7 +282,7 @@ TEST_CASE("solve: what IDASolve returns, on the constraints, in every mode") {
           std::max(interpolated_drift, value(rows, t, plain.data(), 5).cwiseAbs().maxCoeff());
       for (int i = 0; i < 4; ++i) CHECK(std::abs(normal.data()[i] - plain.data()[i]) < 1e-4);
     }
-    CHECK(interpolated_drift > 1e-10);  // what solve() took away
+    CHECK(interpolated_drift > 1e-10);       // what solve() took away
     CHECK(normal.steps() == plain.steps());  // and it does not disturb the integration
     while (one.t < 20.0) {
       REQUIRE(one.projection().solve(20.0, &one.t, one.y, one.yp, IDA_ONE_STEP) >= 0);

@@ -48,7 +48,8 @@ TEST_CASE("joining: counts and names, nested both ways") {
 TEST_CASE("joining kinds that do not mix is refused") {
   tp::Constraints gradients;
   gradients.count = 1;
-  gradients.jacobian = tp::Gradients{[](double, N_Vector, double*) {}, [](double, N_Vector, N_Vector*) {}};
+  gradients.jacobian =
+      tp::Gradients{[](double, N_Vector, double*) {}, [](double, N_Vector, N_Vector*) {}};
   tp::Constraints user;
   user.count = 1;
   user.jacobian = tp::UserProjection{
@@ -164,7 +165,10 @@ TEST_CASE("builders: misuse") {
   CHECK(contains(thrown([] { tp::energy(nullptr, nullptr, 0.0); }), "H is empty"));
   const tp::ScalarFunction H = [](tp::ConstVector) { return 0.0; };
   CHECK(contains(thrown([&] { tp::energy(H, nullptr, 0.0); }), "gradient is empty"));
-  CHECK(contains(thrown([&] { tp::energy(H, [](tp::ConstVector, tp::Vector) {}, 0.0, -2); }),
+  CHECK(contains(thrown([&] {
+                   tp::energy(
+                       H, [](tp::ConstVector, tp::Vector) {}, 0.0, -2);
+                 }),
                  "work = -2"));
   // A wrong number of coefficients shows at the first step, as a message.
   Host host(tether::test::circle(1.0), 1e-6);
@@ -180,13 +184,13 @@ TEST_CASE("energy with a work state: a driven, damped oscillator keeps its balan
     f[1] = -y[0] + force;
     f[2] = force * y[1];
   });
-  const tp::Constraints balance = tp::energy(
-      [](tp::ConstVector y) { return (y[0] * y[0] + y[1] * y[1]) / 2.0; },
-      [](tp::ConstVector y, tp::Vector gradient) {
-        gradient[0] = y[0];
-        gradient[1] = y[1];
-      },
-      0.5, 2);
+  const tp::Constraints balance =
+      tp::energy([](tp::ConstVector y) { return (y[0] * y[0] + y[1] * y[1]) / 2.0; },
+                 [](tp::ConstVector y, tp::Vector gradient) {
+                   gradient[0] = y[0];
+                   gradient[1] = y[1];
+                 },
+                 0.5, 2);
   const Run run = integrate(problem, 1e-6, balance);
   REQUIRE(run.flag >= 0);
   CHECK(run.distance <= tp::Options().tolerance);

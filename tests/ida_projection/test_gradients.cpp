@@ -120,9 +120,9 @@ TEST_CASE("gradients: the same motion as the dense path, dense LU") {
     for (const tp::Metric metric : {tp::Metric::local_correction, tp::Metric::error_weights}) {
       const Problem problem = pendulum(1.0, 1.0, 20.0, form);
       INFO(form << ", metric " << static_cast<int>(metric));
-      const tp::Constraints rows =
-          std::string(form) == "index 1" ? problem.recommended_constraints()
-                                         : problem.select({"position", "velocity", "energy"});
+      const tp::Constraints rows = std::string(form) == "index 1"
+                                       ? problem.recommended_constraints()
+                                       : problem.select({"position", "velocity", "energy"});
       tp::Options options;
       options.metric = metric;
       const Run dense = integrate(problem, 1e-6, rows, options, false);
@@ -146,8 +146,7 @@ TEST_CASE("gradients: redundant rows, inconsistent rows") {
   for (std::size_t i = 0; i < 7; ++i) CHECK(std::abs(full.y[i] - redundant.y[i]) < 1e-6);
 
   const tp::Constraints other = row(
-      "other circle",
-      [](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - 2.0; },
+      "other circle", [](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - 2.0; },
       [](double, const double* y, double* c) {
         c[0] = 2.0 * y[0];
         c[1] = 2.0 * y[1];
@@ -211,8 +210,7 @@ TEST_CASE("vectors without an array, or without operations, are refused by name"
   y->ops->nvdotprod = nullptr;
   ida = IDACreate(context);
   REQUIRE(IDAInit(ida, residual, 0.0, y, yp) == 0);
-  CHECK(contains(thrown([&] { tp::Projection(ida, as_gradients(on_circle(), 2)); }),
-                 "N_VDotProd"));
+  CHECK(contains(thrown([&] { tp::Projection(ida, as_gradients(on_circle(), 2)); }), "N_VDotProd"));
   IDAFree(&ida);
   N_VDestroy(y);
   N_VDestroy(yp);

@@ -105,13 +105,14 @@ TEST_CASE("at rest where every row has its zero: nothing moves, ever") {
   rest.yp0.assign(5, 0.0);
   const tp::Constraints rows =
       rest.select({"position", "velocity"}) +
-      tp::energy([](tp::ConstVector y) { return (y[2] * y[2] + y[3] * y[3]) / 2.0 + 9.80665 * y[1]; },
-                 [](tp::ConstVector y, tp::Vector gradient) {
-                   gradient[1] = 9.80665;
-                   gradient[2] = y[2];
-                   gradient[3] = y[3];
-                 },
-                 -9.80665);
+      tp::energy(
+          [](tp::ConstVector y) { return (y[2] * y[2] + y[3] * y[3]) / 2.0 + 9.80665 * y[1]; },
+          [](tp::ConstVector y, tp::Vector gradient) {
+            gradient[1] = 9.80665;
+            gradient[2] = y[2];
+            gradient[3] = y[3];
+          },
+          -9.80665);
   Host host(rest, 1e-8);
   host.attach(rows);
   REQUIRE(host.finish() >= 0);

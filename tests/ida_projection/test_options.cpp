@@ -36,7 +36,8 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 }  // namespace
 
 TEST_CASE("bad values: the message names the option and the value") {
-  const auto check = [](const std::string& text, const std::string& name, const std::string& value) {
+  const auto check = [](const std::string& text, const std::string& name,
+                        const std::string& value) {
     INFO(text);
     CHECK(contains(text, name));
     CHECK(contains(text, value));

@@ -202,22 +202,20 @@ TEST_CASE("close to rest: length and energy rows almost parallel") {
   const double g = 9.80665, start = 1e-4;
   Problem problem = pendulum(1.0, g, 20.0, "index 1");
   problem.y0 = {std::sin(start), -std::cos(start), 0.0, 0.0, g * std::cos(start)};
-  problem.yp0 = {0.0, 0.0, -problem.y0[0] * problem.y0[4],
-                 -problem.y0[1] * problem.y0[4] - g, 0.0};
+  problem.yp0 = {0.0, 0.0, -problem.y0[0] * problem.y0[4], -problem.y0[1] * problem.y0[4] - g, 0.0};
   const double frequency = std::sqrt(g) * (1.0 - start * start / 16.0);
   const double angle = start * std::cos(frequency * 20.0);
   problem.reference = {std::sin(angle), -std::cos(angle)};
   problem.error_components = 2;
   const tp::Constraints rows =
       problem.select({"position", "velocity"}) +
-      tp::energy(
-          [g](tp::ConstVector y) { return (y[2] * y[2] + y[3] * y[3]) / 2.0 + g * y[1]; },
-          [g](tp::ConstVector y, tp::Vector gradient) {
-            gradient[1] = g;
-            gradient[2] = y[2];
-            gradient[3] = y[3];
-          },
-          -g * std::cos(start));
+      tp::energy([g](tp::ConstVector y) { return (y[2] * y[2] + y[3] * y[3]) / 2.0 + g * y[1]; },
+                 [g](tp::ConstVector y, tp::Vector gradient) {
+                   gradient[1] = g;
+                   gradient[2] = y[2];
+                   gradient[3] = y[3];
+                 },
+                 -g * std::cos(start));
   for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
     INFO("tolerance " << tolerance);
     const Run run = integrate(problem, tolerance, rows);

@@ -48,7 +48,8 @@ Result run(int method, Attach attach, bool attach_last = false) {
   IDAFree(&host.ida);
   host.ida = IDACreate(host.context);
 #if SUNDIALS_VERSION_MAJOR < 7
-  IDASetErrHandlerFn(host.ida, [](int, const char*, const char*, char*, void*) {}, nullptr);
+  IDASetErrHandlerFn(
+      host.ida, [](int, const char*, const char*, char*, void*) {}, nullptr);
 #endif
   REQUIRE(IDAInit(host.ida, residual, 0.0, host.y, host.yp) == 0);
   IDASetUserData(host.ida, &data);
@@ -100,7 +101,8 @@ TEST_CASE("staggered sensitivities: the state is projected, sensitivities are ri
 }
 
 TEST_CASE("staggered sensitivities without constraints: the same bits") {
-  const Result plain = run(IDA_STAGGERED, Attach::no), attached = run(IDA_STAGGERED, Attach::nothing);
+  const Result plain = run(IDA_STAGGERED, Attach::no),
+               attached = run(IDA_STAGGERED, Attach::nothing);
   REQUIRE(attached.flag >= 0);
   CHECK(attached.statistics.solver_calls >= attached.steps);
   CHECK(attached.steps == plain.steps);

@@ -84,10 +84,10 @@ struct UserProjection {
 /// The set { y : g(t, y) = 0 } on which the solution is kept, m rows, g in the caller's own units.
 /// Join sets with `+`. Rows may be redundant, but they must not contradict each other.
 struct Constraints {
-  int count = 0;                                             ///< m, rows of this set
-  Callable<double, ConstVector, Vector> value;               ///< g(t, y)
+  int count = 0;                                ///< m, rows of this set
+  Callable<double, ConstVector, Vector> value;  ///< g(t, y)
   std::variant<FiniteDifferences, DenseJacobian, Gradients, UserProjection> jacobian;  ///< dg/dy
-  std::vector<std::string> names;  ///< optional, one for each row; used in messages
+  std::vector<std::string> names;   ///< optional, one for each row; used in messages
   std::vector<Constraints> joined;  ///< sets added with `+`, their rows after those of this one
 
   /// m over this set and everything joined to it.

@@ -67,12 +67,13 @@ struct Options {
   bool refresh_algebraic = true;
 
   /// The same iteration also removes what IDA's convergence test left of the correction in the
-  /// differential variables; without algebraic variables it is done where IDA iterated once. 0 or 1.
+  /// differential variables; without algebraic variables it is done where IDA iterated once. 0
+  /// or 1.
   int extra_iterations = 1;
 
   /// Choose step sizes with Soederlind's filter H211b instead of IDA's rule "keep h until it can be
-  /// doubled": end errors and step counts then vary smoothly with the tolerance. Error estimates are
-  /// steered to 1 / smoothing_setpoint of what the error test allows (> 0; formulas and limits:
+  /// doubled": end errors and step counts then vary smoothly with the tolerance. Error estimates
+  /// are steered to 1 / smoothing_setpoint of what the error test allows (> 0; formulas and limits:
   /// ida_projection/README.md). Owns IDA's IDASetEta... settings and IDASetMaxStep: give the
   /// longest step here (0: none), and IDASetMaxOrd's order, if it was called.
   bool step_smoothing = false;
@@ -95,7 +96,8 @@ struct Options {
   /// host afterwards.
   SUNNonlinearSolver nonlinear_solver = nullptr;
 
-  /// Print the message of a failure that ends the run to stderr, once, as SUNDIALS does with its own.
+  /// Print the message of a failure that ends the run to stderr, once, as SUNDIALS does with its
+  /// own.
   bool print_fatal = true;
 
   /// Called after every `progress_interval`-th accepted step; must not throw.

@@ -13,18 +13,18 @@ namespace tether::ida_projection {
 
 /// Outcome of the last thing that the plugin did. Negative values end the run.
 enum class Status {
-  unused = 0,            ///< attached, IDA has not called yet
+  unused = 0,  ///< attached, IDA has not called yet
   success,
-  not_converged,         ///< moves did not shrink, or too many of them
+  not_converged,  ///< moves did not shrink, or too many of them
   move_too_long,
-  inconsistent,          ///< rows contradict each other; message names them
-  not_finite,            ///< NaN or infinity in g, C or y
+  inconsistent,  ///< rows contradict each other; message names them
+  not_finite,    ///< NaN or infinity in g, C or y
   callback_recoverable,
-  corrector_failed,      ///< the decorated solver failed; nothing was projected
+  corrector_failed,  ///< the decorated solver failed; nothing was projected
   callback_fatal = -1,
-  late_attach = -2,      ///< attached after IDA was initialised: call IDAReInit
+  late_attach = -2,                 ///< attached after IDA was initialised: call IDAReInit
   simultaneous_sensitivities = -3,  ///< IDA_SIMULTANEOUS bypasses the plugin: use IDA_STAGGERED
-  never_called = -4,     ///< IDA took steps without the plugin: another solver was attached later
+  never_called = -4,  ///< IDA took steps without the plugin: another solver was attached later
   internal_error = -5,
 };
 
@@ -34,16 +34,16 @@ const char* to_string(Status status);
 struct ConsistencyReport {
   Status status = Status::unused;
   std::string message;
-  int iterations = 0;           ///< Gauss-Newton steps of the projection of y
-  double move = 0.0;            ///< length of the change of y, in tolerances (WRMS)
-  double largest_change = 0.0;  ///< largest |change| of a component of y
-  int changed_component = -1;   ///< which one (serial vectors)
+  int iterations = 0;              ///< Gauss-Newton steps of the projection of y
+  double move = 0.0;               ///< length of the change of y, in tolerances (WRMS)
+  double largest_change = 0.0;     ///< largest |change| of a component of y
+  int changed_component = -1;      ///< which one (serial vectors)
   double derivative_change = 0.0;  ///< largest |change| of a component of y'
-  double drift_before = 0.0;    ///< largest |g_i|
+  double drift_before = 0.0;       ///< largest |g_i|
   double drift_after = 0.0;
   double residual_before = -1.0;  ///< largest |F_i| at the given values; -1 when not known
   double residual_after = -1.0;   ///< largest |F_i| after; -1 when not known
-  int rank = 0;                 ///< of C at the end
+  int rank = 0;                   ///< of C at the end
   bool slow_convergence = false;  ///< gradients vanish on the set: |g| says little about distance
   std::vector<int> contradicting_rows;
 
@@ -59,7 +59,8 @@ struct Consistency {
     keep,           ///< leave y' as it is
   };
   Derivative derivative = Derivative::automatic;
-  double direction = 0.0;  ///< time of a first output, as IDACalcIC wants; 0 = t0 + 1e-3 max(1,|t0|)
+  double direction =
+      0.0;  ///< time of a first output, as IDACalcIC wants; 0 = t0 + 1e-3 max(1,|t0|)
   IDAResFn residual = nullptr;  ///< F, for least squares and for the residuals in the report
   void* user_data = nullptr;
   int maximum_iterations = 30;
@@ -85,8 +86,8 @@ class Projection {
   Projection& operator=(const Projection&) = delete;
 
   /// Initial values onto the constraints, then y' (and the algebraic variables) consistent with F.
-  /// Damped Gauss-Newton in the error weights. Restarts IDA (IDAReInit) at the result. On failure yy
-  /// and yp are unchanged. Call it after tolerances and linear solver are set.
+  /// Damped Gauss-Newton in the error weights. Restarts IDA (IDAReInit) at the result. On failure
+  /// yy and yp are unchanged. Call it after tolerances and linear solver are set.
   ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp,
                                     const Consistency& how = {});
 
@@ -100,8 +101,8 @@ class Projection {
 
   Statistics statistics() const;
   void reset_statistics();
-  Status status() const;              ///< of the last call by IDA, or of the last call above
-  const std::string& message() const; ///< what to do about it; empty when all is well
+  Status status() const;               ///< of the last call by IDA, or of the last call above
+  const std::string& message() const;  ///< what to do about it; empty when all is well
   const Constraints& constraints() const;
 
   class Impl;  // the decorator; see src/

@@ -15,18 +15,21 @@ struct Statistics {
   long value_evaluations = 0;     ///< calls of g
   long jacobian_evaluations = 0;  ///< C, however formed
   long factorizations = 0;
-  long extra_iterations = 0;   ///< corrector iterations added
-  long corrections_repeated = 0;  ///< corrections redone with fresh factors: the old ones misled IDA
-  long refreshes = 0;          ///< refreshes of the algebraic variables
+  long extra_iterations = 0;  ///< corrector iterations added
+  long corrections_repeated =
+      0;               ///< corrections redone with fresh factors: the old ones misled IDA
+  long refreshes = 0;  ///< refreshes of the algebraic variables
   long residual_evaluations = 0;  ///< F called by the plugin itself (also in IDA's own count)
-  long rank_drops = 0;         ///< factorisations that dropped redundant rows
+  long rank_drops = 0;            ///< factorisations that dropped redundant rows
+  long smoothing_begun = 0;  ///< step smoothing switched on because IDA's own steps were refused
+                             ///< again and again (README, section 9); 0 or 1 a run
 
   // Failures by kind; each makes IDA retry with a smaller step unless noted.
-  long not_converged = 0;       ///< too many moves, stagnation or divergence
-  long move_too_long = 0;       ///< longer than Options::largest_move (rejected)
-  long moves_capped = 0;        ///< shortened by LongMove::cap; not a failure
-  long inconsistent = 0;        ///< rows contradict each other
-  long not_finite = 0;          ///< NaN or infinity in g, C or y
+  long not_converged = 0;         ///< too many moves, stagnation or divergence
+  long move_too_long = 0;         ///< longer than Options::largest_move (rejected)
+  long moves_capped = 0;          ///< shortened by LongMove::cap; not a failure
+  long inconsistent = 0;          ///< rows contradict each other
+  long not_finite = 0;            ///< NaN or infinity in g, C or y
   long callback_recoverable = 0;  ///< a callback returned > 0
   long callback_fatal = 0;        ///< a callback returned < 0 or threw; ends the run
   long corrector_failures = 0;    ///< the decorated solver itself failed; not projected
