@@ -10,7 +10,7 @@ namespace tether::contact::detail {
 // Sliding minimises the energy on the arc of the conic that sees the unconstrained minimum
 // y* = h / beta. With u at angle phi from u0 = y*/|y*| and t = tan(phi/2), the derivative along
 // the arc is a quartic in t that is negative at the near and positive at the far end (README,
-// section 3). Newton with bisection as safeguard on [0, 1], after reflection (root at phi < 0)
+// section 3). Halley with bisection as safeguard on [0, 1], after reflection (root at phi < 0)
 // and inversion (root beyond 90 degrees). No trigonometric function is called.
 struct MaximumDissipation {
   static constexpr Law kLaw = Law::maximum_dissipation;
@@ -107,13 +107,18 @@ struct MaximumDissipation {
       } else {
         hi = t;
       }
-      const double step = -f / d;
+      // Halley's step where it is one, else Newton's.
+      const double fs = f * ((6 * q4 * t + 3 * q3) * t + q2), dd = d * d;
+      const bool halley = fs < 0.5 * dd;
+      const double step = halley ? -f * d / (dd - fs) : -f / d;
       double next = t + step;
-      // Quadratic convergence: a Newton step of 1e-8 leaves 1e-16 or so.
-      if (std::abs(step) <= 1e-8 && d > 0) {
-        t = next < lo ? lo : (next > hi ? hi : next);
-        if (std::abs(step) <= 1e-8 * t || std::abs(step) <= 1e-12) break;
-        continue;
+      // A Halley step leaves the cube of itself, a Newton step its square.
+      if (d > 0) {
+        const double size = std::abs(step);
+        if ((size <= 1e-5 * t && std::abs(fs) <= 1e-5 * dd) || size <= 1e-8 * t || size <= 1e-12) {
+          t = next < lo ? lo : (next > hi ? hi : next);
+          break;
+        }
       }
       if (!(next > lo && next < hi) || !(d > 0)) next = 0.5 * (lo + hi);
       if (next == t || hi - lo <= 4e-17) break;

@@ -159,22 +159,6 @@ struct Secular {
     }
     return l;
   }
-  // The zero in the concave part that f rises through, where f(0) < 0; -1: none.
-  double first(double warm, double least) {
-    double l = warm > 0 ? warm : 0;
-    for (int n = 0; n < 60; ++n) {
-      at(l);
-      if (n == 0 && l > 0 && !(slope > 0 && curvature() < 0 && l * slope > f)) {
-        l = 0;
-        at(l);
-      }
-      if ((l == 0 && f >= 0) || !(slope > 0) || !(curvature() < 0)) return -1;
-      const double step = -f / slope;
-      l += step;
-      if (std::abs(step) <= 1e-12 * (l + least)) return l;
-    }
-    return -1;
-  }
   // f' = 0 likewise; stops where `until` (sign of f) is reached.
   double turn(double l, double least, double until) {
     for (int n = 0; n < 100; ++n) {
@@ -189,6 +173,63 @@ struct Secular {
 };
 
 }  // namespace
+
+bool Coulomb::only_two(const LocalBlock& L, const LocalRhs& r, double room, double l) {
+  const double s0 = L.beta[1] * r.h0, s1 = L.beta[0] * r.h1;
+  const double z0 = s0 + l * r.h0, z1 = s1 + l * r.h1, zz = z0 * z0 + z1 * z1, z = std::sqrt(zz);
+  const double w1 = r.k * (L.beta[0] + L.beta[1]) - L.g[0] * r.h0 - L.g[1] * r.h1;
+  const double straight = w1 + 2 * r.k * l;
+  const double d = r.h0 * r.h1 * (L.beta[0] - L.beta[1]), hh = r.h0 * r.h0 + r.h1 * r.h1;
+  if (!(straight * z > z0 * r.h0 + z1 * r.h1)) return false;
+  if (!(d * d <= 2 * r.k * zz * z || straight * straight >= hh)) return false;
+  // The other zero of the first quadratic, by the product of both.
+  const double m = (room - (z0 * s0 + z1 * s1) / z) / (r.k * l), s = std::sqrt(s0 * s0 + s1 * s1);
+  return m < 0 || (m < l && room - s + m * (w1 - (s0 * r.h0 + s1 * r.h1) / s + m * r.k) < 0);
+}
+
+bool Coulomb::safeguarded(const LocalBlock& L, const LocalRhs& r, double warm, double& l,
+                          int& evaluations) {
+  const double beta_min = std::min(L.beta[0], L.beta[1]), beta_max = std::max(L.beta[0], L.beta[1]);
+  const double h = std::sqrt(r.h0 * r.h0 + r.h1 * r.h1), ik = 1 / r.k;
+  const double gh = L.g[0] * r.h0 + L.g[1] * r.h1;
+  if (!(h * ik < 1e60 * beta_max)) return false;
+  // s lies between (1 - e) and (1 + e) times |y|; at e > 1 it may start lower.
+  double lo = std::max((1 - L.e) * h * ik - beta_max, 0.0);
+  double hi = std::max((1 + L.e) * h * ik - beta_min, lo);
+  if (!(l > lo && l < hi)) l = warm > lo && warm < hi ? warm : lo;
+  // A Newton step of 3e-8 leaves round-off unless the two beta are far apart.
+  const double stop = beta_max < 1e3 * beta_min ? 3e-8 : 1e-12;
+  for (int n = 0; n < kMaxEvaluations; ++n) {
+    ++evaluations;
+    const double e0 = L.beta[0] + l, e1 = L.beta[1] + l, p = e0 * e1;
+    const double z0 = r.h0 * e1, z1 = r.h1 * e0;
+    const double z = std::sqrt(z0 * z0 + z1 * z1);
+    const double q = z + L.g[0] * z0 + L.g[1] * z1;
+    const double excess = q - r.k * p;
+    // d(p/q) z q^2 = (p' q - p q') z with q' z = z.h + z g.h
+    const double zh = z0 * r.h0 + z1 * r.h1;
+    double slope = (e0 + e1) * q * z - p * (zh + z * gh);
+    double step = excess * q * z / (r.k * slope);
+    if (!(slope > 0 && q > 0.1 * z) || n > 8) {  // near the pole of p / q, e > 1: Newton for f
+      slope = (r.k * (e0 + e1) - gh) * z - zh;
+      step = excess * z / slope;
+    }
+    if (excess > 0) {
+      lo = l;
+    } else {
+      hi = l;
+    }
+    double next = l + step;
+    if (std::abs(step) <= stop * (l + beta_min) && slope > 0) {
+      l = next < lo ? lo : (next > hi ? hi : next);
+      return true;
+    }
+    if (!(next > lo && next < hi) || !(slope > 0)) next = 0.5 * (lo + hi);
+    if (next == l || hi - lo <= 1e-16 * (hi + beta_min)) break;
+    l = next;
+  }
+  return true;
+}
 
 Regime Coulomb::nearest(const LocalBlock& L, const LocalRhs& r, double bn, double* x,
                         double& lambda, int& evaluations) {
@@ -208,23 +249,11 @@ Regime Coulomb::nearest(const LocalBlock& L, const LocalRhs& r, double bn, doubl
   if (!(bn > 0)) offer(best, Regime::separating, lambda);
   const auto slides = [&](double l) {
     if (!(l >= 0) || !std::isfinite(l)) return;
-    slide(L, r, l, z);
+    slide(L, r, bn, l, z);
     if (z[0] > 0 && std::isfinite(z[0])) offer(z, Regime::sliding, l);
   };
   Secular e(L, r);
   const double least = std::min(L.beta[0], L.beta[1]);
-  if (bn > 0) {
-    const double l = e.first(lambda, least);
-    // f' >= k (sum + 2 l) - g.h - |h| beyond l: nothing else follows.
-    const double straight = e.k * (e.sum + 2 * l) - e.gh;
-    if (l > 0 && straight > 0 && straight * straight >= e.hh) {
-      evaluations += e.evaluations;
-      slides(l);
-      std::copy(best, best + 3, x);
-      lambda = l;
-      return regime;
-    }
-  }
   const double infinity = std::numeric_limits<double>::infinity();
   e.at(0);
   const bool static_ = sticks(L, r, e.s0, e.s1, e.length);
