@@ -1,11 +1,15 @@
 // Spheres that settle in a box: time of a step and how exactly it is solved, beside Bullet's
 // dynamics where it is installed. SPDX-License-Identifier: BSD-3-Clause
 //
-//   settling [spheres = 10000] [seconds = 3] [tolerance ...] [alone]
+//   settling [spheres = 10000] [seconds = 1] [rest = 30] [tolerance ...] [alone]
 //
-// Both are judged by the same evaluate(): the fixed-point residual of the Coulomb law with exact
-// cones on the contacts, velocities and impulses of the solver's own step. Times are of whole
-// steps, collision included, of the processor (one thread).
+// First all solvers over the same `seconds` from the start, judged by the same evaluate(): the
+// fixed-point residual of the Coulomb law with exact cones on the contacts, velocities and impulses
+// of the solver's own step. Times are of whole steps, collision included, of the processor (one
+// thread). Then one run until everything lies still, for at most `rest` seconds (0: left out).
+//
+// Angular velocities decay by 2/s in all runs: without rolling and spinning resistance, of which
+// Coulomb's law knows nothing, a sphere on the floor rolls for ever.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -28,6 +32,9 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double kRadius = 0.5, kMass = 1, kFriction = 0.3, kGravity = 9.81, kStep = 5e-3;
+constexpr double kAngularDecay = 2;                // 1/s
+constexpr double kStill = 0.1 * kGravity * kStep;  // m/s: a tenth of what a step of gravity adds
+constexpr double kStillFor = 0.5, kRestTolerance = 3e-3;  // s
 
 // Processor time: others may use the machine.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -75,7 +82,7 @@ void print(const Row& r) {
   std::fflush(stdout);
 }
 
-Row tether_run(const Start& start, double duration, double tolerance) {
+tc::Stepper tether_scene(const Start& start, double tolerance) {
   tc::BodySet bodies;
   std::vector<tc::Surface> surfaces;
   const auto wall = [&](const Vector3d& at, const Vector3d& normal) {
@@ -96,7 +103,29 @@ Row tether_run(const Start& start, double duration, double tolerance) {
   options.tolerance = tolerance;
   tc::Stepper s(std::move(bodies), std::move(surfaces),
                 {{0, 0, kFriction, 0}, {0, 1, kFriction, 0}}, options);
+  s.add_force("drag", [](tc::BodySet& all, double, double dt) {
+    const double keep = std::exp(-kAngularDecay * dt);
+    for (tc::RigidBody& b : all.motion) b.angular_velocity *= keep;
+  });
+  return s;
+}
 
+double fastest(const tc::Stepper& s) {
+  double most = 0;
+  for (const tc::RigidBody& b : s.bodies().motion) most = std::max(most, b.velocity.norm());
+  return most;
+}
+
+void print_stages(const tc::Stepper& s) {
+  for (const tc::StageCost& c : s.costs())
+    std::printf("    %-24s %9.2f ms\n", c.effect,
+                1e3 * c.seconds / static_cast<double>(s.counts().steps));
+  std::printf("    %ld sweeps, %ld assembled islands, %ld steps not to tolerance\n",
+              s.counts().sweeps, s.counts().assembled_islands, s.counts().unsolved);
+}
+
+void tether_run(const Start& start, double duration, double tolerance) {
+  tc::Stepper s = tether_scene(start, tolerance);
   Row row;
   char name[64];
   std::snprintf(name, sizeof name, "Tether, tolerance %.0e", tolerance);
@@ -113,17 +142,46 @@ Row tether_run(const Start& start, double duration, double tolerance) {
     if (s.residual() >= 0 && k > steps / 3) residuals.push_back(s.residual());
   }
   row.ms_per_step = 1e3 * seconds / static_cast<double>(steps);
-  row.us_per_contact = 1e6 * seconds / static_cast<double>(row.contacts);
+  row.us_per_contact = 1e6 * seconds / static_cast<double>(std::max(1L, row.contacts));
   row.contacts /= steps;
   row.residual = median(residuals);
-  for (const tc::RigidBody& b : s.bodies().motion)
-    row.speed = std::max(row.speed, b.velocity.norm());
+  row.speed = fastest(s);
   print(row);
-  for (const tc::StageCost& c : s.costs())
-    std::printf("    %-24s %9.2f ms\n", c.effect, 1e3 * c.seconds / static_cast<double>(steps));
-  std::printf("    %ld sweeps, %ld assembled islands, %ld steps not to tolerance\n",
-              s.counts().sweeps, s.counts().assembled_islands, s.counts().unsolved);
-  return row;
+  print_stages(s);
+}
+
+// Until no sphere has been faster than kStill for kStillFor.
+void to_rest(const Start& start, double longest) {
+  tc::Stepper s = tether_scene(start, kRestTolerance);
+  std::printf("\nto rest, tolerance %.0e: no sphere above %.1e m/s for %g s\n", kRestTolerance,
+              kStill, kStillFor);
+  std::printf("%9s %12s %12s %12s %9s %9s\n", "t / s", "fastest m/s", "energy / J", "depth %R",
+              "contacts", "us/cont.");
+  double seconds = 0, still_since = 0, deepest = 0, contacts = 0;
+  const long report = std::lround(1 / kStep), most = std::lround(longest / kStep);
+  bool rests = false;
+  for (long k = 1; k <= most && !rests; ++k) {
+    const double begin = now();
+    s.step();
+    seconds += now() - begin;
+    contacts += static_cast<double>(s.contacts().points.size());
+    deepest = std::max(deepest, s.penetration());
+    const double speed = fastest(s);
+    if (speed > kStill) still_since = s.time();
+    rests = s.time() - still_since >= kStillFor;
+    if (k % report == 0 || rests || k == most) {
+      std::printf("%9.2f %12.1e %12.1e %12.3f %9zu %9.2f\n", s.time(), speed,
+                  tc::kinetic_energy(s.bodies()), 100 * deepest / kRadius,
+                  s.contacts().points.size(), 1e6 * seconds / contacts);
+      std::fflush(stdout);
+    }
+  }
+  if (rests)
+    std::printf("    at rest from %.2f s on; deepest penetration %.3f %% of a radius\n",
+                still_since, 100 * deepest / kRadius);
+  else
+    std::printf("    NOT at rest after %g s\n", s.time());
+  print_stages(s);
 }
 
 #if defined(TETHER_HAVE_BULLET)
@@ -165,7 +223,7 @@ double bullet_residual(btDispatcher& dispatcher, std::vector<tc::RigidBody>& bod
   return tc::evaluate(bodies, contacts, tc::Law::coulomb, impulses).fixed_point;
 }
 
-Row bullet_run(const Start& start, double duration, int iterations, bool two_directions) {
+void bullet_run(const Start& start, double duration, int iterations, bool two_directions) {
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher(&configuration);
   btDbvtBroadphase broadphase;
@@ -189,6 +247,7 @@ Row bullet_run(const Start& start, double duration, int iterations, bool two_dir
     auto body = std::make_unique<btRigidBody>(info);
     body->setUserIndex(index);
     body->setActivationState(DISABLE_DEACTIVATION);
+    body->setDamping(0, 1 - std::exp(-kAngularDecay));  // of a second
     world.addRigidBody(body.get());
     all.push_back(std::move(body));
   };
@@ -221,7 +280,8 @@ Row bullet_run(const Start& start, double duration, int iterations, bool two_dir
         before[i].inverse_mass = 1 / kMass;
         before[i].inverse_inertia = 2.5 / (kMass * kRadius * kRadius) * Eigen::Matrix3d::Identity();
         before[i].velocity = from_bullet(b.getLinearVelocity()) - Vector3d(0, 0, kGravity * kStep);
-        before[i].angular_velocity = from_bullet(b.getAngularVelocity());
+        before[i].angular_velocity =
+            std::exp(-kAngularDecay * kStep) * from_bullet(b.getAngularVelocity());
       }
     const double begin = now();
     world.stepSimulation(kStep, 0);
@@ -243,7 +303,6 @@ Row bullet_run(const Start& start, double duration, int iterations, bool two_dir
   for (const auto& b : all) row.speed = std::max(row.speed, b->getLinearVelocity().length());
   print(row);
   for (const auto& b : all) world.removeRigidBody(b.get());
-  return row;
 }
 #endif
 
@@ -251,18 +310,19 @@ Row bullet_run(const Start& start, double duration, int iterations, bool two_dir
 
 int main(int argc, char** argv) {
   const int spheres = argc > 1 ? std::atoi(argv[1]) : 10000;
-  const double duration = argc > 2 ? std::atof(argv[2]) : 3;
+  const double duration = argc > 2 ? std::atof(argv[2]) : 1;
+  const double rest = argc > 3 ? std::atof(argv[3]) : 30;
   std::vector<double> tolerances;
   bool alone = false;
-  for (int k = 3; k < argc; ++k) {
+  for (int k = 4; k < argc; ++k) {
     if (std::string(argv[k]) == "alone")
       alone = true;
     else
       tolerances.push_back(std::atof(argv[k]));
   }
   if (tolerances.empty()) tolerances = {1e-1, 1e-2, 1e-3};
-  if (spheres < 1 || !(duration > 0)) {
-    std::fprintf(stderr, "settling [spheres] [seconds] [tolerance ...] [alone]\n");
+  if (spheres < 1 || !(duration > 0) || !(rest >= 0)) {
+    std::fprintf(stderr, "settling [spheres] [seconds] [rest] [tolerance ...] [alone]\n");
     return 2;
   }
   const Start start = start_of(spheres);
@@ -270,13 +330,15 @@ int main(int argc, char** argv) {
   std::printf("%-28s %9s %9s %10s %9s %10s %9s\n", "", "ms/step", "us/cont.", "residual",
               "depth %R", "speed m/s", "contacts");
   for (const double tolerance : tolerances) tether_run(start, duration, tolerance);
-  if (alone) return 0;
 #if defined(TETHER_HAVE_BULLET)
-  bullet_run(start, duration, 10, false);
-  bullet_run(start, duration, 10, true);
-  bullet_run(start, duration, 50, true);
+  if (!alone) {
+    bullet_run(start, duration, 10, false);
+    bullet_run(start, duration, 10, true);
+    bullet_run(start, duration, 50, true);
+  }
 #else
-  std::printf("Bullet: not installed (libbullet-dev)\n");
+  if (!alone) std::printf("Bullet: not installed (libbullet-dev)\n");
 #endif
+  if (rest > 0) to_rest(start, rest);
   return 0;
 }

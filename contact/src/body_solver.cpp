@@ -42,6 +42,7 @@ constexpr int kTogether = 1500;
 // assembly and solution cost, measured on stacks and packings of 8 to 1400 contacts), after one
 // sweep for each contact: assembled.
 constexpr int kFirstForecast = 5;
+constexpr int kFew = 64;  // see BodyOptions::min_sweeps
 constexpr double kSlow = 15, kPatience = 7;
 
 bool moves(const RigidBody& b) { return b.inverse_mass > 0 || !b.inverse_inertia.isZero(0); }
@@ -187,6 +188,7 @@ int severity(Status s) {
 void check(const BodyOptions& o) {
   if (!(o.tolerance > 0)) throw std::invalid_argument("tolerance must be > 0");
   if (o.max_sweeps < 1) throw std::invalid_argument("max_sweeps must be >= 1");
+  if (o.min_sweeps < 0) throw std::invalid_argument("min_sweeps must be >= 0");
   if (o.threads < 1 || o.threads > 256) {
     throw std::invalid_argument("threads must lie in 1 .. 256");
   }
@@ -693,7 +695,8 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
   const double norm = r.norm > 0 ? r.norm : 1;
   const double bound = options.tolerance * options.tolerance * norm * norm;
   double earlier = std::numeric_limits<double>::infinity();  // at the last forecast
-  int forecast = kFirstForecast, next_test = 0, failed_tests = 0;
+  int forecast = kFirstForecast, failed_tests = 0;
+  int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   Momentum momentum;
   for (;;) {
     const double sum = pass(island, team, turn, [&](int c) { return sweep(c, team); });

@@ -340,6 +340,7 @@ TEST_CASE("stepping: misuse is refused") {
   };
   bad([](Scene& s) { s.options.step = 0; });
   bad([](Scene& s) { s.options.tolerance = 0; });
+  bad([](Scene& s) { s.options.min_sweeps = -1; });
   bad([](Scene& s) { s.options.error_reduction = 1.5; });
   bad([](Scene& s) { s.surfaces[0].body = 1; });  // a plane that moves
   bad([](Scene& s) { s.surfaces[1].body = 7; });

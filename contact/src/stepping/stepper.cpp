@@ -38,6 +38,7 @@ BodyOptions solver_options(const SteppingOptions& o) {
   BodyOptions b;
   b.law = o.law;
   b.tolerance = o.tolerance;
+  b.min_sweeps = o.min_sweeps;
   b.max_sweeps = o.max_sweeps;
   b.max_assembled = o.max_assembled;
   b.max_work = o.max_work;
@@ -51,6 +52,7 @@ BodyOptions correction_options(const SteppingOptions& o) {
   BodyOptions b = solver_options(o);
   b.law = Law::frictionless;
   b.tolerance = 1e-2;
+  b.min_sweeps = 0;
   b.max_sweeps = 10;
   b.max_assembled = 0;
   return b;

@@ -42,6 +42,10 @@ struct BodyOptions {
   /// block of contact i, b the relative velocities before the impulses.
   double tolerance = 1e-6;
   int max_sweeps = 1000;   ///< of an island
+  /// Of an island of more than 64 contacts, before it may be called solved. The tolerance is one of
+  /// the whole island: a single contact of many may be off by far more than its share. Such errors
+  /// fade within a few sweeps; errors common to many contacts are what the tolerance sees.
+  int min_sweeps = 0;
   int threads = 1;         ///< results have the same bits for every number of threads
   bool warm_start = true;  ///< contacts with an id start from their impulse of the previous solve
   /// Islands of at most so many contacts that sweeps do not soon finish are assembled and given to

@@ -77,6 +77,7 @@ struct SteppingOptions {
   /// Points closer than this part of the size of the smaller shape, beyond what the velocities
   /// cover within the step, are contacts.
   double near_part = 1e-3;
+  int min_sweeps = 8;     ///< see BodyOptions: at rest they wipe out what the tolerance allows
   int max_sweeps = 1000;  ///< see BodyOptions
   int max_assembled = 1000;
   double max_work = 2e8;  ///< see BodyOptions: bounds the time of a step
