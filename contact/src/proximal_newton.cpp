@@ -146,6 +146,36 @@ int ProximalNewton::inner(Search& search, double tau) {
   return 13;
 }
 
+int ProximalNewton::correct(Search& search, double tau, const PackedVector* anchor, Packed& x, int most) {
+  constexpr double kExact = 0.1;  // residual / proximal term
+  const auto& locals = search.system.problem().locals();
+  std::copy(anchor, anchor + n_, anchor_.begin());
+  std::copy(x.begin(), x.end(), x_.begin());
+  for (int i = 0; i < n_; ++i) clip_cone(locals[at(i)].mu, x_[at(i)].v);
+  const Proximal proximal{tau, anchor_.data()};
+  double res = residual(search, x_, z_, proximal, true);
+  for (int step = 1; step <= most; ++step) {
+    if (!direction(search, tau)) return 0;
+    double move = 0;
+    for (int i = 0; i < n_; ++i)
+      for (int c = 0; c < 3; ++c) x_[at(i)].v[c] += dx_[at(i)].v[c];
+    const double next = residual(search, x_, z_, proximal, true);
+    for (int i = 0; i < n_; ++i)
+      for (int c = 0; c < 3; ++c) {
+        const double d = search.system.weight(i) * (z_[at(i)].v[c] - anchor_[at(i)].v[c]);
+        move += d * d;
+      }
+    if (next <= kExact * tau * std::sqrt(move)) {
+      std::copy(z_.begin(), z_.end(), x.begin());
+      return step;
+    }
+    // The first step may cross kinks; after it the iteration converges or has failed.
+    if (!(next < (step == 1 ? 10 : 0.5) * res)) return 0;
+    res = next;
+  }
+  return 0;
+}
+
 void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
   ++search.counts.newton_phases;
   std::copy(x, x + n_, x_.begin());

@@ -17,6 +17,9 @@ class ProximalNewton {
   void reset(int contacts);
   // From x; at most `most` outer steps. The result is search.best.
   void run(Search& search, const PackedVector* x, int most);
+  // Full Newton steps on the proximal problem from x, at most `most`, until its residual is a tenth of
+  // its proximal term. Returns how many and x; or 0, x as it was.
+  int correct(Search& search, double tau, const PackedVector* anchor, Packed& x, int most);
   // Estimated ns of one Newton step.
   double cost(const Search& search) const;
 

@@ -1,0 +1,85 @@
+// Tether: points of the second-order cone and their scaling. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::contact::detail {
+
+// Points x of the cone |x_t| <= x_n have four entries, x_n, x_t and the gap x_n - |x_t|: close to
+// the cone the difference of the first three has lost its digits.
+inline double tangent(const double* x) { return std::sqrt(x[1] * x[1] + x[2] * x[2]); }
+inline double determinant(const double* x) { return x[3] * (x[3] + 2 * tangent(x)); }
+
+// x.u >= 0 for two points of the cone, without cancellation where they are nearly orthogonal.
+inline double product(const double* x, const double* u) {
+  const double tx = tangent(x), tu = tangent(u), along = x[1] * u[1] + x[2] * u[2];
+  double rest = tx * tu + along;
+  if (along < 0) {
+    const double across = x[1] * u[2] - x[2] * u[1];
+    rest = across * across / (tx * tu - along);
+  }
+  return x[3] * u[0] + tx * u[3] + rest;
+}
+
+// Largest t with x + t d in the cone; determinant = x_n^2 - |x_t|^2.
+inline double longest(const double* x, double determinant, const double* d) {
+  // det(x + t d) = a t^2 + 2 b t + c
+  const double a = d[0] * d[0] - d[1] * d[1] - d[2] * d[2];
+  const double b = x[0] * d[0] - x[1] * d[1] - x[2] * d[2], c = determinant;
+  double t = d[0] < 0 ? -x[0] / d[0] : std::numeric_limits<double>::infinity();
+  const double D = b * b - a * c;
+  if (D >= 0) {
+    const double q = -(b + std::copysign(std::sqrt(D), b));
+    if (c / q > 0) t = std::min(t, c / q);
+    if (q / a > 0) t = std::min(t, q / a);
+  }
+  return t;
+}
+
+// Scaling by Nesterov and Todd, W x = W^-1 u = lambda. W is symmetric and diagonal in the frame Q:
+// with t the direction of omega_t, W^2 = theta (2 omega omega' - J), J = diag(1, -1, -1), the
+// eigenvectors are (1, t), (1, -t), both over sqrt(2), and the tangent across t.
+struct ConeScaling {
+  double Q[9];  // rows: eigenvectors
+  double d[3];  // eigenvalues of W
+  double lambda[3], lambda_det;
+
+  // A single nonnegative number in place of the cone.
+  void set_flat(double x, double u) {
+    *this = {
+        {1, 0, 0, 0, 1, 0, 0, 0, 1}, {std::sqrt(u / x), 1, 1}, {std::sqrt(x * u), 0, 0}, x * u};
+  }
+  // false: x or u is not inside of the cone.
+  bool set(const double* x, const double* u) {
+    const double dx = std::sqrt(determinant(x)), du = std::sqrt(determinant(u));
+    if (!(dx > 0 && du > 0)) return false;
+    const double half = std::sqrt(0.5 * (1 + product(x, u) / (dx * du)));
+    const double w1 = (u[1] / du - x[1] / dx) / (2 * half);
+    const double w2 = (u[2] / du - x[2] / dx) / (2 * half);
+    const double t = std::sqrt(w1 * w1 + w2 * w2), h = std::sqrt(0.5);
+    const double t1 = t > 0 ? w1 / t : 1, t2 = t > 0 ? w2 / t : 0;
+    const double frame[9] = {h, h * t1, h * t2, h, -h * t1, -h * t2, 0, -t2, t1};
+    std::copy(frame, frame + 9, Q);
+    const double root = std::sqrt(du / dx), stretch = std::sqrt(1 + t * t) + t;
+    d[0] = root * stretch;
+    d[1] = root / stretch;
+    d[2] = root;
+    lambda_det = dx * du;
+    const double g = std::sqrt(lambda_det), q = g / (x[0] / dx + u[0] / du + 2 * half);
+    lambda[0] = g * half;
+    for (int c = 1; c < 3; ++c)
+      lambda[c] = q * ((half + u[0] / du) * x[c] / dx + (half + x[0] / dx) * u[c] / du);
+    return true;
+  }
+  // Into the frame and back.
+  void turn(const double* x, double* y) const {
+    for (int r = 0; r < 3; ++r) y[r] = Q[3 * r] * x[0] + Q[3 * r + 1] * x[1] + Q[3 * r + 2] * x[2];
+  }
+  void turn_back(const double* y, double* x) const {
+    for (int c = 0; c < 3; ++c) x[c] = Q[c] * y[0] + Q[3 + c] * y[1] + Q[6 + c] * y[2];
+  }
+};
+
+}  // namespace tether::contact::detail

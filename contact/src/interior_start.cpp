@@ -1,0 +1,138 @@
+// Tether: where interior points start. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+
+#include "interior_point.hpp"
+
+namespace tether::contact::detail {
+
+void InteriorPoint::order(const Search& search) {
+  if (ordered_) return;
+  lu_.order(search.system.problem());
+  lu_.analyse(search.system.problem(), nullptr);
+  ordered_ = true;
+}
+
+// The point where everything sticks, A x = b, shifted into the cone; false if it is the solution
+// or cannot be found.
+bool InteriorPoint::start(Search& search) {
+  System& system = search.system;
+  const Problem& p = system.problem();
+  const double speed = system.norm_b() / std::sqrt(n_);
+  if (!(speed > 0)) return false;
+  order(search);
+  constexpr double kShift = 1e-8;
+  for (int row = 0; row < n_; ++row) {
+    const int i = lu_.contact(row);
+    lu_.begin_row(row);
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      PackedBlock block = p.blocks()[at(k)];
+      if (p.columns()[at(k)] == i)
+        for (int c = 0; c < 3; ++c) block.column[5 * c] += kShift * mean_diagonal(p.local(i));
+      lu_.add(p.columns()[at(k)], block.column);
+    }
+    if (!lu_.end_row()) return false;
+  }
+  ++search.counts.factorisations;
+  search.counts.work += cost(search);
+  for (int i = 0; i < n_; ++i) z_[at(i)] = p.packed_b()[at(i)];
+  lu_.solve(z_.data());
+  double size = 0, outside = 0;
+  for (int i = 0; i < n_; ++i) {
+    flat_[at(i)] = system.law() == Law::frictionless || !(p.local(i).mu > 0);
+    double* x = x_[at(i)].v;
+    for (int c = 0; c < 3; ++c) x[c] = z_[at(i)].v[c];
+    if (flat_[at(i)]) {
+      x[1] = x[2] = 0;
+    } else {
+      x[0] *= p.local(i).mu;
+    }
+    const double t = tangent(x);
+    size += std::abs(x[0]) + t;
+    outside = std::max(outside, t - x[0]);
+  }
+  if (!std::isfinite(size)) return false;
+  // Admissible as it is: two refinements remove the shift of the matrix.
+  for (int refinement = 0; refinement < 3 && outside <= 0; ++refinement) {
+    for (int i = 0; i < n_; ++i) {
+      if (flat_[at(i)]) z_[at(i)].v[1] = z_[at(i)].v[2] = 0;
+      clip_cone(p.local(i).mu, z_[at(i)].v);
+    }
+    search.test(z_.data(), Method::interior_point);
+    if (search.solved()) return false;
+    system.velocities(z_.data(), w_.data());
+    lu_.solve(w_.data());
+    search.count_sweep();
+    for (int i = 0; i < n_; ++i)
+      for (int c = 0; c < 3; ++c) z_[at(i)].v[c] -= w_[at(i)].v[c];
+  }
+  for (int i = 0; i < n_; ++i) {
+    double* x = x_[at(i)].v;
+    double* u = u_[at(i)].v;
+    x[0] += outside + 0.1 * std::max(size / n_, speed / mean_diagonal(p.local(i)));
+    x[3] = x[0] - tangent(x);
+    u[0] = u[3] = speed;
+    u[1] = u[2] = 0;
+  }
+  residual(system);
+  return true;
+}
+
+// x and the u that belongs to its velocity, both kept off the cone as far as x.u = nu asks for,
+// nu = near * (mean size of x) * (mean size of u).
+bool InteriorPoint::start_near(Search& search, const PackedVector* start, double near) {
+  System& system = search.system;
+  const Problem& p = system.problem();
+  order(search);
+  system.velocities(start, w_.data());
+  double x_size = 0, u_size = 0;
+  for (int i = 0; i < n_; ++i) {
+    const double mu = p.local(i).mu;
+    const double* w = w_[at(i)].v;
+    double* x = x_[at(i)].v;
+    double* u = u_[at(i)].v;
+    flat_[at(i)] = system.law() == Law::frictionless || !(mu > 0);
+    if (flat_[at(i)]) {
+      x[0] = std::max(start[i].v[0], 0.0);
+      u[0] = std::max(w[0], 0.0);
+      x[1] = x[2] = u[1] = u[2] = 0;
+    } else {
+      x[0] = mu * start[i].v[0];
+      for (int c = 1; c < 3; ++c) x[c] = start[i].v[c];
+      double gamma[2];
+      system.gamma(i, gamma);
+      const double s = slip(w[1], w[2], gamma[0], gamma[1]);
+      for (int c = 1; c < 3; ++c) u[c] = w[c] + s * gamma[c - 1];
+      // u_n - s(u) = w_n / mu
+      const double v = std::max(w[0], 0.0) / mu, q = 1 - kSmooth, uu = u[1] * u[1] + u[2] * u[2];
+      u[0] = (v + std::sqrt(std::max(0.0, v * v - q * (v * v - q * uu)))) / q;
+    }
+    x[3] = std::max(0.0, x[0] - tangent(x));
+    u[3] = std::max(0.0, u[0] - tangent(u));
+    x_size += tangent(x) + x[3];
+    u_size += tangent(u) + u[3];
+  }
+  if (!(x_size > 0 && u_size > 0)) return false;
+  const double nu = near * (x_size / n_) * (u_size / n_), ratio = u_size / x_size;
+  for (int i = 0; i < n_; ++i) {
+    double* x = x_[at(i)].v;
+    double* u = u_[at(i)].v;
+    const double x0 = x[3] + tangent(x), u0 = u[3] + tangent(u);
+    x[3] = std::max(x[3], nu / (u0 + std::sqrt(nu * ratio)));
+    u[3] = std::max(u[3], nu / (x0 + std::sqrt(nu / ratio)));
+    x[0] = x[3] + tangent(x);
+    u[0] = u[3] + tangent(u);
+  }
+  residual(system);
+  return true;
+}
+
+// Near the anchor, in the proximal problem around it.
+bool InteriorPoint::start_proximal(Search& search, double tau, double near) {
+  tau_ = 0;
+  if (!start_near(search, anchor_.data(), near)) return false;
+  tau_ = tau;
+  residual(search.system);
+  return true;
+}
+
+}  // namespace tether::contact::detail
