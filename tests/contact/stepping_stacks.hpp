@@ -21,11 +21,11 @@ inline Scene stack(double dt, double top_mass, double mu = 0.5, int n = 10) {
 // Three levels of 15 cards (L = 1, t = 0.02, half width 0.35, 1 kg), lean 15 degrees from the
 // vertical, apexes 1.02 apart, flats of length 1. A leaning card stands on its lower inner edge;
 // the top inner edges touch; flats lie on the upper edges. Static for mu >= 0.2376138.
-inline Scene card_house(double dt, double mu, int levels = 3) {
+inline Scene card_house(double dt, double mu, int levels = 3, double lean_degrees = 15) {
   Scene scene(dt);
   scene.friction(mu);
   scene.ground();
-  const double L = 1, t = 0.02, lean = radians(15), spacing = 1.02;
+  const double L = 1, t = 0.02, lean = radians(lean_degrees), spacing = 1.02;
   const double c = std::cos(lean), s = std::sin(lean);
   const Vector3d card(t, 0.7, L), flat(1, 0.7, t);
   double floor = 0, left = 0;  // of this level, and its first apex
