@@ -12,162 +12,19 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
-#include "measure.hpp"
-#include "page.hpp"
+#include "report.hpp"
 
 using namespace tether::bench;
 
 namespace {
-
-constexpr double kLineWidth = 1.5;  // decades; see Curve::cpu_at
-
-bool is_peer(const std::string& code) { return base_name(code) != "IDA" && !is_ours(code); }
-
-std::string number(double value, const char* format = "{:.3g}") {
-  return std::isnan(value) ? "-" : fmt::format(fmt::runtime(format), value);
-}
-
-/// Over all forms, with and without the algebraic variables in the error test ("s": without).
-Best best_of(const std::vector<Family>& all, const std::string& base, double error) {
-  Best found{std::nan(""), "-"};
-  for (const Family& family : all) {
-    if (base_name(family.code) != base) continue;
-    const Best one = best(family.forms, error, kLineWidth);
-    if (std::isnan(one.cpu) || one.cpu >= found.cpu) continue;
-    found = {one.cpu, one.title + (family.code == base ? "" : " s")};
-  }
-  return found;
-}
-
-/// CPU at equal error: a line for each decade.
-struct Comparison {
-  Table table;
-  std::map<std::string, GeometricMean> ratio;  ///< ours / that code
-  std::map<std::string, int> ahead;            ///< decades at which that code is the faster one
-};
-
-Comparison compare(const std::vector<Point>& points, const std::vector<std::string>& peers) {
-  const std::vector<Family> all = families(points);
-  Comparison out;
-  out.table.head = {"error", "Tether ms", "form", "plain IDA ms", "form", "ratio"};
-  for (const std::string& peer : peers) {
-    out.table.head.push_back(peer + " ms");
-    out.table.head.push_back("ratio");
-  }
-  for (int decade = 3; decade <= 9; ++decade) {
-    const double error = std::pow(10.0, -decade);
-    const Best ours = best_of(all, "Tether", error), plain = best_of(all, "IDA", error);
-    const auto note = [&](const std::string& code, double cpu) {
-      const double ratio = ours.cpu / cpu;
-      out.ratio[code].add(ratio);
-      if (ratio > 1.0) ++out.ahead[code];
-      return number(ratio, "{:.2f}");
-    };
-    std::vector<std::string> row = {fmt::format("{:.0e}", error), number(ours.cpu), ours.title,
-                                    number(plain.cpu), plain.title};
-    row.push_back(note("plain IDA", plain.cpu));
-    for (const std::string& peer : peers) {
-      const Best other = best_of(all, peer, error);
-      row.push_back(number(other.cpu));
-      row.push_back(note(peer, other.cpu));
-    }
-    out.table.rows.push_back(std::move(row));
-  }
-  return out;
-}
-
-Table failures(const std::vector<Point>& points) {
-  Table table;
-  table.head = {"code, form", "tolerance", "why"};
-  for (const Point& point : points)
-    if (is_ours(point.code) && !point.mark.empty())
-      table.rows.push_back(
-          {point.code + ", " + point.form, fmt::format("{:.1e}", point.tolerance), point.mark});
-  return table;
-}
-
-Table work_at(const std::vector<Point>& points, double tolerance) {
-  Table table;
-  table.head = {"code, form", "error", "scd",    "steps",  "F",    "J",
-                "LU",         "proj.", "failed", "CPU ms", "drift"};
-  double nearest = 0.0;
-  for (const Point& point : points)
-    if (std::abs(std::log(point.tolerance / tolerance)) < std::abs(std::log(nearest / tolerance)))
-      nearest = point.tolerance;
-  for (const Point& p : points) {
-    if (p.tolerance != nearest) continue;
-    std::string drift;
-    for (const auto& [name, value] : p.drift)
-      drift += fmt::format("{}{} {:.0e}", drift.empty() ? "" : ", ", name, value);
-    const bool failed = p.run.failed;
-    table.rows.push_back(
-        {p.code + ", " + p.form, failed ? "-" : fmt::format("{:.1e}", p.run.error),
-         failed ? "-" : fmt::format("{:.1f}", p.scd), fmt::format("{}", p.run.steps),
-         fmt::format("{}", p.run.residuals), fmt::format("{}", p.run.jacobians),
-         fmt::format("{}", p.run.factorizations), fmt::format("{}", p.run.projections),
-         fmt::format("{}", p.run.error_failures + p.run.solver_failures),
-         fmt::format("{:.3g}", p.run.cpu_ms), failed ? p.run.message : drift});
-  }
-  return table;
-}
-
-std::string picture(const Case& which, const std::vector<Point>& points) {
-  std::vector<Line> lines;
-  for (const Point& point : points) {
-    auto line = std::find_if(lines.begin(), lines.end(), [&](const Line& l) {
-      return l.name == point.code && l.hint == point.code + ", " + point.form;
-    });
-    if (line == lines.end())
-      line = lines.insert(lines.end(),
-                          Line{point.code, point.code + ", " + point.form, {}, {}, false});
-    if (!point.usable() || point.run.error > 1.0) continue;
-    line->x.push_back(std::max(point.run.error, 1e-16));
-    line->y.push_back(point.run.cpu_ms);
-  }
-  return svg(which.name + ": " + which.text, "end error (mixed)", "CPU ms", lines);
-}
-
-std::string csv_line(const Point& p) {
-  std::string drift, orders;
-  for (const auto& [name, value] : p.drift)
-    drift += fmt::format("{}{}={:.3e}", drift.empty() ? "" : ";", name, value);
-  for (std::size_t k = 0; k < p.orders.size(); ++k)
-    if (p.orders[k] > 0)
-      orders += fmt::format("{}{}:{}", orders.empty() ? "" : ";", k, p.orders[k]);
-  return fmt::format("{},{},{},{:.4e},{:.4e},{:.2f},{:.5g},{},{},{},{},{},{},{},{},{},\"{}\"\n",
-                     p.problem, p.code, p.form, p.tolerance, p.run.error, p.scd, p.run.cpu_ms,
-                     p.run.steps, p.run.residuals, p.run.jacobians, p.run.factorizations,
-                     p.run.projections, p.run.error_failures, p.run.solver_failures, drift, orders,
-                     p.mark);
-}
-
-std::string json_point(const Point& p) {
-  std::string drift, orders;
-  for (const auto& [name, value] : p.drift)
-    drift += (drift.empty() ? "" : ",") + json_string(name) + ":" + json_number(value);
-  for (std::size_t k = 0; k < p.orders.size(); ++k)
-    if (p.orders[k] > 0)
-      orders += fmt::format("{}\"{}\":{}", orders.empty() ? "" : ",", k, p.orders[k]);
-  return fmt::format(
-      "{{\"problem\":{},\"code\":{},\"form\":{},\"tolerance\":{},\"error\":{},\"scd\":{},"
-      "\"cpu_ms\":{},\"steps\":{},\"F\":{},\"J\":{},\"factorizations\":{},\"projections\":{},"
-      "\"error_failures\":{},\"solver_failures\":{},\"drift\":{{{}}},\"orders\":{{{}}},\"mark\":{}}"
-      "}",
-      json_string(p.problem), json_string(p.code), json_string(p.form), json_number(p.tolerance),
-      p.run.failed ? "null" : json_number(p.run.error), json_number(p.scd),
-      json_number(p.run.cpu_ms), p.run.steps, p.run.residuals, p.run.jacobians,
-      p.run.factorizations, p.run.projections, p.run.error_failures, p.run.solver_failures, drift,
-      orders, json_string(p.mark));
-}
 
 struct Arguments {
   std::string problem, tolerances = "1e-3:1e-10", csv, svg, json, html;
   int count = 15, repeats = 3;
   double seconds = 2.0;
   std::vector<std::string> peers;
-  bool no_watch = false, list = false, work = false;
+  bool no_watch = false, no_reach = false, list = false, work = false;
 };
 
 void read(int argc, char** argv, CLI::App& app, Arguments& a) {
@@ -184,20 +41,46 @@ void read(int argc, char** argv, CLI::App& app, Arguments& a) {
   app.add_option("--json", a.json, "All runs and ratios");
   app.add_option("--html", a.html, "Tables and pictures as a piece of a page");
   app.add_flag("--no-drift", a.no_watch, "Skip the untimed runs that follow drift and orders");
+  app.add_flag("--no-reach", a.no_reach,
+               "Only these tolerances, even where end errors do not "
+               "cover 1e-3 to 1e-9");
   app.add_flag("--work", a.work, "Also print the work of every code and form near tolerance 1e-6");
   app.add_flag("--list", a.list, "Print problems, forms and codes, and stop");
   app.parse(argc, argv);
 }
 
-Codes wanted_codes(const Arguments& arguments) {
-  Codes wanted;
-  for (auto& code : all_codes()) {
+// "1e-3:1e-10"; says what it got and what it wants.
+std::pair<double, double> range(const std::string& text) {
+  double loose = 0.0, tight = 0.0;
+  char colon = 0, rest = 0;
+  const int read = std::sscanf(text.c_str(), "%lf%c%lf%c", &loose, &colon, &tight, &rest);
+  if (read != 3 || colon != ':' || !(loose < 1.0 && loose >= tight && tight >= 1e-14))
+    throw CLI::ValidationError("--tolerances", "got \"" + text +
+                                                   "\"; want loosest:tightest, 1 > loosest >= "
+                                                   "tightest >= 1e-14, as in 1e-3:1e-10");
+  return {loose, tight};
+}
+
+Codes wanted_codes(const std::vector<std::string>& names) {
+  Codes wanted, all = all_codes();
+  std::string known = "none";
+  for (const auto& code : all)
+    if (is_peer(code->name()) && base_name(code->name()) == code->name())
+      known += ", " + code->name();
+  for (const std::string& name : names) {
+    const auto is = [&](const auto& code) {
+      return is_peer(code->name()) && base_name(code->name()) == name;
+    };
+    if (name != "none" && std::none_of(all.begin(), all.end(), is))
+      throw CLI::ValidationError("--peers", "no peer \"" + name + "\"; there are " + known);
+  }
+  for (auto& code : all) {
     const std::string name = code->name();
-    const bool named = std::find(arguments.peers.begin(), arguments.peers.end(), base_name(name)) !=
-                       arguments.peers.end();
-    if (is_peer(name) && !arguments.peers.empty() && !named) continue;
+    if (is_peer(name) && !names.empty() &&
+        std::find(names.begin(), names.end(), base_name(name)) == names.end())
+      continue;
     if (!code->missing().empty()) {
-      fmt::print("{} left out: {}\n", name, code->missing());
+      if (name == base_name(name)) fmt::print("{} left out: {}\n", name, code->missing());
       continue;
     }
     wanted.push_back(std::move(code));
@@ -215,20 +98,91 @@ void list(const std::vector<Case>& cases) {
     fmt::print("{} ({}) {}\n", code->name(), code->version(), code->missing());
 }
 
-int run(const Arguments& arguments) {
-  const std::size_t colon = arguments.tolerances.find(':');
-  if (colon == std::string::npos)
-    throw CLI::ValidationError("--tolerances", "want loosest:tightest, as in 1e-3:1e-10");
-  const double loose = std::stod(arguments.tolerances.substr(0, colon));
-  const double tight = std::stod(arguments.tolerances.substr(colon + 1));
-  if (!(loose > 0.0 && tight > 0.0)) throw CLI::ValidationError("--tolerances", "want numbers > 0");
+// Fails before the runs rather than after them.
+void check_writable(const Arguments& a) {
+  if (!a.svg.empty()) mkdir(a.svg.c_str(), 0777);
+  for (const std::string& file : {a.csv, a.json, a.html, a.svg.empty() ? a.svg : a.svg + "/.try"})
+    if (!file.empty()) write_file(file, "");
+  if (!a.svg.empty()) std::remove((a.svg + "/.try").c_str());
+}
 
+std::string file_name(std::string problem) {
+  std::replace(problem.begin(), problem.end(), ' ', '_');
+  return problem + ".svg";
+}
+
+std::string details(const std::string& title, const Table& table) {
+  if (table.rows.empty()) return {};
+  return "<details><summary>" + html_escape(title) + "</summary>" + table.html() + "</details>\n";
+}
+
+class Report {
+ public:
+  Report(const Arguments& arguments, std::vector<std::string> peers)
+      : arguments_(arguments), comparison_(std::move(peers)) {}
+
+  void add(const Case& which, const std::vector<Point>& points) {
+    const Table costs = comparison_.add(which.name, points), work = work_at(points, 1e-6);
+    const Table ours = standing_of_ours(points);
+    Table wrong = unmet(points, "missed");
+    for (auto& row : unmet(points, "failed").rows) wrong.rows.push_back(row);
+    fmt::print("{}: {}\n{}", which.name, which.text, costs.text());
+    if (arguments_.work) fmt::print("\n{}", work.text());
+    fmt::print("our runs against 100 tolerances\n{}", ours.text());
+    if (!wrong.rows.empty()) fmt::print("{}", wrong.text());
+    fmt::print("\n");
+    std::fflush(stdout);
+    const std::string image = picture(which, points);
+    if (!arguments_.svg.empty()) write_file(arguments_.svg + "/" + file_name(which.name), image);
+    html_ += fmt::format("<h3>{}</h3>\n<p>{}</p>\n{}\n{}", html_escape(which.name),
+                         html_escape(which.text), image, costs.html());
+    html_ += details("Work at 1e-6", work) + details("Our runs against 100 tolerances", ours) +
+             details("Why ours is beyond 100 tolerances", unmet(points));
+    for (const Point& point : points) {
+      csv_ += csv_line(point);
+      json_ += (json_.empty() ? "" : ",\n") + json_point(point);
+    }
+  }
+
+  void finish(const std::string& versions) {
+    std::string matrices;
+    fmt::print("CPU at equal error, 1e-3 to 1e-9, all problems\n{}", comparison_.summary().text());
+    for (const auto& [code, standing] : comparison_.standings()) {
+      const Table matrix = comparison_.point_by_point(code);
+      fmt::print("\n{}", matrix.text());
+      matrices += matrix.html();
+    }
+    if (!arguments_.csv.empty()) write_file(arguments_.csv, csv_head() + csv_);
+    if (!arguments_.html.empty())
+      write_file(arguments_.html, "<h2>Error against time</h2>\n" + comparison_.summary().html() +
+                                      "<details><summary>Point by point</summary>" + matrices +
+                                      "</details>\n" + html_);
+    if (!arguments_.json.empty())
+      write_file(arguments_.json, "{\"versions\":{" + versions + "},\n\"ratios\":[" +
+                                      comparison_.json() + "],\n\"runs\":[" + json_ + "]}\n");
+  }
+
+ private:
+  const Arguments& arguments_;
+  Comparison comparison_;
+  std::string html_, csv_, json_;
+};
+
+int run(const Arguments& arguments) {
+  const auto [loose, tight] = range(arguments.tolerances);
   const std::vector<Case> cases = catalogue();
   if (arguments.list) {
     list(cases);
     return 0;
   }
-  const Codes codes = wanted_codes(arguments);
+  const auto named = [&](const Case& which) {
+    return which.name.find(arguments.problem) != std::string::npos;
+  };
+  if (std::none_of(cases.begin(), cases.end(), named))
+    throw CLI::ValidationError(
+        "--problem", "no problem's name contains \"" + arguments.problem + "\"; --list shows them");
+  const Codes codes = wanted_codes(arguments.peers);
+  check_writable(arguments);
   std::vector<std::string> peers;
   std::string versions;
   for (const auto& code : codes) {
@@ -238,72 +192,16 @@ int run(const Arguments& arguments) {
     versions += (versions.empty() ? "" : ",") + json_string(code->name()) + ":" +
                 json_string(code->version());
   }
-  const Plan plan{tolerance_ladder(loose, tight, arguments.count), arguments.repeats,
-                  !arguments.no_watch, arguments.seconds, 300000};
-
-  std::string csv =
-      "problem,code,form,tolerance,error,scd,cpu_ms,steps,F,J,factorizations,projections,"
-      "error_failures,solver_failures,drift,orders,mark\n";
-  std::string html, json_points, json_ratios;
-  std::map<std::string, GeometricMean> overall;
-  std::map<std::string, int> ahead;
-  int matched = 0;
-  for (const Case& which : cases) {
-    if (which.name.find(arguments.problem) == std::string::npos) continue;
-    ++matched;
-    const std::vector<Point> points = measure(which, codes, plan);
-    const Comparison comparison = compare(points, peers);
-    const Table marked = failures(points), work = work_at(points, 1e-6);
-    fmt::print("{}: {}\n{}", which.name, which.text, comparison.table.text());
-    if (arguments.work) fmt::print("\n{}", work.text());
-    if (!marked.rows.empty()) fmt::print("ours beyond 100 tolerances:\n{}", marked.text());
-    fmt::print("\n");
-    std::fflush(stdout);
-    for (const auto& [code, mean] : comparison.ratio) {
-      overall[code].add(mean.value());
-      json_ratios +=
-          fmt::format("{}{{\"problem\":{},\"code\":{},\"mean\":{},\"largest\":{},\"decades\":{}}}",
-                      json_ratios.empty() ? "" : ",\n", json_string(which.name), json_string(code),
-                      json_number(mean.value()), json_number(mean.largest()), mean.count());
-    }
-    for (const auto& [code, count] : comparison.ahead) ahead[code] += count;
-    const std::string image = picture(which, points);
-    if (!arguments.svg.empty()) {
-      std::string file = which.name;
-      std::replace(file.begin(), file.end(), ' ', '_');
-      mkdir(arguments.svg.c_str(), 0777);
-      write_file(arguments.svg + "/" + file + ".svg", image);
-    }
-    html += fmt::format(
-        "<h3>{}</h3>\n<p>{}</p>\n{}\n{}<details><summary>Work at 1e-6</summary>{}"
-        "</details>\n",
-        html_escape(which.name), html_escape(which.text), image, comparison.table.html(),
-        work.html());
-    if (!marked.rows.empty())
-      html +=
-          "<details><summary>Ours beyond 100 tolerances</summary>" + marked.html() + "</details>\n";
-    for (const Point& point : points) {
-      csv += csv_line(point);
-      json_points += (json_points.empty() ? "" : ",\n") + json_point(point);
-    }
-  }
-  if (matched == 0) {
-    fmt::print(stderr, "no problem's name contains \"{}\"; --list shows them\n", arguments.problem);
-    return 2;
-  }
-
-  Table summary;
-  summary.head = {"ours / its best form", "geometric mean", "worst problem", "decades it leads"};
-  for (const auto& [code, mean] : overall)
-    summary.rows.push_back({code, number(mean.value(), "{:.2f}"), number(mean.largest(), "{:.2f}"),
-                            fmt::format("{}", ahead[code])});
-  fmt::print("CPU at equal error, 1e-3 to 1e-9, all problems\n{}", summary.text());
-  html = "<h2>Error against time</h2>\n" + summary.html() + html;
-  if (!arguments.csv.empty()) write_file(arguments.csv, csv);
-  if (!arguments.html.empty()) write_file(arguments.html, html);
-  if (!arguments.json.empty())
-    write_file(arguments.json, "{\"versions\":{" + versions + "},\n\"ratios\":[" + json_ratios +
-                                   "],\n\"runs\":[" + json_points + "]}\n");
+  Plan plan;
+  plan.tolerances = tolerance_ladder(loose, tight, arguments.count);
+  plan.repeats = arguments.repeats;
+  plan.watch = !arguments.no_watch;
+  plan.run_seconds = arguments.seconds;
+  plan.reach = !arguments.no_reach;
+  Report report(arguments, peers);
+  for (const Case& which : cases)
+    if (named(which)) report.add(which, measure(which, codes, plan));
+  report.finish(versions);
   return 0;
 }
 

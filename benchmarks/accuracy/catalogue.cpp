@@ -3,8 +3,11 @@
 
 #include <problems/akzo_nobel.hpp>
 #include <problems/andrews.hpp>
+#include <problems/bricard.hpp>
 #include <problems/car_axis.hpp>
+#include <problems/governor.hpp>
 #include <problems/kepler.hpp>
+#include <problems/link_chain.hpp>
 #include <problems/lotka_volterra.hpp>
 #include <problems/pendulum.hpp>
 #include <problems/pinned_rods.hpp>
@@ -51,8 +54,19 @@ std::vector<Case> catalogue() {
       {"lotka volterra", "one invariant that is no polynomial", {lotka_volterra(2, 0.5, 100)}},
       {"four bar", "two linked four-bars: rank drops twice a turn",
        in_forms(pinned_rods_forms(), [](auto& form) { return n_four_bar(2, 10.0, form); })},
+      {"four bar of 5", "five linked four-bars, t = 3: rank drops by five",
+       in_forms(pinned_rods_forms(), [](auto& form) { return n_four_bar(5, 3.0, form); })},
+      {"four bar of 10", "ten linked four-bars, t = 1: rank drops by ten",
+       in_forms(pinned_rods_forms(), [](auto& form) { return n_four_bar(10, 1.0, form); })},
+      {"bricard", "six-bar linkage in space, one row redundant throughout",
+       in_forms(bricard_forms(), [](auto& form) { return bricard(5.0, form); })},
+      {"governor", "stiff dampers; angular momentum kept, energy not",
+       in_forms(governor_forms(), [](auto& form) { return governor(1.0, form); })},
       {"five-link chain", "chaotic: falls from the horizontal, t = 2",
        in_forms(pinned_rods_forms(), [](auto& form) { return five_link_chain(2.0, form); })},
+      {"chain of 100",
+       "hundred links falling, t = 0.5: sparse factors (KLU)",
+       {link_chain(100, 0.5)}},
   };
 }
 

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <problems/problem.hpp>
 #include <string>
@@ -26,6 +27,22 @@ class Code {
                   const Watch& watch = {}) const = 0;
 };
 
+/// A code that this machine does not have.
+class Absent : public Code {
+ public:
+  Absent(std::string name, std::string why) : name_(std::move(name)), why_(std::move(why)) {}
+  std::string name() const override { return name_; }
+  std::string version() const override { return "absent"; }
+  std::string missing() const override { return why_; }
+  std::string refuses(const problems::Problem&) const override { return why_; }
+  Run run(const problems::Problem&, double, const Limits&, const Watch&) const override {
+    return {};
+  }
+
+ private:
+  std::string name_, why_;
+};
+
 using Codes = std::vector<std::unique_ptr<Code>>;
 
 /// Ours and plain IDA: "IDA" (algebraic variables in the error test), "IDA suppressed", "Tether",
@@ -35,7 +52,8 @@ void add_ida_codes(Codes& codes);
 /// "RADAU5", "DASPK", "DASPK suppressed" from r-cran-desolve, opened at run time.
 void add_desolve_codes(Codes& codes);
 
-/// "CVODE+proj", for forms that are ordinary differential equations.
+/// "CVODE+proj" (least move in the weights of the error test) and "CVODE+proj (length)" (in
+/// length), for forms that are ordinary differential equations.
 void add_cvode_code(Codes& codes);
 
 /// "CPodes" of Simbody, where that was found when the benchmarks were built.
@@ -44,11 +62,15 @@ void add_cpodes_code(Codes& codes);
 /// Every code, the missing ones too.
 Codes all_codes();
 
-/// The code without what is said about its error test: "IDA suppressed" is one way to run "IDA".
+/// The code without what is said about its variant: "IDA suppressed" is one way to run "IDA".
 inline std::string base_name(const std::string& code) {
-  const std::size_t end = code.find(" suppressed");
+  const std::size_t end = std::min(code.find(" suppressed"), code.find(" ("));
   return end == std::string::npos ? code : code.substr(0, end);
 }
+
+/// For codes without sparse factors here.
+inline bool dense_enough(const problems::Problem& problem) { return problem.sparse.starts.empty(); }
+constexpr const char* kOnlyDense = "sparse problem, and its adapter has dense factors only";
 
 inline bool is_ours(const std::string& code) { return code == "Tether" || code == "Tether smooth"; }
 

@@ -10,6 +10,9 @@ Codes all_codes() {
   add_desolve_codes(codes);
 #ifdef TETHER_HAVE_CVODE
   add_cvode_code(codes);
+#else
+  codes.push_back(std::make_unique<Absent>(
+      "CVODE+proj", "needs CVODE when the benchmarks are built (apt-get install libsundials-dev)"));
 #endif
   add_cpodes_code(codes);
   return codes;

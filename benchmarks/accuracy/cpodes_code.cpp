@@ -5,25 +5,6 @@
 
 namespace tether::bench {
 
-namespace {
-
-class Absent : public Code {
- public:
-  explicit Absent(std::string why) : why_(std::move(why)) {}
-  std::string name() const override { return "CPodes"; }
-  std::string version() const override { return "absent"; }
-  std::string missing() const override { return why_; }
-  std::string refuses(const problems::Problem&) const override { return why_; }
-  Run run(const problems::Problem&, double, const Limits&, const Watch&) const override {
-    return {};
-  }
-
- private:
-  std::string why_;
-};
-
-}  // namespace
-
 void add_cpodes_code(Codes& codes) {
 #ifdef TETHER_CPODES_MODULE
   void* module = dlopen(TETHER_CPODES_MODULE, RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
@@ -34,10 +15,10 @@ void add_cpodes_code(Codes& codes) {
     }
   }
   const char* why = dlerror();
-  codes.push_back(std::make_unique<Absent>(why ? why : "its module has no entry"));
+  codes.push_back(std::make_unique<Absent>("CPodes", why ? why : "its module has no entry"));
 #else
   codes.push_back(std::make_unique<Absent>(
-      "needs Simbody when the benchmarks are built (apt-get install libsimbody-dev)"));
+      "CPodes", "needs Simbody when the benchmarks are built (apt-get install libsimbody-dev)"));
 #endif
 }
 

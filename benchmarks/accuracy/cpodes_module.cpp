@@ -20,6 +20,7 @@ class CpodesCode : public Code {
   std::string name() const override { return "CPodes"; }
   std::string version() const override { return "of libsimbody"; }
   std::string refuses(const problems::Problem& problem) const override {
+    if (!dense_enough(problem)) return kOnlyDense;
     // Simbody's vectors lack the minimum that CPodes wants of a tolerance for each component.
     if (!problem.atol_scale.empty()) return "takes one absolute tolerance only";
     return ExplicitForm(problem).ordinary() ? std::string() : "no ordinary differential equation";
@@ -30,16 +31,13 @@ class CpodesCode : public Code {
 
 class System : public SimTK::CPodesSystem {
  public:
-  System(const problems::Problem& problem, const ExplicitForm& form, double deadline)
-      : form_(form), rows_(problem.recommended_constraints()), deadline_(deadline) {
+  System(const problems::Problem& problem, const ExplicitForm& form, double seconds)
+      : form_(form), rows_(problem.recommended_constraints()), deadline_(seconds, problem.size) {
     for (const auto* part : parts()) count_ += part->count;
   }
 
   int explicitODE(SimTK::Real t, const SimTK::Vector& y, SimTK::Vector& f) const override {
-    if (++calls_ % 1024 == 0 && cpu_seconds() > deadline_) {
-      late_ = true;
-      return SimTK::CPodes::UnrecoverableError;
-    }
+    if (deadline_.passed()) return SimTK::CPodes::UnrecoverableError;
     form_.evaluate(t, &y[0], &f[0], true);
     return SimTK::CPodes::Success;
   }
@@ -57,8 +55,7 @@ class System : public SimTK::CPodesSystem {
   void errorHandler(int, const char*, const char*, char*) const override {}
 
   int count() const { return count_; }
-  long calls() const { return calls_; }
-  bool late() const { return late_; }
+  const Deadline& deadline() const { return deadline_; }
 
  private:
   std::vector<const ida_projection::Constraints*> parts() const {
@@ -68,17 +65,15 @@ class System : public SimTK::CPodesSystem {
   }
   const ExplicitForm& form_;
   ida_projection::Constraints rows_;
-  double deadline_;
+  mutable Deadline deadline_;
   int count_ = 0;
-  mutable long calls_ = 0;
-  mutable bool late_ = false;
 };
 
 Run CpodesCode::run(const problems::Problem& problem, double tolerance, const Limits& limits,
                     const Watch& watch) const {
   using SimTK::CPodes;
   const ExplicitForm form(problem);
-  System system(problem, form, cpu_seconds() + limits.cpu_seconds);
+  System system(problem, form, limits.cpu_seconds);
   const int N = problem.size;
   SimTK::Vector y(N), yp(N), ctol(system.count(), tolerance);
   SimTK::Real atol = tolerance;
@@ -111,7 +106,7 @@ Run CpodesCode::run(const problems::Problem& problem, double tolerance, const Li
   run.failed = run.flag < 0;
   run.y.assign(&y[0], &y[0] + N);
   run.error = problem.error(run.y.data());
-  run.residuals = system.calls();
+  run.residuals = system.deadline().calls();
   int steps = 0, setups = 0, jacobians = 0, error_failures = 0, failures = 0, projections = 0;
   cpodes.getNumSteps(&steps);
   cpodes.getNumLinSolvSetups(&setups);
@@ -126,7 +121,8 @@ Run CpodesCode::run(const problems::Problem& problem, double tolerance, const Li
   run.solver_failures = failures;
   run.projections = projections;
   if (run.failed)
-    run.message = system.late() ? "time limit" : "return code " + std::to_string(run.flag);
+    run.message =
+        system.deadline().late() ? "time limit" : "return code " + std::to_string(run.flag);
   return run;
 }
 

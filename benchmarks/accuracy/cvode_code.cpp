@@ -1,18 +1,17 @@
 // Tether: CVODE's BDF with its own projection. SPDX-License-Identifier: BSD-3-Clause
 #include <cvode/cvode.h>
 #include <cvode/cvode_proj.h>
-#include <nvector/nvector_serial.h>
 #include <sundials/sundials_version.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <Eigen/Dense>
-#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <tether/linalg/minimum_norm.hpp>
 
 #include "code.hpp"
 #include "explicit_form.hpp"
-#include "projection/context.hpp"
 #include "rows_of.hpp"
 
 namespace tether::bench {
@@ -21,67 +20,90 @@ namespace {
 
 struct Host {
   const ExplicitForm* form;
-  ida_projection::Constraints constraints;
-  double deadline;
-  unsigned calls = 0;
-  bool late = false;
-  Eigen::VectorXd y, g, weight;
+  Deadline deadline;
+  ida_projection::Constraints rows;
+  bool weighted;  // metric: weights of the error test, or plain length
+  void* cvode;
+  N_Vector weights;
+  Eigen::VectorXd y, g, step;
   RowMajor C;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
+  linalg::MinimumNorm factors;
 };
 
 int rates(sunrealtype t, N_Vector y, N_Vector f, void* data) {
   auto* host = static_cast<Host*>(data);
-  if (++host->calls % 1024 == 0 && cpu_seconds() > host->deadline) {
-    host->late = true;
-    return -1;
-  }
+  if (host->deadline.passed()) return -1;
   host->form->evaluate(t, N_VGetArrayPointer(y), N_VGetArrayPointer(f), true);
   return 0;
 }
 
-// As CVODE's guide describes it: Gauss-Newton by the least move, and the part of the error estimate
-// that is tangential to the constraints.
-int project(sunrealtype t, N_Vector y_now, N_Vector correction, sunrealtype epsilon, N_Vector error,
-            void* data) {
-  auto* host = static_cast<Host*>(data);
-  const Eigen::Index N = host->weight.size();
-  const Eigen::Map<const Eigen::VectorXd> start(N_VGetArrayPointer(y_now), N);
-  Eigen::Map<Eigen::VectorXd> move(N_VGetArrayPointer(correction), N);
-  const auto& rows = host->constraints;
-  host->y = start;
-  auto& factors = host->factors;
-  for (int iteration = 0; iteration < 5; ++iteration) {
-    evaluate_rows(rows, t, host->y, host->g, host->C);
-    factors.compute(host->C);
-    const Eigen::VectorXd step = factors.solve(host->g);
-    host->y -= step;
-    if (!host->y.allFinite()) return 1;
-    const double length =
-        std::sqrt(step.cwiseProduct(host->weight).squaredNorm() / static_cast<double>(N));
-    if (length <= epsilon) {
-      move = host->y - start;
-      if (error) {
-        Eigen::Map<Eigen::VectorXd> e(N_VGetArrayPointer(error), N);
-        e -= factors.solve(host->C * e).eval();
-      }
-      return 0;
-    }
-  }
-  return 1;
+bool factor(Host& host, double t) {
+  evaluate_rows(host.rows, t, host.y, host.g, host.C);
+  for (Eigen::Index i = 0; i < host.C.rows(); ++i)
+    std::copy(host.C.row(i).data(), host.C.row(i).data() + host.C.cols(),
+              host.factors.row(static_cast<int>(i)));
+  const double* weights = N_VGetArrayPointer(host.weights);
+  for (int j = 0; j < host.factors.columns(); ++j)
+    host.factors.metric()[j] = host.weighted ? 1.0 / weights[j] : 1.0;
+  return host.factors.factor(host.factors.metric(), 1e-9);
 }
 
-[[maybe_unused]] void silent(int, const char*, const char*, char*, void*) {}
+// As CVODE's guide describes it: the least move, and the part of the error estimate that is
+// tangential to the constraints. Analytic rows, one factorisation a step: later moves, which are
+// rare, keep the first one's factors (chord), as their error is of second order.
+int project(sunrealtype t, N_Vector y_now, N_Vector correction, sunrealtype epsilon, N_Vector error,
+            void* data) {
+  auto& host = *static_cast<Host*>(data);
+  const Eigen::Index N = host.y.size();
+  const Eigen::Map<const Eigen::VectorXd> start(N_VGetArrayPointer(y_now), N);
+  CVodeGetErrWeights(host.cvode, host.weights);
+  const Eigen::Map<const Eigen::VectorXd> weights(N_VGetArrayPointer(host.weights), N);
+  host.y = start;
+  if (!factor(host, t)) return 1;
+  bool there = false;
+  for (int move = 0; move < 5 && !there; ++move) {
+    if (move > 0) evaluate_values(host.rows, t, host.y, host.g);
+    host.factors.solve(host.g.data(), host.step.data());
+    host.y -= host.step;
+    const double length =
+        std::sqrt(host.step.cwiseProduct(weights).squaredNorm() / static_cast<double>(N));
+    if (!std::isfinite(length)) return 1;
+    there = length <= epsilon;
+  }
+  if (!there) return 1;
+  Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(correction), N) = host.y - start;
+  if (!error) return 0;
+  Eigen::Map<Eigen::VectorXd> e(N_VGetArrayPointer(error), N);
+  host.g.noalias() = host.C * e;
+  host.factors.solve(host.g.data(), host.step.data());
+  e -= host.step;
+  return 0;
+}
+
+void read_counts(void* cvode, Run& run) {
+  long differences = 0;
+  CVodeGetNumSteps(cvode, &run.steps);
+  CVodeGetNumRhsEvals(cvode, &run.residuals);
+  CVodeGetNumLinRhsEvals(cvode, &differences);
+  run.residuals += differences;
+  CVodeGetNumErrTestFails(cvode, &run.error_failures);
+  CVodeGetNumNonlinSolvConvFails(cvode, &run.solver_failures);
+  CVodeGetNumJacEvals(cvode, &run.jacobians);
+  CVodeGetNumLinSolvSetups(cvode, &run.factorizations);
+  CVodeGetNumProjEvals(cvode, &run.projections);
+}
 
 class CvodeCode : public Code {
  public:
-  std::string name() const override { return "CVODE+proj"; }
+  explicit CvodeCode(bool weighted) : weighted_(weighted) {}
+  std::string name() const override { return weighted_ ? "CVODE+proj" : "CVODE+proj (length)"; }
   std::string version() const override {
     char text[32] = "";
     SUNDIALSGetVersion(text, sizeof text);
     return std::string("SUNDIALS ") + text;
   }
   std::string refuses(const problems::Problem& problem) const override {
+    if (!dense_enough(problem)) return kOnlyDense;
     return ExplicitForm(problem).ordinary() ? std::string() : "no ordinary differential equation";
   }
 
@@ -90,27 +112,22 @@ class CvodeCode : public Code {
     const ExplicitForm form(problem);
     const int N = problem.size;
     SUNContext context = make_context();
-    N_Vector y = N_VNew_Serial(N, context), atol = N_VClone(y);
-    std::copy(problem.y0.begin(), problem.y0.end(), N_VGetArrayPointer(y));
-    Host host{&form,
-              problem.recommended_constraints(),
-              cpu_seconds() + limits.cpu_seconds,
-              0,
-              false,
-              {},
-              {},
-              Eigen::VectorXd(N),
-              {},
-              {}};
-    host.factors.setThreshold(1e-9);
-    for (int i = 0; i < N; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      const double absolute =
-          tolerance * (problem.atol_scale.empty() ? 1.0 : problem.atol_scale[k]);
-      N_VGetArrayPointer(atol)[i] = absolute;
-      host.weight[i] = 1.0 / (tolerance * std::abs(problem.y0[k]) + absolute);
-    }
+    N_Vector y = vector_of(problem.y0, context);
+    N_Vector atol = vector_of(absolute_tolerances(problem, tolerance), context);
     void* cvode = CVodeCreate(CV_BDF, context);
+    const ida_projection::Constraints rows = problem.recommended_constraints();
+    const int m = rows.total_count();
+    Host host{&form,
+              Deadline(limits.cpu_seconds, N),
+              rows,
+              weighted_,
+              cvode,
+              N_VClone(y),
+              Eigen::VectorXd(N),
+              Eigen::VectorXd(m),
+              Eigen::VectorXd(N),
+              RowMajor(m, N),
+              linalg::MinimumNorm(m, N)};
 #ifndef SUN_COMM_NULL
     CVodeSetErrHandlerFn(cvode, silent, nullptr);
 #endif
@@ -137,33 +154,29 @@ class CvodeCode : public Code {
     run.failed = run.flag < 0;
     run.y.assign(N_VGetArrayPointer(y), N_VGetArrayPointer(y) + N);
     run.error = problem.error(run.y.data());
-    long differences = 0;
-    CVodeGetNumSteps(cvode, &run.steps);
-    CVodeGetNumRhsEvals(cvode, &run.residuals);
-    CVodeGetNumLinRhsEvals(cvode, &differences);
-    run.residuals += differences;
-    CVodeGetNumErrTestFails(cvode, &run.error_failures);
-    CVodeGetNumNonlinSolvConvFails(cvode, &run.solver_failures);
-    CVodeGetNumJacEvals(cvode, &run.jacobians);
-    CVodeGetNumLinSolvSetups(cvode, &run.factorizations);
-    CVodeGetNumProjEvals(cvode, &run.projections);
+    read_counts(cvode, run);
     if (run.failed) {
       char* flag = CVodeGetReturnFlagName(run.flag);
-      run.message = host.late ? "time limit" : std::string(flag);
+      run.message = host.deadline.late() ? "time limit" : std::string(flag);
       std::free(flag);
     }
     CVodeFree(&cvode);
     SUNLinSolFree(solver);
     SUNMatDestroy(matrix);
-    N_VDestroy(y);
-    N_VDestroy(atol);
+    for (N_Vector v : {y, atol, host.weights}) N_VDestroy(v);
     SUNContext_Free(&context);
     return run;
   }
+
+ private:
+  bool weighted_;
 };
 
 }  // namespace
 
-void add_cvode_code(Codes& codes) { codes.push_back(std::make_unique<CvodeCode>()); }
+void add_cvode_code(Codes& codes) {
+  codes.push_back(std::make_unique<CvodeCode>(true));
+  codes.push_back(std::make_unique<CvodeCode>(false));
+}
 
 }  // namespace tether::bench

@@ -25,17 +25,10 @@ namespace {
 
 // Fortran callbacks carry no pointer of the caller's.
 struct Host {
-  const problems::Problem* problem = nullptr;
-  const ExplicitForm* form = nullptr;
-  const Watch* watch = nullptr;
-  double deadline = 0.0;
-  long calls = 0;
-  bool late = false;
-
-  bool too_late() {
-    if (++calls % 1024 == 0 && cpu_seconds() > deadline) late = true;
-    return late;
-  }
+  const problems::Problem* problem;
+  const ExplicitForm* form;
+  const Watch* watch;
+  Deadline deadline;
 };
 Host* host = nullptr;
 
@@ -56,7 +49,7 @@ using Ddaspk = void (*)(DaspkResidual, int* n, double* t, double* y, double* yp,
                         int* iwork, int* liw, double* rpar, int* ipar, void* jac, void* psol);
 
 void radau_rates(int* n, double* t, double* y, double* f, double*, int*) {
-  if (host->too_late()) {  // RADAU5 has no way out but a step size that becomes too small
+  if (host->deadline.passed()) {  // RADAU5 has no way out but a step size that becomes too small
     std::fill(f, f + *n, std::nan(""));
     return;
   }
@@ -73,7 +66,7 @@ void radau_output(int* number, double*, double* t, double* y, double*, int*, int
 }
 void daspk_residual(double* t, double* y, double* yp, double*, double* r, int* ires, double*,
                     int*) {
-  if (host->too_late()) {
+  if (host->deadline.passed()) {
     *ires = -2;
     return;
   }
@@ -99,31 +92,31 @@ class Library {
  private:
   Library() {
     const char* named = std::getenv("TETHER_DESOLVE");
-    const char* const places[] = {named ? named : "",
-                                  "/usr/lib/R/site-library/deSolve/libs/deSolve.so",
-                                  "/usr/local/lib/R/site-library/deSolve/libs/deSolve.so",
-                                  "/usr/lib/R/library/deSolve/libs/deSolve.so"};
-    for (const char* place : places) {
-      void* handle = *place ? dlopen(place, RTLD_LAZY | RTLD_LOCAL) : nullptr;
-      if (!handle) continue;
-      radau5 = reinterpret_cast<Radau5>(dlsym(handle, "radau5_"));
-      ddaspk = reinterpret_cast<Ddaspk>(dlsym(handle, "ddaspk_"));
-      return;  // stays open to the end
+    // A name that is given is the only place: it can also hide the package.
+    if (named) {
+      open(named);
+      return;
     }
+    for (const char* place : {"/usr/lib/R/site-library/deSolve/libs/deSolve.so",
+                              "/usr/local/lib/R/site-library/deSolve/libs/deSolve.so",
+                              "/usr/lib/R/library/deSolve/libs/deSolve.so"})
+      if (!ddaspk) open(place);
+  }
+
+  void open(const char* place) {
+    void* handle = dlopen(place, RTLD_LAZY | RTLD_LOCAL);  // stays open to the end
+    if (!handle) return;
+    radau5 = reinterpret_cast<Radau5>(dlsym(handle, "radau5_"));
+    ddaspk = reinterpret_cast<Ddaspk>(dlsym(handle, "ddaspk_"));
   }
 };
-
-std::vector<double> absolute(const problems::Problem& problem, double tolerance) {
-  std::vector<double> atol(static_cast<std::size_t>(problem.size), tolerance);
-  for (std::size_t i = 0; i < problem.atol_scale.size(); ++i) atol[i] *= problem.atol_scale[i];
-  return atol;
-}
 
 void finish(const problems::Problem& problem, const Host& its, double begin, Run& run) {
   run.cpu_ms = 1e3 * (cpu_seconds() - begin);
   run.error = problem.error(run.y.data());
-  run.residuals = its.calls;
-  if (run.failed) run.message = its.late ? "time limit" : "return code " + std::to_string(run.flag);
+  run.residuals = its.deadline.calls();
+  if (run.failed)
+    run.message = its.deadline.late() ? "time limit" : "return code " + std::to_string(run.flag);
 }
 
 class Radau5Code : public Code {
@@ -132,6 +125,7 @@ class Radau5Code : public Code {
   std::string version() const override { return "of r-cran-desolve"; }
   std::string missing() const override { return Library::get().missing(); }
   std::string refuses(const problems::Problem& problem) const override {
+    if (!dense_enough(problem)) return kOnlyDense;
     return ExplicitForm(problem).constant() ? std::string() : "dF/dy' is not constant";
   }
 
@@ -143,14 +137,15 @@ class Radau5Code : public Code {
         limit_steps = static_cast<int>(limits.steps);
     std::vector<double> work(static_cast<std::size_t>(lwork), 0.0);
     std::vector<int> iwork(static_cast<std::size_t>(liwork), 0);
-    std::vector<double> atol = absolute(problem, tolerance), rtol(atol.size(), tolerance);
+    std::vector<double> atol = absolute_tolerances(problem, tolerance),
+                        rtol(atol.size(), tolerance);
     iwork[1] = limit_steps;
     for (std::size_t k = 0; k < 3 && !problem.variable_index.empty(); ++k)
       iwork[4 + k] = static_cast<int>(std::count(
           problem.variable_index.begin(), problem.variable_index.end(), static_cast<int>(k) + 1));
     double t = problem.t0, t_end = problem.t_end, rpar = 0.0;
     double h = problem.initial_step > 0.0 ? problem.initial_step : 1e-6 * (t_end - t);
-    Host its{&problem, &form, &watch, cpu_seconds() + limits.cpu_seconds, 0, false};
+    Host its{&problem, &form, &watch, Deadline(limits.cpu_seconds, n)};
     host = &its;
     Run run;
     run.y = problem.y0;
@@ -178,6 +173,7 @@ class DaspkCode : public Code {
   std::string version() const override { return "of r-cran-desolve"; }
   std::string missing() const override { return Library::get().missing(); }
   std::string refuses(const problems::Problem& problem) const override {
+    if (!dense_enough(problem)) return kOnlyDense;
     if (problem.index > 2) return "DASPK is made for index 0, 1 and, with care, 2";
     const bool algebraic = std::count(problem.id.begin(), problem.id.end(), 0.0) > 0;
     return suppressed_ && !algebraic ? "no algebraic variables" : std::string();
@@ -190,7 +186,7 @@ class DaspkCode : public Code {
     int lrw = 60 + 12 * n + n * n, liw = 60 + 3 * n;
     std::vector<double> rwork(static_cast<std::size_t>(lrw), 0.0);
     std::vector<int> iwork(static_cast<std::size_t>(liw), 0);
-    std::vector<double> atol = absolute(problem, tolerance), rtol(N, tolerance);
+    std::vector<double> atol = absolute_tolerances(problem, tolerance), rtol(N, tolerance);
     info[1] = 1;  // a tolerance for each component
     info[2] = watch ? 1 : 0;
     info[3] = 1;  // not past t_end
@@ -203,7 +199,7 @@ class DaspkCode : public Code {
       info[15] = 1;
       for (std::size_t i = 0; i < N; ++i) iwork[40 + i] = problem.id[i] == 1.0 ? 1 : -1;
     }
-    Host its{&problem, nullptr, &watch, cpu_seconds() + limits.cpu_seconds, 0, false};
+    Host its{&problem, nullptr, &watch, Deadline(limits.cpu_seconds, n)};
     host = &its;
     Run run;
     run.y = problem.y0;

@@ -52,6 +52,8 @@ class IdaCode : public Code {
       settings.constraints = problem.recommended_constraints();
       settings.options.step_smoothing = variant_ == Variant::smooth;
       settings.options.print_fatal = false;
+      // Derived from columns of dF/dy' it would cost an F for each unknown.
+      settings.give_id = !problem.sparse.starts.empty();
     }
     return integrate(problem, tolerance, settings);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,8 +22,13 @@ struct Point {
   /// Largest |g| over all steps, for every group of rows; empty when not watched.
   std::vector<std::pair<std::string, double>> drift;
   std::array<long, 13> orders{};  ///< steps taken with each order; all 0 when not watched
-  /// Why its error is not within 100 tolerances; empty when it is.
-  std::string mark;
+  /// "met": error within 100 tolerances; "adds up", "missed" or "failed" and why.
+  std::string status;
+  /// CPU / that of the best form of any peer, of plain IDA, at the same error; NaN where none is
+  /// read.
+  double to_peers = std::nan(""), to_plain = std::nan("");
+
+  bool met() const { return status == "met"; }
 
   bool usable() const { return !run.failed && run.error == run.error; }
 };
@@ -33,6 +39,10 @@ struct Plan {
   bool watch = true;         ///< second, untimed run: drift and orders
   double run_seconds = 2.0;  ///< CPU limit of one run
   long steps = 300000;
+  /// Go on beyond the tolerances until a code's end errors cover 1e-3 to 1e-9, at most from 1e-1 to
+  /// 1e-13: codes whose errors are far from their tolerances are compared at equal error all the
+  /// same.
+  bool reach = true;
 };
 
 /// Timed runs are interleaved: every repeat goes once through all codes and forms, so that what
@@ -45,5 +55,11 @@ struct Family {
   std::vector<Curve> forms;
 };
 std::vector<Family> families(const std::vector<Point>& points);
+
+/// The cheapest form of a code at an error, its variants ("IDA suppressed": "s" after the form)
+/// included; CPU NaN when none reaches it.
+Best best_of(const std::vector<Family>& all, const std::string& base, double error);
+
+inline bool is_peer(const std::string& code) { return base_name(code) != "IDA" && !is_ours(code); }
 
 }  // namespace tether::bench

@@ -9,22 +9,37 @@ namespace tether::bench {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// g and C = dg/dy of rows that were joined with `+`; all of them with dense Jacobians.
-inline void evaluate_rows(const ida_projection::Constraints& rows, double t,
-                          const Eigen::VectorXd& y, Eigen::VectorXd& g, RowMajor& C) {
-  g.resize(rows.total_count());
-  C.setZero(rows.total_count(), y.size());
+/// f(rows, index of their first row) for each of the sets that were joined with `+`.
+template <class F>
+void each_part(const ida_projection::Constraints& rows, F f) {
   Eigen::Index first = 0;
-  const auto one = [&](const ida_projection::Constraints& part) {
+  f(rows, first);
+  first += rows.count;
+  for (const auto& part : rows.joined) {
+    f(part, first);
+    first += part.count;
+  }
+}
+
+/// g of joined rows; g has their total count.
+inline void evaluate_values(const ida_projection::Constraints& rows, double t,
+                            const Eigen::VectorXd& y, Eigen::VectorXd& g) {
+  each_part(rows, [&](const ida_projection::Constraints& part, Eigen::Index first) {
     part.value(t, ida_projection::ConstVector(y.data(), y.size()),
                ida_projection::Vector(g.data() + first, part.count));
+  });
+}
+
+/// g and C = dg/dy, all of them with dense Jacobians; C is total count x N.
+inline void evaluate_rows(const ida_projection::Constraints& rows, double t,
+                          const Eigen::VectorXd& y, Eigen::VectorXd& g, RowMajor& C) {
+  evaluate_values(rows, t, y, g);
+  C.setZero();
+  each_part(rows, [&](const ida_projection::Constraints& part, Eigen::Index first) {
     std::get<ida_projection::DenseJacobian>(part.jacobian)
         .fill(t, ida_projection::ConstVector(y.data(), y.size()),
               ida_projection::Matrix(C.data() + first * y.size(), part.count, y.size()));
-    first += part.count;
-  };
-  one(rows);
-  for (const auto& part : rows.joined) one(part);
+  });
 }
 
 }  // namespace tether::bench

@@ -29,17 +29,10 @@ void rates(const double* y, double* dy) {
 }  // namespace
 
 Problem akzo_nobel() {
-  Problem p;
-  p.name = "akzo nobel";
-  p.form = "index 1";
-  p.size = 6;
-  p.t_end = 180.0;
-  p.y0 = {.444, .00123, 0.0, .007, 0.0, kEquilibrium * .444 * .007};
-  p.yp0.assign(6, 0.0);
-  rates(p.y0.data(), p.yp0.data());
-  p.yp0[5] = kEquilibrium * (p.yp0[0] * p.y0[3] + p.y0[0] * p.yp0[3]);
-  p.id = {1.0, 1.0, 1.0, 1.0, 1.0, 0.0};
-  p.error_components = 6;
+  std::vector<double> y0 = {.444, .00123, 0.0, .007, 0.0, kEquilibrium * .444 * .007}, yp0(6);
+  rates(y0.data(), yp0.data());
+  yp0[5] = kEquilibrium * (yp0[0] * y0[3] + y0[0] * yp0[3]);
+  Problem p = start_problem("akzo nobel", "index 1", 1, 180.0, y0, yp0, {1, 1, 1, 1, 1, 0});
   p.residual = [](double, const double* y, const double* yp, double* r) {
     rates(y, r);
     for (int i = 0; i < 5; ++i) r[i] = yp[i] - r[i];

@@ -28,16 +28,9 @@ std::vector<double> exact(long double e, long double t) {
 
 Problem kepler(double e, double t_end) {
   if (!(e >= 0.0 && e < 1.0)) throw std::invalid_argument("kepler: 0 <= e < 1");
-  Problem p;
-  p.name = "kepler";
-  p.form = "index 0";
-  p.index = 0;
-  p.size = 4;
-  p.t_end = t_end;
-  p.y0 = exact(e, 0.0L);
-  p.yp0 = {p.y0[2], p.y0[3], -1.0 / (p.y0[0] * p.y0[0]), 0.0};
-  p.id.assign(4, 1.0);
-  p.error_components = 4;
+  const std::vector<double> y0 = exact(e, 0.0L);
+  Problem p = start_problem("kepler", "index 0", 0, t_end, y0,
+                            {y0[2], y0[3], -1.0 / (y0[0] * y0[0]), 0.0}, {1, 1, 1, 1});
   p.reference = exact(e, t_end);
   p.residual = [](double, const double* y, const double* yp, double* r) {
     const double r2 = y[0] * y[0] + y[1] * y[1], pull = 1.0 / (r2 * std::sqrt(r2));

@@ -9,16 +9,8 @@ namespace tether::problems {
 Problem lotka_volterra(double x0, double y0, double t_end) {
   if (!(x0 > 0.0) || !(y0 > 0.0))
     throw std::invalid_argument("lotka volterra: the start must be positive");
-  Problem p;
-  p.name = "lotka volterra";
-  p.form = "index 0";
-  p.index = 0;
-  p.size = 2;
-  p.t_end = t_end;
-  p.y0 = {x0, y0};
-  p.yp0 = {x0 * (1.0 - y0), y0 * (x0 - 1.0)};
-  p.id = {1.0, 1.0};
-  p.error_components = 2;
+  Problem p = start_problem("lotka volterra", "index 0", 0, t_end, {x0, y0},
+                            {x0 * (1.0 - y0), y0 * (x0 - 1.0)}, {1, 1});
   p.residual = [](double, const double* y, const double* yp, double* r) {
     r[0] = yp[0] - y[0] * (1.0 - y[1]);
     r[1] = yp[1] - y[1] * (y[0] - 1.0);

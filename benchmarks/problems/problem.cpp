@@ -25,7 +25,9 @@ ida_projection::Constraints Problem::select(const std::vector<std::string>& name
   return joined;
 }
 
-ida_projection::Constraints Problem::recommended_constraints() const { return select(recommended); }
+ida_projection::Constraints Problem::recommended_constraints() const {
+  return own_projection ? *own_projection : select(recommended);
+}
 
 double Problem::error(const double* y) const {
   double worst = 0.0;

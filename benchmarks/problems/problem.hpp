@@ -3,6 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <tether/ida_projection/constraints.hpp>
 #include <vector>
@@ -15,8 +17,16 @@ struct Rows {
   ida_projection::Constraints constraints;
 };
 
+/// dF/dy + cj dF/dy' in compressed columns, for what is too large for dense factors.
+struct SparseJacobian {
+  std::vector<int> starts;  ///< N + 1 indices into `rows`; empty: the problem has dense factors
+  std::vector<int> rows;    ///< ascending in each column
+  std::function<void(double t, double cj, const double* y, const double* yp, double* values)> fill;
+};
+
 /// F(t, y, y') = 0 with a consistent start, everything that its solution keeps, and a reference.
-/// Copies are independent of each other: the callbacks hold constants only.
+/// Copies are independent of each other: the callbacks hold constants only (a projection of its own
+/// has a workspace, which copies share: one run at a time).
 struct Problem {
   std::string name;  ///< "pendulum"
   std::string form;  ///< "index 1"
@@ -32,15 +42,21 @@ struct Problem {
   /// J = dF/dy + cj dF/dy', N x N column-major, every entry written; may be empty.
   std::function<void(double t, double cj, const double* y, const double* yp, double* J)> jacobian;
 
+  SparseJacobian sparse;
+
+  /// The recommended rows by a sparse projection of the problem's own; none: as dense rows.
+  std::optional<ida_projection::Constraints> own_projection;
+  std::shared_ptr<void> kept;  ///< what `own_projection` points to
+
   std::vector<Rows> rows;                ///< each group separately
   std::vector<std::string> recommended;  ///< groups to project by default
   std::vector<double> reference;         ///< y(t_end); NaN where unknown
   int error_components = 0;              ///< the first so many components are compared
   std::vector<double> atol_scale;        ///< factors of the absolute tolerance; empty: all 1
-  /// Index of each unknown in Hairer and Wanner's sense (1, 2 or 3; not decreasing), by which RADAU5
-  /// scales errors; empty: all 1.
+  /// Index of each unknown in Hairer and Wanner's sense (1, 2 or 3; not decreasing), by which
+  /// RADAU5 scales errors; empty: all 1.
   std::vector<int> variable_index;
-  double initial_step = 0.0;             ///< for IDASetInitStep; 0: the integrator's choice
+  double initial_step = 0.0;  ///< for IDASetInitStep; 0: the integrator's choice
 
   /// The named groups joined with `+`; std::invalid_argument for a name that is not there.
   ida_projection::Constraints select(const std::vector<std::string>& names) const;

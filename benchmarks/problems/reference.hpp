@@ -11,13 +11,14 @@ namespace tether::problems {
 
 /// y(t_end) of y' = f(y), y(0) = y0, to the round-off of long double: Gragg's midpoint rule
 /// extrapolated to order 14 (Gragg, Bulirsch, Stoer). f(y, dy) works on std::array<long double, n>.
-/// Not meant for stiff equations.
+/// Not meant for stiff equations; mildly stiff ones want `smallest_step` a few of their shortest
+/// time constants.
 template <std::size_t n, class F>
-std::array<long double, n> reference_solution(F f, std::array<long double, n> y,
-                                              long double t_end) {
+std::array<long double, n> reference_solution(F f, std::array<long double, n> y, long double t_end,
+                                              long double smallest_step = 2e-3L) {
   using State = std::array<long double, n>;
   constexpr int kRows = 7;
-  constexpr long double kTolerance = 1e-18L, kSmallestStep = 2e-3L;
+  constexpr long double kTolerance = 1e-18L;
   State table[kRows], slope, before, middle, after;
   long double t = 0.0L, H = std::min(t_end, 0.1L);
   while (t < t_end) {
@@ -54,7 +55,7 @@ std::array<long double, n> reference_solution(F f, std::array<long double, n> y,
       }
       table[k] = current;
     }
-    if (error > kTolerance && H > kSmallestStep) {  // below: round-off, not truncation
+    if (error > kTolerance && H > smallest_step) {  // below: round-off, not truncation
       H /= 2.0L;
       continue;
     }

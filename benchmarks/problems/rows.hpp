@@ -27,6 +27,23 @@ Rows make_rows(std::string name, std::vector<std::string> row_names, Value value
   return rows;
 }
 
+/// A problem whose unknowns are all compared: name, form, index, end and consistent start.
+inline Problem start_problem(std::string name, std::string form, int index, double t_end,
+                             std::vector<double> y0, std::vector<double> yp0,
+                             std::vector<double> id) {
+  Problem p;
+  p.name = std::move(name);
+  p.form = std::move(form);
+  p.index = index;
+  p.size = static_cast<int>(y0.size());
+  p.error_components = p.size;
+  p.t_end = t_end;
+  p.y0 = std::move(y0);
+  p.yp0 = std::move(yp0);
+  p.id = std::move(id);
+  return p;
+}
+
 /// Throws std::invalid_argument that lists what there is.
 [[noreturn]] inline void unknown_form(const std::string& problem, const std::string& form,
                                       const std::vector<std::string>& forms) {

@@ -30,12 +30,6 @@ void currents(double t, const double* y, double* d) {
 }  // namespace
 
 Problem transistor_amplifier() {
-  Problem p;
-  p.name = "transistor amplifier";
-  p.form = "index 1";
-  p.size = 8;
-  p.t_end = 0.2;
-  p.y0 = {0.0, 3.0, 3.0, 6.0, 3.0, 3.0, 6.0, 0.0};
   // Both halves of each capacitor move together at the start; their common rate keeps the sums of
   // currents at zero.
   const double slope = beta / Uf, dU = 20.0 * 3.14159265358979323846;
@@ -45,9 +39,8 @@ Problem transistor_amplifier() {
   const double y5 =
       (-alpha * slope * (y2 - y3) + (1.0 - alpha) * slope * y6) / (3.0 / R + (1.0 - alpha) * slope);
   const double y8 = -alpha * slope * (y5 - y6) / (2.0 / R);
-  p.yp0 = {y2, y2, y3, y5, y5, y6, y8, y8};
-  p.id.assign(8, 1.0);
-  p.error_components = 8;
+  Problem p = start_problem("transistor amplifier", "index 1", 1, 0.2, {0, 3, 3, 6, 3, 3, 6, 0},
+                            {y2, y2, y3, y5, y5, y6, y8, y8}, std::vector<double>(8, 1.0));
   p.residual = [](double t, const double* y, const double* yp, double* r) {
     currents(t, y, r);
     const double i1 = C1 * (yp[0] - yp[1]), i3 = C3 * (yp[3] - yp[4]), i5 = C5 * (yp[6] - yp[7]);

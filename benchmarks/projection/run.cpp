@@ -3,13 +3,15 @@
 #include "run.hpp"
 
 #include <ida/ida.h>
-#include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
+#ifdef TETHER_HAVE_KLU
+#include <sunlinsol/sunlinsol_klu.h>
+#include <sunmatrix/sunmatrix_sparse.h>
+#endif
 
 #include <algorithm>
 #include <cstdlib>
-#include <ctime>
 
 #include "context.hpp"
 
@@ -19,29 +21,45 @@ namespace {
 
 struct Host {
   const problems::Problem* problem;
-  double deadline;
-  unsigned calls = 0;
-  bool late = false;
+  Deadline deadline;
 };
 
 int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
   auto* host = static_cast<Host*>(data);
-  // Reading the clock costs as much as a small F.
-  if (++host->calls % 1024 == 0 && cpu_seconds() > host->deadline) {
-    host->late = true;
-    return -1;
-  }
+  if (host->deadline.passed()) return -1;
   host->problem->residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), N_VGetArrayPointer(r));
   return 0;
 }
 
-N_Vector vector_of(const std::vector<double>& values, SUNContext context) {
-  N_Vector v = N_VNew_Serial(static_cast<sunindextype>(values.size()), context);
-  std::copy(values.begin(), values.end(), N_VGetArrayPointer(v));
-  return v;
+#ifdef TETHER_HAVE_KLU
+int sparse_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J,
+                    void* data, N_Vector, N_Vector, N_Vector) {
+  const problems::SparseJacobian& sparse = static_cast<Host*>(data)->problem->sparse;
+  std::copy(sparse.starts.begin(), sparse.starts.end(), SUNSparseMatrix_IndexPointers(J));
+  std::copy(sparse.rows.begin(), sparse.rows.end(), SUNSparseMatrix_IndexValues(J));
+  sparse.fill(t, cj, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), SUNSparseMatrix_Data(J));
+  return 0;
 }
+#endif
 
-[[maybe_unused]] void silent(int, const char*, const char*, char*, void*) {}
+// Dense LU and a difference Jacobian; KLU and the given one where the problem is sparse.
+void attach_linear_solver(void* ida, const problems::Problem& problem, N_Vector y,
+                          SUNContext context, SUNMatrix* matrix, SUNLinearSolver* solver) {
+#ifdef TETHER_HAVE_KLU
+  if (!problem.sparse.starts.empty()) {
+    *matrix =
+        SUNSparseMatrix(problem.size, problem.size,
+                        static_cast<sunindextype>(problem.sparse.rows.size()), CSC_MAT, context);
+    *solver = SUNLinSol_KLU(y, *matrix, context);
+    IDASetLinearSolver(ida, *solver, *matrix);
+    IDASetJacFn(ida, sparse_jacobian);
+    return;
+  }
+#endif
+  *matrix = SUNDenseMatrix(problem.size, problem.size, context);
+  *solver = SUNLinSol_Dense(y, *matrix, context);
+  IDASetLinearSolver(ida, *solver, *matrix);
+}
 
 int watched_solve(void* ida, const problems::Problem& problem, const Watch& watch, N_Vector y,
                   N_Vector yp, sunrealtype* t) {
@@ -70,31 +88,22 @@ void read_counts(void* ida, Run& run) {
 
 }  // namespace
 
-double cpu_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 Run integrate(const problems::Problem& problem, double tolerance, Settings settings) {
   SUNContext context = make_context();
   N_Vector y = vector_of(problem.y0, context), yp = vector_of(problem.yp0, context);
-  N_Vector id = vector_of(problem.id, context), atol = N_VClone(y);
-  for (int i = 0; i < problem.size; ++i)
-    N_VGetArrayPointer(atol)[i] =
-        tolerance *
-        (problem.atol_scale.empty() ? 1.0 : problem.atol_scale[static_cast<std::size_t>(i)]);
+  N_Vector id = vector_of(problem.id, context);
+  N_Vector atol = vector_of(absolute_tolerances(problem, tolerance), context);
   void* ida = IDACreate(context);
 #ifndef SUN_COMM_NULL
   IDASetErrHandlerFn(ida, silent, nullptr);
 #endif
   IDAInit(ida, residual, problem.t0, y, yp);
   IDASVtolerances(ida, tolerance, atol);
-  Host host{&problem, cpu_seconds() + settings.limits.cpu_seconds};
+  Host host{&problem, Deadline(settings.limits.cpu_seconds, problem.size)};
   IDASetUserData(ida, &host);
-  SUNMatrix matrix = SUNDenseMatrix(problem.size, problem.size, context);
-  SUNLinearSolver solver = SUNLinSol_Dense(y, matrix, context);
-  IDASetLinearSolver(ida, solver, matrix);
+  SUNMatrix matrix = nullptr;
+  SUNLinearSolver solver = nullptr;
+  attach_linear_solver(ida, problem, y, context, &matrix, &solver);
   // One-step mode counts each call: the limit then holds for one step only.
   IDASetMaxNumSteps(ida, settings.limits.steps);
   IDASetStopTime(ida, problem.t_end);
@@ -127,7 +136,7 @@ Run integrate(const problems::Problem& problem, double tolerance, Settings setti
     }
     if (run.failed && run.message.empty()) {
       char* name = IDAGetReturnFlagName(run.flag);
-      run.message = host.late ? "time limit" : std::string(name);
+      run.message = host.deadline.late() ? "time limit" : std::string(name);
       std::free(name);
     }
     IDAFree(&ida);

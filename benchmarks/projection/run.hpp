@@ -9,6 +9,8 @@
 #include <tether/ida_projection.hpp>
 #include <vector>
 
+#include "context.hpp"
+
 namespace tether::bench {
 
 /// Looks at every accepted step: time, unknowns (of the problem's form), order (0: not known).
@@ -43,10 +45,8 @@ struct Settings {
   Watch watch;
 };
 
-/// Process CPU time in s.
-double cpu_seconds();
-
-/// IDA with rtol = atol = tolerance, dense LU, difference Jacobian.
+/// IDA with rtol = atol = tolerance, dense LU, difference Jacobian; a sparse problem has KLU and
+/// its own Jacobian, where SUNDIALS has KLU.
 Run integrate(const problems::Problem& problem, double tolerance, Settings settings = {});
 
 }  // namespace tether::bench

@@ -3,8 +3,11 @@
 #include <cmath>
 #include <problems/akzo_nobel.hpp>
 #include <problems/andrews.hpp>
+#include <problems/bricard.hpp>
 #include <problems/car_axis.hpp>
+#include <problems/governor.hpp>
 #include <problems/kepler.hpp>
+#include <problems/link_chain.hpp>
 #include <problems/lotka_volterra.hpp>
 #include <problems/pendulum.hpp>
 #include <problems/pinned_rods.hpp>
@@ -53,6 +56,9 @@ std::vector<Problem> everything() {
     all.push_back(parallelogram(kThirdTurn / 2.0, 0.0, 1.0, form));
     all.push_back(parallelogram(0.0, 8.0, 1.0, form));
   }
+  for (const std::string& form : bricard_forms()) all.push_back(bricard(1.0, form));
+  for (const std::string& form : governor_forms()) all.push_back(governor(0.1, form));
+  all.push_back(link_chain(8, 0.3));
   return all;
 }
 
@@ -243,10 +249,13 @@ TEST_CASE("invariants stay constant along the motion") {
     if (p.name == "transistor amplifier") continue;  // its rows are equations of F, with all ids 1
     // Here w is an unknown that only the equations of motion, not solved here, tie to the rest.
     if (p.index > 1 && p.form.back() == 'w') continue;
+    // From a random state its springs accelerate too much for Gauss-Newton onto the accelerations.
+    const bool stiff = p.name == "governor";
+    if (stiff && p.index > 1) continue;
     for (int repeat = 0; repeat < 3; ++repeat) {
       double t;
       Eigen::VectorXd y = random_state(p, random, &t);
-      y = project(p, t, y);
+      y = project(p, t, y, stiff ? p.recommended : std::vector<std::string>());
       without_mu(p, y);
       const bool index1 = p.form.rfind("index 1", 0) == 0;
       const Eigen::VectorXd yp = index1 ? motion(p, t, &y) : derivative(p, t, y);
@@ -530,8 +539,13 @@ TEST_CASE("the references satisfy the rows to their own accuracy") {
   }
 }
 
-// About three times what is measured, at rtol = atol = 1e-8 and with nothing projected.
+// IDA's Newton iteration does not get through the governor's index-2 forms below 1e-7.
+double plain_ida_tolerance(const Problem& p) { return p.name == "governor" ? 1e-6 : 1e-8; }
+
+// About three times what is measured at that tolerance, with nothing projected.
 double plain_ida_bound(const Problem& p) {
+  if (p.name == "governor") return 3.5e-4;
+  if (p.name == "bricard") return 1e-5;
   if (p.name == "pendulum") return p.form == "index 1" ? 1.5e-3 : 1.5e-4;
   if (p.name == "car axis") return 2e-5;
   if (p.name == "andrews") return 1e-6;
@@ -553,7 +567,8 @@ TEST_CASE("plain IDA reaches the references") {
     for (const bool analytic : {false, true}) {
       if (analytic && !p.jacobian) continue;
       long steps = 0;
-      const Eigen::VectorXd end = integrate(p, 1e-8, 1e-8, &steps, analytic);
+      const double tolerance = plain_ida_tolerance(p);
+      const Eigen::VectorXd end = integrate(p, tolerance, tolerance, &steps, analytic);
       const double error = p.error(end.data());
       INFO(label(p) << ", " << (analytic ? "given" : "difference") << " Jacobian: error " << error
                     << " in " << steps << " steps");

@@ -1,0 +1,226 @@
+// Tether: what measured runs say, as tables, lines and pictures. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "report.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tether::bench {
+
+namespace {
+
+constexpr int kLoosest = 3, kTightest = 9;  // decades of error that are compared
+const std::string kPlain = "plain IDA";
+
+std::string number(double value, const char* format = "{:.3g}") {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
+}
+
+// "position 1e-9, velocity 2e-8"
+template <class Format>
+std::string join(const Point& point, const char* separator, Format format) {
+  std::string out;
+  for (const auto& [name, value] : point.drift)
+    out += (out.empty() ? "" : separator) + format(name, value);
+  return out;
+}
+
+template <class Format>
+std::string orders(const Point& point, const char* separator, Format format) {
+  std::string out;
+  for (std::size_t k = 0; k < point.orders.size(); ++k)
+    if (point.orders[k] > 0) out += (out.empty() ? "" : separator) + format(k, point.orders[k]);
+  return out;
+}
+
+std::string first_word(const std::string& status) { return status.substr(0, status.find(':')); }
+
+}  // namespace
+
+Comparison::Comparison(std::vector<std::string> peers) : peers_(std::move(peers)) {}
+
+Table Comparison::add(const std::string& problem, const std::vector<Point>& points) {
+  const std::vector<Family> all = families(points);
+  Table table;
+  table.head = {"error", "Tether ms", "form", "plain IDA ms", "form", "ratio"};
+  for (const std::string& peer : peers_) {
+    table.head.push_back(peer + " ms");
+    table.head.push_back("ratio");
+  }
+  std::map<std::string, GeometricMean> here;
+  std::map<std::string, std::vector<std::string>> cells;
+  for (int decade = kLoosest; decade <= kTightest; ++decade) {
+    const double error = std::pow(10.0, -decade);
+    const std::string at = fmt::format("{:.0e}", error);
+    const Best ours = best_of(all, "Tether", error);
+    const auto note = [&](const std::string& code, double cpu) {
+      const double ratio = ours.cpu / cpu;
+      Standing& standing = standings_[code];
+      standing.points.add(ratio);
+      here[code].add(ratio);
+      if (ratio > 1.0) ++standing.ahead;
+      if (ratio > standing.worst) {
+        standing.worst = ratio;
+        standing.worst_at = problem + " at " + at;
+      }
+      cells[code].push_back(number(ratio, "{:.2f}"));
+      json_ += fmt::format("{}{{\"problem\":{},\"code\":{},\"error\":{},\"ratio\":{}}}",
+                           json_.empty() ? "" : ",\n", json_string(problem), json_string(code), at,
+                           json_number(ratio));
+      return cells[code].back();
+    };
+    const Best plain = best_of(all, "IDA", error);
+    std::vector<std::string> row = {at, number(ours.cpu), ours.title, number(plain.cpu),
+                                    plain.title};
+    row.push_back(note(kPlain, plain.cpu));
+    for (const std::string& peer : peers_) {
+      const Best other = best_of(all, peer, error);
+      row.push_back(number(other.cpu));
+      row.push_back(note(peer, other.cpu));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  for (auto& [code, row] : cells) {
+    row.insert(row.begin(), problem);
+    lines_[code].push_back(row);
+  }
+  for (const auto& [code, mean] : here) standings_[code].problems.add(mean.value());
+  return table;
+}
+
+Table Comparison::summary() const {
+  Table table;
+  table.head = {
+      "ours / its best form", "mean of points", "mean of problems", "worst point", "where",
+      "it leads at",          "points"};
+  for (const auto& [code, standing] : standings_)
+    table.rows.push_back({code, number(standing.points.value(), "{:.2f}"),
+                          number(standing.problems.value(), "{:.2f}"),
+                          number(standing.worst, "{:.2f}"), standing.worst_at,
+                          fmt::format("{}", standing.ahead),
+                          fmt::format("{}", standing.points.count())});
+  return table;
+}
+
+Table Comparison::point_by_point(const std::string& code) const {
+  Table table;
+  table.head = {"ours / " + code};
+  for (int decade = kLoosest; decade <= kTightest; ++decade)
+    table.head.push_back(fmt::format("1e-{:02}", decade));
+  if (const auto found = lines_.find(code); found != lines_.end()) table.rows = found->second;
+  return table;
+}
+
+Table standing_of_ours(const std::vector<Point>& points) {
+  Table table;
+  table.head = {"code, form", "runs", "met", "adds up", "missed", "failed"};
+  std::map<std::string, std::map<std::string, int>> counts;
+  std::vector<std::string> order;
+  for (const Point& point : points) {
+    if (!is_ours(point.code)) continue;
+    const std::string name = point.code + ", " + point.form;
+    if (counts.find(name) == counts.end()) order.push_back(name);
+    ++counts[name][first_word(point.status)];
+    ++counts[name]["runs"];
+  }
+  for (const std::string& name : order) {
+    std::vector<std::string> row = {name};
+    for (const char* what : {"runs", "met", "adds up", "missed", "failed"})
+      row.push_back(fmt::format("{}", counts[name][what]));
+    table.rows.push_back(row);
+  }
+  return table;
+}
+
+Table unmet(const std::vector<Point>& points, const std::string& only) {
+  Table table;
+  table.head = {"code, form", "tolerance", "status"};
+  for (const Point& point : points)
+    if (is_ours(point.code) && !point.met() && point.status.compare(0, only.size(), only) == 0)
+      table.rows.push_back(
+          {point.code + ", " + point.form, fmt::format("{:.1e}", point.tolerance), point.status});
+  return table;
+}
+
+Table work_at(const std::vector<Point>& points, double tolerance) {
+  Table table;
+  table.head = {"code, form", "error",  "scd",    "steps",       "F",     "J",     "LU",
+                "proj.",      "failed", "CPU ms", "/ best peer", "drift", "orders"};
+  double nearest = 0.0;
+  for (const Point& point : points)
+    if (std::abs(std::log(point.tolerance / tolerance)) < std::abs(std::log(nearest / tolerance)))
+      nearest = point.tolerance;
+  for (const Point& p : points) {
+    if (p.tolerance != nearest) continue;
+    const bool failed = p.run.failed;
+    const std::string drift = join(p, ", ", [](const std::string& name, double value) {
+      return fmt::format("{} {:.0e}", name, value);
+    });
+    table.rows.push_back(
+        {p.code + ", " + p.form, failed ? "-" : fmt::format("{:.1e}", p.run.error),
+         failed ? "-" : fmt::format("{:.1f}", p.scd), fmt::format("{}", p.run.steps),
+         fmt::format("{}", p.run.residuals), fmt::format("{}", p.run.jacobians),
+         fmt::format("{}", p.run.factorizations), fmt::format("{}", p.run.projections),
+         fmt::format("{}", p.run.error_failures + p.run.solver_failures),
+         fmt::format("{:.3g}", p.run.cpu_ms), number(p.to_peers, "{:.2f}"),
+         failed ? p.run.message : drift,
+         orders(p, " ", [](std::size_t k, long n) { return fmt::format("{}:{}", k, n); })});
+  }
+  return table;
+}
+
+std::string picture(const Case& which, const std::vector<Point>& points) {
+  std::vector<Line> lines;
+  for (const Point& point : points) {
+    const std::string hint = point.code + ", " + point.form;
+    auto line =
+        std::find_if(lines.begin(), lines.end(), [&](const Line& l) { return l.hint == hint; });
+    if (line == lines.end())
+      line = lines.insert(lines.end(), Line{point.code, hint, {}, {}, false});
+    if (!point.usable() || point.run.error > 1.0) continue;
+    line->x.push_back(std::max(point.run.error, 1e-16));
+    line->y.push_back(point.run.cpu_ms);
+  }
+  return svg(which.name + ": " + which.text, "end error (mixed)", "CPU ms", lines);
+}
+
+std::string csv_head() {
+  return "problem,code,form,tolerance,error,scd,cpu_ms,steps,F,J,factorizations,projections,"
+         "error_failures,solver_failures,to_best_peer,to_plain_ida,drift,orders,status\n";
+}
+
+std::string csv_line(const Point& p) {
+  const std::string drift = join(p, ";", [](const std::string& name, double value) {
+    return fmt::format("{}={:.3e}", name, value);
+  });
+  std::string status = p.status;
+  std::replace(status.begin(), status.end(), '"', '\'');
+  return fmt::format(
+      "{},{},{},{:.4e},{:.4e},{:.2f},{:.5g},{},{},{},{},{},{},{},{:.3g},{:.3g},{},{},\"{}\"\n",
+      p.problem, p.code, p.form, p.tolerance, p.run.error, p.scd, p.run.cpu_ms, p.run.steps,
+      p.run.residuals, p.run.jacobians, p.run.factorizations, p.run.projections,
+      p.run.error_failures, p.run.solver_failures, p.to_peers, p.to_plain, drift,
+      orders(p, ";", [](std::size_t k, long n) { return fmt::format("{}:{}", k, n); }), status);
+}
+
+std::string json_point(const Point& p) {
+  const std::string drift = join(p, ",", [](const std::string& name, double value) {
+    return json_string(name) + ":" + json_number(value);
+  });
+  return fmt::format(
+      "{{\"problem\":{},\"code\":{},\"form\":{},\"tolerance\":{},\"error\":{},\"scd\":{},"
+      "\"cpu_ms\":{},\"steps\":{},\"F\":{},\"J\":{},\"factorizations\":{},\"projections\":{},"
+      "\"error_failures\":{},\"solver_failures\":{},\"to_best_peer\":{},\"to_plain_ida\":{},"
+      "\"drift\":{{{}}},\"orders\":{{{}}},\"status\":{}}}",
+      json_string(p.problem), json_string(p.code), json_string(p.form), json_number(p.tolerance),
+      p.run.failed ? "null" : json_number(p.run.error), json_number(p.scd),
+      json_number(p.run.cpu_ms), p.run.steps, p.run.residuals, p.run.jacobians,
+      p.run.factorizations, p.run.projections, p.run.error_failures, p.run.solver_failures,
+      json_number(p.to_peers), json_number(p.to_plain), drift,
+      orders(p, ",", [](std::size_t k, long n) { return fmt::format("\"{}\":{}", k, n); }),
+      json_string(p.status));
+}
+
+}  // namespace tether::bench

@@ -1,0 +1,55 @@
+// Tether: what measured runs say, as tables, lines and pictures. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "measure.hpp"
+#include "page.hpp"
+
+namespace tether::bench {
+
+/// Ours / another code's best form at equal error, over problems and decades.
+struct Standing {
+  GeometricMean points, problems;
+  double worst = 0.0;
+  std::string worst_at;  ///< "kepler at 1e-05"
+  int ahead = 0;         ///< points at which the other one is faster
+};
+
+class Comparison {
+ public:
+  explicit Comparison(std::vector<std::string> peers);
+
+  /// Takes a problem in and returns its table: CPU at equal error, a line for each decade.
+  Table add(const std::string& problem, const std::vector<Point>& points);
+
+  Table summary() const;
+  /// Ratio to one code: a line for each problem, a column for each decade.
+  Table point_by_point(const std::string& code) const;
+  const std::map<std::string, Standing>& standings() const { return standings_; }
+  /// {"problem":..,"code":..,"error":..,"ratio":..}, joined with commas.
+  std::string json() const { return json_; }
+
+ private:
+  std::vector<std::string> peers_;  // without plain IDA
+  std::map<std::string, Standing> standings_;
+  std::map<std::string, std::vector<std::vector<std::string>>> lines_;
+  std::string json_;
+};
+
+/// Our runs: how many met 100 tolerances and how many did not, for each code and form.
+Table standing_of_ours(const std::vector<Point>& points);
+/// Our runs that did not, each with its status; `only`: those whose status begins so.
+Table unmet(const std::vector<Point>& points, const std::string& only = "");
+/// Every code and form at the tolerance nearest to this one.
+Table work_at(const std::vector<Point>& points, double tolerance);
+
+std::string picture(const Case& which, const std::vector<Point>& points);
+std::string csv_head();
+std::string csv_line(const Point& point);
+std::string json_point(const Point& point);
+
+}  // namespace tether::bench
