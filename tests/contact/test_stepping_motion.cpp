@@ -253,6 +253,27 @@ TEST_CASE("stepping: capsules, points and hulls lie still on a plane") {
   CHECK(sum == Approx(3 * kGravity * 1e-2).epsilon(1e-9));
 }
 
+TEST_CASE("stepping: a body may touch at hundreds of points") {
+  Scene scene(1e-2);
+  scene.friction(0.3);
+  scene.ground();
+  std::vector<Vector3d> rim;
+  for (int k = 0; k < 300; ++k)
+    rim.emplace_back(0.5 * std::cos(2 * kPi * k / 300), 0.5 * std::sin(2 * kPi * k / 300), 0);
+  scene.bodies.add(1, Vector3d(1, 1, 2).asDiagonal().toDenseMatrix(), Vector3d::Zero(),
+                   Quaterniond::Identity(), Vector3d::Zero(), Vector3d(0, 0, 1));
+  scene.surfaces.push_back({1, tc::Shape::touching_points(rim), 0});
+  tc::Stepper s = scene.stepper();
+  s.step();
+  CHECK(s.contacts().points.size() == 300);
+  run(s, 2);  // I w/(mu m g R) = 1.36 s until it stops
+  double sum = 0;
+  for (const Vector3d& p : s.contacts().impulses) sum += p.z();
+  CHECK(sum == Approx(kGravity * 1e-2).epsilon(1e-8));
+  CHECK(position(s, 1).norm() < 1e-9);
+  CHECK(angular_velocity(s, 1).norm() < 1e-9);
+}
+
 TEST_CASE("stepping: the grid finds the pairs that all pairs of balls have") {
   Scene scene = heap(6, 0.3, 0);
   tc::Stepper s = scene.stepper();

@@ -45,15 +45,15 @@ struct NearPoint {
   std::uint16_t feature = 0;  ///< the same from step to step while the same features touch
 };
 
-/// Storage for the points of one pair. Further points are left out.
+/// The points of one pair, in storage that is used again: set `count` to 0 before.
 struct NearPoints {
-  static constexpr int kMost = 64;
-  NearPoint point[kMost];
+  std::vector<NearPoint> point;  ///< the first `count` of them
   int count = 0;
   void add(const Eigen::Vector3d& on_first, const Eigen::Vector3d& on_second,
            const Eigen::Vector3d& normal, double gap, int feature) {
-    if (count < kMost)
-      point[count++] = {on_first, on_second, normal, gap, static_cast<std::uint16_t>(feature)};
+    if (count == static_cast<int>(point.size())) point.resize(2 * point.size() + 8);
+    point[static_cast<std::size_t>(count++)] = {on_first, on_second, normal, gap,
+                                                static_cast<std::uint16_t>(feature)};
   }
 };
 
