@@ -8,12 +8,14 @@ namespace tether::contact::detail {
 // solution, x drifts at a constant rate until one of them changes (README, section 9).
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
                                  ProximalNewton& newton) {
-  constexpr int kCorrections = 4, kSteps = 20;
+  constexpr int kCorrections = 4, kSteps = 20, kPatience = 700;
   constexpr double kLeast = 1e-9, kMost = 1;  // tau
   System& system = search.system;
   Packed rate(at(n_)), point(at(n_));  // rate: tau (x_k+1 - x_k)
   std::copy(x, x + n_, anchor_.begin());
   double tau = 1e-2, near = 1e-4;
+  double reference = search.best_error;
+  int gain = 0;
   bool drifting = false;
   for (int outer = 0; outer < most; ++outer) {
     int corrections = 0;
@@ -43,7 +45,11 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
         near = near < 5e-5 ? 1e-3 : near > 5e-4 ? 1e-4 : 1e-5;  // another way to the same point
       }
     }
-    if (search.exhausted()) break;
+    if (search.best_error < 0.97 * reference) {
+      reference = search.best_error;
+      gain = outer;
+    }
+    if (search.exhausted() || outer - gain > kPatience) break;
     if (!found) {
       tau = std::min(kMost, 3 * tau);
       continue;

@@ -184,7 +184,7 @@ Status Solver::Implementation::rotate(bool last) {
       if (search.solved()) return Status::solved;
       newton.run(search, admm.point(), outers);
       if (search.solved()) return Status::solved;
-      if (regular) interior.run_proximal(search, admm.point(), 1000, newton);
+      if (regular) interior.run_proximal(search, admm.point(), 4000, newton);
       if (search.solved()) return Status::solved;
       if (search.exhausted()) return Status::work_limit;
       burst = std::min(20000, burst + burst / 2);
