@@ -152,9 +152,12 @@ Status Solver::Implementation::rotate(bool last) {
     if (search.exhausted()) return Status::work_limit;
 
     const double before = search.best_error;
-    // Started near a rough answer, interior points take ten steps or so; far from one, alternating
-    // directions do first what they can.
+    // Started near a rough answer, a few alternating directions (two steps of interior points in cost)
+    // or ten steps or so of interior points do; far from one, alternating directions what they can.
     if (first && regular && before < kRough) {
+      admm.start(search, search.best.data());
+      admm.run(search, 15, true, true);
+      if (search.solved()) return Status::solved;
       interior.run_near(search, search.best.data(), 20);
       if (search.solved()) return Status::solved;
     }
@@ -162,6 +165,9 @@ Status Solver::Implementation::rotate(bool last) {
     admm.run(search, 200, true, true);
     if (search.solved()) return Status::solved;
     if (first && regular) interior.run(search, 40);
+    if (search.solved()) return Status::solved;
+    if (first && regular && before >= kRough && search.best_error < kRough)
+      interior.run_near(search, search.best.data(), 20);
     if (search.solved()) return Status::solved;
     first = false;
     newton.run(search, search.best.data(), 12);

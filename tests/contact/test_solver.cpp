@@ -217,11 +217,33 @@ TEST_CASE("high mass ratios") {
       }
     }
   }
+}
+
+// What an iteration costs must not hang on the last bit: other compilers and processors round
+// differently.
+TEST_CASE("high mass ratios: the work of two and of twenty boxes, whatever the rounding") {
+  random::Generator g(11);
   for (double ratio : {1e4, 1e5, 1e6}) {
-    const Solution s = Solver(with(Law::coulomb)).solve(random::stack(2, ratio).problem());
-    INFO("ratio " << ratio << ": " << name(s.status) << " " << s.error);
+    for (int k = 0; k < 30; ++k) {
+      random::Assembly a = random::stack(2, ratio);
+      for (auto& body : a.bodies)
+        for (int c = 0; c < 6; ++c) body.velocity[c] += k * 1e-17 * g.uniform(-1, 1);
+      const Solution s = Solver(with(Law::coulomb)).solve(a.problem());
+      INFO("ratio " << ratio << ", " << k << ": " << name(s.status) << " " << s.error);
+      CHECK(s.status == Status::solved);
+      CHECK(s.counts.work < 1e5);  // 0.1 ms
+    }
+  }
+  for (int k = 0; k < 10; ++k) {
+    random::Assembly a = random::stack(20, 1000);
+    for (int i = 0; i < 20; ++i) {
+      Vector6d& v = a.bodies[static_cast<std::size_t>(i)].velocity;
+      v[0] = 0.001 * (i + 1) * (1 + k * 1e-16), v[3] = 0.0005 * i;
+    }
+    const Solution s = Solver(with(Law::maximum_dissipation)).solve(a.problem());
+    INFO(k << ": " << name(s.status) << " " << s.error);
     CHECK(s.status == Status::solved);
-    CHECK(s.counts.work < 1e5);  // 0.1 ms
+    CHECK(s.counts.work < 1e7);  // 10 ms
   }
 }
 
