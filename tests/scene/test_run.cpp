@@ -240,4 +240,37 @@ TEST_CASE("files that cannot be written are reported") {
   Scene scene = parse_scene(rod(""), "test.toml");
   scene.output.csv = "/proc/nowhere/a.csv";
   CHECK_THROWS_AS(run(scene), std::runtime_error);
+  scene.output.csv = "/dev/full";
+  CHECK_THROWS_WITH(run(scene), Catch::Contains("/dev/full"));
+  scene.output.csv.clear();
+  scene.output.svg = "/proc/a.svg";
+  CHECK_THROWS_WITH(run(scene), Catch::Contains("/proc/a.svg"));
+  scene.output.svg.clear();
+  // A state takes the place of another one, never that of a device or a folder.
+  scene.output.state = folder("state").string();
+  CHECK_THROWS_WITH(run(scene), Catch::Contains("no file"));
+  CHECK(fs::is_directory(scene.output.state));
+}
+
+TEST_CASE("times that no run can have are refused") {
+  const Scene good = parse_scene(block(""), "test.toml");
+  const auto bad = [&](auto change, const char* named) {
+    Scene scene = good;
+    change(scene);
+    INFO(named);
+    CHECK_THROWS_WITH(run(scene), Catch::Contains(named));
+    CHECK_THROWS_AS(run(scene), std::invalid_argument);
+  };
+  const double nan = std::nan("");
+  bad([&](Scene& s) { s.end = nan; }, "end = nan");
+  bad([&](Scene& s) { s.end = 0; }, "end = 0");
+  bad([&](Scene& s) { s.end = 1e300; }, "step");
+  bad([&](Scene& s) { s.output.every = nan; }, "every = nan");
+  bad([&](Scene& s) { s.output.every = -1; }, "every = -1");
+  bad([&](Scene& s) { s.output.every = 1e-300; }, "every = 1e-300");
+  bad([&](Scene& s) { s.output.checkpoint = 1e-300; }, "checkpoint");
+  bad([&](Scene& s) { s.stepping->step = 1e-300; }, "step");
+  CostOptions options;
+  options.settings = {1e-300};
+  CHECK_THROWS_AS(cost(good, options), std::invalid_argument);
 }

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 #include <tether/scene/plan.hpp>
+#include <tether/scene/run.hpp>
 
 #include "read.hpp"
 
@@ -108,7 +109,6 @@ void check_invariants(const Scene& scene, Report& report) {
 }
 
 void check_times(const Scene& scene, Report& report) {
-  constexpr double kMostSteps = 1e9, kMostRecords = 1e7;
   if (scene.stepping && !(scene.end / scene.stepping->step <= kMostSteps))
     report.add({scene.file, 1, 1}, "stepping: step", fmt::format("{}", scene.stepping->step),
                fmt::format("end / step must be at most {:g}", kMostSteps));

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 
 extern char** environ;
 
@@ -51,12 +52,20 @@ std::string picture_head(const std::string& file, int width, int height) {
       width, height, quoted(file));
 }
 
+void check_writable(const std::string& file) {
+  const std::string name = file + ".gp";
+  if (!std::ofstream(name, std::ios::binary | std::ios::app))
+    throw std::runtime_error("cannot write " + name);
+  std::error_code ignored;
+  std::filesystem::remove(name, ignored);
+}
+
 std::string gnuplot(const std::string& script, const std::string& file) {
   const std::string name = file + ".gp";
   {
     std::ofstream out(name, std::ios::binary);
     out << script;
-    if (!out.flush()) return "cannot write " + name;
+    if (!out.flush()) throw std::runtime_error("cannot write " + name);
   }
   const int code = execute(name);
   if (code != 0)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <tether/scene/plan.hpp>
@@ -68,11 +69,29 @@ double processor_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+/// What a command line or a caller may have put over the scene.
+const Scene& checked(const Scene& scene) {
+  const auto demand = [](bool holds, const char* what, double value, const std::string& range) {
+    if (!holds) throw std::invalid_argument(fmt::format("{} = {}: {}", what, value, range));
+  };
+  demand(scene.end > 0 && std::isfinite(scene.end), "end", scene.end,
+         "must be a finite number > 0, s");
+  for (const auto& [what, value] :
+       {std::pair("every", scene.output.every), std::pair("checkpoint", scene.output.checkpoint)})
+    demand(value == 0 || (value > 0 && scene.end / value <= kMostRecords), what, value,
+           fmt::format("must be > 0, s, and end / it at most {:g}", kMostRecords));
+  if (make_plan(scene).engine != EngineKind::stepping) return scene;
+  const double step = scene.stepping.value_or(SteppingOptions{}).step;
+  demand(scene.end / step <= kMostSteps, "step", step,
+         fmt::format("end / step must be at most {:g}", kMostSteps));
+  return scene;
+}
+
 /// One run from its start, or from a saved state, to the end.
 class Run {
  public:
   Run(const Scene& scene, const RunOptions& options)
-      : scene_(scene), options_(options), judge_(scene), engine_(make_engine(scene)) {
+      : scene_(checked(scene)), options_(options), judge_(scene), engine_(make_engine(scene)) {
     result_.engine = engine_->name();
     if (options.restart.empty())
       start();
@@ -145,6 +164,8 @@ class Run {
   // A state is whole or absent: it replaces the old one in one go.
   void save(const std::string& file) {
     make_folder_of(file);
+    if (std::filesystem::exists(file) && !std::filesystem::is_regular_file(file))
+      throw std::runtime_error("cannot write " + file + ": it is there and is no file");
     const std::string fresh = file + ".new";
     {
       std::ofstream out(fresh, std::ios::binary | std::ios::trunc);

@@ -50,9 +50,12 @@ struct RunResult {
   bool met() const;  ///< every expectation that counts was judged and holds
 };
 
+constexpr double kMostSteps = 1e9;    ///< of the stepping engine in a run: end / step
+constexpr double kMostRecords = 1e7;  ///< end / every, end / checkpoint
+
 /// Runs the scene to its end and writes what Scene::output names. Throws std::invalid_argument for
-/// a scene that no engine has and std::runtime_error for files; a run that cannot go on is a
-/// result.
+/// times out of range and for a scene that no engine has, std::runtime_error for files; a run that
+/// cannot go on is a result.
 RunResult run(const Scene& scene, const RunOptions& options = {});
 
 /// The value of a quantity now; `start` is the state and `start_energy` the energy at t = 0.
