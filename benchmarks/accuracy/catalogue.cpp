@@ -1,6 +1,7 @@
 // Tether: the problems of the comparison. SPDX-License-Identifier: BSD-3-Clause
 #include "catalogue.hpp"
 
+#include <algorithm>
 #include <problems/akzo_nobel.hpp>
 #include <problems/andrews.hpp>
 #include <problems/bricard.hpp>
@@ -15,6 +16,7 @@
 #include <problems/robertson.hpp>
 #include <problems/slider_crank.hpp>
 #include <problems/transistor_amplifier.hpp>
+#include <stdexcept>
 
 namespace tether::bench {
 
@@ -68,6 +70,26 @@ std::vector<Case> catalogue() {
        "hundred links falling, t = 0.5: sparse factors (KLU)",
        {link_chain(100, 0.5)}},
   };
+}
+
+std::vector<Case> catalogue(const std::vector<std::string>& only,
+                            const std::vector<std::string>& skip) {
+  const auto has = [](const Case& which, std::string name) {
+    std::replace(name.begin(), name.end(), '_', ' ');
+    return which.name.find(name) != std::string::npos;
+  };
+  const auto any = [&](const Case& which, const std::vector<std::string>& names) {
+    return std::any_of(names.begin(), names.end(),
+                       [&](const std::string& name) { return has(which, name); });
+  };
+  std::vector<Case> cases = catalogue(), wanted;
+  for (const std::string& name : only)
+    if (std::none_of(cases.begin(), cases.end(), [&](const Case& c) { return has(c, name); }))
+      throw std::invalid_argument("--problem: no problem's name contains \"" + name +
+                                  "\"; accuracy_cost --list shows them");
+  for (Case& which : cases)
+    if ((only.empty() || any(which, only)) && !any(which, skip)) wanted.push_back(std::move(which));
+  return wanted;
 }
 
 }  // namespace tether::bench

@@ -17,4 +17,9 @@ struct Case {
 /// Every case; a new problem is a file in benchmarks/problems and an entry here.
 std::vector<Case> catalogue();
 
+/// Those whose name contains one of `only` (all when it is empty) and none of `skip`; "_" may stand
+/// for a blank. std::invalid_argument when a name of `only` fits no case.
+std::vector<Case> catalogue(const std::vector<std::string>& only,
+                            const std::vector<std::string>& skip);
+
 }  // namespace tether::bench

@@ -113,9 +113,12 @@ std::string Table::text() const {
   std::string out;
   const auto line = [&](const std::vector<std::string>& row) {
     std::string one;
-    for (std::size_t k = 0; k < row.size(); ++k)
-      one += k == 0 ? fmt::format("{:<{}}", row[k], width[k])
-                    : fmt::format("  {:>{}}", row[k], width[k]);
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      const bool sentence = k + 1 == row.size() && head[k] == "status";
+      one += k == 0     ? fmt::format("{:<{}}", row[k], width[k])
+             : sentence ? "  " + row[k]
+                        : fmt::format("  {:>{}}", row[k], width[k]);
+    }
     out += one + "\n";
   };
   line(head);

@@ -10,7 +10,8 @@ namespace tether::hard_cases {
 struct Outcome {
   std::string plain;  ///< what plain IDA does
   std::string ours;
-  bool right = false;  ///< ours is the right answer, or refuses what has none
+  std::vector<std::string> peers;  ///< in the order of peer_names(); may be empty
+  bool right = false;              ///< ours is the right answer, or refuses what has none
 };
 
 struct HardCase {
