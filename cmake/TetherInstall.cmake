@@ -49,16 +49,19 @@ function(tether_pkg_config library description requires)
   if(NOT TARGET tether_${library})
     return()
   endif()
-  cmake_parse_arguments(PARSE_ARGV 3 arg "" "" "CFLAGS")
+  cmake_parse_arguments(PARSE_ARGV 3 arg "" "" "CFLAGS;LIBS")
   string(REPLACE "_" "-" name tether-${library})
   string(JOIN " " cflags ${arg_CFLAGS})
+  list(TRANSFORM arg_LIBS PREPEND " ")
+  string(JOIN "" libs ${arg_LIBS})
   configure_file(${PROJECT_SOURCE_DIR}/cmake/tether.pc.in ${PROJECT_BINARY_DIR}/package/${name}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/package/${name}.pc
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT ${library})
 endfunction()
 
 tether_pkg_config(linalg "Minimum-norm solves shared by Tether's libraries" "eigen3 >= 3.4")
-tether_pkg_config(contact "Rigid-body contact with the exact friction cone" "tether-linalg = ${PROJECT_VERSION}")
+tether_pkg_config(contact "Rigid-body contact with the exact friction cone"
+  "tether-linalg = ${PROJECT_VERSION}" LIBS ${CMAKE_THREAD_LIBS_INIT})
 if(TARGET tether_ida_projection)
   install(FILES ${PROJECT_SOURCE_DIR}/cmake/TetherSundials.cmake
     DESTINATION ${tether_cmake_dir} COMPONENT ida_projection)

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "refuse.hpp"
+
 namespace tether::contact {
 namespace {
 
@@ -14,9 +16,11 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
   for (std::size_t k = 0; k < bodies.size(); ++k) {
-    if (!bodies[k].inverse_mass.allFinite() || !bodies[k].velocity.allFinite()) {
-      throw std::invalid_argument("body " + std::to_string(k) + " has a value that is not finite");
-    }
+    const auto where = [k] { return "body " + std::to_string(k) + ": "; };
+    if (!bodies[k].inverse_mass.allFinite())
+      detail::require_finite("inverse_mass", bodies[k].inverse_mass, where());
+    if (!bodies[k].velocity.allFinite())
+      detail::require_finite("velocity", bodies[k].velocity, where());
   }
   const int n = static_cast<int>(bodies.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {
@@ -24,11 +28,13 @@ void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& cont
     if (c.first < 0 || c.first >= n || c.second < -1 || c.second >= n || c.first == c.second) {
       throw std::invalid_argument("contact " + std::to_string(k) + " names bodies " +
                                   std::to_string(c.first) + " and " + std::to_string(c.second) +
-                                  " of " + std::to_string(n));
+                                  ": must be two of " + std::to_string(n) +
+                                  ", the second one -1 for the world");
     }
-    if (!c.J1.allFinite() || !c.J2.allFinite() || !c.bias.allFinite()) {
-      throw std::invalid_argument("contact " + std::to_string(k) + " has a value that is not finite");
-    }
+    const auto where = [k] { return "contact " + std::to_string(k) + ": "; };
+    if (!c.J1.allFinite()) detail::require_finite("J1", c.J1, where());
+    if (!c.J2.allFinite()) detail::require_finite("J2", c.J2, where());
+    if (!c.bias.allFinite()) detail::require_finite("bias", c.bias, where());
   }
 }
 
@@ -47,7 +53,10 @@ Eigen::Matrix3d tangent_frame(const Eigen::Vector3d& n) {
 BodyContact BodyContact::at_point(int first, int second, const Eigen::Vector3d& r1,
                                   const Eigen::Vector3d& r2, const Eigen::Vector3d& normal,
                                   double mu) {
-  if (!(std::abs(normal.norm() - 1) < 1e-6)) throw std::invalid_argument("the normal must have length 1");
+  detail::require(std::abs(normal.norm() - 1) < 1e-6, "length of normal", normal.norm(),
+                  "must be 1 (to 1e-6)");
+  detail::require_finite("r1", r1);
+  detail::require_finite("r2", r2);
   BodyContact c;
   c.first = first;
   c.second = second;
@@ -98,8 +107,10 @@ std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
                                        const Eigen::VectorXd& impulses) {
   check(bodies, contacts);
   if (impulses.size() != 3 * static_cast<Eigen::Index>(contacts.size())) {
-    throw std::invalid_argument("three impulses for each contact are needed");
+    detail::refuse_size("impulses", impulses.size(), 3 * static_cast<Eigen::Index>(contacts.size()),
+                        "3 for each contact");
   }
+  detail::require_finite("impulses", impulses);
   std::vector<Vector6d> v;
   for (const Body& body : bodies) v.push_back(body.velocity);
   for (std::size_t i = 0; i < contacts.size(); ++i) {

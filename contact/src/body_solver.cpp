@@ -14,6 +14,7 @@
 #include "body_kernels.hpp"
 #include "contact_graph.hpp"
 #include "impulse_memory.hpp"
+#include "refuse.hpp"
 #include "worker_team.hpp"
 
 namespace tether::contact {
@@ -186,14 +187,14 @@ int severity(Status s) {
 }
 
 void check(const BodyOptions& o) {
-  if (!(o.tolerance > 0)) throw std::invalid_argument("tolerance must be > 0");
-  if (o.max_sweeps < 1) throw std::invalid_argument("max_sweeps must be >= 1");
-  if (o.min_sweeps < 0) throw std::invalid_argument("min_sweeps must be >= 0");
-  if (o.threads < 1 || o.threads > 256) {
-    throw std::invalid_argument("threads must lie in 1 .. 256");
-  }
-  if (o.max_assembled < 0) throw std::invalid_argument("max_assembled must be >= 0");
-  if (!(o.max_work > 0)) throw std::invalid_argument("max_work must be > 0");
+  using detail::require;
+  require(o.tolerance > 0 && std::isfinite(o.tolerance), "tolerance", o.tolerance,
+          "must be finite and > 0");
+  require(o.max_sweeps >= 1, "max_sweeps", o.max_sweeps, "must be >= 1");
+  require(o.min_sweeps >= 0, "min_sweeps", o.min_sweeps, "must be >= 0");
+  require(o.threads >= 1 && o.threads <= 256, "threads", o.threads, "must lie in 1 .. 256");
+  require(o.max_assembled >= 0, "max_assembled", o.max_assembled, "must be >= 0");
+  require(o.max_work > 0, "max_work", o.max_work, "must be > 0");
 }
 
 }  // namespace
@@ -277,11 +278,7 @@ void BodySolver::Implementation::read_bodies() {
   fixed.assign(1, {});
   for (std::size_t k = 0; k < bodies->size(); ++k) {
     const RigidBody& b = (*bodies)[k];
-    if (!std::isfinite(b.inverse_mass) || b.inverse_mass < 0 || !b.inverse_inertia.allFinite() ||
-        !b.velocity.allFinite() || !b.angular_velocity.allFinite()) {
-      throw std::invalid_argument("body " + std::to_string(k) +
-                                  " has a value that is not finite or a negative mass");
-    }
+    detail::check(k, b);
     const Matrix3d& I = b.inverse_inertia;
     const bool isotropic = I(0, 1) == 0 && I(0, 2) == 0 && I(1, 2) == 0 && I(1, 0) == 0 &&
                            I(2, 0) == 0 && I(2, 1) == 0 && I(0, 0) == I(1, 1) && I(0, 0) == I(2, 2);
@@ -313,19 +310,11 @@ void BodySolver::Implementation::read_contacts() {
   };
   for (std::size_t i = 0; i < n; ++i) {
     const PointContact& c = (*contacts)[i];
-    if (c.first < 0 || c.first >= m || c.second < -1 || c.second >= m || c.first == c.second) {
-      throw std::invalid_argument("contact " + std::to_string(i) +
-                                  " names bodies that do not exist");
-    }
-    if (!c.r1.allFinite() || !c.r2.allFinite() || !std::isfinite(c.mu) || c.mu < 0 ||
-        !std::isfinite(c.bias) || !(std::abs(c.normal.squaredNorm() - 1) < 2e-6)) {
-      throw std::invalid_argument("contact " + std::to_string(i) +
-                                  " has a value that is not finite, mu < 0, or a normal that is "
-                                  "not a unit vector");
-    }
+    detail::check(i, c, m);
     const bool a = body_kind[at(c.first)] & 1, b = c.second >= 0 && body_kind[at(c.second)] & 1;
     if (!a && !b)
-      throw std::invalid_argument("contact " + std::to_string(i) + " joins fixed bodies");
+      throw std::invalid_argument("contact " + std::to_string(i) +
+                                  " joins fixed bodies: one of the two must be able to move");
     turned[i] = !a;
     first[i] = a ? c.first : c.second;
     second[i] = a && b ? c.second : -1;
@@ -974,7 +963,7 @@ void BodySolver::set_options(const BodyOptions& options) {
 }
 void BodySolver::scale_warm_start(double factor) {
   if (!(factor >= 0) || !std::isfinite(factor)) {
-    throw std::invalid_argument("factor must be finite and >= 0");
+    detail::refuse("factor", factor, "must be finite and >= 0");
   }
   implementation_->memory.scale(factor);
 }

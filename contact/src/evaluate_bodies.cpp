@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "refuse.hpp"
 #include "system.hpp"
 
 namespace tether::contact {
@@ -34,9 +35,16 @@ Eigen::Matrix3d local_matrix(const RigidBody& A, const RigidBody& B, const Eigen
 Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
                    Law law, const std::vector<Eigen::Vector3d>& impulses) {
   if (impulses.size() != contacts.size()) {
-    throw std::invalid_argument("one impulse for each contact is needed");
+    throw std::invalid_argument("impulses has " + std::to_string(impulses.size()) + " entries: " +
+                                std::to_string(contacts.size()) +
+                                " are needed, one for each contact");
   }
   const int m = static_cast<int>(bodies.size());
+  for (std::size_t k = 0; k < bodies.size(); ++k) detail::check(k, bodies[k]);
+  for (std::size_t i = 0; i < contacts.size(); ++i) detail::check(i, contacts[i], m);
+  // Nothing can be said of an answer that is not finite.
+  for (const Eigen::Vector3d& p : impulses)
+    if (!p.allFinite()) return {};
   std::vector<Eigen::Vector3d> v(bodies.size()), w(bodies.size());
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     v[k] = bodies[k].velocity;
@@ -51,10 +59,6 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
   double bb = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const PointContact& c = contacts[i];
-    if (c.first < 0 || c.first >= m || c.second < -1 || c.second >= m || c.first == c.second) {
-      throw std::invalid_argument("contact " + std::to_string(i) +
-                                  " names bodies that do not exist");
-    }
     bb += relative(c).squaredNorm();
   }
   std::vector<Eigen::Vector3d> before;

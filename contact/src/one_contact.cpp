@@ -10,6 +10,7 @@
 #include "law_coulomb.hpp"
 #include "law_frictionless.hpp"
 #include "law_maximum_dissipation.hpp"
+#include "refuse.hpp"
 
 namespace tether::contact {
 
@@ -32,16 +33,14 @@ const char* name(Regime regime) {
 }
 
 LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
-  if (!(friction >= 0) || !std::isfinite(friction)) {
-    throw std::invalid_argument("friction coefficient must be finite and >= 0");
-  }
+  detail::require(friction >= 0 && std::isfinite(friction), "mu", friction,
+                  "must be finite and >= 0");
   // Entry by entry: sums may overflow, comparisons with NaN are false.
   double trace = A.trace();
-  if (!A.allFinite() || !std::isfinite(trace)) {
-    throw std::invalid_argument("contact matrix has an entry that is not finite");
-  }
+  if (!A.allFinite()) detail::require_finite("A", A);
+  detail::require(std::isfinite(trace), "trace of A", trace, "must be finite");
   a = A(0, 0);
-  if (!(a > 0)) throw std::invalid_argument("contact matrix needs A_nn > 0");
+  detail::require(a > 0, "A_nn", a, "must be > 0: no body moves along the normal");
   inv_a = 1 / a;
   mu = friction;
   c[0] = 0.5 * (A(0, 1) + A(1, 0));
@@ -62,9 +61,8 @@ LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
     beta[0] = B00 - t * B01;
     beta[1] = B11 + t * B01;
   }
-  if (std::min(beta[0], beta[1]) < -1e-8 * trace) {
-    throw std::invalid_argument("contact matrix is not positive semidefinite");
-  }
+  detail::require(std::min(beta[0], beta[1]) >= -1e-8 * trace, "least eigenvalue of T - c c'/a",
+                  std::min(beta[0], beta[1]), "A must be positive semidefinite");
   const double floor = 1e-12 * trace;
   for (int i = 0; i < 2; ++i) {
     null[i] = !(beta[i] >= floor);
@@ -122,7 +120,7 @@ void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, Loc
 }
 
 OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b, double mu) {
-  if (!b.allFinite()) throw std::invalid_argument("right-hand side has an entry that is not finite");
+  detail::require_finite("b", b);
   LocalState state;
   solve_local(law, LocalBlock(A, mu), b, state);
   return {Eigen::Vector3d(state.x[0], state.x[1], state.x[2]), state.regime, state.evaluations};
@@ -130,6 +128,8 @@ OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b
 
 OneContact solve_one_golden_section(const LocalBlock& L, const Eigen::Vector3d& b,
                                     double angle_tolerance) {
+  detail::require_finite("b", b);
+  detail::require(angle_tolerance > 0, "angle_tolerance", angle_tolerance, "must be > 0");
   OneContact out;
   if (!(b[0] > 0)) return out;
   double x[3];
@@ -194,12 +194,12 @@ OneContact solve_one_golden_section(const LocalBlock& L, const Eigen::Vector3d& 
 
 PlanarContact solve_planar(Law law, const Eigen::Matrix2d& A, const Eigen::Vector2d& b, double mu) {
   const double a = A(0, 0), c = 0.5 * (A(0, 1) + A(1, 0));
-  if (!A.allFinite() || !b.allFinite() || !(a > 0)) {
-    throw std::invalid_argument("planar contact needs finite A and b with A_nn > 0");
-  }
-  if (!(mu >= 0) || !std::isfinite(mu)) {
-    throw std::invalid_argument("friction coefficient must be finite and >= 0");
-  }
+  detail::require_finite("A", A);
+  detail::require_finite("b", b);
+  detail::require(a > 0, "A_nn", a, "must be > 0: no body moves along the normal");
+  detail::require(mu >= 0 && std::isfinite(mu), "mu", mu, "must be finite and >= 0");
+  detail::require(A(1, 1) - c * c / a >= -1e-8 * A.trace(), "t - c^2/a", A(1, 1) - c * c / a,
+                  "A must be positive semidefinite");
   PlanarContact out;
   if (!(b[0] > 0)) return out;
   if (law == Law::frictionless || mu == 0) {

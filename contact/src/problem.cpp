@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
+
+#include "refuse.hpp"
 
 namespace tether::contact {
 namespace {
@@ -15,8 +18,9 @@ int dimension_of(const Eigen::VectorXd& b, const Eigen::VectorXd& mu) {
   for (int d : {3, 2}) {
     if (b.size() == d * mu.size()) return d;
   }
-  throw std::invalid_argument("b has " + std::to_string(b.size()) + " entries, which is neither 3 nor 2 for each of " +
-                              std::to_string(mu.size()) + " friction coefficients");
+  throw std::invalid_argument("b has " + std::to_string(b.size()) +
+                              " entries: 3 (or 2, in the plane) are needed for each of " +
+                              std::to_string(mu.size()) + " friction coefficients mu");
 }
 
 }  // namespace
@@ -25,10 +29,12 @@ Problem Problem::dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
                        const Eigen::VectorXd& mu) {
   const int d = dimension_of(b, mu), n = static_cast<int>(mu.size());
   if (A.rows() != b.size() || A.cols() != b.size()) {
+    const std::string size = std::to_string(b.size());
     throw std::invalid_argument("A is " + std::to_string(A.rows()) + " x " +
-                                std::to_string(A.cols()) + ", b has " + std::to_string(b.size()) +
-                                " entries");
+                                std::to_string(A.cols()) + ": must be " + size + " x " + size +
+                                ", as b has " + size + " entries");
   }
+  detail::require_finite("A", A);
   std::vector<MatrixBlock> blocks;
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
@@ -45,24 +51,27 @@ Problem Problem::dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
 Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const Eigen::VectorXd& b,
                         const Eigen::VectorXd& mu) {
   const int n = static_cast<int>(mu.size()), d = dimension;
-  if (d != 2 && d != 3) throw std::invalid_argument("dimension must be 2 or 3");
+  detail::require(d == 2 || d == 3, "dimension", d, "must be 2 or 3");
+  detail::require(mu.size() <= std::numeric_limits<int>::max() / 3, "size of mu",
+                  static_cast<double>(mu.size()), "must be at most 715827882");
   if (b.size() != d * mu.size()) {
-    throw std::invalid_argument("b needs " + std::to_string(d * n) + " entries, it has " +
-                                std::to_string(b.size()));
+    detail::refuse_size("b", b.size(), d * mu.size(),
+                        std::to_string(d) + " for each of " + std::to_string(n) +
+                            " friction coefficients mu");
   }
-  if (!b.allFinite()) throw std::invalid_argument("b has an entry that is not finite");
+  detail::require_finite("b", b);
   const std::size_t given = blocks.size();
   for (std::size_t k = 0; k < given; ++k) {
     const MatrixBlock& block = blocks[k];
     if (block.row < 0 || block.row >= n || block.column < 0 || block.column >= n) {
       throw std::invalid_argument("block (" + std::to_string(block.row) + ", " +
-                                  std::to_string(block.column) + ") lies outside of " +
-                                  std::to_string(n) + " contacts");
+                                  std::to_string(block.column) +
+                                  "): row and column must lie in 0 .. " + std::to_string(n - 1));
     }
     if (!block.value.topLeftCorner(d, d).allFinite()) {
-      throw std::invalid_argument("A has an entry that is not finite in block (" +
-                                  std::to_string(block.row) + ", " + std::to_string(block.column) +
-                                  ")");
+      detail::require_finite("A", block.value.topLeftCorner(d, d),
+                             "block (" + std::to_string(block.row) + ", " +
+                                 std::to_string(block.column) + "): ");
     }
     // A zero on the other side keeps the pattern symmetric.
     if (block.row != block.column) {
@@ -86,6 +95,11 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const Ei
     }
     // The plane is a 3-D contact whose second tangent is decoupled and at rest.
     if (d == 2 && row == column) sum(2, 2) = sum(1, 1) > 0 ? sum(1, 1) : sum(0, 0);
+    if (!sum.allFinite()) {
+      detail::require_finite("sum of blocks", sum,
+                             "block (" + std::to_string(row) + ", " + std::to_string(column) +
+                                 "): ");
+    }
     PackedBlock packed;
     for (int c = 0; c < 3; ++c)
       for (int r = 0; r < 3; ++r) packed.column[4 * c + r] = sum(r, c);
@@ -106,7 +120,10 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const Ei
 }
 
 void Problem::set_ids(std::vector<std::uint64_t> ids) {
-  if (ids.size() != local_.size()) throw std::invalid_argument("one id for each contact is needed");
+  if (ids.size() != local_.size()) {
+    detail::refuse_size("ids", static_cast<Eigen::Index>(ids.size()), contacts(),
+                        "one for each contact");
+  }
   ids_ = std::move(ids);
 }
 
@@ -126,8 +143,7 @@ Eigen::MatrixXd Problem::dense_matrix() const {
 std::vector<PackedVector> Problem::pack(const Eigen::VectorXd& x) const {
   const int n = contacts(), d = dimension_;
   if (x.size() != d * n) {
-    throw std::invalid_argument("vector needs " + std::to_string(d * n) + " entries, it has " +
-                                std::to_string(x.size()));
+    detail::refuse_size("impulses", x.size(), d * n, std::to_string(d) + " for each contact");
   }
   std::vector<PackedVector> out(at(n));
   for (int i = 0; i < n; ++i)

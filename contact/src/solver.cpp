@@ -11,6 +11,7 @@
 #include "convex_relaxation.hpp"
 #include "interior_point.hpp"
 #include "proximal_newton.hpp"
+#include "refuse.hpp"
 
 namespace tether::contact {
 
@@ -62,18 +63,17 @@ constexpr double kStronglyCoupled = 0.98;
 constexpr double kCoupled = 0.8;
 
 void check(const Options& o) {
-  if (!(o.tolerance > 0)) throw std::invalid_argument("tolerance must be > 0");
-  if (!(o.relaxation > 0 && o.relaxation < 2)) {
-    throw std::invalid_argument("relaxation must lie between 0 and 2");
-  }
-  if (o.method == Method::jacobi && o.relaxation > 1) {
-    throw std::invalid_argument("relaxation of jacobi must not exceed 1");
-  }
-  if (o.max_sweeps < 1) throw std::invalid_argument("max_sweeps must be >= 1");
-  if (!(o.max_work > 0)) throw std::invalid_argument("max_work must be > 0");
-  if (o.anderson_depth < 1 || o.anderson_depth > detail::Anderson::kMaxDepth) {
-    throw std::invalid_argument("anderson_depth must lie in 1 .. 20");
-  }
+  using detail::require;
+  require(o.tolerance > 0 && std::isfinite(o.tolerance), "tolerance", o.tolerance,
+          "must be finite and > 0");
+  require(o.relaxation > 0 && o.relaxation < 2, "relaxation", o.relaxation,
+          "must lie between 0 and 2");
+  require(o.method != Method::jacobi || o.relaxation <= 1, "relaxation", o.relaxation,
+          "must lie in (0, 1] for jacobi");
+  require(o.max_sweeps >= 1, "max_sweeps", o.max_sweeps, "must be >= 1");
+  require(o.max_work > 0, "max_work", o.max_work, "must be > 0");
+  require(o.anderson_depth >= 1 && o.anderson_depth <= detail::Anderson::kMaxDepth,
+          "anderson_depth", o.anderson_depth, "must lie in 1 .. 20");
 }
 
 }  // namespace
@@ -358,7 +358,9 @@ void Solver::Implementation::solve(const Problem& problem, const Eigen::VectorXd
   search.reset(problem, options, measure);
   stages_ready = false;
   if (start) {
-    if (!start->allFinite()) throw std::invalid_argument("start has an entry that is not finite");
+    if (start->size() != problem.b().size())
+      detail::refuse_size("start", start->size(), problem.b().size(), "as many as b has");
+    detail::require_finite("start", *start);
     x = problem.pack(*start);
   } else {
     x.assign(n, PackedVector());

@@ -21,7 +21,8 @@ struct Residuals {
 };
 
 /// The same yardstick for every solver. natural_map is the law's own (README, section 6); for
-/// Law::coulomb it is the one that Siconos reports. `impulses` has dimension * contacts entries.
+/// Law::coulomb it is the one that Siconos reports. `impulses` has dimension * contacts entries;
+/// if one of them is not finite, all is NaN.
 Residuals evaluate(const Problem& problem, Law law, const Eigen::VectorXd& impulses);
 
 }  // namespace tether::contact
