@@ -98,8 +98,8 @@ Table Comparison::summary() const {
   for (const auto& [code, standing] : standings_)
     table.rows.push_back({code, number(standing.points.value(), "{:.2f}"),
                           number(standing.problems.value(), "{:.2f}"),
-                          number(standing.worst, "{:.2f}"), standing.worst_at,
-                          fmt::format("{}", standing.ahead),
+                          number(standing.worst > 0.0 ? standing.worst : std::nan(""), "{:.2f}"),
+                          standing.worst_at, fmt::format("{}", standing.ahead),
                           fmt::format("{}", standing.points.count())});
   return table;
 }
