@@ -1,42 +1,11 @@
 // Tether: which variables are algebraic.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "impl.hpp"
 
 namespace tether::ida_projection {
-
-namespace {
-
-constexpr int kRankLimit = 200;      // unknowns; a full QR of F_y' beyond would take too long
-constexpr double kDependent = 1e-6;  // of the largest pivot; difference quotients are this good
-
-// Whether the differential columns of F_y' depend on each other: then combinations of variables
-// that are differential one by one are algebraic. Rows and columns are scaled to 1.
-bool has_dependent_columns(Eigen::MatrixXd slopes, const double* id) {
-  int count = 0;
-  for (int j = 0; j < slopes.cols(); ++j)
-    if (id[j] != 0.0) slopes.col(count++) = slopes.col(j);
-  Eigen::MatrixXd scaled = slopes.leftCols(count);
-  if (!scaled.allFinite()) return false;
-  for (int pass = 0; pass < 2; ++pass) {
-    for (int i = 0; i < scaled.rows(); ++i) {
-      const double largest = scaled.row(i).lpNorm<Eigen::Infinity>();
-      if (largest > 0.0) scaled.row(i) /= largest;
-    }
-    for (int j = 0; j < count; ++j) {
-      const double largest = scaled.col(j).lpNorm<Eigen::Infinity>();
-      if (largest > 0.0) scaled.col(j) /= largest;
-    }
-  }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-  qr.setThreshold(kDependent);
-  return qr.rank() < count;
-}
-
-}  // namespace
 
 void Projection::Impl::set_id(N_Vector id) {
   if (!id_) id_ = OwnedVector(id);
@@ -81,8 +50,6 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
   double* mask = N_VGetArrayPointer(id);
   const double* before = N_VGetArrayPointer(base);
   const double* after = N_VGetArrayPointer(shifted);
-  Eigen::MatrixXd slopes;  // F_y', a column for each y'_j
-  if (size_ <= kRankLimit) slopes.setZero(size_, size_);
   bool known = true;
   for (int j = 0; j < size_ && known; ++j) {
     bool moves = false, answered = false;
@@ -101,8 +68,6 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
       if (!ok) continue;  // F refuses this y'; the other size decides
       answered = true;
       moves = moves || !std::equal(before, before + size_, after);
-      if (slopes.size() > 0)
-        for (int i = 0; i < size_; ++i) slopes(i, j) = (after[i] - before[i]) / change;
     }
     known = answered;
     mask[j] = moves ? 1.0 : 0.0;
@@ -115,7 +80,6 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
     return Status::success;
   }
   set_id(id);
-  hidden_algebraic_ = slopes.size() > 0 && has_dependent_columns(std::move(slopes), mask);
   return Status::success;
 }
 

@@ -173,10 +173,9 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, 
 Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
                                        void* mem) {
   corrector_was_right_ = true;
-  const bool polishes = wants_polish();
-  if (polishes) keep_corrector(candidate);
+  keep_corrector(candidate);
   Move move = mover_->move(candidate);
-  if (polishes && move.status == Status::success)
+  if (move.status == Status::success && wants_polish(move.length))
     move.status = polish(candidate, cj, tolerance, mem);
   return move;
 }
@@ -221,18 +220,19 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   pending_ = false;
 }
 
-// IDA may double its step right after a doubling was refused. Where algebraic combinations of
-// variables stand in the error test (no component of id can take them out), the estimate grows with
-// the change of h instead of h^(k+1): IDA doubles h after every step, is refused every time, and
-// stays at order 1 with tiny steps, since it raises the order only after k + 2 steps of one size.
-// Smooth steps do not get there, and must take over before.
+// IDA may double its step right after a doubling was refused, and raises the order only after k + 2
+// steps of one size: one failed error test a step at order 1 can go on for ever.
 void Projection::Impl::look_for_refusals() {
   if (smoother_.on()) return;
   long failures = 0;
   IDAGetNumErrTestFails(ida_mem_, &failures);
   refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;
   last_error_failures_ = failures;
-  if (!engaged_ || refused_in_row_ < (hidden_algebraic_ ? 1 : kTrapped)) return;
+  if (engaged_ && refused_in_row_ >= kTrapped) begin_smoothing();
+}
+
+void Projection::Impl::begin_smoothing() {
+  if (smoother_.on() || !options_.smooth_where_needed) return;
   smoother_.begin();
   ++statistics_.smoothing_begun;
 }
@@ -248,6 +248,8 @@ Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
     IDASetId(ida_mem_, id_);
     IDASetSuppressAlg(ida_mem_, 1);
   }
+  // Multipliers of higher index answer to a change of h by errors proportional to the change.
+  if (options_.smooth_where_needed && index_exceeds_one(candidate, mem)) begin_smoothing();
   return mover_->set_algebraic(candidate, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr);
 }
 

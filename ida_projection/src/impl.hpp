@@ -90,12 +90,13 @@ class Projection::Impl {
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   void look_for_refusals();
+  void begin_smoothing();
   int corrector_failed(int flag);
   int look_before_moving(const Candidate& candidate, void* mem, bool& done);
   Status engage(const Candidate& candidate, void* mem);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance, void* mem);
   void keep_corrector(const Candidate& candidate);
-  bool wants_polish() const;  // polish.cpp
+  bool wants_polish(double length) const;  // polish.cpp
   Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
   bool newton_step_at_moved_point(const Candidate& candidate, void* mem);
   double differential_length(const Candidate& candidate);
@@ -106,6 +107,7 @@ class Projection::Impl {
   // algebraic.cpp
   Status derive_id(const Candidate& candidate, void* mem);
   void set_id(N_Vector id);
+  bool index_exceeds_one(const Candidate& candidate, void* mem);  // index.cpp
 
   // consistency.cpp
   bool probe(double t0, N_Vector yy, N_Vector yp);
@@ -139,7 +141,6 @@ class Projection::Impl {
   double *delta_entries_ = nullptr, *newton_entries_ = nullptr, *saved_entries_ = nullptr;
   std::vector<int> algebraic_;  // indices, contiguous vectors
   bool has_algebraic_ = false;
-  bool hidden_algebraic_ = false;    // F_y' is singular though each variable's rate appears in F
   bool corrector_was_right_ = true;  // the polish found what IDA's convergence test promised
   bool engaged_ = false;             // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;

@@ -21,19 +21,20 @@ namespace {
 
 // IDA's own test promises that one more iteration changes y by at most its tolerance.
 constexpr double kMisled = 2.0;
+constexpr double kAnswered = 0.1;  // tolerances: a shorter move needs no answer of y_a
 
 }  // namespace
 
-bool Projection::Impl::wants_polish() const {
+bool Projection::Impl::wants_polish(double length) const {
   if (linear_solve_ == nullptr) return false;
-  if (has_algebraic_ && options_.refresh_algebraic) return true;
-  if (options_.extra_iterations == 0) return false;
-  // After two iterations of its own the corrector leaves nothing worth another one; but whether it
-  // made them varies from run to run, which smooth step sizes are not meant to.
+  if (options_.extra_iterations == 0) return has_algebraic_ && options_.refresh_algebraic;
+  // After two iterations of its own the corrector leaves nothing worth another one, unless the move
+  // asks for an answer of the algebraic variables. Whether it made them varies from run to run,
+  // which smooth step sizes are not meant to.
   if (smoother_.on()) return true;
   long iterations = 0;
   SUNNonlinSolGetNumIters(inner_, &iterations);
-  return iterations <= 1;
+  return iterations <= 1 || (has_algebraic_ && length > kAnswered);
 }
 
 // F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N) through IDA's own callback, which adds ycor to

@@ -33,7 +33,7 @@ std::vector<Entry> entries(const Statistics& s) {
       count("refreshes of algebraic variables", "refreshes", s.refreshes),
       count("evaluations of F by the plugin", "residual_evaluations", s.residual_evaluations),
       count("factorizations with dropped rows", "rank_drops", s.rank_drops),
-      count("step smoothing begun by refusals", "smoothing_begun", s.smoothing_begun),
+      count("step smoothing begun", "smoothing_begun", s.smoothing_begun),
       count("failures: not converged", "not_converged", s.not_converged),
       count("failures: move too long", "move_too_long", s.move_too_long),
       count("moves capped", "moves_capped", s.moves_capped),

@@ -1,8 +1,11 @@
 // Tether: step sizes by Soederlind's filter. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <problems/akzo_nobel.hpp>
 #include <problems/andrews.hpp>
+#include <problems/car_axis.hpp>
 #include <problems/pendulum.hpp>
+#include <problems/slider_crank.hpp>
 #include <problems/transistor_amplifier.hpp>
 
 #include "host.hpp"
@@ -155,6 +158,29 @@ TEST_CASE("smooth steps begin where hidden algebraic combinations make IDA refus
     CHECK(run.statistics.smoothing_begun == 1);
     CHECK(run.error <= 40.0 * tolerance);
     CHECK(static_cast<double>(run.steps) <= 1900.0 * std::pow(tolerance / 1e-4, -0.15));
+  }
+}
+
+TEST_CASE("smooth steps begin in forms of index 2 and make them as accurate as those of index 1") {
+  tp::Options ida_alone;
+  ida_alone.smooth_where_needed = false;
+  for (const char* form : {"GGL", "index 2"}) {
+    double better = 0.0;
+    for (int i = 0; i <= 6; ++i) {
+      const double tolerance = std::pow(10.0, -4.0 - 4.0 * i / 6.0);
+      INFO(form << ", tolerance " << tolerance);
+      const Problem problem = pendulum(1, 1, 100, form);
+      const tp::Constraints rows = problem.recommended_constraints();
+      const Run run = integrate(problem, tolerance, rows, {}, false);
+      const Run plain = integrate(problem, tolerance, rows, ida_alone, false);
+      REQUIRE(run.flag >= 0);
+      CHECK(run.statistics.smoothing_begun == 1);
+      CHECK(plain.statistics.smoothing_begun == 0);
+      CHECK(run.error <= 500.0 * tolerance);
+      CHECK(run.steps <= plain.steps);
+      better += std::log10(plain.error / run.error) / 7.0;
+    }
+    CHECK(better >= 0.7);
   }
 }
 

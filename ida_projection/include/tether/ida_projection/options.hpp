@@ -67,8 +67,8 @@ struct Options {
   bool refresh_algebraic = true;
 
   /// The same iteration also removes what IDA's convergence test left of the correction in the
-  /// differential variables; without algebraic variables it is done where IDA iterated once. 0
-  /// or 1.
+  /// differential variables. 0 or 1. Neither is done where IDA made two iterations of its own,
+  /// unless there are algebraic variables and the move was longer than a tenth of a tolerance.
   int extra_iterations = 1;
 
   /// Choose step sizes with Soederlind's filter H211b instead of IDA's rule "keep h until it can be
@@ -77,6 +77,10 @@ struct Options {
   /// ida_projection/README.md). Owns IDA's IDASetEta... settings and IDASetMaxStep: give the
   /// longest step here (0: none), and IDASetMaxOrd's order, if it was called.
   bool step_smoothing = false;
+  /// The same from where the run stands, where IDA's rule is known to harm: F is not of index 1 in
+  /// its own variables (looked at once, up to 200 unknowns in serial vectors), or ten steps in a
+  /// row had a failed error test. IDASetMaxStep is left alone then.
+  bool smooth_where_needed = true;
   double smoothing_setpoint = 4.0;
   double maximum_step = 0.0;
   int maximum_order = 5;

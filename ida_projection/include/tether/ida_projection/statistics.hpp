@@ -21,8 +21,7 @@ struct Statistics {
   long refreshes = 0;  ///< refreshes of the algebraic variables
   long residual_evaluations = 0;  ///< F called by the plugin itself (also in IDA's own count)
   long rank_drops = 0;            ///< factorisations that dropped redundant rows
-  long smoothing_begun = 0;  ///< step smoothing switched on because IDA's own steps were refused
-                             ///< again and again (README, section 9); 0 or 1 a run
+  long smoothing_begun = 0;       ///< runs in which Options::smooth_where_needed acted
 
   // Failures by kind; each makes IDA retry with a smaller step unless noted.
   long not_converged = 0;         ///< too many moves, stagnation or divergence
