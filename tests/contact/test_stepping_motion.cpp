@@ -325,6 +325,26 @@ TEST_CASE("stepping: a run repeats bit by bit, for any number of threads, and fr
   CHECK(a.time() == c.time());
 }
 
+TEST_CASE("stepping: two threads sweep one large island together, with the bits of one") {
+  Scene scene = heap(11, 0.3, 0.2, 5e-3);
+  scene.options.tolerance = 1e-2;
+  tc::Stepper a = scene.stepper();
+  scene.options.threads = 2;
+  tc::Stepper b = scene.stepper();
+  std::size_t contacts = 0;
+  for (int k = 0; k < 120; ++k) {
+    a.step();
+    b.step();
+    contacts = std::max(contacts, b.contacts().points.size());
+  }
+  CHECK(contacts > 2000);  // below 1500 an island has one thread
+  bool same = true;
+  for (int i = 0; i < a.bodies().size(); ++i)
+    same = same && (position(a, i).array() == position(b, i).array()).all() &&
+           (velocity(a, i).array() == velocity(b, i).array()).all();
+  CHECK(same);
+}
+
 TEST_CASE("stepping: only what is asked for is a stage") {
   const auto effects = [](const Scene& scene) {
     std::string all;
