@@ -47,11 +47,9 @@ double in_plane(const Vector3d& p, double x, double y) { return std::hypot(p.x()
 const Formulation kForms[] = {Formulation::index1, Formulation::index0,
                               Formulation::stabilised_index2};
 
-// Every form and tolerance: error below `factor` times the tolerance (`last_factor` in the
-// stabilised index 2, whose multipliers cost it a digit), constraints kept, steps bounded.
+// Every form and tolerance: error below ten times the tolerance, constraints kept, steps bounded.
 void meets(const char* what, const std::function<Scene(double)>& make, double end,
-           const std::function<double(const Engine&)>& error, double factor, double last_factor,
-           long steps) {
+           const std::function<double(const Engine&)>& error, long steps) {
   for (const Formulation form : kForms)
     for (const double tolerance : {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
       Scene scene = make(tolerance);
@@ -59,9 +57,8 @@ void meets(const char* what, const std::function<Scene(double)>& make, double en
       const Outcome out = run(scene, end, error);
       INFO(what << ", " << word(form) << ", tolerance " << tolerance << ", steps "
                 << out.counts.steps << ", error in tolerances " << out.error / tolerance);
-      const bool index2 = form == Formulation::stabilised_index2;
-      CHECK(out.error < (index2 ? last_factor : factor) * tolerance);
-      CHECK(out.drift < 1e-6 * tolerance + 2e-9);
+      CHECK(out.error < 10 * tolerance);
+      CHECK(out.drift < 2e-9);
       CHECK(std::abs(out.energy_change) < 1e-9);
       CHECK(out.counts.steps < steps);
     }
@@ -84,7 +81,7 @@ TEST_CASE("pendulum against the elliptic functions", "[smooth]") {
       [](const Engine& e) {
         return in_plane(e.bodies()[0].position, 0.275087462576117, -0.961419205099125);
       },
-      10, 300, 4000);
+      6000);
 }
 
 TEST_CASE("a rod on a hinge has the period of the compound pendulum", "[smooth]") {
@@ -102,18 +99,34 @@ TEST_CASE("four-bar linkage through its dead points", "[smooth]") {
       [](const Engine& e) {
         return in_plane(2 * e.bodies()[0].position, 0.328458111540815, 0.944518538178601);
       },
-      10, 200, 5000);
+      6000);
 }
 
 TEST_CASE("slider-crank of equal lengths through its dead points", "[smooth]") {
   meets(
       "without gravity", [](double tolerance) { return slider_crank(M_PI / 4, 1, 0, tolerance); },
-      10, [](const Engine& e) { return std::abs(e.bodies()[2].position.x() - 0.143670570267); }, 10,
-      30, 3000);
+      10, [](const Engine& e) { return std::abs(e.bodies()[2].position.x() - 0.143670570267); },
+      4000);
   meets(
       "with gravity", [](double tolerance) { return slider_crank(0, 6, kGravity, tolerance); }, 10,
-      [](const Engine& e) { return std::abs(e.bodies()[2].position.x() + 0.104094678258); }, 10, 30,
-      6000);
+      [](const Engine& e) { return std::abs(e.bodies()[2].position.x() + 0.104094678258); }, 8000);
+}
+
+TEST_CASE("slider-crank of equal lengths from other starts", "[smooth]") {
+  // Crank angles at t = 10 of the reduced equation (design/hard_cases_more.md).
+  meets(
+      "at rest", [](double tolerance) { return slider_crank(M_PI / 4, 0, kGravity, tolerance); },
+      10,
+      [](const Engine& e) {
+        return std::abs(e.bodies()[2].position.x() - 2 * std::cos(0.746757721449060));
+      },
+      8000);
+  meets(
+      "over and over", [](double tolerance) { return slider_crank(M_PI / 4, 4, 0, tolerance); }, 10,
+      [](const Engine& e) {
+        return std::abs(e.bodies()[2].position.x() - 2 * std::cos(42.6381845060193));
+      },
+      14000);
 }
 
 TEST_CASE("double pendulum", "[smooth]") {
@@ -122,7 +135,7 @@ TEST_CASE("double pendulum", "[smooth]") {
       [](const Engine& e) {
         return in_plane(e.bodies()[1].position, -1.444818849943475, -1.321794461381465);
       },
-      10, 60, 2000);
+      3000);
 }
 
 TEST_CASE("five rods", "[smooth]") {
@@ -190,7 +203,7 @@ TEST_CASE("Bricard's linkage, redundant everywhere", "[smooth]") {
       [](const Engine& e) {
         return (end_of(e, 1) - Vector3d(-0.784913056605, -0.981403582262, -0.191955746785)).norm();
       },
-      10, 60, 3000);
+      5000);
 }
 
 TEST_CASE("flyball governor: stiff springs with dampers, energy by their work", "[smooth]") {

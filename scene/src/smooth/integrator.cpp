@@ -23,10 +23,23 @@ namespace {
 // Unknowns from which KLU is faster than the dense solver.
 constexpr int kSparseFrom = 80;
 
-// IDA bounds the error of each step. A tenth of the wanted error keeps slider-crank, four-bar and
-// Bricard's linkage below ten times the tolerance after 10 s, for about 1.4 times the steps.
-constexpr double kLocal = 0.1, kSmallest = 1e-13;
-double local_tolerance(double tolerance) { return std::max(kLocal * tolerance, kSmallest); }
+// IDA bounds the error of each step; a run's error grows with the number of steps, which is about
+// tolerance^(-1/6). With this, and a tenth of the wanted error at 1e-4, slider-crank and four-bar
+// stay below ten times the tolerance after 10 s. The stabilised form needs smaller steps, and its
+// multipliers, which it divides by the step, are noise below 1e-11.
+double local_tolerance(const SmoothOptions& options) {
+  const bool index2 = options.formulation == Formulation::stabilised_index2;
+  const double part = index2 ? 0.03 : 0.1, smallest = index2 ? 1e-11 : 1e-13;
+  const double tighter = std::min(1.0, std::pow(options.tolerance / 1e-4, 1.0 / 6.0));
+  return std::max(part * tighter * options.tolerance, smallest);
+}
+
+// Newton's test, of the local tolerance: IDA's 0.33 leaves noise that dead points and the
+// multipliers of index 2 magnify.
+constexpr double kNewton = 0.1, kNewtonIndex2 = 0.02;
+
+// Of velocities across the joints, times pivot^2; see weights().
+constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3;
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -61,6 +74,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     : system_(system),
       options_(options),
       t_(t),
+      tolerance_(local_tolerance(options)),
       context_(make_context()),
       watch_(system.effect_names().size()) {
   const int N = system.size();
@@ -72,13 +86,14 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     N_VGetArrayPointer(y_)[i] = y[i];
     N_VGetArrayPointer(yp_)[i] = yp[i];
     N_VGetArrayPointer(id_)[i] = system.id(i);
-    N_VGetArrayPointer(atol_)[i] = system.absolute_tolerance(i, local_tolerance(options.tolerance));
+    N_VGetArrayPointer(atol_)[i] = system.absolute_tolerance(i, tolerance_);
   }
   ida_ = IDACreate(context_);
   catch_messages();
   IDAInit(ida_, residual, t, y_, yp_);
   IDASetUserData(ida_, this);
-  IDASVtolerances(ida_, local_tolerance(options.tolerance), atol_);
+  system.choose_rows(t, y.data(), tolerance_);
+  IDAWFtolerances(ida_, weights);
   IDASetMaxNumSteps(ida_, options.max_steps);
   if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
   prepare_matrix();
@@ -87,12 +102,17 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   IDASetId(ida_, id_);
   // Multipliers are derived quantities in every form: IDA judges the motion.
   IDASetSuppressAlg(ida_, 1);
+  IDASetNonlinConvCoef(
+      ida_, options.formulation == Formulation::stabilised_index2 ? kNewtonIndex2 : kNewton);
   if (options.projection) {
     ida_projection::Options projection;
     projection.id = id_;
     projection.print_fatal = false;
+    // Without its refresh the noise of index 1's multipliers grows until Newton fails. Those of
+    // index 2 scale with cj, as IDA's own factor does: the refresh with old factors makes errors at
+    // tight tolerances up to thirty times larger.
+    projection.refresh_algebraic = options.formulation == Formulation::index1;
     projection.progress = [&system](const ida_projection::Progress&) { system.look_at_rows(); };
-    system.choose_rows(t, y.data(), local_tolerance(options.tolerance));
     projection_.emplace(ida_, system.constraints(), projection);
   }
 }
@@ -165,6 +185,20 @@ int Integrator::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* se
   return std::isfinite(sum) ? 0 : 1;  // IDA tries a smaller step
 }
 
+// 1 / (rtol |y| + atol). Near a dead point velocities across the joints are known to
+// round-off / pivot^2 only, and no step size makes them better: what cannot be had is not asked
+// for.
+int Integrator::weights(N_Vector y, N_Vector weights, void* self) {
+  const Integrator& me = *static_cast<Integrator*>(self);
+  const double pivot = std::max(me.system_.weakest_pivot(), kSmallestPivot);
+  const double widen = std::max(1.0, kNoise / (pivot * pivot * me.tolerance_));
+  const double *values = N_VGetArrayPointer(y), *atol = N_VGetArrayPointer(me.atol_);
+  double* out = N_VGetArrayPointer(weights);
+  for (int i = 0; i < me.system_.size(); ++i)
+    out[i] = 1.0 / (widen * (me.tolerance_ * std::abs(values[i]) + atol[i]));
+  return 0;
+}
+
 int Integrator::jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J,
                          void* self, N_Vector, N_Vector, N_Vector) {
   Integrator& me = *static_cast<Integrator*>(self);
@@ -176,6 +210,10 @@ int Integrator::jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector,
     std::copy(me.row_indices_.begin(), me.row_indices_.end(), SUNSparseMatrix_IndexValues(J));
     values = SUNSparseMatrix_Data(J);
     std::fill(values, values + me.row_indices_.size(), 0.0);
+    if (me.multiplier_choices_ != me.system_.multiplier_choices()) {
+      me.multiplier_choices_ = me.system_.multiplier_choices();
+      SUNLinSol_KLUReInit(me.solver_, J, 0, SUNKLU_REINIT_PARTIAL);  // other pivots
+    }
   }
 #endif
   if (!values) {

@@ -41,6 +41,7 @@ class Integrator {
   static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
   static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
                       void* self, N_Vector, N_Vector, N_Vector);
+  static int weights(N_Vector y, N_Vector weights, void* self);
   void prepare_matrix();
   void catch_messages();
   std::string failure(int flag) const;
@@ -48,6 +49,7 @@ class Integrator {
   System& system_;
   SmoothOptions options_;
   double t_;
+  double tolerance_;  // of a step
   SUNContext context_ = nullptr;
   N_Vector y_ = nullptr, yp_ = nullptr, id_ = nullptr, atol_ = nullptr;
   SUNMatrix matrix_ = nullptr;
@@ -56,6 +58,7 @@ class Integrator {
   std::optional<ida_projection::Projection> projection_;
   Entries entries_;
   std::vector<sunindextype> column_starts_, row_indices_;  // sparse: the pattern
+  int multiplier_choices_ = 0;                             // those that KLU's pivots are for
   std::string last_message_;                               // IDA's
 
   Stopwatch watch_;

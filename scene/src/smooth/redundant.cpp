@@ -30,6 +30,7 @@ constexpr double kSecondOrder = 1e-7;  // of n^T gamma, relative to |gamma|
 constexpr int kMostTrials = 8;         // velocities
 constexpr double kRounding = 1e-12;    // of g, with room for the next steps
 constexpr double kWeakest = 1e-2, kGood = 0.3;
+constexpr double kMuchWorse = 0.1;
 constexpr int kWait = 4;  // steps between looks while all pivots are good
 
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
@@ -85,6 +86,7 @@ void System::count_independent_rows() {
   }
   used_.assign(at(p_), 0);
   place_of_used_.assign(at(m_), -1);
+  carries_.assign(at(m_), 0);
   choose_rows();
 }
 
@@ -114,6 +116,32 @@ void System::choose_rows() {
   std::fill(place_of_used_.begin(), place_of_used_.end(), -1);
   for (int k = p_ - 1; k >= 0; --k) place_of_used_[at(used_[at(k)])] = k;
   wait_ = pivot > kGood ? kWait : 1;
+  weakest_ =
+      p_ <= row_choice_.matrixR().rows() ? std::abs(row_choice_.matrixR()(p_ - 1, p_ - 1)) : 0;
+  choose_multipliers();
+}
+
+// A change costs IDA a new matrix, so the rows stay while others are not much better.
+void System::choose_multipliers() {
+  const auto& order = row_choice_.colsPermutation().indices();
+  const auto last = [this](const auto& qr) {
+    return p_ <= qr.matrixR().rows() ? std::abs(qr.matrixR()(p_ - 1, p_ - 1)) : 0.0;
+  };
+  if (p_ == m_) {
+    std::fill(carries_.begin(), carries_.end(), char(1));
+    return;
+  }
+  Eigen::Index k = 0;
+  carried_gradient_.resize(G_.cols(), p_);
+  for (int i = 0; i < m_; ++i)
+    if (carries_[at(i)]) carried_gradient_.col(k++) = G_.row(i).transpose();
+  if (k == p_) {
+    carried_rows_.compute(carried_gradient_);
+    if (last(carried_rows_) > kMuchWorse * last(row_choice_)) return;
+  }
+  ++multiplier_choices_;
+  std::fill(carries_.begin(), carries_.end(), char(0));
+  for (Eigen::Index i = 0; i < p_; ++i) carries_[static_cast<std::size_t>(order[i])] = 1;
 }
 
 void System::look_at_rows() {

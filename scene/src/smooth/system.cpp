@@ -14,9 +14,8 @@ namespace {
 
 constexpr double kTurn = 6.283185307179586;
 
-// Of the diagonal of G M^-1 G^T. Rows of accelerations, and rows of velocities and positions,
-// whose block is smaller by 1 / cj.
-constexpr double kAccelerationEpsilon = 1e-11, kVelocityEpsilon = 1e-14;
+// Index 0: of the diagonal of G M^-1 G^T.
+constexpr double kEpsilon = 1e-11;
 
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
@@ -123,9 +122,8 @@ System::System(const Scene& scene) : form_(scene.smooth.value_or(SmoothOptions{}
   a_.setZero(n);
   free_.setZero(n);
   factor_ = Eigen::LLT<Eigen::MatrixXd>(m_);
-  const double relative =
-      form_ == Formulation::stabilised_index2 ? kVelocityEpsilon : kAccelerationEpsilon;
-  epsilon_ = relative * S_.diagonal();
+  size_of_row_ = S_.diagonal();
+  epsilon_ = kEpsilon * size_of_row_;
   if (form_ == Formulation::index0) left_.setZero(n + m_, kBody * moving());
 }
 
@@ -401,6 +399,12 @@ void System::complete(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp) {
   if (form_ == Formulation::stabilised_index2) y.segment(first_eta(), m_).setZero();
 }
 
+// In the place of a row that depends on others: its multiplier is 0.
+void System::pin_multipliers(const double* multipliers, double* rows) const {
+  for (int i = 0; i < m_; ++i)
+    if (!carries_[at(i)]) rows[i] = size_of_row_[i] * multipliers[i];
+}
+
 void System::residual(double t, const double* y, const double* yp, double* r, Stopwatch* watch) {
   const std::size_t joints = effects_.size(), bodies = joints + 1;
   const double* lambda = y + first_multiplier();
@@ -464,7 +468,7 @@ void System::residual(double t, const double* y, const double* yp, double* r, St
       row.template rows<1>(A, B, out + row.row);
       row.template rows<0>(A, B, positions + row.row);
     });
-    for (int i = 0; i < m_; ++i) positions[i] += epsilon_[i] * y[first_eta() + i];
+    pin_multipliers(y + first_eta(), positions);
   } else {
     update_accelerations(yp);
     each_row([&](const auto& row) {
@@ -472,7 +476,7 @@ void System::residual(double t, const double* y, const double* yp, double* r, St
                            out + row.row);
     });
   }
-  for (int i = 0; i < m_; ++i) out[i] += epsilon_[i] * lambda[i];
+  pin_multipliers(lambda, out);
   if (watch) watch->lap(joints);
 }
 
@@ -522,7 +526,8 @@ void System::add_motion_jacobian(JacobianBlocks& J, const double* lambda, int fi
 
 // Derivatives of the order-th rate of g to y, and with cj to the accelerations.
 template <int order>
-void System::add_row_jacobian(JacobianBlocks& J, int first_row, bool accelerations, double cj) {
+void System::add_row_jacobian(JacobianBlocks& J, int first_row, bool carried_only,
+                              bool accelerations, double cj) {
   each_row([&](const auto& row) {
     const Inertia &ia = bodies_.inertia[at(row.first)], &ib = bodies_.inertia[at(row.second)];
     const Frame<Dual> A = seed(bodies_.frames[at(row.first)], ia.slot >= 0, 0);
@@ -537,8 +542,10 @@ void System::add_row_jacobian(JacobianBlocks& J, int first_row, bool acceleratio
         d.segment<6>(6) += cj * rate[i].derivatives().template segment<6>(6);
         d.segment<6>(18) += cj * rate[i].derivatives().template segment<6>(18);
       }
-      if (ia.slot >= 0) J.add_directions(first_row + row.row + i, ia.slot, d, 0, 1.0);
-      if (ib.slot >= 0) J.add_directions(first_row + row.row + i, ib.slot, d, kBodyDirections, 1.0);
+      const double factor = carried_only && !carries_[at(row.row + i)] ? 0.0 : 1.0;
+      if (ia.slot >= 0) J.add_directions(first_row + row.row + i, ia.slot, d, 0, factor);
+      if (ib.slot >= 0)
+        J.add_directions(first_row + row.row + i, ib.slot, d, kBodyDirections, factor);
     }
   });
 }
@@ -587,14 +594,18 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
           J.add(first_work(), first_multiplier() + row.row + i, g_t[i]);
       });
   }
-  for (int i = 0; i < m_; ++i) J.add(first_multiplier() + i, first_multiplier() + i, epsilon_[i]);
+  const auto pin = [&](int first) {
+    for (int i = 0; i < m_; ++i)
+      J.add(first + i, first + i, carries_[at(i)] ? 0.0 : size_of_row_[i]);
+  };
+  pin(first_multiplier());
   if (!index2) {
-    add_row_jacobian<2>(J, first_multiplier(), true, cj);
+    add_row_jacobian<2>(J, first_multiplier(), true, true, cj);
     return;
   }
-  add_row_jacobian<1>(J, first_multiplier(), false, 0.0);
-  add_row_jacobian<0>(J, first_eta(), false, 0.0);
-  for (int i = 0; i < m_; ++i) J.add(first_eta() + i, first_eta() + i, epsilon_[i]);
+  add_row_jacobian<1>(J, first_multiplier(), true, false, 0.0);
+  add_row_jacobian<0>(J, first_eta(), true, false, 0.0);
+  pin(first_eta());
   // eta moves x and q; its own size is that of the drift, so that d(G^T)/dq eta is left out.
   each_row([&](const auto& row) {
     double unit[3] = {0, 0, 0};
@@ -637,7 +648,7 @@ void System::index0_jacobian(double cj, const double* y, const double*, Entries&
   const auto partials = [&] {
     JacobianBlocks D(dense_entries_, bodies_.turns, 6, 0, 0);
     add_motion_jacobian(D, lambda_.data(), -1);
-    add_row_jacobian<2>(D, n, false, 0.0);
+    add_row_jacobian<2>(D, n, false, false, 0.0);
   };
   if (!dense_recorded_) {
     dense_entries_.record();

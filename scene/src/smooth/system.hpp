@@ -4,14 +4,16 @@
 // forces without potential if energy is kept with them; then the multipliers lambda and, in the
 // stabilised form, eta.
 //
-//   index 1        x' = v, q' = q (0, w) / 2, M (v', w') = f + G^T lambda, g'' + eps lambda = 0
+//   index 1        x' = v, q' = q (0, w) / 2, M (v', w') = f + G^T lambda, g'' = 0
 //   index 0        the same with lambda eliminated: G M^-1 G^T lambda = -(gamma + G M^-1 f)
-//   stabilised 2   x', q' with (v, w) + M^-1 G^T eta, G v + g_t + eps lambda = 0, g + eps eta = 0
+//   stabilised 2   x', q' with (v, w) + M^-1 G^T eta, G v + g_t = 0, g = 0
 //
 // Rows may depend on each other, everywhere (planar linkages of 3-D hinges, Bricard's) or at a dead
-// point. eps keeps the equations solvable, choosing multipliers of least norm. It changes
-// accelerations by about eps relative to what the joints carry, across the constraints, where the
-// projection removes it. The projection uses independent rows only, see redundant.cpp.
+// point. So index 1 and 2 give multipliers to as many rows as are independent along the motion, and
+// hold the others at 0; see redundant.cpp. A diagonal term eps lambda in their place acts through
+// eps / pivot^2: at tight tolerances it bends the motion at a dead point, and IDA does not get
+// through. Index 0 has it (eps = 1e-11 of the diagonal, refined three times, so to the third
+// power).
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -56,6 +58,11 @@ class System {
   /// Chooses the rows of the joints that the projection uses from here on, see redundant.cpp.
   void choose_rows(double t, const double* y, double tolerance);
   void look_at_rows();  ///< after a step
+  /// How far the rows in use are from depending on each other: the length of what the last one adds
+  /// to the others, rows of unit length; 0 at a dead point, 1 without joints.
+  double weakest_pivot() const { return weakest_; }
+  /// Grows when other rows carry multipliers: the matrix has other zeros then.
+  int multiplier_choices() const { return multiplier_choices_; }
   int constraint_count() const;
   void constraint_values(double t, const double* y, double* g);
   using Rows = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
@@ -77,6 +84,7 @@ class System {
   void add_joints(const Scene& scene);
   void count_independent_rows();
   void choose_rows();
+  void choose_multipliers();
   void add_invariants(const Scene& scene);
   template <class F>
   void each_row(F f) const;
@@ -89,7 +97,9 @@ class System {
   void solve_multipliers();  // lambda_, a_ of forces_ at the present state
   void add_motion_jacobian(JacobianBlocks& J, const double* lambda, int first_lambda);
   template <int order>
-  void add_row_jacobian(JacobianBlocks& J, int first_row, bool accelerations, double cj);
+  void add_row_jacobian(JacobianBlocks& J, int first_row, bool carried_only, bool accelerations,
+                        double cj);
+  void pin_multipliers(const double* multipliers, double* rows) const;
   void index0_jacobian(double cj, const double* y, const double* yp, Entries& entries);
   double power(const double* lambda) const;
   double energy() const;
@@ -110,7 +120,10 @@ class System {
   int p_ = 0;                       // rows that the projection uses
   std::vector<int> used_;           // these, now
   std::vector<int> place_of_used_;  // of each row the first place in used_, or -1
-  int wait_ = 0;                    // steps until they are looked at again
+  std::vector<char> carries_;       // of each row: it has a multiplier
+  double weakest_ = 1;
+  int multiplier_choices_ = 0;
+  int wait_ = 0;  // steps until they are looked at again
   std::vector<Coincidence> coincidences_;
   std::vector<RightAngle> right_angles_;
   std::vector<Angle> angles_;
@@ -127,9 +140,9 @@ class System {
 
   // Workspace.
   std::vector<Load6> loads_, pulls_;
-  Eigen::VectorXd epsilon_, lambda_, a_, gamma_, free_, right_, values_, scratch_;
-  Eigen::MatrixXd G_, GM_, S_, regular_, left_, dense_;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> row_choice_;
+  Eigen::VectorXd size_of_row_, epsilon_, lambda_, a_, gamma_, free_, right_, values_, scratch_;
+  Eigen::MatrixXd G_, GM_, S_, regular_, left_, dense_, carried_gradient_;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> row_choice_, carried_rows_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Entries dense_entries_;
   bool dense_recorded_ = false;
