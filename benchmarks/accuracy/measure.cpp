@@ -164,6 +164,24 @@ void extend(Session& session, double tolerance, double factor, double end, std::
   }
 }
 
+// A failure of ours that plain IDA shares, with and without algebraic variables in its error test,
+// is one of the form and tolerance and not of the projection.
+void name_shared_failures(std::vector<Point>& points) {
+  for (Point& point : points) {
+    if (!is_ours(point.code) || !point.run.failed) continue;
+    int runs = 0, fails = 0;
+    for (const Point& other : points) {
+      if (base_name(other.code) != "IDA" || other.form != point.form ||
+          other.tolerance != point.tolerance)
+        continue;
+      ++runs;
+      fails += other.run.failed;
+    }
+    if (runs > 0)
+      point.status += fails == runs ? "; plain IDA fails here, too" : "; plain IDA does not";
+  }
+}
+
 void set_ratios(std::vector<Point>& points) {
   const std::vector<Family> all = families(points);
   std::vector<std::string> peers;
@@ -201,6 +219,7 @@ std::vector<Point> measure(const Case& which, const Codes& codes, const Plan& pl
                    [](const Point& a, const Point& b) { return a.tolerance > b.tolerance; });
   const double growth = amplification(which);
   for (Point& point : points) point.status = status_of(point, growth);
+  name_shared_failures(points);
   set_ratios(points);
   return points;
 }
