@@ -1,0 +1,197 @@
+// Tether: sweeps over an island, with momentum. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "body_parts.hpp"
+
+namespace tether::contact {
+
+namespace {
+
+// Forecasts of the sweeps that are still needed are made after 5, 10, 20, 40, ... sweeps. More than
+// kSlow: momentum is used. More than kPatience for each contact of the island (about what its
+// assembly and solution cost, measured on stacks and packings of 8 to 1400 contacts), after one
+// sweep for each contact: assembled.
+constexpr int kFirstForecast = 5;
+constexpr int kFew = 64;  // see BodyOptions::min_sweeps
+constexpr double kSlow = 15, kPatience = 7;
+constexpr detail::BodyInertia kNoInertia = {};
+
+// Nesterov's momentum on the sweeps. A sweep is no gradient step, but the same rule serves: where a
+// sweep changes more than the one before, the momentum is dropped and its growth set back by half.
+// Where contacts toggle between stick and slip that happens all the time: as long as it does not
+// get on, a little more change is allowed in every other window.
+class Momentum {
+ public:
+  void start() { on_ = true; }
+  bool on() const { return on_; }
+  // beta, given the sum of squares that the last sweep changed.
+  double next(double change) {
+    best_ = std::min(best_, change);
+    if (++count_ == window_end_) look_back();
+    const double grown = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
+    double beta = (t_ - 1) / grown;
+    if (change > allowed_ * last_) {
+      t_ = std::max(1.0, 0.5 * t_);
+      beta = 0;
+    } else {
+      t_ = grown;
+    }
+    last_ = change;
+    return beta;
+  }
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+
+  void look_back() {
+    if (best_ > 0.25 * best_before_) {  // of squares: not halved
+      allowed_ = allowed_ > 1 ? 1 : 1.2;
+      t_ = 1;
+      last_ = kNone;
+    }
+    best_before_ = best_;
+    window_ += window_ / 2;
+    window_end_ = count_ + window_;
+  }
+
+  bool on_ = false;
+  double t_ = 1, last_ = kNone, allowed_ = 1, best_ = kNone, best_before_ = kNone;
+  int count_ = 0, window_ = 100, window_end_ = 100;
+};
+
+}  // namespace
+
+template <class Operation>
+double BodySolver::Implementation::over_kinds(int chunk, const Team& team,
+                                              const Operation& operation) {
+  const BodyArrays s{state.data(), inertia.data(), fixed.data(), &team.worker->nowhere,
+                     &kNoInertia};
+  const auto &from = graph.chunks[at(chunk)].begin, &to = graph.chunks[at(chunk + 1)].begin;
+  double sum = 0;
+  const auto kind_range = [&](auto& list, Kind k, int width) {
+    const int begin = from[static_cast<int>(k)] / width, end = to[static_cast<int>(k)] / width;
+    if (begin < end) sum += operation(s, list.data() + begin, list.data() + end);
+  };
+  kind_range(general4, Kind::general4, 4);
+  kind_range(spheres4, Kind::sphere4, 4);
+  kind_range(general, Kind::general, 1);
+  kind_range(spheres, Kind::sphere, 1);
+  kind_range(smooth, Kind::smooth, 1);
+  return sum;
+}
+
+double BodySolver::Implementation::sweep(int chunk, const Team& team) {
+  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end) {
+    return detail::sweep(s, options.law, begin, end);
+  });
+}
+
+double BodySolver::Implementation::test(int chunk, const Team& team) {
+  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end) {
+    return detail::test(s, options.law, begin, end);
+  });
+}
+
+// The first chunk of part k of `parts` with about the same number of contacts.
+int BodySolver::Implementation::cut(int begin, int end, int k, int parts) const {
+  if (k == 0) return begin;
+  if (k == parts) return end;
+  const Chunk* chunks = graph.chunks.data();
+  const long long first_place = chunks[begin].place;
+  const long long place = first_place + (chunks[end].place - first_place) * k / parts;
+  const Chunk* c = std::partition_point(chunks + begin, chunks + end, [&](const Chunk& chunk) {
+    return static_cast<long long>(chunk.place) + (&chunk)[1].place < 2 * place;
+  });
+  return static_cast<int>(c - chunks);
+}
+
+// x <- x + beta (x - previous x) and the same for the velocities, which follow x linearly.
+void BodySolver::Implementation::extrapolate(const Island& island, const Team& team, double beta) {
+  const auto move = [beta](double& x, double& previous) {
+    const double now = x;
+    x += beta * (now - previous);
+    previous = now;
+  };
+  const int begin = team.from(island.chunk_begin, island.chunk_end);
+  const int end = team.to(island.chunk_begin, island.chunk_end);
+  for (int chunk = begin; chunk < end; ++chunk) {
+    double* previous = previous_impulse.data() + 3 * at(graph.chunks[at(chunk)].place);
+    const auto &from = graph.chunks[at(chunk)].begin, &to = graph.chunks[at(chunk + 1)].begin;
+    const auto over = [&](auto& list, Kind k, int width, auto&& impulses) {
+      const int last = to[static_cast<int>(k)] / width;
+      for (int i = from[static_cast<int>(k)] / width; i < last; ++i) {
+        double* x = impulses(list[at(i)]);
+        for (int c = 0; c < 3 * width; ++c) move(x[c], *previous++);
+      }
+    };
+    over(general4, Kind::general4, 4, [](GeneralGroup& g) { return &g.x[0][0]; });
+    over(spheres4, Kind::sphere4, 4, [](SphereGroup& g) { return &g.p[0][0]; });
+    over(general, Kind::general, 1, [](GeneralContact& c) { return c.x; });
+    over(spheres, Kind::sphere, 1, [](SphereContact& c) { return c.p; });
+    const int last = to[static_cast<int>(Kind::smooth)];
+    for (int i = from[static_cast<int>(Kind::smooth)]; i < last; ++i) {
+      move(smooth[at(i)].x, *previous++);
+    }
+  }
+  const int bodies_end = team.to(island.body_begin, island.body_end);
+  for (int i = team.from(island.body_begin, island.body_end); i < bodies_end; ++i) {
+    double* previous = previous_velocity.data() + 6 * at(i);
+    for (int c = 0; c < 3; ++c) {
+      move(state[at(i)].v[c], previous[c]);
+      move(state[at(i)].w[c], previous[3 + c]);
+    }
+  }
+  team.meet();
+}
+
+// Sweeps until the island is solved, max_sweeps are reached, or it should be assembled.
+void BodySolver::Implementation::iterate(int k, const Team& team) {
+  const Island& island = graph.islands[at(k)];
+  const bool small = island.contacts <= options.max_assembled;
+  int turn = 0;
+  IslandResult r;
+  r.norm = std::sqrt(pass(island, team, turn, [&](int c) { return pack(c, *team.worker); }));
+  const double norm = r.norm > 0 ? r.norm : 1;
+  const double bound = options.tolerance * options.tolerance * norm * norm;
+  double earlier = std::numeric_limits<double>::infinity();  // at the last forecast
+  int forecast = kFirstForecast, failed_tests = 0;
+  int next_test = island.contacts > kFew ? options.min_sweeps : 0;
+  Momentum momentum;
+  for (;;) {
+    const double sum = pass(island, team, turn, [&](int c) { return sweep(c, team); });
+    ++r.sweeps;
+    const bool last = r.sweeps >= options.max_sweeps;
+    // What a sweep changes is close to the residual, which costs another pass.
+    if ((sum <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
+      const double residual = pass(island, team, turn, [&](int c) { return test(c, team); });
+      r.error = std::sqrt(residual) / norm;
+      if (residual <= bound) {
+        r.status = Status::solved;
+        break;
+      }
+      next_test = r.sweeps + ++failed_tests;
+    }
+    if (last) {
+      r.status = sum > 0.998 * earlier ? Status::cycling : Status::work_limit;
+      break;
+    }
+    if (r.sweeps == forecast) {
+      // Linear convergence as since half as many sweeps: how many more?
+      const double rate = std::log(sum / earlier) / (0.5 * r.sweeps);
+      const double more =
+          rate < 0 ? std::log(bound / sum) / rate : std::numeric_limits<double>::infinity();
+      if (r.sweeps > kFirstForecast) {
+        const bool tried = r.sweeps >= island.contacts && momentum.on();
+        if (small && tried && more > kPatience * island.contacts) break;
+        if (more > kSlow && !momentum.on()) momentum.start();
+      }
+      earlier = sum;
+      forecast *= 2;
+    }
+    if (momentum.on()) extrapolate(island, team, momentum.next(sum));
+  }
+  if (team.thread == 0) results[at(k)] = r;
+}
+
+}  // namespace tether::contact
