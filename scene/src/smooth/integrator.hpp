@@ -62,7 +62,8 @@ class Integrator {
   std::string last_message_;                               // IDA's
 
   Stopwatch watch_;
-  double jacobian_seconds_ = 0, total_seconds_ = 0;
+  double jacobian_seconds_ = 0, total_seconds_ = 0;  // wall clock
+  double processor_seconds_ = 0;
   long residuals_ = 0, timed_ = 0;
 };
 
