@@ -32,7 +32,9 @@ double local_tolerance(const SmoothOptions& options) {
   const bool index2 = options.formulation == Formulation::stabilised_index2;
   const double part = index2 ? 0.03 : 0.1, smallest = index2 ? 1e-11 : 1e-13;
   const double tighter = std::min(1.0, std::pow(options.tolerance / 1e-4, 1.0 / 6.0));
-  return std::max(part * tighter * options.tolerance, smallest);
+  // Below 1e-11 rounding decides, not the number of steps.
+  const double wanted = part * options.tolerance;
+  return std::max({tighter * wanted, std::min(wanted, 1e-11), smallest});
 }
 
 // Newton's test, of the local tolerance: IDA's 0.33 leaves noise that dead points and the
