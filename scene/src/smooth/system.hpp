@@ -99,6 +99,7 @@ class System {
   template <int order>
   void add_row_jacobian(JacobianBlocks& J, int first_row, bool carried_only, bool accelerations,
                         double cj);
+  void add_eta_jacobian(JacobianBlocks& J, const double* y) const;
   void pin_multipliers(const double* multipliers, double* rows) const;
   void index0_jacobian(double cj, const double* y, const double* yp, Entries& entries);
   double power(const double* lambda) const;
