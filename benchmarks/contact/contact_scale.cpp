@@ -1,10 +1,11 @@
 // Tether: many packed contacts: time and memory of a sweep. SPDX-License-Identifier: BSD-3-Clause
 //
 //   contact_scale [--least N] [--most N] [--sweeps S] [--rounds R] [--threads T] [--shuffle 1]
+//   contact_scale --residual TOLERANCE [--least N] [--most N] [--mu MU] [--shuffle 1]
 //
 // ns: per contact and sweep, the least of R rounds, from the difference of S and 3 S sweeps, so
 // that set-up and results cancel; "setup" is what remains for S sweeps. One and T threads
-// alternate.
+// alternate. --residual: what is reached with at most 100, 300, 1000, 3000 sweeps instead.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -47,28 +48,53 @@ struct Timing {
   unsigned long bits = 0;
 };
 
+void residuals(random::Packing p, bool spheres, double tolerance, double mu) {
+  for (PointContact& c : p.contacts) c.mu = mu;
+  std::printf("%-8s %8zu %5g ", spheres ? "spheres" : "general", p.contacts.size(), mu);
+  for (int most : {100, 300, 1000, 3000}) {
+    BodyOptions o;
+    o.tolerance = tolerance;
+    o.max_assembled = 0;
+    o.max_sweeps = most;
+    const BodySolution s = BodySolver(o).solve(p.bodies, p.contacts);
+    std::printf(" %8.1e (%4d)", s.error, s.sweeps);
+  }
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  double least = 0, most = 1e6;
+  double least = 0, most = 1e6, tolerance = 0, mu = 0.4;
   int sweeps = 20, rounds = 0, many = 2;
   bool shuffle = false;
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string name = argv[i];
     if (name == "--least") least = std::atof(argv[i + 1]);
     if (name == "--most") most = std::atof(argv[i + 1]);
+    if (name == "--residual") tolerance = std::atof(argv[i + 1]);
+    if (name == "--mu") mu = std::atof(argv[i + 1]);
     if (name == "--sweeps") sweeps = std::atoi(argv[i + 1]);
     if (name == "--rounds") rounds = std::atoi(argv[i + 1]);
     if (name == "--threads") many = std::atoi(argv[i + 1]);
     if (name == "--shuffle") shuffle = std::atoi(argv[i + 1]) != 0;
   }
-  std::printf("%-8s %-19s %8s %3s %4s %6s %7s %6s %6s %6s %8s %s\n", "bodies", "law", "contacts",
-              "thr", "col", "ns", "CPU ns", "setup", "B/con", "B/body", "speed-up", "same bits");
+  if (tolerance > 0) {
+    std::printf("bodies   contacts    mu  residual (sweeps) with at most 100, 300, 1000, 3000\n");
+  } else {
+    std::printf("%-8s %-19s %8s %3s %4s %6s %7s %6s %6s %6s %8s %s\n", "bodies", "law", "contacts",
+                "thr", "col", "ns", "CPU ns", "setup", "B/con", "B/body", "speed-up", "same bits");
+  }
   for (int side : {7, 15, 32, 69}) {
     for (bool spheres : {false, true}) {
       const double expected = 3.0 * side * side * side;
       if (expected > 1.3 * most || expected < 0.7 * least) continue;
       const random::Packing p = random::packing(side, spheres, 1, shuffle);
+      if (tolerance > 0) {
+        residuals(p, spheres, tolerance, mu);
+        continue;
+      }
       const double n = static_cast<double>(p.contacts.size());
       for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
         if (spheres && law == Law::coulomb) continue;

@@ -20,6 +20,7 @@ struct IslandResult {
   int sweeps = 0;
   double norm = 0, error = 0;
   bool assembled = false;
+  bool saved = false;  // an earlier point was the best and is unpacked already
 };
 
 // What each thread has of its own.
@@ -119,6 +120,7 @@ struct BodySolver::Implementation {
            graph.islands[at(k)].contacts <= options.max_assembled;
   }
   void iterate(int k, const Team& team);
+  void save(const Island& island, const Team& team);
   void extrapolate(const Island& island, const Team& team, double beta);
   void assemble(int k, Worker& worker);
 

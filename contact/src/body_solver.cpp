@@ -65,7 +65,7 @@ void BodySolver::Implementation::together(int k, const Team& team) {
   team.meet();
   iterate(k, team);
   team.meet();
-  if (!assemblable(k)) unpack(island, team);
+  if (!assemblable(k) && !results[at(k)].saved) unpack(island, team);
 }
 
 void BodySolver::Implementation::alone(int k, Worker& worker) {
@@ -77,7 +77,7 @@ void BodySolver::Implementation::alone(int k, Worker& worker) {
     iterate(k, team);
   }
   if (assemblable(k)) assemble(k, worker);
-  unpack(island, team);
+  if (!results[at(k)].saved) unpack(island, team);
 }
 
 void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,

@@ -60,6 +60,45 @@ class Momentum {
   int count_ = 0, window_ = 100, window_end_ = 100;
 };
 
+// The best point of an island that may never be solved. Residuals of earlier points cost a pass
+// each: they are looked at where a sweep changes clearly less than at the last look or that is long
+// ago, and only where the forecast passes max_sweeps, half of them are gone, or changes begin to
+// rise in a long run.
+class BestPoint {
+ public:
+  BestPoint(bool wanted, int max_sweeps) : wanted_(wanted), max_sweeps_(max_sweeps) {}
+  void forecast(double sweeps) { slow_ = !(sweeps <= max_sweeps_); }
+  // change: sum of squares that the last sweep changed.
+  bool look(int sweeps, double change) {
+    const bool rises = change > last_ && sweeps >= kLong;
+    last_ = change;
+    if (!wanted_ || sweeps < next_) return false;
+    if (!(change < kLess * change_) && sweeps < next_ + kOld) return false;
+    if (!rises && !slow_ && sweeps <= max_sweeps_ / 2) return false;
+    change_ = change;
+    next_ = sweeps + kApart;
+    return true;
+  }
+  // residual: a sum of squares too. True: the point is to be saved.
+  bool improved(double residual) {
+    if (!(residual < residual_)) return false;
+    residual_ = residual;
+    return true;
+  }
+  // False where the residual of the last point is not a number, unless nothing was saved.
+  bool last_is_best(double residual) const { return !(residual_ < kNone) || residual <= residual_; }
+  double residual() const { return residual_; }
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  static constexpr int kFirst = 64, kApart = 8, kLong = 256, kOld = 120;
+  static constexpr double kLess = 0.64;
+
+  bool wanted_, slow_ = false;
+  int max_sweeps_, next_ = kFirst;
+  double change_ = kNone, last_ = kNone, residual_ = kNone;
+};
+
 }  // namespace
 
 template <class Operation>
@@ -145,6 +184,14 @@ void BodySolver::Implementation::extrapolate(const Island& island, const Team& t
   team.meet();
 }
 
+// To the caller's storage, which takes the last point otherwise. The threads meet before it, since
+// one may still add up what the last pass returned, and after it, since the next one moves bodies.
+void BodySolver::Implementation::save(const Island& island, const Team& team) {
+  team.meet();
+  unpack(island, team);
+  team.meet();
+}
+
 // Sweeps until the island is solved, max_sweeps are reached, or it should be assembled.
 void BodySolver::Implementation::iterate(int k, const Team& team) {
   const Island& island = graph.islands[at(k)];
@@ -158,19 +205,25 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
   int forecast = kFirstForecast, failed_tests = 0;
   int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   Momentum momentum;
+  BestPoint best(!small, options.max_sweeps);
   for (;;) {
     const double sum = pass(island, team, turn, [&](int c) { return sweep(c, team); });
     ++r.sweeps;
     const bool last = r.sweeps >= options.max_sweeps;
     // What a sweep changes is close to the residual, which costs another pass.
     if ((sum <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
-      const double residual = pass(island, team, turn, [&](int c) { return test(c, team); });
+      double residual = pass(island, team, turn, [&](int c) { return test(c, team); });
+      r.saved = last && !best.last_is_best(residual);
+      if (r.saved) residual = best.residual();
       r.error = std::sqrt(residual) / norm;
       if (residual <= bound) {
         r.status = Status::solved;
         break;
       }
       next_test = r.sweeps + ++failed_tests;
+    } else if (best.look(r.sweeps, sum) &&
+               best.improved(pass(island, team, turn, [&](int c) { return test(c, team); }))) {
+      save(island, team);
     }
     if (last) {
       r.status = sum > 0.998 * earlier ? Status::cycling : Status::work_limit;
@@ -186,6 +239,7 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
         if (small && tried && more > kPatience * island.contacts) break;
         if (more > kSlow && !momentum.on()) momentum.start();
       }
+      best.forecast(r.sweeps + more);
       earlier = sum;
       forecast *= 2;
     }

@@ -41,7 +41,9 @@ struct BodyOptions {
   /// Of each island: (sum |D_i (x_i - block(x_i))|^2)^1/2 <= tolerance * |b|, D_i the diagonal
   /// block of contact i, b the relative velocities before the impulses.
   double tolerance = 1e-6;
-  int max_sweeps = 1000;   ///< of an island
+  /// Of an island. Where they are reached above max_assembled, the best point looked at is
+  /// returned.
+  int max_sweeps = 1000;
   /// Of an island of more than 64 contacts, before it may be called solved. The tolerance is one of
   /// the whole island: a single contact of many may be off by far more than its share. Such errors
   /// fade within a few sweeps; errors common to many contacts are what the tolerance sees.
