@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
@@ -13,8 +14,9 @@ namespace tether::bench {
 namespace {
 
 // Colour-blind safe (Okabe, Ito).
-const char* const kColours[] = {"#000000", "#7f7f7f", "#d55e00", "#e69f00", "#0072b2",
-                                "#009e73", "#cc79a7", "#56b4e9", "#f0e442"};
+constexpr std::array<const char*, 12> kColours = {"#000000", "#7f7f7f", "#d55e00", "#e69f00",
+                                                  "#0072b2", "#009e73", "#cc79a7", "#56b4e9",
+                                                  "#f0e442", "#8c564b", "#4b0082", "#7a9a01"};
 
 constexpr double kWidth = 640, kHeight = 400, kLeft = 64, kRight = 150, kTop = 30, kBottom = 46;
 
@@ -78,7 +80,8 @@ std::string svg(const std::string& title, const std::string& x_label, const std:
   for (const Line& line : lines) {
     auto found = std::find(names.begin(), names.end(), line.name);
     if (found == names.end()) found = names.insert(names.end(), line.name);
-    const char* colour = kColours[static_cast<std::size_t>(found - names.begin()) % 9];
+    const char* colour =
+        kColours[static_cast<std::size_t>(found - names.begin()) % kColours.size()];
     out += fmt::format("<g fill=\"{}\"><title>{}</title>", colour, html_escape(line.hint));
     std::string path;
     for (std::size_t i = 0; i < line.x.size(); ++i) {
@@ -97,8 +100,8 @@ std::string svg(const std::string& title, const std::string& x_label, const std:
     out += fmt::format(
         "<circle cx=\"{0:.0f}\" cy=\"{1:.0f}\" r=\"4\" fill=\"{2}\"/><text x=\"{3:.0f}\" "
         "y=\"{4:.0f}\">{5}</text>\n",
-        kLeft + w + 14, kTop + 12 + 18.0 * static_cast<double>(k), kColours[k % 9], kLeft + w + 24,
-        kTop + 16 + 18.0 * static_cast<double>(k), html_escape(names[k]));
+        kLeft + w + 14, kTop + 12 + 18.0 * static_cast<double>(k), kColours[k % kColours.size()],
+        kLeft + w + 24, kTop + 16 + 18.0 * static_cast<double>(k), html_escape(names[k]));
   return out + "</svg>\n";
 }
 
