@@ -1,16 +1,14 @@
-// Tether: every contact problem of a folder, with Siconos in the same run. SPDX-License-Identifier: BSD-3-Clause
+// Tether: every contact problem of a folder, with Siconos in the same run. SPDX-License-Identifier:
+// BSD-3-Clause
 //
 //   contact_collection FOLDER [--law coulomb] [--tolerances 1e-3,1e-6,1e-9] [--csv FILE]
 //                      [--permutations N] [--no-siconos] [--methods] [--time-limit s]
 //
-// CPU milliseconds: median over repeated cold solves, zero start. Ratio: ours / best Siconos solver.
-#include <sys/types.h>
-#include <unistd.h>
-
+// CPU milliseconds: median over repeated cold solves, zero start. Ratio: ours / best Siconos
+// solver.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <sstream>
@@ -27,21 +25,18 @@ using namespace tether::contact;
 namespace {
 
 int usage(const char* why) {
-  std::fprintf(stderr, "contact_collection: %s\nusage: contact_collection FOLDER [--law LAW] "
+  std::fprintf(stderr,
+               "contact_collection: %s\nusage: contact_collection FOLDER [--law LAW] "
                "[--tolerances 1e-3,1e-6,1e-9] [--csv FILE] [--permutations N] [--no-siconos] "
-               "[--methods] [--time-limit SECONDS]\n", why);
+               "[--methods] [--time-limit SECONDS]\n",
+               why);
   return 2;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  // One thread for everybody; OpenBLAS reads this when it is loaded.
-  if (!std::getenv("OPENBLAS_NUM_THREADS")) {
-    setenv("OPENBLAS_NUM_THREADS", "1", 1);
-    setenv("OMP_NUM_THREADS", "1", 1);
-    execv("/proc/self/exe", argv);
-  }
+  use_one_thread(argv);
   std::string folder, csv;
   Law law = Law::coulomb;
   std::vector<double> tolerances{1e-3, 1e-6, 1e-9};
@@ -91,8 +86,10 @@ int main(int argc, char** argv) {
   if (files.empty()) return usage(("no problems in " + folder).c_str());
   std::FILE* table = csv.empty() ? nullptr : std::fopen(csv.c_str(), "w");
   if (!csv.empty() && !table) return usage(("cannot write " + csv).c_str());
-  if (table) std::fprintf(table, "problem,contacts,law,tolerance,measure,solver,status,sweeps,admm,factorisations,"
-                          "replaced,ms,error,natural_map,natural_map_data,fixed_point,ratio\n");
+  if (table)
+    std::fprintf(table,
+                 "problem,contacts,law,tolerance,measure,solver,status,sweeps,admm,factorisations,"
+                 "replaced,ms,error,natural_map,natural_map_data,fixed_point,ratio\n");
 
   std::vector<Measure> measures{Measure::natural_map, Measure::natural_map_data};
   if (law == Law::maximum_dissipation) measures = {Measure::fixed_point};
@@ -123,9 +120,12 @@ int main(int argc, char** argv) {
             const Residuals r = evaluate(problem, law, run.impulses);
             const bool good = r.natural_map <= 1.001 * tolerance;
             if (table) {
-              std::fprintf(table, "%s,%d,%s,%g,natural_map,siconos_%s,%s,%d,0,0,0,%.6g,%.3e,%.3e,%.3e,%.3e,\n", label.c_str(),
-                           problem.contacts(), name(law), tolerance, run.solver.c_str(), good ? "solved" : "failed",
-                           run.iterations, run.milliseconds, run.error, r.natural_map, r.natural_map_data, r.fixed_point);
+              std::fprintf(
+                  table,
+                  "%s,%d,%s,%g,natural_map,siconos_%s,%s,%d,0,0,0,%.6g,%.3e,%.3e,%.3e,%.3e,\n",
+                  label.c_str(), problem.contacts(), name(law), tolerance, run.solver.c_str(),
+                  good ? "solved" : "failed", run.iterations, run.milliseconds, run.error,
+                  r.natural_map, r.natural_map_data, r.fixed_point);
             }
             if (good && (best == 0 || run.milliseconds < best)) {
               best = run.milliseconds;
@@ -140,14 +140,17 @@ int main(int argc, char** argv) {
         options.tolerance = tolerance;
         options.measure = measure;
         std::vector<Method> tried{Method::automatic};
-        if (methods) tried = {Method::automatic, Method::gauss_seidel, Method::anderson, Method::admm, Method::proximal_newton};
+        if (methods)
+          tried = {Method::automatic, Method::gauss_seidel, Method::anderson, Method::admm,
+                   Method::proximal_newton};
         for (Method method : tried) {
           options.method = method;
           options.max_work = method == Method::automatic ? Options().max_work : 1e9;
           Solution s;
           const double ms = timed(options, problem, s);
           const Residuals r = evaluate(problem, law, s.impulses);
-          const bool compared = best > 0 && measure == Measure::natural_map && s.status == Status::solved;
+          const bool compared =
+              best > 0 && measure == Measure::natural_map && s.status == Status::solved;
           const double ratio = compared ? ms / best : 0;
           if (method == Method::automatic) {
             unsolved += s.status != Status::solved;
@@ -157,17 +160,21 @@ int main(int argc, char** argv) {
               slower += std::max(ms, best) > 0.05 && ratio > 1.2;
             }
           }
-          std::printf("%-44s %4d %-7g %-16s %-15s %-10s %10.5f ms  error %.2e  %d/%d/%d  replaced %zu", label.c_str(),
-                      problem.contacts(), tolerance, name(measure), name(method), name(s.status), ms, s.error,
-                      s.counts.sweeps, s.counts.admm_iterations, s.counts.factorisations, s.replaced.size());
-          if (compared) std::printf("  best Siconos %s %.5f ms, ratio %.3f", best_name.c_str(), best, ratio);
+          std::printf(
+              "%-44s %4d %-7g %-16s %-15s %-10s %10.5f ms  error %.2e  %d/%d/%d  replaced %zu",
+              label.c_str(), problem.contacts(), tolerance, name(measure), name(method),
+              name(s.status), ms, s.error, s.counts.sweeps, s.counts.admm_iterations,
+              s.counts.factorisations, s.replaced.size());
+          if (compared)
+            std::printf("  best Siconos %s %.5f ms, ratio %.3f", best_name.c_str(), best, ratio);
           std::printf("\n");
           std::fflush(stdout);
           if (table) {
-            std::fprintf(table, "%s,%d,%s,%g,%s,%s,%s,%d,%d,%d,%zu,%.6g,%.3e,%.3e,%.3e,%.3e,%.4g\n", label.c_str(),
-                         problem.contacts(), name(law), tolerance, name(measure), name(method), name(s.status),
-                         s.counts.sweeps, s.counts.admm_iterations, s.counts.factorisations, s.replaced.size(), ms,
-                         s.error, r.natural_map, r.natural_map_data, r.fixed_point, ratio);
+            std::fprintf(table, "%s,%d,%s,%g,%s,%s,%s,%d,%d,%d,%zu,%.6g,%.3e,%.3e,%.3e,%.3e,%.4g\n",
+                         label.c_str(), problem.contacts(), name(law), tolerance, name(measure),
+                         name(method), name(s.status), s.counts.sweeps, s.counts.admm_iterations,
+                         s.counts.factorisations, s.replaced.size(), ms, s.error, r.natural_map,
+                         r.natural_map_data, r.fixed_point, ratio);
             std::fflush(table);
           }
         }
@@ -184,19 +191,24 @@ int main(int argc, char** argv) {
           ++shuffled_runs;
           if (s.status != Status::solved) {
             ++shuffled_failures;
-            std::printf("  permutation %d of %s: %s, error %.2e\n", k, label.c_str(), name(s.status), s.error);
+            std::printf("  permutation %d of %s: %s, error %.2e\n", k, label.c_str(),
+                        name(s.status), s.error);
           }
         }
         if (!times.empty()) {
           std::sort(times.begin(), times.end());
-          std::printf("  permuted: median %.4f ms, most %.4f ms\n", times[times.size() / 2], times.back());
+          std::printf("  permuted: median %.4f ms, most %.4f ms\n", times[times.size() / 2],
+                      times.back());
         }
       }
     }
-    if (ratios > 0) std::printf("tolerance %g: geometric mean ratio to the best Siconos solver %.4f over %d\n", tolerance, std::exp(log_ratio / ratios), ratios);
+    if (ratios > 0)
+      std::printf("tolerance %g: geometric mean ratio to the best Siconos solver %.4f over %d\n",
+                  tolerance, std::exp(log_ratio / ratios), ratios);
   }
-  std::printf("unsolved %d; permuted: %d of %d failed; slower than 1.2 x Siconos above 0.05 ms: %d\n", unsolved,
-              shuffled_failures, shuffled_runs, slower);
+  std::printf(
+      "unsolved %d; permuted: %d of %d failed; slower than 1.2 x Siconos above 0.05 ms: %d\n",
+      unsolved, shuffled_failures, shuffled_runs, slower);
   if (table) std::fclose(table);
   return 0;
 }

@@ -1,10 +1,13 @@
 // Tether: Siconos' solvers on a contact problem. SPDX-License-Identifier: BSD-3-Clause
 #include "siconos.hpp"
 
+#include <unistd.h>
+
+#include <cstdlib>
+
 #ifdef TETHER_HAVE_SICONOS
 #include <sys/time.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <FrictionContactProblem.h>
 #include <Friction_cst.h>
@@ -13,7 +16,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <fc3d_compute_error.h>
@@ -22,6 +24,13 @@
 #endif
 
 namespace tether::contact {
+
+void use_one_thread(char** argv) {
+  if (std::getenv("OPENBLAS_NUM_THREADS") != nullptr) return;
+  setenv("OPENBLAS_NUM_THREADS", "1", 1);
+  setenv("OMP_NUM_THREADS", "1", 1);
+  execv("/proc/self/exe", argv);
+}
 
 bool siconos_is_tried_dense(const std::string& solver, int contacts) {
   if (contacts > 300) return false;
@@ -67,8 +76,8 @@ struct Report {
 };
 
 // In the child: solve, time, write the report and the impulses.
-void child(int out, const std::string& name, const std::string& file, std::size_t size, int contacts,
-           double tolerance, double time_limit) {
+void child(int out, const std::string& name, const std::string& file, std::size_t size,
+           int contacts, double tolerance, double time_limit) {
   const Choice choice = choices().at(name);
   FrictionContactProblem* p = frictionContact_new_from_filename(file.c_str());
   if (p == nullptr) _exit(2);
@@ -102,7 +111,8 @@ void child(int out, const std::string& name, const std::string& file, std::size_
     std::free(o);
   } while (times.size() < 201 && sum < 0.05 && sum < 0.2 * time_limit);
   (void)contacts;
-  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
+  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2),
+                   times.end());
   report.milliseconds = 1e3 * times[times.size() / 2];
   bool good = write(out, &report, sizeof report) == static_cast<ssize_t>(sizeof report);
   const char* data = reinterpret_cast<const char*>(r.data());
@@ -127,8 +137,8 @@ std::vector<std::string> siconos_solvers() {
   return out;
 }
 
-SiconosRun run_siconos(const std::string& name, const Problem& problem, bool dense, double tolerance,
-                       double time_limit) {
+SiconosRun run_siconos(const std::string& name, const Problem& problem, bool dense,
+                       double tolerance, double time_limit) {
   SiconosRun run;
   run.solver = name + (dense ? "(dense)" : "");
   const std::string file = "/tmp/tether_siconos_" + std::to_string(getpid()) + ".dat";
@@ -140,7 +150,8 @@ SiconosRun run_siconos(const std::string& name, const Problem& problem, bool den
   const pid_t pid = fork();
   if (pid == 0) {
     close(ends[0]);
-    if (!std::freopen("/dev/null", "w", stdout) || !std::freopen("/dev/null", "w", stderr)) _exit(4);
+    if (!std::freopen("/dev/null", "w", stdout) || !std::freopen("/dev/null", "w", stderr))
+      _exit(4);
     itimerval limit = {};
     limit.it_value.tv_sec = static_cast<time_t>(time_limit);
     limit.it_value.tv_usec = static_cast<suseconds_t>(1e6 * (time_limit - std::floor(time_limit)));
@@ -152,7 +163,8 @@ SiconosRun run_siconos(const std::string& name, const Problem& problem, bool den
   Report report{};
   std::vector<char> bytes(sizeof report + size * sizeof(double));
   std::size_t got = 0;
-  for (ssize_t n; got < bytes.size() && (n = read(ends[0], bytes.data() + got, bytes.size() - got)) > 0;)
+  for (ssize_t n;
+       got < bytes.size() && (n = read(ends[0], bytes.data() + got, bytes.size() - got)) > 0;)
     got += static_cast<std::size_t>(n);
   close(ends[0]);
   int status = 0;

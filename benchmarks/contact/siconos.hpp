@@ -17,6 +17,10 @@ struct SiconosRun {
   Eigen::VectorXd impulses;
 };
 
+// One thread for everybody: OpenBLAS reads its setting when it is loaded, so a program without it
+// starts anew. Call it first in main.
+void use_one_thread(char** argv);
+
 bool has_siconos();
 // Solvers that the comparison covers.
 std::vector<std::string> siconos_solvers();
@@ -24,7 +28,7 @@ std::vector<std::string> siconos_solvers();
 bool siconos_is_tried_dense(const std::string& solver, int contacts);
 // Cold solve of the problem in its native block or dense storage, in a process of its own that may
 // take time_limit seconds.
-SiconosRun run_siconos(const std::string& solver, const Problem& problem, bool dense, double tolerance,
-                       double time_limit);
+SiconosRun run_siconos(const std::string& solver, const Problem& problem, bool dense,
+                       double tolerance, double time_limit);
 
 }  // namespace tether::contact

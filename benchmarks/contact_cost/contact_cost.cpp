@@ -5,15 +5,13 @@
 //
 // Residual against CPU of the contact solvers on the problems of FOLDER, and error against CPU of
 // the stepping scheme over time steps on scenes. FILE of --csv: solvers; scenes go beside it.
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdlib>
+#include <fmt/format.h>
+#include <sys/stat.h>
 
 #include "accuracy/page.hpp"
+#include "contact/siconos.hpp"
 #include "projection/curve.hpp"
 #include "report.hpp"
 
@@ -109,12 +107,7 @@ int run(const Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // One thread for everybody; OpenBLAS reads this when it is loaded.
-  if (!std::getenv("OPENBLAS_NUM_THREADS")) {
-    setenv("OPENBLAS_NUM_THREADS", "1", 1);
-    setenv("OMP_NUM_THREADS", "1", 1);
-    execv("/proc/self/exe", argv);
-  }
+  tether::contact::use_one_thread(argv);
   CLI::App app("Error against time of contact solvers and of the stepping scheme");
   Arguments arguments;
   try {
