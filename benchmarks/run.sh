@@ -46,7 +46,7 @@ if [ "$quick" = yes ]; then
   accuracy='--count 6 --repeats 1 --seconds 0.1 --no-drift --no-reach --skip four_bar_of'
   sweep='--count 20 --problem pendulum,car_axis,andrews --skip long' peers=
 else
-  accuracy='--count 11 --repeats 3 --seconds 1'
+  accuracy='--count 8 --repeats 3 --seconds 1'
   sweep='--count 100 --skip of_100,of_10,of_5' peers=--peers
 fi
 

@@ -55,7 +55,7 @@ std::vector<Sweep> sweep(const Problem& problem, const Codes& codes,
                          const std::vector<double>& tolerances, int repeats) {
   std::vector<Sweep> sweeps;
   for (const auto& code : codes) sweeps.push_back({code->name(), {}, {}, {}, {}, 0});
-  const Limits limits{300000, 5.0};
+  const Limits limits{300000, 1.0};  // steps, CPU seconds
   for (const double tolerance : tolerances) {
     std::vector<double> fastest(codes.size(), std::nan(""));
     for (int repeat = 0; repeat < repeats; ++repeat) {
