@@ -63,22 +63,45 @@ void residuals(random::Packing p, bool spheres, double tolerance, double mu) {
   std::fflush(stdout);
 }
 
+int usage(const char* option) {
+  std::fprintf(
+      stderr,
+      "contact_scale: %s: no such option, or its value is missing or out of range\n"
+      "usage: contact_scale [--least CONTACTS] [--most CONTACTS] [--sweeps N] [--rounds N] "
+      "[--threads 1..256] [--shuffle 0|1] [--residual R] [--mu MU]\n",
+      option);
+  return 2;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   double least = 0, most = 1e6, tolerance = 0, mu = 0.4;
   int sweeps = 20, rounds = 0, many = 2;
   bool shuffle = false;
-  for (int i = 1; i + 1 < argc; i += 2) {
+  for (int i = 1; i < argc; i += 2) {
     const std::string name = argv[i];
-    if (name == "--least") least = std::atof(argv[i + 1]);
-    if (name == "--most") most = std::atof(argv[i + 1]);
-    if (name == "--residual") tolerance = std::atof(argv[i + 1]);
-    if (name == "--mu") mu = std::atof(argv[i + 1]);
-    if (name == "--sweeps") sweeps = std::atoi(argv[i + 1]);
-    if (name == "--rounds") rounds = std::atoi(argv[i + 1]);
-    if (name == "--threads") many = std::atoi(argv[i + 1]);
-    if (name == "--shuffle") shuffle = std::atoi(argv[i + 1]) != 0;
+    char* end = nullptr;
+    const double value = i + 1 < argc ? std::strtod(argv[i + 1], &end) : -1;
+    if (end == nullptr || *end != '\0' || !(value >= 0 && value <= 1e9)) return usage(argv[i]);
+    if (name == "--least")
+      least = value;
+    else if (name == "--most")
+      most = value;
+    else if (name == "--residual")
+      tolerance = value;
+    else if (name == "--mu")
+      mu = value;
+    else if (name == "--sweeps" && value >= 1)
+      sweeps = static_cast<int>(value);
+    else if (name == "--rounds")
+      rounds = static_cast<int>(value);
+    else if (name == "--threads" && value >= 1 && value <= 256)
+      many = static_cast<int>(value);
+    else if (name == "--shuffle")
+      shuffle = value != 0;
+    else
+      return usage(argv[i]);
   }
   if (tolerance > 0) {
     std::printf("bodies   contacts    mu  residual (sweeps) with at most 100, 300, 1000, 3000\n");

@@ -324,7 +324,9 @@ int main(int argc, char** argv) {
       tolerances.push_back(std::atof(argv[k]));
   }
   if (tolerances.empty()) tolerances = {1e-1, 1e-2, 1e-3};
-  if (spheres < 1 || !(duration > 0) || !(rest >= 0)) {
+  const bool positive = std::all_of(tolerances.begin(), tolerances.end(),
+                                    [](double t) { return t > 0 && std::isfinite(t); });
+  if (spheres < 1 || !(duration > 0) || !(rest >= 0) || !positive) {
     std::fprintf(stderr, "settling [spheres] [seconds] [rest] [tolerance ...] [alone]\n");
     return 2;
   }
