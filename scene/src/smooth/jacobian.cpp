@@ -48,24 +48,13 @@ void System::add_motion_jacobian(JacobianBlocks& J, const double* lambda, int fi
     put(ib, B, b);
     if (first_lambda < 0) return;
     // -G^T
-    double unit[3] = {0, 0, 0};
-    for (int i = 0; i < row.count; ++i) {
-      unit[i] = 1.0;
-      Wrench<double> on_a = no_wrench<double>(), on_b = no_wrench<double>();
-      row.pull(bodies_.frames[at(row.first)], bodies_.frames[at(row.second)], unit, on_a, on_b);
-      unit[i] = 0.0;
-      const auto column = [&](int body, const Wrench<double>& wrench) {
-        const int slot = bodies_.inertia[at(body)].slot;
-        if (slot < 0) return;
-        const Vector3d torque = bodies_.frames[at(body)].R.transpose() * wrench.torque;
-        for (int k = 0; k < 3; ++k) {
-          J.add(J.motion_row(slot, k), first_lambda + row.row + i, -wrench.force[k]);
-          J.add(J.motion_row(slot, 3 + k), first_lambda + row.row + i, -torque[k]);
-        }
-      };
-      column(row.first, on_a);
-      column(row.second, on_b);
-    }
+    each_unit_load(row, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+      const int slot = bodies_.inertia[at(body)].slot;
+      for (int k = 0; k < 3; ++k) {
+        J.add(J.motion_row(slot, k), first_lambda + row.row + i, -force[k]);
+        J.add(J.motion_row(slot, 3 + k), first_lambda + row.row + i, -torque[k]);
+      }
+    });
   });
 }
 
@@ -98,27 +87,16 @@ void System::add_row_jacobian(JacobianBlocks& J, int first_row, bool carried_onl
 // eta moves x and q; its own size is that of the drift, so that d(G^T)/dq eta is left out.
 void System::add_eta_jacobian(JacobianBlocks& J, const double* y) const {
   each_row([&](const auto& row) {
-    double unit[3] = {0, 0, 0};
-    for (int i = 0; i < row.count; ++i) {
-      unit[i] = 1.0;
-      Wrench<double> on_a = no_wrench<double>(), on_b = no_wrench<double>();
-      row.pull(bodies_.frames[at(row.first)], bodies_.frames[at(row.second)], unit, on_a, on_b);
-      unit[i] = 0.0;
-      const auto column = [&](int body, const Wrench<double>& wrench) {
-        const Inertia& inertia = bodies_.inertia[at(body)];
-        if (inertia.slot < 0) return;
-        const int first = kBody * inertia.slot;
-        const Vector3d spin =
-            inertia.inverse * (bodies_.frames[at(body)].R.transpose() * wrench.torque);
-        const Eigen::Vector4d turn = quaternion_rate(y + first + kQuaternion, spin);
-        for (int k = 0; k < 3; ++k)
-          J.add(first + k, first_eta() + row.row + i, -wrench.force[k] / inertia.mass);
-        for (int k = 0; k < 4; ++k)
-          J.add(first + kQuaternion + k, first_eta() + row.row + i, -turn[k]);
-      };
-      column(row.first, on_a);
-      column(row.second, on_b);
-    }
+    each_unit_load(row, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+      const Inertia& inertia = bodies_.inertia[at(body)];
+      const int first = kBody * inertia.slot;
+      const Vector3d spin = inertia.inverse * torque;
+      const Eigen::Vector4d turn = quaternion_rate(y + first + kQuaternion, spin);
+      for (int k = 0; k < 3; ++k)
+        J.add(first + k, first_eta() + row.row + i, -force[k] / inertia.mass);
+      for (int k = 0; k < 4; ++k)
+        J.add(first + kQuaternion + k, first_eta() + row.row + i, -turn[k]);
+    });
   });
 }
 

@@ -14,22 +14,11 @@ void System::form_gradient() {
   G_.setZero(m_, 6 * moving());
   GM_.resize(m_, 6 * moving());
   each_row([&](const auto& row) {
-    const Frame<double>&A = bodies_.frames[at(row.first)], &B = bodies_.frames[at(row.second)];
-    double unit[3] = {0, 0, 0};
-    for (int i = 0; i < row.count; ++i) {
-      unit[i] = 1.0;
-      Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
-      row.pull(A, B, unit, a, b);
-      unit[i] = 0.0;
-      const auto put = [&](int body, const Frame<double>& f, const Wrench<double>& wrench) {
-        const int slot = bodies_.inertia[at(body)].slot;
-        if (slot < 0) return;
-        G_.block<1, 3>(row.row + i, 6 * slot) += wrench.force.transpose();
-        G_.block<1, 3>(row.row + i, 6 * slot + 3) += (f.R.transpose() * wrench.torque).transpose();
-      };
-      put(row.first, A, a);
-      put(row.second, B, b);
-    }
+    each_unit_load(row, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+      const int slot = bodies_.inertia[at(body)].slot;
+      G_.block<1, 3>(row.row + i, 6 * slot) += force.transpose();
+      G_.block<1, 3>(row.row + i, 6 * slot + 3) += torque.transpose();
+    });
   });
   for (int k = 0; k < moving(); ++k) {
     const Inertia& inertia = bodies_.inertia[at(body_of_slot_[at(k)])];

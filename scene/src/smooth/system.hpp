@@ -88,6 +88,10 @@ class System {
   void add_invariants(const Scene& scene);
   template <class F>
   void each_row(F f) const;
+  /// Calls f(i, body, force, torque about the body's axes) for the multiplier i of the row being 1,
+  /// all others 0, and each moving body that it acts on.
+  template <class Row, class F>
+  void each_unit_load(const Row& row, const F& f) const;
   void update(double t, const double* y);  // frames, without accelerations
   void update_accelerations(const double* yp);
   void add_multipliers(const double* lambda, std::vector<Load6>& loads) const;
@@ -156,6 +160,23 @@ void System::each_row(F f) const {
   for (const Angle& each : angles_) f(each);
   for (const Plane& each : planes_) f(each);
   for (const Distance& each : distances_) f(each);
+}
+
+template <class Row, class F>
+void System::each_unit_load(const Row& row, const F& f) const {
+  const auto index = [](int i) { return static_cast<std::size_t>(i); };
+  const Frame<double>&A = bodies_.frames[index(row.first)], &B = bodies_.frames[index(row.second)];
+  double unit[3] = {0, 0, 0};
+  for (int i = 0; i < row.count; ++i) {
+    unit[i] = 1.0;
+    Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
+    row.pull(A, B, unit, a, b);
+    unit[i] = 0.0;
+    if (bodies_.inertia[index(row.first)].slot >= 0)
+      f(i, row.first, a.force, Vector3d(A.R.transpose() * a.torque));
+    if (bodies_.inertia[index(row.second)].slot >= 0)
+      f(i, row.second, b.force, Vector3d(B.R.transpose() * b.torque));
+  }
 }
 
 }  // namespace tether::scene::smooth
