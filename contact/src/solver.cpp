@@ -12,48 +12,12 @@
 #include "interior_point.hpp"
 #include "proximal_newton.hpp"
 #include "refuse.hpp"
+#include "solver_words.hpp"
 
 namespace tether::contact {
 
 using detail::at;
 using detail::Packed;
-
-const char* name(Measure measure) {
-  switch (measure) {
-    case Measure::automatic: return "automatic";
-    case Measure::natural_map: return "natural_map";
-    case Measure::natural_map_data: return "natural_map_data";
-    case Measure::fixed_point: return "fixed_point";
-  }
-  return "?";
-}
-
-const char* name(Method method) {
-  switch (method) {
-    case Method::automatic: return "automatic";
-    case Method::gauss_seidel: return "gauss_seidel";
-    case Method::sor: return "sor";
-    case Method::jacobi: return "jacobi";
-    case Method::anderson: return "anderson";
-    case Method::admm: return "admm";
-    case Method::proximal_newton: return "proximal_newton";
-    case Method::interior_point: return "interior_point";
-    case Method::convex_relaxation: return "convex_relaxation";
-  }
-  return "?";
-}
-
-const char* name(Status status) {
-  switch (status) {
-    case Status::unsolved: return "unsolved";
-    case Status::solved: return "solved";
-    case Status::stalled: return "stalled";
-    case Status::cycling: return "cycling";
-    case Status::work_limit: return "work_limit";
-    case Status::relaxed: return "relaxed";
-  }
-  return "?";
-}
 
 namespace {
 
@@ -334,18 +298,7 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
       out.replaced.push_back(static_cast<int>(i));
     }
   }
-  switch (status) {
-    case Status::solved: out.advice.clear(); break;
-    case Status::cycling:
-      out.advice = options.law == Law::maximum_dissipation && options.strict
-                       ? "no fixed point was found; try strict = false, or Law::coulomb"
-                       : "no fixed point was found; try another start, a shorter time step or Method::convex_relaxation";
-      break;
-    case Status::stalled: out.advice = "round-off or ill-conditioned data; try a larger tolerance or Method::automatic"; break;
-    case Status::work_limit: out.advice = "raise max_work or max_sweeps, or use Method::automatic"; break;
-    case Status::relaxed: out.advice = "the convex relaxation is solved; error is the residual of the law"; break;
-    case Status::unsolved: break;
-  }
+  out.advice = detail::advice(status, options);
 }
 
 void Solver::Implementation::solve(const Problem& problem, const Eigen::VectorXd* start,

@@ -1,5 +1,15 @@
+# What scripts that count instructions share. SPDX-License-Identifier: BSD-3-Clause
+
+# need_valgrind(): without it the script ends, and CTest counts it as skipped.
+macro(need_valgrind)
+  if(NOT VALGRIND)
+    message("skipped: valgrind is not installed (Debian valgrind)")
+    return()
+  endif()
+endmacro()
+
 # count(<program and arguments> TOGGLE <function> TOTAL <var> FUNCTIONS <var> OUTPUT <var>): runs a
-# program under callgrind, collecting inside one function only. SPDX-License-Identifier: BSD-3-Clause
+# program under callgrind, collecting inside one function only.
 function(count)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "TOGGLE;TOTAL;FUNCTIONS;OUTPUT" "COMMAND")
   string(MD5 name "${arg_COMMAND}")

@@ -1,11 +1,8 @@
 # Scenes without contacts, moved by the `tether` program: which code of the contact library runs?
 # SPDX-License-Identifier: BSD-3-Clause
 cmake_minimum_required(VERSION 3.23)
-if(NOT VALGRIND)
-  message("skipped: valgrind is not installed (Debian valgrind)")
-  return()
-endif()
 include(${CMAKE_CURRENT_LIST_DIR}/callgrind.cmake)
+need_valgrind()
 
 set(body [==[
 [scene]

@@ -1,0 +1,316 @@
+// Tether: islands, threads, warm starts and storage of BodySolver. SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <tether/contact.hpp>
+
+#include "assemblies.hpp"
+#include "linalg/allocations.hpp"
+#include "packing.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::contact;
+
+namespace {
+
+BodySolution run(const random::Packing& p, Law law, int threads, double tolerance = 1e-10) {
+  BodyOptions o;
+  o.law = law;
+  o.tolerance = tolerance;
+  o.max_sweeps = 20000;
+  o.threads = threads;
+  return BodySolver(o).solve(p.bodies, p.contacts);
+}
+
+}  // namespace
+
+TEST_CASE("warm start: contacts are found by id, in any order and frame") {
+  for (bool spheres : {true, false}) {
+    random::Packing p = random::packing(4, spheres);
+    for (std::size_t k = 0; k < p.contacts.size(); ++k) p.contacts[k].id = 7 * k + 3;
+    BodyOptions o;
+    o.tolerance = 1e-9;
+    o.max_sweeps = 20000;
+    BodySolver solver(o);
+    BodySolution s;
+    solver.solve(p.bodies, p.contacts, s);
+    REQUIRE(s.status == Status::solved);
+    CHECK(s.warm_started == 0);
+    const int cold = s.sweeps;
+    std::reverse(p.contacts.begin(), p.contacts.end());
+    o.tolerance = 1e-8;
+    solver.set_options(o);
+    solver.solve(p.bodies, p.contacts, s);
+    CHECK(s.warm_started == static_cast<int>(p.contacts.size()));
+    CHECK(s.sweeps == 1);
+    // Bodies and normals turned a little; every other contact is new.
+    const Eigen::Matrix3d R =
+        Eigen::AngleAxisd(1e-3, Eigen::Vector3d(1, 2, 3).normalized()).matrix();
+    for (std::size_t k = 0; k < p.contacts.size(); ++k) {
+      p.contacts[k].normal = R * p.contacts[k].normal;
+      if (k % 2 == 0) p.contacts[k].id += 1000000;
+    }
+    solver.solve(p.bodies, p.contacts, s);
+    REQUIRE(s.status == Status::solved);
+    CHECK(s.warm_started == static_cast<int>(p.contacts.size() / 2));
+    CHECK(evaluate(p.bodies, p.contacts, o.law, s.impulses).fixed_point <= 1.1e-8);
+    solver.forget();
+    solver.solve(p.bodies, p.contacts, s);
+    CHECK(s.warm_started == 0);
+    CHECK(s.sweeps >= cold / 2);
+  }
+}
+
+TEST_CASE("warm start: scaled for another time step") {
+  random::Packing p = random::packing(3, false);
+  for (std::size_t k = 0; k < p.contacts.size(); ++k) p.contacts[k].id = k;
+  BodyOptions o;
+  o.tolerance = 1e-9;
+  o.max_sweeps = 20000;
+  BodySolver solver(o);
+  BodySolution s;
+  solver.solve(p.bodies, p.contacts, s);
+  // Half the velocities: half the impulses, found at once.
+  for (RigidBody& b : p.bodies) {
+    b.velocity *= 0.5;
+    b.angular_velocity *= 0.5;
+  }
+  solver.scale_warm_start(0.5);
+  o.tolerance = 1e-8;
+  solver.set_options(o);
+  solver.solve(p.bodies, p.contacts, s);
+  CHECK(s.status == Status::solved);
+  CHECK(s.sweeps == 1);
+  CHECK_THROWS_AS(solver.scale_warm_start(-1), std::invalid_argument);
+}
+
+TEST_CASE("threads do not change a bit") {
+  for (bool spheres : {true, false}) {
+    const random::Packing p = random::packing(9, spheres);
+    BodyOptions o;
+    o.max_sweeps = 30;
+    const BodySolution one = BodySolver(o).solve(p.bodies, p.contacts);
+    for (int threads : {2, 3}) {
+      o.threads = threads;
+      const BodySolution more = BodySolver(o).solve(p.bodies, p.contacts);
+      REQUIRE(more.sweeps == one.sweeps);
+      CHECK(more.error == one.error);
+      for (std::size_t k = 0; k < one.velocities.size(); ++k) {
+        REQUIRE(std::memcmp(one.velocities[k].data(), more.velocities[k].data(), 24) == 0);
+        REQUIRE(std::memcmp(one.angular_velocities[k].data(), more.angular_velocities[k].data(),
+                            24) == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("a moving plate under a heap: same bits for all threads") {
+  random::Packing p = random::packing(12, false, 3);
+  RigidBody plate;
+  plate.inverse_mass = 1e-3;
+  plate.inverse_inertia = 1e-4 * Eigen::Matrix3d::Identity();
+  const int index = static_cast<int>(p.bodies.size());
+  p.bodies.push_back(plate);
+  for (std::size_t k = 0; k < p.contacts.size(); ++k) {
+    PointContact& c = p.contacts[k];
+    if (c.second >= 0) continue;
+    c.second = index;
+    c.r2 << static_cast<double>(k % 11), static_cast<double>(k % 7), 0.5;
+  }
+  BodyOptions o;
+  o.tolerance = 1e-7;
+  o.max_sweeps = 200;
+  const BodySolution one = BodySolver(o).solve(p.bodies, p.contacts);
+  CHECK(one.islands == 1);
+  CHECK(one.error < 1e-2);
+  for (int threads : {2, 4}) {
+    o.threads = threads;
+    const BodySolution more = BodySolver(o).solve(p.bodies, p.contacts);
+    REQUIRE(more.sweeps == one.sweeps);
+    CHECK(more.error == one.error);
+    for (std::size_t k = 0; k < p.contacts.size(); ++k)
+      REQUIRE(more.impulses[k] == one.impulses[k]);
+  }
+}
+
+TEST_CASE("a body with more contacts than colours") {
+  random::Packing p;
+  RigidBody floor;
+  floor.inverse_mass = 0.01;
+  floor.inverse_inertia = 0.01 * Eigen::Matrix3d::Identity();
+  p.bodies.push_back(floor);
+  for (int k = 0; k < 100; ++k) {
+    RigidBody ball;
+    ball.inverse_mass = 1;
+    ball.inverse_inertia = 10 * Eigen::Matrix3d::Identity();
+    ball.velocity << 0, 0, -0.1;
+    p.bodies.push_back(ball);
+    PointContact c;
+    c.first = k + 1;
+    c.second = 0;
+    c.mu = 0.5;
+    c.r1 << 0, 0, -0.5;
+    c.r2 << 0.01 * k, 0.02 * (k % 7), 0.5;
+    p.contacts.push_back(c);
+  }
+  const BodySolution s = run(p, Law::maximum_dissipation, 2);
+  CHECK(s.status == Status::solved);
+  CHECK(s.failed_islands == 0);
+}
+
+TEST_CASE("an island does not depend on others") {
+  // Stacks that are assembled, a packing in several chunks, and single balls; then one at a time.
+  std::vector<random::RigidAssembly> parts;
+  parts.push_back(random::rigid_stack(3, 100));
+  random::RigidAssembly pile;
+  {
+    random::Packing p = random::packing(7, false, 5);
+    pile.bodies = p.bodies;
+    pile.contacts = p.contacts;
+    for (std::size_t k = 0; k < pile.contacts.size(); ++k) pile.contacts[k].id = k;
+  }
+  parts.push_back(pile);
+  random::RigidAssembly ball;
+  {
+    random::Packing p = random::packing(1, true);
+    ball.bodies = p.bodies;
+    ball.contacts = p.contacts;
+    ball.contacts[0].id = 0;
+  }
+  parts.push_back(ball);
+  parts.push_back(random::rigid_stack(5, 1000));
+  {
+    random::Packing p = random::packing(4, true, 8);
+    random::RigidAssembly spheres{p.bodies, p.contacts};
+    parts.push_back(spheres);
+  }
+  random::RigidAssembly all;
+  for (const random::RigidAssembly& part : parts) all.add(part);
+  BodyOptions o;
+  o.tolerance = 1e-8;
+  o.max_assembled = 100;
+  o.max_sweeps = 5000;
+  for (int threads : {1, 2, 3}) {
+    o.threads = threads;
+    BodySolver together(o);
+    BodySolution s;
+    for (int step = 0; step < 2; ++step) {  // cold, then warm
+      together.solve(all.bodies, all.contacts, s);
+      CHECK(s.status == Status::solved);
+      CHECK(s.islands == 5);
+    }
+    std::size_t body = 0, contact = 0;
+    int assembled = 0;
+    for (const random::RigidAssembly& part : parts) {
+      o.threads = 1;
+      BodySolver alone(o);
+      BodySolution t;
+      alone.solve(part.bodies, part.contacts, t);
+      assembled += t.assembled_islands;
+      alone.solve(part.bodies, part.contacts, t);
+      REQUIRE(t.islands == 1);
+      for (std::size_t k = 0; k < part.contacts.size(); ++k) {
+        REQUIRE(t.impulses[k] == s.impulses[contact + k]);
+        REQUIRE(t.regimes[k] == s.regimes[contact + k]);
+      }
+      for (std::size_t k = 0; k < part.bodies.size(); ++k) {
+        REQUIRE(t.velocities[k] == s.velocities[body + k]);
+        REQUIRE(t.angular_velocities[k] == s.angular_velocities[body + k]);
+      }
+      contact += part.contacts.size();
+      body += part.bodies.size();
+    }
+    CHECK(assembled == 2);
+  }
+}
+
+TEST_CASE("an island that fails is counted, the others are solved") {
+  random::RigidAssembly a = random::rigid_stack(10, 1000);
+  for (int k = 0; k < 5; ++k) a.add(random::rigid_stack(1, 1));
+  BodyOptions o;
+  o.tolerance = 1e-9;
+  o.max_assembled = 0;
+  o.max_sweeps = 50;
+  const BodySolution s = BodySolver(o).solve(a.bodies, a.contacts);
+  CHECK(s.status != Status::solved);
+  CHECK(s.status != Status::unsolved);
+  CHECK(s.islands == 6);
+  CHECK(s.failed_islands == 1);
+  CHECK(s.assembled_islands == 0);
+  CHECK(s.error > o.tolerance);
+  for (std::size_t k = 10; k < a.bodies.size(); ++k) CHECK(std::abs(s.velocities[k][2]) < 1e-9);
+}
+
+TEST_CASE("an island that is never solved: the best point is returned, not the last") {
+  // Stick and slip toggle: residuals go up and down by a factor of ten.
+  const random::Packing p = random::packing(9, true, 2);
+  REQUIRE(p.contacts.size() > 1500);  // swept by all threads
+  BodyOptions o;
+  o.tolerance = 1e-9;
+  o.max_assembled = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (int sweeps : {100, 200, 400, 600, 700, 800, 900, 1000, 1100, 1200}) {
+    o.max_sweeps = sweeps;
+    o.threads = 1;
+    const BodySolution one = BodySolver(o).solve(p.bodies, p.contacts);
+    REQUIRE(one.status != Status::solved);
+    CHECK(one.sweeps == sweeps);
+    INFO(sweeps << " sweeps: " << one.error << ", least before " << least);
+    // Residuals are looked at where the change of a sweep has fallen by a fifth.
+    CHECK(one.error <= 1.25 * least);
+    least = std::min(least, one.error);
+    // Impulses, velocities and residual are of the same point.
+    const double error = evaluate(p.bodies, p.contacts, o.law, one.impulses).fixed_point;
+    CHECK(std::abs(error - one.error) <= 1e-8 * error);
+    std::vector<Eigen::Vector3d> v;
+    for (const RigidBody& b : p.bodies) v.push_back(b.velocity);
+    for (std::size_t k = 0; k < p.contacts.size(); ++k) {
+      const auto a = static_cast<std::size_t>(p.contacts[k].first);
+      v[a] += p.bodies[a].inverse_mass * one.impulses[k];
+      if (p.contacts[k].second < 0) continue;
+      const auto b = static_cast<std::size_t>(p.contacts[k].second);
+      v[b] -= p.bodies[b].inverse_mass * one.impulses[k];
+    }
+    for (std::size_t k = 0; k < v.size(); ++k) REQUIRE((v[k] - one.velocities[k]).norm() < 1e-12);
+    for (int threads : {2, 3}) {
+      o.threads = threads;
+      const BodySolution more = BodySolver(o).solve(p.bodies, p.contacts);
+      CHECK(more.error == one.error);
+      for (std::size_t k = 0; k < v.size(); ++k) REQUIRE(more.velocities[k] == one.velocities[k]);
+      for (std::size_t k = 0; k < p.contacts.size(); ++k) {
+        REQUIRE(more.impulses[k] == one.impulses[k]);
+        REQUIRE(more.regimes[k] == one.regimes[k]);
+      }
+    }
+  }
+}
+
+TEST_CASE("body form: no allocation in steady state") {
+  for (int threads : {1, 2}) {
+    // Spheres, general and frictionless contacts, enough for two threads.
+    random::RigidAssembly a;
+    for (bool spheres : {true, false}) {
+      const random::Packing p = random::packing(9, spheres);
+      a.add({p.bodies, p.contacts});
+    }
+    for (std::size_t k = 0; k < a.contacts.size(); ++k) {
+      a.contacts[k].id = k;
+      if (k % 5 == 0) a.contacts[k].mu = 0;
+    }
+    BodyOptions o;
+    o.tolerance = 1e-4;
+    o.threads = threads;
+    o.max_assembled = 0;
+    BodySolver solver(o);
+    BodySolution s;
+    for (int step = 0; step < 2; ++step) solver.solve(a.bodies, a.contacts, s);
+    const long before = tether::test::allocations();
+    for (int step = 0; step < 3; ++step) {
+      for (RigidBody& b : a.bodies) b.velocity[2] -= 0.01;
+      solver.solve(a.bodies, a.contacts, s);
+    }
+    CHECK(tether::test::allocations() == before);
+    CHECK(s.warm_started == static_cast<int>(a.contacts.size()));
+  }
+}
