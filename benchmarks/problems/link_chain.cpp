@@ -1,11 +1,11 @@
 // Tether: a falling chain of many links, with sparse factors. SPDX-License-Identifier: BSD-3-Clause
 #include <array>
 #include <map>
+#include <numeric>
 #include <problems/link_chain.hpp>
 #include <problems/linkage.hpp>
 #include <problems/reference.hpp>
 #include <problems/rows.hpp>
-#include <problems/sparse_projection.hpp>
 #include <stdexcept>
 
 namespace tether::problems {
@@ -133,30 +133,87 @@ SparseJacobian sparse_jacobian(const LinkagePointer& linkage, const Problem& p) 
   return sparse;
 }
 
-SparseRows projected_rows(const LinkagePointer& linkage) {
-  const int n = linkage->n(), m = linkage->m();
-  SparseRows rows;
-  rows.count = 2 * m + 1;
-  rows.columns = 2 * n;
-  rows.value = [linkage, n, m](const double* y, double* g) {
-    linkage->position(y, g);
-    linkage->velocity(y, y + n, g + m);
-    g[2 * m] = linkage->energy(y, y + n);
-  };
-  rows.gradient = [linkage, n, m](const double* y, const SparseRows::Add& add) {
-    linkage->gradient(y, [&](int i, int j, double entry) {
-      add(i, j, entry);
-      add(m + i, n + j, entry);
+// Position rows, then velocity rows, of the forms of pinned_rods.hpp as one sparse set.
+class PinRows {
+ public:
+  explicit PinRows(LinkagePointer linkage)
+      : linkage_(std::move(linkage)), turned_(linkage_->rods.size()) {}
+
+  void values(const double* y, double* g) {
+    const int n = linkage_->n(), m = linkage_->m();
+    turn(y);
+    linkage_->position_of_ground(g);
+    std::fill(g + m, g + 2 * m, 0.0);
+    linkage_->each_end([&](int i, int rod, double at, double sign) {
+      const auto [c, s] = turned_[static_cast<std::size_t>(rod)];
+      const double *q = y + 3 * rod, *v = y + n + 3 * rod;
+      g[i] += sign * (q[0] + at * c);
+      g[i + 1] += sign * (q[1] + at * s);
+      g[m + i] += sign * (v[0] - at * s * v[2]);
+      g[m + i + 1] += sign * (v[1] + at * c * v[2]);
     });
-    linkage->velocity_gradient(y, y + n, [&](int i, int j, double entry) { add(m + i, j, entry); });
+  }
+
+  // add(row, column, entry), in an order that does not depend on y; each entry once.
+  template <class Add>
+  void entries(const double* y, Add add) {
+    const int n = linkage_->n(), m = linkage_->m();
+    turn(y);
+    linkage_->each_end([&](int i, int rod, double at, double sign) {
+      const auto [cosine, sine] = turned_[static_cast<std::size_t>(rod)];
+      const double s = sign * at * sine, c = sign * at * cosine;
+      const int q = 3 * rod, v = n + 3 * rod;
+      add(i, q, sign);
+      add(i, q + 2, -s);
+      add(i + 1, q + 1, sign);
+      add(i + 1, q + 2, c);
+      add(m + i, q + 2, -c * y[v + 2]);
+      add(m + i, v, sign);
+      add(m + i, v + 2, -s);
+      add(m + i + 1, q + 2, -s * y[v + 2]);
+      add(m + i + 1, v + 1, sign);
+      add(m + i + 1, v + 2, c);
+    });
+  }
+
+ private:
+  void turn(const double* y) {
+    for (std::size_t k = 0; k < turned_.size(); ++k)
+      turned_[k] = {std::cos(y[3 * k + 2]), std::sin(y[3 * k + 2])};
+  }
+
+  LinkagePointer linkage_;
+  std::vector<std::pair<double, double>> turned_;  // cosine and sine of each rod's angle
+};
+
+ida_projection::Constraints sparse_rows(const LinkagePointer& linkage, const Problem& p) {
+  PinRows rows(linkage);
+  std::map<std::pair<int, int>, int> where;  // (row, column)
+  rows.entries(p.y0.data(), [&](int i, int j, double) { where[{i, j}] = 0; });
+  ida_projection::Constraints set;
+  set.count = 2 * linkage->m();
+  for (const char* group : {"position", "velocity"})
+    for (const std::string& name : p.select({group}).names) set.names.push_back(name);
+  set.value = [rows](double, ida_projection::ConstVector y, ida_projection::Vector g) mutable {
+    rows.values(y.data(), g.data());
   };
-  rows.full = [linkage, n](const double* y, double* row) {
-    for (int i = 0; i < n; ++i) {
-      row[i] = -linkage->force(i);
-      row[n + i] = linkage->mass(i) * y[n + i];
-    }
+  ida_projection::SparseJacobian sparse;
+  sparse.starts.assign(static_cast<std::size_t>(set.count) + 1, 0);
+  for (auto& [place, index] : where) {
+    index = static_cast<int>(sparse.columns.size());
+    sparse.columns.push_back(place.second);
+    ++sparse.starts[static_cast<std::size_t>(place.first) + 1];
+  }
+  std::partial_sum(sparse.starts.begin(), sparse.starts.end(), sparse.starts.begin());
+  std::vector<int> slots;
+  rows.entries(p.y0.data(), [&](int i, int j, double) { slots.push_back(where.at({i, j})); });
+  sparse.fill = [rows, slots](double, ida_projection::ConstVector y,
+                              ida_projection::Vector values) mutable {
+    const int* slot = slots.data();
+    rows.entries(y.data(), [&](int, int, double entry) { values[*slot++] = entry; });
   };
-  return rows;
+  set.jacobian = std::move(sparse);
+  return set;
 }
 
 }  // namespace
@@ -178,9 +235,7 @@ Problem link_chain(int N, double t_end) {
   place(links, reference_solution<2 * kMost>(FallingChain(links), State{}, t_end), &q, &v);
   set_reference(q, v, &p);
   p.sparse = sparse_jacobian(linkage, p);
-  auto projection = std::make_shared<SparseProjection>(projected_rows(linkage), p.y0.data());
-  p.own_projection = SparseProjection::attach(projection.get());
-  p.kept = projection;
+  p.sparse_constraints = sparse_rows(linkage, p) + p.select({"energy"});
   return p;
 }
 

@@ -49,13 +49,18 @@ struct Linkage {
     }
   }
 
-  void position(const double* q, double* r) const {
+  // What pins to the ground contribute to `position`.
+  void position_of_ground(double* r) const {
     int row = 0;
     for (const Pin& pin : pins) {
       r[row] = pin.b == kGround ? -pin.x : 0.0;
       r[row + 1] = pin.b == kGround ? -pin.y : 0.0;
       row += 2;
     }
+  }
+
+  void position(const double* q, double* r) const {
+    position_of_ground(r);
     each_end([&](int i, int rod, double at, double sign) {
       const double* c = q + 3 * rod;
       r[i] += sign * (c[0] + at * std::cos(c[2]));

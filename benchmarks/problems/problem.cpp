@@ -26,7 +26,7 @@ ida_projection::Constraints Problem::select(const std::vector<std::string>& name
 }
 
 ida_projection::Constraints Problem::recommended_constraints() const {
-  return own_projection ? *own_projection : select(recommended);
+  return sparse_constraints ? *sparse_constraints : select(recommended);
 }
 
 double Problem::error(const double* y) const {

@@ -25,8 +25,7 @@ struct SparseJacobian {
 };
 
 /// F(t, y, y') = 0 with a consistent start, everything that its solution keeps, and a reference.
-/// Copies are independent of each other: the callbacks hold constants only (a projection of its own
-/// has a workspace, which copies share: one run at a time).
+/// Copies are independent of each other.
 struct Problem {
   std::string name;  ///< "pendulum"
   std::string form;  ///< "index 1"
@@ -44,9 +43,8 @@ struct Problem {
 
   SparseJacobian sparse;
 
-  /// The recommended rows by a sparse projection of the problem's own; none: as dense rows.
-  std::optional<ida_projection::Constraints> own_projection;
-  std::shared_ptr<void> kept;  ///< what `own_projection` points to
+  /// The recommended rows as sparse ones; none: they are dense.
+  std::optional<ida_projection::Constraints> sparse_constraints;
 
   std::vector<Rows> rows;                ///< each group separately
   std::vector<std::string> recommended;  ///< groups to project by default

@@ -122,9 +122,7 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
 // The nearest point on the constraints in the error weights; y changes only on success.
 void Projection::Impl::project_point(double t, N_Vector y, const std::vector<bool>& hold,
                                      N_Vector id, ConsistencyReport& report) {
-  const bool dense = std::holds_alternative<FiniteDifferences>(constraints.jacobian) ||
-                     std::holds_alternative<DenseJacobian>(constraints.jacobian);
-  if (dense) {
+  if (has_values(constraints)) {
     const auto n = static_cast<std::size_t>(size_);
     double* values = N_VGetArrayPointer(y);
     const double* w = N_VGetArrayPointer(weights_);
@@ -137,7 +135,7 @@ void Projection::Impl::project_point(double t, N_Vector y, const std::vector<boo
         held[i] = true;
       }
     }
-    if (!point_) point_ = std::make_unique<GaussNewton>(constraints, size_);
+    if (!point_) point_ = make_gauss_newton(constraints, size_);
     point_->project(t, point, WT, held, id != nullptr ? N_VGetArrayPointer(id) : nullptr, report);
     if (report.status == Status::success) std::copy(point.begin(), point.end(), values);
     return;

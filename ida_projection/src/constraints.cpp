@@ -63,7 +63,7 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
   if (kind(constraints)[0] != '\0')
     throw std::invalid_argument(std::string("check_jacobian: rows are given as ") +
                                 kind(constraints) +
-                                "; it works for DenseJacobian and FiniteDifferences");
+                                "; it works for DenseJacobian, SparseJacobian and FiniteDifferences");
   Statistics counts;
   Evaluator evaluator(constraints, counts);
   const int n = static_cast<int>(y.size());

@@ -23,6 +23,16 @@ long first_not_finite(const double* a, long n) {
 
 }  // namespace
 
+bool has_sparse_rows(const Constraints& set) {
+  return std::holds_alternative<SparseJacobian>(set.jacobian) ||
+         std::any_of(set.joined.begin(), set.joined.end(), has_sparse_rows);
+}
+
+bool has_values(const Constraints& set) {
+  return !std::holds_alternative<Gradients>(set.jacobian) &&
+         !std::holds_alternative<UserProjection>(set.jacobian);
+}
+
 Evaluator::Evaluator(const Constraints& constraints, Statistics& statistics)
     : constraints_(constraints), statistics_(statistics) {
   flatten(constraints);
@@ -63,23 +73,59 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
   return Status::not_finite;
 }
 
+// Entries that are not finite are found by the factors, which scan them anyway.
+Status Evaluator::dense(const Part& part, double t, const double* y, int n, const double* scale,
+                        const std::vector<int>& columns, double* C) {
+  const auto* given = std::get_if<DenseJacobian>(&part.set->jacobian);
+  if (given == nullptr) return differences(part, t, y, n, scale, columns, C);
+  const int flag = guarded(
+      [&] { return given->fill(t, ConstVector(y, n), Matrix(C, part.set->count, n)); }, thrown_);
+  return checked(flag, "jacobian", part);
+}
+
+Status Evaluator::sparse(const Part& part, double t, const double* y, int n, double* entries) {
+  const SparseJacobian& given = *part.sparse();
+  const auto count = static_cast<Eigen::Index>(given.columns.size());
+  const int flag =
+      guarded([&] { return given.fill(t, ConstVector(y, n), Vector(entries, count)); }, thrown_);
+  return checked(flag, "jacobian", part);
+}
+
 Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
                            const std::vector<int>& columns, double* C) {
   ++statistics_.jacobian_evaluations;
   std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
-  const ConstVector state(y, n);
   for (const Part& part : parts_) {
     double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
-    if (const auto* dense = std::get_if<DenseJacobian>(&part.set->jacobian)) {
-      const int flag = guarded(
-          [&] { return dense->fill(t, state, Matrix(block, part.set->count, n)); }, thrown_);
-      if (flag != 0) return checked(flag, "jacobian", part);
-    } else {
-      const Status status = differences(part, t, y, n, scale, columns, block);
-      if (status != Status::success) return status;
-    }
+    const SparseJacobian* given = part.sparse();
+    if (given != nullptr) entries_.assign(given->columns.size(), 0.0);
+    const Status status = given != nullptr ? sparse(part, t, y, n, entries_.data())
+                                           : dense(part, t, y, n, scale, columns, block);
+    if (status != Status::success) return status;
+    for (int i = 0; given != nullptr && i < part.set->count; ++i)
+      for (int e = given->starts[static_cast<std::size_t>(i)];
+           e < given->starts[static_cast<std::size_t>(i) + 1]; ++e)
+        block[static_cast<std::ptrdiff_t>(i) * n + given->columns[static_cast<std::size_t>(e)]] =
+            entries_[static_cast<std::size_t>(e)];
   }
-  // Entries that are not finite are found by MinimumNorm::factor, which scans them anyway.
+  return Status::success;
+}
+
+Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
+                           const std::vector<int>& columns, double* entries, double* full) {
+  ++statistics_.jacobian_evaluations;
+  for (const Part& part : parts_) {
+    const SparseJacobian* given = part.sparse();
+    double*& at = given != nullptr ? entries : full;
+    const std::ptrdiff_t size = given != nullptr
+                                    ? static_cast<std::ptrdiff_t>(given->columns.size())
+                                    : static_cast<std::ptrdiff_t>(part.set->count) * n;
+    std::fill(at, at + size, 0.0);
+    const Status status =
+        given != nullptr ? sparse(part, t, y, n, at) : dense(part, t, y, n, scale, columns, at);
+    if (status != Status::success) return status;
+    at += size;
+  }
   return Status::success;
 }
 

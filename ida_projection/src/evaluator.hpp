@@ -27,6 +27,11 @@ int guarded(Call&& call, std::string& message) noexcept {
   }
 }
 
+/// Are there rows with a SparseJacobian in the set or in what is joined to it?
+bool has_sparse_rows(const Constraints& set);
+/// Is g given by Constraints::value, and C by entries or differences?
+bool has_values(const Constraints& set);
+
 /// g and C of a set and of everything joined to it, as one system of m rows.
 class Evaluator {
  public:
@@ -43,6 +48,19 @@ class Evaluator {
   Status jacobian(double t, const double* y, int n, const double* scale,
                   const std::vector<int>& columns, double* C);
 
+  /// The same with the sparse sets' entries one after the other in `entries`, and the rows of all
+  /// other sets one after the other in `full` (n entries each).
+  Status jacobian(double t, const double* y, int n, const double* scale,
+                  const std::vector<int>& columns, double* entries, double* full);
+
+  /// A set of the union and the first of its rows.
+  struct Part {
+    const Constraints* set;
+    int first_row;
+    const SparseJacobian* sparse() const { return std::get_if<SparseJacobian>(&set->jacobian); }
+  };
+  const std::vector<Part>& parts() const { return parts_; }
+
   /// Which entries g can fill as a function of y (m x n, row-major, added to `filled`), for the
   /// sets that leave C to differences: those where g notices a large change of y_j, or cannot take
   /// it.
@@ -52,19 +70,18 @@ class Evaluator {
   const std::string& message() const { return message_; }
 
  private:
-  struct Part {
-    const Constraints* set;
-    int first_row;
-  };
   void flatten(const Constraints& set);
   Status checked(int flag, const char* what, const Part& part);
+  Status dense(const Part& part, double t, const double* y, int n, const double* scale,
+               const std::vector<int>& columns, double* C);
+  Status sparse(const Part& part, double t, const double* y, int n, double* entries);
   Status differences(const Part& part, double t, const double* y, int n, const double* scale,
                      const std::vector<int>& columns, double* C);
 
   const Constraints& constraints_;
   Statistics& statistics_;
   std::vector<Part> parts_;
-  std::vector<double> y_shifted_, g_base_, g_shifted_;
+  std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string message_, thrown_;
   int rows_ = 0;
   bool uses_differences_ = false;

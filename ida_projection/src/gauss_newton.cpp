@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "row_blocks.hpp"
+#include "sparse_rows.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
@@ -14,29 +17,45 @@ constexpr int kMaximumIterations = 60;
 constexpr double kSmallestDamping = 1.0 / 1024.0;
 constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off
 
-}  // namespace
+// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
+template <class Rows>
+class GaussNewtonOn final : public GaussNewton {
+ public:
+  GaussNewtonOn(const Constraints& constraints, int size)
+      : evaluator_(constraints, counts_),
+        blocks_(constraints, evaluator_, size),
+        n_(size),
+        g_(static_cast<std::size_t>(evaluator_.rows()), 0.0) {}
 
-GaussNewton::GaussNewton(const Constraints& constraints, int size)
-    : constraints_(constraints),
-      evaluator_(constraints, counts_),
-      blocks_(constraints, evaluator_.rows(), size),
-      n_(size),
-      m_(evaluator_.rows()) {
-  const auto n = static_cast<std::size_t>(n_);
-  const auto m = static_cast<std::size_t>(m_);
-  g_.assign(m, 0.0);
-  C_.assign(m * n, 0.0);
-  rank_tolerance_ = evaluator_.uses_differences() ? 1e-6 : std::max(m_, n_) * 1e-13;
-}
+  void project(double t, std::vector<double>& y, const std::vector<double>& WT,
+               const std::vector<bool>& hold, const double* id, ConsistencyReport& report) override;
+  bool tangent(double t, const std::vector<double>& y, double* yp) override;
 
-bool GaussNewton::evaluate(double t, const std::vector<double>& y, ConsistencyReport& report) {
+ private:
+  using Block = typename Rows::Block;
+
+  bool evaluate(double t, const std::vector<double>& y, ConsistencyReport& report);
+  double correction();  // solves for the present g, returns its length
+  double largest(const std::vector<double>& g) const;
+
+  Statistics counts_;
+  Evaluator evaluator_;
+  Rows blocks_;
+  int n_;
+  std::vector<double> WT_, g_;
+};
+
+template <class Rows>
+bool GaussNewtonOn<Rows>::evaluate(double t, const std::vector<double>& y,
+                                   ConsistencyReport& report) {
   report.status = evaluator_.value(t, y.data(), n_, g_.data());
   if (report.status != Status::success) report.message = evaluator_.message();
   return report.status == Status::success;
 }
 
-double GaussNewton::correction() {
-  blocks_.solve(g_, C_);
+template <class Rows>
+double GaussNewtonOn<Rows>::correction() {
+  blocks_.solve(g_);
   double sum = 0.0;
   for (const Block* block : {&blocks_.d, &blocks_.a})
     for (std::size_t k = 0; k < block->columns.size(); ++k) {
@@ -46,18 +65,20 @@ double GaussNewton::correction() {
   return std::sqrt(sum / n_);
 }
 
-double GaussNewton::largest(const std::vector<double>& g) const {
+template <class Rows>
+double GaussNewtonOn<Rows>::largest(const std::vector<double>& g) const {
   double value = 0.0;
   for (double x : g) value = std::max(value, std::abs(x));
   return value;
 }
 
-void GaussNewton::project(double t, std::vector<double>& y0, const std::vector<double>& WT,
-                          const std::vector<bool>& hold, const double* id,
-                          ConsistencyReport& report) {
+template <class Rows>
+void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::vector<double>& WT,
+                                  const std::vector<bool>& hold, const double* id,
+                                  ConsistencyReport& report) {
   WT_ = WT;
   std::vector<double> y = y0;
-  report.status = blocks_.structure(evaluator_, t, y, WT_, hold, id, C_);
+  report.status = blocks_.structure(evaluator_, t, y, WT_, hold, id);
   if (report.status != Status::success) {
     report.message = blocks_.message;
     return;
@@ -69,7 +90,6 @@ void GaussNewton::project(double t, std::vector<double>& y0, const std::vector<d
   if (!evaluate(t, y, report)) return;
   report.drift_before = report.drift_after = largest(g_);
 
-  const std::vector<int>& columns = blocks_.columns;
   double previous = -1.0;
   int halvings_in_a_row = 0;
   std::vector<double> trial(y.size()), dy(y.size());
@@ -78,8 +98,8 @@ void GaussNewton::project(double t, std::vector<double>& y0, const std::vector<d
       report.status = Status::not_converged;
       break;
     }
-    report.status = evaluator_.jacobian(t, y.data(), n_, WT_.data(), columns, C_.data());
-    if (report.status != Status::success || !blocks_.factor(C_, rank_tolerance_)) {
+    report.status = blocks_.evaluate(evaluator_, t, y.data(), WT_.data());
+    if (report.status != Status::success || !blocks_.factor()) {
       report.message = report.status != Status::success
                            ? evaluator_.message()
                            : "the constraint Jacobian C has an entry that is not finite";
@@ -125,15 +145,15 @@ void GaussNewton::project(double t, std::vector<double>& y0, const std::vector<d
   }
 
   report.drift_after = largest(g_);
-  if (report.status == Status::success && blocks_.dropped_rows() && blocks_.contradict(C_, WT_)) {
+  if (report.status == Status::success && blocks_.dropped_rows() && blocks_.contradict(WT_)) {
     report.status = Status::inconsistent;
-    report.message = blocks_.message;
-    report.contradicting_rows = blocks_.rows();
+    report.message = blocks_.contradiction.message;
+    report.contradicting_rows = blocks_.contradiction.rows;
   } else if (report.status == Status::not_converged) {
-    if (blocks_.dropped_rows() && blocks_.contradict(C_, WT_)) {
+    if (blocks_.dropped_rows() && blocks_.contradict(WT_)) {
       report.status = Status::inconsistent;
-      report.message = blocks_.message;
-      report.contradicting_rows = blocks_.rows();
+      report.message = blocks_.contradiction.message;
+      report.contradicting_rows = blocks_.contradiction.rows;
     } else {
       report.message = "no point on the constraints was found near the given one: |g| is " +
                        std::to_string(report.drift_before) + " there and stalls at " +
@@ -148,27 +168,32 @@ void GaussNewton::project(double t, std::vector<double>& y0, const std::vector<d
   if (report.status == Status::success) y0 = y;
 }
 
-bool GaussNewton::tangent(double t, const std::vector<double>& y, double* yp) {
+template <class Rows>
+bool GaussNewtonOn<Rows>::tangent(double t, const std::vector<double>& y, double* yp) {
   const double h = std::cbrt(kEpsilon) * std::max(1.0, std::abs(t));
   std::vector<double> plus(g_.size()), minus(g_.size());
   if (evaluator_.value(t + h, y.data(), n_, plus.data()) != Status::success ||
       evaluator_.value(t - h, y.data(), n_, minus.data()) != Status::success ||
-      evaluator_.jacobian(t, y.data(), n_, WT_.data(), blocks_.columns, C_.data()) !=
-          Status::success ||
-      !blocks_.factor(C_, rank_tolerance_))
+      blocks_.evaluate(evaluator_, t, y.data(), WT_.data()) != Status::success || !blocks_.factor())
     return false;
   std::vector<double> defect(g_.size());
   for (std::size_t i = 0; i < g_.size(); ++i) {
     // Differences of a g that does not contain t are exactly zero.
-    defect[i] = (plus[i] - minus[i]) / (2.0 * h);
-    for (int j = 0; j < n_; ++j)
-      defect[i] += C_[i * static_cast<std::size_t>(n_) + static_cast<std::size_t>(j)] * yp[j];
+    defect[i] = (plus[i] - minus[i]) / (2.0 * h) + blocks_.times(static_cast<int>(i), yp);
   }
-  blocks_.solve(defect, C_);
+  blocks_.solve(defect);
   for (const Block* block : {&blocks_.d, &blocks_.a})
     for (std::size_t k = 0; k < block->columns.size() && !block->rows.empty(); ++k)
       yp[block->columns[k]] -= block->dy[k];
   return true;
+}
+
+}  // namespace
+
+std::unique_ptr<GaussNewton> make_gauss_newton(const Constraints& constraints, int size) {
+  if (has_sparse_rows(constraints))
+    return std::make_unique<GaussNewtonOn<SparseRows>>(constraints, size);
+  return std::make_unique<GaussNewtonOn<RowBlocks>>(constraints, size);
 }
 
 }  // namespace tether::ida_projection

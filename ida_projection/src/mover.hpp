@@ -79,6 +79,7 @@ class Mover {
 
 /// Factories; `size` is N. The options and statistics outlive the mover.
 std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size);
+std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size);
 std::unique_ptr<Mover> make_gradient_mover(const Constraints&, const Options&, Statistics&,
                                            N_Vector like);
 std::unique_ptr<Mover> make_user_mover(const Constraints&, const Options&, Statistics&,

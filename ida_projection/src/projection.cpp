@@ -60,6 +60,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   else if (constraints.total_count() > 0)
     mover_ = std::holds_alternative<Gradients>(constraints.jacobian)
                  ? make_gradient_mover(constraints, options_, statistics_, like)
+             : has_sparse_rows(constraints)
+                 ? make_sparse_mover(constraints, options_, statistics_, size_)
                  : make_dense_mover(constraints, options_, statistics_, size_);
   if (mover_) {
     delta_ = OwnedVector(like);

@@ -4,21 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace tether::ida_projection {
 
-namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-// A tolerance-size move could not have caused a larger contradiction.
-constexpr double kContradiction = 0.5;
-
-}  // namespace
+RowBlocks::RowBlocks(const Constraints& constraints, const Evaluator& evaluator, int n)
+    : constraints_(constraints),
+      m_(evaluator.rows()),
+      n_(n),
+      rank_tolerance_(evaluator.uses_differences() ? 1e-6 : std::max(m_, n) * 1e-13),
+      C_(static_cast<std::size_t>(m_) * static_cast<std::size_t>(n), 0.0) {}
 
 Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<double>& y0,
                             const std::vector<double>& WT, const std::vector<bool>& hold,
-                            const double* id, std::vector<double>& C) {
+                            const double* id) {
   const auto n = static_cast<std::size_t>(n_);
   std::vector<char> filled(static_cast<std::size_t>(m_) * n, 0);
   std::vector<double> y = y0;
@@ -29,13 +27,13 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
       for (std::size_t i = 0; i < n; ++i)
         y[i] += (0.7 + 0.6 * std::sin(1.0 + 3.7 * static_cast<double>(i))) *
                 std::max(1e-3 * std::abs(y[i]), 10.0 * (WT[i] > 0.0 ? WT[i] : 1e-6));
-    const Status status = evaluator.jacobian(t, y.data(), n_, WT.data(), all, C.data());
+    const Status status = evaluator.jacobian(t, y.data(), n_, WT.data(), all, C_.data());
     if (status != Status::success && pass == 0) {
       message = evaluator.message();
       return status;
     }
     if (status == Status::success)
-      for (std::size_t e = 0; e < filled.size(); ++e) filled[e] |= C[e] != 0.0;
+      for (std::size_t e = 0; e < filled.size(); ++e) filled[e] |= C_[e] != 0.0;
   }
 
   evaluator.sensitive(t, y0.data(), n_, WT.data(), filled);
@@ -71,11 +69,14 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
     a.rows.clear();
     a.columns.clear();
   }
-  d.resize();
-  a.resize();
-  columns.clear();
+  for (Block* block : {&d, &a}) {
+    block->solver.resize(static_cast<int>(block->rows.size()),
+                         static_cast<int>(block->columns.size()));
+    block->resize();
+  }
+  columns_.clear();
   for (std::size_t j = 0; j < n; ++j)
-    if (column_used[j]) columns.push_back(static_cast<int>(j));
+    if (column_used[j]) columns_.push_back(static_cast<int>(j));
 
   for (int i = 0; i < m_; ++i) {
     bool free = false;
@@ -89,13 +90,19 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
   return Status::success;
 }
 
-bool RowBlocks::factor(const std::vector<double>& C, double rank_tolerance) {
+Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
+  return evaluator.jacobian(t, y, n_, WT, columns_, C_.data());
+}
+
+bool RowBlocks::factor() {
   for (Block* block : {&d, &a})
-    if (!block->rows.empty() && !block->factor(C, n_, rank_tolerance)) return false;
+    if (!block->rows.empty() && !block->solver.factor(C_.data(), n_, block->rows.data(),
+                                                      block->columns.data(), rank_tolerance_))
+      return false;
   return true;
 }
 
-void RowBlocks::solve(const std::vector<double>& g, const std::vector<double>& C) {
+void RowBlocks::solve(const std::vector<double>& g) {
   if (a.rows.empty()) {  // then d has every row, in order
     d.solver.solve(g.data(), d.dy.data());
     return;
@@ -103,7 +110,7 @@ void RowBlocks::solve(const std::vector<double>& g, const std::vector<double>& C
   for (std::size_t i = 0; i < d.rows.size(); ++i) d.g[i] = g[static_cast<std::size_t>(d.rows[i])];
   d.solve();
   for (std::size_t i = 0; i < a.rows.size(); ++i) {
-    const double* c = C.data() + static_cast<std::ptrdiff_t>(a.rows[i]) * n_;
+    const double* c = row(a.rows[i]);
     double rest = g[static_cast<std::size_t>(a.rows[i])];
     for (std::size_t k = 0; k < d.columns.size(); ++k) rest -= c[d.columns[k]] * d.dy[k];
     a.g[i] = rest;
@@ -111,45 +118,31 @@ void RowBlocks::solve(const std::vector<double>& g, const std::vector<double>& C
   a.solve();
 }
 
-bool RowBlocks::contradict(const std::vector<double>& C, const std::vector<double>& WT) {
-  for (Block* block : {&d, &a}) {
-    const auto& solver = block->solver;
-    for (int k = solver.rank(); k < static_cast<int>(block->rows.size()); ++k) {
-      const int row = block->rows[static_cast<std::size_t>(solver.pivot(k))];
-      const double norm = solver.row_norm(solver.pivot(k));
-      double row_in_tolerances = 0.0;
-      for (int j : block->columns) {
-        const double c = C[static_cast<std::size_t>(row) * static_cast<std::size_t>(n_) +
-                           static_cast<std::size_t>(j)] *
-                         WT[static_cast<std::size_t>(j)];
-        row_in_tolerances += c * c;
-      }
-      const bool vanished = !(norm > std::numeric_limits<double>::min());
-      const double left = solver.inconsistency(k) * (vanished ? 1.0 : norm);
-      const double allowed =
-          vanished ? 1e-12
-                   : kContradiction * std::sqrt(n_ * row_in_tolerances) + 1e2 * kEpsilon * norm;
-      if (left <= allowed) continue;
+double RowBlocks::terms(int i, const double* y) const {
+  const double* c = row(i);
+  double sum = 0.0;
+  for (int j = 0; j < n_; ++j) sum += std::abs(c[j] * y[j]);
+  return sum;
+}
 
-      contradicting_ = {row};
-      if (vanished) {
-        message =
-            constraints_.name(row) + ": the gradient vanishes although g = " + std::to_string(left);
-        return true;
+double RowBlocks::times(int i, const double* y) const {
+  const double* c = row(i);
+  double sum = 0.0;
+  for (int j = 0; j < n_; ++j) sum += c[j] * y[j];
+  return sum;
+}
+
+bool RowBlocks::contradict(const std::vector<double>& WT) {
+  for (const Block* block : {&d, &a}) {
+    const auto in_tolerances = [&](int i) {
+      double sum = 0.0;
+      for (int j : block->columns) {
+        const double c = row(i)[j] * WT[static_cast<std::size_t>(j)];
+        sum += c * c;
       }
-      const std::vector<double> share = solver.dependence(k);
-      for (int i = 0; i < solver.rank(); ++i)
-        if (std::abs(share[static_cast<std::size_t>(i)]) > 1e-3)
-          contradicting_.push_back(block->rows[static_cast<std::size_t>(solver.pivot(i))]);
-      std::sort(contradicting_.begin(), contradicting_.end());
-      message = "rows contradict each other:";
-      for (int i : contradicting_)
-        message += " " + std::to_string(i) + " (" + constraints_.name(i) + ")";
-      message += "; a distance of " +
-                 std::to_string(left / std::sqrt(n_ * std::max(row_in_tolerances, 1e-300))) +
-                 " tolerances stays unsolved";
-      return true;
-    }
+      return std::sqrt(sum);
+    };
+    if (contradicts(*block, constraints_, n_, in_tolerances, &contradiction)) return true;
   }
   return false;
 }

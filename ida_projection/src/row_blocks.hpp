@@ -3,6 +3,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <tether/linalg/minimum_norm.hpp>
 #include <vector>
@@ -12,14 +14,15 @@
 namespace tether::ida_projection {
 
 /// One set of rows solved for one set of columns.
-struct Block {
+template <class Solver>
+struct BlockOf {
   std::vector<int> rows, columns;
-  linalg::MinimumNorm solver;
+  Solver solver;
   std::vector<double> g, dy;
   int first = -1;  // of columns that follow each other without a gap; -1: they do not
 
+  /// After rows, columns and the solver were set up.
   void resize() {
-    solver.resize(static_cast<int>(rows.size()), static_cast<int>(columns.size()));
     g.assign(rows.size(), 0.0);
     dy.assign(columns.size(), 0.0);
     const bool adjacent = !columns.empty() &&
@@ -28,10 +31,6 @@ struct Block {
   }
 
   double* D() { return solver.metric(); }
-  bool factor(const std::vector<double>& C, int n, double rank_tolerance) {
-    return solver.factor(C.data(), n, rows.data(), columns.data(), rank_tolerance);
-  }
-
   void solve() { solver.solve(g.data(), dy.data()); }
 
   /// body(k, j) for each column j = columns[k]. Adjacent columns make a plain loop, which the
@@ -47,45 +46,102 @@ struct Block {
   }
 };
 
+/// Rows that a block dropped and that ask for what its kept rows exclude.
+struct Contradiction {
+  std::vector<int> rows;
+  std::string message;
+};
+
+/// After solve(): do dropped rows of the block ask for what the kept ones exclude? Up to what a
+/// tolerance-size move explains, they must follow from them. in_tolerances(row): |row_i(C WT)| over
+/// the block's columns. n: unknowns.
+template <class Solver, class Norm>
+bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, int n,
+                 Norm in_tolerances, Contradiction* found) {
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  constexpr double kContradiction =
+      0.5;  // a tolerance-size move could not have caused a larger one
+  const Solver& solver = block.solver;
+  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
+    const int row = block.rows[static_cast<std::size_t>(solver.pivot(k))];
+    const double norm = solver.row_norm(solver.pivot(k));
+    const double row_in_tolerances = in_tolerances(row);
+    const bool vanished = !(norm > std::numeric_limits<double>::min());
+    const double left = solver.inconsistency(k) * (vanished ? 1.0 : norm);
+    const double allowed =
+        vanished ? 1e-12
+                 : kContradiction * std::sqrt(n) * row_in_tolerances + 1e2 * kEpsilon * norm;
+    if (left <= allowed) continue;
+
+    found->rows = {row};
+    if (vanished) {
+      found->message =
+          constraints.name(row) + ": the gradient vanishes although g = " + std::to_string(left);
+      return true;
+    }
+    const std::vector<double> share = solver.dependence(k);
+    for (int i = 0; i < solver.rank(); ++i)
+      if (std::abs(share[static_cast<std::size_t>(i)]) > 1e-3)
+        found->rows.push_back(block.rows[static_cast<std::size_t>(solver.pivot(i))]);
+    std::sort(found->rows.begin(), found->rows.end());
+    found->message = "rows contradict each other:";
+    for (int i : found->rows)
+      found->message += " " + std::to_string(i) + " (" + constraints.name(i) + ")";
+    found->message += "; a distance of " +
+                      std::to_string(left / (std::sqrt(n) * std::max(row_in_tolerances, 1e-300))) +
+                      " tolerances stays unsolved";
+    return true;
+  }
+  return false;
+}
+
 /// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
 /// differential columns ("d"); then rows that contain algebraic variables ("B") are solved for
 /// these columns ("a") alone, so that no position or velocity is bent to repair a multiplier.
-/// Where no variable is algebraic, B is empty and this is one minimum-norm solve.
+/// Where no variable is algebraic, B is empty and this is one minimum-norm solve. C is dense.
 class RowBlocks {
  public:
-  RowBlocks(const Constraints& constraints, int m, int n)
-      : constraints_(constraints), m_(m), n_(n) {}
+  using Block = BlockOf<linalg::MinimumNorm>;
+
+  RowBlocks(const Constraints& constraints, const Evaluator& evaluator, int n);
 
   Block d, a;
-  std::vector<int> columns;  ///< every column that C can fill and that is free
 
   /// Finds A, B, d and a from the entries that C can fill: those not zero at y or at a point some
   /// tolerances away, so that a velocity that happens to be zero is not taken for a structural
-  /// zero. `id`: 1 differential, 0 algebraic, null: none algebraic. `C` is work space.
+  /// zero. `id`: 1 differential, 0 algebraic, null: none algebraic.
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
-                   const std::vector<double>& WT, const std::vector<bool>& hold, const double* id,
-                   std::vector<double>& C);
+                   const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
 
-  /// From C (m x n, row-major) and the metric in d.D() and a.D(). False: an entry is not finite.
-  bool factor(const std::vector<double>& C, double rank_tolerance);
+  /// C at y; WT: only differences need it. The text of a failure is the evaluator's.
+  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
+  /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
+  bool factor();
   /// d.dy and a.dy for the values g, with the C that was factored.
-  void solve(const std::vector<double>& g, const std::vector<double>& C);
+  void solve(const std::vector<double>& g);
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
 
-  /// After solve(): do dropped rows ask for what the kept ones exclude? Up to what a tolerance-size
-  /// move explains, they must follow from them. Fills message and rows() when they do not.
-  bool contradict(const std::vector<double>& C, const std::vector<double>& WT);
-  const std::vector<int>& rows() const { return contradicting_; }
+  /// sum_j |C_ij y_j| and sum_j C_ij y_j.
+  double terms(int i, const double* y) const;
+  double times(int i, const double* y) const;
 
+  /// After solve(): as contradicts() above, for both blocks.
+  bool contradict(const std::vector<double>& WT);
+
+  Contradiction contradiction;
   std::string message;
 
  private:
+  const double* row(int i) const { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
+
   const Constraints& constraints_;
   int m_, n_;
+  double rank_tolerance_;
+  std::vector<double> C_;     // m x n, row-major
+  std::vector<int> columns_;  // every column that C can fill and that is free
   bool structured_ = false;
-  std::vector<int> contradicting_;
 };
 
 }  // namespace tether::ida_projection

@@ -34,25 +34,54 @@ const char* missing_gradient_operation(N_Vector v) {
   return nullptr;
 }
 
-void check_rows(const Constraints& set) {
+// The pattern of rows given by their entries.
+void check_sparse(const SparseJacobian& sparse, int rows, long unknowns) {
+  const auto count = static_cast<int>(sparse.columns.size());
+  if (!sparse.fill) reject("SparseJacobian::fill is empty; give the entries of C(t, y)");
+  if (static_cast<int>(sparse.starts.size()) != rows + 1)
+    reject("SparseJacobian::starts has " + std::to_string(sparse.starts.size()) + " entries for " +
+           std::to_string(rows) + " rows; it must have one more than there are rows");
+  if (sparse.starts.front() != 0 || sparse.starts.back() != count)
+    reject("SparseJacobian::starts goes from " + std::to_string(sparse.starts.front()) + " to " +
+           std::to_string(sparse.starts.back()) + "; it must go from 0 to the number of entries, " +
+           std::to_string(count));
+  for (int i = 0; i < rows; ++i) {
+    const int begin = sparse.starts[static_cast<std::size_t>(i)];
+    const int end = sparse.starts[static_cast<std::size_t>(i) + 1];
+    if (end < begin || end > count)
+      reject("SparseJacobian::starts[" + std::to_string(i + 1) + "] = " + std::to_string(end) +
+             "; starts must not decrease, nor exceed the number of entries");
+    for (int e = begin; e < end; ++e) {
+      const int j = sparse.columns[static_cast<std::size_t>(e)];
+      const std::string where = "SparseJacobian::columns[" + std::to_string(e) +
+                                "] = " + std::to_string(j) + " in row " + std::to_string(i);
+      if (j < 0 || j >= unknowns)
+        reject(where + "; it must be 0 .. " + std::to_string(unknowns - 1));
+      if (e > begin && j <= sparse.columns[static_cast<std::size_t>(e) - 1])
+        reject(where + "; columns of a row must ascend, each once");
+    }
+  }
+}
+
+void check_rows(const Constraints& set, long unknowns) {
   if (set.count < 0)
     reject("constraints.count = " + std::to_string(set.count) + "; it must be >= 0");
   if (!set.names.empty() && static_cast<int>(set.names.size()) != set.count)
     reject("constraints.names has " + std::to_string(set.names.size()) + " entries for " +
            std::to_string(set.count) + " rows; give one for each row, or none");
-  const bool by_value = std::holds_alternative<FiniteDifferences>(set.jacobian) ||
-                        std::holds_alternative<DenseJacobian>(set.jacobian);
-  if (set.count > 0 && by_value && !set.value)
+  if (set.count > 0 && has_values(set) && !set.value)
     reject("constraints.value is empty although constraints.count = " + std::to_string(set.count) +
            "; give g(t, y)");
   if (const auto* dense = std::get_if<DenseJacobian>(&set.jacobian))
     if (set.count > 0 && !dense->fill) reject("DenseJacobian is empty; give C(t, y)");
+  if (const auto* sparse = std::get_if<SparseJacobian>(&set.jacobian))
+    if (set.count > 0) check_sparse(*sparse, set.count, unknowns);
   if (const auto* gradients = std::get_if<Gradients>(&set.jacobian))
     if (set.count > 0 && (!gradients->value || !gradients->fill))
       reject("Gradients needs both value and fill");
   if (const auto* user = std::get_if<UserProjection>(&set.jacobian))
     if (user->function == nullptr) reject("UserProjection::function is null");
-  for (const Constraints& part : set.joined) check_rows(part);
+  for (const Constraints& part : set.joined) check_rows(part, unknowns);
 }
 
 void require(bool condition, const char* name, double value, const char* right) {
@@ -86,7 +115,7 @@ bool is_contiguous(N_Vector v) {
 void validate(const Constraints& constraints, const Options& options, N_Vector like) {
   if (const char* missing = missing_operation(like))
     reject(std::string("the vector type lacks ") + missing + ", which the projection needs");
-  check_rows(constraints);
+  check_rows(constraints, like->ops->nvgetlength != nullptr ? N_VGetLength(like) : 0);
 
   require(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0 (tolerances)");
   require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,
@@ -106,14 +135,12 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
       SUNNonlinSolGetType(options.nonlinear_solver) != SUNNONLINEARSOLVER_ROOTFIND)
     reject("options.nonlinear_solver is not of root-finding type, which IDA needs");
 
-  const bool dense = std::holds_alternative<FiniteDifferences>(constraints.jacobian) ||
-                     std::holds_alternative<DenseJacobian>(constraints.jacobian);
   const int rows = constraints.total_count();
   if (rows == 0 && !std::holds_alternative<UserProjection>(constraints.jacobian)) return;
 
   const bool contiguous = is_contiguous(like);
   const auto length = like->ops->nvgetlength != nullptr ? N_VGetLength(like) : -1;
-  if (dense && !contiguous)
+  if (has_values(constraints) && !contiguous)
     reject("the vectors are not contiguous in this process; give the constraints as Gradients");
   if (std::holds_alternative<Gradients>(constraints.jacobian))
     if (const char* missing = missing_gradient_operation(like))

@@ -5,7 +5,6 @@
 #include <problems/governor.hpp>
 #include <problems/link_chain.hpp>
 #include <problems/pinned_rods.hpp>
-#include <problems/sparse_projection.hpp>
 
 #include "oracle.hpp"
 #include "support/catch.hpp"
@@ -126,33 +125,28 @@ TEST_CASE("link chain: the sparse Jacobian is the dense one") {
   CHECK((given - expected).cwiseAbs().maxCoeff() == 0.0);
 }
 
-// Lands on every row, and the move is a combination of the rows in the metric: the least one.
-TEST_CASE("sparse projection: on the rows, by the least move") {
+TEST_CASE("link chain: the sparse rows are the dense ones") {
   const Problem p = link_chain(6, 0.3);
-  const int n = 18;
-  auto& projection = *static_cast<SparseProjection*>(p.kept.get());
+  REQUIRE(p.sparse_constraints);
   std::mt19937 random(6);
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  Eigen::VectorXd y = vector(p.reference).head(2 * n), corrector(2 * n), change(2 * n);
-  for (int i = 0; i < 2 * n; ++i) {
-    y[i] += 1e-5 * uniform(random);
-    corrector[i] = 1e-3 * (0.1 + std::abs(uniform(random)));
-  }
-  REQUIRE(projection.project(y.data(), change.data(), corrector.data(), 1e-4) == 0);
-  Eigen::VectorXd full = Eigen::VectorXd::Zero(p.size);
-  full.head(2 * n) = y + change;
-  RowMajor C(0, p.size);
-  for (const char* name : {"position", "velocity", "energy"}) {
-    const Rows& rows = group(p, name);
-    CHECK(value(rows, 0.0, full).cwiseAbs().maxCoeff() < 1e-12);
-    RowMajor longer(C.rows() + rows.constraints.count, p.size);
-    longer << C, jacobian(rows, 0.0, full);
-    C = longer;
-  }
-  CHECK(change.norm() > 1e-6);
-  // D^-2 change = C^T multipliers, up to the curvature of the rows over the move.
-  const Eigen::VectorXd pull = change.cwiseQuotient(corrector.cwiseAbs2());
-  const Eigen::MatrixXd across = C.leftCols(2 * n).transpose();
-  const Eigen::VectorXd rest = pull - across * across.completeOrthogonalDecomposition().solve(pull);
-  CHECK(rest.norm() < 1e-3 * pull.norm());
+  double t;
+  const Eigen::VectorXd y = random_state(p, random, &t);
+  const auto& sparse =
+      std::get<tether::ida_projection::SparseJacobian>(p.sparse_constraints->jacobian);
+  std::vector<double> g(24), entries(sparse.columns.size(), 0.0);
+  const tether::ida_projection::ConstVector at(y.data(), p.size);
+  REQUIRE(p.sparse_constraints->value(t, at, {g.data(), 24}) == 0);
+  REQUIRE(sparse.fill(t, at, {entries.data(), static_cast<int>(entries.size())}) == 0);
+  RowMajor given = RowMajor::Zero(24, p.size), expected(24, p.size);
+  for (int i = 0; i < 24; ++i)
+    for (int e = sparse.starts[static_cast<std::size_t>(i)];
+         e < sparse.starts[static_cast<std::size_t>(i) + 1]; ++e)
+      given(i, sparse.columns[static_cast<std::size_t>(e)]) = entries[static_cast<std::size_t>(e)];
+  expected << jacobian(group(p, "position"), t, y), jacobian(group(p, "velocity"), t, y);
+  CHECK((given - expected).cwiseAbs().maxCoeff() < 1e-15);
+  Eigen::VectorXd values(24);
+  values << value(group(p, "position"), t, y), value(group(p, "velocity"), t, y);
+  CHECK((vector(g) - values).cwiseAbs().maxCoeff() < 1e-14);
+  CHECK(p.sparse_constraints->total_count() == 25);
+  CHECK(p.sparse_constraints->name(23) == "pin 5 y rate");
 }

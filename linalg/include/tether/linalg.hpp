@@ -3,3 +3,4 @@
 #pragma once
 
 #include <tether/linalg/minimum_norm.hpp>
+#include <tether/linalg/sparse_minimum_norm.hpp>

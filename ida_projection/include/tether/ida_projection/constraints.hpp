@@ -62,6 +62,17 @@ struct DenseJacobian {
   DenseJacobian(F&& f) : fill(std::forward<F>(f)) {}
 };
 
+/// Many rows with few entries each: C by its entries. The pattern is fixed and lists every entry
+/// that can ever differ from zero (a velocity that is zero at the start included), in compressed
+/// rows: entries starts[i] .. starts[i + 1] - 1 belong to row i, in the ascending columns
+/// `columns[..]`. `fill` writes their values in the same order; they are zero on entry. Joined
+/// dense rows (energy) stay full rows, of which there should be few.
+struct SparseJacobian {
+  std::vector<int> starts;   ///< count + 1, from 0 to the number of entries
+  std::vector<int> columns;  ///< of each entry
+  Callable<double, ConstVector, Vector> fill;
+};
+
 /// Few constraints on any vector type (MPI, GPU, a framework's own): values and gradients through
 /// N_Vectors only. `value` fills g[0..m-1] with the same numbers on every process; `fill` writes
 /// the m gradients dg_i/dy, each an N_Vector like y. Replaces Constraints::value.
@@ -86,7 +97,8 @@ struct UserProjection {
 struct Constraints {
   int count = 0;                                ///< m, rows of this set
   Callable<double, ConstVector, Vector> value;  ///< g(t, y)
-  std::variant<FiniteDifferences, DenseJacobian, Gradients, UserProjection> jacobian;  ///< dg/dy
+  std::variant<FiniteDifferences, DenseJacobian, SparseJacobian, Gradients, UserProjection>
+      jacobian;                     ///< dg/dy
   std::vector<std::string> names;   ///< optional, one for each row; used in messages
   std::vector<Constraints> joined;  ///< sets added with `+`, their rows after those of this one
 
@@ -116,7 +128,8 @@ struct JacobianReport {
 };
 
 /// Compares the caller's Jacobian with extrapolated central differences at (t, y), entry by entry.
-/// Works for DenseJacobian; FiniteDifferences pass trivially. An entry is wrong when it differs by
+/// Works for DenseJacobian and SparseJacobian (an entry that the pattern lacks is wrong, too);
+/// FiniteDifferences pass trivially. An entry is wrong when it differs by
 /// more than `tolerance` times the larger of its own size and its row's largest entry, both in
 /// the scale max(|y_j|, 1).
 JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,

@@ -1,4 +1,4 @@
-// Tether: the move onto the constraints on contiguous vectors, dense C.
+// Tether: the move onto the constraints on contiguous vectors.
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Notation as in ida_projection/README.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w
@@ -9,6 +9,7 @@
 
 #include "mover.hpp"
 #include "row_blocks.hpp"
+#include "sparse_rows.hpp"
 
 namespace tether::ida_projection {
 
@@ -20,10 +21,12 @@ constexpr double kMetricDecay = 0.8;   // per accepted step
 constexpr long kMeasureEvery = 64;
 constexpr double kLargestFloor = 0.1;  // tolerances
 
-class DenseMover final : public Mover {
+/// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
+template <class Rows>
+class ContiguousMover final : public Mover {
  public:
-  DenseMover(const Constraints& constraints, const Options& options, Statistics& statistics,
-             int size)
+  ContiguousMover(const Constraints& constraints, const Options& options, Statistics& statistics,
+                  int size)
       : options_(options),
         statistics_(statistics),
         evaluator_(constraints, statistics),
@@ -31,7 +34,7 @@ class DenseMover final : public Mover {
         n_(size),
         m_(evaluator_.rows()),
         inverse_n_(1.0 / size),
-        blocks_(constraints, m_, size) {
+        blocks_(constraints, evaluator_, size) {
     const auto n = static_cast<std::size_t>(n_);
     const auto m = static_cast<std::size_t>(m_);
     scale_.assign(n, 0.0);
@@ -39,8 +42,6 @@ class DenseMover final : public Mover {
     y_.assign(n, 0.0);
     WT_.assign(n, 0.0);
     g_.assign(m, 0.0);
-    C_.assign(m * n, 0.0);
-    rank_tolerance_ = evaluator_.uses_differences() ? 1e-6 : std::max(m_, n_) * 1e-13;
   }
 
   Move measure(const Candidate& candidate) override;
@@ -63,6 +64,8 @@ class DenseMover final : public Mover {
   }
 
  private:
+  using Block = typename Rows::Block;
+
   void load(const Candidate& candidate);
   const std::vector<double>& WT();
   void set_metric();
@@ -84,10 +87,9 @@ class DenseMover final : public Mover {
   Monitor monitor_;
   int n_, m_;
   double inverse_n_;
-  double rank_tolerance_;
-  RowBlocks blocks_;
+  Rows blocks_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
-  std::vector<double> y_, WT_, g_, C_;
+  std::vector<double> y_, WT_, g_;
   std::vector<double> group_sum_;
   std::vector<int> group_members_;
   const double* w_ = nullptr;
@@ -100,7 +102,8 @@ class DenseMover final : public Mover {
 };
 
 // y = base + correction.
-void DenseMover::load(const Candidate& candidate) {
+template <class Rows>
+void ContiguousMover<Rows>::load(const Candidate& candidate) {
   const double* base = candidate.base_entries;
   ycor_ = candidate.correction_entries;
   w_ = candidate.weight_entries;
@@ -110,7 +113,8 @@ void DenseMover::load(const Candidate& candidate) {
 }
 
 // WT = 1/w. A weight of zero means that the error of this component does not count at all.
-const std::vector<double>& DenseMover::WT() {
+template <class Rows>
+const std::vector<double>& ContiguousMover<Rows>::WT() {
   if (!WT_known_)
     for (std::size_t i = 0; i < WT_.size(); ++i) WT_[i] = w_[i] > 0.0 ? 1.0 / w_[i] : 0.0;
   WT_known_ = true;
@@ -118,7 +122,8 @@ const std::vector<double>& DenseMover::WT() {
 }
 
 // s <- max(0.8 s, |correction|), D = s or, where the error weights are asked for, WT.
-void DenseMover::set_metric() {
+template <class Rows>
+void ContiguousMover<Rows>::set_metric() {
   const bool local = options_.metric == Metric::local_correction;
   const bool grouped = local && !options_.group.empty();
   for (Block* block : {&blocks_.d, &blocks_.a}) {
@@ -141,7 +146,8 @@ void DenseMover::set_metric() {
 }
 
 // One scale for each group: rms of |correction| in tolerances over its members.
-void DenseMover::set_group_metric() {
+template <class Rows>
+void ContiguousMover<Rows>::set_group_metric() {
   const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());
   std::vector<double>& sum = group_sum_;  // no allocation after the first step
   std::vector<int>& members = group_members_;
@@ -170,34 +176,38 @@ void DenseMover::set_group_metric() {
   }
 }
 
-Status DenseMover::structure(const Candidate& candidate, const double* id) {
-  const Status status = blocks_.structure(evaluator_, candidate.t, y_, WT(), options_.hold, id, C_);
+template <class Rows>
+Status ContiguousMover<Rows>::structure(const Candidate& candidate, const double* id) {
+  const Status status = blocks_.structure(evaluator_, candidate.t, y_, WT(), options_.hold, id);
   if (status != Status::success) message_ = blocks_.message;
   return status;
 }
 
-Status DenseMover::set_algebraic(const Candidate& candidate, N_Vector id) {
+template <class Rows>
+Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector id) {
   load(candidate);
   const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
   return structure(candidate, mask);
 }
 
-Status DenseMover::value(double t) {
+template <class Rows>
+Status ContiguousMover<Rows>::value(double t) {
   const Status status = evaluator_.value(t, y_.data(), n_, g_.data());
   if (status != Status::success) message_ = evaluator_.message();
   return status;
 }
 
-Status DenseMover::factor(double t) {
+template <class Rows>
+Status ContiguousMover<Rows>::factor(double t) {
   // Only differences need to know how large a tolerance is.
   const double* WT = evaluator_.uses_differences() ? this->WT().data() : nullptr;
-  const Status status = evaluator_.jacobian(t, y_.data(), n_, WT, blocks_.columns, C_.data());
+  const Status status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
   if (status != Status::success) {
     message_ = evaluator_.message();
     return status;
   }
   ++statistics_.factorizations;
-  if (!blocks_.factor(C_, rank_tolerance_)) {
+  if (!blocks_.factor()) {
     message_ =
         "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
     return Status::not_finite;
@@ -208,9 +218,10 @@ Status DenseMover::factor(double t) {
 
 // Returns the WRMS length of dy in the error norm. Algebraic columns do not count there: they
 // follow the others.
-double DenseMover::solve() {
+template <class Rows>
+double ContiguousMover<Rows>::solve() {
   ++statistics_.iterations;
-  blocks_.solve(g_, C_);
+  blocks_.solve(g_);
   const Block& counted = blocks_.d.rows.empty() ? blocks_.a : blocks_.d;
   double sum = 0.0;
   const double* dy = counted.dy.data();
@@ -221,14 +232,16 @@ double DenseMover::solve() {
   return std::sqrt(sum * inverse_n_);
 }
 
-bool DenseMover::contradicts() {
-  if (!blocks_.dropped_rows() || !blocks_.contradict(C_, WT())) return false;
-  message_ = blocks_.message;
-  contradicting_rows_ = blocks_.rows();
+template <class Rows>
+bool ContiguousMover<Rows>::contradicts() {
+  if (!blocks_.dropped_rows() || !blocks_.contradict(WT())) return false;
+  message_ = blocks_.contradiction.message;
+  contradicting_rows_ = blocks_.contradiction.rows;
   return true;
 }
 
-void DenseMover::apply(double factor, double* correction) {
+template <class Rows>
+void ContiguousMover<Rows>::apply(double factor, double* correction) {
   for (const Block* block : {&blocks_.d, &blocks_.a}) {
     if (block->rows.empty()) continue;
     double* __restrict y = y_.data();
@@ -243,13 +256,15 @@ void DenseMover::apply(double factor, double* correction) {
 }
 
 // WRMS |y| in tolerances.
-double DenseMover::size_of_y() const {
+template <class Rows>
+double ContiguousMover<Rows>::size_of_y() const {
   double sum = 0.0;
   for (std::size_t i = 0; i < y_.size(); ++i) sum += (y_[i] * w_[i]) * (y_[i] * w_[i]);
   return std::sqrt(sum * inverse_n_);
 }
 
-double DenseMover::drift() const {
+template <class Rows>
+double ContiguousMover<Rows>::drift() const {
   double largest = 0.0;
   for (double g : g_) largest = std::max(largest, std::abs(g));
   return largest;
@@ -257,24 +272,22 @@ double DenseMover::drift() const {
 
 // Does the rounding of its own terms explain every g_i? Then there is nothing to enforce, however
 // short the tolerances are that the metric would make of it.
-bool DenseMover::rounding_only() const {
+template <class Rows>
+bool ContiguousMover<Rows>::rounding_only() const {
   for (int i = 0; i < m_; ++i) {
-    const double* c = C_.data() + static_cast<std::ptrdiff_t>(i) * n_;
-    double terms = 0.0;
-    for (std::size_t j = 0; j < y_.size(); ++j) terms += std::abs(c[j] * y_[j]);
+    const double terms = blocks_.terms(i, y_.data());
     if (!(std::abs(g_[static_cast<std::size_t>(i)]) <= 64.0 * kEpsilon * terms)) return false;
   }
   return true;
 }
 
 // Length of the move that the rounding of g asks for in the worst case, with the present factors.
-double DenseMover::rounding_length() {
+template <class Rows>
+double ContiguousMover<Rows>::rounding_length() {
   const std::vector<double> g = g_;
   double total = 0.0;
   for (std::size_t i = 0; i < g.size(); ++i) {
-    const double* c = C_.data() + i * y_.size();
-    double terms = 0.0;
-    for (std::size_t j = 0; j < y_.size(); ++j) terms += std::abs(c[j] * y_[j]);
+    const double terms = blocks_.terms(static_cast<int>(i), y_.data());
     std::fill(g_.begin(), g_.end(), 0.0);
     g_[i] = 8.0 * kEpsilon * terms;
     total += solve();
@@ -284,7 +297,8 @@ double DenseMover::rounding_length() {
   return total;
 }
 
-Move DenseMover::measure(const Candidate& candidate) {
+template <class Rows>
+Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   Move result;
   load(candidate);
   if (!blocks_.structured() && (result.status = structure(candidate, nullptr)) != Status::success)
@@ -301,7 +315,8 @@ Move DenseMover::measure(const Candidate& candidate) {
   return result;
 }
 
-Move DenseMover::move(const Candidate& candidate) {
+template <class Rows>
+Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
   load(candidate);
   set_metric();
@@ -377,7 +392,8 @@ Move DenseMover::move(const Candidate& candidate) {
   return result;
 }
 
-Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
+template <class Rows>
+Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
   for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
   double sum = 0.0;
@@ -409,7 +425,12 @@ Status DenseMover::settle(const Candidate& candidate, N_Vector change) {
 
 std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
                                         Statistics& statistics, int size) {
-  return std::make_unique<DenseMover>(constraints, options, statistics, size);
+  return std::make_unique<ContiguousMover<RowBlocks>>(constraints, options, statistics, size);
+}
+
+std::unique_ptr<Mover> make_sparse_mover(const Constraints& constraints, const Options& options,
+                                         Statistics& statistics, int size) {
+  return std::make_unique<ContiguousMover<SparseRows>>(constraints, options, statistics, size);
 }
 
 }  // namespace tether::ida_projection

@@ -1,0 +1,63 @@
+// Tether: RowBlocks for sparse rows. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tether/linalg/sparse_minimum_norm.hpp>
+#include <vector>
+
+#include "row_blocks.hpp"
+
+namespace tether::ida_projection {
+
+/// The two stages of RowBlocks with sparse factors. Rows with a SparseJacobian keep their pattern;
+/// all others are full rows. A block's rows are the sparse ones first. Members as in RowBlocks.
+class SparseRows {
+ public:
+  using Block = BlockOf<linalg::SparseMinimumNorm>;
+
+  SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n);
+
+  Block d, a;
+
+  Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
+                   const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
+  bool structured() const { return structured_; }
+  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
+  bool factor();
+  void solve(const std::vector<double>& g);
+  int rank() const { return d.solver.rank() + a.solver.rank(); }
+  bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
+  double terms(int i, const double* y) const;
+  double times(int i, const double* y) const;
+  bool contradict(const std::vector<double>& WT);
+
+  Contradiction contradiction;
+  std::string message;
+
+ private:
+  /// Where row i of C is: entries begin .. end - 1, or full row `full` >= 0.
+  struct Row {
+    int begin = 0, end = 0, full = -1;
+  };
+  template <class Visit>
+  void visit(int i, Visit f) const;  // f(column, entry) of row i
+  Status find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y,
+                           const std::vector<double>& WT);
+  bool fills(const Row& row, int j) const;
+  void split(const std::vector<bool>& hold, const double* id);
+  void set_up(Block& block, std::vector<int>* gather);
+  void load(Block& block, const std::vector<int>& gather);
+
+  const Constraints& constraints_;
+  int m_, n_, full_ = 0;
+  std::vector<Row> rows_;
+  std::vector<int> columns_of_;              // of every sparse entry
+  std::vector<double> entries_, full_rows_;  // C
+  std::vector<char> full_fills_;             // which entries of the full rows can differ from zero
+  std::vector<int> columns_;                 // every column that differences must visit
+  std::vector<int> gather_d_, gather_a_;     // entry of C of each entry of a block
+  std::vector<double> moved_;                // d.dy at its columns, 0 elsewhere; where B exists
+  bool structured_ = false;
+};
+
+}  // namespace tether::ida_projection

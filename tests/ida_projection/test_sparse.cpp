@@ -1,0 +1,211 @@
+// Tether: rows given by their entries. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <problems/andrews.hpp>
+#include <problems/link_chain.hpp>
+#include <problems/pendulum.hpp>
+
+#include "host.hpp"
+#include "linalg/allocations.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// The named groups as sparse rows: the entries of their C that are not zero at some points.
+tp::Constraints sparse(const Problem& problem, const std::vector<std::string>& names) {
+  tp::Constraints joined;
+  for (const std::string& name : names) {
+    tp::Constraints set = problem.select({name});
+    const auto fill = std::get<tp::DenseJacobian>(set.jacobian).fill;
+    const int m = set.count, n = problem.size;
+    RowMajor C(m, n), pattern = RowMajor::Zero(m, n);
+    for (int point = 0; point < 3; ++point) {
+      std::vector<double> y = problem.y0;
+      for (std::size_t i = 0; i < y.size(); ++i) y[i] += 0.01 * point * std::sin(1.0 + 2.3 * i);
+      C.setZero();
+      fill(0.1 * point, tp::ConstVector(y.data(), n), tp::Matrix(C.data(), m, n));
+      pattern += C.cwiseAbs();
+    }
+    tp::SparseJacobian given;
+    given.starts = {0};
+    for (int i = 0; i < m; ++i) {
+      for (int j = 0; j < n; ++j)
+        if (pattern(i, j) != 0.0) given.columns.push_back(j);
+      given.starts.push_back(static_cast<int>(given.columns.size()));
+    }
+    given.fill = [=, C = RowMajor(m, n), starts = given.starts, columns = given.columns](
+                     double t, tp::ConstVector y, tp::Vector entries) mutable {
+      C.setZero();
+      const int flag = fill(t, y, tp::Matrix(C.data(), m, n));
+      for (int i = 0; i < m; ++i)
+        for (int e = starts[static_cast<std::size_t>(i)];
+             e < starts[static_cast<std::size_t>(i) + 1]; ++e)
+          entries[e] = C(i, columns[static_cast<std::size_t>(e)]);
+      return flag;
+    };
+    set.jacobian = std::move(given);
+    joined = joined.count == 0 ? std::move(set) : std::move(joined) + set;
+  }
+  return joined;
+}
+
+double largest(const std::vector<double>& a, const std::vector<double>& b) {
+  double difference = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    difference = std::max(difference, std::abs(a[i] - b[i]) / (1.0 + std::abs(a[i])));
+  return difference;
+}
+
+std::vector<double> after(const Problem& problem, const tp::Constraints& rows, int steps,
+                          double* drift) {
+  Host host(problem, 1e-8);
+  host.attach(rows);
+  for (int i = 0; i < steps; ++i) REQUIRE(host.step() >= 0);
+  CHECK(host.projection().statistics().failures() == 0);
+  *drift = host.projection().statistics().largest_drift_after;
+  return host.state();
+}
+
+}  // namespace
+
+TEST_CASE("sparse rows: the motion of the same rows as dense ones") {
+  struct Given {
+    Problem problem;
+    std::vector<std::string> names;
+  };
+  const std::vector<Given> all = {
+      {pendulum(1.0, 1.0, 100.0, "index 1"), {"position", "velocity", "energy"}},
+      // Rows with algebraic variables, solved for these in a second stage.
+      {pendulum(1.0, 1.0, 100.0, "index 1"), {"position", "velocity", "acceleration"}},
+      {pendulum(1.0, 1.0, 100.0, "index 0"), {"position", "velocity", "energy"}},
+      {andrews("index 1"), {"position", "velocity"}},
+      {link_chain(8, 0.5), {"position", "velocity", "energy"}},
+  };
+  for (const Given& given : all) {
+    INFO(given.problem.name << ", " << given.problem.form << ", with " << given.names.back());
+    double of_sparse = 0.0, of_dense = 0.0;
+    const std::vector<double> y =
+        after(given.problem, sparse(given.problem, given.names), 30, &of_sparse);
+    const std::vector<double> expected =
+        after(given.problem, given.problem.select(given.names), 30, &of_dense);
+    CHECK(largest(y, expected) < 1e-9);
+    CHECK(of_sparse <= 10.0 * of_dense + 1e-12);
+  }
+}
+
+TEST_CASE("sparse rows and a full one: chain of 30 links on all its rows") {
+  const Problem problem = link_chain(30, 0.4);
+  REQUIRE(problem.sparse_constraints);
+  Host host(problem, 1e-8);
+  host.attach(*problem.sparse_constraints);
+  REQUIRE(host.finish() >= 0);
+  const tp::Statistics s = host.projection().statistics();
+  CHECK(host.error() < 1e-5);
+  CHECK(s.failures() == 0);
+  CHECK(s.largest_drift_after < 1e-11);
+  CHECK(s.factorizations <= s.projections + s.corrections_repeated + 20);
+  CHECK(static_cast<double>(s.value_evaluations) < 3.0 * static_cast<double>(s.projections));
+}
+
+TEST_CASE("sparse rows: redundant ones are dropped, contradicting ones named") {
+  const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
+  const std::vector<std::string> names = {"position", "velocity", "energy"};
+  double drift = 0.0;
+  const tp::Constraints once = sparse(problem, names);
+  const std::vector<double> expected = after(problem, once, 30, &drift);
+  CHECK(largest(after(problem, once + sparse(problem, {"position"}), 30, &drift), expected) < 1e-9);
+
+  tp::Constraints other = sparse(problem, {"position"});
+  const auto g = other.value;
+  other.value = [g](double t, tp::ConstVector y, tp::Vector out) {
+    const int flag = g(t, y, out);
+    out[0] += 1e-3;
+    return flag;
+  };
+  other.names = {"another length"};
+  Host host(problem, 1e-8);
+  tp::Projection& projection = host.attach(once + other);
+  CHECK(host.step() < 0);
+  CHECK(projection.status() == tp::Status::inconsistent);
+  CHECK(contains(projection.message(), "another length"));
+}
+
+TEST_CASE("sparse rows: consistent start and projected output") {
+  Problem problem = link_chain(10, 0.4);
+  problem.y0[3] += 1e-3;
+  problem.y0[31] += 1e-3;
+  Host host(problem, 1e-8);
+  tp::Projection& projection = host.attach(*problem.sparse_constraints);
+  const tp::ConsistencyReport report = projection.make_consistent(0.0, host.y, host.yp);
+  REQUIRE(report.status == tp::Status::success);
+  CHECK(report.drift_before > 1e-4);
+  CHECK(report.drift_after < 1e-13);
+  CHECK(report.rank == 41);
+  REQUIRE(host.to(0.2) >= 0);
+  const tp::ConsistencyReport output = projection.project(host.t, host.y, host.yp);
+  CHECK(output.status == tp::Status::success);
+  CHECK(output.drift_after < 1e-13);
+  std::vector<double> g(41);
+  REQUIRE(problem.select({"position", "velocity", "energy"}).total_count() == 41);
+  tp::Constraints position = problem.select({"position"});
+  REQUIRE(position.value(host.t, tp::ConstVector(host.data(), problem.size),
+                         tp::Vector(g.data(), 20)) == 0);
+  for (int i = 0; i < 20; ++i) CHECK(std::abs(g[static_cast<std::size_t>(i)]) < 1e-13);
+}
+
+TEST_CASE("sparse rows: no allocation in a projected step") {
+  const Problem problem = link_chain(12, 1.0);
+  Host host(problem, 1e-8);
+  host.attach(*problem.sparse_constraints);
+  for (int i = 0; i < 150; ++i) REQUIRE(host.step() >= 0);
+  const long before = allocations();
+  for (int i = 0; i < 100; ++i) REQUIRE(host.step() >= 0);
+  CHECK(allocations() == before);
+}
+
+TEST_CASE("sparse rows: check_jacobian names entries that are wrong or missing") {
+  const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
+  tp::Constraints set = sparse(problem, {"position"});
+  const std::vector<double> y = {0.6, -0.8, 0.1, 0.2, 0.3};
+  CHECK(tp::check_jacobian(set, 0.0, y).correct);
+  auto& given = std::get<tp::SparseJacobian>(set.jacobian);
+  const int missing = given.columns.back();
+  given.columns.pop_back();
+  --given.starts.back();
+  const tp::JacobianReport report = tp::check_jacobian(set, 0.0, y);
+  CHECK_FALSE(report.correct);
+  CHECK(report.column == missing);
+}
+
+TEST_CASE("sparse rows: patterns that make no sense are refused by name") {
+  const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
+  const tp::Constraints good = sparse(problem, {"position"});
+  Host host(problem, 1e-6);
+  const auto refusal = [&](auto change) {
+    tp::Constraints set = good;
+    change(std::get<tp::SparseJacobian>(set.jacobian));
+    return thrown([&] { host.attach(set); });
+  };
+  using Given = tp::SparseJacobian;
+  CHECK(contains(refusal([](Given& s) { s.fill = nullptr; }), "fill is empty"));
+  CHECK(contains(refusal([](Given& s) { s.starts.push_back(2); }), "starts has 3 entries for 1"));
+  CHECK(contains(refusal([](Given& s) { s.starts.back() = 1; }), "from 0 to 1"));
+  CHECK(contains(refusal([](Given& s) { s.columns[0] = -1; }), "columns[0] = -1"));
+  CHECK(contains(refusal([](Given& s) { s.columns[1] = 5; }), "it must be 0 .. 4"));
+  CHECK(contains(refusal([](Given& s) { s.columns[1] = 0; }), "ascend"));
+  CHECK(refusal([](Given&) {}).empty());
+  // Rows without an entry have nothing to move.
+  tp::Constraints none = good;
+  auto& given = std::get<Given>(none.jacobian);
+  given.starts = {0, 0};
+  given.columns.clear();
+  given.fill = [](double, tp::ConstVector, tp::Vector) {};
+  host.attach(none);
+  CHECK(host.step() < 0);
+  CHECK(contains(host.projection().message(), "depends on no component"));
+}
