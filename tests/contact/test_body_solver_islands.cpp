@@ -1,4 +1,5 @@
-// Tether: islands, threads, warm starts and storage of BodySolver. SPDX-License-Identifier: BSD-3-Clause
+// Tether: islands, threads, warm starts and storage of BodySolver. SPDX-License-Identifier:
+// BSD-3-Clause
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstring>

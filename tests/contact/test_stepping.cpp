@@ -88,6 +88,16 @@ TEST_CASE("stepping: incline with the box yawed by 45 degrees slides as far") {
   }
 }
 
+TEST_CASE("stepping: above the angle of friction the box sticks at every yaw") {
+  const double mu = 1.001 * std::tan(radians(30));
+  for (const double yaw : {10.0, 22.5, 30.0, 45.0, 60.0}) {
+    const Slid stuck = slide(mu, 1e-2, 10, 0.3, radians(yaw), Vector3d(1, 1, 0.5));
+    INFO("yaw " << yaw);
+    CHECK(std::hypot(stuck.along, stuck.aside, stuck.off) < 1e-9);
+    CHECK(stuck.turned < 1e-9);
+  }
+}
+
 TEST_CASE("stepping: sphere from sliding to rolling, both laws, every heading") {
   const tc::Law law = GENERATE(tc::Law::coulomb, tc::Law::maximum_dissipation);
   const double heading = GENERATE(0.0, 0.5, 0.6435, 2.0, 4.0);
@@ -110,4 +120,26 @@ TEST_CASE("stepping: sphere from sliding to rolling, both laws, every heading") 
   CHECK(position(s, ball).dot(forward) == Approx(exact - v0 * dt / 7).margin(5 * dt * dt));
   CHECK(std::abs(position(s, ball).dot(Vector3d::UnitZ().cross(forward))) < 1e-12);
   CHECK(std::abs(position(s, ball).z() - R) < 1e-12);
+}
+
+TEST_CASE("stepping: a sphere thrown with spin ends at (5 v0 + 2 R w0 x up)/7, whatever the axis") {
+  const tc::Law law = GENERATE(tc::Law::coulomb, tc::Law::maximum_dissipation);
+  const double R = 0.5, dt = GENERATE(1e-2, 1e-3);
+  const Vector3d v0(2, 1, 0);
+  // Forward, backward, sideways, and about the vertical, which no friction at a point ends.
+  for (const Vector3d& w0 : {Vector3d(0, 20, 0), Vector3d(0, -20, 0), Vector3d(15, 0, 0),
+                             Vector3d(-6, 9, 4), Vector3d(0, 0, 30)}) {
+    Scene scene(dt);
+    scene.options.law = law;
+    scene.friction(0.3);
+    scene.ground();
+    const int ball = scene.sphere(R, 1, Vector3d(0, 0, R), v0, w0);
+    tc::Stepper s = scene.stepper();
+    run(s, 2);
+    const Vector3d flat(w0.x(), w0.y(), 0), up = Vector3d::UnitZ();
+    const Vector3d v = (5 * v0 + 2 * R * flat.cross(up)) / 7;
+    INFO("w0 " << w0.transpose() << " dt " << dt);
+    CHECK((velocity(s, ball) - v).norm() < 1e-11);
+    CHECK((angular_velocity(s, ball) - up.cross(v) / R - Vector3d(0, 0, w0.z())).norm() < 1e-10);
+  }
 }

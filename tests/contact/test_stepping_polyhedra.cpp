@@ -11,8 +11,6 @@ namespace {
 
 using namespace stepping_scenes;
 
-tc::Stepper with_polyhedra(const Scene& scene) { return scene.stepper(tc::make_polyhedra()); }
-
 // Vertical impulse that the layer of contacts at this height carries.
 double carried(const tc::Stepper& s, double height) {
   double sum = 0;
@@ -107,9 +105,10 @@ TEST_CASE("polyhedra: capsules and spheres on boxes and hulls") {
   CHECK((across.point[0].normal - Vector3d::UnitZ()).norm() < 1e-15);
 }
 
-TEST_CASE("stepping: ten boxes, top mass 1 to 1000, neither sink nor drift in 10 s") {
-  const double top = GENERATE(1.0, 100.0, 1000.0);
+TEST_CASE("stepping: ten boxes, top mass 1 to 10000, neither sink nor drift in 10 s") {
+  const double top = GENERATE(1.0, 100.0, 1000.0, 10000.0);
   const double dt = GENERATE(1e-2, 1e-3);
+  if (top > 1000 && dt < 1e-2) return;  // the longer step is the harder one, and takes a tenth
   const Scene scene = stack(dt, top);
   tc::Stepper s = with_polyhedra(scene);
   double lost = 0, drift = 0;
@@ -165,28 +164,6 @@ TEST_CASE("stepping: the limit of the card house lies at mu = 0.2376") {
     tc::Stepper s = with_polyhedra(card_house(dt, 0.2376138 * (1 + part)));
     s.step();
     CHECK((largest_speed(s) < 1e-7 * kGravity * dt) == (part > 0));
-  }
-}
-
-TEST_CASE("stepping: masonry arch stands and falls within 1.5 percent of its least thickness") {
-  struct Case {
-    int n;
-    double least;
-  };
-  const Case c = GENERATE(Case{7, 0.0962450}, Case{21, 0.1067899});
-  const bool arcs = GENERATE(true, false);
-  {
-    const Scene scene = arch(1e-3, c.n, 1.015 * c.least, 10, arcs);
-    tc::Stepper s = with_polyhedra(scene);
-    run(s, 1);
-    CHECK(largest_move(s, scene.bodies) < 1e-9);
-  }
-  {
-    Scene scene = arch(1e-3, c.n, 0.985 * c.least, 10, arcs);
-    scene.options.tolerance = 1e-6;
-    tc::Stepper s = with_polyhedra(scene);
-    run(s, 0.3);
-    CHECK(largest_move(s, scene.bodies) > 3e-3);
   }
 }
 

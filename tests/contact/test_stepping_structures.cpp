@@ -11,16 +11,7 @@ namespace {
 
 using namespace stepping_scenes;
 
-tc::Stepper with_polyhedra(const Scene& scene) { return scene.stepper(tc::make_polyhedra()); }
-
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-bool stands(const Scene& scene) {
-  tc::Stepper s = with_polyhedra(scene);
-  s.step();
-  CHECK(s.status() == tc::Status::solved);
-  return largest_speed(s) < 1e-7 * kGravity * scene.options.step;
-}
 
 // Dominoes with frictionless, inelastic sides on a floor without slip, the first one pushed. Speed
 // of the wave between two of them, over sqrt(g h).
@@ -47,7 +38,9 @@ double train(double height, double thickness, double gap, double dt) {
     for (const Vector3d& p : s.bodies().position) now += kGravity * p.z();
     double fall = 0;
     for (const tc::RigidBody& b : s.bodies().motion) fall += std::abs(b.velocity.z());
-    CHECK(now <= energy + kGravity * dt * fall + 1e-9);
+    // Taking a penetration back may lift as many as lean on each other.
+    const double lift = n * scene.options.error_reduction * s.penetration();
+    CHECK(now <= energy + kGravity * (dt * fall + lift) + 1e-9);
     energy = now;
     int which = 0;
     for (const int k : {from, to}) {
@@ -78,19 +71,6 @@ TEST_CASE("stepping: two leaning cards stand for mu > tan(lean)/2 - t/(2 L)") {
   tc::Stepper t = with_polyhedra(slippery);
   run(t, 1);
   CHECK(largest_move(t, slippery.bodies) > 1e-3);
-}
-
-TEST_CASE("stepping: an arch slips at the friction of the table") {
-  struct Case {
-    int n;
-    double thickness, mu;
-  };
-  const Case c =
-      GENERATE(Case{7, 0.15, 0.3340393}, Case{15, 0.15, 0.3465698}, Case{21, 0.15, 0.3495184},
-               Case{7, 0.12, 0.3618882}, Case{15, 0.12, 0.3780367}, Case{21, 0.12, 0.3800265});
-  INFO(c.n << " voussoirs, t/R " << c.thickness);
-  CHECK(stands(arch(1e-2, c.n, c.thickness, c.mu * 1.01)));
-  CHECK_FALSE(stands(arch(1e-2, c.n, c.thickness, c.mu * 0.99)));
 }
 
 TEST_CASE("stepping: an icy wedge between two walls presses with m g / (2 sin(half angle))") {
@@ -124,8 +104,14 @@ TEST_CASE("stepping: an icy wedge between two walls presses with m g / (2 sin(ha
 }
 
 TEST_CASE("stepping: dominoes fall as fast as the chain of one freedom says") {
-  // A chain of one freedom with plastic impacts: 1.8403 sqrt(g h) for h = 1, d = 0.15, gap 0.3.
-  const double speed = train(1, 0.15, 0.3, 1e-3);
-  INFO("speed " << speed);
-  CHECK(speed == Approx(1.8403).epsilon(0.02));
+  // A chain of one freedom with plastic impacts. Time steps in units of sqrt(h / 1 m).
+  struct Case {
+    double height, thickness, gap, speed, step;  // m, m, m, sqrt(g h), s
+  };
+  const Case c =
+      GENERATE(Case{1, 0.15, 0.3, 1.8403, 1e-3}, Case{1, 0.15, 0.5, 1.6979, 2e-3},
+               Case{0.048, 0.0075, 0.02, 1.7455, 2e-3}, Case{1, 0.02, 0.5, 1.6877, 1e-3});
+  const double speed = train(c.height, c.thickness, c.gap, c.step * std::sqrt(c.height));
+  INFO("h " << c.height << " thickness " << c.thickness << " gap " << c.gap << " speed " << speed);
+  CHECK(speed == Approx(c.speed).epsilon(0.02));
 }

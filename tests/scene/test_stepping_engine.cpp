@@ -160,6 +160,24 @@ TEST_CASE("stepping engine: what is named with zero strength equals what is not 
   CHECK(effects(*c) == "gravity,collision,contact,penetration,motion,");
   CHECK(effects(*d) == "collision,contact,penetration,motion,");
 
+  // Springs without stiffness, loads and drags of nothing: named, and in the list.
+  Scene idle = balls_on_floor();
+  Spring spring;
+  spring.first = 1;
+  spring.second = 2;
+  spring.at = idle.bodies[1].position;
+  spring.at_second = idle.bodies[2].position;
+  idle.springs = {spring};
+  Load load;
+  load.body = 1;
+  idle.loads = {load};
+  idle.bodies[1].drag = Drag{};
+  const auto e = make_stepping_engine(idle), f = make_stepping_engine(balls_on_floor());
+  e->advance(1);
+  f->advance(1);
+  check_same_bits(*e, *f);
+  CHECK(effects(*e) == "gravity,springs,loads,drag,collision,contact,penetration,motion,");
+
   Scene apart = balls_on_floor();
   apart.pairs.clear();
   CHECK(effects(*make_stepping_engine(apart)) == "gravity,motion,");
