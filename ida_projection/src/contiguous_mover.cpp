@@ -20,6 +20,10 @@ constexpr double kMetricFloor = 1e-3;  // D_i >= kMetricFloor WT_i
 constexpr double kMetricDecay = 0.8;   // per accepted step
 constexpr long kMeasureEvery = 64;
 constexpr double kLargestFloor = 0.1;  // tolerances
+// Factors of an earlier step (Rows::kReuse): used while they leave less than kWorn of a move, and
+// what they leave is less than kForLater tolerances, which settle() takes back.
+constexpr double kWorn = 0.06, kForLater = 0.1, kUnknownSlope = 0.03;
+constexpr int kLookAgain = 4;  // candidates
 
 /// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
 template <class Rows>
@@ -54,7 +58,11 @@ class ContiguousMover final : public Mover {
     return value(candidate.t) == Status::success ? drift() : -1.0;
   }
   void accept() override { std::swap(scale_, trial_scale_); }
+  Status finish(const Candidate& candidate) override {
+    return left_ > options_.tolerance ? take_back(candidate) : Status::success;
+  }
   void reset() override {
+    reusable_ = false;
     std::fill(scale_.begin(), scale_.end(), 0.0);
     std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
     monitor_.reset();
@@ -68,7 +76,10 @@ class ContiguousMover final : public Mover {
 
   void load(const Candidate& candidate);
   const std::vector<double>& WT();
-  void set_metric();
+  void set_metric(bool for_factors);
+  bool may_reuse() const { return Rows::kReuse && reusable_ && !blocks_.dropped_rows(); }
+  Status take_back(const Candidate& candidate);
+  double rate() const { return slope_ * age_; }
   void set_group_metric();
   Status structure(const Candidate& candidate, const double* id);
   Status value(double t);
@@ -97,6 +108,12 @@ class ContiguousMover final : public Mover {
   double staleness_ = -1.0;   // of factors, for each tolerance of distance; < 0: not measured
   double measured_ = 0.0;     // longest distance at which it was looked for
   long settles_ = 0;
+  bool reusable_ = false;  // factors of an earlier step are there
+  bool reused_ = false;    // and are in use for this one
+  double slope_ = 0.0;     // they leave slope_ * age_ of a move
+  int age_ = 0;            // candidates since they were made
+  int measured_age_ = 0;   // the same when slope_ was last looked at
+  double left_ = 0.0;      // what the last move() left for settle() or finish(), tolerances
   const double* ycor_ = nullptr;
   bool WT_known_ = false;
 };
@@ -121,11 +138,17 @@ const std::vector<double>& ContiguousMover<Rows>::WT() {
   return WT_;
 }
 
-// s <- max(0.8 s, |correction|), D = s or, where the error weights are asked for, WT.
+// s <- max(0.8 s, |correction|), D = s or, where the error weights are asked for, WT. Factors that
+// are used again keep their D.
 template <class Rows>
-void ContiguousMover<Rows>::set_metric() {
+void ContiguousMover<Rows>::set_metric(bool for_factors) {
   const bool local = options_.metric == Metric::local_correction;
   const bool grouped = local && !options_.group.empty();
+  if (!for_factors) {
+    for (std::size_t i = 0; i < y_.size(); ++i)
+      trial_scale_[i] = std::max(kMetricDecay * scale_[i], std::abs(ycor_[i]));
+    return;
+  }
   for (Block* block : {&blocks_.d, &blocks_.a}) {
     if (block->rows.empty()) continue;
     double* __restrict D = block->D();
@@ -178,6 +201,7 @@ void ContiguousMover<Rows>::set_group_metric() {
 
 template <class Rows>
 Status ContiguousMover<Rows>::structure(const Candidate& candidate, const double* id) {
+  reusable_ = false;
   const Status status = blocks_.structure(evaluator_, candidate.t, y_, WT(), options_.hold, id);
   if (status != Status::success) message_ = blocks_.message;
   return status;
@@ -207,12 +231,16 @@ Status ContiguousMover<Rows>::factor(double t) {
     return status;
   }
   ++statistics_.factorizations;
+  reusable_ = false;
   if (!blocks_.factor()) {
     message_ =
         "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
     return Status::not_finite;
   }
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
+  reusable_ = true;
+  slope_ = kUnknownSlope;
+  age_ = measured_age_ = 0;
   return Status::success;
 }
 
@@ -306,7 +334,7 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   if ((result.status = value(candidate.t)) != Status::success) return result;
   result.drift_before = result.drift_after = drift();
   if (result.drift_before == 0.0) return result;
-  set_metric();
+  set_metric(true);
   if ((result.status = factor(candidate.t)) != Status::success) return result;
   if (rounding_only()) return result;
   result.length = solve();
@@ -319,14 +347,17 @@ template <class Rows>
 Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
   load(candidate);
-  set_metric();
+  reused_ = may_reuse();
+  left_ = 0.0;
+  ++age_;
+  set_metric(!reused_);
   double* correction = candidate.correction_entries;
   if ((result.status = value(candidate.t)) != Status::success) return result;
   result.drift_before = result.drift_after = drift();
 
   monitor_.start();
   bool fresh = false;  // factors belong to the present y
-  bool have_factors = false;
+  bool have_factors = reused_;
   for (;;) {
     if (!have_factors) {
       if ((result.status = factor(candidate.t)) != Status::success) return result;
@@ -363,6 +394,15 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
       }
     }
     apply(1.0, correction);
+    if (reused_) {
+      left_ = 2.0 * rate() * length;
+      if (left_ <= kForLater) break;
+      if ((result.status = value(candidate.t)) != Status::success) return result;
+      set_metric(true);
+      reused_ = have_factors = false;
+      left_ = 0.0;
+      continue;
+    }
 
     // A first move longer than the largest floor need not know it.
     const double floor = result.moves == 1 && length > kLargestFloor
@@ -396,6 +436,7 @@ template <class Rows>
 Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
   for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
+  if (reused_) return take_back(candidate);
   double sum = 0.0;
   for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
   const double reach = move_length_ + std::sqrt(sum * inverse_n_);
@@ -418,6 +459,36 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
     if ((k > 0 || !measure) && 4.0 * staleness_ * reach * length <= options_.tolerance) break;
     previous = length;
   }
+  return Status::success;
+}
+
+// The same with factors of an earlier step, which leave a part of each move that grows with their
+// age. Where they no longer halve what is left they are made anew.
+template <class Rows>
+Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
+  double previous = 0.0;
+  left_ = 0.0;
+  const double floor = 1e2 * kEpsilon * size_of_y();
+  for (int k = 0; k < options_.maximum_iterations; ++k) {
+    Status status = value(candidate.t);
+    if (status != Status::success) return status;
+    double length = solve();
+    if (k > 0 && length > floor) {
+      slope_ = length / (previous * age_);
+      measured_age_ = age_;
+      if (rate() > 0.5) {
+        set_metric(true);
+        if ((status = factor(candidate.t)) != Status::success) return status;
+        age_ = 1;
+        length = solve();
+      }
+    }
+    apply(1.0, candidate.correction_entries);
+    const bool look = k == 0 && age_ >= measured_age_ + kLookAgain;
+    if (length <= floor || (!look && 2.0 * rate() * length <= options_.tolerance)) break;
+    previous = length;
+  }
+  if (rate() > kWorn) reusable_ = false;
   return Status::success;
 }
 

@@ -175,8 +175,9 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
   corrector_was_right_ = true;
   keep_corrector(candidate);
   Move move = mover_->move(candidate);
-  if (move.status == Status::success && wants_polish(move.length))
-    move.status = polish(candidate, cj, tolerance, mem);
+  if (move.status == Status::success)
+    move.status = wants_polish(move.length) ? polish(candidate, cj, tolerance, mem)
+                                            : mover_->finish(candidate);
   return move;
 }
 

@@ -64,6 +64,9 @@ class Mover {
   /// constraints, with the factors at hand.
   virtual Status settle(const Candidate& candidate, N_Vector change) = 0;
 
+  /// No settle() follows the last move(): takes back what it left for that.
+  virtual Status finish(const Candidate&) { return Status::success; }
+
   /// The attempt that used the last candidate was accepted: keep what it taught the metric.
   virtual void accept() {}
   /// A new run starts: forget what the last one taught.

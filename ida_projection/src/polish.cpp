@@ -65,7 +65,7 @@ bool Projection::Impl::newton_step_at_moved_point(const Candidate& candidate, vo
 Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance,
                                 void* mem) {
   // A refinement: where F or the linear solver fails here, the move itself stands.
-  if (!newton_step_at_moved_point(candidate, mem)) return Status::success;
+  if (!newton_step_at_moved_point(candidate, mem)) return mover_->finish(candidate);
   ++statistics_.residual_evaluations;
   extra_iterations_of_last_solve_ = 1;
 

@@ -102,6 +102,8 @@ bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, i
 class RowBlocks {
  public:
   using Block = BlockOf<linalg::MinimumNorm>;
+  /// Factors are cheap beside F, and a step older they may leave half of a move: always fresh.
+  static constexpr bool kReuse = false;
 
   RowBlocks(const Constraints& constraints, const Evaluator& evaluator, int n);
 

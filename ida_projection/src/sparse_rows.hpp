@@ -14,6 +14,8 @@ namespace tether::ida_projection {
 class SparseRows {
  public:
   using Block = BlockOf<linalg::SparseMinimumNorm>;
+  /// C and its factors cost four solves: they serve several steps.
+  static constexpr bool kReuse = true;
 
   SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n);
 

@@ -106,12 +106,13 @@ double SparseMinimumNorm::row_dot(int i, const double* u) const {
 
 // u <- u + sign A^T z over the sparse rows.
 void SparseMinimumNorm::add_rows(const double* z, double sign, double* u) const {
-  const double* A = A_.data();
+  const double* entry = A_.data();
   const int* column = column_.data();
+  const int *begin = column, *starts = starts_.data();
   for (int i = 0; i < sparse_; ++i) {
     const double share = sign * z[i];
-    const int end = starts_[static_cast<std::size_t>(i) + 1];
-    for (int e = starts_[static_cast<std::size_t>(i)]; e < end; ++e) u[column[e]] += A[e] * share;
+    for (const int* end = begin + starts[i + 1]; column != end; ++column, ++entry)
+      u[*column] += *entry * share;
   }
 }
 

@@ -54,18 +54,19 @@ tp::Constraints sparse(const Problem& problem, const std::vector<std::string>& n
   return joined;
 }
 
-double largest(const std::vector<double>& a, const std::vector<double>& b) {
+/// Over the first components, which the problem compares.
+double largest(const Problem& problem, const std::vector<double>& a, const std::vector<double>& b) {
   double difference = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i)
+  for (std::size_t i = 0; i < static_cast<std::size_t>(problem.error_components); ++i)
     difference = std::max(difference, std::abs(a[i] - b[i]) / (1.0 + std::abs(a[i])));
   return difference;
 }
 
-std::vector<double> after(const Problem& problem, const tp::Constraints& rows, int steps,
+std::vector<double> after(const Problem& problem, const tp::Constraints& rows, double t,
                           double* drift) {
   Host host(problem, 1e-8);
   host.attach(rows);
-  for (int i = 0; i < steps; ++i) REQUIRE(host.step() >= 0);
+  REQUIRE(host.to(t) >= 0);
   CHECK(host.projection().statistics().failures() == 0);
   *drift = host.projection().statistics().largest_drift_after;
   return host.state();
@@ -77,24 +78,27 @@ TEST_CASE("sparse rows: the motion of the same rows as dense ones") {
   struct Given {
     Problem problem;
     std::vector<std::string> names;
+    double t;
   };
   const std::vector<Given> all = {
-      {pendulum(1.0, 1.0, 100.0, "index 1"), {"position", "velocity", "energy"}},
+      {pendulum(1.0, 1.0, 100.0, "index 1"), {"position", "velocity", "energy"}, 1.0},
       // Rows with algebraic variables, solved for these in a second stage.
-      {pendulum(1.0, 1.0, 100.0, "index 1"), {"position", "velocity", "acceleration"}},
-      {pendulum(1.0, 1.0, 100.0, "index 0"), {"position", "velocity", "energy"}},
-      {andrews("index 1"), {"position", "velocity"}},
-      {link_chain(8, 0.5), {"position", "velocity", "energy"}},
+      {pendulum(1.0, 1.0, 100.0, "index 1"), {"position", "velocity", "acceleration"}, 1.0},
+      {pendulum(1.0, 1.0, 100.0, "index 0"), {"position", "velocity", "energy"}, 1.0},
+      {andrews("index 1"), {"position", "velocity"}, 0.01},
+      {link_chain(8, 0.5), {"position", "velocity", "energy"}, 0.3},
   };
   for (const Given& given : all) {
     INFO(given.problem.name << ", " << given.problem.form << ", with " << given.names.back());
     double of_sparse = 0.0, of_dense = 0.0;
     const std::vector<double> y =
-        after(given.problem, sparse(given.problem, given.names), 30, &of_sparse);
+        after(given.problem, sparse(given.problem, given.names), given.t, &of_sparse);
     const std::vector<double> expected =
-        after(given.problem, given.problem.select(given.names), 30, &of_dense);
-    CHECK(largest(y, expected) < 1e-9);
-    CHECK(of_sparse <= 10.0 * of_dense + 1e-12);
+        after(given.problem, given.problem.select(given.names), given.t, &of_dense);
+    // Both keep what they have to; they differ in the metric, within the error of a run.
+    CHECK(largest(given.problem, y, expected) < 3e-7);
+    // 1e-4 tolerances; Andrews' velocities are some 100 rad/s.
+    CHECK(of_sparse <= of_dense + 1e-10);
   }
 }
 
@@ -108,8 +112,8 @@ TEST_CASE("sparse rows and a full one: chain of 30 links on all its rows") {
   CHECK(host.error() < 1e-5);
   CHECK(s.failures() == 0);
   CHECK(s.largest_drift_after < 1e-11);
-  CHECK(s.factorizations <= s.projections + s.corrections_repeated + 20);
-  CHECK(static_cast<double>(s.value_evaluations) < 3.0 * static_cast<double>(s.projections));
+  CHECK(s.factorizations <= s.projections / 3);
+  CHECK(static_cast<double>(s.value_evaluations) < 4.5 * static_cast<double>(s.projections));
 }
 
 TEST_CASE("sparse rows: redundant ones are dropped, contradicting ones named") {
@@ -117,8 +121,9 @@ TEST_CASE("sparse rows: redundant ones are dropped, contradicting ones named") {
   const std::vector<std::string> names = {"position", "velocity", "energy"};
   double drift = 0.0;
   const tp::Constraints once = sparse(problem, names);
-  const std::vector<double> expected = after(problem, once, 30, &drift);
-  CHECK(largest(after(problem, once + sparse(problem, {"position"}), 30, &drift), expected) < 1e-9);
+  const std::vector<double> expected = after(problem, once, 1.0, &drift);
+  CHECK(largest(problem, after(problem, once + sparse(problem, {"position"}), 1.0, &drift),
+                expected) < 3e-7);
 
   tp::Constraints other = sparse(problem, {"position"});
   const auto g = other.value;
