@@ -86,41 +86,47 @@ inline Scene pendulum(double tolerance) {
   return s;
 }
 
-/// A02: N + 1 uprights 0 .. N, then N bars; theta' = 1 from the upright.
-inline Scene four_bar(int N, double tolerance) {
+/// A02: N + 1 uprights 0 .. N, then N bars; from `angle` to the vertical, clockwise, with `speed`.
+inline Scene four_bar(int N, double tolerance, double angle = 0, double speed = 1) {
   Scene s = scene(tolerance);
   s.gravity = Vector3d(0, -kGravity, 0);
+  const Vector3d top(std::sin(angle), std::cos(angle), 0), x = Vector3d::UnitX();
   for (int i = 0; i <= N; ++i) {
-    s.bodies.push_back(rod("upright " + std::to_string(i), {double(i), 0, 0}, {double(i), 1, 0}));
-    turn_about(s.bodies.back(), {double(i), 0, 0}, -1);
-    s.joints.push_back(hinge(i, kWorld, {double(i), 0, 0}));
+    s.bodies.push_back(rod("upright " + std::to_string(i), i * x, i * x + top));
+    turn_about(s.bodies.back(), i * x, -speed);
+    s.joints.push_back(hinge(i, kWorld, i * x));
   }
   for (int i = 0; i < N; ++i) {
-    s.bodies.push_back(rod("bar " + std::to_string(i), {double(i), 1, 0}, {i + 1.0, 1, 0}));
-    s.bodies.back().velocity = {1, 0, 0};
-    s.joints.push_back(hinge(N + 1 + i, i, {double(i), 1, 0}));
-    s.joints.push_back(hinge(N + 1 + i, i + 1, {i + 1.0, 1, 0}));
+    const Vector3d left = i * x + top, right = left + x;
+    s.bodies.push_back(rod("bar " + std::to_string(i), left, right));
+    s.bodies.back().velocity = speed * Vector3d(top.y(), -top.x(), 0);
+    s.joints.push_back(hinge(N + 1 + i, i, left));
+    s.joints.push_back(hinge(N + 1 + i, i + 1, right));
   }
   keep_energy(s);
   return s;
 }
 
-/// Section 2.1: crank, coupler and slider of 1 kg, both rods 1 m.
-inline Scene slider_crank(double angle, double speed, double gravity, double tolerance) {
+/// Section 2.1: crank, coupler and slider of 1 kg; the crank is 1 m long, the coupler at least so.
+inline Scene slider_crank(double angle, double speed, double gravity, double tolerance,
+                          double length = 1) {
   Scene s = scene(tolerance);
   if (gravity != 0) s.gravity = Vector3d(0, -gravity, 0);
   const double c = std::cos(angle), n = std::sin(angle);
+  // The coupler goes down by n, along by a; its angle changes by -c / a of the crank's.
+  const double a = length == 1 ? c : std::sqrt(length * length - n * n);
+  const double turn = length == 1 ? -1 : -c / a, x = c + a;
   s.bodies.push_back(rod("crank", {0, 0, 0}, {c, n, 0}));
   turn_about(s.bodies[0], {0, 0, 0}, speed);
-  s.bodies.push_back(rod("coupler", {c, n, 0}, {2 * c, 0, 0}));
-  s.bodies[1].velocity = Vector3d(-1.5 * n, 0.5 * c, 0) * speed;
-  s.bodies[1].angular_velocity = {0, 0, -speed};
-  s.bodies.push_back(ball("slider", {2 * c, 0, 0}));
-  s.bodies[2].velocity = {-2 * n * speed, 0, 0};
+  s.bodies.push_back(rod("coupler", {c, n, 0}, {x, 0, 0}));
+  s.bodies[1].velocity = Vector3d(-n + n * turn / 2, c / 2, 0) * speed;
+  s.bodies[1].angular_velocity = {0, 0, turn * speed};
+  s.bodies.push_back(ball("slider", {x, 0, 0}));
+  s.bodies[2].velocity = {(-n + n * turn) * speed, 0, 0};
   s.joints.push_back(hinge(0, kWorld, {0, 0, 0}));
   s.joints.push_back(hinge(1, 0, {c, n, 0}));
-  s.joints.push_back(hinge(2, 1, {2 * c, 0, 0}));
-  s.joints.push_back(joint(JointKind::slider, 2, kWorld, {2 * c, 0, 0}));
+  s.joints.push_back(hinge(2, 1, {x, 0, 0}));
+  s.joints.push_back(joint(JointKind::slider, 2, kWorld, {x, 0, 0}));
   s.joints.back().axis = {1, 0, 0};
   keep_energy(s);
   return s;

@@ -44,6 +44,10 @@ constexpr double kNewton = 0.1, kNewtonIndex2 = 0.02;
 // Of velocities across the joints, times pivot^2; see weights().
 constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3;
 
+// The first step's error is an eighth of what IDA allows, and nothing moves by more than this part.
+constexpr double kFirstError = 0.125, kFirstMove = 1e-2;
+constexpr double kLook = 1e-5;  // the part of a move over which y'' is looked at
+
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -62,6 +66,16 @@ void remember(int, const char*, const char*, const char* message, SUNErrCode, vo
 #else
 void remember(int, const char*, const char*, char* message, void* data) {
   *static_cast<std::string*>(data) = message ? message : "";
+}
+#endif
+
+#ifdef TETHER_SCENE_KLU
+// SUNDIALS calls KLU's singular matrix unrecoverable, and its next setups want the factors that
+// were not made. A predictor may meet a dead point exactly; another step passes by.
+int factor_or_try_smaller_step(SUNLinearSolver solver, SUNMatrix matrix) {
+  if (SUNLinSolSetup_KLU(solver, matrix) == 0) return 0;
+  SUNLinSol_KLUReInit(solver, matrix, 0, SUNKLU_REINIT_PARTIAL);
+  return 1;
 }
 #endif
 
@@ -105,6 +119,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   IDAWFtolerances(ida_, weights);
   IDASetMaxNumSteps(ida_, options.max_steps);
   if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
+  IDASetInitStep(ida_, first_step(t, y, yp));
   prepare_matrix();
   IDASetLinearSolver(ida_, solver_, matrix_);
   IDASetJacFn(ida_, jacobian);
@@ -117,6 +132,9 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     ida_projection::Options projection;
     projection.id = id_;
     projection.print_fatal = false;
+    // Behind a dead point rows come back, and weights narrow, with errors of earlier steps: no
+    // smaller step makes that move shorter. It is part of what IDA's error test judges.
+    projection.long_move = ida_projection::LongMove::cap;
     // Without its refresh the noise of index 1's multipliers grows until Newton fails. Those of
     // index 2 scale with cj, as IDA's own factor does: the refresh with old factors makes errors at
     // tight tolerances up to thirty times larger.
@@ -141,6 +159,29 @@ void Integrator::catch_messages() {
 #else
   IDASetErrHandlerFn(ida_, remember, &last_message_);
 #endif
+}
+
+// IDA begins with half a tolerance / |y'|, at tight tolerances 1e-12 s. There the multipliers of
+// index 2, changes of velocity / h, are rounding, and Newton fails at every smaller step. At order
+// 1 IDA's estimate of the error is h^2 |y''| / 4. 0: IDA's own.
+double Integrator::first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const {
+  double speed = 0;
+  for (int i = 0; i < system_.size(); ++i)
+    if (system_.id(i) != 0.0) speed = std::max(speed, std::abs(yp[i]) / (1.0 + std::abs(y[i])));
+  if (!(speed > 0 && std::isfinite(speed))) return 0.0;
+  const double look = kLook / speed;
+  Eigen::VectorXd ahead = y + look * yp, rate;
+  system_.complete(t + look, ahead, rate);
+  double sum = 0;
+  for (int i = 0; i < system_.size(); ++i) {
+    if (system_.id(i) == 0.0) continue;
+    const double change = (rate[i] - yp[i]) / (tolerance_ * (1.0 + std::abs(y[i])));
+    sum += change * change;
+  }
+  const double curvature = std::sqrt(sum / system_.size()) / look;
+  if (!std::isfinite(curvature)) return 0.0;
+  const double longest = kFirstMove / speed;
+  return curvature > 0 ? std::min(longest, std::sqrt(4.0 * kFirstError / curvature)) : longest;
 }
 
 void Integrator::prepare_matrix() {
@@ -171,6 +212,7 @@ void Integrator::prepare_matrix() {
     matrix_ =
         SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context_);
     solver_ = SUNLinSol_KLU(y_, matrix_, context_);
+    solver_->ops->setup = factor_or_try_smaller_step;
     entries_.finish(std::move(slots));
     return;
   }

@@ -42,6 +42,7 @@ class Integrator {
   static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
                       void* self, N_Vector, N_Vector, N_Vector);
   static int weights(N_Vector y, N_Vector weights, void* self);
+  double first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const;
   void prepare_matrix();
   void catch_messages();
   std::string failure(int flag) const;
