@@ -81,6 +81,7 @@ struct Reference {
   Samples samples;
   std::string what;
   double error = 0;
+  double drift = 0;  // how far it left the joints
 };
 
 constexpr int kReferenceSteps = 20000;  // between two stops; then it is given up
@@ -114,7 +115,8 @@ std::optional<Reference> tightest(Scene (*make)(const Scene&, double), const Sce
       best->error = distance(best->samples, m.samples);
       return best;
     }
-    best = Reference{m.samples, fmt::format("{}, tolerance {:g}", name, tolerance), 0};
+    best = Reference{m.samples, fmt::format("{}, tolerance {:g}", name, tolerance), 0,
+                     m.result.summary.drift};
   }
   return std::nullopt;
 }
@@ -135,9 +137,11 @@ Reference smooth_reference(const Scene& scene, double tolerance, int samples) {
     return only;
   }
   const double apart = distance(own->samples, other->samples);
-  Reference out = 10 * own->error < other->error ? *own : *other;
-  out.what += fmt::format(" ({:.1e} from {})", apart,
-                          10 * own->error < other->error ? other->what : own->what);
+  const bool take_own = 10 * own->error < other->error;
+  Reference out = take_own ? *own : *other;
+  const Reference& witness = take_own ? *other : *own;
+  out.what += fmt::format(" ({:.1e} from {}, whose joints drift by {:.1e})", apart, witness.what,
+                          witness.drift);
   return out;
 }
 

@@ -11,6 +11,7 @@
 
 #include "commands.hpp"
 #include "run/gnuplot.hpp"
+#include "settings.hpp"
 
 namespace tether::scene {
 
@@ -18,7 +19,7 @@ namespace {
 
 struct Arguments {
   std::string file, csv, svg;
-  std::vector<double> tolerances, steps;
+  std::vector<std::string> tolerances, steps;
   std::optional<double> reference, wanted;
 };
 
@@ -88,7 +89,8 @@ int run_cost(const Arguments& arguments) {
                                     ? "the scene runs on the smooth engine: use --tolerances"
                                     : "the scene runs on the stepping engine: use --time-steps");
   CostOptions options;
-  options.settings = smooth ? arguments.tolerances : arguments.steps;
+  options.settings = has_tolerance ? read_settings("--tolerances", arguments.tolerances, 10)
+                                   : read_settings("--time-steps", arguments.steps, 2);
   options.reference = arguments.reference;
   std::optional<tether::Progress> bar;
   options.progress = [&](const std::string& what, int done, int all) {
@@ -126,21 +128,21 @@ void add_cost_command(CLI::App& app, int* status) {
   command->add_option("scene", a->file, "Scene file (TOML)")->required();
   CLI::Option* tolerances = command
                                 ->add_option("--tolerances", a->tolerances,
-                                             "Tolerances of the smooth engine [1e-4 to 1e-9]")
-                                ->check(CLI::PositiveNumber)
+                                             "Tolerances of the smooth engine, each or as a range "
+                                             "[1e-4:1e-9]")
                                 ->delimiter(',');
   command
       ->add_option("--time-steps", a->steps,
-                   "Steps of the stepping engine, s [8 to 1/4 times that of the scene]")
-      ->check(CLI::PositiveNumber)
+                   "Steps of the stepping engine, s, each or as a range such as 8e-3:1e-3 (halved) "
+                   "[8 to 1/4 times that of the scene]")
       ->delimiter(',')
       ->excludes(tolerances);
   command
       ->add_option("--reference", a->reference,
                    "Tolerance or time step of the reference [1e-12, or a quarter of the finest]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("--wanted", a->wanted, "Name the cheapest setting with at most this error")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("--csv", a->csv, "Write the table");
   command->add_option("--svg", a->svg, "Draw error against time (needs gnuplot)");
   command->footer(

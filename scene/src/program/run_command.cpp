@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "report_run.hpp"
+#include "settings.hpp"
 
 namespace tether::scene {
 
@@ -69,8 +70,8 @@ void add_run_command(CLI::App& app, int* status) {
   command->add_option("--vtk", a->vtk, "Film for ParaView (.pvd, with a folder of .vtp)");
   command->add_option("--svg", a->svg, "Picture (needs gnuplot)");
   command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
-  command->add_option("--every", a->every, "Time between records, s")->check(CLI::PositiveNumber);
-  command->add_option("--end", a->end, "End of the run, s")->check(CLI::PositiveNumber);
+  command->add_option("--every", a->every, "Time between records, s")->check(positive_number());
+  command->add_option("--end", a->end, "End of the run, s")->check(positive_number());
   command->add_flag("--quiet", a->quiet, "No progress bar");
   command->footer(
       "Exit code: 0 every expectation is met, 1 one is not, 2 the scene, a file or an option is\n"

@@ -1,0 +1,56 @@
+// Tether: numbers of the command line. SPDX-License-Identifier: BSD-3-Clause
+#include "settings.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+namespace tether::scene {
+
+namespace {
+
+constexpr double kMostSettings = 1000;
+
+std::optional<double> positive(const std::string& text) {
+  double value = 0;
+  if (!CLI::detail::lexical_cast(text, value) || !(value > 0) || !std::isfinite(value)) return {};
+  return value;
+}
+
+}  // namespace
+
+CLI::Validator positive_number() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        return positive(text) ? std::string() : fmt::format("\"{}\" is not a number > 0", text);
+      },
+      "NUMBER > 0");
+}
+
+std::vector<double> read_settings(const std::string& option, const std::vector<std::string>& items,
+                                  double ratio) {
+  std::vector<double> settings;
+  for (const std::string& item : items) {
+    const std::size_t colon = item.find(':');
+    const std::optional<double> from = positive(item.substr(0, colon));
+    const std::optional<double> to =
+        colon == std::string::npos ? from : positive(item.substr(colon + 1));
+    if (!from || !to)
+      throw std::invalid_argument(fmt::format(
+          "{}: \"{}\" is neither a number > 0 nor a range such as 1e-3:1e-9", option, item));
+    const double steps = std::abs(std::log(*to / *from)) / std::log(ratio);
+    if (!(steps < kMostSettings))
+      throw std::invalid_argument(
+          fmt::format("{}: \"{}\" has more than {} settings by factors of {}", option, item,
+                      kMostSettings, ratio));
+    const double factor = *to < *from ? 1 / ratio : ratio;
+    for (int k = 0; k < steps - 1e-6; ++k) settings.push_back(*from * std::pow(factor, k));
+    settings.push_back(*to);
+  }
+  return settings;
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,18 @@
+// Tether: numbers of the command line. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace tether::scene {
+
+/// Refuses what is not a finite number > 0.
+CLI::Validator positive_number();
+
+/// Each item is a number > 0 or a range "1e-3:1e-9", which gives both ends and what lies between
+/// them by factors of `ratio`. std::invalid_argument naming `option` and the item otherwise.
+std::vector<double> read_settings(const std::string& option, const std::vector<std::string>& items,
+                                  double ratio);
+
+}  // namespace tether::scene
