@@ -26,20 +26,20 @@ constexpr int kSparseFrom = 80;
 
 // IDA bounds the error of each step; a run's error grows with the number of steps, which is about
 // tolerance^(-1/6). With this, and a tenth of the wanted error at 1e-4, slider-crank and four-bar
-// stay below ten times the tolerance after 10 s. The stabilised form needs smaller steps, and its
-// multipliers, which it divides by the step, are noise below 1e-11.
+// stay below ten times the tolerance after 10 s. The stabilised form needs smaller steps.
 double local_tolerance(const SmoothOptions& options) {
   const bool index2 = options.formulation == Formulation::stabilised_index2;
-  const double part = index2 ? 0.03 : 0.1, smallest = index2 ? 1e-11 : 1e-13;
+  const double wanted = (index2 ? 0.02 : 0.1) * options.tolerance;
   const double tighter = std::min(1.0, std::pow(options.tolerance / 1e-4, 1.0 / 6.0));
-  // Below 1e-11 rounding decides, not the number of steps.
-  const double wanted = part * options.tolerance;
-  return std::max({tighter * wanted, std::min(wanted, 1e-11), smallest});
+  // Below this rounding decides, not the number of steps.
+  const double rounding = index2 ? 3e-12 : 1e-11, smallest = index2 ? 3e-12 : 1e-13;
+  return std::max({tighter * wanted, std::min(wanted, rounding), smallest});
 }
 
 // Newton's test, of the local tolerance: IDA's 0.33 leaves noise that dead points and the
 // multipliers of index 2 magnify.
 constexpr double kNewton = 0.1, kNewtonIndex2 = 0.02;
+constexpr double kNewtonRounding = 2e-13;  // no less of it
 
 // Of velocities across the joints, times pivot^2; see weights().
 constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3;
@@ -126,8 +126,9 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   IDASetId(ida_, id_);
   // Multipliers are derived quantities in every form: IDA judges the motion.
   IDASetSuppressAlg(ida_, 1);
-  IDASetNonlinConvCoef(
-      ida_, options.formulation == Formulation::stabilised_index2 ? kNewtonIndex2 : kNewton);
+  const bool index2 = options.formulation == Formulation::stabilised_index2;
+  IDASetNonlinConvCoef(ida_,
+                       index2 ? std::max(kNewtonIndex2, kNewtonRounding / tolerance_) : kNewton);
   if (options.projection) {
     ida_projection::Options projection;
     projection.id = id_;
