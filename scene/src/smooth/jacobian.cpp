@@ -105,7 +105,7 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
   for (int k = 0; k < moving(); ++k)
     bodies_.turns[at(k)] = turn_of_quaternion(y + kBody * k + kQuaternion);
   if (form_ == Formulation::index0) {
-    index0_jacobian(cj, y, yp, entries);
+    index0_jacobian(cj, y, entries);
     return;
   }
   update_accelerations(yp);
@@ -150,10 +150,8 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
   add_eta_jacobian(J, y);
 }
 
-// With D = -d(f + G^T lambda)/dy and A = dg''/dy at fixed a and lambda:
-// M da = G^T dlambda - D dy, G da = -A dy.
-void System::index0_jacobian(double cj, const double* y, const double*, Entries& entries) {
-  const int n = 6 * moving(), columns = kBody * moving();
+// The multipliers of the present state, and the accelerations that they leave in the frames.
+void System::accelerations_from_multipliers() {
   sum_forces(nullptr);
   torques_to_body_axes(loads_);
   solve_multipliers();
@@ -162,7 +160,10 @@ void System::index0_jacobian(double cj, const double* y, const double*, Entries&
     f.a = a_.segment<3>(6 * k);
     f.alpha = f.R * a_.segment<3>(6 * k + 3);
   }
-  const int pitch = n + m_;
+}
+
+void System::form_left() {
+  const int n = 6 * moving(), pitch = n + m_;
   const auto partials = [&] {
     JacobianBlocks D(dense_entries_, bodies_.turns, 6, 0, 0);
     add_motion_jacobian(D, lambda_.data(), -1);
@@ -179,8 +180,13 @@ void System::index0_jacobian(double cj, const double* y, const double*, Entries&
   left_.setZero();
   dense_entries_.begin(left_.data());
   partials();
+}
 
-  Eigen::MatrixXd da = -left_.topRows(n);  // M^-1 (-D)
+// With D = -d(f + G^T lambda)/dy and A = dg''/dy at fixed a and lambda:
+// M da = G^T dlambda - D dy, G da = -A dy.
+Eigen::MatrixXd System::acceleration_jacobian() {
+  form_left();
+  Eigen::MatrixXd da = -left_.topRows(6 * moving());  // M^-1 (-D)
   for (int k = 0; k < moving(); ++k) {
     const Inertia& inertia = bodies_.inertia[at(body_of_slot_[at(k)])];
     da.middleRows<3>(6 * k) /= inertia.mass;
@@ -191,10 +197,30 @@ void System::index0_jacobian(double cj, const double* y, const double*, Entries&
     da += GM_.transpose() * dlambda;
     dense_ = dlambda;
   }
+  return da;
+}
 
+void System::index0_work_jacobian(double cj, JacobianBlocks& J) {
+  const int columns = kBody * moving();
+  J.add(first_work(), first_work(), cj);
+  for (const auto& effect : effects_)
+    if (effect->has_power()) effect->add_power_jacobian(bodies_, J);
+  if (!has_motion_) return;
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(columns);
+  each_row([&](const auto& row) {
+    double g_t[3];
+    row.rate_by_time(g_t);
+    for (int i = 0; i < row.count; ++i) sum += g_t[i] * dense_.row(row.row + i);
+  });
+  for (int column = 0; column < columns; ++column) J.add(first_work(), column, sum[column]);
+}
+
+void System::index0_jacobian(double cj, const double* y, Entries& entries) {
+  accelerations_from_multipliers();
+  const Eigen::MatrixXd da = acceleration_jacobian();
   JacobianBlocks J(entries, bodies_.turns, kBody, kVelocity, first_work());
   for (int k = 0; k < moving(); ++k) {
-    const int first = kBody * k;
+    const int first = kBody * k, columns = kBody * moving();
     add_kinematic_jacobian(J, first, cj, y + first + kQuaternion,
                            bodies_.w[at(body_of_slot_[at(k)])]);
     for (int i = 0; i < 6; ++i) {
@@ -203,19 +229,7 @@ void System::index0_jacobian(double cj, const double* y, const double*, Entries&
               (column == first + kVelocity + i ? cj : 0.0) - da(6 * k + i, column));
     }
   }
-  if (!has_work_) return;
-  J.add(first_work(), first_work(), cj);
-  for (const auto& effect : effects_)
-    if (effect->has_power()) effect->add_power_jacobian(bodies_, J);
-  if (has_motion_) {
-    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(columns);
-    each_row([&](const auto& row) {
-      double g_t[3];
-      row.rate_by_time(g_t);
-      for (int i = 0; i < row.count; ++i) sum += g_t[i] * dense_.row(row.row + i);
-    });
-    for (int column = 0; column < columns; ++column) J.add(first_work(), column, sum[column]);
-  }
+  if (has_work_) index0_work_jacobian(cj, J);
 }
 
 }  // namespace tether::scene::smooth

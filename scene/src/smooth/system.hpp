@@ -81,6 +81,7 @@ class System {
   int first_multiplier() const { return first_work() + (has_work_ ? 1 : 0); }
   int first_eta() const { return first_multiplier() + m_; }
 
+  class JointRows;  // joints.cpp
   void add_joints(const Scene& scene);
   void count_independent_rows();
   void choose_rows();
@@ -105,7 +106,11 @@ class System {
                         double cj);
   void add_eta_jacobian(JacobianBlocks& J, const double* y) const;
   void pin_multipliers(const double* multipliers, double* rows) const;
-  void index0_jacobian(double cj, const double* y, const double* yp, Entries& entries);
+  void index0_jacobian(double cj, const double* y, Entries& entries);
+  void accelerations_from_multipliers();
+  void form_left();  // left_: -d(f + G^T lambda)/dy over dg''/dy, a and lambda fixed
+  Eigen::MatrixXd acceleration_jacobian();  // da/dy, and dlambda/dy in dense_
+  void index0_work_jacobian(double cj, JacobianBlocks& J);
   double power(const double* lambda) const;
   double energy() const;
   Vector3d momentum() const;
