@@ -46,6 +46,7 @@ class ContiguousMover final : public Mover {
     y_.assign(n, 0.0);
     WT_.assign(n, 0.0);
     g_.assign(m, 0.0);
+    start_.assign(n, 0.0);
   }
 
   Move measure(const Candidate& candidate) override;
@@ -66,6 +67,7 @@ class ContiguousMover final : public Mover {
     std::fill(scale_.begin(), scale_.end(), 0.0);
     std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
     monitor_.reset();
+    if constexpr (Rows::kThinRows) blocks_.trust.reset();
     staleness_ = -1.0;
     measured_ = 0.0;
     settles_ = 0;
@@ -85,6 +87,11 @@ class ContiguousMover final : public Mover {
   Status value(double t);
   Status factor(double t);
   double solve();
+  double first_solve();
+  Status learn_trust(double t, double length);
+  Move newton(const Candidate& candidate, double drift_before);
+  Move newton_with_firm_rows(const Candidate& candidate, const Move& failed);
+  bool too_long(double length, double& limit) const;
   bool contradicts();
   bool rounding_only() const;
   double rounding_length();
@@ -99,6 +106,10 @@ class ContiguousMover final : public Mover {
   int n_, m_;
   double inverse_n_;
   Rows blocks_;
+  bool thin_ = false;          // the last factor() found rows that need RowTrust
+  bool firm_only_ = false;     // this attempt does without them
+  std::vector<double> start_;  // the correction before the move, kept where there are thin rows
+  bool start_known_ = false;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
   std::vector<double> y_, WT_, g_;
   std::vector<double> group_sum_;
@@ -238,6 +249,7 @@ Status ContiguousMover<Rows>::factor(double t) {
     return Status::not_finite;
   }
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
+  if constexpr (Rows::kThinRows) thin_ = RowTrust::has_thin_rows(blocks_.counted().solver);
   reusable_ = true;
   slope_ = kUnknownSlope;
   age_ = measured_age_ = 0;
@@ -258,6 +270,50 @@ double ContiguousMover<Rows>::solve() {
     sum += move * move;
   });
   return std::sqrt(sum * inverse_n_);
+}
+
+// The first solve() after factor(): decides which of the thin rows take part until the next one.
+template <class Rows>
+double ContiguousMover<Rows>::first_solve() {
+  const double length = solve();
+  if constexpr (Rows::kThinRows) {
+    if (!thin_) return length;
+    linalg::MinimumNorm& solver = blocks_.counted().solver;
+    const int all = solver.rank();
+    if (!firm_only_ && blocks_.trust.trusted_rows(solver, length) == all) return length;
+    const bool whole = !blocks_.dropped_rows();
+    // Nothing magnifies what the firm rows ask for.
+    const int firm = RowTrust::firm_rows(solver);
+    solver.use_rank(firm);
+    const double firm_length = solve();
+    --statistics_.iterations;
+    if (!firm_only_) {
+      solver.use_rank(all);
+      const int trusted = blocks_.trust.trusted_rows(solver, firm_length);
+      solver.use_rank(trusted);
+      if (trusted > firm) {
+        --statistics_.iterations;
+        if (whole && trusted < all) ++statistics_.rank_drops;
+        return solve();
+      }
+    }
+    if (whole) ++statistics_.rank_drops;
+    return firm_length;
+  }
+  return length;
+}
+
+// After the first move: by how much has C turned?
+template <class Rows>
+Status ContiguousMover<Rows>::learn_trust(double t, double length) {
+  if constexpr (Rows::kThinRows) {
+    if (!thin_) return Status::success;
+    const double* WT = evaluator_.uses_differences() ? this->WT().data() : nullptr;
+    const Status status = blocks_.learn_trust(evaluator_, t, y_.data(), WT, length);
+    if (status != Status::success) message_ = evaluator_.message();
+    return status;
+  }
+  return Status::success;
 }
 
 template <class Rows>
@@ -337,10 +393,24 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   set_metric(true);
   if ((result.status = factor(candidate.t)) != Status::success) return result;
   if (rounding_only()) return result;
-  result.length = solve();
+  firm_only_ = false;
+  result.length = first_solve();
   result.floor = 4.0 * kEpsilon * size_of_y();
   if (contradicts()) result.status = Status::inconsistent;
   return result;
+}
+
+// Only a long move can be too long: the limit is at least largest_move.
+template <class Rows>
+bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
+  if (length <= options_.largest_move) return false;
+  double sum = 0.0;
+  for (int j : blocks_.d.columns) {
+    const double change = ycor_[j] * w_[j];
+    sum += change * change;
+  }
+  limit = options_.largest_move * std::max(1.0, std::sqrt(sum * inverse_n_));
+  return !(length <= limit);
 }
 
 template <class Rows>
@@ -351,9 +421,46 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   left_ = 0.0;
   ++age_;
   set_metric(!reused_);
-  double* correction = candidate.correction_entries;
   if ((result.status = value(candidate.t)) != Status::success) return result;
-  result.drift_before = result.drift_after = drift();
+  firm_only_ = start_known_ = false;
+  result = newton(candidate, drift());
+  const bool broken =
+      result.status == Status::not_converged || result.status == Status::move_too_long;
+  if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
+  if (result.status == Status::success && !result.capped && contradicts())
+    result.status = Status::inconsistent;
+  return result;
+}
+
+// Where rows are nearly parallel they magnify the rounding of g beyond any tolerance. Such a row
+// cannot be followed, nor need it be, if without it the others lead to a point where rounding
+// explains every g: only then does this count.
+template <class Rows>
+Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, const Move& failed) {
+  const std::string reason = message_;
+  for (std::size_t i = 0; i < y_.size(); ++i) {
+    candidate.correction_entries[i] = start_[i];
+    y_[i] = candidate.base_entries[i] + start_[i];
+  }
+  Move result = failed;
+  if ((result.status = value(candidate.t)) != Status::success) return result;
+  firm_only_ = true;
+  result = newton(candidate, failed.drift_before);
+  if (result.status == Status::success && !result.capped) {
+    if ((result.status = value(candidate.t)) != Status::success) return result;
+    result.drift_after = drift();
+    if (rounding_only()) return result;
+  }
+  message_ = reason;
+  return failed;
+}
+
+// Newton's method from y_, with g_ known there.
+template <class Rows>
+Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_before) {
+  Move result;
+  double* correction = candidate.correction_entries;
+  result.drift_before = result.drift_after = drift_before;
 
   monitor_.start();
   bool fresh = false;  // factors belong to the present y
@@ -362,35 +469,31 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
     if (!have_factors) {
       if ((result.status = factor(candidate.t)) != Status::success) return result;
       have_factors = fresh = true;
+      if (result.moves == 0 && !firm_only_) {
+        start_known_ = thin_;
+        if (thin_) std::copy(correction, correction + n_, start_.begin());
+      }
     }
-    const double length = solve();
+    const double length = fresh ? first_solve() : solve();
     ++result.moves;
 
     if (result.moves == 1) {
       result.length = move_length_ = length;
-      // Only a long first move can be too long: the limit is at least largest_move.
-      if (!(length <= options_.largest_move)) {
-        double sum = 0.0;
-        for (int j : blocks_.d.columns) {
-          const double change = ycor_[j] * w_[j];
-          sum += change * change;
-        }
-        const double limit = options_.largest_move * std::max(1.0, std::sqrt(sum * inverse_n_));
-        if (!(length <= limit)) {
-          if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
-            result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
-            message_ = "the move onto the constraints is " + std::to_string(length) +
-                       " tolerances long, the limit is " + std::to_string(limit) +
-                       " (Options::largest_move); start closer with make_consistent, or use a "
-                       "smaller step";
-            return result;
-          }
-          apply(limit / length, correction);
-          result.length = limit;
-          result.capped = true;
-          result.status = Status::success;
+      double limit = 0.0;
+      if (!std::isfinite(length) || too_long(length, limit)) {
+        if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
+          result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
+          message_ = "the move onto the constraints is " + std::to_string(length) +
+                     " tolerances long, the limit is " + std::to_string(limit) +
+                     " (Options::largest_move); start closer with make_consistent, or use a "
+                     "smaller step";
           return result;
         }
+        apply(limit / length, correction);
+        result.length = limit;
+        result.capped = true;
+        result.status = Status::success;
+        return result;
       }
     }
     apply(1.0, correction);
@@ -403,6 +506,8 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
       left_ = 0.0;
       continue;
     }
+    if (result.moves == 1 && (result.status = learn_trust(candidate.t, length)) != Status::success)
+      return result;
 
     // A first move longer than the largest floor need not know it.
     const double floor = result.moves == 1 && length > kLargestFloor
@@ -428,7 +533,7 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
     have_factors = verdict != Monitor::Verdict::refactor;
   }
 
-  result.status = contradicts() ? Status::inconsistent : Status::success;
+  result.status = Status::success;
   return result;
 }
 

@@ -94,6 +94,17 @@ Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, cons
   return evaluator.jacobian(t, y, n_, WT, columns_, C_.data());
 }
 
+Status RowBlocks::learn_trust(Evaluator& evaluator, double t, const double* y, const double* WT,
+                              double length) {
+  if (!trust.wants_to_learn(length)) return Status::success;
+  C_after_.resize(C_.size());
+  const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_after_.data());
+  Block& block = counted();
+  if (status == Status::success)
+    trust.learn(block.solver, block.rows, block.columns, n_, C_, C_after_, length);
+  return status;
+}
+
 bool RowBlocks::factor() {
   for (Block* block : {&d, &a})
     if (!block->rows.empty() && !block->solver.factor(C_.data(), n_, block->rows.data(),

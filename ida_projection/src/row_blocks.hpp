@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "evaluator.hpp"
+#include "row_trust.hpp"
 
 namespace tether::ida_projection {
 
@@ -104,6 +105,8 @@ class RowBlocks {
   using Block = BlockOf<linalg::MinimumNorm>;
   /// Factors are cheap beside F, and a step older they may leave half of a move: always fresh.
   static constexpr bool kReuse = false;
+  /// The solver's pivots tell which rows need RowTrust.
+  static constexpr bool kThinRows = true;
 
   RowBlocks(const Constraints& constraints, const Evaluator& evaluator, int n);
 
@@ -123,6 +126,12 @@ class RowBlocks {
   /// d.dy and a.dy for the values g, with the C that was factored.
   void solve(const std::vector<double>& g);
   int rank() const { return d.solver.rank() + a.solver.rank(); }
+  /// The rows whose move is measured in tolerances.
+  Block& counted() { return d.rows.empty() ? a : d; }
+  /// After a move of this length with the C at hand: C at y, where it is time to learn from it.
+  Status learn_trust(Evaluator& evaluator, double t, const double* y, const double* WT,
+                     double length);
+  RowTrust trust;
   bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
 
   /// sum_j |C_ij y_j| and sum_j C_ij y_j.
@@ -141,8 +150,9 @@ class RowBlocks {
   const Constraints& constraints_;
   int m_, n_;
   double rank_tolerance_;
-  std::vector<double> C_;     // m x n, row-major
-  std::vector<int> columns_;  // every column that C can fill and that is free
+  std::vector<double> C_;        // m x n, row-major
+  std::vector<double> C_after_;  // work space of learn_trust()
+  std::vector<int> columns_;     // every column that C can fill and that is free
   bool structured_ = false;
 };
 

@@ -16,6 +16,7 @@ class SparseRows {
   using Block = BlockOf<linalg::SparseMinimumNorm>;
   /// C and its factors cost four solves: they serve several steps.
   static constexpr bool kReuse = true;
+  static constexpr bool kThinRows = false;
 
   SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n);
 

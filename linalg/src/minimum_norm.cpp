@@ -20,7 +20,7 @@ void MinimumNorm::resize(int rows, int columns) {
                                 ", columns = " + std::to_string(columns) + "; both must be >= 0");
   m_ = rows;
   n_ = columns;
-  rank_ = 0;
+  set_rank(0);
   const auto m = static_cast<std::size_t>(rows);
   inconsistency_.assign(m, 0.0);
   if (rows <= kSmallRows && columns <= kSmallColumns) {
@@ -39,6 +39,14 @@ void MinimumNorm::resize(int rows, int columns) {
   }
 }
 
+void MinimumNorm::set_rank(int rank) {
+  rank_ = factored_rank_ = rank;
+  least_square_ = 1.0;
+  if (rank > 0)
+    least_square_ = kernel_ != nullptr ? small_->ratio[rank - 1]
+                                       : std::pow(qr_.matrixQR()(rank - 1, rank - 1), 2);
+}
+
 double* MinimumNorm::row(int i) {
   return kernel_ != nullptr ? small_->u + static_cast<std::ptrdiff_t>(i) * kernel_->stride
                             : large_.row(i).data();
@@ -46,20 +54,20 @@ double* MinimumNorm::row(int i) {
 
 bool MinimumNorm::factor(const double* D, double rank_tolerance) {
   for (int j = 0; j < n_; ++j) metric_[static_cast<std::size_t>(j)] = D[j];
-  rank_ = 0;
+  set_rank(0);
   if (kernel_ == nullptr) return factor_large(rank_tolerance);
   if (!kernel_->form_rows(*small_, m_, metric_.data())) return false;
-  rank_ = kernel_->factor(*small_, m_, n_, rank_tolerance);
+  set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
   return true;
 }
 
 bool MinimumNorm::factor(const double* wide, int width, const int* rows, const int* columns,
                          double rank_tolerance) {
-  rank_ = 0;
+  set_rank(0);
   if (kernel_ != nullptr) {
     if (!kernel_->gather_rows(*small_, m_, n_, wide, width, rows, columns, metric_.data()))
       return false;
-    rank_ = kernel_->factor(*small_, m_, n_, rank_tolerance);
+    set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
     return true;
   }
   for (int i = 0; i < m_; ++i) {
@@ -80,7 +88,7 @@ bool MinimumNorm::factor_large(double rank_tolerance) {
   }
   qr_.setThreshold(rank_tolerance);
   qr_.compute(large_.transpose());
-  rank_ = qr_.maxPivot() > rank_tolerance ? static_cast<int>(qr_.rank()) : 0;
+  set_rank(qr_.maxPivot() > rank_tolerance ? static_cast<int>(qr_.rank()) : 0);
   return true;
 }
 
@@ -165,11 +173,14 @@ std::vector<double> MinimumNorm::dependence(int k) const {
   return {x.data(), x.data() + r};
 }
 
+double MinimumNorm::independent_part(int k) const {
+  return kernel_ != nullptr ? std::sqrt(small_->ratio[k]) : std::abs(qr_.matrixQR()(k, k));
+}
+
 double MinimumNorm::condition() const {
   double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
   for (int k = 0; k < rank_; ++k) {
-    const double r =
-        kernel_ != nullptr ? std::sqrt(small_->ratio[k]) : std::abs(qr_.matrixQR()(k, k));
+    const double r = independent_part(k);
     smallest = std::min(smallest, r);
     largest = std::max(largest, r);
   }

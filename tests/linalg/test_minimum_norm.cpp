@@ -214,3 +214,40 @@ TEST_CASE("no rows, no columns, and sizes that make no sense") {
   REQUIRE_THROWS_AS(MinimumNorm(-1, 2), std::invalid_argument);
   CHECK(contains(thrown([] { MinimumNorm(2, -3); }), "columns = -3"));
 }
+
+TEST_CASE("fewer rows than the rank: the solution of these rows alone") {
+  for (const auto& [m, n] : sizes()) {
+    if (m < 3) continue;
+    INFO(label(m, n));
+    const Case c = random_case(m, n, 17);
+    MinimumNorm solver(m, n);
+    load(solver, c.C);
+    REQUIRE(solver.factor(c.D.data()));
+    REQUIRE(solver.rank() == m);
+    const Eigen::VectorXd all = solve(solver, c.g);
+    for (int k = 1; k < m; ++k)
+      CHECK(solver.independent_part(k) <= solver.independent_part(k - 1) * (1.0 + 1e-12));
+
+    const int kept = m - 2;
+    Case part = c;
+    part.C.resize(kept, n);
+    part.g.resize(kept);
+    for (int k = 0; k < kept; ++k) {
+      part.C.row(k) = c.C.row(solver.pivot(k));
+      part.g[k] = c.g[solver.pivot(k)];
+    }
+    solver.use_rank(kept);
+    CHECK(solver.dropped() == 2);
+    const Eigen::VectorXd dy = solve(solver, c.g), expected = oracle(part);
+    CHECK(distance(dy, expected, c.D) <= 1e-9 * length(expected, c.D));
+    // What is left of a dropped row, as a distance.
+    for (int k = kept; k < m; ++k) {
+      const int i = solver.pivot(k);
+      const double left = std::abs(c.C.row(i).dot(dy) - c.g[i]) / solver.row_norm(i);
+      CHECK(solver.inconsistency(k) == Approx(left).epsilon(1e-8).margin(1e-12));
+    }
+    solver.use_rank(m + 5);  // no more than factor() has kept
+    CHECK(solver.rank() == m);
+    CHECK((solve(solver, c.g) - all).cwiseAbs().maxCoeff() == 0.0);
+  }
+}

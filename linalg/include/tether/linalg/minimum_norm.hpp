@@ -60,10 +60,19 @@ class MinimumNorm {
   /// Dropped rows take no part; see inconsistency().
   void solve(const double* g, double* dy);
 
+  /// Until the next factor() only the first `rank` rows of the pivot order take part, at most as
+  /// many as factor() has kept.
+  void use_rank(int rank) { rank_ = rank < factored_rank_ ? rank : factored_rank_; }
+
   int rank() const { return rank_; }
   int dropped() const { return m_ - rank_; }
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
   int pivot(int k) const;
+  /// |R_kk|, k < rank(): how much of a unit row is independent of those before it; no larger than
+  /// the one before.
+  double independent_part(int k) const;
+  /// The square of the smallest one that factor() has kept; 1 for rank 0.
+  double least_square() const { return least_square_; }
   /// |row_i(C D)|; 0 for a row that vanishes.
   double row_norm(int i) const;
   /// After solve(): the part of dropped row k (k in rank()..m-1, pivot order) that the solution
@@ -76,14 +85,16 @@ class MinimumNorm {
   double condition() const;
 
  private:
+  void set_rank(int rank);
   bool factor_large(double rank_tolerance);
   void solve_large(const double* g, double* dy);
   void solve_small(const double* g, double* dy);
   double scaled(const double* g, int i) const;
 
-  int m_ = 0, n_ = 0, rank_ = 0;
+  int m_ = 0, n_ = 0, rank_ = 0, factored_rank_ = 0;
   const small::Kernel* kernel_ = nullptr;  // null: beyond the small sizes
   std::unique_ptr<small::Storage> small_;
+  double least_square_ = 1.0;
   std::vector<double> metric_;  // D, padded with zeros to the kernel's stride
 
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> large_;
