@@ -248,4 +248,16 @@ Eigen::VectorXd integrate(const Problem& problem, double rtol, double atol, long
   return end;
 }
 
+Eigen::VectorXd vector(const std::vector<double>& from) {
+  return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<int>(from.size()));
+}
+
+const Rows* find(const Problem& problem, const std::string& name) {
+  for (const Rows& rows : problem.rows)
+    if (rows.name == name) return &rows;
+  return nullptr;
+}
+
+std::string label(const Problem& problem) { return problem.name + ", " + problem.form; }
+
 }  // namespace tether::problems::test

@@ -12,6 +12,14 @@ namespace tether::problems::test {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+constexpr double kThirdTurn = 2.09439510239319549231;
+
+Eigen::VectorXd vector(const std::vector<double>& from);
+/// The group of that name; null: there is none.
+const Rows* find(const Problem& problem, const std::string& name);
+/// Name and form.
+std::string label(const Problem& problem);
+
 /// g(t, y) and its given Jacobian, of a single group.
 Eigen::VectorXd value(const Rows& rows, double t, const Eigen::VectorXd& y);
 RowMajor jacobian(const Rows& rows, double t, const Eigen::VectorXd& y);

@@ -20,10 +20,6 @@ const Rows& group(const Problem& p, const std::string& name) {
   throw std::logic_error(p.name + " has no rows " + name);
 }
 
-Eigen::VectorXd vector(const std::vector<double>& from) {
-  return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<int>(from.size()));
-}
-
 Eigen::MatrixXd dense(const Problem& p, double cj, const Eigen::VectorXd& y,
                       const Eigen::VectorXd& yp) {
   Eigen::MatrixXd J(p.size, p.size);
