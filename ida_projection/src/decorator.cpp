@@ -19,6 +19,7 @@ constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter 
 constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
 constexpr long kSampleEvery = 16;
 constexpr int kTrapped = 10;             // steps in a row with failed error tests
+constexpr int kRefused = 3;              // failed error tests in one step
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
@@ -157,7 +158,7 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, 
     // Before the first step a smaller step cannot cure rows that contradict each other.
     return last_steps_ == 0 && first.status == Status::inconsistent ? kFatal : code;
   }
-  if (first.length <= std::max(kOnConstraints, first.floor)) {
+  if (first.length <= std::max(kOnConstraints, first.floor) && !struggling()) {
     ++statistics_.skipped;
     statistics_.largest_drift_before =
         std::max(statistics_.largest_drift_before, first.drift_before);
@@ -230,6 +231,15 @@ void Projection::Impl::look_for_refusals() {
   refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;
   last_error_failures_ = failures;
   if (engaged_ && refused_in_row_ >= kTrapped) begin_smoothing();
+}
+
+// Before the first move: does IDA fail on algebraic variables in its error test, which would be
+// taken out of it with that move?
+bool Projection::Impl::struggling() const {
+  if (!options_.suppress_algebraic) return false;
+  long failures = 0;
+  IDAGetNumErrTestFails(ida_mem_, &failures);
+  return refused_in_row_ >= kTrapped || failures - last_error_failures_ >= kRefused;
 }
 
 void Projection::Impl::begin_smoothing() {

@@ -90,6 +90,7 @@ class Projection::Impl {
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   void look_for_refusals();
+  bool struggling() const;
   void begin_smoothing();
   int corrector_failed(int flag);
   int look_before_moving(const Candidate& candidate, void* mem, bool& done);

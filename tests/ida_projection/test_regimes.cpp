@@ -3,6 +3,7 @@
 #include <cmath>
 #include <problems/car_axis.hpp>
 #include <problems/pendulum.hpp>
+#include <problems/slider_crank.hpp>
 
 #include "host.hpp"
 #include "support/catch.hpp"
@@ -174,4 +175,26 @@ TEST_CASE("stop time: reached exactly, on the constraints, and left again") {
     CHECK(distance(host, rows) < 2.0 * tp::Options().tolerance);
   }
   CHECK(host.steps() < 1000);
+}
+
+TEST_CASE("IDA stuck before the first move: algebraic variables leave its error test at once") {
+  // Accelerations and multipliers of velocity rows fail the error test while the constraints are
+  // still met to rounding, so that no move would ever begin.
+  const Problem axis = car_axis("GGL w");
+  for (const double tolerance : {1e-7, 1e-9}) {
+    INFO("car axis, tolerance " << tolerance);
+    const Run run = integrate(axis, tolerance, axis.recommended_constraints(), {}, false);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.steps <= 5000);
+    CHECK(run.error <= 1e4 * tolerance);
+    CHECK(run.drift <= 1e-9);
+  }
+  const Problem crank = slider_crank("GGL w");
+  for (const double tolerance : {1e-6, 1e-7}) {
+    INFO("slider crank, tolerance " << tolerance);
+    const Run run = integrate(crank, tolerance, crank.recommended_constraints(), {}, false);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.steps <= 9000);
+    CHECK(run.error <= 10.0 * tolerance);
+  }
 }
