@@ -41,6 +41,7 @@ int Projection::Impl::initialize() {
   }
   initialized_ = true;
   engaged_ = false;
+  high_index_ = false;
   pending_ = false;
   last_steps_ = last_setups_ = -1;
   if (mover_) mover_->reset();
@@ -146,6 +147,10 @@ void Projection::Impl::control_step(const Candidate& candidate) {
 int Projection::Impl::corrector_failed(int flag) {
   ++statistics_.corrector_failures;
   status = Status::corrector_failed;
+  if (high_index_)
+    message =
+        "IDA's corrector failed; in forms of index 2 or more multipliers carry rounding divided by "
+        "the step, which may not allow this tolerance: try a larger one, or a form of index 1 or 0";
   return flag;
 }
 
@@ -260,7 +265,8 @@ Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
     IDASetSuppressAlg(ida_mem_, 1);
   }
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
-  if (options_.smooth_where_needed && index_exceeds_one(candidate, mem)) begin_smoothing();
+  high_index_ = options_.smooth_where_needed && index_exceeds_one(candidate, mem);
+  if (high_index_) begin_smoothing();
   return mover_->set_algebraic(candidate, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr);
 }
 

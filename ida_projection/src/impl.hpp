@@ -119,7 +119,8 @@ class Projection::Impl {
   void* ida_mem_;
   Options options_;
   StepSmoother smoother_;
-  int refused_in_row_ = 0;  // accepted steps that needed more than one attempt
+  bool high_index_ = false;  // F is not of index 1 in its own variables
+  int refused_in_row_ = 0;   // accepted steps that needed more than one attempt
   long last_error_failures_ = 0;
   Statistics statistics_;
   double move_sum_ = 0.0;

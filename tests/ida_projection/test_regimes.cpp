@@ -198,3 +198,11 @@ TEST_CASE("IDA stuck before the first move: algebraic variables leave its error 
     CHECK(run.error <= 10.0 * tolerance);
   }
 }
+
+TEST_CASE("forms of index 2 beyond what IDA's corrector can meet: the failure says so") {
+  const Problem problem = pendulum(1.0, 9.81, 100.0, "GGL");
+  const Run run = integrate(problem, 1e-12, problem.recommended_constraints(), {}, false);
+  REQUIRE(run.flag < 0);
+  CHECK(run.status == tp::Status::corrector_failed);
+  CHECK(run.message.find("index 1 or 0") != std::string::npos);
+}
