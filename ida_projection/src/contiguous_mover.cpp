@@ -23,6 +23,7 @@ constexpr double kLargestFloor = 0.1;  // tolerances
 // Factors of an earlier step (Rows::kReuse): used while they leave less than kWorn of a move, and
 // what they leave is less than kForLater tolerances, which settle() takes back.
 constexpr double kWorn = 0.06, kForLater = 0.1, kUnknownSlope = 0.03;
+constexpr double kSlow = 0.1;  // of a move: five would not be enough
 constexpr int kLookAgain = 4;  // candidates
 
 /// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
@@ -568,7 +569,7 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
 }
 
 // The same with factors of an earlier step, which leave a part of each move that grows with their
-// age. Where they no longer halve what is left they are made anew.
+// age. Where that is more than kSlow they are made anew.
 template <class Rows>
 Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
   double previous = 0.0;
@@ -581,7 +582,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
     if (k > 0 && length > floor) {
       slope_ = length / (previous * age_);
       measured_age_ = age_;
-      if (rate() > 0.5) {
+      if (rate() > kSlow) {
         set_metric(true);
         if ((status = factor(candidate.t)) != Status::success) return status;
         age_ = 1;
@@ -590,11 +591,17 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
     }
     apply(1.0, candidate.correction_entries);
     const bool look = k == 0 && age_ >= measured_age_ + kLookAgain;
-    if (length <= floor || (!look && 2.0 * rate() * length <= options_.tolerance)) break;
+    if (length <= floor || (!look && 2.0 * rate() * length <= options_.tolerance)) {
+      if (rate() > kWorn) reusable_ = false;
+      return Status::success;
+    }
     previous = length;
   }
-  if (rate() > kWorn) reusable_ = false;
-  return Status::success;
+  reusable_ = false;
+  message_ = "after " + std::to_string(options_.maximum_iterations) +
+             " moves with sparse factors the next one still is " + std::to_string(previous) +
+             " tolerances long (Options::maximum_iterations)";
+  return Status::not_converged;
 }
 
 }  // namespace
