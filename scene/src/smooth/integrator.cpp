@@ -42,7 +42,7 @@ constexpr double kNewton = 0.1, kNewtonIndex2 = 0.02;
 constexpr double kNewtonRounding = 2e-13;  // no less of it
 
 // Of velocities across the joints, times pivot^2; see weights().
-constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3;
+constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3, kSmallestPivotIndex2 = 1e-3;
 
 // The first step's error is an eighth of what IDA allows, and nothing moves by more than this part.
 constexpr double kFirstError = 0.125, kFirstMove = 1e-2;
@@ -242,7 +242,9 @@ int Integrator::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* se
 // for.
 int Integrator::weights(N_Vector y, N_Vector weights, void* self) {
   const Integrator& me = *static_cast<Integrator*>(self);
-  const double pivot = std::max(me.system_.weakest_pivot(), kSmallestPivot);
+  const bool index2 = me.options_.formulation == Formulation::stabilised_index2;
+  const double smallest = index2 ? kSmallestPivotIndex2 : kSmallestPivot;
+  const double pivot = std::max(me.system_.weakest_pivot(), smallest);
   const double widen = std::max(1.0, kNoise / (pivot * pivot * me.tolerance_));
   const double *values = N_VGetArrayPointer(y), *atol = N_VGetArrayPointer(me.atol_);
   double* out = N_VGetArrayPointer(weights);
