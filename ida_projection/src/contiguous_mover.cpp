@@ -92,6 +92,12 @@ double ContiguousMover<Rows>::first_solve() {
   return length;
 }
 
+template <class Rows>
+bool ContiguousMover<Rows>::must_learn(double length) const {
+  if constexpr (Rows::kThinRows) return thin_ && start_known_ && blocks_.trust.must_learn(length);
+  return false;
+}
+
 // After the first move: by how much has C turned?
 template <class Rows>
 Status ContiguousMover<Rows>::learn_trust(double t, double length) {
@@ -191,16 +197,22 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   return result;
 }
 
+// Back to the correction before the move.
+template <class Rows>
+void ContiguousMover<Rows>::restart(const Candidate& candidate) {
+  for (std::size_t i = 0; i < y_.size(); ++i) {
+    candidate.correction_entries[i] = start_[i];
+    y_[i] = candidate.base_entries[i] + start_[i];
+  }
+}
+
 // Where rows are nearly parallel they magnify the rounding of g beyond any tolerance. Such a row
 // cannot be followed, nor need it be, if without it the others lead to a point where rounding
 // explains every g: only then does this count.
 template <class Rows>
 Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, const Move& failed) {
   const std::string reason = message_;
-  for (std::size_t i = 0; i < y_.size(); ++i) {
-    candidate.correction_entries[i] = start_[i];
-    y_[i] = candidate.base_entries[i] + start_[i];
-  }
+  restart(candidate);
   Move result = failed;
   if ((result.status = value(candidate.t)) != Status::success) return result;
   firm_only_ = true;
@@ -224,6 +236,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   monitor_.start();
   bool fresh = false;  // factors belong to the present y
   bool have_factors = reused_;
+  bool tried = firm_only_;
   for (;;) {
     if (!have_factors) {
       if ((result.status = factor(candidate.t)) != Status::success) return result;
@@ -234,6 +247,15 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       }
     }
     const double length = fresh ? first_solve() : solve();
+    if (result.moves == 0 && !tried && must_learn(length)) {
+      // The firm rows' move shows how C turns; then all rows are judged, from the start.
+      tried = true;
+      apply(1.0, correction);
+      if ((result.status = learn_trust(candidate.t, length)) != Status::success) return result;
+      restart(candidate);
+      have_factors = false;
+      continue;
+    }
     ++result.moves;
 
     if (result.moves == 1) {

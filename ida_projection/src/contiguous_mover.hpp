@@ -85,7 +85,9 @@ class ContiguousMover final : public Mover {
   Status factor(double t);
   double solve();
   double first_solve();
+  bool must_learn(double length) const;
   Status learn_trust(double t, double length);
+  void restart(const Candidate& candidate);
   Move newton(const Candidate& candidate, double drift_before);
   Move newton_with_firm_rows(const Candidate& candidate, const Move& failed);
   bool too_long(double length, double& limit) const;

@@ -10,13 +10,11 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kSafety = 2.0;
-constexpr double kShort = 1e-3;  // tolerances: over less than that C does not turn visibly
 constexpr long kLearnEvery = 64;
 
 }  // namespace
 
 int RowTrust::trusted_rows(const Solver& solver, double length) const {
-  // As long as kappa is not known, no thin row is trusted for a move that could tell.
   if (kappa_ < 0.0) return rows_from(solver, length > kShort ? kThin : 0.0);
   return rows_from(solver, std::min(kThin, kSafety * kappa_ * length));
 }

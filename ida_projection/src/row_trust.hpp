@@ -28,6 +28,8 @@ class RowTrust {
   /// Rows to be trusted for a move of this length (tolerances) by the firm rows.
   int trusted_rows(const Solver& solver, double length) const;
 
+  /// Thin rows cannot be judged for a move of this length before C was looked at behind it.
+  bool must_learn(double length) const { return kappa_ < 0.0 && length > kShort; }
   /// Is it time to look how C turns over a move of this length?
   bool wants_to_learn(double length);
   /// From C (row-major, n columns) before and after the move; rows, columns: those in the solver.
@@ -36,6 +38,8 @@ class RowTrust {
   void reset() { *this = RowTrust(); }
 
  private:
+  static constexpr double kShort = 1e-3;  // tolerances: over less than that C does not turn visibly
+
   static int rows_from(const Solver& solver, double smallest) {
     int rank = solver.rank();
     while (rank > 0 && solver.independent_part(rank - 1) < smallest) --rank;
