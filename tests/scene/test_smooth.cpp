@@ -129,6 +129,28 @@ TEST_CASE("slider-crank of equal lengths from other starts", "[smooth]") {
       14000);
 }
 
+TEST_CASE("errors follow the tolerance through dead points", "[smooth]") {
+  // By IDA's own rule for step sizes single tolerances end with 12 to 20 times their tolerance.
+  for (const Formulation form : {Formulation::index1, Formulation::index0}) {
+    double previous = 0;
+    for (double tolerance = 1e-4; tolerance > 0.9e-9; tolerance /= std::sqrt(10.0)) {
+      Scene scene = slider_crank(0, 6, kGravity, tolerance);
+      scene.smooth->formulation = form;
+      const Outcome out = run(scene, 10, [](const Engine& e) {
+        return std::abs(e.bodies()[2].position.x() + 0.104094678258);
+      });
+      INFO(word(form) << ", tolerance " << tolerance << ", error in tolerances "
+                      << out.error / tolerance);
+      CHECK(out.error < tolerance);
+      if (previous > 0) {
+        CHECK(previous / out.error > 2.5);
+        CHECK(previous / out.error < 5);
+      }
+      previous = out.error;
+    }
+  }
+}
+
 TEST_CASE("four-bar linkage at speed from the side", "[smooth]") {
   // IDA's own first step is 1e-12 s, in which index 2 has no multipliers but rounding.
   meets(
