@@ -5,23 +5,11 @@
 #include <tether/contact.hpp>
 
 #include "assemblies.hpp"
+#include "body_runs.hpp"
 #include "packing.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::contact;
-
-namespace {
-
-BodySolution run(const random::Packing& p, Law law, int threads, double tolerance = 1e-10) {
-  BodyOptions o;
-  o.law = law;
-  o.tolerance = tolerance;
-  o.max_sweeps = 20000;
-  o.threads = threads;
-  return BodySolver(o).solve(p.bodies, p.contacts);
-}
-
-}  // namespace
 
 TEST_CASE("body form and Delassus form judge alike") {
   for (bool spheres : {true, false}) {
