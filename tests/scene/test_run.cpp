@@ -1,5 +1,7 @@
 // Runs: expectations, files, restarts, effects of no strength. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -76,9 +78,17 @@ std::string content(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// A folder of this test's own, empty.
+/// An empty folder of this process's own (others may test here, too), gone when it ends.
 fs::path folder(const std::string& name) {
-  const fs::path path = fs::temp_directory_path() / ("tether_test_run_" + name);
+  struct Own {
+    fs::path path = fs::temp_directory_path() / ("tether_test_run_" + std::to_string(getpid()));
+    ~Own() {
+      std::error_code ignored;
+      fs::remove_all(path, ignored);
+    }
+  };
+  static const Own own;
+  const fs::path path = own.path / name;
   fs::remove_all(path);
   fs::create_directories(path);
   return path;
