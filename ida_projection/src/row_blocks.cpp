@@ -4,8 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tether::ida_projection {
+
+std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT) {
+  for (std::size_t i = 0; i < y.size(); ++i)
+    y[i] += (0.7 + 0.6 * std::sin(1.0 + 3.7 * static_cast<double>(i))) *
+            std::max(1e-3 * std::abs(y[i]), 10.0 * (WT[i] > 0.0 ? WT[i] : 1e-6));
+  return y;
+}
 
 RowBlocks::RowBlocks(const Constraints& constraints, const Evaluator& evaluator, int n)
     : constraints_(constraints),
@@ -23,10 +31,7 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
   std::vector<int> all(n);
   for (std::size_t j = 0; j < n; ++j) all[j] = static_cast<int>(j);
   for (int pass = 0; pass < 2; ++pass) {
-    if (pass == 1)
-      for (std::size_t i = 0; i < n; ++i)
-        y[i] += (0.7 + 0.6 * std::sin(1.0 + 3.7 * static_cast<double>(i))) *
-                std::max(1e-3 * std::abs(y[i]), 10.0 * (WT[i] > 0.0 ? WT[i] : 1e-6));
+    if (pass == 1) y = some_tolerances_away(std::move(y), WT);
     const Status status = evaluator.jacobian(t, y.data(), n_, WT.data(), all, C_.data());
     if (status != Status::success && pass == 0) {
       message = evaluator.message();

@@ -96,6 +96,10 @@ bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, i
   return false;
 }
 
+/// y moved by some tolerances in no special direction: a velocity that happens to be zero at y is
+/// not zero there. WT = 0: unweighted.
+std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT);
+
 /// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
 /// differential columns ("d"); then rows that contain algebraic variables ("B") are solved for
 /// these columns ("a") alone, so that no position or velocity is bent to repair a multiplier.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tether::ida_projection {
 
@@ -48,10 +49,7 @@ Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::
   for (int j = 0; j < n_; ++j) columns_[at(j)] = j;
   std::vector<double> y = y0;
   for (int pass = 0; pass < 2; ++pass) {
-    if (pass == 1)
-      for (std::size_t i = 0; i < y.size(); ++i)
-        y[i] += (0.7 + 0.6 * std::sin(1.0 + 3.7 * static_cast<double>(i))) *
-                std::max(1e-3 * std::abs(y[i]), 10.0 * (WT[i] > 0.0 ? WT[i] : 1e-6));
+    if (pass == 1) y = some_tolerances_away(std::move(y), WT);
     const Status status = evaluate(evaluator, t, y.data(), WT.data());
     if (status != Status::success && pass == 0) {
       message = evaluator.message();
