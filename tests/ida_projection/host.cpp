@@ -181,6 +181,15 @@ tp::Constraints row(std::string name, std::function<double(double, const double*
   return set;
 }
 
+tp::Constraints circle_of(double square, const std::string& name) {
+  return row(
+      name, [square](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - square; },
+      [](double, const double* y, double* c) {
+        c[0] = 2.0 * y[0];
+        c[1] = 2.0 * y[1];
+      });
+}
+
 Eigen::VectorXd value(const tp::Constraints& set, double t, const double* y, int n) {
   Eigen::VectorXd g(set.total_count());
   if (set.count > 0) set.value(t, tp::ConstVector(y, n), tp::Vector(g.data(), set.count));

@@ -78,6 +78,9 @@ tp::Constraints on_circle();
 tp::Constraints row(std::string name, std::function<double(double, const double*)> g,
                     std::function<void(double, const double*, double*)> gradient);
 
+/// x^2 + y^2 = square, another way of saying on_circle() when square = 1.
+tp::Constraints circle_of(double square, const std::string& name);
+
 /// g and C of joined sets, by the given callbacks.
 Eigen::VectorXd value(const tp::Constraints& set, double t, const double* y, int n);
 Eigen::MatrixXd jacobian(const tp::Constraints& set, double t, const double* y, int n);

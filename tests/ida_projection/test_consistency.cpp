@@ -26,15 +26,6 @@ Problem still(std::vector<double> y0) {
              [n = y0.size()](double, const double*, double* f) { std::fill(f, f + n, 0.0); });
 }
 
-tp::Constraints circle_of(double square, const std::string& name) {
-  return row(
-      name, [square](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - square; },
-      [](double, const double* y, double* c) {
-        c[0] = 2.0 * y[0];
-        c[1] = 2.0 * y[1];
-      });
-}
-
 /// project() must refuse, name `why`, and leave the point as it was.
 void refused(const std::vector<double>& point, double tolerance, const tp::Constraints& set,
              tp::Status why) {

@@ -20,16 +20,6 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
   return largest;
 }
 
-/// x^2 + y^2 = square, another way of saying on_circle() when square = 1.
-tp::Constraints circle_of(double square, const std::string& name) {
-  return row(
-      name, [square](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - square; },
-      [](double, const double* y, double* c) {
-        c[0] = 2.0 * y[0];
-        c[1] = 2.0 * y[1];
-      });
-}
-
 }  // namespace
 
 TEST_CASE("full rank: two evaluations, one factorisation for most steps") {
