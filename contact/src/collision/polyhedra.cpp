@@ -19,20 +19,31 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // Faces more oblique to each other than this have an edge contact between them.
 constexpr double kParallel = 0.99875;  // cos 0.05
-// Of the smaller thickness: separations that are equal; corners that lie in a side plane.
-constexpr double kTie = 1e-4, kSide = 1e-7;
+constexpr double kFlat = 1e-9;         // radian: along a face
+// Of the smaller thickness: separations between which faces are preferred; corners that are one;
+// numbers that differ by rounding only, of which the first is taken in every attitude.
+constexpr double kTie = 1e-4, kSame = 1e-7, kRounding = 1e-12;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // A body at its pose: shared topology, own coordinates (world axes, about a common origin).
 struct Placed {
   const Polyhedron* shape;
   Polyhedron now;
+  Eigen::Matrix3d rotation;
   const Polyhedron::Face& face(int f) const { return now.faces[at(f)]; }
   const std::vector<int>& loop(int f) const { return shape->faces[at(f)].loop; }
   const Vector3d& vertex(int v) const { return now.vertices[at(v)]; }
   int loop_size(int f) const { return static_cast<int>(loop(f).size()); }
   const Vector3d& corner(int f, int k) const {
     return vertex(loop(f)[at(k < loop_size(f) ? k : k - loop_size(f))]);
+  }
+  // Into the face from its edge k. From the shape's own coordinates: those of a pose are rounded to
+  // the distance from the common origin, and a short edge would turn by that.
+  Vector3d inward(int f, int k) const {
+    const int next = k + 1 < loop_size(f) ? k + 1 : 0;
+    const std::vector<Vector3d>& v = shape->vertices;
+    const Vector3d along = v[at(loop(f)[at(next)])] - v[at(loop(f)[at(k)])];
+    return rotation * shape->faces[at(f)].normal.cross(along).normalized();
   }
 };
 
@@ -42,13 +53,13 @@ struct FaceAxis {
 };
 
 // The face of `a` beyond whose plane all of `b` lies farthest.
-FaceAxis best_face(const Placed& a, const Placed& b) {
+FaceAxis best_face(const Placed& a, const Placed& b, double rounding) {
   FaceAxis best;
   for (int f = 0; f < static_cast<int>(a.now.faces.size()); ++f) {
     double least = kInfinity;
     for (const Vector3d& v : b.now.vertices) least = std::min(least, a.face(f).normal.dot(v));
     const double separation = least - a.face(f).offset;
-    if (separation > best.separation) best = {separation, f};
+    if (separation > best.separation + rounding) best = {separation, f};
   }
   return best;
 }
@@ -61,7 +72,7 @@ struct EdgeAxis {
 
 // Only edges whose arcs of normals cross can touch (Gregorius, The Separating Axis Test between
 // Convex Polyhedra, 2013).
-EdgeAxis best_edges(const Placed& a, const Placed& b) {
+EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
   EdgeAxis best;
   for (int i = 0; i < static_cast<int>(a.shape->edges.size()); ++i) {
     const Polyhedron::Edge& e = a.shape->edges[at(i)];
@@ -79,7 +90,7 @@ EdgeAxis best_edges(const Placed& a, const Placed& b) {
       n /= length;
       if (n.dot(n1) + n.dot(n2) < 0) n = -n;
       const double separation = n.dot(b.vertex(g.from) - a.vertex(e.from));
-      if (separation > best.separation) best = {separation, i, j, n};
+      if (separation > best.separation + rounding) best = {separation, i, j, n};
     }
   }
   return best;
@@ -156,6 +167,7 @@ class Polyhedra final : public PairCollision {
 
   void place(const Entry& entry, const Pose& pose, Placed& to) {
     to.shape = &entry.shape;
+    to.rotation = pose.rotation;
     detail::place(entry.shape, pose, origin_, to.now);
   }
 
@@ -167,15 +179,16 @@ class Polyhedra final : public PairCollision {
   }
 
   void polyhedra(double margin, NearPoints& out) {
-    const FaceAxis A = best_face(a_, b_);
-    if (A.separation >= margin) return;
-    const FaceAxis B = best_face(b_, a_);
-    if (B.separation >= margin) return;
-    const EdgeAxis E = best_edges(a_, b_);
-    if (E.separation >= margin) return;
     const double size = std::min(a_.now.size, b_.now.size), tie = kTie * size;
+    const double rounding = kRounding * size;
+    const FaceAxis A = best_face(a_, b_, rounding);
+    if (A.separation >= margin) return;
+    const FaceAxis B = best_face(b_, a_, rounding);
+    if (B.separation >= margin) return;
+    const EdgeAxis E = best_edges(a_, b_, rounding);
+    if (E.separation >= margin) return;
     const double best = std::max(A.separation, B.separation);
-    if (E.separation > best + tie) return crossing_edges(E, margin, out);
+    if (E.separation > best + tie) return crossing_edges(E, tie, margin, out);
     const Vector3d &nA = a_.face(A.face).normal, &nB = b_.face(B.face).normal;
     if (std::abs(A.separation - B.separation) < tie && -nA.dot(nB) < kParallel)
       return edge_along_edge((nA - nB).normalized(), tie, margin, out);
@@ -183,71 +196,113 @@ class Polyhedra final : public PairCollision {
     // their reference.
     if (A.separation >= B.separation - tie) {
       const int from = out.count;
-      clip(a_, A.face, b_, margin, kSide * size, 0, out);
+      clip(a_, A.face, b_, margin, size, 0, out);
       turn(out, from);
     } else {
-      clip(b_, B.face, a_, margin, kSide * size, 1 << 15, out);
+      clip(b_, B.face, a_, margin, size, 1 << 15, out);
     }
+  }
+
+  // Of the faces that reach farthest against n the one that lies most against it. A face that lies
+  // more against n may still end above the lowest corner.
+  int lowest_face(const Placed& other, const Vector3d& n, double same) {
+    double lowest = kInfinity;
+    height_.clear();
+    for (const Vector3d& v : other.now.vertices) {
+      height_.push_back(n.dot(v));
+      lowest = std::min(lowest, height_.back());
+    }
+    int best = -1;
+    double cosine = 0;
+    for (int f = 0; f < static_cast<int>(other.now.faces.size()); ++f) {
+      const std::vector<int>& loop = other.loop(f);
+      if (std::none_of(loop.begin(), loop.end(),
+                       [&](int v) { return height_[at(v)] < lowest + same; }))
+        continue;
+      const double c = other.face(f).normal.dot(n);
+      if (best >= 0 && !(c < cosine - kRounding)) continue;
+      best = f;
+      cosine = c;
+    }
+    return best;
   }
 
   // Points on faces of `other` over the reference face; on_first of a result is on `other`, its
   // normal is that of the reference face.
-  void clip(const Placed& reference, int face, const Placed& other, double margin, double side,
+  void clip(const Placed& reference, int face, const Placed& other, double margin, double size,
             int mark, NearPoints& out) {
     const Vector3d& n = reference.face(face).normal;
     const double offset = reference.face(face).offset;
-    int opposite = 0;
-    for (int f = 1; f < static_cast<int>(other.now.faces.size()); ++f)
-      if (other.face(f).normal.dot(n) < other.face(opposite).normal.dot(n)) opposite = f;
+    const double same = kSame * size;
+    const int opposite = lowest_face(other, n, same);
     polygon_.clear();
     // Loops run the other way round seen from the reference face; either way serves.
     for (int k = 0; k < other.loop_size(opposite); ++k) {
       const int v = other.loop(opposite)[at(k)];
       polygon_.push_back({other.vertex(v), v & 0x7ff, k});
     }
-    for (int k = 0; k < reference.loop_size(face) && !polygon_.empty(); ++k) {
-      const Vector3d& p = reference.corner(face, k);
-      const Vector3d inward = n.cross(reference.corner(face, k + 1) - p).normalized();
-      clip_to(inward, inward.dot(p), k, side);
-    }
-    for (std::size_t k = 0; k < polygon_.size(); ++k) {
-      const Vector3d& p = polygon_[k].point;
-      const double gap = n.dot(p) - offset;
-      if (!(gap < margin)) continue;
-      const bool again =
-          std::any_of(polygon_.begin(), polygon_.begin() + static_cast<long>(k),
-                      [&](const Corner& c) { return (c.point - p).squaredNorm() < side * side; });
-      if (!again) out.add(p, p - gap * n, n, gap, mark | polygon_[k].feature);
+    for (int k = 0; k < reference.loop_size(face) && !polygon_.empty(); ++k)
+      clip_to(reference.inward(face, k), reference.corner(face, k), k, same);
+    merge(same);
+    for (const Corner& c : polygon_) {
+      const double gap = n.dot(c.point) - offset;
+      if (gap < margin) out.add(c.point, c.point - gap * n, n, gap, mark | c.feature);
     }
   }
 
-  // Keeps inward . x >= offset - side. Corners within `side` of the plane stay what they are, so
-  // that faces of equal size do not flicker.
-  void clip_to(const Vector3d& inward, double offset, int plane, double side) {
+  // Keeps inward . (x - on_plane) >= 0. Signs and cut parameters are of the same two numbers, so
+  // that a cut lies between the ends of its edge however flat the edge lies in the plane. A cut
+  // within `same` of a corner takes over its feature: faces of equal size do not flicker.
+  void clip_to(const Vector3d& inward, const Vector3d& on_plane, int plane, double same) {
     clipped_.clear();
     const std::size_t n = polygon_.size();
     for (std::size_t k = 0; k < n; ++k) {
       const Corner &c = polygon_[k], &next = polygon_[k + 1 == n ? 0 : k + 1];
-      const double d = inward.dot(c.point) - offset, e = inward.dot(next.point) - offset;
-      const bool in = d >= -side, next_in = e >= -side;
+      const double d = inward.dot(c.point - on_plane), e = inward.dot(next.point - on_plane);
+      const bool in = d >= 0, next_in = e >= 0;
       if (in) clipped_.push_back(c);
       if (in == next_in) continue;
       const Vector3d point = c.point + d / (d - e) * (next.point - c.point);
-      const int feature = 2048 + (c.edge * 181 + plane) % 30000;
+      int feature = 2048 + (c.edge * 181 + plane) % 30000;
+      if ((point - c.point).squaredNorm() < same * same) feature = c.feature;
+      if ((point - next.point).squaredNorm() < same * same) feature = next.feature;
       // Going out, the side plane follows; coming in, the rest of the edge.
       clipped_.push_back({point, feature, in ? 128 + plane : c.edge});
     }
     polygon_.swap(clipped_);
   }
 
-  void crossing_edges(const EdgeAxis& E, double margin, NearPoints& out) {
+  // Leaves out corners within `same` of another one or of the line between their neighbours: what
+  // is left spans the polygon up to that, and no point is moved.
+  void merge(double same) {
+    const auto spare = [&](std::size_t k) {
+      const std::size_t n = polygon_.size();
+      const Vector3d p = polygon_[k == 0 ? n - 1 : k - 1].point - polygon_[k].point;
+      const Vector3d q = polygon_[k + 1 == n ? 0 : k + 1].point - polygon_[k].point;
+      const double pp = p.squaredNorm(), qq = q.squaredNorm(), s2 = same * same;
+      if (pp < s2 || qq < s2) return true;
+      return p.dot(q) < 0 && p.cross(q).squaredNorm() < s2 * (p - q).squaredNorm();
+    };
+    for (std::size_t k = polygon_.size(); k-- > 0 && polygon_.size() > 1;)
+      if (spare(k)) polygon_.erase(polygon_.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+
+  // Segments that pass each other beside their ends are as far apart as their nearest points, which
+  // is farther than along the product of their directions.
+  void crossing_edges(const EdgeAxis& E, double tie, double margin, NearPoints& out) {
     const Polyhedron::Edge& e = a_.shape->edges[at(E.first)];
     const Polyhedron::Edge& g = b_.shape->edges[at(E.second)];
     Vector3d p, q;
     nearest(a_.vertex(e.from), a_.vertex(e.to) - a_.vertex(e.from), b_.vertex(g.from),
             b_.vertex(g.to) - b_.vertex(g.from), p, q);
-    if (E.separation < margin)
-      out.add(p, q, -E.normal, E.separation, 1 + (E.first * 251 + E.second) % 65000);
+    Vector3d n = -E.normal;
+    double gap = E.separation;
+    const Vector3d apart = p - q;
+    if (gap > 0 && (apart - gap * n).norm() > tie) {
+      gap = apart.norm();
+      n = apart / gap;
+    }
+    if (gap < margin) out.add(p, q, n, gap, 1 + (E.first * 251 + E.second) % 65000);
   }
 
   // Vertices of `a` that are farthest in direction m.
@@ -284,7 +339,11 @@ class Polyhedra final : public PairCollision {
     // The ends of what the edges share, by their places along the first.
     const double from = std::max(0.0, std::min(u.dot(q - p), u.dot(q + v - p)) / uu);
     const double to = std::min(1.0, std::max(u.dot(q - p), u.dot(q + v - p)) / uu);
-    if (from > to) return;
+    if (from > to) {  // one beyond the other: end to end
+      Vector3d x, y;
+      nearest(p, u, q, v, x, y);
+      return add(x, y, 0x7f01);
+    }
     for (int end = 0; end < 2; ++end) {
       const Vector3d x = p + (end == 0 ? from : to) * u;
       const Vector3d y = q + std::clamp(v.dot(x - q) / vv, 0.0, 1.0) * v;
@@ -323,7 +382,8 @@ class Polyhedra final : public PairCollision {
         point = x;
       }
     }
-    if (least > 0) normal = (c - point) / least;
+    // On the surface to rounding the difference has no direction.
+    if (least > kRounding * b_.now.size) normal = (c - point) / least;
     return least;
   }
 
@@ -354,9 +414,12 @@ class Polyhedra final : public PairCollision {
       const double distance = n.norm();
       if (!(distance > 0) || distance - round.radius >= margin) continue;
       n /= distance;
-      // Nearest to the edge from outside: between the normals of its faces.
-      if (n.dot(b_.face(e.left).normal.cross(v)) * n.dot(b_.face(e.right).normal.cross(v)) > 0)
-        continue;
+      // Nearest to the edge from outside: between the normals of its faces, or along one of them
+      // where the capsule lies flat on a face and reaches beyond it.
+      const double slack = kFlat * v.norm();
+      const double left = n.dot(b_.face(e.left).normal.cross(v));
+      const double right = n.dot(b_.face(e.right).normal.cross(v));
+      if (std::min(left, right) > slack || std::max(left, right) < -slack) continue;
       if (n.dot(b_.face(e.left).normal + b_.face(e.right).normal) <= 0) continue;
       out.add(x - round.radius * n, y, n, distance - round.radius, 2 + static_cast<int>(k % 60000));
     }
@@ -366,6 +429,7 @@ class Polyhedra final : public PairCollision {
   Vector3d origin_ = Vector3d::Zero();
   Placed a_, b_;
   std::vector<Corner> polygon_, clipped_;
+  std::vector<double> height_;
   std::vector<int> on_a_, on_b_;
 };
 

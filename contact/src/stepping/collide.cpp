@@ -134,8 +134,13 @@ void sphere_box(const Shape& a, const Pose& A, const Shape& b, const Pose& B, do
                 NearPoints& out) {
   const Vector3d p = B.rotation.transpose() * (A.position - B.position), half = 0.5 * b.size;
   const Vector3d inside = p.cwiseMax(-half).cwiseMin(half);
-  if (!(p - inside).isZero(0)) {
-    ball_ball(A.position, a.radius, B.position + B.rotation * inside, 0, margin, 0, out);
+  // In the axes of the box: differences of world positions have no direction on its surface.
+  const Vector3d d = p - inside;
+  const double distance = d.norm();
+  if (distance > 0) {
+    if (!(distance - a.radius < margin)) return;
+    const Vector3d n = B.rotation * (d / distance);
+    out.add(A.position - a.radius * n, B.position + B.rotation * inside, n, distance - a.radius, 0);
     return;
   }
   // The centre is in the box: out through the nearest face.
