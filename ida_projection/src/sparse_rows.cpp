@@ -11,6 +11,7 @@ namespace {
 
 // Sine of the angle at which a row counts as dependent: its square is what A A^T tells from zero.
 constexpr double kRankTolerance = 1e-6;
+constexpr double kSolved = 1e-8;  // of g: Newton's next move takes the rest
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -169,12 +170,12 @@ bool SparseRows::factor() {
 
 void SparseRows::solve(const std::vector<double>& g) {
   for (std::size_t k = 0; k < d.rows.size(); ++k) d.g[k] = g[at(d.rows[k])];
-  d.solve();
+  d.solver.solve(d.g.data(), d.dy.data(), kSolved);
   if (a.rows.empty()) return;
   d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
   for (std::size_t k = 0; k < a.rows.size(); ++k)
     a.g[k] = g[at(a.rows[k])] - times(a.rows[k], moved_.data());
-  a.solve();
+  a.solver.solve(a.g.data(), a.dy.data(), kSolved);
 }
 
 double SparseRows::terms(int i, const double* y) const {

@@ -1,150 +1,271 @@
-// Tether: L diag(d) L^T of A A^T for sparse A. SPDX-License-Identifier: BSD-3-Clause
+// Tether: L diag(d) L^T of A A^T + eps I for sparse A. SPDX-License-Identifier: BSD-3-Clause
 //
 // Row by row ("up-looking"; T. A. Davis, Direct Methods for Sparse Linear Systems, section 4.8):
-// row k of L solves a triangular system with the rows above it. A dependent row is left out by
-// 1/d_k = 0, which makes its column of L zero.
+// row k of L solves a triangular system with the rows above it. Neither A A^T nor a list of its
+// products is kept: row k of A meets the rows before it in the columns that they share.
 #include "gram_factor.hpp"
 
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <array>
 #include <numeric>
 
 namespace tether::linalg {
 
 namespace {
 
-using Lists = std::vector<std::vector<int>>;
+constexpr double kDependent = 16.0;  // eps (1 + |c|^2)
+constexpr double kThin = 1e6;        // eps
+constexpr int kTogether = 4;         // columns of L that are applied in one pass
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// place[i] of row i in the order of elimination.
-std::vector<int> minimum_degree(int m, const Lists& in_column, const std::vector<int>& row) {
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int i = 0; i < m; ++i) entries.emplace_back(i, i, 1.0);  // without a diagonal it gives up
-  for (const auto& column : in_column)
-    for (const int a : column)
-      for (const int b : column)
-        if (row[at(a)] > row[at(b)]) entries.emplace_back(row[at(a)], row[at(b)], 1.0);
-  Eigen::SparseMatrix<double> gram(m, m);
-  gram.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> inverse;
-  Eigen::AMDOrdering<int>()(gram.selfadjointView<Eigen::Lower>(), inverse);
-  std::vector<int> place(at(m));
-  for (int k = 0; k < m; ++k) place[at(inverse.indices()[k])] = k;
-  return place;
+// The rows of each column, ascending, one column after the other; starts has n + 1 entries.
+void transpose(int n, const std::vector<int>& row_starts, const std::vector<int>& columns,
+               std::vector<int>& starts, std::vector<int>& rows) {
+  starts.assign(at(n) + 1, 0);
+  for (const int j : columns) ++starts[at(j) + 1];
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  std::vector<int> next(starts.begin(), starts.end() - 1);
+  rows.resize(columns.size());
+  for (int i = 0; i + 1 < static_cast<int>(row_starts.size()); ++i)
+    for (int e = row_starts[at(i)]; e < row_starts[at(i) + 1]; ++e)
+      rows[at(next[at(columns[at(e)])]++)] = i;
 }
 
 }  // namespace
 
 void GramFactor::analyse(int n, const std::vector<int>& starts, const std::vector<int>& columns) {
   m_ = static_cast<int>(starts.size()) - 1;
-  std::vector<int> row(columns.size());
-  Lists in_column(at(n));
-  for (int i = 0; i < m_; ++i)
-    for (int e = starts[at(i)]; e < starts[at(i) + 1]; ++e) {
-      row[at(e)] = i;
-      in_column[at(columns[at(e)])].push_back(e);
-    }
-  place_ = minimum_degree(m_, in_column, row);
-  row_at_.resize(at(m_));
-  for (int i = 0; i < m_; ++i) row_at_[at(place_[at(i)])] = i;
-  find_products(in_column, row);
+  n_ = n;
+  order(starts, columns);
+  list_columns(starts, columns);
   find_factor_pattern();
+  find_supernodes();
   work_.assign(at(m_), 0.0);  // zero between calls of factor()
   solution_.assign(at(m_), 0.0);
   inverse_d_.assign(at(m_), 0.0);
+  dependent_.assign(at(m_), 0);
 }
 
-void GramFactor::find_products(const Lists& in_column, const std::vector<int>& row) {
-  std::vector<std::array<int, 4>> all;  // row and column of the product, entries
-  for (const auto& column : in_column)
-    for (const int a : column)
-      for (const int b : column) {
-        const int i = place_[at(row[at(a)])], j = place_[at(row[at(b)])];
-        if (i > j) all.push_back({i, j, a, b});
-      }
-  std::sort(all.begin(), all.end());
-  gram_starts_.assign(at(m_) + 1, 0);
-  gram_columns_.clear();
-  product_starts_.clear();
-  products_.clear();
-  for (std::size_t p = 0; p < all.size(); ++p) {
-    if (p == 0 || all[p][0] != all[p - 1][0] || all[p][1] != all[p - 1][1]) {
-      ++gram_starts_[at(all[p][0]) + 1];
-      gram_columns_.push_back(all[p][1]);
-      product_starts_.push_back(static_cast<int>(products_.size()));
+// place_: approximate minimum degree of the pattern of A A^T.
+void GramFactor::order(const std::vector<int>& starts, const std::vector<int>& columns) {
+  std::vector<int> column_starts, rows, seen(at(m_), -1), passed(at(n_), 0);
+  transpose(n_, starts, columns, column_starts, rows);
+  // Column i of the lower triangle: rows after i that share a column with it, and the diagonal,
+  // without which Eigen's ordering gives up.
+  std::vector<int> gram_starts{0}, gram_rows;
+  for (int i = 0; i < m_; ++i) {
+    gram_rows.push_back(i);
+    seen[at(i)] = i;
+    for (int e = starts[at(i)]; e < starts[at(i) + 1]; ++e) {
+      const int j = columns[at(e)];
+      const int first = column_starts[at(j)] + ++passed[at(j)];
+      for (int p = first; p < column_starts[at(j) + 1]; ++p)
+        if (seen[at(rows[at(p)])] != i) {
+          seen[at(rows[at(p)])] = i;
+          gram_rows.push_back(rows[at(p)]);
+        }
     }
-    products_.push_back({all[p][2], all[p][3]});
+    gram_starts.push_back(static_cast<int>(gram_rows.size()));
   }
-  product_starts_.push_back(static_cast<int>(products_.size()));
-  std::partial_sum(gram_starts_.begin(), gram_starts_.end(), gram_starts_.begin());
+  const std::vector<double> ones(gram_rows.size(), 1.0);
+  using Pattern = Eigen::SparseMatrix<double>;
+  const Eigen::Map<const Pattern> gram(m_, m_, static_cast<int>(gram_rows.size()),
+                                       gram_starts.data(), gram_rows.data(), ones.data());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> inverse;
+  Pattern whole;
+  whole = gram.selfadjointView<Eigen::Lower>();
+  Eigen::internal::minimum_degree_ordering(whole, inverse);
+  place_.resize(at(m_));
+  row_at_.resize(at(m_));
+  for (int k = 0; k < m_; ++k) {
+    row_at_[at(k)] = inverse.indices()[k];
+    place_[at(row_at_[at(k)])] = k;
+  }
+}
+
+void GramFactor::list_columns(const std::vector<int>& starts, const std::vector<int>& columns) {
+  entry_starts_.assign(1, 0);
+  entry_.clear();
+  entry_column_.clear();
+  for (const int i : row_at_) {
+    for (int e = starts[at(i)]; e < starts[at(i) + 1]; ++e) {
+      entry_.push_back(e);
+      entry_column_.push_back(columns[at(e)]);
+    }
+    entry_starts_.push_back(static_cast<int>(entry_.size()));
+  }
+  transpose(n_, entry_starts_, entry_column_, member_starts_, member_);
+  met_.assign(at(n_), 0);
+  member_value_.assign(entry_.size(), 0.0);
 }
 
 // Row k of L has the columns on the elimination tree's paths from the entries of row k of A A^T.
+// The rows that share a column lie on one path: it starts at the first of them.
 void GramFactor::find_factor_pattern() {
-  std::vector<int> parent(at(m_), -1), seen(at(m_), -1);
-  row_starts_.assign(1, 0);
-  row_columns_.clear();
-  column_starts_.assign(at(m_) + 1, 0);
+  std::vector<int> parent(at(m_), -1), seen(at(m_), -1), starts{0}, columns;
   for (int k = 0; k < m_; ++k) {
     seen[at(k)] = k;
-    for (int p = gram_starts_[at(k)]; p < gram_starts_[at(k) + 1]; ++p)
-      for (int j = gram_columns_[at(p)]; seen[at(j)] != k; j = parent[at(j)]) {
+    for (int p = entry_starts_[at(k)]; p < entry_starts_[at(k) + 1]; ++p)
+      for (int j = member_[at(member_starts_[at(entry_column_[at(p)])])]; seen[at(j)] != k;
+           j = parent[at(j)]) {
         if (parent[at(j)] == -1) parent[at(j)] = k;
         seen[at(j)] = k;
-        row_columns_.push_back(j);
-        ++column_starts_[at(j) + 1];
+        columns.push_back(j);
       }
-    std::sort(row_columns_.begin() + row_starts_.back(), row_columns_.end());
-    row_starts_.push_back(static_cast<int>(row_columns_.size()));
+    starts.push_back(static_cast<int>(columns.size()));
   }
-  std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
-  filled_.assign(column_starts_.begin(), column_starts_.end() - 1);
-  column_rows_.assign(row_columns_.size(), 0);
-  L_.assign(row_columns_.size(), 0.0);
-  for (int k = 0; k < m_; ++k)
-    for (int p = row_starts_[at(k)]; p < row_starts_[at(k) + 1]; ++p)
-      column_rows_[at(filled_[at(row_columns_[at(p)])]++)] = k;
+  transpose(m_, starts, columns, column_starts_, column_rows_);
+  transpose(m_, column_starts_, column_rows_, row_starts_, row_columns_);  // now ascending
+  filled_.assign(at(m_), 0);
+  L_.assign(column_rows_.size(), 0.0);
 }
 
-int GramFactor::factor(const double* A, const double* norm, double smallest) {
-  int left_out = 0;
+// Column j + 1 has the rows of column j without its own.
+void GramFactor::find_supernodes() {
+  alike_.assign(at(m_), 1);
+  const auto length = [this](int j) { return column_starts_[at(j) + 1] - column_starts_[at(j)]; };
+  for (int j = m_ - 2; j >= 0; --j)
+    if (length(j) == length(j + 1) + 1 && column_rows_[at(column_starts_[at(j)])] == j + 1)
+      alike_[at(j)] = alike_[at(j + 1)] + 1;
+}
+
+// Row k of A times the rows before it, into work_.
+void GramFactor::scatter_products(int k, const double* A) {
+  double* __restrict y = work_.data();
+  double* __restrict value = member_value_.data();
+  const int *member = member_.data(), *starts = member_starts_.data();
+  for (int p = entry_starts_[at(k)]; p < entry_starts_[at(k) + 1]; ++p) {
+    const int j = entry_column_[at(p)];
+    const double a = A[entry_[at(p)]];
+    const int here = starts[j] + met_[at(j)]++;
+    for (int q = starts[j]; q < here; ++q) y[member[q]] += a * value[q];
+    value[here] = a;
+  }
+}
+
+// Row k of L from row k of A A^T in work_, which becomes zero again; returns d_k.
+double GramFactor::eliminate(int k, double d) {
   double* __restrict y = work_.data();
   double* __restrict L = L_.data();
-  double* __restrict inverse_d = inverse_d_.data();
+  const double* __restrict inverse_d = inverse_d_.data();
   int* __restrict filled = filled_.data();
-  const int *rows = column_rows_.data(), *column_starts = column_starts_.data();
-  const int *gram_column = gram_columns_.data(), *row_column = row_columns_.data();
-  const int* last = product_starts_.data() + 1;
-  const Product* product = products_.data();
-  std::copy(column_starts_.begin(), column_starts_.end() - 1, filled_.begin());
-  for (int k = 0; k < m_; ++k) {
-    for (const int* end = gram_columns_.data() + gram_starts_[at(k) + 1]; gram_column < end;
-         ++gram_column, ++last) {
-      double sum = 0.0;
-      for (const Product* stop = products_.data() + *last; product < stop; ++product)
-        sum += A[product->a] * A[product->b];
-      y[*gram_column] = sum;
-    }
-    double d = norm[row_at_[at(k)]] > 0.0 ? 1.0 : 0.0;
-    for (const int* end = row_columns_.data() + row_starts_[at(k) + 1]; row_column < end;
-         ++row_column) {
-      const int j = *row_column;
+  const int *rows = column_rows_.data(), *starts = column_starts_.data();
+  const int* column = row_columns_.data() + row_starts_[at(k)];
+  const int* end = row_columns_.data() + row_starts_[at(k) + 1];
+  const auto finish = [&](int j, double yj) {
+    const double entry = yj * inverse_d[j];
+    d -= entry * yj;
+    L[starts[j] + filled[j]++] = entry;
+    y[j] = 0.0;
+  };
+  while (column < end) {
+    const int j = *column;
+    if (alike_[at(j)] >= kTogether && end - column >= kTogether) {
+      const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
+                   *L3 = L + starts[j + 3];
+      const double y0 = y[j];
+      const double y1 = y[j + 1] - L0[0] * y0;
+      const double y2 = y[j + 2] - L0[1] * y0 - L1[0] * y1;
+      const double y3 = y[j + 3] - L0[2] * y0 - L1[1] * y1 - L2[0] * y2;
+      const int* row = rows + starts[j + 3];
+      const int count = filled[j + 3];
+      for (int q = 0; q < count; ++q)
+        y[row[q]] -= L0[q + 3] * y0 + L1[q + 2] * y1 + L2[q + 1] * y2 + L3[q] * y3;
+      finish(j, y0);
+      finish(j + 1, y1);
+      finish(j + 2, y2);
+      finish(j + 3, y3);
+      column += kTogether;
+    } else {
       const double yj = y[j];
-      y[j] = 0.0;
-      const int stop = filled[j]++;
-      for (int q = column_starts[j]; q < stop; ++q) y[rows[q]] -= L[q] * yj;
-      const double entry = yj * inverse_d[j];
-      d -= entry * yj;
-      L[stop] = entry;
+      const int stop = starts[j] + filled[j];
+      for (int q = starts[j]; q < stop; ++q) y[rows[q]] -= L[q] * yj;
+      finish(j, yj);
+      ++column;
     }
-    const bool dependent = !(d > smallest);
-    left_out += dependent;
-    inverse_d[k] = dependent ? 0.0 : 1.0 / d;
   }
-  return left_out;
+  return d;
+}
+
+// |c|^2, c the coefficients of row k over the rows before it: L_before^T c = row k of L.
+double GramFactor::coefficients_square(int k) {
+  double* __restrict x = work_.data();
+  const double* __restrict L = L_.data();
+  const int *rows = column_rows_.data(), *starts = column_starts_.data();
+  const int* first = row_columns_.data() + row_starts_[at(k)];
+  const int* column = row_columns_.data() + row_starts_[at(k) + 1];
+  double square = 0.0;
+  while (column > first) {
+    const int j = column[-1] - (kTogether - 1);  // of four columns, if they are alike
+    if (column - first >= kTogether && column[-kTogether] == j && alike_[at(j)] >= kTogether) {
+      const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
+                   *L3 = L + starts[j + 3];
+      const int* row = rows + starts[j + 3];
+      const int count = filled_[at(j + 3)] - 1;  // the last entry is that of row k
+      double x0 = L0[count + 3], x1 = L1[count + 2], x2 = L2[count + 1], x3 = L3[count];
+      for (int q = 0; q < count; ++q) {
+        const double xq = x[row[q]];
+        x0 -= L0[q + 3] * xq;
+        x1 -= L1[q + 2] * xq;
+        x2 -= L2[q + 1] * xq;
+        x3 -= L3[q] * xq;
+      }
+      x2 -= L2[0] * x3;
+      x1 -= L1[0] * x2 + L1[1] * x3;
+      x0 -= L0[0] * x1 + L0[1] * x2 + L0[2] * x3;
+      x[j] = x0;
+      x[j + 1] = x1;
+      x[j + 2] = x2;
+      x[j + 3] = x3;
+      square += x0 * x0 + x1 * x1 + x2 * x2 + x3 * x3;
+      column -= kTogether;
+    } else {
+      const int last = starts[column[-1]] + filled_[at(column[-1])] - 1;
+      double xj = L[last];
+      for (int q = starts[column[-1]]; q < last; ++q) xj -= L[q] * x[rows[q]];
+      x[*--column] = xj;
+      square += xj * xj;
+    }
+  }
+  for (const int* end = row_columns_.data() + row_starts_[at(k) + 1]; column < end; ++column)
+    x[*column] = 0.0;
+  return square;
+}
+
+int GramFactor::factor(const double* A, const double* norm, double eps) {
+  std::fill(filled_.begin(), filled_.end(), 0);
+  std::fill(met_.begin(), met_.end(), 0);
+  int count = 0;
+  for (int k = 0; k < m_; ++k) {
+    scatter_products(k, A);
+    // Without rounding d is at least eps.
+    const double d = std::max(eliminate(k, 1.0 + eps), eps);
+    const bool thin = d <= kThin * eps;
+    const bool dependent = (thin && d <= kDependent * eps * (1.0 + coefficients_square(k))) ||
+                           !(norm[row_at_[at(k)]] > 0.0);
+    dependent_[at(k)] = dependent;
+    count += dependent;
+    inverse_d_[at(k)] = 1.0 / d;
+  }
+  return count;
+}
+
+void GramFactor::forward_in_place() {
+  double* __restrict x = solution_.data();
+  const double* __restrict L = L_.data();
+  const int *rows = column_rows_.data(), *starts = column_starts_.data();
+  for (int j = 0; j < m_; ++j) {
+    const double xj = x[j];
+    for (int q = starts[j]; q < starts[j + 1]; ++q) x[rows[q]] -= L[q] * xj;
+  }
+}
+
+void GramFactor::forward(double* z) {
+  for (int i = 0; i < m_; ++i) solution_[at(place_of(i))] = z[i];
+  forward_in_place();
+  for (int i = 0; i < m_; ++i) z[i] = solution_[at(place_of(i))];
 }
 
 void GramFactor::solve(double* z) {
@@ -153,16 +274,33 @@ void GramFactor::solve(double* z) {
   const double* __restrict inverse_d = inverse_d_.data();
   const int *rows = column_rows_.data(), *starts = column_starts_.data(), *place = place_.data();
   for (int i = 0; i < m_; ++i) x[place[i]] = z[i];
-  for (int j = 0; j < m_; ++j) {
-    const double xj = x[j];
-    for (int q = starts[j]; q < starts[j + 1]; ++q) x[rows[q]] -= L[q] * xj;
-  }
+  forward_in_place();
   for (int j = m_ - 1; j >= 0; --j) {
     double xj = x[j] * inverse_d[j];
     for (int q = starts[j]; q < starts[j + 1]; ++q) xj -= L[q] * x[rows[q]];
     x[j] = xj;
   }
   for (int i = 0; i < m_; ++i) z[i] = x[place[i]];
+}
+
+// c = L^-T D^-1 L^-1 z over the rows before the last. A dependent row among them gives its share to
+// those that it depends on: leaving c_j out of the back substitution does just that.
+void GramFactor::depend(double* z, int last) const {
+  const int count = last < 0 ? m_ : place_of(last);
+  std::vector<double> x(at(m_), 0.0);
+  for (int k = 0; k < count; ++k) x[at(k)] = z[row_at_[at(k)]];
+  for (int j = 0; j < count; ++j)
+    for (int q = column_starts_[at(j)];
+         q < column_starts_[at(j) + 1] && column_rows_[at(q)] < count; ++q)
+      x[at(column_rows_[at(q)])] -= L_[at(q)] * x[at(j)];
+  for (int j = count - 1; j >= 0; --j) {
+    double xj = x[at(j)] * inverse_d_[at(j)];
+    for (int q = column_starts_[at(j)];
+         q < column_starts_[at(j) + 1] && column_rows_[at(q)] < count; ++q)
+      xj -= L_[at(q)] * x[at(column_rows_[at(q)])];
+    x[at(j)] = dependent_[at(j)] ? 0.0 : xj;
+  }
+  for (int i = 0; i < m_; ++i) z[i] = x[at(place_of(i))];
 }
 
 }  // namespace tether::linalg

@@ -1,44 +1,61 @@
-// Tether: L diag(d) L^T of A A^T for sparse A. SPDX-License-Identifier: BSD-3-Clause
+// Tether: L diag(d) L^T of A A^T + eps I for sparse A. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <vector>
 
 namespace tether::linalg {
 
-/// A A^T = P^T L diag(d) L^T P, L unit lower triangular, for rows A of unit length (or zero) with a
-/// fixed pattern. The pattern of L and the products that make each entry of A A^T are found once.
+/// A A^T + eps I = P^T L diag(d) L^T P, L unit lower triangular, for rows A of unit length (or
+/// zero) with a fixed pattern. The pattern of L is found once. With w = L^-1 P b,
+///
+///     d_k = eps + min_c |a_k - A_before^T c|^2 + eps |c|^2 ,   w_k = b_k - c . b_before ,
+///
+/// c the coefficients of row k over the rows before it: d_k tells whether it depends on them, w_k
+/// whether b_k is what they make of it.
 class GramFactor {
  public:
   /// Rows in compressed form, n columns.
   void analyse(int n, const std::vector<int>& starts, const std::vector<int>& columns);
 
-  /// From the entries of A; norm[i] is 0 where row i is zero. A row with d_k <= `smallest` depends
-  /// on those before it, or is zero: it is left out, as if it were not there (1/d_k = 0). Returns
-  /// the number of such rows.
-  int factor(const double* A, const double* norm, double smallest);
+  /// From the entries of A; norm[i] is 0 where row i is zero. Rows that are zero or have
+  /// d_k <= 10 eps count as dependent; they take part all the same. Returns their number.
+  int factor(const double* A, const double* norm, double eps);
 
-  /// z <- (A A^T)^-1 z over the kept rows; 0 for the others.
+  /// z <- (A A^T + eps I)^-1 z.
   void solve(double* z);
-  bool kept(int i) const {
-    return inverse_d_[static_cast<std::size_t>(place_[static_cast<std::size_t>(i)])] != 0.0;
-  }
+  /// z <- P^T L^-1 P z
+  void forward(double* z);
+  /// z = A a, z.size() rows, becomes the coefficients of a over the independent rows before row
+  /// `last`, or over all independent rows if it is -1.
+  void depend(double* z, int last) const;
+
+  bool dependent(int i) const { return dependent_[static_cast<std::size_t>(place_of(i))] != 0; }
   int rows() const { return m_; }
+  long entries_of_factor() const { return static_cast<long>(L_.size()); }
 
  private:
-  struct Product {
-    int a, b;  // entries of A
-  };
-  void find_products(const std::vector<std::vector<int>>& in_column, const std::vector<int>& row);
+  int place_of(int i) const { return place_[static_cast<std::size_t>(i)]; }
+  void order(const std::vector<int>& starts, const std::vector<int>& columns);
+  void list_columns(const std::vector<int>& starts, const std::vector<int>& columns);
   void find_factor_pattern();
+  void find_supernodes();
+  double eliminate(int k, double d);
+  double coefficients_square(int k);
+  void scatter_products(int k, const double* A);
+  void forward_in_place();
 
-  int m_ = 0;
+  int m_ = 0, n_ = 0;
   std::vector<int> place_, row_at_;  // row i of A is row place_[i] of P A, and back
-  // Strict lower part of P A A^T P^T by rows, and each entry's products.
-  std::vector<int> gram_starts_, gram_columns_, product_starts_;
-  std::vector<Product> products_;
+  // P A by rows (where each entry is in A, and its column) and by columns (rows of P A, ascending,
+  // and the values of those that factor() has met).
+  std::vector<int> entry_starts_, entry_, entry_column_;
+  std::vector<int> member_starts_, member_, met_;
+  std::vector<double> member_value_;
   // L by rows (which columns, ascending) and by columns (which rows, ascending, and the values).
   std::vector<int> row_starts_, row_columns_, column_starts_, column_rows_, filled_;
+  std::vector<int> alike_;  // columns from j on that have the rows of column j below them
   std::vector<double> L_, inverse_d_, work_, solution_;
+  std::vector<char> dependent_;
 };
 
 }  // namespace tether::linalg

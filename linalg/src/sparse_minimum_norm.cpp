@@ -8,13 +8,17 @@
 #include <stdexcept>
 #include <string>
 
-#include "gram_factor.hpp"
+#include "bordered_gram.hpp"
 
 namespace tether::linalg {
 
 namespace {
 
-constexpr double kAnew = 0.1;  // q shorter than this part of a is orthogonalised twice
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kSmallestEps = 1e-13;  // A A^T of unit rows carries some 1e-15 of rounding
+constexpr double kHalving = 0.5;        // a step that leaves more of the residual is the last one
+constexpr int kProximalSteps = 8;
+constexpr int kGradientSteps = 10;
 
 double dot(const double* a, const double* b, std::size_t n) {
   double sum = 0.0;
@@ -80,18 +84,18 @@ void SparseMinimumNorm::resize(int columns, std::vector<int> starts, std::vector
   A_.assign(column_.size(), 0.0);
   metric_.assign(width(), 0.0);
   du_.assign(width(), 0.0);
-  z_.assign(static_cast<std::size_t>(sparse_), 0.0);
+  step_.assign(width(), 0.0);
+  p_.assign(width(), 0.0);
+  for (std::vector<double>* rows : {&b_, &left_, &z_, &Ap_, &MAp_}) rows->assign(m, 0.0);
   full_rows_.assign(f * width(), 0.0);
-  apart_.assign(f * width(), 0.0);
-  along_.assign(f, 0.0);
   norm_.assign(m, 0.0);
   inverse_norm_.assign(m, 0.0);
   order_.assign(m, 0);
   dropped_.clear();
   dropped_.reserve(m);
   inconsistency_.reserve(m);
-  gram_ = std::make_unique<GramFactor>();
-  gram_->analyse(n_, starts_, column_);
+  gram_ = std::make_unique<BorderedGram>();
+  gram_->analyse(n_, starts_, column_, full_);
 }
 
 double SparseMinimumNorm::row_dot(int i, const double* u) const {
@@ -104,16 +108,37 @@ double SparseMinimumNorm::row_dot(int i, const double* u) const {
   return sum;
 }
 
-// u <- u + sign A^T z over the sparse rows.
-void SparseMinimumNorm::add_rows(const double* z, double sign, double* u) const {
+// z = A u
+void SparseMinimumNorm::multiply(const double* u, double* z) const {
   const double* entry = A_.data();
   const int* column = column_.data();
   const int *begin = column, *starts = starts_.data();
   for (int i = 0; i < sparse_; ++i) {
-    const double share = sign * z[i];
+    double sum = 0.0;
+    for (const int* end = begin + starts[i + 1]; column != end; ++column, ++entry)
+      sum += *entry * u[*column];
+    z[i] = sum;
+  }
+  for (int i = sparse_; i < rows(); ++i) z[i] = row_dot(i, u);
+}
+
+// u = A^T z; returns |u|.
+double SparseMinimumNorm::transposed(const double* z, double* u) const {
+  std::fill(u, u + n_, 0.0);
+  const double* entry = A_.data();
+  const int* column = column_.data();
+  const int *begin = column, *starts = starts_.data();
+  for (int i = 0; i < sparse_; ++i) {
+    const double share = z[i];
     for (const int* end = begin + starts[i + 1]; column != end; ++column, ++entry)
       u[*column] += *entry * share;
   }
+  const double* a = full_rows_.data();
+  for (int f = 0; f < full_; ++f, a += n_) {
+    const double share = z[sparse_ + f];
+    for (int j = 0; j < n_; ++j) u[j] += share * a[j];
+  }
+  return std::sqrt(dot(u, u, width()));
 }
 
 bool SparseMinimumNorm::scale_sparse() {
@@ -142,51 +167,22 @@ bool SparseMinimumNorm::scale_full() {
   return true;
 }
 
-// row <- row - A^T (A A^T)^-1 A row
-void SparseMinimumNorm::take_out_sparse(double* row) {
-  for (int i = 0; i < sparse_; ++i) z_[static_cast<std::size_t>(i)] = row_dot(i, row);
-  gram_->solve(z_.data());
-  add_rows(z_.data(), -1.0, row);
-}
-
-// q_f of each full row: orthogonal to the sparse rows and to the q before it.
-void SparseMinimumNorm::orthogonalise() {
+void SparseMinimumNorm::couple_full() {
   for (int f = 0; f < full_; ++f) {
     const double* a = full_row(f);
-    double* q = apart_.data() + static_cast<std::size_t>(f) * width();
-    std::copy(a, a + width(), q);
-    double length = 1.0;
-    for (int pass = 0; pass < 2; ++pass) {
-      take_out_sparse(q);
-      for (int e = 0; e < f; ++e) {
-        if (along_[static_cast<std::size_t>(e)] == 0.0) continue;
-        const double* other = apart_.data() + static_cast<std::size_t>(e) * width();
-        const double share = dot(other, q, width());
-        for (std::size_t j = 0; j < width(); ++j) q[j] -= share * other[j];
-      }
-      length = std::sqrt(dot(q, q, width()));
-      if (length > kAnew) break;
-    }
-    along_[static_cast<std::size_t>(f)] = length;
-    if (length > 0.0)
-      for (std::size_t j = 0; j < width(); ++j) q[j] /= length;
+    for (int i = 0; i < sparse_; ++i) gram_->coupling(f)[i] = row_dot(i, a);
+    for (int e = 0; e <= f; ++e) gram_->product(f, e) = dot(a, full_row(e), width());
   }
 }
 
 bool SparseMinimumNorm::factor(double rank_tolerance) {
   if (!scale_sparse() || !scale_full()) return false;
-  const int left_out = gram_->factor(A_.data(), norm_.data(), rank_tolerance * rank_tolerance);
-  orthogonalise();
+  couple_full();
+  const double eps = std::max(rank_tolerance * rank_tolerance, kSmallestEps);
+  const int dependent = gram_->factor(A_.data(), norm_.data(), eps);
   dropped_.clear();
-  if (left_out > 0)
-    for (int i = 0; i < sparse_; ++i)
-      if (!gram_->kept(i)) dropped_.push_back(i);
-  for (int f = 0; f < full_; ++f) {
-    double& along = along_[static_cast<std::size_t>(f)];
-    if (along > rank_tolerance) continue;
-    along = 0.0;
-    dropped_.push_back(sparse_ + f);
-  }
+  for (int i = 0; dependent > 0 && i < rows(); ++i)
+    if (gram_->dependent(i)) dropped_.push_back(i);
   std::size_t kept = 0, next = 0;
   for (int i = 0; i < rows(); ++i) {
     if (next < dropped_.size() && dropped_[next] == i)
@@ -198,33 +194,101 @@ bool SparseMinimumNorm::factor(double rank_tolerance) {
   return true;
 }
 
-void SparseMinimumNorm::solve(const double* g, double* dy) {
-  for (int i = 0; i < sparse_; ++i)
-    z_[static_cast<std::size_t>(i)] = g[i] * inverse_norm_[static_cast<std::size_t>(i)];
+// left_ = b - A du; returns its length.
+double SparseMinimumNorm::find_left() {
+  multiply(du_.data(), left_.data());
+  for (std::size_t i = 0; i < left_.size(); ++i) left_[i] = b_[i] - left_[i];
+  return std::sqrt(dot(left_.data(), left_.data(), left_.size()));
+}
+
+// z_ = M^-1 left_, step_ = A^T z_; returns |step_|.
+double SparseMinimumNorm::find_step() {
+  z_ = left_;
   gram_->solve(z_.data());
+  ++iterations_;
+  return transposed(z_.data(), step_.data());
+}
+
+// Is the residual small enough, or does du no longer change?
+bool SparseMinimumNorm::done(double step, double left) const {
+  const double length = std::sqrt(dot(du_.data(), du_.data(), width()));
+  return left <= tolerance_ * size_ + 2.0 * kEpsilon * length || step <= tolerance_ * length;
+}
+
+void SparseMinimumNorm::take_back(double share, const std::vector<double>& step, double* left) {
+  for (std::size_t j = 0; j < width(); ++j) du_[j] -= share * step[j];
+  *left = find_left();
+}
+
+// From du = 0. Returns false where more of them would reduce the residual too slowly.
+bool SparseMinimumNorm::proximal_steps(double* left) {
+  for (int k = 0; k < kProximalSteps; ++k) {
+    const double step = find_step(), before = *left;
+    for (std::size_t j = 0; j < width(); ++j) du_[j] += step_[j];
+    *left = find_left();
+    if (*left > before) {  // rounding rules: b has no part that the rows can give
+      take_back(1.0, step_, left);
+      return true;
+    }
+    if (done(step, *left)) return true;
+    if (k > 0 && *left > kHalving * before) return false;
+  }
+  return false;
+}
+
+// Least squares by conjugate gradients (Golub and Van Loan, section 11.3.9) in the norm of M^-1:
+// what proximal steps do, with the best multiple of each direction.
+void SparseMinimumNorm::gradient_steps(double* left) {
+  double square = std::pow(find_step(), 2);
+  p_ = step_;
+  for (int k = 0; k < kGradientSteps; ++k) {
+    multiply(p_.data(), Ap_.data());
+    MAp_ = Ap_;
+    gram_->solve(MAp_.data());
+    ++iterations_;
+    const double curvature = dot(Ap_.data(), MAp_.data(), Ap_.size());
+    if (!(curvature > 0.0)) return;
+    const double share = square / curvature, before = *left;
+    for (std::size_t j = 0; j < width(); ++j) du_[j] += share * p_[j];
+    for (std::size_t i = 0; i < z_.size(); ++i) z_[i] -= share * MAp_[i];
+    *left = find_left();
+    if (*left > before) return take_back(share, p_, left);  // rounding rules
+    const double step = transposed(z_.data(), step_.data()), next = step * step;
+    if (done(step, *left)) return;
+    for (std::size_t j = 0; j < width(); ++j) p_[j] = step_[j] + next / square * p_[j];
+    square = next;
+  }
+}
+
+void SparseMinimumNorm::solve(const double* g, double* dy, double tolerance) {
+  for (std::size_t i = 0; i < b_.size(); ++i) left_[i] = b_[i] = g[i] * inverse_norm_[i];
   std::fill(du_.begin(), du_.end(), 0.0);
-  add_rows(z_.data(), 1.0, du_.data());
-  for (int f = 0; f < full_; ++f) {
-    const auto k = static_cast<std::size_t>(f), i = k + static_cast<std::size_t>(sparse_);
-    if (along_[k] == 0.0) continue;
-    const double* q = apart_.data() + k * width();
-    const double left = g[i] * inverse_norm_[i] - row_dot(static_cast<int>(i), du_.data());
-    const double share = left / along_[k];
-    for (std::size_t j = 0; j < width(); ++j) du_[j] += share * q[j];
-  }
-  inconsistency_.clear();
-  for (const int i : dropped_) {
-    const double scale = inverse_norm_[static_cast<std::size_t>(i)];
-    inconsistency_.push_back(std::abs(scale > 0.0 ? row_dot(i, du_.data()) - scale * g[i] : g[i]));
-  }
+  iterations_ = 0;
+  tolerance_ = tolerance;
+  size_ = std::sqrt(dot(b_.data(), b_.data(), b_.size()));
+  double left = size_;
+  if (size_ > 0.0 && !proximal_steps(&left)) gradient_steps(&left);
+  residual_ = size_ > 0.0 ? left / size_ : 0.0;
+  find_inconsistencies(g);
   for (std::size_t j = 0; j < width(); ++j) dy[j] = du_[j] * metric_[j];
 }
 
-// a_k = sum of shares of the kept rows: those of the full rows from the last to the first, then the
-// sparse ones by (A A^T)^-1 A of the rest.
+// L^-1 (b - A du): entry k is what row k differs by from the combination of rows before it.
+void SparseMinimumNorm::find_inconsistencies(const double* g) {
+  inconsistency_.clear();
+  if (dropped_.empty()) return;
+  z_ = left_;
+  gram_->forward(z_.data());
+  for (const int i : dropped_) {
+    const auto k = static_cast<std::size_t>(i);
+    inconsistency_.push_back(std::abs(norm_[k] > 0.0 ? z_[k] : g[i]));
+  }
+}
+
+// Two rounds, the second one for what eps has left.
 std::vector<double> SparseMinimumNorm::dependence(int k) const {
   const int row = pivot(k);
-  std::vector<double> rest(width(), 0.0), share(static_cast<std::size_t>(rows()), 0.0);
+  std::vector<double> rest(width(), 0.0), share(norm_.size(), 0.0), z(norm_.size()), part(width());
   if (row >= sparse_) {
     const double* a = full_rows_.data() + static_cast<std::size_t>(row - sparse_) * width();
     rest.assign(a, a + width());
@@ -234,18 +298,13 @@ std::vector<double> SparseMinimumNorm::dependence(int k) const {
       rest[static_cast<std::size_t>(column_[static_cast<std::size_t>(e)])] =
           A_[static_cast<std::size_t>(e)];
   }
-  for (int f = std::min(row - sparse_, full_) - 1; f >= 0; --f) {
-    const auto e = static_cast<std::size_t>(f);
-    if (along_[e] == 0.0) continue;
-    const double* a = full_rows_.data() + e * width();
-    const double part = dot(apart_.data() + e * width(), rest.data(), width()) / along_[e];
-    for (std::size_t j = 0; j < width(); ++j) rest[j] -= part * a[j];
-    share[static_cast<std::size_t>(sparse_) + e] = part;
+  for (int round = 0; round < 2; ++round) {
+    multiply(rest.data(), z.data());
+    gram_->depend(z.data(), row);
+    transposed(z.data(), part.data());
+    for (std::size_t j = 0; j < width(); ++j) rest[j] -= part[j];
+    for (std::size_t i = 0; i < z.size(); ++i) share[i] += z[i];
   }
-  std::vector<double> z(static_cast<std::size_t>(sparse_));
-  for (int i = 0; i < sparse_; ++i) z[static_cast<std::size_t>(i)] = row_dot(i, rest.data());
-  gram_->solve(z.data());
-  std::copy(z.begin(), z.end(), share.begin());
   std::vector<double> kept;
   for (int i = 0; i < rank(); ++i) kept.push_back(share[static_cast<std::size_t>(pivot(i))]);
   return kept;

@@ -17,6 +17,7 @@ struct SparseCase {
   Case dense;
   std::vector<int> starts{0}, columns;
   int full = 0;
+  std::vector<double> values{};  // where C would be too large to be dense
 };
 
 /// Row i has entries near column 1.4 i and one anywhere.
@@ -60,6 +61,66 @@ Eigen::VectorXd solve(SparseMinimumNorm& solver, const Eigen::VectorXd& g) {
   Eigen::VectorXd dy(solver.columns());
   solver.solve(g.data(), dy.data());
   return dy;
+}
+
+/// Distances between n x n balls on a wavy surface, along both diagonals, too: more rows than the
+/// 3 n^2 - 6 ways to move them, and many that depend on others up to 1e-6 and less of themselves.
+SparseCase net(int n, double bend) {
+  SparseCase c;
+  std::vector<Eigen::Vector3d> balls;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const double x = i / (n - 1.0) - 0.5, y = j / (n - 1.0) - 0.5;
+      balls.emplace_back(x, y, 0.1 * bend * std::sin(6.0 * x) * std::cos(5.0 * y));
+    }
+  std::vector<Eigen::Vector3d> directions;
+  const auto link = [&](int a, int b) {
+    directions.push_back(balls[static_cast<std::size_t>(b)] - balls[static_cast<std::size_t>(a)]);
+    for (const int ball : {a, b})
+      for (int k = 0; k < 3; ++k) c.columns.push_back(3 * ball + k);
+    c.starts.push_back(static_cast<int>(c.columns.size()));
+  };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const int ball = i * n + j;
+      if (i + 1 < n) link(ball, ball + n);
+      if (j + 1 < n) link(ball, ball + 1);
+      if (i + 1 < n && j + 1 < n) {
+        link(ball, ball + n + 1);
+        link(ball + 1, ball + n);
+      }
+    }
+  for (const Eigen::Vector3d& d : directions)
+    for (const double sign : {-1.0, 1.0})
+      for (int k = 0; k < 3; ++k) c.values.push_back(sign * d[k] / d.norm());
+  c.dense.D = Eigen::VectorXd::Ones(3 * n * n);
+  return c;
+}
+
+Eigen::VectorXd times(const SparseCase& c, const Eigen::VectorXd& x) {
+  Eigen::VectorXd product = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(c.starts.size()) - 1);
+  for (int i = 0; i < product.size(); ++i)
+    for (int e = c.starts[static_cast<std::size_t>(i)];
+         e < c.starts[static_cast<std::size_t>(i) + 1]; ++e)
+      product[i] +=
+          c.values[static_cast<std::size_t>(e)] * x[c.columns[static_cast<std::size_t>(e)]];
+  return product;
+}
+
+SparseMinimumNorm factored_net(const SparseCase& c) {
+  SparseMinimumNorm solver;
+  solver.resize(static_cast<int>(c.dense.D.size()), c.starts, c.columns, 0);
+  std::copy(c.values.begin(), c.values.end(), solver.entries());
+  std::copy_n(c.dense.D.data(), solver.columns(), solver.metric());
+  REQUIRE(solver.factor());
+  return solver;
+}
+
+RowMajor dense_rows(const SparseCase& c) {
+  const auto m = static_cast<Eigen::Index>(c.starts.size()) - 1, n = c.dense.D.size();
+  RowMajor A(m, n);
+  for (Eigen::Index j = 0; j < n; ++j) A.col(j) = times(c, Eigen::VectorXd::Unit(n, j));
+  return A;
 }
 
 }  // namespace
@@ -164,6 +225,79 @@ TEST_CASE("vanishing rows, held columns, huge and tiny units, entries that are n
   load(solver, c);  // and recovers
   REQUIRE(solver.factor());
   CHECK((solve(solver, c.dense.g) - plain).cwiseAbs().maxCoeff() == 0.0);
+}
+
+TEST_CASE("nets of nearly dependent rows: solved, never longer than the least norm, rank known") {
+  std::mt19937 random(5);
+  for (const double bend : {0.3, 1.5})
+    for (const int n : {10, 30, 60, 110}) {
+      if (n > 60 && bend < 1.0) continue;
+      INFO(n << " x " << n << " balls, bend " << bend);
+      SparseCase c = net(n, bend);
+      const Eigen::VectorXd generated = random_vector(3 * n * n, random);
+      const Eigen::VectorXd b = times(c, generated);
+      SparseMinimumNorm solver = factored_net(c);
+      Eigen::VectorXd x(3 * n * n);
+      solver.solve(b.data(), x.data());
+      const double left = (b - times(c, x)).norm() / b.norm();
+      CHECK(left < 1e-9);
+      CHECK(solver.residual() == Approx(left).margin(1e-14));
+      CHECK(solver.iterations() <= 18);
+      CHECK(x.norm() <= (1.0 + 1e-9) * generated.norm());  // the least norm is not longer
+      CHECK(std::abs(solver.rank() - (3 * n * n - 6)) <= n * n / 40);
+      double contradiction = 0.0;
+      for (int k = solver.rank(); k < solver.rows(); ++k)
+        contradiction = std::max(contradiction, solver.inconsistency(k));
+      CHECK(contradiction < 1e-6);
+    }
+}
+
+TEST_CASE("every direction of a net, however thin: at most the least norm, and no residual grows") {
+  const SparseCase c = net(8, 1.5);
+  const RowMajor A = dense_rows(c);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  SparseMinimumNorm solver = factored_net(c);
+  int thin = 0;
+  for (Eigen::Index k = 0; k < svd.singularValues().size(); ++k) {
+    const double sigma = svd.singularValues()[k];
+    INFO("singular value " << sigma);
+    const Eigen::VectorXd b = svd.matrixU().col(k), x = solve(solver, b);
+    thin += sigma < 1e-3;
+    CHECK(solver.residual() <= 1.0 + 1e-12);
+    if (sigma > 1e-14) CHECK(x.norm() <= 2.0 / sigma);
+    if (sigma > 1e-6) {
+      CHECK(solver.residual() < 1e-6);
+      CHECK((x - svd.matrixV().col(k) / sigma).norm() <= 1e-6 / sigma);
+    }
+  }
+  CHECK(thin >= 6);
+}
+
+TEST_CASE("what no motion of a net can give is told by rows, in any units of the rows") {
+  for (const double unit : {1e-8, 1.0, 1e8}) {
+    INFO("unit " << unit);
+    SparseCase c = net(8, 1.5);
+    for (double& value : c.values) value *= unit;
+    const RowMajor A = dense_rows(c);
+    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> least(A);
+    SparseMinimumNorm solver = factored_net(c);
+    REQUIRE(solver.dropped() > 0);
+    std::mt19937 random(8);
+    Eigen::VectorXd b = A * random_vector(solver.columns(), random);
+    const int row = solver.pivot(solver.rank());
+    b[row] += 0.25 * solver.row_norm(row);
+    const Eigen::VectorXd x = solve(solver, b);
+    const double expected = (A * least.solve(b) - b).norm();
+    CHECK((A * x - b).norm() == Approx(expected).epsilon(1e-3));
+    CHECK(solver.residual() == Approx(expected / b.norm()).epsilon(1e-3));
+    // The changed row is off by what was added to it.
+    CHECK(solver.inconsistency(solver.rank()) == Approx(0.25).epsilon(1e-3));
+    const std::vector<double> share = solver.dependence(solver.rank());
+    Eigen::VectorXd rest = A.row(row).transpose() / unit;
+    for (int i = 0; i < solver.rank(); ++i)
+      rest -= share[static_cast<std::size_t>(i)] * A.row(solver.pivot(i)).transpose() / unit;
+    CHECK(rest.norm() < 1e-5);
+  }
 }
 
 TEST_CASE("a long band: little fill, no allocation once resized") {

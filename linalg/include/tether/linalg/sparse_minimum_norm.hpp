@@ -7,26 +7,34 @@
 
 namespace tether::linalg {
 
-class GramFactor;
+class BorderedGram;
 
 /// The same as MinimumNorm, min sum_j (dy_j / D_j)^2 subject to C dy = g, for an m x n matrix C
-/// whose first rows are sparse with a fixed pattern and whose last `full` rows are dense:
+/// whose first rows are sparse with a fixed pattern and whose last `full` rows are dense.
 ///
-/// With A = S C D, S = diag(1 / |row_i(C D)|), for the sparse rows alone du = A^T z, A A^T z = S g.
-/// A A^T = L diag(d) L^T with L sparse (approximate minimum degree, analysed once). A full row a,
-/// which would fill A A^T, is replaced by its part q = a - A^T (A A^T)^-1 A a that leaves the
-/// sparse rows alone, and du follows along q. dy = D du.
+/// With A = S C D, S = diag(1 / |row_i(C D)|), b = S g and M = A A^T + eps I = L diag(d) L^T (L
+/// sparse, approximate minimum degree, analysed once; full rows as a border) the steps
 ///
-/// Condition: A A^T squares that of A. Rows have unit length, so d_k is the squared sine of the
-/// angle between row k and those before it; a row with a sine of `rank_tolerance` or less is
-/// dropped, and 1e-6 is what round-off allows. There is no pivoting for rank: dropped are rows that
-/// depend on earlier ones in the elimination's order. A move is exact up to about eps /
-/// rank_tolerance^2 at worst, which repeated moves (Newton's method) remove.
+///     du <- du + A^T M^-1 (b - A du)
 ///
-/// Cost: resize() sets up a list of products, sum_j (entries in column j)^2 long: a column that all
-/// rows share makes that m^2. factor() and solve() do not allocate.
+/// reduce the part of the residual along a singular value s of A to eps / (s^2 + eps) of itself
+/// each (proximal point method: Rockafellar, SIAM J. Control Optim. 14 (1976), 877). They stop at
+/// the residual that solve() is asked for, or where du no longer changes; where the residual stops
+/// halving, conjugate gradients on |M^-1/2 (b - A du)| with the same factors go on. In every
+/// direction du grows from 0 towards the solution of least norm: however nearly dependent the rows
+/// are, |du| stays below |b| / (2 sqrt(eps)) for each step, and below the least norm altogether.
+///
+/// Rank: with unit rows d_k is the squared sine of the angle between row k and those before it, in
+/// the elimination's order, plus a small multiple of eps. A row with d_k <= 10 eps is called
+/// dropped. It takes part in the solution all the same; rows that contradict each other share what
+/// cannot be solved (least squares), and inconsistency() says how much that is.
+///
+/// resize() analyses the pattern: its cost grows as the entries of A A^T; a column that all rows
+/// share makes that m^2. factor() and solve() do not allocate.
 class SparseMinimumNorm {
  public:
+  static constexpr double kTolerance = 1e-14;
+
   SparseMinimumNorm();
   ~SparseMinimumNorm();
   SparseMinimumNorm(SparseMinimumNorm&&) noexcept;
@@ -47,10 +55,12 @@ class SparseMinimumNorm {
   /// Writable storage for D, n entries >= 0, that the next factor() reads; D_j = 0 keeps dy_j = 0.
   double* metric() { return metric_.data(); }
 
-  /// False if C D has an entry that is not finite; the factors are then unusable.
+  /// eps = rank_tolerance^2, at least 1e-13, which rounding of A A^T needs. False if C D has an
+  /// entry that is not finite; the factors are then unusable.
   bool factor(double rank_tolerance = 1e-6);
-  /// dy (n entries) from the kept factors; g has m entries in the units of the rows.
-  void solve(const double* g, double* dy);
+  /// dy (n entries) from the kept factors; g has m entries in the units of the rows. Stops at
+  /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() says what was reached.
+  void solve(const double* g, double* dy, double tolerance = kTolerance);
 
   int rank() const { return rows() - dropped(); }
   int dropped() const { return static_cast<int>(dropped_.size()); }
@@ -58,7 +68,15 @@ class SparseMinimumNorm {
   int pivot(int k) const { return order_[static_cast<std::size_t>(k)]; }
   /// |row_i(C D)|; 0 for a row that vanishes.
   double row_norm(int i) const { return norm_[static_cast<std::size_t>(i)]; }
-  /// After solve(): |A_i du - (S g)_i| of the dropped row pivot(k); |g_i| if it vanishes.
+
+  /// After solve(): |b - A du| / |b|, 0 for b = 0. Rows that vanish do not count.
+  double residual() const { return residual_; }
+  /// After solve(): (b - A du)_i, a distance in the metric.
+  double residual(int i) const { return left_[static_cast<std::size_t>(i)]; }
+  /// M^-1 solves of the last solve().
+  int iterations() const { return iterations_; }
+  /// After solve(): by how much dropped row pivot(k) contradicts the rows that it depends on, a
+  /// distance in the metric: |b_i - c . b_kept|, c = dependence(k); |g_i| if the row vanishes.
   double inconsistency(int k) const { return inconsistency_[static_cast<std::size_t>(k - rank())]; }
   /// Coefficients over the kept rows pivot(0 .. rank()-1) that give dropped row k. Allocates.
   std::vector<double> dependence(int k) const;
@@ -67,18 +85,27 @@ class SparseMinimumNorm {
   std::size_t width() const { return static_cast<std::size_t>(n_); }
   bool scale_sparse();
   bool scale_full();
-  void orthogonalise();
-  void take_out_sparse(double* row);
+  void couple_full();
   double row_dot(int i, const double* u) const;
-  void add_rows(const double* z, double sign, double* u) const;
+  void multiply(const double* u, double* z) const;
+  double transposed(const double* z, double* u) const;
+  double find_left();
+  double find_step();
+  void take_back(double share, const std::vector<double>& step, double* left);
+  bool done(double step, double left) const;
+  bool proximal_steps(double* left);
+  void gradient_steps(double* left);
+  void find_inconsistencies(const double* g);
 
-  int n_ = 0, sparse_ = 0, full_ = 0;
+  int n_ = 0, sparse_ = 0, full_ = 0, iterations_ = 0;
   std::vector<int> starts_{0}, column_;
   std::vector<double> A_, metric_, norm_, inverse_norm_;
-  std::vector<double> full_rows_, apart_;  // a, unit length, and q, unit length
-  std::vector<double> along_;              // a . q; 0: the full row is dropped
-  std::vector<double> du_, z_;
-  std::unique_ptr<GramFactor> gram_;
+  std::vector<double> full_rows_;      // unit length
+  std::vector<double> du_, b_, left_;  // left_ = b - A du
+  std::vector<double> z_, step_;       // M^-1 (b - A du), and A^T of it
+  std::vector<double> p_, Ap_, MAp_;   // conjugate gradients: direction, A p, M^-1 A p
+  double size_ = 0.0, tolerance_ = 0.0, residual_ = 0.0;  // size_ = |b|
+  std::unique_ptr<BorderedGram> gram_;
   std::vector<int> dropped_, order_;
   std::vector<double> inconsistency_;
 };
