@@ -1,4 +1,4 @@
-// Tether: which variables are algebraic.
+// Tether: which variables are algebraic, and which of them move with the rest.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
@@ -81,6 +81,99 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
   }
   set_id(id);
   return Status::success;
+}
+
+// F(t, y, y'_pred), N values, through IDA's own callback: ypred is replaced for the call.
+bool Projection::Impl::residual_at(const double* y, double* f) {
+  if (!none_) {
+    none_ = OwnedVector(present_.base);
+    f_ = OwnedVector(present_.base);
+    N_VConst(0.0, none_);
+  }
+  double* base = present_.base_entries;
+  std::copy(base, base + size_, saved_entries_);
+  std::copy(y, y + size_, base);
+  ++statistics_.residual_evaluations;
+  const bool evaluated = system_(none_, f_, mem_) == 0;
+  std::copy(saved_entries_, saved_entries_ + size_, base);
+  const double* values = N_VGetArrayPointer(f_);
+  std::copy(values, values + size_, f);
+  return evaluated;
+}
+
+// The equations of F that notice no change of y', bit for bit.
+std::vector<char> Projection::Impl::derivative_free_equations(const Candidate& candidate) {
+  const auto n = static_cast<std::size_t>(size_);
+  const double cj = step_data().cj;
+  OwnedVector ycor(candidate.base), none(candidate.base), base(candidate.base),
+      shifted(candidate.base);
+  N_VScale(1.0, candidate.base, saved_);
+  N_VConst(0.0, none);
+  double* e = N_VGetArrayPointer(ycor);
+  std::vector<double> lower(n);
+  std::vector<char> free(n, 1);
+  bool known = false;
+  for (const double size : {1.0, -0.37}) {
+    for (std::size_t j = 0; j < n; ++j) {
+      const double w = candidate.weight_entries[j];
+      const double change = size * (1.0 + 0.5 * std::sin(1.0 + 2.3 * static_cast<double>(j))) *
+                            std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(cj));
+      const double low = saved_entries_[j] - change;
+      candidate.base_entries[j] = low + change;  // what F sees in both evaluations
+      e[j] = change;
+      lower[j] = low;
+    }
+    bool ok = system_(none, base, mem_) == 0;
+    std::copy(lower.begin(), lower.end(), candidate.base_entries);
+    ok = system_(ycor, shifted, mem_) == 0 && ok;
+    statistics_.residual_evaluations += 2;
+    N_VScale(1.0, saved_, candidate.base);
+    if (!ok) continue;  // F refuses this y'; the other size decides
+    known = true;
+    const double* before = N_VGetArrayPointer(base);
+    const double* after = N_VGetArrayPointer(shifted);
+    for (std::size_t i = 0; i < n; ++i) free[i] = free[i] && before[i] == after[i];
+  }
+  if (!known) free.assign(n, 0);
+  return free;
+}
+
+// Rows that hang on algebraic variables which equations of F determine are moved together with
+// these equations.
+void Projection::Impl::join_equations(const Candidate& candidate) {
+  if (!contiguous_ || !has_algebraic_ || !has_values(constraints) ||
+      size_ > options_.derive_id_limit)
+    return;
+  const auto n = static_cast<std::size_t>(size_);
+  std::vector<double> y(n), WT(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
+    WT[j] = candidate.weight_entries[j] > 0.0 ? 1.0 / candidate.weight_entries[j] : 0.0;
+  }
+  Evaluator rows(constraints, statistics_);
+  const Residual residual = [this](const double* at, double* f) { return residual_at(at, f); };
+  const double* id = N_VGetArrayPointer(id_);
+  if (!contain_algebraic(rows, candidate.t, y, WT, options_.hold, id)) return;
+  const JoinedEquations found = find_joined_equations(
+      rows, residual, derivative_free_equations(candidate), candidate.t, y, WT, options_.hold, id);
+  if (found.moves.empty()) return;
+  moved_id_ = OwnedVector(candidate.base);
+  for (std::size_t j = 0; j < n; ++j)
+    N_VGetArrayPointer(moved_id_)[j] = found.moves[j] ? 1.0 : id[j];
+  if (found.equations.empty()) return;
+  joined_ = constraints + as_constraints(
+                              found, residual, [this] { return present_.weight_entries; }, size_);
+  own_mover_ = std::move(mover_);
+  mover_ = has_sparse_rows(constraints)
+               ? make_sparse_mover(joined_, options_, statistics_, size_, rows.rows())
+               : make_dense_mover(joined_, options_, statistics_, size_, rows.rows());
+  mover_->reset();
+}
+
+// 1 where a variable moves with the rest, 0 where it follows; null: all move.
+N_Vector Projection::Impl::moved_id() const {
+  if (!has_algebraic_) return nullptr;
+  return moved_id_ ? moved_id_ : id_;
 }
 
 }  // namespace tether::ida_projection

@@ -322,13 +322,15 @@ template double ContiguousMover<RowBlocks>::rounding_length();
 template double ContiguousMover<SparseRows>::rounding_length();
 
 std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
-                                        Statistics& statistics, int size) {
-  return std::make_unique<ContiguousMover<RowBlocks>>(constraints, options, statistics, size);
+                                        Statistics& statistics, int size, int reported) {
+  return std::make_unique<ContiguousMover<RowBlocks>>(constraints, options, statistics, size,
+                                                      reported);
 }
 
 std::unique_ptr<Mover> make_sparse_mover(const Constraints& constraints, const Options& options,
-                                         Statistics& statistics, int size) {
-  return std::make_unique<ContiguousMover<SparseRows>>(constraints, options, statistics, size);
+                                         Statistics& statistics, int size, int reported) {
+  return std::make_unique<ContiguousMover<SparseRows>>(constraints, options, statistics, size,
+                                                       reported);
 }
 
 }  // namespace tether::ida_projection

@@ -27,13 +27,14 @@ template <class Rows>
 class ContiguousMover final : public Mover {
  public:
   ContiguousMover(const Constraints& constraints, const Options& options, Statistics& statistics,
-                  int size)
+                  int size, int reported)
       : options_(options),
         statistics_(statistics),
         evaluator_(constraints, statistics),
         monitor_(options),
         n_(size),
         m_(evaluator_.rows()),
+        reported_(reported >= 0 ? reported : m_),
         inverse_n_(1.0 / size),
         blocks_(constraints, evaluator_, size) {
     const auto n = static_cast<std::size_t>(n_);
@@ -103,6 +104,7 @@ class ContiguousMover final : public Mover {
   Evaluator evaluator_;
   Monitor monitor_;
   int n_, m_;
+  int reported_;  // rows whose drift is told; the others are equations of F
   double inverse_n_;
   Rows blocks_;
   bool thin_ = false;          // the last factor() found rows that need RowTrust
@@ -178,7 +180,8 @@ void ContiguousMover<Rows>::apply(double factor, double* correction) {
 template <class Rows>
 double ContiguousMover<Rows>::drift() const {
   double largest = 0.0;
-  for (double g : g_) largest = std::max(largest, std::abs(g));
+  for (int i = 0; i < reported_; ++i)
+    largest = std::max(largest, std::abs(g_[static_cast<std::size_t>(i)]));
   return largest;
 }
 

@@ -20,6 +20,7 @@ constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
 constexpr long kSampleEvery = 16;
 constexpr int kTrapped = 10;             // steps in a row with failed error tests
 constexpr int kRefused = 3;              // failed error tests in one step
+constexpr int kOftenRefused = 4;         // steps for each failed error test, of the run so far
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
@@ -41,9 +42,11 @@ int Projection::Impl::initialize() {
   }
   initialized_ = true;
   engaged_ = false;
-  high_index_ = false;
+  high_index_ = index_known_ = false;
   pending_ = false;
   last_steps_ = last_setups_ = -1;
+  if (own_mover_) mover_ = std::move(own_mover_);
+  moved_id_ = OwnedVector();
   if (mover_) mover_->reset();
   smoother_.reset();
   refused_in_row_ = 0;
@@ -87,6 +90,8 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
 
   Candidate candidate{0.0, y_predicted, ycor, weights};
   if (contiguous_) candidate.with_entries();
+  present_ = candidate;
+  mem_ = mem;
   if (probing_) {  // make_consistent wants to look around, not to step
     N_VScale(1.0, weights, weights_);
     if (!id_) derive_id(candidate, mem);
@@ -101,6 +106,10 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
 
 int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup,
                                        void* mem) {
+  if (mover_ && !engaged_ && !index_known_ && in_trouble()) {
+    const Status engaged = engage_if_index_is_high(candidate, mem);
+    if (engaged != Status::success) return finish(engaged, mover_->message());
+  }
   int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, candidate.weights,
                                tolerance, call_setup, mem);
   if (!mover_) return flag;
@@ -247,6 +256,27 @@ bool Projection::Impl::struggling() const {
   return refused_in_row_ >= kTrapped || failures - last_error_failures_ >= kRefused;
 }
 
+// Before a first move: has the corrector failed, or the error test in a fourth of all steps?
+bool Projection::Impl::in_trouble() const {
+  if (!options_.suppress_algebraic) return false;
+  long failures = 0;
+  IDAGetNumErrTestFails(ida_mem_, &failures);
+  return statistics_.corrector_failures > 0 ||
+         (failures > 1 && kOftenRefused * failures > last_steps_);
+}
+
+// Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
+// corrector fail: too late for the policy to begin.
+Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate, void* mem) {
+  if (options_.id == nullptr && !id_) {
+    const Status derived = derive_id(candidate, mem);
+    if (derived != Status::success) return derived;
+  }
+  index_known_ = true;
+  high_index_ = index_exceeds_one(candidate, mem);
+  return high_index_ && has_algebraic_ ? engage(candidate, mem) : Status::success;
+}
+
 void Projection::Impl::begin_smoothing() {
   if (smoother_.on() || !options_.smooth_where_needed) return;
   smoother_.begin();
@@ -265,9 +295,12 @@ Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
     IDASetSuppressAlg(ida_mem_, 1);
   }
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
-  high_index_ = options_.smooth_where_needed && index_exceeds_one(candidate, mem);
+  if (!index_known_ && options_.smooth_where_needed)
+    high_index_ = index_exceeds_one(candidate, mem);
+  index_known_ = true;
   if (high_index_) begin_smoothing();
-  return mover_->set_algebraic(candidate, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr);
+  join_equations(candidate);
+  return mover_->set_algebraic(candidate, moved_id());
 }
 
 void Projection::Impl::account(const Move& move, const StepData& step, bool sampled) {

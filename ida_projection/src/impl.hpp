@@ -7,6 +7,7 @@
 #include <tether/ida_projection/projection.hpp>
 #include <vector>
 
+#include "equations.hpp"
 #include "gauss_newton.hpp"
 #include "mover.hpp"
 #include "step_smoothing.hpp"
@@ -91,6 +92,8 @@ class Projection::Impl {
   void account_for_previous_attempt(const StepData& step);
   void look_for_refusals();
   bool struggling() const;
+  bool in_trouble() const;
+  Status engage_if_index_is_high(const Candidate& candidate, void* mem);
   void begin_smoothing();
   int corrector_failed(int flag);
   int look_before_moving(const Candidate& candidate, void* mem, bool& done);
@@ -108,6 +111,10 @@ class Projection::Impl {
   // algebraic.cpp
   Status derive_id(const Candidate& candidate, void* mem);
   void set_id(N_Vector id);
+  void join_equations(const Candidate& candidate);
+  std::vector<char> derivative_free_equations(const Candidate& candidate);
+  bool residual_at(const double* y, double* f);
+  N_Vector moved_id() const;
   bool index_exceeds_one(const Candidate& candidate, void* mem);  // index.cpp
 
   // consistency.cpp
@@ -120,6 +127,7 @@ class Projection::Impl {
   Options options_;
   StepSmoother smoother_;
   bool high_index_ = false;  // F is not of index 1 in its own variables
+  bool index_known_ = false;
   int refused_in_row_ = 0;   // accepted steps that needed more than one attempt
   long last_error_failures_ = 0;
   Statistics statistics_;
@@ -137,6 +145,12 @@ class Projection::Impl {
   bool heard_ = false;  // IDASetMaxNonlinIters reached us
 
   std::unique_ptr<Mover> mover_;
+  std::unique_ptr<Mover> own_mover_;  // for the caller's rows alone, where others are joined
+  Constraints joined_;                // the caller's rows and equations of F
+  OwnedVector moved_id_;              // id, with 1 where an algebraic variable moves with the rest
+  Candidate present_{};               // of the present solve()
+  void* mem_ = nullptr;               // and IDA's memory in it
+  OwnedVector none_, f_;              // ycor = 0 and F for residual_at()
   bool contiguous_ = false;
   int size_ = 0;
   OwnedVector id_, delta_, newton_, saved_, weights_;

@@ -80,9 +80,12 @@ class Mover {
   std::vector<int> contradicting_rows_;
 };
 
-/// Factories; `size` is N. The options and statistics outlive the mover.
-std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size);
-std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size);
+/// Factories; `size` is N. The options and statistics outlive the mover. Drift is that of the first
+/// `reported` rows (-1: of all).
+std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size,
+                                        int reported = -1);
+std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size,
+                                         int reported = -1);
 std::unique_ptr<Mover> make_gradient_mover(const Constraints&, const Options&, Statistics&,
                                            N_Vector like);
 std::unique_ptr<Mover> make_user_mover(const Constraints&, const Options&, Statistics&,

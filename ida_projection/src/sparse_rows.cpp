@@ -46,6 +46,7 @@ void SparseRows::visit(int i, Visit f) const {
 Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y0,
                                      const std::vector<double>& WT) {
   full_fills_.assign(full_rows_.size(), 0);
+  entry_fills_.assign(entries_.size(), 0);
   columns_.resize(at(n_));
   for (int j = 0; j < n_; ++j) columns_[at(j)] = j;
   std::vector<double> y = y0;
@@ -56,8 +57,9 @@ Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::
       message = evaluator.message();
       return status;
     }
-    if (status == Status::success)
-      for (std::size_t e = 0; e < full_fills_.size(); ++e) full_fills_[e] |= full_rows_[e] != 0.0;
+    if (status != Status::success) continue;
+    for (std::size_t e = 0; e < full_fills_.size(); ++e) full_fills_[e] |= full_rows_[e] != 0.0;
+    for (std::size_t e = 0; e < entry_fills_.size(); ++e) entry_fills_[e] |= entries_[e] != 0.0;
   }
   return Status::success;
 }
@@ -92,12 +94,17 @@ Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<d
 
 void SparseRows::split(const std::vector<bool>& hold, const double* id) {
   std::vector<char> used(at(n_), 0), algebraic_row(at(m_), 0);
-  for (int i = 0; i < m_; ++i)
+  // An entry of the pattern that is zero wherever it was looked at makes no row algebraic.
+  for (int i = 0; i < m_; ++i) {
+    int entry = rows_[at(i)].begin;
     visit(i, [&](int j, double) {
+      const bool is_zero = rows_[at(i)].full < 0 && entry_fills_[at(entry++)] == 0;
       if (!fills(rows_[at(i)], j) || (!hold.empty() && hold[at(j)])) return;
-      used[at(j)] = 1;
-      if (id != nullptr && id[j] == 0.0) algebraic_row[at(i)] = 1;
+      const bool is_algebraic = id != nullptr && id[j] == 0.0;
+      used[at(j)] |= !(is_algebraic && is_zero);
+      algebraic_row[at(i)] |= is_algebraic && !is_zero;
     });
+  }
   for (Block* block : {&d, &a}) {
     block->rows.clear();
     block->columns.clear();

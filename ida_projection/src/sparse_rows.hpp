@@ -57,6 +57,7 @@ class SparseRows {
   std::vector<int> columns_of_;              // of every sparse entry
   std::vector<double> entries_, full_rows_;  // C
   std::vector<char> full_fills_;             // which entries of the full rows can differ from zero
+  std::vector<char> entry_fills_;            // the same for the sparse entries, as far as seen
   std::vector<int> columns_;                 // every column that differences must visit
   std::vector<int> gather_d_, gather_a_;     // entry of C of each entry of a block
   std::vector<double> moved_;                // d.dy at its columns, 0 elsewhere; where B exists

@@ -1,0 +1,191 @@
+// Tether: rows that hang on algebraic variables which equations of F determine.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <problems/pendulum.hpp>
+#include <problems/rows.hpp>
+
+#include "contact_points.hpp"
+#include "host.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+/// Plain IDA with algebraic variables out of the error test: its best form here.
+Run suppressed(const Problem& problem, double tolerance) {
+  Host host(problem, tolerance);
+  REQUIRE(IDASetId(host.ida, host.vector(problem.id)) == 0);
+  REQUIRE(IDASetSuppressAlg(host.ida, 1) == 0);
+  Run run;
+  run.flag = host.finish();
+  run.steps = host.steps();
+  run.error = run.flag >= 0 ? host.error() : std::numeric_limits<double>::infinity();
+  return run;
+}
+
+/// Dense rows as sparse ones with every entry in the pattern.
+tp::Constraints as_sparse(const tp::Constraints& rows, int n) {
+  tp::Constraints set;
+  set.count = rows.total_count();
+  set.value = [rows, n](double t, tp::ConstVector y, tp::Vector g) {
+    g = value(rows, t, y.data(), n);
+  };
+  tp::SparseJacobian sparse;
+  for (int i = 0; i <= set.count; ++i) sparse.starts.push_back(i * n);
+  for (int e = 0; e < set.count * n; ++e) sparse.columns.push_back(e % n);
+  sparse.fill = [rows, n](double t, tp::ConstVector y, tp::Vector entries) {
+    tp::Matrix(entries.data(), entries.size() / n, n) = jacobian(rows, t, y.data(), n);
+  };
+  set.jacobian = std::move(sparse);
+  return set;
+}
+
+/// With the reference of the form that has neither contact point nor force among its unknowns.
+Problem with_reference(Problem problem, const Problem& reduced) {
+  problem.reference = integrate_plain(reduced, 1e-12).y;
+  problem.reference.resize(static_cast<std::size_t>(problem.size),
+                           std::numeric_limits<double>::quiet_NaN());
+  return problem;
+}
+
+struct Count {
+  double steps = 0.0, error = 0.0;  // geometric means over those of plain IDA's best form
+  int runs = 0;
+};
+
+/// Every choice of rows without the tangency equations, dense and sparse.
+void check(const Problem& problem, double tolerance, Count* count) {
+  const Run plain = suppressed(problem, tolerance);
+  REQUIRE(plain.flag >= 0);
+  const tp::Constraints tangency = problem.select({"tangency"});
+  for (const std::vector<std::string>& groups :
+       {std::vector<std::string>{"gap"}, {"gap", "rate"}, {"gap", "rate", "energy"}}) {
+    const tp::Constraints rows = problem.select(groups);
+    for (const bool sparse : {false, true}) {
+      INFO(problem.name << ", " << problem.form << ", tolerance " << tolerance << ", "
+                        << groups.size() << (sparse ? " groups, sparse" : " groups"));
+      const Run run =
+          integrate(problem, tolerance, sparse ? as_sparse(rows, problem.size) : rows, {}, false);
+      INFO(tp::to_string(run.status) << ": " << run.message);
+      REQUIRE(run.flag >= 0);
+      CHECK(static_cast<double>(run.steps) <= 1.35 * static_cast<double>(plain.steps));
+      CHECK(run.error <= 50.0 * tolerance);
+      CHECK(run.statistics.failures() <= 2);
+      count->steps += std::log(static_cast<double>(run.steps) / static_cast<double>(plain.steps));
+      count->error += std::log(run.error / plain.error);
+      ++count->runs;
+      // The contact point stays where F wants it.
+      CHECK(value(tangency, 0.0, run.y.data(), problem.size).cwiseAbs().maxCoeff() <=
+            20.0 * tolerance);
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("contact point of a wheel on a rail as algebraic unknown: any choice of rows, any form") {
+  Count count;
+  for (const bool rolling : {false, true}) {
+    const Problem reduced = wheel_on_rail("explicit", rolling, 1.5);
+    for (const std::string& form : contact_forms()) {
+      const Problem problem = with_reference(wheel_on_rail(form, rolling, 1.5), reduced);
+      for (const double tolerance : {1e-3, 1e-5, 1e-8}) check(problem, tolerance, &count);
+    }
+  }
+  CHECK(std::exp(count.steps / count.runs) <= 1.0);
+  CHECK(std::exp(count.error / count.runs) <= 2.0);
+}
+
+TEST_CASE("contact point of an ellipsoid on a plane as algebraic unknown") {
+  Count count;
+  for (const bool rolling : {false, true}) {
+    const Problem reduced = ellipsoid_on_plane("explicit", rolling, 1.0);
+    for (const std::string& form : contact_forms()) {
+      const Problem problem = with_reference(ellipsoid_on_plane(form, rolling, 1.0), reduced);
+      for (const double tolerance : {1e-4, 1e-7}) check(problem, tolerance, &count);
+    }
+  }
+  CHECK(std::exp(count.steps / count.runs) <= 1.0);
+  CHECK(std::exp(count.error / count.runs) <= 2.0);
+}
+
+TEST_CASE("contact points in other units: a rail of micrometres and one of kilometres") {
+  for (const double scale : {1e-6, 1e3}) {
+    const double t_end = 1.5 * std::sqrt(scale);
+    Count count;
+    const Problem reduced = wheel_on_rail("explicit", true, t_end, 0.1, scale);
+    for (const char* form : {"index 1", "index 2"})
+      check(with_reference(wheel_on_rail(form, true, t_end, 0.1, scale), reduced), 1e-6, &count);
+  }
+}
+
+TEST_CASE("contact points of a circle on a straight rail: nothing depends on them but the force") {
+  const Problem problem = wheel_on_rail("index 1", true, 1.0, 0.0);
+  const Run run = integrate(problem, 1e-6, problem.select({"gap", "rate"}), {}, false);
+  REQUIRE(run.flag >= 0);
+  CHECK(run.drift <= 1e-9);
+}
+
+TEST_CASE("rows written in algebraic copies of the positions alone") {
+  // (x, y, vx, vy, lam) of the pendulum, and p = 1000 (x, y): length p^2/2 - 1000^2/2.
+  const Problem plain = pendulum(1.0, 1.0, 20.0, "index 1");
+  Problem problem = plain;
+  problem.size = 7;
+  problem.jacobian = nullptr;
+  problem.y0.insert(problem.y0.end(), {1000.0 * plain.y0[0], 1000.0 * plain.y0[1]});
+  problem.yp0.resize(7, 0.0);
+  problem.id.resize(7, 0.0);
+  problem.reference.resize(7, std::numeric_limits<double>::quiet_NaN());
+  problem.residual = [plain](double t, const double* y, const double* yp, double* r) {
+    plain.residual(t, y, yp, r);
+    r[5] = y[5] - 1000.0 * y[0];
+    r[6] = y[6] - 1000.0 * y[1];
+  };
+  const tp::Constraints copies = make_rows(
+                                     "copies", {"length", "rate"},
+                                     [](double, const double* y, double* g) {
+                                       g[0] = (y[5] * y[5] + y[6] * y[6] - 1e6) / 2.0;
+                                       g[1] = y[5] * y[2] + y[6] * y[3];
+                                     },
+                                     [](double, const double* y, double* C) {
+                                       C[5] = y[5];
+                                       C[6] = y[6];
+                                       C[7 + 2] = y[5];
+                                       C[7 + 3] = y[6];
+                                       C[7 + 5] = y[2];
+                                       C[7 + 6] = y[3];
+                                     })
+                                     .constraints;
+  for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+    INFO("tolerance " << tolerance);
+    const Run direct =
+        integrate(plain, tolerance, plain.select({"position", "velocity"}), {}, false);
+    for (const bool sparse : {false, true}) {
+      const Run run =
+          integrate(problem, tolerance, sparse ? as_sparse(copies, 7) : copies, {}, false);
+      INFO(run.message);
+      REQUIRE(run.flag >= 0);
+      CHECK(static_cast<double>(run.steps) <= 1.1 * static_cast<double>(direct.steps));
+      CHECK(run.error <= 10.0 * direct.error);
+      CHECK(std::abs(std::hypot(run.y[0], run.y[1]) - 1.0) <= 10.0 * tolerance);
+    }
+  }
+}
+
+TEST_CASE("rows that repeat an equation of F are solved for its algebraic variable as before") {
+  const Problem problem = pendulum(1.0, 1.0, 50.0, "index 1");
+  for (const double tolerance : {1e-4, 1e-7}) {
+    const Run without = integrate(problem, tolerance,
+                                  problem.select({"position", "velocity", "energy"}), {}, false);
+    const Run with =
+        integrate(problem, tolerance,
+                  problem.select({"position", "velocity", "acceleration", "energy"}), {}, false);
+    REQUIRE(with.flag >= 0);
+    CHECK(static_cast<double>(with.steps) <= 1.1 * static_cast<double>(without.steps));
+    CHECK(with.error <= 4.0 * without.error);
+  }
+}
