@@ -11,13 +11,6 @@ namespace {
 
 typedef double v4 __attribute__((vector_size(32)));
 
-TETHER_INLINE void multiply(const double* A, const double* B, double* C) {
-  const v4* a = reinterpret_cast<const v4*>(A);
-  v4* c = reinterpret_cast<v4*>(C);
-  for (int j = 0; j < 3; ++j)
-    c[j] = a[0] * B[4 * j] + a[1] * B[4 * j + 1] + a[2] * B[4 * j + 2];
-}
-
 TETHER_INLINE void subtract_product(const double* A, const double* B, double* C) {
   const v4* a = reinterpret_cast<const v4*>(A);
   v4* c = reinterpret_cast<v4*>(C);
@@ -30,33 +23,60 @@ TETHER_INLINE void subtract_apply(const double* A, const double* x, double* y) {
   *reinterpret_cast<v4*>(y) -= a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
 }
 
-bool invert(const double* A, double* X) {
-  // Gauss-Jordan with partial pivoting: pivots are small for ill-conditioned contacts.
-  double m[3][6];
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) {
-      m[r][c] = A[4 * c + r];
-      m[r][3 + c] = r == c ? 1 : 0;
-    }
+// Rows in the order in which partial pivoting takes them; false: singular.
+bool factor(const double* A, BlockPivot& pivot) {
+  double m[3][3];
+  for (int r = 0; r < 3; ++r) {
+    pivot.order[r] = r;
+    for (int c = 0; c < 3; ++c) m[r][c] = A[4 * c + r];
+  }
   for (int k = 0; k < 3; ++k) {
     int p = k;
     for (int r = k + 1; r < 3; ++r)
       if (std::abs(m[r][k]) > std::abs(m[p][k])) p = r;
     if (!(std::abs(m[p][k]) > 0) || !std::isfinite(m[p][k])) return false;
-    if (p != k) std::swap(m[p], m[k]);
-    const double inv = 1 / m[k][k];
-    for (int c = 0; c < 6; ++c) m[k][c] *= inv;
-    for (int r = 0; r < 3; ++r) {
-      if (r == k) continue;
-      const double f = m[r][k];
-      for (int c = 0; c < 6; ++c) m[r][c] -= f * m[k][c];
+    if (p != k) {
+      std::swap(m[p], m[k]);
+      std::swap(pivot.order[p], pivot.order[k]);
+    }
+    pivot.reciprocal[k] = 1 / m[k][k];
+    for (int r = k + 1; r < 3; ++r) {
+      m[r][k] *= pivot.reciprocal[k];
+      for (int c = k + 1; c < 3; ++c) m[r][c] -= m[r][k] * m[k][c];
     }
   }
-  for (int c = 0; c < 3; ++c) {
-    for (int r = 0; r < 3; ++r) X[4 * c + r] = m[r][3 + c];
-    X[4 * c + 3] = 0;
-  }
+  pivot.l10 = m[1][0];
+  pivot.l20 = m[2][0];
+  pivot.l21 = m[2][1];
+  pivot.u01 = m[0][1];
+  pivot.u02 = m[0][2];
+  pivot.u12 = m[1][2];
   return true;
+}
+
+// X = B D^-1. Not by way of an inverse: X D would miss B by cond(D) times the rounding, which for
+// contacts near their cones is all of it.
+TETHER_INLINE void divide(const double* B, const BlockPivot& d, double* X) {
+  const v4* b = reinterpret_cast<const v4*>(B);
+  v4* x = reinterpret_cast<v4*>(X);
+  const v4 y0 = b[0] * d.reciprocal[0];
+  const v4 y1 = (b[1] - y0 * d.u01) * d.reciprocal[1];
+  const v4 z2 = (b[2] - y0 * d.u02 - y1 * d.u12) * d.reciprocal[2];
+  const v4 z1 = y1 - z2 * d.l21;
+  x[d.order[0]] = y0 - z1 * d.l10 - z2 * d.l20;
+  x[d.order[1]] = z1;
+  x[d.order[2]] = z2;
+}
+
+// y <- D^-1 y
+TETHER_INLINE void solve_pivot(const BlockPivot& d, double* y) {
+  const double f0 = y[d.order[0]];
+  const double f1 = y[d.order[1]] - d.l10 * f0;
+  const double f2 = y[d.order[2]] - d.l20 * f0 - d.l21 * f1;
+  y[2] = f2 * d.reciprocal[2];
+  y[1] = (f1 - d.u12 * y[2]) * d.reciprocal[1];
+  y[0] = (f0 - d.u01 * y[1] - d.u02 * y[2]) * d.reciprocal[0];
+  y[3] = 0;
 }
 
 struct Rows {
@@ -65,7 +85,7 @@ struct Rows {
   const int* upper_start;
   const int* upper;
   const PackedBlock* U;
-  const PackedBlock* inverse;
+  const BlockPivot* pivot;
   PackedBlock* L;
   PackedBlock* work;
 };
@@ -75,7 +95,7 @@ TETHER_CLONES void eliminate(const Rows& s) {
   for (int m = 0; m < s.lower_count; ++m) {
     const int k = s.lower[m];
     alignas(32) double l[12];
-    multiply(s.work[k].column, s.inverse[k].column, l);
+    divide(s.work[k].column, s.pivot[k], l);
     for (int c = 0; c < 12; ++c) s.L[m].column[c] = l[c];
     for (int p = s.upper_start[k]; p < s.upper_start[k + 1]; ++p)
       subtract_product(l, s.U[p].column, s.work[s.upper[p]].column);
@@ -84,17 +104,14 @@ TETHER_CLONES void eliminate(const Rows& s) {
 
 TETHER_CLONES void substitute(int n, const int* lower_start, const int* lower,
                               const PackedBlock* L, const int* upper_start, const int* upper,
-                              const PackedBlock* U, const PackedBlock* inverse, PackedVector* y) {
+                              const PackedBlock* U, const BlockPivot* pivot, PackedVector* y) {
   for (int r = 0; r < n; ++r)
     for (int m = lower_start[r]; m < lower_start[r + 1]; ++m)
       subtract_apply(L[m].column, y[lower[m]].v, y[r].v);
   for (int r = n; r-- > 0;) {
     for (int m = upper_start[r]; m < upper_start[r + 1]; ++m)
       subtract_apply(U[m].column, y[upper[m]].v, y[r].v);
-    const double* d = inverse[r].column;
-    const double v0 = y[r].v[0], v1 = y[r].v[1], v2 = y[r].v[2];
-    for (int c = 0; c < 3; ++c) y[r].v[c] = d[c] * v0 + d[4 + c] * v1 + d[8 + c] * v2;
-    y[r].v[3] = 0;
+    solve_pivot(pivot[r], y[r].v);
   }
 }
 
@@ -187,7 +204,7 @@ void BlockLu::analyse(const Problem& problem, const char* active) {
       lower_[at(fill[at(upper_[at(p)])]++)] = k;
   U_.resize(upper_.size());
   L_.resize(upper_.size());
-  inverse_.resize(at(n_));
+  pivot_.resize(at(n_));
   work_.assign(at(n_), PackedBlock());
   rhs_.resize(at(n_));
   analysed_ = true;
@@ -201,14 +218,14 @@ void BlockLu::add(int contact, const double* block) {
 bool BlockLu::end_row() {
   const int r = row_, first = lower_start_[at(r)];
   eliminate({lower_.data() + first, lower_start_[at(r + 1)] - first, upper_start_.data(),
-             upper_.data(), U_.data(), inverse_.data(), L_.data() + first, work_.data()});
+             upper_.data(), U_.data(), pivot_.data(), L_.data() + first, work_.data()});
   const PackedBlock zero;
   for (int m = first; m < lower_start_[at(r + 1)]; ++m) work_[at(lower_[at(m)])] = zero;
   for (int p = upper_start_[at(r)]; p < upper_start_[at(r + 1)]; ++p) {
     U_[at(p)] = work_[at(upper_[at(p)])];
     work_[at(upper_[at(p)])] = zero;
   }
-  const bool regular = invert(work_[at(r)].column, inverse_[at(r)].column);
+  const bool regular = factor(work_[at(r)].column, pivot_[at(r)]);
   work_[at(r)] = zero;
   return regular;
 }
@@ -216,7 +233,7 @@ bool BlockLu::end_row() {
 void BlockLu::solve(PackedVector* x) {
   for (int r = 0; r < n_; ++r) rhs_[at(r)] = x[contact_[at(r)]];
   substitute(n_, lower_start_.data(), lower_.data(), L_.data(), upper_start_.data(), upper_.data(),
-             U_.data(), inverse_.data(), rhs_.data());
+             U_.data(), pivot_.data(), rhs_.data());
   for (int r = 0; r < n_; ++r) x[contact_[at(r)]] = rhs_[at(r)];
 }
 

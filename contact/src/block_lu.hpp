@@ -7,6 +7,13 @@
 
 namespace tether::contact::detail {
 
+// A diagonal block D as P D = L U: unit lower triangle, upper triangle with the reciprocals of its
+// diagonal, row k of P D is row order[k] of D.
+struct BlockPivot {
+  double l10, l20, l21, u01, u02, u12, reciprocal[3];
+  int order[3];
+};
+
 // Unsymmetric values on a symmetric pattern, pivots are the diagonal blocks in minimum-degree order.
 // order() once for a problem, analyse() for each active set, then load() every block, factor().
 class BlockLu {
@@ -36,7 +43,8 @@ class BlockLu {
   std::vector<char> active_;
   std::vector<int> contact_, position_;
   std::vector<int> upper_start_, upper_, lower_start_, lower_;
-  std::vector<PackedBlock> U_, L_, inverse_, work_;
+  std::vector<PackedBlock> U_, L_, work_;
+  std::vector<BlockPivot> pivot_;
   Packed rhs_;
 };
 

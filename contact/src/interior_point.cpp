@@ -5,7 +5,7 @@ namespace tether::contact::detail {
 namespace {
 
 constexpr double kLeastCentre = 1e-3, kCentreAfterBlocked = 0.2;
-constexpr double kLeastShift = 1e-10, kMostShift = 1e-8;
+constexpr double kLeastShift = 1e-13, kMostShift = 1e-8;
 
 typedef double v4 __attribute__((vector_size(32)));
 
@@ -248,16 +248,21 @@ double InteriorPoint::expand(const System& system) {
   return size > 0 ? std::sqrt(defect / size) : 0;
 }
 
-// Newton direction towards x o u = centre e, refined once where it has lost digits.
+// Newton direction towards x o u = centre e, refined where it has lost digits.
 void InteriorPoint::direction(const System& system, double centre, bool correct) {
   constexpr double kRefine = 1e-6;
+  constexpr int kRefinements = 3;
   aim(centre, correct);
   lu_.solve(step_.data());
-  if (!(expand(system) > kRefine)) return;
-  lu_.solve(defect_.data());
-  for (int i = 0; i < n_; ++i)
-    for (int c = 0; c < 3; ++c) step_[at(i)].v[c] += defect_[at(i)].v[c];
-  expand(system);
+  double defect = expand(system);
+  for (int k = 0; k < kRefinements && defect > kRefine; ++k) {
+    lu_.solve(defect_.data());
+    for (int i = 0; i < n_; ++i)
+      for (int c = 0; c < 3; ++c) step_[at(i)].v[c] += defect_[at(i)].v[c];
+    const double before = defect;
+    defect = expand(system);
+    if (!(defect < 0.5 * before)) break;
+  }
 }
 
 double InteriorPoint::longest_step() const {
