@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "column_search.hpp"
 #include "impl.hpp"
 
 namespace tether::ida_projection {
@@ -23,64 +24,82 @@ void Projection::Impl::set_id(N_Vector id) {
 
 // Component j is algebraic if F does not change at all when y'_j does. F is reached through IDA's
 // own residual callback: it evaluates F(t, ypred + ycor, yppred + cj ycor), and ypred can be
-// shifted by -ycor (and put back bit for bit) so that only y' feels ycor.
+// shifted by -ycor (and put back bit for bit) so that only y' feels ycor. Two changes of different
+// size are made of many y' at once (ColumnSearch); their sizes vary irregularly with j, so that
+// those of one equation do not cancel.
 Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
-  if (!contiguous_ || size_ > options_.derive_id_limit) {
-    message = contiguous_ ? "more unknowns than Options::derive_id_limit"
-                          : "vectors without contiguous memory";
-    message +=
-        ": algebraic variables were not derived and stay in the error test; give IDA's id vector "
-        "in Options::id";
+  if (!contiguous_ || options_.derive_id_limit == 0) {
+    advise(contiguous_ ? "Options::derive_id_limit is 0" : "vectors without contiguous memory");
     return Status::success;
   }
+  constexpr int kSizes = 2;
+  const double sizes[kSizes] = {1.0, -1e3};
+  const auto n = static_cast<std::size_t>(size_);
   const double cj = step_data().cj;
-  OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base);
+  OwnedVector ycor(candidate.base), f(candidate.base);
   N_VScale(1.0, candidate.base, saved_);
   N_VConst(0.0, ycor);
   double* e = N_VGetArrayPointer(ycor);
   double* predicted = N_VGetArrayPointer(candidate.base);
-  const double* original = N_VGetArrayPointer(saved_);
-  const double* w = N_VGetArrayPointer(candidate.weights);
-  const auto residual = [&](N_Vector into) {
+  const double* values = N_VGetArrayPointer(f);
+  std::vector<double> change[kSizes], y[kSizes], before[kSizes];
+  bool known[kSizes] = {};
+  const auto residual = [&] {
     ++statistics_.residual_evaluations;
-    return system_(ycor, into, mem);
+    return system_(ycor, f, mem) == 0;
   };
-
-  OwnedVector id(candidate.base);
-  double* mask = N_VGetArrayPointer(id);
-  const double* before = N_VGetArrayPointer(base);
-  const double* after = N_VGetArrayPointer(shifted);
-  bool known = true;
-  for (int j = 0; j < size_ && known; ++j) {
-    bool moves = false, answered = false;
-    for (const double sign : {1.0, -1e3}) {
-      const double weight = w[j] > 0.0 ? 1.0 / w[j] : 1.0;
-      const double change = sign * std::max(weight, 1e-3 / std::abs(cj));  // y'_j by cj times this
-      const double low = original[j] - change;
-      const double y_j = low + change;  // what F sees in both evaluations, bit for bit
-      predicted[j] = y_j;
-      bool ok = residual(base) == 0;
-      predicted[j] = low;
-      e[j] = change;
-      ok = residual(shifted) == 0 && ok;
-      e[j] = 0.0;
-      predicted[j] = original[j];
-      if (!ok) continue;  // F refuses this y'; the other size decides
-      answered = true;
-      moves = moves || !std::equal(before, before + size_, after);
+  for (int k = 0; k < kSizes; ++k) {
+    for (std::size_t j = 0; j < n; ++j) {
+      const double w = candidate.weight_entries[j];
+      const double irregular = 1.5 + 0.5 * std::sin(1.0 + (2.3 + k) * static_cast<double>(j));
+      // y'_j changes by cj times this.
+      change[k].push_back(sizes[k] * irregular *
+                          std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(cj)));
+      // What F sees in all evaluations, bit for bit.
+      y[k].push_back((saved_entries_[j] - change[k][j]) + change[k][j]);
     }
-    known = answered;
-    mask[j] = moves ? 1.0 : 0.0;
+    std::copy(y[k].begin(), y[k].end(), predicted);
+    known[k] = residual();
+    before[k].assign(values, values + size_);
   }
+  const auto probe = [&](const std::vector<int>& columns, std::vector<char>& changed) {
+    bool answered = false;
+    for (int k = 0; k < kSizes; ++k) {
+      if (!known[k]) continue;  // F refuses this y'; the other size decides
+      std::copy(y[k].begin(), y[k].end(), predicted);
+      for (const int i : columns) {
+        const auto j = static_cast<std::size_t>(i);
+        e[j] = change[k][j];
+        predicted[j] = saved_entries_[j] - change[k][j];
+      }
+      const bool evaluated = residual();
+      for (const int i : columns) e[i] = 0.0;
+      if (!evaluated) continue;
+      answered = true;
+      for (std::size_t i = 0; i < n; ++i) changed[i] |= !(values[i] == before[k][i]);
+    }
+    return answered;
+  };
+  std::vector<char> filled;
+  const auto outcome =
+      ColumnSearch(size_, size_, probe, 2L * options_.derive_id_limit).run(&filled);
   N_VScale(1.0, saved_, candidate.base);
-  if (!known) {
-    message =
-        "F could not be evaluated while algebraic variables were looked for; give IDA's id vector "
-        "in Options::id";
+  if (outcome != ColumnSearch::Outcome::found) {
+    advise(outcome == ColumnSearch::Outcome::refused
+               ? "F could not be evaluated at other y'"
+               : "that takes more evaluations of F than 4 times Options::derive_id_limit");
     return Status::success;
   }
+  OwnedVector id(candidate.base);
+  for (std::size_t j = 0; j < n; ++j) N_VGetArrayPointer(id)[j] = filled[j] ? 1.0 : 0.0;
   set_id(id);
   return Status::success;
+}
+
+// Readable through message() as long as nothing else is wrong.
+void Projection::Impl::advise(const std::string& reason) {
+  advice_ = "algebraic variables were not derived (" + reason +
+            ") and stay in the error test; give IDA's id vector in Options::id";
 }
 
 // F(t, y, y'_pred), N values, through IDA's own callback: ypred is replaced for the call.

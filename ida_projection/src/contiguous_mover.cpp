@@ -1,5 +1,7 @@
 // Tether: Newton's method onto the constraints, on contiguous vectors.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdint>
+
 #include "contiguous_mover.hpp"
 
 namespace tether::ida_projection {
@@ -8,6 +10,7 @@ namespace {
 
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
 constexpr double kForLater = 0.1;
+constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
 
 }  // namespace
 
@@ -130,17 +133,36 @@ bool ContiguousMover<Rows>::rounding_only() const {
   return true;
 }
 
-// Length of the move that the rounding of g asks for in the worst case, with the present factors.
+// Length of the move that the rounding of g asks for in the worst case, with the present factors:
+// at most sum_i |dy_i|, dy_i the move for row i alone. Where that would take many solves it is
+// bounded by sqrt(m sum_i |dy_i|^2), the sum of squares by moves for all rows with random signs.
 template <class Rows>
 double ContiguousMover<Rows>::rounding_length() {
   const std::vector<double> g = g_;
+  std::vector<double> rounding(g.size());
+  for (int i = 0; i < m_; ++i)
+    rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks_.terms(i, y_.data());
   double total = 0.0;
-  for (std::size_t i = 0; i < g.size(); ++i) {
-    const double terms = blocks_.terms(static_cast<int>(i), y_.data());
-    std::fill(g_.begin(), g_.end(), 0.0);
-    g_[i] = 8.0 * kEpsilon * terms;
-    total += solve();
+  const auto add = [&](auto&& length) {
+    total += length(solve());
     --statistics_.iterations;
+  };
+  if (m_ <= kRoundedOneByOne) {
+    for (std::size_t i = 0; i < g.size(); ++i) {
+      std::fill(g_.begin(), g_.end(), 0.0);
+      g_[i] = rounding[i];
+      add([](double length) { return length; });
+    }
+  } else {
+    std::uint32_t random = 1;
+    for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
+      for (std::size_t i = 0; i < g.size(); ++i) {
+        random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
+        g_[i] = random >> 31 != 0 ? rounding[i] : -rounding[i];
+      }
+      add([](double length) { return length * length; });
+    }
+    total = std::sqrt(total / kSignPatterns * m_);
   }
   g_ = g;
   return total;

@@ -326,7 +326,7 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
 int Projection::Impl::finish(Status outcome, const std::string& text) {
   status = outcome;
   if (outcome == Status::success) {
-    if (!message.empty()) message.clear();
+    if (message != advice_) message = advice_;
     return 0;
   }
   message = text;

@@ -81,6 +81,7 @@ class Projection::Impl {
 
   Status status = Status::unused;
   std::string message;
+  std::string advice_;  // what message() says while nothing is wrong
   Constraints constraints;
 
  private:
@@ -111,6 +112,7 @@ class Projection::Impl {
   // algebraic.cpp
   Status derive_id(const Candidate& candidate, void* mem);
   void set_id(N_Vector id);
+  void advise(const std::string& reason);
   void join_equations(const Candidate& candidate);
   std::vector<char> derivative_free_equations(const Candidate& candidate);
   bool residual_at(const double* y, double* f);

@@ -173,6 +173,58 @@ TEST_CASE("sparse rows: no allocation in a projected step") {
   CHECK(allocations() == before);
 }
 
+TEST_CASE("id of many unknowns: the right one, by few evaluations of F") {
+  // 400 unknowns, 100 of them multipliers; one by one that took 4 N evaluations.
+  const Problem problem = link_chain(50, 1.0);
+  Host derived(problem, 1e-6), given(problem, 1e-6);
+  derived.attach(*problem.sparse_constraints);
+  tp::Options options;
+  options.id = given.vector(problem.id);
+  given.attach(*problem.sparse_constraints, options);
+  for (int i = 0; i < 30; ++i) REQUIRE((derived.step() >= 0 && given.step() >= 0));
+  REQUIRE(derived.projection().statistics().projections > 0);
+  CHECK(same_bits(derived.state(), given.state()));
+  const long evaluations = derived.projection().statistics().residual_evaluations -
+                           given.projection().statistics().residual_evaluations;
+  CHECK(evaluations > 0);
+  CHECK(evaluations <= 100);
+}
+
+TEST_CASE("id where equations share derivatives, with equal coefficients of opposite sign") {
+  Problem problem = pendulum(1.0, 1.0, 5.0, "index 1");
+  problem.jacobian = nullptr;
+  const auto residual = problem.residual;
+  problem.residual = [residual](double t, const double* y, const double* yp, double* r) {
+    residual(t, y, yp, r);
+    for (int i = 0; i < 4; ++i) r[i] -= r[i + 1];
+  };
+  Host derived(problem, 1e-6), given(problem, 1e-6);
+  const tp::Constraints rows = problem.recommended_constraints();
+  derived.attach(rows);
+  tp::Options options;
+  options.id = given.vector(problem.id);
+  given.attach(rows, options);
+  REQUIRE(derived.finish() >= 0);
+  REQUIRE(given.finish() >= 0);
+  CHECK(same_bits(derived.state(), given.state()));
+}
+
+TEST_CASE("id that is not derived: message() says so as long as nothing else is wrong") {
+  const Problem problem = link_chain(8, 1.0);
+  for (const int limit : {0, 3}) {  // not wanted; too few evaluations
+    INFO("limit " << limit);
+    Host host(problem, 1e-6);
+    tp::Options options;
+    options.derive_id_limit = limit;
+    host.attach(*problem.sparse_constraints, options);
+    for (int i = 0; i < 30; ++i) REQUIRE(host.step() >= 0);
+    REQUIRE(host.projection().statistics().projections > 0);
+    CHECK(host.projection().status() == tp::Status::success);
+    CHECK(contains(host.projection().message(), "derive_id_limit"));
+    CHECK(contains(host.projection().message(), "Options::id"));
+  }
+}
+
 TEST_CASE("sparse rows: check_jacobian names entries that are wrong or missing") {
   const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
   tp::Constraints set = sparse(problem, {"position"});

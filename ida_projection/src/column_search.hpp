@@ -1,0 +1,45 @@
+// Tether: which columns of an unknown sparse matrix are empty. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <vector>
+
+namespace tether::ida_projection {
+
+/// A function of n variables whose dependence is not known: which variables does it not notice at
+/// all? Groups of variables are changed together and halved where some row answers; groups whose
+/// rows are disjoint, as far as their parents' rows tell, share an evaluation. Variables that few
+/// rows share cost some 2 log2(n) probes altogether, n that all rows share cost 2 n.
+class ColumnSearch {
+ public:
+  /// Changes these variables at once; sets changed[i] to 1 for the rows that answer (it comes
+  /// zero). False: the function cannot be evaluated there.
+  using Probe = std::function<bool(const std::vector<int>& columns, std::vector<char>& changed)>;
+  enum class Outcome { found, too_many_probes, refused };
+
+  ColumnSearch(int columns, int rows, Probe probe, long most_probes)
+      : n_(columns), m_(rows), probe_(std::move(probe)), left_(most_probes) {}
+
+  /// filled: n entries, 1 where some row answers.
+  Outcome run(std::vector<char>* filled);
+
+ private:
+  struct Group {
+    int begin, end;
+    std::vector<int> rows;  // that can answer
+  };
+  std::vector<std::vector<std::size_t>> separate() const;
+  Outcome probe_together(const std::vector<std::size_t>& members);
+  Outcome probe_alone(Group& group);
+  void change(const Group& group);
+
+  int n_, m_;
+  Probe probe_;
+  long left_;
+  std::vector<Group> groups_;
+  std::vector<int> columns_;
+  std::vector<char> changed_;
+};
+
+}  // namespace tether::ida_projection
