@@ -6,6 +6,7 @@
 #   tether_executable(<target> SOURCES ... LIBRARIES ...)
 #   tether_library(<name>)       target tether_<name>, alias tether::<name>
 include(GNUInstallDirs)
+include(${CMAKE_CURRENT_LIST_DIR}/TetherPrivate.cmake)
 
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES AND PROJECT_IS_TOP_LEVEL)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
@@ -42,10 +43,12 @@ function(tether_library name)
   set_target_properties(tether_${name} PROPERTIES
     EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON CXX_EXTENSIONS OFF
     VERIFY_INTERFACE_HEADER_SETS ON
+    CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON  # see tether/export.hpp
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   # Installed shared libraries find each other in their own folder.
   set_target_properties(tether_${name} PROPERTIES
     INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>)
   tether_warnings(tether_${name})
+  tether_keep_private(tether_${name})
   set_property(GLOBAL APPEND PROPERTY TETHER_LIBRARIES ${name})
 endfunction()

@@ -104,7 +104,7 @@ Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>
 
 std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
                                        const std::vector<BodyContact>& contacts,
-                                       const Eigen::VectorXd& impulses) {
+                                       const linalg::VectorView& impulses) {
   check(bodies, contacts);
   if (impulses.size() != 3 * static_cast<Eigen::Index>(contacts.size())) {
     detail::refuse_size("impulses", impulses.size(), 3 * static_cast<Eigen::Index>(contacts.size()),

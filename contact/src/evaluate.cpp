@@ -7,7 +7,7 @@
 
 namespace tether::contact {
 
-Residuals evaluate(const Problem& problem, Law law, const Eigen::VectorXd& impulses) {
+Residuals evaluate(const Problem& problem, Law law, const linalg::VectorView& impulses) {
   const detail::Packed x = problem.pack(impulses);
   if (!impulses.allFinite()) return {};  // nothing can be said of it
   detail::Packed w(x.size()), scratch(x.size());

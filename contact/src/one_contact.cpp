@@ -192,7 +192,8 @@ OneContact solve_one_golden_section(const LocalBlock& L, const Eigen::Vector3d& 
   return out;
 }
 
-PlanarContact solve_planar(Law law, const Eigen::Matrix2d& A, const Eigen::Vector2d& b, double mu) {
+PlanarContact solve_planar(Law law, const linalg::Matrix<2, 2>& A, const linalg::Matrix<2, 1>& b,
+                           double mu) {
   const double a = A(0, 0), c = 0.5 * (A(0, 1) + A(1, 0));
   detail::require_finite("A", A);
   detail::require_finite("b", b);

@@ -14,7 +14,7 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-int dimension_of(const Eigen::VectorXd& b, const Eigen::VectorXd& mu) {
+int dimension_of(const linalg::VectorView& b, const linalg::VectorView& mu) {
   for (int d : {3, 2}) {
     if (b.size() == d * mu.size()) return d;
   }
@@ -25,8 +25,8 @@ int dimension_of(const Eigen::VectorXd& b, const Eigen::VectorXd& mu) {
 
 }  // namespace
 
-Problem Problem::dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
-                       const Eigen::VectorXd& mu) {
+Problem Problem::dense(const linalg::MatrixView& A, const linalg::VectorView& b,
+                       const linalg::VectorView& mu) {
   const int d = dimension_of(b, mu), n = static_cast<int>(mu.size());
   if (A.rows() != b.size() || A.cols() != b.size()) {
     const std::string size = std::to_string(b.size());
@@ -48,8 +48,8 @@ Problem Problem::dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
   return sparse(d, std::move(blocks), b, mu);
 }
 
-Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const Eigen::VectorXd& b,
-                        const Eigen::VectorXd& mu) {
+Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const linalg::VectorView& b,
+                        const linalg::VectorView& mu) {
   const int n = static_cast<int>(mu.size()), d = dimension;
   detail::require(d == 2 || d == 3, "dimension", d, "must be 2 or 3");
   detail::require(mu.size() <= std::numeric_limits<int>::max() / 3, "size of mu",
@@ -127,9 +127,9 @@ void Problem::set_ids(std::vector<std::uint64_t> ids) {
   ids_ = std::move(ids);
 }
 
-Eigen::MatrixXd Problem::dense_matrix() const {
+linalg::MatrixX Problem::dense_matrix() const {
   const int n = contacts(), d = dimension_;
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(d * n, d * n);
+  linalg::MatrixX A = linalg::MatrixX::Zero(d * n, d * n);
   for (int i = 0; i < n; ++i) {
     for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k) {
       for (int c = 0; c < d; ++c)
@@ -140,7 +140,7 @@ Eigen::MatrixXd Problem::dense_matrix() const {
   return A;
 }
 
-std::vector<PackedVector> Problem::pack(const Eigen::VectorXd& x) const {
+std::vector<PackedVector> Problem::pack(const linalg::VectorView& x) const {
   const int n = contacts(), d = dimension_;
   if (x.size() != d * n) {
     detail::refuse_size("impulses", x.size(), d * n, std::to_string(d) + " for each contact");
@@ -151,7 +151,7 @@ std::vector<PackedVector> Problem::pack(const Eigen::VectorXd& x) const {
   return out;
 }
 
-void Problem::unpack(const std::vector<PackedVector>& x, Eigen::VectorXd& out) const {
+void Problem::unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const {
   const int n = contacts(), d = dimension_;
   out.resize(d * n);
   for (int i = 0; i < n; ++i)

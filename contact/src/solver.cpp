@@ -53,7 +53,7 @@ struct Solver::Implementation {
   std::unordered_map<std::uint64_t, PackedVector> memory;
   bool stages_ready = false;
 
-  void solve(const Problem& problem, const Eigen::VectorXd* start, Solution& out);
+  void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
   void prepare_stages(int n);
   Status automatic();
   Status rotate(bool last);
@@ -301,7 +301,7 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   out.advice = detail::advice(status, options);
 }
 
-void Solver::Implementation::solve(const Problem& problem, const Eigen::VectorXd* start,
+void Solver::Implementation::solve(const Problem& problem, const linalg::VectorView* start,
                                    Solution& out) {
   const std::size_t n = static_cast<std::size_t>(problem.contacts());
   Measure measure = options.measure;
@@ -401,7 +401,7 @@ Solution Solver::solve(const Problem& problem) {
   implementation_->solve(problem, nullptr, out);
   return out;
 }
-Solution Solver::solve(const Problem& problem, const Eigen::VectorXd& start) {
+Solution Solver::solve(const Problem& problem, const linalg::VectorView& start) {
   Solution out;
   implementation_->solve(problem, &start, out);
   return out;

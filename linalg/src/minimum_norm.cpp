@@ -1,5 +1,6 @@
 // Tether: minimum-norm solution of C dy = g in a diagonal metric.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Dense>
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/minimum_norm.hpp>
@@ -7,6 +8,12 @@
 #include "small_orthogonal.hpp"
 
 namespace tether::linalg {
+
+struct MinimumNorm::Large {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  Eigen::VectorXd work, rhs;
+};
 
 MinimumNorm::MinimumNorm() = default;
 MinimumNorm::MinimumNorm(int rows, int columns) { resize(rows, columns); }
@@ -32,10 +39,11 @@ void MinimumNorm::resize(int rows, int columns) {
     kernel_ = nullptr;
     metric_.assign(static_cast<std::size_t>(columns), 0.0);
     row_norm_.assign(m, 0.0);
-    large_.resize(rows, columns);
-    qr_ = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
-    work_.resize(std::max(rows, columns));
-    rhs_.resize(std::max(rows, columns));
+    if (!large_) large_ = std::make_unique<Large>();
+    large_->A.resize(rows, columns);
+    large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
+    large_->work.resize(std::max(rows, columns));
+    large_->rhs.resize(std::max(rows, columns));
   }
 }
 
@@ -44,12 +52,12 @@ void MinimumNorm::set_rank(int rank) {
   least_square_ = 1.0;
   if (rank > 0)
     least_square_ = kernel_ != nullptr ? small_->ratio[rank - 1]
-                                       : std::pow(qr_.matrixQR()(rank - 1, rank - 1), 2);
+                                       : std::pow(large_->qr.matrixQR()(rank - 1, rank - 1), 2);
 }
 
 double* MinimumNorm::row(int i) {
   return kernel_ != nullptr ? small_->u + static_cast<std::ptrdiff_t>(i) * kernel_->stride
-                            : large_.row(i).data();
+                            : large_->A.row(i).data();
 }
 
 bool MinimumNorm::factor(const double* D, double rank_tolerance) {
@@ -72,23 +80,24 @@ bool MinimumNorm::factor(const double* wide, int width, const int* rows, const i
   }
   for (int i = 0; i < m_; ++i) {
     const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
-    for (int j = 0; j < n_; ++j) large_(i, j) = c[columns[j]];
+    for (int j = 0; j < n_; ++j) large_->A(i, j) = c[columns[j]];
   }
   return factor_large(rank_tolerance);
 }
 
 bool MinimumNorm::factor_large(double rank_tolerance) {
+  auto& [A, qr, work, rhs] = *large_;
   const Eigen::Map<const Eigen::VectorXd> D(metric_.data(), n_);
   for (int i = 0; i < m_; ++i) {
-    large_.row(i) = large_.row(i).cwiseProduct(D.transpose());
-    const double length = small::careful_norm(large_.row(i).data(), n_);
+    A.row(i) = A.row(i).cwiseProduct(D.transpose());
+    const double length = small::careful_norm(A.row(i).data(), n_);
     if (!std::isfinite(length)) return false;
     row_norm_[static_cast<std::size_t>(i)] = length;
-    large_.row(i) *= length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
+    A.row(i) *= length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
   }
-  qr_.setThreshold(rank_tolerance);
-  qr_.compute(large_.transpose());
-  set_rank(qr_.maxPivot() > rank_tolerance ? static_cast<int>(qr_.rank()) : 0);
+  qr.setThreshold(rank_tolerance);
+  qr.compute(A.transpose());
+  set_rank(qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0);
   return true;
 }
 
@@ -122,28 +131,29 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
 }
 
 void MinimumNorm::solve_large(const double* g, double* dy) {
-  const auto& R = qr_.matrixQR();
-  for (int k = 0; k < rank_; ++k) rhs_[k] = scaled(g, pivot(k));
+  auto& [A, qr, work, rhs] = *large_;
+  const auto& R = qr.matrixQR();
+  for (int k = 0; k < rank_; ++k) rhs[k] = scaled(g, pivot(k));
   R.topLeftCorner(rank_, rank_)
       .triangularView<Eigen::Upper>()
       .transpose()
-      .solveInPlace(rhs_.head(rank_));
+      .solveInPlace(rhs.head(rank_));
   for (int k = rank_; k < m_; ++k)
     inconsistency_[static_cast<std::size_t>(k)] =
-        std::abs(scaled(g, pivot(k)) - R.col(k).head(rank_).dot(rhs_.head(rank_)));
+        std::abs(scaled(g, pivot(k)) - R.col(k).head(rank_).dot(rhs.head(rank_)));
 
   Eigen::Map<Eigen::VectorXd> du(dy, n_);
   du.setZero();
-  du.head(rank_) = rhs_.head(rank_);
+  du.head(rank_) = rhs.head(rank_);
   for (int k = rank_ - 1; k >= 0; --k)
-    du.tail(n_ - k).applyHouseholderOnTheLeft(R.col(k).tail(n_ - k - 1), qr_.hCoeffs()[k],
-                                              work_.data());
+    du.tail(n_ - k).applyHouseholderOnTheLeft(R.col(k).tail(n_ - k - 1), qr.hCoeffs()[k],
+                                              work.data());
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
 
 int MinimumNorm::pivot(int k) const {
   return kernel_ != nullptr ? small_->pivot[k]
-                            : static_cast<int>(qr_.colsPermutation().indices()[k]);
+                            : static_cast<int>(large_->qr.colsPermutation().indices()[k]);
 }
 
 double MinimumNorm::row_norm(int i) const {
@@ -167,14 +177,14 @@ std::vector<double> MinimumNorm::dependence(int k) const {
     const auto length = [&](int row) { return std::sqrt(s.square[s.pivot[row]]); };
     for (int j = 0; j < r; ++j) x[j] *= length(j) / length(k);
   } else {
-    x = qr_.matrixQR().col(k).head(r);
-    qr_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solveInPlace(x);
+    x = large_->qr.matrixQR().col(k).head(r);
+    large_->qr.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solveInPlace(x);
   }
   return {x.data(), x.data() + r};
 }
 
 double MinimumNorm::independent_part(int k) const {
-  return kernel_ != nullptr ? std::sqrt(small_->ratio[k]) : std::abs(qr_.matrixQR()(k, k));
+  return kernel_ != nullptr ? std::sqrt(small_->ratio[k]) : std::abs(large_->qr.matrixQR()(k, k));
 }
 
 double MinimumNorm::condition() const {

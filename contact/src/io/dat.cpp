@@ -155,7 +155,7 @@ void write_dat(const Problem& problem, const std::string& path, DatStorage stora
   std::fprintf(file, "%d\n%d\n%d\n%d\n%d\n", d, n, storage == DatStorage::dense ? 0 : 1, size, size);
   if (storage == DatStorage::dense) {
     std::fprintf(file, "%d %d\n", size, size);
-    const Eigen::MatrixXd A = problem.dense_matrix();
+    const linalg::MatrixX A = problem.dense_matrix();
     for (int c = 0; c < size; ++c) {
       for (int r = 0; r < size; ++r) std::fprintf(file, "%.17g ", A(r, c));
       std::fprintf(file, "\n");

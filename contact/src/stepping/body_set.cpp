@@ -10,12 +10,11 @@
 namespace tether::contact {
 
 using Eigen::Matrix3d;
-using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 namespace {
 
-void check_place(const Vector3d& at, const Quaterniond& turned) {
+void check_place(const Vector3d& at, const linalg::Quaternion& turned) {
   if (!at.allFinite() || !turned.coeffs().allFinite() || !(turned.norm() > 0))
     throw std::invalid_argument("a body needs a finite position and a quaternion that is not zero");
 }
@@ -23,7 +22,7 @@ void check_place(const Vector3d& at, const Quaterniond& turned) {
 }  // namespace
 
 int BodySet::add(double body_mass, const Matrix3d& body_inertia, const Vector3d& at,
-                 const Quaterniond& turned, const Vector3d& velocity,
+                 const linalg::Quaternion& turned, const Vector3d& velocity,
                  const Vector3d& angular_velocity) {
   check_place(at, turned);
   if (!(body_mass > 0) || !std::isfinite(body_mass) || !body_inertia.allFinite() ||
@@ -50,7 +49,7 @@ int BodySet::add(double body_mass, const Matrix3d& body_inertia, const Vector3d&
   return size() - 1;
 }
 
-int BodySet::add_fixed(const Vector3d& at, const Quaterniond& turned) {
+int BodySet::add_fixed(const Vector3d& at, const linalg::Quaternion& turned) {
   check_place(at, turned);
   position.push_back(at);
   orientation.push_back(turned.normalized());

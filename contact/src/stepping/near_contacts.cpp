@@ -120,7 +120,7 @@ bool NearContacts::any_restitution() const {
 void NearContacts::place(const BodySet& bodies, double dt) {
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
     const Surface& s = surfaces_[k];
-    const Eigen::Quaterniond& q = bodies.orientation[at(s.body)];
+    const linalg::Quaternion& q = bodies.orientation[at(s.body)];
     pose_[k].position = bodies.position[at(s.body)];
     if (!s.shape.position.isZero(0)) pose_[k].position += q * s.shape.position;
     if (s.shape.kind != ShapeKind::sphere)

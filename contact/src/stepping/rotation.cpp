@@ -7,7 +7,6 @@
 namespace tether::contact::detail {
 
 using Eigen::Matrix3d;
-using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 namespace {
@@ -46,7 +45,7 @@ bool solve_step(const Matrix3d& I, const Vector3d& W, double dt, Vector3d& W1) {
   return last <= 1e-13 * W1.norm();
 }
 
-void turn(const Matrix3d& I, double dt, int depth, Quaterniond& q, Vector3d& W) {
+void turn(const Matrix3d& I, double dt, int depth, linalg::Quaternion& q, Vector3d& W) {
   Vector3d W1;
   if (solve_step(I, W, dt, W1) || depth == 0) {
     q = (q * exponential(0.5 * dt * (W + W1))).normalized();
@@ -65,17 +64,17 @@ bool is_isotropic(const Matrix3d& I) {
   return (I - mean * Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 1e-14 * std::abs(mean);
 }
 
-Matrix3d turned(const Matrix3d& tensor, const Quaterniond& q) {
+Matrix3d turned(const Matrix3d& tensor, const linalg::Quaternion& q) {
   const Matrix3d R = q.toRotationMatrix();
   const Matrix3d out = R * tensor * R.transpose();
   return 0.5 * (out + out.transpose());
 }
 
-Vector3d spin(const Matrix3d& inertia, const Quaterniond& q, const Vector3d& w) {
+Vector3d spin(const Matrix3d& inertia, const linalg::Quaternion& q, const Vector3d& w) {
   return q * (inertia * (q.conjugate() * w));
 }
 
-Quaterniond exponential(const Vector3d& rotation) {
+linalg::Quaternion exponential(const Vector3d& rotation) {
   const double a2 = rotation.squaredNorm(), a = std::sqrt(a2);
   // sin(a/2)/a by its series where the quotient would lose digits.
   const double s = a < 1e-3 ? 0.5 - a2 / 48 + a2 * a2 / 3840 : std::sin(0.5 * a) / a;
@@ -83,13 +82,13 @@ Quaterniond exponential(const Vector3d& rotation) {
 }
 
 Vector3d gyroscopic_explicit(const Matrix3d& inertia, const Matrix3d& inverse_inertia,
-                             const Quaterniond& q, const Vector3d& w, double dt) {
+                             const linalg::Quaternion& q, const Vector3d& w, double dt) {
   const Vector3d W = q.conjugate() * w;
   return -dt * (q * (inverse_inertia * W.cross(inertia * W)));
 }
 
-Vector3d gyroscopic_implicit(const Matrix3d& inertia, const Quaterniond& q, const Vector3d& w,
-                             double dt) {
+Vector3d gyroscopic_implicit(const Matrix3d& inertia, const linalg::Quaternion& q,
+                             const Vector3d& w, double dt) {
   const Vector3d W = q.conjugate() * w, M = inertia * W;
   // f(W1) = I (W1 - W) + dt W1 x I W1 = 0, one Newton step from W.
   const Matrix3d slope = inertia + dt * (skew(W) * inertia - skew(M));
@@ -97,7 +96,7 @@ Vector3d gyroscopic_implicit(const Matrix3d& inertia, const Quaterniond& q, cons
 }
 
 void turn_with_momentum(const Matrix3d& inertia, const Matrix3d& inverse_inertia, double dt,
-                        Quaterniond& q, Vector3d& w, FreeSpin& free) {
+                        linalg::Quaternion& q, Vector3d& w, FreeSpin& free) {
   if (w.isZero(0)) return;
   const bool same = w == free.w && q.coeffs() == free.q.coeffs();
   if (!same) free.L = spin(inertia, q, w);

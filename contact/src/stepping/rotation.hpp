@@ -3,40 +3,41 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <tether/linalg/eigen.hpp>
 
 namespace tether::contact::detail {
 
 bool is_isotropic(const Eigen::Matrix3d& inertia);
 
 /// R I R' of a body tensor.
-Eigen::Matrix3d turned(const Eigen::Matrix3d& tensor, const Eigen::Quaterniond& q);
+Eigen::Matrix3d turned(const Eigen::Matrix3d& tensor, const linalg::Quaternion& q);
 
 /// Angular momentum in world axes.
-Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q,
+Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const linalg::Quaternion& q,
                      const Eigen::Vector3d& w);
 
 /// Unit quaternion of the rotation vector.
-Eigen::Quaterniond exponential(const Eigen::Vector3d& rotation);
+linalg::Quaternion exponential(const Eigen::Vector3d& rotation);
 
 /// Change of the angular velocity (world axes) by the gyroscopic term over dt.
 Eigen::Vector3d gyroscopic_explicit(const Eigen::Matrix3d& inertia,
                                     const Eigen::Matrix3d& inverse_inertia,
-                                    const Eigen::Quaterniond& q, const Eigen::Vector3d& w,
+                                    const linalg::Quaternion& q, const Eigen::Vector3d& w,
                                     double dt);
-Eigen::Vector3d gyroscopic_implicit(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q,
+Eigen::Vector3d gyroscopic_implicit(const Eigen::Matrix3d& inertia, const linalg::Quaternion& q,
                                     const Eigen::Vector3d& w, double dt);
 
 /// The momentum of a body that nothing acts upon: taken over from step to step as long as its state
 /// is the one that was left, since the round-off of computing it anew has a sign and would add up.
 struct FreeSpin {
   Eigen::Vector3d L = Eigen::Vector3d::Zero(), w = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  linalg::Quaternion q = linalg::Quaternion::Identity();
 };
 
 /// Turns the body by dt with its angular momentum kept: with body angular velocities W before and
 /// W1 after, q1 = q exp(dt (W + W1) / 2) and I W1 = R1' R I W. Then R1'L - R'L is a rotation about
 /// W + W1, so (W1 - W).I (W1 + W) = 0: the energy is kept, too, whatever dt.
 void turn_with_momentum(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse_inertia,
-                        double dt, Eigen::Quaterniond& q, Eigen::Vector3d& w, FreeSpin& free);
+                        double dt, linalg::Quaternion& q, Eigen::Vector3d& w, FreeSpin& free);
 
 }  // namespace tether::contact::detail

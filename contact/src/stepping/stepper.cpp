@@ -249,7 +249,7 @@ void Stepper::Implementation::turn_round() {
   for (const int i : round_bodies) {
     const Vector3d& w = bodies.motion[at(i)].angular_velocity;
     if (w.isZero(0)) continue;
-    Eigen::Quaterniond& q = bodies.orientation[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
     q = (detail::exponential(options.step * w) * q).normalized();
   }
 }
@@ -257,7 +257,7 @@ void Stepper::Implementation::turn_round() {
 void Stepper::Implementation::turn_plain() {
   for (const int i : long_bodies) {
     RigidBody& b = bodies.motion[at(i)];
-    Eigen::Quaterniond& q = bodies.orientation[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
     q = (detail::exponential(options.step * b.angular_velocity) * q).normalized();
     b.inverse_inertia = detail::turned(bodies.inverse_inertia[at(i)], q);
   }
@@ -267,7 +267,7 @@ void Stepper::Implementation::turn_keeping_momentum() {
   for (std::size_t k = 0; k < long_bodies.size(); ++k) {
     const int i = long_bodies[k];
     RigidBody& b = bodies.motion[at(i)];
-    Eigen::Quaterniond& q = bodies.orientation[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
     detail::turn_with_momentum(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)], options.step,
                                q, b.angular_velocity, free_spin[k]);
     b.inverse_inertia = detail::turned(bodies.inverse_inertia[at(i)], q);

@@ -19,7 +19,7 @@ namespace {
 struct Solver::Implementation {};
 Solver::Solver(const Options&) { absent("assembled islands"); }
 Solver::~Solver() = default;
-Solution Solver::solve(const Problem&, const Eigen::VectorXd&) { absent("assembled islands"); }
+Solution Solver::solve(const Problem&, const linalg::VectorView&) { absent("assembled islands"); }
 Problem delassus(const std::vector<Body>&, const std::vector<BodyContact>&) {
   absent("assembled islands");
 }
@@ -44,13 +44,13 @@ int Restitution::apply(BodySet&, StepContacts&) { absent("restitution"); }
 
 using M = const Eigen::Matrix3d&;
 using V = const Eigen::Vector3d&;
-Eigen::Vector3d gyroscopic_explicit(M, M, const Eigen::Quaterniond&, V, double) {
+Eigen::Vector3d gyroscopic_explicit(M, M, const linalg::Quaternion&, V, double) {
   absent("gyroscopic term");
 }
-Eigen::Vector3d gyroscopic_implicit(M, const Eigen::Quaterniond&, V, double) {
+Eigen::Vector3d gyroscopic_implicit(M, const linalg::Quaternion&, V, double) {
   absent("gyroscopic term");
 }
-void turn_with_momentum(M, M, double, Eigen::Quaterniond&, Eigen::Vector3d&, FreeSpin&) {
+void turn_with_momentum(M, M, double, linalg::Quaternion&, Eigen::Vector3d&, FreeSpin&) {
   absent("gyroscopic term");
 }
 }  // namespace detail

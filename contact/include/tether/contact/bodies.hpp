@@ -1,15 +1,17 @@
 // Tether: contact problems given by bodies. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <tether/contact/problem.hpp>
+#include <tether/export.hpp>
+#include <tether/linalg/eigen.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix36d = Eigen::Matrix<double, 3, 6>;
+using Matrix6d = linalg::Matrix<6, 6>;
+using Vector6d = linalg::Matrix<6, 1>;
+using Matrix36d = linalg::Matrix<3, 6>;
 
 /// Inverse mass matrix and velocity (linear, angular) before the impulses. Zero inverse: fixed.
 struct Body {
@@ -41,6 +43,7 @@ Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>
 /// Velocities after the impulses: v + M^-1 J' x.
 std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
                                        const std::vector<BodyContact>& contacts,
-                                       const Eigen::VectorXd& impulses);
+                                       const linalg::VectorView& impulses);
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

@@ -6,8 +6,10 @@
 #include <memory>
 #include <tether/contact/bodies.hpp>
 #include <tether/contact/solver.hpp>
+#include <tether/export.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// Rigid body: mass and inertia about its centre, in world axes. Zero inverse mass and inertia:
@@ -101,7 +103,7 @@ class BodySolver {
   void forget();
 
  private:
-  struct Implementation;
+  struct TETHER_HIDDEN Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
 
@@ -114,3 +116,4 @@ std::vector<Body> to_bodies(const std::vector<RigidBody>& bodies);
 std::vector<BodyContact> to_contacts(const std::vector<PointContact>& contacts);
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

@@ -3,7 +3,9 @@
 
 #include <limits>
 #include <tether/contact/problem.hpp>
+#include <tether/export.hpp>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// All in the units of a velocity (impulses are multiplied by A_nn) unless said; NaN: not computed.
@@ -23,6 +25,7 @@ struct Residuals {
 /// The same yardstick for every solver. natural_map is the law's own (README, section 6); for
 /// Law::coulomb it is the one that Siconos reports. `impulses` has dimension * contacts entries;
 /// if one of them is not finite, all is NaN.
-Residuals evaluate(const Problem& problem, Law law, const Eigen::VectorXd& impulses);
+Residuals evaluate(const Problem& problem, Law law, const linalg::VectorView& impulses);
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

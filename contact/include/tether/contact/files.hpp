@@ -3,7 +3,9 @@
 
 #include <string>
 #include <tether/contact/problem.hpp>
+#include <tether/export.hpp>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// Readers throw std::runtime_error with the file and what is wrong with it: missing, truncated,
@@ -23,3 +25,4 @@ void write_fclib(const Problem& problem, const std::string& path);
 bool has_fclib();
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

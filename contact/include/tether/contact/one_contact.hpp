@@ -1,9 +1,11 @@
 // Tether: the one-contact problem and its friction laws. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
+#include <tether/export.hpp>
+#include <tether/linalg/eigen.hpp>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// What an impulse x = (x_n, x_t) and the relative velocity after it, w = A x - b, must satisfy.
@@ -70,9 +72,11 @@ OneContact solve_one_golden_section(const LocalBlock& block, const Eigen::Vector
 
 /// Planar contact (x_n, x_t), A = [a c; c t]: closed form of each law.
 struct PlanarContact {
-  Eigen::Vector2d impulse = Eigen::Vector2d::Zero();
+  linalg::Matrix<2, 1> impulse = linalg::Matrix<2, 1>::Zero();
   Regime regime = Regime::separating;
 };
-PlanarContact solve_planar(Law law, const Eigen::Matrix2d& A, const Eigen::Vector2d& b, double mu);
+PlanarContact solve_planar(Law law, const linalg::Matrix<2, 2>& A, const linalg::Matrix<2, 1>& b,
+                           double mu);
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

@@ -4,7 +4,9 @@
 
 #include <memory>
 #include <tether/contact/shapes.hpp>
+#include <tether/export.hpp>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// Boxes and convex hulls against each other, capsules against both, spheres against hulls.
@@ -20,3 +22,4 @@ namespace tether::contact {
 std::unique_ptr<PairCollision> make_polyhedra();
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

@@ -1,11 +1,13 @@
 // Tether: a frictional contact problem given by its Delassus matrix. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <tether/contact/one_contact.hpp>
+#include <tether/export.hpp>
+#include <tether/linalg/eigen.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// One 3x3 block as three columns of four doubles (the fourth is 0): a vector register each.
@@ -32,18 +34,18 @@ class Problem {
   /// d n x d n matrix, d n vector, n coefficients; d = 2 or 3 follows from the sizes.
   /// Throws std::invalid_argument (here and below) on sizes that do not match, values that are not
   /// finite, A_nn <= 0, indefinite diagonal blocks, mu < 0.
-  static Problem dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
-                       const Eigen::VectorXd& mu);
+  static Problem dense(const linalg::MatrixView& A, const linalg::VectorView& b,
+                       const linalg::VectorView& mu);
   /// Blocks in any order; equal positions are summed.
-  static Problem sparse(int dimension, std::vector<MatrixBlock> blocks, const Eigen::VectorXd& b,
-                        const Eigen::VectorXd& mu);
+  static Problem sparse(int dimension, std::vector<MatrixBlock> blocks, const linalg::VectorView& b,
+                        const linalg::VectorView& mu);
 
   int contacts() const { return static_cast<int>(local_.size()); }
   int dimension() const { return dimension_; }
-  const Eigen::VectorXd& b() const { return b_; }
+  const linalg::VectorX& b() const { return b_; }
   double mu(int contact) const { return local_[static_cast<std::size_t>(contact)].mu; }
   const LocalBlock& local(int contact) const { return local_[static_cast<std::size_t>(contact)]; }
-  Eigen::MatrixXd dense_matrix() const;
+  linalg::MatrixX dense_matrix() const;
 
   /// Identity of each contact, by which a Solver finds its impulse of the previous problem.
   /// Default: 0 .. n-1.
@@ -60,12 +62,12 @@ class Problem {
   const std::vector<LocalBlock>& locals() const { return local_; }
   const std::vector<PackedVector>& packed_b() const { return packed_b_; }
 
-  std::vector<PackedVector> pack(const Eigen::VectorXd& x) const;
-  void unpack(const std::vector<PackedVector>& x, Eigen::VectorXd& out) const;
+  std::vector<PackedVector> pack(const linalg::VectorView& x) const;
+  void unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const;
 
  private:
   int dimension_ = 3;
-  Eigen::VectorXd b_;
+  linalg::VectorX b_;
   std::vector<LocalBlock> local_;
   std::vector<int> row_start_, columns_;
   std::vector<PackedBlock> blocks_;
@@ -74,3 +76,4 @@ class Problem {
 };
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

@@ -1,11 +1,12 @@
 // Tether: shapes of rigid bodies, and where they touch. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstdint>
+#include <tether/export.hpp>
+#include <tether/linalg/eigen.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 enum class ShapeKind : std::uint8_t { sphere, plane, box, capsule, convex, points };
@@ -21,7 +22,7 @@ struct Shape {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the half-space
   std::vector<Eigen::Vector3d> points;                ///< convex: vertices; points: touching points
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();
 
   static Shape sphere(double radius);
   static Shape plane(const Eigen::Vector3d& normal);
@@ -71,3 +72,4 @@ class PairCollision {
 };
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

@@ -6,8 +6,10 @@
 #include <string>
 #include <tether/contact/evaluate.hpp>
 #include <tether/contact/problem.hpp>
+#include <tether/export.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// The number that is compared with Options::tolerance; see Residuals.
@@ -72,7 +74,7 @@ struct Counts {
 
 struct Solution {
   Status status = Status::unsolved;
-  Eigen::VectorXd impulses, velocities;  ///< x and w = A x - b
+  linalg::VectorX impulses, velocities;  ///< x and w = A x - b
   std::vector<Regime> regimes;
   std::vector<int> replaced;  ///< contacts with the Coulomb rule instead of maximum_dissipation
   double error = Residuals::kNone;  ///< the measure that was compared with the tolerance
@@ -93,15 +95,16 @@ class Solver {
 
   Solution solve(const Problem& problem);
   /// Start from the given impulses (dimension * contacts entries).
-  Solution solve(const Problem& problem, const Eigen::VectorXd& start);
+  Solution solve(const Problem& problem, const linalg::VectorView& start);
   /// The same, into storage that is used again.
   void solve(const Problem& problem, Solution& solution);
 
   const Options& options() const;
 
  private:
-  struct Implementation;
+  struct TETHER_HIDDEN Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

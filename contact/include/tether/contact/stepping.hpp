@@ -1,8 +1,6 @@
 // Tether: rigid bodies in motion, by impulses and velocities. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,8 +8,11 @@
 #include <string>
 #include <tether/contact/body_solver.hpp>
 #include <tether/contact/shapes.hpp>
+#include <tether/export.hpp>
+#include <tether/linalg/eigen.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// How the angular velocity of a body without torque changes (README, section 13). Spheres skip it.
@@ -27,7 +28,7 @@ const char* name(Gyroscopic gyroscopic);
 /// Bodies as contiguous data; index i everywhere is body i. World axes but for `inertia`.
 struct BodySet {
   std::vector<Eigen::Vector3d> position;        ///< of the centre of mass, m
-  std::vector<Eigen::Quaterniond> orientation;  ///< unit; body to world
+  std::vector<linalg::Quaternion> orientation;  ///< unit; body to world
   std::vector<RigidBody> motion;  ///< velocities, inverse mass, inverse inertia in world axes
   std::vector<double> mass;       ///< kg; 0: fixed
   std::vector<Eigen::Matrix3d> inertia;          ///< about the centre, body axes, kg m^2
@@ -37,11 +38,11 @@ struct BodySet {
   /// Returns the index. Throws std::invalid_argument unless mass and inertia are positive
   /// (definite) and all values finite.
   int add(double body_mass, const Eigen::Matrix3d& body_inertia, const Eigen::Vector3d& at,
-          const Eigen::Quaterniond& turned = Eigen::Quaterniond::Identity(),
+          const linalg::Quaternion& turned = linalg::Quaternion::Identity(),
           const Eigen::Vector3d& velocity = Eigen::Vector3d::Zero(),
           const Eigen::Vector3d& angular_velocity = Eigen::Vector3d::Zero());
   int add_fixed(const Eigen::Vector3d& at,
-                const Eigen::Quaterniond& turned = Eigen::Quaterniond::Identity());
+                const linalg::Quaternion& turned = linalg::Quaternion::Identity());
 };
 
 /// A shape on a body, of a material.
@@ -148,7 +149,7 @@ class Stepper {
   void start_anew(long steps);
 
  private:
-  struct Implementation;
+  struct TETHER_HIDDEN Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
 
@@ -157,3 +158,4 @@ Eigen::Vector3d momentum(const BodySet& bodies);
 Eigen::Vector3d angular_momentum(const BodySet& bodies);  ///< about the origin
 
 }  // namespace tether::contact
+TETHER_EXPORT_END

@@ -3,9 +3,11 @@
 
 #include <functional>
 #include <string>
+#include <tether/export.hpp>
 #include <tether/ida_projection/constraints.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
 /// |q|^2 = 1 for the four components y[first .. first + 3], as (|q|^2 - 1)/2 = 0.
@@ -30,3 +32,4 @@ Constraints energy(ScalarFunction H, GradientFunction gradient, double value, in
                    std::string name = "energy");
 
 }  // namespace tether::ida_projection
+TETHER_EXPORT_END

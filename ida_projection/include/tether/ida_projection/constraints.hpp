@@ -5,11 +5,13 @@
 #include <functional>
 #include <string>
 #include <sundials/sundials_nvector.h>
+#include <tether/export.hpp>
 #include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
 /// Read-only view of the N unknowns y.
@@ -138,3 +140,4 @@ JacobianReport check_jacobian(const Constraints& constraints, double t,
                               const std::vector<double>& y, double tolerance = 1e-5);
 
 }  // namespace tether::ida_projection
+TETHER_EXPORT_END

@@ -4,8 +4,10 @@
 #include <functional>
 #include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
+#include <tether/export.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
 /// The metric D in which the move is shortest: min sum_i (dy_i / D_i)^2 subject to C dy = g.
@@ -112,3 +114,4 @@ struct Options {
 };
 
 }  // namespace tether::ida_projection
+TETHER_EXPORT_END

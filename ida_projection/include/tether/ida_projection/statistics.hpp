@@ -3,7 +3,9 @@
 
 #include <iosfwd>
 #include <string>
+#include <tether/export.hpp>
 
+TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
 /// Work counts and sizes since attach (or Projection::reset_statistics). A value: copy it freely.
@@ -52,3 +54,4 @@ struct Statistics {
 std::ostream& operator<<(std::ostream& out, const Statistics& statistics);
 
 }  // namespace tether::ida_projection
+TETHER_EXPORT_END

@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Dense>
 #include <memory>
+#include <tether/export.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
-namespace small {
+namespace small {  // inside the library
 struct Storage;
 struct Kernel;
 }  // namespace small
@@ -94,14 +95,13 @@ class MinimumNorm {
   int m_ = 0, n_ = 0, rank_ = 0, factored_rank_ = 0;
   const small::Kernel* kernel_ = nullptr;  // null: beyond the small sizes
   std::unique_ptr<small::Storage> small_;
+  struct TETHER_HIDDEN Large;  // Eigen's types stay inside the library: see eigen.hpp
+  std::unique_ptr<Large> large_;
   double least_square_ = 1.0;
   std::vector<double> metric_;  // D, padded with zeros to the kernel's stride
-
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> large_;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr_;
-  Eigen::VectorXd work_, rhs_;
 
   std::vector<double> row_norm_, inconsistency_;
 };
 
 }  // namespace tether::linalg
+TETHER_EXPORT_END

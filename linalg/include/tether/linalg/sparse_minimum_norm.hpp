@@ -3,8 +3,10 @@
 #pragma once
 
 #include <memory>
+#include <tether/export.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
 class BorderedGram;
@@ -111,3 +113,4 @@ class SparseMinimumNorm {
 };
 
 }  // namespace tether::linalg
+TETHER_EXPORT_END

@@ -1,0 +1,17 @@
+// Tether: which symbols the libraries show. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+/// The libraries are compiled with hidden visibility; what stands between these two lines of a
+/// public header is seen from outside: functions, and classes with all that belongs to them
+/// (vtables and type information, too, so that exceptions are caught by type on the other side).
+/// TETHER_HIDDEN takes an inner class out of that. What templates of Eigen make of them stays
+/// inside: cmake/TetherPrivate.cmake.
+#if defined(__GNUC__)
+#define TETHER_EXPORT_BEGIN _Pragma("GCC visibility push(default)")
+#define TETHER_EXPORT_END _Pragma("GCC visibility pop")
+#define TETHER_HIDDEN __attribute__((visibility("hidden")))
+#else
+#define TETHER_EXPORT_BEGIN
+#define TETHER_EXPORT_END
+#define TETHER_HIDDEN
+#endif
