@@ -8,7 +8,12 @@
 #   tether::sundials_idas      the same with sensitivities
 #   tether::sundials_klu       the KLU linear solver, when SUNDIALS has it
 #
-# Sets TetherSundials_FOUND and TetherSundials_VERSION; when it is missing, says what to install.
+# Sets TetherSundials_FOUND and, from sundials_config.h, TetherSundials_VERSION,
+# TetherSundials_PRECISION (single, double, extended), TetherSundials_INDEX_BITS (32, 64) and
+# TetherSundials_BUILD, the three in words; when it is missing or of no use, says what to install.
+# TetherSundials_REQUIRED_BUILD (list of the three, from the package config): only a SUNDIALS that a
+# library compiled with that one can run with: same major version, no earlier minor one, same
+# precision and size of indices.
 #
 # No version is given to find_package: its version file refuses every other major version.
 find_package(SUNDIALS QUIET CONFIG)
@@ -17,7 +22,6 @@ set(TetherSundials_VERSION "")
 set(_tether_sundials_include "")
 
 if(SUNDIALS_FOUND AND TARGET SUNDIALS::ida)
-  set(TetherSundials_VERSION ${SUNDIALS_VERSION})
   # SUNDIALS::core in 7.x, SUNDIALS::generic in 6.x, behind aliases that are interface targets.
   foreach(_target IN ITEMS core_shared core_static generic_shared generic_static ida_shared ida_static)
     if(TARGET SUNDIALS::${_target})
@@ -55,9 +59,6 @@ else()
     TETHER_SUNDIALS_CORE_LIBRARY TETHER_SUNDIALS_KLU_LIBRARY)
   if(TETHER_SUNDIALS_INCLUDE_DIR)
     set(_tether_sundials_include ${TETHER_SUNDIALS_INCLUDE_DIR})
-    file(STRINGS ${TETHER_SUNDIALS_INCLUDE_DIR}/sundials/sundials_config.h _tether_sundials_line
-      REGEX "^#define SUNDIALS_VERSION \"")
-    string(REGEX REPLACE ".*\"([0-9.]+).*" "\\1" TetherSundials_VERSION "${_tether_sundials_line}")
     foreach(_solver IN ITEMS ida idas klu)
       string(TOUPPER ${_solver} _upper)
       set(_tether_link_${_solver} "")
@@ -77,7 +78,52 @@ else()
   endif()
 endif()
 
-if(_tether_sundials_include AND TetherSundials_VERSION VERSION_GREATER_EQUAL 6.4)
+# What programs will be compiled with.
+set(TetherSundials_PRECISION "")
+set(TetherSundials_INDEX_BITS "")
+foreach(_directory IN LISTS _tether_sundials_include)
+  if(EXISTS "${_directory}/sundials/sundials_config.h" AND NOT TetherSundials_VERSION)
+    file(STRINGS "${_directory}/sundials/sundials_config.h" _tether_sundials_lines REGEX "^#define SUNDIALS_")
+    if(_tether_sundials_lines MATCHES "SUNDIALS_VERSION \"([0-9]+\\.[0-9]+\\.[0-9]+)")
+      set(TetherSundials_VERSION ${CMAKE_MATCH_1})
+    endif()
+    if(_tether_sundials_lines MATCHES "SUNDIALS_(SINGLE|DOUBLE|EXTENDED)_PRECISION")
+      string(TOLOWER ${CMAKE_MATCH_1} TetherSundials_PRECISION)
+    endif()
+    if(_tether_sundials_lines MATCHES "SUNDIALS_INT(32|64)_T")
+      set(TetherSundials_INDEX_BITS ${CMAKE_MATCH_1})
+    endif()
+  endif()
+endforeach()
+set(TetherSundials_BUILD
+  "${TetherSundials_VERSION} (${TetherSundials_PRECISION} precision, ${TetherSundials_INDEX_BITS}-bit indices)")
+
+set(_tether_sundials_problem "")
+if(NOT TetherSundials_VERSION)
+  set(_tether_sundials_problem
+    "SUNDIALS (6.4 or newer) not found. Install libsundials-dev, or set CMAKE_PREFIX_PATH to its prefix.")
+elseif(TetherSundials_VERSION VERSION_LESS 6.4)
+  set(_tether_sundials_problem "SUNDIALS ${TetherSundials_VERSION} is too old: 6.4 or newer is needed.")
+elseif(NOT TetherSundials_PRECISION STREQUAL "double")
+  set(_tether_sundials_problem "SUNDIALS ${TetherSundials_BUILD} in ${_tether_sundials_include} is of no use:\
+ Tether needs double precision (SUNDIALS_PRECISION=double).")
+elseif(TetherSundials_REQUIRED_BUILD)
+  list(GET TetherSundials_REQUIRED_BUILD 0 _tether_version)
+  list(GET TetherSundials_REQUIRED_BUILD 1 _tether_precision)
+  list(GET TetherSundials_REQUIRED_BUILD 2 _tether_bits)
+  string(REGEX REPLACE "^([0-9]+)\\.([0-9]+).*" "\\1.\\2" _tether_least ${_tether_version})
+  string(REGEX REPLACE "\\..*" "" _tether_major ${_tether_version})
+  math(EXPR _tether_next "${_tether_major} + 1")
+  if(TetherSundials_VERSION VERSION_LESS _tether_least OR NOT TetherSundials_VERSION VERSION_LESS _tether_next
+     OR NOT TetherSundials_INDEX_BITS STREQUAL _tether_bits OR NOT TetherSundials_PRECISION STREQUAL _tether_precision)
+    set(_tether_sundials_problem "this Tether was built for SUNDIALS ${_tether_version} (${_tether_precision}\
+ precision, ${_tether_bits}-bit indices), but SUNDIALS ${TetherSundials_BUILD} was found in\
+ ${_tether_sundials_include}. Set SUNDIALS_DIR to the one it was built for (${_tether_least} or a later\
+ ${_tether_major}.x), or build Tether with this one.")
+  endif()
+endif()
+
+if(_tether_sundials_problem STREQUAL "")
   set(TetherSundials_FOUND TRUE)
   if(NOT TARGET tether::sundials_headers)
     add_library(tether::sundials_headers INTERFACE IMPORTED GLOBAL)
@@ -94,15 +140,10 @@ if(_tether_sundials_include AND TetherSundials_VERSION VERSION_GREATER_EQUAL 6.4
     endif()
   endforeach()
   if(NOT CMAKE_FIND_PACKAGE_NAME)
-    message(STATUS "SUNDIALS ${TetherSundials_VERSION}: ${_tether_sundials_include}")
+    message(STATUS "SUNDIALS ${TetherSundials_BUILD}: ${_tether_sundials_include}")
   endif()
 else()
-  if(TetherSundials_VERSION)
-    set(TetherSundials_NOT_FOUND_MESSAGE "SUNDIALS ${TetherSundials_VERSION} is too old: 6.4 or newer is needed.")
-  else()
-    set(TetherSundials_NOT_FOUND_MESSAGE
-      "SUNDIALS (6.4 or newer) not found. Install libsundials-dev, or set CMAKE_PREFIX_PATH to its prefix.")
-  endif()
+  set(TetherSundials_NOT_FOUND_MESSAGE "${_tether_sundials_problem}")
   if(NOT CMAKE_FIND_PACKAGE_NAME)  # not inside tether-config.cmake
     message(FATAL_ERROR "${TetherSundials_NOT_FOUND_MESSAGE} Or build without the plugin: "
       "-DTETHER_BUILD_IDA_PROJECTION=OFF")

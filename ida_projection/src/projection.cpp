@@ -3,6 +3,7 @@
 #include <tether/ida_projection/projection.hpp>
 
 #include "impl.hpp"
+#include "sundials_build.hpp"
 
 namespace tether::ida_projection {
 
@@ -116,8 +117,11 @@ void Projection::Impl::reset_statistics() {
   timed_ = 0;
 }
 
-Projection::Projection(void* ida_mem, Constraints constraints, Options options)
-    : impl_(std::make_unique<Impl>(ida_mem, std::move(constraints), std::move(options))) {}
+Projection::Projection(void* ida_mem, Constraints constraints, Options options,
+                       const SundialsBuild& built) {
+  check_running_sundials(built);
+  impl_ = std::make_unique<Impl>(ida_mem, std::move(constraints), std::move(options));
+}
 Projection::~Projection() = default;
 Projection::Projection(Projection&&) noexcept = default;
 Projection& Projection::operator=(Projection&&) noexcept = default;

@@ -4,11 +4,15 @@
 #include <ida/ida.h>
 #include <memory>
 #include <string>
+#include <tether/export.hpp>
 #include <tether/ida_projection/constraints.hpp>
 #include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/statistics.hpp>
+#include <tether/ida_projection/sundials_build.hpp>
+#include <utility>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
 /// Outcome of the last thing that the plugin did. Negative values end the run.
@@ -77,8 +81,10 @@ struct Consistency {
 class Projection {
  public:
   /// ida_mem: from IDACreate, after IDAInit; tolerances and linear solver may come later.
-  /// Throws std::invalid_argument, naming the argument and its value, and leaves IDA as it was.
-  Projection(void* ida_mem, Constraints constraints, Options options = {});
+  /// Throws std::invalid_argument, naming the argument and its value, and std::runtime_error if the
+  /// SUNDIALS that runs is not the one that the library was compiled with; leaves IDA as it was.
+  Projection(void* ida_mem, Constraints constraints, Options options = {})
+      : Projection(ida_mem, std::move(constraints), std::move(options), TETHER_SUNDIALS_BUILD) {}
   ~Projection();
   Projection(Projection&&) noexcept;
   Projection& operator=(Projection&&) noexcept;
@@ -105,10 +111,13 @@ class Projection {
   const std::string& message() const;  ///< what to do about it; empty when all is well
   const Constraints& constraints() const;
 
-  class Impl;  // the decorator; see src/
+  class TETHER_HIDDEN Impl;  // the decorator; see src/
 
  private:
+  Projection(void* ida_mem, Constraints constraints, Options options, const SundialsBuild& built);
+
   std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace tether::ida_projection
+TETHER_EXPORT_END
