@@ -61,6 +61,7 @@ Status ContiguousMover<Rows>::factor(double t) {
   reusable_ = true;
   slope_ = kUnknownSlope;
   age_ = measured_age_ = 0;
+  wear_.renewed();
   return Status::success;
 }
 
@@ -340,6 +341,8 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   return result;
 }
 
+template void ContiguousMover<RowBlocks>::load(const Candidate&);
+template void ContiguousMover<SparseRows>::load(const Candidate&);
 template double ContiguousMover<RowBlocks>::rounding_length();
 template double ContiguousMover<SparseRows>::rounding_length();
 

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <limits>
 
+#include "frequency.hpp"
 #include "mover.hpp"
 #include "row_blocks.hpp"
 #include "sparse_rows.hpp"
@@ -49,6 +50,9 @@ class ContiguousMover final : public Mover {
 
   Move measure(const Candidate& candidate) override;
   Move move(const Candidate& candidate) override;
+  // Which of the thin rows count was judged at another point.
+  bool may_follow() override { return reusable_ && !thin_ && wear_.usable(); }
+  Move follow(const Candidate& candidate, bool again) override;
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
   Status settle(const Candidate& candidate, N_Vector change) override;
   double remaining_drift(const Candidate& candidate) override {
@@ -69,6 +73,7 @@ class ContiguousMover final : public Mover {
     staleness_ = -1.0;
     measured_ = 0.0;
     settles_ = 0;
+    wear_ = FactorWear();
   }
 
  private:
@@ -126,6 +131,7 @@ class ContiguousMover final : public Mover {
   int age_ = 0;            // candidates since they were made
   int measured_age_ = 0;   // the same when slope_ was last looked at
   double left_ = 0.0;      // what the last move() left for settle() or finish(), tolerances
+  FactorWear wear_;        // for follow()
   const double* ycor_ = nullptr;
   bool WT_known_ = false;
 };

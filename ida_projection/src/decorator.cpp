@@ -49,6 +49,8 @@ int Projection::Impl::initialize() {
   moved_id_ = OwnedVector();
   if (mover_) mover_->reset();
   smoother_.reset();
+  frequency_.reset();
+  repeated_ = false;
   refused_in_row_ = 0;
   last_error_failures_ = 0;
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
@@ -117,10 +119,10 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
 
   const StepData step = step_data();
   account_for_previous_attempt(step);
-  if (options_.frequency > 1 && (last_steps_ + 1) % options_.frequency != 0) return 0;
-
   candidate.t = step.t;
   const Candidate& at = candidate;
+  if (frequency_.on() && !needs_projection(at, step, tolerance, mem))
+    return finish(Status::success, "");
   const Stopwatch stopwatch(*this);
   if (!engaged_) {
     bool done = false;
@@ -166,6 +168,7 @@ int Projection::Impl::corrector_failed(int flag) {
 // Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
 int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, bool& done) {
   const Move first = mover_->measure(candidate);
+  if (frequency_.on()) frequency_.looked(first.length, step_size());
   done = true;
   if (first.status != Status::success) {
     const int code = finish(first.status, mover_->message());
@@ -223,8 +226,9 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   IDAGetNumLinSolvSetups(ida_mem_, &setups);
   if (setups != last_setups_) cj_at_setup_ = step.cj;
   last_setups_ = setups;
-  if (steps != last_steps_) look_for_refusals();
-  if (steps != last_steps_ && pending_) {
+  repeated_ = steps == last_steps_;
+  if (!repeated_) look_for_refusals();
+  if (!repeated_ && pending_) {
     mover_->accept();
     if (options_.progress && ++progress_count_ % options_.progress_interval == 0) {
       progress_.steps = steps;
@@ -308,17 +312,22 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
   ++s.projections;
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
-  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
+  note(move, step);
   if (sampled) s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
+}
+
+// What a successful move, full or not, leaves in the counts.
+void Projection::Impl::note(const Move& move, const StepData& step) {
+  Statistics& s = statistics_;
+  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
   s.largest_move = std::max(s.largest_move, move.length);
   move_sum_ += move.length;
+  if (frequency_.on()) frequency_.looked(move.length, step_size());
   pending_ = true;
   if (options_.progress) {
-    sunrealtype h = 0.0;
     int order = 0;
-    IDAGetCurrentStep(ida_mem_, &h);
     IDAGetCurrentOrder(ida_mem_, &order);
-    progress_ = {step.t, h, order, move.drift_before, move.length, 0};
+    progress_ = {step.t, step_size(), order, move.drift_before, move.length, 0};
   }
 }
 

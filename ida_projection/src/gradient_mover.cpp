@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "frequency.hpp"
 #include "impl.hpp"
 
 namespace tether::ida_projection {
@@ -53,6 +54,8 @@ class GradientMover final : public Mover {
     N_VConst(0.0, scale_);
     N_VConst(0.0, trial_);
     monitor_.reset();
+    wear_ = FactorWear();
+    factored_ = false;
   }
 
   // Algebraic components are held unless a row contains them.
@@ -97,6 +100,23 @@ class GradientMover final : public Mover {
     result.floor = 4.0 * kEpsilon * N_VWrmsNorm(y_, candidate.weights);
     if (contradicts()) result.status = Status::inconsistent;
     return result;
+  }
+
+  bool may_follow() override { return factored_ && wear_.usable(); }
+  Move follow(const Candidate& candidate, bool again) override {
+    if (again)
+      N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
+    else
+      load(candidate);
+    return move_with_old_factors(
+        wear_, [&] { return value(candidate.t); },
+        [&] { return solve(candidate.weights); },
+        [&] {
+          N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
+          N_VLinearSum(1.0, y_, -1.0, dy_, y_);
+        },
+        [&] { return drift(); }, 1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights),
+        options_.largest_move);
   }
 
   Move move(const Candidate& candidate) override {
@@ -235,6 +255,7 @@ class GradientMover final : public Mover {
 
   // Rows S C D orthogonalised in place: S C D = L Q^T with L lower triangular in pivot order.
   Status factor(double t) {
+    factored_ = false;
     const Status status = fill(t);
     if (status != Status::success) return status;
     ++statistics_.factorizations;
@@ -286,6 +307,8 @@ class GradientMover final : public Mover {
       }
     }
     if (rank_ < m_) ++statistics_.rank_drops;
+    factored_ = true;
+    wear_.renewed();
     return Status::success;
   }
 
@@ -348,6 +371,8 @@ class GradientMover final : public Mover {
   std::vector<double> g_, z_, norm_, tolerance_norm_, left_, R_;
   std::vector<int> pivot_;
   double length_;
+  FactorWear wear_;  // for follow()
+  bool factored_ = false;
 };
 
 }  // namespace

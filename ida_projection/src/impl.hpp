@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "equations.hpp"
+#include "frequency.hpp"
 #include "gauss_newton.hpp"
 #include "mover.hpp"
 #include "step_smoothing.hpp"
@@ -103,11 +104,20 @@ class Projection::Impl {
   void keep_corrector(const Candidate& candidate);
   bool wants_polish(double length) const;  // polish.cpp
   Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
+  bool add_newton_step(const Candidate& candidate, double cj, double tolerance, void* mem);
   bool newton_step_at_moved_point(const Candidate& candidate, void* mem);
   double differential_length(const Candidate& candidate);
   void apply_delta(const Candidate& candidate, double differential, double algebraic);
   void account(const Move& move, const StepData& step, bool sampled);
+  void note(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
+
+  // between.cpp
+  bool needs_projection(const Candidate& candidate, const StepData& step, double tolerance,
+                        void* mem);
+  bool leave_alone(const Candidate& candidate, const StepData& step, double tolerance, void* mem);
+  bool follow(const Candidate& candidate, const StepData& step, double tolerance, void* mem);
+  double step_size() const;
 
   // algebraic.cpp
   Status derive_id(const Candidate& candidate, void* mem);
@@ -128,6 +138,8 @@ class Projection::Impl {
   void* ida_mem_;
   Options options_;
   StepSmoother smoother_;
+  FrequencyPolicy frequency_;
+  bool repeated_ = false;  // IDA rejected the last attempt
   bool high_index_ = false;  // F is not of index 1 in its own variables
   bool index_known_ = false;
   int refused_in_row_ = 0;   // accepted steps that needed more than one attempt

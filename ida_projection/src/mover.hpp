@@ -53,6 +53,12 @@ class Mover {
   /// Moves the candidate: correction <- correction - dy.
   virtual Move move(const Candidate& candidate) = 0;
 
+  /// Are there factors of an earlier step that may serve the next candidate, too?
+  virtual bool may_follow() { return false; }
+  /// The move with them. Another status than success: they left too much (frequency.hpp); then the
+  /// correction has to be put back. `again`: the correction was changed after such a move.
+  virtual Move follow(const Candidate&, bool /*again*/) { return {}; }
+
   /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
   virtual double remaining_drift(const Candidate& candidate) = 0;
 

@@ -65,7 +65,14 @@ bool Projection::Impl::newton_step_at_moved_point(const Candidate& candidate, vo
 Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance,
                                 void* mem) {
   // A refinement: where F or the linear solver fails here, the move itself stands.
-  if (!newton_step_at_moved_point(candidate, mem)) return mover_->finish(candidate);
+  return add_newton_step(candidate, cj, tolerance, mem) ? mover_->settle(candidate, delta_)
+                                                        : mover_->finish(candidate);
+}
+
+// ycor <- ycor + delta, as far as delta is to be trusted. False: there is none.
+bool Projection::Impl::add_newton_step(const Candidate& candidate, double cj, double tolerance,
+                                       void* mem) {
+  if (!newton_step_at_moved_point(candidate, mem)) return false;
   ++statistics_.residual_evaluations;
   extra_iterations_of_last_solve_ = 1;
 
@@ -80,15 +87,15 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
   apply_delta(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (has_algebraic_ && algebraic > 0.0) ++statistics_.refreshes;
-  return mover_->settle(candidate, delta_);
+  return true;
 }
 
 // WRMS length of delta over the differential variables.
 double Projection::Impl::differential_length(const Candidate& candidate) {
   if (!contiguous_) {
     if (!has_algebraic_) return N_VWrmsNorm(delta_, candidate.weights);
-    N_VProd(id_, delta_, newton_);
-    return N_VWrmsNorm(newton_, candidate.weights);
+    N_VProd(id_, delta_, saved_);
+    return N_VWrmsNorm(saved_, candidate.weights);
   }
   const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
   double sum = 0.0;
@@ -114,8 +121,8 @@ void Projection::Impl::apply_delta(const Candidate& candidate, double differenti
     return;
   }
   if (has_algebraic_) {
-    N_VProd(id_, delta_, newton_);
-    N_VLinearSum(algebraic, delta_, differential - algebraic, newton_, delta_);
+    N_VProd(id_, delta_, saved_);
+    N_VLinearSum(algebraic, delta_, differential - algebraic, saved_, delta_);
   } else {
     N_VScale(differential, delta_, delta_);
   }

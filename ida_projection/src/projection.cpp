@@ -43,7 +43,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
     : constraints(std::move(set)),
       ida_mem_(ida_mem),
       options_(std::move(options)),
-      smoother_(ida_mem, options_) {
+      smoother_(ida_mem, options_),
+      frequency_(options_.frequency) {
   if (ida_mem == nullptr) reject("ida_mem is null; pass what IDACreate returned");
   N_Vector like = nullptr, yppred, yyn, ypn, res;
   void* user_data;
@@ -103,7 +104,7 @@ Projection::Impl::~Impl() {
 
 Statistics Projection::Impl::statistics() const {
   Statistics s = statistics_;
-  const long moved = s.projections - s.failures();
+  const long moved = s.projections + s.chord_projections - s.failures();
   s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
   s.seconds =
       timed_ > 0 ? timed_seconds_ / static_cast<double>(timed_) * static_cast<double>(s.projections)

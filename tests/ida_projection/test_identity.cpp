@@ -119,16 +119,3 @@ TEST_CASE("at rest where every row has its zero: nothing moves, ever") {
   CHECK(same_bits(host.state(), rest.y0));
   CHECK(host.steps() < 80);
 }
-
-TEST_CASE("frequency beyond the run: the corrector is never touched") {
-  const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
-  Host plain(problem, 1e-6), projected(problem, 1e-6);
-  tp::Options options;
-  options.frequency = 1000000;
-  projected.attach(problem.recommended_constraints(), options);
-  REQUIRE(plain.finish() >= 0);
-  REQUIRE(projected.finish() >= 0);
-  CHECK(same_bits(plain.state(), projected.state()));
-  CHECK(projected.projection().statistics().solver_calls >= plain.steps());
-  CHECK(projected.projection().statistics().value_evaluations == 0);
-}

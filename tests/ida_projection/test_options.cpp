@@ -101,32 +101,6 @@ TEST_CASE("bad constraints are refused by name") {
   CHECK(contains(refusal({}, set), "UserProjection"));
 }
 
-TEST_CASE("frequency: really every n-th accepted step") {
-  for (const int n : {1, 2, 3, 10}) {
-    INFO("every " << n);
-    const Problem problem = tether::test::circle(20.0);
-    long calls = 0;
-    tp::Constraints set = on_circle();
-    const auto g = set.value;
-    set.value = [&calls, g](double t, tp::ConstVector y, tp::Vector out) {
-      ++calls;
-      return g(t, y, out);
-    };
-    tp::Options options;
-    options.frequency = n;
-    Host host(problem, 1e-6);
-    host.attach(set, options);
-    while (host.t < problem.t_end) {
-      const long before = calls;
-      REQUIRE(host.step() >= 0);
-      CHECK((calls > before) == (host.steps() % n == 0));
-      if (host.steps() % n == 0 && host.steps() > 20)
-        CHECK(distance(host, on_circle()) <= tp::Options().tolerance);
-    }
-    CHECK(host.projection().statistics().projections <= host.steps() / n + 10);
-  }
-}
-
 TEST_CASE("hold: a held component is never moved") {
   // z follows x^2 in the equations; x is held, so only z may move.
   const Problem problem = ode({0.5, 0.25, 0.0}, 10.0, [](double t, const double* y, double* f) {

@@ -13,6 +13,8 @@ struct Statistics {
   long solver_calls = 0;          ///< calls of the decorated nonlinear solver by IDA
   long projections = 0;           ///< steps (attempts) that were projected
   long skipped = 0;               ///< attempts already on the constraints, nothing moved
+  long left_alone = 0;            ///< attempts not looked at (Options::frequency)
+  long chord_projections = 0;     ///< moved with factors of an earlier step (Options::frequency)
   long iterations = 0;            ///< Newton moves
   long value_evaluations = 0;     ///< calls of g
   long jacobian_evaluations = 0;  ///< C, however formed

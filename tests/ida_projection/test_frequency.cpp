@@ -1,0 +1,118 @@
+// Tether: steps between full projections leave order and error test as they are.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <nvector/nvector_serial.h>
+#include <problems/andrews.hpp>
+#include <problems/car_axis.hpp>
+#include <problems/kepler.hpp>
+#include <problems/pendulum.hpp>
+#include <problems/rigid_body.hpp>
+#include <problems/robertson.hpp>
+
+#include "host.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+Run every(int n, const Problem& problem, double tolerance, const tp::Constraints& rows) {
+  tp::Options options;
+  options.frequency = n;
+  return integrate(problem, tolerance, rows, options, false);
+}
+
+/// Steps of every n-th and of each step, and that the former spares factorisations.
+void compare(const Problem& problem, double tolerance, int n) {
+  const tp::Constraints rows = problem.recommended_constraints();
+  const Run each = every(1, problem, tolerance, rows), some = every(n, problem, tolerance, rows);
+  INFO(problem.name << ", " << problem.form << ", " << tolerance << ", every " << n << ": "
+                    << some.steps << " steps, " << each.steps << " with every 1");
+  REQUIRE(each.flag >= 0);
+  REQUIRE(some.flag >= 0);
+  CHECK(static_cast<double>(some.steps) <= 1.3 * static_cast<double>(each.steps) + 10.0);
+  if (n > 2)
+    CHECK(static_cast<double>(some.statistics.factorizations) <=
+          0.9 * static_cast<double>(each.statistics.factorizations));
+}
+
+/// x' = -y, y' = x with the circle as Gradients.
+tp::Constraints circle_by_gradient() {
+  tp::Constraints set;
+  set.count = 1;
+  tp::Gradients rows;
+  rows.value = [](double, N_Vector y, double* g) {
+    const double* v = N_VGetArrayPointer(y);
+    g[0] = (v[0] * v[0] + v[1] * v[1] - 1.0) / 2.0;
+    return 0;
+  };
+  rows.fill = [](double, N_Vector y, N_Vector* c) {
+    N_VScale(1.0, y, c[0]);
+    return 0;
+  };
+  set.jacobian = rows;
+  return set;
+}
+
+}  // namespace
+
+TEST_CASE("frequency: the steps of a pendulum in every form") {
+  for (const char* form : {"index 0", "index 1", "index 2", "GGL"})
+    for (const double tolerance : {1e-4, 1e-6, 1e-8})
+      for (const int n : {2, 3, 10, 50}) compare(pendulum(1.7, 3.3, 30.0, form), tolerance, n);
+}
+
+TEST_CASE("frequency: the steps where components are stiff") {
+  // Moves that stiff components do not answer to would start their vibrations.
+  for (const char* form : {"index 0", "index 2 w"}) compare(andrews(form), 1e-6, 20);
+  compare(car_axis("GGL"), 1e-5, 5);
+  compare(robertson(40.0, "index 1"), 1e-6, 10);
+}
+
+TEST_CASE("frequency: the steps with redundant rows") {
+  compare(kepler(0.6, 50.0), 1e-6, 5);
+  compare(rigid_body("dzhanibekov", 50.0), 1e-6, 5);
+}
+
+TEST_CASE("frequency: rows as gradients") {
+  const Problem problem = tether::test::circle(100.0);
+  const Run each = every(1, problem, 1e-6, circle_by_gradient());
+  const Run some = every(10, problem, 1e-6, circle_by_gradient());
+  REQUIRE(each.flag >= 0);
+  REQUIRE(some.flag >= 0);
+  CHECK(static_cast<double>(some.steps) <= 1.3 * static_cast<double>(each.steps));
+  CHECK(2 * some.statistics.factorizations <= each.statistics.factorizations);
+  CHECK(some.statistics.chord_projections > some.statistics.projections);
+  CHECK(some.error < 10.0 * each.error + 1e-6);
+}
+
+TEST_CASE("frequency: accepted steps n, 2n, 3n are projected in full") {
+  for (const int n : {1, 2, 3, 10}) {
+    INFO("every " << n);
+    const Problem problem = tether::test::circle(20.0);
+    tp::Options options;
+    options.frequency = n;
+    Host host(problem, 1e-6);
+    host.attach(on_circle(), options);
+    while (host.t < problem.t_end) {
+      const long before = host.projection().statistics().projections;
+      REQUIRE(host.step() >= 0);
+      const double left = distance(host, on_circle());
+      if (host.steps() % n == 0 && host.steps() > 20) {
+        CHECK(left <= tp::Options().tolerance);
+        CHECK(host.projection().statistics().projections > before);
+      }
+      CHECK(left <= 0.1);  // others leave little, too
+    }
+  }
+}
+
+TEST_CASE("frequency: steps whose drift nobody would notice are not looked at") {
+  // IDA keeps the mass to its Newton tolerance: 1e-9 of the error test.
+  const Problem problem = robertson(40.0, "index 1");
+  const Run run = every(10, problem, 1e-6, problem.recommended_constraints());
+  REQUIRE(run.flag >= 0);
+  CHECK(run.statistics.left_alone > run.steps / 3);
+  CHECK(run.statistics.value_evaluations < run.steps);
+}
