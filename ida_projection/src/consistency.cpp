@@ -202,7 +202,10 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
 
 // IDA's present error weights once it has some; before that, weights of relative size.
 void Projection::Impl::current_weights(N_Vector y) {
-  if (initialized_ && IDAGetErrWeights(ida_mem_, weights_) == 0) return;
+  if (initialized_ && IDAGetErrWeights(ida_mem_, weights_) == 0) {
+    N_VScale(1.0 / weights_factor_, weights_, weights_);
+    return;
+  }
   N_VAbs(y, weights_);
   N_VAddConst(weights_, 1.0, weights_);
   N_VInv(weights_, weights_);

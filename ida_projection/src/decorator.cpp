@@ -43,6 +43,8 @@ int Projection::Impl::initialize() {
   initialized_ = true;
   engaged_ = false;
   high_index_ = index_known_ = false;
+  undetermined_.clear();
+  weights_factor_ = 1.0;
   pending_ = false;
   last_steps_ = last_setups_ = -1;
   if (own_mover_) mover_ = std::move(own_mover_);
@@ -94,6 +96,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (contiguous_) candidate.with_entries();
   present_ = candidate;
   mem_ = mem;
+  restore_weights(weights);
   if (probing_) {  // make_consistent wants to look around, not to step
     N_VScale(1.0, weights, weights_);
     if (!id_) derive_id(candidate, mem);
@@ -106,14 +109,30 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   return flag;
 }
 
+// The decorated solver's correction. Its convergence test leaves out algebraic variables of index 2
+// or more: their rounding, divided by the step, would fail it, and nothing but they depends on
+// them.
+int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup,
+                              void* mem) {
+  N_Vector weights = candidate.weights;
+  if (engaged_ && options_.suppress_algebraic && !undetermined_.empty()) {
+    if (!newton_weights_) newton_weights_ = OwnedVector(weights);
+    N_VScale(1.0, weights, newton_weights_);
+    double* entries = N_VGetArrayPointer(newton_weights_);
+    for (const int j : undetermined_) entries[j] = 0.0;
+    weights = newton_weights_;
+  }
+  return SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, weights, tolerance,
+                           call_setup, mem);
+}
+
 int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup,
                                        void* mem) {
   if (mover_ && !engaged_ && !index_known_ && in_trouble()) {
     const Status engaged = engage_if_index_is_high(candidate, mem);
     if (engaged != Status::success) return finish(engaged, mover_->message());
   }
-  int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, candidate.weights,
-                               tolerance, call_setup, mem);
+  int flag = correct(candidate, tolerance, call_setup, mem);
   if (!mover_) return flag;
   if (flag != 0) return corrector_failed(flag);
 
@@ -135,7 +154,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     // Old factors fooled IDA's convergence test: correct again, with fresh ones.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, at.correction);
-    flag = SUNNonlinSolSolve(inner_, at.base, at.correction, at.weights, tolerance, 1, mem);
+    flag = correct(at, tolerance, true, mem);
     if (flag != 0) return corrector_failed(flag);
     cj_at_setup_ = step.cj;
     move = move_and_polish(at, step.cj, tolerance, mem);
@@ -145,14 +164,24 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   return finish(move.status, mover_->message());
 }
 
+// IDA computes its weights anew for a new step, but not for another attempt at the same one.
+void Projection::Impl::restore_weights(N_Vector weights) {
+  if (weights_factor_ == 1.0) return;
+  long steps = 0;
+  IDAGetNumSteps(ida_mem_, &steps);
+  if (steps == last_steps_) N_VScale(1.0 / weights_factor_, weights, weights);
+  weights_factor_ = 1.0;
+}
+
 // |ycor| in the norm of IDA's error test decides the next step size.
 void Projection::Impl::control_step(const Candidate& candidate) {
   long steps = 0;
   IDAGetNumSteps(ida_mem_, &steps);
   const bool suppressed = engaged_ && id_ && has_algebraic_ && options_.suppress_algebraic;
-  smoother_.control(steps, suppressed
-                               ? N_VWrmsNormMask(candidate.correction, candidate.weights, id_)
-                               : N_VWrmsNorm(candidate.correction, candidate.weights));
+  weights_factor_ = smoother_.control(
+      steps, suppressed ? N_VWrmsNormMask(candidate.correction, candidate.weights, id_)
+                        : N_VWrmsNorm(candidate.correction, candidate.weights));
+  if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
 }
 
 int Projection::Impl::corrector_failed(int flag) {

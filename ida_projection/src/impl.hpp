@@ -88,8 +88,10 @@ class Projection::Impl {
  private:
   class Stopwatch;
   // decorator.cpp: the stages of a projected step
+  int correct(const Candidate& candidate, double tolerance, bool call_setup, void* mem);
   int correct_and_move(Candidate& candidate, double tolerance, bool call_setup, void* mem);
   void control_step(const Candidate& candidate);
+  void restore_weights(N_Vector weights);
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   void look_for_refusals();
@@ -142,6 +144,9 @@ class Projection::Impl {
   bool repeated_ = false;  // IDA rejected the last attempt
   bool high_index_ = false;  // F is not of index 1 in its own variables
   bool index_known_ = false;
+  std::vector<int> undetermined_;  // algebraic variables of index 2 or more
+  OwnedVector newton_weights_;     // without them
+  double weights_factor_ = 1.0;    // by which IDA's weights were multiplied in the last solve()
   int refused_in_row_ = 0;   // accepted steps that needed more than one attempt
   long last_error_failures_ = 0;
   Statistics statistics_;

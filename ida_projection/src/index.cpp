@@ -13,24 +13,35 @@ constexpr int kLargestSize = 200;    // unknowns; the full QR beyond would be fe
 constexpr double kDependent = 1e-6;  // of the largest pivot; difference quotients are this good
 constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
 
-// Rows and columns scaled to 1, as their units differ.
-bool is_singular(Eigen::MatrixXd a) {
-  if (!a.allFinite()) return false;  // not known
+// Columns that the matrix does not determine: those with an entry in a null vector. Rows and
+// columns scaled to 1, as their units differ. Empty: none, or not known.
+std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
+  if (!a.allFinite()) return {};
   for (int pass = 0; pass < 2; ++pass) {
     for (int i = 0; i < a.rows(); ++i) {
       const double largest = a.row(i).lpNorm<Eigen::Infinity>();
-      if (largest == 0.0) return true;
-      a.row(i) /= largest;
+      if (largest > 0.0) a.row(i) /= largest;
     }
     for (int j = 0; j < a.cols(); ++j) {
       const double largest = a.col(j).lpNorm<Eigen::Infinity>();
-      if (largest == 0.0) return true;
-      a.col(j) /= largest;
+      if (largest > 0.0) a.col(j) /= largest;
     }
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
   qr.setThreshold(kDependent);
-  return qr.rank() < a.cols();
+  const Eigen::Index n = a.cols(), rank = qr.rank();
+  if (rank == n) return {};
+  // R11 z1 + R12 z2 = 0, in the order of the pivots.
+  Eigen::MatrixXd null = Eigen::MatrixXd::Identity(n, n).rightCols(n - rank);
+  null.topRows(rank) = -qr.matrixR()
+                            .topLeftCorner(rank, rank)
+                            .triangularView<Eigen::Upper>()
+                            .solve(qr.matrixR().topRightCorner(rank, n - rank));
+  null = qr.colsPermutation() * null;
+  std::vector<char> found(static_cast<std::size_t>(n));
+  for (Eigen::Index j = 0; j < n; ++j)
+    found[static_cast<std::size_t>(j)] = null.row(j).lpNorm<Eigen::Infinity>() > kDependent;
+  return found;
 }
 
 }  // namespace
@@ -39,7 +50,8 @@ bool is_singular(Eigen::MatrixXd a) {
 // and F_y_j (j algebraic) is regular. It is singular for multipliers of position or velocity rows
 // (index 2 and 3), and where combinations of differential variables are algebraic. The columns are
 // differences of IDA's own residual callback, F(t, ypred + ycor, yppred + cj ycor), with ypred
-// shifted by -ycor (and put back bit for bit) where only y' is to feel ycor.
+// shifted by -ycor (and put back bit for bit) where only y' is to feel ycor. Algebraic variables
+// that the matrix leaves free carry rounding divided by the step: undetermined_.
 bool Projection::Impl::index_exceeds_one(const Candidate& candidate, void* mem) {
   if (!contiguous_ || size_ > kLargestSize) return false;
   const double cj = step_data().cj;
@@ -76,7 +88,12 @@ bool Projection::Impl::index_exceeds_one(const Candidate& candidate, void* mem) 
     for (int i = 0; i < size_; ++i) slopes(i, j) = (after[i] - before[i]) / change;
   }
   N_VScale(1.0, saved_, candidate.base);
-  return known && is_singular(std::move(slopes));
+  const std::vector<char> left =
+      known ? undetermined_columns(std::move(slopes)) : std::vector<char>();
+  undetermined_.clear();
+  for (int j = 0; id != nullptr && j < static_cast<int>(left.size()); ++j)
+    if (left[static_cast<std::size_t>(j)] && id[j] == 0.0) undetermined_.push_back(j);
+  return !left.empty();
 }
 
 }  // namespace tether::ida_projection

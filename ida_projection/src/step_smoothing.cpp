@@ -7,7 +7,8 @@
 // and grows by min(tmp, eta_max) where tmp >= eta_max_fx, shrinks by tmp between eta_min and
 // eta_low where tmp <= eta_min_fx, and keeps h otherwise. All of these can be set while the step's
 // correction is being computed, so that the ratio wanted comes out, up to two limits: never more
-// than tmp, and never growth where tmp < 1.
+// than tmp, and never growth where tmp < 1. A ratio below 1 where tmp >= 1 takes IDASetMaxStep, or
+// error weights that are larger for the rest of the attempt.
 #include "step_smoothing.hpp"
 
 #include <ida/ida.h>
@@ -56,6 +57,19 @@ double StepSmoother::error_constant(double h, int order) const {
   return sigma;
 }
 
+// c_k = max(|alpha_k + alpha_s - alpha_0|, alpha_k), by which the error test multiplies |ycor|.
+double StepSmoother::test_constant(double h, int order) const {
+  double sum = h, newest = 1.0, alpha_0 = -1.0, alpha_s = -1.0;  // i = 0
+  for (int i = 1; i <= order; ++i) {
+    sum += i <= known_ ? past_[static_cast<std::size_t>(i - 1)] : h;
+    newest = h / sum;
+    if (i == order) break;
+    alpha_0 -= newest;
+    alpha_s -= 1.0 / (i + 1);
+  }
+  return std::max(std::abs(newest + alpha_s - alpha_0), newest);
+}
+
 void StepSmoother::attempt_was_accepted() {
   for (std::size_t i = past_.size() - 1; i > 0; --i) past_[i] = past_[i - 1];
   past_[0] = h_;
@@ -74,7 +88,7 @@ double StepSmoother::filter(double log_c, int order) const {
   return 1.0 + std::atan(std::exp(log_ratio) - 1.0);
 }
 
-void StepSmoother::control(long steps, double norm) {
+double StepSmoother::control(long steps, double norm) {
   sunrealtype h = 0.0;
   int order = 1;
   IDAGetCurrentStep(ida_mem_, &h);
@@ -118,18 +132,19 @@ void StepSmoother::control(long steps, double norm) {
   if (!std::isfinite(log_c)) {
     hold();
   } else if (order >= max_order_) {
-    request(filter(log_c, order), h, own_ratio);
+    return request(filter(log_c, order), h, own_ratio, norm);
   } else if (block_ + 1 >= order + 2) {  // with this one, k + 2 steps of one size
-    request(filter((block_sum_ + log_c) / (block_ + 1), order), h, own_ratio);
+    return request(filter((block_sum_ + log_c) / (block_ + 1), order), h, own_ratio, norm);
   } else {
     hold();
   }
+  return 1.0;
 }
 
 // Keep h, or reduce it by IDA's own rule.
 void StepSmoother::hold() { set(kLowestFixed, kAnyRatio, kLargest, 0.0, max_step_); }
 
-void StepSmoother::request(double ratio, double h, double own_ratio) {
+double StepSmoother::request(double ratio, double h, double own_ratio, double norm) {
   if (own_ratio < 1.0) {
     if (ratio < 1.0)
       set(kLowestFixed, kAnyRatio, kLargest, ratio, max_step_);
@@ -138,11 +153,26 @@ void StepSmoother::request(double ratio, double h, double own_ratio) {
   } else if (ratio > 1.0) {
     set(kLowestFixed, 1.0, ratio, 0.0, max_step_);
   } else if (!owns_max_step_) {
-    hold();
+    return gentle_reduction(ratio, h, norm);
   } else {
     const double longest = h * ratio;
     set(kLowestFixed, 1.0, kLargest, 0.0, max_step_ > 0.0 ? std::min(max_step_, longest) : longest);
   }
+  return 1.0;
+}
+
+// IDA reduces h by any ratio asked for where its own is below 1, which it is for an error above
+// 0.5. Weights that make it so change no decision on the order, which compares errors; the error
+// test has to be passed all the same.
+double StepSmoother::gentle_reduction(double ratio, double h, double norm) {
+  constexpr double kAsked = 0.55, kPassed = 0.95;
+  const double factor = kAsked / (error_constant(h, order_) * norm);
+  if (!(factor > 1.0) || factor * test_constant(h, order_) * norm > kPassed) {
+    hold();
+    return 1.0;
+  }
+  set(kLowestFixed, kAnyRatio, kLargest, ratio, max_step_);
+  return factor;
 }
 
 void StepSmoother::set(double lowest_fixed, double highest_fixed, double largest, double low,

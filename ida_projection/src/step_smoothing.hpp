@@ -26,17 +26,20 @@ class StepSmoother {
   void begin() { on_ = true; }
   bool on() const { return on_; }
   /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
-  /// norm of IDA's error test.
-  void control(long steps, double norm);
+  /// norm of IDA's error test. Returns by how much IDA's error weights are to be multiplied for
+  /// the rest of this attempt (1: left alone); see gentle_reduction().
+  double control(long steps, double norm);
 
  private:
   static constexpr int kMaximumOrder = 5;
 
   void attempt_was_accepted();
   double error_constant(double h, int order) const;
+  double test_constant(double h, int order) const;
   double filter(double log_c, int order) const;
   void hold();
-  void request(double ratio, double h, double own_ratio);
+  double request(double ratio, double h, double own_ratio, double norm);
+  double gentle_reduction(double ratio, double h, double norm);
   void set(double lowest_fixed, double highest_fixed, double largest, double low, double max_step);
 
   void* ida_mem_;

@@ -184,6 +184,30 @@ TEST_CASE("smooth steps begin in forms of index 2 and make them as accurate as t
   }
 }
 
+TEST_CASE("smooth steps that begin by themselves are as accurate as those from the start") {
+  for (const Problem& problem :
+       {pendulum(1, 1, 100, "GGL"), pendulum(1, 1, 100, "index 2"), andrews("GGL")}) {
+    INFO(problem.name << ", " << problem.form);
+    const tp::Constraints rows = problem.recommended_constraints();
+    double worse = 0.0, slope = 0.0, wanted = 0.0;  // slopes of log error over log tolerance
+    for (int i = 0; i <= 6; ++i) {
+      const double tolerance = std::pow(10.0, -4.0 - 6.0 * i / 6.0);
+      const Run begun = integrate(problem, tolerance, rows, {}, false);
+      const Run from_start = integrate(problem, tolerance, rows, smooth(), false);
+      REQUIRE(begun.flag >= 0);
+      REQUIRE(from_start.flag >= 0);
+      CHECK(static_cast<double>(begun.steps) <= 1.1 * static_cast<double>(from_start.steps));
+      worse += std::log(begun.error / from_start.error) / 7.0;
+      if (i == 0 || i == 6) {
+        slope += (i == 0 ? 1.0 : -1.0) * std::log10(begun.error) / 6.0;
+        wanted += (i == 0 ? 1.0 : -1.0) * std::log10(from_start.error) / 6.0;
+      }
+    }
+    CHECK(std::exp(worse) <= 1.5);
+    CHECK(slope >= wanted - 0.1);
+  }
+}
+
 TEST_CASE("smooth steps do not begin by themselves where IDA gets on") {
   for (const Problem& problem :
        {pendulum(1, 1, 100, "index 1"), pendulum(1, 1, 100, "index 0"), andrews("index 1")}) {
