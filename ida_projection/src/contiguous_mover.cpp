@@ -60,7 +60,7 @@ Status ContiguousMover<Rows>::factor(double t) {
   if constexpr (Rows::kThinRows) thin_ = RowTrust::has_thin_rows(blocks_.counted().solver);
   reusable_ = true;
   slope_ = kUnknownSlope;
-  age_ = measured_age_ = 0;
+  age_ = 0;
   wear_.renewed();
   return Status::success;
 }
@@ -206,7 +206,6 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
   load(candidate);
   reused_ = may_reuse();
-  left_ = 0.0;
   ++age_;
   set_metric(!reused_);
   if ((result.status = value(candidate.t)) != Status::success) return result;
@@ -279,6 +278,11 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       have_factors = false;
       continue;
     }
+    if (reused_ && !(length <= kLong)) {
+      set_metric(true);
+      reused_ = have_factors = false;
+      continue;
+    }
     ++result.moves;
 
     if (result.moves == 1) {
@@ -302,12 +306,10 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
     }
     apply(1.0, correction);
     if (reused_) {
-      left_ = 2.0 * rate() * length;
-      if (left_ <= kForLater) break;
+      if (2.0 * rate() * length <= kForLater) break;
       if ((result.status = value(candidate.t)) != Status::success) return result;
       set_metric(true);
       reused_ = have_factors = false;
-      left_ = 0.0;
       continue;
     }
     if (result.moves == 1 && (result.status = learn_trust(candidate.t, length)) != Status::success)

@@ -20,8 +20,10 @@ namespace tether::ida_projection {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kLargestFloor = 0.1;  // tolerances
-// Factors of an earlier step (Rows::kReuse) leave the part slope * age of a move.
+// Factors of an earlier step (Rows::keeps_factors) leave the part slope * age of a move.
 constexpr double kUnknownSlope = 0.03;
+constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
+constexpr double kLong = 1.0;   // tolerances: such a move is made with fresh factors
 
 /// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
 template <class Rows>
@@ -37,6 +39,7 @@ class ContiguousMover final : public Mover {
         m_(evaluator_.rows()),
         reported_(reported >= 0 ? reported : m_),
         inverse_n_(1.0 / size),
+        keeps_factors_(Rows::keeps_factors(m_)),
         blocks_(constraints, evaluator_, size) {
     const auto n = static_cast<std::size_t>(n_);
     const auto m = static_cast<std::size_t>(m_);
@@ -62,7 +65,8 @@ class ContiguousMover final : public Mover {
   }
   void accept() override { std::swap(scale_, trial_scale_); }
   Status finish(const Candidate& candidate) override {
-    return left_ > options_.tolerance ? take_back(candidate) : Status::success;
+    const bool unseen = keeps_factors_ && move_length_ > kSafe * options_.tolerance;
+    return unseen ? take_back(candidate) : Status::success;
   }
   void reset() override {
     reusable_ = false;
@@ -82,7 +86,7 @@ class ContiguousMover final : public Mover {
   void load(const Candidate& candidate);
   const std::vector<double>& WT();
   void set_metric(bool for_factors);
-  bool may_reuse() const { return Rows::kReuse && reusable_ && !blocks_.dropped_rows(); }
+  bool may_reuse() const { return keeps_factors_ && reusable_ && !blocks_.dropped_rows(); }
   Status take_back(const Candidate& candidate);
   double rate() const { return slope_ * age_; }
   void set_group_metric();
@@ -111,6 +115,7 @@ class ContiguousMover final : public Mover {
   int n_, m_;
   int reported_;  // rows whose drift is told; the others are equations of F
   double inverse_n_;
+  bool keeps_factors_;  // over several steps
   Rows blocks_;
   bool thin_ = false;          // the last factor() found rows that need RowTrust
   bool firm_only_ = false;     // this attempt does without them
@@ -129,8 +134,6 @@ class ContiguousMover final : public Mover {
   bool reused_ = false;    // and are in use for this one
   double slope_ = 0.0;     // they leave slope_ * age_ of a move
   int age_ = 0;            // candidates since they were made
-  int measured_age_ = 0;   // the same when slope_ was last looked at
-  double left_ = 0.0;      // what the last move() left for settle() or finish(), tolerances
   FactorWear wear_;        // for follow()
   const double* ycor_ = nullptr;
   bool WT_known_ = false;

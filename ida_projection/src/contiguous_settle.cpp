@@ -10,7 +10,6 @@ constexpr long kMeasureEvery = 64;
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
 constexpr double kWorn = 0.06, kSlow = 0.1;
-constexpr int kLookAgain = 4;  // candidates
 
 }  // namespace
 
@@ -18,7 +17,7 @@ template <class Rows>
 Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
   for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
-  if (reused_) return take_back(candidate);
+  if (keeps_factors_) return take_back(candidate);
   double sum = 0.0;
   for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
   const double reach = move_length_ + std::sqrt(sum * inverse_n_);
@@ -44,31 +43,31 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
   return Status::success;
 }
 
-// The same with factors of an earlier step, which leave a part of each move that grows with their
-// age. Where that is more than kSlow they are made anew.
+// The same with kept factors, which leave a part of each move that grows with their age. Only what
+// is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
+// two moves with the same factors, that makes the next one so. Where too much is left, or a move is
+// long, factors are made anew.
 template <class Rows>
 Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
-  double previous = 0.0;
-  left_ = 0.0;
   const double floor = 1e2 * kEpsilon * size_of_y();
-  for (int k = 0; k < options_.maximum_iterations; ++k) {
+  double previous = -1.0;  // length of the move before, by the same factors
+  for (int k = 0; k <= options_.maximum_iterations; ++k) {
     Status status = value(candidate.t);
     if (status != Status::success) return status;
     double length = solve();
-    if (k > 0 && length > floor) {
-      slope_ = length / (previous * age_);
-      measured_age_ = age_;
-      if (rate() > kSlow) {
-        set_metric(true);
-        if ((status = factor(candidate.t)) != Status::success) return status;
-        age_ = 1;
-        length = solve();
-      }
+    double part = previous > 0.0 && length > floor ? length / previous : 0.0;
+    if (part > 0.0) slope_ = part / age_;
+    if (age_ > 0 && (part > kSlow || length > kLong)) {
+      set_metric(true);
+      if ((status = factor(candidate.t)) != Status::success) return status;
+      length = solve();
+      part = 0.0;
+      previous = -1.0;
     }
     apply(1.0, candidate.correction_entries);
-    const bool look = k == 0 && age_ >= measured_age_ + kLookAgain;
-    if (length <= floor || (!look && 2.0 * rate() * length <= options_.tolerance)) {
-      if (rate() > kWorn) reusable_ = false;
+    const bool small = length <= std::max(floor, kSafe * options_.tolerance);
+    if (small || (part > 0.0 && part * length <= kSafe * options_.tolerance)) {
+      if (part > kWorn) reusable_ = false;
       return Status::success;
     }
     previous = length;
@@ -76,7 +75,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
   reusable_ = false;
   if (previous <= std::min(kLargestFloor, rounding_length())) return Status::success;
   message_ = "after " + std::to_string(options_.maximum_iterations) +
-             " moves with sparse factors the next one still is " + std::to_string(previous) +
+             " moves with kept factors the next one still is " + std::to_string(previous) +
              " tolerances long (Options::maximum_iterations)";
   return Status::not_converged;
 }

@@ -108,7 +108,7 @@ class RowBlocks {
  public:
   using Block = BlockOf<linalg::MinimumNorm>;
   /// Factors are cheap beside F, and a step older they may leave half of a move: always fresh.
-  static constexpr bool kReuse = false;
+  static bool keeps_factors(int) { return false; }
   /// The solver's pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = true;
 

@@ -14,8 +14,9 @@ namespace tether::ida_projection {
 class SparseRows {
  public:
   using Block = BlockOf<linalg::SparseMinimumNorm>;
-  /// C and its factors cost four solves: they serve several steps.
-  static constexpr bool kReuse = true;
+  /// C and its factors cost four solves and more: they serve several steps. Of few rows nothing
+  /// would be gained that makes up for a metric of an earlier step.
+  static bool keeps_factors(int rows) { return rows > 64; }
   static constexpr bool kThinRows = false;
 
   SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n);
