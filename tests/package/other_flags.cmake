@@ -1,0 +1,87 @@
+# A program compiled with other flags than the libraries, linked with the static and the shared ones,
+# and run where the processor has what the flag allows. SPDX-License-Identifier: BSD-3-Clause
+#
+# -mavx and wider change how Eigen aligns and allocates, in the program only.
+cmake_minimum_required(VERSION 3.23)
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK})
+set(definitions "")
+set(package tether-linalg)
+if("contact" IN_LIST COMPONENTS)
+  set(definitions -DWITH_CONTACT)
+  set(package tether-contact)
+endif()
+
+# What the libraries show of Eigen: nothing. Of an archive not even inline functions of others.
+function(check_symbols form)
+  foreach(component IN LISTS COMPONENTS)
+    file(GLOB library ${PREFIX}/${form}/all/${LIBDIR}/libtether_${component}.a
+      ${PREFIX}/${form}/all/${LIBDIR}/libtether_${component}.so)
+    if(form STREQUAL "static")
+      set(arguments --extern-only)
+      set(unwanted "[^\n]* [WVu] [^\n]*")
+    else()
+      set(arguments --dynamic)
+      set(unwanted "_Z(T[A-Z]|GV|Z)?N?K?5Eigen[^ \n]* [A-Zu] [^\n]*")
+    endif()
+    execute_process(COMMAND ${NM} ${arguments} --defined-only --format=posix ${library}
+      OUTPUT_VARIABLE symbols COMMAND_ERROR_IS_FATAL ANY)
+    if(NOT symbols MATCHES "tether")
+      message(FATAL_ERROR "${library} shows nothing of Tether:\n${symbols}")
+    endif()
+    string(REGEX MATCHALL "${unwanted}" found "${symbols}")
+    list(FILTER found EXCLUDE REGEX "^_Z(T[VIS])?N?K?6tether")  # the interface may have Eigen's types as arguments
+    if(found AND NOT (form STREQUAL "static" AND MERGED))
+      list(SUBLIST found 0 10 found)
+      message(SEND_ERROR "${library} shows ${found}")
+    endif()
+  endforeach()
+endfunction()
+
+function(try_flag name flag needs)
+  execute_process(COMMAND ${COMPILER} ${flag} -E -x c++ /dev/null
+    RESULT_VARIABLE unknown OUTPUT_QUIET ERROR_QUIET)
+  if(unknown)
+    message("${flag}: the compiler does not know it")
+    return()
+  endif()
+  execute_process(COMMAND ${COMPILER} -std=c++17 -O0 ${flag} ${definitions} ${cflags} -c
+    ${CMAKE_CURRENT_LIST_DIR}/other_flags.cpp -o ${WORK}/${name}.o COMMAND_ERROR_IS_FATAL ANY)
+  foreach(form IN ITEMS static shared)
+    set(libraries ${PREFIX}/${form}/all/${LIBDIR})
+    set(ENV{PKG_CONFIG_PATH} ${libraries}/pkgconfig)
+    set(ENV{LD_LIBRARY_PATH} ${libraries})
+    execute_process(COMMAND ${PKG_CONFIG} --libs ${package}
+      OUTPUT_VARIABLE libs OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+    separate_arguments(libs)
+    set(program ${WORK}/${name}_${form})
+    execute_process(COMMAND ${COMPILER} ${flag} ${WORK}/${name}.o -o ${program} ${libs} COMMAND_ERROR_IS_FATAL ANY)
+    if(needs AND NOT processor MATCHES " ${needs}[ \n]")
+      message("${flag}, ${form}: links; not run, this processor has no ${needs}")
+    else()
+      execute_process(COMMAND ${program} RESULT_VARIABLE failed OUTPUT_VARIABLE said ERROR_VARIABLE said)
+      if(failed)
+        message(SEND_ERROR "${flag}, ${form}: ${failed}\n${said}")
+      else()
+        message("${flag}, ${form}: runs")
+      endif()
+    endif()
+  endforeach()
+endfunction()
+
+foreach(form IN ITEMS static shared)
+  check_symbols(${form})
+endforeach()
+
+set(ENV{PKG_CONFIG_PATH} ${PREFIX}/static/all/${LIBDIR}/pkgconfig)
+execute_process(COMMAND ${PKG_CONFIG} --cflags ${package}
+  OUTPUT_VARIABLE cflags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+separate_arguments(cflags)
+set(processor "")
+if(EXISTS /proc/cpuinfo)
+  file(STRINGS /proc/cpuinfo processor REGEX "^flags" LIMIT_COUNT 1)
+  string(APPEND processor " ")
+endif()
+try_flag(native -march=native "")
+try_flag(avx2 -mavx2 avx2)
+try_flag(avx512 "-mavx512f;-mfma" avx512f)
