@@ -1,8 +1,15 @@
 // Tether: files of contact problems. SPDX-License-Identifier: BSD-3-Clause
+#include <clocale>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
+#include <sys/stat.h>
 #include <tether/contact/files.hpp>
+#include <thread>
+
+#ifdef TETHER_HAVE_HDF5
+#include <hdf5.h>
+#endif
 
 #include "assemblies.hpp"
 #include "support/catch.hpp"
@@ -109,4 +116,95 @@ TEST_CASE("damaged fclib files are refused") {
   spill(file.path, "this is not HDF5");
   CHECK_THROWS_AS(read_fclib(file.path), std::runtime_error);
   CHECK_THROWS_AS(read_problem(file.path), std::runtime_error);
+}
+
+#ifdef TETHER_HAVE_HDF5
+
+namespace {
+
+template <class T>
+void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& values, hsize_t claimed = 0) {
+  const hsize_t size = claimed > 0 ? claimed : values.size();
+  const hid_t space = H5Screate_simple(1, &size, nullptr), links = H5Pcreate(H5P_LINK_CREATE);
+  H5Pset_create_intermediate_group(links, 1);
+  const hid_t set = H5Dcreate2(file, ("/fclib_local/" + name).c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT);
+  if (claimed == 0) H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+  H5Dclose(set);
+  H5Pclose(links);
+  H5Sclose(space);
+}
+
+// One contact, W the identity in compressed columns with the given pointers. claimed > 0: W/x says
+// that it has so many entries, none of them written.
+void write_columns(const std::string& path, const std::vector<int>& pointers, hsize_t claimed = 0) {
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  put<int>(file, "spacedim", H5T_NATIVE_INT, {3});
+  put<int>(file, "W/m", H5T_NATIVE_INT, {3});
+  put<int>(file, "W/n", H5T_NATIVE_INT, {3});
+  put<int>(file, "W/nz", H5T_NATIVE_INT, {-1});
+  put<int>(file, "W/p", H5T_NATIVE_INT, pointers);
+  put<int>(file, "W/i", H5T_NATIVE_INT, {0, 1, 2});
+  put<double>(file, "W/x", H5T_NATIVE_DOUBLE, {1, 1, 1}, claimed);
+  put<double>(file, "vectors/q", H5T_NATIVE_DOUBLE, {-1, 0, 0});
+  put<double>(file, "vectors/mu", H5T_NATIVE_DOUBLE, {0.5});
+  H5Fclose(file);
+}
+
+}  // namespace
+
+TEST_CASE("fclib: column pointers that decrease or exceed are refused, and sizes that the file cannot hold") {
+  Temporary file("test_contact_hostile.hdf5");
+  write_columns(file.path, {0, 1, 2, 3});
+  CHECK(read_fclib(file.path).contacts() == 1);
+  for (const std::vector<int>& pointers :
+       {std::vector<int>{0, 100000000, 2, 3}, {0, 2, 1, 3}, {-1, 1, 2, 3}, {0, 1, 100000000, 3}, {0, -5, 2, 3}}) {
+    write_columns(file.path, pointers);
+    CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("W/p must ascend from 0"));
+  }
+  write_columns(file.path, {0, 1, 2, 100000000});
+  CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("fewer entries than W/p says"));
+  write_columns(file.path, {0, 1, 2, 3}, hsize_t{1} << 30);
+  CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("1073741824 entries, but the file holds 0 bytes"));
+}
+
+#endif
+
+TEST_CASE("a pipe is read as .dat, and what never ends is left") {
+  random::Generator g(4);
+  const Problem p = random::cluster(g, 0.4, 2, 3).problem();
+  Temporary file("test_contact_piped.dat"), pipe("test_contact_pipe");
+  write_dat(p, file.path);
+  REQUIRE(mkfifo(pipe.path.c_str(), 0600) == 0);
+  std::thread writer([&] { spill(pipe.path, slurp(file.path)); });
+  const Problem q = read_problem(pipe.path);
+  writer.join();
+  CHECK(equal(p, q));
+  CHECK_THROWS_WITH(read_problem("/dev/zero"), Catch::Contains("binary data"));
+}
+
+TEST_CASE("files are written and read alike in every locale") {
+  random::Generator g(5);
+  const Problem p = random::cluster(g, 0.4, 2, 3).problem();
+  Temporary here("test_contact_here.dat"), there("test_contact_there.dat");
+  write_dat(p, here.path);
+  const std::string before = std::setlocale(LC_ALL, nullptr);
+  bool comma = false;
+  for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "de_DE", "fr_FR.UTF-8", "fr_FR.utf8"})
+    comma = comma || std::setlocale(LC_ALL, name) != nullptr;
+  if (!comma) WARN("skipped in part: no locale with a decimal comma is installed here");
+  write_dat(p, there.path);
+  const bool same = equal(p, read_dat(here.path)) && slurp(here.path) == slurp(there.path);
+  std::setlocale(LC_ALL, before.c_str());
+  CHECK(same);
+}
+
+TEST_CASE(".dat: numbers are whole words within the range of double precision") {
+  Temporary file("test_contact_words.dat");
+  const std::string head = "3\n1\n0\n3\n3\n3 3\n", matrix = "1 0 0 0 1 0 0 0 1\n";
+  spill(file.path, head + matrix + "+1.5 0 -0\n5e-1\n");
+  CHECK(read_dat(file.path).b()[0] == -1.5);
+  for (const char* word : {"1,5", "0x10", "1.5.2", "1e999", "--1", "+-1", "1d3"}) {
+    spill(file.path, head + matrix + word + " 0 0\n0.5\n");
+    CHECK_THROWS_AS(read_dat(file.path), std::runtime_error);
+  }
 }

@@ -1,9 +1,12 @@
 // Tether: the Siconos .dat format. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/files.hpp>
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -13,23 +16,35 @@ namespace tether::contact {
 namespace {
 
 constexpr long kMostContacts = 10'000'000;
+constexpr std::size_t kMostOfPipe = std::size_t{1} << 30;
 
 class Tokens {
  public:
   explicit Tokens(const std::string& path) : path_(path) {
     std::ifstream file(path, std::ios::binary);
     if (!file) throw std::runtime_error(path + ": cannot be opened");
-    std::ostringstream all;
-    all << file.rdbuf();
-    text_ = all.str();
-    at_ = text_.c_str();
+    // Pipes and devices may never end: they are read up to a limit, and not beyond binary data.
+    std::error_code ignored;
+    const bool regular = std::filesystem::is_regular_file(path, ignored);
+    std::vector<char> part(1 << 16);
+    while (file.read(part.data(), static_cast<std::streamsize>(part.size())), file.gcount() > 0) {
+      const auto count = static_cast<std::size_t>(file.gcount());
+      text_.append(part.data(), count);
+      if (std::memchr(part.data(), '\0', count) != nullptr) break;
+      if (!regular && text_.size() > kMostOfPipe) {
+        fail("oversized: more than " + std::to_string(kMostOfPipe) + " bytes, and not a regular file");
+      }
+    }
+    if (file.bad()) fail("cannot be read");
+    at_ = text_.data();
+    end_ = at_ + text_.size();
   }
 
   [[noreturn]] void fail(const std::string& what) const { throw std::runtime_error(path_ + ": " + what); }
 
   bool empty() {
     skip();
-    return *at_ == '\0';
+    return at_ == end_;
   }
   long integer(const char* what, long least, long most) {
     const double value = number(what);
@@ -47,27 +62,36 @@ class Tokens {
     if (!std::isfinite(value)) fail(std::string(what) + " has an entry that is not finite");
     return value;
   }
-  long left() const { return static_cast<long>(text_.c_str() + text_.size() - at_); }
+  long left() const { return static_cast<long>(end_ - at_); }
 
  private:
   void skip() {
-    while (*at_ == ' ' || *at_ == '\n' || *at_ == '\t' || *at_ == '\r') ++at_;
+    while (at_ != end_ && (*at_ == ' ' || *at_ == '\n' || *at_ == '\t' || *at_ == '\r')) ++at_;
   }
+  // The same in every locale, whatever the host has set.
   double number(const char* what) {
     skip();
-    if (*at_ == '\0') {
-      fail(at_ == text_.c_str() + text_.size() ? std::string("truncated: the file ends in ") + what
-                                               : std::string("binary data in ") + what);
+    if (at_ == end_) fail(std::string("truncated: the file ends in ") + what);
+    if (*at_ == '\0') fail(std::string("binary data in ") + what);
+    const char* begin = *at_ == '+' && at_ + 1 != end_ && at_[1] != '-' ? at_ + 1 : at_;
+    double value = 0;
+    const auto [stop, error] = std::from_chars(begin, end_, value);
+    if (error == std::errc::result_out_of_range) {
+      fail(std::string("out of the range of double precision in ") + what + ": '" + word(at_) + "'");
     }
-    char* end = nullptr;
-    const double value = std::strtod(at_, &end);
-    if (end == at_) fail(std::string("not a number in ") + what + ": '" + std::string(at_).substr(0, 20) + "'");
-    at_ = end;
+    if (error != std::errc() || (stop != end_ && !separates(*stop))) {
+      fail(std::string("not a number in ") + what + ": '" + word(at_) + "'");
+    }
+    at_ = stop;
     return value;
+  }
+  static bool separates(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\0'; }
+  std::string word(const char* begin) const {
+    return std::string(begin, std::min<std::size_t>(20, static_cast<std::size_t>(end_ - begin)));
   }
 
   std::string path_, text_;
-  const char* at_ = nullptr;
+  const char *at_ = nullptr, *end_ = nullptr;
 };
 
 }  // namespace
@@ -148,6 +172,18 @@ Problem read_dat(const std::string& path) {
   }
 }
 
+namespace {
+
+// With 17 digits, as "%.17g " would in the C locale.
+void put(std::FILE* file, double value) {
+  char text[32];
+  char* end = std::to_chars(text, text + sizeof text - 1, value, std::chars_format::general, 17).ptr;
+  *end++ = ' ';
+  std::fwrite(text, 1, static_cast<std::size_t>(end - text), file);
+}
+
+}  // namespace
+
 void write_dat(const Problem& problem, const std::string& path, DatStorage storage) {
   std::FILE* file = std::fopen(path.c_str(), "w");
   if (!file) throw std::runtime_error(path + ": cannot be written");
@@ -157,7 +193,7 @@ void write_dat(const Problem& problem, const std::string& path, DatStorage stora
     std::fprintf(file, "%d %d\n", size, size);
     const linalg::MatrixX A = problem.dense_matrix();
     for (int c = 0; c < size; ++c) {
-      for (int r = 0; r < size; ++r) std::fprintf(file, "%.17g ", A(r, c));
+      for (int r = 0; r < size; ++r) put(file, A(r, c));
       std::fprintf(file, "\n");
     }
   } else {
@@ -176,13 +212,13 @@ void write_dat(const Problem& problem, const std::string& path, DatStorage stora
       std::fprintf(file, "%d\n", k);
       for (int c = 0; c < d; ++c)
         for (int r = 0; r < d; ++r)
-          std::fprintf(file, "%.17g ", problem.blocks()[static_cast<std::size_t>(k)].column[4 * c + r]);
+          put(file, problem.blocks()[static_cast<std::size_t>(k)].column[4 * c + r]);
       std::fprintf(file, "\n");
     }
   }
-  for (int i = 0; i < size; ++i) std::fprintf(file, "%.17g ", -problem.b()[i]);
+  for (int i = 0; i < size; ++i) put(file, -problem.b()[i]);
   std::fprintf(file, "\n");
-  for (int i = 0; i < n; ++i) std::fprintf(file, "%.17g ", problem.mu(i));
+  for (int i = 0; i < n; ++i) put(file, problem.mu(i));
   std::fprintf(file, "\n");
   const bool failed = std::ferror(file) != 0;
   if (std::fclose(file) != 0 || failed) throw std::runtime_error(path + ": cannot be written");

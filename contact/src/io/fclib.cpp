@@ -1,6 +1,8 @@
 // Tether: the fclib HDF5 format. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/files.hpp>
 
+#include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 
@@ -11,6 +13,9 @@
 namespace tether::contact {
 
 Problem read_problem(const std::string& path) {
+  // A pipe can be opened and read once only; HDF5 does not come through one.
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return read_dat(path);
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error(path + ": cannot be opened");
   char head[4] = {};
@@ -74,18 +79,35 @@ struct Native<double> {
 };
 
 constexpr hssize_t kMostEntries = hssize_t{1} << 31;
+constexpr hsize_t kBestCompression = 1032;  // of deflate; other filters are not expected to do better
+
+// What `set` claims to hold, in entries, once that is known to fit the bytes that the file has for
+// it: a damaged extent must not ask for memory.
+template <class T>
+std::size_t believable_count(hid_t file, hid_t set, const std::string& full) {
+  Handle space(H5Dget_space(set), H5Sclose);
+  const hssize_t count = H5Sget_simple_extent_npoints(space);
+  hsize_t file_size = 0;
+  if (count < 0 || count > kMostEntries || H5Fget_filesize(file, &file_size) < 0) {
+    throw std::runtime_error(full + " has a size that cannot be");
+  }
+  const hsize_t stored = std::min(H5Dget_storage_size(set), file_size);
+  if (static_cast<hsize_t>(count) * sizeof(T) > kBestCompression * stored) {
+    throw std::runtime_error(full + " says that it has " + std::to_string(count) + " entries, but the file holds " +
+                             std::to_string(stored) + " bytes of it");
+  }
+  return static_cast<std::size_t>(count);
+}
 
 template <class T>
 std::vector<T> read(hid_t file, const std::string& path, const std::string& name) {
-  const std::string full = "/fclib_local/" + name;
-  Handle set(H5Dopen2(file, full.c_str(), H5P_DEFAULT), H5Dclose);
-  if (set < 0) throw std::runtime_error(path + ": " + full + " is missing or damaged");
-  Handle space(H5Dget_space(set), H5Sclose);
-  const hssize_t count = H5Sget_simple_extent_npoints(space);
-  if (count < 0 || count > kMostEntries) throw std::runtime_error(path + ": " + full + " has a size that cannot be");
-  std::vector<T> out(static_cast<std::size_t>(count));
+  const std::string full = path + ": /fclib_local/" + name;
+  Handle set(H5Dopen2(file, ("/fclib_local/" + name).c_str(), H5P_DEFAULT), H5Dclose);
+  if (set < 0) throw std::runtime_error(full + " is missing or damaged");
+  const std::size_t count = believable_count<T>(file, set, full);
+  std::vector<T> out(count);
   if (count > 0 && H5Dread(set, Native<T>::type(), H5S_ALL, H5S_ALL, H5P_DEFAULT, out.data()) < 0) {
-    throw std::runtime_error(path + ": " + full + " cannot be read; the file is truncated or of another kind");
+    throw std::runtime_error(full + " cannot be read; the file is truncated or of another kind");
   }
   return out;
 }
@@ -154,7 +176,9 @@ Problem read_fclib(const std::string& path) {
     const std::size_t count = p[size] < 0 ? 0 : static_cast<std::size_t>(p[size]);
     if (p[size] < 0 || x.size() < count || i.size() < count) fail("truncated: W has fewer entries than W/p says");
     for (std::size_t k = 0; k < size; ++k) {
-      if (p[k] < 0 || p[k] > p[k + 1]) fail("W/p does not ascend");
+      if (p[k] < 0 || p[k] > p[k + 1] || static_cast<std::size_t>(p[k + 1]) > count) {
+        fail("W/p must ascend from 0 to the number of entries");
+      }
       for (int e = p[k]; e < p[k + 1]; ++e) {
         const int other = i[static_cast<std::size_t>(e)], self = static_cast<int>(k);
         const double value = x[static_cast<std::size_t>(e)];
