@@ -18,6 +18,7 @@ Constraints quaternion_norm(int first, std::string name) {
   set.jacobian = DenseJacobian([first](double, ConstVector y, Matrix C) {
     for (int k = 0; k < 4; ++k) C(0, first + k) = y[first + k];
   });
+  set.least_unknowns = static_cast<long>(first) + 4;
   return set;
 }
 
@@ -27,13 +28,9 @@ Constraints linear_invariant(std::vector<double> coefficients, double value, std
   set.names = {std::move(name)};
   const Eigen::VectorXd a = Eigen::Map<const Eigen::VectorXd>(
       coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
-  set.value = [a, value](double, ConstVector y, Vector g) {
-    if (a.size() != y.size())
-      throw std::invalid_argument("linear_invariant: " + std::to_string(a.size()) +
-                                  " coefficients for " + std::to_string(y.size()) + " unknowns");
-    g[0] = a.dot(y) - value;
-  };
+  set.value = [a, value](double, ConstVector y, Vector g) { g[0] = a.dot(y) - value; };
   set.jacobian = DenseJacobian([a](double, ConstVector, Matrix C) { C.row(0) = a.transpose(); });
+  set.least_unknowns = set.most_unknowns = static_cast<long>(coefficients.size());
   return set;
 }
 
@@ -59,6 +56,7 @@ Constraints energy(ScalarFunction H, GradientFunction gradient, double value, in
         gradient(y, Vector(C.data(), C.cols()));
         if (work >= 0) C(0, work) -= 1.0;
       });
+  set.least_unknowns = static_cast<long>(work) + 1;
   return set;
 }
 

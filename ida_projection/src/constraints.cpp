@@ -40,6 +40,20 @@ std::string Constraints::name(int row) const {
   return "row " + std::to_string(row);
 }
 
+std::string wrong_length(const Constraints& set, long unknowns) {
+  if (set.count > 0 && (unknowns < set.least_unknowns || unknowns > set.most_unknowns)) {
+    const bool exact = set.least_unknowns == set.most_unknowns;
+    return "constraint \"" + set.name(0) + "\" needs " + (exact ? "exactly " : unknowns < set.least_unknowns ? "at least " : "at most ") +
+           std::to_string(unknowns < set.least_unknowns ? set.least_unknowns : set.most_unknowns) +
+           " unknowns; y has " + std::to_string(unknowns);
+  }
+  for (const Constraints& part : set.joined) {
+    std::string refusal = wrong_length(part, unknowns);
+    if (!refusal.empty()) return refusal;
+  }
+  return "";
+}
+
 Constraints operator+(Constraints a, const Constraints& b) {
   if (empty(b)) return a;
   if (empty(a)) return b;
@@ -64,6 +78,8 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
     throw std::invalid_argument(std::string("check_jacobian: rows are given as ") +
                                 kind(constraints) +
                                 "; it works for DenseJacobian, SparseJacobian and FiniteDifferences");
+  const std::string refusal = wrong_length(constraints, static_cast<long>(y.size()));
+  if (!refusal.empty()) throw std::invalid_argument("check_jacobian: " + refusal);
   Statistics counts;
   Evaluator evaluator(constraints, counts);
   const int n = static_cast<int>(y.size());

@@ -32,6 +32,9 @@ bool has_sparse_rows(const Constraints& set);
 /// Is g given by Constraints::value, and C by entries or differences?
 bool has_values(const Constraints& set);
 
+/// Why the set, or one joined to it, cannot be evaluated on so many unknowns; empty if it can.
+std::string wrong_length(const Constraints& set, long unknowns);
+
 /// g and C of a set and of everything joined to it, as one system of m rows.
 class Evaluator {
  public:

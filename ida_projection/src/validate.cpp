@@ -2,6 +2,7 @@
 #include <stdexcept>
 #include <sundials/sundials_config.h>
 
+#include "evaluator.hpp"
 #include "impl.hpp"
 
 namespace tether::ida_projection {
@@ -116,6 +117,10 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   if (const char* missing = missing_operation(like))
     reject(std::string("the vector type lacks ") + missing + ", which the projection needs");
   check_rows(constraints, like->ops->nvgetlength != nullptr ? N_VGetLength(like) : 0);
+  if (like->ops->nvgetlength != nullptr) {
+    const std::string refusal = wrong_length(constraints, static_cast<long>(N_VGetLength(like)));
+    if (!refusal.empty()) reject(refusal);
+  }
 
   require(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0 (tolerances)");
   require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,

@@ -1,6 +1,7 @@
 // Tether: sets of constraints, their names, builders and the check of a Jacobian.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <limits>
 #include <problems/andrews.hpp>
 #include <problems/car_axis.hpp>
 #include <problems/rigid_body.hpp>
@@ -170,11 +171,30 @@ TEST_CASE("builders: misuse") {
                        H, [](tp::ConstVector, tp::Vector) {}, 0.0, -2);
                  }),
                  "work = -2"));
-  // A wrong number of coefficients shows at the first step, as a message.
-  Host host(tether::test::circle(1.0), 1e-6);
-  host.attach(tp::linear_invariant({1.0, 1.0, 1.0}, 1.0));
-  CHECK(host.finish() < 0);
-  CHECK(contains(host.projection().message(), "3 coefficients for 2 unknowns"));
+}
+
+TEST_CASE("builders: an index beyond the unknowns is refused before anything is evaluated") {
+  const tp::ScalarFunction H = [](tp::ConstVector y) { return y[0]; };
+  const tp::GradientFunction dH = [](tp::ConstVector, tp::Vector gradient) { gradient[0] = 1.0; };
+  const auto refused = [](const tp::Constraints& set) {
+    Host host(tether::test::circle(1.0), 1e-6);
+    const std::string at_attach = thrown([&] { host.attach(set); });
+    const double y[] = {1.0, 0.0};
+    const std::string by_check =
+        thrown([&] { tp::check_jacobian(set, 0.0, tp::ConstVector(y, 2)); });
+    CHECK(contains(by_check, at_attach.substr(at_attach.find("constraint \""))));
+    return at_attach;
+  };
+  CHECK(contains(refused(tp::quaternion_norm(1)), "\"quaternion norm\" needs at least 5 unknowns"));
+  CHECK(contains(refused(tp::quaternion_norm(100000000)), "at least 100000004"));
+  CHECK(contains(refused(tp::quaternion_norm(std::numeric_limits<int>::max())), "at least 2147483651"));
+  CHECK(contains(refused(tp::energy(H, dH, 0.0, 9)), "\"energy\" needs at least 10 unknowns"));
+  CHECK(contains(refused(tp::energy(H, dH, 0.0, 2)), "at least 3 unknowns; y has 2"));
+  CHECK(contains(refused(tp::linear_invariant({1.0, 1.0, 1.0}, 1.0)),
+                 "\"linear invariant\" needs exactly 3 unknowns; y has 2"));
+  CHECK(contains(refused(tp::linear_invariant({1.0}, 1.0)), "exactly 1 unknowns"));
+  // In a joined set, too.
+  CHECK(contains(refused(tp::energy(H, dH, 0.0) + tp::quaternion_norm(0)), "\"quaternion norm\""));
 }
 
 TEST_CASE("energy with a work state: a driven, damped oscillator keeps its balance") {

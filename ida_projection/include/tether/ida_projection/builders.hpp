@@ -10,6 +10,9 @@
 TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
+// Each set knows which lengths of y it can be evaluated on (Constraints::least_unknowns): an index
+// beyond the unknowns is refused when the set is attached.
+
 /// |q|^2 = 1 for the four components y[first .. first + 3], as (|q|^2 - 1)/2 = 0.
 Constraints quaternion_norm(int first, std::string name = "quaternion norm");
 

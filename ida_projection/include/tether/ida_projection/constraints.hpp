@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <string>
 #include <sundials/sundials_nvector.h>
 #include <tether/export.hpp>
@@ -103,6 +104,9 @@ struct Constraints {
       jacobian;                     ///< dg/dy
   std::vector<std::string> names;   ///< optional, one for each row; used in messages
   std::vector<Constraints> joined;  ///< sets added with `+`, their rows after those of this one
+  /// The rows can only be evaluated on y with least_unknowns <= N <= most_unknowns; any other
+  /// length is refused, by the row's name, when the set is attached and by check_jacobian.
+  long least_unknowns = 0, most_unknowns = std::numeric_limits<long>::max();
 
   /// m over this set and everything joined to it.
   int total_count() const {
