@@ -258,14 +258,16 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   monitor_.start();
   bool fresh = false;  // factors belong to the present y
   bool have_factors = reused_;
+  const bool was_reused = reused_;
+  if (Rows::kThinRows && was_reused) std::copy(correction, correction + n_, start_.begin());
   bool tried = firm_only_;
   for (;;) {
     if (!have_factors) {
       if ((result.status = factor(candidate.t)) != Status::success) return result;
       have_factors = fresh = true;
-      if (result.moves == 0 && !firm_only_) {
+      if (!firm_only_ && (result.moves == 0 || was_reused)) {
         start_known_ = thin_;
-        if (thin_) std::copy(correction, correction + n_, start_.begin());
+        if (thin_ && !was_reused) std::copy(correction, correction + n_, start_.begin());
       }
     }
     const double length = fresh ? first_solve() : solve();
@@ -345,6 +347,8 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
 
 template void ContiguousMover<RowBlocks>::load(const Candidate&);
 template void ContiguousMover<SparseRows>::load(const Candidate&);
+template double ContiguousMover<RowBlocks>::first_solve();
+template double ContiguousMover<SparseRows>::first_solve();
 template double ContiguousMover<RowBlocks>::rounding_length();
 template double ContiguousMover<SparseRows>::rounding_length();
 

@@ -65,7 +65,7 @@ class ContiguousMover final : public Mover {
   }
   void accept() override { std::swap(scale_, trial_scale_); }
   Status finish(const Candidate& candidate) override {
-    const bool unseen = keeps_factors_ && move_length_ > kSafe * options_.tolerance;
+    const bool unseen = keeps_factors() && move_length_ > kSafe * options_.tolerance;
     return unseen ? take_back(candidate) : Status::success;
   }
   void reset() override {
@@ -86,7 +86,9 @@ class ContiguousMover final : public Mover {
   void load(const Candidate& candidate);
   const std::vector<double>& WT();
   void set_metric(bool for_factors);
-  bool may_reuse() const { return keeps_factors_ && reusable_ && !blocks_.dropped_rows(); }
+  // Rows that need RowTrust are judged anew in each step.
+  bool keeps_factors() const { return keeps_factors_ && !thin_; }
+  bool may_reuse() const { return keeps_factors() && reusable_ && !blocks_.dropped_rows(); }
   Status take_back(const Candidate& candidate);
   double rate() const { return slope_ * age_; }
   void set_group_metric();

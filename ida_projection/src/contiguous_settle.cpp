@@ -17,7 +17,7 @@ template <class Rows>
 Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
   for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
-  if (keeps_factors_) return take_back(candidate);
+  if (keeps_factors()) return take_back(candidate);
   double sum = 0.0;
   for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
   const double reach = move_length_ + std::sqrt(sum * inverse_n_);
@@ -60,7 +60,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
     if (age_ > 0 && (part > kSlow || length > kLong)) {
       set_metric(true);
       if ((status = factor(candidate.t)) != Status::success) return status;
-      length = solve();
+      length = first_solve();
       part = 0.0;
       previous = -1.0;
     }

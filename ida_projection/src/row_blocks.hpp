@@ -107,8 +107,9 @@ std::vector<double> some_tolerances_away(std::vector<double> y, const std::vecto
 class RowBlocks {
  public:
   using Block = BlockOf<linalg::MinimumNorm>;
-  /// Factors are cheap beside F, and a step older they may leave half of a move: always fresh.
-  static bool keeps_factors(int) { return false; }
+  /// Few rows: factors are cheap beside F, and a step older they may leave half of a move. Many:
+  /// an orthogonal factorisation costs some m / 2 solves.
+  static bool keeps_factors(int rows) { return rows > 64; }
   /// The solver's pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = true;
 
