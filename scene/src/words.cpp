@@ -9,5 +9,5 @@ static_assert(word(ShapeKind::points) == "points" && word(JointKind::fixed) == "
               word(Formulation::stabilised_index2) == "stabilised_index2" &&
               word(Gyroscopic::momentum) == "momentum" &&
               word(ContactLaw::frictionless) == "frictionless" && word(OnFailure::warn) == "warn" &&
-              word(Quantity::residual) == "residual");
+              word(RestitutionLaw::poisson) == "poisson" && word(Quantity::residual) == "residual");
 }  // namespace tether::scene

@@ -87,6 +87,11 @@ TEST_CASE("every field of a scene is read") {
   const Scene t = parse_scene(kTouching, "box.toml");
   CHECK(t.stepping->law == ContactLaw::maximum_dissipation);
   CHECK(t.stepping->gyroscopic == Gyroscopic::implicit_step);
+  CHECK(t.stepping->restitution_law == RestitutionLaw::poisson);
+  CHECK(t.stepping->restitution_threshold == 0.02);
+  CHECK(t.stepping->impact_threshold == 0.03);
+  CHECK(t.stepping->acceptance == 10);
+  CHECK(t.stepping->max_halvings == 2);
   CHECK(t.stepping->on_failure == OnFailure::warn);
   CHECK(t.stepping->threads == 2);
   CHECK(t.pairs[0].friction == 0.3);

@@ -144,7 +144,11 @@ tolerance = 1e-10
 gyroscopic = "implicit"
 error_reduction = 0.1
 max_depenetration_speed = 2
+restitution_law = "poisson"
 restitution_threshold = 0.02
+impact_threshold = 0.03
+acceptance = 10
+max_halvings = 2
 on_failure = "warn"
 threads = 2
 

@@ -90,8 +90,10 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
         polyhedra_->add(static_cast<int>(k), surfaces_[k].shape);
 
   pose_.resize(surfaces_.size());
-  for (const Surface& s : surfaces_)
+  for (const Surface& s : surfaces_) {
     centred_.push_back(s.shape.kind == ShapeKind::sphere && s.shape.position.isZero(0));
+    size_.push_back(reach(s.shape));
+  }
   reach_.resize(bounded_.size());
   centre_.resize(bounded_.size());
   ball_.resize(bounded_.size());
@@ -110,6 +112,11 @@ int NearContacts::meeting_of(int a, int b) const {
 const Meeting& NearContacts::meeting(const PointContact& c) const {
   const int a = static_cast<int>(c.id >> 40), b = static_cast<int>(c.id >> 16 & 0xffffff);
   return meetings_[at(meeting_of(a, b))];
+}
+
+double NearContacts::size(const PointContact& c) const {
+  return std::min(size_[at(static_cast<int>(c.id >> 40))],
+                  size_[at(static_cast<int>(c.id >> 16 & 0xffffff))]);
 }
 
 bool NearContacts::any_restitution() const {

@@ -21,6 +21,8 @@ class NearContacts {
 
   const Surface& surface(int k) const { return surfaces_[static_cast<std::size_t>(k)]; }
   const Meeting& meeting(const PointContact& c) const;
+  /// Of the smaller of its shapes: farthest point from its origin, m.
+  double size(const PointContact& c) const;
   bool any_restitution() const;
 
  private:
@@ -40,6 +42,7 @@ class NearContacts {
   // For each surface: its pose; for each bounded one: reach with and without what it may move.
   std::vector<Pose> pose_;
   std::vector<char> centred_;  // a sphere about the centre of its body
+  std::vector<double> size_;   // of each surface: its reach, infinite for planes
   std::vector<double> reach_;
   std::vector<Eigen::Vector3d> centre_;
   std::vector<double> ball_;

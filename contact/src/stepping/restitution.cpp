@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "rotation.hpp"
 
@@ -14,12 +13,6 @@ using Eigen::Vector3d;
 namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& c) {
-  const RigidBody &a = motion[at(c.first)], &b = motion[at(c.second)];
-  return c.normal.dot(a.velocity + a.angular_velocity.cross(c.r1) - b.velocity -
-                      b.angular_velocity.cross(c.r2));
-}
 
 void push(RigidBody& body, const Vector3d& r, const Vector3d& p) {
   body.velocity += body.inverse_mass * p;
@@ -33,82 +26,75 @@ BodyOptions cold(BodyOptions options) {
 
 }  // namespace
 
-Restitution::Restitution(double threshold, const BodyOptions& options)
-    : threshold_(threshold), solver_(cold(options)) {}
+Restitution::Restitution(RestitutionLaw law, const BodyOptions& options)
+    : law_(law), solver_(cold(options)) {}
 
-void Restitution::remember(const BodySet& bodies) { coming_ = bodies.motion; }
-
-void Restitution::choose(const NearContacts& near, const BodySet& bodies, double dt,
+void Restitution::choose(const std::vector<Impact>& impacts, const BodySet& bodies,
                          StepContacts& contacts) {
   bounces_.clear();
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    PointContact& c = contacts.points[k];
-    const double epsilon = near.meeting(c).restitution;
-    if (epsilon == 0) continue;
-    const double came = -normal_velocity(coming_, c);
-    if (!(came > threshold_)) continue;
-    const double comes = -normal_velocity(bodies.motion, c);
-    if (!(comes * dt > contacts.gaps[k])) continue;
+  for (const Impact& i : impacts) {
+    if (i.restitution == 0) continue;
+    PointContact& c = contacts.points[at(i.contact)];
     // The speed that the forces of this step added is not given back: a body at rest would hop.
-    bounces_.push_back({static_cast<int>(k), epsilon * std::min(1.0, came / comes)});
-    c.bias = 0;
+    const double speed = i.restitution * std::min(i.came, i.comes);
+    bounces_.push_back({i.contact, speed, speed / i.comes});
+    if (law_ == RestitutionLaw::newton) c.bias = -speed;
   }
   if (!bounces_.empty()) before_ = bodies.motion;
 }
 
-int Restitution::root(int body) {
-  while (parent_[at(body)] != body) body = parent_[at(body)] = parent_[at(parent_[at(body)])];
-  return body;
-}
-
-// Energy of an island against `before_` as a function of the scale s of `change_`:
-// constant + linear s + square s^2, constant <= 0. The largest s <= 1 that keeps it <= 0.
-void Restitution::limit_energy(const BodySet& bodies, const StepContacts& contacts) {
-  const std::size_t n = bodies.motion.size();
-  parent_.resize(n);
-  std::iota(parent_.begin(), parent_.end(), 0);
-  for (const PointContact& c : contacts.points)
-    if (bodies.mass[at(c.first)] > 0 && bodies.mass[at(c.second)] > 0)
-      parent_[at(root(c.first))] = root(c.second);
+// Energy of an island against `before_` as a function of the scale s of `change_`, from `now`:
+// constant + linear s + square s^2.
+void Restitution::sum_energies(const BodySet& bodies, const std::vector<RigidBody>& now) {
+  const std::size_t n = now.size();
   constant_.assign(n, 0);
   linear_.assign(n, 0);
   square_.assign(n, 0);
-  scale_.assign(n, 1);
   for (std::size_t i = 0; i < n; ++i) {
     const double m = bodies.mass[i];
     if (m == 0) continue;
     const auto spin_of = [&](const Vector3d& w) {
       return spin(bodies.inertia[i], bodies.orientation[i], w);
     };
-    const RigidBody &now = bodies.motion[i], &was = before_[i], &d = change_[i];
-    const std::size_t r = at(root(static_cast<int>(i)));
-    constant_[r] += 0.5 * m * (now.velocity - was.velocity).dot(now.velocity + was.velocity) +
-                    0.5 * spin_of(now.angular_velocity - was.angular_velocity)
-                              .dot(now.angular_velocity + was.angular_velocity);
+    const RigidBody &is = now[i], &was = before_[i], &d = change_[i];
+    const std::size_t r = at(islands_.root(static_cast<int>(i)));
+    constant_[r] += 0.5 * m * (is.velocity - was.velocity).dot(is.velocity + was.velocity) +
+                    0.5 * spin_of(is.angular_velocity - was.angular_velocity)
+                              .dot(is.angular_velocity + was.angular_velocity);
     const Vector3d L = spin_of(d.angular_velocity);
-    linear_[r] += m * now.velocity.dot(d.velocity) + now.angular_velocity.dot(L);
+    linear_[r] += m * is.velocity.dot(d.velocity) + is.angular_velocity.dot(L);
     square_[r] += 0.5 * (m * d.velocity.squaredNorm() + d.angular_velocity.dot(L));
   }
-  for (std::size_t i = 0; i < n; ++i) {
+}
+
+// Does an island end with more energy than before the impulses?
+bool Restitution::gains_energy(const BodySet& bodies) {
+  change_ = bodies.motion;
+  for (std::size_t i = 0; i < change_.size(); ++i) {
+    change_[i].velocity -= before_[i].velocity;
+    change_[i].angular_velocity -= before_[i].angular_velocity;
+  }
+  sum_energies(bodies, bodies.motion);
+  for (std::size_t i = 0; i < change_.size(); ++i)
+    if (constant_[i] > 1e-14 * square_[i]) return true;
+  return false;
+}
+
+// The largest s <= 1 that leaves no island with more energy than before; at s = 0 none has.
+void Restitution::limit_energy(const BodySet& bodies) {
+  sum_energies(bodies, bodies.motion);
+  scale_.assign(constant_.size(), 1);
+  for (std::size_t i = 0; i < scale_.size(); ++i) {
     const double a = square_[i], b = linear_[i], c = std::min(constant_[i], 0.0);
-    if (!(a > 0) || a + b + c <= 1e-14 * a) {
-      scale_[i] = 1;
-      continue;
-    }
+    if (!(a > 0) || a + b + c <= 1e-14 * a) continue;
     const double root_of = std::sqrt(b * b - 4 * a * c);
     const double s = b > 0 ? -2 * c / (b + root_of) : (root_of - b) / (2 * a);
     scale_[i] = std::clamp(s, 0.0, 1.0);
   }
 }
 
-int Restitution::apply(BodySet& bodies, StepContacts& contacts) {
-  bounces_.erase(
-      std::remove_if(bounces_.begin(), bounces_.end(),
-                     [&](const Bounce& b) { return contacts.impulses[at(b.contact)].isZero(0); }),
-      bounces_.end());
-  if (bounces_.empty()) return 0;
-
-  // change_: first the velocities without restitution, at the end what restitution adds to them.
+// From the solution without restitution in `bodies` and `contacts` to `change_` and `added_`.
+void Restitution::add_impulses_again(BodySet& bodies, StepContacts& contacts) {
   change_ = bodies.motion;
   for (const Bounce& b : bounces_) {
     const PointContact& c = contacts.points[at(b.contact)];
@@ -123,22 +109,60 @@ int Restitution::apply(BodySet& bodies, StepContacts& contacts) {
     change_[i].velocity = solution_.velocities[i] - change_[i].velocity;
     change_[i].angular_velocity = solution_.angular_velocities[i] - change_[i].angular_velocity;
   }
+  added_ = solution_.impulses;
+  for (const Bounce& b : bounces_)
+    added_[at(b.contact)] += b.part * contacts.impulses[at(b.contact)];
+}
 
-  // Both ends obey the contacts and the cones; so does everything between them.
-  limit_energy(bodies, contacts);
+// From the solution with restitution to the one without it, in `bodies` and `contacts`, and the
+// difference in `change_` and `added_`.
+void Restitution::solve_without(BodySet& bodies, StepContacts& contacts) {
+  for (const Bounce& b : bounces_) contacts.points[at(b.contact)].bias = 0;
+  change_ = bodies.motion;
+  added_ = contacts.impulses;
+  solver_.solve(before_, contacts.points, solution_);
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
     if (bodies.mass[i] == 0) continue;
-    const double s = scale_[at(root(static_cast<int>(i)))];
+    bodies.motion[i].velocity = solution_.velocities[i];
+    bodies.motion[i].angular_velocity = solution_.angular_velocities[i];
+    change_[i].velocity -= solution_.velocities[i];
+    change_[i].angular_velocity -= solution_.angular_velocities[i];
+  }
+  for (std::size_t k = 0; k < added_.size(); ++k) {
+    contacts.impulses[k] = solution_.impulses[k];
+    added_[k] -= solution_.impulses[k];
+  }
+}
+
+// Both ends obey the contacts and the cones; so does everything between them.
+void Restitution::add_change(BodySet& bodies, StepContacts& contacts) {
+  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
+    if (bodies.mass[i] == 0) continue;
+    const double s = scale_[at(islands_.root(static_cast<int>(i)))];
     bodies.motion[i].velocity += s * change_[i].velocity;
     bodies.motion[i].angular_velocity += s * change_[i].angular_velocity;
   }
-  for (const Bounce& b : bounces_)
-    solution_.impulses[at(b.contact)] += b.part * contacts.impulses[at(b.contact)];
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    const PointContact& c = contacts.points[k];
-    const int moving = bodies.mass[at(c.first)] > 0 ? c.first : c.second;
-    contacts.impulses[k] += scale_[at(root(moving))] * solution_.impulses[k];
+    const double s = scale_[at(islands_.root(bodies, contacts.points[k]))];
+    contacts.impulses[k] += s * added_[k];
   }
+}
+
+int Restitution::apply(BodySet& bodies, StepContacts& contacts) {
+  bounces_.erase(
+      std::remove_if(bounces_.begin(), bounces_.end(),
+                     [&](const Bounce& b) { return contacts.impulses[at(b.contact)].isZero(0); }),
+      bounces_.end());
+  if (bounces_.empty()) return 0;
+  islands_.join(bodies, contacts);
+  if (law_ == RestitutionLaw::poisson) {
+    add_impulses_again(bodies, contacts);
+  } else {
+    if (!gains_energy(bodies)) return static_cast<int>(bounces_.size());
+    solve_without(bodies, contacts);
+  }
+  limit_energy(bodies);
+  add_change(bodies, contacts);
   return static_cast<int>(bounces_.size());
 }
 

@@ -4,37 +4,45 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "near_contacts.hpp"
+#include "impacts.hpp"
+#include "moving_islands.hpp"
 
 namespace tether::contact::detail {
 
-/// README, section 14. First the contact problem without restitution, impulses x; then epsilon x at
-/// the contacts that bounce; then the contact problem once more, for contacts which that pressed
-/// together. What the last two add is scaled down where an island of bodies would end with more
-/// energy than it had before the impulses.
+/// README, section 14. `newton`: contacts that bounce leave with epsilon times the speed they came
+/// with, in the one solve that friction takes part in. `poisson`: the contact problem without
+/// restitution, impulses x; then epsilon x at the contacts that bounce; then the contact problem
+/// once more, for contacts which that pressed together. In both, what restitution adds to the
+/// solution without it is scaled down where an island of bodies would end with more energy than it
+/// had before the impulses.
 class Restitution {
  public:
-  Restitution(double threshold, const BodyOptions& options);
+  Restitution(RestitutionLaw law, const BodyOptions& options);
 
-  /// Start of a step: velocities that bodies come with, before forces.
-  void remember(const BodySet& bodies);
-  /// After the contacts are found: chooses those that bounce. Their impact is now, bias 0.
-  void choose(const NearContacts& near, const BodySet& bodies, double dt, StepContacts& contacts);
-  /// After the first solve. Adds to velocities and impulses; returns the number of bounces.
+  /// After the impacts are chosen: those that bounce.
+  void choose(const std::vector<Impact>& impacts, const BodySet& bodies, StepContacts& contacts);
+  /// After the solve. Changes velocities and impulses; returns the number of bounces.
   int apply(BodySet& bodies, StepContacts& contacts);
 
  private:
   struct Bounce {
     int contact;
-    double part;  // of its impulse
+    double speed;  // given back, m/s
+    double part;   // of the impulse
   };
-  int root(int body);
-  void limit_energy(const BodySet& bodies, const StepContacts& contacts);
+  void sum_energies(const BodySet& bodies, const std::vector<RigidBody>& now);
+  bool gains_energy(const BodySet& bodies);
+  void add_impulses_again(BodySet& bodies, StepContacts& contacts);
+  void solve_without(BodySet& bodies, StepContacts& contacts);
+  void limit_energy(const BodySet& bodies);
+  void add_change(BodySet& bodies, StepContacts& contacts);
 
-  double threshold_;
+  RestitutionLaw law_;
   std::vector<Bounce> bounces_;
-  std::vector<RigidBody> coming_, before_, change_;
-  std::vector<int> parent_;
+  // Velocities before the impulses; what restitution adds to those without it, and to impulses.
+  std::vector<RigidBody> before_, change_;
+  std::vector<Eigen::Vector3d> added_;
+  MovingIslands islands_;
   std::vector<double> constant_, linear_, square_, scale_;  // of each island; see limit_energy
   BodySolver solver_;
   BodySolution solution_;

@@ -7,12 +7,16 @@
 #include <tether/contact/stepping.hpp>
 #include <utility>
 
+#include "closing.hpp"
+#include "impacts.hpp"
 #include "near_contacts.hpp"
 #include "restitution.hpp"
 #include "rotation.hpp"
 
 namespace tether::contact {
 
+using detail::Closing;
+using detail::Impacts;
 using detail::NearContacts;
 using detail::Restitution;
 using Eigen::Vector3d;
@@ -31,6 +35,9 @@ void check(const SteppingOptions& o) {
   demand(o.error_reduction >= 0 && o.error_reduction <= 1, "error_reduction must lie in 0 .. 1");
   demand(o.max_depenetration_speed >= 0, "max_depenetration_speed must be >= 0");
   demand(o.restitution_threshold >= 0, "restitution_threshold must be >= 0");
+  demand(o.impact_threshold >= 0, "impact_threshold must be >= 0");
+  demand(o.acceptance >= 1, "acceptance must be >= 1");
+  demand(o.max_halvings >= 0 && o.max_halvings <= 30, "max_halvings must lie in 0 .. 30");
   demand(o.near_part >= 0, "near_part must be >= 0");
 }
 
@@ -44,6 +51,11 @@ BodyOptions solver_options(const SteppingOptions& o) {
   b.max_work = o.max_work;
   b.threads = o.threads;
   return b;
+}
+
+// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
+double speed(double threshold, const SteppingOptions& o) {
+  return o.gravity ? threshold * std::sqrt(o.gravity->norm()) : 0;
 }
 
 // Penetrations need not vanish in one step: a rough answer is good enough, as the next step sees
@@ -74,6 +86,18 @@ const char* name(Gyroscopic gyroscopic) {
   return "?";
 }
 
+namespace {
+constexpr double kRough = 1e-4;  // residual above which an answer is none
+}  // namespace
+
+double accepted_residual(const SteppingOptions& o) {
+  return std::max(o.tolerance, std::min(o.acceptance * o.tolerance, kRough));
+}
+
+const char* name(RestitutionLaw law) {
+  return law == RestitutionLaw::newton ? "newton" : "poisson";
+}
+
 // A step is the list of stages, made once from what the scene asks for.
 struct Stepper::Implementation {
   using Method = void (Implementation::*)();
@@ -96,15 +120,22 @@ struct Stepper::Implementation {
   // Only with meetings.
   std::unique_ptr<NearContacts> near;
   std::unique_ptr<BodySolver> solver;
+  std::unique_ptr<Impacts> impacts;
   std::unique_ptr<Restitution> restitution;
   StepContacts contacts;
   BodySolution solution;
-  double deepest = 0;
+
+  // Of the step: the length of the part that is taken, and what is worst of all its parts.
+  double dt = 0;
+  bool may_halve = false, failed = false, succeeded = true;
+  Status status = Status::solved;
+  double residual = 0, deepest = 0;
 
   // Only with error reduction.
+  std::unique_ptr<Closing> closing;
   std::unique_ptr<BodySolver> correction;
   BodySolution correction_solution;
-  std::vector<RigidBody> at_rest;
+  std::vector<RigidBody> at_rest, closing_move;
   bool corrects = false;
 
   StepCounts counts;
@@ -112,15 +143,24 @@ struct Stepper::Implementation {
   void add_stage(const char* effect, Method method) { stages.push_back({effect, method, -1, 0}); }
   void make_stages();
 
-  void remember_velocities() { restitution->remember(bodies); }
+  void make_solvers();
+  void step();
+  void advance(double time, double length, int halvings);
+  bool run_stages(double time);
+  void judge();
+
+  void remember_velocities() { impacts->remember(bodies); }
   void apply_gravity();
   void gyrate_explicit();
   void gyrate_implicit();
   void find_contacts();
-  void choose_bounces() { restitution->choose(*near, bodies, options.step, contacts); }
+  void choose_impacts();
+  void choose_bounces() { restitution->choose(impacts->list(), bodies, contacts); }
   void solve_contacts();
   void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
+  void close_gaps();
   void correct_penetration();
+  void shift(int body, const Vector3d& v, const Vector3d& w);
   void move();
   void turn_round();
   void turn_plain();
@@ -135,7 +175,8 @@ void Stepper::Implementation::make_stages() {
     const bool round = detail::is_isotropic(bodies.inertia[at(i)]);
     (round ? round_bodies : long_bodies).push_back(i);
   }
-  if (restitution) add_stage("restitution", &I::remember_velocities);
+  const char* impact = restitution ? "restitution" : "collision";
+  if (near) add_stage(impact, &I::remember_velocities);
   if (options.gravity) add_stage("gravity", &I::apply_gravity);
   after_forces = stages.size();
   if (!long_bodies.empty()) {
@@ -146,9 +187,11 @@ void Stepper::Implementation::make_stages() {
   }
   if (near) {
     add_stage("collision", &I::find_contacts);
+    add_stage(impact, &I::choose_impacts);
     if (restitution) add_stage("restitution", &I::choose_bounces);
     add_stage("contact", &I::solve_contacts);
     if (restitution) add_stage("restitution", &I::rebound);
+    if (closing) add_stage("penetration", &I::close_gaps);
     if (correction) add_stage("penetration", &I::correct_penetration);
   }
   add_stage("motion", &I::move);
@@ -163,7 +206,7 @@ void Stepper::Implementation::make_stages() {
 }
 
 void Stepper::Implementation::apply_gravity() {
-  const Vector3d dv = options.step * *options.gravity;
+  const Vector3d dv = dt * *options.gravity;
   for (const int i : moving) bodies.motion[at(i)].velocity += dv;
 }
 
@@ -171,47 +214,70 @@ void Stepper::Implementation::gyrate_explicit() {
   for (const int i : long_bodies) {
     Vector3d& w = bodies.motion[at(i)].angular_velocity;
     w += detail::gyroscopic_explicit(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)],
-                                     bodies.orientation[at(i)], w, options.step);
+                                     bodies.orientation[at(i)], w, dt);
   }
 }
 
 void Stepper::Implementation::gyrate_implicit() {
   for (const int i : long_bodies) {
     Vector3d& w = bodies.motion[at(i)].angular_velocity;
-    w += detail::gyroscopic_implicit(bodies.inertia[at(i)], bodies.orientation[at(i)], w,
-                                     options.step);
+    w += detail::gyroscopic_implicit(bodies.inertia[at(i)], bodies.orientation[at(i)], w, dt);
   }
 }
 
 void Stepper::Implementation::find_contacts() {
-  near->find(bodies, options.step, contacts);
-  deepest = 0;
+  near->find(bodies, dt, contacts);
   for (std::size_t k = 0; k < contacts.gaps.size(); ++k) {
     const double gap = contacts.gaps[k];
     deepest = std::max(deepest, -gap);
-    contacts.points[k].bias = gap > 0 ? gap / options.step : 0;
+    contacts.points[k].bias = gap > 0 ? gap / dt : 0;
   }
 }
 
 void Stepper::Implementation::solve_contacts() {
   contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
   std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
+  failed = false;
   if (contacts.points.empty()) {
-    solution.status = Status::solved;
-    solution.error = 0;
     solver->forget();
     return;
   }
   solver->solve(bodies.motion, contacts.points, solution);
+  ++counts.contact_problems;
+  counts.sweeps += solution.sweeps;
+  counts.assembled_islands += solution.assembled_islands;
+  judge();
+  if (failed && may_halve) return;
   for (const int i : moving) {
     bodies.motion[at(i)].velocity = solution.velocities[at(i)];
     bodies.motion[at(i)].angular_velocity = solution.angular_velocities[at(i)];
   }
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
-  ++counts.contact_problems;
-  counts.sweeps += solution.sweeps;
-  counts.assembled_islands += solution.assembled_islands;
-  counts.unsolved += solution.status != Status::solved;
+}
+
+// Accepts the solution, or not; one that a shorter step replaces leaves no trace.
+void Stepper::Implementation::judge() {
+  const bool solved = solution.status == Status::solved;
+  const bool shortest = options.max_halvings > 0 && !may_halve;
+  const double most = std::max(accepted_residual(options), shortest ? kRough : 0.0);
+  failed = !solved && !(solution.error <= most);
+  if (failed && may_halve) return;
+  counts.accepted += !solved && !failed;
+  counts.unsolved += failed;
+  if (!solved) status = solution.status;
+  succeeded = succeeded && !failed;
+  residual = solution.error <= residual ? residual : solution.error;
+}
+
+void Stepper::Implementation::choose_impacts() {
+  impacts->choose(*near, bodies, dt, contacts);
+  if (closing) closing->begin(impacts->list(), bodies, contacts);
+}
+
+void Stepper::Implementation::close_gaps() {
+  if (!closing->find(bodies, dt, contacts, closing_move)) return;
+  for (const int i : moving)
+    shift(i, closing_move[at(i)].velocity, closing_move[at(i)].angular_velocity);
 }
 
 // The least move (in the metric of the masses) that takes penetrations back; contacts that are open
@@ -226,23 +292,28 @@ void Stepper::Implementation::correct_penetration() {
   }
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
     const double gap = contacts.gaps[k];
-    contacts.points[k].bias = gap > 0 ? gap / options.step
-                                      : std::max(options.error_reduction * gap / options.step,
-                                                 -options.max_depenetration_speed);
+    contacts.points[k].bias =
+        gap > 0 ? gap / dt
+                : std::max(options.error_reduction * gap / dt, -options.max_depenetration_speed);
   }
   correction->solve(at_rest, contacts.points, correction_solution);
-  for (const int i : moving) {
-    bodies.position[at(i)] += options.step * correction_solution.velocities[at(i)];
-    const Vector3d w = correction_solution.angular_velocities[at(i)];
-    if (w.isZero(0)) continue;
-    // Body axes keep their angular velocity in world axes.
-    bodies.orientation[at(i)] =
-        (detail::exponential(options.step * w) * bodies.orientation[at(i)]).normalized();
-  }
+  for (const int i : moving)
+    shift(i, correction_solution.velocities[at(i)], correction_solution.angular_velocities[at(i)]);
+}
+
+// By velocities that are not kept. The angular velocity turns with the body: so its energy stays.
+void Stepper::Implementation::shift(int body, const Vector3d& v, const Vector3d& w) {
+  bodies.position[at(body)] += dt * v;
+  if (w.isZero(0)) return;
+  const linalg::Quaternion turn = detail::exponential(dt * w);
+  linalg::Quaternion& q = bodies.orientation[at(body)];
+  q = (turn * q).normalized();
+  Vector3d& spin = bodies.motion[at(body)].angular_velocity;
+  spin = turn * spin;
 }
 
 void Stepper::Implementation::move() {
-  for (const int i : moving) bodies.position[at(i)] += options.step * bodies.motion[at(i)].velocity;
+  for (const int i : moving) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
 }
 
 void Stepper::Implementation::turn_round() {
@@ -250,7 +321,7 @@ void Stepper::Implementation::turn_round() {
     const Vector3d& w = bodies.motion[at(i)].angular_velocity;
     if (w.isZero(0)) continue;
     linalg::Quaternion& q = bodies.orientation[at(i)];
-    q = (detail::exponential(options.step * w) * q).normalized();
+    q = (detail::exponential(dt * w) * q).normalized();
   }
 }
 
@@ -258,7 +329,7 @@ void Stepper::Implementation::turn_plain() {
   for (const int i : long_bodies) {
     RigidBody& b = bodies.motion[at(i)];
     linalg::Quaternion& q = bodies.orientation[at(i)];
-    q = (detail::exponential(options.step * b.angular_velocity) * q).normalized();
+    q = (detail::exponential(dt * b.angular_velocity) * q).normalized();
     b.inverse_inertia = detail::turned(bodies.inverse_inertia[at(i)], q);
   }
 }
@@ -268,10 +339,61 @@ void Stepper::Implementation::turn_keeping_momentum() {
     const int i = long_bodies[k];
     RigidBody& b = bodies.motion[at(i)];
     linalg::Quaternion& q = bodies.orientation[at(i)];
-    detail::turn_with_momentum(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)], options.step,
-                               q, b.angular_velocity, free_spin[k]);
+    detail::turn_with_momentum(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)], dt, q,
+                               b.angular_velocity, free_spin[k]);
     b.inverse_inertia = detail::turned(bodies.inverse_inertia[at(i)], q);
   }
+}
+
+// New ones: nothing of the past is left.
+void Stepper::Implementation::make_solvers() {
+  const BodyOptions o = solver_options(options);
+  solver = std::make_unique<BodySolver>(o);
+  if (near->any_restitution())
+    restitution = std::make_unique<Restitution>(options.restitution_law, o);
+  if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
+    correction = std::make_unique<BodySolver>(correction_options(options));
+    closing = std::make_unique<Closing>(o);
+  }
+}
+
+void Stepper::Implementation::step() {
+  status = Status::solved;
+  succeeded = true;
+  residual = deepest = 0;
+  advance(static_cast<double>(counts.steps) * options.step, options.step, options.max_halvings);
+  ++counts.steps;
+}
+
+void Stepper::Implementation::advance(double time, double length, int halvings) {
+  dt = length;
+  may_halve = halvings > 0;
+  if (run_stages(time)) return;
+  // Nothing has moved yet.
+  bodies.motion = impacts->coming();
+  solver->scale_warm_start(0.5);
+  ++counts.halved;
+  advance(time, length / 2, halvings - 1);
+  advance(time + length / 2, length / 2, halvings - 1);
+  solver->scale_warm_start(2);
+}
+
+// false: the contact problem failed, and the step is to be taken in halves.
+bool Stepper::Implementation::run_stages(double time) {
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start = Clock::now();
+  failed = false;
+  for (Stage& stage : stages) {
+    if (stage.method)
+      (this->*stage.method)();
+    else
+      force[at(stage.force)](bodies, time, dt);
+    const Clock::time_point end = Clock::now();
+    stage.seconds += std::chrono::duration<double>(end - start).count();
+    start = end;
+    if (failed && may_halve) return false;
+  }
+  return true;
 }
 
 Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
@@ -284,15 +406,10 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
   if (!meetings.empty() && !surfaces.empty()) {
     s.near = std::make_unique<NearContacts>(s.bodies, std::move(surfaces), std::move(meetings),
                                             options.law, options.near_part, std::move(polyhedra));
-    s.solver = std::make_unique<BodySolver>(solver_options(options));
-    if (s.near->any_restitution())
-      s.restitution =
-          std::make_unique<Restitution>(options.restitution_threshold, solver_options(options));
-    if (options.error_reduction > 0 && options.max_depenetration_speed > 0)
-      s.correction = std::make_unique<BodySolver>(correction_options(options));
+    s.impacts = std::make_unique<Impacts>(speed(options.impact_threshold, options),
+                                          speed(options.restitution_threshold, options));
+    s.make_solvers();
   }
-  s.solution.status = Status::solved;
-  s.solution.error = 0;
   s.make_stages();
 }
 
@@ -307,21 +424,7 @@ void Stepper::add_force(const char* effect, Force force) {
                   {effect, nullptr, static_cast<int>(s.force.size()) - 1, 0});
 }
 
-void Stepper::step() {
-  using Clock = std::chrono::steady_clock;
-  Implementation& s = *implementation_;
-  Clock::time_point start = Clock::now();
-  for (Implementation::Stage& stage : s.stages) {
-    if (stage.method)
-      (s.*stage.method)();
-    else
-      s.force[at(stage.force)](s.bodies, time(), s.options.step);
-    const Clock::time_point end = Clock::now();
-    stage.seconds += std::chrono::duration<double>(end - start).count();
-    start = end;
-  }
-  ++s.counts.steps;
-}
+void Stepper::step() { implementation_->step(); }
 
 double Stepper::time() const {
   return static_cast<double>(implementation_->counts.steps) * implementation_->options.step;
@@ -330,8 +433,9 @@ const BodySet& Stepper::bodies() const { return implementation_->bodies; }
 BodySet& Stepper::bodies() { return implementation_->bodies; }
 const StepContacts& Stepper::contacts() const { return implementation_->contacts; }
 double Stepper::penetration() const { return implementation_->deepest; }
-double Stepper::residual() const { return implementation_->solution.error; }
-Status Stepper::status() const { return implementation_->solution.status; }
+double Stepper::residual() const { return implementation_->residual; }
+Status Stepper::status() const { return implementation_->status; }
+bool Stepper::succeeded() const { return implementation_->succeeded; }
 const StepCounts& Stepper::counts() const { return implementation_->counts; }
 const SteppingOptions& Stepper::options() const { return implementation_->options; }
 
@@ -356,12 +460,7 @@ void Stepper::start_anew(long steps) {
   for (const int i : s.long_bodies)
     s.bodies.motion[at(i)].inverse_inertia =
         detail::turned(s.bodies.inverse_inertia[at(i)], s.bodies.orientation[at(i)]);
-  // New solvers: nothing of the past is left.
-  if (s.solver) s.solver = std::make_unique<BodySolver>(solver_options(s.options));
-  if (s.correction) s.correction = std::make_unique<BodySolver>(correction_options(s.options));
-  if (s.restitution)
-    s.restitution =
-        std::make_unique<Restitution>(s.options.restitution_threshold, solver_options(s.options));
+  if (s.near) s.make_solvers();
 }
 
 }  // namespace tether::contact

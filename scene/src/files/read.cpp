@@ -238,8 +238,14 @@ void read_engine(Fields& root, Reader& r) {
   o.error_reduction = in.number("error_reduction", o.error_reduction, kPart, "");
   o.max_depenetration_speed =
       in.number("max_depenetration_speed", o.max_depenetration_speed, kNotNegative, "m/s");
-  o.restitution_threshold =
-      in.number("restitution_threshold", o.restitution_threshold, kNotNegative, "m/s");
+  o.restitution_law = in.word("restitution_law", o.restitution_law);
+  o.restitution_threshold = in.number("restitution_threshold", o.restitution_threshold,
+                                      kNotNegative, "of sqrt(gravity * size)");
+  o.impact_threshold =
+      in.number("impact_threshold", o.impact_threshold, kNotNegative, "of sqrt(gravity * size)");
+  o.acceptance = in.number("acceptance", o.acceptance, {1, 1e12, false, "a number from 1 to 1e12"},
+                           "of the tolerance");
+  o.max_halvings = in.count("max_halvings", o.max_halvings, 0, 30);
   o.on_failure = in.word("on_failure", o.on_failure);
   o.threads = in.count("threads", o.threads, 1, 1024);
   in.finish();

@@ -195,7 +195,11 @@ void write_stepping(const SteppingOptions& o, Writer& out) {
   out.raw("gyroscopic", toml_word(o.gyroscopic));
   out.field("error_reduction", o.error_reduction);
   out.field("max_depenetration_speed", o.max_depenetration_speed, "m/s");
-  out.field("restitution_threshold", o.restitution_threshold, "m/s");
+  out.raw("restitution_law", toml_word(o.restitution_law));
+  out.field("restitution_threshold", o.restitution_threshold, "of sqrt(gravity * size)");
+  out.field("impact_threshold", o.impact_threshold, "of sqrt(gravity * size)");
+  out.field("acceptance", o.acceptance, "of the tolerance");
+  out.field("max_halvings", o.max_halvings, "of a step");
   out.raw("on_failure", toml_word(o.on_failure));
   out.field("threads", o.threads);
 }

@@ -74,6 +74,9 @@ void print_summary(const Scene& scene, const RunResult& r) {
                s.penetration, s.residual);
     fmt::print("  work         {} steps, {} contact problems, {} sweeps, {} unsolved\n", c.steps,
                c.contact_problems, c.sweeps, c.unsolved);
+    if (c.accepted + c.halved > 0)
+      fmt::print("  accepted     {} contact problems above the tolerance; {} steps halved\n",
+                 c.accepted, c.halved);
   } else if (c.residual_evaluations > 0) {
     fmt::print("  drift        {:.2e} (largest violation of a joint or a kept invariant)\n",
                s.drift);

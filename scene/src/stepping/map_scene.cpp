@@ -54,6 +54,16 @@ contact::Gyroscopic gyroscopic(Gyroscopic g) {
   throw std::invalid_argument("unknown gyroscopic step");
 }
 
+contact::RestitutionLaw restitution_law(RestitutionLaw l) {
+  switch (l) {
+    case RestitutionLaw::newton:
+      return contact::RestitutionLaw::newton;
+    case RestitutionLaw::poisson:
+      return contact::RestitutionLaw::poisson;
+  }
+  throw std::invalid_argument("unknown law of restitution");
+}
+
 void refuse(const Scene& scene) {
   if (!scene.joints.empty())
     throw std::invalid_argument(
@@ -123,7 +133,11 @@ Mapped map_scene(const Scene& scene) {
   out.options.gyroscopic = gyroscopic(options.gyroscopic);
   out.options.error_reduction = options.error_reduction;
   out.options.max_depenetration_speed = options.max_depenetration_speed;
+  out.options.restitution_law = restitution_law(options.restitution_law);
   out.options.restitution_threshold = options.restitution_threshold;
+  out.options.impact_threshold = options.impact_threshold;
+  out.options.acceptance = options.acceptance;
+  out.options.max_halvings = options.max_halvings;
   out.options.threads = options.threads;
   return out;
 }

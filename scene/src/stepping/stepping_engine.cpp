@@ -1,6 +1,7 @@
 // Tether: the engine that steps with impulses. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping_engine.hpp"
 
+#include <cmath>
 #include <cstring>
 #include <istream>
 #include <ostream>
@@ -86,7 +87,7 @@ void SteppingEngine::advance(double t) {
   const double slack = 1e-9 * stepper_.options().step;
   while (time() < t - slack) {
     stepper_.step();
-    if (on_failure_ == OnFailure::stop && stepper_.status() != contact::Status::solved) {
+    if (on_failure_ == OnFailure::stop && !stepper_.succeeded()) {
       read_bodies();
       report_failure();
     }
@@ -98,8 +99,10 @@ void SteppingEngine::report_failure() const {
   std::ostringstream text;
   text << "t = " << time() << " s: the contact problem (" << stepper_.contacts().points.size()
        << " contacts) was not solved: " << contact::name(stepper_.status()) << " at a residual of "
-       << stepper_.residual() << ", wanted " << stepper_.options().tolerance
-       << "; raise stepping.tolerance, reduce stepping.step, or set on_failure = \"warn\"";
+       << stepper_.residual() << ", wanted " << stepper_.options().tolerance << ", also in parts of "
+       << std::ldexp(stepper_.options().step, -stepper_.options().max_halvings)
+       << " s; raise stepping.tolerance or stepping.max_halvings, reduce stepping.step, or set "
+          "on_failure = \"warn\"";
   throw SimulationError(text.str());
 }
 
@@ -152,6 +155,8 @@ Counts SteppingEngine::counts() const {
   out.contact_problems = c.contact_problems;
   out.sweeps = c.sweeps;
   out.unsolved = c.unsolved;
+  out.accepted = c.accepted;
+  out.halved = c.halved;
   return out;
 }
 

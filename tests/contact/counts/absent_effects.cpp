@@ -35,9 +35,8 @@ double test(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
 double sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
 double test(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
 
-Restitution::Restitution(double, const BodyOptions&) { absent("restitution"); }
-void Restitution::remember(const BodySet&) { absent("restitution"); }
-void Restitution::choose(const NearContacts&, const BodySet&, double, StepContacts&) {
+Restitution::Restitution(RestitutionLaw, const BodyOptions&) { absent("restitution"); }
+void Restitution::choose(const std::vector<Impact>&, const BodySet&, StepContacts&) {
   absent("restitution");
 }
 int Restitution::apply(BodySet&, StepContacts&) { absent("restitution"); }

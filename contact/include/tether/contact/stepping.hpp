@@ -25,6 +25,16 @@ enum class Gyroscopic : std::uint8_t {
 
 const char* name(Gyroscopic gyroscopic);
 
+/// What an impact gives back (README, section 14).
+enum class RestitutionLaw : std::uint8_t {
+  /// Normal velocities: w_n+ + e w_n- >= 0 complementary to x_n, together with friction in one solve.
+  newton,
+  /// Impulses: those without restitution, and e times as much more; slip is given back as well.
+  poisson
+};
+
+const char* name(RestitutionLaw law);
+
 /// Bodies as contiguous data; index i everywhere is body i. World axes but for `inertia`.
 struct BodySet {
   std::vector<Eigen::Vector3d> position;        ///< of the centre of mass, m
@@ -68,13 +78,26 @@ struct SteppingOptions {
   Law law = Law::coulomb;
   /// Of the contact problem; see BodyOptions::tolerance.
   double tolerance = 1e-9;
+  /// A problem that ends above the tolerance is used and counted as `accepted` if its residual is at
+  /// most acceptance * tolerance and at most 1e-4. 1: none is.
+  double acceptance = 1;
+  /// Where it is above that, too, the step is taken in two halves, they in quarters, ... so many
+  /// times; the shortest parts accept up to 1e-4, above that a problem is used all the same and
+  /// counted as `unsolved`. 0: at once.
+  int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
   /// A penetration of depth d is reduced by the speed min(error_reduction d / dt,
   /// max_depenetration_speed). That speed moves bodies but is no velocity of theirs: it enters no
   /// energy. 0: penetrations stay.
   double error_reduction = 0.2;
   double max_depenetration_speed = 1;   ///< m/s
-  double restitution_threshold = 0.01;  ///< m/s: slower approaches do not bounce
+  RestitutionLaw restitution_law = RestitutionLaw::newton;
+  /// Approaches slower than this times sqrt(g s) do not bounce: g gravity (none: all bounce), s the
+  /// reach of the smaller shape from its origin. A drop from h bounces if h > threshold^2 s / 2.
+  double restitution_threshold = 0.01;
+  /// Faster approaches that end within a step do so as a whole, where they are; slower ones end at
+  /// the surface. Of sqrt(g s), as above.
+  double impact_threshold = 0.01;
   /// Points closer than this part of the size of the smaller shape, beyond what the velocities
   /// cover within the step, are contacts.
   double near_part = 1e-3;
@@ -85,7 +108,10 @@ struct SteppingOptions {
   int threads = 1;
 };
 
-/// Contacts of the last step, side by side.
+/// What a problem may end at to be used: see SteppingOptions::acceptance.
+double accepted_residual(const SteppingOptions& options);
+
+/// Contacts of the last step (of its last part, where it was taken in parts), side by side.
 struct StepContacts {
   std::vector<PointContact> points;       ///< id: see contact_id
   std::vector<double> gaps;               ///< m, at the start of the step
@@ -99,8 +125,10 @@ constexpr std::uint64_t contact_id(int first_surface, int second_surface, int fe
 }
 
 struct StepCounts {
-  long steps = 0, contact_problems = 0, sweeps = 0, unsolved = 0, assembled_islands = 0,
-       bounces = 0;
+  long steps = 0, contact_problems = 0, sweeps = 0, assembled_islands = 0, bounces = 0;
+  long accepted = 0;  ///< problems above the tolerance that were accepted
+  long halved = 0;    ///< steps, or parts of steps, that were taken in two halves
+  long unsolved = 0;  ///< problems that were used though above what is accepted
 };
 
 struct StageCost {
@@ -112,7 +140,8 @@ struct StageCost {
 ///
 ///     v* = v + dt M^-1 f,   v+ = v* + M^-1 J' x,   x+ = x + dt v+,   q+ = exp(dt w / 2) q
 ///
-/// with impulses x of the contact problem w = J v+ + bias, bias_n = gap / dt for gaps >= 0.
+/// with impulses x of the contact problem w = J v+ + bias, bias_n = gap / dt for gaps >= 0, and
+/// e w_n- (newton) or 0 for impacts.
 /// What is not asked for is not in the list of stages that a step runs through: no gravity, no
 /// force, no meeting of materials, no friction, no restitution, no gyroscopic term.
 ///
@@ -138,9 +167,11 @@ class Stepper {
   BodySet& bodies();  ///< to set positions and velocities between steps
   const StepContacts& contacts() const;
   double penetration() const;  ///< deepest at the start of the last step, m
-  double residual() const;     ///< of its contact problem
-  /// Of its contact problem; solved if there were no contacts.
+  double residual() const;     ///< of its contact problem, the largest of its parts
+  /// Of its contact problem, the worst of its parts; solved if there were no contacts.
   Status status() const;
+  /// Solved or accepted, in all of its parts.
+  bool succeeded() const;
   const StepCounts& counts() const;
   std::vector<StageCost> costs() const;
   const SteppingOptions& options() const;

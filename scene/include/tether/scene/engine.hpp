@@ -40,6 +40,8 @@ struct Diagnostics {
 struct Counts {
   long steps = 0, residual_evaluations = 0, jacobian_evaluations = 0, projections = 0;
   long contact_problems = 0, sweeps = 0, unsolved = 0, error_test_failures = 0;
+  long accepted = 0;  ///< contact problems above the tolerance, within what is accepted
+  long halved = 0;    ///< steps, or parts of them, taken in two halves
 };
 
 /// Seconds spent on one effect since the start.

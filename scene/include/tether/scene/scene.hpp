@@ -113,6 +113,7 @@ struct Invariant {
 enum class Formulation : std::uint8_t { index1, index0, stabilised_index2 };
 enum class Gyroscopic : std::uint8_t { none, explicit_step, implicit_step, momentum };
 enum class ContactLaw : std::uint8_t { coulomb, maximum_dissipation, frictionless };
+enum class RestitutionLaw : std::uint8_t { newton, poisson };
 enum class OnFailure : std::uint8_t { stop, warn };
 
 /// Scenes without contact: IDA with projection.
@@ -132,7 +133,12 @@ struct SteppingOptions {
   Gyroscopic gyroscopic = Gyroscopic::momentum;
   double error_reduction = 0.2;         ///< part of a penetration that one step removes
   double max_depenetration_speed = 1;   ///< m/s
-  double restitution_threshold = 0.01;  ///< m/s: slower approaches do not bounce
+  RestitutionLaw restitution_law = RestitutionLaw::newton;
+  /// Of sqrt(gravity * size of the smaller body): slower approaches do not bounce, or do not end as
+  /// one whole impact.
+  double restitution_threshold = 0.01, impact_threshold = 0.01;
+  double acceptance = 1000;  ///< of the tolerance: what is used, and counted, all the same
+  int max_halvings = 2;      ///< of a step whose contact problem is not solved
   OnFailure on_failure = OnFailure::stop;
   int threads = 1;
 };

@@ -74,6 +74,14 @@ struct Words<ContactLaw> {
 };
 
 template <>
+struct Words<RestitutionLaw> {
+  static constexpr std::array<std::pair<std::string_view, RestitutionLaw>, 2> list{{
+      {"newton", RestitutionLaw::newton},
+      {"poisson", RestitutionLaw::poisson},
+  }};
+};
+
+template <>
 struct Words<OnFailure> {
   static constexpr std::array<std::pair<std::string_view, OnFailure>, 2> list{{
       {"stop", OnFailure::stop},

@@ -1,0 +1,50 @@
+// Tether: gaps that inelastic impacts close. SPDX-License-Identifier: BSD-3-Clause
+#include "closing.hpp"
+
+namespace tether::contact::detail {
+
+namespace {
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+}  // namespace
+
+void Closing::begin(const std::vector<Impact>& impacts, const BodySet& bodies,
+                    const StepContacts& contacts) {
+  closes_.clear();
+  bounces_.clear();
+  for (const Impact& i : impacts) {
+    if (i.restitution > 0)
+      bounces_.push_back(i.contact);
+    else if (contacts.gaps[at(i.contact)] > 0)
+      closes_.push_back(i.contact);
+  }
+  if (!closes_.empty()) free_ = bodies.motion;
+}
+
+bool Closing::find(const BodySet& bodies, double dt, StepContacts& contacts,
+                   std::vector<RigidBody>& move) {
+  if (closes_.empty()) return false;
+  islands_.join(bodies, contacts);
+  marked_.assign(bodies.motion.size(), 0);
+  const auto mark = [&](int contact) -> char& {
+    return marked_[at(islands_.root(bodies, contacts.points[at(contact)]))];
+  };
+  for (const int c : closes_) mark(c) = 1;
+  for (const int c : bounces_) mark(c) = 0;
+  for (std::size_t k = 0; k < contacts.points.size(); ++k)
+    contacts.points[k].bias = contacts.gaps[k] > 0 ? contacts.gaps[k] / dt : 0;
+  // All of the others stay as they are.
+  for (std::size_t i = 0; i < free_.size(); ++i)
+    if (!marked_[at(islands_.root(static_cast<int>(i)))]) free_[i] = bodies.motion[i];
+  solver_.solve(free_, contacts.points, solution_);
+  move.resize(bodies.motion.size());
+  for (std::size_t i = 0; i < move.size(); ++i) {
+    move[i].velocity.setZero();
+    move[i].angular_velocity.setZero();
+    if (bodies.mass[i] == 0 || !marked_[at(islands_.root(static_cast<int>(i)))]) continue;
+    move[i].velocity = solution_.velocities[i] - bodies.motion[i].velocity;
+    move[i].angular_velocity = solution_.angular_velocities[i] - bodies.motion[i].angular_velocity;
+  }
+  return true;
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,36 @@
+// Tether: gaps that inelastic impacts close. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "impacts.hpp"
+#include "moving_islands.hpp"
+#include "near_contacts.hpp"
+
+namespace tether::contact::detail {
+
+/// An impact that does not bounce takes all of the approach at once and would leave its gap open.
+/// Positions of its island move as if it only stopped the approach at the surface (bias gap / dt);
+/// what they move more or less than the velocities is no velocity. README, section 13.
+class Closing {
+ public:
+  explicit Closing(const BodyOptions& options) : solver_(options) {}
+
+  /// After the impacts are chosen, before the solve: velocities with the forces of the step.
+  void begin(const std::vector<Impact>& impacts, const BodySet& bodies,
+             const StepContacts& contacts);
+  /// After the solve. Fills `move`: velocities to add for this step; false: there are none. Changes
+  /// the bias of contacts.
+  bool find(const BodySet& bodies, double dt, StepContacts& contacts, std::vector<RigidBody>& move);
+
+ private:
+  std::vector<RigidBody> free_;
+  std::vector<int> closes_, bounces_;  // contacts
+  std::vector<char> marked_;           // islands
+  MovingIslands islands_;
+  BodySolver solver_;
+  BodySolution solution_;
+};
+
+}  // namespace tether::contact::detail

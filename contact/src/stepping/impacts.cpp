@@ -1,0 +1,35 @@
+// Tether: contacts that close within a step. SPDX-License-Identifier: BSD-3-Clause
+#include "impacts.hpp"
+
+#include <cmath>
+
+namespace tether::contact::detail {
+
+namespace {
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+}  // namespace
+
+double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& c) {
+  const RigidBody &a = motion[at(c.first)], &b = motion[at(c.second)];
+  return c.normal.dot(a.velocity + a.angular_velocity.cross(c.r1) - b.velocity -
+                      b.angular_velocity.cross(c.r2));
+}
+
+void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
+                     StepContacts& contacts) {
+  list_.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    PointContact& c = contacts.points[k];
+    const double came = -normal_velocity(coming_, c);
+    if (!(came > 0)) continue;
+    const double size = std::sqrt(near.size(c));
+    const double epsilon = came > restitution_threshold_ * size ? near.meeting(c).restitution : 0;
+    if (!(came > threshold_ * size || epsilon > 0)) continue;
+    const double comes = -normal_velocity(bodies.motion, c);
+    if (!(comes > 0) || !(comes * dt > contacts.gaps[k])) continue;
+    c.bias = 0;
+    list_.push_back({static_cast<int>(k), came, comes, epsilon});
+  }
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,199 @@
+// Impacts with friction: one whole impact at every phase of the step, Newton's law with the cone,
+// and when a body bounces. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <random>
+#include <string>
+
+#include "stepping_scenes.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+using namespace stepping_scenes;
+
+// Capobianco, Harsch, Eugster and Leine, A nonsmooth generalized-alpha method for mechanical
+// systems with frictional contact (2021): a ball of R = 0.1, mu = 0.2, falls from 1 m with spin.
+Scene rotating_ball(double dt, double restitution, const Vector3d& at, const Vector3d& v,
+                    double spin) {
+  Scene scene(dt);
+  scene.friction(0.2, restitution);
+  scene.ground();
+  scene.sphere(0.1, 1, at, v, Vector3d(0, spin, 0));
+  return scene;
+}
+
+// Velocity along x and spin about y in the mean of a window without impacts.
+struct Flight {
+  double v, spin, x;
+};
+Flight flight(tc::Stepper& s, double until) {
+  run(s, until - s.time());
+  return {velocity(s, 1).x(), angular_velocity(s, 1).y(), position(s, 1).x()};
+}
+
+// Order of errors that belong to halved steps, from the first to the last.
+double order(const std::vector<double>& error) {
+  return std::log2(error.front() / error.back()) / static_cast<double>(error.size() - 1);
+}
+
+}  // namespace
+
+TEST_CASE("stepping: an inelastic impact with slip reversal is the same at every phase and step") {
+  // One touching point of a rod at 45 degrees, 1 kg, 1 m, that comes with (0.1, -1) m/s: slip turns
+  // round within the impact. A_nn = 1 + 12 * 0.125 = 2.5 = A_tt, A_nt = 1.5.
+  const double exact = 0.1 + 0.3 / 2.05;
+  for (const tc::Law law : {tc::Law::coulomb, tc::Law::maximum_dissipation})
+    for (const double dt : {1e-2, 1e-3, 1e-4})
+      for (int k = 0; k <= 20; ++k) {
+        const Quaterniond turn(AngleAxisd(0.3 * k, Vector3d::UnitZ()));
+        Scene scene(dt);
+        scene.options.gravity.reset();
+        scene.options.law = law;
+        scene.friction(0.3);
+        scene.ground();
+        const Vector3d tip = turn * Vector3d(-std::sqrt(0.125), 0, -std::sqrt(0.125));
+        scene.bodies.add(1, Matrix3d::Identity() / 12, Vector3d(0, 0, (3 + k / 20.0) * dt) - tip,
+                         Quaterniond::Identity(), turn * Vector3d(0.1, 0, -1));
+        scene.surfaces.push_back({1, tc::Shape::touching_points({tip}), 0});
+        tc::Stepper s = scene.stepper();
+        for (int n = 0; n < 10; ++n) s.step();
+        INFO("dt " << dt << " phase " << k / 20.0);
+        CHECK((turn.conjugate() * velocity(s, 1)).x() == Approx(exact).epsilon(1e-9));
+      }
+}
+
+TEST_CASE("stepping: a spinning ball that does not bounce slips, then rolls, of order 1") {
+  std::vector<double> after, rolls;
+  for (const double dt : {4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4}) {
+    tc::Stepper s = rotating_ball(dt, 0, {0, 0, 1}, {0, 0, 0}, -50).stepper();
+    // The whole impact takes mu v_n from the slip; then mu g until it rolls at 0.728 s.
+    const double impact = 0.42835293687811934, v = 0.84042846215487015, stops = 0.72811999417504005;
+    const Flight a = flight(s, 0.6);
+    const double t = 0.6 - impact;
+    after.push_back(std::abs(-a.v - (v + 0.2 * kGravity * t)) / v);
+    const Flight b = flight(s, 0.9);
+    CHECK(-b.v == Approx(10.0 / 7).epsilon(2 * dt));
+    CHECK(-b.spin == Approx(100.0 / 7).epsilon(2 * dt));
+    const double x = v * (stops - impact) + 0.1 * kGravity * std::pow(stops - impact, 2) +
+                     10.0 / 7 * (0.9 - stops);
+    rolls.push_back(std::abs(-b.x - x));
+  }
+  INFO("errors of v " << after.front() << " " << after.back() << ", of x " << rolls.front() << " "
+                      << rolls.back());
+  CHECK(after.back() < 1e-2);
+  CHECK(rolls.back() < 1e-3);
+  CHECK(order(rolls) > 0.8);
+}
+
+TEST_CASE("stepping: a spinning ball with restitution 1/2 keeps to Newton's law in every bounce") {
+  // It slips through the first impact and sticks from the second one on; flights in between.
+  std::vector<double> first, places;
+  for (const double dt : {4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4}) {
+    tc::Stepper s = rotating_ball(dt, 0.5, {-0.5, 0, 1}, {1, 0, 0}, -50).stepper();
+    const Flight a = flight(s, 0.64);
+    first.push_back(std::max(std::abs(a.v + 0.26064269323230522) / 0.26,
+                             std::abs(a.spin + 18.48393266919237) / 18));
+    CHECK(first.back() < 16 * dt);
+    const Flight b = flight(s, 0.96);
+    CHECK(b.v == Approx(-5.0 / 7).epsilon(1e-12));
+    CHECK(b.spin == Approx(-50.0 / 7).epsilon(1e-12));
+    const Flight c = flight(s, 1.12);
+    CHECK(c.v == Approx(-5.0 / 7).epsilon(1e-12));
+    CHECK(c.spin == Approx(-50.0 / 7).epsilon(1e-12));
+    const double x[] = {-0.07164706312188066 - 0.26064269323230522 * (0.64 - 0.42835293687811934),
+                        -0.18329412624376132 - 5.0 / 7 * (0.96 - 0.85670587375623868),
+                        -0.3362773179859468 - 5.0 / 7 * (1.12 - 1.0708823421952984)};
+    places.push_back(std::max({std::abs(a.x - x[0]), std::abs(b.x - x[1]), std::abs(c.x - x[2])}));
+  }
+  INFO("first bounce " << first.back() << " places " << places.front() << " " << places.back());
+  CHECK(places.back() < 5e-4);
+  CHECK(order(places) > 0.8);
+}
+
+TEST_CASE("stepping: the law of Poisson, by name, gives slip back as well") {
+  tc::Stepper s = [] {
+    Scene scene = rotating_ball(1e-4, 0.5, {-0.5, 0, 1}, {1, 0, 0}, -50);
+    scene.options.restitution_law = tc::RestitutionLaw::poisson;
+    return scene.stepper();
+  }();
+  const Flight b = flight(s, 0.96);
+  CHECK(b.v == Approx(-0.8910).epsilon(5e-3));
+  CHECK(b.spin == Approx(-2.73).epsilon(5e-2));
+  CHECK(std::string(tc::name(s.options().restitution_law)) == "poisson");
+}
+
+TEST_CASE("stepping: boxes that strike with restitution and friction never gain energy") {
+  // Newton's law does gain some by itself where friction and normal impulse are coupled.
+  std::mt19937 generator(17);
+  std::normal_distribution<double> normal;
+  const auto vector = [&] {
+    return Vector3d(normal(generator), normal(generator), normal(generator));
+  };
+  for (int trial = 0; trial < 60; ++trial) {
+    Scene scene(1e-3);
+    scene.options.gravity.reset();
+    scene.options.restitution_law =
+        trial % 2 == 0 ? tc::RestitutionLaw::newton : tc::RestitutionLaw::poisson;
+    const double e = trial % 3 / 2.0;
+    scene.meetings = {{0, 1, 0.3 * (trial % 4), e}};
+    scene.ground();
+    const Vector3d size = Vector3d(1, 0.3, 0.1) + 0.05 * vector().cwiseAbs();
+    scene.bodies.add(1, box_inertia(1, size), Vector3d(0, 0, 1), Quaterniond::UnitRandom(),
+                     3 * vector() - Vector3d(0, 0, 5), 5 * vector());
+    scene.surfaces.push_back({1, tc::Shape::box(size), 0});
+    tc::Stepper s = scene.stepper();
+    double energy = tc::kinetic_energy(s.bodies());
+    for (int k = 0; k < 500; ++k) {
+      s.step();
+      const double now = tc::kinetic_energy(s.bodies());
+      CHECK(now <= energy * (1 + 1e-9));
+      energy = now;
+    }
+    CHECK(s.counts().unsolved == 0);
+  }
+}
+
+TEST_CASE("stepping: what bounces is relative to size and gravity, whatever the unit") {
+  // A ball of radius R falls from h: it bounces if h > threshold^2 R / 2, here 5e-5 R.
+  for (const double R : {1e-6, 1e-3, 1.0, 1e3})
+    for (const double g : {1.6, 9.81})
+      for (const double h : {2.0, 1e-2, 1e-3, 2e-5}) {
+        const double dt = 2e-3 * std::sqrt(2 * h * R / g);
+        Scene scene(dt);
+        scene.options.gravity = Vector3d(0, 0, -g);
+        scene.friction(0.3, 0.5);
+        scene.ground();
+        const int ball = scene.sphere(R, 1, {0, 0, R * (1 + h)});
+        tc::Stepper s = scene.stepper();
+        double up = 0;
+        for (int k = 0; k < 700; ++k) {
+          s.step();
+          up = std::max(up, velocity(s, ball).z());
+        }
+        INFO("R " << R << " g " << g << " h/R " << h);
+        const double fell = std::sqrt(2 * g * h * R);
+        if (h > 5e-5)
+          CHECK(up == Approx(0.5 * fell).epsilon(1e-2));
+        else
+          CHECK(up < 1e-9 * fell);
+      }
+}
+
+TEST_CASE("stepping: a box dropped flat lands at the surface in one step and lies still") {
+  for (const double dt : {1e-2, 1e-3})
+    for (const double h : {0.5, 1e-3, 1e-6}) {
+      Scene scene(dt);
+      scene.friction(0.5);
+      scene.ground();
+      const int box = scene.box({1, 1, 1}, 1, {0, 0, 0.5 + h});
+      tc::Stepper s = scene.stepper();
+      run(s, std::sqrt(2 * h / kGravity) + 3 * dt);
+      INFO("dt " << dt << " h " << h);
+      CHECK(position(s, box).z() == Approx(0.5).margin(1e-9));
+      CHECK(velocity(s, box).norm() < 1e-8);
+      const Vector3d at = position(s, box);
+      run(s, 1);
+      CHECK((position(s, box) - at).norm() < 1e-9);
+      CHECK(s.counts().unsolved == 0);
+    }
+}

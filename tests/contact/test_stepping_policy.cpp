@@ -1,0 +1,112 @@
+// Contact problems that are not solved: accepted, taken in shorter steps, used all the same.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "stepping_scenes.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+using namespace stepping_scenes;
+
+// A stack of balls in a corner; two sweeps do not solve it, and nothing else is allowed.
+Scene hard(double tolerance, double acceptance, int max_halvings) {
+  Scene scene(1e-2);
+  scene.options.tolerance = tolerance;
+  scene.options.acceptance = acceptance;
+  scene.options.max_halvings = max_halvings;
+  scene.options.max_sweeps = 2;
+  scene.options.min_sweeps = 0;
+  scene.options.max_assembled = 0;
+  scene.friction(0.4);
+  scene.ground();
+  for (int k = 0; k < 6; ++k) scene.sphere(0.5, 1 + k, {0.05 * (k % 2), 0, 0.5 + 0.999 * k});
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("stepping: a problem above the tolerance is accepted within the factor, and counted") {
+  tc::Stepper strict = hard(1e-12, 1, 0).stepper(), tolerant = hard(1e-12, 1e12, 0).stepper();
+  run(strict, 0.1);
+  CHECK(strict.counts().accepted == 0);
+  CHECK(strict.counts().unsolved == 10);
+  CHECK(!strict.succeeded());
+  CHECK(strict.status() != tc::Status::solved);
+  // Never above 1e-4: a loose tolerance is no licence.
+  CHECK(tc::accepted_residual(tolerant.options()) == 1e-4);
+  CHECK(tc::accepted_residual(strict.options()) == 1e-12);
+  Scene loose = hard(1e-3, 1e12, 0);
+  CHECK(tc::accepted_residual(loose.options) == 1e-3);
+  // Accepted where the residual is within it, unsolved elsewhere; one or the other, always.
+  Scene near = hard(1e-9, 1e5, 0);
+  near.options.max_sweeps = 30;
+  tc::Stepper s = near.stepper();
+  long accepted = 0, unsolved = 0;
+  for (int k = 0; k < 50; ++k) {
+    s.step();
+    const bool solved = s.status() == tc::Status::solved;
+    CHECK(s.succeeded() == (solved || s.residual() <= 1e-4));
+    accepted += !solved && s.residual() <= 1e-4;
+    unsolved += !s.succeeded();
+  }
+  CHECK(s.counts().accepted == accepted);
+  CHECK(s.counts().unsolved == unsolved);
+  CHECK(accepted > 0);
+}
+
+TEST_CASE("stepping: a step that fails is taken in halves and quarters, forces at their times") {
+  const Scene scene = hard(1e-14, 1, 2);
+  tc::Stepper s = scene.stepper();
+  double end = 0, last = 0;
+  bool follows = true;
+  int calls = 0;
+  // Attempts go 1, 1/2, 1/4, 1/4, 1/2, 1/4, 1/4 of the step.
+  s.add_force("watch", [&](tc::BodySet&, double time, double dt) {
+    ++calls;
+    follows = follows && (std::abs(time - last) < 1e-15 || std::abs(time - end) < 1e-15);
+    last = time;
+    end = time + dt;
+  });
+  for (int k = 0; k < 5; ++k) s.step();
+  CHECK(s.counts().steps == 5);
+  CHECK(s.counts().halved == 15);
+  CHECK(s.counts().unsolved + s.counts().accepted > 0);
+  CHECK(s.counts().unsolved + s.counts().accepted <= 20);
+  CHECK(calls == 35);
+  CHECK(follows);
+  CHECK(end == Approx(5e-2).epsilon(1e-12));
+  CHECK(s.time() == Approx(5e-2).epsilon(1e-15));
+  CHECK(s.succeeded() == (s.residual() <= 1e-4));
+  // Free fall in parts is that of the shorter step.
+  const double n = 20, dt = 2.5e-3;
+  tc::Stepper free = [] {
+    Scene f = hard(1e-14, 1, 2);
+    f.bodies.position[6].z() += 100;
+    return f.stepper();
+  }();
+  const double from = position(free, 6).z();
+  run(free, 0.05);
+  CHECK(position(free, 6).z() ==
+        Approx(from - kGravity * dt * dt * n * (n + 1) / 2).epsilon(1e-12));
+}
+
+TEST_CASE("stepping: solved problems are neither accepted nor halved") {
+  Scene scene = hard(1e-9, 1e3, 4);
+  scene.options.max_sweeps = 1000;
+  scene.options.max_assembled = 1000;
+  tc::Stepper s = scene.stepper();
+  run(s, 0.5);
+  CHECK(s.counts().accepted == 0);
+  CHECK(s.counts().halved == 0);
+  CHECK(s.counts().unsolved == 0);
+  CHECK(s.succeeded());
+  Scene bad = scene;
+  bad.options.acceptance = 0.5;
+  CHECK_THROWS_AS(bad.stepper(), std::invalid_argument);
+  bad = scene;
+  bad.options.max_halvings = -1;
+  CHECK_THROWS_AS(bad.stepper(), std::invalid_argument);
+}
