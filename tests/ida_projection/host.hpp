@@ -108,6 +108,13 @@ Run integrate(const Problem& problem, double tolerance, const tp::Constraints& r
               const tp::Options& options = {}, bool watch = true);
 Run integrate_plain(const Problem& problem, double tolerance);
 
+/// The same with algebraic variables out of the error test: plain IDA's best form of index 1 and 2.
+/// The error of a run that failed or took 60000 steps is infinite.
+Run integrate_suppressed(const Problem& problem, double tolerance);
+
+/// Rows as sparse ones with every entry in the pattern.
+tp::Constraints as_sparse(const tp::Constraints& rows, int n);
+
 /// Are both states the same, bit for bit?
 bool same_bits(const std::vector<double>& a, const std::vector<double>& b);
 

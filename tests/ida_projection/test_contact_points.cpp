@@ -15,35 +15,6 @@ using namespace tether::problems;
 
 namespace {
 
-/// Plain IDA with algebraic variables out of the error test: its best form here.
-Run suppressed(const Problem& problem, double tolerance) {
-  Host host(problem, tolerance);
-  REQUIRE(IDASetId(host.ida, host.vector(problem.id)) == 0);
-  REQUIRE(IDASetSuppressAlg(host.ida, 1) == 0);
-  Run run;
-  run.flag = host.finish();
-  run.steps = host.steps();
-  run.error = run.flag >= 0 ? host.error() : std::numeric_limits<double>::infinity();
-  return run;
-}
-
-/// Dense rows as sparse ones with every entry in the pattern.
-tp::Constraints as_sparse(const tp::Constraints& rows, int n) {
-  tp::Constraints set;
-  set.count = rows.total_count();
-  set.value = [rows, n](double t, tp::ConstVector y, tp::Vector g) {
-    g = value(rows, t, y.data(), n);
-  };
-  tp::SparseJacobian sparse;
-  for (int i = 0; i <= set.count; ++i) sparse.starts.push_back(i * n);
-  for (int e = 0; e < set.count * n; ++e) sparse.columns.push_back(e % n);
-  sparse.fill = [rows, n](double t, tp::ConstVector y, tp::Vector entries) {
-    tp::Matrix(entries.data(), entries.size() / n, n) = jacobian(rows, t, y.data(), n);
-  };
-  set.jacobian = std::move(sparse);
-  return set;
-}
-
 /// With the reference of the form that has neither contact point nor force among its unknowns.
 Problem with_reference(Problem problem, const Problem& reduced) {
   problem.reference = integrate_plain(reduced, 1e-12).y;
@@ -59,7 +30,7 @@ struct Count {
 
 /// Every choice of rows without the tangency equations, dense and sparse.
 void check(const Problem& problem, double tolerance, Count* count) {
-  const Run plain = suppressed(problem, tolerance);
+  const Run plain = integrate_suppressed(problem, tolerance);
   REQUIRE(plain.flag >= 0);
   const tp::Constraints tangency = problem.select({"tangency"});
   for (const std::vector<std::string>& groups :
