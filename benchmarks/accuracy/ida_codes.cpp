@@ -52,6 +52,7 @@ class IdaCode : public Code {
       settings.constraints = problem.recommended_constraints();
       settings.options.step_smoothing = variant_ == Variant::smooth;
       settings.options.print_fatal = false;
+      settings.options.print_warnings = false;
       // Derived from columns of dF/dy' it would cost an F for each unknown.
       settings.give_id = !problem.sparse.starts.empty();
     }

@@ -300,6 +300,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
           return result;
         }
         apply(limit / length, correction);
+        result.left = length - limit;
         result.length = limit;
         result.capped = true;
         result.status = Status::success;
@@ -332,7 +333,8 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       message_ = "move " + std::to_string(result.moves) + " onto the constraints still is " +
                  std::to_string(length) +
                  " tolerances long; check the constraint Jacobian with check_jacobian, or whether "
-                 "the rows have a common solution here";
+                 "the rows have a common solution here; rows written as squares have none but double "
+                 "roots, and rows with |.| or max no derivative: neither lets Newton's moves shrink";
       return result;
     }
     if ((result.status = value(candidate.t)) != Status::success) return result;

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "impl.hpp"
 
@@ -42,6 +43,10 @@ int Projection::Impl::initialize() {
   }
   initialized_ = true;
   engaged_ = false;
+  rejections_ = rejections_before_ = window_begin_ = refused_steps_ = 0;
+  rejected_in_step_ = collapsed_ = false;
+  failing_step_ = -1;
+  left_before_ = std::numeric_limits<double>::infinity();
   high_index_ = index_known_ = false;
   undetermined_.clear();
   weights_factor_ = 1.0;
@@ -68,8 +73,7 @@ class Projection::Impl::Stopwatch {
   }
   ~Stopwatch() {
     if (!running_) return;
-    owner_.timed_seconds_ += std::chrono::duration<double>(Clock::now() - begin_).count();
-    ++owner_.timed_;
+    owner_.timed_.add(std::chrono::duration<double>(Clock::now() - begin_).count());
   }
   bool running() const { return running_; }
   Stopwatch(const Stopwatch&) = delete;
@@ -140,6 +144,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   account_for_previous_attempt(step);
   candidate.t = step.t;
   const Candidate& at = candidate;
+  if (collapsed_ && warning.empty()) look_for_causes(at, step);
   if (frequency_.on() && !needs_projection(at, step, tolerance, mem))
     return finish(Status::success, "");
   const Stopwatch stopwatch(*this);
@@ -150,7 +155,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   }
 
   Move move = move_and_polish(at, step.cj, tolerance, mem);
-  if (move.status == Status::success && !corrector_was_right_ && !call_setup) {
+  if (move.status == Status::success && !corrector_was_right_ && !call_setup && has_setup_) {
     // Old factors fooled IDA's convergence test: correct again, with fresh ones.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, at.correction);
@@ -161,7 +166,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   }
   if (stopwatch.running()) move.drift_after = mover_->remaining_drift(at);
   account(move, step, stopwatch.running());
-  return finish(move.status, mover_->message());
+  return finish(move.status, move.capped ? capped_message_ : mover_->message());
 }
 
 // IDA computes its weights anew for a new step, but not for another attempt at the same one.
@@ -222,10 +227,25 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
   corrector_was_right_ = true;
   keep_corrector(candidate);
   Move move = mover_->move(candidate);
+  if (move.capped) {
+    judge_capped(move);
+    return move;  // what follows would make the whole move
+  }
   if (move.status == Status::success)
     move.status = wants_polish(move.length) ? polish(candidate, cj, tolerance, mem)
                                             : mover_->finish(candidate);
   return move;
+}
+
+// A cap is meant for a start off the constraints, which is approached step by step. A step that
+// ends farther away than the last one, by more than the error test allows, has failed.
+void Projection::Impl::judge_capped(Move& move) {
+  if (move.left <= std::max(1.0, left_before_)) return;
+  move.status = Status::move_too_long;
+  capped_message_ =
+      "the move onto the constraints, capped at " + std::to_string(move.length) +
+      " tolerances (Options::largest_move), leaves " + std::to_string(move.left) +
+      ", which the error test does not allow; use a larger largest_move";
 }
 
 // The corrector's ycor, before the move.
@@ -238,10 +258,10 @@ void Projection::Impl::keep_corrector(const Candidate& candidate) {
 
 StepData Projection::Impl::step_data() const {
   StepData step;
-  N_Vector yppred, yyn, ypn, res;
+  N_Vector yyn, ypn, res;
   void* user_data;
   sunrealtype t, cj;
-  IDAGetNonlinearSystemData(ida_mem_, &t, &step.y_predicted, &yppred, &yyn, &ypn, &res, &cj,
+  IDAGetNonlinearSystemData(ida_mem_, &t, &step.y_predicted, &step.yp_predicted, &yyn, &ypn, &res, &cj,
                             &user_data);
   step.t = t;
   step.cj = cj;
@@ -256,8 +276,10 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (setups != last_setups_) cj_at_setup_ = step.cj;
   last_setups_ = setups;
   repeated_ = steps == last_steps_;
+  count_rejections();
   if (!repeated_) look_for_refusals();
   if (!repeated_ && pending_) {
+    left_before_ = left_;
     mover_->accept();
     if (options_.progress && ++progress_count_ % options_.progress_interval == 0) {
       progress_.steps = steps;
@@ -319,6 +341,8 @@ void Projection::Impl::begin_smoothing() {
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
 Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
   engaged_ = true;
+  long linear_iterations = 0;  // none are counted by direct solvers
+  iterative_ = IDAGetNumLinIters(ida_mem_, &linear_iterations) == 0 && linear_iterations > 0;
   if (options_.id == nullptr && !id_) {
     const Status derived = derive_id(candidate, mem);
     if (derived != Status::success) return derived;
@@ -353,6 +377,7 @@ void Projection::Impl::note(const Move& move, const StepData& step) {
   move_sum_ += move.length;
   if (frequency_.on()) frequency_.looked(move.length, step_size());
   pending_ = true;
+  left_ = move.left;
   if (options_.progress) {
     int order = 0;
     IDAGetCurrentOrder(ida_mem_, &order);
@@ -394,6 +419,7 @@ int Projection::Impl::finish(Status outcome, const std::string& text) {
     printed_ = true;  // once: IDA reports the failure of the run by itself
     std::fprintf(stderr, "tether: %s: %s\n", to_string(outcome), text.c_str());
   }
+  if (!is_fatal(outcome)) count_failure_in_step(text);
   return is_fatal(outcome) ? kFatal : kRecoverable;
 }
 

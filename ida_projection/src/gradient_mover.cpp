@@ -39,6 +39,7 @@ class GradientMover final : public Mover {
     for (const OwnedVector& q : owned_) gradients_.push_back(q);
     g_.assign(m, 0.0);
     z_.assign(m, 0.0);
+    terms_.assign(m, 0.0);
     norm_.assign(m, 0.0);
     tolerance_norm_.assign(m, 0.0);
     left_.assign(m, 0.0);
@@ -95,7 +96,11 @@ class GradientMover final : public Mover {
     result.drift_before = result.drift_after = drift();
     if (result.drift_before == 0.0) return result;
     set_metric();
-    if ((result.status = factor(candidate.t)) != Status::success) return result;
+    sums_terms_ = static_cast<N_Vector>(y_)->ops->nvl1norm != nullptr;
+    result.status = factor(candidate.t);
+    sums_terms_ = false;
+    if (result.status != Status::success) return result;
+    if (rounding_only()) return result;
     result.length = solve(candidate.weights);
     result.floor = 4.0 * kEpsilon * N_VWrmsNorm(y_, candidate.weights);
     if (contradicts()) result.status = Status::inconsistent;
@@ -149,6 +154,7 @@ class GradientMover final : public Mover {
             return result;
           }
           N_VLinearSum(1.0, candidate.correction, -limit / length, dy_, candidate.correction);
+          result.left = length - limit;
           result.length = limit;
           result.capped = true;
           result.status = Status::success;
@@ -262,6 +268,10 @@ class GradientMover final : public Mover {
     std::vector<double>& left = left_;
     for (int i = 0; i < m_; ++i) {
       const auto k = static_cast<std::size_t>(i);
+      if (sums_terms_) {
+        N_VProd(gradients_[k], y_, work_);
+        terms_[k] = N_VL1Norm(work_);
+      }
       N_VProd(gradients_[k], WT_, work_);
       tolerance_norm_[k] = norm(work_);
       N_VProd(gradients_[k], D_, gradients_[k]);
@@ -353,6 +363,14 @@ class GradientMover final : public Mover {
     return false;
   }
 
+  // Does the rounding of its own terms explain every g_i? It grows with the root of their number.
+  bool rounding_only() const {
+    const double unit = 64.0 * kEpsilon;
+    for (std::size_t i = 0; i < g_.size(); ++i)
+      if (!(std::abs(g_[i]) <= unit * terms_[i])) return false;
+    return true;
+  }
+
   double drift() const {
     double largest = 0.0;
     for (double g : g_) largest = std::max(largest, std::abs(g));
@@ -373,6 +391,8 @@ class GradientMover final : public Mover {
   double length_;
   FactorWear wear_;  // for follow()
   bool factored_ = false;
+  bool sums_terms_ = false;    // measure() asks for them
+  std::vector<double> terms_;  // sum_j |C_ij y_j|
 };
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "frequency.hpp"
 #include "gauss_newton.hpp"
 #include "mover.hpp"
+#include "sampled_time.hpp"
 #include "step_smoothing.hpp"
 
 namespace tether::ida_projection {
@@ -39,7 +40,7 @@ class OwnedVector {
 /// What IDA's public getters tell inside a solve.
 struct StepData {
   double t = 0.0, cj = 0.0;
-  N_Vector y_predicted = nullptr;
+  N_Vector y_predicted = nullptr, yp_predicted = nullptr;
 };
 
 /// Is this vector contiguous and whole in this process's memory?
@@ -73,6 +74,7 @@ class Projection::Impl {
   SUNNonlinearSolver inner() const { return inner_; }
   void set_system(SUNNonlinSolSysFn f) { system_ = f; }
   void set_linear_solve(SUNNonlinSolLSolveFn f) { linear_solve_ = f; }
+  void set_has_setup(bool has) { has_setup_ = has; }
   void note_maximum_iterations(int n) {
     maximum_iterations_ = n;
     heard_ = true;
@@ -82,6 +84,7 @@ class Projection::Impl {
 
   Status status = Status::unused;
   std::string message;
+  std::string warning;  // what makes IDA reject most steps, once that was seen
   std::string advice_;  // what message() says while nothing is wrong
   Constraints constraints;
 
@@ -103,6 +106,7 @@ class Projection::Impl {
   int look_before_moving(const Candidate& candidate, void* mem, bool& done);
   Status engage(const Candidate& candidate, void* mem);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance, void* mem);
+  void judge_capped(Move& move);
   void keep_corrector(const Candidate& candidate);
   bool wants_polish(double length) const;  // polish.cpp
   Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
@@ -113,6 +117,13 @@ class Projection::Impl {
   void account(const Move& move, const StepData& step, bool sampled);
   void note(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
+
+  // collapse.cpp
+  void count_rejections();
+  void say_once(const std::string& text);
+  void look_for_causes(const Candidate& candidate, const StepData& step);
+  std::string suspected_row(const Candidate& candidate, const StepData& step) const;
+  void count_failure_in_step(const std::string& text);
 
   // between.cpp
   bool needs_projection(const Candidate& candidate, const StepData& step, double tolerance,
@@ -141,6 +152,13 @@ class Projection::Impl {
   Options options_;
   StepSmoother smoother_;
   FrequencyPolicy frequency_;
+  long rejections_ = 0, rejections_before_ = 0;  // attempts that IDA repeated
+  long window_begin_ = 0;                        // accepted steps when they were last looked at
+  long refused_steps_ = 0;                       // of these, steps with a rejection
+  bool rejected_in_step_ = false, collapsed_ = false;
+  long failing_step_ = -1;
+  int failures_in_step_ = 0;
+  bool said_failures_ = false;
   bool repeated_ = false;  // IDA rejected the last attempt
   bool high_index_ = false;  // F is not of index 1 in its own variables
   bool index_known_ = false;
@@ -151,14 +169,15 @@ class Projection::Impl {
   long last_error_failures_ = 0;
   Statistics statistics_;
   double move_sum_ = 0.0;
-  long timed_ = 0;
-  double timed_seconds_ = 0.0;
+  SampledTime timed_;
 
   SUNNonlinearSolver solver_ = nullptr;  // ours, the one that IDA sees
   SUNNonlinearSolver inner_ = nullptr;   // decorated
   bool owns_inner_ = false;
   SUNNonlinSolSysFn system_ = nullptr;
   SUNNonlinSolLSolveFn linear_solve_ = nullptr;
+  bool has_setup_ = false;  // IDA's linear solver has factors, or a preconditioner, to be made anew
+  bool iterative_ = false;  // it is a Krylov method
   bool initialized_ = false;
   int maximum_iterations_ = 4;
   bool heard_ = false;  // IDASetMaxNonlinIters reached us
@@ -177,6 +196,9 @@ class Projection::Impl {
   std::vector<int> algebraic_;  // indices, contiguous vectors
   bool has_algebraic_ = false;
   bool corrector_was_right_ = true;  // the polish found what IDA's convergence test promised
+  // What capped moves lacked, in tolerances: in the last accepted step and in the present attempt.
+  double left_before_ = 0.0, left_ = 0.0;
+  std::string capped_message_;
   bool engaged_ = false;             // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;
   std::unique_ptr<GaussNewton> point_;  // for points between steps and initial values

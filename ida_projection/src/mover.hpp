@@ -40,6 +40,7 @@ struct Move {
   int moves = 0;              ///< Newton moves made
   double floor = 0.0;         ///< measure(): length that rounding of y alone explains
   bool capped = false;
+  double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
 };
 
 /// Moves candidates onto the constraints and remembers what the metric needs.

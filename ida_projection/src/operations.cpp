@@ -34,6 +34,7 @@ int set_system(SUNNonlinearSolver s, SUNNonlinSolSysFn f) {
   return SUNNonlinSolSetSysFn(self(s).inner(), f);
 }
 int set_linear_setup(SUNNonlinearSolver s, SUNNonlinSolLSetupFn f) {
+  self(s).set_has_setup(f != nullptr);
   return SUNNonlinSolSetLSetupFn(self(s).inner(), f);
 }
 int set_linear_solve(SUNNonlinearSolver s, SUNNonlinSolLSolveFn f) {

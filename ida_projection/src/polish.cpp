@@ -11,6 +11,9 @@
 // variables to the move, -F_a^-1 F_d dy, the step of IDACalcIC's IDA_YA_YDP_INIT. As y' stays where
 // the corrector put it, the iteration does not pull the differential variables back. What of delta
 // leaves the constraints is then taken back with the projection's own factors.
+//
+// Krylov methods solve to a tolerance that suits IDA's own test: delta would be noise as long as
+// what it is to remove (Burgers, 10^4 unknowns, SPGMR, 1e-3: 1155 steps with it, plain IDA 171).
 #include <cmath>
 
 #include "impl.hpp"
@@ -26,7 +29,7 @@ constexpr double kAnswered = 0.1;  // tolerances: a shorter move needs no answer
 }  // namespace
 
 bool Projection::Impl::wants_polish(double length) const {
-  if (linear_solve_ == nullptr) return false;
+  if (linear_solve_ == nullptr || iterative_) return false;
   if (options_.extra_iterations == 0) return has_algebraic_ && options_.refresh_algebraic;
   // After two iterations of its own the corrector leaves nothing worth another one, unless the move
   // asks for an answer of the algebraic variables. Whether it made them varies from run to run,

@@ -25,6 +25,8 @@ const char* to_string(Status status) {
       return "callback failed, recoverable";
     case Status::corrector_failed:
       return "corrector failed";
+    case Status::collapsed:
+      return "steps collapsed";
     case Status::callback_fatal:
       return "callback failed";
     case Status::late_attach:
@@ -106,16 +108,14 @@ Statistics Projection::Impl::statistics() const {
   Statistics s = statistics_;
   const long moved = s.projections + s.chord_projections - s.failures();
   s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
-  s.seconds =
-      timed_ > 0 ? timed_seconds_ / static_cast<double>(timed_) * static_cast<double>(s.projections)
-                 : 0.0;
+  s.seconds = timed_.total(s.projections);
   return s;
 }
 
 void Projection::Impl::reset_statistics() {
   statistics_ = Statistics{};
-  move_sum_ = timed_seconds_ = 0.0;
-  timed_ = 0;
+  move_sum_ = 0.0;
+  timed_ = SampledTime();
 }
 
 Projection::Projection(void* ida_mem, Constraints constraints, Options options,
@@ -139,8 +139,13 @@ int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, 
 }
 Statistics Projection::statistics() const { return impl_->statistics(); }
 void Projection::reset_statistics() { impl_->reset_statistics(); }
-Status Projection::status() const { return impl_->status; }
-const std::string& Projection::message() const { return impl_->message; }
+Status Projection::status() const {
+  return impl_->status == Status::success && !impl_->warning.empty() ? Status::collapsed
+                                                                     : impl_->status;
+}
+const std::string& Projection::message() const {
+  return impl_->message.empty() ? impl_->warning : impl_->message;
+}
 const Constraints& Projection::constraints() const { return impl_->constraints; }
 
 }  // namespace tether::ida_projection

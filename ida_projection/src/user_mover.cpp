@@ -59,6 +59,7 @@ class UserMover final : public Mover {
           return result;
         }
         factor = limit / result.length;
+        result.left = result.length - limit;
         result.length = limit;
         result.capped = true;
       }

@@ -126,7 +126,9 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,
           ">= 1");
   require(options.frequency >= 1, "frequency", options.frequency, ">= 1 (every n-th step)");
-  require(options.largest_move > 0.0, "largest_move", options.largest_move, "> 0 (tolerances)");
+  require(options.largest_move >= 0.1, "largest_move", options.largest_move,
+          ">= 0.1 (tolerances): the drift of a single good step is as long, and shorter limits make "
+          "steps short instead");
   require(options.smoothing_setpoint > 0.0 && std::isfinite(options.smoothing_setpoint),
           "smoothing_setpoint", options.smoothing_setpoint, "> 0");
   require(options.maximum_step >= 0.0, "maximum_step", options.maximum_step, ">= 0 (0: no limit)");

@@ -173,7 +173,7 @@ TEST_CASE("gradients on serial, OpenMP and custom vectors") {
   CHECK(same_bits(open_mp.y, serial.y));
   CHECK(open_mp.steps == serial.steps);
   CHECK(custom.statistics.projections >= custom.steps - 5);
-  CHECK(custom.statistics.extra_iterations > 0);
+  CHECK(custom.statistics.extra_iterations == 0);
   for (const End* end : {&serial, &open_mp, &custom}) {
     CHECK(value(dense, 10.0, end->y.data(), 5).cwiseAbs().maxCoeff() < 1e-6);
     for (std::size_t i = 0; i < 4; ++i) CHECK(std::abs(end->y[i] - problem.reference[i]) < 1e-5);
@@ -186,7 +186,7 @@ TEST_CASE("gradients on custom vectors with algebraic variables") {
   const End serial = run(Kind::serial, problem, 1e-7, gradients);
   const End custom = run(Kind::custom, problem, 1e-7, gradients);
   close(custom, serial, 1e-5);
-  CHECK(custom.statistics.refreshes > 0);
+  CHECK(custom.statistics.refreshes == 0);
 }
 
 TEST_CASE("dense constraints on OpenMP vectors: the same bits as on serial ones") {

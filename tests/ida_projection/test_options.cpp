@@ -50,6 +50,7 @@ TEST_CASE("bad values: the message names the option and the value") {
   check(refusal_of([](O& o) { o.frequency = 0; }), "frequency", "0");
   check(refusal_of([](O& o) { o.frequency = -5; }), "frequency", "-5");
   check(refusal_of([](O& o) { o.largest_move = 0.0; }), "largest_move", "0.0");
+  check(refusal_of([](O& o) { o.largest_move = 0.001; }), "largest_move", "0.001");
   check(refusal_of([](O& o) { o.largest_move = kNaN; }), "largest_move", "nan");
   check(refusal_of([](O& o) { o.extra_iterations = 2; }), "extra_iterations", "2");
   check(refusal_of([](O& o) { o.extra_iterations = -1; }), "extra_iterations", "-1");
@@ -188,6 +189,22 @@ TEST_CASE("largest_move: a start too far away is rejected, or approached in capp
     host.attach(on_circle(), options);
     REQUIRE(host.finish() >= 0);
     CHECK(host.projection().statistics().failures() == 0);
+  }
+}
+
+TEST_CASE("capped moves that fall behind are failures of the step, not silent drift") {
+  const Problem problem = pendulum(1.0, 1.0, 30.0, "index 1");
+  tp::Options options;
+  options.long_move = tp::LongMove::cap;
+  options.largest_move = 0.1;
+  for (const double tolerance : {1e-4, 1e-6}) {
+    const Run run = integrate(problem, tolerance, problem.recommended_constraints(), options);
+    INFO("tolerance " << tolerance);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.statistics.moves_capped > 0);
+    CHECK(run.statistics.move_too_long > 0);
+    CHECK(run.distance <= 1.5);
+    CHECK(run.error <= 30.0 * tolerance);
   }
 }
 

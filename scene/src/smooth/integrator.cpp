@@ -133,6 +133,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     ida_projection::Options projection;
     projection.id = id_;
     projection.print_fatal = false;
+    projection.print_warnings = false;
     // Behind a dead point rows come back, and weights narrow, with errors of earlier steps: no
     // smaller step makes that move shorter. It is part of what IDA's error test judges.
     projection.long_move = ida_projection::LongMove::cap;

@@ -23,7 +23,8 @@ enum class Metric {
 /// What happens when a move is longer than Options::largest_move allows.
 enum class LongMove {
   reject,  ///< recoverable failure: IDA retries with a smaller step
-  cap,     ///< scale the move down to the allowed length, as DASSLX does
+  cap,     ///< scale the move down to the allowed length, as DASSLX does; a failure as above where
+           ///< more than a tolerance is left and more than after the last step
 };
 
 /// One report of the progress callback.
@@ -55,7 +56,7 @@ struct Options {
   int frequency = 1;
 
   /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in
-  /// tolerances; > 0.
+  /// tolerances; >= 0.1.
   double largest_move = 10.0;
   LongMove long_move = LongMove::reject;
 
@@ -111,6 +112,9 @@ struct Options {
   /// Print the message of a failure that ends the run to stderr, once, as SUNDIALS does with its
   /// own.
   bool print_fatal = true;
+
+  /// Say once on stderr what makes IDA reject most steps, or one step again and again.
+  bool print_warnings = true;
 
   /// Called after every `progress_interval`-th accepted step; must not throw.
   std::function<void(const Progress&)> progress;

@@ -25,6 +25,7 @@ enum class Status {
   not_finite,    ///< NaN or infinity in g, C or y
   callback_recoverable,
   corrector_failed,  ///< the decorated solver failed; nothing was projected
+  collapsed,  ///< the last step was projected, but IDA rejects most steps; message tells why
   callback_fatal = -1,
   late_attach = -2,                 ///< attached after IDA was initialised: call IDAReInit
   simultaneous_sensitivities = -3,  ///< IDA_SIMULTANEOUS bypasses the plugin: use IDA_STAGGERED
