@@ -36,13 +36,14 @@ double dot3(const double* x, const double* y) { return x[0] * y[0] + x[1] * y[1]
 void InteriorPoint::reset(int contacts) {
   n_ = contacts;
   for (Packed* p : {&x_, &u_, &dx_, &du_, &r_, &w_, &z_, &swept_, &anchor_, &scaled_x_, &scaled_u_,
-                    &affine_x_, &affine_u_, &step_, &aim_, &defect_})
+                    &affine_x_, &affine_u_, &step_, &aim_, &defect_, &stuck_x_})
     p->resize(at(n_));
   scaling_.resize(at(n_));
   sides_.resize(at(n_));
   flat_.resize(at(n_));
   tau_ = 0;
   ordered_ = false;
+  stuck_ = Stuck::untried;
 }
 
 double InteriorPoint::cost(const Search& search) const {

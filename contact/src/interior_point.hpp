@@ -14,6 +14,8 @@ namespace tether::contact::detail {
 class InteriorPoint {
  public:
   void reset(int contacts);
+  // Tests the point where everything sticks, which run() starts from: one factorisation.
+  void stick(Search& search);
   // From the point where everything sticks; at most `most` steps. The result is search.best.
   void run(Search& search, int most);
   // From near x.
@@ -23,7 +25,9 @@ class InteriorPoint {
   // of `newton` from the point to which the last step leads or, where that fails, along its own
   // path.
   void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton);
-  // Estimated ns of one step.
+  // Orders the matrix, so that cost() knows its fill.
+  void order(Search& search);
+  // Estimated ns of one step; by a guess of the fill before order().
   double cost(const Search& search) const;
 
  private:
@@ -33,7 +37,6 @@ class InteriorPoint {
     PackedBlock left, right;
     double column[3], gradient[3];
   };
-  void order(const Search& search);
   bool start(Search& search);
   bool start_near(Search& search, const PackedVector* start, double near);
   bool start_proximal(Search& search, double tau, double near);
@@ -58,6 +61,10 @@ class InteriorPoint {
       0;  // added to the Newton matrix, relative to A: bounds steps along its null space
   bool ordered_ = false;
   BlockLu lu_;
+  // A x = b, how far it is outside of the cone at most, and the sum of its lengths.
+  enum class Stuck { untried, unknown, found } stuck_ = Stuck::untried;
+  Packed stuck_x_;
+  double outside_ = 0, stuck_size_ = 0;
   std::vector<ConeScaling> scaling_;
   std::vector<Sides> sides_;
   std::vector<char> flat_;  // mu = 0: x_n and u_n alone

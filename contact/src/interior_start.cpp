@@ -6,20 +6,24 @@
 
 namespace tether::contact::detail {
 
-void InteriorPoint::order(const Search& search) {
+void InteriorPoint::order(Search& search) {
   if (ordered_) return;
+  search.counts.work += 100 * static_cast<double>(search.system.problem().blocks().size());
   lu_.order(search.system.problem());
   lu_.analyse(search.system.problem(), nullptr);
+  for (int i = 0; i < n_; ++i)
+    flat_[at(i)] =
+        search.system.law() == Law::frictionless || !(search.system.problem().local(i).mu > 0);
   ordered_ = true;
 }
 
-// The point where everything sticks, A x = b, shifted into the cone; false if it is the solution
-// or cannot be found.
-bool InteriorPoint::start(Search& search) {
+// A x = b: the point where everything sticks, in the frame where the cone is its own dual. Where it
+// is admissible it is the solution, and refinements remove the shift of the matrix.
+void InteriorPoint::stick(Search& search) {
+  if (stuck_ != Stuck::untried) return;
+  stuck_ = Stuck::unknown;
   System& system = search.system;
   const Problem& p = system.problem();
-  const double speed = system.norm_b() / std::sqrt(n_);
-  if (!(speed > 0)) return false;
   order(search);
   // Below the eigenvalues that light bodies between heavy ones leave (1e-12 of the largest for 200
   // boxes of masses 1 : 1e6), above the rounding of A.
@@ -34,16 +38,15 @@ bool InteriorPoint::start(Search& search) {
         for (int c = 0; c < 3; ++c) block.column[5 * c] += kShift * mean_diagonal(p.local(i));
       lu_.add(p.columns()[at(k)], block.column);
     }
-    if (!lu_.end_row()) return false;
+    if (!lu_.end_row()) return;
   }
   ++search.counts.factorisations;
   search.counts.work += cost(search);
   for (int i = 0; i < n_; ++i) z_[at(i)] = p.packed_b()[at(i)];
   lu_.solve(z_.data());
-  double size = 0, outside = 0;
+  stuck_size_ = outside_ = 0;
   for (int i = 0; i < n_; ++i) {
-    flat_[at(i)] = system.law() == Law::frictionless || !(p.local(i).mu > 0);
-    double* x = x_[at(i)].v;
+    double* x = stuck_x_[at(i)].v;
     for (int c = 0; c < 3; ++c) x[c] = z_[at(i)].v[c];
     if (flat_[at(i)]) {
       x[1] = x[2] = 0;
@@ -51,20 +54,19 @@ bool InteriorPoint::start(Search& search) {
       x[0] *= p.local(i).mu;
     }
     const double t = tangent(x);
-    size += std::abs(x[0]) + t;
-    outside = std::max(outside, t - x[0]);
+    stuck_size_ += std::abs(x[0]) + t;
+    outside_ = std::max(outside_, t - x[0]);
   }
-  if (!std::isfinite(size)) return false;
-  // Admissible as it is: refinements remove the shift of the matrix.
+  if (!std::isfinite(stuck_size_)) return;
+  stuck_ = Stuck::found;
   double last = std::numeric_limits<double>::infinity();
-  for (int refinement = 0; refinement <= kRefinements && outside <= 0; ++refinement) {
+  for (int refinement = 0; refinement <= kRefinements && outside_ <= 0; ++refinement) {
     for (int i = 0; i < n_; ++i) {
       if (flat_[at(i)]) z_[at(i)].v[1] = z_[at(i)].v[2] = 0;
       clip_cone(p.local(i).mu, z_[at(i)].v);
     }
     const double error = search.test(z_.data(), Method::interior_point);
-    if (search.solved()) return false;
-    if (!(error < 0.5 * last)) break;
+    if (search.solved() || !(error < 0.5 * last)) return;
     last = error;
     system.velocities(z_.data(), w_.data());
     lu_.solve(w_.data());
@@ -72,10 +74,22 @@ bool InteriorPoint::start(Search& search) {
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) z_[at(i)].v[c] -= w_[at(i)].v[c];
   }
+}
+
+// The point where everything sticks, shifted into the cone; false if it is the solution or cannot
+// be found.
+bool InteriorPoint::start(Search& search) {
+  const System& system = search.system;
+  const double speed = system.norm_b() / std::sqrt(n_);
+  if (!(speed > 0)) return false;
+  stick(search);
+  if (search.solved() || stuck_ != Stuck::found) return false;
   for (int i = 0; i < n_; ++i) {
     double* x = x_[at(i)].v;
     double* u = u_[at(i)].v;
-    x[0] += outside + 0.1 * std::max(size / n_, speed / mean_diagonal(p.local(i)));
+    for (int c = 0; c < 3; ++c) x[c] = stuck_x_[at(i)].v[c];
+    x[0] += outside_ +
+            0.1 * std::max(stuck_size_ / n_, speed / mean_diagonal(system.problem().local(i)));
     x[3] = x[0] - tangent(x);
     u[0] = u[3] = speed;
     u[1] = u[2] = 0;

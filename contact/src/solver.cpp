@@ -52,10 +52,13 @@ struct Solver::Implementation {
   Packed x, z;
   std::unordered_map<std::uint64_t, PackedVector> memory;
   bool stages_ready = false;
+  double sweep_work = 0;  // of the accelerated sweeps
 
   void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
   void prepare_stages(int n);
   Status automatic();
+  bool mostly_sticks();
+  bool sweep_while_cheap(bool first, bool regular, double kappa);
   Status rotate(bool last);
   Status plain();
   Status give_up();
@@ -69,6 +72,7 @@ void Solver::Implementation::prepare_stages(int n) {
   newton.reset(n);
   admm.reset(n);
   interior.reset(n);
+  sweep_work = search.counts.work;
   stages_ready = true;
 }
 
@@ -91,9 +95,56 @@ Status Solver::Implementation::give_up() {
   return change > 1e-8 * size ? Status::cycling : Status::stalled;
 }
 
-// Stages in rotation (README, section 9).
+// Whether the point where everything sticks may be admissible: few contacts that slide or part.
+bool Solver::Implementation::mostly_sticks() {
+  z.resize(search.best.size());
+  search.system.velocities(search.best.data(), z.data());
+  const double speed = 1e-3 * search.system.norm_b() / std::sqrt(search.system.size());
+  int against = 0;
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    const double* r = search.best[i].v;
+    const double* w = z[i].v;
+    against += w[0] > speed || (r[0] > 0 && std::hypot(w[1], w[2]) > speed);
+  }
+  return against <= search.system.size() / 4;
+}
+
+// Sweeps until their forecast costs more than interior points; true: solved. Half a factorisation of
+// sweeps by a guess of the fill, then its exact price; after as much again the point where all stick,
+// if a factorisation is cheap or that point looks admissible. The stay before the forecast is asked
+// grows with the sweeps that a factorisation costs: forecasts need sweeps, and in large packings
+// contacts toggle for hundreds of them before they settle.
+bool Solver::Implementation::sweep_while_cheap(bool first, bool regular, double kappa) {
+  constexpr double kSteps = 20;         // factorisations of a run of interior points
+  constexpr double kLookAround = 0.5;   // factorisations
+  constexpr double kStay = 11, kCheap = 30;
+  const double begin = search.counts.work;
+  const auto sweep = [&](double factorisations, double worth) {
+    detail::AcceleratedSweeps::Leave leave;
+    leave.other_cost = interior.cost(search);
+    leave.least_work = factorisations * leave.other_cost - (search.counts.work - begin);
+    leave.worth = worth;
+    sweeps.run(search, leave);
+    return search.solved() || search.exhausted();
+  };
+  if (first) {
+    if (sweep(kLookAround, 3)) return search.solved();
+    interior.order(search);
+    if (sweep(kLookAround, 3)) return search.solved();
+  }
+  const double ratio = interior.cost(search) / search.sweep_cost;
+  if (first && regular && (ratio < kCheap || mostly_sticks())) interior.stick(search);
+  if (search.solved()) return true;
+  // Later as much as the other stages have taken meanwhile.
+  const double share = (begin - 2 * sweep_work) / interior.cost(search);
+  sweep(std::max(share, kappa * (1 + kStay * ratio / (ratio + kCheap))), kSteps);
+  sweep_work += search.counts.work - begin;
+  return search.solved();
+}
+
+// Stages in rotation (README, section 10).
 Status Solver::Implementation::rotate(bool last) {
-  constexpr double kRough = 1e-2;
+  constexpr double kRough = 1e-2, kNear = 1e-3, kDear = 30;
   constexpr int kPhases = 2;  // Newton phases before a rescue
   // Rotations without halving the error; one if the law may be replaced afterwards.
   const int most_patience = last ? 3 : 1;
@@ -108,30 +159,30 @@ Status Solver::Implementation::rotate(bool last) {
   }
   int phases = 0, bursts = 4, burst = 500, patience = 0, outers = 12;
   for (;;) {
-    detail::AcceleratedSweeps::Leave leave;
-    leave.other_cost = newton.cost(search);
-    leave.least_work = 3 * kappa * leave.other_cost;
-    sweeps.run(search, leave);
-    if (search.solved()) return Status::solved;
+    if (sweep_while_cheap(first, regular, kappa)) return Status::solved;
     if (search.exhausted()) return Status::work_limit;
 
     const double before = search.best_error;
-    // Started near a rough answer, a few alternating directions (two steps of interior points in cost)
-    // or ten steps or so of interior points do; far from one, alternating directions what they can.
-    if (first && regular && before < kRough) {
+    // Near an answer interior points need ten steps or so, after a few alternating directions.
+    if (first && regular && before < kNear) {
       admm.start(search, search.best.data());
       admm.run(search, 15, true, true);
       if (search.solved()) return Status::solved;
-      interior.run_near(search, search.best.data(), 20);
+      interior.run_near(search, search.best.data(), 30);
       if (search.solved()) return Status::solved;
+    }
+    if (first && regular) interior.run(search, 40);
+    if (search.solved()) return Status::solved;
+    // Where factorisations are dear sweeps go on before stages that take many.
+    if (first && regular && interior.cost(search) > kDear * search.sweep_cost) {
+      first = false;
+      continue;
     }
     admm.start(search, search.best.data());
     admm.run(search, 200, true, true);
     if (search.solved()) return Status::solved;
-    if (first && regular) interior.run(search, 40);
-    if (search.solved()) return Status::solved;
     if (first && regular && before >= kRough && search.best_error < kRough)
-      interior.run_near(search, search.best.data(), 20);
+      interior.run_near(search, search.best.data(), 30);
     if (search.solved()) return Status::solved;
     first = false;
     newton.run(search, search.best.data(), 12);
