@@ -86,7 +86,6 @@ Move move_with_old_factors(FactorWear& wear, Value value, Solve solve, Apply app
                            double floor, double longest) {
   constexpr int kMostMoves = 3;
   constexpr double kMayBeLeft = 0.02;  // tolerances
-  constexpr double kWornOut = 0.2;     // of a move: then factors are renewed
 
   Move result;
   double previous = 0.0;
