@@ -34,7 +34,7 @@ void compare(const Problem& problem, double tolerance, int n) {
   CHECK(static_cast<double>(some.steps) <= 1.3 * static_cast<double>(each.steps) + 10.0);
   if (n > 2)
     CHECK(static_cast<double>(some.statistics.factorizations) <=
-          0.9 * static_cast<double>(each.statistics.factorizations));
+          0.95 * static_cast<double>(each.statistics.factorizations));
 }
 
 /// x' = -y, y' = x with the circle as Gradients.
