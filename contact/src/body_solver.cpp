@@ -220,6 +220,17 @@ void BodySolver::scale_warm_start(double factor) {
   implementation_->memory.scale(factor);
 }
 void BodySolver::forget() { implementation_->memory.clear(); }
+WarmStart BodySolver::warm_start() const {
+  return {implementation_->memory.ids(), implementation_->memory.impulses()};
+}
+void BodySolver::set_warm_start(const WarmStart& start) {
+  if (start.ids.size() != start.impulses.size())
+    throw std::invalid_argument("warm start: " + std::to_string(start.ids.size()) + " ids, but " +
+                                std::to_string(start.impulses.size()) + " impulses");
+  detail::ImpulseMemory& memory = implementation_->memory;
+  memory.clear();
+  for (std::size_t i = 0; i < start.ids.size(); ++i) memory.add(start.ids[i], start.impulses[i]);
+}
 
 BodySolution BodySolver::solve(const std::vector<RigidBody>& bodies,
                                const std::vector<PointContact>& contacts) {

@@ -24,6 +24,8 @@ class ImpulseMemory {
     for (Eigen::Vector3d& p : impulses_) p *= factor;
   }
 
+  const std::vector<std::uint64_t>& ids() const { return ids_; }
+  const std::vector<Eigen::Vector3d>& impulses() const { return impulses_; }
   bool empty() const { return ids_.empty(); }
   std::size_t bytes() const {
     return ids_.capacity() * sizeof(ids_[0]) + impulses_.capacity() * sizeof(impulses_[0]) +

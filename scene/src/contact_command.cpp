@@ -36,6 +36,23 @@ std::map<std::string, Method> methods() {
   return out;
 }
 
+// Words, not values: CLI11 would print those of an enumeration of bytes as characters. `value` has to outlive the
+// parsing.
+template <class E>
+void add_choice(CLI::App& command, const char* option, const char* what, const std::map<std::string, E>& words,
+                E& value) {
+  std::vector<std::string> names;
+  std::string now;
+  for (const auto& [word, each] : words) {
+    names.push_back(word);
+    if (each == value) now = word;
+  }
+  command.add_option_function<std::string>(option, [words, &value](const std::string& word) { value = words.at(word); },
+                                           what)
+      ->check(CLI::IsMember(names))
+      ->default_str(now);
+}
+
 // 0: all solved, 1: some not solved, 2: some file or option is wrong.
 int run(const Arguments& arguments) {
   int status = 0;
@@ -87,11 +104,10 @@ void add_contact_command(CLI::App& app, int* status) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("contact", "Solves frictional contact problems (.dat, fclib .hdf5)");
   command->add_option("files", arguments->files, "Problem files")->required();
-  command->add_option("--law", arguments->options.law, "Friction law")->transform(CLI::CheckedTransformer(kLaws));
+  add_choice(*command, "--law", "Friction law", kLaws, arguments->options.law);
   command->add_option("--tolerance", arguments->options.tolerance, "The measure ends below it")->capture_default_str();
-  command->add_option("--method", arguments->options.method, "Solution method")->transform(CLI::CheckedTransformer(methods()));
-  command->add_option("--measure", arguments->options.measure, "What is compared with the tolerance")
-      ->transform(CLI::CheckedTransformer(kMeasures));
+  add_choice(*command, "--method", "Solution method", methods(), arguments->options.method);
+  add_choice(*command, "--measure", "What is compared with the tolerance", kMeasures, arguments->options.measure);
   command->add_flag("--strict", arguments->options.strict, "Never replace the law");
   command->add_flag("--csv", arguments->csv, "One line a file");
   command->callback([arguments, status] { *status = run(*arguments); });

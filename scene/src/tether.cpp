@@ -1,6 +1,7 @@
 // Tether: the program. SPDX-License-Identifier: BSD-3-Clause
 #include <exception>
 #include <iostream>
+#include <string>
 
 #include "contact_command.hpp"
 #include "program/commands.hpp"
@@ -18,7 +19,7 @@ int main(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 good; 1 an expectation is not met or a contact problem not solved; 2 a file, "
       "a "
-      "scene or an option is wrong; 3 a run could not go on.");
+      "scene or an option is wrong; 3 a run could not go on; 128 and its number: a signal.");
   int status = 0;
 #ifdef TETHER_SCENE_FILES
   tether::scene::add_run_command(app, &status);
@@ -27,6 +28,9 @@ int main(int argc, char** argv) {
   tether::scene::add_cost_command(app, &status);
 #endif
   tether::scene::add_contact_command(app, &status);
+  const std::string version = "tether " TETHER_VERSION;
+  app.set_version_flag("--version", version);
+  for (CLI::App* command : app.get_subcommands({})) command->set_version_flag("--version", version);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

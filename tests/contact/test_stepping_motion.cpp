@@ -332,6 +332,36 @@ TEST_CASE("stepping: a run repeats bit by bit, for any number of threads, and fr
   CHECK(a.time() == c.time());
 }
 
+TEST_CASE("stepping: bodies and memory are all that a run goes on from") {
+  // They bounce, rest and are pushed apart: all three warm starts have something to keep.
+  Scene scene = heap(4, 0.3, 0.6);
+  tc::Stepper whole = scene.stepper();
+  run(whole, 0.31);
+  const tc::StepperMemory memory = whole.memory();
+  CHECK(memory.contacts.ids.size() == whole.contacts().points.size());
+  Scene again = scene;
+  again.bodies = whole.bodies();
+  tc::Stepper part = again.stepper();
+  part.set_memory(memory);
+  CHECK(part.contacts().gaps == whole.contacts().gaps);
+  CHECK(part.penetration() == whole.penetration());
+  CHECK(part.residual() == whole.residual());
+  for (int k = 0; k < 200; ++k) {
+    whole.step(), part.step();
+    REQUIRE(part.residual() == whole.residual());
+  }
+  for (int i = 0; i < whole.bodies().size(); ++i) {
+    CHECK((position(whole, i).array() == position(part, i).array()).all());
+    CHECK((velocity(whole, i).array() == velocity(part, i).array()).all());
+  }
+  CHECK(whole.time() == part.time());
+  tc::StepperMemory other = memory;
+  other.spins.resize(memory.spins.size() + 1);
+  CHECK_THROWS_AS(part.set_memory(other), std::invalid_argument);
+  tc::BodySolver solver;
+  CHECK_THROWS_AS(solver.set_warm_start({{1, 2}, {}}), std::invalid_argument);
+}
+
 TEST_CASE("stepping: two threads sweep one large island together, with the bits of one") {
   Scene scene = heap(11, 0.3, 0.2, 5e-3);
   scene.options.tolerance = 1e-2;

@@ -1,7 +1,5 @@
 // Runs: expectations, files, restarts, effects of no strength. SPDX-License-Identifier:
 // BSD-3-Clause
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -15,10 +13,13 @@
 #include <tether/scene/run.hpp>
 #include <vector>
 
+#include "run_files.hpp"
 #include "support/catch.hpp"
 #include "texts.hpp"
 
 using namespace tether::scene;
+using tether::test::content;
+using tether::test::folder;
 namespace fs = std::filesystem;
 
 namespace {
@@ -71,27 +72,6 @@ position = [0, 0, 0.05]
 velocity = [1, 0.5, 0]
 material = "steel"
 )" + more;
-}
-
-std::string content(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-/// An empty folder of this process's own (others may test here, too), gone when it ends.
-fs::path folder(const std::string& name) {
-  struct Own {
-    fs::path path = fs::temp_directory_path() / ("tether_test_run_" + std::to_string(getpid()));
-    ~Own() {
-      std::error_code ignored;
-      fs::remove_all(path, ignored);
-    }
-  };
-  static const Own own;
-  const fs::path path = own.path / name;
-  fs::remove_all(path);
-  fs::create_directories(path);
-  return path;
 }
 
 /// The bits of all bodies at the end.

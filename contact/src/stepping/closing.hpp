@@ -24,6 +24,10 @@ class Closing {
   /// the bias of contacts.
   bool find(const BodySet& bodies, double dt, StepContacts& contacts, std::vector<RigidBody>& move);
 
+  /// All that one step leaves to the next.
+  WarmStart warm_start() const { return solver_.warm_start(); }
+  void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
+
  private:
   std::vector<RigidBody> free_;
   std::vector<int> closes_, bounces_;  // contacts

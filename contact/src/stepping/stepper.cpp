@@ -1,5 +1,6 @@
 // Tether: impulse-velocity steps. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
@@ -142,6 +143,7 @@ struct Stepper::Implementation {
 
   void add_stage(const char* effect, Method method) { stages.push_back({effect, method, -1, 0}); }
   void make_stages();
+  void turn_inertias();
 
   void make_solvers();
   void step();
@@ -316,6 +318,13 @@ void Stepper::Implementation::move() {
   for (const int i : moving) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
 }
 
+// To world axes, after orientations were set from outside.
+void Stepper::Implementation::turn_inertias() {
+  for (const int i : long_bodies)
+    bodies.motion[at(i)].inverse_inertia =
+        detail::turned(bodies.inverse_inertia[at(i)], bodies.orientation[at(i)]);
+}
+
 void Stepper::Implementation::turn_round() {
   for (const int i : round_bodies) {
     const Vector3d& w = bodies.motion[at(i)].angular_velocity;
@@ -453,14 +462,51 @@ std::vector<StageCost> Stepper::costs() const {
   return sums;
 }
 
+StepperMemory Stepper::memory() const {
+  const Implementation& s = *implementation_;
+  StepperMemory m;
+  m.steps = s.counts.steps;
+  if (s.solver) m.contacts = s.solver->warm_start();
+  if (s.correction) m.corrections = s.correction->warm_start();
+  if (s.restitution) m.bounces = s.restitution->warm_start();
+  if (s.closing) m.closings = s.closing->warm_start();
+  for (const detail::FreeSpin& each : s.free_spin)
+    m.spins.push_back({each.L, each.w, {each.q.x(), each.q.y(), each.q.z(), each.q.w()}});
+  m.last = s.contacts;
+  m.penetration = s.deepest;
+  m.residual = s.residual;
+  m.status = s.status;
+  return m;
+}
+
+void Stepper::set_memory(const StepperMemory& m) {
+  Implementation& s = *implementation_;
+  if (m.spins.size() != s.free_spin.size() || m.steps < 0)
+    throw std::invalid_argument("stepping: a memory of " + std::to_string(m.steps) + " steps of " +
+                                std::to_string(m.spins.size()) + " turning bodies, but there are " +
+                                std::to_string(s.free_spin.size()));
+  s.counts.steps = m.steps;
+  s.turn_inertias();
+  if (s.solver) s.solver->set_warm_start(m.contacts);
+  if (s.correction) s.correction->set_warm_start(m.corrections);
+  if (s.restitution) s.restitution->set_warm_start(m.bounces);
+  if (s.closing) s.closing->set_warm_start(m.closings);
+  for (std::size_t k = 0; k < m.spins.size(); ++k) {
+    const std::array<double, 4>& q = m.spins[k].orientation;
+    s.free_spin[k] = {m.spins[k].momentum, m.spins[k].angular_velocity, {q[3], q[0], q[1], q[2]}};
+  }
+  s.contacts = m.last;
+  s.deepest = m.penetration;
+  s.residual = m.residual;
+  s.status = m.status;
+}
+
 void Stepper::start_anew(long steps) {
   Implementation& s = *implementation_;
   s.counts.steps = steps;
   s.free_spin.assign(s.free_spin.size(), {});
-  for (const int i : s.long_bodies)
-    s.bodies.motion[at(i)].inverse_inertia =
-        detail::turned(s.bodies.inverse_inertia[at(i)], s.bodies.orientation[at(i)]);
-  if (s.near) s.make_solvers();
+  s.turn_inertias();
+  if (s.near) s.make_solvers();  // nothing of the past is left
 }
 
 }  // namespace tether::contact

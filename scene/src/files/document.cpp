@@ -8,6 +8,8 @@
 #include <cmath>
 #include <toml++/toml.h>
 
+#include "nesting.hpp"
+
 namespace tether::scene::files {
 
 namespace {
@@ -31,7 +33,7 @@ void add_entries(const toml::table& table, Value& out) {
   }
 }
 
-// The parser bounds the depth of nesting (256), so recursion is safe.
+// The depth of nesting is bounded before anything is parsed, so recursion is safe.
 Value plain(const toml::node& node) {
   Value out;
   out.line = static_cast<int>(node.source().begin.line);
@@ -102,6 +104,13 @@ std::string shown(const Value& value) {
 }
 
 Value parse_document(std::string_view text, const std::string& name) {
+  const Nesting nesting = nesting_of(text);
+  if (nesting.depth > kDeepest)
+    refuse(
+        {name, nesting.line, nesting.column},
+        fmt::format("more than {} tables and arrays inside each other; dotted keys count for all "
+                    "their parts",
+                    kDeepest));
   try {
     return plain(toml::parse(text, name));
   } catch (const toml::parse_error& e) {

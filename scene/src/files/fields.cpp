@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 namespace tether::scene::files {
@@ -121,6 +122,24 @@ std::string Fields::text(std::string_view key, const std::string& otherwise) {
       return otherwise;
     }
   return found->value.text;
+}
+
+// Who runs the scene of somebody else's must not be surprised: no way out of the folder, no pipe of
+// a program that takes names for commands.
+std::string Fields::file_name(std::string_view key) {
+  const std::string name = text(key, "");
+  if (name.empty()) return "";
+  const std::filesystem::path path(name);
+  const bool out = path.is_absolute() || std::find(path.begin(), path.end(), "..") != path.end();
+  const bool odd = name.find_first_of("|<>\\*?:`$;&!") != std::string::npos || name[0] == '-' ||
+                   name[0] == '~' || name[0] == ' ' || name.back() == ' ';
+  if (!out && !odd && path.has_filename() && path.filename() != "." && name.size() < 200)
+    return name;
+  wrong(key,
+        out ? "must stay in the folder of the output: a relative name without \"..\""
+            : "must be the name of a file, of less than 200 characters, without | < > \\ * ? : ` "
+              "$ ; & ! and not beginning with - or ~ or a blank");
+  return "";
 }
 
 std::vector<double> Fields::numbers(std::string_view key, const std::vector<std::size_t>& lengths,
@@ -257,7 +276,7 @@ void Fields::finish() {
   for (const Entry& each : table_->entries) {
     if (std::find(known_.begin(), known_.end(), each.key) != known_.end()) continue;
     report_.add({place_.file, each.line, each.column}, field(each.key), shown(each.value),
-                "unknown key" + hint(each.key, known_));
+                "unknown key" + (report_.full() ? "" : hint(each.key, known_)));
   }
 }
 

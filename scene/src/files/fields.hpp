@@ -35,6 +35,8 @@ class Fields {
   int count(std::string_view key, int otherwise, int low, int high);
   bool flag(std::string_view key, bool otherwise);
   std::string text(std::string_view key, const std::string& otherwise);
+  /// The name of a file inside the folder of the output; empty if absent or wrong.
+  std::string file_name(std::string_view key);
   Eigen::Vector3d vector(std::string_view key, const Eigen::Vector3d& otherwise, const Range& range,
                          std::string_view unit);
   /// A direction of any length but zero; returned with length one.

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <fstream>
 #include <map>
+#include <set>
 #include <tether/scene/files.hpp>
 
 #include "document.hpp"
@@ -22,6 +22,7 @@ struct Reader {
   Report& report;
   Scene scene;
   std::map<std::string, int> bodies;  // by name
+  std::set<std::string> materials;    // of bodies
 
   Fields fields(const Value* table, std::string path) const {
     return {table, std::move(path), file, report};
@@ -38,12 +39,16 @@ struct Reader {
     }
   }
 
-  std::vector<std::string> body_names(bool with_world) const {
-    std::vector<std::string> names;
-    if (with_world) names.emplace_back("world");
-    for (const Body& body : scene.bodies) names.push_back(body.name);
-    return names;
+  /// What was meant; nothing for problems that nobody will see: each hint looks at all names.
+  template <class Names>
+  std::string hint_of(const std::string& wrong, const Names& names) const {
+    if (report.full()) return "";
+    std::vector<std::string> all;
+    for (const auto& each : names) all.push_back(name_of(each));
+    return hint(wrong, all);
   }
+  static const std::string& name_of(const std::string& name) { return name; }
+  static const std::string& name_of(const Body& body) { return body.name; }
 
   /// The body that `key` names.
   int body(Fields& in, std::string_view key) const {
@@ -54,7 +59,7 @@ struct Reader {
     const std::string name = in.text(key, "");
     const auto found = bodies.find(name);
     if (found != bodies.end()) return found->second;
-    in.wrong(key, "no such body" + hint(name, body_names(false)));
+    in.wrong(key, "no such body" + hint_of(name, scene.bodies));
     return 0;
   }
 
@@ -74,7 +79,7 @@ struct Reader {
       const auto found = bodies.find(name.text);
       if (found == bodies.end())
         return in.wrong("bodies", fmt::format("there is no body \"{}\"{}", name.text,
-                                              hint(name.text, body_names(true))));
+                                              hint_of(name.text, scene.bodies)));
       *out[i] = found->second;
     }
     if (first == second) in.wrong("bodies", "must be two different bodies");
@@ -189,17 +194,10 @@ void read_pair(Fields& in, Reader& r) {
     return in.wrong("between", std::string("must be ") + kAllowed);
   pair.first = between->items[0].text;
   pair.second = between->items[1].text;
-  std::vector<std::string> materials;
-  for (const Body& body : r.scene.bodies) materials.push_back(body.material);
   for (const std::string& name : {pair.first, pair.second})
-    if (name.empty() || std::find(materials.begin(), materials.end(), name) == materials.end()) {
-      std::vector<std::string> named;
-      for (const std::string& each : materials)
-        if (!each.empty() && std::find(named.begin(), named.end(), each) == named.end())
-          named.push_back(each);
-      return in.wrong("between",
-                      fmt::format("no body has the material \"{}\"{}", name, hint(name, named)));
-    }
+    if (r.materials.count(name) == 0)
+      return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,
+                                             r.hint_of(name, r.materials)));
   r.scene.pairs.push_back(std::move(pair));
 }
 
@@ -256,10 +254,10 @@ void read_engine(Fields& root, Reader& r) {
 void read_output(Fields& root, Reader& r) {
   Fields in = r.fields(root.table("output"), "output");
   Output& o = r.scene.output;
-  o.csv = in.text("csv", o.csv);
-  o.vtk = in.text("vtk", o.vtk);
-  o.svg = in.text("svg", o.svg);
-  o.state = in.text("state", o.state);
+  o.csv = in.file_name("csv");
+  o.vtk = in.file_name("vtk");
+  o.svg = in.file_name("svg");
+  o.state = in.file_name("state");
   o.every = in.number("every", o.every, kNotNegative, "s; 0: end / 1000");
   o.checkpoint = in.number("checkpoint", o.checkpoint, kNotNegative, "s; 0: only at the end");
   in.finish();
@@ -292,7 +290,7 @@ void read_expect(Fields& in, Reader& r) {
 Scene read(std::string_view text, const std::string& name) {
   const Value document = parse_document(text, name);
   Report report;
-  Reader r{name, report, {}, {}};
+  Reader r{name, report, {}, {}, {}};
   r.scene.file = name;
   Fields root(&document, "", name, report);
 
@@ -300,6 +298,7 @@ Scene read(std::string_view text, const std::string& name) {
   r.each(root, "body", [&](Fields& in) {
     Body body = read_body(in, name, report);
     r.bodies.emplace(body.name, static_cast<int>(r.scene.bodies.size()));
+    if (!body.material.empty()) r.materials.insert(body.material);
     r.scene.bodies.push_back(std::move(body));
   });
   r.each(root, "pair", [&](Fields& in) { read_pair(in, r); });

@@ -39,9 +39,11 @@ namespace files {
 
 void Report::add(const Place& place, std::string field, std::string value, std::string allowed) {
   // A file of garbage may have a problem on each of a million lines.
-  if (problems_.size() >= kShown) return;
+  if (full()) return;
   problems_.push_back({place, std::move(field), std::move(value), std::move(allowed)});
 }
+
+bool Report::full() const { return problems_.size() >= kShown; }
 
 void Report::finish() {
   if (problems_.empty()) return;

@@ -13,6 +13,7 @@ class Report {
  public:
   void add(const Place& place, std::string field, std::string value, std::string allowed);
   bool clean() const { return problems_.empty(); }
+  bool full() const;  ///< no more are shown
   /// Throws SceneError if there is a problem.
   void finish();
 

@@ -11,9 +11,10 @@ namespace tether::scene {
 /// What `tether` exits with.
 enum ExitCode : int {
   kGood = 0,
-  kNotMet = 1,  ///< an [[expect]] does not hold, a contact problem is not solved
-  kWrong = 2,   ///< a file, a scene or an option is wrong; nothing was run
-  kFailed = 3,  ///< the run could not go on
+  kNotMet = 1,   ///< an [[expect]] does not hold, a contact problem is not solved
+  kWrong = 2,    ///< a file, a scene or an option is wrong; nothing was run
+  kFailed = 3,   ///< the run could not go on
+  kSignal = 128  ///< and the number of the signal that ended it, as shells have it
 };
 
 void add_check_command(CLI::App& app, int* status);

@@ -28,8 +28,7 @@ const char* setting_name(const CostTable& table) { return table.smooth ? "tolera
 void print(const Scene& scene, const CostTable& table) {
   fmt::print("{}: errors against {}\n", scene.name.empty() ? scene.file : scene.name,
              table.reference);
-  fmt::print("  (ten times looser, or at twice the step, the reference changes by {:.1e})\n",
-             table.reference_error);
+  fmt::print("  (which may be off by {:.1e}; the errors include that)\n", table.reference_error);
   fmt::print("  {:>9}  {:>10}  {:>10}  {:>9}  {:>9}  {:>11}{}\n", setting_name(table), "error",
              "time / ms", "steps", table.smooth ? "drift" : "depth / m", "us per step",
              scene.expect.empty() ? "" : "  expectations met");
@@ -58,7 +57,7 @@ void write_csv(const std::string& file, const CostTable& table) {
 
 /// Error against time, each point with its setting.
 std::string draw(const std::string& file, const Scene& scene, const CostTable& table) {
-  std::string script = picture_head(file, 560, 400) + "$runs << EOD\n";
+  std::string script = picture_head(560, 400) + "$runs << EOD\n";
   for (const CostRow& row : table.rows)
     if (row.failure.empty())
       script += fmt::format("{:.4e} {:.4e} {:g}\n", 1e3 * row.seconds, std::max(row.error, 1e-17),
@@ -146,9 +145,10 @@ void add_cost_command(CLI::App& app, int* status) {
   command->add_option("--csv", a->csv, "Write the table");
   command->add_option("--svg", a->svg, "Draw error against time (needs gnuplot)");
   command->footer(
-      "The error is the largest distance (m) or angle (rad) of a body from the reference at 20 "
+      "The error is the largest distance (m) or angle (rad) of a body from the reference at 100 "
       "equal\n"
-      "times. Exit code: 0, 1 no setting meets --wanted, 2 the scene or an option is wrong, or "
+      "times, and what the reference may be off. Exit code: 0, 1 no setting meets --wanted, 2 the "
+      "scene or an option is wrong, or "
       "there\n"
       "is no reference.");
   command->callback([a, status] { *status = run_cost(*a); });

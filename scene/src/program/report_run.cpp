@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <ctime>
 #include <string>
 #include <tether/scene/words.hpp>
 #include <vector>
@@ -64,8 +65,8 @@ std::string bound(const Expect& e) {
 void print_summary(const Scene& scene, const RunResult& r) {
   const Summary& s = r.summary;
   const Counts& c = r.counts;
-  fmt::print("{}: {} engine, {:g} s in {:.3g} s of processor time\n",
-             scene.name.empty() ? scene.file : scene.name, r.engine, r.time, r.seconds);
+  fmt::print("{}: {} engine, {:g} s\n", scene.name.empty() ? scene.file : scene.name, r.engine,
+             r.time);
   fmt::print(
       "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
       s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
@@ -91,6 +92,16 @@ void print_summary(const Scene& scene, const RunResult& r) {
   if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, r.failure);
 }
 
+void print_times(const RunResult& r, double wall) {
+  timespec processor{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &processor);
+  fmt::print(
+      "  time         engine {:.3g} s (processor {:.3g} s); with reading and output {:.3g} s "
+      "(processor {:.3g} s)\n",
+      r.wall, r.seconds, wall,
+      static_cast<double>(processor.tv_sec) + 1e-9 * static_cast<double>(processor.tv_nsec));
+}
+
 void print_judgements(const Scene& scene, const RunResult& r) {
   if (scene.expect.empty()) return;
   const auto met = std::count_if(r.judgements.begin(), r.judgements.end(),
@@ -112,20 +123,25 @@ void print_judgements(const Scene& scene, const RunResult& r) {
   table.print();
 }
 
+// Everything on the clock: parts that were measured on different clocks add up to nothing.
 void print_costs(const RunResult& r) {
   double sum = 0;
   for (const EffectCost& each : r.costs) sum += each.seconds;
-  fmt::print("cost: {:.3g} s of processor time for {:g} s\n", r.seconds, r.time);
+  fmt::print("cost: {:.3g} s for {:g} s (processor {:.3g} s)\n", r.whole_wall, r.time,
+             r.whole_seconds);
   Table table({"effect", "s", "share"});
-  for (const EffectCost& each : r.costs)
-    table.add({each.effect, fmt::format("{:.3g}", each.seconds),
-               fmt::format("{:.1f} %", 100 * each.seconds / std::max(sum, 1e-300))});
+  const auto add = [&](const std::string& what, double seconds) {
+    table.add({what, fmt::format("{:.3g}", seconds),
+               fmt::format("{:.1f} %", 100 * seconds / std::max(r.whole_wall, 1e-300))});
+  };
+  for (const EffectCost& each : r.costs) add(each.effect, each.seconds);
+  add("start, records, expectations", std::max(0.0, r.whole_wall - sum));
   table.print();
 }
 
 void print_files(const RunResult& r) {
   for (const std::string& file : r.written) fmt::print("written: {}\n", file);
-  for (const std::string& remark : r.remarks) fmt::print(stderr, "{}\n", remark);
+  for (const std::string& remark : r.remarks) fmt::print("note: {}\n", remark);
 }
 
 int exit_code(const RunResult& r) {

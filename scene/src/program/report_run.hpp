@@ -7,6 +7,8 @@ namespace tether::scene {
 
 /// Energies, errors and work.
 void print_summary(const Scene& scene, const RunResult& result);
+/// What the engine took, and all of the program: `wall` seconds, reading and output included.
+void print_times(const RunResult& result, double wall);
 /// Each [[expect]] with what was found.
 void print_judgements(const Scene& scene, const RunResult& result);
 /// What each effect cost.

@@ -1,6 +1,8 @@
 // Tether: `tether run`: moves a scene. SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/core.h>
 
+#include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -11,6 +13,7 @@
 #include "commands.hpp"
 #include "report_run.hpp"
 #include "settings.hpp"
+#include "signals.hpp"
 
 namespace tether::scene {
 
@@ -20,12 +23,38 @@ struct Arguments {
   std::string file, restart, folder;
   std::optional<std::string> csv, vtk, svg, state;
   std::optional<double> end, every;
-  bool quiet = false;
+  bool force = false, quiet = false;
 };
+
+/// Names of a scene file stay inside the folder of the output, links and all: who runs a scene of
+/// somebody else's chooses what may be overwritten.
+void stay_inside(const std::string& folder, const Output& o) {
+  namespace fs = std::filesystem;
+  const fs::path inside = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder));
+  for (const std::string& file : {o.csv, o.vtk, o.svg, o.state}) {
+    if (file.empty()) continue;
+    const fs::path whole = fs::weakly_canonical(inside / file),
+                   way = whole.lexically_relative(inside);
+    std::error_code error;
+    const fs::file_status there = fs::status(whole, error);
+    if (way.empty() || *way.begin() == ".." ||
+        (fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there)))
+      throw std::invalid_argument(fmt::format(
+          "output: \"{}\" leads to {}: names in a scene stay in the folder of its output, {}, and "
+          "name files; options of the command line may name any place",
+          file, whole.string(), inside.string()));
+  }
+}
 
 /// What the command line says goes before what the scene says.
 void overlay(const Arguments& arguments, Scene& scene) {
   Output& o = scene.output;
+  Output by_scene = o;
+  if (arguments.csv) by_scene.csv.clear();
+  if (arguments.vtk) by_scene.vtk.clear();
+  if (arguments.svg) by_scene.svg.clear();
+  if (arguments.state) by_scene.state.clear();
+  stay_inside(arguments.folder, by_scene);
   if (arguments.csv) o.csv = *arguments.csv;
   if (arguments.vtk) o.vtk = *arguments.vtk;
   if (arguments.svg) o.svg = *arguments.svg;
@@ -41,19 +70,31 @@ void overlay(const Arguments& arguments, Scene& scene) {
 }
 
 int run_scene(const Arguments& arguments) {
+  const auto begin = std::chrono::steady_clock::now();
   Scene scene = read_scene(arguments.file);
   overlay(arguments, scene);
   tether::Progress bar(1);
   RunOptions options;
   options.restart = arguments.restart;
+  options.force = arguments.force;
+  options.interrupted = [] { return caught_signal() != 0; };
+  catch_signals();
   bar.start(scene.name, scene.end, 1);
   if (!arguments.quiet) options.progress = [&](double t) { bar.at(t); };
   const RunResult result = run(scene, options);
   bar.hide();
   print_summary(scene, result);
+  print_times(result,
+              std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   print_judgements(scene, result);
   print_files(result);
-  return exit_code(result);
+  if (result.interrupted)
+    fmt::print("interrupted at {:.9g} s of {:g} s{}\n", result.time, scene.end,
+               scene.output.state.empty()
+                   ? ""
+                   : fmt::format("; to go on: --restart {}", scene.output.state));
+  std::fflush(stdout);
+  return result.interrupted ? kSignal + caught_signal() : exit_code(result);
 }
 
 }  // namespace
@@ -72,10 +113,15 @@ void add_run_command(CLI::App& app, int* status) {
   command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
   command->add_option("--every", a->every, "Time between records, s")->check(positive_number());
   command->add_option("--end", a->end, "End of the run, s")->check(positive_number());
+  command->add_flag("--force", a->force,
+                    "With --restart: the state may be of another scene; positions and velocities "
+                    "are taken over, bits are not the same");
   command->add_flag("--quiet", a->quiet, "No progress bar");
   command->footer(
       "Exit code: 0 every expectation is met, 1 one is not, 2 the scene, a file or an option is\n"
-      "wrong, 3 the run could not go on. Options go before what the scene says in [output].");
+      "wrong, 3 the run could not go on, 130 (143) ended by Ctrl-C (SIGTERM), with all files "
+      "whole\n"
+      "and the state saved. Options go before what the scene says in [output].");
   command->callback([a, status] { *status = run_scene(*a); });
 }
 

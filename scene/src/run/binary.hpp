@@ -3,6 +3,7 @@
 // For the machine that wrote them: a state is for going on, not for exchange.
 #pragma once
 
+#include <Eigen/Core>
 #include <istream>
 #include <ostream>
 #include <stdexcept>
@@ -21,6 +22,30 @@ void get(std::istream& in, T&... values) {
   static_assert((std::is_arithmetic_v<T> && ...));
   (in.read(reinterpret_cast<char*>(&values), sizeof values), ...);
   if (!in) throw std::runtime_error("the saved state is cut off");
+}
+
+template <class T>
+T get(std::istream& in) {
+  T value{};
+  get(in, value);
+  return value;
+}
+
+/// Vectors of Eigen, of a length that reader and writer know.
+template <class... Vector>
+void put_array(std::ostream& out, const Vector&... vectors) {
+  const auto each = [&](const auto& v) {
+    for (Eigen::Index i = 0; i < v.size(); ++i) put(out, v[i]);
+  };
+  (each(vectors), ...);
+}
+
+template <class... Vector>
+void get_array(std::istream& in, Vector&&... vectors) {
+  const auto each = [&](auto& v) {
+    for (Eigen::Index i = 0; i < v.size(); ++i) get(in, v[i]);
+  };
+  (each(vectors), ...);
 }
 
 }  // namespace tether::scene::binary

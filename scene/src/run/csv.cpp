@@ -1,18 +1,24 @@
 // Tether: a run as a table. SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <cstdlib>
-#include <filesystem>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 
 #include "recorder.hpp"
+#include "whole_file.hpp"
 
 namespace tether::scene {
 
 namespace {
 
-/// Beyond it only VTK files hold the bodies: a table of a million columns serves nobody.
+/// The table has the first of them: one of a million columns serves nobody.
 constexpr std::size_t kMostBodies = 200;
 
 class CsvRecorder : public Recorder {
@@ -22,14 +28,20 @@ class CsvRecorder : public Recorder {
       : file_(file), start_energy_(start_energy) {
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       if (!scene.bodies[i].fixed) moving_.push_back(i);
-    all_ = moving_.size() <= kMostBodies;
-    if (!all_) moving_.clear();
-
-    const std::string kept = resume.restarted ? rows_up_to(resume.time) : "";
+    bodies_ = moving_.size();
+    moving_.resize(std::min(bodies_, kMostBodies));
     make_folder_of(file);
-    out_.open(file, std::ios::binary | std::ios::trunc);
-    if (!out_) throw std::runtime_error("cannot write " + file);
-    out_ << header(scene) << kept;
+    const std::string first = header(scene);
+    const long kept = resume.restarted ? length_up_to(resume.time, first) : 0;
+    // Cut where the run goes on, never emptied: what is kept is safe at every moment.
+    out_.reset(std::fopen(file.c_str(), kept > 0 ? "r+b" : "wb"));
+    if (!out_) fail();
+    if (kept == 0) {
+      put(first);
+      return;
+    }
+    if (ftruncate(fileno(out_.get()), kept) != 0 || std::fseek(out_.get(), kept, SEEK_SET) != 0)
+      fail();
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {
@@ -48,16 +60,24 @@ class CsvRecorder : public Recorder {
       add3(b.velocity), add3(b.angular_velocity);
     }
     line_ += '\n';
-    out_ << line_;
+    put(line_);
+  }
+
+  void keep() override {
+    if (std::fflush(out_.get()) != 0) fail();
+    fsync(fileno(out_.get()));  // devices have none
   }
 
   void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) override {
-    out_.flush();
-    if (!out_) throw std::runtime_error("cannot write " + file_);
+    if (std::fflush(out_.get()) != 0) fail();
     written.push_back(file_);
-    if (!all_)
+    if (bodies_ > moving_.size())
+      remarks.push_back(
+          fmt::format("{} has the first {} of {} moving bodies; VTK files have all of them (--vtk)",
+                      file_, moving_.size(), bodies_));
+    if (lacks_rows_)
       remarks.push_back(fmt::format(
-          "{}: more than {} bodies, so their states are only in VTK files", file_, kMostBodies));
+          "{} lacks rows from before the restart: it was no longer there, or cut", file_));
   }
 
  private:
@@ -74,33 +94,42 @@ class CsvRecorder : public Recorder {
     return text + '\n';
   }
 
-  /// The rows of an earlier run, so that a run in two parts leaves the table of one.
-  std::string rows_up_to(double time) const {
+  /// Bytes of the rows of an earlier run that are kept, so that a run in two parts leaves the table
+  /// of one; 0: there is no such table.
+  long length_up_to(double time, const std::string& first) {
     std::ifstream in(file_, std::ios::binary);
-    std::string kept, line;
-    std::getline(in, line);  // the header
-    while (std::getline(in, line) && std::strtod(line.c_str(), nullptr) <= time)
-      kept += line + '\n';
-    return kept;
+    std::string line;
+    lacks_rows_ = true;
+    if (!std::getline(in, line) || line + '\n' != first) return 0;
+    auto length = static_cast<long>(first.size());
+    while (std::getline(in, line) && !in.eof()) {  // a row without its end is cut
+      const double at = std::strtod(line.c_str(), nullptr);
+      if (at > time) break;
+      lacks_rows_ = at != time;
+      length += static_cast<long>(line.size()) + 1;
+    }
+    return length;
+  }
+
+  void put(const std::string& text) {
+    if (std::fwrite(text.data(), 1, text.size(), out_.get()) != text.size()) fail();
+  }
+  [[noreturn]] void fail() const {
+    throw std::runtime_error(fmt::format("cannot write {}: {}", file_, std::strerror(errno)));
   }
 
   std::string file_, line_;
   double start_energy_;
-  std::vector<std::size_t> moving_;
-  bool all_ = true;
-  std::ofstream out_;
+  std::vector<std::size_t> moving_;  // those in the table
+  std::size_t bodies_ = 0;           // that move
+  bool lacks_rows_ = false;
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::unique_ptr<std::FILE, Close> out_;
 };
 
 }  // namespace
-
-void make_folder_of(const std::string& file) {
-  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
-  if (folder.empty()) return;
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error)
-    throw std::runtime_error(fmt::format("cannot make {}: {}", folder.string(), error.message()));
-}
 
 std::unique_ptr<Recorder> make_csv_recorder(const Scene& scene, const std::string& file,
                                             double start_energy, const Resume& resume) {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "binary.hpp"
+#include "schedule.hpp"
 
 namespace tether::scene {
 
@@ -16,14 +17,17 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<double> list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
+/// What is no number is larger than any.
+double larger(double a, double b) {
+  return std::isnan(a) || std::isnan(b) ? kInfinity : std::max(a, b);
+}
+
 /// Largest difference of a component; quaternions stand for the same orientation in both signs.
 double difference(Quantity quantity, const std::vector<double>& a, const std::vector<double>& b) {
   double same = 0, opposite = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    // Written so that nan stays nan.
-    const double plus = std::abs(a[i] - b[i]), minus = std::abs(a[i] + b[i]);
-    same = plus <= same ? same : plus;
-    opposite = minus <= opposite ? opposite : minus;
+    same = larger(same, std::abs(a[i] - b[i]));
+    opposite = larger(opposite, std::abs(a[i] + b[i]));
   }
   return quantity == Quantity::orientation ? std::min(same, opposite) : same;
 }
@@ -89,18 +93,19 @@ std::vector<double> measure(const Scene& scene, Quantity quantity, int body, con
 Judge::Judge(const Scene& scene)
     : scene_(scene), judgements_(scene.expect.size()), excess_(scene.expect.size(), -kInfinity) {
   for (std::size_t i = 0; i < scene.expect.size(); ++i)
-    judgements_[i].beyond = scene.expect[i].time > scene.end;
+    judgements_[i].beyond =
+        scene.expect[i].time > scene.end && !same_time(scene.expect[i].time, scene.end);
 }
 
-void Judge::look(double event, const Engine& engine, double start_energy) {
+void Judge::look(double event, bool record, const Engine& engine, double start_energy) {
   for (std::size_t i = 0; i < scene_.expect.size(); ++i) {
     const Expect& expect = scene_.expect[i];
-    const bool now = expect.time == event || (expect.throughout && event < expect.time);
-    if (!now) continue;
+    const bool due = same_time(expect.time, event);
+    if (!due && !(record && expect.throughout && event < expect.time)) continue;
     const std::vector<double> value =
         measure(scene_, expect.quantity, expect.body, engine, start_energy);
     double error = 0, excess = -kInfinity;
-    const auto over = [&](double by) { excess = by <= excess ? excess : by; };
+    const auto over = [&](double by) { excess = larger(excess, by); };
     if (!expect.value.empty()) {
       error = difference(expect.quantity, value, expect.value);
       over(error - expect.within);
@@ -109,13 +114,13 @@ void Judge::look(double event, const Engine& engine, double start_energy) {
     if (expect.at_least) over(*expect.at_least - size(value));
 
     Judgement& judgement = judgements_[i];
-    if (!(excess <= excess_[i]) || judgement.value.empty()) {
+    if (excess > excess_[i] || judgement.value.empty()) {
       excess_[i] = excess;
       judgement.time = engine.time();
       judgement.value = value;
       judgement.error = error;
     }
-    if (expect.time == event) judgement.judged = true;
+    judgement.judged = judgement.judged || due;
     judgement.met = judgement.judged && excess_[i] <= 0;
   }
 }

@@ -15,6 +15,7 @@
 #include "geometry/mesh.hpp"
 #include "gnuplot.hpp"
 #include "recorder.hpp"
+#include "whole_file.hpp"
 
 namespace tether::scene {
 
@@ -131,7 +132,7 @@ class PictureRecorder : public Recorder {
   std::string script() {
     eye_ = view(instants_, scene_, bodies_);
     find_frame();
-    std::string text = picture_head(file_, 860, 400);
+    std::string text = picture_head(860, 400);
     text += "set multiplot\nunset key\n";
     text +=
         "set lmargin at screen 0.02\nset rmargin at screen 0.5\nset tmargin at screen "

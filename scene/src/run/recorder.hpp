@@ -11,13 +11,16 @@ namespace tether::scene {
 /// Where a run goes on from: recorders keep what they wrote up to then and drop what came later.
 struct Resume {
   bool restarted = false;
-  double time = 0;  // s
+  double time = 0;  // s, of the last record that a run in one piece has, too
 };
 
 class Recorder {
  public:
   virtual ~Recorder() = default;
   virtual void record(const Engine& engine, const Diagnostics& diagnostics) = 0;
+  /// With a saved state: what was recorded outlasts a crash, so that a run that goes on from the
+  /// state leaves the files of an undisturbed one.
+  virtual void keep() {}
   /// The run is over; says which files there are and what went wrong.
   virtual void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) = 0;
 };
@@ -29,8 +32,5 @@ std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::strin
                                             const Resume& resume);
 std::unique_ptr<Recorder> make_picture_recorder(const Scene& scene, const std::string& file,
                                                 double start_energy);
-
-/// Makes the folder of a file. Throws std::runtime_error.
-void make_folder_of(const std::string& file);
 
 }  // namespace tether::scene

@@ -3,71 +3,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
-#include <filesystem>
-#include <fstream>
-#include <limits>
+#include <optional>
+#include <sstream>
 #include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 
 #include "binary.hpp"
 #include "judge.hpp"
+#include "output_lock.hpp"
+#include "output_names.hpp"
 #include "recorder.hpp"
+#include "saved_state.hpp"
+#include "schedule.hpp"
 
 namespace tether::scene {
 
 namespace {
 
-constexpr const char kMagic[] = "tether state 1\n";
+/// Since it was made.
+class Stopwatch {
+ public:
+  double wall() const { return seconds(CLOCK_MONOTONIC) - wall_; }
+  double processor() const { return seconds(CLOCK_PROCESS_CPUTIME_ID) - processor_; }
 
-/// Times at which the run stops, in order, each for one or several reasons.
-struct Event {
-  double time;
-  bool record, checkpoint;
-};
-
-/// Multiples of `every` and the end. The last multiple may be the end but for rounding.
-std::vector<double> multiples(double every, double end) {
-  std::vector<double> times;
-  const double count = end / every;
-  for (long k = 1; static_cast<double>(k) < count * (1 - 1e-12); ++k)
-    times.push_back(static_cast<double>(k) * every);
-  times.push_back(end);
-  return times;
-}
-
-std::vector<Event> events(const Scene& scene, const std::vector<double>& stops) {
-  std::vector<Event> all;
-  const double every = scene.output.every > 0 ? scene.output.every : scene.end / 1000;
-  for (const double t : multiples(every, scene.end)) all.push_back({t, true, false});
-  if (scene.output.checkpoint > 0)
-    for (const double t : multiples(scene.output.checkpoint, scene.end))
-      all.push_back({t, false, true});
-  all.push_back({scene.end, true, true});
-  for (const Expect& expect : scene.expect)
-    if (expect.time <= scene.end) all.push_back({expect.time, false, false});
-  for (const double t : stops)
-    if (t <= scene.end) all.push_back({t, false, false});
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Event& a, const Event& b) { return a.time < b.time; });
-  std::vector<Event> merged;
-  for (const Event& event : all) {
-    if (merged.empty() || merged.back().time != event.time) {
-      merged.push_back(event);
-    } else {
-      merged.back().record = merged.back().record || event.record;
-      merged.back().checkpoint = merged.back().checkpoint || event.checkpoint;
-    }
+ private:
+  static double seconds(clockid_t clock) {
+    timespec now{};
+    clock_gettime(clock, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
   }
-  return merged;
-}
-
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
+  double wall_ = seconds(CLOCK_MONOTONIC), processor_ = seconds(CLOCK_PROCESS_CPUTIME_ID);
+};
 
 /// What a command line or a caller may have put over the scene.
 const Scene& checked(const Scene& scene) {
@@ -92,28 +59,39 @@ class Run {
  public:
   Run(const Scene& scene, const RunOptions& options)
       : scene_(checked(scene)), options_(options), judge_(scene), engine_(make_engine(scene)) {
+    const Output& o = scene.output;
+    check_names(o, {scene.file, o.state == options.restart ? "" : options.restart});
+    for (const std::string& each : names(o)) lock_.take(each);
+    if (!o.state.empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene);
     result_.engine = engine_->name();
+    if (make_plan(scene).engine == EngineKind::stepping)
+      step_ = scene.stepping.value_or(SteppingOptions{}).step;
     if (options.restart.empty())
       start();
     else
       restore(options.restart);
-    const Output& o = scene.output;
+    engine_->stop_when(options.interrupted);
     if (!o.csv.empty())
       recorders_.push_back(make_csv_recorder(scene, o.csv, summary().start_energy, resume_));
     if (!o.vtk.empty()) recorders_.push_back(make_vtk_recorder(scene, o.vtk, resume_));
     if (!o.svg.empty())
       recorders_.push_back(make_picture_recorder(scene, o.svg, summary().start_energy));
-    if (!resume_.restarted) stop({0, true, false});
   }
 
   RunResult go() {
     try {
-      for (const Event& event : events(scene_, options_.stops)) {
-        if (event.time <= done_) continue;
-        const double before = processor_seconds();
-        engine_->advance(event.time);
-        result_.seconds += processor_seconds() - before;
-        stop(event);
+      if (!resume_.restarted) stop(at_start());
+      for (const Event& event : schedule(scene_, options_.stops)) {
+        if (event.time <= done_ || same_time(event.time, done_)) continue;
+        move(event.time);
+        if (engine_->time() >= event.time || !interrupted()) stop(event);
+        if (!interrupted() || event.end) continue;
+        result_.interrupted = true;
+        Event here;
+        here.time = engine_->time();
+        here.end = true;
+        stop(here);
+        break;
       }
     } catch (const SimulationError& e) {
       result_.failure = e.what();
@@ -124,22 +102,44 @@ class Run {
 
  private:
   Summary& summary() { return result_.summary; }
+  bool interrupted() const { return options_.interrupted && options_.interrupted(); }
+
+  static Event at_start() {
+    Event event;
+    event.record = event.expect = true;
+    return event;
+  }
 
   void start() {
     const Diagnostics d = engine_->diagnostics();
     summary().start_energy = d.kinetic_energy + d.potential_energy;
   }
 
-  void stop(const Event& event) {
-    done_ = event.time;
-    judge_.look(event.time, *engine_, summary().start_energy);
-    if (options_.record) options_.record(*engine_);
-    if (event.record) record();
-    if (event.checkpoint && !scene_.output.state.empty()) save(scene_.output.state);
+  void move(double time) {
+    const Stopwatch watch;
+    engine_->advance(time);
+    result_.seconds += watch.processor();
+    result_.wall += watch.wall();
   }
 
-  void record() {
+  // A state is that of a run which goes on: what belongs to an end on the way comes after it.
+  void stop(const Event& event) {
     const Diagnostics d = engine_->diagnostics();
+    demand_finite(d);
+    done_ = event.time;
+    if (event.record || event.expect)
+      judge_.look(event.time, event.record, *engine_, summary().start_energy);
+    if (options_.record) options_.record(*engine_);
+    if (event.record) record(d);
+    if ((event.checkpoint || event.end) && !scene_.output.state.empty()) save(scene_.output.state);
+    if (event.end && !event.record) record(d);
+  }
+
+  // Steps may be longer than the time between records: no state is recorded twice.
+  void record(const Diagnostics& d) {
+    if (recorded_ && engine_->time() == last_record_) return;
+    recorded_ = true;
+    last_record_ = engine_->time();
     Summary& s = summary();
     s.end_energy = d.kinetic_energy + d.potential_energy;
     s.lowest_change = std::min(s.lowest_change, s.end_energy - s.start_energy);
@@ -148,8 +148,38 @@ class Run {
     s.penetration = std::max(s.penetration, d.penetration);
     s.residual = std::max(s.residual, d.residual);
     s.contacts = std::max(s.contacts, d.contacts);
+    look_for_fast_turns();
     for (const auto& recorder : recorders_) recorder->record(*engine_, d);
     if (options_.progress) options_.progress(engine_->time());
+  }
+
+  void demand_finite(const Diagnostics& d) const {
+    const auto refuse = [&](const std::string& what) {
+      throw SimulationError(fmt::format(
+          "t = {:g} s: {} is not a finite number: the motion has left the range of numbers, about "
+          "1e-150 to 1e150 in SI units, or a step is far too long for it",
+          engine_->time(), what));
+    };
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
+      const BodyState& b = engine_->bodies()[i];
+      if (!b.position.allFinite() || !b.orientation.coeffs().allFinite() ||
+          !b.velocity.allFinite() || !b.angular_velocity.allFinite())
+        refuse(fmt::format("the state of body \"{}\"", scene_.bodies[i].name));
+    }
+    if (!std::isfinite(d.kinetic_energy + d.potential_energy)) refuse("the energy");
+    if (!d.momentum.allFinite() || !d.angular_momentum.allFinite()) refuse("a momentum");
+    if (!std::isfinite(d.drift) || !std::isfinite(d.penetration) || std::isnan(d.residual))
+      refuse("an error");
+  }
+
+  void look_for_fast_turns() {
+    if (!step_) return;
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i)
+      if (const double turn = *step_ * engine_->bodies()[i].angular_velocity.norm();
+          turn > fastest_turn_) {
+        fastest_turn_ = turn;
+        fastest_ = i;
+      }
   }
 
   void finish() {
@@ -159,56 +189,73 @@ class Run {
     result_.judgements = judge_.judgements();
     for (const auto& recorder : recorders_) recorder->finish(result_.written, result_.remarks);
     if (saved_) result_.written.push_back(scene_.output.state);
+    // Beyond a radian a step the midpoint rule of rotations is no longer near the motion.
+    if (fastest_turn_ > 1)
+      result_.remarks.push_back(fmt::format(
+          "body \"{}\" turns by {:.3g} rad in a step: its rotation is not resolved, and collisions "
+          "may take its energy; stepping.step should be below {:.2g} s",
+          scene_.bodies[fastest_].name, fastest_turn_, 0.1 * *step_ / fastest_turn_));
+    result_.whole_seconds = watch_.processor();
+    result_.whole_wall = watch_.wall();
   }
 
-  // A state is whole or absent: it replaces the old one in one go.
   void save(const std::string& file) {
-    make_folder_of(file);
-    if (std::filesystem::exists(file) && !std::filesystem::is_regular_file(file))
-      throw std::runtime_error("cannot write " + file + ": it is there and is no file");
-    const std::string fresh = file + ".new";
-    {
-      std::ofstream out(fresh, std::ios::binary | std::ios::trunc);
-      out << kMagic;
-      const Summary& s = summary();
-      binary::put(out, done_, engine_->time(), s.start_energy, s.end_energy, s.lowest_change,
-                  s.largest_change, s.drift, s.penetration, s.residual, s.contacts);
-      judge_.save(out);
-      engine_->save(out);
-      if (!out.flush()) throw std::runtime_error("cannot write " + fresh);
-    }
-    if (std::rename(fresh.c_str(), file.c_str()) != 0)
-      throw std::runtime_error("cannot write " + file);
+    for (const auto& recorder : recorders_) recorder->keep();
+    std::ostringstream out;
+    const Summary& s = summary();
+    binary::put(out, done_, last_record_, s.start_energy, s.end_energy, s.lowest_change,
+                s.largest_change, s.drift, s.penetration, s.residual, s.contacts);
+    judge_.save(out);
+    engine_->save(out);
+    write_state(file, scene_hash_, out.str());
     saved_ = true;
   }
 
   void restore(const std::string& file) {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) throw std::runtime_error("cannot open the saved state " + file);
-    std::string magic(sizeof kMagic - 1, '\0');
-    in.read(magic.data(), static_cast<std::streamsize>(magic.size()));
-    if (!in || magic != kMagic) throw std::runtime_error(file + " is not a saved state");
+    const SavedState saved = read_state(file, scene_hash_, options_.force);
+    if (!options_.force) return restore(file, saved.content, Engine::Restore::exact);
+    try {
+      return restore(file, saved.content,
+                     saved.same ? Engine::Restore::exact : Engine::Restore::near);
+    } catch (const std::runtime_error&) {
+      if (!saved.same) throw;
+    }
+    restore(file, saved.content, Engine::Restore::near);
+  }
+
+  void restore(const std::string& file, const std::string& content, Engine::Restore how) {
+    std::istringstream in(content);
     Summary& s = summary();
-    binary::get(in, done_, resume_.time, s.start_energy, s.end_energy, s.lowest_change,
+    binary::get(in, done_, last_record_, s.start_energy, s.end_energy, s.lowest_change,
                 s.largest_change, s.drift, s.penetration, s.residual, s.contacts);
     judge_.restore(in);
-    engine_->restore(in);
-    resume_.restarted = true;
+    engine_->restore(in, how);
+    if (in.peek() != std::char_traits<char>::eof())
+      throw std::runtime_error("the saved state " + file + " is longer than this scene needs");
+    resume_ = {true, last_record_};
+    recorded_ = true;
     if (done_ >= scene_.end)
       throw std::runtime_error(fmt::format(
           "{} was saved at {} s, but the scene ends at {} s: nothing is left to run (--end)", file,
           done_, scene_.end));
   }
 
+  const Stopwatch watch_;
   const Scene& scene_;
   const RunOptions& options_;
+  OutputLock lock_;
   Judge judge_;
   std::unique_ptr<Engine> engine_;
   RunResult result_;
   Resume resume_;
   std::vector<std::unique_ptr<Recorder>> recorders_;
+  std::uint64_t scene_hash_ = 0;
   double done_ = -1;  // the last event
-  bool saved_ = false;
+  bool recorded_ = false, saved_ = false;
+  double last_record_ = 0;
+  std::optional<double> step_;  // of the stepping engine
+  double fastest_turn_ = 0;     // rad in a step
+  std::size_t fastest_ = 0;     // body
 };
 
 }  // namespace

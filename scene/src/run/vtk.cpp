@@ -9,7 +9,9 @@
 #include <fstream>
 
 #include "geometry/mesh.hpp"
+#include "output_names.hpp"
 #include "recorder.hpp"
+#include "whole_file.hpp"
 
 namespace tether::scene {
 
@@ -92,8 +94,7 @@ void put(std::vector<float>& out, const Vector3d& v) {
 class VtkRecorder : public Recorder {
  public:
   VtkRecorder(const Scene& scene, const std::string& file, const Resume& resume)
-      : file_(std::filesystem::path(file).replace_extension(".pvd").string()),
-        folder_(std::filesystem::path(file_).replace_extension("").string()) {
+      : file_(film_file(file)), folder_(film_folder(file)) {
     if (resume.restarted) keep_up_to(resume.time);
     make_folder_of(folder_ + "/x");
     std::size_t surfaces = 0;
@@ -111,16 +112,22 @@ class VtkRecorder : public Recorder {
 
   void record(const Engine& engine, const Diagnostics&) override {
     add("bodies", 0, engine.time(), bodies(engine));
-    if (!engine.contacts().empty()) add("contacts", 1, engine.time(), contacts(engine));
+    if (!engine.contacts().empty())
+      add("contacts", 1, engine.time(), contacts(engine));
+    else
+      remove_frame("contacts");
     ++number_;
   }
 
+  void keep() override {
+    write_whole(file_,
+                "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
+                "byte_order=\"LittleEndian\">\n<Collection>\n" +
+                    sets_ + "</Collection>\n</VTKFile>\n");
+  }
+
   void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
-    std::ofstream out(file_, std::ios::binary);
-    out << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
-           "byte_order=\"LittleEndian\">\n<Collection>\n"
-        << sets_ << "</Collection>\n</VTKFile>\n";
-    if (!out.flush()) throw std::runtime_error("cannot write " + file_);
+    keep();
     written.push_back(file_);
   }
 
@@ -141,6 +148,12 @@ class VtkRecorder : public Recorder {
     data.write(name);
     sets_ += fmt::format("<DataSet timestep=\"{}\" part=\"{}\" file=\"{}/{}_{:06}.vtp\"/>\n", time,
                          part, std::filesystem::path(folder_).filename().string(), what, number_);
+  }
+
+  // That of an earlier run, of which this one takes the names.
+  void remove_frame(const char* what) const {
+    std::error_code ignored;
+    std::filesystem::remove(fmt::format("{}/{}_{:06}.vtp", folder_, what, number_), ignored);
   }
 
   PolyData bodies(const Engine& engine) const {
@@ -200,9 +213,9 @@ class VtkRecorder : public Recorder {
       if (line.compare(0, start.size(), start) != 0) continue;
       if (std::strtod(line.c_str() + start.size(), nullptr) > time) break;
       sets_ += line + '\n';
-      const std::size_t dot = line.rfind(".vtp");
-      if (dot != std::string::npos && dot >= 6)
-        number_ = std::strtol(line.substr(dot - 6, 6).c_str(), nullptr, 10) + 1;
+      const std::size_t number = line.rfind('_');
+      if (number != std::string::npos)
+        number_ = std::strtol(line.c_str() + number + 1, nullptr, 10) + 1;
     }
   }
 

@@ -3,9 +3,11 @@
 #include <cmath>
 #include <cstdio>
 #include <istream>
+#include <limits>
 #include <ostream>
 
 #include "integrator.hpp"
+#include "run/binary.hpp"
 
 namespace tether::scene {
 
@@ -13,53 +15,61 @@ namespace {
 
 using namespace smooth;
 
-constexpr char kMagic[8] = {'s', 'm', 'o', 'o', 't', 'h', ' ', '1'};
+constexpr char kMagic[8] = {'s', 'm', 'o', 'o', 't', 'h', ' ', '2'};
 
 // Figures of a file are rounded, so a start may be off the joints by this much, relative to the
 // scene's size and speed (at least 1 m, 1 m/s). It is moved onto them.
 constexpr double kStartTolerance = 1e-4;
 
+// A multistep method's history cannot be read from IDA nor given to it. So a saved state holds an
+// anchor, a point from which the history was built anew, and the time reached: whoever restores it
+// takes the same steps once more from there. Anchors are part of the integration, whether anybody
+// saves or not: the start, then every some thousand steps (Integrator::anchor_is_due).
 class SmoothEngine : public Engine {
  public:
   explicit SmoothEngine(const Scene& scene)
-      : options_(scene.smooth.value_or(SmoothOptions{})), system_(scene) {
+      : scene_(scene),
+        options_(scene.smooth.value_or(SmoothOptions{})),
+        system_(std::make_unique<System>(scene)) {
     bodies_.resize(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
       bodies_[b].position = scene.bodies[b].position;
       bodies_[b].orientation = scene.bodies[b].orientation.normalized();
     }
-    y_ = system_.start_state();
+    y_ = system_->start_state();
     check_start();
-    system_.complete(0.0, y_, yp_);
-    if (system_.constraint_count() > 0) {
+    system_->complete(0.0, y_, yp_);
+    if (system_->constraint_count() > 0) {
       SmoothOptions with = options_;
       with.projection = true;
       // Invariants keep the values of the start once it is consistent.
-      system_.keep_invariants_of(0.0, y_);
+      system_->keep_invariants_of(0.0, y_);
       for (int pass = 0; pass < 2; ++pass) {
-        Integrator start(system_, with, 0.0, y_, yp_);
+        Integrator start(*system_, with, 0.0, y_, yp_);
         const ida_projection::ConsistencyReport report = start.make_consistent(0.0);
         if (!report)
           throw std::invalid_argument("the start of the scene contradicts its joints: " +
                                       report.message);
         y_ = start.y();
-        system_.keep_invariants_of(0.0, y_);
+        system_->keep_invariants_of(0.0, y_);
       }
     }
-    restart(0.0);
+    renew(0.0, y_, std::vector<double>(system_->kept()));
   }
 
   const char* name() const override { return "smooth"; }
   double time() const override { return integrator_->time(); }
 
   void advance(double t) override {
-    integrator_->advance(t);
-    system_.bodies(integrator_->y().data(), bodies_);
+    long steps_left = options_.max_steps;
+    const auto stop = [this] { return interrupted(); };
+    while (!integrator_->advance(t, steps_left, stop) && !interrupted()) anchor();
+    system_->bodies(integrator_->y().data(), bodies_);
   }
 
   const std::vector<BodyState>& bodies() const override { return bodies_; }
   Diagnostics diagnostics() const override {
-    return system_.diagnostics(time(), integrator_->y().data());
+    return system_->diagnostics(time(), integrator_->y().data());
   }
   const std::vector<ContactState>& contacts() const override { return no_contacts_; }
 
@@ -76,13 +86,13 @@ class SmoothEngine : public Engine {
 
   std::vector<EffectCost> costs() const override {
     std::vector<EffectCost> costs;
-    const std::vector<std::string> names = system_.effect_names();
+    const std::vector<std::string> names = system_->effect_names();
     Integrator::Seconds s = integrator_->seconds();
     if (!seconds_before_.effects.empty()) add(seconds_before_, s);
     double rest = s.total - s.jacobian - s.projection;
     for (std::size_t i = 0; i < names.size(); ++i) {
       rest -= s.effects[i];
-      if (names[i] != "joints" || system_.rows() > 0) costs.push_back({names[i], s.effects[i]});
+      if (names[i] != "joints" || system_->rows() > 0) costs.push_back({names[i], s.effects[i]});
     }
     costs.push_back({"Jacobian", s.jacobian});
     if (options_.projection) costs.push_back({"projection", s.projection});
@@ -90,47 +100,40 @@ class SmoothEngine : public Engine {
     return costs;
   }
 
-  void save(std::ostream& out) override {
-    const Eigen::VectorXd y = integrator_->y();
-    const double t = time();
-    const std::vector<double>& kept = system_.kept();
+  void save(std::ostream& out) const override {
+    const Eigen::VectorXd now = integrator_->y();
+    const std::vector<double>& kept = system_->kept();
     out.write(kMagic, sizeof kMagic);
-    write_number(out, static_cast<double>(y.size()));
-    write_number(out, static_cast<double>(kept.size()));
-    write_number(out, t);
-    for (const double value : y) write_number(out, value);
-    for (const double value : kept) write_number(out, value);
-    y_ = y;
-    restart(t);
+    binary::put(out, static_cast<std::uint64_t>(y_.size()), static_cast<std::uint64_t>(kept.size()),
+                anchor_, time());
+    binary::put_array(out, y_, now);
+    for (const double value : kept) binary::put(out, value);
   }
 
-  void restore(std::istream& in) override {
+  void restore(std::istream& in, Restore how) override {
     char magic[sizeof kMagic];
     in.read(magic, sizeof magic);
     if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
       throw std::runtime_error("this is not a state of the smooth engine");
-    std::vector<double>& kept = system_.kept();
-    const double size = read_number(in), invariants = read_number(in);
-    if (size != static_cast<double>(y_.size()) || invariants != static_cast<double>(kept.size()))
+    std::vector<double> kept = system_->kept();
+    std::uint64_t size = 0, invariants = 0;
+    double from = 0, to = 0;
+    binary::get(in, size, invariants, from, to);
+    if (size != static_cast<std::uint64_t>(y_.size()) || invariants != kept.size())
       throw std::runtime_error("the saved state is of another scene: it has " +
-                               std::to_string(static_cast<long>(size)) +
-                               " unknowns, this scene has " + std::to_string(y_.size()));
-    const double t = read_number(in);
-    for (double& value : y_) value = read_number(in);
-    for (double& value : kept) value = read_number(in);
-    restart(t);
+                               std::to_string(size) + " unknowns, this scene has " +
+                               std::to_string(y_.size()));
+    Eigen::VectorXd y(y_.size()), saved(y_.size());
+    binary::get_array(in, y, saved);
+    for (double& value : kept) binary::get(in, value);
+    if (!y.allFinite() || !saved.allFinite() || !(to >= from))
+      throw std::runtime_error("the saved state is damaged");
+    renew(from, y, kept);
+    if (how == Restore::exact) repeat(to, saved);
+    if (how == Restore::near) renew(to, saved, kept);
   }
 
  private:
-  static void write_number(std::ostream& out, double value) {
-    out.write(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  static double read_number(std::istream& in) {
-    double value = 0;
-    if (!in.read(reinterpret_cast<char*>(&value), sizeof value))
-      throw std::runtime_error("the saved state ends too early");
-    return value;
-  }
   static void add(const Integrator::Seconds& from, Integrator::Seconds& to) {
     for (std::size_t i = 0; i < to.effects.size(); ++i) to.effects[i] += from.effects[i];
     to.jacobian += from.jacobian;
@@ -138,26 +141,55 @@ class SmoothEngine : public Engine {
     to.total += from.total;
   }
 
-  // A new IDA at t, from y_ alone: whoever has these bits goes on with the same ones.
-  void restart(double t) {
+  // The step that begins here is the first of a new history.
+  void anchor() {
+    const double t = integrator_->step_end();
+    renew(t, integrator_->at_step_end(), std::vector<double>(system_->kept()));
+  }
+
+  // Everything anew from t and y: whoever has these bits goes on with the same ones.
+  void renew(double t, const Eigen::VectorXd& y, const std::vector<double>& kept) {
     if (integrator_) {
       before_ = counts();
       Integrator::Seconds s = integrator_->seconds();
       if (!seconds_before_.effects.empty()) add(seconds_before_, s);
       seconds_before_ = s;
+      integrator_.reset();
     }
-    system_.complete(t, y_, yp_);
-    integrator_ = std::make_unique<Integrator>(system_, options_, t, y_, yp_);
-    system_.bodies(y_.data(), bodies_);
+    system_ = std::make_unique<System>(scene_);
+    system_->kept() = kept;
+    y_ = y;
+    anchor_ = t;
+    system_->complete(t, y_, yp_);
+    integrator_ = std::make_unique<Integrator>(*system_, options_, t, y_, yp_);
+    system_->bodies(y_.data(), bodies_);
+  }
+
+  // The steps from the anchor to the time of a saved state. Without the limit between two stops:
+  // they were taken between several.
+  void repeat(double t, const Eigen::VectorXd& saved) {
+    long steps_left = std::numeric_limits<long>::max();
+    try {
+      while (!integrator_->advance(t, steps_left, nullptr))
+        if (integrator_->anchor_is_due()) break;  // no state is saved so far from its anchor
+    } catch (const SimulationError& e) {
+      throw std::runtime_error(std::string("the saved state cannot be arrived at again: ") +
+                               e.what());
+    }
+    const Eigen::VectorXd y = integrator_->y();
+    if (time() != t || y != saved)
+      throw std::runtime_error(
+          "the saved state is of another build or machine: the same steps lead to other bits here");
+    system_->bodies(y.data(), bodies_);
   }
 
   void check_start() {
-    const int m = system_.rows();
+    const int m = system_->rows();
     if (m == 0) return;
     Eigen::VectorXd g(2 * m);
-    system_.joint_values(0.0, y_.data(), g.data());
+    system_->joint_values(0.0, y_.data(), g.data());
     double size = 1, speed = 1;
-    for (int k = 0; k < system_.moving(); ++k) {
+    for (int k = 0; k < system_->moving(); ++k) {
       size = std::max(size, y_.segment<3>(kBody * k + kPosition).norm());
       speed = std::max({speed, y_.segment<3>(kBody * k + kVelocity).norm(),
                         y_.segment<3>(kBody * k + kSpin).norm()});
@@ -173,7 +205,7 @@ class SmoothEngine : public Engine {
                     g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s", allowed);
       throw std::invalid_argument(
           std::string("the start of the scene contradicts the ") +
-          (half == 0 ? "position" : "velocity") + " of joint \"" + system_.joint_of_row(worst) +
+          (half == 0 ? "position" : "velocity") + " of joint \"" + system_->joint_of_row(worst) +
           "\"" + text +
           (half == 0 ? ""
                      : "; give both bodies velocities and angular velocities that the joint "
@@ -181,9 +213,11 @@ class SmoothEngine : public Engine {
     }
   }
 
+  Scene scene_;
   SmoothOptions options_;
-  mutable System system_;  // its workspace changes in a look, too
-  Eigen::VectorXd y_, yp_;
+  std::unique_ptr<System> system_;  // its workspace changes in a look, too
+  double anchor_ = 0;
+  Eigen::VectorXd y_, yp_;  // at the anchor
   std::unique_ptr<Integrator> integrator_;
   std::vector<BodyState> bodies_;
   std::vector<ContactState> no_contacts_;

@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <numeric>
 
 namespace tether::scene::smooth {
@@ -46,16 +45,16 @@ constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3, kSmallestPivotIndex2 = 1
 
 // The first step's error is an eighth of what IDA allows, and nothing moves by more than this part.
 constexpr double kFirstError = 0.125, kFirstMove = 1e-2;
-constexpr double kLook = 1e-5;  // the part of a move over which y'' is looked at
+constexpr double kFirstAtRest = 1e-3;  // s
+constexpr double kLook = 1e-5;         // the part of a move over which y'' is looked at
+
+// Steps from one anchor to the next, see SmoothEngine; not close to a dead point, where y' and the
+// multipliers are badly known.
+constexpr long kAnchor = 5000;
+constexpr double kAnchorPivot = 0.01;
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-double processor_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 #ifdef SUN_COMM_NULL  // SUNDIALS 7
@@ -117,7 +116,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   IDASetUserData(ida_, this);
   system.choose_rows(t, y.data(), tolerance_);
   IDAWFtolerances(ida_, weights);
-  IDASetMaxNumSteps(ida_, options.max_steps);
+  IDASetMaxNumSteps(ida_, -1);  // counted in step_past
   if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
   IDASetInitStep(ida_, first_step(t, y, yp));
   prepare_matrix();
@@ -169,12 +168,13 @@ void Integrator::catch_messages() {
 
 // IDA begins with half a tolerance / |y'|, at tight tolerances 1e-12 s. There the multipliers of
 // index 2, changes of velocity / h, are rounding, and Newton fails at every smaller step. At order
-// 1 IDA's estimate of the error is h^2 |y''| / 4. 0: IDA's own.
+// 1 IDA's estimate of the error is h^2 |y''| / 4. Never IDA's own: that depends on the time asked
+// for.
 double Integrator::first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const {
   double speed = 0;
   for (int i = 0; i < system_.size(); ++i)
     if (system_.id(i) != 0.0) speed = std::max(speed, std::abs(yp[i]) / (1.0 + std::abs(y[i])));
-  if (!(speed > 0 && std::isfinite(speed))) return 0.0;
+  if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
   const double look = kLook / speed;
   Eigen::VectorXd ahead = y + look * yp, rate;
   system_.complete(t + look, ahead, rate);
@@ -185,7 +185,7 @@ double Integrator::first_step(double t, const Eigen::VectorXd& y, const Eigen::V
     sum += change * change;
   }
   const double curvature = std::sqrt(sum / system_.size()) / look;
-  if (!std::isfinite(curvature)) return 0.0;
+  if (!std::isfinite(curvature)) return 0.5 * tolerance_ / speed;
   const double longest = kFirstMove / speed;
   return curvature > 0 ? std::min(longest, std::sqrt(4.0 * kFirstError / curvature)) : longest;
 }
@@ -291,17 +291,60 @@ ida_projection::ConsistencyReport Integrator::make_consistent(double t) {
   return projection_->make_consistent(t, y_, yp_, how);
 }
 
-void Integrator::advance(double t) {
-  if (t - t_ <= 1e-13 * std::max(1.0, std::abs(t))) return;
-  const double begin = now(), begin_processor = processor_seconds();
-  double reached = t_;
+// Step by step up to t. IDA's own way to an output time takes the same steps.
+int Integrator::step_past(double t, long& steps_left, const std::function<bool()>& interrupted) {
+  while (step_end() < t && !anchor_is_due() && !(interrupted && interrupted())) {
+    if (steps_left <= 0) {
+      last_message_ = "max_steps = " + std::to_string(options_.max_steps) + " steps are taken.";
+      return IDA_TOO_MUCH_WORK;
+    }
+    const long before = steps();
+    const int flag = IDASolve(ida_, t, &t_, y_, yp_, IDA_ONE_STEP);
+    if (flag < 0) return flag;
+    steps_left -= steps() - before;
+  }
+  return IDA_SUCCESS;
+}
+
+bool Integrator::advance(double t, long& steps_left, const std::function<bool()>& interrupted) {
+  if (t - t_ <= 1e-13 * std::abs(t)) return true;
+  const double begin = now();
   last_message_.clear();
-  const int flag = projection_ ? projection_->solve(t, &reached, y_, yp_, IDA_NORMAL)
-                               : IDASolve(ida_, t, &reached, y_, yp_, IDA_NORMAL);
+  const double from = t_;
+  int flag = step_past(t, steps_left, interrupted);
+  const double to = std::min(t, step_end());
+  // Also where a step ended there: whoever arrives in other pieces has the same bits.
+  if (flag == IDA_SUCCESS && to > from)
+    flag = projection_ ? projection_->solve(to, &t_, y_, yp_, IDA_NORMAL)
+                       : IDASolve(ida_, to, &t_, y_, yp_, IDA_NORMAL);
   total_seconds_ += now() - begin;
-  processor_seconds_ += processor_seconds() - begin_processor;
-  t_ = reached;
   if (flag < 0) throw SimulationError(failure(flag));
+  return t_ >= t;
+}
+
+long Integrator::steps() const {
+  long steps = 0;
+  IDAGetNumSteps(ida_, &steps);
+  return steps;
+}
+
+bool Integrator::anchor_is_due() const {
+  return steps() >= kAnchor && system_.weakest_pivot() > kAnchorPivot;
+}
+
+double Integrator::step_end() const {
+  if (steps() == 0) return t_;
+  double end = t_;
+  IDAGetCurrentTime(ida_, &end);
+  return end;
+}
+
+Eigen::VectorXd Integrator::at_step_end() const {
+  Eigen::VectorXd y(system_.size());
+  N_Vector out = N_VMake_Serial(system_.size(), y.data(), context_);
+  IDAGetDky(ida_, step_end(), 0, out);
+  N_VDestroy(out);
+  return y;
 }
 
 std::string Integrator::failure(int flag) const {
@@ -347,13 +390,7 @@ Integrator::Seconds Integrator::seconds() const {
       each *= static_cast<double>(residuals_) / static_cast<double>(timed_);
   s.jacobian = jacobian_seconds_;
   if (projection_) s.projection = projection_->statistics().seconds;
-  // The parts are read from the wall clock, which is cheap; where other programs share the
-  // processor it runs faster than the time that a run is charged for.
-  const double charged = total_seconds_ > 0 ? processor_seconds_ / total_seconds_ : 1.0;
-  for (double& each : s.effects) each *= charged;
-  s.jacobian *= charged;
-  s.projection *= charged;
-  s.total = processor_seconds_;
+  s.total = total_seconds_;
   return s;
 }
 

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <ida/ida.h>
 #include <memory>
 #include <optional>
@@ -14,7 +15,8 @@
 
 namespace tether::scene::smooth {
 
-/// One uninterrupted run of IDA. A restart is a new object.
+/// One run of IDA from a point on. What it does depends on that point alone, never on the times
+/// that it is asked for: they are interpolated.
 class Integrator {
  public:
   /// `y` and `yp` are consistent, but for what `make_consistent` repairs.
@@ -26,12 +28,20 @@ class Integrator {
 
   /// Moves y onto the constraints. Only with the projection.
   ida_projection::ConsistencyReport make_consistent(double t);
-  void advance(double t);  ///< throws SimulationError
+  /// Whether it is at t; else it stands at the end of a step before t, where it is time for an
+  /// anchor, or where `interrupted`. `steps_left` counts down; at 0, as for any failure of IDA,
+  /// SimulationError.
+  bool advance(double t, long& steps_left, const std::function<bool()>& interrupted);
   double time() const { return t_; }
+  /// The end of the last step, which may lie beyond time().
+  bool anchor_is_due() const;
+  long steps() const;
+  double step_end() const;
+  Eigen::VectorXd at_step_end() const;
   Eigen::Map<const Eigen::VectorXd> y() const;
   Counts counts() const;
 
-  struct Seconds {
+  struct Seconds {                // on the clock
     std::vector<double> effects;  ///< as System::effect_names()
     double jacobian = 0, projection = 0, total = 0;
   };
@@ -45,6 +55,7 @@ class Integrator {
   double first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const;
   void prepare_matrix();
   void catch_messages();
+  int step_past(double t, long& steps_left, const std::function<bool()>& interrupted);
   std::string failure(int flag) const;
 
   System& system_;
@@ -64,7 +75,6 @@ class Integrator {
 
   Stopwatch watch_;
   double jacobian_seconds_ = 0, total_seconds_ = 0;  // wall clock
-  double processor_seconds_ = 0;
   long residuals_ = 0, timed_ = 0;
 };
 

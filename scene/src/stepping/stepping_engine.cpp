@@ -9,6 +9,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "run/binary.hpp"
+#include "saved_memory.hpp"
+
 #if defined(TETHER_HAVE_COLLISION)
 #include <tether/contact/polyhedra.hpp>
 #endif
@@ -33,7 +36,8 @@ contact::Stepper make_stepper(const Scene& scene, Mapped mapped) {
                           std::move(mapped.meetings), mapped.options, polyhedra(scene));
 }
 
-// FNV-1a over what makes saved states of two scenes interchangeable.
+// FNV-1a over what a state cannot do without: the same bodies and step. Whether the rest of the
+// scene is the same is looked at by who keeps the file.
 std::uint64_t fingerprint(const Scene& scene, double step) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   const auto add = [&](const void* data, std::size_t size) {
@@ -49,23 +53,7 @@ std::uint64_t fingerprint(const Scene& scene, double step) {
   return hash;
 }
 
-constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '1'};
-
-template <class T>
-void put(std::ostream& out, const T& value) {
-  char bytes[sizeof(T)];
-  std::memcpy(bytes, &value, sizeof(T));
-  out.write(bytes, sizeof(T));
-}
-
-template <class T>
-T get(std::istream& in) {
-  char bytes[sizeof(T)];
-  if (!in.read(bytes, sizeof(T))) throw std::runtime_error("the saved state ends too early");
-  T value;
-  std::memcpy(&value, bytes, sizeof(T));
-  return value;
-}
+constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '2'};
 
 }  // namespace
 
@@ -86,6 +74,7 @@ void SteppingEngine::advance(double t) {
   // A time that is a multiple of the step up to round-off is that step.
   const double slack = 1e-9 * stepper_.options().step;
   while (time() < t - slack) {
+    if (interrupted()) break;
     stepper_.step();
     if (on_failure_ == OnFailure::stop && !stepper_.succeeded()) {
       read_bodies();
@@ -166,40 +155,33 @@ std::vector<EffectCost> SteppingEngine::costs() const {
   return out;
 }
 
-void SteppingEngine::save(std::ostream& out) {
+void SteppingEngine::save(std::ostream& out) const {
   out.write(kMagic, sizeof kMagic);
-  put(out, fingerprint_);
-  put(out, static_cast<std::int64_t>(stepper_.counts().steps));
+  binary::put(out, fingerprint_, static_cast<std::uint64_t>(bodies_.size()), time());
   const contact::BodySet& b = stepper_.bodies();
-  for (std::size_t i = 0; i < b.position.size(); ++i) {
-    for (int k = 0; k < 3; ++k) put(out, b.position[i][k]);
-    for (int k = 0; k < 4; ++k) put(out, b.orientation[i].coeffs()[k]);
-    for (int k = 0; k < 3; ++k) put(out, b.motion[i].velocity[k]);
-    for (int k = 0; k < 3; ++k) put(out, b.motion[i].angular_velocity[k]);
-  }
+  for (std::size_t i = 0; i < b.position.size(); ++i)
+    binary::put_array(out, b.position[i], b.orientation[i].coeffs(), b.motion[i].velocity,
+                      b.motion[i].angular_velocity);
+  put_memory(out, stepper_.memory());
   if (!out) throw std::runtime_error("the state could not be written");
-  // Warm starts are not saved; the run that goes on does without them as well, to the same bits.
-  stepper_.start_anew(stepper_.counts().steps);
 }
 
-void SteppingEngine::restore(std::istream& in) {
+void SteppingEngine::restore(std::istream& in, Restore how) {
   char magic[sizeof kMagic];
   if (!in.read(magic, sizeof magic) || std::memcmp(magic, kMagic, sizeof magic) != 0)
     throw std::runtime_error("this is no saved state of the stepping engine");
-  if (get<std::uint64_t>(in) != fingerprint_)
+  const bool same = binary::get<std::uint64_t>(in) == fingerprint_;
+  if (binary::get<std::uint64_t>(in) != bodies_.size() || (!same && how == Restore::exact))
     throw std::runtime_error("the saved state is of another scene or another step");
-  const auto steps = get<std::int64_t>(in);
-  if (steps < 0) throw std::runtime_error("the saved state is damaged");
+  const auto time = binary::get<double>(in);
   std::vector<BodyState> states(bodies_.size());
   for (BodyState& s : states) {
-    for (int k = 0; k < 3; ++k) s.position[k] = get<double>(in);
-    for (int k = 0; k < 4; ++k) s.orientation.coeffs()[k] = get<double>(in);
-    for (int k = 0; k < 3; ++k) s.velocity[k] = get<double>(in);
-    for (int k = 0; k < 3; ++k) s.angular_velocity[k] = get<double>(in);
+    binary::get_array(in, s.position, s.orientation.coeffs(), s.velocity, s.angular_velocity);
     if (!s.position.allFinite() || !(std::abs(s.orientation.norm() - 1) < 1e-6) ||
         !s.velocity.allFinite() || !s.angular_velocity.allFinite())
       throw std::runtime_error("the saved state is damaged");
   }
+  const contact::StepperMemory memory = get_memory(in, static_cast<int>(bodies_.size()));
   contact::BodySet& b = stepper_.bodies();
   for (std::size_t i = 0; i < states.size(); ++i) {
     b.position[i] = states[i].position;
@@ -207,7 +189,14 @@ void SteppingEngine::restore(std::istream& in) {
     b.motion[i].velocity = states[i].velocity;
     b.motion[i].angular_velocity = states[i].angular_velocity;
   }
-  stepper_.start_anew(static_cast<long>(steps));
+  try {
+    if (same)
+      stepper_.set_memory(memory);
+    else
+      stepper_.start_anew(std::lround(time / stepper_.options().step));
+  } catch (const std::invalid_argument&) {
+    throw std::runtime_error("the saved state is of another scene");
+  }
   contacts_of_ = -1;
   read_bodies();
 }

@@ -22,8 +22,8 @@ class SteppingEngine final : public Engine {
   const std::vector<ContactState>& contacts() const override;
   Counts counts() const override;
   std::vector<EffectCost> costs() const override;
-  void save(std::ostream& out) override;
-  void restore(std::istream& in) override;
+  void save(std::ostream& out) const override;
+  void restore(std::istream& in, Restore how) override;
 
  private:
   SteppingEngine(const Scene& scene, Mapped mapped);

@@ -59,6 +59,12 @@ struct BodyOptions {
   double max_work = 1e9;  ///< as Options::max_work, for each assembled island
 };
 
+/// What a warm start begins with: the impulses of the last solve by id, in the order of its contacts.
+struct WarmStart {
+  std::vector<std::uint64_t> ids;
+  std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`, N s
+};
+
 struct BodySolution {
   Status status = Status::unsolved;  ///< solved if all islands are, else that of the worst
   double error = Residuals::kNone;   ///< as in BodyOptions::tolerance, of the worst island
@@ -101,6 +107,9 @@ class BodySolver {
   void scale_warm_start(double factor);
   /// Forgets them.
   void forget();
+  /// All that one solve leaves to the next. Throws std::invalid_argument if the lengths differ.
+  WarmStart warm_start() const;
+  void set_warm_start(const WarmStart& start);
 
  private:
   struct TETHER_HIDDEN Implementation;

@@ -1,6 +1,7 @@
 // Tether: rigid bodies in motion, by impulses and velocities. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -131,6 +132,22 @@ struct StepCounts {
   long unsolved = 0;  ///< problems that were used though above what is accepted
 };
 
+/// What a step leaves to the next one beside positions and velocities, and to those who look at it.
+/// A Stepper of the same scene that is given bodies and memory of another goes on with its bits.
+struct StepperMemory {
+  /// The momentum of a body without torque, see rotation.hpp, and the state that it belongs to.
+  struct Spin {
+    Eigen::Vector3d momentum, angular_velocity;
+    std::array<double, 4> orientation;  ///< x, y, z, w
+  };
+  long steps = 0;
+  WarmStart contacts, corrections, bounces, closings;  ///< of the contact problems of a step
+  std::vector<Spin> spins;                   ///< of bodies that turn with their momentum kept
+  StepContacts last;                         ///< contacts of the last step, and what became of it:
+  double penetration = 0, residual = 0;
+  Status status = Status::solved;
+};
+
 struct StageCost {
   const char* effect;
   double seconds;
@@ -176,7 +193,11 @@ class Stepper {
   std::vector<StageCost> costs() const;
   const SteppingOptions& options() const;
 
-  /// To go on from a saved state: forgets what warm starts remember, sets the number of steps.
+  /// To go on where another one stands, bit by bit; bodies() are copied by the caller.
+  /// set_memory() throws std::invalid_argument on a memory of other bodies.
+  StepperMemory memory() const;
+  void set_memory(const StepperMemory& memory);
+  /// Forgets what warm starts remember, sets the number of steps.
   void start_anew(long steps);
 
  private:

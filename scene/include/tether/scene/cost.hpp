@@ -13,8 +13,9 @@ namespace tether::scene {
 /// One setting of a scene.
 struct CostRow {
   double setting = 0;  ///< tolerance (smooth) or time step, s (stepping)
-  /// Largest distance of a body's centre (m) and angle of its orientation (rad) from the reference,
-  /// whichever is larger, over `CostOptions::samples` equal times and all bodies.
+  /// Bound on the error: the largest distance of a body's centre (m) and angle of its orientation
+  /// (rad) from the reference, whichever is larger, over `CostOptions::samples` equal times and all
+  /// bodies, and what the reference may be off.
   double error = 0;
   double seconds = 0;  ///< processor time of the engine, the least of several runs
   double drift = 0, penetration = 0;
@@ -26,7 +27,7 @@ struct CostRow {
 struct CostOptions {
   std::vector<double> settings;     ///< empty: a range around that of the scene
   std::optional<double> reference;  ///< its tolerance or step; default 1e-12, or the finest / 4
-  int samples = 20;
+  int samples = 100;
   /// Before each part of the work: its name, and how many of all parts are done.
   std::function<void(const std::string& what, int done, int all)> progress;
 };
@@ -34,8 +35,9 @@ struct CostOptions {
 struct CostTable {
   bool smooth = true;
   std::string reference;  ///< what the errors are measured against
-  double reference_error =
-      0;  ///< its change from the next looser setting: smaller errors mean little
+  /// What it may be off: its change from the next looser setting (smooth), or how far the limits of
+  /// pairs of steps are apart (stepping).
+  double reference_error = 0;
   std::vector<CostRow> rows;  ///< in the order of the settings, loosest first
   /// The cheapest row with an error of at most `wanted`; null: there is none.
   const CostRow* cheapest(double wanted) const;

@@ -4,11 +4,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <iosfwd>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <tether/scene/scene.hpp>
+#include <utility>
 #include <vector>
 
 namespace tether::scene {
@@ -44,7 +46,7 @@ struct Counts {
   long halved = 0;    ///< steps, or parts of them, taken in two halves
 };
 
-/// Seconds spent on one effect since the start.
+/// Seconds on the clock spent on one effect since the start.
 struct EffectCost {
   std::string effect;
   double seconds = 0;
@@ -70,11 +72,22 @@ class Engine {
   virtual const std::vector<ContactState>& contacts() const = 0;
   virtual Counts counts() const = 0;
   virtual std::vector<EffectCost> costs() const = 0;
-  /// After save(), this run and one that restores the state go on with the same bits (a multistep
-  /// method starts anew at that point in both).
-  virtual void save(std::ostream& out) = 0;
-  virtual void restore(
-      std::istream& in) = 0;  ///< throws std::runtime_error on a state of another scene
+  /// Changes nothing. An engine of the same scene that restores the state goes on with the bits of
+  /// this one.
+  virtual void save(std::ostream& out) const = 0;
+  /// Throws std::runtime_error on a state of other bodies, and on one that this build does not
+  /// arrive at by the same bits; `near` goes on from the positions and velocities in it then.
+  enum class Restore : std::uint8_t { exact, near };
+  virtual void restore(std::istream& in, Restore how = Restore::exact) = 0;
+
+  /// Asked after every step: where it says true, advance() returns early, at the end of that step.
+  void stop_when(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
+
+ protected:
+  bool interrupted() const { return interrupted_ && interrupted_(); }
+
+ private:
+  std::function<bool()> interrupted_;
 };
 
 /// Each throws std::invalid_argument, naming what the scene asks for and the engine does not have.

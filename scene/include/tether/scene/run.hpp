@@ -30,22 +30,28 @@ struct Summary {
 
 struct RunOptions {
   std::string restart;                        ///< a saved state to go on from; empty: from t = 0
+  bool force = false;                         ///< the state may be of another scene or version
   std::function<void(double time)> progress;  ///< called at each record
   std::vector<double> stops;                  ///< further times at which `record` is called, s
   std::function<void(const Engine&)> record;  ///< called at each record and stop
+  /// Asked after every step: where it says true, the run ends there, with all its files whole.
+  std::function<bool()> interrupted;
 };
 
 struct RunResult {
   std::string engine;
-  double time = 0;      ///< s, reached
-  double seconds = 0;   ///< processor time of the engine
-  std::string failure;  ///< why the run could not go on; empty: it reached the end
+  double time = 0;                           ///< s, reached
+  double seconds = 0;                        ///< processor time of the engine, all threads
+  double wall = 0;                           ///< s on the clock, of the engine
+  double whole_wall = 0, whole_seconds = 0;  ///< of the whole run, with what it records
+  std::string failure;                       ///< why the run could not go on; empty: it could
+  bool interrupted = false;                  ///< it was ended before its time
   Summary summary;
   Counts counts;
   std::vector<EffectCost> costs;
   std::vector<Judgement> judgements;  ///< one for each Scene::expect
   std::vector<std::string> written;   ///< files
-  std::vector<std::string> remarks;   ///< what could not be written, and why
+  std::vector<std::string> remarks;   ///< what is not in the files, and what to be careful of
 
   bool met() const;  ///< every expectation that counts was judged and holds
 };
@@ -54,8 +60,11 @@ constexpr double kMostSteps = 1e9;    ///< of the stepping engine in a run: end 
 constexpr double kMostRecords = 1e7;  ///< end / every, end / checkpoint
 
 /// Runs the scene to its end and writes what Scene::output names. Throws std::invalid_argument for
-/// times out of range and for a scene that no engine has, std::runtime_error for files; a run that
-/// cannot go on is a result.
+/// times out of range, names that collide and a scene that no engine has, std::runtime_error for
+/// files, also those that another run writes at the time; a run that cannot go on is a result.
+///
+/// With its state saved, a run is continued bit by bit: RunOptions::restart leaves the rows, frames
+/// and states that a run in one piece would have left.
 RunResult run(const Scene& scene, const RunOptions& options = {});
 
 /// The value of a quantity now; `start` is the state and `start_energy` the energy at t = 0.

@@ -1,0 +1,13 @@
+// Tether: Ctrl-C and its kind. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace tether::scene {
+
+/// From now on the first SIGINT, SIGTERM or SIGHUP is only noted; the second one ends the program.
+/// A signal that is ignored (nohup) stays ignored.
+void catch_signals();
+
+/// 0: none yet.
+int caught_signal();
+
+}  // namespace tether::scene

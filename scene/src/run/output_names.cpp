@@ -1,0 +1,82 @@
+// Tether: what a run writes. SPDX-License-Identifier: BSD-3-Clause
+#include "output_names.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+
+namespace tether::scene {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// The same for all spellings of a path; links are followed as far as they exist.
+std::string one_name(const std::string& file) {
+  std::error_code error;
+  const fs::path whole = fs::weakly_canonical(fs::absolute(file, error), error);
+  return error ? file : whole.string();
+}
+
+bool is_device(const std::string& file) {
+  std::error_code error;
+  const fs::file_status there = fs::status(file, error);
+  return fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
+}
+
+}  // namespace
+
+std::string film_file(const std::string& vtk) {
+  return fs::path(vtk).replace_extension(".pvd").string();
+}
+
+std::string film_folder(const std::string& vtk) {
+  return fs::path(vtk).replace_extension("").string();
+}
+
+void check_names(const Output& o, const std::vector<std::string>& inputs) {
+  std::map<std::string, std::string> taken;  // name: what it is
+  for (const std::string& input : inputs)
+    if (!input.empty()) taken.emplace(one_name(input), "an input of this run: " + input);
+  const auto take = [&](const char* what, const std::string& file) {
+    if (is_device(file)) return;
+    const auto [at, fresh] = taken.emplace(one_name(file), fmt::format("written as {}", what));
+    if (!fresh)
+      throw std::invalid_argument(
+          fmt::format("{} = \"{}\": this file is {}", what, file, at->second));
+  };
+  const auto take_all = [&](const char* what, const std::string& file,
+                            std::initializer_list<const char*> with) {
+    if (file.empty()) return;
+    const fs::path name = fs::path(file).filename();
+    if (name.empty() || name == "." || name == "..")
+      throw std::invalid_argument(fmt::format("{} = \"{}\": must name a file", what, file));
+    take(what, file);
+    for (const char* each : with) take(what, file + each);
+  };
+  take_all("csv", o.csv, {".lock"});
+  take_all("svg", o.svg, {".lock", ".new", ".gp"});
+  take_all("state", o.state, {".lock", ".new"});
+  if (o.vtk.empty()) return;
+  take_all("vtk", film_file(o.vtk), {".lock", ".new"});
+  take("vtk", film_folder(o.vtk));
+  for (const std::string& other : {o.csv, o.svg, o.state}) {
+    const fs::path path = one_name(other);
+    if (!other.empty() && path.extension() == ".vtp" &&
+        path.parent_path() == one_name(film_folder(o.vtk)))
+      throw std::invalid_argument(
+          fmt::format("\"{}\": frames of vtk = \"{}\" have such names", other, o.vtk));
+  }
+}
+
+std::vector<std::string> names(const Output& o) {
+  std::vector<std::string> all;
+  for (const std::string& each :
+       {o.csv, o.vtk.empty() ? std::string() : film_file(o.vtk), o.svg, o.state})
+    if (!each.empty()) all.push_back(each);
+  return all;
+}
+
+}  // namespace tether::scene

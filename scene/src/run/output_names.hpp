@@ -1,0 +1,20 @@
+// Tether: what a run writes. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+namespace tether::scene {
+
+/// The list of frames and the folder of a film.
+std::string film_file(const std::string& vtk);
+std::string film_folder(const std::string& vtk);
+
+/// Throws std::invalid_argument if two outputs have a name in common, or one that of an input.
+void check_names(const Output& output, const std::vector<std::string>& inputs);
+
+/// One name for each output that is asked for: who holds it, holds all its files.
+std::vector<std::string> names(const Output& output);
+
+}  // namespace tether::scene

@@ -1,0 +1,117 @@
+// Tether: the file of a saved state. SPDX-License-Identifier: BSD-3-Clause
+#include "saved_state.hpp"
+
+#include <array>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+#include <tether/scene/files.hpp>
+#include <tether/scene/plan.hpp>
+
+#include "binary.hpp"
+#include "whole_file.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+const std::string kFormat = "tether state ";
+const std::string kThis = kFormat + "3 " TETHER_VERSION "\n";
+
+// CRC-32 of IEEE 802.3 (polynomial 0x04c11db7, bits reversed): finds every damage of up to 32 bits
+// in a row, and any other but for one in 4e9.
+std::uint32_t crc32(std::string_view bytes) {
+  static const std::array<std::uint32_t, 256> table = [] {
+    std::array<std::uint32_t, 256> t{};
+    for (std::uint32_t n = 0; n < 256; ++n) {
+      std::uint32_t c = n;
+      for (int k = 0; k < 8; ++k) c = (c & 1) != 0 ? 0xedb88320u ^ (c >> 1) : c >> 1;
+      t[n] = c;
+    }
+    return t;
+  }();
+  std::uint32_t c = 0xffffffffu;
+  for (const char byte : bytes) c = table[(c ^ static_cast<unsigned char>(byte)) & 0xff] ^ (c >> 8);
+  return c ^ 0xffffffffu;
+}
+
+std::string all_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw std::runtime_error("cannot open the saved state " + file);
+  // A device has no end; states hold a few hundred bytes a body.
+  constexpr std::size_t kLargest = std::size_t{1} << 32;
+  std::string all, block(std::size_t{1} << 16, '\0');
+  while (in && all.size() <= kLargest) {
+    in.read(block.data(), static_cast<std::streamsize>(block.size()));
+    all.append(block.data(), static_cast<std::size_t>(in.gcount()));
+    if (all.compare(0, kFormat.size(), kFormat) != 0)
+      throw std::runtime_error(file + " is not a saved state");
+  }
+  return all;
+}
+
+}  // namespace
+
+std::uint64_t hash_of_motion(const Scene& scene) {
+  Scene moving = scene;
+  moving.name.clear();
+  moving.end = 1;
+  moving.output = Output{};
+  moving.expect.clear();
+  if (make_plan(scene).engine == EngineKind::smooth) {
+    if (!moving.smooth) moving.smooth.emplace();
+    moving.smooth->max_steps = SmoothOptions{}.max_steps;
+  } else {
+    if (!moving.stepping) moving.stepping.emplace();
+    moving.stepping->threads = 1;
+    moving.stepping->on_failure = OnFailure::stop;
+  }
+  std::uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a
+  for (const char c : write_scene(moving))
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  return hash;
+}
+
+void write_state(const std::string& file, std::uint64_t scene, const std::string& content) {
+  std::ostringstream out;
+  out << kThis;
+  binary::put(out, scene, static_cast<std::uint64_t>(content.size()));
+  out << content;
+  std::string bytes = out.str();
+  std::ostringstream check;
+  binary::put(check, crc32(bytes));
+  write_whole_regular(file, bytes + check.str());
+}
+
+SavedState read_state(const std::string& file, std::uint64_t scene, bool any_scene) {
+  const std::string bytes = all_of(file);
+  const std::size_t line = bytes.find('\n');
+  constexpr std::size_t kNumbers = 2 * sizeof(std::uint64_t), kCheck = sizeof(std::uint32_t);
+  if (line == std::string::npos || bytes.size() < line + 1 + kNumbers + kCheck)
+    throw std::runtime_error("the saved state " + file + " is cut off");
+  const std::string_view sum = std::string_view(bytes).substr(0, bytes.size() - kCheck);
+  std::istringstream check(bytes.substr(sum.size()));
+  if (bytes.compare(0, kFormat.size() + 2, kThis, 0, kFormat.size() + 2) != 0)
+    throw std::runtime_error(file + " is a saved state of another version of Tether");
+  if (binary::get<std::uint32_t>(check) != crc32(sum))
+    throw std::runtime_error("the saved state " + file + " is damaged: its check sum is wrong");
+  std::istringstream head(bytes.substr(line + 1, kNumbers));
+  const auto of = binary::get<std::uint64_t>(head), length = binary::get<std::uint64_t>(head);
+  if (length != sum.size() - (line + 1 + kNumbers))
+    throw std::runtime_error("the saved state " + file + " is damaged: its length is wrong");
+  const bool same_version = bytes.compare(0, line + 1, kThis) == 0;
+  if (!any_scene && !same_version)
+    throw std::runtime_error("the saved state " + file + " was written by Tether " +
+                             bytes.substr(kFormat.size() + 2, line - kFormat.size() - 2) +
+                             ", this is " TETHER_VERSION
+                             ": --force goes on from it, with other bits");
+  if (!any_scene && of != scene)
+    throw std::runtime_error(
+        "the saved state " + file +
+        " is of another scene, or of another version of it: bodies, effects or options differ; "
+        "--force goes on from its positions and velocities");
+  return {std::string(sum.substr(line + 1 + kNumbers)), same_version && of == scene};
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,83 @@
+// Tether: files that are whole or absent. SPDX-License-Identifier: BSD-3-Clause
+#include "whole_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+
+namespace tether::scene {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void fail(const std::string& file) {
+  throw std::runtime_error(fmt::format("cannot write {}: {}", file, std::strerror(errno)));
+}
+
+/// A descriptor that is closed in the end.
+struct Open {
+  int descriptor;
+  ~Open() {
+    if (descriptor >= 0) close(descriptor);
+  }
+};
+
+void write_all(const std::string& file, int flags, std::string_view content, bool lasting) {
+  const Open out{open(file.c_str(), flags | O_WRONLY | O_CLOEXEC, 0666)};
+  if (out.descriptor < 0) fail(file);
+  while (!content.empty()) {
+    const ssize_t written = write(out.descriptor, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) fail(file);
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  if (lasting && fsync(out.descriptor) != 0 && errno != EINVAL && errno != EROFS) fail(file);
+}
+
+// The name in the folder outlasts a loss of power only with the folder.
+void sync_folder_of(const std::string& file) {
+  const fs::path folder = fs::path(file).parent_path();
+  const Open in{open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (in.descriptor >= 0) fsync(in.descriptor);
+}
+
+}  // namespace
+
+void make_folder_of(const std::string& file) {
+  const fs::path folder = fs::path(file).parent_path();
+  if (folder.empty()) return;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    throw std::runtime_error(fmt::format("cannot make {}: {}", folder.string(), error.message()));
+}
+
+void write_whole_regular(const std::string& file, std::string_view content) {
+  make_folder_of(file);
+  std::error_code error;
+  const fs::file_status there = fs::status(file, error);
+  if (fs::exists(there) && !fs::is_regular_file(there))
+    throw std::runtime_error("cannot write " + file + ": it is there and is no file");
+  const std::string fresh = file + ".new";
+  write_all(fresh, O_CREAT | O_TRUNC, content, true);
+  if (std::rename(fresh.c_str(), file.c_str()) != 0) fail(file);
+  sync_folder_of(file);
+}
+
+void write_whole(const std::string& file, std::string_view content) {
+  std::error_code error;
+  const fs::file_status there = fs::status(file, error);
+  if (fs::exists(there) && !fs::is_regular_file(there))
+    write_all(file, 0, content, false);
+  else
+    write_whole_regular(file, content);
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,94 @@
+// Tether: what a stepper remembers, in a saved state. SPDX-License-Identifier: BSD-3-Clause
+#include "saved_memory.hpp"
+
+#include <stdexcept>
+
+#include "run/binary.hpp"
+
+namespace tether::scene::stepping {
+
+using contact::PointContact;
+using contact::StepperMemory;
+using contact::WarmStart;
+
+namespace {
+
+void put(std::ostream& out, const WarmStart& start) {
+  binary::put(out, static_cast<std::uint64_t>(start.ids.size()));
+  for (std::size_t k = 0; k < start.ids.size(); ++k) {
+    binary::put(out, start.ids[k]);
+    binary::put_array(out, start.impulses[k]);
+  }
+}
+
+// Lists grow by what is there: a damaged length asks for no memory.
+WarmStart get_warm_start(std::istream& in) {
+  WarmStart start;
+  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
+    start.ids.push_back(binary::get<std::uint64_t>(in));
+    binary::get_array(in, start.impulses.emplace_back());
+  }
+  return start;
+}
+
+void put(std::ostream& out, const PointContact& c) {
+  binary::put(out, c.first, c.second, c.mu, c.bias, c.id);
+  binary::put_array(out, c.r1, c.r2, c.normal);
+}
+
+PointContact get_contact(std::istream& in, int bodies) {
+  PointContact c;
+  binary::get(in, c.first, c.second, c.mu, c.bias, c.id);
+  binary::get_array(in, c.r1, c.r2, c.normal);
+  if (c.first < 0 || c.first >= bodies || c.second < -1 || c.second >= bodies)
+    throw std::runtime_error("the saved state is damaged: it has contacts of no bodies");
+  return c;
+}
+
+}  // namespace
+
+void put_memory(std::ostream& out, const StepperMemory& m) {
+  binary::put(out, static_cast<std::int64_t>(m.steps));
+  put(out, m.contacts);
+  put(out, m.corrections);
+  put(out, m.bounces);
+  put(out, m.closings);
+  binary::put(out, static_cast<std::uint64_t>(m.spins.size()));
+  for (const StepperMemory::Spin& spin : m.spins) {
+    binary::put_array(out, spin.momentum, spin.angular_velocity);
+    for (const double x : spin.orientation) binary::put(out, x);
+  }
+  binary::put(out, static_cast<std::uint64_t>(m.last.points.size()));
+  for (std::size_t k = 0; k < m.last.points.size(); ++k) {
+    put(out, m.last.points[k]);
+    binary::put(out, m.last.gaps[k]);
+    binary::put_array(out, m.last.impulses[k]);
+  }
+  binary::put(out, m.penetration, m.residual, static_cast<std::int32_t>(m.status));
+}
+
+StepperMemory get_memory(std::istream& in, int bodies) {
+  StepperMemory m;
+  m.steps = static_cast<long>(binary::get<std::int64_t>(in));
+  if (m.steps < 0) throw std::runtime_error("the saved state is damaged: it has no time");
+  m.contacts = get_warm_start(in);
+  m.corrections = get_warm_start(in);
+  m.bounces = get_warm_start(in);
+  m.closings = get_warm_start(in);
+  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
+    StepperMemory::Spin& spin = m.spins.emplace_back();
+    binary::get_array(in, spin.momentum, spin.angular_velocity);
+    for (double& x : spin.orientation) binary::get(in, x);
+  }
+  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
+    m.last.points.push_back(get_contact(in, bodies));
+    binary::get(in, m.last.gaps.emplace_back());
+    binary::get_array(in, m.last.impulses.emplace_back());
+  }
+  std::int32_t status = 0;
+  binary::get(in, m.penetration, m.residual, status);
+  m.status = static_cast<contact::Status>(status);
+  return m;
+}
+
+}  // namespace tether::scene::stepping

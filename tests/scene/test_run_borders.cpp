@@ -1,0 +1,225 @@
+// Runs at the borders: numbers that are none, files of two runs, names, many bodies.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <tether/scene/files.hpp>
+#include <tether/scene/run.hpp>
+#include <vector>
+
+#include "run/judge.hpp"
+#include "run_files.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::scene;
+using namespace tether::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string falling(const std::string& more, int bodies = 1) {
+  std::string text =
+      "[scene]\nname = \"falling\"\nend = 0.1\ngravity = [0, 0, -9.81]\n[stepping]\nstep = 1e-3\n";
+  for (int k = 0; k < bodies; ++k)
+    text += fmt::format(
+        "[[body]]\nname = \"b{}\"\nshape = \"box\"\nsize = [1, 2, 3]\nmass = 1\nposition = [{}, 0, "
+        "0]\n",
+        k, 10 * k);
+  return text + more;
+}
+
+long rows(const fs::path& file) {
+  const std::string text = content(file);
+  return std::count(text.begin(), text.end(), '\n') - 1;
+}
+
+/// One body wherever it is told to be.
+class Still : public Engine {
+ public:
+  const char* name() const override { return "still"; }
+  double time() const override { return 0; }
+  void advance(double) override {}
+  const std::vector<BodyState>& bodies() const override { return bodies_; }
+  Diagnostics diagnostics() const override { return d; }
+  const std::vector<ContactState>& contacts() const override { return contacts_; }
+  Counts counts() const override { return {}; }
+  std::vector<EffectCost> costs() const override { return {}; }
+  void save(std::ostream&) const override {}
+  void restore(std::istream&, Restore) override {}
+  std::vector<BodyState> bodies_{1};
+  Diagnostics d;
+
+ private:
+  std::vector<ContactState> contacts_;
+};
+
+}  // namespace
+
+TEST_CASE("a motion that leaves the range of numbers is a failure, never a success") {
+  for (const char* engine : {"[smooth]\n", "[stepping]\n"})
+    for (const char* what :
+         {"[scene]\ngravity = [0, 0, -1e306]\n", "spin", "[scene]\ngravity = [1e200, 0, 0]\n"}) {
+      INFO(engine << what);
+      const bool spin = std::string(what) == "spin";
+      const Scene scene = parse_scene(
+          std::string(spin ? "" : what) + engine +
+              "[[body]]\nname = \"b\"\nshape = \"box\"\nsize = [1, 2, 3]\nmass = 1\nposition = "
+              "[1, 1, 1e3]\n" +
+              (spin ? "angular_velocity = [1e200, 1e199, 0]\n" : "") +
+              "[[expect]]\nquantity = \"position\"\nbody = \"b\"\nvalue = [0, 0, 0]\nwithin = "
+              "1e300\n",
+          "nan.toml");
+      const RunResult result = run(scene);
+      CHECK(result.failure != "");
+      CHECK_FALSE(result.met());
+    }
+}
+
+TEST_CASE("what is no number is never met") {
+  const double nan = std::nan("");
+  Scene scene = parse_scene(falling(""), "judge.toml");
+  const auto expectation = [&](Quantity quantity) {
+    Expect e;
+    e.time = 1;
+    e.throughout = true;
+    e.quantity = quantity;
+    e.body = 0;
+    e.value.assign(static_cast<std::size_t>(components(quantity)), 0.5);
+    e.within = 10;
+    e.at_most = 100;
+    e.at_least = -100;
+    return e;
+  };
+  scene.end = 1;
+  scene.expect = {expectation(Quantity::position), expectation(Quantity::orientation),
+                  expectation(Quantity::energy), expectation(Quantity::drift)};
+  for (int component = 0; component < 3; ++component) {
+    Judge judge(scene);
+    Still engine;
+    judge.look(0.2, true, engine, 0);
+    engine.bodies_[0].position[component] = nan;
+    engine.bodies_[0].orientation.coeffs()[component] = nan;
+    engine.d.kinetic_energy = engine.d.drift = nan;
+    judge.look(0.5, true, engine, 0);
+    const Still well;
+    judge.look(1, true, well, 0);  // and right again at the end
+    for (const Judgement& j : judge.judgements()) {
+      CHECK(j.judged);
+      CHECK_FALSE(j.met);
+    }
+  }
+}
+
+TEST_CASE("steps longer than the time between records leave no row twice") {
+  Scene scene = parse_scene(falling(""), "rows.toml");
+  const fs::path file = folder("rows") / "a.csv";
+  scene.output.csv = file.string();
+  for (const double step : {1e-3, 7e-3, 0.02}) {
+    scene.stepping->step = step;
+    scene.output.every = 0;
+    run(scene);
+    CHECK(rows(file) == 1 + std::lround(std::ceil(0.1 / step - 1e-9)));
+  }
+  scene.output.every = 0.03;  // 0, 0.03, 0.06, 0.09 and the end
+  scene.stepping->step = 1e-3;
+  run(scene);
+  CHECK(rows(file) == 5);
+}
+
+TEST_CASE("the table of many bodies has the first of them, and says so") {
+  Scene scene = parse_scene(falling("", 230), "many.toml");
+  scene.end = 2e-3;
+  const fs::path file = folder("many") / "a.csv";
+  scene.output.csv = file.string();
+  const RunResult result = run(scene);
+  std::ifstream in(file);
+  std::string header;
+  std::getline(in, header);
+  CHECK(header.find(",b199.wz_rad_per_s") != std::string::npos);
+  CHECK(header.find(",b200.") == std::string::npos);
+  REQUIRE(result.remarks.size() == 1);
+  CHECK(result.remarks[0].find("first 200 of 230") != std::string::npos);
+}
+
+TEST_CASE("two runs at the same time do not write the same files; one after the other does") {
+  Scene scene = parse_scene(falling(""), "lock.toml");
+  const fs::path path = folder("lock");
+  const auto with = [&](const char* csv, const char* state) {
+    Scene out = scene;
+    out.output.csv = (path / csv).string();
+    out.output.state = (path / state).string();
+    return out;
+  };
+  const Scene first = with("a.csv", "a.state");
+  RunOptions options;
+  int refused = 0, ran = 0;
+  options.progress = [&](double t) {
+    if (t < 0.05 || refused > 0) return;
+    for (const Scene& other : {with("a.csv", "b.state"), with("b.csv", "a.state")}) {
+      CHECK_THROWS_WITH(run(other), Catch::Contains("another run"));
+      ++refused;
+    }
+    ran += run(with("b.csv", "b.state")).failure.empty();
+  };
+  REQUIRE(run(first, options).failure == "");
+  CHECK(refused == 2);
+  CHECK(ran == 1);
+  CHECK(content(path / "a.csv") == content(path / "b.csv"));
+  CHECK(run(first).failure == "");
+  // Nothing is left behind, and what a killed run left keeps nobody out.
+  CHECK_FALSE(fs::exists(path / "a.csv.lock"));
+  std::ofstream(path / "a.csv.lock") << "1\n";
+  CHECK(run(first).failure == "");
+}
+
+TEST_CASE("outputs that collide with each other or with an input are refused") {
+  const Scene good = parse_scene(falling(""), "names.toml");
+  const fs::path path = folder("names");
+  const auto refused = [&](auto change) {
+    Scene scene = good;
+    change(scene.output);
+    for (std::string* name :
+         {&scene.output.csv, &scene.output.vtk, &scene.output.svg, &scene.output.state})
+      if (!name->empty()) *name = (path / *name).string();
+    CHECK_THROWS_AS(run(scene), std::invalid_argument);
+    CHECK(fs::is_empty(path));
+  };
+  refused([](Output& o) { o.csv = o.svg = "a"; });
+  refused([](Output& o) { o.csv = "a", o.state = "./a"; });
+  refused([](Output& o) { o.csv = "a.pvd", o.vtk = "a.vtu"; });
+  refused([](Output& o) { o.csv = "a", o.vtk = "a.pvd"; });
+  refused([](Output& o) { o.csv = "s.new", o.state = "s"; });
+  refused([](Output& o) { o.svg = "s", o.state = "s.gp"; });
+  refused([](Output& o) { o.vtk = "a", o.csv = "a/bodies_000001.vtp"; });
+  refused([](Output& o) { o.csv = "x/.."; });
+
+  // The scene itself, under another name, too.
+  Scene scene = good;
+  scene.file = (path / "scene.toml").string();
+  std::ofstream(scene.file) << "precious";
+  fs::create_symlink(scene.file, path / "link");
+  for (const char* name : {"scene.toml", "link", "./scene.toml"}) {
+    scene.output.csv = (path / name).string();
+    CHECK_THROWS_AS(run(scene), std::invalid_argument);
+  }
+  CHECK(content(scene.file) == "precious");
+}
+
+TEST_CASE("gnuplot never sees a name from a scene") {
+  Scene scene = parse_scene(falling(""), "picture.toml");
+  const fs::path path = folder("picture");
+  const fs::path before = fs::current_path();
+  fs::current_path(path);
+  scene.output.svg = "| touch pwned; cat > x";
+  const RunResult result = run(scene);
+  fs::current_path(before);
+  CHECK_FALSE(fs::exists(path / "pwned"));
+  CHECK_FALSE(fs::exists(path / "x"));
+  if (result.remarks.empty())
+    CHECK(content(path / scene.output.svg).find("<svg") != std::string::npos);
+}
