@@ -1,4 +1,5 @@
 // Effects, forms and the engine of jointed scenes. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -309,5 +310,59 @@ TEST_CASE("costs name only the effects of the scene", "[smooth]") {
     CHECK(cost.effect != "gravity");
     CHECK(cost.effect != "joints");
     CHECK(cost.effect != "springs");
+  }
+}
+
+TEST_CASE("a mechanism of any size, time and mass moves alike", "[smooth]") {
+  // Two rods under their weight, energy kept: the same numbers in its own units.
+  const auto rods = [](double length, double time, double mass, Formulation form) {
+    Scene s;
+    s.end = 4 * time;
+    s.gravity = Vector3d(0, 0, -9.81 * length / (time * time));
+    s.smooth.emplace();
+    s.smooth->formulation = form;
+    for (int k = 0; k < 2; ++k) {
+      Body rod;
+      rod.name = k == 0 ? "first" : "second";
+      rod.mass = mass;
+      rod.inertia = Vector3d(0.01, 0.1, 0.1).asDiagonal();
+      rod.inertia *= mass * length * length;
+      rod.position = {(0.5 + k) * length, 0, 0};
+      s.bodies.push_back(rod);
+    }
+    Joint hinge;
+    hinge.kind = JointKind::hinge;
+    hinge.first = 0;
+    hinge.axis = {0, 1, 0};
+    Joint ball;
+    ball.first = 0;
+    ball.second = 1;
+    ball.at = {length, 0, 0};
+    s.joints = {hinge, ball};
+    s.invariants = {Invariant{}};
+    return s;
+  };
+  for (const Formulation form : kForms) {
+    const auto reference = make_smooth_engine(rods(1, 1, 1, form));
+    reference->advance(4);
+    for (const double length : {1e-8, 1e-6, 1e-3, 1e4, 1e6, 1e8})
+      for (const double rate : {1.0, 1e-4, 1e5}) {
+        const double time = std::sqrt(length) / rate, mass = length < 1 ? 1e-9 : 1e7;
+        INFO("length " << length << " time " << time << " formulation " << static_cast<int>(form));
+        const auto e = make_smooth_engine(rods(length, time, mass, form));
+        e->advance(4 * time);
+        CHECK(e->time() == Approx(4 * time).epsilon(1e-14));
+        for (std::size_t b = 0; b < 2; ++b) {
+          const BodyState &found = e->bodies()[b], &wanted = reference->bodies()[b];
+          CHECK((found.position / length - wanted.position).norm() < 1e-5);
+          CHECK((found.velocity * time / length - wanted.velocity).norm() < 1e-4);
+          CHECK(found.orientation.angularDistance(wanted.orientation) < 1e-5);
+        }
+        const double energy = mass * length * length / (time * time);
+        const Diagnostics d = e->diagnostics();
+        CHECK(std::abs(d.kinetic_energy + d.potential_energy) < 1e-9 * energy);
+        CHECK(d.drift < 1e-9 * std::max({length, length / time, 1 / time, energy, 1.0}));
+        CHECK(e->counts().steps < 2 * reference->counts().steps);
+      }
   }
 }

@@ -17,7 +17,8 @@ extern "C" void note(int signal) { caught = signal; }
 void catch_signals() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
-    if (sigaction(signal, nullptr, &before) != 0 || before.sa_handler == SIG_IGN) continue;
+    if (sigaction(signal, nullptr, &before) != 0) continue;
+    if (signal == SIGHUP && before.sa_handler == SIG_IGN) continue;
     struct sigaction action {};
     action.sa_handler = note;
     // Calls of the system go on, so that no file is cut; a second signal finds no handler.

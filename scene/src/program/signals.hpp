@@ -4,7 +4,7 @@
 namespace tether::scene {
 
 /// From now on the first SIGINT, SIGTERM or SIGHUP is only noted; the second one ends the program.
-/// A signal that is ignored (nohup) stays ignored.
+/// SIGHUP stays ignored where it is (nohup).
 void catch_signals();
 
 /// 0: none yet.

@@ -28,9 +28,10 @@ constexpr double kStartTolerance = 1e-4;
 class SmoothEngine : public Engine {
  public:
   explicit SmoothEngine(const Scene& scene)
-      : scene_(scene),
-        options_(scene.smooth.value_or(SmoothOptions{})),
-        system_(std::make_unique<System>(scene)) {
+      : units_(units_of(scene)),
+        scene_(in_units(scene, units_)),
+        options_(scene_.smooth.value_or(SmoothOptions{})),
+        system_(std::make_unique<System>(scene_, units_)) {
     bodies_.resize(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
       bodies_[b].position = scene.bodies[b].position;
@@ -58,18 +59,20 @@ class SmoothEngine : public Engine {
   }
 
   const char* name() const override { return "smooth"; }
-  double time() const override { return integrator_->time(); }
+  double time() const override { return units_.time * integrator_->time(); }
 
   void advance(double t) override {
     long steps_left = options_.max_steps;
     const auto stop = [this] { return interrupted(); };
-    while (!integrator_->advance(t, steps_left, stop) && !interrupted()) anchor();
-    system_->bodies(integrator_->y().data(), bodies_);
+    while (!integrator_->advance(t / units_.time, steps_left, stop) && !interrupted()) anchor();
+    look_at_bodies();
   }
 
   const std::vector<BodyState>& bodies() const override { return bodies_; }
   Diagnostics diagnostics() const override {
-    return system_->diagnostics(time(), integrator_->y().data());
+    Diagnostics d = system_->diagnostics(integrator_->time(), integrator_->y().data());
+    to_si(units_, d);
+    return d;
   }
   const std::vector<ContactState>& contacts() const override { return no_contacts_; }
 
@@ -105,7 +108,7 @@ class SmoothEngine : public Engine {
     const std::vector<double>& kept = system_->kept();
     out.write(kMagic, sizeof kMagic);
     binary::put(out, static_cast<std::uint64_t>(y_.size()), static_cast<std::uint64_t>(kept.size()),
-                anchor_, time());
+                units_.length, units_.time, units_.mass, anchor_, integrator_->time());
     binary::put_array(out, y_, now);
     for (const double value : kept) binary::put(out, value);
   }
@@ -118,7 +121,10 @@ class SmoothEngine : public Engine {
     std::vector<double> kept = system_->kept();
     std::uint64_t size = 0, invariants = 0;
     double from = 0, to = 0;
-    binary::get(in, size, invariants, from, to);
+    Units units;
+    binary::get(in, size, invariants, units.length, units.time, units.mass, from, to);
+    if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass)
+      throw std::runtime_error("the saved state is of another scene: of another size");
     if (size != static_cast<std::uint64_t>(y_.size()) || invariants != kept.size())
       throw std::runtime_error("the saved state is of another scene: it has " +
                                std::to_string(size) + " unknowns, this scene has " +
@@ -156,13 +162,19 @@ class SmoothEngine : public Engine {
       seconds_before_ = s;
       integrator_.reset();
     }
-    system_ = std::make_unique<System>(scene_);
+    system_ = std::make_unique<System>(scene_, units_);
     system_->kept() = kept;
     y_ = y;
     anchor_ = t;
     system_->complete(t, y_, yp_);
     integrator_ = std::make_unique<Integrator>(*system_, options_, t, y_, yp_);
-    system_->bodies(y_.data(), bodies_);
+    look_at_bodies();
+  }
+
+  void look_at_bodies() {
+    system_->bodies(integrator_->y().data(), bodies_);
+    for (std::size_t b = 0; b < bodies_.size(); ++b)
+      if (!scene_.bodies[b].fixed) to_si(units_, bodies_[b]);
   }
 
   // The steps from the anchor to the time of a saved state. Without the limit between two stops:
@@ -177,10 +189,10 @@ class SmoothEngine : public Engine {
                                e.what());
     }
     const Eigen::VectorXd y = integrator_->y();
-    if (time() != t || y != saved)
+    if (integrator_->time() != t || y != saved)
       throw std::runtime_error(
           "the saved state is of another build or machine: the same steps lead to other bits here");
-    system_->bodies(y.data(), bodies_);
+    look_at_bodies();
   }
 
   void check_start() {
@@ -199,10 +211,12 @@ class SmoothEngine : public Engine {
       const double value = g.segment(half * m, m).cwiseAbs().maxCoeff(&worst);
       const double allowed = kStartTolerance * (half == 0 ? size : speed);
       if (value <= allowed) continue;
+      const double unit = half == 0 ? units_.length : units_.speed();
       char text[300];
       std::snprintf(text, sizeof text,
                     ": its bodies are off by %.3g %s at t = 0 (at most %.3g is taken for rounding)",
-                    g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s", allowed);
+                    unit * g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s",
+                    unit * allowed);
       throw std::invalid_argument(
           std::string("the start of the scene contradicts the ") +
           (half == 0 ? "position" : "velocity") + " of joint \"" + system_->joint_of_row(worst) +
@@ -213,7 +227,8 @@ class SmoothEngine : public Engine {
     }
   }
 
-  Scene scene_;
+  Units units_;
+  Scene scene_;  // in these units, as everything here but bodies_
   SmoothOptions options_;
   std::unique_ptr<System> system_;  // its workspace changes in a look, too
   double anchor_ = 0;

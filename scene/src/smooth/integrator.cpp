@@ -351,8 +351,8 @@ std::string Integrator::failure(int flag) const {
   double h = 0;
   IDAGetLastStep(ida_, &h);
   char text[200];
-  std::snprintf(text, sizeof text,
-                "the smooth engine stopped at t = %.6g s (last step %.3g s): ", t_, h);
+  std::snprintf(text, sizeof text, "the smooth engine stopped at t = %.6g s (last step %.3g s): ",
+                system_.units().time * t_, system_.units().time * h);
   char* name = IDAGetReturnFlagName(flag);
   std::string message = text + std::string(name) + ". ";
   std::free(name);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <tether/scene/words.hpp>
+#include <type_traits>
 
 #include "system.hpp"
 
@@ -308,11 +309,34 @@ ida_projection::Constraints System::constraints() {
   return all;
 }
 
-Diagnostics System::diagnostics(double t, const double* y) {
-  Diagnostics d;
+// Of rows with different units, in SI.
+double System::drift(double t, const double* y) {
   Eigen::VectorXd g(constraint_count());
   constraint_values(t, y, g.data());
-  d.drift = std::max(g.lpNorm<Eigen::Infinity>(), values_.lpNorm<Eigen::Infinity>());
+  double largest = 0;
+  const auto take = [&](double value, double unit) {
+    largest = std::max(largest, std::abs(value) * unit);
+  };
+  each_row([&](const auto& row) {
+    using Row = std::decay_t<decltype(row)>;
+    constexpr bool angle = std::is_same_v<Row, RightAngle> || std::is_same_v<Row, Angle>;
+    for (int i = 0; i < row.count; ++i) {
+      take(values_[row.row + i], angle ? 1 : units_.length);
+      take(values_[m_ + row.row + i], angle ? 1 / units_.time : units_.speed());
+    }
+  });
+  int k = 2 * p_;
+  for (const int end = k + moving(); k < end; ++k) take(g[k], 1);
+  if (!kept_.empty() && keeps_energy_) take(g[k++], units_.energy());
+  if (!kept_.empty() && keeps_momentum_)
+    for (const int end = k + 3; k < end; ++k) take(g[k], units_.momentum());
+  for (; k < g.size(); ++k) take(g[k], units_.angular_momentum());
+  return largest;
+}
+
+Diagnostics System::diagnostics(double t, const double* y) {
+  Diagnostics d;
+  d.drift = drift(t, y);
   for (const auto& effect : effects_) d.potential_energy += effect->potential(bodies_);
   d.kinetic_energy = energy() - d.potential_energy;
   d.momentum = momentum();

@@ -31,7 +31,8 @@ Now evaluate(const Motion& motion, double t) {
 
 }  // namespace
 
-System::System(const Scene& scene) : form_(scene.smooth.value_or(SmoothOptions{}).formulation) {
+System::System(const Scene& scene, const Units& units)
+    : form_(scene.smooth.value_or(SmoothOptions{}).formulation), units_(units) {
   const std::size_t count = scene.bodies.size();
   bodies_.inertia.resize(count + 1);
   bodies_.frames.resize(count + 1);

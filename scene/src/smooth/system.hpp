@@ -28,12 +28,15 @@
 #include "effects.hpp"
 #include "rows.hpp"
 #include "stopwatch.hpp"
+#include "units.hpp"
 
 namespace tether::scene::smooth {
 
 class System {
  public:
-  explicit System(const Scene& scene);
+  /// `scene` is in these units already; they are for figures that are told to others.
+  explicit System(const Scene& scene, const Units& units = {});
+  const Units& units() const { return units_; }
 
   int size() const { return size_; }
   int rows() const { return m_; }
@@ -73,7 +76,7 @@ class System {
   std::string joint_of_row(int row) const;
 
   void bodies(const double* y, std::vector<BodyState>& out) const;
-  Diagnostics diagnostics(double t, const double* y);
+  Diagnostics diagnostics(double t, const double* y);  ///< drift in SI, the rest in units()
   std::vector<std::string> effect_names() const;
 
  private:
@@ -118,7 +121,10 @@ class System {
   void invariant_values(double t, const double* y, double* g) const;
   void invariant_jacobian(Rows C, int row) const;
 
+  double drift(double t, const double* y);
+
   Formulation form_;
+  Units units_;
   std::vector<std::string> joint_names_;
   std::vector<int> body_of_slot_;
   Bodies bodies_;

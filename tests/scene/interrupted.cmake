@@ -1,0 +1,31 @@
+# Ctrl-C and SIGTERM: PROGRAM runs SCENE into FOLDER, is told to stop, exits with 128 and the signal, and
+# leaves whole files and a state to go on from. SPDX-License-Identifier: BSD-3-Clause
+foreach(case IN ITEMS INT:130 TERM:143)
+  string(REPLACE ":" ";" case ${case})
+  list(GET case 0 signal)
+  list(GET case 1 wanted)
+  file(REMOVE_RECURSE ${FOLDER})
+  execute_process(COMMAND timeout --preserve-status -s ${signal} 1 ${PROGRAM} run ${SCENE} --quiet
+    --output ${FOLDER} --csv a.csv --vtk f.pvd --state a.state --end 1000 --every 0.1
+    RESULT_VARIABLE code OUTPUT_VARIABLE said ERROR_VARIABLE said)
+  if(NOT code STREQUAL wanted OR NOT said MATCHES "interrupted at" OR NOT EXISTS ${FOLDER}/a.state)
+    message(FATAL_ERROR "SIG${signal}: exit code ${code}, expected ${wanted}; it printed: ${said}")
+  endif()
+  file(READ ${FOLDER}/a.csv table)
+  file(READ ${FOLDER}/f.pvd film)
+  string(REGEX MATCH "time_s[^\n]*" header "${table}")
+  string(REGEX MATCH "[^\n]*\n$" last "${table}")
+  string(REGEX MATCHALL "," header "${header}")
+  string(REGEX MATCHALL "," last "${last}")
+  if(NOT last STREQUAL header OR NOT film MATCHES "</VTKFile>\n$")
+    message(FATAL_ERROR "SIG${signal}: a cut table or film")
+  endif()
+  string(REGEX MATCH "interrupted at ([0-9.]+)" ignored "${said}")
+  string(REGEX MATCH "^[0-9]+" whole ${CMAKE_MATCH_1})
+  math(EXPR end "${whole} + 1")
+  execute_process(COMMAND ${PROGRAM} run ${SCENE} --quiet --restart ${FOLDER}/a.state --end ${end}
+    RESULT_VARIABLE code OUTPUT_VARIABLE said ERROR_VARIABLE said)
+  if(NOT code MATCHES "^[01]$")
+    message(FATAL_ERROR "SIG${signal}: the restart exits with ${code}: ${said}")
+  endif()
+endforeach()

@@ -1,0 +1,79 @@
+// Scene files of somebody who means harm: names that lead away, depth and length without end.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <string>
+#include <tether/scene/files.hpp>
+
+#include "support/catch.hpp"
+
+using namespace tether::scene;
+
+namespace {
+
+std::string repeated(const std::string& text, int times) {
+  std::string all;
+  for (int k = 0; k < times; ++k) all += text;
+  return all;
+}
+
+std::string body(const std::string& more) {
+  return "[[body]]\nshape = \"sphere\"\nradius = 1\nmass = 1\n" + more;
+}
+
+}  // namespace
+
+TEST_CASE("names of outputs stay in the folder of the output") {
+  for (const char* key : {"csv", "vtk", "svg", "state"}) {
+    const auto with = [&](const std::string& name) {
+      return parse_scene(body("[output]\n") + key + " = '" + name + "'\n", "names.toml");
+    };
+    for (const char* good : {"a.csv", "results/run 1/a.csv", "a..b", "./x.svg", "Ergebnis_%d.csv"})
+      CHECK_NOTHROW(with(good));
+    for (const char* bad :
+         {"| touch pwned", "/etc/passwd", "../a.csv", "a/../../b", "x/..", ".", "a/", "/dev/null",
+          "a|b", "`touch x`", "$(x)", "-o", "~/a", "a;b", "a\\b"})
+      CHECK_THROWS_AS(with(bad), SceneError);
+    CHECK_THROWS_AS(with(std::string(5000, 'a')), SceneError);
+  }
+}
+
+TEST_CASE("depth without end is refused before it is parsed, with its place") {
+  const auto refused = [](const std::string& text) {
+    INFO(text.substr(0, 60));
+    CHECK_THROWS_WITH(parse_scene(text, "deep.toml"), Catch::Contains("inside each other"));
+  };
+  for (const int depth : {70, 20000, 1000000}) {
+    refused("a" + repeated(".a", depth) + " = 1\n");
+    refused("[a" + repeated(" . \"a\"", depth) + "]\n");
+    refused("[[a" + repeated(".'='", depth) + "]]\n");
+    refused("x = " + repeated("[", depth));
+    refused("x = " + repeated("{a=", depth));
+    refused("x = " + repeated("{a.b.c=", depth / 3));
+    refused("# ''' \"\"\"\nx = 'it\"s'\ny = \"\\\"\"\nz = \"\"\"\"a\"\" [[ \\\"\"\"\"\n" +
+            repeated("a.", depth));
+  }
+  CHECK_THROWS_WITH(parse_scene("[scene]\nend = 1\na" + repeated(".a", 99) + " = 1", "deep.toml"),
+                    Catch::Contains("deep.toml:3:"));
+  // What only looks deep: numbers, texts, comments, long lists, many tables.
+  CHECK_NOTHROW(
+      parse_scene("[scene]\nname = '" + repeated(".[{", 99) + "' # " + repeated("a.", 99) + "\n" +
+                      body("position = [1.5, # [[[\n 2.5,\n 3.5]\n") + repeated(body(""), 300),
+                  "flat.toml"));
+}
+
+TEST_CASE("wrong names and missing pairs in thousands cost no more than the file") {
+  // Quadratic work over 30 000 lines would be a thousand million comparisons of texts: minutes.
+  std::string references, materials = "[stepping]\n", fixed = body("material = \"m\"\n");
+  for (int k = 0; k < 30000; ++k) {
+    const std::string number = std::to_string(k);
+    references += body("name = \"b" + number + "\"\n") + "[[load]]\nbody = \"c" + number +
+                  "\"\nforce = [1, 1, 1]\n";
+    materials += body("material = \"m" + number + "\"\n");
+    fixed += "[[body]]\nshape = \"sphere\"\nradius = 1\nfixed = true\nmaterial = \"f" + number +
+             "\"\n[[pair]]\nbetween = [\"m\", \"f" + number + "\"]\n";
+  }
+  CHECK_THROWS_WITH(parse_scene(references, "references.toml"), Catch::Contains("no such body"));
+  CHECK_THROWS_WITH(
+      parse_scene(materials + "[[pair]]\nbetween = [\"m1\", \"m2\"]\n", "materials.toml"),
+      Catch::Contains("can touch"));
+  CHECK(parse_scene(fixed, "fixed.toml").pairs.size() == 30000);
+}
