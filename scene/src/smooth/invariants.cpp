@@ -318,8 +318,8 @@ double System::drift(double t, const double* y) {
     largest = std::max(largest, std::abs(value) * unit);
   };
   each_row([&](const auto& row) {
-    using Row = std::decay_t<decltype(row)>;
-    constexpr bool angle = std::is_same_v<Row, RightAngle> || std::is_same_v<Row, Angle>;
+    using Kind = std::decay_t<decltype(row)>;
+    constexpr bool angle = std::is_same_v<Kind, RightAngle> || std::is_same_v<Kind, Angle>;
     for (int i = 0; i < row.count; ++i) {
       take(values_[row.row + i], angle ? 1 : units_.length);
       take(values_[m_ + row.row + i], angle ? 1 / units_.time : units_.speed());
