@@ -10,12 +10,14 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr int kStep = 20;  // binary digits
+// Binary digits about 1 m, 1 s and 1 kg that need no other units.
+constexpr double kOrdinary = 10, kOrdinaryMass = 30;
 
-/// The power of 2^20 nearest to x > 0.
+bool within(double x, double digits) { return std::abs(std::log2(x)) <= digits; }
+
+/// The power of 2 nearest to x; 1 where there is no x.
 double unit_near(double x) {
-  if (!(x > 0) || !std::isfinite(x)) return 1;
-  return std::ldexp(1.0, kStep * static_cast<int>(std::lround(std::log2(x) / kStep)));
+  return x > 0 && std::isfinite(x) ? std::exp2(std::round(std::log2(x))) : 1;
 }
 
 double length_of(const Scene& scene) {
@@ -83,8 +85,13 @@ double time_of(const Scene& scene, double length, double mass) {
 }  // namespace
 
 Units units_of(const Scene& scene) {
-  const double length = length_of(scene), mass = mass_of(scene);
-  return {unit_near(length), unit_near(time_of(scene, length, mass)), unit_near(mass)};
+  const double L = length_of(scene), M = mass_of(scene);
+  Units units{unit_near(L), unit_near(time_of(scene, L, M)), unit_near(M)};
+  // Tolerances that are absolute in SI serve them, whose length and time belong together.
+  const bool ordinary = within(units.length, kOrdinary) && within(units.time, kOrdinary);
+  if (ordinary) units.length = units.time = 1;
+  if (ordinary && within(units.mass, kOrdinaryMass)) units.mass = 1;
+  return units;
 }
 
 Scene in_units(const Scene& scene, const Units& u) {

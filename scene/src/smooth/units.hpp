@@ -6,8 +6,9 @@
 
 namespace tether::scene::smooth {
 
-/// Each is a power of 2^20, so that conversions are exact: 1 for sizes of 1 mm to 1 km, times of 1
-/// ms to 1000 s, masses of 1 g to 1 t, and so on. Tolerances are absolute in them.
+/// SI for scenes of 1 mm to 1 km and of times of 1 ms to 1000 s; beyond, powers of 2 near the
+/// scene's own length, time and mass, so that conversions are exact. Tolerances are absolute in
+/// them.
 struct Units {
   double length = 1, time = 1, mass = 1;  // m, s, kg
 
