@@ -87,8 +87,9 @@ double time_of(const Scene& scene, double length, double mass) {
 Units units_of(const Scene& scene) {
   const double L = length_of(scene), M = mass_of(scene);
   Units units{unit_near(L), unit_near(time_of(scene, L, M)), unit_near(M)};
-  // Tolerances that are absolute in SI serve them, whose length and time belong together.
-  const bool ordinary = within(units.length, kOrdinary) && within(units.time, kOrdinary);
+  // Tolerances that are absolute in SI serve them, in positions and in velocities.
+  const bool ordinary = within(units.length, kOrdinary) && within(units.time, kOrdinary) &&
+                        within(units.speed(), kOrdinary);
   if (ordinary) units.length = units.time = 1;
   if (ordinary && within(units.mass, kOrdinaryMass)) units.mass = 1;
   return units;
