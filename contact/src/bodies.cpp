@@ -19,6 +19,8 @@ void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& cont
     const auto where = [k] { return "body " + std::to_string(k) + ": "; };
     if (!bodies[k].inverse_mass.allFinite())
       detail::require_finite("inverse_mass", bodies[k].inverse_mass, where());
+    if (!bodies[k].inverse_mass.isZero(0))
+      detail::require_semidefinite("inverse_mass", bodies[k].inverse_mass, where);
     if (!bodies[k].velocity.allFinite())
       detail::require_finite("velocity", bodies[k].velocity, where());
   }

@@ -54,7 +54,7 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
   // Back to the bodies.
   for (int s = island.body_begin; s < island.body_end; ++s) load_body(s);
   int i = 0;
-  double residual = 0;
+  PassResult residual;
   for (int chunk = island.chunk_begin; chunk < island.chunk_end; ++chunk) {
     visit(chunk, [&](int contact, Kind kind_, int place) {
       const Vector3d n = turned[at(contact)] ? Vector3d(-(*contacts)[at(contact)].normal)
@@ -70,8 +70,8 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
   }
   if (!worker.solution.replaced.empty()) return;  // the sweeps do not know the other rule
   const Team one{0, 1, nullptr, &worker};
-  for (int c = island.chunk_begin; c < island.chunk_end; ++c) residual += test(c, one);
-  r.error = std::sqrt(residual) / (r.norm > 0 ? r.norm : 1);
+  for (int c = island.chunk_begin; c < island.chunk_end; ++c) residual.add(test(c, one));
+  r.error = r.relative(residual.most);
   if (r.error <= options.tolerance) {
     r.status = Status::solved;
   } else if (r.status == Status::solved) {

@@ -53,9 +53,7 @@ void BodySolver::Implementation::read_contacts() {
     const PointContact& c = (*contacts)[i];
     detail::check(i, c, m);
     const bool a = body_kind[at(c.first)] & 1, b = c.second >= 0 && body_kind[at(c.second)] & 1;
-    if (!a && !b)
-      throw std::invalid_argument("contact " + std::to_string(i) +
-                                  " joins fixed bodies: one of the two must be able to move");
+    if (!a && !b) detail::refuse_fixed(i);
     turned[i] = !a;
     first[i] = a ? c.first : c.second;
     second[i] = a && b ? c.second : -1;

@@ -26,9 +26,16 @@ TETHER_INLINE const BodyState& second(const BodyArrays& s, const Contact& c) {
   return *(c.second < 0 ? s.fixed - 1 - c.second : s.state + c.second);
 }
 
+TETHER_INLINE void add(Squares& sum, double square, double share) {
+  square /= share * share;
+  sum.sum += square;
+  sum.most = square > sum.most ? square : sum.most;
+}
+
 template <class L0, bool kTest>
-TETHER_INLINE double pass(const BodyArrays& s, GeneralContact* begin, GeneralContact* end) {
-  double sum = 0;
+TETHER_INLINE Squares pass(const BodyArrays& s, GeneralContact* begin, GeneralContact* end,
+                           Coupled coupled) {
+  Squares sum;
   int count = 0;
   for (GeneralContact* it = begin; it < end; ++it) {
     GeneralContact& c = *it;
@@ -41,9 +48,13 @@ TETHER_INLINE double pass(const BodyArrays& s, GeneralContact* begin, GeneralCon
     for (int k = 0; k < 3; ++k) u[k] = A.v[k] - B.v[k] + a1[k] - a2[k];
     double o[3];
     cross(c.n, c.t, o);
-    const double w0 = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2] + c.bias;
-    const double w1 = u[0] * c.t[0] + u[1] * c.t[1] + u[2] * c.t[2];
-    const double w2 = u[0] * o[0] + u[1] * o[1] + u[2] * o[2];
+    double w0 = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2] + c.bias;
+    double w1 = u[0] * c.t[0] + u[1] * c.t[1] + u[2] * c.t[2];
+    double w2 = u[0] * o[0] + u[1] * o[1] + u[2] * o[2];
+    const double share = kTest ? 1.0 / coupled[it - begin] : 1;
+    w0 *= share;
+    w1 *= share;
+    w2 *= share;
     LocalBlock L;
     L.a = c.a;
     L.inv_a = c.inv_a;
@@ -61,13 +72,13 @@ TETHER_INLINE double pass(const BodyArrays& s, GeneralContact* begin, GeneralCon
     L.unique = false;
     // D x with T = diag(beta) + c c'/a
     const double cx = c.c[0] * c.x[1] + c.c[1] * c.x[2], dn = c.a * c.x[0] + cx, f = dn * c.inv_a;
-    double x[3] = {c.x[0], c.x[1], c.x[2]}, lambda = c.lambda;
+    double x[3] = {c.x[0], c.x[1], c.x[2]}, lambda = c.lambda * share;
     L0::solve(L, dn - w0, c.c[0] * f + c.beta[0] * c.x[1] - w1,
               c.c[1] * f + c.beta[1] * c.x[2] - w2, x, lambda, count);
     const double d0 = x[0] - c.x[0], d1 = x[1] - c.x[1], d2 = x[2] - c.x[2];
     const double e0 = c.a * d0 + c.c[0] * d1 + c.c[1] * d2, ef = e0 * c.inv_a;
     const double e1 = c.c[0] * ef + c.beta[0] * d1, e2 = c.c[1] * ef + c.beta[1] * d2;
-    sum += e0 * e0 + e1 * e1 + e2 * e2;
+    add(sum, e0 * e0 + e1 * e1 + e2 * e2, share);
     if (kTest) continue;
     double p[3], q[3];
     for (int k = 0; k < 3; ++k) p[k] = d0 * c.n[k] + d1 * c.t[k] + d2 * o[k];
@@ -86,8 +97,9 @@ TETHER_INLINE double pass(const BodyArrays& s, GeneralContact* begin, GeneralCon
 }
 
 template <bool kTest>
-TETHER_INLINE double pass(const BodyArrays& s, SphereContact* begin, SphereContact* end) {
-  double sum = 0;
+TETHER_INLINE Squares pass(const BodyArrays& s, SphereContact* begin, SphereContact* end,
+                           Coupled coupled) {
+  Squares sum;
   for (SphereContact* it = begin; it < end; ++it) {
     SphereContact& c = *it;
     fetch(s, it, end);
@@ -99,12 +111,14 @@ TETHER_INLINE double pass(const BodyArrays& s, SphereContact* begin, SphereConta
     cross(w, c.n, u);
     for (int k = 0; k < 3; ++k) u[k] += A.v[k] - B.v[k];
     const double un = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2];  // without bias
+    const double share = kTest ? 1.0 / coupled[it - begin] : 1;
+    const double inv_a = share * c.inv_a, inv_t = share * c.inv_t;
     const double pn = c.p[0] * c.n[0] + c.p[1] * c.n[1] + c.p[2] * c.n[2];
-    double xn = pn - (un + c.bias) * c.inv_a;
+    double xn = pn - (un + c.bias) * inv_a;
     xn = xn > 0 ? xn : 0;
     double t[3], tt = 0;
     for (int k = 0; k < 3; ++k) {
-      t[k] = c.p[k] - pn * c.n[k] - (u[k] - un * c.n[k]) * c.inv_t;
+      t[k] = c.p[k] - pn * c.n[k] - (u[k] - un * c.n[k]) * inv_t;
       tt += t[k] * t[k];
     }
     const double most = c.mu * xn;
@@ -115,7 +129,7 @@ TETHER_INLINE double pass(const BodyArrays& s, SphereContact* begin, SphereConta
       dn += p[k] * c.n[k];
       dd += p[k] * p[k];
     }
-    sum += dn * dn / (c.inv_a * c.inv_a) + (dd - dn * dn) / (c.inv_t * c.inv_t);
+    add(sum, dn * dn / (inv_a * inv_a) + (dd - dn * dn) / (inv_t * inv_t), 1);
     if (kTest) continue;
     double q[3];
     cross(c.n, p, q);
@@ -136,8 +150,9 @@ TETHER_INLINE double pass(const BodyArrays& s, SphereContact* begin, SphereConta
 }
 
 template <bool kTest>
-TETHER_INLINE double pass(const BodyArrays& s, SmoothContact* begin, SmoothContact* end) {
-  double sum = 0;
+TETHER_INLINE Squares pass(const BodyArrays& s, SmoothContact* begin, SmoothContact* end,
+                           Coupled coupled) {
+  Squares sum;
   for (SmoothContact* it = begin; it < end; ++it) {
     SmoothContact& c = *it;
     fetch(s, it, end);
@@ -147,10 +162,11 @@ TETHER_INLINE double pass(const BodyArrays& s, SmoothContact* begin, SmoothConta
     for (int k = 0; k < 3; ++k) {
       w += (A.v[k] - B.v[k]) * c.n[k] + A.w[k] * c.q1[k] - B.w[k] * c.q2[k];
     }
-    double x = c.x - w * c.inv_a;
+    const double share = kTest ? 1.0 / coupled[it - begin] : 1;
+    double x = c.x - share * w * c.inv_a;
     x = x > 0 ? x : 0;
     const double d = x - c.x, e = d * c.weight;
-    sum += e * e;
+    add(sum, e * e, share);
     if (kTest) continue;
     c.x = x;
     double p[3], q[3];
@@ -171,38 +187,44 @@ TETHER_INLINE double pass(const BodyArrays& s, SmoothContact* begin, SmoothConta
 
 using S = const BodyArrays&;
 using G = GeneralContact*;
-TETHER_CLONES double sweep_dissipation(S s, G b, G e) {
-  return pass<MaximumDissipation, false>(s, b, e);
+TETHER_CLONES Squares sweep_dissipation(S s, G b, G e) {
+  return pass<MaximumDissipation, false>(s, b, e, nullptr);
 }
-TETHER_CLONES double test_dissipation(S s, G b, G e) {
-  return pass<MaximumDissipation, true>(s, b, e);
+TETHER_CLONES Squares test_dissipation(S s, G b, G e, Coupled c) {
+  return pass<MaximumDissipation, true>(s, b, e, c);
 }
-TETHER_CLONES double sweep_coulomb(S s, G b, G e) { return pass<Coulomb, false>(s, b, e); }
-TETHER_CLONES double test_coulomb(S s, G b, G e) { return pass<Coulomb, true>(s, b, e); }
-TETHER_CLONES double sweep_spheres(S s, SphereContact* b, SphereContact* e) {
-  return pass<false>(s, b, e);
+TETHER_CLONES Squares sweep_coulomb(S s, G b, G e) { return pass<Coulomb, false>(s, b, e, nullptr); }
+TETHER_CLONES Squares test_coulomb(S s, G b, G e, Coupled c) {
+  return pass<Coulomb, true>(s, b, e, c);
 }
-TETHER_CLONES double test_spheres(S s, SphereContact* b, SphereContact* e) {
-  return pass<true>(s, b, e);
+TETHER_CLONES Squares sweep_spheres(S s, SphereContact* b, SphereContact* e) {
+  return pass<false>(s, b, e, nullptr);
 }
-TETHER_CLONES double sweep_smooth(S s, SmoothContact* b, SmoothContact* e) {
-  return pass<false>(s, b, e);
+TETHER_CLONES Squares test_spheres(S s, SphereContact* b, SphereContact* e, Coupled c) {
+  return pass<true>(s, b, e, c);
 }
-TETHER_CLONES double test_smooth(S s, SmoothContact* b, SmoothContact* e) {
-  return pass<true>(s, b, e);
+TETHER_CLONES Squares sweep_smooth(S s, SmoothContact* b, SmoothContact* e) {
+  return pass<false>(s, b, e, nullptr);
+}
+TETHER_CLONES Squares test_smooth(S s, SmoothContact* b, SmoothContact* e, Coupled c) {
+  return pass<true>(s, b, e, c);
 }
 
 }  // namespace
 
-double sweep(S s, Law law, G b, G e) {
+Squares sweep(S s, Law law, G b, G e) {
   return law == Law::coulomb ? sweep_coulomb(s, b, e) : sweep_dissipation(s, b, e);
 }
-double test(S s, Law law, G b, G e) {
-  return law == Law::coulomb ? test_coulomb(s, b, e) : test_dissipation(s, b, e);
+Squares test(S s, Law law, G b, G e, Coupled c) {
+  return law == Law::coulomb ? test_coulomb(s, b, e, c) : test_dissipation(s, b, e, c);
 }
-double sweep(S s, Law, SphereContact* b, SphereContact* e) { return sweep_spheres(s, b, e); }
-double test(S s, Law, SphereContact* b, SphereContact* e) { return test_spheres(s, b, e); }
-double sweep(S s, Law, SmoothContact* b, SmoothContact* e) { return sweep_smooth(s, b, e); }
-double test(S s, Law, SmoothContact* b, SmoothContact* e) { return test_smooth(s, b, e); }
+Squares sweep(S s, Law, SphereContact* b, SphereContact* e) { return sweep_spheres(s, b, e); }
+Squares test(S s, Law, SphereContact* b, SphereContact* e, Coupled c) {
+  return test_spheres(s, b, e, c);
+}
+Squares sweep(S s, Law, SmoothContact* b, SmoothContact* e) { return sweep_smooth(s, b, e); }
+Squares test(S s, Law, SmoothContact* b, SmoothContact* e, Coupled c) {
+  return test_smooth(s, b, e, c);
+}
 
 }  // namespace tether::contact::detail

@@ -137,7 +137,8 @@ TETHER_AVX2 Sliding slide(MaximumDissipation, const Blocks& L, v4 bn, v4 k, v4 h
   const v4 opening = L.ee - one;
   const v4 id = one / denominator, radius = k * id;
   return {bn * L.inv_a * id, radius * v0, radius * v1, lambda,
-          both(less(zero, opening), less(denominator, all(1e-3) * opening))};
+          either(either(at_most(length, all(1e-140)), at_most(all(1e140), length)),
+                 both(less(zero, opening), less(denominator, all(1e-3) * opening)))};
 }
 
 TETHER_AVX2 Sliding slide(Coulomb, const Blocks& L, v4 bn, v4 k, v4 h0, v4 h1, v4, v4, v4, v4, v4,
@@ -183,9 +184,23 @@ TETHER_AVX2 Sliding slide(Coulomb, const Blocks& L, v4 bn, v4 k, v4 h0, v4 h1, v
   return {f * z, fm * z0, fm * z1, l, rare};
 }
 
+struct Sums {
+  v4 sum, most;
+};
+TETHER_AVX2 void add(Sums& s, v4 square) {
+  s.sum = s.sum + square;
+  s.most = most(square, s.most);
+}
+TETHER_AVX2 Squares total(const Sums& s) {
+  const double pair = s.most[0] > s.most[1] ? s.most[0] : s.most[1];
+  const double other = s.most[2] > s.most[3] ? s.most[2] : s.most[3];
+  return {(s.sum[0] + s.sum[1]) + (s.sum[2] + s.sum[3]), pair > other ? pair : other};
+}
+
 template <class Rule, bool kTest>
-TETHER_AVX2 double pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* end) {
-  v4 sum = all(0);
+TETHER_AVX2 Squares pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* end,
+                         Coupled coupled) {
+  Sums sums = {all(0), all(0)};
   for (GeneralGroup* it = begin; it < end; ++it) {
     GeneralGroup& c = *it;
     if (it + 2 < end) fetch<true>(s, it[2]);
@@ -197,7 +212,8 @@ TETHER_AVX2 double pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* 
     const Vector a1 = cross(A.w, r1), a2 = cross(B.w, r2);
     const Vector u = {A.v.x - B.v.x + a1.x - a2.x, A.v.y - B.v.y + a1.y - a2.y,
                       A.v.z - B.v.z + a1.z - a2.z};
-    const v4 w0 = dot(u, n) + load(c.bias), w1 = dot(u, t), w2 = dot(u, o);
+    const v4 share = kTest ? all(1) / widen(coupled + 4 * (it - begin)) : all(1);
+    const v4 w0 = share * (dot(u, n) + load(c.bias)), w1 = share * dot(u, t), w2 = share * dot(u, o);
     Blocks L;
     L.a = load(c.a);
     L.inv_a = load(c.inv_a);
@@ -210,7 +226,8 @@ TETHER_AVX2 double pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* 
     L.ee = L.g0 * L.g0 + L.g1 * L.g1;
     L.beta0 = load(c.beta[0]);
     L.beta1 = load(c.beta[1]);
-    const v4 x0 = load(c.x[0]), x1 = load(c.x[1]), x2 = load(c.x[2]), lambda = load(c.lambda);
+    const v4 x0 = load(c.x[0]), x1 = load(c.x[1]), x2 = load(c.x[2]);
+    const v4 lambda = share * load(c.lambda);
     // b = D x - w, D with T = diag(beta) + c c'/a
     const v4 dn = L.a * x0 + L.c0 * x1 + L.c1 * x2, f = dn * L.inv_a;
     const v4 bn = dn - w0, b0 = L.c0 * f + L.beta0 * x1 - w1, b1 = L.c1 * f + L.beta1 * x2 - w2;
@@ -260,7 +277,7 @@ TETHER_AVX2 double pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* 
     const v4 d0 = z0 - x0, d1 = z1 - x1, d2 = z2 - x2;
     const v4 e0 = L.a * d0 + L.c0 * d1 + L.c1 * d2, ef = e0 * L.inv_a;
     const v4 e1 = L.c0 * ef + L.beta0 * d1, e2 = L.c1 * ef + L.beta1 * d2;
-    sum = sum + (e0 * e0 + e1 * e1 + e2 * e2);
+    add(sums, (e0 * e0 + e1 * e1 + e2 * e2) / (share * share));
     if (kTest) continue;
     _mm256_store_pd(c.x[0], z0);
     _mm256_store_pd(c.x[1], z1);
@@ -281,12 +298,13 @@ TETHER_AVX2 double pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup* 
     write(A);
     write(B);
   }
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+  return total(sums);
 }
 
 template <bool kTest>
-TETHER_AVX2 double pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* end) {
-  v4 sum = all(0);
+TETHER_AVX2 Squares pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* end,
+                         Coupled coupled) {
+  Sums sums = {all(0), all(0)};
   const v4 zero = all(0), one = all(1);
   for (SphereGroup* it = begin; it < end; ++it) {
     SphereGroup& c = *it;
@@ -296,7 +314,9 @@ TETHER_AVX2 double pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* en
     read(A);
     read(B);
     const Vector n = load(c.n), p = load(c.p);
-    const v4 s1 = load(c.s1), s2 = load(c.s2), inv_a = load(c.inv_a), inv_t = load(c.inv_t);
+    const v4 s1 = load(c.s1), s2 = load(c.s2);
+    const v4 share = kTest ? all(1) / widen(coupled + 4 * (it - begin)) : all(1);
+    const v4 inv_a = share * load(c.inv_a), inv_t = share * load(c.inv_t);
     const Vector w = {s1 * A.w.x - s2 * B.w.x, s1 * A.w.y - s2 * B.w.y, s1 * A.w.z - s2 * B.w.z};
     const Vector wn = cross(w, n);
     const Vector u = {wn.x + (A.v.x - B.v.x), wn.y + (A.v.y - B.v.y), wn.z + (A.v.z - B.v.z)};
@@ -309,7 +329,7 @@ TETHER_AVX2 double pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* en
     const Vector d = {xn * n.x + scale * t.x - p.x, xn * n.y + scale * t.y - p.y,
                       xn * n.z + scale * t.z - p.z};
     const v4 dn = dot(d, n), dd = dot(d, d);
-    sum = sum + (dn * dn / (inv_a * inv_a) + (dd - dn * dn) / (inv_t * inv_t));
+    add(sums, dn * dn / (inv_a * inv_a) + (dd - dn * dn) / (inv_t * inv_t));
     if (kTest) continue;
     _mm256_store_pd(c.p[0], p.x + d.x);
     _mm256_store_pd(c.p[1], p.y + d.y);
@@ -323,18 +343,19 @@ TETHER_AVX2 double pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* en
     write(A);
     write(B);
   }
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+  return total(sums);
 }
 
-#define TETHER_PASS __attribute__((target("avx2,fma"))) double
-TETHER_PASS dissipation(const BodyArrays& s, GeneralGroup* b, GeneralGroup* e, bool test) {
-  return test ? pass<MaximumDissipation, true>(s, b, e) : pass<MaximumDissipation, false>(s, b, e);
+#define TETHER_PASS __attribute__((target("avx2,fma"))) Squares
+TETHER_PASS dissipation(const BodyArrays& s, GeneralGroup* b, GeneralGroup* e, Coupled c) {
+  return c ? pass<MaximumDissipation, true>(s, b, e, c)
+           : pass<MaximumDissipation, false>(s, b, e, c);
 }
-TETHER_PASS coulomb(const BodyArrays& s, GeneralGroup* b, GeneralGroup* e, bool test) {
-  return test ? pass<Coulomb, true>(s, b, e) : pass<Coulomb, false>(s, b, e);
+TETHER_PASS coulomb(const BodyArrays& s, GeneralGroup* b, GeneralGroup* e, Coupled c) {
+  return c ? pass<Coulomb, true>(s, b, e, c) : pass<Coulomb, false>(s, b, e, c);
 }
-TETHER_PASS spheres(const BodyArrays& s, SphereGroup* b, SphereGroup* e, bool test) {
-  return test ? pass<true>(s, b, e) : pass<false>(s, b, e);
+TETHER_PASS spheres(const BodyArrays& s, SphereGroup* b, SphereGroup* e, Coupled c) {
+  return c ? pass<true>(s, b, e, c) : pass<false>(s, b, e, c);
 }
 
 }  // namespace
@@ -343,17 +364,17 @@ bool groups_are_served() {
   static const bool served = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   return served;
 }
-double sweep(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end) {
-  return law == Law::coulomb ? coulomb(s, begin, end, false) : dissipation(s, begin, end, false);
+Squares sweep(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end) {
+  return law == Law::coulomb ? coulomb(s, begin, end, nullptr) : dissipation(s, begin, end, nullptr);
 }
-double test(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end) {
-  return law == Law::coulomb ? coulomb(s, begin, end, true) : dissipation(s, begin, end, true);
+Squares test(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end, Coupled c) {
+  return law == Law::coulomb ? coulomb(s, begin, end, c) : dissipation(s, begin, end, c);
 }
-double sweep(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end) {
-  return spheres(s, begin, end, false);
+Squares sweep(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end) {
+  return spheres(s, begin, end, nullptr);
 }
-double test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end) {
-  return spheres(s, begin, end, true);
+Squares test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end, Coupled c) {
+  return spheres(s, begin, end, c);
 }
 
 }  // namespace tether::contact::detail
@@ -363,10 +384,10 @@ double test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end) {
 namespace tether::contact::detail {
 
 bool groups_are_served() { return false; }
-double sweep(const BodyArrays&, Law, GeneralGroup*, GeneralGroup*) { return 0; }
-double test(const BodyArrays&, Law, GeneralGroup*, GeneralGroup*) { return 0; }
-double sweep(const BodyArrays&, Law, SphereGroup*, SphereGroup*) { return 0; }
-double test(const BodyArrays&, Law, SphereGroup*, SphereGroup*) { return 0; }
+Squares sweep(const BodyArrays&, Law, GeneralGroup*, GeneralGroup*) { return {}; }
+Squares test(const BodyArrays&, Law, GeneralGroup*, GeneralGroup*, Coupled) { return {}; }
+Squares sweep(const BodyArrays&, Law, SphereGroup*, SphereGroup*) { return {}; }
+Squares test(const BodyArrays&, Law, SphereGroup*, SphereGroup*, Coupled) { return {}; }
 
 }  // namespace tether::contact::detail
 

@@ -15,6 +15,7 @@ using v4 = __m256d;
 
 TETHER_AVX2 v4 all(double x) { return _mm256_set1_pd(x); }
 TETHER_AVX2 v4 load(const double* p) { return _mm256_load_pd(p); }
+TETHER_AVX2 v4 widen(const float* p) { return _mm256_cvtps_pd(_mm_loadu_ps(p)); }
 TETHER_AVX2 v4 root(v4 x) { return _mm256_sqrt_pd(x); }
 TETHER_AVX2 v4 less(v4 a, v4 b) { return _mm256_cmp_pd(a, b, _CMP_LT_OQ); }
 TETHER_AVX2 v4 at_most(v4 a, v4 b) { return _mm256_cmp_pd(a, b, _CMP_LE_OQ); }

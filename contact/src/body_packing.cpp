@@ -1,4 +1,5 @@
 // Tether: contacts as the kernels want them, and back. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 
@@ -48,8 +49,8 @@ Vector3d on_cone(const Vector3d& p, const Vector3d& n, double mu) {
 
 }  // namespace
 
-// Returns |b|^2 of the contact.
-double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) {
+// Returns |b|^2, the needed change and the speeds of which b is the difference.
+detail::PassResult BodySolver::Implementation::pack_contact(int contact, Kind k, int place) {
   const PointContact& c = (*contacts)[at(contact)];
   const detail::Side s = detail::side(*bodies, c, turned[at(contact)] != 0);
   const int a = graph.slot[at(first[at(contact)])];
@@ -58,6 +59,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
                 : partner < 0            ? -1
                                          : -1 - fixed_slot[at(partner)];
   const Vector3d before = detail::velocity_before(s, c.bias);
+  double slip = 0;  // T/a of the tangents that friction moves
   const double mass = s.first->inverse_mass + (s.second ? s.second->inverse_mass : 0);
   switch (k) {
     case Kind::sphere:
@@ -66,6 +68,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       double t = mass + s1 * s1 * s.first->inverse_inertia(0, 0);
       if (s.second) t += s2 * s2 * s.second->inverse_inertia(0, 0);
       if (!(mass > 0)) throw std::invalid_argument("the bodies cannot move along the normal");
+      slip = t / mass;
       SphereContact p = {};
       p.first = a;
       p.second = b;
@@ -101,6 +104,7 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
       const LocalBlock L(F * detail::diagonal_block(s) * F.transpose(), c.mu);
       // Tangents turned by V, in which the tangential block is diagonal.
       const Vector3d t = L.cosine * F.row(1) + L.sine * F.row(2);
+      slip = 0.5 * (L.T[0] + L.T[2]) * L.inv_a;
       GeneralContact p = {};
       p.first = a;
       p.second = b;
@@ -127,7 +131,12 @@ double BodySolver::Implementation::pack_contact(int contact, Kind k, int place) 
   }
   set_impulse(k, place, p);
   if (!p.isZero(0)) apply(contact, p);
-  return before.squaredNorm();
+  const double bn = -before.dot(s.n), bb = before.squaredNorm();
+  PassResult result;
+  result.sum = bb;
+  result.most = detail::needed_change(bn, std::sqrt(std::max(0.0, bb - bn * bn)), c.mu, slip);
+  result.speed = detail::speed_before(s, c.bias);
+  return result;
 }
 
 detail::GeneralContact BodySolver::Implementation::general_contact(Kind k, int place) const {
@@ -189,12 +198,12 @@ void BodySolver::Implementation::apply(int contact, const Vector3d& p) {
   detail::push(state[at(b)], inertia[at(b)], minus.data(), r.data());
 }
 
-double BodySolver::Implementation::pack(int chunk, Worker& worker) {
-  double sum = 0;
+detail::PassResult BodySolver::Implementation::pack(int chunk, Worker& worker) {
+  PassResult sum;
   visit(chunk, [&](int contact, Kind k, int place) {
     // Other threads wait at the next barrier: a failure is reported after the run.
     try {
-      sum += pack_contact(contact, k, place);
+      sum.add(pack_contact(contact, k, place));
     } catch (const std::invalid_argument& e) {
       if (contact >= worker.bad_contact) return;
       worker.bad_contact = contact;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "body_kernels.hpp"
+#include "criterion.hpp"
 #include "contact_graph.hpp"
 #include "impulse_memory.hpp"
 #include "worker_team.hpp"
@@ -18,9 +19,27 @@ namespace tether::contact::detail {
 struct IslandResult {
   Status status = Status::unsolved;
   int sweeps = 0;
-  double norm = 0, error = 0;
+  double error = 0;
+  double inverse_scale = 0;  // 1 / velocity scale
+  double floor = 0;          // squares of errors up to here are round-off of the bodies' velocities
+  double relative(double square) const {
+    return square <= floor ? 0 : std::sqrt(square) * inverse_scale;
+  }
   bool assembled = false;
   bool saved = false;  // an earlier point was the best and is unpacked already
+};
+
+// What a pass over contacts adds up, in squares of velocities: before the first sweep |b|^2 and the
+// largest speed, and the largest needed change itself; later errors.
+struct PassResult : Squares {
+  double speed = 0;
+  PassResult() = default;
+  PassResult(const Squares& s) : Squares(s) {}
+  void add(const PassResult& r) {
+    sum += r.sum;
+    most = most > r.most ? most : r.most;
+    speed = speed > r.speed ? speed : r.speed;
+  }
 };
 
 // What each thread has of its own.
@@ -62,9 +81,11 @@ struct BodySolver::Implementation {
   using Chunk = detail::Chunk;
   using GeneralContact = detail::GeneralContact;
   using GeneralGroup = detail::GeneralGroup;
+  using Coupled = detail::Coupled;
   using Island = detail::Island;
   using IslandResult = detail::IslandResult;
   using Kind = detail::Kind;
+  using PassResult = detail::PassResult;
   using SmoothContact = detail::SmoothContact;
   using SphereContact = detail::SphereContact;
   using SphereGroup = detail::SphereGroup;
@@ -100,7 +121,7 @@ struct BodySolver::Implementation {
   std::vector<BodyState> fixed;
   std::vector<BodyState> state;
   std::vector<BodyInertia> inertia;
-  std::vector<double> chunk_sum[2];  // in turns: a thread may still read those of the last pass
+  std::vector<PassResult> chunk_sum[2];  // in turns: a thread may still read those of the last pass
   std::vector<IslandResult> results;
   std::vector<double> previous_impulse, previous_velocity;  // for the momentum
 
@@ -126,16 +147,17 @@ struct BodySolver::Implementation {
 
   int cut(int begin, int end, int k, int parts) const;
   template <class Operation>
-  double pass(const Island& island, const Team& team, int& turn, const Operation& operation);
+  PassResult pass(const Island& island, const Team& team, int& turn, const Operation& operation);
   template <class Operation>
-  double over_kinds(int chunk, const Team& team, const Operation& operation);
-  double sweep(int chunk, const Team& team);
-  double test(int chunk, const Team& team);
-  double pack(int chunk, Worker& worker);
+  PassResult over_kinds(int chunk, const Team& team, const Operation& operation);
+  PassResult sweep(int chunk, const Team& team);
+  PassResult test(int chunk, const Team& team);
+  PassResult pack(int chunk, Worker& worker);
   void unpack(int chunk);
   template <class Visit>
   void visit(int chunk, const Visit& visit);
-  double pack_contact(int contact, Kind k, int place);
+  PassResult pack_contact(int contact, Kind k, int place);
+  void rest(const Island& island, const Team& team, int& turn);
   GeneralContact general_contact(Kind k, int place) const;
   SphereContact sphere_contact(Kind k, int place) const;
   void put(const GeneralContact& c, Kind k, int place);
@@ -158,13 +180,13 @@ void BodySolver::Implementation::visit(int chunk, const Visit& visit) {
   }
 }
 
-// operation(chunk) for all chunks of the island, colour by colour; the sum of what it returns, in
+// operation(chunk) for all chunks of the island, colour by colour; what it returns together, in
 // an order that no thread count changes.
 template <class Operation>
-double BodySolver::Implementation::pass(const Island& island, const Team& team, int& turn,
-                                        const Operation& operation) {
+detail::PassResult BodySolver::Implementation::pass(const Island& island, const Team& team,
+                                                    int& turn, const Operation& operation) {
   turn = 1 - turn;
-  std::vector<double>& sums = chunk_sum[turn];
+  std::vector<PassResult>& sums = chunk_sum[turn];
   for (int k = island.colour_begin; k < island.colour_end; ++k) {
     const int begin =
         cut(graph.colours[at(k)], graph.colours[at(k + 1)], team.thread, team.threads);
@@ -173,8 +195,8 @@ double BodySolver::Implementation::pass(const Island& island, const Team& team, 
     for (int c = begin; c < end; ++c) sums[at(c)] = operation(c);
     team.meet();
   }
-  double sum = 0;
-  for (int c = island.chunk_begin; c < island.chunk_end; ++c) sum += sums[at(c)];
+  PassResult sum;
+  for (int c = island.chunk_begin; c < island.chunk_end; ++c) sum.add(sums[at(c)]);
   return sum;
 }
 

@@ -27,6 +27,8 @@ int severity(Status s) {
       return 2;
     case Status::cycling:
       return 3;
+    case Status::infeasible:
+      return 5;
     default:
       return 4;
   }
@@ -47,7 +49,7 @@ void check(const BodyOptions& o) {
 
 void BodySolver::Implementation::unpack(const Island& island, const Team& team) {
   int turn = 0;
-  pass(island, team, turn, [&](int chunk) { return unpack(chunk), 0.0; });
+  pass(island, team, turn, [&](int chunk) { return unpack(chunk), PassResult(); });
   const int begin = island.body_begin, end = island.body_end;
   for (int s = team.from(begin, end); s < team.to(begin, end); ++s) {
     const int b = graph.body[at(s)];
@@ -99,7 +101,7 @@ void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
   smooth.resize(total(Kind::smooth));
   state.resize(graph.body.size());
   inertia.resize(graph.body.size());
-  for (std::vector<double>& sums : chunk_sum) sums.resize(graph.chunks.size());
+  for (std::vector<PassResult>& sums : chunk_sum) sums.resize(graph.chunks.size());
   results.resize(graph.islands.size());  // assign() would grow without reserve
   std::fill(results.begin(), results.end(), IslandResult{});
   previous_impulse.resize(3 * c.size());

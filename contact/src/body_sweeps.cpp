@@ -101,16 +101,19 @@ class BestPoint {
 
 }  // namespace
 
+// operation(bodies, begin, end, theta of these contacts)
 template <class Operation>
-double BodySolver::Implementation::over_kinds(int chunk, const Team& team,
-                                              const Operation& operation) {
+detail::PassResult BodySolver::Implementation::over_kinds(int chunk, const Team& team,
+                                                          const Operation& operation) {
   const BodyArrays s{state.data(), inertia.data(), fixed.data(), &team.worker->nowhere,
                      &kNoInertia};
   const auto &from = graph.chunks[at(chunk)].begin, &to = graph.chunks[at(chunk + 1)].begin;
-  double sum = 0;
+  PassResult sum;
+  Coupled coupled = graph.coupled.data() + graph.chunks[at(chunk)].place;
   const auto kind_range = [&](auto& list, Kind k, int width) {
     const int begin = from[static_cast<int>(k)] / width, end = to[static_cast<int>(k)] / width;
-    if (begin < end) sum += operation(s, list.data() + begin, list.data() + end);
+    if (begin < end) sum.add(operation(s, list.data() + begin, list.data() + end, coupled));
+    coupled += width * (end - begin);
   };
   kind_range(general4, Kind::general4, 4);
   kind_range(spheres4, Kind::sphere4, 4);
@@ -120,15 +123,15 @@ double BodySolver::Implementation::over_kinds(int chunk, const Team& team,
   return sum;
 }
 
-double BodySolver::Implementation::sweep(int chunk, const Team& team) {
-  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end) {
+detail::PassResult BodySolver::Implementation::sweep(int chunk, const Team& team) {
+  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end, Coupled) {
     return detail::sweep(s, options.law, begin, end);
   });
 }
 
-double BodySolver::Implementation::test(int chunk, const Team& team) {
-  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end) {
-    return detail::test(s, options.law, begin, end);
+detail::PassResult BodySolver::Implementation::test(int chunk, const Team& team) {
+  return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end, Coupled coupled) {
+    return detail::test(s, options.law, begin, end, coupled);
   });
 }
 
@@ -192,37 +195,53 @@ void BodySolver::Implementation::save(const Island& island, const Team& team) {
   team.meet();
 }
 
+// b = 0: no impulses, whatever the last solve has left.
+void BodySolver::Implementation::rest(const Island& island, const Team& team, int& turn) {
+  pass(island, team, turn, [&](int chunk) {
+    visit(chunk, [&](int, Kind k, int place) { set_impulse(k, place, Vector3d::Zero()); });
+    return PassResult();
+  });
+  for (int s = team.from(island.body_begin, island.body_end);
+       s < team.to(island.body_begin, island.body_end); ++s)
+    load_body(s);
+  team.meet();
+}
+
 // Sweeps until the island is solved, max_sweeps are reached, or it should be assembled.
 void BodySolver::Implementation::iterate(int k, const Team& team) {
   const Island& island = graph.islands[at(k)];
   const bool small = island.contacts <= options.max_assembled;
   int turn = 0;
   IslandResult r;
-  r.norm = std::sqrt(pass(island, team, turn, [&](int c) { return pack(c, *team.worker); }));
-  const double norm = r.norm > 0 ? r.norm : 1;
-  const double bound = options.tolerance * options.tolerance * norm * norm;
+  const PassResult b = pass(island, team, turn, [&](int c) { return pack(c, *team.worker); });
+  r.inverse_scale = detail::inverse_scale(b.most, b.sum);
+  r.floor = detail::round_off(b.speed);
+  if (b.sum == 0 && b.most == 0) rest(island, team, turn);
+  const double allowed = options.tolerance / r.inverse_scale;
+  const double bound = std::max(allowed * allowed, r.floor);
   double earlier = std::numeric_limits<double>::infinity();  // at the last forecast
   int forecast = kFirstForecast, failed_tests = 0;
   int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   Momentum momentum;
   BestPoint best(!small, options.max_sweeps);
   for (;;) {
-    const double sum = pass(island, team, turn, [&](int c) { return sweep(c, team); });
+    const PassResult change = pass(island, team, turn, [&](int c) { return sweep(c, team); });
+    const double sum = change.sum;
     ++r.sweeps;
     const bool last = r.sweeps >= options.max_sweeps;
     // What a sweep changes is close to the residual, which costs another pass.
-    if ((sum <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
-      double residual = pass(island, team, turn, [&](int c) { return test(c, team); });
+    if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
+      double residual = pass(island, team, turn, [&](int c) { return test(c, team); }).most;
       r.saved = last && !best.last_is_best(residual);
       if (r.saved) residual = best.residual();
-      r.error = std::sqrt(residual) / norm;
+      r.error = r.relative(residual);
       if (residual <= bound) {
         r.status = Status::solved;
         break;
       }
       next_test = r.sweeps + ++failed_tests;
-    } else if (best.look(r.sweeps, sum) &&
-               best.improved(pass(island, team, turn, [&](int c) { return test(c, team); }))) {
+    } else if (best.look(r.sweeps, change.most) &&
+               best.improved(pass(island, team, turn, [&](int c) { return test(c, team); }).most)) {
       save(island, team);
     }
     if (last) {
@@ -233,7 +252,7 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
       // Linear convergence as since half as many sweeps: how many more?
       const double rate = std::log(sum / earlier) / (0.5 * r.sweeps);
       const double more =
-          rate < 0 ? std::log(bound / sum) / rate : std::numeric_limits<double>::infinity();
+          rate < 0 ? std::log(bound / change.most) / rate : std::numeric_limits<double>::infinity();
       if (r.sweeps > kFirstForecast) {
         const bool tried = r.sweeps >= island.contacts && momentum.on();
         if (small && tried && more > kPatience * island.contacts) break;

@@ -40,21 +40,21 @@ void ContactGraph::build(int bodies, const std::vector<int>& first, const std::v
   used_.assign(at(bodies), 0);
   bool large = false;
   for (const Island& island : islands) large = large || island.contacts > kOneChunk;
+  adjacent_start_.assign(at(bodies) + 1, 0);
+  const auto count = [&](int b) {
+    if (b >= 0) ++adjacent_start_[at(b)];
+  };
+  for (std::size_t i = 0; i < n; ++i) count(first[i]), count(second[i]);
+  int sum = 0;
+  for (int& start : adjacent_start_) sum += start, start = sum;
+  adjacent_.resize(at(sum));
+  for (std::size_t i = n; i-- > 0;) {
+    adjacent_[at(--adjacent_start_[at(first[i])])] = static_cast<int>(i);
+    if (second[i] >= 0) adjacent_[at(--adjacent_start_[at(second[i])])] = static_cast<int>(i);
+  }
   if (large) {
     mark_.assign(at(bodies), -1);
     taken_.resize(n);
-    adjacent_start_.assign(at(bodies) + 1, 0);
-    const auto count = [&](int b) {
-      if (b >= 0) ++adjacent_start_[at(b)];
-    };
-    for (std::size_t i = 0; i < n; ++i) count(first[i]), count(second[i]);
-    int sum = 0;
-    for (int& start : adjacent_start_) sum += start, start = sum;
-    adjacent_.resize(at(sum));
-    for (std::size_t i = n; i-- > 0;) {
-      adjacent_[at(--adjacent_start_[at(first[i])])] = static_cast<int>(i);
-      if (second[i] >= 0) adjacent_[at(--adjacent_start_[at(second[i])])] = static_cast<int>(i);
-    }
   }
   // Places of each kind: running counts over the chunks, filled by order_within.
   chunks.push_back({});
@@ -73,6 +73,32 @@ void ContactGraph::build(int bodies, const std::vector<int>& first, const std::v
     island.colour_end = static_cast<int>(colours.size());
     colours.push_back(island.chunk_end);
   }
+  count_coupled();
+}
+
+// Contacts of the one body and of the other, those between the two once.
+void ContactGraph::count_coupled() {
+  const std::vector<int>&first = *first_, &second = *second_;
+  const auto contacts = [&](int b) { return adjacent_start_[at(b) + 1] - adjacent_start_[at(b)]; };
+  between_.assign(slot.size(), 0);
+  count_.resize(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) count_[i] = static_cast<float>(contacts(first[i]));
+  for (int b : body) {
+    const int* begin = adjacent_.data() + adjacent_start_[at(b)];
+    const int* end = adjacent_.data() + adjacent_start_[at(b) + 1];
+    const auto other = [&](int c) { return first[at(c)] == b ? second[at(c)] : first[at(c)]; };
+    for (const int* c = begin; c < end; ++c)
+      if (other(*c) >= 0) ++between_[at(other(*c))];
+    for (const int* c = begin; c < end; ++c) {
+      if (first[at(*c)] != b || second[at(*c)] < 0) continue;
+      count_[at(*c)] += static_cast<float>(contacts(second[at(*c)]) - between_[at(second[at(*c)])]);
+    }
+    for (const int* c = begin; c < end; ++c)
+      if (other(*c) >= 0) between_[at(other(*c))] = 0;
+  }
+  coupled.resize(order.size());
+  for (std::size_t place = 0; place < order.size(); ++place)
+    coupled[place] = count_[at(order[place])];
 }
 
 void ContactGraph::find_islands(int bodies) {
@@ -283,14 +309,15 @@ void ContactGraph::group(const int* begin, const int* end) {
 
 std::size_t ContactGraph::contact_bytes() const {
   return sizeof(int) * (order.capacity() + sorted_.capacity() + adjacent_.capacity()) +
-         taken_.capacity() + sizeof(Chunk) * chunks.capacity() +
+         sizeof(float) * (coupled.capacity() + count_.capacity()) + taken_.capacity() +
+         sizeof(Chunk) * chunks.capacity() +
          sizeof(Island) * islands.capacity();
 }
 
 std::size_t ContactGraph::body_bytes() const {
   return sizeof(int) *
              (slot.capacity() + body.capacity() + parent_.capacity() + island_of_.capacity() +
-              adjacent_start_.capacity() + mark_.capacity() + near_.capacity() + far_.capacity()) +
+              adjacent_start_.capacity() + between_.capacity() + mark_.capacity() + near_.capacity() + far_.capacity()) +
          sizeof(std::uint64_t) * used_.capacity();
 }
 

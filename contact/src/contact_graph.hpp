@@ -40,6 +40,7 @@ class ContactGraph {
              const std::vector<Kind>& kind, bool in_fours);
 
   std::vector<int> order;     // place -> contact
+  std::vector<float> coupled;  // place -> contacts with a moving body in common, itself included
   std::vector<int> slot;      // body -> slot; -1: fixed or without contact
   std::vector<int> body;      // slot -> body
   std::vector<Chunk> chunks;  // and one behind the last
@@ -56,6 +57,7 @@ class ContactGraph {
   void one_chunk(Island& island);
   void cluster(Island& island);
   void colour_chunks(Island& island);
+  void count_coupled();
   void order_within(const int* begin, const int* end, int place);
   void group(const int* begin, const int* end);
 
@@ -65,7 +67,9 @@ class ContactGraph {
   std::vector<int> parent_;                     // body -> union-find parent
   std::vector<int> island_of_;                  // body (root) -> island
   std::vector<int> sorted_;                     // contacts by island, later by chunk
-  std::vector<int> adjacent_start_, adjacent_;  // body -> contacts, of one large island
+  std::vector<int> adjacent_start_, adjacent_;  // body -> contacts
+  std::vector<int> between_;                    // body -> contacts with the body looked at
+  std::vector<float> count_;                    // contact -> coupled
   std::vector<char> taken_;                     // contact -> in a cluster
   std::vector<int> chunk_start_;                // chunk -> contacts
   std::vector<int> chunk_colour_, by_colour_, sequence_;

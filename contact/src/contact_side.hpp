@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <tether/contact/body_solver.hpp>
 #include <utility>
 #include <vector>
@@ -57,6 +58,16 @@ inline Vector3d velocity_before(const Side& s, double bias) {
   Vector3d u = s.first->velocity + s.first->angular_velocity.cross(s.r1) - s.fixed + bias * s.n;
   if (s.second) u -= s.second->velocity + s.second->angular_velocity.cross(s.r2);
   return u;
+}
+
+// Square of the largest of the velocities of which velocity_before is the sum.
+inline double speed_before(const Side& s, double bias) {
+  double most = std::max(s.first->velocity.squaredNorm(),
+                         s.first->angular_velocity.cross(s.r1).squaredNorm());
+  most = std::max({most, s.fixed.squaredNorm(), bias * bias});
+  if (!s.second) return most;
+  return std::max({most, s.second->velocity.squaredNorm(),
+                   s.second->angular_velocity.cross(s.r2).squaredNorm()});
 }
 
 // Diagonal block of A in world axes.

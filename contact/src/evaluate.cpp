@@ -9,13 +9,15 @@ namespace tether::contact {
 
 Residuals evaluate(const Problem& problem, Law law, const linalg::VectorView& impulses) {
   const detail::Packed x = problem.pack(impulses);
+  detail::Packed own = x;  // in the units of the system
   if (!impulses.allFinite()) return {};  // nothing can be said of it
   detail::Packed w(x.size()), scratch(x.size());
   detail::System system;
   system.reset(problem, law);
-  system.velocities(x.data(), w.data());
-  detail::Test test = system.natural_map(x.data(), scratch.data());
-  test.fixed = system.fixed_point(x.data(), scratch.data()).fixed;
+  system.to_own_units(own.data());
+  detail::velocities(problem, x.data(), w.data());
+  detail::Test test = system.natural_map(own.data(), scratch.data());
+  test.fixed = std::max(system.fixed_point(own.data()).fixed, system.rounding(own.data()));
   Residuals r;
   r.fixed_point = system.measure(test, Measure::fixed_point);
   r.natural_map = system.measure(test, Measure::natural_map);

@@ -7,6 +7,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "contact_graph.hpp"
+#include "contact_side.hpp"
+#include "criterion.hpp"
 #include "refuse.hpp"
 #include "system.hpp"
 
@@ -16,19 +19,57 @@ using detail::at;
 
 namespace {
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& r) {
-  Eigen::Matrix3d X;
-  X << 0, -r[2], r[1], r[2], 0, -r[0], -r[1], r[0], 0;
-  return X;
-}
+// The islands of BodySolver with their velocity scales.
+class Scales {
+ public:
+  Scales(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts, Law law,
+         const std::vector<LocalBlock>& blocks) {
+    const std::size_t n = contacts.size();
+    std::vector<int> first(n), second(n);
+    std::vector<detail::Side> sides;
+    for (std::size_t i = 0; i < n; ++i) {
+      const PointContact& c = contacts[i];
+      const bool turned = !detail::moves(bodies[at(c.first)]);
+      sides.push_back(detail::side(bodies, c, turned));
+      first[i] = turned ? c.second : c.first;
+      second[i] = sides[i].second ? (turned ? c.first : c.second) : -1;
+    }
+    detail::ContactGraph graph;
+    graph.build(static_cast<int>(bodies.size()), first, second,
+                std::vector<detail::Kind>(n, detail::Kind::general), false);
+    island_.resize(n);
+    coupled_.resize(n);
+    for (const detail::Island& island : graph.islands) {
+      double needed = 0, bb = 0, speed = 0;
+      for (int place = island.contact_begin; place < island.contact_begin + island.contacts;
+           ++place) {
+        const std::size_t i = at(graph.order[at(place)]);
+        island_[i] = static_cast<int>(inverse_.size());
+        coupled_[i] = static_cast<double>(graph.coupled[at(place)]);
+        const Eigen::Vector3d u = detail::velocity_before(sides[i], contacts[i].bias);
+        const double bn = -u.dot(sides[i].n), square = u.squaredNorm();
+        const double ratio = 0.5 * (blocks[i].T[0] + blocks[i].T[2]) * blocks[i].inv_a;
+        const double bt = std::sqrt(std::max(0.0, square - bn * bn));
+        needed = std::max(needed, detail::needed_change(bn, bt,
+                                                        law == Law::frictionless ? 0 : contacts[i].mu,
+                                                        ratio));
+        bb += square;
+        speed = std::max(speed, detail::speed_before(sides[i], contacts[i].bias));
+      }
+      inverse_.push_back(detail::inverse_scale(needed, bb));
+      floor_.push_back(detail::round_off(speed));
+    }
+  }
+  double coupled(std::size_t i) const { return coupled_[i]; }
+  double relative(std::size_t i, double error) const {
+    const std::size_t k = at(island_[i]);
+    return error * error <= floor_[k] ? 0 : error * inverse_[k];
+  }
 
-// Diagonal block of A in world axes.
-Eigen::Matrix3d local_matrix(const RigidBody& A, const RigidBody& B, const Eigen::Vector3d& r1,
-                             const Eigen::Vector3d& r2) {
-  const Eigen::Matrix3d X1 = skew(r1), X2 = skew(r2);
-  return (A.inverse_mass + B.inverse_mass) * Eigen::Matrix3d::Identity() -
-         X1 * A.inverse_inertia * X1 - X2 * B.inverse_inertia * X2;
-}
+ private:
+  std::vector<int> island_;
+  std::vector<double> coupled_, inverse_, floor_;
+};
 
 }  // namespace
 
@@ -50,7 +91,6 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     v[k] = bodies[k].velocity;
     w[k] = bodies[k].angular_velocity;
   }
-  const RigidBody none;
   const auto relative = [&](const PointContact& c) {
     Eigen::Vector3d u = v[at(c.first)] + w[at(c.first)].cross(c.r1) + c.bias * c.normal;
     if (c.second >= 0) u -= v[at(c.second)] + w[at(c.second)].cross(c.r2);
@@ -72,27 +112,42 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     v[at(c.second)] -= bodies[at(c.second)].inverse_mass * p;
     w[at(c.second)] -= bodies[at(c.second)].inverse_inertia * c.r2.cross(p);
   }
-  Residuals r;
-  r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
-  double fixed = 0, map = 0, xx = 0, ww = 0;
+  std::vector<LocalBlock> blocks;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const PointContact& c = contacts[i];
-    const RigidBody& A = bodies[at(c.first)];
-    const RigidBody& B = c.second < 0 ? none : bodies[at(c.second)];
+    if (!detail::moves(bodies[at(c.first)]) &&
+        (c.second < 0 || !detail::moves(bodies[at(c.second)])))
+      detail::refuse_fixed(i);
     const Eigen::Matrix3d F = tangent_frame(c.normal);
-    const LocalBlock L(F * local_matrix(A, B, c.r1, c.r2) * F.transpose(), c.mu);
+    const detail::Side side = detail::side(bodies, c, !detail::moves(bodies[at(c.first)]));
+    blocks.emplace_back(F * detail::diagonal_block(side) * F.transpose(), c.mu);
+  }
+  const Scales scales(bodies, contacts, law, blocks);
+  Residuals r;
+  r.fixed_point = 0;
+  r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
+  double map = 0, xx = 0, ww = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    const Eigen::Matrix3d F = tangent_frame(c.normal);
+    const LocalBlock& L = blocks[i];
     const Eigen::Vector3d x = F * impulses[i], u = F * relative(c);
     const double mu = law == Law::frictionless ? 0 : c.mu, t = x.tail<2>().norm();
     r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], u[0])));
     r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
     r.dissipation += x.dot(u);
     r.energy_change += 0.5 * x.dot(u + F * before[i]);
-    // Block fixed point.
+    // Block fixed point (README, section 6).
+    const double theta = scales.coupled(i);
     const Eigen::Matrix3d D = L.matrix();
     LocalState state;
     for (int k = 0; k < 3; ++k) state.x[k] = x[k];
-    solve_local(law, L, D * x - u, state);
-    fixed += (D * (x - Eigen::Vector3d(state.x[0], state.x[1], state.x[2]))).squaredNorm();
+    solve_local(law, L, D * x - u / theta, state);
+    const double change = (D * (x - Eigen::Vector3d(state.x[0], state.x[1], state.x[2]))).norm();
+    const double outside = L.a * std::max(t - mu * x[0], -x[0]);
+    const double error = scales.relative(i, theta * std::max(change, outside));
+    if (!(error <= r.fixed_point)) r.fixed_point = error;
+    if (error != error) return {};  // velocities out of range
     // Natural map, and the nearest slip that the law allows.
     double gamma[2] = {0, 0};
     if (law == Law::maximum_dissipation) {
@@ -121,7 +176,6 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     r.alignment = std::max(r.alignment, misfit);
   }
   const auto over = [](double p, double q) { return q > 0 ? p / q : p; };
-  r.fixed_point = over(std::sqrt(fixed), std::sqrt(bb));
   r.natural_map = over(std::sqrt(map), std::sqrt(std::max({bb, xx, ww})));
   r.natural_map_data = over(std::sqrt(map), std::sqrt(bb));
   return r;

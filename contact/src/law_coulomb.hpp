@@ -74,7 +74,7 @@ struct Coulomb {
         l = next;
         // A step of third order leaves the cube of it.
         if ((std::abs(step) <= 1e-5 * (l + beta_min)) & (std::abs(curved) <= 1e-5 * AA))
-          return true;
+          return l < 1e30;  // a step that overflows is no step
         if (starts < 2 || P < 8 * Z) continue;
       }
       // Too far for Halley (a pole of its step, P' < 0, overflow), or a start of which little is

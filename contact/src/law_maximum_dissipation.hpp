@@ -29,6 +29,8 @@ struct MaximumDissipation {
     const double length = std::sqrt(s0 * s0 + s1 * s1);
     if (sticks(L, r, s0, s1, length)) return stick(L, r, bn, x);
 
+    if (!((length > 1e-140) & (length < 1e140)))
+      return in_other_units(L, bn, b0, b1, x, evaluations);
     const double il = 1 / length, u0 = s0 * il, u1 = s1 * il;
     // Cosine of half the visible arc, from the conic's tangents through y*.
     const double kappa = (r.k * L.beta[0] * L.beta[1] - L.g[0] * s0 - L.g[1] * s1) * il;
@@ -146,6 +148,10 @@ struct MaximumDissipation {
   // s >= 1, with p and q along the asymptotes, and dE/ds is almost linear (README, section 3).
   static Regime near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0, double y1,
                                double* x);
+
+  // Where |B| y* squared leaves the range: in units in which it does not.
+  static Regime in_other_units(const LocalBlock& L, double bn, double b0, double b1, double* x,
+                               int& evaluations);
 
   // Singular block: where b lies in the range, E does not depend on the null direction, and the
   // admissible point of least |y| that minimises it is taken. (solve() weighs the null direction

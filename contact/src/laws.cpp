@@ -33,36 +33,54 @@ void MaximumDissipation::derivative(const LocalBlock& L, double bn, double b0, d
   detail::derivative(L, bn, b0, b1, x, regime, true, out);
 }
 
+Regime MaximumDissipation::in_other_units(const LocalBlock& L, double bn, double b0, double b1,
+                                          double* x, int& evaluations) {
+  const LocalRhs r = to_local(L, bn, b0, b1);
+  const double h = std::max(std::abs(r.h0), std::abs(r.h1)), trace = L.beta[0] + L.beta[1];
+  if (!(h > 0) || !std::isfinite(h) || !std::isfinite(trace)) {
+    x[0] = x[1] = x[2] = std::numeric_limits<double>::quiet_NaN();  // sweeps have overflowed
+    return Regime::sliding;
+  }
+  const int p = -std::ilogb(trace), q = -std::ilogb(h);
+  double none = -1;
+  for (int c = 0; c < 3; ++c) x[c] = std::ldexp(x[c], q - p);
+  const Regime regime = solve(rescaled(L, p), std::ldexp(bn, q), std::ldexp(b0, q),
+                              std::ldexp(b1, q), x, none, evaluations);
+  for (int c = 0; c < 3; ++c) x[c] = std::ldexp(x[c], p - q);
+  return regime;
+}
+
 Regime MaximumDissipation::near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0,
                                           double y1, double* x) {
-  // Axes: along g and across it, on the side of y. A = k / (e^2 - 1), B = k / sqrt(e^2 - 1).
+  // Axes: along g and across it, on the side of y. In units of k: A = 1 / (e^2 - 1) and B = 1 /
+  // sqrt(e^2 - 1), so that no product leaves the range where k is tiny.
   const double e = L.e, d0 = L.g[0] / e, d1 = L.g[1] / e;
   const double side = d0 * y1 - d1 * y0 < 0 ? -1 : 1;
   const double a0 = -side * d1, a1 = side * d0;
-  const double A = r.k / (e * e - 1), B = r.k / std::sqrt(e * e - 1);
+  const double A = 1 / (e * e - 1), B = 1 / std::sqrt(e * e - 1);
   const double c0 = e * A * d0, c1 = e * A * d1;
   const double p0 = 0.5 * (-A * d0 + B * a0), p1 = 0.5 * (-A * d1 + B * a1);
   const double q0 = 0.5 * (-A * d0 - B * a0), q1 = 0.5 * (-A * d1 - B * a1);
-  const double z = std::abs(a0 * y0 + a1 * y1) / B;
-  double s = z + std::sqrt(z * z + 1);
+  const double b0 = r.k * L.beta[0], b1 = r.k * L.beta[1];
+  const double z = std::abs(a0 * (y0 / r.k) + a1 * (y1 / r.k)) / B;
+  double s = z + std::hypot(z, 1.0);
   for (int n = 0; n < 30; ++n) {
     const double is = 1 / s;
     y0 = c0 + p0 * s + q0 * is;
     y1 = c1 + p1 * s + q1 * is;
-    const double G0 = L.beta[0] * y0 - r.h0, G1 = L.beta[1] * y1 - r.h1;
+    const double G0 = b0 * y0 - r.h0, G1 = b1 * y1 - r.h1;
     const double t0 = p0 - q0 * is * is, t1 = p1 - q1 * is * is;
     const double f = G0 * t0 + G1 * t1;
-    const double df = L.beta[0] * t0 * t0 + L.beta[1] * t1 * t1 +
-                      2 * is * is * is * (G0 * q0 + G1 * q1);
+    const double df = b0 * t0 * t0 + b1 * t1 * t1 + 2 * is * is * is * (G0 * q0 + G1 * q1);
     double next = s - f / df;
     if (!(next > 1)) next = 0.5 * (1 + s);
     const bool done = std::abs(next - s) <= 1e-13 * s;
     s = next;
     if (done) break;
   }
-  y0 = c0 + p0 * s + q0 / s;
-  y1 = c1 + p1 * s + q1 / s;
-  from_local(L, std::sqrt(y0 * y0 + y1 * y1) / L.mu, y0, y1, x);
+  y0 = r.k * (c0 + p0 * s + q0 / s);
+  y1 = r.k * (c1 + p1 * s + q1 / s);
+  from_local(L, std::hypot(y0, y1) / L.mu, y0, y1, x);
   return Regime::sliding;
 }
 
@@ -231,7 +249,9 @@ bool Coulomb::safeguarded(const LocalBlock& L, const LocalRhs& r, double warm, d
   return true;
 }
 
-Regime Coulomb::nearest(const LocalBlock& L, const LocalRhs& r, double bn, double* x,
+namespace {
+
+Regime nearest_ordinary(const LocalBlock& L, const LocalRhs& r, double bn, double* x,
                         double& lambda, int& evaluations) {
   double best[3] = {0, 0, 0}, distance = -1, best_lambda = lambda;
   Regime regime = Regime::separating;
@@ -249,7 +269,7 @@ Regime Coulomb::nearest(const LocalBlock& L, const LocalRhs& r, double bn, doubl
   if (!(bn > 0)) offer(best, Regime::separating, lambda);
   const auto slides = [&](double l) {
     if (!(l >= 0) || !std::isfinite(l)) return;
-    slide(L, r, bn, l, z);
+    Coulomb::slide(L, r, bn, l, z);
     if (z[0] > 0 && std::isfinite(z[0])) offer(z, Regime::sliding, l);
   };
   Secular e(L, r);
@@ -316,6 +336,52 @@ Regime Coulomb::nearest(const LocalBlock& L, const LocalRhs& r, double bn, doubl
   evaluations += e.evaluations;
   std::copy(best, best + 3, x);
   lambda = best_lambda;
+  return regime;
+}
+
+}  // namespace
+
+// In units in which beta and h are near 1. A grazing contact, k far below h / beta: its impulse is k
+// h / (|h| + g.h) to more than double precision, or on an asymptote and does not depend on k. It is
+// solved with a larger k, and in the first case scaled back.
+Regime Coulomb::nearest(const LocalBlock& L, const LocalRhs& r, double bn, double* x,
+                        double& lambda, int& evaluations) {
+  constexpr double kGrazing = 0x1p-80;
+  const double trace = L.beta[0] + L.beta[1];
+  const double most = std::max({std::abs(r.h0), std::abs(r.h1), std::abs(r.k) * trace});
+  if (!std::isfinite(most) || !std::isfinite(trace)) {
+    x[0] = x[1] = x[2] = std::numeric_limits<double>::quiet_NaN();  // sweeps have overflowed
+    return Regime::sliding;
+  }
+  if (!(most > 0)) return nearest_ordinary(L, r, bn, x, lambda, evaluations);
+  const int p = -std::ilogb(trace), q = -std::ilogb(most);
+  const LocalBlock S = rescaled(L, p);
+  double impulse = std::ldexp(bn, q) * S.inv_a;
+  LocalRhs s{L.mu * impulse, std::ldexp(r.h0, q), std::ldexp(r.h1, q)};
+  double graze = 1;
+  if (s.k == 0 && bn > 0) {  // no friction to speak of
+    x[0] = bn * L.inv_a;
+    x[1] = x[2] = 0;
+    return Regime::sliding;
+  }
+  if (s.k != 0 && std::abs(s.k) < kGrazing) {
+    const double k = std::copysign(kGrazing, bn);
+    graze = std::abs(s.k) / kGrazing;
+    s.k = k;
+    impulse = k / L.mu;
+  }
+  for (int c = 0; c < 3; ++c) x[c] = std::ldexp(x[c], q - p);
+  double l = std::ldexp(lambda, p);
+  const Regime regime = nearest_ordinary(S, s, impulse * S.a, x, l, evaluations);
+  const double t = std::sqrt(x[1] * x[1] + x[2] * x[2]);
+  if (graze < 1 && regime == Regime::sliding && t < 0x1p-40) {
+    for (int c = 0; c < 3; ++c) x[c] *= graze;
+    l /= graze;
+  } else if (graze < 1 && regime != Regime::separating) {
+    x[0] = t / L.mu;
+  }
+  for (int c = 0; c < 3; ++c) x[c] = std::ldexp(x[c], p - q);
+  lambda = std::ldexp(l, -p);
   return regime;
 }
 

@@ -42,12 +42,14 @@ LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
   a = A(0, 0);
   detail::require(a > 0, "A_nn", a, "must be > 0: no body moves along the normal");
   inv_a = 1 / a;
+  detail::require(std::isfinite(inv_a), "A_nn", a, "must be > 1 / the largest number");
+  ordinary = trace > detail::kLeastOrdinary && trace < detail::kMostOrdinary;
   mu = friction;
   c[0] = 0.5 * (A(0, 1) + A(1, 0));
   c[1] = 0.5 * (A(0, 2) + A(2, 0));
   // B = T - c c'/a and its rotation V, tan(2 theta) = 2 B01 / (B00 - B11).
-  const double B00 = A(1, 1) - c[0] * c[0] * inv_a, B11 = A(2, 2) - c[1] * c[1] * inv_a;
-  const double B01 = 0.5 * (A(1, 2) + A(2, 1)) - c[0] * c[1] * inv_a;
+  const double B00 = A(1, 1) - c[0] * (c[0] * inv_a), B11 = A(2, 2) - c[1] * (c[1] * inv_a);
+  const double B01 = 0.5 * (A(1, 2) + A(2, 1)) - c[0] * (c[1] * inv_a);
   cosine = 1;
   sine = 0;
   beta[0] = B00;
@@ -69,9 +71,9 @@ LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
     if (null[i]) beta[i] = floor;
   }
   const double cc = cosine * cosine, ss = sine * sine, cs = cosine * sine;
-  T[0] = cc * beta[0] + ss * beta[1] + c[0] * c[0] * inv_a;
-  T[1] = cs * (beta[0] - beta[1]) + c[0] * c[1] * inv_a;
-  T[2] = ss * beta[0] + cc * beta[1] + c[1] * c[1] * inv_a;
+  T[0] = cc * beta[0] + ss * beta[1] + c[0] * (c[0] * inv_a);
+  T[1] = cs * (beta[0] - beta[1]) + c[0] * (c[1] * inv_a);
+  T[2] = ss * beta[0] + cc * beta[1] + c[1] * (c[1] * inv_a);
   g[0] = mu * inv_a * (cosine * c[0] + sine * c[1]);
   g[1] = mu * inv_a * (cosine * c[1] - sine * c[0]);
   e = std::sqrt(g[0] * g[0] + g[1] * g[1]);
@@ -98,10 +100,7 @@ TETHER_CLONES Regime solve_coulomb(const LocalBlock& L, const double* b, double*
   return detail::Coulomb::solve(L, b[0], b[1], b[2], x, lambda, evaluations);
 }
 
-}  // namespace
-
-void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, LocalState& s) {
-  s.evaluations = 0;
+void solve_ordinary(Law law, const LocalBlock& block, const Eigen::Vector3d& b, LocalState& s) {
   switch (law) {
     case Law::maximum_dissipation:
       if ((block.null[0] || block.null[1]) &&
@@ -117,6 +116,29 @@ void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, Loc
       s.regime = detail::Frictionless::solve(block, b[0], b[1], b[2], s.x, s.lambda, s.evaluations);
       return;
   }
+}
+
+// In units in which the traces and the largest component of b are near 1: the same bits.
+void solve_rescaled(Law law, const LocalBlock& block, const Eigen::Vector3d& b, double most,
+                    LocalState& s) {
+  const int p = -std::ilogb(block.a + block.T[0] + block.T[2]), q = -std::ilogb(most);
+  for (double& x : s.x) x = std::ldexp(x, q - p);
+  s.lambda = std::ldexp(s.lambda, p);
+  solve_ordinary(law, detail::rescaled(block, p),
+                 {std::ldexp(b[0], q), std::ldexp(b[1], q), std::ldexp(b[2], q)}, s);
+  for (double& x : s.x) x = std::ldexp(x, p - q);
+  s.lambda = std::ldexp(s.lambda, -p);
+}
+
+}  // namespace
+
+void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, LocalState& s) {
+  s.evaluations = 0;
+  const double most = std::max({std::abs(b[0]), std::abs(b[1]), std::abs(b[2])});
+  if (block.ordinary & (most > detail::kLeastOrdinary) & (most < detail::kMostOrdinary))
+    return solve_ordinary(law, block, b, s);
+  if (!(most > 0) || !std::isfinite(most)) return solve_ordinary(law, block, b, s);
+  solve_rescaled(law, block, b, most, s);
 }
 
 OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b, double mu) {
@@ -199,7 +221,7 @@ PlanarContact solve_planar(Law law, const linalg::Matrix<2, 2>& A, const linalg:
   detail::require_finite("b", b);
   detail::require(a > 0, "A_nn", a, "must be > 0: no body moves along the normal");
   detail::require(mu >= 0 && std::isfinite(mu), "mu", mu, "must be finite and >= 0");
-  detail::require(A(1, 1) - c * c / a >= -1e-8 * A.trace(), "t - c^2/a", A(1, 1) - c * c / a,
+  detail::require(A(1, 1) - c * (c / a) >= -1e-8 * A.trace(), "t - c^2/a", A(1, 1) - c * (c / a),
                   "A must be positive semidefinite");
   PlanarContact out;
   if (!(b[0] > 0)) return out;
@@ -208,12 +230,12 @@ PlanarContact solve_planar(Law law, const linalg::Matrix<2, 2>& A, const linalg:
     out.regime = Regime::sliding;
     return out;
   }
-  const double B = std::max(A(1, 1) - c * c / a, 1e-12 * A.trace()), h = b[1] - c * b[0] / a;
+  const double B = std::max(A(1, 1) - c * (c / a), 1e-12 * A.trace()), h = b[1] - c * (b[0] / a);
   // Interval of admissible x_t; a nonpositive denominator is an end at infinity. In the plane both
   // laws pick the same point of it.
   const double infinity = std::numeric_limits<double>::infinity();
-  const double lower = a - mu * c > 0 ? -mu * b[0] / (a - mu * c) : -infinity;
-  const double upper = a + mu * c > 0 ? mu * b[0] / (a + mu * c) : infinity;
+  const double lower = a - mu * c > 0 ? -mu * (b[0] / (a - mu * c)) : -infinity;
+  const double upper = a + mu * c > 0 ? mu * (b[0] / (a + mu * c)) : infinity;
   const double free = h / B, xt = std::clamp(free, lower, upper);
   out.regime = xt == free ? Regime::sticking : Regime::sliding;
   out.impulse << (out.regime == Regime::sliding ? std::abs(xt) / mu : (b[0] - c * xt) / a), xt;

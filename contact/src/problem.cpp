@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "local_geometry.hpp"
 #include "refuse.hpp"
 
 namespace tether::contact {
@@ -21,6 +22,32 @@ int dimension_of(const linalg::VectorView& b, const linalg::VectorView& mu) {
   throw std::invalid_argument("b has " + std::to_string(b.size()) +
                               " entries: 3 (or 2, in the plane) are needed for each of " +
                               std::to_string(mu.size()) + " friction coefficients mu");
+}
+
+// Connected components of the blocks that are not zero.
+std::vector<int> find_islands(int n, const std::vector<int>& row_start,
+                              const std::vector<int>& columns,
+                              const std::vector<PackedBlock>& blocks) {
+  std::vector<int> parent(at(n));
+  for (int i = 0; i < n; ++i) parent[at(i)] = i;
+  const auto root = [&](int i) {
+    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
+    return i;
+  };
+  for (int i = 0; i < n; ++i) {
+    for (int k = row_start[at(i)]; k < row_start[at(i + 1)]; ++k) {
+      const int p = root(i), q = root(columns[at(k)]);
+      if (p == q) continue;
+      bool joined = false;
+      for (double v : blocks[at(k)].column) joined = joined || v != 0;
+      if (joined) parent[at(std::max(p, q))] = std::min(p, q);
+    }
+  }
+  // A root precedes the contacts of its island.
+  int count = 0;
+  std::vector<int> island(at(n));
+  for (int i = 0; i < n; ++i) island[at(i)] = root(i) == i ? count++ : island[at(root(i))];
+  return island;
 }
 
 }  // namespace
@@ -115,6 +142,7 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const li
     }
   }
   for (int i = 0; i < n; ++i) out.row_start_[at(i + 1)] += out.row_start_[at(i)];
+  out.islands_ = find_islands(n, out.row_start_, out.columns_, out.blocks_);
   out.packed_b_ = out.pack(b);
   return out;
 }
@@ -125,6 +153,19 @@ void Problem::set_ids(std::vector<std::uint64_t> ids) {
                         "one for each contact");
   }
   ids_ = std::move(ids);
+}
+
+Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const {
+  Problem out = *this;
+  for (int i = 0; i < contacts(); ++i) {
+    const std::size_t island = at(islands_[at(i)]);
+    out.local_[at(i)] = detail::rescaled(local_[at(i)], mass[island]);
+    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k)
+      for (double& v : out.blocks_[at(k)].column) v = std::ldexp(v, mass[island]);
+    for (double& v : out.packed_b_[at(i)].v) v = std::ldexp(v, speed[island]);
+  }
+  out.unpack(out.packed_b_, out.b_);
+  return out;
 }
 
 linalg::MatrixX Problem::dense_matrix() const {

@@ -41,6 +41,8 @@ void check(std::size_t k, const RigidBody& b) {
   if (!(b.inverse_mass >= 0) || !std::isfinite(b.inverse_mass))
     refuse(where() + "inverse_mass", b.inverse_mass, "must be finite and >= 0 (0: fixed)");
   if (!b.inverse_inertia.allFinite()) require_finite("inverse_inertia", b.inverse_inertia, where());
+  if (!b.inverse_inertia.isZero(0))
+    require_semidefinite("inverse_inertia", b.inverse_inertia, where);
   if (!b.velocity.allFinite()) require_finite("velocity", b.velocity, where());
   if (!b.angular_velocity.allFinite())
     require_finite("angular_velocity", b.angular_velocity, where());
@@ -64,6 +66,11 @@ void check(std::size_t i, const PointContact& c, int count) {
   if (!std::isfinite(c.bias)) refuse(where() + "bias", c.bias, "must be finite");
   if (!(std::abs(c.normal.squaredNorm() - 1) < 2e-6))
     refuse(where() + "length of normal", c.normal.norm(), "must be 1 (to 1e-6)");
+}
+
+void refuse_fixed(std::size_t i) {
+  throw std::invalid_argument("contact " + std::to_string(i) +
+                              " joins fixed bodies: one of the two must be able to move");
 }
 
 }  // namespace tether::contact::detail

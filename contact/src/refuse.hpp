@@ -1,7 +1,10 @@
 // Tether: bad input is refused. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <cmath>
 #include <string>
 #include <tether/contact/body_solver.hpp>
 
@@ -19,8 +22,36 @@ inline void require(bool holds, const char* argument, double value, const char* 
 void require_finite(const char* argument, const Eigen::Ref<const Eigen::MatrixXd>& values,
                     const std::string& where = {});
 
+// Symmetric to 1e-8 and without eigenvalues below -1e-8 of the trace; names the entry or the
+// eigenvalue that is not. where() comes before the argument.
+template <int n, class Where>
+void require_semidefinite(const char* argument, const Eigen::Matrix<double, n, n>& A,
+                          const Where& where) {
+  constexpr double kSmall = 1e-8;
+  const double trace = A.diagonal().cwiseAbs().sum(), most = kSmall * trace;
+  for (int c = 0; c < n; ++c) {
+    for (int r = c + 1; r < n; ++r) {
+      if (std::abs(A(r, c) - A(c, r)) <= most) continue;
+      refuse(where() + argument + "(" + std::to_string(r) + ", " + std::to_string(c) + ")", A(r, c),
+             ("must be " + std::string(argument) + "(" + std::to_string(c) + ", " +
+              std::to_string(r) + "): the matrix is symmetric")
+                 .c_str());
+    }
+  }
+  if (!(trace > 0)) return;
+  // A Cholesky factor of what is raised a little costs far less than eigenvalues.
+  Eigen::Matrix<double, n, n> raised = A / trace;
+  raised.diagonal().array() += kSmall;
+  if (Eigen::LLT<Eigen::Matrix<double, n, n>>(raised).info() == Eigen::Success) return;
+  const double least =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, n, n>>(A, Eigen::EigenvaluesOnly)
+          .eigenvalues()[0];
+  refuse(where() + "least eigenvalue of " + argument, least, "must be >= 0");
+}
+
 // Body k of BodySolver, and contact i between `count` bodies.
 void check(std::size_t k, const RigidBody& body);
 void check(std::size_t i, const PointContact& contact, int count);
+[[noreturn]] void refuse_fixed(std::size_t i);  // neither body of contact i moves
 
 }  // namespace tether::contact::detail

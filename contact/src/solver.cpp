@@ -9,6 +9,7 @@
 #include "accelerated_sweeps.hpp"
 #include "admm.hpp"
 #include "convex_relaxation.hpp"
+#include "infeasible.hpp"
 #include "interior_point.hpp"
 #include "proximal_newton.hpp"
 #include "refuse.hpp"
@@ -49,9 +50,9 @@ struct Solver::Implementation {
   detail::Admm admm;
   detail::ProximalNewton newton;
   detail::InteriorPoint interior;
-  Packed x, z;
+  Packed x, z, pressed;  // pressed: empty, or the proof that there is no solution
   std::unordered_map<std::uint64_t, PackedVector> memory;
-  bool stages_ready = false;
+  bool stages_ready = false, looked_for_proof = false;
   double sweep_work = 0;  // of the accelerated sweeps
 
   void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
@@ -62,6 +63,7 @@ struct Solver::Implementation {
   Status rotate(bool last);
   Status plain();
   Status give_up();
+  bool infeasible();
   bool replace_contacts(double eccentricity, bool only_unconverged);
   void finish(const Problem& problem, Status status, Solution& out);
 };
@@ -79,6 +81,7 @@ void Solver::Implementation::prepare_stages(int n) {
 // What the failed iteration looks like: plain sweeps from the best point that keep moving are a
 // cycle (or a wander), those that come to rest above the tolerance are a stall.
 Status Solver::Implementation::give_up() {
+  if (infeasible()) return Status::infeasible;
   if (search.exhausted()) return Status::work_limit;
   x = search.best;
   double change = 0, size = 0;
@@ -93,6 +96,15 @@ Status Solver::Implementation::give_up() {
       size += x[i].v[c] * x[i].v[c];
     }
   return change > 1e-8 * size ? Status::cycling : Status::stalled;
+}
+
+// Looked for once in a solve, where the quick stages have failed.
+bool Solver::Implementation::infeasible() {
+  if (!looked_for_proof) {
+    looked_for_proof = true;
+    if (!detail::proves_infeasible(search, pressed)) pressed.clear();
+  }
+  return !pressed.empty();
 }
 
 // Whether the point where everything sticks may be admissible: few contacts that slide or part.
@@ -187,6 +199,7 @@ Status Solver::Implementation::rotate(bool last) {
     first = false;
     newton.run(search, search.best.data(), 12);
     if (search.solved()) return Status::solved;
+    if (infeasible()) return Status::infeasible;
     if (search.exhausted()) return Status::work_limit;
     if (search.best_error < 0.9 * before) sweeps.start(search.best.data());
     kappa = std::min(64.0, 2 * kappa);
@@ -262,7 +275,7 @@ Status Solver::Implementation::automatic() {
   Status status = rotate(!replaceable);
   // First the strongly coupled contacts that do not converge, then all of them, then coupled ones.
   z.resize(x.size());
-  for (int attempt = 0; replaceable && attempt < 3 && status != Status::solved; ++attempt) {
+  for (int attempt = 0; replaceable && attempt < 3 && status != Status::solved && status != Status::infeasible; ++attempt) {
     search.work_end = attempt == 0 ? std::min(search.counts.work + 0.025 * options.max_work, options.max_work)
                                    : options.max_work;
     if (search.exhausted()) return Status::work_limit;
@@ -333,8 +346,12 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   out.counts = search.counts;
   out.history.swap(search.history);
   problem.unpack(search.best, out.impulses);
-  system.velocities(search.best.data(), x.data());
+  detail::velocities(problem, search.best.data(), x.data());
   problem.unpack(x, out.velocities);
+  out.infeasible_direction.clear();
+  for (const PackedVector& d : pressed)
+    out.infeasible_direction.insert(out.infeasible_direction.end(), d.v,
+                                    d.v + problem.dimension());
   out.regimes.resize(n);
   out.replaced.clear();
   for (std::size_t i = 0; i < n; ++i) {
@@ -355,12 +372,10 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
 void Solver::Implementation::solve(const Problem& problem, const linalg::VectorView* start,
                                    Solution& out) {
   const std::size_t n = static_cast<std::size_t>(problem.contacts());
-  Measure measure = options.measure;
-  if (measure == Measure::automatic) {
-    measure = options.law == Law::maximum_dissipation ? Measure::fixed_point : Measure::natural_map;
-  }
-  search.reset(problem, options, measure);
-  stages_ready = false;
+  search.reset(problem, options,
+               options.measure == Measure::automatic ? Measure::fixed_point : options.measure);
+  stages_ready = looked_for_proof = false;
+  pressed.clear();
   if (start) {
     if (start->size() != problem.b().size())
       detail::refuse_size("start", start->size(), problem.b().size(), "as many as b has");
@@ -375,8 +390,11 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
       }
     }
   }
+  search.system.to_own_units(x.data());
   for (std::size_t i = 0; i < n; ++i) {
-    if (options.law == Law::frictionless) {
+    if (search.system.at_rest(static_cast<int>(i))) {
+      x[i] = {};
+    } else if (options.law == Law::frictionless) {
       x[i].v[1] = x[i].v[2] = 0;
       x[i].v[0] = std::max(x[i].v[0], 0.0);
     } else {
@@ -432,6 +450,7 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
       break;
     }
   }
+  search.system.to_given_units(search.best.data());
   if (options.warm_start) {
     memory.clear();
     for (std::size_t i = 0; i < n; ++i) memory[problem.id(static_cast<int>(i))] = search.best[i];

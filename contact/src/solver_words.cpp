@@ -55,6 +55,8 @@ const char* name(Status status) {
       return "work_limit";
     case Status::relaxed:
       return "relaxed";
+    case Status::infeasible:
+      return "infeasible";
   }
   return "?";
 }
@@ -71,11 +73,15 @@ const char* advice(Status status, const Options& options) {
                  : "no fixed point was found; try another start, a shorter time step or "
                    "Method::convex_relaxation";
     case Status::stalled:
-      return "round-off or ill-conditioned data; try a larger tolerance or Method::automatic";
+      return "no further progress: round-off or ill-conditioned data, or no solution of the law is "
+             "near; error is what was reached; try a larger tolerance or Method::automatic";
     case Status::work_limit:
-      return "raise max_work or max_sweeps, or use Method::automatic";
+      return "error is what was reached; raise max_work or max_sweeps, or use Method::automatic";
     case Status::relaxed:
       return "the convex relaxation is solved; error is the residual of the law";
+    case Status::infeasible:
+      return "bodies are pressed between contacts that close and cannot yield (infeasible_direction): "
+             "lower the closing velocities, or let one of the contacts go";
     case Status::unsolved:
       return "";
   }

@@ -2,8 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <limits>
 #include <tether/contact/solver.hpp>
 
+#include "criterion.hpp"
 #include "local_geometry.hpp"
 
 namespace tether::contact::detail {
@@ -12,7 +15,7 @@ using Packed = std::vector<PackedVector>;
 
 inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// Norms that a test leaves behind.
+// What a test leaves behind: norms, and the largest error of a contact relative to its island.
 struct Test {
   double natural = 0, fixed = 0, x = 0, w = 0;
 };
@@ -28,7 +31,11 @@ class System {
  public:
   void reset(const Problem& problem, Law law);
 
+  // The problem that the stages see: the given one, or in units in which nothing leaves the range.
   const Problem& problem() const { return *problem_; }
+  // Impulses of the given problem in these units, and back. Exact.
+  void to_own_units(PackedVector* x) const;
+  void to_given_units(PackedVector* x) const;
   Law law() const { return law_; }
   int size() const { return n_; }
   double norm_b() const { return norm_b_; }
@@ -48,10 +55,17 @@ class System {
                 Regime* regimes = nullptr, LocalDerivative* derivatives = nullptr);
   // w = A x - b
   void velocities(const PackedVector* x, PackedVector* w) const;
-  // Natural map with the norms of x and w, or the block fixed point alone. scratch is overwritten.
+  // Natural map with the norms of x and w (scratch is overwritten), or the block fixed point alone.
   Test natural_map(const PackedVector* x, PackedVector* scratch);
-  Test fixed_point(const PackedVector* x, PackedVector* scratch);
+  Test fixed_point(const PackedVector* x);
   double measure(const Test& test, Measure measure) const;
+  // What round-off makes of w = A x - b, relative to the velocity scale of the island: the largest
+  // component of u |A| |x|. A residual below it says nothing.
+  double rounding(const PackedVector* x) const;
+  // 1 / velocity scale of the island of contact i.
+  double inverse_scale(int i) const { return inverse_scale_[at(i)]; }
+  // b = 0 in the island of contact i: the solution is x = 0, and nothing else is judged as one.
+  bool at_rest(int i) const { return inverse_scale_[at(i)] == kAtRest; }
 
   // gamma of contact i in its own frame: mu c / a for maximum_dissipation, 0 for the Coulomb rule.
   void gamma(int i, double* out) const;
@@ -59,14 +73,26 @@ class System {
   int sweeps = 0;
 
  private:
+  void choose_units(const Problem& problem);
+  Test natural_map_given(const PackedVector* x, PackedVector* scratch);
+
   const Problem* problem_ = nullptr;
+  Problem rescaled_;             // empty where the given units serve
+  std::vector<int> mass_, speed_;  // exponents of the units of each island; empty: those given
   Law law_ = Law::coulomb;
   int n_ = 0;
   double norm_b_ = 0;
   bool any_replaced_ = false;
   std::vector<char> rule_;
+  std::vector<std::array<double, 2>> largest_;  // trace of a block, component of b, of each island
   std::vector<double> weight_, lambda_;
+  std::vector<double> share_;          // 1 / blocks in the row: the contact's part of its bodies
+  std::vector<double> inverse_scale_;  // of the contact's island
+  std::vector<double> needed_, norm2_; // of each island
 };
+
+// w = A x - b
+void velocities(const Problem& problem, const PackedVector* x, PackedVector* w);
 
 // |x_t| <= mu x_n, the nearest point (Euclid).
 TETHER_INLINE void project_cone(double mu, double* v) {

@@ -214,6 +214,10 @@ TEST_CASE("bad input: bodies that are assembled") {
     CHECK_THAT(refused([&](B&, C& c) { c[0].second = other; }),
                Contains("contact 0 names bodies 0 and " + std::to_string(other)));
   CHECK_THAT(refused([](B&, C& c) { c[0].first = -1; }), Contains("must be two of 2"));
+  CHECK_THAT(refused([](B& b, C&) { b[1].inverse_mass(4, 3) = 0.1; }),
+             Contains("body 1: inverse_mass(4, 3) = 0.1") && Contains("symmetric"));
+  CHECK_THAT(refused([](B& b, C&) { b[0].inverse_mass(5, 5) = -2; }),
+             Contains("body 0: least eigenvalue of inverse_mass = -2") && Contains(">= 0"));
   // Between fixed bodies nothing moves.
   CHECK_THAT(refused([](B& b, C&) { b[0].inverse_mass.setZero(), b[1].inverse_mass.setZero(); }),
              Contains("contact 0: A_nn = 0"));
@@ -255,6 +259,18 @@ TEST_CASE("bad input: body form") {
   CHECK(refused([](B&, C&) {}).empty());
   CHECK_THAT(refused([](B& b, C&) { b[1].inverse_mass = -1; }),
              Contains("body 1: inverse_mass = -1") && Contains(">= 0"));
+  CHECK_THAT(refused([](B& b, C&) { b[1].inverse_inertia(2, 0) = 0.3; }),
+             Contains("body 1: inverse_inertia(2, 0) = 0.3") && Contains("symmetric"));
+  for (double scale : {1e-150, 1.0, 1e150}) {
+    CHECK_THAT(refused([&](B& b, C&) {
+                 b[0].inverse_inertia << 1, 3, 0, 3, 1, 0, 0, 0, 1;
+                 b[0].inverse_inertia *= scale;
+               }),
+               Contains("body 0: least eigenvalue of inverse_inertia = -2") && Contains(">= 0"));
+    CHECK(refused([&](B& b, C&) {  // a rod does not turn about its axis
+            b[0].inverse_inertia = scale * Vector3d(1, 1, 0).asDiagonal().toDenseMatrix();
+          }).empty());
+  }
   for (double bad : {kNan, kInfinity}) {
     CHECK_THAT(refused([&](B& b, C&) { b[0].inverse_mass = bad; }),
                Contains("body 0: inverse_mass = "));

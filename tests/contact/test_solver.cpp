@@ -68,7 +68,7 @@ TEST_CASE("fixed points dissipate and residuals agree with the status") {
       CHECK(r.energy_change <= 1e-8 * p.b().norm());
       CHECK(r.cone <= 1e-12 * (1 + s.impulses.norm()));
       if (s.replaced.empty()) {
-        CHECK((law == Law::coulomb ? r.natural_map : r.fixed_point) <= 1.001e-9);
+        CHECK(r.fixed_point <= 1.001e-9);
         CHECK(r.signorini <= 1e-7 * p.b().norm());
       }
     }
@@ -228,7 +228,8 @@ TEST_CASE("high mass ratios: the work of two and of twenty boxes, whatever the r
       random::Assembly a = random::stack(2, ratio);
       for (auto& body : a.bodies)
         for (int c = 0; c < 6; ++c) body.velocity[c] += k * 1e-17 * g.uniform(-1, 1);
-      const Solution s = Solver(with(Law::coulomb)).solve(a.problem());
+      // At 1e6 round-off of A x is 6e-10 of the approach.
+      const Solution s = Solver(with(Law::coulomb, ratio > 5e5 ? 1e-8 : 1e-9)).solve(a.problem());
       INFO("ratio " << ratio << ", " << k << ": " << name(s.status) << " " << s.error);
       CHECK(s.status == Status::solved);
       CHECK(s.counts.work < 1e5);  // 0.1 ms

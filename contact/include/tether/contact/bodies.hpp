@@ -13,7 +13,7 @@ using Matrix6d = linalg::Matrix<6, 6>;
 using Vector6d = linalg::Matrix<6, 1>;
 using Matrix36d = linalg::Matrix<3, 6>;
 
-/// Inverse mass matrix and velocity (linear, angular) before the impulses. Zero inverse: fixed.
+/// Inverse mass matrix (symmetric, positive semidefinite) and velocity (linear, angular) before the impulses. Zero inverse: fixed.
 struct Body {
   Matrix6d inverse_mass = Matrix6d::Zero();
   Vector6d velocity = Vector6d::Zero();

@@ -40,8 +40,8 @@ struct PointContact {
 
 struct BodyOptions {
   Law law = Law::maximum_dissipation;
-  /// Of each island: (sum |D_i (x_i - block(x_i))|^2)^1/2 <= tolerance * |b|, D_i the diagonal
-  /// block of contact i, b the relative velocities before the impulses.
+  /// Of each contact: its error in velocity over the largest velocity that a contact of its island
+  /// needs; Residuals::fixed_point.
   double tolerance = 1e-6;
   /// Of an island. Where they are reached above max_assembled, the best point looked at is
   /// returned.

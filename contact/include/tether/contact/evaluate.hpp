@@ -17,7 +17,9 @@ struct Residuals {
                                ///< on it the nearest -s (u + gamma), s >= 0, gamma of the law
   double dissipation = kNone;  ///< sum of x_i . w_i (energy): <= 0 at a solution
   double energy_change = kNone;  ///< 1/2 x'Ax - b'x: kinetic energy gained by the impulses
-  double fixed_point = kNone;  ///< (sum |D_i (x_i - block(x_i))|^2)^1/2 / |b|
+  /// Largest error in velocity of a contact, over the largest velocity that a contact of its island
+  /// needs (README, section 6); at least what round-off makes of A x - b. Changed by no units.
+  double fixed_point = kNone;
   double natural_map = kNone;  ///< |x - P_K(x - w - De Saxce term)| / max(|b|, |x|, |w|)
   double natural_map_data = kNone;  ///< the same / |b|
 };

@@ -36,6 +36,7 @@ struct LocalBlock {
   /// e <= 2 sqrt(q) / (1 + q), q = beta_min / beta_max: the Coulomb law has one solution (README).
   bool unique;
   bool null[2];  ///< beta was below 1e-12 trace(A)
+  bool ordinary;  ///< trace(A) is so near to 1 that no product of a solve leaves the range
 
   LocalBlock() = default;
   /// Uses (A + A')/2. Throws std::invalid_argument unless A is finite, A_nn > 0, the matrix is

@@ -61,6 +61,11 @@ class Problem {
   const std::vector<PackedBlock>& blocks() const { return blocks_; }
   const std::vector<LocalBlock>& locals() const { return local_; }
   const std::vector<PackedVector>& packed_b() const { return packed_b_; }
+  /// The same in other units, exactly: in island k, A times 2^mass[k] and b times 2^speed[k].
+  Problem rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const;
+  /// Island of each contact: contacts with a block that is not zero between them share one. Numbered
+  /// from 0 in the order of their first contacts.
+  const std::vector<int>& islands() const { return islands_; }
 
   std::vector<PackedVector> pack(const linalg::VectorView& x) const;
   void unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const;
@@ -69,7 +74,7 @@ class Problem {
   int dimension_ = 3;
   linalg::VectorX b_;
   std::vector<LocalBlock> local_;
-  std::vector<int> row_start_, columns_;
+  std::vector<int> row_start_, columns_, islands_;
   std::vector<PackedBlock> blocks_;
   std::vector<PackedVector> packed_b_;
   std::vector<std::uint64_t> ids_;

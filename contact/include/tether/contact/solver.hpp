@@ -14,10 +14,10 @@ namespace tether::contact {
 
 /// The number that is compared with Options::tolerance; see Residuals.
 enum class Measure : std::uint8_t {
-  automatic,         ///< fixed_point for maximum_dissipation, natural_map for the other laws
-  natural_map,
-  natural_map_data,
-  fixed_point
+  automatic,         ///< fixed_point
+  natural_map,       ///< as Siconos; hangs on the units of A and b: for comparisons only
+  natural_map_data,  ///< hangs on the units of A
+  fixed_point        ///< has no units
 };
 
 enum class Method : std::uint8_t {
@@ -34,11 +34,12 @@ enum class Method : std::uint8_t {
 
 enum class Status : std::uint8_t {
   unsolved,
-  solved,     ///< measure <= tolerance
+  solved,     ///< measure <= tolerance, and round-off of A x - b does not exceed it
   stalled,    ///< no progress any more
   cycling,    ///< the iteration repeats without progress; often no solution of the law is near
   work_limit, ///< max_work or max_sweeps reached while there was progress
-  relaxed     ///< convex_relaxation converged, but its answer violates the law (see error)
+  relaxed,    ///< convex_relaxation converged, but its answer violates the law (see error)
+  infeasible  ///< no impulses keep every w_n >= 0, see Solution::infeasible_direction
 };
 
 const char* name(Measure measure);
@@ -78,6 +79,9 @@ struct Solution {
   std::vector<Regime> regimes;
   std::vector<int> replaced;  ///< contacts with the Coulomb rule instead of maximum_dissipation
   double error = Residuals::kNone;  ///< the measure that was compared with the tolerance
+  /// Status::infeasible: normal impulses d >= 0 (dimension * contacts entries, the largest 1) with
+  /// A d = 0 to round-off and b.d > 0, so that d.w = -b.d < 0 whatever the impulses. Else empty.
+  std::vector<double> infeasible_direction;
   std::vector<HistoryEntry> history;
   Counts counts;
   std::string advice;  ///< what to try when it is not solved
