@@ -40,7 +40,9 @@ if(NOT CMAKE_SCRIPT_MODE_FILE)
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
     add_custom_command(TARGET ${target} POST_BUILD VERBATIM COMMAND ${CMAKE_COMMAND}
       -DARCHIVE=$<TARGET_FILE:${target}> -DWORK=${CMAKE_CURRENT_BINARY_DIR}/${target}.private
-      "-DOBJECTS=$<TARGET_OBJECTS:${target}>" -DROOT=${CMAKE_CURRENT_BINARY_DIR}
+      # Objects may also be among the sources (the tests of the package reuse those of the build).
+      "-DOBJECTS=$<TARGET_OBJECTS:${target}>;$<FILTER:$<TARGET_PROPERTY:${target},SOURCES>,INCLUDE,[.]o$>"
+      -DROOT=${CMAKE_CURRENT_BINARY_DIR}
       -DAR=${CMAKE_AR} -DLD=${TETHER_LD} -DNM=${CMAKE_NM} -DOBJCOPY=${CMAKE_OBJCOPY}
       -P ${TETHER_PRIVATE_SCRIPT})
   endfunction()
@@ -51,6 +53,7 @@ function(run)
   execute_process(COMMAND ${ARGV} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
+list(FILTER OBJECTS INCLUDE REGEX "[.]o$")  # precompiled headers are listed, too
 file(RENAME ${ARCHIVE} ${ARCHIVE}.whole)  # a failure below leaves none, and is not passed over later
 
 # What one object takes from another stays visible (and hidden from outside): explicit instantiations

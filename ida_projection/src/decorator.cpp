@@ -49,6 +49,8 @@ int Projection::Impl::initialize() {
   left_before_ = std::numeric_limits<double>::infinity();
   high_index_ = index_known_ = false;
   undetermined_.clear();
+  failed_corrections_ = 0;
+  rounding_fails_ = false;
   weights_factor_ = 1.0;
   pending_ = false;
   last_steps_ = last_setups_ = -1;
@@ -113,21 +115,24 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   return flag;
 }
 
-// The decorated solver's correction. Its convergence test leaves out algebraic variables of index 2
-// or more: their rounding, divided by the step, would fail it, and nothing but they depends on
-// them.
+// The decorated solver's correction. Where it fails although IDA has already cut the step for that,
+// its convergence test from then on leaves out algebraic variables of index 2 or more: their
+// rounding, divided by the step, fails it, and nothing but they depends on them.
 int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup,
                               void* mem) {
   N_Vector weights = candidate.weights;
-  if (engaged_ && options_.suppress_algebraic && !undetermined_.empty()) {
+  if (rounding_fails_ && engaged_ && options_.suppress_algebraic && !undetermined_.empty()) {
     if (!newton_weights_) newton_weights_ = OwnedVector(weights);
     N_VScale(1.0, weights, newton_weights_);
     double* entries = N_VGetArrayPointer(newton_weights_);
     for (const int j : undetermined_) entries[j] = 0.0;
     weights = newton_weights_;
   }
-  return SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, weights, tolerance,
-                           call_setup, mem);
+  const int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, weights,
+                                     tolerance, call_setup, mem);
+  failed_corrections_ = flag == 0 ? 0 : failed_corrections_ + 1;
+  if (failed_corrections_ >= 2) rounding_fails_ = true;
+  return flag;
 }
 
 int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup,

@@ -164,6 +164,8 @@ class Projection::Impl {
   bool index_known_ = false;
   std::vector<int> undetermined_;  // algebraic variables of index 2 or more
   OwnedVector newton_weights_;     // without them
+  int failed_corrections_ = 0;    // in a row
+  bool rounding_fails_ = false;   // the corrector, by multipliers of index 2 or more
   double weights_factor_ = 1.0;    // by which IDA's weights were multiplied in the last solve()
   int refused_in_row_ = 0;   // accepted steps that needed more than one attempt
   long last_error_failures_ = 0;

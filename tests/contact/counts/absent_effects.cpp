@@ -26,14 +26,14 @@ Problem delassus(const std::vector<Body>&, const std::vector<BodyContact>&) {
 
 namespace detail {
 using S = const BodyArrays&;
-double sweep(S, Law, GeneralContact*, GeneralContact*) { absent("friction"); }
-double test(S, Law, GeneralContact*, GeneralContact*) { absent("friction"); }
-double sweep(S, Law, SphereContact*, SphereContact*) { absent("friction"); }
-double test(S, Law, SphereContact*, SphereContact*) { absent("friction"); }
-double sweep(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
-double test(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
-double sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
-double test(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
+Squares sweep(S, Law, GeneralContact*, GeneralContact*) { absent("friction"); }
+Squares test(S, Law, GeneralContact*, GeneralContact*, Coupled) { absent("friction"); }
+Squares sweep(S, Law, SphereContact*, SphereContact*) { absent("friction"); }
+Squares test(S, Law, SphereContact*, SphereContact*, Coupled) { absent("friction"); }
+Squares sweep(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
+Squares test(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction"); }
+Squares sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
+Squares test(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
 
 Restitution::Restitution(RestitutionLaw, const BodyOptions&) { absent("restitution"); }
 void Restitution::choose(const std::vector<Impact>&, const BodySet&, StepContacts&) {
