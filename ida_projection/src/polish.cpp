@@ -13,7 +13,7 @@
 // leaves the constraints is then taken back with the projection's own factors.
 //
 // Krylov methods solve to a tolerance that suits IDA's own test: delta would be noise as long as
-// what it is to remove (Burgers, 10^4 unknowns, SPGMR, 1e-3: 1155 steps with it, plain IDA 171).
+// what it is to remove.
 #include <cmath>
 
 #include "impl.hpp"

@@ -58,8 +58,8 @@ random::Packing close_packing(int cells, bool spheres, double mu, std::uint64_t 
 
 }  // namespace
 
-// Where contacts toggle for long, one sweep more at the start changes their number: single problems
-// are unlucky (up to 6 times the best stage), so what most of them cost is bounded.
+// Seven of the eight take 1.0 to 1.26 times the work of the best stage; spheres with mu 0.7, seed 2,
+// whose contacts toggle for long, take 11.6 times: a known weakness, which the mean includes.
 TEST_CASE("packings: automatic solves all, most at little more than the cost of its best stage") {
   double ratios = 1;
   int count = 0, dear = 0;
@@ -85,7 +85,7 @@ TEST_CASE("packings: automatic solves all, most at little more than the cost of 
           if (other.status == Status::solved) best = std::min(best, other.counts.work);
         }
         UNSCOPED_INFO(s.counts.work / best);
-        if (s.counts.work > 2 * best) ++dear;
+        if (s.counts.work > 1.4 * best) ++dear;
         ratios *= s.counts.work / best;
         ++count;
       }
