@@ -230,7 +230,8 @@ TEST_CASE("bad input: bodies that are assembled") {
   CHECK_THAT(at(zero, zero, bad), Contains("length of normal = "));
   CHECK_THAT(at(bad, zero, n), Contains("r1(1) = "));
   CHECK_THAT(at(zero, bad, n), Contains("r2(1) = "));
-  CHECK_THAT(refusal([&] { velocities_after(bodies, {touch()}, VectorXd::Zero(2)); }),
+  const VectorXd two = VectorXd::Zero(2);  // GCC 12 calls the copy of an expression an overflow
+  CHECK_THAT(refusal([&] { velocities_after(bodies, {touch()}, two); }),
              Contains("impulses has 2 entries: 3 are needed"));
   CHECK_THAT(refusal([&] { velocities_after(bodies, {touch()}, bad); }),
              Contains("impulses(1) = "));

@@ -59,6 +59,26 @@ TEST_CASE("stepping: free fall has the closed sum of the scheme") {
   CHECK(s.counts().contact_problems == 0);
 }
 
+TEST_CASE("stepping: any number may name a material, the last meeting of a pair counts") {
+  // A table of all pairs of materials would not fit into memory.
+  const int stone = 2000000000, ice = 7, floor = 2000000001, nothing = 1999999999;
+  Scene scene;
+  scene.ground();
+  scene.surfaces[0].material = floor;
+  const int rough = scene.sphere(0.5, 1, Vector3d(0, 0, 0.5), Vector3d(7, 0, 0));
+  scene.surfaces.back().material = stone;
+  const int smooth = scene.sphere(0.5, 1, Vector3d(0, 5, 0.5), Vector3d(7, 0, 0));
+  scene.surfaces.back().material = ice;
+  const int falls = scene.sphere(0.5, 1, Vector3d(0, 9, 0.5));
+  scene.surfaces.back().material = nothing;
+  scene.meetings = {{floor, stone, 0, 0}, {ice, floor, 0, 0}, {stone, floor, 0.3, 0}};
+  tc::Stepper s = scene.stepper();
+  run(s, 1.5);
+  CHECK(velocity(s, rough).x() == Approx(5).epsilon(1e-12));
+  CHECK(velocity(s, smooth).x() == 7);
+  CHECK(position(s, falls).z() < -10);
+}
+
 TEST_CASE("stepping: incline at the angle of friction, every heading and step") {
   const double dt = GENERATE(1e-2, 1e-3);
   const double heading = radians(GENERATE(0.0, 36.87));

@@ -26,6 +26,17 @@ void outputs(Scene& scene, const fs::path& folder) {
   scene.output.state = (folder / "a.state").string();
 }
 
+/// A scene that has run to 0.1 s, whose state is saved, and that ends at 0.2 s.
+Scene first_half(const std::string& text, const char* name) {
+  Scene scene = parse_scene(text, name);
+  outputs(scene, folder(name));
+  scene.end = 0.1;
+  run(scene);
+  scene.output.csv.clear();
+  scene.end = 0.2;
+  return scene;
+}
+
 /// Runs the scene in one piece, and in two with a cut at a part of it; both leave the same files.
 void check_cut(Scene scene, double part) {
   INFO(scene.name << ", cut at " << part);
@@ -205,12 +216,7 @@ TEST_CASE("a heap at rest stays at rest behind a restart") {
 
 TEST_CASE("a saved state that is damaged, cut or longer is refused") {
   for (const std::string& text : {chain(1, "index1", 1e-4), tumble(2, 0.4, 0, "momentum")}) {
-    Scene scene = parse_scene(text, "state.toml");
-    outputs(scene, folder("damaged"));
-    scene.end = 0.1;
-    run(scene);
-    scene.output.csv.clear();
-    scene.end = 0.2;
+    Scene scene = first_half(text, "damaged");
     RunOptions options;
     options.restart = scene.output.state;
     const std::string good = content(scene.output.state);
@@ -233,15 +239,7 @@ TEST_CASE("a saved state that is damaged, cut or longer is refused") {
 }
 
 TEST_CASE("a saved state of another scene is refused unless forced") {
-  const Scene scene = [] {
-    Scene s = parse_scene(tumble(3, 0.4, 0, "momentum"), "other.toml");
-    outputs(s, folder("other"));
-    s.end = 0.1;
-    run(s);
-    s.output.csv.clear();
-    s.end = 0.2;
-    return s;
-  }();
+  const Scene scene = first_half(tumble(3, 0.4, 0, "momentum"), "other");
   const auto refused = [&](const char* what, auto change) {
     INFO(what);
     Scene other = scene;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -43,51 +42,9 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     if (plane && moves(bodies, s.body))
       throw std::invalid_argument(where + "a plane belongs to a fixed body");
     (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
-    materials_ = std::max(materials_, s.material + 1);
+    material_.push_back(meetings_.row(s.material));
   }
-  for (const Meeting& m : meetings_) {
-    if (m.first < 0 || m.second < 0 || !(m.friction >= 0) || !std::isfinite(m.friction) ||
-        !(m.restitution >= 0 && m.restitution <= 1))
-      throw std::invalid_argument(
-          "meeting: materials must be >= 0, friction >= 0 and finite, restitution 0 .. 1");
-    materials_ = std::max({materials_, m.first + 1, m.second + 1});
-  }
-  table_.assign(at(materials_) * at(materials_), -1);
-  for (std::size_t k = 0; k < meetings_.size(); ++k) {
-    const Meeting& m = meetings_[k];
-    table_[at(m.first * materials_ + m.second)] = static_cast<int>(k);
-    table_[at(m.second * materials_ + m.first)] = static_cast<int>(k);
-  }
-
-  // Kinds by material, of bodies that move and of all: who may meet, and who serves it.
-  std::set<std::pair<int, ShapeKind>> kinds, moving_kinds;
-  for (const Surface& s : surfaces_) {
-    kinds.insert({s.material, s.shape.kind});
-    if (moves(bodies, s.body)) moving_kinds.insert({s.material, s.shape.kind});
-  }
-  std::set<std::pair<int, ShapeKind>> foreign;
-  for (const auto& a : moving_kinds)
-    for (const auto& b : kinds) {
-      if (table_[at(a.first * materials_ + b.first)] < 0) continue;
-      if (has_own_collision(a.second, b.second)) continue;
-      // One body alone meets nobody of its own kind.
-      if (a == b && std::count_if(surfaces_.begin(), surfaces_.end(), [&](const Surface& s) {
-                      return s.material == a.first && s.shape.kind == a.second;
-                    }) < 2)
-        continue;
-      if (!polyhedra_ || !polyhedra_->serves(a.second, b.second))
-        throw std::invalid_argument(
-            std::string("contact of ") + name(a.second) + " and " + name(b.second) +
-            (polyhedra_ ? " is not supported"
-                        : " needs the collision of polyhedra (target tether_contact_collision, "
-                          "built where Bullet is installed: Debian libbullet-dev)"));
-      foreign.insert(a);
-      foreign.insert(b);
-    }
-  if (polyhedra_)
-    for (std::size_t k = 0; k < surfaces_.size(); ++k)
-      if (foreign.count({surfaces_[k].material, surfaces_[k].shape.kind}) > 0)
-        polyhedra_->add(static_cast<int>(k), surfaces_[k].shape);
+  find_foreign(bodies);
 
   pose_.resize(surfaces_.size());
   for (const Surface& s : surfaces_) {
@@ -105,13 +62,52 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
   }
 }
 
+// Who meets whom by material and kind: refuses pairs that nobody serves, and hands the surfaces of
+// those to `polyhedra` that are not served here.
+void NearContacts::find_foreign(const BodySet& bodies) {
+  struct Kind {
+    ShapeKind kind;
+    bool moves, foreign;
+    std::vector<int> surfaces;
+  };
+  std::vector<std::vector<Kind>> kinds(at(meetings_.rows()));
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+    if (material_[k] < 0) continue;
+    std::vector<Kind>& list = kinds[at(material_[k])];
+    const Surface& s = surfaces_[k];
+    auto found = std::find_if(list.begin(), list.end(),
+                              [&](const Kind& a) { return a.kind == s.shape.kind; });
+    if (found == list.end()) found = list.insert(found, {s.shape.kind, false, false, {}});
+    found->moves = found->moves || moves(bodies, s.body);
+    found->surfaces.push_back(static_cast<int>(k));
+  }
+  const auto meet = [&](Kind& a, Kind& b) {
+    if (!(a.moves || b.moves) || has_own_collision(a.kind, b.kind)) return;
+    if (&a == &b && a.surfaces.size() < 2) return;  // one body alone meets nobody of its own kind
+    if (!polyhedra_ || !polyhedra_->serves(a.kind, b.kind))
+      throw std::invalid_argument(
+          std::string("contact of ") + name(a.kind) + " and " + name(b.kind) +
+          (polyhedra_ ? " is not supported"
+                      : " needs the collision of polyhedra (target tether_contact_collision, "
+                        "built where Bullet is installed: Debian libbullet-dev)"));
+    a.foreign = b.foreign = true;
+  };
+  for (const Meeting& m : meetings_.list())
+    for (Kind& a : kinds[at(meetings_.row(m.first))])
+      for (Kind& b : kinds[at(meetings_.row(m.second))]) a.moves ? meet(a, b) : meet(b, a);
+  for (const std::vector<Kind>& list : kinds)
+    for (const Kind& each : list)
+      if (each.foreign)
+        for (const int k : each.surfaces) polyhedra_->add(k, surface(k).shape);
+}
+
 int NearContacts::meeting_of(int a, int b) const {
-  return table_[at(surface(a).material * materials_ + surface(b).material)];
+  return meetings_.find(material_[at(a)], material_[at(b)]);
 }
 
 const Meeting& NearContacts::meeting(const PointContact& c) const {
   const int a = static_cast<int>(c.id >> 40), b = static_cast<int>(c.id >> 16 & 0xffffff);
-  return meetings_[at(meeting_of(a, b))];
+  return meetings_[meeting_of(a, b)];
 }
 
 double NearContacts::size(const PointContact& c) const {
@@ -120,7 +116,7 @@ double NearContacts::size(const PointContact& c) const {
 }
 
 bool NearContacts::any_restitution() const {
-  return std::any_of(meetings_.begin(), meetings_.end(),
+  return std::any_of(meetings_.list().begin(), meetings_.list().end(),
                      [](const Meeting& m) { return m.restitution > 0; });
 }
 
@@ -173,7 +169,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
     c.r2 = centred_[at(j)] ? Vector3d((t.shape.radius + part * p.gap) * p.normal)
                            : Vector3d(p.on_second - half - bodies.position[at(t.body)]);
     c.normal = p.normal;
-    c.mu = law_ == Law::frictionless ? 0 : meetings_[at(m)].friction;
+    c.mu = law_ == Law::frictionless ? 0 : meetings_[m].friction;
     c.id = contact_id(i, j, p.feature);
     out.points.push_back(c);
     out.gaps.push_back(p.gap);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "broadphase.hpp"
+#include "meetings.hpp"
 
 namespace tether::contact::detail {
 
@@ -26,14 +27,14 @@ class NearContacts {
   bool any_restitution() const;
 
  private:
+  void find_foreign(const BodySet& bodies);
   int meeting_of(int a, int b) const;
   void place(const BodySet& bodies, double dt);
   void pair(const BodySet& bodies, int a, int b, StepContacts& out);
 
   std::vector<Surface> surfaces_;
-  std::vector<Meeting> meetings_;
-  std::vector<int> table_;  // of two materials: index in meetings_, -1: pass through each other
-  int materials_ = 0;
+  Meetings meetings_;
+  std::vector<int> material_;  // of each surface: its row in meetings_
   Law law_;
   double near_part_;
   std::unique_ptr<PairCollision> polyhedra_;

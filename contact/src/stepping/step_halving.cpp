@@ -1,0 +1,62 @@
+// Tether: steps, whole or in halves. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <chrono>
+
+#include "stepper_parts.hpp"
+
+namespace tether::contact {
+
+void Stepper::Implementation::step() {
+  status = Status::solved;
+  succeeded = true;
+  residual = deepest = 0;
+  advance(static_cast<double>(counts.steps) * options.step, options.step, options.max_halvings);
+  ++counts.steps;
+}
+
+void Stepper::Implementation::advance(double time, double length, int halvings) {
+  dt = length;
+  may_halve = halvings > 0;
+  if (run_stages(time)) return;
+  // Nothing has moved yet.
+  bodies.motion = impacts->coming();
+  solver->scale_warm_start(0.5);
+  ++counts.halved;
+  advance(time, length / 2, halvings - 1);
+  advance(time + length / 2, length / 2, halvings - 1);
+  solver->scale_warm_start(2);
+}
+
+// false: the contact problem failed, and the step is to be taken in halves.
+bool Stepper::Implementation::run_stages(double time) {
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start = Clock::now();
+  failed = false;
+  for (Stage& stage : stages) {
+    if (stage.method)
+      (this->*stage.method)();
+    else
+      force[at(stage.force)](bodies, time, dt);
+    const Clock::time_point end = Clock::now();
+    stage.seconds += std::chrono::duration<double>(end - start).count();
+    start = end;
+    if (failed && may_halve) return false;
+  }
+  return true;
+}
+
+// Accepts the solution, or not; one that a shorter step replaces leaves no trace.
+void Stepper::Implementation::judge() {
+  const bool solved = solution.status == Status::solved;
+  const bool shortest = options.max_halvings > 0 && !may_halve;
+  const double most = std::max(accepted_residual(options), shortest ? detail::kRough : 0.0);
+  failed = !solved && !(solution.error <= most);
+  if (failed && may_halve) return;
+  counts.accepted += !solved && !failed;
+  counts.unsolved += failed;
+  if (!solved) status = solution.status;
+  succeeded = succeeded && !failed;
+  residual = solution.error <= residual ? residual : solution.error;
+}
+
+}  // namespace tether::contact

@@ -1,0 +1,80 @@
+// Tether: options of steps. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "stepper_parts.hpp"
+
+namespace tether::contact {
+namespace detail {
+
+void check(const SteppingOptions& o) {
+  const auto demand = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("stepping: ") + what);
+  };
+  demand(o.step > 0 && std::isfinite(o.step), "step must be > 0 and finite");
+  demand(!o.gravity || o.gravity->allFinite(), "gravity must be finite");
+  demand(o.tolerance > 0, "tolerance must be > 0");
+  demand(o.error_reduction >= 0 && o.error_reduction <= 1, "error_reduction must lie in 0 .. 1");
+  demand(o.max_depenetration_speed >= 0, "max_depenetration_speed must be >= 0");
+  demand(o.restitution_threshold >= 0, "restitution_threshold must be >= 0");
+  demand(o.impact_threshold >= 0, "impact_threshold must be >= 0");
+  demand(o.acceptance >= 1, "acceptance must be >= 1");
+  demand(o.max_halvings >= 0 && o.max_halvings <= 30, "max_halvings must lie in 0 .. 30");
+  demand(o.near_part >= 0, "near_part must be >= 0");
+}
+
+BodyOptions contact_options(const SteppingOptions& o) {
+  BodyOptions b;
+  b.law = o.law;
+  b.tolerance = o.tolerance;
+  b.min_sweeps = o.min_sweeps;
+  b.max_sweeps = o.max_sweeps;
+  b.max_assembled = o.max_assembled;
+  b.max_work = o.max_work;
+  b.threads = o.threads;
+  return b;
+}
+
+double threshold_speed(double threshold, const SteppingOptions& o) {
+  return o.gravity ? threshold * std::sqrt(o.gravity->norm()) : 0;
+}
+
+// Penetrations need not vanish in one step: a rough answer is good enough, as the next step sees
+// what is left.
+BodyOptions correction_options(const SteppingOptions& o) {
+  BodyOptions b = contact_options(o);
+  b.law = Law::frictionless;
+  b.tolerance = 1e-2;
+  b.min_sweeps = 0;
+  b.max_sweeps = 10;
+  b.max_assembled = 0;
+  return b;
+}
+
+}  // namespace detail
+
+const char* name(Gyroscopic gyroscopic) {
+  switch (gyroscopic) {
+    case Gyroscopic::none:
+      return "none";
+    case Gyroscopic::explicit_step:
+      return "explicit";
+    case Gyroscopic::implicit_step:
+      return "implicit";
+    case Gyroscopic::momentum:
+      return "momentum";
+  }
+  return "?";
+}
+
+const char* name(RestitutionLaw law) {
+  return law == RestitutionLaw::newton ? "newton" : "poisson";
+}
+
+double accepted_residual(const SteppingOptions& o) {
+  return std::max(o.tolerance, std::min(o.acceptance * o.tolerance, detail::kRough));
+}
+
+}  // namespace tether::contact

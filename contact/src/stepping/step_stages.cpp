@@ -1,0 +1,181 @@
+// Tether: the stages of a step. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "stepper_parts.hpp"
+
+namespace tether::contact {
+
+using Eigen::Vector3d;
+
+void Stepper::Implementation::make_stages() {
+  using I = Implementation;
+  for (int i = 0; i < bodies.size(); ++i) {
+    if (bodies.mass[at(i)] == 0) continue;
+    moving.push_back(i);
+    const bool round = detail::is_isotropic(bodies.inertia[at(i)]);
+    (round ? round_bodies : long_bodies).push_back(i);
+  }
+  const char* impact = restitution ? "restitution" : "collision";
+  if (near) add_stage(impact, &I::remember_velocities);
+  if (options.gravity) add_stage("gravity", &I::apply_gravity);
+  after_forces = stages.size();
+  if (!long_bodies.empty()) {
+    if (options.gyroscopic == Gyroscopic::explicit_step)
+      add_stage("gyroscopic term", &I::gyrate_explicit);
+    if (options.gyroscopic == Gyroscopic::implicit_step)
+      add_stage("gyroscopic term", &I::gyrate_implicit);
+  }
+  if (near) {
+    add_stage("collision", &I::find_contacts);
+    add_stage(impact, &I::choose_impacts);
+    if (restitution) add_stage("restitution", &I::choose_bounces);
+    add_stage("contact", &I::solve_contacts);
+    if (restitution) add_stage("restitution", &I::rebound);
+    if (closing) add_stage("penetration", &I::close_gaps);
+    if (correction) add_stage("penetration", &I::correct_penetration);
+  }
+  add_stage("motion", &I::move);
+  if (!round_bodies.empty()) add_stage("motion", &I::turn_round);
+  if (!long_bodies.empty()) {
+    if (options.gyroscopic == Gyroscopic::momentum) free_spin.resize(long_bodies.size());
+    if (options.gyroscopic == Gyroscopic::momentum)
+      add_stage("gyroscopic term", &I::turn_keeping_momentum);
+    else
+      add_stage("motion", &I::turn_plain);
+  }
+}
+
+void Stepper::Implementation::apply_gravity() {
+  const Vector3d dv = dt * *options.gravity;
+  for (const int i : moving) bodies.motion[at(i)].velocity += dv;
+}
+
+void Stepper::Implementation::gyrate_explicit() {
+  for (const int i : long_bodies) {
+    Vector3d& w = bodies.motion[at(i)].angular_velocity;
+    w += detail::gyroscopic_explicit(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)],
+                                     bodies.orientation[at(i)], w, dt);
+  }
+}
+
+void Stepper::Implementation::gyrate_implicit() {
+  for (const int i : long_bodies) {
+    Vector3d& w = bodies.motion[at(i)].angular_velocity;
+    w += detail::gyroscopic_implicit(bodies.inertia[at(i)], bodies.orientation[at(i)], w, dt);
+  }
+}
+
+void Stepper::Implementation::find_contacts() {
+  near->find(bodies, dt, contacts);
+  for (std::size_t k = 0; k < contacts.gaps.size(); ++k) {
+    const double gap = contacts.gaps[k];
+    deepest = std::max(deepest, -gap);
+    contacts.points[k].bias = gap > 0 ? gap / dt : 0;
+  }
+}
+
+void Stepper::Implementation::choose_impacts() {
+  impacts->choose(*near, bodies, dt, contacts);
+  if (closing) closing->begin(impacts->list(), bodies, contacts);
+}
+
+void Stepper::Implementation::solve_contacts() {
+  contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
+  std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
+  failed = false;
+  if (contacts.points.empty()) {
+    solver->forget();
+    return;
+  }
+  solver->solve(bodies.motion, contacts.points, solution);
+  ++counts.contact_problems;
+  counts.sweeps += solution.sweeps;
+  counts.assembled_islands += solution.assembled_islands;
+  judge();
+  if (failed && may_halve) return;
+  for (const int i : moving) {
+    bodies.motion[at(i)].velocity = solution.velocities[at(i)];
+    bodies.motion[at(i)].angular_velocity = solution.angular_velocities[at(i)];
+  }
+  std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
+}
+
+void Stepper::Implementation::close_gaps() {
+  if (!closing->find(bodies, dt, contacts, closing_move)) return;
+  for (const int i : moving)
+    shift(i, closing_move[at(i)].velocity, closing_move[at(i)].angular_velocity);
+}
+
+// The least move (in the metric of the masses) that takes penetrations back; contacts that are open
+// may close by as much as they are open. Its velocity is not kept.
+void Stepper::Implementation::correct_penetration() {
+  corrects = deepest > 0;
+  if (!corrects) return;
+  at_rest.resize(bodies.motion.size());
+  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
+    at_rest[i].inverse_mass = bodies.motion[i].inverse_mass;
+    at_rest[i].inverse_inertia = bodies.motion[i].inverse_inertia;
+  }
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const double gap = contacts.gaps[k];
+    contacts.points[k].bias =
+        gap > 0 ? gap / dt
+                : std::max(options.error_reduction * gap / dt, -options.max_depenetration_speed);
+  }
+  correction->solve(at_rest, contacts.points, correction_solution);
+  for (const int i : moving)
+    shift(i, correction_solution.velocities[at(i)], correction_solution.angular_velocities[at(i)]);
+}
+
+// By velocities that are not kept. The angular velocity turns with the body: so its energy stays.
+void Stepper::Implementation::shift(int body, const Vector3d& v, const Vector3d& w) {
+  bodies.position[at(body)] += dt * v;
+  if (w.isZero(0)) return;
+  const linalg::Quaternion turn = detail::exponential(dt * w);
+  linalg::Quaternion& q = bodies.orientation[at(body)];
+  q = (turn * q).normalized();
+  Vector3d& spin = bodies.motion[at(body)].angular_velocity;
+  spin = turn * spin;
+}
+
+void Stepper::Implementation::move() {
+  for (const int i : moving) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
+}
+
+// To world axes, after orientations were set from outside.
+void Stepper::Implementation::turn_inertias() {
+  for (const int i : long_bodies)
+    bodies.motion[at(i)].inverse_inertia =
+        detail::turned(bodies.inverse_inertia[at(i)], bodies.orientation[at(i)]);
+}
+
+void Stepper::Implementation::turn_round() {
+  for (const int i : round_bodies) {
+    const Vector3d& w = bodies.motion[at(i)].angular_velocity;
+    if (w.isZero(0)) continue;
+    linalg::Quaternion& q = bodies.orientation[at(i)];
+    q = (detail::exponential(dt * w) * q).normalized();
+  }
+}
+
+void Stepper::Implementation::turn_plain() {
+  for (const int i : long_bodies) {
+    RigidBody& b = bodies.motion[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
+    q = (detail::exponential(dt * b.angular_velocity) * q).normalized();
+    b.inverse_inertia = detail::turned(bodies.inverse_inertia[at(i)], q);
+  }
+}
+
+void Stepper::Implementation::turn_keeping_momentum() {
+  for (std::size_t k = 0; k < long_bodies.size(); ++k) {
+    const int i = long_bodies[k];
+    RigidBody& b = bodies.motion[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
+    detail::turn_with_momentum(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)], dt, q,
+                               b.angular_velocity, free_spin[k]);
+    b.inverse_inertia = detail::turned(bodies.inverse_inertia[at(i)], q);
+  }
+}
+
+}  // namespace tether::contact

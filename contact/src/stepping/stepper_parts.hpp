@@ -1,0 +1,103 @@
+// Tether: what a step consists of. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "closing.hpp"
+#include "impacts.hpp"
+#include "near_contacts.hpp"
+#include "restitution.hpp"
+#include "rotation.hpp"
+
+namespace tether::contact {
+
+namespace detail {
+
+/// Residual above which an answer is none.
+constexpr double kRough = 1e-4;
+
+/// Throws std::invalid_argument.
+void check(const SteppingOptions& o);
+/// Of the contact problem of a step, and of the one that takes penetrations back.
+BodyOptions contact_options(const SteppingOptions& o);
+BodyOptions correction_options(const SteppingOptions& o);
+/// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
+double threshold_speed(double threshold, const SteppingOptions& o);
+
+}  // namespace detail
+
+// A step is the list of stages, made once from what the scene asks for.
+struct Stepper::Implementation {
+  using Method = void (Implementation::*)();
+  struct Stage {
+    const char* effect;
+    Method method;  // null: the force
+    int force;
+    double seconds;
+  };
+
+  BodySet bodies;
+  SteppingOptions options;
+  std::vector<Stage> stages;
+  std::size_t after_forces = 0;  // where the next force goes
+  std::vector<Force> force;
+  std::vector<int> moving, round_bodies, long_bodies;  // of inertia 1 or not
+
+  std::vector<detail::FreeSpin> free_spin;  // of long_bodies
+
+  // Only with meetings.
+  std::unique_ptr<detail::NearContacts> near;
+  std::unique_ptr<BodySolver> solver;
+  std::unique_ptr<detail::Impacts> impacts;
+  std::unique_ptr<detail::Restitution> restitution;
+  StepContacts contacts;
+  BodySolution solution;
+
+  // Of the step: the length of the part that is taken, and what is worst of all its parts.
+  double dt = 0;
+  bool may_halve = false, failed = false, succeeded = true;
+  Status status = Status::solved;
+  double residual = 0, deepest = 0;
+
+  // Only with error reduction.
+  std::unique_ptr<detail::Closing> closing;
+  std::unique_ptr<BodySolver> correction;
+  BodySolution correction_solution;
+  std::vector<RigidBody> at_rest, closing_move;
+  bool corrects = false;
+
+  StepCounts counts;
+
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  void add_stage(const char* effect, Method method) { stages.push_back({effect, method, -1, 0}); }
+  void make_stages();
+  void turn_inertias();
+
+  void make_solvers();
+  void step();
+  void advance(double time, double length, int halvings);
+  bool run_stages(double time);
+  void judge();
+
+  void remember_velocities() { impacts->remember(bodies); }
+  void apply_gravity();
+  void gyrate_explicit();
+  void gyrate_implicit();
+  void find_contacts();
+  void choose_impacts();
+  void choose_bounces() { restitution->choose(impacts->list(), bodies, contacts); }
+  void solve_contacts();
+  void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
+  void close_gaps();
+  void correct_penetration();
+  void shift(int body, const Eigen::Vector3d& v, const Eigen::Vector3d& w);
+  void move();
+  void turn_round();
+  void turn_plain();
+  void turn_keeping_momentum();
+};
+
+}  // namespace tether::contact
