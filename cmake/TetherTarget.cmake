@@ -5,6 +5,7 @@
 #   tether_warnings(<target>)    warnings and instrumentation of the project
 #   tether_executable(<target> SOURCES ... LIBRARIES ...)
 #   tether_library(<name>)       target tether_<name>, alias tether::<name>
+#   TETHER_KEEP_BITS             options for sources whose rounding is part of their promise
 include(GNUInstallDirs)
 include(${CMAKE_CURRENT_LIST_DIR}/TetherPrivate.cmake)
 
@@ -26,6 +27,9 @@ function(tether_warnings target)
     target_link_options(${target} PRIVATE --coverage)
   endif()
 endfunction()
+
+# For sources whose results must be the same bits wherever they are compiled; after the builder's flags.
+set(TETHER_KEEP_BITS "$<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-fno-fast-math;-ffp-contract=off>")
 
 function(tether_executable target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LIBRARIES")

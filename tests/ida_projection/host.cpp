@@ -53,11 +53,13 @@ Context::Context() {
 
 Context::~Context() { SUNContext_Free(&context_); }
 
-Host::Host(Problem what, double tolerance) : problem(std::move(what)) {
+Host::Host(Problem what, double tolerance, Vectors vectors) : problem(std::move(what)) {
+  const bool fast = vectors == Vectors::fast;
   const auto n = static_cast<sunindextype>(problem.size);
   t = problem.t0;
   y = vector(problem.y0);
   yp = vector(problem.yp0);
+  if (fast) tp::fast_vector(y);
   ida = IDACreate(context);
 #if SUNDIALS_VERSION_MAJOR < 7
   IDASetErrHandlerFn(ida, silent, nullptr);
@@ -72,7 +74,8 @@ Host::Host(Problem what, double tolerance) : problem(std::move(what)) {
     require(IDASVtolerances(ida, tolerance, atol), "IDASVtolerances");
   }
   matrix_ = SUNDenseMatrix(n, n, context);
-  linear_solver_ = SUNLinSol_Dense(y, matrix_, context);
+  linear_solver_ = fast && n <= tp::kLargestFastDense ? tp::fast_dense_solver(y, matrix_)
+                                                      : SUNLinSol_Dense(y, matrix_, context);
   use_linear_solver();
   if (problem.jacobian) require(IDASetJacFn(ida, ida_jacobian), "IDASetJacFn");
   if (problem.initial_step > 0.0) IDASetInitStep(ida, problem.initial_step);

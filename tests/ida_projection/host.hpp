@@ -29,11 +29,14 @@ class Context {
   SUNContext context_ = nullptr;
 };
 
+/// SUNDIALS' own serial vectors and dense factors, or fast_vector and fast_dense_solver.
+enum class Vectors { serial, fast };
+
 /// IDA on a problem: serial vectors, dense LU, the problem's Jacobian (or IDA's differences),
 /// tolerances rtol = atol = tol, atol times the problem's own factors.
 class Host {
  public:
-  Host(Problem problem, double tolerance);
+  Host(Problem problem, double tolerance, Vectors vectors = Vectors::serial);
   ~Host();
   Host(const Host&) = delete;
   Host& operator=(const Host&) = delete;

@@ -1,4 +1,4 @@
-# Runs PLAIN and ATTACHED with ARGUMENTS in a folder each and compares all that they write.
+# Runs PLAIN and ATTACHED (the plugin or its fast vectors in use) with ARGUMENTS in a folder each and compares all that they write.
 # SPDX-License-Identifier: BSD-3-Clause
 file(REMOVE_RECURSE ${WORK})
 set(calls_file ${WORK}/solver_calls)
@@ -42,6 +42,6 @@ foreach(count IN LISTS calls)
   math(EXPR total "${total} + ${count}")
 endforeach()
 if(total EQUAL 0)
-  message(FATAL_ERROR "The decorated solver was never called.")
+  message(FATAL_ERROR "The plugin was never called.")
 endif()
-message(STATUS "${files_plain}: identical; calls of the decorated solver, for each integrator: ${calls}")
+message(STATUS "${files_plain}: identical; calls, as the program counts them: ${calls}")

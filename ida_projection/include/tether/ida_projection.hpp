@@ -3,6 +3,7 @@
 
 #include <tether/ida_projection/builders.hpp>
 #include <tether/ida_projection/constraints.hpp>
+#include <tether/ida_projection/fast.hpp>
 #include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/projection.hpp>
 #include <tether/ida_projection/statistics.hpp>

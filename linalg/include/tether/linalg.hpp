@@ -3,4 +3,5 @@
 #pragma once
 
 #include <tether/linalg/minimum_norm.hpp>
+#include <tether/linalg/small_lu.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>

@@ -100,7 +100,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
       context_(make_context()),
       watch_(system.effect_names().size()) {
   const int N = system.size();
-  y_ = N_VNew_Serial(N, context_);
+  y_ = ida_projection::fast_vector(N_VNew_Serial(N, context_));
   yp_ = N_VClone(y_);
   id_ = N_VClone(y_);
   atol_ = N_VClone(y_);
@@ -225,7 +225,8 @@ void Integrator::prepare_matrix() {
 #endif
   for (std::size_t k = 0; k < places.size(); ++k) slots[k] = places[k].first + N * places[k].second;
   matrix_ = SUNDenseMatrix(N, N, context_);
-  solver_ = SUNLinSol_Dense(y_, matrix_, context_);
+  solver_ = N <= ida_projection::kLargestFastDense ? ida_projection::fast_dense_solver(y_, matrix_)
+                                                   : SUNLinSol_Dense(y_, matrix_, context_);
   entries_.finish(std::move(slots));
 }
 

@@ -1,0 +1,246 @@
+// Tether: operations on serial vectors with the bits of SUNDIALS' own.
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Compiled without contraction to fused multiply-adds and without -ffast-math: bits count.
+#include "kernels.hpp"
+
+#include <nvector/nvector_serial.h>
+
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+namespace tether::ida_projection::fast {
+
+namespace {
+
+N_VectorContent_Serial content(N_Vector v) {
+  return static_cast<N_VectorContent_Serial>(v->content);
+}
+double* data(N_Vector v) { return content(v)->data; }
+double* array_pointer(N_Vector v) { return data(v); }
+
+#if defined(__GNUC__)
+using Pair = double __attribute__((vector_size(16)));
+#else
+struct Pair {
+  double a, b;
+  friend Pair operator*(Pair x, Pair y) { return {x.a * y.a, x.b * y.b}; }
+  Pair& operator+=(Pair x) { return *this = {a + x.a, b + x.b}; }
+};
+#endif
+Pair pair_at(const double* x) {
+  Pair pair;
+  std::memcpy(&pair, x, sizeof pair);
+  return pair;
+}
+
+/// The kernels for vectors of one length, or of any (Length 0). Arrays are the same or apart, as
+/// everywhere in SUNDIALS: elements do not depend on each other ("ivdep").
+template <int Length>
+struct Kernels {
+  static sunindextype length(N_Vector v) { return Length > 0 ? Length : content(v)->length; }
+
+  static void linear_sum(sunrealtype a, N_Vector X, sunrealtype b, N_Vector Y, N_Vector Z) {
+    const sunindextype n = length(Z);
+    const double *x = data(X), *y = data(Y);
+    double* z = data(Z);
+    if (b == 1.0) {
+#pragma GCC ivdep
+      for (sunindextype i = 0; i < n; ++i) z[i] = a * x[i] + y[i];
+    } else if (a == 1.0) {
+#pragma GCC ivdep
+      for (sunindextype i = 0; i < n; ++i) z[i] = x[i] + b * y[i];
+    } else if (a == b && a != -1.0) {
+#pragma GCC ivdep
+      for (sunindextype i = 0; i < n; ++i) z[i] = a * (x[i] + y[i]);
+    } else if (a == -b) {
+#pragma GCC ivdep
+      for (sunindextype i = 0; i < n; ++i) z[i] = a * (x[i] - y[i]);
+    } else {
+#pragma GCC ivdep
+      for (sunindextype i = 0; i < n; ++i) z[i] = a * x[i] + b * y[i];
+    }
+  }
+
+  static void constant(sunrealtype c, N_Vector Z) {
+    const sunindextype n = length(Z);
+    double* z = data(Z);
+    for (sunindextype i = 0; i < n; ++i) z[i] = c;
+  }
+
+  static void scale(sunrealtype c, N_Vector X, N_Vector Z) {
+    const sunindextype n = length(Z);
+    const double* x = data(X);
+    double* z = data(Z);
+#pragma GCC ivdep
+    for (sunindextype i = 0; i < n; ++i) z[i] = c * x[i];
+  }
+
+  template <class Function>
+  static void each(N_Vector X, N_Vector Z, Function f) {
+    const sunindextype n = length(Z);
+    const double* x = data(X);
+    double* z = data(Z);
+#pragma GCC ivdep
+    for (sunindextype i = 0; i < n; ++i) z[i] = f(x[i]);
+  }
+  static void absolute(N_Vector X, N_Vector Z) {
+    each(X, Z, [](double x) { return std::abs(x); });
+  }
+  static void inverse(N_Vector X, N_Vector Z) {
+    each(X, Z, [](double x) { return 1.0 / x; });
+  }
+  static void add_constant(N_Vector X, sunrealtype b, N_Vector Z) {
+    each(X, Z, [b](double x) { return x + b; });
+  }
+
+  static void product(N_Vector X, N_Vector Y, N_Vector Z) {
+    const sunindextype n = length(Z);
+    const double *x = data(X), *y = data(Y);
+    double* z = data(Z);
+#pragma GCC ivdep
+    for (sunindextype i = 0; i < n; ++i) z[i] = x[i] * y[i];
+  }
+  static void quotient(N_Vector X, N_Vector Y, N_Vector Z) {
+    const sunindextype n = length(Z);
+    const double *x = data(X), *y = data(Y);
+    double* z = data(Z);
+#pragma GCC ivdep
+    for (sunindextype i = 0; i < n; ++i) z[i] = x[i] / y[i];
+  }
+
+  static sunrealtype dot(N_Vector X, N_Vector Y) {
+    const sunindextype n = length(X);
+    const double *x = data(X), *y = data(Y);
+    double sum = 0.0;
+    for (sunindextype i = 0; i < n; ++i) sum += x[i] * y[i];
+    return sum;
+  }
+
+  static sunrealtype minimum(N_Vector X) {
+    const sunindextype n = length(X);
+    const double* x = data(X);
+    double least = x[0];
+    for (sunindextype i = 1; i < n; ++i) least = x[i] < least ? x[i] : least;
+    return least;
+  }
+
+  static double square_sum(N_Vector X, N_Vector W) {
+    const sunindextype n = length(X);
+    const double *x = data(X), *w = data(W);
+    double sum = 0.0;
+    for (sunindextype i = 0; i < n; ++i) {
+      const double share = x[i] * w[i];
+      sum += share * share;
+    }
+    return sum;
+  }
+  static sunrealtype wrms_norm(N_Vector X, N_Vector W) {
+    return root(square_sum(X, W) / static_cast<double>(length(X)));
+  }
+  static sunrealtype wl2_norm(N_Vector X, N_Vector W) { return root(square_sum(X, W)); }
+
+  // What the mask leaves out adds 0, which changes no sum of squares.
+  static sunrealtype wrms_norm_mask(N_Vector X, N_Vector W, N_Vector Mask) {
+    const sunindextype n = length(X);
+    const double *x = data(X), *w = data(W), *mask = data(Mask);
+    double sum = 0.0;
+    for (sunindextype i = 0; i < n; ++i) {
+      const double share = x[i] * w[i], square = share * share;
+      sum += mask[i] > 0.0 ? square : 0.0;
+    }
+    return root(sum / static_cast<double>(n));
+  }
+
+  // SUNRsqrt: 0 for what is negative; what is no number stays none.
+  static double root(double square) { return square <= 0.0 ? 0.0 : std::sqrt(square); }
+
+  /// Size elements from `first` on, two at a time.
+  template <int Size>
+  static void combine(int count, const double* c, N_Vector* X, double* z, sunindextype first) {
+    constexpr int kPairs = Size / 2;
+    Pair sum[kPairs + 1];
+    double last = 0.0;
+    const double* x = data(X[0]) + first;
+    for (int i = 0; i < kPairs; ++i) sum[i] = Pair{c[0], c[0]} * pair_at(x + 2 * i);
+    if (Size % 2) last = c[0] * x[Size - 1];
+    for (int k = 1; k < count; ++k) {
+      x = data(X[k]) + first;
+      for (int i = 0; i < kPairs; ++i) sum[i] += Pair{c[k], c[k]} * pair_at(x + 2 * i);
+      if (Size % 2) last += c[k] * x[Size - 1];
+    }
+    z += first;
+#pragma GCC unroll 8
+    for (int i = 0; i < kPairs; ++i) std::memcpy(z + 2 * i, &sum[i], sizeof(Pair));
+    if (Size % 2) z[Size - 1] = last;
+  }
+
+  // As the N_VScale and N_VLinearSum that SUNDIALS uses where this operation is not there.
+  static int linear_combination(int count, sunrealtype* c, N_Vector* X, N_Vector Z) {
+    double* z = data(Z);
+    if constexpr (Length > 0) {
+      combine<Length>(count, c, X, z, 0);
+    } else {
+      const sunindextype n = length(Z);
+      sunindextype first = 0;
+      for (; first + 8 <= n; first += 8) combine<8>(count, c, X, z, first);
+      for (; first < n; ++first) combine<1>(count, c, X, z, first);
+    }
+    return 0;
+  }
+
+  // As SUNDIALS' own one, where a program has enabled it.
+  static int enabled_linear_combination(int count, sunrealtype* c, N_Vector* X, N_Vector Z) {
+    if (count == 2) {
+      linear_sum(c[0], X[0], c[1], X[1], Z);
+      return 0;
+    }
+    return linear_combination(count, c, X, Z);
+  }
+
+  static int linear_sums(int count, sunrealtype a, N_Vector* X, sunrealtype b, N_Vector* Y,
+                         N_Vector* Z) {
+    for (int k = 0; k < count; ++k) linear_sum(a, X[k], b, Y[k], Z[k]);
+    return 0;
+  }
+  static int scale_each(int count, sunrealtype* c, N_Vector* X, N_Vector* Z) {
+    for (int k = 0; k < count; ++k) scale(c[k], X[k], Z[k]);
+    return 0;
+  }
+
+  static void install(N_Vector_Ops ops) {
+    ops->nvgetarraypointer = array_pointer;
+    ops->nvlinearsum = linear_sum;
+    ops->nvconst = constant;
+    ops->nvprod = product;
+    ops->nvdiv = quotient;
+    ops->nvscale = scale;
+    ops->nvabs = absolute;
+    ops->nvinv = inverse;
+    ops->nvaddconst = add_constant;
+    ops->nvdotprod = dot;
+    ops->nvmin = minimum;
+    ops->nvwrmsnorm = wrms_norm;
+    ops->nvwrmsnormmask = wrms_norm_mask;
+    ops->nvwl2norm = wl2_norm;
+    ops->nvlinearcombination =
+        ops->nvlinearcombination ? enabled_linear_combination : linear_combination;
+    ops->nvlinearsumvectorarray = linear_sums;
+    ops->nvscalevectorarray = scale_each;
+  }
+};
+
+template <int... Lengths>
+void install_sized(N_Vector_Ops ops, sunindextype length, std::integer_sequence<int, Lengths...>) {
+  static constexpr void (*install[])(N_Vector_Ops) = {Kernels<Lengths>::install...};
+  install[length <= kSized ? length : 0](ops);
+}
+
+}  // namespace
+
+void install_kernels(N_Vector_Ops ops, sunindextype length) {
+  install_sized(ops, length, std::make_integer_sequence<int, kSized + 1>());
+}
+
+}  // namespace tether::ida_projection::fast

@@ -1,0 +1,88 @@
+// Tether: IDA with fast vectors and factors takes the same steps, bit for bit.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <nvector/nvector_serial.h>
+#include <problems/akzo_nobel.hpp>
+#include <problems/andrews.hpp>
+#include <problems/bricard.hpp>
+#include <problems/car_axis.hpp>
+#include <problems/governor.hpp>
+#include <problems/kepler.hpp>
+#include <problems/link_chain.hpp>
+#include <problems/lotka_volterra.hpp>
+#include <problems/pendulum.hpp>
+#include <problems/pinned_rods.hpp>
+#include <problems/rigid_body.hpp>
+#include <problems/robertson.hpp>
+#include <problems/slider_crank.hpp>
+#include <problems/slider_crank_equal.hpp>
+#include <problems/transistor_amplifier.hpp>
+
+#include "host.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+std::vector<Problem> everything() {
+  std::vector<Problem> all;
+  for (const auto& form : pendulum_forms()) all.push_back(pendulum(1.0, 9.81, 10.0, form));
+  for (const auto& form : car_axis_forms()) all.push_back(car_axis(form));
+  for (const auto& form : andrews_forms()) all.push_back(andrews(form));
+  for (const auto& form : slider_crank_forms()) all.push_back(slider_crank(form));
+  for (const auto& form : robertson_forms()) all.push_back(robertson(40.0, form));
+  for (const auto& motion : rigid_body_motions()) all.push_back(rigid_body(motion, 10.0));
+  for (const auto& form : slider_crank_equal_forms())
+    all.push_back(slider_crank_equal(kSliderCrankTurn, 1.0, form));
+  for (const auto& form : pinned_rods_forms()) {
+    all.push_back(n_four_bar(2, 1.0, form));
+    all.push_back(five_link_chain(1.0, form));
+    all.push_back(parallelogram(0.0, 8.0, 1.0, form));
+  }
+  for (const auto& form : bricard_forms()) all.push_back(bricard(1.0, form));
+  for (const auto& form : governor_forms()) all.push_back(governor(0.1, form));
+  all.push_back(kepler(0.6, 10.0));
+  all.push_back(lotka_volterra(2.0, 0.5, 10.0));
+  all.push_back(akzo_nobel());
+  all.push_back(transistor_amplifier());
+  all.push_back(link_chain(4, 0.3));
+  return all;
+}
+
+/// Up to `steps` steps of both side by side: every time, order and bit of y and y' must agree.
+void compare(const Problem& problem, double tolerance, bool projected, int steps) {
+  INFO(problem.name << ", " << problem.form << ", tolerance " << tolerance
+                    << (projected ? ", projected" : ""));
+  Host plain(problem, tolerance), fast(problem, tolerance, Vectors::fast);
+  if (projected) {
+    plain.attach(problem.recommended_constraints());
+    fast.attach(problem.recommended_constraints());
+  }
+  bool same = true;
+  int flag = 0;
+  for (int k = 0; k < steps && same && flag >= 0 && plain.t < problem.t_end; ++k) {
+    flag = plain.step();
+    const auto derivative = [&](const Host& host) {
+      const double* yp = N_VGetArrayPointer(host.yp);
+      return std::vector<double>(yp, yp + problem.size);
+    };
+    same = fast.step() == flag && plain.t == fast.t && same_bits(plain.state(), fast.state()) &&
+           same_bits(derivative(plain), derivative(fast));
+  }
+  INFO("t = " << plain.t << ", step " << plain.steps());
+  CHECK(same);
+  CHECK(plain.steps() == fast.steps());
+}
+
+}  // namespace
+
+TEST_CASE("Fast vectors and factors leave every bit of plain IDA's steps on all problems") {
+  for (const Problem& problem : everything())
+    for (const double tolerance : {1e-4, 1e-8}) compare(problem, tolerance, false, 150);
+}
+
+TEST_CASE("Fast vectors and factors leave every bit of projected steps on all problems") {
+  for (const Problem& problem : everything())
+    for (const double tolerance : {1e-4, 1e-8}) compare(problem, tolerance, true, 80);
+}
