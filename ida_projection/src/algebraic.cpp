@@ -27,7 +27,7 @@ void Projection::Impl::set_id(N_Vector id) {
 // shifted by -ycor (and put back bit for bit) so that only y' feels ycor. Two changes of different
 // size are made of many y' at once (ColumnSearch); their sizes vary irregularly with j, so that
 // those of one equation do not cancel.
-Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
+Status Projection::Impl::derive_id(const Candidate& candidate) {
   if (!contiguous_ || options_.derive_id_limit == 0) {
     advise(contiguous_ ? "Options::derive_id_limit is 0" : "vectors without contiguous memory");
     return Status::success;
@@ -46,7 +46,7 @@ Status Projection::Impl::derive_id(const Candidate& candidate, void* mem) {
   bool known[kSizes] = {};
   const auto residual = [&] {
     ++statistics_.residual_evaluations;
-    return system_(ycor, f, mem) == 0;
+    return this->residual(ycor, f) == 0;
   };
   for (int k = 0; k < kSizes; ++k) {
     for (std::size_t j = 0; j < n; ++j) {
@@ -113,7 +113,7 @@ bool Projection::Impl::residual_at(const double* y, double* f) {
   std::copy(base, base + size_, saved_entries_);
   std::copy(y, y + size_, base);
   ++statistics_.residual_evaluations;
-  const bool evaluated = system_(none_, f_, mem_) == 0;
+  const bool evaluated = residual(none_, f_) == 0;
   std::copy(saved_entries_, saved_entries_ + size_, base);
   const double* values = N_VGetArrayPointer(f_);
   std::copy(values, values + size_, f);
@@ -142,9 +142,9 @@ std::vector<char> Projection::Impl::derivative_free_equations(const Candidate& c
       e[j] = change;
       lower[j] = low;
     }
-    bool ok = system_(none, base, mem_) == 0;
+    bool ok = residual(none, base) == 0;
     std::copy(lower.begin(), lower.end(), candidate.base_entries);
-    ok = system_(ycor, shifted, mem_) == 0 && ok;
+    ok = residual(ycor, shifted) == 0 && ok;
     statistics_.residual_evaluations += 2;
     N_VScale(1.0, saved_, candidate.base);
     if (!ok) continue;  // F refuses this y'; the other size decides
@@ -160,6 +160,8 @@ std::vector<char> Projection::Impl::derivative_free_equations(const Candidate& c
 // Rows that hang on algebraic variables which equations of F determine are moved together with
 // these equations.
 void Projection::Impl::join_equations(const Candidate& candidate) {
+  if (own_mover_) mover_ = std::move(own_mover_);  // of an attempt that failed
+  moved_id_ = OwnedVector();
   if (!contiguous_ || !has_algebraic_ || !has_values(constraints) ||
       size_ > options_.derive_id_limit)
     return;
@@ -172,9 +174,11 @@ void Projection::Impl::join_equations(const Candidate& candidate) {
   Evaluator rows(constraints, statistics_);
   const Residual residual = [this](const double* at, double* f) { return residual_at(at, f); };
   const double* id = N_VGetArrayPointer(id_);
-  if (!contain_algebraic(rows, candidate.t, y, WT, options_.hold, id)) return;
-  const JoinedEquations found = find_joined_equations(
-      rows, residual, derivative_free_equations(candidate), candidate.t, y, WT, options_.hold, id);
+  JoinedEquations found;
+  if (contain_algebraic(rows, candidate.t, y, WT, options_.hold, id))
+    found = find_joined_equations(rows, residual, derivative_free_equations(candidate), candidate.t,
+                                  y, WT, options_.hold, id);
+  if (rows.fatal()) stop(-1, rows.message());
   if (found.moves.empty()) return;
   moved_id_ = OwnedVector(candidate.base);
   for (std::size_t j = 0; j < n; ++j)
@@ -182,10 +186,12 @@ void Projection::Impl::join_equations(const Candidate& candidate) {
   if (found.equations.empty()) return;
   joined_ = constraints + as_constraints(
                               found, residual, [this] { return present_.weight_entries; }, size_);
+  std::unique_ptr<Mover> together =
+      has_sparse_rows(constraints)
+          ? make_sparse_mover(joined_, options_, statistics_, size_, rows.rows())
+          : make_dense_mover(joined_, options_, statistics_, size_, rows.rows());
   own_mover_ = std::move(mover_);
-  mover_ = has_sparse_rows(constraints)
-               ? make_sparse_mover(joined_, options_, statistics_, size_, rows.rows())
-               : make_dense_mover(joined_, options_, statistics_, size_, rows.rows());
+  mover_ = std::move(together);
   mover_->reset();
 }
 

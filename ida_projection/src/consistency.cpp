@@ -20,10 +20,15 @@ double largest_difference(const double* a, const double* b, int n, int* where) {
   return largest;
 }
 
-double largest_residual(IDAResFn residual, void* user_data, double t, N_Vector y, N_Vector yp) {
+constexpr const char* kResidualEnded = "F, the residual function, returned a negative flag";
+
+// Largest |F_i|; -1 where it is not known. `flag`: F's.
+double largest_residual(IDAResFn residual, void* user_data, double t, N_Vector y, N_Vector yp,
+                        int* flag) {
   if (residual == nullptr) return -1.0;
   OwnedVector r(y);
-  return residual(t, y, yp, r, user_data) == 0 ? N_VMaxNorm(r) : -1.0;
+  *flag = residual(t, y, yp, r, user_data);
+  return *flag == 0 ? N_VMaxNorm(r) : -1.0;
 }
 
 }  // namespace
@@ -58,11 +63,17 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
            std::to_string(size_) + " unknowns");
   if (!mover_) return report.status = status = Status::success, report;
 
-  if (IDAReInit(ida_mem_, t0, yy, yp) != 0 || !probe(t0, yy, yp))
+  int flag = 0;
+  stop_flag_ = 0;
+  if (IDAReInit(ida_mem_, t0, yy, yp) != 0 || !probe(t0, yy, yp)) {
+    if (broken_) return fail(status, std::string(message));
     return fail(Status::internal_error,
                 "IDA could not be started at the given values; set tolerances and the linear "
                 "solver before make_consistent, and look at IDA's own message");
-  report.residual_before = largest_residual(how.residual, how.user_data, t0, yy, yp);
+  }
+  if (stop_flag_ < 0) return fail(Status::callback_fatal, std::string(stop_text_));
+  report.residual_before = largest_residual(how.residual, how.user_data, t0, yy, yp, &flag);
+  if (flag < 0) return fail(Status::callback_fatal, kResidualEnded);
 
   // y onto the constraints, algebraic variables only where rows fix them.
   OwnedVector y(yy), ydot(yp);
@@ -80,13 +91,17 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
       IDASetId(ida_mem_, id_);
       const double direction =
           how.direction != 0.0 ? how.direction : t0 + 1e-3 * std::max(1.0, std::abs(t0));
-      found = IDACalcIC(ida_mem_, IDA_YA_YDP_INIT, direction) == 0 &&
-              IDAGetConsistentIC(ida_mem_, y, ydot) == 0;
+      flag = IDACalcIC(ida_mem_, IDA_YA_YDP_INIT, direction);
+      if (flag == IDA_RES_FAIL) return fail(Status::callback_fatal, kResidualEnded);
+      found = flag == 0 && IDAGetConsistentIC(ida_mem_, y, ydot) == 0;
     }
   }
-  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr && contiguous_)
-    found = consistent_derivative(how.residual, how.user_data, t0, y, ydot, id_, weights_,
-                                  how.maximum_iterations);
+  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr && contiguous_) {
+    const Status solved = consistent_derivative(how.residual, how.user_data, t0, y, ydot, id_,
+                                                weights_, how.maximum_iterations);
+    if (solved == Status::callback_fatal) return fail(solved, kResidualEnded);
+    found = solved == Status::success;
+  }
   if (!found)
     return fail(Status::not_converged,
                 "y' consistent with F was not found; give Options::id and Consistency::residual, "
@@ -95,6 +110,7 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
   // Rows that contain algebraic variables may have moved a little with them.
   ConsistencyReport again;
   project_point(t0, y, how.hold, has_algebraic_ ? static_cast<N_Vector>(id_) : nullptr, again);
+  if (again.status == Status::callback_fatal) return fail(again.status, again.message);
   if (again.status == Status::success) report.drift_after = again.drift_after;
 
   N_VLinearSum(1.0, y, -1.0, yy, delta_);
@@ -109,7 +125,8 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
     N_VLinearSum(1.0, ydot, -1.0, yp, delta_);
     report.derivative_change = N_VMaxNorm(delta_);
   }
-  report.residual_after = largest_residual(how.residual, how.user_data, t0, y, ydot);
+  report.residual_after = largest_residual(how.residual, how.user_data, t0, y, ydot, &flag);
+  if (flag < 0) return fail(Status::callback_fatal, kResidualEnded);
   N_VScale(1.0, y, yy);
   N_VScale(1.0, ydot, yp);
   IDAReInit(ida_mem_, t0, yy, yp);
@@ -137,6 +154,10 @@ void Projection::Impl::project_point(double t, N_Vector y, const std::vector<boo
     }
     if (!point_) point_ = make_gauss_newton(constraints, size_);
     point_->project(t, point, WT, held, id != nullptr ? N_VGetArrayPointer(id) : nullptr, report);
+    if (point_->fatal()) {  // met on the way, perhaps at a trial point
+      report.status = Status::callback_fatal;
+      report.message = point_->message();
+    }
     if (report.status == Status::success) std::copy(point.begin(), point.end(), values);
     return;
   }
@@ -153,6 +174,7 @@ void Projection::Impl::project_point(double t, N_Vector y, const std::vector<boo
   OwnedVector correction(y);
   N_VConst(0.0, correction);
   const Candidate candidate{t, y, correction, weights_};
+  point_mover_->forget_failure();
   const Move move = point_mover_->move(candidate);
   report.status = move.status;
   report.iterations = move.moves;
@@ -181,7 +203,11 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
     OwnedVector ydot(yp);
     N_VScale(1.0, yp, ydot);
     const double* values = N_VGetArrayPointer(y);
-    if (point_->tangent(t, {values, values + size_}, N_VGetArrayPointer(ydot))) {
+    const bool found = point_->tangent(t, {values, values + size_}, N_VGetArrayPointer(ydot));
+    if (point_->fatal()) {
+      report.status = Status::callback_fatal;
+      report.message = point_->message();
+    } else if (found) {
       report.derivative_change =
           largest_difference(N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp), size_, nullptr);
       N_VScale(1.0, ydot, yp);

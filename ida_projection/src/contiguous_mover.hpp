@@ -64,6 +64,8 @@ class ContiguousMover final : public Mover {
     return value(candidate.t) == Status::success ? drift() : -1.0;
   }
   void accept() override { std::swap(scale_, trial_scale_); }
+  bool fatal() const override { return evaluator_.fatal(); }
+  void forget_failure() override { evaluator_.forget(); }
   Status finish(const Candidate& candidate) override {
     const bool unseen = keeps_factors() && move_length_ > kSafe * options_.tolerance;
     return unseen ? take_back(candidate) : Status::success;

@@ -30,6 +30,7 @@ bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
 
 // Called by IDA once tolerances, linear solver and sensitivities are known.
 int Projection::Impl::initialize() {
+  initialized_ = broken_ = false;
   // IDASetMaxNonlinIters reaches the state's solver unless IDAS solves states and sensitivities
   // together; there is no getter for that. Ask, and see whether the question arrives here.
   // Without constraints nothing would be lost.
@@ -98,28 +99,68 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
         "the Projection was made after IDA had been initialised, so IDA never handed its linear "
         "solver over; make it before IDACalcIC and the first IDASolve, or call IDAReInit");
 
+  if (broken_) return kFatal;  // status and message are those of the exception
+
   Candidate candidate{0.0, y_predicted, ycor, weights};
   if (contiguous_) candidate.with_entries();
   present_ = candidate;
   mem_ = mem;
+  stop_flag_ = 0;
+  if (mover_) mover_->forget_failure();
   restore_weights(weights);
+  int flag = attempt(candidate, tolerance, call_setup);
+  // Evaluations that only look around may fail, but what asks for the end of the run ends it.
+  const bool ended = stop_flag_ < 0 || (mover_ && mover_->fatal());
+  if (flag >= 0 && ended) flag = finish(Status::callback_fatal, mover_->message());
+  return stop_flag_ < 0 ? stop_flag_ : flag;
+}
+
+int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_setup) {
   if (probing_) {  // make_consistent wants to look around, not to step
-    N_VScale(1.0, weights, weights_);
-    if (!id_) derive_id(candidate, mem);
+    N_VScale(1.0, candidate.weights, weights_);
+    if (!id_) derive_id(candidate);
     probed_ = true;
     return 0;
   }
-
-  const int flag = correct_and_move(candidate, tolerance, call_setup, mem);
+  const int flag = correct_and_move(candidate, tolerance, call_setup);
   if (flag == 0 && smoother_.on()) control_step(candidate);
   return flag;
+}
+
+// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be
+// evaluated. Once it asked for the end of the run it is not called again.
+int Projection::Impl::residual(N_Vector ycor, N_Vector into) {
+  if (stop_flag_ < 0) return stop_flag_;
+  const int flag = system_(ycor, into, mem_);
+  if (flag < 0) stop(flag, "F, IDA's residual function, returned a negative flag");
+  return flag;
+}
+
+void Projection::Impl::stop(int flag, const std::string& text) {
+  stop_flag_ = flag;
+  stop_text_ = text;
+}
+
+int Projection::Impl::caught(Status outcome, const char* text) noexcept {
+  broken_ = true;
+  probing_ = false;
+  status = outcome;
+  try {
+    message = text;
+  } catch (...) {  // no memory for the text either
+    message.clear();
+  }
+  if (options_.print_fatal && !printed_) {
+    printed_ = true;
+    std::fprintf(stderr, "tether: %s: %s\n", to_string(outcome), text);
+  }
+  return kFatal;
 }
 
 // The decorated solver's correction. Where it fails although IDA has already cut the step for that,
 // its convergence test from then on leaves out algebraic variables of index 2 or more: their
 // rounding, divided by the step, fails it, and nothing but they depends on them.
-int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup,
-                              void* mem) {
+int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup) {
   N_Vector weights = candidate.weights;
   if (rounding_fails_ && engaged_ && options_.suppress_algebraic && !undetermined_.empty()) {
     if (!newton_weights_) newton_weights_ = OwnedVector(weights);
@@ -129,19 +170,18 @@ int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool
     weights = newton_weights_;
   }
   const int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, weights,
-                                     tolerance, call_setup, mem);
+                                     tolerance, call_setup, mem_);
   failed_corrections_ = flag == 0 ? 0 : failed_corrections_ + 1;
   if (failed_corrections_ >= 2) rounding_fails_ = true;
   return flag;
 }
 
-int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup,
-                                       void* mem) {
+int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup) {
   if (mover_ && !engaged_ && !index_known_ && in_trouble()) {
-    const Status engaged = engage_if_index_is_high(candidate, mem);
+    const Status engaged = engage_if_index_is_high(candidate);
     if (engaged != Status::success) return finish(engaged, mover_->message());
   }
-  int flag = correct(candidate, tolerance, call_setup, mem);
+  int flag = correct(candidate, tolerance, call_setup);
   if (!mover_) return flag;
   if (flag != 0) return corrector_failed(flag);
 
@@ -150,24 +190,23 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   candidate.t = step.t;
   const Candidate& at = candidate;
   if (collapsed_ && warning.empty()) look_for_causes(at, step);
-  if (frequency_.on() && !needs_projection(at, step, tolerance, mem))
-    return finish(Status::success, "");
+  if (frequency_.on() && !needs_projection(at, step, tolerance)) return finish(Status::success, "");
   const Stopwatch stopwatch(*this);
   if (!engaged_) {
     bool done = false;
-    const int outcome = look_before_moving(at, mem, done);
+    const int outcome = look_before_moving(at, done);
     if (done) return outcome;
   }
 
-  Move move = move_and_polish(at, step.cj, tolerance, mem);
+  Move move = move_and_polish(at, step.cj, tolerance);
   if (move.status == Status::success && !corrector_was_right_ && !call_setup && has_setup_) {
     // Old factors fooled IDA's convergence test: correct again, with fresh ones.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, at.correction);
-    flag = correct(at, tolerance, true, mem);
+    flag = correct(at, tolerance, true);
     if (flag != 0) return corrector_failed(flag);
     cj_at_setup_ = step.cj;
-    move = move_and_polish(at, step.cj, tolerance, mem);
+    move = move_and_polish(at, step.cj, tolerance);
   }
   if (stopwatch.running()) move.drift_after = mover_->remaining_drift(at);
   account(move, step, stopwatch.running());
@@ -205,7 +244,7 @@ int Projection::Impl::corrector_failed(int flag) {
 }
 
 // Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
-int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, bool& done) {
+int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done) {
   const Move first = mover_->measure(candidate);
   if (frequency_.on()) frequency_.looked(first.length, step_size());
   done = true;
@@ -221,14 +260,13 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, void* mem, 
     statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, first.drift_before);
     return finish(Status::success, "");
   }
-  const Status engaged = engage(candidate, mem);
+  const Status engaged = engage(candidate);
   if (engaged != Status::success) return finish(engaged, mover_->message());
   done = false;
   return 0;
 }
 
-Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
-                                       void* mem) {
+Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance) {
   corrector_was_right_ = true;
   keep_corrector(candidate);
   Move move = mover_->move(candidate);
@@ -237,8 +275,8 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
     return move;  // what follows would make the whole move
   }
   if (move.status == Status::success)
-    move.status = wants_polish(move.length) ? polish(candidate, cj, tolerance, mem)
-                                            : mover_->finish(candidate);
+    move.status =
+        wants_polish(move.length) ? polish(candidate, cj, tolerance) : mover_->finish(candidate);
   return move;
 }
 
@@ -247,10 +285,9 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, left_before_)) return;
   move.status = Status::move_too_long;
-  capped_message_ =
-      "the move onto the constraints, capped at " + std::to_string(move.length) +
-      " tolerances (Options::largest_move), leaves " + std::to_string(move.left) +
-      ", which the error test does not allow; use a larger largest_move";
+  capped_message_ = "the move onto the constraints, capped at " + std::to_string(move.length) +
+                    " tolerances (Options::largest_move), leaves " + std::to_string(move.left) +
+                    ", which the error test does not allow; use a larger largest_move";
 }
 
 // The corrector's ycor, before the move.
@@ -266,8 +303,8 @@ StepData Projection::Impl::step_data() const {
   N_Vector yyn, ypn, res;
   void* user_data;
   sunrealtype t, cj;
-  IDAGetNonlinearSystemData(ida_mem_, &t, &step.y_predicted, &step.yp_predicted, &yyn, &ypn, &res, &cj,
-                            &user_data);
+  IDAGetNonlinearSystemData(ida_mem_, &t, &step.y_predicted, &step.yp_predicted, &yyn, &ypn, &res,
+                            &cj, &user_data);
   step.t = t;
   step.cj = cj;
   return step;
@@ -327,14 +364,14 @@ bool Projection::Impl::in_trouble() const {
 
 // Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
 // corrector fail: too late for the policy to begin.
-Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate, void* mem) {
+Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
   if (options_.id == nullptr && !id_) {
-    const Status derived = derive_id(candidate, mem);
+    const Status derived = derive_id(candidate);
     if (derived != Status::success) return derived;
   }
   index_known_ = true;
-  high_index_ = index_exceeds_one(candidate, mem);
-  return high_index_ && has_algebraic_ ? engage(candidate, mem) : Status::success;
+  high_index_ = index_exceeds_one(candidate);
+  return high_index_ && has_algebraic_ ? engage(candidate) : Status::success;
 }
 
 void Projection::Impl::begin_smoothing() {
@@ -344,12 +381,11 @@ void Projection::Impl::begin_smoothing() {
 }
 
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
-Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
-  engaged_ = true;
+Status Projection::Impl::engage(const Candidate& candidate) {
   long linear_iterations = 0;  // none are counted by direct solvers
   iterative_ = IDAGetNumLinIters(ida_mem_, &linear_iterations) == 0 && linear_iterations > 0;
   if (options_.id == nullptr && !id_) {
-    const Status derived = derive_id(candidate, mem);
+    const Status derived = derive_id(candidate);
     if (derived != Status::success) return derived;
   }
   if (id_ && has_algebraic_ && options_.suppress_algebraic) {
@@ -357,12 +393,14 @@ Status Projection::Impl::engage(const Candidate& candidate, void* mem) {
     IDASetSuppressAlg(ida_mem_, 1);
   }
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
-  if (!index_known_ && options_.smooth_where_needed)
-    high_index_ = index_exceeds_one(candidate, mem);
+  if (!index_known_ && options_.smooth_where_needed) high_index_ = index_exceeds_one(candidate);
   index_known_ = true;
   if (high_index_) begin_smoothing();
   join_equations(candidate);
-  return mover_->set_algebraic(candidate, moved_id());
+  if (stop_flag_ < 0) return Status::callback_fatal;
+  const Status structured = mover_->set_algebraic(candidate, moved_id());
+  engaged_ = structured == Status::success;  // else the next attempt looks again
+  return structured;
 }
 
 void Projection::Impl::account(const Move& move, const StepData& step, bool sampled) {
@@ -397,7 +435,7 @@ int Projection::Impl::finish(Status outcome, const std::string& text) {
     if (message != advice_) message = advice_;
     return 0;
   }
-  message = text;
+  message = outcome == Status::callback_fatal && stop_flag_ < 0 ? stop_text_ : text;
   switch (outcome) {
     case Status::not_converged:
       ++statistics_.not_converged;
@@ -422,7 +460,7 @@ int Projection::Impl::finish(Status outcome, const std::string& text) {
   }
   if (is_fatal(outcome) && options_.print_fatal && !printed_) {
     printed_ = true;  // once: IDA reports the failure of the run by itself
-    std::fprintf(stderr, "tether: %s: %s\n", to_string(outcome), text.c_str());
+    std::fprintf(stderr, "tether: %s: %s\n", to_string(outcome), message.c_str());
   }
   if (!is_fatal(outcome)) count_failure_in_step(text);
   return is_fatal(outcome) ? kFatal : kRecoverable;

@@ -23,6 +23,10 @@ long first_not_finite(const double* a, long n) {
 
 }  // namespace
 
+bool all_finite(const double* a, std::size_t n) {
+  return first_not_finite(a, static_cast<long>(n)) < 0;
+}
+
 bool has_sparse_rows(const Constraints& set) {
   return std::holds_alternative<SparseJacobian>(set.jacobian) ||
          std::any_of(set.joined.begin(), set.joined.end(), has_sparse_rows);
@@ -54,10 +58,12 @@ Status Evaluator::checked(int flag, const char* what, const Part& part) {
   message_ = std::string(what) + " of " + constraints_.name(part.first_row) +
              (thrown_.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown_);
   thrown_.clear();
+  if (flag < 0) fatal_ = true;
   return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
 }
 
 Status Evaluator::value(double t, const double* y, int n, double* g) {
+  if (fatal_) return Status::callback_fatal;
   ++statistics_.value_evaluations;
   const ConstVector state(y, n);
   for (const Part& part : parts_) {
@@ -93,6 +99,7 @@ Status Evaluator::sparse(const Part& part, double t, const double* y, int n, dou
 
 Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
                            const std::vector<int>& columns, double* C) {
+  if (fatal_) return Status::callback_fatal;
   ++statistics_.jacobian_evaluations;
   std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
   for (const Part& part : parts_) {
@@ -113,6 +120,7 @@ Status Evaluator::jacobian(double t, const double* y, int n, const double* scale
 
 Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
                            const std::vector<int>& columns, double* entries, double* full) {
+  if (fatal_) return Status::callback_fatal;
   ++statistics_.jacobian_evaluations;
   for (const Part& part : parts_) {
     const SparseJacobian* given = part.sparse();
@@ -169,13 +177,12 @@ void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
     if (!std::holds_alternative<FiniteDifferences>(part.set->jacobian)) continue;
     const int m = part.set->count;
     const auto evaluate = [&](double* g) {
+      if (fatal_) return false;
       ++statistics_.value_evaluations;
-      std::string ignored;
-      return guarded(
-                 [&] {
-                   return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(g, m));
-                 },
-                 ignored) == 0;
+      const int flag = guarded(
+          [&] { return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(g, m)); },
+          thrown_);
+      return checked(flag, "value", part) == Status::success;
     };
     y_shifted_.assign(y, y + n);
     const bool known = evaluate(g_base_.data());

@@ -35,6 +35,8 @@ bool has_values(const Constraints& set);
 /// Why the set, or one joined to it, cannot be evaluated on so many unknowns; empty if it can.
 std::string wrong_length(const Constraints& set, long unknowns);
 
+bool all_finite(const double* a, std::size_t n);
+
 /// g and C of a set and of everything joined to it, as one system of m rows.
 class Evaluator {
  public:
@@ -72,6 +74,11 @@ class Evaluator {
   /// Which row the last not_finite or failing callback belongs to, or what it threw.
   const std::string& message() const { return message_; }
 
+  /// A callback returned a negative flag or threw: whoever met it as a mere failure of a trial
+  /// point must not hide that. Until forget() every evaluation then fails without another call.
+  bool fatal() const { return fatal_; }
+  void forget() { fatal_ = false; }
+
  private:
   void flatten(const Constraints& set);
   Status checked(int flag, const char* what, const Part& part);
@@ -88,6 +95,7 @@ class Evaluator {
   std::string message_, thrown_;
   int rows_ = 0;
   bool uses_differences_ = false;
+  bool fatal_ = false;
 };
 
 }  // namespace tether::ida_projection

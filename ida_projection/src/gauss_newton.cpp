@@ -30,6 +30,8 @@ class GaussNewtonOn final : public GaussNewton {
   void project(double t, std::vector<double>& y, const std::vector<double>& WT,
                const std::vector<bool>& hold, const double* id, ConsistencyReport& report) override;
   bool tangent(double t, const std::vector<double>& y, double* yp) override;
+  bool fatal() const override { return evaluator_.fatal(); }
+  const std::string& message() const override { return evaluator_.message(); }
 
  private:
   using Block = typename Rows::Block;
@@ -77,6 +79,7 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
                                   const std::vector<bool>& hold, const double* id,
                                   ConsistencyReport& report) {
   WT_ = WT;
+  evaluator_.forget();
   std::vector<double> y = y0;
   report.status = blocks_.structure(evaluator_, t, y, WT_, hold, id);
   if (report.status != Status::success) {
@@ -131,6 +134,10 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
       ConsistencyReport attempt;
       if (!evaluate(t, trial, attempt)) {
         report.message = attempt.message;
+        if (evaluator_.fatal()) {
+          report.status = Status::callback_fatal;
+          return;
+        }
         continue;
       }
       accepted = correction() <= (1.0 - 0.5 * s) * length + floor;

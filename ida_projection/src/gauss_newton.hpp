@@ -24,6 +24,10 @@ class GaussNewton {
   /// After project(): y' onto C y' + g_t = 0 (nearest in the weights), with g_t by central
   /// differences. False if g fails nearby.
   virtual bool tangent(double t, const std::vector<double>& y, double* yp) = 0;
+
+  /// Did a callback ask for the end of the run in the last project() or tangent()? What it said.
+  virtual bool fatal() const = 0;
+  virtual const std::string& message() const = 0;
 };
 
 /// With sparse factors where a set has sparse rows.

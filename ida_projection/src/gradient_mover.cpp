@@ -114,8 +114,7 @@ class GradientMover final : public Mover {
     else
       load(candidate);
     return move_with_old_factors(
-        wear_, [&] { return value(candidate.t); },
-        [&] { return solve(candidate.weights); },
+        wear_, [&] { return value(candidate.t); }, [&] { return solve(candidate.weights); },
         [&] {
           N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
           N_VLinearSum(1.0, y_, -1.0, dy_, y_);
@@ -226,10 +225,12 @@ class GradientMover final : public Mover {
   Status failed(int flag, const char* what, const std::string& thrown) {
     message_ = std::string(what) +
                (thrown.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown);
+    if (flag < 0) fatal_ = true;
     return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
   }
 
   Status value(double t) {
+    if (fatal_) return Status::callback_fatal;
     ++statistics_.value_evaluations;
     std::string thrown;
     for (const Part& part : parts_) {
@@ -246,6 +247,7 @@ class GradientMover final : public Mover {
   }
 
   Status fill(double t) {
+    if (fatal_) return Status::callback_fatal;
     ++statistics_.jacobian_evaluations;
     std::string thrown;
     for (N_Vector row : gradients_) N_VConst(0.0, row);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <new>
 #include <string>
 #include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/projection.hpp>
@@ -20,7 +21,14 @@ namespace tether::ida_projection {
 class OwnedVector {
  public:
   OwnedVector() = default;
-  explicit OwnedVector(N_Vector like) : v_(like != nullptr ? N_VClone(like) : nullptr) {}
+  /// Throws std::bad_alloc where the vector cannot be cloned.
+  explicit OwnedVector(N_Vector like) {
+    if (like == nullptr) return;
+    // N_VClone writes into what it gets, null or not.
+    v_ = like->ops->nvclone(like);
+    if (v_ == nullptr) throw std::bad_alloc();
+    v_->sunctx = like->sunctx;
+  }
   ~OwnedVector() {
     if (v_ != nullptr) N_VDestroy(v_);
   }
@@ -36,6 +44,16 @@ class OwnedVector {
  private:
   N_Vector v_ = nullptr;
 };
+
+/// A nonlinear solver that the plugin frees, our own by the second one.
+struct FreeSolver {
+  void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFree(solver); }
+};
+struct FreeEmptySolver {
+  void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFreeEmpty(solver); }
+};
+template <class Free>
+using SolverOwner = std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, Free>;
 
 /// What IDA's public getters tell inside a solve.
 struct StepData {
@@ -79,6 +97,8 @@ class Projection::Impl {
     maximum_iterations_ = n;
     heard_ = true;
   }
+  /// The code that IDA gets for an exception, which must not pass through its C functions.
+  int caught(Status outcome, const char* text) noexcept;
   long extra_iterations_of_last_solve() const { return extra_iterations_of_last_solve_; }
   long extra_iterations() const { return statistics_.extra_iterations; }
 
@@ -91,8 +111,12 @@ class Projection::Impl {
  private:
   class Stopwatch;
   // decorator.cpp: the stages of a projected step
-  int correct(const Candidate& candidate, double tolerance, bool call_setup, void* mem);
-  int correct_and_move(Candidate& candidate, double tolerance, bool call_setup, void* mem);
+  int attempt(Candidate& candidate, double tolerance, bool call_setup);
+  int residual(N_Vector ycor, N_Vector into);
+  bool solve_linear(N_Vector rhs);
+  void stop(int flag, const std::string& text);
+  int correct(const Candidate& candidate, double tolerance, bool call_setup);
+  int correct_and_move(Candidate& candidate, double tolerance, bool call_setup);
   void control_step(const Candidate& candidate);
   void restore_weights(N_Vector weights);
   StepData step_data() const;
@@ -100,18 +124,18 @@ class Projection::Impl {
   void look_for_refusals();
   bool struggling() const;
   bool in_trouble() const;
-  Status engage_if_index_is_high(const Candidate& candidate, void* mem);
+  Status engage_if_index_is_high(const Candidate& candidate);
   void begin_smoothing();
   int corrector_failed(int flag);
-  int look_before_moving(const Candidate& candidate, void* mem, bool& done);
-  Status engage(const Candidate& candidate, void* mem);
-  Move move_and_polish(const Candidate& candidate, double cj, double tolerance, void* mem);
+  int look_before_moving(const Candidate& candidate, bool& done);
+  Status engage(const Candidate& candidate);
+  Move move_and_polish(const Candidate& candidate, double cj, double tolerance);
   void judge_capped(Move& move);
   void keep_corrector(const Candidate& candidate);
   bool wants_polish(double length) const;  // polish.cpp
-  Status polish(const Candidate& candidate, double cj, double tolerance, void* mem);
-  bool add_newton_step(const Candidate& candidate, double cj, double tolerance, void* mem);
-  bool newton_step_at_moved_point(const Candidate& candidate, void* mem);
+  Status polish(const Candidate& candidate, double cj, double tolerance);
+  bool add_newton_step(const Candidate& candidate, double cj, double tolerance);
+  bool newton_step_at_moved_point(const Candidate& candidate);
   double differential_length(const Candidate& candidate);
   void apply_delta(const Candidate& candidate, double differential, double algebraic);
   void account(const Move& move, const StepData& step, bool sampled);
@@ -126,21 +150,22 @@ class Projection::Impl {
   void count_failure_in_step(const std::string& text);
 
   // between.cpp
-  bool needs_projection(const Candidate& candidate, const StepData& step, double tolerance,
-                        void* mem);
-  bool leave_alone(const Candidate& candidate, const StepData& step, double tolerance, void* mem);
-  bool follow(const Candidate& candidate, const StepData& step, double tolerance, void* mem);
+  bool needs_projection(const Candidate& candidate, const StepData& step, double tolerance);
+  bool leave_alone(const Candidate& candidate, const StepData& step, double tolerance);
+  bool follow(const Candidate& candidate, const StepData& step, double tolerance);
   double step_size() const;
 
   // algebraic.cpp
-  Status derive_id(const Candidate& candidate, void* mem);
+  Status derive_id(const Candidate& candidate);
   void set_id(N_Vector id);
   void advise(const std::string& reason);
   void join_equations(const Candidate& candidate);
   std::vector<char> derivative_free_equations(const Candidate& candidate);
   bool residual_at(const double* y, double* f);
   N_Vector moved_id() const;
-  bool index_exceeds_one(const Candidate& candidate, void* mem);  // index.cpp
+  bool index_exceeds_one(const Candidate& candidate);  // index.cpp
+
+  void attach();  // projection.cpp
 
   // consistency.cpp
   bool probe(double t0, N_Vector yy, N_Vector yp);
@@ -159,23 +184,23 @@ class Projection::Impl {
   long failing_step_ = -1;
   int failures_in_step_ = 0;
   bool said_failures_ = false;
-  bool repeated_ = false;  // IDA rejected the last attempt
+  bool repeated_ = false;    // IDA rejected the last attempt
   bool high_index_ = false;  // F is not of index 1 in its own variables
   bool index_known_ = false;
   std::vector<int> undetermined_;  // algebraic variables of index 2 or more
   OwnedVector newton_weights_;     // without them
-  int failed_corrections_ = 0;    // in a row
-  bool rounding_fails_ = false;   // the corrector, by multipliers of index 2 or more
+  int failed_corrections_ = 0;     // in a row
+  bool rounding_fails_ = false;    // the corrector, by multipliers of index 2 or more
   double weights_factor_ = 1.0;    // by which IDA's weights were multiplied in the last solve()
-  int refused_in_row_ = 0;   // accepted steps that needed more than one attempt
+  int refused_in_row_ = 0;         // accepted steps that needed more than one attempt
   long last_error_failures_ = 0;
   Statistics statistics_;
   double move_sum_ = 0.0;
   SampledTime timed_;
 
-  SUNNonlinearSolver solver_ = nullptr;  // ours, the one that IDA sees
+  SolverOwner<FreeEmptySolver> solver_;  // ours, the one that IDA sees
+  SolverOwner<FreeSolver> own_inner_;    // where the caller gave none
   SUNNonlinearSolver inner_ = nullptr;   // decorated
-  bool owns_inner_ = false;
   SUNNonlinSolSysFn system_ = nullptr;
   SUNNonlinSolLSolveFn linear_solve_ = nullptr;
   bool has_setup_ = false;  // IDA's linear solver has factors, or a preconditioner, to be made anew
@@ -190,7 +215,10 @@ class Projection::Impl {
   OwnedVector moved_id_;              // id, with 1 where an algebraic variable moves with the rest
   Candidate present_{};               // of the present solve()
   void* mem_ = nullptr;               // and IDA's memory in it
-  OwnedVector none_, f_;              // ycor = 0 and F for residual_at()
+  int stop_flag_ = 0;                 // < 0: a callback ended the run in an evaluation of our own
+  std::string stop_text_;
+  bool broken_ = false;   // an exception left things half done: the run cannot go on
+  OwnedVector none_, f_;  // ycor = 0 and F for residual_at()
   bool contiguous_ = false;
   int size_ = 0;
   OwnedVector id_, delta_, newton_, saved_, weights_;
@@ -201,7 +229,7 @@ class Projection::Impl {
   // What capped moves lacked, in tolerances: in the last accepted step and in the present attempt.
   double left_before_ = 0.0, left_ = 0.0;
   std::string capped_message_;
-  bool engaged_ = false;             // the policy acts from the first move that was needed
+  bool engaged_ = false;  // the policy acts from the first move that was needed
   bool probing_ = false, probed_ = false;
   std::unique_ptr<GaussNewton> point_;  // for points between steps and initial values
   std::unique_ptr<Mover> point_mover_;  // the same for gradients and user projections

@@ -52,7 +52,7 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
 // differences of IDA's own residual callback, F(t, ypred + ycor, yppred + cj ycor), with ypred
 // shifted by -ycor (and put back bit for bit) where only y' is to feel ycor. Algebraic variables
 // that the matrix leaves free carry rounding divided by the step: undetermined_.
-bool Projection::Impl::index_exceeds_one(const Candidate& candidate, void* mem) {
+bool Projection::Impl::index_exceeds_one(const Candidate& candidate) {
   if (!contiguous_ || size_ > kLargestSize) return false;
   const double cj = step_data().cj;
   OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base);
@@ -67,7 +67,7 @@ bool Projection::Impl::index_exceeds_one(const Candidate& candidate, void* mem) 
   const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
   const auto residual = [&](N_Vector into) {
     ++statistics_.residual_evaluations;
-    return system_(ycor, into, mem) == 0;
+    return this->residual(ycor, into) == 0;
   };
 
   bool known = true;

@@ -9,8 +9,8 @@
 
 namespace tether::ida_projection {
 
-bool consistent_derivative(IDAResFn residual, void* user_data, double t, N_Vector y, N_Vector yp,
-                           N_Vector id, N_Vector weights, int maximum_iterations) {
+Status consistent_derivative(IDAResFn residual, void* user_data, double t, N_Vector y, N_Vector yp,
+                             N_Vector id, N_Vector weights, int maximum_iterations) {
   const auto n = static_cast<Eigen::Index>(N_VGetLength(y));
   OwnedVector y_new(y), yp_new(yp), F(y), F_shifted(y);
   N_VScale(1.0, y, y_new);
@@ -22,14 +22,17 @@ bool consistent_derivative(IDAResFn residual, void* user_data, double t, N_Vecto
   const auto unknown = [&](Eigen::Index j) -> double& {
     return mask != nullptr && mask[j] == 0.0 ? values[j] : slopes[j];
   };
+  Status failure = Status::not_converged;
   const auto evaluate = [&](N_Vector into) {
-    return residual(t, y_new, yp_new, into, user_data) == 0;
+    const int flag = residual(t, y_new, yp_new, into, user_data);
+    if (flag < 0) failure = Status::callback_fatal;
+    return flag == 0;
   };
   const auto as_vector = [&](N_Vector v) {
     return Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(v), n);
   };
 
-  if (!evaluate(F)) return false;
+  if (!evaluate(F)) return failure;
   Eigen::MatrixXd J(n, n);
   double previous = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration < maximum_iterations; ++iteration) {
@@ -40,7 +43,7 @@ bool consistent_derivative(IDAResFn residual, void* user_data, double t, N_Vecto
       const double kept = z;
       z = kept + std::sqrt(std::numeric_limits<double>::epsilon()) * scale[j];
       const double increment = z - kept;
-      if (!evaluate(F_shifted)) return false;
+      if (!evaluate(F_shifted)) return failure;
       J.col(j) = (as_vector(F_shifted) - as_vector(F)) / increment * scale[j];
       z = kept;
     }
@@ -51,22 +54,22 @@ bool consistent_derivative(IDAResFn residual, void* user_data, double t, N_Vecto
     factors.setThreshold(1e-7);  // differences carry about half the digits
     factors.compute(rows.asDiagonal() * J);
     const Eigen::VectorXd dz = factors.solve(rows.cwiseProduct(as_vector(F)));
-    if (!dz.allFinite()) return false;
+    if (!dz.allFinite()) return failure;
     for (Eigen::Index j = 0; j < n; ++j) unknown(j) -= scale[j] * dz[j];
-    if (!evaluate(F)) return false;
+    if (!evaluate(F)) return failure;
     const double left = rows.cwiseProduct(as_vector(F)).lpNorm<Eigen::Infinity>();
     // dz is relative to the size of the unknowns: stop when it is rounding, or no longer shrinks.
     const double change = dz.lpNorm<Eigen::Infinity>();
     const bool small = change <= 1e-12 || (change <= 1e-7 && change >= 0.3 * previous);
     if (small) {
-      if (!(left <= 1e-6)) return false;  // stalled off F = 0: no solution near
+      if (!(left <= 1e-6)) return failure;  // stalled off F = 0: no solution near
       N_VScale(1.0, y_new, y);
       N_VScale(1.0, yp_new, yp);
-      return true;
+      return Status::success;
     }
     previous = change;
   }
-  return false;
+  return failure;
 }
 
 }  // namespace tether::ida_projection

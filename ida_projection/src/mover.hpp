@@ -79,11 +79,16 @@ class Mover {
   /// A new run starts: forget what the last one taught.
   virtual void reset() {}
 
+  /// Did a callback ask for the end of the run since forget_failure(), in whatever evaluation?
+  virtual bool fatal() const { return fatal_; }
+  virtual void forget_failure() { fatal_ = false; }
+
   const std::string& message() const { return message_; }
   const std::vector<int>& contradicting_rows() const { return contradicting_rows_; }
 
  protected:
   std::string message_;
+  bool fatal_ = false;
   std::vector<int> contradicting_rows_;
 };
 

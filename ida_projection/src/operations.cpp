@@ -1,5 +1,7 @@
 // Tether: the table of operations through which IDA calls the decorator.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <exception>
+#include <new>
 #include <sundials/sundials_config.h>
 
 #include "impl.hpp"
@@ -12,13 +14,32 @@ Projection::Impl& self(SUNNonlinearSolver solver) {
   return *static_cast<Projection::Impl*>(solver->content);
 }
 
+// No exception passes through IDA's C functions. SUNDIALS' solvers are C as well, and what a C++
+// residual function throws passes through them to here.
+template <class Call>
+int shielded(SUNNonlinearSolver solver, Call call) noexcept {
+  Projection::Impl& ours = self(solver);
+  try {
+    return call(ours);
+  } catch (const std::bad_alloc&) {
+    return ours.caught(Status::out_of_memory, "not enough memory for the projection");
+  } catch (const std::exception& e) {
+    return ours.caught(Status::callback_fatal, e.what());
+  } catch (...) {
+    return ours.caught(Status::callback_fatal, "a callback threw what is no std::exception");
+  }
+}
+
 // The operations that IDA calls on us; the rest goes to the decorated solver.
 SUNNonlinearSolver_Type get_type(SUNNonlinearSolver s) {
   return SUNNonlinSolGetType(self(s).inner());
 }
-int initialize(SUNNonlinearSolver s) { return self(s).initialize(); }
+int initialize(SUNNonlinearSolver s) {
+  return shielded(s, [](Projection::Impl& ours) { return ours.initialize(); });
+}
 int setup(SUNNonlinearSolver s, N_Vector y, void* mem) {
-  return SUNNonlinSolSetup(self(s).inner(), y, mem);
+  return shielded(s,
+                  [&](Projection::Impl& ours) { return SUNNonlinSolSetup(ours.inner(), y, mem); });
 }
 int solve(SUNNonlinearSolver s, N_Vector y0, N_Vector ycor, N_Vector w, sunrealtype tolerance,
 #if SUNDIALS_VERSION_MAJOR >= 7
@@ -27,7 +48,9 @@ int solve(SUNNonlinearSolver s, N_Vector y0, N_Vector ycor, N_Vector w, sunrealt
           booleantype call_setup,
 #endif
           void* mem) {
-  return self(s).solve(y0, ycor, w, tolerance, call_setup != 0, mem);
+  return shielded(s, [&](Projection::Impl& ours) {
+    return ours.solve(y0, ycor, w, tolerance, call_setup != 0, mem);
+  });
 }
 int set_system(SUNNonlinearSolver s, SUNNonlinSolSysFn f) {
   self(s).set_system(f);

@@ -42,40 +42,45 @@ bool Projection::Impl::wants_polish(double length) const {
 
 // F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N) through IDA's own callback, which adds ycor to
 // IDA's ypred and yppred: ypred is shifted by -dy for the call and put back bit for bit.
-bool Projection::Impl::newton_step_at_moved_point(const Candidate& candidate, void* mem) {
+bool Projection::Impl::newton_step_at_moved_point(const Candidate& candidate) {
   if (contiguous_) {
     double* base = candidate.base_entries;
     for (int j = 0; j < size_; ++j) {
       saved_entries_[j] = base[j];
       base[j] += candidate.correction_entries[j] - newton_entries_[j];
     }
-    const bool evaluated = system_(newton_, delta_, mem) == 0;
+    const bool evaluated = residual(newton_, delta_) == 0;
     for (int j = 0; j < size_; ++j) {
       base[j] = saved_entries_[j];
       delta_entries_[j] = -delta_entries_[j];
     }
-    return evaluated && linear_solve_(delta_, mem) == 0;
+    return evaluated && solve_linear(delta_);
   }
   N_VScale(1.0, candidate.base, saved_);
   N_VLinearSum(1.0, candidate.correction, -1.0, newton_, delta_);
   N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
-  const bool evaluated = system_(newton_, delta_, mem) == 0;
+  const bool evaluated = residual(newton_, delta_) == 0;
   N_VScale(1.0, saved_, candidate.base);
   N_VScale(-1.0, delta_, delta_);
-  return evaluated && linear_solve_(delta_, mem) == 0;
+  return evaluated && solve_linear(delta_);
 }
 
-Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance,
-                                void* mem) {
-  // A refinement: where F or the linear solver fails here, the move itself stands.
-  return add_newton_step(candidate, cj, tolerance, mem) ? mover_->settle(candidate, delta_)
-                                                        : mover_->finish(candidate);
+bool Projection::Impl::solve_linear(N_Vector rhs) {
+  const int flag = linear_solve_(rhs, mem_);
+  if (flag < 0) stop(flag, "IDA's linear solver failed for good, flag " + std::to_string(flag));
+  return flag == 0;
+}
+
+Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance) {
+  // A refinement: where F or the linear solver fails here, the move itself stands, unless the
+  // failure is to end the run; then stop() has kept it.
+  return add_newton_step(candidate, cj, tolerance) ? mover_->settle(candidate, delta_)
+                                                   : mover_->finish(candidate);
 }
 
 // ycor <- ycor + delta, as far as delta is to be trusted. False: there is none.
-bool Projection::Impl::add_newton_step(const Candidate& candidate, double cj, double tolerance,
-                                       void* mem) {
-  if (!newton_step_at_moved_point(candidate, mem)) return false;
+bool Projection::Impl::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
+  if (!newton_step_at_moved_point(candidate)) return false;
   ++statistics_.residual_evaluations;
   extra_iterations_of_last_solve_ = 1;
 

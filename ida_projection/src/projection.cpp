@@ -1,4 +1,5 @@
 // Tether: attaching the projection to IDA. SPDX-License-Identifier: BSD-3-Clause
+#include <new>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include <tether/ida_projection/projection.hpp>
 
@@ -35,6 +36,8 @@ const char* to_string(Status status) {
       return "simultaneous sensitivities";
     case Status::never_called:
       return "never called";
+    case Status::out_of_memory:
+      return "out of memory";
     case Status::internal_error:
       return "internal error";
   }
@@ -89,20 +92,34 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
 
   inner_ = options_.nonlinear_solver;
   if (inner_ == nullptr) {
-    inner_ = SUNNonlinSol_Newton(like, like->sunctx);
-    owns_inner_ = true;
+    own_inner_.reset(SUNNonlinSol_Newton(like, like->sunctx));
+    inner_ = own_inner_.get();
   }
-  solver_ = inner_ != nullptr ? make_solver(*this, inner_, like->sunctx) : nullptr;
-  if (inner_ == nullptr || solver_ == nullptr) reject("out of memory");
-  const int flag = IDASetNonlinearSolver(ida_mem, solver_);
+  if (inner_ != nullptr) solver_.reset(make_solver(*this, inner_, like->sunctx));
+  if (!solver_) throw std::bad_alloc();
+  attach();
+}
+
+// IDA lets go of its own solver before it finds out that another one takes no functions: that is
+// asked before.
+void Projection::Impl::attach() {
+  const SUNNonlinSolSysFn nothing = [](N_Vector, N_Vector, void*) { return 0; };
+  const SUNNonlinSolConvTestFn converged = [](SUNNonlinearSolver, N_Vector, N_Vector, sunrealtype,
+                                              N_Vector, void*) { return 0; };
+  const auto require = [](int flag, const char* what) {
+    if (flag != 0)
+      reject("options.nonlinear_solver refuses " + std::string(what) + ", flag " +
+             std::to_string(flag) + "; IDA needs all of its functions");
+  };
+  require(SUNNonlinSolSetSysFn(solver_.get(), nothing), "a system function");
+  require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
+  require(SUNNonlinSolSetMaxIters(solver_.get(), maximum_iterations_), "a number of iterations");
+  const int flag = IDASetNonlinearSolver(ida_mem_, solver_.get());
   if (flag != 0)
     reject("IDASetNonlinearSolver returned " + std::to_string(flag) + "; call IDAInit before");
 }
 
-Projection::Impl::~Impl() {
-  if (solver_ != nullptr) SUNNonlinSolFreeEmpty(solver_);
-  if (owns_inner_ && inner_ != nullptr) SUNNonlinSolFree(inner_);
-}
+Projection::Impl::~Impl() = default;
 
 Statistics Projection::Impl::statistics() const {
   Statistics s = statistics_;

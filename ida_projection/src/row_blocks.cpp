@@ -25,6 +25,7 @@ RowBlocks::RowBlocks(const Constraints& constraints, const Evaluator& evaluator,
 Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<double>& y0,
                             const std::vector<double>& WT, const std::vector<bool>& hold,
                             const double* id) {
+  structured_ = false;
   const auto n = static_cast<std::size_t>(n_);
   std::vector<char> filled(static_cast<std::size_t>(m_) * n, 0);
   std::vector<double> y = y0;
@@ -32,9 +33,12 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
   for (std::size_t j = 0; j < n; ++j) all[j] = static_cast<int>(j);
   for (int pass = 0; pass < 2; ++pass) {
     if (pass == 1) y = some_tolerances_away(std::move(y), WT);
-    const Status status = evaluator.jacobian(t, y.data(), n_, WT.data(), all, C_.data());
+    Status status = evaluator.jacobian(t, y.data(), n_, WT.data(), all, C_.data());
+    const bool evaluated = status == Status::success;
+    if (evaluated && !all_finite(C_.data(), C_.size())) status = Status::not_finite;
     if (status != Status::success && pass == 0) {
-      message = evaluator.message();
+      message = evaluated ? "the constraint Jacobian C has an entry that is not finite"
+                          : evaluator.message();
       return status;
     }
     if (status == Status::success)

@@ -52,9 +52,14 @@ Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::
   std::vector<double> y = y0;
   for (int pass = 0; pass < 2; ++pass) {
     if (pass == 1) y = some_tolerances_away(std::move(y), WT);
-    const Status status = evaluate(evaluator, t, y.data(), WT.data());
+    Status status = evaluate(evaluator, t, y.data(), WT.data());
+    const bool evaluated = status == Status::success;
+    if (evaluated && !(all_finite(entries_.data(), entries_.size()) &&
+                       all_finite(full_rows_.data(), full_rows_.size())))
+      status = Status::not_finite;
     if (status != Status::success && pass == 0) {
-      message = evaluator.message();
+      message = evaluated ? "the constraint Jacobian C has an entry that is not finite"
+                          : evaluator.message();
       return status;
     }
     if (status != Status::success) continue;
@@ -71,6 +76,7 @@ bool SparseRows::fills(const Row& row, int j) const {
 Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                              const std::vector<double>& WT, const std::vector<bool>& hold,
                              const double* id) {
+  structured_ = false;
   const Status status = find_full_columns(evaluator, t, y, WT);
   if (status != Status::success) return status;
   for (int i = 0; i < m_; ++i) {

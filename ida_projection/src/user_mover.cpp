@@ -33,6 +33,7 @@ class UserMover final : public Mover {
     if (flag != 0) {
       message_ = thrown.empty() ? "the user's projection returned " + std::to_string(flag)
                                 : "the user's projection threw: " + thrown;
+      if (flag < 0) fatal_ = true;
       result.status = flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
       return result;
     }

@@ -126,9 +126,10 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,
           ">= 1");
   require(options.frequency >= 1, "frequency", options.frequency, ">= 1 (every n-th step)");
-  require(options.largest_move >= 0.1, "largest_move", options.largest_move,
-          ">= 0.1 (tolerances): the drift of a single good step is as long, and shorter limits make "
-          "steps short instead");
+  require(
+      options.largest_move >= 0.1, "largest_move", options.largest_move,
+      ">= 0.1 (tolerances): the drift of a single good step is as long, and shorter limits make "
+      "steps short instead");
   require(options.smoothing_setpoint > 0.0 && std::isfinite(options.smoothing_setpoint),
           "smoothing_setpoint", options.smoothing_setpoint, "> 0");
   require(options.maximum_step >= 0.0, "maximum_step", options.maximum_step, ">= 0 (0: no limit)");
@@ -138,6 +139,11 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
           options.extra_iterations, "0 or 1");
   require(options.progress_interval >= 1, "progress_interval", options.progress_interval, ">= 1");
   require(options.derive_id_limit >= 0, "derive_id_limit", options.derive_id_limit, ">= 0");
+  if (options.nonlinear_solver != nullptr) {
+    const SUNNonlinearSolver_Ops ops = options.nonlinear_solver->ops;
+    if (ops->gettype == nullptr || ops->solve == nullptr || ops->setsysfn == nullptr)
+      reject("options.nonlinear_solver lacks gettype, solve or setsysfn, which IDA needs");
+  }
   if (options.nonlinear_solver != nullptr &&
       SUNNonlinSolGetType(options.nonlinear_solver) != SUNNONLINEARSOLVER_ROOTFIND)
     reject("options.nonlinear_solver is not of root-finding type, which IDA needs");

@@ -25,12 +25,13 @@ enum class Status {
   not_finite,    ///< NaN or infinity in g, C or y
   callback_recoverable,
   corrector_failed,  ///< the decorated solver failed; nothing was projected
-  collapsed,  ///< the last step was projected, but IDA rejects most steps; message tells why
+  collapsed,         ///< the last step was projected, but IDA rejects most steps; message tells why
   callback_fatal = -1,
   late_attach = -2,                 ///< attached after IDA was initialised: call IDAReInit
   simultaneous_sensitivities = -3,  ///< IDA_SIMULTANEOUS bypasses the plugin: use IDA_STAGGERED
   never_called = -4,  ///< IDA took steps without the plugin: another solver was attached later
   internal_error = -5,
+  out_of_memory = -6,  ///< memory ran out inside IDA's call; IDAReInit starts anew
 };
 
 const char* to_string(Status status);
@@ -83,7 +84,8 @@ class Projection {
  public:
   /// ida_mem: from IDACreate, after IDAInit; tolerances and linear solver may come later.
   /// Throws std::invalid_argument, naming the argument and its value, and std::runtime_error if the
-  /// SUNDIALS that runs is not the one that the library was compiled with; leaves IDA as it was.
+  /// SUNDIALS that runs is not the one that the library was compiled with, std::bad_alloc without
+  /// memory; leaves IDA as it was.
   Projection(void* ida_mem, Constraints constraints, Options options = {})
       : Projection(ida_mem, std::move(constraints), std::move(options), TETHER_SUNDIALS_BUILD) {}
   ~Projection();
