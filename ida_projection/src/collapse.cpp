@@ -72,13 +72,18 @@ void Projection::Impl::look_for_causes(const Candidate& candidate, const StepDat
     out << "; check the rows with check_jacobian, the id vector and the tolerances";
   else
     out << "; " << row;
-  warning = out.str();
-  say_once(warning);
+  warn(Status::collapsed, out.str());
+}
+
+void Projection::Impl::warn(Status kind, const std::string& text) {
+  warning = text;
+  warning_status = kind;
+  if (said_warning_ != kind) say_once(warning);  // not again after every IDAReInit
+  said_warning_ = kind;
 }
 
 // A wrong row of C, or a row that F does not keep: C y' + g_t, term by term from differences of g.
-std::string Projection::Impl::suspected_row(const Candidate& candidate,
-                                            const StepData& step) const {
+std::string Projection::Impl::suspected_row(const Candidate& candidate, const StepData& step) {
   if (!has_values(constraints) || size_ > kLargestSearch) return {};
   const auto n = static_cast<std::size_t>(size_);
   std::vector<double> y(n), yp(n);

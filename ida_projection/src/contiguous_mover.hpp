@@ -63,6 +63,7 @@ class ContiguousMover final : public Mover {
       y_[static_cast<std::size_t>(i)] = candidate.base_entries[i] + candidate.correction_entries[i];
     return value(candidate.t) == Status::success ? drift() : -1.0;
   }
+  bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
   void accept() override { std::swap(scale_, trial_scale_); }
   bool fatal() const override { return evaluator_.fatal(); }
   void forget_failure() override { evaluator_.forget(); }

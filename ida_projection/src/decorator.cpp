@@ -19,6 +19,7 @@ namespace {
 constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
 constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
 constexpr long kSampleEvery = 16;
+constexpr long kFirstSteps = 100;        // in which rows and tolerances are looked at
 constexpr int kTrapped = 10;             // steps in a row with failed error tests
 constexpr int kRefused = 3;              // failed error tests in one step
 constexpr int kOftenRefused = 4;         // steps for each failed error test, of the run so far
@@ -46,6 +47,10 @@ int Projection::Impl::initialize() {
   engaged_ = false;
   rejections_ = rejections_before_ = window_begin_ = refused_steps_ = 0;
   rejected_in_step_ = collapsed_ = false;
+  warning.clear();
+  warning_status = Status::success;
+  row_doubts_.assign(static_cast<std::size_t>(constraints.total_count()), 0);
+  looks_ = small_looks_ = 0;
   failing_step_ = -1;
   left_before_ = std::numeric_limits<double>::infinity();
   high_index_ = index_known_ = false;
@@ -189,7 +194,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   account_for_previous_attempt(step);
   candidate.t = step.t;
   const Candidate& at = candidate;
-  if (collapsed_ && warning.empty()) look_for_causes(at, step);
+  if (collapsed_ && warning_status != Status::collapsed) look_for_causes(at, step);
   if (frequency_.on() && !needs_projection(at, step, tolerance)) return finish(Status::success, "");
   const Stopwatch stopwatch(*this);
   if (!engaged_) {
@@ -210,6 +215,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   }
   if (stopwatch.running()) move.drift_after = mover_->remaining_drift(at);
   account(move, step, stopwatch.running());
+  if (last_steps_ <= kFirstSteps && move.status == Status::success) look_at_first_steps(at, step);
   return finish(move.status, move.capped ? capped_message_ : mover_->message());
 }
 

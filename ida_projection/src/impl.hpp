@@ -11,6 +11,7 @@
 #include "equations.hpp"
 #include "frequency.hpp"
 #include "gauss_newton.hpp"
+#include "ida_lifetime.hpp"
 #include "mover.hpp"
 #include "sampled_time.hpp"
 #include "step_smoothing.hpp"
@@ -82,7 +83,8 @@ class Projection::Impl {
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp);
   int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
 
-  Statistics statistics() const;
+  void look_for_bypass();  // bypass.cpp
+  Statistics statistics();
   void reset_statistics();
 
   // The operations of SUNNonlinearSolver that IDA calls (decorator.cpp).
@@ -104,7 +106,8 @@ class Projection::Impl {
 
   Status status = Status::unused;
   std::string message;
-  std::string warning;  // what makes IDA reject most steps, once that was seen
+  std::string warning;  // what makes IDA reject most steps or results doubtful, once it was seen
+  Status warning_status = Status::success;
   std::string advice_;  // what message() says while nothing is wrong
   Constraints constraints;
 
@@ -146,7 +149,15 @@ class Projection::Impl {
   void count_rejections();
   void say_once(const std::string& text);
   void look_for_causes(const Candidate& candidate, const StepData& step);
-  std::string suspected_row(const Candidate& candidate, const StepData& step) const;
+  std::string suspected_row(const Candidate& candidate, const StepData& step);
+  void warn(Status kind, const std::string& text);
+
+  // first_steps.cpp
+  void look_at_first_steps(const Candidate& candidate, const StepData& step);
+  void look_for_false_rows(const Candidate& candidate, const StepData& step);
+  void look_at_tolerances(const Candidate& candidate, const StepData& step);
+  std::string wrong_entry(double t);
+  std::string false_row(int row, const Tangency& seen, const StepData& step);
   void count_failure_in_step(const std::string& text);
 
   // between.cpp
@@ -165,7 +176,8 @@ class Projection::Impl {
   N_Vector moved_id() const;
   bool index_exceeds_one(const Candidate& candidate);  // index.cpp
 
-  void attach();  // projection.cpp
+  void attach();                      // projection.cpp
+  long steps_without_plugin() const;  // bypass.cpp
 
   // consistency.cpp
   bool probe(double t0, N_Vector yy, N_Vector yp);
@@ -184,8 +196,13 @@ class Projection::Impl {
   long failing_step_ = -1;
   int failures_in_step_ = 0;
   bool said_failures_ = false;
-  bool repeated_ = false;    // IDA rejected the last attempt
-  bool high_index_ = false;  // F is not of index 1 in its own variables
+  Status said_warning_ = Status::success;
+  Tangency tangency_;                      // of the caller's rows, in the first steps
+  std::vector<int> row_doubts_;            // steps in which F did not seem to keep a row
+  int looks_ = 0, small_looks_ = 0;        // at doubts in rows; at a solution below its tolerances
+  std::vector<double> corrected_, slope_;  // y and y' as the corrector left them
+  bool repeated_ = false;                  // IDA rejected the last attempt
+  bool high_index_ = false;                // F is not of index 1 in its own variables
   bool index_known_ = false;
   std::vector<int> undetermined_;  // algebraic variables of index 2 or more
   OwnedVector newton_weights_;     // without them
@@ -236,6 +253,10 @@ class Projection::Impl {
   Options point_options_;
   Statistics point_statistics_;
   bool printed_ = false;
+
+  long steps_at_attach_ = 0, steps_unseen_ = 0;
+  bool said_bypass_ = false;
+  IdaLifetime lifetime_;  // of ida_mem_
 
   long last_steps_ = -1, last_setups_ = -1;
   double cj_at_setup_ = 0.0;

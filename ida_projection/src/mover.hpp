@@ -32,6 +32,13 @@ struct Candidate {
   }
 };
 
+/// How far y' points out of the constraints.
+struct Tangency {
+  std::vector<double> rate;       ///< sum_j C_ij y'_j
+  std::vector<double> terms;      ///< sum_j |C_ij y'_j|; < 0: the row contains algebraic variables
+  std::vector<double> tolerance;  ///< |row_i(C WT)|, a move of one tolerance
+};
+
 struct Move {
   Status status = Status::unused;
   double length = 0.0;        ///< WRMS length of the whole move, in tolerances
@@ -59,6 +66,12 @@ class Mover {
   /// The move with them. Another status than success: they left too much (frequency.hpp); then the
   /// correction has to be put back. `again`: the correction was changed after such a move.
   virtual Move follow(const Candidate&, bool /*again*/) { return {}; }
+
+  /// C y' row by row with C as it was evaluated last, over the first `reported` rows. False: not
+  /// known. `id` as in set_algebraic().
+  virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {
+    return false;
+  }
 
   /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
   virtual double remaining_drift(const Candidate& candidate) = 0;

@@ -28,6 +28,8 @@ const char* to_string(Status status) {
       return "corrector failed";
     case Status::collapsed:
       return "steps collapsed";
+    case Status::doubtful:
+      return "doubtful";
     case Status::callback_fatal:
       return "callback failed";
     case Status::late_attach:
@@ -114,15 +116,26 @@ void Projection::Impl::attach() {
   require(SUNNonlinSolSetSysFn(solver_.get(), nothing), "a system function");
   require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
   require(SUNNonlinSolSetMaxIters(solver_.get(), maximum_iterations_), "a number of iterations");
+  IDAGetNumSteps(ida_mem_, &steps_at_attach_);
+  const StepData step = step_data();
+  lifetime_.watch(step.y_predicted, step.yp_predicted, [this] {
+    std::string ignored;
+    guarded([this] { return look_for_bypass(), 0; }, ignored);
+  });
   const int flag = IDASetNonlinearSolver(ida_mem_, solver_.get());
   if (flag != 0)
     reject("IDASetNonlinearSolver returned " + std::to_string(flag) + "; call IDAInit before");
 }
 
-Projection::Impl::~Impl() = default;
+Projection::Impl::~Impl() {
+  std::string ignored;
+  guarded([this] { return look_for_bypass(), 0; }, ignored);
+}
 
-Statistics Projection::Impl::statistics() const {
+Statistics Projection::Impl::statistics() {
+  look_for_bypass();
   Statistics s = statistics_;
+  s.steps_without_plugin = steps_unseen_;
   const long moved = s.projections + s.chord_projections - s.failures();
   s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
   s.seconds = timed_.total(s.projections);
@@ -157,10 +170,11 @@ int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, 
 Statistics Projection::statistics() const { return impl_->statistics(); }
 void Projection::reset_statistics() { impl_->reset_statistics(); }
 Status Projection::status() const {
-  return impl_->status == Status::success && !impl_->warning.empty() ? Status::collapsed
-                                                                     : impl_->status;
+  impl_->look_for_bypass();
+  return impl_->status == Status::success ? impl_->warning_status : impl_->status;
 }
 const std::string& Projection::message() const {
+  impl_->look_for_bypass();
   return impl_->message.empty() ? impl_->warning : impl_->message;
 }
 const Constraints& Projection::constraints() const { return impl_->constraints; }

@@ -142,6 +142,11 @@ class RowBlocks {
   /// sum_j |C_ij y_j| and sum_j C_ij y_j.
   double terms(int i, const double* y) const;
   double times(int i, const double* y) const;
+  /// f(column, entry) for the entries of row i.
+  template <class Visit>
+  void visit_row(int i, Visit f) const {
+    for (int j = 0; j < n_; ++j) f(j, row(i)[j]);
+  }
 
   /// After solve(): as contradicts() above, for both blocks.
   bool contradict(const std::vector<double>& WT);

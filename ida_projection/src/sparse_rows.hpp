@@ -34,6 +34,16 @@ class SparseRows {
   double terms(int i, const double* y) const;
   double times(int i, const double* y) const;
   bool contradict(const std::vector<double>& WT);
+  /// f(column, entry) for the entries of row i.
+  template <class Visit>
+  void visit_row(int i, Visit f) const {
+    const Row& row = rows_[static_cast<std::size_t>(i)];
+    for (int e = row.begin; e < row.end; ++e)
+      f(columns_of_[static_cast<std::size_t>(e)], entries_[static_cast<std::size_t>(e)]);
+    for (int j = 0; row.full >= 0 && j < n_; ++j)
+      f(j, full_rows_[static_cast<std::size_t>(row.full) * static_cast<std::size_t>(n_) +
+                      static_cast<std::size_t>(j)]);
+  }
 
   Contradiction contradiction;
   std::string message;

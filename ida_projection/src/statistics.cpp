@@ -22,6 +22,7 @@ std::vector<Entry> entries(const Statistics& s) {
   };
   return {
       count("solver calls", "solver_calls", s.solver_calls),
+      count("steps of IDA without the plugin", "steps_without_plugin", s.steps_without_plugin),
       count("projections", "projections", s.projections),
       count("already on the constraints", "skipped", s.skipped),
       count("left alone", "left_alone", s.left_alone),
@@ -68,6 +69,8 @@ std::string Statistics::table() const {
     write(out, entry);
     out << '\n';
   }
+  if (steps_without_plugin > 0 && solver_calls > 0)
+    out << "IDA took steps without the plugin: another nonlinear solver was attached after it.\n";
   if (solver_calls == 0)
     out << "IDA has not called the plugin. If IDASolve was called, another nonlinear solver was "
            "attached after it.\n";

@@ -136,6 +136,43 @@ TEST_CASE("never called: another solver was attached afterwards") {
   SUNNonlinSolFree(newton);
 }
 
+TEST_CASE("replaced before or during the run: status and statistics say it at once") {
+  for (const double until : {0.0, 3.0}) {
+    Host host(swing(), 1e-6);
+    host.attach(host.problem.recommended_constraints());
+    if (until > 0.0) REQUIRE(host.to(until) >= 0);
+    CHECK(host.projection().status() == (until > 0.0 ? tp::Status::success : tp::Status::unused));
+    const long seen = host.steps();
+    SUNNonlinearSolver newton = SUNNonlinSol_Newton(host.y, host.context);
+    REQUIRE(IDASetNonlinearSolver(host.ida, newton) == 0);
+    // SUNDIALS hands the linear solver to a nonlinear one when a run begins.
+    if (until > 0.0) REQUIRE(host.restart() == 0);
+    CHECK(host.projection().status() != tp::Status::never_called);
+    REQUIRE(host.to(5.0) >= 0);
+    INFO("replaced at " << until << ", steps " << seen << " and " << host.steps());
+    CHECK(host.projection().status() == tp::Status::never_called);
+    CHECK(contains(host.projection().message(), "another nonlinear solver"));
+    const tp::Statistics statistics = host.projection().statistics();
+    CHECK(statistics.steps_without_plugin >= 1);
+    CHECK(contains(statistics.table(), "another nonlinear solver"));
+    IDAFree(&host.ida);
+    CHECK(host.projection().status() == tp::Status::never_called);  // still known
+    SUNNonlinSolFree(newton);
+  }
+}
+
+TEST_CASE("status and statistics after IDAFree: what was last known") {
+  Host host(swing(), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  REQUIRE(host.finish() >= 0);
+  const long projections = host.projection().statistics().projections;
+  IDAFree(&host.ida);
+  CHECK(host.projection().status() == tp::Status::success);
+  CHECK(host.projection().message().empty());
+  CHECK(host.projection().statistics().projections == projections);
+  CHECK(host.projection().statistics().steps_without_plugin == 0);
+}
+
 TEST_CASE("IDA's own settings reach the decorated solver") {
   Host host(swing(), 1e-6);
   host.attach(host.problem.recommended_constraints());

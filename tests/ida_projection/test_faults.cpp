@@ -67,12 +67,14 @@ tp::Constraints spoilt(const tp::Constraints& set, const std::shared_ptr<Spoiler
           return flag != 0 ? flag : (*of_C)(C.data(), C.size());
         });
   if (const auto* sparse = std::get_if<tp::SparseJacobian>(&set.jacobian)) {
-    tp::SparseJacobian rows = *sparse;
-    rows.fill = [fill = sparse->fill, of_C](double t, tp::ConstVector y, tp::Vector entries) {
+    tp::SparseJacobian with_fault;
+    with_fault.starts = sparse->starts;
+    with_fault.columns = sparse->columns;
+    with_fault.fill = [fill = sparse->fill, of_C](double t, tp::ConstVector y, tp::Vector entries) {
       const int flag = fill(t, y, entries);
       return flag != 0 ? flag : (*of_C)(entries.data(), entries.size());
     };
-    out.jacobian = rows;
+    out.jacobian = std::move(with_fault);
   }
   for (std::size_t k = 0; k < set.joined.size(); ++k)
     out.joined[k] = spoilt(set.joined[k], of_g, of_C);

@@ -26,6 +26,8 @@ enum class Status {
   callback_recoverable,
   corrector_failed,  ///< the decorated solver failed; nothing was projected
   collapsed,         ///< the last step was projected, but IDA rejects most steps; message tells why
+  doubtful,  ///< the last step was projected, but F does not keep a row, C is wrong, or atol lies
+             ///< above the solution; message tells which
   callback_fatal = -1,
   late_attach = -2,                 ///< attached after IDA was initialised: call IDAReInit
   simultaneous_sensitivities = -3,  ///< IDA_SIMULTANEOUS bypasses the plugin: use IDA_STAGGERED
@@ -76,6 +78,9 @@ struct Consistency {
 /// Constraint projection inside IDA: decorates IDA's nonlinear solver, so that every candidate
 /// y = ypred + ycor is moved onto g(t, y) = 0 before IDA tests its error and accepts it
 /// (Hanson and Krogh). The object must live until IDAFree or the last IDASolve, whichever is first.
+/// A nonlinear solver that the host attaches later takes its place without a word of IDA's:
+/// status(), message() and statistics() compare IDA's steps with what the plugin has seen, IDAFree
+/// and the destructor do so as well, and it is said once on stderr (Options::print_warnings).
 ///
 /// One call to add, after IDAInit and before IDACalcIC and the first IDASolve:
 ///

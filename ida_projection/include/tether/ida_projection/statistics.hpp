@@ -11,6 +11,7 @@ namespace tether::ida_projection {
 /// Work counts and sizes since attach (or Projection::reset_statistics). A value: copy it freely.
 struct Statistics {
   long solver_calls = 0;          ///< calls of the decorated nonlinear solver by IDA
+  long steps_without_plugin = 0;  ///< IDA took them with another nonlinear solver, see never_called
   long projections = 0;           ///< steps (attempts) that were projected
   long skipped = 0;               ///< attempts already on the constraints, nothing moved
   long left_alone = 0;            ///< attempts not looked at (Options::frequency)

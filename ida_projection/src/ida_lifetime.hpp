@@ -1,0 +1,35 @@
+// Tether: whether the host's ida_mem is still there. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <sundials/sundials_nvector.h>
+
+namespace tether::ida_projection {
+
+/// IDA tells nobody that it is freed, nor that another nonlinear solver took the place of ours. But
+/// IDAFree destroys the vectors that IDAInit made: the destroy operation of one of them, in its own
+/// table, is replaced and put back. Nothing is watched where vectors share a table.
+class IdaLifetime {
+ public:
+  IdaLifetime() = default;
+  ~IdaLifetime();
+  IdaLifetime(const IdaLifetime&) = delete;
+  IdaLifetime& operator=(const IdaLifetime&) = delete;
+
+  /// `one`, `other`: vectors that IDA owns. `at_end` is called when IDAFree begins to free them,
+  /// with ida_mem still readable; it must not throw.
+  void watch(N_Vector one, N_Vector other, std::function<void()> at_end);
+  /// Is ida_mem certainly there?
+  bool alive() const { return vector_ != nullptr; }
+
+ private:
+  static void replace(N_Vector v);
+  static void destroy(N_Vector v);
+  static N_Vector clone(N_Vector v);
+  static N_Vector clone_empty(N_Vector v);
+
+  N_Vector vector_ = nullptr;  // watched; null: nothing is, or it is gone
+  std::function<void()> at_end_;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,104 @@
+// Tether: wrong rows and tolerances are named in the first steps. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <cmath>
+#include <problems/pendulum.hpp>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+/// What is said after so many steps.
+struct Said {
+  tp::Status status;
+  std::string message;
+};
+
+Said after(long steps, const Problem& problem, double tolerance, const tp::Constraints& rows,
+           double wrong_slope = 1.0) {
+  Host host(problem, tolerance);
+  for (int j = 0; j < problem.size; ++j) N_VGetArrayPointer(host.yp)[j] *= wrong_slope;
+  host.attach(rows);
+  int flag = 0;
+  while (host.steps() < steps && host.t < problem.t_end && flag >= 0) flag = host.step();
+  return {host.projection().status(), host.projection().message()};
+}
+
+/// Energy of the pendulum with this gravity, as it is at (x, y, vx, vy) = start.
+tp::Constraints energy_with(double gravity, const std::vector<double>& start) {
+  const auto H = [gravity](const double* y) {
+    return 0.5 * (y[2] * y[2] + y[3] * y[3]) + gravity * y[1];
+  };
+  const double value = H(start.data());
+  return row(
+      "energy", [H, value](double, const double* y) { return H(y) - value; },
+      [gravity](double, const double* y, double* c) {
+        c[1] = gravity;
+        c[2] = y[2];
+        c[3] = y[3];
+      });
+}
+
+}  // namespace
+
+TEST_CASE("an energy row with gravity off by 5 % is named in the first steps") {
+  for (const char* form : {"index 1", "index 0"})
+    for (const double tolerance : {1e-3, 1e-5, 1e-8}) {
+      INFO(form << ", tolerance " << tolerance);
+      const Problem problem = pendulum(1.7, 3.3, 100.0, form);
+      const tp::Constraints geometry = problem.select({"position", "velocity"});
+      const Said wrong =
+          after(100, problem, tolerance, geometry + energy_with(0.95 * 3.3, problem.y0));
+      CHECK(wrong.status == tp::Status::doubtful);
+      CHECK(contains(wrong.message, "F does not keep row 2 (energy)"));
+      const Said right = after(100, problem, tolerance, geometry + energy_with(3.3, problem.y0));
+      CHECK(right.status == tp::Status::success);
+      CHECK(right.message.empty());
+      // The host's y' at the start is no evidence.
+      const Said started = after(100, problem, tolerance, geometry, 3.0);
+      CHECK(started.message.empty());
+    }
+}
+
+TEST_CASE("a row that is no invariant is named, true at the start as it may be") {
+  const Problem problem = pendulum(1.0, 1.0, 100.0, "index 0");
+  const tp::Constraints product = row(
+      "x vx", [](double, const double* y) { return y[0] * y[2]; },
+      [](double, const double* y, double* c) {
+        c[0] = y[2];
+        c[2] = y[0];
+      });
+  const Said said = after(100, problem, 1e-6, product);
+  CHECK(said.status == tp::Status::doubtful);
+  CHECK(contains(said.message, "F does not keep row 0 (x vx)"));
+}
+
+TEST_CASE("a row that moves with t is no alarm, and one whose g_t is wrong is") {
+  // x' = -sin t, so x = cos t.
+  Problem problem =
+      ode({1.0}, 20.0, [](double t, const double*, double* f) { f[0] = -std::sin(t); });
+  for (const double amplitude : {1.0, 1.1}) {
+    const tp::Constraints moving = row(
+        "path",
+        [amplitude](double t, const double* y) {
+          return y[0] - 1.0 - amplitude * (std::cos(t) - 1.0);
+        },
+        [](double, const double*, double* c) { c[0] = 1.0; });
+    const Said said = after(60, problem, 1e-6, moving);
+    CHECK((said.status == tp::Status::doubtful) == (amplitude != 1.0));
+  }
+}
+
+TEST_CASE("atol above the solution is said, at rest it is not") {
+  Problem small = tether::test::circle(100.0);
+  for (double& value : small.y0) value *= 1e-3;
+  for (double& value : small.yp0) value *= 1e-3;
+  const Said said = after(12, small, 1e-2, circle_of(1e-6, "small circle"));
+  CHECK(said.status == tp::Status::doubtful);
+  CHECK(contains(said.message, "reduce atol"));
+  CHECK(after(12, small, 1e-6, circle_of(1e-6, "small circle")).status == tp::Status::success);
+}
