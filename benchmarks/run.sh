@@ -4,10 +4,14 @@
 #
 #   sh benchmarks/run.sh [--quick] [--output DIR] [--contact FOLDER] [--build DIR]
 #
-#   --quick     fewer problems and tolerances: under 2 minutes instead of under 15
+#   --quick     fewer problems and tolerances: under 2 minutes instead of under 20
 #   --output    where index.html, results.json and the tables go (default build/benchmarks)
 #   --contact   folder of contact problems (fclib files) for contact_collection
 #   --build     an existing build directory instead of build/release
+#
+# Measures with an optimised SUNDIALS: the one in TETHER_SUNDIALS, a prefix, or else the distribution's
+# version built with -O3 in build/sundials (once; Debian's own is not optimised). The distribution's has
+# a table of its own after it. TETHER_SUNDIALS=none takes the distribution's alone.
 set -eu
 
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
@@ -35,6 +39,29 @@ cmake --build "$build" --parallel "$(nproc)" --target accuracy_cost stability co
 cmake --build "$build" --parallel "$(nproc)" --target hard_cases >/dev/null 2>&1 || true
 mkdir -p "$output"
 programs=$build/benchmarks
+
+# Programs run with any SUNDIALS of the same soname; for another one they are built again.
+optimised=${TETHER_SUNDIALS:-}
+if [ -z "$optimised" ]; then
+  optimised=$root/build/sundials
+  sh benchmarks/optimised_sundials.sh "$optimised" || optimised=none
+fi
+[ "$optimised" != none ] || optimised=
+distribution=$programs
+if [ -n "$optimised" ]; then
+  [ -d "$optimised/lib" ] || { echo "TETHER_SUNDIALS=$optimised: no folder lib in it" >&2; exit 2; }
+  optimised=$(CDPATH='' cd -- "$optimised" && pwd)
+  ida=$(ldd "$programs/accuracy/accuracy_cost" | sed -n 's/.*\(libsundials_ida\.so\.[0-9]*\).*/\1/p')
+  if [ ! -e "$optimised/lib/$ida" ]; then
+    cmake -S . -B build/other_sundials -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$optimised" \
+      -DTETHER_BUILD_TESTS=OFF >/dev/null
+    cmake --build build/other_sundials --parallel "$(nproc)" \
+      --target accuracy_cost stability contact_collection contact_cost >/dev/null
+    programs=build/other_sundials/benchmarks
+  fi
+fi
+# Runs a program with the optimised library.
+with_optimised() { LD_LIBRARY_PATH="${optimised:+$optimised/lib:}${LD_LIBRARY_PATH:-}" "$@"; }
 hard_cases=$build/tests/hard_cases/hard_cases
 started=$(date +%s)
 
@@ -44,17 +71,24 @@ export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 if [ "$quick" = yes ]; then
   accuracy='--count 6 --repeats 1 --seconds 0.1 --no-drift --no-reach --skip four_bar_of'
+  again='--count 4 --repeats 1 --seconds 0.1 --no-drift --no-reach --skip four_bar_of,long,chain'
   sweep='--count 20 --problem pendulum,car_axis,andrews --skip long' peers=
 else
   accuracy='--count 8 --repeats 3 --seconds 1'
+  again='--count 6 --repeats 2 --seconds 0.5 --no-drift --no-reach --skip four_bar_of'
   sweep='--count 100 --skip of_100,of_10,of_5' peers=--peers
 fi
 
 # With a second core the rest runs beside accuracy_cost: what is compared is timed within one program.
 compare_accuracy() {
   # shellcheck disable=SC2086  # lists of options
-  "$programs/accuracy/accuracy_cost" $accuracy --csv "$output/accuracy.csv" --svg "$output" \
+  with_optimised "$programs/accuracy/accuracy_cost" $accuracy --csv "$output/accuracy.csv" --svg "$output" \
     --json "$output/accuracy.json" --html "$output/accuracy.part" >"$output/accuracy.txt"
+  [ -n "$optimised" ] || return 0
+  # shellcheck disable=SC2086
+  "$distribution/accuracy/accuracy_cost" $again --csv "$output/accuracy_distribution.csv" \
+    --json "$output/accuracy_distribution.json" --html "$output/accuracy_distribution.part" \
+    >"$output/accuracy_distribution.txt"
 }
 beside=
 if [ "$cores" -gt 1 ]; then
@@ -66,7 +100,7 @@ fi
 
 echo 'Computational stability'
 # shellcheck disable=SC2086
-"$programs/accuracy/stability" $sweep --csv "$output/stability.csv" --json "$output/stability.json" \
+with_optimised "$programs/accuracy/stability" $sweep --csv "$output/stability.csv" --json "$output/stability.json" \
   --html "$output/stability.part" | tee "$output/stability.txt"
 
 echo
@@ -107,8 +141,14 @@ folder=
 
 [ -z "$beside" ] || wait "$beside"
 echo
-echo 'Error against time'
+library=${optimised:+optimised, $optimised}
+echo "Error against time, SUNDIALS ${library:-of the distribution}"
 cat "$output/accuracy.txt"
+if [ -n "$optimised" ]; then
+  echo
+  echo 'Error against time, SUNDIALS of the distribution'
+  sed -n '/^CPU at equal error/,$p' "$output/accuracy_distribution.txt"
+fi
 
 # Facts without which times mean nothing.
 one_line() { tr '\n' ' ' | tr -d '"\\' | sed 's/  */ /g; s/ *$//'; }
@@ -131,11 +171,13 @@ seconds=$(($(date +%s) - started))
   printf '"compiler": "%s", "packages": {%s},\n' "$compiler" "$packages"
   printf '"commit": "%s", "date": "%s", "quick": "%s", "seconds": %s,\n' \
     "$commit" "$(date -u +%Y-%m-%dT%H:%M:%SZ)" "$quick" "$seconds"
-  printf '"accuracy": %s,\n"stability": %s,\n' "$(cat "$output/accuracy.json")" \
-    "$(cat "$output/stability.json")"
+  printf '"sundials": "%s",\n"accuracy": %s,\n"stability": %s,\n' "${library:-distribution}" \
+    "$(cat "$output/accuracy.json")" "$(cat "$output/stability.json")"
+  [ -z "$optimised" ] || printf '"accuracy_distribution": %s,\n' \
+    "$(cat "$output/accuracy_distribution.json")"
   printf '"contact": %s}\n' "$(cat "$output/contact_cost.json")"
 } >"$output/results.json"
-rm -f "$output/accuracy.json" "$output/stability.json" "$output/contact_cost.json"
+rm -f "$output/accuracy.json" "$output/accuracy_distribution.json" "$output/stability.json" "$output/contact_cost.json"
 
 {
   cat <<'HEAD'
@@ -149,7 +191,14 @@ HEAD
     "$load" "$compiler" "$commit" "$(date -u +%Y-%m-%d)" "$seconds"
   printf '<p>CPU of one process, dense LU and difference Jacobians in every code. '
   printf 'What each column means: benchmarks/README.md.</p>\n'
-  cat "$output/accuracy.part" "$output/stability.part" "$output/hard_cases.part"
+  printf '<p>SUNDIALS: %s.</p>\n' "${library:-of the distribution}"
+  cat "$output/accuracy.part"
+  if [ -n "$optimised" ]; then
+    echo '<details><summary>The same with the SUNDIALS of the distribution</summary>'
+    cat "$output/accuracy_distribution.part"
+    echo '</details>'
+  fi
+  cat "$output/stability.part" "$output/hard_cases.part"
   printf '<h2>Contact</h2><pre>%s</pre>\n' \
     "$(printf '%s\n' "$contact_text" | sed 's/&/\&amp;/g; s/</\&lt;/g')"
   cat "$output/contact_cost.part"

@@ -149,8 +149,8 @@ class Report {
   void finish(const std::string& versions) {
     std::string matrices;
     fmt::print("CPU at equal error, 1e-3 to 1e-9, all problems\n{}", comparison_.summary().text());
-    for (const auto& [code, standing] : comparison_.standings()) {
-      const Table matrix = comparison_.point_by_point(code);
+    for (const auto& [pair, standing] : comparison_.standings()) {
+      const Table matrix = comparison_.point_by_point(pair);
       fmt::print("\n{}", matrix.text());
       matrices += matrix.html();
     }

@@ -46,7 +46,7 @@ class Absent : public Code {
 using Codes = std::vector<std::unique_ptr<Code>>;
 
 /// Ours and plain IDA: "IDA" (algebraic variables in the error test), "IDA suppressed", "Tether",
-/// "Tether smooth".
+/// "Tether smooth"; with fast vectors and factors "IDA fast", "IDA fast suppressed", "Tether fast".
 void add_ida_codes(Codes& codes);
 
 /// "RADAU5", "DASPK", "DASPK suppressed" from r-cran-desolve, opened at run time.
@@ -72,6 +72,10 @@ inline std::string base_name(const std::string& code) {
 inline bool dense_enough(const problems::Problem& problem) { return problem.sparse.starts.empty(); }
 constexpr const char* kOnlyDense = "sparse problem, and its adapter has dense factors only";
 
-inline bool is_ours(const std::string& code) { return code == "Tether" || code == "Tether smooth"; }
+inline bool is_ours(const std::string& code) { return code.rfind("Tether", 0) == 0; }
+/// Plain IDA in any variant, "IDA fast" too.
+inline bool is_plain(const std::string& code) { return code.rfind("IDA", 0) == 0; }
+/// The same steps and bits as the code without it: only times differ.
+inline bool is_fast(const std::string& code) { return code.find(" fast") != std::string::npos; }
 
 }  // namespace tether::bench

@@ -13,20 +13,21 @@ enum class Variant { tested, suppressed, projected, smooth };
 
 class IdaCode : public Code {
  public:
-  explicit IdaCode(Variant variant) : variant_(variant) {}
+  IdaCode(Variant variant, bool fast) : variant_(variant), fast_(fast) {}
 
   std::string name() const override {
+    const std::string fast = fast_ ? " fast" : "";
     switch (variant_) {
       case Variant::tested:
-        return "IDA";
+        return "IDA" + fast;
       case Variant::suppressed:
-        return "IDA suppressed";
+        return "IDA" + fast + " suppressed";
       case Variant::projected:
-        return "Tether";
+        return "Tether" + fast;
       case Variant::smooth:
         break;
     }
-    return "Tether smooth";
+    return "Tether" + fast + " smooth";
   }
 
   std::string version() const override {
@@ -45,6 +46,7 @@ class IdaCode : public Code {
   Run run(const problems::Problem& problem, double tolerance, const Limits& limits,
           const Watch& watch) const override {
     Settings settings;
+    settings.fast = fast_;
     settings.limits = limits;
     settings.watch = watch;
     settings.suppress = variant_ == Variant::suppressed;
@@ -61,6 +63,7 @@ class IdaCode : public Code {
 
  private:
   Variant variant_;
+  bool fast_;
 };
 
 }  // namespace
@@ -68,7 +71,9 @@ class IdaCode : public Code {
 void add_ida_codes(Codes& codes) {
   for (const Variant variant :
        {Variant::tested, Variant::suppressed, Variant::projected, Variant::smooth})
-    codes.push_back(std::make_unique<IdaCode>(variant));
+    codes.push_back(std::make_unique<IdaCode>(variant, false));
+  for (const Variant variant : {Variant::tested, Variant::suppressed, Variant::projected})
+    codes.push_back(std::make_unique<IdaCode>(variant, true));
 }
 
 }  // namespace tether::bench

@@ -137,7 +137,7 @@ class Session {
 
   void follow(const Job& job, Point& made) const {
     made.scd = significant_digits(*job.problem, made.run.y);
-    if (!plan_.watch) return;
+    if (!plan_.watch || is_fast(made.code)) return;  // the fast one takes the same steps
     Recorder recorder(*job.problem, made);
     job.code->run(*job.problem, made.tolerance, limits_, std::ref(recorder));
   }

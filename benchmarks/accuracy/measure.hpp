@@ -60,6 +60,6 @@ std::vector<Family> families(const std::vector<Point>& points);
 /// included; CPU NaN when none reaches it.
 Best best_of(const std::vector<Family>& all, const std::string& base, double error);
 
-inline bool is_peer(const std::string& code) { return base_name(code) != "IDA" && !is_ours(code); }
+inline bool is_peer(const std::string& code) { return !is_plain(code) && !is_ours(code); }
 
 }  // namespace tether::bench

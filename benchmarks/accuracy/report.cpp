@@ -12,7 +12,6 @@ namespace tether::bench {
 namespace {
 
 constexpr int kLoosest = 3, kTightest = 9;  // decades of error that are compared
-const std::string kPlain = "plain IDA";
 
 std::string number(double value, const char* format = "{:.3g}") {
   return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
@@ -41,62 +40,70 @@ std::string first_word(const std::string& status) { return status.substr(0, stat
 
 Comparison::Comparison(std::vector<std::string> peers) : peers_(std::move(peers)) {}
 
+std::string Comparison::note(const Pair& pair, const std::string& problem, int decade,
+                             double ratio) {
+  const std::string at = fmt::format("1e-{:02}", decade);
+  Standing& standing = standings_[pair];
+  standing.points.add(ratio);
+  if (ratio > 1.0) ++standing.ahead;
+  if (ratio > standing.worst) {
+    standing.worst = ratio;
+    standing.worst_at = problem + " at " + at;
+  }
+  json_ += fmt::format("{}{{\"problem\":{},\"ours\":{},\"code\":{},\"error\":{},\"ratio\":{}}}",
+                       json_.empty() ? "" : ",\n", json_string(problem), json_string(pair.first),
+                       json_string(pair.second), at, json_number(ratio));
+  return number(ratio, "{:.2f}");
+}
+
 Table Comparison::add(const std::string& problem, const std::vector<Point>& points) {
   const std::vector<Family> all = families(points);
+  // Ours, and whom they are divided by. "fast": with fast vectors and factors.
+  const std::vector<std::string> ours = {"Tether fast", "Tether"};
+  std::vector<std::string> others = {"IDA", "IDA fast"};
+  others.insert(others.end(), peers_.begin(), peers_.end());
   Table table;
-  table.head = {"error", "Tether ms", "form", "plain IDA ms", "form", "ratio"};
-  for (const std::string& peer : peers_) {
-    table.head.push_back(peer + " ms");
-    table.head.push_back("ratio");
-  }
-  std::map<std::string, GeometricMean> here;
-  std::map<std::string, std::vector<std::string>> cells;
+  table.head = {"error"};
+  for (const std::string& code : ours) table.head.insert(table.head.end(), {code + " ms", "form"});
+  for (const std::string& code : others)
+    table.head.insert(table.head.end(), {code + " ms", "form", "fast /", "/"});
+  std::map<Pair, GeometricMean> here;
+  std::map<Pair, std::vector<std::string>> cells;
   for (int decade = kLoosest; decade <= kTightest; ++decade) {
     const double error = std::pow(10.0, -decade);
-    const std::string at = fmt::format("{:.0e}", error);
-    const Best ours = best_of(all, "Tether", error);
-    const auto note = [&](const std::string& code, double cpu) {
-      const double ratio = ours.cpu / cpu;
-      Standing& standing = standings_[code];
-      standing.points.add(ratio);
-      here[code].add(ratio);
-      if (ratio > 1.0) ++standing.ahead;
-      if (ratio > standing.worst) {
-        standing.worst = ratio;
-        standing.worst_at = problem + " at " + at;
-      }
-      cells[code].push_back(number(ratio, "{:.2f}"));
-      json_ += fmt::format("{}{{\"problem\":{},\"code\":{},\"error\":{},\"ratio\":{}}}",
-                           json_.empty() ? "" : ",\n", json_string(problem), json_string(code), at,
-                           json_number(ratio));
-      return cells[code].back();
+    std::vector<std::string> row = {fmt::format("{:.0e}", error)};
+    const auto show = [&](const Best& best) {
+      row.insert(row.end(), {number(best.cpu), best.title});
     };
-    const Best plain = best_of(all, "IDA", error);
-    std::vector<std::string> row = {at, number(ours.cpu), ours.title, number(plain.cpu),
-                                    plain.title};
-    row.push_back(note(kPlain, plain.cpu));
-    for (const std::string& peer : peers_) {
-      const Best other = best_of(all, peer, error);
-      row.push_back(number(other.cpu));
-      row.push_back(note(peer, other.cpu));
+    std::vector<Best> mine;
+    for (const std::string& code : ours) show(mine.emplace_back(best_of(all, code, error)));
+    for (const std::string& code : others) {
+      const Best other = best_of(all, code, error);
+      show(other);
+      for (std::size_t k = 0; k < ours.size(); ++k) {
+        const Pair pair{ours[k], code};
+        const double ratio = mine[k].cpu / other.cpu;
+        here[pair].add(ratio);
+        row.push_back(note(pair, problem, decade, ratio));
+        cells[pair].push_back(row.back());
+      }
     }
     table.rows.push_back(std::move(row));
   }
-  for (auto& [code, row] : cells) {
+  for (auto& [pair, row] : cells) {
     row.insert(row.begin(), problem);
-    lines_[code].push_back(row);
+    lines_[pair].push_back(row);
   }
-  for (const auto& [code, mean] : here) standings_[code].problems.add(mean.value());
+  for (const auto& [pair, mean] : here) standings_[pair].problems.add(mean.value());
   return table;
 }
 
 Table Comparison::summary() const {
   Table table;
-  table.head = {
-      "ours / its best form", "mean of points", "mean of problems", "worst point", "where",
-      "it leads at",          "points"};
-  for (const auto& [code, standing] : standings_)
-    table.rows.push_back({code, number(standing.points.value(), "{:.2f}"),
+  table.head = {"best form of", "/ best form of", "mean of points", "mean of problems",
+                "worst point",  "where",          "it leads at",    "points"};
+  for (const auto& [pair, standing] : standings_)
+    table.rows.push_back({pair.first, pair.second, number(standing.points.value(), "{:.2f}"),
                           number(standing.problems.value(), "{:.2f}"),
                           number(standing.worst > 0.0 ? standing.worst : std::nan(""), "{:.2f}"),
                           standing.worst_at, fmt::format("{}", standing.ahead),
@@ -104,12 +111,12 @@ Table Comparison::summary() const {
   return table;
 }
 
-Table Comparison::point_by_point(const std::string& code) const {
+Table Comparison::point_by_point(const Pair& pair) const {
   Table table;
-  table.head = {"ours / " + code};
+  table.head = {pair.first + " / " + pair.second};
   for (int decade = kLoosest; decade <= kTightest; ++decade)
     table.head.push_back(fmt::format("1e-{:02}", decade));
-  if (const auto found = lines_.find(code); found != lines_.end()) table.rows = found->second;
+  if (const auto found = lines_.find(pair); found != lines_.end()) table.rows = found->second;
   return table;
 }
 
@@ -119,7 +126,7 @@ Table standing_of_ours(const std::vector<Point>& points) {
   std::map<std::string, std::map<std::string, int>> counts;
   std::vector<std::string> order;
   for (const Point& point : points) {
-    if (!is_ours(point.code)) continue;
+    if (!is_ours(point.code) || is_fast(point.code)) continue;
     const std::string name = point.code + ", " + point.form;
     if (counts.find(name) == counts.end()) order.push_back(name);
     ++counts[name][first_word(point.status)];
@@ -138,7 +145,8 @@ Table unmet(const std::vector<Point>& points, const std::string& only) {
   Table table;
   table.head = {"code, form", "tolerance", "status"};
   for (const Point& point : points)
-    if (is_ours(point.code) && !point.met() && point.status.compare(0, only.size(), only) == 0)
+    if (is_ours(point.code) && !is_fast(point.code) && !point.met() &&
+        point.status.compare(0, only.size(), only) == 0)
       table.rows.push_back(
           {point.code + ", " + point.form, fmt::format("{:.1e}", point.tolerance), point.status});
   return table;

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "measure.hpp"
@@ -26,21 +27,28 @@ class Comparison {
   /// Takes a problem in and returns its table: CPU at equal error, a line for each decade.
   Table add(const std::string& problem, const std::vector<Point>& points);
 
+  /// Ours and whom they are divided by: "Tether fast", "IDA".
+  using Pair = std::pair<std::string, std::string>;
+
   Table summary() const;
-  /// Ratio to one code: a line for each problem, a column for each decade.
-  Table point_by_point(const std::string& code) const;
-  const std::map<std::string, Standing>& standings() const { return standings_; }
-  /// {"problem":..,"code":..,"error":..,"ratio":..}, joined with commas.
+  /// Ratio of two codes: a line for each problem, a column for each decade.
+  Table point_by_point(const Pair& pair) const;
+  const std::map<Pair, Standing>& standings() const { return standings_; }
+  /// {"problem":..,"ours":..,"code":..,"error":..,"ratio":..}, joined with commas.
   std::string json() const { return json_; }
 
  private:
+  // Takes a ratio in and returns it as text.
+  std::string note(const Pair& pair, const std::string& problem, int decade, double ratio);
+
   std::vector<std::string> peers_;  // without plain IDA
-  std::map<std::string, Standing> standings_;
-  std::map<std::string, std::vector<std::vector<std::string>>> lines_;
+  std::map<Pair, Standing> standings_;
+  std::map<Pair, std::vector<std::vector<std::string>>> lines_;
   std::string json_;
 };
 
-/// Our runs: how many met 100 tolerances and how many did not, for each code and form.
+/// Our runs: how many met 100 tolerances and how many did not, for each code and form. (Fast ones
+/// take the same steps and are left out.)
 Table standing_of_ours(const std::vector<Point>& points);
 /// Our runs that did not, each with its status; `only`: those whose status begins so.
 Table unmet(const std::vector<Point>& points, const std::string& only = "");

@@ -44,7 +44,8 @@ int sparse_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Ve
 
 // Dense LU and a difference Jacobian; KLU and the given one where the problem is sparse.
 void attach_linear_solver(void* ida, const problems::Problem& problem, N_Vector y,
-                          SUNContext context, SUNMatrix* matrix, SUNLinearSolver* solver) {
+                          SUNContext context, bool fast, SUNMatrix* matrix,
+                          SUNLinearSolver* solver) {
 #ifdef TETHER_HAVE_KLU
   if (!problem.sparse.starts.empty()) {
     *matrix =
@@ -57,7 +58,9 @@ void attach_linear_solver(void* ida, const problems::Problem& problem, N_Vector 
   }
 #endif
   *matrix = SUNDenseMatrix(problem.size, problem.size, context);
-  *solver = SUNLinSol_Dense(y, *matrix, context);
+  *solver = fast && problem.size <= ida_projection::kLargestFastDense
+                ? ida_projection::fast_dense_solver(y, *matrix)
+                : SUNLinSol_Dense(y, *matrix, context);
   IDASetLinearSolver(ida, *solver, *matrix);
 }
 
@@ -91,6 +94,7 @@ void read_counts(void* ida, Run& run) {
 Run integrate(const problems::Problem& problem, double tolerance, Settings settings) {
   SUNContext context = make_context();
   N_Vector y = vector_of(problem.y0, context), yp = vector_of(problem.yp0, context);
+  if (settings.fast) ida_projection::fast_vector(y, yp);
   N_Vector id = vector_of(problem.id, context);
   N_Vector atol = vector_of(absolute_tolerances(problem, tolerance), context);
   void* ida = IDACreate(context);
@@ -103,7 +107,7 @@ Run integrate(const problems::Problem& problem, double tolerance, Settings setti
   IDASetUserData(ida, &host);
   SUNMatrix matrix = nullptr;
   SUNLinearSolver solver = nullptr;
-  attach_linear_solver(ida, problem, y, context, &matrix, &solver);
+  attach_linear_solver(ida, problem, y, context, settings.fast, &matrix, &solver);
   // One-step mode counts each call: the limit then holds for one step only.
   IDASetMaxNumSteps(ida, settings.limits.steps);
   IDASetStopTime(ida, problem.t_end);

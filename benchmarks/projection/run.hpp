@@ -41,6 +41,7 @@ struct Settings {
   ida_projection::Options options = {};
   bool suppress = false;  ///< plain IDA's own IDASetSuppressAlg
   bool give_id = false;   ///< pass the problem's id to the options
+  bool fast = false;      ///< fast_vector, and fast_dense_solver where the matrix is small enough
   Limits limits = {};
   Watch watch;
 };

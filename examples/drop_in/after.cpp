@@ -35,7 +35,7 @@ int main() {
   y[0] = 1.0;
   N_VGetArrayPointer(yp)[3] = -1.0;
 
-  tether::ida_projection::fast_vector(yy);
+  tether::ida_projection::fast_vector(yy, yp);
   void* ida_mem = IDACreate(ctx);
   if (check(IDAInit(ida_mem, pendulum, 0.0, yy, yp), "IDAInit")) return 1;
   tether::ida_projection::Projection projection(ida_mem, constraints());

@@ -59,7 +59,7 @@ Host::Host(Problem what, double tolerance, Vectors vectors) : problem(std::move(
   t = problem.t0;
   y = vector(problem.y0);
   yp = vector(problem.yp0);
-  if (fast) tp::fast_vector(y);
+  if (fast) tp::fast_vector(y, yp);
   ida = IDACreate(context);
 #if SUNDIALS_VERSION_MAJOR < 7
   IDASetErrHandlerFn(ida, silent, nullptr);

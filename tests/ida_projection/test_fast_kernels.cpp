@@ -200,10 +200,9 @@ TEST_CASE("The fast dense solver has the pivots, factors and solutions of SUNLin
     CHECK(SUNLinSolGetType(fast) == SUNLINEARSOLVER_DIRECT);
     CHECK(SUNLinSolInitialize(fast) == 0);
     for (const bool singular : {false, true, false}) {
-      for (int k = 0; k < n * n; ++k)
-        SM_DATA_D(A)
-        [k] = SM_DATA_D(B)[k] =
-            random() % 4 == 0 && k % (n + 1) ? 0.0 : std::exp(9.0 * normal(random));
+      for (int k = 0; k < n * n; ++k) SM_DATA_D(A)
+      [k] = SM_DATA_D(B)[k] =
+          random() % 4 == 0 && k % (n + 1) ? 0.0 : std::exp(9.0 * normal(random));
       for (int i = 0; i < n; ++i) NV_DATA_S(b)[i] = normal(random);
       if (singular)
         for (int i = 0; i < n; ++i) SM_ELEMENT_D(A, i, n - 1) = SM_ELEMENT_D(B, i, n - 1) = 0.0;
@@ -234,6 +233,10 @@ TEST_CASE("What cannot be made fast is refused by name") {
   SUNMatrix band = SUNBandMatrix(4, 1, 1, context);
   CHECK(contains(thrown([&] { tp::fast_vector(nullptr); }), "fast_vector: y is null"));
   CHECK(contains(thrown([&] { tp::fast_vector(custom); }), "not a serial vector"));
+  const auto operation = y->ops->nvlinearsum;
+  CHECK(contains(thrown([&] { tp::fast_vector(y, nullptr); }), "fast_vector: yp is null"));
+  CHECK(contains(thrown([&] { tp::fast_vector(nullptr, y); }), "fast_vector: y is null"));
+  CHECK(y->ops->nvlinearsum == operation);
   const auto solver = [](N_Vector v, SUNMatrix M) {
     return thrown([&] { tp::fast_dense_solver(v, M); });
   };

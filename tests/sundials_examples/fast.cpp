@@ -34,8 +34,8 @@ auto guarded(Call call) {
   }
 }
 
-void make_fast(N_Vector y) {
-  guarded([&] { return tp::fast_vector(y); });
+void make_fast(N_Vector y, N_Vector yp) {
+  guarded([&] { tp::fast_vector(y, yp); });
   ++counts.integrators;
 }
 
@@ -43,14 +43,14 @@ void make_fast(N_Vector y) {
 
 extern "C" int tether_init_fast(void* ida_mem, IDAResFn res, sunrealtype t0, N_Vector yy0,
                                 N_Vector yp0) {
-  make_fast(yy0);
+  make_fast(yy0, yp0);
   return IDAInit(ida_mem, res, t0, yy0, yp0);
 }
 
 #ifdef IDA_STAGGERED
 extern "C" int tether_init_fast_backwards(void* ida_mem, int which, IDAResFnB res, sunrealtype t0,
                                           N_Vector yy0, N_Vector yp0) {
-  make_fast(yy0);
+  make_fast(yy0, yp0);
   return IDAInitB(ida_mem, which, res, t0, yy0, yp0);
 }
 #endif

@@ -16,4 +16,10 @@ N_Vector fast_vector(N_Vector y) {
   return y;
 }
 
+void fast_vector(N_Vector y, N_Vector yp) {
+  fast::require_serial(yp, "fast_vector: yp");
+  fast_vector(y);
+  fast_vector(yp);
+}
+
 }  // namespace tether::ida_projection

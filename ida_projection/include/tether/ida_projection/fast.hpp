@@ -23,6 +23,9 @@ namespace tether::ida_projection {
 /// Throws std::invalid_argument for a null pointer and for any other vector than a serial one.
 N_Vector fast_vector(N_Vector y);
 
+/// Both vectors that IDASolve returns y and y' in: IDA works in them at every step.
+void fast_vector(N_Vector y, N_Vector yp);
+
 /// LU with partial pivoting for a dense, square matrix of up to 64 rows: SUNLinSol_Dense with its
 /// pivots and its bits, without its copies. Factors are written over A, as there. Free it with
 /// SUNLinSolFree; it is of type SUNLINEARSOLVER_DIRECT and says SUNLINEARSOLVER_CUSTOM for its id.
