@@ -67,7 +67,8 @@ void Projection::Impl::look_for_causes(const Candidate& candidate, const StepDat
       out << "; " << below << " of " << size_
           << " unknowns are smaller than their tolerances: reduce atol";
   }
-  const std::string row = contiguous_ ? suspected_row(candidate, step) : std::string();
+  std::string row = contiguous_ ? suspected_row(candidate, step) : std::string();
+  if (row.empty() && contiguous_) row = squared_row(candidate);
   if (row.empty())
     out << "; check the rows with check_jacobian, the id vector and the tolerances";
   else
@@ -80,6 +81,40 @@ void Projection::Impl::warn(Status kind, const std::string& text) {
   warning_status = kind;
   if (said_warning_ != kind) say_once(warning);  // not again after every IDAReInit
   said_warning_ = kind;
+}
+
+// A row with a double root: Newton's move for it alone leaves a fourth of g.
+std::string Projection::Impl::squared_row(const Candidate& candidate) {
+  if (!has_values(constraints) || size_ > kLargestSearch) return {};
+  const auto n = static_cast<std::size_t>(size_);
+  Evaluator evaluator(constraints, statistics_);
+  const auto m = static_cast<std::size_t>(evaluator.rows());
+  std::vector<double> y(n), WT(n), g(m), left(m), C(m * n);
+  std::vector<int> columns(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    const double w = candidate.weight_entries[j];
+    y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
+    WT[j] = w > 0.0 ? 1.0 / w : 0.0;
+    columns[j] = static_cast<int>(j);
+  }
+  const double t = candidate.t;
+  std::string found;
+  if (evaluator.value(t, y.data(), size_, g.data()) == Status::success &&
+      evaluator.jacobian(t, y.data(), size_, WT.data(), columns, C.data()) == Status::success)
+    for (std::size_t i = 0; i < m && found.empty(); ++i) {
+      double square = 0.0;
+      for (std::size_t j = 0; j < n; ++j) square += std::pow(C[i * n + j] * WT[j], 2);
+      if (!(square > 0.0) || g[i] == 0.0) continue;
+      std::vector<double> moved = y;
+      for (std::size_t j = 0; j < n; ++j) moved[j] -= g[i] / square * C[i * n + j] * WT[j] * WT[j];
+      if (evaluator.value(t, moved.data(), size_, left.data()) != Status::success) continue;
+      if (std::abs(left[i] / g[i] - 0.25) < 0.05)
+        found = "row " + std::to_string(i) + " (" + constraints.name(static_cast<int>(i)) +
+                ") looks like a square: Newton's move leaves a fourth of g, as at a double root; "
+                "write it without the square";
+    }
+  if (evaluator.fatal()) stop(-1, evaluator.message());
+  return found;
 }
 
 // A wrong row of C, or a row that F does not keep: C y' + g_t, term by term from differences of g.

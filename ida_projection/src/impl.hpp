@@ -150,6 +150,7 @@ class Projection::Impl {
   void say_once(const std::string& text);
   void look_for_causes(const Candidate& candidate, const StepData& step);
   std::string suspected_row(const Candidate& candidate, const StepData& step);
+  std::string squared_row(const Candidate& candidate);
   void warn(Status kind, const std::string& text);
 
   // first_steps.cpp

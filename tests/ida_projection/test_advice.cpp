@@ -1,0 +1,139 @@
+// Tether: what wrong rows, wrong options and starts off the constraints make the plugin say.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <cstdio>
+#include <problems/pendulum.hpp>
+#include <unistd.h>
+
+#include "host.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using namespace tether::problems;
+
+namespace {
+
+/// What the run writes to stderr, read back when it is over.
+class Stderr {
+ public:
+  Stderr() : file_(std::tmpfile()) {
+    std::fflush(stderr);
+    kept_ = dup(2);
+    dup2(fileno(file_), 2);
+  }
+  ~Stderr() {
+    if (kept_ >= 0) text();
+    std::fclose(file_);
+  }
+  std::string text() {
+    std::fflush(stderr);
+    dup2(kept_, 2);
+    close(kept_);
+    kept_ = -1;
+    std::rewind(file_);
+    std::string all;
+    for (int c = std::fgetc(file_); c != EOF; c = std::fgetc(file_)) all += static_cast<char>(c);
+    return all;
+  }
+
+ private:
+  std::FILE* file_;
+  int kept_ = -1;
+};
+
+struct Ended {
+  int flag;
+  tp::Status status;
+  std::string message, printed;
+};
+
+Ended run(const Problem& problem, double tolerance, const tp::Constraints& rows, long most_steps,
+          const tp::Options& options = {}, double shift = 0.0) {
+  Host host(problem, tolerance);
+  host.data()[0] += shift;
+  REQUIRE(IDAReInit(host.ida, problem.t0, host.y, host.yp) == 0);
+  Stderr captured;
+  Ended end{};
+  {
+    tp::Projection projection(host.ida, rows, options);
+    while (host.t < problem.t_end && host.steps() < most_steps && end.flag >= 0)
+      end.flag = host.step();
+    end.status = projection.status();
+    end.message = projection.message();
+    IDAFree(&host.ida);
+  }
+  end.printed = captured.text();
+  return end;
+}
+
+long count(const std::string& text, const std::string& part) {
+  long n = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+Problem swing(double t_end) { return pendulum(1.7, 3.3, t_end, "index 1"); }
+
+/// |p|^2 - L^2 through f, with the derivative that the chain rule gives.
+tp::Constraints length_through(const std::string& name, double (*f)(double), double (*df)(double)) {
+  return row(
+      name, [f](double, const double* y) { return f(y[0] * y[0] + y[1] * y[1] - 1.7 * 1.7); },
+      [df](double, const double* y, double* c) {
+        const double slope = df(y[0] * y[0] + y[1] * y[1] - 1.7 * 1.7);
+        c[0] = 2.0 * slope * y[0];
+        c[1] = 2.0 * slope * y[1];
+      });
+}
+
+}  // namespace
+
+TEST_CASE("an entry of C that is wrong by a factor 2 is named") {
+  const Problem problem = swing(100.0);
+  const tp::Constraints wrong = row(
+      "length", [](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - 1.7 * 1.7; },
+      [](double, const double* y, double* c) {
+        c[0] = 4.0 * y[0];
+        c[1] = 2.0 * y[1];
+      });
+  const Ended end = run(problem, 1e-6, wrong + problem.select({"velocity", "energy"}), 3000);
+  INFO(end.message);
+  CHECK(end.status != tp::Status::success);
+  CHECK(contains(end.message, "check_jacobian"));
+  CHECK(contains(end.message, "row 0 (length)"));
+  CHECK(count(end.printed, "check_jacobian") >= 1);
+}
+
+TEST_CASE("an id vector that calls everything algebraic is named") {
+  const Problem problem = swing(100.0);
+  Host host(problem, 1e-6);
+  tp::Options options;
+  options.id = host.vector(std::vector<double>(5, 0.0));
+  const Ended end = run(problem, 1e-6, problem.recommended_constraints(), 3000, options);
+  INFO(end.message);
+  CHECK(end.status != tp::Status::success);
+  CHECK(contains(end.message, "id"));
+}
+
+TEST_CASE("a squared row, whose gradient vanishes on the set, is suspected by name") {
+  const tp::Constraints square = length_through(
+      "square", [](double u) { return u * u; }, [](double u) { return 2.0 * u; });
+  const Ended end = run(swing(20.0), 1e-6, square, 2000);
+  INFO(end.message);
+  CHECK(end.status != tp::Status::success);
+  CHECK(contains(end.message, "square"));
+  CHECK(contains(end.message, "double root"));
+}
+
+TEST_CASE("a start off the constraints is explained once on stderr") {
+  const Problem problem = swing(20.0);
+  const Ended end = run(problem, 1e-8, problem.recommended_constraints(), 2000, {}, 0.3);
+  INFO(end.message << " | " << end.printed);
+  CHECK(end.flag < 0);
+  CHECK(count(end.printed, "times without a point on the constraints") == 1);
+  CHECK(contains(end.printed, "make_consistent"));
+
+  tp::Options silent;
+  silent.print_warnings = false;
+  CHECK(run(problem, 1e-8, problem.recommended_constraints(), 2000, silent, 0.3).printed.empty());
+}
