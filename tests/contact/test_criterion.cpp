@@ -94,9 +94,7 @@ long double violation(const Problem& p, Law law, const VectorXd& x, const std::v
           norm += a * a;
         }
       reach[at(i)] += std::sqrt(norm);
-      if (norm > 0)
-        for (int& l : island)  // small problems
-          if (l == island[at(j)] && l != island[at(i)]) l = island[at(i)];
+      if (norm > 0) std::replace(island.begin(), island.end(), int(island[at(j)]), int(island[at(i)]));
     }
     for (int c = 0; c < d; ++c) w[at(i)][at(c)] -= p.b()[d * i + c];
   }
@@ -321,7 +319,6 @@ TEST_CASE("criterion: random small problems, never a wrong solved, never a value
     REQUIRE(s.impulses.allFinite());
     if (s.status != Status::solved) continue;
     ++solved;
-    if (kind == 1 && o.law == Law::frictionless) continue;  // judged by |b| where nothing approaches
     CHECK(violation(p, o.law, s.impulses, s.replaced) <= 10 * o.tolerance);
   }
   CHECK(solved > 2500);
