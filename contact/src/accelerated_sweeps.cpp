@@ -29,6 +29,17 @@ void AcceleratedSweeps::start(const PackedVector* x) {
   later_ = {kRecent / 2, 0};
 }
 
+// What was seen of the rate is the past; when the next test is due is not.
+void AcceleratedSweeps::replace(const PackedVector* x) {
+  std::copy(x, x + n_, x_.begin());
+  anderson_.clear();
+  slow_ = 0;
+  eager_ = false;
+  least_f_ = window_f_ = std::numeric_limits<double>::infinity();
+  earlier_ = {};
+  later_ = {sweeps_, 0};
+}
+
 // x_n > 0 and the cone: 0 separated, 1 sticking, 2 sliding. Counts what is not as in the last
 // sweep.
 int AcceleratedSweeps::toggles(const System& system) {
@@ -139,15 +150,16 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
     }
     if (search.exhausted()) return;
     if (leave.most_sweeps > 0 && sweep - first >= leave.most_sweeps) return;
+    if (leave.most_work > 0 && search.counts.work - begin >= leave.most_work) return;
     // Near the tolerance sweeps get more time: their rate is irregular, other stages have a fixed
     // cost.
     const double patience = last_error < 30 * search.options.tolerance ? 3 : 1;
-    if (leave.other_cost > 0 && search.counts.work - begin >= patience * leave.least_work) {
+    if (leave.price > 0 && search.counts.work - begin >= patience * leave.least_work) {
       const double left = forecast(sweep, f, std::log(search.options.tolerance / last_error));
       // What is spent already counts as well: at the price of the other stages only a sure end is
       // waited for.
-      const double price = leave.worth * leave.other_cost;
-      const double allowed = std::max(0.1 * price, price - (search.counts.work - begin));
+      const double allowed =
+          std::max(0.1 * leave.price, leave.price - (search.counts.work - begin));
       const bool slow = left * (search.sweep_cost + accelerated_cost) > allowed;
       slow_ = slow ? slow_ + 1 : 0;
       // Forecasts are noise: they have to agree for a while.

@@ -11,13 +11,14 @@ class AcceleratedSweeps {
  public:
   void reset(int contacts, int depth);
   void start(const PackedVector* x);  // next iterate; forgets what was seen of others
+  void replace(const PackedVector* x);  // next iterate, near the last one
   const PackedVector* point() const { return g_.data(); }
 
   struct Leave {            // conditions under which the stage gives way; work in estimated ns
-    double other_cost = 0;  // of one Newton step; 0: stay
+    double price = 0;       // of the other stages: leave if the predicted rest costs more; 0: stay
     double least_work = 0;  // spent here before leaving is considered
+    double most_work = 0;   // > 0: leave after so much
     int most_sweeps = 0;    // > 0: leave after so many
-    double worth = 15;      // leave if the predicted rest costs more than worth * other_cost
   };
   // Until solved, exhausted, or the conditions hold.
   void run(Search& search, const Leave& leave);

@@ -23,6 +23,7 @@ int severity(Status s) {
       return 0;
     case Status::work_limit:
       return 1;
+    case Status::round_off:
     case Status::stalled:
       return 2;
     case Status::cycling:

@@ -1,4 +1,4 @@
-// Tether: solver of contact problems: the order of the stages. SPDX-License-Identifier: BSD-3-Clause
+// Tether: solver of contact problems. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/solver.hpp>
 
 #include <algorithm>
@@ -6,12 +6,8 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "accelerated_sweeps.hpp"
-#include "admm.hpp"
+#include "automatic.hpp"
 #include "convex_relaxation.hpp"
-#include "infeasible.hpp"
-#include "interior_point.hpp"
-#include "proximal_newton.hpp"
 #include "refuse.hpp"
 #include "solver_words.hpp"
 
@@ -21,11 +17,6 @@ using detail::at;
 using detail::Packed;
 
 namespace {
-
-// Contacts with e above this may have no solution near under maximum_dissipation: the block map
-// jumps at b_n = 0 when e > 1.
-constexpr double kStronglyCoupled = 0.98;
-constexpr double kCoupled = 0.8;
 
 void check(const Options& o) {
   using detail::require;
@@ -46,217 +37,15 @@ void check(const Options& o) {
 struct Solver::Implementation {
   Options options;
   detail::Search search;
-  detail::AcceleratedSweeps sweeps;
-  detail::Admm admm;
-  detail::ProximalNewton newton;
-  detail::InteriorPoint interior;
-  Packed x, z, pressed;  // pressed: empty, or the proof that there is no solution
+  detail::Automatic stages;
+  Packed x, z;
   std::unordered_map<std::uint64_t, PackedVector> memory;
-  bool stages_ready = false, looked_for_proof = false;
-  double sweep_work = 0;  // of the accelerated sweeps
 
   void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
-  void prepare_stages(int n);
   Status automatic();
-  bool mostly_sticks();
-  bool sweep_while_cheap(bool first, bool regular, double kappa);
-  Status rotate(bool last);
   Status plain();
-  Status give_up();
-  bool infeasible();
-  bool replace_contacts(double eccentricity, bool only_unconverged);
   void finish(const Problem& problem, Status status, Solution& out);
 };
-
-void Solver::Implementation::prepare_stages(int n) {
-  if (stages_ready) return;
-  sweeps.reset(n, options.anderson_depth);
-  newton.reset(n);
-  admm.reset(n);
-  interior.reset(n);
-  sweep_work = search.counts.work;
-  stages_ready = true;
-}
-
-// What the failed iteration looks like: plain sweeps from the best point that keep moving are a
-// cycle (or a wander), those that come to rest above the tolerance are a stall.
-Status Solver::Implementation::give_up() {
-  if (infeasible()) return Status::infeasible;
-  if (search.exhausted()) return Status::work_limit;
-  x = search.best;
-  double change = 0, size = 0;
-  for (int k = 0; k < 100; ++k) {
-    z = x;
-    search.system.sweep(x.data());
-    search.count_sweep();
-  }
-  for (std::size_t i = 0; i < x.size(); ++i)
-    for (int c = 0; c < 3; ++c) {
-      change += (x[i].v[c] - z[i].v[c]) * (x[i].v[c] - z[i].v[c]);
-      size += x[i].v[c] * x[i].v[c];
-    }
-  return change > 1e-8 * size ? Status::cycling : Status::stalled;
-}
-
-// Looked for once in a solve, where the quick stages have failed.
-bool Solver::Implementation::infeasible() {
-  if (!looked_for_proof) {
-    looked_for_proof = true;
-    if (!detail::proves_infeasible(search, pressed)) pressed.clear();
-  }
-  return !pressed.empty();
-}
-
-// Whether the point where everything sticks may be admissible: few contacts that slide or part.
-bool Solver::Implementation::mostly_sticks() {
-  z.resize(search.best.size());
-  search.system.velocities(search.best.data(), z.data());
-  const double speed = 1e-3 * search.system.norm_b() / std::sqrt(search.system.size());
-  int against = 0;
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    const double* r = search.best[i].v;
-    const double* w = z[i].v;
-    against += w[0] > speed || (r[0] > 0 && std::hypot(w[1], w[2]) > speed);
-  }
-  return against <= search.system.size() / 4;
-}
-
-// Sweeps until their forecast costs more than interior points; true: solved. Half a factorisation of
-// sweeps by a guess of the fill, then its exact price; after as much again the point where all stick,
-// if a factorisation is cheap or that point looks admissible. The stay before the forecast is asked
-// grows with the sweeps that a factorisation costs: forecasts need sweeps, and in large packings
-// contacts toggle for hundreds of them before they settle.
-bool Solver::Implementation::sweep_while_cheap(bool first, bool regular, double kappa) {
-  constexpr double kSteps = 20;         // factorisations of a run of interior points
-  constexpr double kLookAround = 0.5;   // factorisations
-  constexpr double kStay = 11, kCheap = 30;
-  const double begin = search.counts.work;
-  const auto sweep = [&](double factorisations, double worth) {
-    detail::AcceleratedSweeps::Leave leave;
-    leave.other_cost = interior.cost(search);
-    leave.least_work = factorisations * leave.other_cost - (search.counts.work - begin);
-    leave.worth = worth;
-    sweeps.run(search, leave);
-    return search.solved() || search.exhausted();
-  };
-  if (first) {
-    if (sweep(kLookAround, 3)) return search.solved();
-    interior.order(search);
-    if (sweep(kLookAround, 3)) return search.solved();
-  }
-  const double ratio = interior.cost(search) / search.sweep_cost;
-  if (first && regular && (ratio < kCheap || mostly_sticks())) interior.stick(search);
-  if (search.solved()) return true;
-  // Later as much as the other stages have taken meanwhile.
-  const double share = (begin - 2 * sweep_work) / interior.cost(search);
-  sweep(std::max(share, kappa * (1 + kStay * ratio / (ratio + kCheap))), kSteps);
-  sweep_work += search.counts.work - begin;
-  return search.solved();
-}
-
-// Stages in rotation (README, section 10).
-Status Solver::Implementation::rotate(bool last) {
-  constexpr double kRough = 1e-2, kNear = 1e-3, kDear = 30;
-  constexpr int kPhases = 2;  // Newton phases before a rescue
-  // Rotations without halving the error; one if the law may be replaced afterwards.
-  const int most_patience = last ? 3 : 1;
-  prepare_stages(search.system.size());
-  sweeps.start(search.best.data());
-  double kappa = 1, halved = search.best_error, tenth = search.best_error;
-  bool first = true, regular = true;
-  for (int i = 0; i < search.system.size(); ++i) {
-    double gamma[2];
-    search.system.gamma(i, gamma);
-    regular = regular && std::hypot(gamma[0], gamma[1]) < kStronglyCoupled;
-  }
-  int phases = 0, bursts = 4, burst = 500, patience = 0, outers = 12;
-  for (;;) {
-    if (sweep_while_cheap(first, regular, kappa)) return Status::solved;
-    if (search.exhausted()) return Status::work_limit;
-
-    const double before = search.best_error;
-    // Near an answer interior points need ten steps or so, after a few alternating directions.
-    if (first && regular && before < kNear) {
-      admm.start(search, search.best.data());
-      admm.run(search, 15, true, true);
-      if (search.solved()) return Status::solved;
-      interior.run_near(search, search.best.data(), 30);
-      if (search.solved()) return Status::solved;
-    }
-    if (first && regular) interior.run(search, 40);
-    if (search.solved()) return Status::solved;
-    // Where factorisations are dear sweeps go on before stages that take many.
-    if (first && regular && interior.cost(search) > kDear * search.sweep_cost) {
-      first = false;
-      continue;
-    }
-    admm.start(search, search.best.data());
-    admm.run(search, 200, true, true);
-    if (search.solved()) return Status::solved;
-    if (first && regular && before >= kRough && search.best_error < kRough)
-      interior.run_near(search, search.best.data(), 30);
-    if (search.solved()) return Status::solved;
-    first = false;
-    newton.run(search, search.best.data(), 12);
-    if (search.solved()) return Status::solved;
-    if (infeasible()) return Status::infeasible;
-    if (search.exhausted()) return Status::work_limit;
-    if (search.best_error < 0.9 * before) sweeps.start(search.best.data());
-    kappa = std::min(64.0, 2 * kappa);
-    if (search.best_error < 0.1 * tenth) {
-      tenth = search.best_error;
-      kappa = 1;
-    }
-    if (++phases < kPhases) continue;
-
-    // Rescue: long plain alternating directions identify the active set, Newton finishes.
-    phases = 0;
-    for (int k = 0; k < bursts; ++k) {
-      if (!admm.started()) admm.start(search, search.best.data());
-      if (!admm.started()) break;
-      admm.run(search, burst, false, false);
-      if (search.solved()) return Status::solved;
-      newton.run(search, admm.point(), outers);
-      if (search.solved()) return Status::solved;
-      if (regular) interior.run_proximal(search, admm.point(), 4000, newton);
-      if (search.solved()) return Status::solved;
-      if (search.exhausted()) return Status::work_limit;
-      burst = std::min(20000, burst + burst / 2);
-      outers = std::min(60, outers + 12);
-    }
-    bursts = std::min(16, bursts + 2);
-    sweeps.start(search.best.data());
-    if (search.best_error > 0.5 * halved) {
-      if (++patience >= most_patience) return give_up();
-    } else {
-      patience = 0;
-      halved = search.best_error;
-    }
-  }
-}
-
-bool Solver::Implementation::replace_contacts(double eccentricity, bool only_unconverged) {
-  detail::System& system = search.system;
-  bool any = false;
-  system.blocks(search.best.data(), z.data());
-  double worst = 0;
-  std::vector<double> defect(z.size());
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      const double d = z[i].v[c] - search.best[i].v[c];
-      defect[i] += d * d;
-    }
-    defect[i] = system.weight(static_cast<int>(i)) * std::sqrt(defect[i]);
-    worst = std::max(worst, defect[i]);
-  }
-  for (int i = 0; i < system.size(); ++i) {
-    if (system.problem().local(i).e <= eccentricity || system.replaced(i)) continue;
-    if (only_unconverged && defect[at(i)] < 1e-2 * worst) continue;
-    system.replace(i);
-    any = true;
-  }
-  return any;
-}
 
 Status Solver::Implementation::automatic() {
   // Nothing is allocated before a first sweep has failed.
@@ -266,27 +55,7 @@ Status Solver::Implementation::automatic() {
   search.count_sweep();
   search.test(x.data(), Method::gauss_seidel);
   if (search.solved()) return Status::solved;
-  bool replaceable = false;
-  if (options.law == Law::maximum_dissipation && !options.strict) {
-    for (int i = 0; i < search.system.size(); ++i)
-      replaceable = replaceable || search.system.problem().local(i).e > kCoupled;
-  }
-  if (replaceable) search.work_end = 0.025 * options.max_work;
-  Status status = rotate(!replaceable);
-  // First the strongly coupled contacts that do not converge, then all of them, then coupled ones.
-  z.resize(x.size());
-  for (int attempt = 0; replaceable && attempt < 3 && status != Status::solved && status != Status::infeasible; ++attempt) {
-    search.work_end = attempt == 0 ? std::min(search.counts.work + 0.025 * options.max_work, options.max_work)
-                                   : options.max_work;
-    if (search.exhausted()) return Status::work_limit;
-    if (!replace_contacts(attempt < 2 ? kStronglyCoupled : kCoupled, attempt == 0)) continue;
-    x = search.best;
-    search.best_error = std::numeric_limits<double>::infinity();
-    search.test(x.data(), Method::gauss_seidel);
-    stages_ready = false;
-    status = search.solved() ? Status::solved : rotate(attempt == 2);
-  }
-  return status;
+  return stages.run(search);
 }
 
 // gauss_seidel, sor, jacobi
@@ -329,7 +98,7 @@ Status Solver::Implementation::plain() {
     }
     if (search.exhausted()) return Status::work_limit;
     if (sweep >= window_end) {
-      if (search.best_error > 0.999 * window_error) return give_up();
+      if (search.best_error > 0.999 * window_error) return stages.give_up(search);
       window_error = search.best_error;
       window *= 2;
       window_end = sweep + window;
@@ -349,7 +118,7 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   detail::velocities(problem, search.best.data(), x.data());
   problem.unpack(x, out.velocities);
   out.infeasible_direction.clear();
-  for (const PackedVector& d : pressed)
+  for (const PackedVector& d : stages.proof())
     out.infeasible_direction.insert(out.infeasible_direction.end(), d.v,
                                     d.v + problem.dimension());
   out.regimes.resize(n);
@@ -374,8 +143,7 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
   const std::size_t n = static_cast<std::size_t>(problem.contacts());
   search.reset(problem, options,
                options.measure == Measure::automatic ? Measure::fixed_point : options.measure);
-  stages_ready = looked_for_proof = false;
-  pressed.clear();
+  stages.reset(problem.contacts(), options);
   if (start) {
     if (start->size() != problem.b().size())
       detail::refuse_size("start", start->size(), problem.b().size(), "as many as b has");
@@ -413,35 +181,35 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
         status = Status::solved;
         break;
       }
-      prepare_stages(problem.contacts());
-      sweeps.start(x.data());
+      stages.prepare(search);
+      stages.sweeps.start(x.data());
       detail::AcceleratedSweeps::Leave leave;
       leave.most_sweeps = options.max_sweeps;
-      sweeps.run(search, leave);
-      status = search.solved() ? Status::solved : give_up();
+      stages.sweeps.run(search, leave);
+      status = search.solved() ? Status::solved : stages.give_up(search);
       break;
     }
     case Method::admm:
       search.test(x.data(), Method::admm);
-      prepare_stages(problem.contacts());
-      admm.start(search, x.data());
-      if (!search.solved()) admm.run(search, options.max_sweeps, true, false);
-      status = search.solved() ? Status::solved : give_up();
+      stages.prepare(search);
+      stages.admm.start(search, x.data());
+      if (!search.solved()) stages.admm.run(search, options.max_sweeps, true, false);
+      status = search.solved() ? Status::solved : stages.give_up(search);
       break;
     case Method::proximal_newton:
       search.test(x.data(), Method::gauss_seidel);
-      prepare_stages(problem.contacts());
+      stages.prepare(search);
       search.system.sweep(x.data());
       search.count_sweep();
       search.test(x.data(), Method::gauss_seidel);
-      if (!search.solved()) newton.run(search, x.data(), 60);
-      status = search.solved() ? Status::solved : give_up();
+      if (!search.solved()) stages.newton.run(search, x.data(), 60);
+      status = search.solved() ? Status::solved : stages.give_up(search);
       break;
     case Method::interior_point:
       search.test(x.data(), Method::interior_point);
-      prepare_stages(problem.contacts());
-      if (!search.solved()) interior.run(search, options.max_sweeps);
-      status = search.solved() ? Status::solved : give_up();
+      stages.prepare(search);
+      if (!search.solved()) stages.interior.run(search, options.max_sweeps);
+      status = search.solved() ? Status::solved : stages.give_up(search);
       break;
     case Method::convex_relaxation: {
       const bool done = detail::solve_convex_relaxation(search, x);

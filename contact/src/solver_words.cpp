@@ -55,6 +55,8 @@ const char* name(Status status) {
       return "work_limit";
     case Status::relaxed:
       return "relaxed";
+    case Status::round_off:
+      return "round_off";
     case Status::infeasible:
       return "infeasible";
   }
@@ -75,6 +77,9 @@ const char* advice(Status status, const Options& options) {
     case Status::stalled:
       return "no further progress: round-off or ill-conditioned data, or no solution of the law is "
              "near; error is what was reached; try a larger tolerance or Method::automatic";
+    case Status::round_off:
+      return "error is what rounding leaves of A x - b at impulses of this size: the tolerance cannot "
+             "be reached; use a larger one, or smaller ratios of mass";
     case Status::work_limit:
       return "error is what was reached; raise max_work or max_sweeps, or use Method::automatic";
     case Status::relaxed:

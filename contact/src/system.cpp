@@ -375,6 +375,14 @@ void System::reset(const Problem& given, Law law) {
   sweeps = 0;
 }
 
+void System::belong_to(const System& whole, const int* contacts) {
+  for (int i = 0; i < n_; ++i) {
+    if (whole.replaced(contacts[i])) replace(i);
+    const int unit = mass_.empty() ? 0 : speed_[at(problem_->islands()[at(i)])];
+    inverse_scale_[at(i)] = std::ldexp(whole.inverse_scale(contacts[i]), -unit);
+  }
+}
+
 void System::replace(int i) {
   if (!any_replaced_) rule_.assign(at(n_), 0);
   any_replaced_ = true;

@@ -31,6 +31,9 @@ class System {
  public:
   void reset(const Problem& problem, Law law);
 
+  // After reset() with the problem of some contacts of `whole`: the same rules and velocity scales.
+  void belong_to(const System& whole, const int* contacts);
+
   // The problem that the stages see: the given one, or in units in which nothing leaves the range.
   const Problem& problem() const { return *problem_; }
   // Impulses of the given problem in these units, and back. Exact.

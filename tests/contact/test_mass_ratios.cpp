@@ -117,3 +117,22 @@ TEST_CASE("mass ratios: other units of mass and time change nothing") {
     }
   }
 }
+
+TEST_CASE("mass ratios: what round-off keeps from being solved ends soon and says so") {
+  for (double ratio : {1e8, 1e12}) {
+    for (int n : {100, 400}) {
+      const Problem p = stack(
+                            n, [&](int k) { return k % 2 ? ratio : 1; }, 0.3, 0.1)
+                            .problem();
+      Options o;
+      o.law = Law::coulomb;
+      o.tolerance = 1e-6;
+      const Solution s = Solver(o).solve(p);
+      INFO(n << " boxes, 1 : " << ratio << ": " << name(s.status) << " " << s.error);
+      CHECK(s.status == Status::round_off);
+      CHECK(s.counts.work < 0.06 * o.max_work);  // limit of work: 1e10
+      CHECK(s.error < 1e-13 * n * ratio);        // the size of the impulses
+      CHECK_FALSE(s.advice.empty());
+    }
+  }
+}

@@ -58,11 +58,11 @@ random::Packing close_packing(int cells, bool spheres, double mu, std::uint64_t 
 
 }  // namespace
 
-// Seven of the eight take 1.0 to 1.26 times the work of the best stage; spheres with mu 0.7, seed 2,
-// whose contacts toggle for long, take 11.6 times: a known weakness, which the mean includes.
+// Six of the eight take 0.2 to 1.17 times the work of the best stage, the others 1.46 and 1.77: with
+// much friction the number of sweeps until contacts settle is chance, and any step aside is another throw.
 TEST_CASE("packings: automatic solves all, most at little more than the cost of its best stage") {
   double ratios = 1;
-  int count = 0, dear = 0;
+  int count = 0;
   for (bool spheres : {true, false}) {
     for (double mu : {0.4, 0.7}) {
       for (std::uint64_t seed : {1, 2}) {
@@ -85,12 +85,37 @@ TEST_CASE("packings: automatic solves all, most at little more than the cost of 
           if (other.status == Status::solved) best = std::min(best, other.counts.work);
         }
         UNSCOPED_INFO(s.counts.work / best);
-        if (s.counts.work > 1.4 * best) ++dear;
+        CHECK(s.counts.work < 2 * best);
         ratios *= s.counts.work / best;
         ++count;
       }
     }
   }
-  CHECK(dear <= 1);
-  CHECK(std::pow(ratios, 1.0 / count) < 1.6);
+  CHECK(std::pow(ratios, 1.0 / count) < 1.2);
+}
+
+TEST_CASE("packings: the few contacts that toggle are solved as problems of their own") {
+  double ratios = 1;
+  int count = 0;
+  for (bool spheres : {true, false}) {
+    for (std::uint64_t seed : {3, 4}) {
+      const random::Packing packing = close_packing(5, spheres, 1, seed);
+      const Problem p = delassus(to_bodies(packing.bodies), to_contacts(packing.contacts));
+      Options o;
+      o.law = Law::coulomb;
+      o.tolerance = 1e-6;
+      const Solution s = Solver(o).solve(p);
+      o.method = Method::anderson;  // the same sweeps, without
+      o.max_work = 1e9;
+      const Solution alone = Solver(o).solve(p);
+      INFO((spheres ? "spheres" : "bodies") << ", seed " << seed << ": " << name(s.status) << " "
+                                            << s.error << ", " << s.counts.work << " and "
+                                            << alone.counts.work);
+      CHECK(s.status == Status::solved);
+      CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1e-6);
+      ratios *= s.counts.work / alone.counts.work;
+      ++count;
+    }
+  }
+  CHECK(std::pow(ratios, 1.0 / count) < 0.8);
 }

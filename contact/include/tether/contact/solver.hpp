@@ -39,6 +39,7 @@ enum class Status : std::uint8_t {
   cycling,    ///< the iteration repeats without progress; often no solution of the law is near
   work_limit, ///< max_work or max_sweeps reached while there was progress
   relaxed,    ///< convex_relaxation converged, but its answer violates the law (see error)
+  round_off,  ///< what is left is what round-off makes of A x - b: no smaller tolerance can be reached
   infeasible  ///< no impulses keep every w_n >= 0, see Solution::infeasible_direction
 };
 
@@ -69,8 +70,19 @@ struct HistoryEntry {
 };
 
 struct Counts {
-  int sweeps = 0, admm_iterations = 0, factorisations = 0, interior_steps = 0, tests = 0, newton_phases = 0;
+  int sweeps = 0, admm_iterations = 0, factorisations = 0, interior_steps = 0, tests = 0,
+      newton_phases = 0;
   double work = 0;  ///< estimated nanoseconds
+
+  void add(const Counts& other) {
+    sweeps += other.sweeps;
+    admm_iterations += other.admm_iterations;
+    factorisations += other.factorisations;
+    interior_steps += other.interior_steps;
+    tests += other.tests;
+    newton_phases += other.newton_phases;
+    work += other.work;
+  }
 };
 
 struct Solution {
