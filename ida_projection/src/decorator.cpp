@@ -64,6 +64,7 @@ int Projection::Impl::initialize() {
   moved_id_ = OwnedVector();
   if (mover_) mover_->reset();
   smoother_.reset();
+  order_limit_.reset();
   frequency_.reset();
   repeated_ = false;
   refused_in_row_ = 0;
@@ -128,7 +129,7 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
     return 0;
   }
   const int flag = correct_and_move(candidate, tolerance, call_setup);
-  if (flag == 0 && smoother_.on()) control_step(candidate);
+  if (flag == 0) control_step(candidate);
   return flag;
 }
 
@@ -217,26 +218,6 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   account(move, step, stopwatch.running());
   if (last_steps_ <= kFirstSteps && move.status == Status::success) look_at_first_steps(at, step);
   return finish(move.status, move.capped ? capped_message_ : mover_->message());
-}
-
-// IDA computes its weights anew for a new step, but not for another attempt at the same one.
-void Projection::Impl::restore_weights(N_Vector weights) {
-  if (weights_factor_ == 1.0) return;
-  long steps = 0;
-  IDAGetNumSteps(ida_mem_, &steps);
-  if (steps == last_steps_) N_VScale(1.0 / weights_factor_, weights, weights);
-  weights_factor_ = 1.0;
-}
-
-// |ycor| in the norm of IDA's error test decides the next step size.
-void Projection::Impl::control_step(const Candidate& candidate) {
-  long steps = 0;
-  IDAGetNumSteps(ida_mem_, &steps);
-  const bool suppressed = engaged_ && id_ && has_algebraic_ && options_.suppress_algebraic;
-  weights_factor_ = smoother_.control(
-      steps, suppressed ? N_VWrmsNormMask(candidate.correction, candidate.weights, id_)
-                        : N_VWrmsNorm(candidate.correction, candidate.weights));
-  if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
 }
 
 int Projection::Impl::corrector_failed(int flag) {

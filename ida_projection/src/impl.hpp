@@ -13,6 +13,7 @@
 #include "gauss_newton.hpp"
 #include "ida_lifetime.hpp"
 #include "mover.hpp"
+#include "order_limit.hpp"
 #include "sampled_time.hpp"
 #include "step_smoothing.hpp"
 
@@ -120,8 +121,6 @@ class Projection::Impl {
   void stop(int flag, const std::string& text);
   int correct(const Candidate& candidate, double tolerance, bool call_setup);
   int correct_and_move(Candidate& candidate, double tolerance, bool call_setup);
-  void control_step(const Candidate& candidate);
-  void restore_weights(N_Vector weights);
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   void look_for_refusals();
@@ -144,6 +143,12 @@ class Projection::Impl {
   void account(const Move& move, const StepData& step, bool sampled);
   void note(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
+
+  // step_control.cpp
+  void restore_weights(N_Vector weights);
+  double error_norm(N_Vector v, N_Vector weights) const;
+  void control_step(const Candidate& candidate);
+  void compare_slopes(const Candidate& candidate, long steps);
 
   // collapse.cpp
   void count_rejections();
@@ -189,6 +194,8 @@ class Projection::Impl {
   void* ida_mem_;
   Options options_;
   StepSmoother smoother_;
+  OrderLimit order_limit_;
+  OwnedVector kept_slope_;  // y' of a step, for the order
   FrequencyPolicy frequency_;
   long rejections_ = 0, rejections_before_ = 0;  // attempts that IDA repeated
   long window_begin_ = 0;                        // accepted steps when they were last looked at

@@ -51,6 +51,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       ida_mem_(ida_mem),
       options_(std::move(options)),
       smoother_(ida_mem, options_),
+      order_limit_(ida_mem, options_),
       frequency_(options_.frequency) {
   if (ida_mem == nullptr) reject("ida_mem is null; pass what IDACreate returned");
   N_Vector like = nullptr, yppred, yyn, ypn, res;

@@ -94,6 +94,12 @@ struct Options {
   double maximum_step = 0.0;
   int maximum_order = 5;
 
+  /// Limit the order to 2 where higher ones excite fast oscillations that are below the tolerance
+  /// otherwise, which is seen by the differences of y (ida_projection/README.md, section 9); not
+  /// while step sizes are smoothed. Uses IDASetMaxOrd and IDASetEtaFixedStepBounds, and multiplies
+  /// the error weights in the three steps that lower the order.
+  bool limit_order = true;
+
   /// Components that a move must not change: true = held. Empty, or one entry for each unknown
   /// (serial vectors). For other vectors use `hold_vector`: 1 free, 0 held.
   std::vector<bool> hold;

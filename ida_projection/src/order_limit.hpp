@@ -1,0 +1,74 @@
+// Tether: keeps IDA off the orders that excite oscillations. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/ida_projection/options.hpp>
+
+namespace tether::ida_projection {
+
+/// BDF of order 3 to 5 amplifies undamped oscillations of frequency w where about 0.7 < w h < 5
+/// (Hairer and Wanner II, V.1): a mode whose amplitude is far below the tolerance grows until it
+/// is what the step size has to resolve. Order 2 damps it. What is seen of it is the ratio of the
+/// backward differences that IDA's error test uses,
+///
+///     r = (|nabla^(k+1) y| / |nabla^2 y|)^(1 / (k - 1)),   nabla^(k+1) y = ycor,
+///     nabla^2 y = h (y'_n - y'_{n-1}),
+///
+/// 2 sin(w h / 2) of the oscillation that dominates the error. A motion worth resolving, of an
+/// amplitude of 1000 tolerances, has r < 0.4 at order 5. Where r stays large, the order is limited
+/// to 2; the limit stays if the steps do not become shorter for it, and is tried again and again
+/// without.
+class OrderLimit {
+ public:
+  OrderLimit(void* ida_mem, const Options& options)
+      : ida_mem_(ida_mem), wanted_(options.limit_order) {}
+
+  /// Before the first step.
+  void reset();
+  /// No limit for the rest of the run.
+  void end();
+  /// Does this attempt look at y'? As the first or the second of two steps in a row; `steps`
+  /// accepted before it.
+  bool keeps_slope(long steps) const { return on_ && steps % kEvery == 0; }
+  bool compares_slopes(long steps) const { return on_ && steps % kEvery == 1; }
+  /// For such a second attempt: |ycor| and |h (y'_n - y'_{n-1})| in the norm of IDA's error test.
+  void note_differences(long steps, double ycor, double curvature);
+  /// At the end of each successful solve at time t. Returns by how much IDA's error weights are to
+  /// be multiplied for the rest of this attempt; 1: left alone.
+  double control(long steps, double t, double norm);
+
+  bool lowering() const { return phase_ == Phase::lowering; }
+  long begun() const { return begun_; }
+
+ private:
+  static constexpr int kLimit = 2;
+  static constexpr long kEvery = 4;
+  enum class Phase { watching, lowering, limited };
+
+  void take_sample(long steps, int most);
+  void watch(long steps, int order);
+  double lower(int order, long steps, double t, double norm);
+  void judge(long steps, double t);
+  void release(long steps, long wait);
+  void hold_step(bool hold);
+
+  void* ida_mem_;
+  bool wanted_, on_ = false;
+  Phase phase_ = Phase::watching;
+  long begun_ = 0;
+
+  // of the differences
+  double pending_ = 0.0;  // log r of an attempt that IDA has not yet judged
+  long pending_steps_ = -1;
+  int samples_ = 0;
+  double mean_ = 0.0;  // of log r
+
+  int tries_ = 0, highest_ = 0;
+  bool kept_ = false;         // a limit that made the steps no shorter
+  double step_before_ = 0.0;  // the limit
+  long since_ = 0;            // steps when it was judged last
+  double t_since_ = 0.0;
+  long trials_ = 0, duration_ = 1;  // of kTrial steps each, passed and at least wanted
+  long not_before_ = 0, wait_ = 0;  // after one that made the steps shorter
+};
+
+}  // namespace tether::ida_projection
