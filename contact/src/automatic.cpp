@@ -221,6 +221,21 @@ bool Automatic::rescue(Search& search, Rotation& r) {
   return false;
 }
 
+// Many contacts between few bodies, such as the bricks of a wall: impulses are far from unique, the
+// path of interior points ends where contacts that stick and slide admit no solution, and sweeps
+// hardly move. The proximal problems have a path, and factorisations by bodies are cheap.
+void Automatic::few_bodies(Search& search) {
+  constexpr int kSweeps = 30;
+  x_ = search.best;
+  for (int k = 0; k < kSweeps; ++k) {
+    search.system.sweep(x_.data());
+    search.count_sweep();
+    if (k % 10 == 9) search.test(x_.data(), Method::gauss_seidel);
+    if (search.solved()) return;
+  }
+  interior.run_proximal(search, search.best.data(), 4000, newton);
+}
+
 // Stages in rotation (README, section 10).
 Status Automatic::rotate(Search& search, bool last) {
   constexpr int kPhases = 2;  // Newton phases before a rescue
@@ -234,6 +249,12 @@ Status Automatic::rotate(Search& search, bool last) {
     double gamma[2];
     search.system.gamma(i, gamma);
     r.regular = r.regular && std::hypot(gamma[0], gamma[1]) < kStronglyCoupled;
+  }
+  if (r.regular && interior.order_bodies(search)) {
+    few_bodies(search);
+    if (search.solved()) return Status::solved;
+    if (search.exhausted()) return Status::work_limit;
+    sweeps.start(search.best.data());
   }
   for (;;) {
     if (sweep_while_cheap(search, r)) return Status::solved;

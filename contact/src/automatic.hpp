@@ -38,6 +38,7 @@ class Automatic {
   bool infeasible(Search& search);
   bool at_round_off(const Search& search) const;
   bool mostly_sticks(Search& search);
+  void few_bodies(Search& search);
   bool replace_contacts(Search& search, double eccentricity, bool only_unconverged);
   bool sweep_first(Search& search, const Rotation& r);
   bool sweep_while_cheap(Search& search, Rotation& r);

@@ -117,10 +117,8 @@ TETHER_CLONES void substitute(int n, const int* lower_start, const int* lower,
 
 }  // namespace
 
-void BlockLu::order(const Problem& problem) {
-  const int n = problem.contacts();
-  const auto& start = problem.row_start();
-  const auto& columns = problem.columns();
+void BlockLu::order(const std::vector<int>& start, const std::vector<int>& columns) {
+  const int n = static_cast<int>(start.size()) - 1;
   full_order_.resize(at(n));
   for (int i = 0; i < n; ++i) full_order_[at(i)] = i;
   // A dense matrix has nothing to order.
@@ -138,8 +136,9 @@ void BlockLu::order(const Problem& problem) {
   analysed_ = false;
 }
 
-void BlockLu::analyse(const Problem& problem, const char* active) {
-  const int n = problem.contacts();
+void BlockLu::analyse(const std::vector<int>& start, const std::vector<int>& columns,
+                      const char* active) {
+  const int n = static_cast<int>(start.size()) - 1;
   if (analysed_) {
     bool same = true;
     for (int i = 0; i < n && same; ++i) same = (active == nullptr || active[i]) == (active_[at(i)] != 0);
@@ -157,8 +156,6 @@ void BlockLu::analyse(const Problem& problem, const char* active) {
   n_ = static_cast<int>(contact_.size());
 
   // S_k = later neighbours of k and of the children of k in the elimination tree.
-  const auto& start = problem.row_start();
-  const auto& columns = problem.columns();
   std::vector<int> mark(at(n_), -1), first_child(at(n_), -1), sibling(at(n_), -1);
   upper_start_.assign(1, 0);
   upper_.clear();

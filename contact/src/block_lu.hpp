@@ -18,9 +18,14 @@ struct BlockPivot {
 // order() once for a problem, analyse() for each active set, then load() every block, factor().
 class BlockLu {
  public:
-  void order(const Problem& problem);
+  void order(const Problem& problem) { order(problem.row_start(), problem.columns()); }
   // Rows and columns with active != 0 (null: all). Does nothing if the set is the last one.
-  void analyse(const Problem& problem, const char* active);
+  void analyse(const Problem& problem, const char* active) {
+    analyse(problem.row_start(), problem.columns(), active);
+  }
+  // The same for any pattern of blocks: symmetric, with its diagonal, columns ascending.
+  void order(const std::vector<int>& start, const std::vector<int>& columns);
+  void analyse(const std::vector<int>& start, const std::vector<int>& columns, const char* active);
   double operations() const { return operations_; }  // sum of |S_k|^2 over the pivots
 
   int size() const { return n_; }

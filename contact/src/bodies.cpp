@@ -1,12 +1,15 @@
 // Tether: the Delassus matrix of bodies in contact. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/bodies.hpp>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
+#include "body_form.hpp"
 #include "refuse.hpp"
 
 namespace tether::contact {
@@ -73,6 +76,44 @@ BodyContact BodyContact::at_point(int first, int second, const Eigen::Vector3d& 
   return c;
 }
 
+namespace {
+
+// C with C C' = inverse mass.
+Matrix6d root(const Matrix6d& inverse_mass) {
+  using Plain = Eigen::Matrix<double, 6, 6>;
+  const Eigen::LLT<Plain> cholesky((Plain(inverse_mass)));
+  if (cholesky.info() == Eigen::Success) return Plain(cholesky.matrixL());
+  const Eigen::SelfAdjointEigenSolver<Plain> eigen((Plain(inverse_mass)));
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+std::shared_ptr<const detail::BodyForm> body_form(const std::vector<Body>& bodies,
+                                                  const std::vector<BodyContact>& contacts) {
+  auto form = std::make_shared<detail::BodyForm>();
+  form->bodies = static_cast<int>(bodies.size());
+  std::vector<Matrix6d> C;
+  for (const Body& body : bodies) C.push_back(root(body.inverse_mass));
+  form->contacts.resize(contacts.size());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const BodyContact& c = contacts[i];
+    detail::BodyForm::Contact& to = form->contacts[i];
+    const int body[2] = {c.first, c.second};
+    for (int s = 0; s < 2; ++s) {
+      const bool moves = body[s] >= 0 && !bodies[at(body[s])].inverse_mass.isZero(0);
+      to.body[s] = moves ? body[s] : -1;
+      if (!moves) continue;
+      const Matrix36d H = (s == 0 ? c.J1 : c.J2) * C[at(body[s])];
+      for (int h = 0; h < 2; ++h)
+        for (int r = 0; r < 3; ++r)
+          for (int k = 0; k < 3; ++k)
+            to.H[s][h].column[4 * k + r] = to.turned[s][h].column[4 * r + k] = H(r, 3 * h + k);
+    }
+  }
+  return form;
+}
+
+}  // namespace
+
 Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
   check(bodies, contacts);
   const int n = static_cast<int>(contacts.size());
@@ -101,7 +142,10 @@ Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>
       for (const Side& q : sides[k]) blocks.push_back({p.contact, q.contact, JM * q.J->transpose()});
     }
   }
-  return Problem::sparse(3, std::move(blocks), b, mu);
+  Problem problem = Problem::sparse(3, std::move(blocks), b, mu);
+  // Only where it may serve: rows of bodies are fewer than those of contacts.
+  if (bodies.size() < contacts.size()) problem.set_body_form(body_form(bodies, contacts));
+  return problem;
 }
 
 std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,

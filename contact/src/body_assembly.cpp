@@ -46,6 +46,7 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
   o.tolerance = 0.9 * options.tolerance;  // the two forms round differently
   o.strict = options.strict;
   o.max_work = options.max_work;
+  o.enough = options.enough;
   worker.solver = std::make_unique<Solver>(o);
   worker.solution = worker.solver->solve(problem, x);
   r.status = worker.solution.status;

@@ -97,7 +97,7 @@ struct BodySolver::Implementation {
   BodyOptions options;
   detail::WorkerTeam threads_;
   detail::ContactGraph graph;
-  detail::ImpulseMemory memory;
+  detail::ImpulseMemory memory, memory_before;  // of the last solve, and of the one before it
   std::vector<std::unique_ptr<Worker>> workers;
 
   // The present problem; the caller's.

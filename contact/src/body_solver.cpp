@@ -44,6 +44,7 @@ void check(const BodyOptions& o) {
   require(o.threads >= 1 && o.threads <= 256, "threads", o.threads, "must lie in 1 .. 256");
   require(o.max_assembled >= 0, "max_assembled", o.max_assembled, "must be >= 0");
   require(o.max_work > 0, "max_work", o.max_work, "must be > 0");
+  require(o.enough >= 0, "enough", o.enough, "must be >= 0");
 }
 
 }  // namespace
@@ -190,6 +191,7 @@ void BodySolver::Implementation::finish() {
   out->spheres = general.empty() && general4.empty();
 
   if (options.warm_start) {
+    std::swap(memory, memory_before);
     memory.clear();
     for (std::size_t i = 0; i < contacts->size(); ++i)
       memory.add((*contacts)[i].id, out->impulses[i]);
@@ -222,6 +224,7 @@ void BodySolver::scale_warm_start(double factor) {
   }
   implementation_->memory.scale(factor);
 }
+void BodySolver::take_back() { std::swap(implementation_->memory, implementation_->memory_before); }
 void BodySolver::forget() { implementation_->memory.clear(); }
 WarmStart BodySolver::warm_start() const {
   return {implementation_->memory.ids(), implementation_->memory.impulses()};

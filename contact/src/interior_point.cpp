@@ -42,12 +42,13 @@ void InteriorPoint::reset(int contacts) {
   sides_.resize(at(n_));
   flat_.resize(at(n_));
   tau_ = 0;
-  ordered_ = false;
+  ordered_ = by_bodies_ = false;
   stuck_ = Stuck::untried;
 }
 
 double InteriorPoint::cost(const Search& search) const {
   const double blocks = static_cast<double>(search.system.problem().blocks().size());
+  if (ordered_ && by_bodies_) return bodies_.cost() + 3 * search.sweep_cost;
   const double operations = ordered_ ? lu_.operations() : blocks * blocks / std::max(1, n_);
   return 4 * operations + 3 * search.sweep_cost + 25 * blocks + 150.0 * n_;
 }
@@ -127,34 +128,56 @@ bool InteriorPoint::scale(const System& system) {
   return true;
 }
 
-// Unknowns W dx in the frames of the scalings.
-bool InteriorPoint::factor(Search& search) {
-  const Problem& p = search.system.problem();
-  if (!scale(search.system)) return false;
-  bool regular = true;
+// The block on the diagonal of the Newton matrix, with A in it (whole) or what else is there.
+void InteriorPoint::diagonal(const System& system, int i, bool whole, PackedBlock& scaled) const {
+  const Problem& p = system.problem();
+  PackedBlock block;
+  if (whole)
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k)
+      if (p.columns()[at(k)] == i) block = p.blocks()[at(k)];
+  for (int c = 0; c < 3; ++c) {
+    double unit[3] = {0, 0, 0};
+    unit[c] = 1;
+    add_block(p.local(i), tau_, unit, block.column + 4 * c);
+    block.column[5 * c] += shift_ * mean_diagonal(p.local(i));
+  }
+  enclose(sides_[at(i)].left, block, sides_[at(i)].right, scaled);
+  for (int c = 0; c < 3; ++c) scaled.column[5 * c] += 1;
+}
+
+bool InteriorPoint::factor_contacts(const System& system) {
+  const Problem& p = system.problem();
   PackedBlock scaled;
-  for (int row = 0; row < n_ && regular; ++row) {
+  for (int row = 0; row < n_; ++row) {
     const int i = lu_.contact(row);
     lu_.begin_row(row);
     for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
       const int j = p.columns()[at(k)];
-      if (i != j) {
+      if (i != j)
         enclose(sides_[at(i)].left, p.blocks()[at(k)], sides_[at(j)].right, scaled);
-      } else {
-        PackedBlock block = p.blocks()[at(k)];
-        for (int c = 0; c < 3; ++c) {
-          double unit[3] = {0, 0, 0};
-          unit[c] = 1;
-          add_block(p.local(i), tau_, unit, block.column + 4 * c);
-          block.column[5 * c] += shift_ * mean_diagonal(p.local(i));
-        }
-        enclose(sides_[at(i)].left, block, sides_[at(i)].right, scaled);
-        for (int c = 0; c < 3; ++c) scaled.column[5 * c] += 1;
-      }
+      else
+        diagonal(system, i, true, scaled);
       lu_.add(j, scaled.column);
     }
-    regular = lu_.end_row();
+    if (!lu_.end_row()) return false;
   }
+  return true;
+}
+
+bool InteriorPoint::factor_bodies(const System& system) {
+  PackedBlock scaled;
+  bodies_.begin();
+  for (int i = 0; i < n_; ++i) {
+    diagonal(system, i, false, scaled);
+    bodies_.add(i, scaled, sides_[at(i)].left, sides_[at(i)].right);
+  }
+  return bodies_.factor();
+}
+
+// Unknowns W dx in the frames of the scalings.
+bool InteriorPoint::factor(Search& search) {
+  if (!scale(search.system)) return false;
+  const bool regular = by_bodies_ ? factor_bodies(search.system) : factor_contacts(search.system);
   ++search.counts.factorisations;
   ++search.counts.interior_steps;
   search.counts.work += cost(search);
@@ -254,10 +277,10 @@ void InteriorPoint::direction(const System& system, double centre, bool correct)
   constexpr double kRefine = 1e-6;
   constexpr int kRefinements = 3;
   aim(centre, correct);
-  lu_.solve(step_.data());
+  solve(step_.data());
   double defect = expand(system);
   for (int k = 0; k < kRefinements && defect > kRefine; ++k) {
-    lu_.solve(defect_.data());
+    solve(defect_.data());
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) step_[at(i)].v[c] += defect_[at(i)].v[c];
     const double before = defect;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "block_lu.hpp"
+#include "body_newton.hpp"
 #include "cone_scaling.hpp"
 #include "proximal_newton.hpp"
 #include "search.hpp"
@@ -29,6 +30,9 @@ class InteriorPoint {
   void order(Search& search);
   // Estimated ns of one step; by a guess of the fill before order().
   double cost(const Search& search) const;
+  // True, and ordered, where bodies have so many contacts that equations of bodies take the place of
+  // those of contacts.
+  bool order_bodies(Search& search);
 
  private:
   // Around contact i the Newton matrix is left A right + 1, left = D^-1 Q J^-1 P^-1 and
@@ -47,6 +51,12 @@ class InteriorPoint {
   double natural_map(const System& system) const;
   bool scale(const System& system);
   bool factor(Search& search);
+  bool factor_contacts(const System& system);
+  bool factor_bodies(const System& system);
+  bool factor_stuck(const Problem& problem);
+  void find_flat(const System& system);
+  void diagonal(const System& system, int i, bool whole, PackedBlock& scaled) const;
+  void solve(PackedVector* x) { by_bodies_ ? bodies_.solve(x) : lu_.solve(x); }
   void aim(double centre, bool correct);
   double expand(const System& system);
   void direction(const System& system, double centre, bool correct);
@@ -61,6 +71,8 @@ class InteriorPoint {
       0;  // added to the Newton matrix, relative to A: bounds steps along its null space
   bool ordered_ = false;
   BlockLu lu_;
+  BodyNewton bodies_;
+  bool by_bodies_ = false;
   // A x = b, how far it is outside of the cone at most, and the sum of its lengths.
   enum class Stuck { untried, unknown, found } stuck_ = Stuck::untried;
   Packed stuck_x_;

@@ -6,15 +6,62 @@
 
 namespace tether::contact::detail {
 
+bool InteriorPoint::order_bodies(Search& search) {
+  if (ordered_) return by_bodies_;
+  constexpr int kMany = 4;          // contacts for each body
+  constexpr double kClearly = 0.5;  // of a guess, and of factors whose digits need no refinement
+  const Problem& p = search.system.problem();
+  const BodyForm* form = p.body_form();
+  if (form == nullptr || n_ < kMany * form->bodies) return false;
+  bodies_.order(p);
+  if (!(bodies_.cost() + 3 * search.sweep_cost < kClearly * cost(search))) return false;
+  search.counts.work += 500.0 * n_;
+  ordered_ = by_bodies_ = true;
+  find_flat(search.system);
+  return true;
+}
+
 void InteriorPoint::order(Search& search) {
-  if (ordered_) return;
+  if (ordered_ || order_bodies(search)) return;
   search.counts.work += 100 * static_cast<double>(search.system.problem().blocks().size());
   lu_.order(search.system.problem());
   lu_.analyse(search.system.problem(), nullptr);
-  for (int i = 0; i < n_; ++i)
-    flat_[at(i)] =
-        search.system.law() == Law::frictionless || !(search.system.problem().local(i).mu > 0);
   ordered_ = true;
+  find_flat(search.system);
+}
+
+void InteriorPoint::find_flat(const System& system) {
+  for (int i = 0; i < n_; ++i)
+    flat_[at(i)] = system.law() == Law::frictionless || !(system.problem().local(i).mu > 0);
+}
+
+// A, shifted.
+bool InteriorPoint::factor_stuck(const Problem& p) {
+  // Below the eigenvalues that light bodies between heavy ones leave (1e-12 of the largest for 200
+  // boxes of masses 1 : 1e6), above the rounding of A; by bodies above what cancels.
+  const double shift = by_bodies_ ? 1e-9 : 1e-12;
+  if (by_bodies_) {
+    PackedBlock unit, block;
+    for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
+    bodies_.begin();
+    for (int i = 0; i < n_; ++i) {
+      for (int c = 0; c < 3; ++c) block.column[5 * c] = shift * mean_diagonal(p.local(i));
+      bodies_.add(i, block, unit, unit);
+    }
+    return bodies_.factor();
+  }
+  for (int row = 0; row < n_; ++row) {
+    const int i = lu_.contact(row);
+    lu_.begin_row(row);
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      PackedBlock block = p.blocks()[at(k)];
+      if (p.columns()[at(k)] == i)
+        for (int c = 0; c < 3; ++c) block.column[5 * c] += shift * mean_diagonal(p.local(i));
+      lu_.add(p.columns()[at(k)], block.column);
+    }
+    if (!lu_.end_row()) return false;
+  }
+  return true;
 }
 
 // A x = b: the point where everything sticks, in the frame where the cone is its own dual. Where it
@@ -25,25 +72,12 @@ void InteriorPoint::stick(Search& search) {
   System& system = search.system;
   const Problem& p = system.problem();
   order(search);
-  // Below the eigenvalues that light bodies between heavy ones leave (1e-12 of the largest for 200
-  // boxes of masses 1 : 1e6), above the rounding of A.
-  constexpr double kShift = 1e-12;
   constexpr int kRefinements = 6;
-  for (int row = 0; row < n_; ++row) {
-    const int i = lu_.contact(row);
-    lu_.begin_row(row);
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      PackedBlock block = p.blocks()[at(k)];
-      if (p.columns()[at(k)] == i)
-        for (int c = 0; c < 3; ++c) block.column[5 * c] += kShift * mean_diagonal(p.local(i));
-      lu_.add(p.columns()[at(k)], block.column);
-    }
-    if (!lu_.end_row()) return;
-  }
+  if (!factor_stuck(p)) return;
   ++search.counts.factorisations;
   search.counts.work += cost(search);
   for (int i = 0; i < n_; ++i) z_[at(i)] = p.packed_b()[at(i)];
-  lu_.solve(z_.data());
+  solve(z_.data());
   stuck_size_ = outside_ = 0;
   for (int i = 0; i < n_; ++i) {
     double* x = stuck_x_[at(i)].v;
@@ -69,7 +103,7 @@ void InteriorPoint::stick(Search& search) {
     if (search.solved() || !(error < 0.5 * last)) return;
     last = error;
     system.velocities(z_.data(), w_.data());
-    lu_.solve(w_.data());
+    solve(w_.data());
     search.count_sweep();
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) z_[at(i)].v[c] -= w_[at(i)].v[c];

@@ -157,6 +157,7 @@ void Problem::set_ids(std::vector<std::uint64_t> ids) {
 
 Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const {
   Problem out = *this;
+  out.body_form_.reset();  // of other units
   for (int i = 0; i < contacts(); ++i) {
     const std::size_t island = at(islands_[at(i)]);
     out.local_[at(i)] = detail::rescaled(local_[at(i)], mass[island]);

@@ -8,7 +8,7 @@ namespace tether::contact::detail {
 // solution, x drifts at a constant rate until one of them changes (README, section 9).
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
                                  ProximalNewton& newton) {
-  constexpr int kCorrections = 4, kSteps = 20, kPatience = 700;
+  constexpr int kCorrections = 4, kSteps = 20, kPatience = 700, kSweeps = 3;
   constexpr double kLeast = 1e-9, kMost = 1;  // tau
   System& system = search.system;
   Packed rate(at(n_)), point(at(n_));  // rate: tau (x_k+1 - x_k)
@@ -60,6 +60,13 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
     drifting = true;
     std::copy(point.begin(), point.end(), anchor_.begin());
     search.test(anchor_.data(), Method::interior_point);
+    // What single contacts are off by, sweeps take out.
+    std::copy(anchor_.begin(), anchor_.end(), swept_.begin());
+    for (int k = 0; k < kSweeps && !search.solved(); ++k) {
+      system.sweep(swept_.data());
+      search.count_sweep();
+    }
+    if (!search.solved()) search.test(swept_.data(), Method::interior_point);
     if (search.solved()) break;
     tau = std::max(kLeast, (corrections == 1 ? 0.4 : 0.5) * tau);
   }

@@ -24,7 +24,10 @@ struct Search {
   // Measures x, keeps it if it is the best.
   double test(const PackedVector* x, Method stage);
   bool solved() const { return best_error <= options.tolerance; }
-  bool exhausted() const { return counts.work > work_end; }
+  bool exhausted() const {
+    return counts.work > work_end ||
+           (best_error <= options.enough && counts.work > 0.25 * options.max_work);
+  }
   void count_sweep(double factor = 1) {
     ++counts.sweeps;
     counts.work += factor * sweep_cost;

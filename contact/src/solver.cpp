@@ -28,6 +28,7 @@ void check(const Options& o) {
           "must lie in (0, 1] for jacobi");
   require(o.max_sweeps >= 1, "max_sweeps", o.max_sweeps, "must be >= 1");
   require(o.max_work > 0, "max_work", o.max_work, "must be > 0");
+  require(o.enough >= 0, "enough", o.enough, "must be >= 0");
   require(o.anderson_depth >= 1 && o.anderson_depth <= detail::Anderson::kMaxDepth,
           "anderson_depth", o.anderson_depth, "must lie in 1 .. 20");
 }

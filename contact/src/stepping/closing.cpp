@@ -20,7 +20,7 @@ void Closing::begin(const std::vector<Impact>& impacts, const BodySet& bodies,
   if (!closes_.empty()) free_ = bodies.motion;
 }
 
-bool Closing::find(const BodySet& bodies, double dt, StepContacts& contacts,
+bool Closing::find(const BodySet& bodies, double dt, const StepContacts& contacts,
                    std::vector<RigidBody>& move) {
   if (closes_.empty()) return false;
   islands_.join(bodies, contacts);
@@ -30,12 +30,20 @@ bool Closing::find(const BodySet& bodies, double dt, StepContacts& contacts,
   };
   for (const int c : closes_) mark(c) = 1;
   for (const int c : bounces_) mark(c) = 0;
-  for (std::size_t k = 0; k < contacts.points.size(); ++k)
-    contacts.points[k].bias = contacts.gaps[k] > 0 ? contacts.gaps[k] / dt : 0;
-  // All of the others stay as they are.
-  for (std::size_t i = 0; i < free_.size(); ++i)
-    if (!marked_[at(islands_.root(static_cast<int>(i)))]) free_[i] = bodies.motion[i];
-  solver_.solve(free_, contacts.points, solution_);
+  // Contacts of the others are left out. It starts from the impulses that the first solve has
+  // found.
+  points_.clear();
+  start_.ids.clear();
+  start_.impulses.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    if (!mark(static_cast<int>(k))) continue;
+    points_.push_back(contacts.points[k]);
+    points_.back().bias = contacts.gaps[k] > 0 ? contacts.gaps[k] / dt : 0;
+    start_.ids.push_back(points_.back().id);
+    start_.impulses.push_back(contacts.impulses[k]);
+  }
+  solver_.set_warm_start(start_);
+  solver_.solve(free_, points_, solution_);
   move.resize(bodies.motion.size());
   for (std::size_t i = 0; i < move.size(); ++i) {
     move[i].velocity.setZero();

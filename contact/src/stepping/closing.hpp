@@ -20,9 +20,9 @@ class Closing {
   /// After the impacts are chosen, before the solve: velocities with the forces of the step.
   void begin(const std::vector<Impact>& impacts, const BodySet& bodies,
              const StepContacts& contacts);
-  /// After the solve. Fills `move`: velocities to add for this step; false: there are none. Changes
-  /// the bias of contacts.
-  bool find(const BodySet& bodies, double dt, StepContacts& contacts, std::vector<RigidBody>& move);
+  /// After the solve. Fills `move`: velocities to add for this step; false: there are none.
+  bool find(const BodySet& bodies, double dt, const StepContacts& contacts,
+            std::vector<RigidBody>& move);
 
   /// All that one step leaves to the next.
   WarmStart warm_start() const { return solver_.warm_start(); }
@@ -33,6 +33,8 @@ class Closing {
   std::vector<int> closes_, bounces_;  // contacts
   std::vector<char> marked_;           // islands
   MovingIslands islands_;
+  std::vector<PointContact> points_;
+  WarmStart start_;
   BodySolver solver_;
   BodySolution solution_;
 };

@@ -20,6 +20,7 @@ void Stepper::Implementation::advance(double time, double length, int halvings) 
   if (run_stages(time)) return;
   // Nothing has moved yet.
   bodies.motion = impacts->coming();
+  solver->take_back();
   solver->scale_warm_start(0.5);
   ++counts.halved;
   advance(time, length / 2, halvings - 1);
@@ -45,11 +46,17 @@ bool Stepper::Implementation::run_stages(double time) {
   return true;
 }
 
+// Whether a shorter step would not help: there is none, or there is an impact. What an impact takes
+// does not hang on the length of the step. Who accepts nothing gets the shorter steps even so.
+bool Stepper::Implementation::shortest() const {
+  const bool impact = options.acceptance > 1 && !impacts->list().empty();
+  return options.max_halvings > 0 && (!may_halve || impact);
+}
+
 // Accepts the solution, or not; one that a shorter step replaces leaves no trace.
 void Stepper::Implementation::judge() {
   const bool solved = solution.status == Status::solved;
-  const bool shortest = options.max_halvings > 0 && !may_halve;
-  const double most = std::max(accepted_residual(options), shortest ? detail::kRough : 0.0);
+  const double most = std::max(accepted_residual(options), shortest() ? detail::kRough : 0.0);
   failed = !solved && !(solution.error <= most);
   if (failed && may_halve) return;
   counts.accepted += !solved && !failed;

@@ -33,12 +33,20 @@ BodyOptions contact_options(const SteppingOptions& o) {
   b.max_sweeps = o.max_sweeps;
   b.max_assembled = o.max_assembled;
   b.max_work = o.max_work;
+  if (o.acceptance > 1) b.enough = accepted_residual(o);
   b.threads = o.threads;
   return b;
 }
 
 double threshold_speed(double threshold, const SteppingOptions& o) {
   return o.gravity ? threshold * std::sqrt(o.gravity->norm()) : 0;
+}
+
+BodyOptions patient_options(const SteppingOptions& o) {
+  BodyOptions b = contact_options(o);
+  b.max_work *= 25;
+  b.enough = std::max(kRough, o.tolerance);
+  return b;
 }
 
 // Penetrations need not vanish in one step: a rough answer is good enough, as the next step sees

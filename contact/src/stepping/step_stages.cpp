@@ -79,6 +79,13 @@ void Stepper::Implementation::choose_impacts() {
   if (closing) closing->begin(impacts->list(), bodies, contacts);
 }
 
+void Stepper::Implementation::solve_problem() {
+  solver->solve(bodies.motion, contacts.points, solution);
+  ++counts.contact_problems;
+  counts.sweeps += solution.sweeps;
+  counts.assembled_islands += solution.assembled_islands;
+}
+
 void Stepper::Implementation::solve_contacts() {
   contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
   std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
@@ -87,10 +94,12 @@ void Stepper::Implementation::solve_contacts() {
     solver->forget();
     return;
   }
-  solver->solve(bodies.motion, contacts.points, solution);
-  ++counts.contact_problems;
-  counts.sweeps += solution.sweeps;
-  counts.assembled_islands += solution.assembled_islands;
+  solve_problem();
+  if (shortest() && solution.status != Status::solved && !(solution.error <= detail::kRough)) {
+    solver->set_options(detail::patient_options(options));
+    solve_problem();
+    solver->set_options(detail::contact_options(options));
+  }
   judge();
   if (failed && may_halve) return;
   for (const int i : moving) {

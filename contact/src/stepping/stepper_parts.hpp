@@ -22,6 +22,8 @@ constexpr double kRough = 1e-4;
 void check(const SteppingOptions& o);
 /// Of the contact problem of a step, and of the one that takes penetrations back.
 BodyOptions contact_options(const SteppingOptions& o);
+/// Of contact problems that a shorter step would not make easier.
+BodyOptions patient_options(const SteppingOptions& o);
 BodyOptions correction_options(const SteppingOptions& o);
 /// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
 double threshold_speed(double threshold, const SteppingOptions& o);
@@ -80,6 +82,8 @@ struct Stepper::Implementation {
   void step();
   void advance(double time, double length, int halvings);
   bool run_stages(double time);
+  void solve_problem();
+  bool shortest() const;
   void judge();
 
   void remember_velocities() { impacts->remember(bodies); }

@@ -57,6 +57,7 @@ struct BodyOptions {
   int max_assembled = 1000;
   bool strict = false;    ///< as Options::strict, for assembled islands
   double max_work = 1e9;  ///< as Options::max_work, for each assembled island
+  double enough = 0;      ///< as Options::enough, for each assembled island
 };
 
 /// What a warm start begins with: the impulses of the last solve by id, in the order of its contacts.
@@ -105,6 +106,8 @@ class BodySolver {
 
   /// Multiplies the impulses that the next warm start will find, as for a changed time step.
   void scale_warm_start(double factor);
+  /// The last solve leaves nothing to the next one: as if it had not been. Once for each solve.
+  void take_back();
   /// Forgets them.
   void forget();
   /// All that one solve leaves to the next. Throws std::invalid_argument if the lengths differ.

@@ -2,13 +2,19 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <tether/contact/one_contact.hpp>
 #include <tether/export.hpp>
 #include <tether/linalg/eigen.hpp>
+#include <utility>
 #include <vector>
 
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
+
+namespace detail {
+struct BodyForm;
+}
 
 /// One 3x3 block as three columns of four doubles (the fourth is 0): a vector register each.
 struct alignas(32) PackedBlock {
@@ -67,6 +73,10 @@ class Problem {
   /// from 0 in the order of their first contacts.
   const std::vector<int>& islands() const { return islands_; }
 
+  /// Its factors where delassus() has made it, else null; the solver's own.
+  const detail::BodyForm* body_form() const { return body_form_.get(); }
+  void set_body_form(std::shared_ptr<const detail::BodyForm> form) { body_form_ = std::move(form); }
+
   std::vector<PackedVector> pack(const linalg::VectorView& x) const;
   void unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const;
 
@@ -78,6 +88,7 @@ class Problem {
   std::vector<PackedBlock> blocks_;
   std::vector<PackedVector> packed_b_;
   std::vector<std::uint64_t> ids_;
+  std::shared_ptr<const detail::BodyForm> body_form_;
 };
 
 }  // namespace tether::contact

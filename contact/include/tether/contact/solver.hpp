@@ -58,6 +58,9 @@ struct Options {
   double relaxation = 1.0;    ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
   int max_sweeps = 200000;    ///< of the plain methods and anderson
   double max_work = 1e10;     ///< automatic: estimated nanoseconds, counted from operations
+  /// An error with which the solve ends, as work_limit, once a quarter of max_work is spent: what is
+  /// hard to solve is then not worth all of it. 0: none.
+  double enough = 0;
   int anderson_depth = 10;    ///< 1 .. 20
   bool warm_start = false;    ///< start from the impulses of the previous solve, found by contact id
   bool history = false;       ///< record Solution::history

@@ -83,8 +83,9 @@ struct SteppingOptions {
   /// most acceptance * tolerance and at most 1e-4. 1: none is.
   double acceptance = 1;
   /// Where it is above that, too, the step is taken in two halves, they in quarters, ... so many
-  /// times; the shortest parts accept up to 1e-4, above that a problem is used all the same and
-  /// counted as `unsolved`. 0: at once.
+  /// times. The shortest parts, and all with an impact, which is as hard in a shorter step, accept
+  /// up to 1e-4 and are given 25 times max_work where they are above that; above it even so, the
+  /// shortest part is used all the same and counted as `unsolved`. 0: at once.
   int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
   /// A penetration of depth d is reduced by the speed min(error_reduction d / dt,
@@ -105,7 +106,7 @@ struct SteppingOptions {
   int min_sweeps = 8;     ///< see BodyOptions: at rest they wipe out what the tolerance allows
   int max_sweeps = 1000;  ///< see BodyOptions
   int max_assembled = 1000;
-  double max_work = 2e8;  ///< see BodyOptions: bounds the time of a step
+  double max_work = 4e7;  ///< see BodyOptions: bounds the time of a step
   int threads = 1;
 };
 

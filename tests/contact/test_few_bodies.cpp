@@ -1,0 +1,141 @@
+// Many contacts between few bodies: equations of bodies in place of those of contacts.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <random>
+#include <tether/contact.hpp>
+#include <vector>
+
+#include "support/catch.hpp"
+
+namespace {
+
+using namespace tether::contact;
+using Eigen::Vector3d;
+
+struct Pile {
+  std::vector<Body> bodies;
+  std::vector<BodyContact> contacts;
+};
+
+// Round plates on each other and on the ground, each touching the next at `points` of its rim, with
+// random velocities downwards: three points would hold it.
+Pile pile(int plates, int points, double mu, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> any(-1, 1);
+  Pile out;
+  for (int k = 0; k < plates; ++k) {
+    Body body;
+    const double mass = 1 + 0.3 * any(random);
+    body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 4 / mass, 4 / mass, 2 / mass;
+    body.velocity << 0.5 * any(random), 0.5 * any(random), -1 + 0.2 * any(random), any(random),
+        any(random), any(random);
+    out.bodies.push_back(body);
+    for (int p = 0; p < points; ++p) {
+      const double angle = 2 * 3.141592653589793 * (p + 0.3 * k) / points;
+      const Vector3d rim(std::cos(angle), std::sin(angle), 0);
+      out.contacts.push_back(BodyContact::at_point(
+          k, k - 1, rim - Vector3d(0, 0, 0.2), rim + Vector3d(0, 0, 0.2), Vector3d::UnitZ(), mu));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("few bodies: the solution is that of the matrix without bodies, for less work") {
+  const double mu = 0.6;
+  const Pile p = pile(6, 40, mu, 7);
+  const Problem by_bodies = delassus(p.bodies, p.contacts);
+  const Eigen::VectorXd coefficients = Eigen::VectorXd::Constant(by_bodies.contacts(), mu);
+  const Problem by_contacts = Problem::dense(by_bodies.dense_matrix(), by_bodies.b(), coefficients);
+  Options options;
+  options.law = Law::coulomb;
+  options.method = Method::interior_point;
+  options.tolerance = 1e-10;
+  const Solution few = Solver(options).solve(by_bodies);
+  const Solution many = Solver(options).solve(by_contacts);
+  INFO("work " << few.counts.work << " and " << many.counts.work);
+  CHECK(few.status == Status::solved);
+  CHECK(many.status == Status::solved);
+  CHECK(evaluate(by_contacts, Law::coulomb, few.impulses).fixed_point <= 1e-10);
+  // Impulses are not unique; velocities are here.
+  CHECK((few.velocities - many.velocities).cwiseAbs().maxCoeff() < 1e-7);
+  CHECK(few.counts.work < 0.3 * many.counts.work);
+}
+
+TEST_CASE("few bodies: where interior points end, proximal problems go on") {
+  for (const double mu : {0.2, 0.6}) {
+    const Pile p = pile(6, 40, mu, 7);
+    const Problem problem = delassus(p.bodies, p.contacts);
+    Options options;
+    options.law = Law::coulomb;
+    options.tolerance = 1e-10;
+    options.max_work = 1e9;
+    const Solution solution = Solver(options).solve(problem);
+    INFO("mu " << mu << " work " << solution.counts.work);
+    CHECK(solution.status == Status::solved);
+    CHECK(evaluate(problem, Law::coulomb, solution.impulses).fixed_point <= 1e-10);
+  }
+}
+
+TEST_CASE("few bodies: an inverse mass that is singular or zero serves, too") {
+  Pile p = pile(5, 40, 0.4, 3);
+  p.bodies[2].inverse_mass.setZero();  // fixed
+  p.bodies[4].inverse_mass(5, 5) = 0;  // never turns about the vertical
+  p.bodies[2].velocity.setZero();
+  const Problem problem = delassus(p.bodies, p.contacts);
+  Options options;
+  options.law = Law::coulomb;
+  options.tolerance = 1e-9;
+  options.max_work = 1e9;
+  const Solution solution = Solver(options).solve(problem);
+  CHECK(solution.status == Status::solved);
+  CHECK(evaluate(problem, Law::coulomb, solution.impulses).fixed_point <= 1e-9);
+}
+
+TEST_CASE("few bodies: an error that is enough ends the solve after a quarter of the work") {
+  const Pile p = pile(6, 40, 0.6, 11);
+  const Problem problem = delassus(p.bodies, p.contacts);
+  Options options;
+  options.law = Law::coulomb;
+  options.method = Method::gauss_seidel;
+  options.tolerance = 1e-13;
+  options.max_work = 1e8;
+  const Solution all = Solver(options).solve(problem);
+  options.enough = 1;
+  const Solution some = Solver(options).solve(problem);
+  CHECK(some.status == Status::work_limit);
+  CHECK(some.error <= 1);
+  CHECK(some.counts.work < 0.3 * options.max_work);
+  CHECK(some.counts.work < all.counts.work);
+  options.enough = -1;
+  CHECK_THROWS_AS(Solver(options), std::invalid_argument);
+}
+
+TEST_CASE("few bodies: a solve that is taken back leaves nothing to the next one") {
+  std::vector<RigidBody> bodies(2);
+  for (RigidBody& b : bodies) {
+    b.inverse_mass = 1;
+    b.inverse_inertia.setIdentity();
+    b.velocity = Vector3d(0.1, 0, -1);
+  }
+  std::vector<PointContact> contacts(2);
+  for (int k = 0; k < 2; ++k) {
+    PointContact& c = contacts[static_cast<std::size_t>(k)];
+    c.first = k;
+    c.second = k - 1;
+    c.r1 = Vector3d(0.2, 0.1, -0.5);
+    c.r2 = Vector3d(0.2, 0.1, 0.5);
+    c.mu = 0.4;
+    c.id = static_cast<std::uint64_t>(k);
+  }
+  BodySolver solver, other;
+  solver.solve(bodies, contacts);
+  other.solve(bodies, contacts);
+  std::vector<RigidBody> hit = bodies;
+  hit[1].velocity.z() = -100;
+  solver.solve(hit, contacts);
+  solver.take_back();
+  CHECK(solver.warm_start().impulses == other.warm_start().impulses);
+  CHECK(solver.warm_start().ids == other.warm_start().ids);
+}
