@@ -15,8 +15,9 @@ namespace tether::ida_projection {
 ///
 /// 2 sin(w h / 2) of the oscillation that dominates the error. A motion worth resolving, of an
 /// amplitude of 1000 tolerances, has r < 0.4 at order 5. Where r stays large, the order is limited
-/// to 2; the limit stays if the steps do not become shorter for it, and is tried again and again
-/// without.
+/// to 2. The limit ends where the steps become shorter with it, and where r shows that a higher
+/// order would pay. For three steps IDA's error weights are next to nothing: all its estimates are
+/// then zero, and it lowers the order by itself; IDAGetErrWeights is of no use there.
 class OrderLimit {
  public:
   OrderLimit(void* ida_mem, const Options& options)
