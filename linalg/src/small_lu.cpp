@@ -38,7 +38,6 @@ int SmallLU::factor(double* a, int n) {
       double* changed = column(j);
       const double share = changed[k];
       if (share == 0.0) continue;  // also what keeps infinite entries of L out of zeros
-#pragma GCC ivdep
       for (int i = k + 1; i < n; ++i) changed[i] -= share * pivots[i];
     }
   }

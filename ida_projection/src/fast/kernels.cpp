@@ -10,6 +10,15 @@
 #include <cstring>
 #include <utility>
 
+// Arrays are the same or apart, as everywhere in SUNDIALS: no element depends on another one.
+#if defined(__clang__)
+#define TETHER_ELEMENTWISE _Pragma("clang loop vectorize(assume_safety)")
+#elif defined(__GNUC__)
+#define TETHER_ELEMENTWISE _Pragma("GCC ivdep")
+#else
+#define TETHER_ELEMENTWISE
+#endif
+
 namespace tether::ida_projection::fast {
 
 namespace {
@@ -35,8 +44,7 @@ Pair pair_at(const double* x) {
   return pair;
 }
 
-/// The kernels for vectors of one length, or of any (Length 0). Arrays are the same or apart, as
-/// everywhere in SUNDIALS: elements do not depend on each other ("ivdep").
+/// The kernels for vectors of one length, or of any (Length 0).
 template <int Length>
 struct Kernels {
   static sunindextype length(N_Vector v) { return Length > 0 ? Length : content(v)->length; }
@@ -46,19 +54,19 @@ struct Kernels {
     const double *x = data(X), *y = data(Y);
     double* z = data(Z);
     if (b == 1.0) {
-#pragma GCC ivdep
+      TETHER_ELEMENTWISE
       for (sunindextype i = 0; i < n; ++i) z[i] = a * x[i] + y[i];
     } else if (a == 1.0) {
-#pragma GCC ivdep
+      TETHER_ELEMENTWISE
       for (sunindextype i = 0; i < n; ++i) z[i] = x[i] + b * y[i];
     } else if (a == b && a != -1.0) {
-#pragma GCC ivdep
+      TETHER_ELEMENTWISE
       for (sunindextype i = 0; i < n; ++i) z[i] = a * (x[i] + y[i]);
     } else if (a == -b) {
-#pragma GCC ivdep
+      TETHER_ELEMENTWISE
       for (sunindextype i = 0; i < n; ++i) z[i] = a * (x[i] - y[i]);
     } else {
-#pragma GCC ivdep
+      TETHER_ELEMENTWISE
       for (sunindextype i = 0; i < n; ++i) z[i] = a * x[i] + b * y[i];
     }
   }
@@ -73,7 +81,7 @@ struct Kernels {
     const sunindextype n = length(Z);
     const double* x = data(X);
     double* z = data(Z);
-#pragma GCC ivdep
+    TETHER_ELEMENTWISE
     for (sunindextype i = 0; i < n; ++i) z[i] = c * x[i];
   }
 
@@ -82,7 +90,7 @@ struct Kernels {
     const sunindextype n = length(Z);
     const double* x = data(X);
     double* z = data(Z);
-#pragma GCC ivdep
+    TETHER_ELEMENTWISE
     for (sunindextype i = 0; i < n; ++i) z[i] = f(x[i]);
   }
   static void absolute(N_Vector X, N_Vector Z) {
@@ -99,14 +107,14 @@ struct Kernels {
     const sunindextype n = length(Z);
     const double *x = data(X), *y = data(Y);
     double* z = data(Z);
-#pragma GCC ivdep
+    TETHER_ELEMENTWISE
     for (sunindextype i = 0; i < n; ++i) z[i] = x[i] * y[i];
   }
   static void quotient(N_Vector X, N_Vector Y, N_Vector Z) {
     const sunindextype n = length(Z);
     const double *x = data(X), *y = data(Y);
     double* z = data(Z);
-#pragma GCC ivdep
+    TETHER_ELEMENTWISE
     for (sunindextype i = 0; i < n; ++i) z[i] = x[i] / y[i];
   }
 
