@@ -1,8 +1,9 @@
 # Install rules: one component for each library, a package config, a version file, pkg-config files.
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Components: linalg (with the package files that all need), ida_projection, contact. Each library
-# builds alone (TETHER_BUILD_*) and installs alone on top of linalg:
+# Components: linalg (with the package files that all need), ida_projection, contact, contact_io and
+# contact_collision (on contact), scene (on all of these but contact_io). Each library builds alone
+# (TETHER_BUILD_*) and installs alone on top of those that it stands on:
 #
 #   cmake --install build --component linalg
 #   cmake --install build --component contact
@@ -20,6 +21,22 @@ foreach(library IN LISTS tether_libraries)
     FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${library})
   install(EXPORT tether-${library}-targets NAMESPACE tether::
     DESTINATION ${tether_cmake_dir} COMPONENT ${library})
+endforeach()
+
+# What the config has to find and include.
+set(tether_needs_scene ida_projection contact)
+if(TARGET tether_contact_collision)
+  list(APPEND tether_needs_scene contact_collision)
+endif()
+set(tether_has_hdf5 FALSE)
+if(TARGET tether::hdf5)
+  set(tether_has_hdf5 TRUE)
+endif()
+foreach(library IN ITEMS contact_io contact_collision)
+  if(TARGET tether_${library})
+    install(FILES ${CMAKE_CURRENT_LIST_DIR}/TetherExternal.cmake
+      DESTINATION ${tether_cmake_dir} COMPONENT ${library})
+  endif()
 endforeach()
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/tether-config.cmake.in
@@ -71,3 +88,31 @@ if(TARGET tether_ida_projection)
   tether_pkg_config(ida_projection "Constraint projection for SUNDIALS IDA and IDAS"
     "tether-linalg = ${PROJECT_VERSION}" CFLAGS ${sundials_include})
 endif()
+# A static library leaves its own libraries to the program.
+set(hdf5_libs "")
+set(bullet_libs "")
+set(scene_libs "")
+if(NOT BUILD_SHARED_LIBS)
+  if(TARGET tether::hdf5)
+    get_target_property(hdf5_libs tether::hdf5 INTERFACE_LINK_LIBRARIES)
+    list(TRANSFORM hdf5_libs REPLACE "^([^/-].*)$" "-l\\1")
+  endif()
+  if(TARGET tether::bullet)
+    get_target_property(bullet_libs tether::bullet INTERFACE_LINK_LIBRARIES)
+  endif()
+  set(scene_libs -lfmt -ltomlplusplus)
+  if(TARGET tether::sundials_klu)
+    list(APPEND scene_libs -lsundials_sunlinsolklu -lsundials_sunmatrixsparse)
+  endif()
+  list(APPEND scene_libs -lsundials_ida)
+endif()
+tether_pkg_config(contact_io "Contact problems in files" "tether-contact = ${PROJECT_VERSION}"
+  LIBS ${hdf5_libs})
+tether_pkg_config(contact_collision "Collision of polyhedra" "tether-contact = ${PROJECT_VERSION}"
+  LIBS ${bullet_libs})
+set(scene_requires "tether-ida-projection = ${PROJECT_VERSION}, tether-contact = ${PROJECT_VERSION}")
+if(TARGET tether_contact_collision)
+  string(APPEND scene_requires ", tether-contact-collision = ${PROJECT_VERSION}")
+endif()
+tether_pkg_config(scene "Rigid bodies in motion, from scene files" "${scene_requires}"
+  LIBS ${scene_libs})

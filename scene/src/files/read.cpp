@@ -4,210 +4,22 @@
 #include <fmt/format.h>
 
 #include <fstream>
-#include <map>
-#include <set>
 #include <tether/scene/files.hpp>
 
-#include "document.hpp"
+#include "effects/list.hpp"
+#include "toml/document.hpp"
+#include "toml/reader.hpp"
 
 namespace tether::scene::files {
 
 namespace {
 
-using Eigen::Vector3d;
-
-/// The scene under construction, with what every part of the reader needs.
-struct Reader {
-  const std::string& file;
-  Report& report;
-  Scene scene;
-  std::map<std::string, int> bodies;  // by name
-  std::set<std::string> materials;    // of bodies
-
-  Fields fields(const Value* table, std::string path) const {
-    return {table, std::move(path), file, report};
-  }
-
-  /// Reads the elements of [[key]]; `path` of one without a name: key and number.
-  template <class Read>
-  void each(Fields& root, std::string_view key, Read read) {
-    int number = 0;
-    for (const Value* table : root.tables(key)) {
-      Fields in = fields(table, fmt::format("{} {}", key, ++number));
-      read(in);
-      in.finish();
-    }
-  }
-
-  /// What was meant; nothing for problems that nobody will see: each hint looks at all names.
-  template <class Names>
-  std::string hint_of(const std::string& wrong, const Names& names) const {
-    if (report.full()) return "";
-    std::vector<std::string> all;
-    for (const auto& each : names) all.push_back(name_of(each));
-    return hint(wrong, all);
-  }
-  static const std::string& name_of(const std::string& name) { return name; }
-  static const std::string& name_of(const Body& body) { return body.name; }
-
-  /// The body that `key` names.
-  int body(Fields& in, std::string_view key) const {
-    if (!in.has(key)) {
-      in.missing(key, "the name of a body");
-      return 0;
-    }
-    const std::string name = in.text(key, "");
-    const auto found = bodies.find(name);
-    if (found != bodies.end()) return found->second;
-    in.wrong(key, "no such body" + hint_of(name, scene.bodies));
-    return 0;
-  }
-
-  /// bodies = ["a", "world"]
-  void two_bodies(Fields& in, int& first, int& second) const {
-    const Value* value = in.find("bodies");
-    constexpr const char* kAllowed = "two names of bodies; \"world\" is the ground";
-    if (value == nullptr) return in.missing("bodies", kAllowed);
-    if (value->kind != Value::Kind::array || value->items.size() != 2)
-      return in.wrong("bodies", std::string("must be ") + kAllowed);
-    int* const out[] = {&first, &second};
-    for (std::size_t i = 0; i < 2; ++i) {
-      const Value& name = value->items[i];
-      if (name.kind != Value::Kind::text)
-        return in.wrong("bodies", std::string("must be ") + kAllowed);
-      if (name.text == "world") continue;
-      const auto found = bodies.find(name.text);
-      if (found == bodies.end())
-        return in.wrong("bodies", fmt::format("there is no body \"{}\"{}", name.text,
-                                              hint_of(name.text, scene.bodies)));
-      *out[i] = found->second;
-    }
-    if (first == second) in.wrong("bodies", "must be two different bodies");
-  }
-};
-
-std::string item_name(Fields& in, const std::string& kind) {
-  const std::string name = in.text("name", in.path());
-  if (in.has("name")) in.rename(fmt::format("{} \"{}\"", kind, name));
-  return name;
-}
-
 void read_scene_table(Fields& root, Reader& r) {
   Fields in = r.fields(root.table("scene"), "scene");
   r.scene.name = in.text("name", "");
   r.scene.end = in.number("end", r.scene.end, kPositive, "s");
-  if (in.has("gravity")) r.scene.gravity = in.vector("gravity", Vector3d::Zero(), kAny, "m/s^2");
+  for (const effects::Effect* each : effects::all()) each->read_scene(in, r.scene);
   in.finish();
-}
-
-Motion read_motion(Fields& in, bool turns) {
-  Motion m;
-  if (turns) {
-    m.rate = in.angle("rate_", m.rate, "/s");
-    m.amplitude = in.angle("amplitude_", m.amplitude);
-  } else {
-    m.rate = in.number("rate", m.rate, kAny, "m/s");
-    m.amplitude = in.number("amplitude", m.amplitude, kAny, "m");
-  }
-  m.frequency = in.number("frequency", m.frequency, kNotNegative, "Hz");
-  m.phase = in.angle("phase_", m.phase);
-  in.finish();
-  return m;
-}
-
-/// at = [[x, y, z], [x, y, z]]: the point on the first and the one on the second body.
-void two_points(Fields& in, Vector3d& at, Vector3d& at_second) {
-  if (!in.has("at")) in.missing("at", "the two points [[x, y, z], [x, y, z]], world, m");
-  const std::vector<Vector3d> points = in.points("at", 2, 2);
-  if (points.empty()) return;
-  at = points[0];
-  at_second = points[1];
-}
-
-void read_joint(Fields& in, Reader& r) {
-  Joint joint;
-  joint.place = in.place();
-  joint.name = item_name(in, "joint");
-  if (!in.has("kind")) in.missing("kind", "it is a distance, ball, hinge, slider or fixed joint");
-  const std::optional<JointKind> kind = in.word_of<JointKind>("kind");
-  r.two_bodies(in, joint.first, joint.second);
-  if (!kind) return in.pass_over({"at", "axis", "length", "motion"});
-  joint.kind = *kind;
-
-  const bool turns = joint.kind == JointKind::hinge, slides = joint.kind == JointKind::slider;
-  if (joint.kind == JointKind::distance) {
-    two_points(in, joint.at, joint.at_second);
-    if (in.has("length")) joint.length = in.number("length", 1, kPositive, "m");
-    const bool apart = (joint.at - joint.at_second).norm() > 0;
-    if (in.has("at") && !apart) in.wrong("at", "the two points must be apart");
-  } else {
-    if (!in.has("at") && !slides) in.missing("at", "a point [x, y, z], world, m");
-    joint.at = in.vector("at", joint.at, kAny, "m");
-  }
-  if (turns || slides) {
-    if (!in.has("axis")) in.missing("axis", "a direction [x, y, z], world");
-    joint.axis = in.direction("axis", joint.axis);
-  }
-  if (turns || slides || joint.kind == JointKind::distance)
-    if (const Value* motion = in.table("motion")) {
-      Fields fields = r.fields(motion, in.path() + ": motion");
-      joint.motion = read_motion(fields, turns);
-    }
-  r.scene.joints.push_back(std::move(joint));
-}
-
-void read_spring(Fields& in, Reader& r) {
-  Spring spring;
-  spring.place = in.place();
-  spring.name = item_name(in, "spring");
-  r.two_bodies(in, spring.first, spring.second);
-  two_points(in, spring.at, spring.at_second);
-  spring.stiffness = in.number("stiffness", spring.stiffness, kNotNegative, "N/m");
-  spring.damping = in.number("damping", spring.damping, kNotNegative, "N s/m");
-  if (in.has("rest")) spring.rest = in.number("rest", 0, kNotNegative, "m");
-  if (!in.has("stiffness") && !in.has("damping"))
-    in.missing("stiffness", "give stiffness (N/m), damping (N s/m) or both");
-  r.scene.springs.push_back(std::move(spring));
-}
-
-void read_load(Fields& in, Reader& r) {
-  Load load;
-  load.place = in.place();
-  load.body = r.body(in, "body");
-  load.force = in.vector("force", load.force, kAny, "N");
-  load.torque = in.vector("torque", load.torque, kAny, "N m");
-  if (!in.has("force") && !in.has("torque"))
-    in.missing("force", "give force (N), torque (N m) or both");
-  r.scene.loads.push_back(load);
-}
-
-void read_pair(Fields& in, Reader& r) {
-  Pair pair;
-  pair.place = in.place();
-  pair.friction = in.number("friction", pair.friction, kNotNegative, "");
-  pair.restitution = in.number("restitution", pair.restitution, kPart, "");
-  constexpr const char* kAllowed = "two names of materials, e.g. [\"card\", \"table\"]";
-  const Value* between = in.find("between");
-  if (between == nullptr) return in.missing("between", kAllowed);
-  if (between->kind != Value::Kind::array || between->items.size() != 2 ||
-      between->items[0].kind != Value::Kind::text || between->items[1].kind != Value::Kind::text)
-    return in.wrong("between", std::string("must be ") + kAllowed);
-  pair.first = between->items[0].text;
-  pair.second = between->items[1].text;
-  for (const std::string& name : {pair.first, pair.second})
-    if (r.materials.count(name) == 0)
-      return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,
-                                             r.hint_of(name, r.materials)));
-  r.scene.pairs.push_back(std::move(pair));
-}
-
-void read_invariant(Fields& in, Reader& r) {
-  Invariant invariant;
-  invariant.place = in.place();
-  if (!in.has("kind")) in.missing("kind", "energy, momentum or angular_momentum");
-  invariant.kind = in.word("kind", invariant.kind);
-  invariant.project = in.flag("project", invariant.project);
-  r.scene.invariants.push_back(invariant);
 }
 
 void read_engine(Fields& root, Reader& r) {
@@ -296,16 +108,19 @@ Scene read(std::string_view text, const std::string& name) {
 
   read_scene_table(root, r);
   r.each(root, "body", [&](Fields& in) {
-    Body body = read_body(in, name, report);
+    Body body = read_body(in, r);
+    for (const effects::Effect* each : effects::all()) each->read_body(in, r, body);
     r.bodies.emplace(body.name, static_cast<int>(r.scene.bodies.size()));
     if (!body.material.empty()) r.materials.insert(body.material);
     r.scene.bodies.push_back(std::move(body));
   });
-  r.each(root, "pair", [&](Fields& in) { read_pair(in, r); });
-  r.each(root, "joint", [&](Fields& in) { read_joint(in, r); });
-  r.each(root, "spring", [&](Fields& in) { read_spring(in, r); });
-  r.each(root, "load", [&](Fields& in) { read_load(in, r); });
-  r.each(root, "invariant", [&](Fields& in) { read_invariant(in, r); });
+  r.each(root, "pair", [&](Fields& in) {
+    Pair pair;
+    pair.place = in.place();
+    for (const effects::Effect* each : effects::all()) each->read_pair(in, r, pair);
+    r.scene.pairs.push_back(std::move(pair));
+  });
+  for (const effects::Effect* each : effects::all()) each->read(root, r);
   read_engine(root, r);
   read_output(root, r);
   r.each(root, "expect", [&](Fields& in) { read_expect(in, r); });

@@ -4,14 +4,12 @@
 #include <string>
 #include <tether/scene/scene.hpp>
 
-#include "fields.hpp"
+#include "toml/reader.hpp"
 
 namespace tether::scene::files {
 
-/// One [[body]].
-Body read_body(Fields& in, const std::string& file, Report& report);
-/// wxyz, or an axis with deg or rad.
-Eigen::Quaterniond read_orientation(Fields& in, const std::string& file, Report& report);
+/// One [[body]], but for the fields of effects.
+Body read_body(Fields& in, const Reader& r);
 /// What no single field shows: names, pairs of materials, bodies that cannot move, times.
 void check(const Scene& scene, Report& report);
 

@@ -22,6 +22,36 @@ void required(Fields& in, std::string_view key, std::string_view allowed) {
   if (!in.has(key)) in.missing(key, std::string(allowed));
 }
 
+// wxyz, or an axis with deg or rad.
+Eigen::Quaterniond read_orientation(Fields& in, const Reader& r) {
+  const Value* table = in.table("orientation");
+  if (table == nullptr) return Eigen::Quaterniond::Identity();
+  Fields fields = r.fields(table, in.path() + ": orientation");
+  Eigen::Quaterniond out = Eigen::Quaterniond::Identity();
+  if (fields.has("wxyz")) {
+    const std::vector<double> q = fields.numbers("wxyz", {4}, "");
+    if (!q.empty()) {
+      const Eigen::Quaterniond read(q[0], q[1], q[2], q[3]);
+      const double length = read.coeffs().stableNorm();
+      // Digits cut off are mended; anything else is a mistake.
+      if (std::abs(length - 1) <= 1e-15)
+        out = read;
+      else if (std::abs(length - 1) <= 1e-3)
+        out.coeffs() = read.coeffs() / length;
+      else
+        fields.wrong("wxyz", "must have length 1 (unit quaternion, scalar first)");
+    }
+  } else {
+    if (!fields.has("axis"))
+      fields.missing("axis", "give axis and deg (or rad), or wxyz (scalar first)");
+    const Vector3d axis = fields.direction("axis", Vector3d::UnitZ());
+    if (!fields.has("deg") && !fields.has("rad")) fields.missing("deg", "give deg or rad");
+    out = Eigen::AngleAxisd(fields.angle("", 0), axis);
+  }
+  fields.finish();
+  return out;
+}
+
 // The fields of a shape; `in` is the body itself for a body's only shape.
 Shape read_shape(Fields& in) {
   Shape shape;
@@ -62,7 +92,7 @@ Shape read_shape(Fields& in) {
   return shape;
 }
 
-std::vector<Shape> read_shapes(Fields& in, const std::string& file, Report& report) {
+std::vector<Shape> read_shapes(Fields& in, const Reader& r) {
   std::vector<Shape> shapes;
   const bool several = in.has("shapes");
   if (several && in.has("shape")) in.wrong("shape", "give shape or shapes, not both");
@@ -71,10 +101,10 @@ std::vector<Shape> read_shapes(Fields& in, const std::string& file, Report& repo
     return shapes;
   }
   for (const Value* each : in.tables("shapes")) {
-    Fields fields(each, fmt::format("{}: shape {}", in.path(), shapes.size() + 1), file, report);
+    Fields fields = r.fields(each, fmt::format("{}: shape {}", in.path(), shapes.size() + 1));
     Shape shape = read_shape(fields);
     shape.position = fields.vector("position", Vector3d::Zero(), kAny, "m");
-    shape.orientation = read_orientation(fields, file, report);
+    shape.orientation = read_orientation(fields, r);
     fields.finish();
     shapes.push_back(std::move(shape));
   }
@@ -163,63 +193,21 @@ void read_mass(Fields& in, Body& body) {
     in.missing("inertia", "that of the shapes is not a finite number > 0");
 }
 
-std::optional<Drag> read_drag(Fields& in, const std::string& file, Report& report) {
-  const Value* table = in.table("drag");
-  if (table == nullptr) return std::nullopt;
-  Fields fields(table, in.path() + ": drag", file, report);
-  Drag drag;
-  drag.linear = fields.number("linear", drag.linear, kNotNegative, "N s/m");
-  drag.quadratic = fields.number("quadratic", drag.quadratic, kNotNegative, "N s^2/m^2");
-  drag.rotational = fields.number("rotational", drag.rotational, kNotNegative, "N m s");
-  fields.finish();
-  return drag;
-}
-
 }  // namespace
 
-Eigen::Quaterniond read_orientation(Fields& in, const std::string& file, Report& report) {
-  const Value* table = in.table("orientation");
-  if (table == nullptr) return Eigen::Quaterniond::Identity();
-  Fields fields(table, in.path() + ": orientation", file, report);
-  Eigen::Quaterniond out = Eigen::Quaterniond::Identity();
-  if (fields.has("wxyz")) {
-    const std::vector<double> q = fields.numbers("wxyz", {4}, "");
-    if (!q.empty()) {
-      const Eigen::Quaterniond read(q[0], q[1], q[2], q[3]);
-      const double length = read.coeffs().stableNorm();
-      // Digits cut off are mended; anything else is a mistake.
-      if (std::abs(length - 1) <= 1e-15)
-        out = read;
-      else if (std::abs(length - 1) <= 1e-3)
-        out.coeffs() = read.coeffs() / length;
-      else
-        fields.wrong("wxyz", "must have length 1 (unit quaternion, scalar first)");
-    }
-  } else {
-    if (!fields.has("axis"))
-      fields.missing("axis", "give axis and deg (or rad), or wxyz (scalar first)");
-    const Vector3d axis = fields.direction("axis", Vector3d::UnitZ());
-    if (!fields.has("deg") && !fields.has("rad")) fields.missing("deg", "give deg or rad");
-    out = Eigen::AngleAxisd(fields.angle("", 0), axis);
-  }
-  fields.finish();
-  return out;
-}
-
-Body read_body(Fields& in, const std::string& file, Report& report) {
+Body read_body(Fields& in, const Reader& r) {
   Body body;
   body.place = in.place();
   body.name = in.text("name", in.path());
   if (in.has("name")) in.rename(fmt::format("body \"{}\"", body.name));
   body.fixed = in.flag("fixed", false);
-  body.shapes = read_shapes(in, file, report);
+  body.shapes = read_shapes(in, r);
   read_mass(in, body);
   body.position = in.vector("position", Vector3d::Zero(), kAny, "m");
-  body.orientation = read_orientation(in, file, report);
+  body.orientation = read_orientation(in, r);
   body.velocity = in.vector("velocity", Vector3d::Zero(), kAny, "m/s");
   body.angular_velocity = in.vector("angular_velocity", Vector3d::Zero(), kAny, "rad/s");
   body.material = in.text("material", "");
-  body.drag = read_drag(in, file, report);
   return body;
 }
 

@@ -6,68 +6,16 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/words.hpp>
 
+#include "effects/list.hpp"
+#include "toml/writer.hpp"
+
 namespace tether::scene {
 
 namespace {
 
-using Eigen::Vector3d;
-
-// fmt prints the shortest digits that give the same number again; "-0" would be an integer.
-std::string toml(double x) { return x == 0 && std::signbit(x) ? "-0.0" : fmt::format("{}", x); }
-std::string toml(const std::vector<double>& numbers) {
-  std::string out = "[";
-  for (const double x : numbers) out += (out.size() > 1 ? ", " : "") + toml(x);
-  return out + "]";
-}
-std::string toml(bool x) { return x ? "true" : "false"; }
-std::string toml(int x) { return fmt::format("{}", x); }
-std::string toml(const Vector3d& v) { return toml(std::vector<double>{v.x(), v.y(), v.z()}); }
-std::string toml(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    const auto code = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\')
-      out += std::string("\\") + c;
-    else if (code < 0x20 || code == 0x7f)
-      out += fmt::format("\\u{:04x}", code);
-    else
-      out += c;
-  }
-  return out + '"';
-}
-std::string toml(const std::string& text) { return toml(std::string_view(text)); }
-std::string toml(const Eigen::Quaterniond& q) {
-  return fmt::format("{{ wxyz = {} }}", toml(std::vector<double>{q.w(), q.x(), q.y(), q.z()}));
-}
-std::string toml(const std::vector<Vector3d>& points) {
-  std::string out = "[";
-  for (const Vector3d& p : points) out += (out.size() > 1 ? ", " : "") + toml(p);
-  return out + "]";
-}
-template <class E>
-std::string toml_word(E value) {
-  return toml(word(value));
-}
-
-/// Writes tables line by line.
-class Writer {
- public:
-  void table(std::string_view name) { text_ += fmt::format("\n[{}]\n", name); }
-  void item(std::string_view name) { text_ += fmt::format("\n[[{}]]\n", name); }
-  template <class T>
-  void field(std::string_view key, const T& value, std::string_view comment = "") {
-    raw(key, toml(value), comment);
-  }
-  void raw(std::string_view key, const std::string& value, std::string_view comment = "") {
-    text_ += fmt::format("{} = {}", key, value);
-    if (!comment.empty()) text_ += fmt::format("  # {}", comment);
-    text_ += '\n';
-  }
-  std::string take() { return std::move(text_); }
-
- private:
-  std::string text_;
-};
+using files::toml;
+using files::toml_word;
+using files::Writer;
 
 using Keys = std::vector<std::pair<std::string, std::string>>;
 
@@ -133,49 +81,7 @@ void write_body(const Body& body, Writer& out) {
   out.field("velocity", body.velocity, "m/s");
   out.field("angular_velocity", body.angular_velocity, "rad/s, world axes");
   if (!body.material.empty()) out.field("material", body.material);
-  if (body.drag)
-    out.raw("drag", fmt::format("{{ linear = {}, quadratic = {}, rotational = {} }}",
-                                toml(body.drag->linear), toml(body.drag->quadratic),
-                                toml(body.drag->rotational)));
-}
-
-/// Names of bodies for joints and springs.
-std::string two_names(const Scene& scene, int first, int second) {
-  const auto name = [&](int body) {
-    return toml(body < 0 ? std::string("world")
-                         : scene.bodies[static_cast<std::size_t>(body)].name);
-  };
-  return fmt::format("[{}, {}]", name(first), name(second));
-}
-
-void write_joint(const Scene& scene, const Joint& joint, Writer& out) {
-  const bool turns = joint.kind == JointKind::hinge;
-  out.item("joint");
-  out.field("name", joint.name);
-  out.raw("kind", toml_word(joint.kind));
-  out.raw("bodies", two_names(scene, joint.first, joint.second));
-  if (joint.kind == JointKind::distance)
-    out.raw("at", toml(std::vector<Vector3d>{joint.at, joint.at_second}), "m");
-  else
-    out.field("at", joint.at, "m");
-  if (turns || joint.kind == JointKind::slider) out.field("axis", joint.axis);
-  if (joint.length) out.field("length", *joint.length, "m");
-  if (!joint.motion) return;
-  const Motion& m = *joint.motion;
-  const char* const unit = turns ? "_rad" : "";
-  out.raw("motion",
-          fmt::format("{{ rate{} = {}, amplitude{} = {}, frequency = {}, phase_rad = {} }}", unit,
-                      toml(m.rate), unit, toml(m.amplitude), toml(m.frequency), toml(m.phase)));
-}
-
-void write_spring(const Scene& scene, const Spring& spring, Writer& out) {
-  out.item("spring");
-  out.field("name", spring.name);
-  out.raw("bodies", two_names(scene, spring.first, spring.second));
-  out.raw("at", toml(std::vector<Vector3d>{spring.at, spring.at_second}), "m");
-  out.field("stiffness", spring.stiffness, "N/m");
-  out.field("damping", spring.damping, "N s/m");
-  if (spring.rest) out.field("rest", *spring.rest, "m");
+  for (const effects::Effect* each : effects::all()) each->write_body(body, out);
 }
 
 void write_smooth(const SmoothOptions& o, Writer& out) {
@@ -234,30 +140,16 @@ std::string write_scene(const Scene& scene) {
   out.table("scene");
   out.field("name", scene.name);
   out.field("end", scene.end, "s");
-  if (scene.gravity) out.field("gravity", *scene.gravity, "m/s^2");
+  for (const effects::Effect* each : effects::all()) each->write_scene(scene, out);
   if (scene.smooth) write_smooth(*scene.smooth, out);
   if (scene.stepping) write_stepping(*scene.stepping, out);
   write_output(scene.output, out);
   for (const Body& body : scene.bodies) write_body(body, out);
   for (const Pair& pair : scene.pairs) {
     out.item("pair");
-    out.raw("between", fmt::format("[{}, {}]", toml(pair.first), toml(pair.second)));
-    out.field("friction", pair.friction);
-    out.field("restitution", pair.restitution);
+    for (const effects::Effect* each : effects::all()) each->write_pair(pair, out);
   }
-  for (const Joint& joint : scene.joints) write_joint(scene, joint, out);
-  for (const Spring& spring : scene.springs) write_spring(scene, spring, out);
-  for (const Load& load : scene.loads) {
-    out.item("load");
-    out.field("body", scene.bodies[static_cast<std::size_t>(load.body)].name);
-    out.field("force", load.force, "N");
-    out.field("torque", load.torque, "N m");
-  }
-  for (const Invariant& each : scene.invariants) {
-    out.item("invariant");
-    out.raw("kind", toml_word(each.kind));
-    out.field("project", each.project);
-  }
+  for (const effects::Effect* each : effects::all()) each->write(scene, out);
   for (const Expect& each : scene.expect) write_expect(scene, each, out);
   return out.take().substr(1);
 }

@@ -10,7 +10,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "commands.hpp"
-#include "run/gnuplot.hpp"
+#include "record/gnuplot.hpp"
 #include "settings.hpp"
 
 namespace tether::scene {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "binary.hpp"
+#include "output/binary.hpp"
 #include "schedule.hpp"
 
 namespace tether::scene {

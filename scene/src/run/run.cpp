@@ -9,11 +9,11 @@
 #include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 
-#include "binary.hpp"
 #include "judge.hpp"
-#include "output_lock.hpp"
-#include "output_names.hpp"
-#include "recorder.hpp"
+#include "output/binary.hpp"
+#include "output/output_lock.hpp"
+#include "output/output_names.hpp"
+#include "record/recorder.hpp"
 #include "saved_state.hpp"
 #include "schedule.hpp"
 

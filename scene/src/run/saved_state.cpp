@@ -9,8 +9,8 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
-#include "binary.hpp"
-#include "whole_file.hpp"
+#include "output/binary.hpp"
+#include "output/whole_file.hpp"
 
 namespace tether::scene {
 

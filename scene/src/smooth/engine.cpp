@@ -7,7 +7,8 @@
 #include <ostream>
 
 #include "integrator.hpp"
-#include "run/binary.hpp"
+#include "output/binary.hpp"
+#include "units.hpp"
 
 namespace tether::scene {
 

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "effects/list.hpp"
+
 namespace tether::scene::stepping {
 
 namespace {
@@ -26,42 +28,6 @@ contact::ShapeKind kind(ShapeKind k) {
       return contact::ShapeKind::points;
   }
   throw std::invalid_argument("unknown kind of shape");
-}
-
-contact::Law law(ContactLaw l) {
-  switch (l) {
-    case ContactLaw::coulomb:
-      return contact::Law::coulomb;
-    case ContactLaw::maximum_dissipation:
-      return contact::Law::maximum_dissipation;
-    case ContactLaw::frictionless:
-      return contact::Law::frictionless;
-  }
-  throw std::invalid_argument("unknown contact law");
-}
-
-contact::Gyroscopic gyroscopic(Gyroscopic g) {
-  switch (g) {
-    case Gyroscopic::none:
-      return contact::Gyroscopic::none;
-    case Gyroscopic::explicit_step:
-      return contact::Gyroscopic::explicit_step;
-    case Gyroscopic::implicit_step:
-      return contact::Gyroscopic::implicit_step;
-    case Gyroscopic::momentum:
-      return contact::Gyroscopic::momentum;
-  }
-  throw std::invalid_argument("unknown gyroscopic step");
-}
-
-contact::RestitutionLaw restitution_law(RestitutionLaw l) {
-  switch (l) {
-    case RestitutionLaw::newton:
-      return contact::RestitutionLaw::newton;
-    case RestitutionLaw::poisson:
-      return contact::RestitutionLaw::poisson;
-  }
-  throw std::invalid_argument("unknown law of restitution");
 }
 
 void refuse(const Scene& scene) {
@@ -121,24 +87,23 @@ Mapped map_scene(const Scene& scene) {
       out.surfaces.push_back(std::move(surface));
     }
   }
-  for (const Pair& pair : scene.pairs)
-    out.meetings.push_back(
-        {material.at(pair.first), material.at(pair.second), pair.friction, pair.restitution});
+  for (const Pair& pair : scene.pairs) {
+    contact::Meeting meeting;
+    meeting.first = material.at(pair.first);
+    meeting.second = material.at(pair.second);
+    for (const effects::Effect* each : effects::all()) each->configure(pair, meeting);
+    out.meetings.push_back(meeting);
+  }
 
   const SteppingOptions options = scene.stepping.value_or(SteppingOptions{});
   out.options.step = options.step;
-  out.options.gravity = scene.gravity;
-  out.options.law = law(options.law);
   out.options.tolerance = options.tolerance;
-  out.options.gyroscopic = gyroscopic(options.gyroscopic);
   out.options.error_reduction = options.error_reduction;
   out.options.max_depenetration_speed = options.max_depenetration_speed;
-  out.options.restitution_law = restitution_law(options.restitution_law);
-  out.options.restitution_threshold = options.restitution_threshold;
-  out.options.impact_threshold = options.impact_threshold;
   out.options.acceptance = options.acceptance;
   out.options.max_halvings = options.max_halvings;
   out.options.threads = options.threads;
+  for (const effects::Effect* each : effects::all()) each->configure(scene, out.options);
   return out;
 }
 

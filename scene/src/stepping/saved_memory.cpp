@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "run/binary.hpp"
+#include "output/binary.hpp"
 
 namespace tether::scene::stepping {
 

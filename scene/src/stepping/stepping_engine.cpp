@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "run/binary.hpp"
+#include "output/binary.hpp"
 #include "saved_memory.hpp"
 
 #if defined(TETHER_HAVE_COLLISION)
@@ -60,14 +60,29 @@ constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '2'};
 SteppingEngine::SteppingEngine(const Scene& scene) : SteppingEngine(scene, map_scene(scene)) {}
 
 SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
-    : gravity_(scene.gravity),
-      springs_(attach(scene)),
+    : stepped_(scene),
+      forces_(effects::make_forces(scene, stepped_.bodies())),
       on_failure_(scene.stepping.value_or(SteppingOptions{}).on_failure),
       stepper_(make_stepper(scene, std::move(mapped))),
       fingerprint_(fingerprint(scene, stepper_.options().step)),
       bodies_(scene.bodies.size()) {
-  add_forces(scene, springs_, stepper_);
+  add_forces(scene);
   read_bodies();
+}
+
+// Explicit forces first: implicit ones need the velocities that they leave.
+void SteppingEngine::add_forces(const Scene& scene) {
+  using Stepping = mechanics::Force::Stepping;
+  for (const Stepping wanted : {Stepping::explicit_, Stepping::implicit})
+    for (const auto& force : forces_) {
+      if (force->stepping() != wanted) continue;
+      force->check_step(scene, stepped_.bodies(), stepper_.options().step);
+      stepper_.add_force(force->name(),
+                         [this, force = force.get()](contact::BodySet& bodies, double, double dt) {
+                           stepped_.read(bodies);
+                           force->step(stepped_, dt);
+                         });
+    }
 }
 
 void SteppingEngine::advance(double t) {
@@ -88,7 +103,8 @@ void SteppingEngine::report_failure() const {
   std::ostringstream text;
   text << "t = " << time() << " s: the contact problem (" << stepper_.contacts().points.size()
        << " contacts) was not solved: " << contact::name(stepper_.status()) << " at a residual of "
-       << stepper_.residual() << ", wanted " << stepper_.options().tolerance << ", also in parts of "
+       << stepper_.residual() << ", wanted " << stepper_.options().tolerance
+       << ", also in parts of "
        << std::ldexp(stepper_.options().step, -stepper_.options().max_halvings)
        << " s; raise stepping.tolerance or stepping.max_halvings, reduce stepping.step, or set "
           "on_failure = \"warn\"";
@@ -106,10 +122,8 @@ Diagnostics SteppingEngine::diagnostics() const {
   const contact::BodySet& b = stepper_.bodies();
   Diagnostics d;
   d.kinetic_energy = contact::kinetic_energy(b);
-  if (gravity_)
-    for (std::size_t i = 0; i < b.position.size(); ++i)
-      d.potential_energy -= b.mass[i] * gravity_->dot(b.position[i]);
-  d.potential_energy += potential_energy(springs_, b);
+  stepped_.read_positions(b);
+  for (const auto& force : forces_) d.potential_energy += force->potential(stepped_.bodies());
   d.momentum = contact::momentum(b);
   d.angular_momentum = contact::angular_momentum(b);
   d.contacts = static_cast<int>(stepper_.contacts().points.size());

@@ -5,7 +5,7 @@
 #include <tether/scene/engine.hpp>
 #include <vector>
 
-#include "forces.hpp"
+#include "effects/list.hpp"
 #include "map_scene.hpp"
 
 namespace tether::scene::stepping {
@@ -30,8 +30,10 @@ class SteppingEngine final : public Engine {
   void report_failure() const;
   void read_bodies();
 
-  std::optional<Eigen::Vector3d> gravity_;
-  std::vector<AttachedSpring> springs_;
+  void add_forces(const Scene& scene);
+
+  mutable mechanics::SteppedBodies stepped_;  // the view of the forces
+  std::vector<std::unique_ptr<mechanics::Force>> forces_;
   OnFailure on_failure_;
   contact::Stepper stepper_;
   std::uint64_t fingerprint_;  // of the scene, in saved states

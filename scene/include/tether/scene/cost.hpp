@@ -4,10 +4,12 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <tether/export.hpp>
 #include <tether/scene/run.hpp>
 #include <tether/scene/scene.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
 /// One setting of a scene.
@@ -48,3 +50,4 @@ struct CostTable {
 CostTable cost(const Scene& scene, const CostOptions& options = {});
 
 }  // namespace tether::scene
+TETHER_EXPORT_END

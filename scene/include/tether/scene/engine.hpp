@@ -9,16 +9,18 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <tether/export.hpp>
 #include <tether/scene/scene.hpp>
 #include <utility>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
 /// World axes; position of the centre of mass.
 struct BodyState {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
 };
@@ -95,3 +97,4 @@ std::unique_ptr<Engine> make_smooth_engine(const Scene& scene);
 std::unique_ptr<Engine> make_stepping_engine(const Scene& scene);
 
 }  // namespace tether::scene
+TETHER_EXPORT_END

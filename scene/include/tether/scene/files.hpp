@@ -6,9 +6,11 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <tether/export.hpp>
 #include <tether/scene/scene.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
 /// One thing wrong in a scene file.
@@ -41,3 +43,4 @@ Scene parse_scene(std::string_view text, const std::string& name);
 std::string write_scene(const Scene& scene);
 
 }  // namespace tether::scene
+TETHER_EXPORT_END

@@ -5,14 +5,17 @@
 #include <iosfwd>
 #include <memory>
 #include <string>
+#include <tether/export.hpp>
 #include <tether/scene/engine.hpp>
 #include <tether/scene/scene.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
 enum class EngineKind : std::uint8_t { smooth, stepping };
 
+/// An effect that the scene names.
 struct Effect {
   std::string name;    ///< e.g. "gravity"
   std::string detail;  ///< e.g. "[0, 0, -9.81] m/s^2"
@@ -43,3 +46,4 @@ std::unique_ptr<Engine> make_engine(const Scene& scene);
 int joint_rows(const Joint& joint);
 
 }  // namespace tether::scene
+TETHER_EXPORT_END

@@ -4,10 +4,12 @@
 
 #include <functional>
 #include <string>
+#include <tether/export.hpp>
 #include <tether/scene/engine.hpp>
 #include <tether/scene/scene.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
 /// What became of an [[expect]]. Of one that holds `throughout`, the worst moment.
@@ -72,3 +74,4 @@ std::vector<double> measure(const Scene& scene, Quantity quantity, int body, con
                             double start_energy);
 
 }  // namespace tether::scene
+TETHER_EXPORT_END

@@ -6,15 +6,13 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tether/export.hpp>
+#include <tether/linalg/eigen.hpp>
+#include <tether/scene/joint.hpp>
 #include <vector>
 
+TETHER_EXPORT_BEGIN
 namespace tether::scene {
-
-/// Where in a file something was written; line 0: made by a program.
-struct Place {
-  std::string file;
-  int line = 0, column = 0;
-};
 
 enum class ShapeKind : std::uint8_t { sphere, plane, box, capsule, convex, points };
 
@@ -27,13 +25,7 @@ struct Shape {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the solid half-space
   std::vector<Eigen::Vector3d> points;                ///< convex: vertices; points: touching points
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-};
-
-/// s(t) = rate t + amplitude sin(2 pi frequency t + phase) - amplitude sin(phase), so that s(0) =
-/// 0.
-struct Motion {
-  double rate = 0, amplitude = 0, frequency = 0, phase = 0;  // m/s or rad/s; m or rad; Hz; rad
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();
 };
 
 struct Drag {
@@ -50,7 +42,7 @@ struct Body {
   double mass = 0;                                    ///< kg
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre, body axes, kg m^2
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
   std::string material;
@@ -64,23 +56,6 @@ struct Pair {
   std::string first, second;
   double friction = 0;
   double restitution = 0;  ///< 0 .. 1
-  Place place;
-};
-
-enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed };
-
-/// `first` and `second` are indices of bodies, -1 the world. Points and axes in world coordinates
-/// at t = 0. A motion prescribes the angle of a hinge (rad, of first against second about axis),
-/// the displacement of a slider (m, of first along axis) or the change of a distance (m).
-struct Joint {
-  JointKind kind = JointKind::ball;
-  std::string name;
-  int first = -1, second = -1;
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();
-  Eigen::Vector3d at_second = Eigen::Vector3d::Zero();  ///< distance only: the point on `second`
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();      ///< hinge, slider
-  std::optional<double> length;                         ///< distance: default the one at t = 0
-  std::optional<Motion> motion;
   Place place;
 };
 
@@ -99,6 +74,14 @@ struct Spring {
 struct Load {
   int body = 0;
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
+  Place place;
+};
+
+/// A point at rest that attracts every body: force -GM m r / |r|^3 at the centre of mass, r from
+/// the point.
+struct CentralGravity {
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< m
+  double gravitational_parameter = 0;            ///< GM, m^3/s^2
   Place place;
 };
 
@@ -131,8 +114,8 @@ struct SteppingOptions {
   ContactLaw law = ContactLaw::coulomb;
   double tolerance = 1e-9;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
-  double error_reduction = 0.2;         ///< part of a penetration that one step removes
-  double max_depenetration_speed = 1;   ///< m/s
+  double error_reduction = 0.2;        ///< part of a penetration that one step removes
+  double max_depenetration_speed = 1;  ///< m/s
   RestitutionLaw restitution_law = RestitutionLaw::newton;
   /// Of sqrt(gravity * size of the smaller body): slower approaches do not bounce, or do not end as
   /// one whole impact.
@@ -210,6 +193,7 @@ struct Scene {
   std::vector<Joint> joints;
   std::vector<Spring> springs;
   std::vector<Load> loads;
+  std::vector<CentralGravity> central_gravity;
   std::vector<Invariant> invariants;
   std::optional<SmoothOptions> smooth;      ///< at most one of the two is given;
   std::optional<SteppingOptions> stepping;  ///< neither: the plan chooses with defaults
@@ -218,3 +202,4 @@ struct Scene {
 };
 
 }  // namespace tether::scene
+TETHER_EXPORT_END

@@ -27,13 +27,7 @@ struct Words<ShapeKind> {
 
 template <>
 struct Words<JointKind> {
-  static constexpr std::array<std::pair<std::string_view, JointKind>, 5> list{{
-      {"distance", JointKind::distance},
-      {"ball", JointKind::ball},
-      {"hinge", JointKind::hinge},
-      {"slider", JointKind::slider},
-      {"fixed", JointKind::fixed},
-  }};
+  static constexpr auto list = kJointWords;
 };
 
 template <>

@@ -1,0 +1,50 @@
+// Tether: joints and their prescribed motions. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tether/scene/place.hpp>
+#include <utility>
+
+namespace tether::scene {
+
+/// s(t) = rate t + amplitude sin(2 pi frequency t + phase) - amplitude sin(phase), so that s(0) =
+/// 0.
+struct Motion {
+  double rate = 0, amplitude = 0, frequency = 0, phase = 0;  // m/s or rad/s; m or rad; Hz; rad
+};
+
+enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal };
+
+/// The words of files for them.
+inline constexpr std::array<std::pair<std::string_view, JointKind>, 6> kJointWords{{
+    {"distance", JointKind::distance},
+    {"ball", JointKind::ball},
+    {"hinge", JointKind::hinge},
+    {"slider", JointKind::slider},
+    {"fixed", JointKind::fixed},
+    {"universal", JointKind::universal},
+}};
+
+/// `first` and `second` are indices of bodies, -1 the world. Points and axes in world coordinates
+/// at t = 0. A motion prescribes the angle of a hinge (rad, of first against second about axis),
+/// the displacement of a slider (m, of first along axis) or the change of a distance (m).
+struct Joint {
+  JointKind kind = JointKind::ball;
+  std::string name;
+  int first = -1, second = -1;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  Eigen::Vector3d at_second = Eigen::Vector3d::Zero();  ///< distance only: the point on `second`
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();      ///< hinge, slider, universal
+  std::optional<double> length;                         ///< distance: default the one at t = 0
+  std::optional<Motion> motion;
+  Place place;
+  /// Universal only: the arm of the cross on `second`, at right angles to `axis`, that on `first`.
+  Eigen::Vector3d axis_second = Eigen::Vector3d::UnitX();
+};
+
+}  // namespace tether::scene

@@ -1,0 +1,14 @@
+// Tether: places in scene files. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+namespace tether::scene {
+
+/// Where in a file something was written; line 0: made by a program.
+struct Place {
+  std::string file;
+  int line = 0, column = 0;
+};
+
+}  // namespace tether::scene

@@ -1,0 +1,102 @@
+// Tether: contact between bodies of two materials. SPDX-License-Identifier: BSD-3-Clause
+//
+// The stepping engine takes contact from tether::contact. A pair that no table names is an error
+// where bodies of it can touch: nothing is mixed from single materials.
+#include <algorithm>
+
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+using Materials = std::pair<std::string, std::string>;
+
+Materials ordered(const std::string& a, const std::string& b) { return std::minmax(a, b); }
+
+class ContactEffect : public Effect {
+ public:
+  void read_pair(files::Fields& in, files::Reader& r, Pair& pair) const override {
+    constexpr const char* kAllowed = "two names of materials, e.g. [\"card\", \"table\"]";
+    using Kind = files::Value::Kind;
+    const files::Value* between = in.find("between");
+    if (between == nullptr) return in.missing("between", kAllowed);
+    if (between->kind != Kind::array || between->items.size() != 2 ||
+        between->items[0].kind != Kind::text || between->items[1].kind != Kind::text)
+      return in.wrong("between", std::string("must be ") + kAllowed);
+    pair.first = between->items[0].text;
+    pair.second = between->items[1].text;
+    for (const std::string& name : {pair.first, pair.second})
+      if (r.materials.count(name) == 0)
+        return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,
+                                               r.hint_of(name, r.materials)));
+  }
+  void write_pair(const Pair& pair, files::Writer& out) const override {
+    out.raw("between", fmt::format("[{}, {}]", files::toml(pair.first), files::toml(pair.second)));
+  }
+  void check(const Scene& scene, files::Report& report) const override;
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    const std::size_t count = scene.pairs.size();
+    if (count > 0)
+      lines.push_back(
+          {"contact", fmt::format("{} pair{} of materials", count, count == 1 ? "" : "s")});
+  }
+  void add_columns(const Scene&, std::vector<Column>& columns) const override {
+    columns.push_back(
+        {"contacts", [](const Diagnostics& d) { return static_cast<double>(d.contacts); }});
+    columns.push_back({"penetration_m", [](const Diagnostics& d) { return d.penetration; }});
+    columns.push_back({"residual", [](const Diagnostics& d) { return d.residual; }});
+  }
+};
+
+void ContactEffect::check(const Scene& scene, files::Report& report) const {
+  if (scene.pairs.empty()) return;  // nothing touches
+  std::set<Materials> named;
+  for (const Pair& pair : scene.pairs)
+    if (!named.insert(ordered(pair.first, pair.second)).second)
+      report.add(pair.place, "pair: between",
+                 fmt::format("[\"{}\", \"{}\"]", pair.first, pair.second),
+                 "another [[pair]] has the same materials");
+
+  // How many bodies have a material, and how many of these move.
+  struct Count {
+    int all = 0, moving = 0;
+    Place place;
+  };
+  std::map<std::string, Count> materials;
+  for (const Body& body : scene.bodies) {
+    if (body.material.empty()) continue;
+    Count& of = materials[body.material];
+    if (of.all == 0) of.place = body.place;
+    ++of.all;
+    of.moving += !body.fixed;
+  }
+  // One of the two must move. Every pair here is named in the file or is a problem, so that the
+  // work ends with the longer of the file and the report.
+  for (const auto& [first, a] : materials) {
+    if (a.moving == 0) continue;
+    for (const auto& [second, b] : materials) {
+      if (report.full()) return;
+      if ((b.moving > 0 && second < first) || (first == second && a.all < 2)) continue;
+      const auto [low, high] = ordered(first, second);
+      if (named.count({low, high}) > 0) continue;
+      report.add(
+          std::max(a.place.line, b.place.line) == a.place.line ? a.place : b.place, "material",
+          fmt::format("\"{}\"", high),
+          fmt::format("bodies of \"{0}\" and \"{1}\" can touch, but no [[pair]] says between "
+                      "= [\"{0}\", \"{1}\"] (nothing is mixed from single materials)",
+                      low, high));
+    }
+  }
+}
+
+}  // namespace
+
+const Effect& contact_effect() {
+  static const ContactEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects

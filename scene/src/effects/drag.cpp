@@ -1,0 +1,166 @@
+// Tether: drag. SPDX-License-Identifier: BSD-3-Clause
+//
+//   force -(linear + quadratic |v|) v at the centre of mass,   torque -rotational w
+//
+// The stepping engine takes it implicitly, so that any strength is stable.
+#include <Eigen/LU>
+
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+struct Dragged {
+  int body;
+  Drag drag;
+};
+
+/// Force by speed, N s/m.
+double resistance(const Drag& drag, double speed) { return drag.linear + drag.quadratic * speed; }
+
+class DragForce : public Force {
+ public:
+  explicit DragForce(std::vector<Dragged> bodies) : bodies_(std::move(bodies)) {}
+  const char* name() const override { return "drag"; }
+  Stepping stepping() const override { return Stepping::implicit; }
+
+  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
+    for (const Dragged& each : bodies_) {
+      Load6& load = loads[at(bodies.inertia[at(each.body)].slot)];
+      const Vector3d& v = bodies.frames[at(each.body)].v;
+      load.force -= resistance(each.drag, v.norm()) * v;
+      load.torque_body -= each.drag.rotational * bodies.w[at(each.body)];
+    }
+  }
+  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const Dragged& each : bodies_) {
+      const int slot = bodies.inertia[at(each.body)].slot;
+      const Vector3d& v = bodies.frames[at(each.body)].v;
+      const double speed = v.norm();
+      Matrix3d D = resistance(each.drag, speed) * Matrix3d::Identity();
+      if (speed > 0) D += each.drag.quadratic / speed * v * v.transpose();
+      J.add_block(J.motion_row(slot, 0), kBody * slot + kVelocity, D);
+      J.add_block(J.motion_row(slot, 3), kBody * slot + kSpin,
+                  each.drag.rotational * Matrix3d::Identity());
+    }
+  }
+  bool has_power() const override { return true; }
+  double power(const Bodies& bodies) const override {
+    double sum = 0;
+    for (const Dragged& each : bodies_) {
+      const Vector3d& v = bodies.frames[at(each.body)].v;
+      sum -= resistance(each.drag, v.norm()) * v.squaredNorm() +
+             each.drag.rotational * bodies.w[at(each.body)].squaredNorm();
+    }
+    return sum;
+  }
+  void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const Dragged& each : bodies_) {
+      const int column = kBody * bodies.inertia[at(each.body)].slot;
+      const Vector3d& v = bodies.frames[at(each.body)].v;
+      for (int k = 0; k < 3; ++k) {
+        J.add(J.work_row, column + kVelocity + k,
+              (2 * each.drag.linear + 3 * each.drag.quadratic * v.norm()) * v[k]);
+        J.add(J.work_row, column + kSpin + k,
+              2 * each.drag.rotational * bodies.w[at(each.body)][k]);
+      }
+    }
+  }
+  // (m + dt resistance) v+ = m v,   (I + dt rotational) w+ = I w in body axes.
+  void step(SteppedBodies& stepped, double dt) const override {
+    const Bodies& bodies = stepped.bodies();
+    for (const Dragged& each : bodies_) {
+      const contact::RigidBody& motion = stepped.motion(each.body);
+      const double force = resistance(each.drag, motion.velocity.norm());
+      const Vector3d v = motion.velocity / (1 + dt * motion.inverse_mass * force);
+      Vector3d w = motion.angular_velocity;
+      if (each.drag.rotational != 0) {
+        const Matrix3d& I = bodies.inertia[at(each.body)].inertia;
+        const Matrix3d slowed = I + dt * each.drag.rotational * Matrix3d::Identity();
+        w = bodies.frames[at(each.body)].R * (slowed.inverse() * (I * bodies.w[at(each.body)]));
+      }
+      stepped.set_velocity(each.body, v, w);
+    }
+  }
+
+ private:
+  std::vector<Dragged> bodies_;
+};
+
+class DragEffect : public Effect {
+ public:
+  void read_body(files::Fields& in, files::Reader& r, Body& body) const override {
+    const files::Value* table = in.table("drag");
+    if (table == nullptr) return;
+    files::Fields fields = r.fields(table, in.path() + ": drag");
+    Drag drag;
+    drag.linear = fields.number("linear", drag.linear, files::kNotNegative, "N s/m");
+    drag.quadratic = fields.number("quadratic", drag.quadratic, files::kNotNegative, "N s^2/m^2");
+    drag.rotational = fields.number("rotational", drag.rotational, files::kNotNegative, "N m s");
+    fields.finish();
+    body.drag = drag;
+  }
+  void write_body(const Body& body, files::Writer& out) const override {
+    if (body.drag)
+      out.raw("drag", fmt::format("{{ linear = {}, quadratic = {}, rotational = {} }}",
+                                  files::toml(body.drag->linear), files::toml(body.drag->quadratic),
+                                  files::toml(body.drag->rotational)));
+  }
+  void check_body(const Body& body, files::Report& report) const override {
+    if (body.fixed && body.drag)
+      report.add(body.place, fmt::format("body \"{}\": drag", body.name), "",
+                 "has no meaning: the body is fixed");
+  }
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    int count = 0;
+    for (const Body& body : scene.bodies) count += body.drag.has_value();
+    if (count > 0)
+      lines.push_back({"drag", fmt::format("{} {}", count, count == 1 ? "body" : "bodies")});
+  }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Body& body : scene.bodies) {
+      if (!body.drag) continue;
+      body.drag->linear /= units.force() / units.speed();
+      body.drag->quadratic /= units.mass / units.length;
+      body.drag->rotational /= units.inertia() / units.time;
+    }
+  }
+  void limit_momenta(Momenta& momenta) const override {
+    for (const Dragged& each : dragged(momenta.scene)) {
+      const std::string what =
+          "the drag of body \"" + momenta.scene.bodies[at(each.body)].name + "\"";
+      momenta.push(what);
+      momenta.axes.none(what);
+    }
+  }
+  bool does_work(const Scene& scene) const override {
+    for (const Body& body : scene.bodies)
+      if (body.drag) return true;
+    return false;
+  }
+  std::unique_ptr<Force> make_force(const Scene& scene, const Bodies&) const override {
+    std::vector<Dragged> bodies = dragged(scene);
+    return bodies.empty() ? nullptr : std::make_unique<DragForce>(std::move(bodies));
+  }
+
+ private:
+  static std::vector<Dragged> dragged(const Scene& scene) {
+    std::vector<Dragged> all;
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+      if (const Body& body = scene.bodies[b]; body.drag && !body.fixed)
+        all.push_back({static_cast<int>(b), *body.drag});
+    return all;
+  }
+};
+
+}  // namespace
+
+const Effect& drag_effect() {
+  static const DragEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects

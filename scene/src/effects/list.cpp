@@ -1,0 +1,33 @@
+// Tether: all effects. SPDX-License-Identifier: BSD-3-Clause
+#include "list.hpp"
+
+namespace tether::scene::effects {
+
+#define EFFECT(name) const Effect& name##_effect();
+#include "effect_list.inc"
+#undef EFFECT
+
+const std::vector<const Effect*>& all() {
+  static const std::vector<const Effect*> list = {
+#define EFFECT(name) &name##_effect(),
+#include "effect_list.inc"
+#undef EFFECT
+  };
+  return list;
+}
+
+std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
+                                                           const mechanics::Bodies& bodies) {
+  std::vector<std::unique_ptr<mechanics::Force>> forces;
+  for (const Effect* each : all())
+    if (auto force = each->make_force(scene, bodies)) forces.push_back(std::move(force));
+  return forces;
+}
+
+mechanics::Momenta momenta_of(const Scene& scene) {
+  mechanics::Momenta momenta(scene);
+  for (const Effect* each : all()) each->limit_momenta(momenta);
+  return momenta;
+}
+
+}  // namespace tether::scene::effects

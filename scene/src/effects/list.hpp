@@ -1,0 +1,21 @@
+// Tether: all effects. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+/// Every effect that a scene may name, in the order of CMakeLists.txt beside this file.
+const std::vector<const Effect*>& all();
+
+/// The forces of those that the scene names, in that order. `bodies`: at t = 0.
+std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
+                                                           const mechanics::Bodies& bodies);
+
+/// What all of them leave of momentum and angular momentum.
+mechanics::Momenta momenta_of(const Scene& scene);
+
+}  // namespace tether::scene::effects

@@ -1,0 +1,58 @@
+// Tether: restitution of impacts. SPDX-License-Identifier: BSD-3-Clause
+//
+// Newton's law: normal velocity after an impact = -restitution * the one before; Poisson's: the
+// same of impulses.
+#include <algorithm>
+#include <stdexcept>
+
+#include "mechanics/effect.hpp"
+#include "range.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+contact::RestitutionLaw in_contact(RestitutionLaw law) {
+  switch (law) {
+    case RestitutionLaw::newton:
+      return contact::RestitutionLaw::newton;
+    case RestitutionLaw::poisson:
+      return contact::RestitutionLaw::poisson;
+  }
+  throw std::invalid_argument("unknown law of restitution");
+}
+
+class RestitutionEffect : public Effect {
+ public:
+  void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
+    pair.restitution = in.number("restitution", pair.restitution, files::kPart, "");
+  }
+  void write_pair(const Pair& pair, files::Writer& out) const override {
+    out.field("restitution", pair.restitution);
+  }
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    if (std::any_of(scene.pairs.begin(), scene.pairs.end(),
+                    [](const Pair& pair) { return pair.restitution > 0; }))
+      lines.push_back({"restitution", range(scene.pairs, &Pair::restitution)});
+  }
+  void configure(const Scene& scene, contact::SteppingOptions& options) const override {
+    const SteppingOptions wanted = scene.stepping.value_or(SteppingOptions{});
+    options.restitution_law = in_contact(wanted.restitution_law);
+    options.restitution_threshold = wanted.restitution_threshold;
+    options.impact_threshold = wanted.impact_threshold;
+  }
+  void configure(const Pair& pair, contact::Meeting& meeting) const override {
+    meeting.restitution = pair.restitution;
+  }
+};
+
+}  // namespace
+
+const Effect& restitution_effect() {
+  static const RestitutionEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects

@@ -1,0 +1,320 @@
+// Tether: springs and dampers between two points. SPDX-License-Identifier: BSD-3-Clause
+//
+// With d from a point of the first to one of the second body:
+//
+//   tension k (|d| - rest) + c d|d|/dt along d,   potential k (|d| - rest)^2 / 2,
+//   power of the damper -c (d|d|/dt)^2
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+/// A spring in the axes of its bodies.
+struct Item {
+  int first, second;
+  Vector3d at_first, at_second;
+  double stiffness, damping, rest;
+};
+
+/// Vector from the first to the second point, and its rate.
+template <class S>
+struct Span {
+  Jet<S> a, b;
+  Vector3<S> d;
+
+  Span(const Item& each, const Frame<S>& A, const Frame<S>& B)
+      : a(point<1>(A, each.at_first)), b(point<1>(B, each.at_second)), d(b.x - a.x) {}
+  Vector3<S> rate() const { return b.x1 - a.x1; }
+};
+
+template <class S>
+void pull(const Item& each, const Frame<S>& A, const Frame<S>& B, bool with_damping,
+          Wrench<S>& on_first, Wrench<S>& on_second) {
+  using std::sqrt;
+  const Span<S> span(each, A, B);
+  // Per length of d; a spring without rest length has no direction at d = 0 and needs none.
+  S factor(each.stiffness);
+  const bool damps = with_damping && each.damping > 0;
+  if (each.rest > 0 || damps) {
+    const S square = dot(span.d, span.d);
+    if (each.rest > 0) factor -= each.stiffness * each.rest / sqrt(square);
+    if (damps) factor += each.damping * dot(span.d, span.rate()) / square;
+  }
+  Vector3<S> force;
+  for (int i = 0; i < 3; ++i) force[i] = factor * span.d[i];
+  on_first.add(A, span.a.x, force);
+  on_second.add(B, span.b.x, Vector3<S>(-force));
+}
+
+template <class S>
+S power_of_damper(const Item& each, const Frame<S>& A, const Frame<S>& B) {
+  if (!(each.damping > 0)) return S(0.0);
+  const Span<S> span(each, A, B);
+  const S along = dot(span.d, span.rate());
+  return S(-each.damping * along * along / dot(span.d, span.d));
+}
+
+class SpringForce : public Force {
+ public:
+  SpringForce(const std::vector<Spring>& springs, const Bodies& bodies) {
+    for (const Spring& each : springs) {
+      Item item;
+      item.first = bodies.index(each.first);
+      item.second = bodies.index(each.second);
+      item.at_first = point_in(bodies.frames[at(item.first)], each.at);
+      item.at_second = point_in(bodies.frames[at(item.second)], each.at_second);
+      item.stiffness = each.stiffness;
+      item.damping = each.damping;
+      item.rest = each.rest ? *each.rest : (each.at_second - each.at).norm();
+      damped_ = damped_ || each.damping > 0;
+      items_.push_back(item);
+    }
+  }
+  const char* name() const override { return "springs"; }
+
+  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
+    for (const Item& each : items_) {
+      const auto [a, b] = pair_of<double>(each, frame_pair(bodies, each), true);
+      put(bodies, each.first, a, loads);
+      put(bodies, each.second, b, loads);
+    }
+  }
+  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const Item& each : items_) {
+      const auto frames = seed_pair(bodies, each);
+      const auto [a, b] = pair_of<Dual>(each, frames, true);
+      put(bodies, each, each.first, frames.first, a, J);
+      put(bodies, each, each.second, frames.second, b, J);
+    }
+  }
+  double potential(const Bodies& bodies) const override {
+    double sum = 0;
+    for (const Item& each : items_) {
+      const double stretch = (point<0>(bodies.frames[at(each.second)], each.at_second).x -
+                              point<0>(bodies.frames[at(each.first)], each.at_first).x)
+                                 .norm() -
+                             each.rest;
+      sum += 0.5 * each.stiffness * stretch * stretch;
+    }
+    return sum;
+  }
+  void add_potential_gradient(const Bodies& bodies, double* row) const override {
+    for (const Item& each : items_) {
+      const auto [a, b] = pair_of<double>(each, frame_pair(bodies, each), false);
+      gradient(bodies, each.first, a, row);
+      gradient(bodies, each.second, b, row);
+    }
+  }
+  bool has_power() const override { return damped_; }
+  double power(const Bodies& bodies) const override {
+    double sum = 0;
+    for (const Item& each : items_)
+      sum += power_of_damper<double>(each, bodies.frames[at(each.first)],
+                                     bodies.frames[at(each.second)]);
+    return sum;
+  }
+  void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const Item& each : items_) {
+      const auto [A, B] = seed_pair(bodies, each);
+      const Dual P = power_of_damper<Dual>(each, A, B);
+      if (bodies.moves(each.first))
+        J.add_directions(J.work_row, bodies.inertia[at(each.first)].slot, P.derivatives(), 0, -1.0);
+      if (bodies.moves(each.second))
+        J.add_directions(J.work_row, bodies.inertia[at(each.second)].slot, P.derivatives(),
+                         kBodyDirections, -1.0);
+    }
+  }
+
+  // Explicit springs of a semi-implicit step need dt^2 k / m < 4 and dt c / m < 2; together
+  // dt^2 k + 2 dt c < 4 m.
+  void check_step(const Scene& scene, const Bodies& bodies, double dt) const override {
+    // The largest inverse mass of the point in any direction.
+    const auto softness = [&](int body, const Vector3d& where) {
+      if (!bodies.moves(body)) return 0.0;
+      const Inertia& inertia = bodies.inertia[at(body)];
+      return 1 / inertia.mass + where.squaredNorm() * inertia.inverse.trace();
+    };
+    for (std::size_t i = 0; i < items_.size(); ++i) {
+      const Item& s = items_[i];
+      const double inverse = softness(s.first, s.at_first) + softness(s.second, s.at_second);
+      if ((dt * s.stiffness + 2 * s.damping) * dt * inverse < 4) continue;
+      const double c = 2 * s.damping * inverse, k = s.stiffness * inverse;
+      const double most = k > 0 ? (std::sqrt(c * c + 16 * k) - c) / (2 * k) : 4 / c;
+      std::ostringstream text;
+      text << scene.file << ":" << scene.springs[i].place.line << ": spring \""
+           << scene.springs[i].name << "\": a step of " << dt
+           << " s is too long for it to be stable; stepping.step must be below about " << most
+           << " s (or, without contacts, use the smooth engine)";
+      throw std::invalid_argument(text.str());
+    }
+  }
+  // One after the other, so that each damper sees the velocities that the others leave.
+  void step(SteppedBodies& stepped, double dt) const override {
+    const Bodies& bodies = stepped.bodies();
+    for (const Item& each : items_) {
+      const Frame<double>&A = bodies.frames[at(each.first)], &B = bodies.frames[at(each.second)];
+      if (!(Span<double>(each, A, B).d.squaredNorm() > 0)) continue;  // no direction
+      const auto [a, b] = pair_of<double>(each, {A, B}, true);
+      stepped.push(each.first, dt, a.force, a.torque);
+      stepped.push(each.second, dt, b.force, b.torque);
+    }
+  }
+
+ private:
+  template <class S>
+  using FramePair = std::pair<const Frame<S>&, const Frame<S>&>;
+
+  static FramePair<double> frame_pair(const Bodies& bodies, const Item& each) {
+    return {bodies.frames[at(each.first)], bodies.frames[at(each.second)]};
+  }
+  static std::pair<Frame<Dual>, Frame<Dual>> seed_pair(const Bodies& bodies, const Item& each) {
+    return {seed(bodies.frames[at(each.first)], bodies.moves(each.first), 0),
+            seed(bodies.frames[at(each.second)], bodies.moves(each.second), kBodyDirections)};
+  }
+  template <class S>
+  static std::pair<Wrench<S>, Wrench<S>> pair_of(const Item& each, const FramePair<S>& frames,
+                                                 bool with_damping) {
+    std::pair<Wrench<S>, Wrench<S>> wrenches{no_wrench<S>(), no_wrench<S>()};
+    pull(each, frames.first, frames.second, with_damping, wrenches.first, wrenches.second);
+    return wrenches;
+  }
+
+  static void put(const Bodies& bodies, int body, const Wrench<double>& wrench,
+                  std::vector<Load6>& loads) {
+    const int slot = bodies.inertia[at(body)].slot;
+    if (slot < 0) return;
+    loads[at(slot)].force += wrench.force;
+    loads[at(slot)].torque_world += wrench.torque;
+  }
+  static void put(const Bodies& bodies, const Item& each, int body, const Frame<Dual>& frame,
+                  const Wrench<Dual>& wrench, JacobianBlocks& J) {
+    const int slot = bodies.inertia[at(body)].slot;
+    if (slot < 0) return;
+    const Vector3<Dual> torque = transposed_times(frame.R, wrench.torque);
+    for (int i = 0; i < 6; ++i) {
+      const Derivatives& d = (i < 3 ? wrench.force[i] : torque[i - 3]).derivatives();
+      const int row = J.motion_row(slot, i);
+      if (bodies.moves(each.first))
+        J.add_directions(row, bodies.inertia[at(each.first)].slot, d, 0, -1.0);
+      if (bodies.moves(each.second))
+        J.add_directions(row, bodies.inertia[at(each.second)].slot, d, kBodyDirections, -1.0);
+    }
+  }
+  static void gradient(const Bodies& bodies, int body, const Wrench<double>& wrench, double* row) {
+    const int slot = bodies.inertia[at(body)].slot;
+    if (slot < 0) return;
+    const Frame<double>& f = bodies.frames[at(body)];
+    for (int k = 0; k < 3; ++k) row[kBody * slot + k] -= wrench.force[k];
+    const Eigen::RowVector4d q =
+        (f.R.transpose() * wrench.torque).transpose() * bodies.turns[at(slot)];
+    for (int k = 0; k < 4; ++k) row[kBody * slot + kQuaternion + k] -= q[k];
+  }
+
+  std::vector<Item> items_;
+  bool damped_ = false;
+};
+
+bool damps(const Spring& spring) { return spring.damping > 0; }
+bool pulls(const Spring& spring) { return spring.stiffness > 0 || !damps(spring); }
+
+class SpringEffect : public Effect {
+ public:
+  void read(files::Fields& root, files::Reader& r) const override {
+    r.each(root, "spring", [&](files::Fields& in) {
+      Spring spring;
+      spring.place = in.place();
+      spring.name = files::read_name(in, "spring");
+      r.two_bodies(in, spring.first, spring.second);
+      files::read_two_points(in, spring.at, spring.at_second);
+      spring.stiffness = in.number("stiffness", spring.stiffness, files::kNotNegative, "N/m");
+      spring.damping = in.number("damping", spring.damping, files::kNotNegative, "N s/m");
+      if (in.has("rest")) spring.rest = in.number("rest", 0, files::kNotNegative, "m");
+      if (!in.has("stiffness") && !in.has("damping"))
+        in.missing("stiffness", "give stiffness (N/m), damping (N s/m) or both");
+      r.scene.springs.push_back(std::move(spring));
+    });
+  }
+  void write(const Scene& scene, files::Writer& out) const override {
+    for (const Spring& spring : scene.springs) {
+      out.item("spring");
+      out.field("name", spring.name);
+      out.raw("bodies", files::two_names(scene, spring.first, spring.second));
+      out.raw("at", files::toml(std::vector<Vector3d>{spring.at, spring.at_second}), "m");
+      out.field("stiffness", spring.stiffness, "N/m");
+      out.field("damping", spring.damping, "N s/m");
+      if (spring.rest) out.field("rest", *spring.rest, "m");
+    }
+  }
+  void check(const Scene& scene, files::Report& report) const override {
+    files::check_connections(scene, scene.springs, "spring", report);
+  }
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    int springs = 0, dampers = 0;
+    for (const Spring& each : scene.springs) {
+      springs += pulls(each);
+      dampers += damps(each);
+    }
+    if (springs > 0)
+      lines.push_back({"springs", fmt::format("{} spring{}", springs, springs == 1 ? "" : "s")});
+    if (dampers > 0)
+      lines.push_back({"dampers", fmt::format("{} damper{}", dampers, dampers == 1 ? "" : "s")});
+  }
+  void take_lengths(const Scene& scene, Largest& length) const override {
+    const auto arm = [&](int body, const Vector3d& point) {
+      if (body < 0 || scene.bodies[at(body)].fixed) return;
+      length.take((point - scene.bodies[at(body)].position).norm());
+    };
+    for (const Spring& spring : scene.springs) {
+      arm(spring.first, spring.at);
+      arm(spring.second, spring.at_second);
+      length.take((spring.at - spring.at_second).norm());
+    }
+  }
+  void take_rates(const Scene& scene, double, double mass, Largest& rate) const override {
+    for (const Spring& spring : scene.springs) rate.take(std::sqrt(spring.stiffness / mass));
+  }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Spring& spring : scene.springs) {
+      spring.at /= units.length;
+      spring.at_second /= units.length;
+      spring.stiffness /= units.stiffness();
+      spring.damping /= units.stiffness() * units.time;
+      if (spring.rest) *spring.rest /= units.length;
+    }
+  }
+  void limit_momenta(Momenta& momenta) const override {
+    for (const Spring& spring : momenta.scene.springs) {
+      if (!momenta.holds_outside(spring.first, spring.second)) continue;
+      const std::string what = "spring \"" + spring.name + "\"";
+      momenta.push(what);
+      const bool second = momenta.is_outside(spring.second);
+      momenta.force_through(second ? spring.at_second : spring.at, 1e-12,
+                            what + " holds from outside");
+    }
+  }
+  bool does_work(const Scene& scene) const override {
+    for (const Spring& each : scene.springs)
+      if (damps(each)) return true;
+    return false;
+  }
+  std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
+    if (scene.springs.empty()) return nullptr;
+    return std::make_unique<SpringForce>(scene.springs, bodies);
+  }
+};
+
+}  // namespace
+
+const Effect& springs_effect() {
+  static const SpringEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects

@@ -1,0 +1,125 @@
+// Tether: the rows of all joints of a scene. SPDX-License-Identifier: BSD-3-Clause
+#include "joint_rows.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <tether/scene/words.hpp>
+
+#include "list.hpp"
+
+namespace tether::scene::joints {
+
+JointRows::JointRows(const Scene& scene, const Bodies& bodies) {
+  motions_.reserve(scene.joints.size());
+  now_.resize(scene.joints.size());  // fixed from here on: rows keep pointers
+  for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+    const Joint& joint = scene.joints[j];
+    const std::string name = name_of(joint, j);
+    names_.push_back(name);
+    Row row;
+    row.first = bodies.index(joint.first);
+    row.second = bodies.index(joint.second);
+    row.joint = static_cast<int>(j);
+    if (row.first == row.second || (!bodies.moves(row.first) && !bodies.moves(row.second)))
+      throw std::invalid_argument("joint \"" + name +
+                                  "\" joins nothing that can move against each other");
+    const JointType& kind = type(joint.kind);
+    if (joint.motion && kind.motion() == JointType::MotionOf::nothing)
+      throw std::invalid_argument("joint \"" + name + "\": a " + std::string(word(joint.kind)) +
+                                  " joint has no motion to prescribe");
+    kind.check(joint, name);
+    const Now* now = nullptr;
+    if (joint.motion) {
+      now = &now_[motions_.size()];
+      motions_.push_back(*joint.motion);
+    }
+    RowBuilder builder(*this, joint, row, bodies.frames[at(row.first)],
+                       bodies.frames[at(row.second)], now);
+    kind.add_rows(builder);
+  }
+}
+
+void JointRows::set_time(double t) {
+  for (std::size_t i = 0; i < motions_.size(); ++i) now_[i] = evaluate(motions_[i], t);
+}
+
+void JointRows::hold_motions() {
+  for (Now& each : now_) each.s1 = each.s2 = 0.0;
+}
+
+const std::string& JointRows::joint_of(int row) const {
+  int joint = 0;
+  each([&](const auto& kind) {
+    if (kind.row <= row && row < kind.row + kind.count) joint = kind.joint;
+  });
+  return name(joint);
+}
+
+RowBuilder::RowBuilder(JointRows& rows, const Joint& joint, const Row& bodies,
+                       const Frame<double>& A, const Frame<double>& B, const Now* now)
+    : rows_(rows),
+      joint_(joint),
+      bodies_(bodies),
+      A_(A),
+      B_(B),
+      now_(now),
+      z_(joint.axis.norm() > 0 ? Vector3d(joint.axis.normalized()) : Vector3d(Vector3d::UnitZ())),
+      x_(z_.unitOrthogonal()),
+      y_(z_.cross(x_)) {}
+
+template <class Kind>
+void RowBuilder::place(Kind row) {
+  static_cast<Row&>(row) = bodies_;
+  row.row = rows_.count_;
+  rows_.count_ += row.count;
+  std::get<std::vector<Kind>>(rows_.rows_).push_back(row);
+}
+
+void RowBuilder::coincide() {
+  Coincidence row;
+  row.at_first = point_in(A_, joint_.at);
+  row.at_second = point_in(B_, joint_.at);
+  place(row);
+}
+
+void RowBuilder::right_angle(const Vector3d& u, const Vector3d& v) {
+  RightAngle row;
+  row.of_first = direction_in(A_, u);
+  row.of_second = direction_in(B_, v);
+  place(row);
+}
+
+void RowBuilder::same_attitude() {
+  right_angle(x_, y_);
+  right_angle(y_, z_);
+  right_angle(z_, x_);
+}
+
+void RowBuilder::prescribed_angle() {
+  Angle row;
+  row.of_first = direction_in(A_, x_);
+  row.zero = direction_in(B_, x_);
+  row.ahead = direction_in(B_, y_);
+  row.now = now_;
+  place(row);
+}
+
+void RowBuilder::plane(const Vector3d& normal, const Now* motion) {
+  Plane row;
+  row.at_first = point_in(A_, joint_.at);
+  row.at_second = point_in(B_, joint_.at);
+  row.normal = direction_in(B_, normal);
+  row.now = motion;
+  place(row);
+}
+
+void RowBuilder::distance(double length) {
+  Distance row;
+  row.at_first = point_in(A_, joint_.at);
+  row.at_second = point_in(B_, joint_.at_second);
+  row.length = length;
+  row.now = now_;
+  place(row);
+}
+
+}  // namespace tether::scene::joints

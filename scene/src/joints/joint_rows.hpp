@@ -1,0 +1,108 @@
+// Tether: the rows of all joints of a scene. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "mechanics/bodies.hpp"
+#include "rows.hpp"
+
+namespace tether::scene::joints {
+
+class RowBuilder;
+
+class JointRows {
+ public:
+  JointRows() = default;
+  /// `bodies`: at t = 0. Throws std::invalid_argument, naming the joint and what is wrong.
+  JointRows(const Scene& scene, const Bodies& bodies);
+  JointRows(const JointRows&) = delete;  // rows keep pointers to the motions
+  JointRows& operator=(const JointRows&) = delete;
+
+  int count() const { return count_; }
+  bool has_motion() const { return !motions_.empty(); }
+  const std::string& name(int joint) const { return names_[at(joint)]; }
+  const std::string& joint_of(int row) const;
+
+  void set_time(double t);  ///< of the prescribed motions
+  void hold_motions();      ///< their values stay, their rates are 0
+
+  /// Calls f with every row, kind by kind.
+  template <class F>
+  void each(const F& f) const {
+    std::apply([&](const auto&... kinds) { (each_of(kinds, f), ...); }, rows_);
+  }
+  /// Calls f(i, body, force, torque in body axes) for the multiplier i of `row` being 1, the others
+  /// 0, and each moving body that it acts on.
+  template <class Row, class F>
+  static void each_unit_load(const Row& row, const Bodies& bodies, const F& f);
+
+ private:
+  friend class RowBuilder;
+  template <class Rows, class F>
+  static void each_of(const Rows& rows, const F& f) {
+    for (const auto& row : rows) f(row);
+  }
+
+  int count_ = 0;
+  AllRows rows_;
+  std::vector<std::string> names_;  // of the joints
+  std::vector<Motion> motions_;
+  std::vector<Now> now_;
+};
+
+/// Adds the rows of one joint in terms of points and directions in world axes at t = 0.
+class RowBuilder {
+ public:
+  RowBuilder(JointRows& rows, const Joint& joint, const Row& bodies, const Frame<double>& A,
+             const Frame<double>& B, const Now* now);
+
+  const Joint& joint() const { return joint_; }
+  const Now* now() const { return now_; }  ///< null: no prescribed motion
+  /// Right-handed directions; z along the axis of the joint.
+  const Vector3d& x() const { return x_; }
+  const Vector3d& y() const { return y_; }
+  const Vector3d& z() const { return z_; }
+
+  /// Both bodies keep the point joint.at in common: 3 rows.
+  void coincide();
+  /// Direction u of the first body stays at right angles to v of the second: 1 row.
+  void right_angle(const Vector3d& u, const Vector3d& v);
+  /// 3 rows.
+  void same_attitude();
+  /// The first body turns about z of the second by the prescribed angle: 1 row.
+  void prescribed_angle();
+  /// The point joint.at of the first body stays in the plane of the second with this normal; with a
+  /// motion, at that distance from it: 1 row.
+  void plane(const Vector3d& normal, const Now* motion);
+  /// joint.at of the first and joint.at_second of the second body keep their distance: 1 row.
+  void distance(double length);
+
+ private:
+  template <class Kind>
+  void place(Kind row);
+
+  JointRows& rows_;
+  const Joint& joint_;
+  Row bodies_;
+  const Frame<double>&A_, &B_;
+  const Now* now_;
+  Vector3d z_, x_, y_;
+};
+
+template <class Row, class F>
+void JointRows::each_unit_load(const Row& row, const Bodies& bodies, const F& f) {
+  const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
+  double unit[3] = {0, 0, 0};
+  for (int i = 0; i < row.count; ++i) {
+    unit[i] = 1.0;
+    Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
+    row.pull(A, B, unit, a, b);
+    unit[i] = 0.0;
+    if (bodies.moves(row.first)) f(i, row.first, a.force, Vector3d(A.R.transpose() * a.torque));
+    if (bodies.moves(row.second)) f(i, row.second, b.force, Vector3d(B.R.transpose() * b.torque));
+  }
+}
+
+}  // namespace tether::scene::joints

@@ -1,0 +1,63 @@
+// Tether: one kind of joint, as everybody who deals with joints sees it. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <tether/scene/joint.hpp>
+
+#include "joint_rows.hpp"
+#include "mechanics/momenta.hpp"
+#include "mechanics/units.hpp"
+#include "toml/fields.hpp"
+#include "toml/writer.hpp"
+
+namespace tether::scene::joints {
+
+/// The rows that it adds are all that the engines know of a joint.
+class JointType {
+ public:
+  virtual ~JointType() = default;
+  virtual JointKind kind() const = 0;
+
+  /// Its fields beside name, kind, bodies and motion. Default: the point `at`.
+  virtual void read(files::Fields& in, Joint& joint) const { read_point(in, joint); }
+  virtual void write(const Joint& joint, files::Writer& out) const {
+    out.field("at", joint.at, "m");
+  }
+  /// What must hold of a joint that was filled in by hand, beside two bodies that can move against
+  /// each other. Throws std::invalid_argument; `name` for messages.
+  virtual void check(const Joint&, const std::string& /*name*/) const {}
+
+  /// At t = 0, in world axes.
+  virtual void add_rows(RowBuilder& rows) const = 0;
+
+  /// What a motion prescribes.
+  enum class MotionOf { nothing, angle, length };
+  virtual MotionOf motion() const { return MotionOf::nothing; }
+
+  virtual const Vector3d& point_on_second(const Joint& joint) const { return joint.at; }
+  virtual void take_lengths(const Joint&, Largest&) const {}
+  /// Of a joint to the world. Default: torques in all directions.
+  virtual void limit_axes(const Joint&, Momenta& momenta, const std::string& because) const {
+    momenta.axes.none(because);
+  }
+
+ protected:
+  static constexpr double kOrigin = 1e-12;  // m: a point this near to the origin is there
+
+  static void read_point(files::Fields& in, Joint& joint) {
+    if (!in.has("at")) in.missing("at", "a point [x, y, z], world, m");
+    joint.at = in.vector("at", joint.at, files::kAny, "m");
+  }
+  static void read_axis(files::Fields& in, Joint& joint) {
+    if (!in.has("axis")) in.missing("axis", "a direction [x, y, z], world");
+    joint.axis = in.direction("axis", joint.axis);
+  }
+  static void check_axis(const Vector3d& axis, const std::string& name) {
+    if (!(axis.norm() > 0))
+      throw std::invalid_argument("joint \"" + name + "\": its axis has no length");
+  }
+};
+
+}  // namespace tether::scene::joints

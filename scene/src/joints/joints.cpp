@@ -1,0 +1,107 @@
+// Tether: joints of a scene as an effect. SPDX-License-Identifier: BSD-3-Clause
+//
+// Their forces are the multipliers of their rows, which the smooth engine solves for.
+#include <tether/scene/words.hpp>
+
+#include "list.hpp"
+#include "mechanics/effect.hpp"
+#include "prescribed_motion.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+using joints::JointType;
+
+namespace {
+
+void read_joint(files::Fields& in, files::Reader& r) {
+  Joint joint;
+  joint.place = in.place();
+  joint.name = files::read_name(in, "joint");
+  if (!in.has("kind")) {
+    std::vector<std::string> words;
+    for (const auto& [text, kind] : kJointWords) words.emplace_back(text);
+    in.missing("kind", "it is one of " + files::list(words));
+  }
+  const std::optional<JointKind> kind = in.word_of<JointKind>("kind");
+  r.two_bodies(in, joint.first, joint.second);
+  if (!kind) return in.pass_over({"at", "axis", "length", "motion"});
+  joint.kind = *kind;
+  const JointType& type = joints::type(*kind);
+  type.read(in, joint);
+  if (type.motion() != JointType::MotionOf::nothing)
+    if (const files::Value* motion = in.table("motion")) {
+      files::Fields fields = r.fields(motion, in.path() + ": motion");
+      joint.motion = joints::read_motion(fields, type.motion() == JointType::MotionOf::angle);
+    }
+  r.scene.joints.push_back(std::move(joint));
+}
+
+class JointEffect : public Effect {
+ public:
+  void read(files::Fields& root, files::Reader& r) const override {
+    r.each(root, "joint", [&](files::Fields& in) { read_joint(in, r); });
+  }
+  void write(const Scene& scene, files::Writer& out) const override {
+    for (const Joint& joint : scene.joints) {
+      const JointType& type = joints::type(joint.kind);
+      out.item("joint");
+      out.field("name", joint.name);
+      out.raw("kind", files::toml_word(joint.kind));
+      out.raw("bodies", files::two_names(scene, joint.first, joint.second));
+      type.write(joint, out);
+      if (joint.motion)
+        joints::write_motion(*joint.motion, type.motion() == JointType::MotionOf::angle, out);
+    }
+  }
+  void check(const Scene& scene, files::Report& report) const override {
+    files::check_connections(scene, scene.joints, "joint", report);
+  }
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    std::string text;
+    for (const auto& [name, kind] : Words<JointKind>::list) {
+      int count = 0;
+      for (const Joint& joint : scene.joints) count += joint.kind == kind;
+      if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, name);
+    }
+    if (!text.empty()) lines.push_back({"joints", text});
+  }
+  void take_lengths(const Scene& scene, Largest& length) const override {
+    const auto arm = [&](int body, const Vector3d& point) {
+      if (body < 0 || scene.bodies[at(body)].fixed) return;
+      length.take((point - scene.bodies[at(body)].position).norm());
+    };
+    for (const Joint& joint : scene.joints) {
+      const JointType& type = joints::type(joint.kind);
+      arm(joint.first, joint.at);
+      arm(joint.second, type.point_on_second(joint));
+      type.take_lengths(joint, length);
+    }
+  }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Joint& joint : scene.joints) {
+      joint.at /= units.length;
+      joint.at_second /= units.length;
+      if (joint.length) *joint.length /= units.length;
+    }
+  }
+  void limit_momenta(Momenta& momenta) const override {
+    for (std::size_t j = 0; j < momenta.scene.joints.size(); ++j) {
+      const Joint& joint = momenta.scene.joints[j];
+      if (!momenta.holds_outside(joint.first, joint.second)) continue;
+      const std::string name = joints::name_of(joint, j);
+      momenta.push("joint \"" + name + "\"");
+      joints::type(joint.kind)
+          .limit_axes(joint, momenta, "joint \"" + name + "\" holds from outside");
+    }
+  }
+};
+
+}  // namespace
+
+const Effect& joints_effect() {
+  static const JointEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects

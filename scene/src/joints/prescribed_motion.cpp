@@ -1,0 +1,110 @@
+// Tether: prescribed motions of joints. SPDX-License-Identifier: BSD-3-Clause
+#include "prescribed_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "list.hpp"
+#include "mechanics/effect.hpp"
+
+namespace tether::scene {
+
+namespace joints {
+
+namespace {
+
+constexpr double kFullTurn = 6.283185307179586;
+
+}  // namespace
+
+Now evaluate(const Motion& motion, double t) {
+  const double speed = kFullTurn * motion.frequency, angle = speed * t + motion.phase;
+  Now now;
+  now.s = motion.rate * t + motion.amplitude * (std::sin(angle) - std::sin(motion.phase));
+  now.s1 = motion.rate + motion.amplitude * speed * std::cos(angle);
+  now.s2 = -motion.amplitude * speed * speed * std::sin(angle);
+  return now;
+}
+
+Motion read_motion(files::Fields& in, bool angle) {
+  Motion m;
+  if (angle) {
+    m.rate = in.angle("rate_", m.rate, "/s");
+    m.amplitude = in.angle("amplitude_", m.amplitude);
+  } else {
+    m.rate = in.number("rate", m.rate, files::kAny, "m/s");
+    m.amplitude = in.number("amplitude", m.amplitude, files::kAny, "m");
+  }
+  m.frequency = in.number("frequency", m.frequency, files::kNotNegative, "Hz");
+  m.phase = in.angle("phase_", m.phase);
+  in.finish();
+  return m;
+}
+
+void write_motion(const Motion& m, bool angle, files::Writer& out) {
+  using files::toml;
+  const char* const unit = angle ? "_rad" : "";
+  out.raw("motion",
+          fmt::format("{{ rate{} = {}, amplitude{} = {}, frequency = {}, phase_rad = {} }}", unit,
+                      toml(m.rate), unit, toml(m.amplitude), toml(m.frequency), toml(m.phase)));
+}
+
+}  // namespace joints
+
+namespace effects {
+
+using namespace mechanics;
+
+namespace {
+
+bool is_driven(const Joint& joint) { return joint.motion.has_value(); }
+
+/// Its fields are those of the joint that it drives; its force is a part of the multipliers.
+class PrescribedMotion : public Effect {
+ public:
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), is_driven);
+    if (count > 0)
+      lines.push_back(
+          {"prescribed motion", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
+  }
+  void take_lengths(const Scene& scene, Largest& length) const override {
+    for (const Joint& joint : scene.joints)
+      if (joint.motion && !is_angle(joint)) length.take(std::abs(joint.motion->amplitude));
+  }
+  void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
+    for (const Joint& joint : scene.joints) {
+      if (!joint.motion) continue;
+      rate.take(joint.motion->frequency);
+      rate.take(std::abs(joint.motion->rate) / (is_angle(joint) ? 1 : length));
+    }
+  }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Joint& joint : scene.joints) {
+      if (!joint.motion) continue;
+      const double way = is_angle(joint) ? 1 : units.length;
+      joint.motion->rate /= way / units.time;
+      joint.motion->amplitude /= way;
+      joint.motion->frequency *= units.time;
+    }
+  }
+  bool does_work(const Scene& scene) const override {
+    return std::any_of(scene.joints.begin(), scene.joints.end(), is_driven);
+  }
+
+ private:
+  static bool is_angle(const Joint& joint) {
+    return joints::type(joint.kind).motion() == joints::JointType::MotionOf::angle;
+  }
+};
+
+}  // namespace
+
+const Effect& prescribed_motion_effect() {
+  static const PrescribedMotion effect;
+  return effect;
+}
+
+}  // namespace effects
+
+}  // namespace tether::scene

@@ -1,0 +1,195 @@
+// Tether: the rows that joints are made of. SPDX-License-Identifier: BSD-3-Clause
+//
+// Each kind of row has
+//   rows<order>(A, B, g)        the order-th time derivative of its g
+//   pull(A, B, lambda, a, b)    adds G^T lambda to the wrenches of its two bodies
+//   rate_by_time(g_t)           the part of the velocity row that does not come from velocities
+// for any scalar, so that the derivatives come from the same formulas. `first` and `second` index
+// the frames of the bodies, `row` is the first row, `has_length` tells a g in m from one in rad.
+#pragma once
+
+#include <cmath>
+#include <tuple>
+#include <vector>
+
+#include "mechanics/frames.hpp"
+#include "prescribed_motion.hpp"
+
+namespace tether::scene::joints {
+
+using namespace mechanics;
+
+struct Row {
+  int first = 0, second = 0, row = 0, joint = 0;
+};
+
+/// A point of the first body coincides with a point of the second: 3 rows.
+struct Coincidence : Row {
+  static constexpr int count = 3;
+  static constexpr bool has_length = true;
+  Vector3d at_first, at_second;
+
+  template <int order, class S>
+  void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
+    const Jet<S> a = point<order>(A, at_first), b = point<order>(B, at_second);
+    for (int i = 0; i < 3; ++i)
+      g[i] = order == 0 ? a.x[i] - b.x[i] : order == 1 ? a.x1[i] - b.x1[i] : a.x2[i] - b.x2[i];
+  }
+  template <class S>
+  void pull(const Frame<S>& A, const Frame<S>& B, const double* lambda, Wrench<S>& on_first,
+            Wrench<S>& on_second) const {
+    const Vector3<S> force = {S(lambda[0]), S(lambda[1]), S(lambda[2])};
+    on_first.add(A, point<0>(A, at_first).x, force);
+    on_second.add(B, point<0>(B, at_second).x, Vector3<S>(-force));
+  }
+  void rate_by_time(double* g_t) const { g_t[0] = g_t[1] = g_t[2] = 0.0; }
+};
+
+/// u . v with u = (u_k) of the first and v of the second body, k = 1 .. order.
+template <int order, class S>
+S product(const Jet<S>& u, const Jet<S>& v) {
+  if constexpr (order == 0) {
+    return dot(u.x, v.x);
+  } else if constexpr (order == 1) {
+    S sum = dot(u.x1, v.x);
+    sum += dot(u.x, v.x1);
+    return sum;
+  } else {
+    S sum = dot(u.x1, v.x1);
+    sum += sum;
+    sum += dot(u.x2, v.x);
+    sum += dot(u.x, v.x2);
+    return sum;
+  }
+}
+
+/// A direction of the first body stays at right angles to one of the second.
+struct RightAngle : Row {
+  static constexpr int count = 1;
+  static constexpr bool has_length = false;
+  Vector3d of_first, of_second;
+
+  template <int order, class S>
+  void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
+    g[0] = product<order>(direction<order>(A, of_first), direction<order>(B, of_second));
+  }
+  template <class S>
+  void pull(const Frame<S>& A, const Frame<S>& B, const double* lambda, Wrench<S>& on_first,
+            Wrench<S>& on_second) const {
+    turn(times(A.R, of_first), times(B.R, of_second), lambda[0], on_first, on_second);
+  }
+  void rate_by_time(double* g_t) const { g_t[0] = 0.0; }
+
+  template <class S>
+  static void turn(const Vector3<S>& u, const Vector3<S>& v, double lambda, Wrench<S>& on_first,
+                   Wrench<S>& on_second) {
+    const Vector3<S> axis = cross(u, v);
+    for (int i = 0; i < 3; ++i) {
+      const S torque(axis[i] * lambda);
+      on_first.torque[i] += torque;
+      on_second.torque[i] -= torque;
+    }
+  }
+};
+
+/// A direction of the first body has turned by the angle s against `zero` of the second, about the
+/// axis zero x ahead: sin(angle - s) = 0.
+struct Angle : Row {
+  static constexpr int count = 1;
+  static constexpr bool has_length = false;
+  Vector3d of_first, zero, ahead;
+  const Now* now = nullptr;
+
+  Vector3d normal() const { return std::cos(now->s) * ahead - std::sin(now->s) * zero; }
+  Vector3d tangent() const { return -std::cos(now->s) * zero - std::sin(now->s) * ahead; }
+
+  template <int order, class S>
+  void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
+    const Vector3d n = normal(), t = tangent();
+    g[0] = product<order>(direction<order>(A, of_first),
+                          moving_direction<order>(B, n, Vector3d(now->s1 * t),
+                                                  Vector3d(now->s2 * t - now->s1 * now->s1 * n)));
+  }
+  template <class S>
+  void pull(const Frame<S>& A, const Frame<S>& B, const double* lambda, Wrench<S>& on_first,
+            Wrench<S>& on_second) const {
+    RightAngle::turn(times(A.R, of_first), times(B.R, normal()), lambda[0], on_first, on_second);
+  }
+  // d/ds sin(angle - s) = -cos(angle - s) = -1 on the constraint.
+  void rate_by_time(double* g_t) const { g_t[0] = -now->s1; }
+};
+
+/// The point of the first body stays in a plane of the second (or at distance s from it).
+struct Plane : Row {
+  static constexpr int count = 1;
+  static constexpr bool has_length = true;
+  Vector3d at_first, at_second, normal;  // normal: of the second body
+  const Now* now = nullptr;              // null: s = 0
+
+  template <int order, class S>
+  void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
+    Jet<S> d = point<order>(A, at_first);
+    const Jet<S> b = point<order>(B, at_second);
+    d.x -= b.x;
+    if constexpr (order >= 1) d.x1 -= b.x1;
+    if constexpr (order >= 2) d.x2 -= b.x2;
+    g[0] = product<order>(direction<order>(B, normal), d);
+    if (now) g[0] -= order == 0 ? now->s : order == 1 ? now->s1 : now->s2;
+  }
+  // The force acts on both bodies at the point of the first.
+  template <class S>
+  void pull(const Frame<S>& A, const Frame<S>& B, const double* lambda, Wrench<S>& on_first,
+            Wrench<S>& on_second) const {
+    const Vector3<S> n = times(B.R, normal);
+    const Vector3<S> force = {S(n[0] * lambda[0]), S(n[1] * lambda[0]), S(n[2] * lambda[0])};
+    const Vector3<S> at = point<0>(A, at_first).x;
+    on_first.add(A, at, force);
+    on_second.add(B, at, Vector3<S>(-force));
+  }
+  void rate_by_time(double* g_t) const { g_t[0] = now ? -now->s1 : 0.0; }
+};
+
+/// Two points stay at the distance L = length + s: (|d|^2 - L^2) / (2 length).
+struct Distance : Row {
+  static constexpr int count = 1;
+  static constexpr bool has_length = true;
+  Vector3d at_first, at_second;
+  double length = 1;
+  const Now* now = nullptr;  // null: s = 0
+
+  template <int order, class S>
+  void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
+    Jet<S> d = point<order>(A, at_first);
+    const Jet<S> b = point<order>(B, at_second);
+    d.x -= b.x;
+    if constexpr (order >= 1) d.x1 -= b.x1;
+    if constexpr (order >= 2) d.x2 -= b.x2;
+    const Now n = now ? *now : Now{};
+    const double L = length + n.s;
+    const double square = order == 0   ? L * L
+                          : order == 1 ? 2.0 * L * n.s1
+                                       : 2.0 * (n.s1 * n.s1 + L * n.s2);
+    g[0] = product<order>(d, d);
+    g[0] -= square;
+    g[0] *= 0.5 / length;
+  }
+  template <class S>
+  void pull(const Frame<S>& A, const Frame<S>& B, const double* lambda, Wrench<S>& on_first,
+            Wrench<S>& on_second) const {
+    const Vector3<S> a = point<0>(A, at_first).x, b = point<0>(B, at_second).x;
+    const double scale = lambda[0] / length;
+    Vector3<S> force;
+    for (int i = 0; i < 3; ++i) force[i] = (a[i] - b[i]) * scale;
+    on_first.add(A, a, force);
+    on_second.add(B, b, Vector3<S>(-force));
+  }
+  void rate_by_time(double* g_t) const {
+    g_t[0] = now ? -(length + now->s) * now->s1 / length : 0.0;
+  }
+};
+
+/// All kinds of rows, in the order in which they are visited.
+using AllRows = std::tuple<std::vector<Coincidence>, std::vector<RightAngle>, std::vector<Angle>,
+                           std::vector<Plane>, std::vector<Distance>>;
+
+}  // namespace tether::scene::joints

@@ -1,0 +1,47 @@
+// Tether: bodies as forces and joints see them, in either engine. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "frames.hpp"
+#include "index.hpp"
+
+namespace tether::scene::mechanics {
+
+/// `slot`: index among the moving bodies, -1: it does not move.
+struct Inertia {
+  int slot = -1;
+  double mass = 0;                                                  ///< kg
+  Matrix3d inertia = Matrix3d::Zero(), inverse = Matrix3d::Zero();  ///< body axes, kg m^2
+};
+
+/// All bodies of a scene, then the world.
+struct Bodies {
+  std::vector<Inertia> inertia;
+  std::vector<Frame<double>> frames;
+  std::vector<Vector3d> w;                         ///< angular velocities in body axes
+  std::vector<Eigen::Matrix<double, 3, 4>> turns;  ///< of the moving bodies: turn_of_quaternion
+  int moving = 0;
+
+  int world() const { return static_cast<int>(inertia.size()) - 1; }
+  bool moves(int body) const { return inertia[at(body)].slot >= 0; }
+  /// Index of a body of the scene, where -1 is the world.
+  int index(int body) const { return body < 0 ? world() : body; }
+};
+
+/// Point `p` and direction `u` of world axes in the axes of a body.
+inline Vector3d point_in(const Frame<double>& f, const Vector3d& p) {
+  return f.R.transpose() * (p - f.x);
+}
+inline Vector3d direction_in(const Frame<double>& f, const Vector3d& u) {
+  return f.R.transpose() * u;
+}
+
+/// Sum of the forces on a body: force in world axes (N), torque about the centre in body axes and,
+/// apart from it, torque in world axes (N m).
+struct Load6 {
+  Vector3d force, torque_body, torque_world;
+};
+
+}  // namespace tether::scene::mechanics

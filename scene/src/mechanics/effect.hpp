@@ -1,0 +1,81 @@
+// Tether: one effect, as everybody who deals with a scene sees it. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <tether/contact/stepping.hpp>
+#include <tether/scene/plan.hpp>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "force.hpp"
+#include "momenta.hpp"
+#include "toml/reader.hpp"
+#include "toml/writer.hpp"
+#include "units.hpp"
+
+namespace tether::scene::mechanics {
+
+/// A line of the plan; `Effect` is the effect itself here.
+using PlannedEffect = scene::Effect;
+
+/// A column of the table of a run.
+struct Column {
+  std::string name;
+  double (*value)(const Diagnostics&);
+};
+
+/// Gravity, contact, springs, ...: an effect answers here for its fields in scene files, its words
+/// in the plan, its units, the momenta that it leaves alone, and its forces. What it does not
+/// answer, it has none of. A scene may lack the effect in each of these calls.
+class Effect {
+ public:
+  virtual ~Effect() = default;
+
+  /// Its own tables of the file, and its fields in tables that it shares with others. Every reader
+  /// asks for all its keys, and leaves a default where one is wrong.
+  virtual void read(files::Fields& /*root*/, files::Reader&) const {}
+  virtual void read_scene(files::Fields&, Scene&) const {}
+  virtual void read_body(files::Fields&, files::Reader&, Body&) const {}
+  virtual void read_pair(files::Fields&, files::Reader&, Pair&) const {}
+  /// The same, to be read again.
+  virtual void write(const Scene&, files::Writer&) const {}
+  virtual void write_scene(const Scene&, files::Writer&) const {}
+  virtual void write_body(const Body&, files::Writer&) const {}
+  virtual void write_pair(const Pair&, files::Writer&) const {}
+  /// What no single field shows.
+  virtual void check(const Scene&, files::Report&) const {}
+  virtual void check_body(const Body&, files::Report&) const {}
+
+  /// Adds a line where the scene names the effect.
+  virtual void plan(const Scene&, EngineKind, std::vector<PlannedEffect>&) const {}
+  /// Adds its columns to the table of a run.
+  virtual void add_columns(const Scene&, std::vector<Column>&) const {}
+
+  /// Lengths (m) and rates (1/s) of the scene; `length` and `mass`: its size.
+  virtual void take_lengths(const Scene&, Largest&) const {}
+  virtual void take_rates(const Scene&, double /*length*/, double /*mass*/, Largest&) const {}
+  /// Divides its numbers by their units.
+  virtual void convert(Scene&, const Units&) const {}
+
+  virtual void limit_momenta(Momenta&) const {}
+  /// Whether it gives or takes energy that no potential counts.
+  virtual bool does_work(const Scene&) const { return false; }
+  /// Null where the scene does not name it. `bodies`: at t = 0.
+  virtual std::unique_ptr<Force> make_force(const Scene&, const Bodies& /*bodies*/) const {
+    return nullptr;
+  }
+  /// Its part in the contact library's step.
+  virtual void configure(const Scene&, contact::SteppingOptions&) const {}
+  virtual void configure(const Pair&, contact::Meeting&) const {}
+};
+
+}  // namespace tether::scene::mechanics
+
+namespace tether::scene::effects {
+
+using mechanics::Effect;
+
+}  // namespace tether::scene::effects

@@ -1,0 +1,46 @@
+// Tether: the forces that one effect exerts in one scene. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "entries.hpp"
+#include "stepped_bodies.hpp"
+
+namespace tether::scene::mechanics {
+
+/// The smooth engine takes forces, derivatives, potential and power; the stepping engine changes
+/// velocities by impulses and takes the potential. Positions, velocities and forces in world axes,
+/// angular velocities `w` and `torque_body` in body axes.
+class Force {
+ public:
+  virtual ~Force() = default;
+  virtual const char* name() const = 0;
+
+  /// Adds to the loads of the moving bodies, by slot.
+  virtual void add(const Bodies& bodies, std::vector<Load6>& loads) const = 0;
+  /// Adds minus the derivatives of the force and of the torque in body axes.
+  virtual void add_jacobian(const Bodies&, JacobianBlocks&) const {}
+
+  virtual double potential(const Bodies&) const { return 0.0; }  ///< J
+  /// Adds the gradient of the potential to a row of y.
+  virtual void add_potential_gradient(const Bodies&, double*) const {}
+
+  /// Whether a part of the force has no potential here; its power, W, and minus the derivatives of
+  /// that in JacobianBlocks::work_row.
+  virtual bool has_power() const { return false; }
+  virtual double power(const Bodies&) const { return 0.0; }
+  virtual void add_power_jacobian(const Bodies&, JacobianBlocks&) const {}
+
+  enum class Stepping {
+    by_contact,  ///< a part of the contact library's own step
+    explicit_,   ///< impulses of the velocities so far
+    implicit     ///< needs the velocities that all others leave: acts after them
+  };
+  virtual Stepping stepping() const { return Stepping::explicit_; }
+  /// Throws std::invalid_argument where steps of dt are not stable.
+  virtual void check_step(const Scene&, const Bodies&, double /*dt*/) const {}
+  /// Changes velocities as the force does in dt.
+  virtual void step(SteppedBodies& bodies, double dt) const;
+};
+
+}  // namespace tether::scene::mechanics

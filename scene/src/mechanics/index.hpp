@@ -1,0 +1,12 @@
+// Tether: indices of bodies and rows, as containers take them. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+
+namespace tether::scene::mechanics {
+
+/// `index` >= 0.
+constexpr std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+}  // namespace tether::scene::mechanics

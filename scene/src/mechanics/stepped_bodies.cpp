@@ -1,0 +1,65 @@
+// Tether: the bodies of the stepping engine, as forces see them. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "stepped_bodies.hpp"
+
+#include <Eigen/LU>
+
+namespace tether::scene::mechanics {
+
+SteppedBodies::SteppedBodies(const Scene& scene) {
+  const std::size_t count = scene.bodies.size();
+  bodies_.inertia.resize(count + 1);
+  bodies_.frames.resize(count + 1);
+  bodies_.w.assign(count + 1, Vector3d::Zero());
+  for (std::size_t b = 0; b <= count; ++b) {
+    Frame<double>& f = bodies_.frames[b];
+    f.x = f.v = f.W = f.a = f.alpha = Vector3d::Zero();
+    f.R = Matrix3d::Identity();
+    if (b == count) continue;  // the world
+    const Body& body = scene.bodies[b];
+    f.x = body.position;
+    f.R = body.orientation.normalized().toRotationMatrix();
+    if (body.fixed) continue;
+    bodies_.inertia[b] = {bodies_.moving++, body.mass, body.inertia, body.inertia.inverse()};
+  }
+  loads_.resize(at(bodies_.moving));
+}
+
+void SteppedBodies::read(contact::BodySet& set) {
+  set_ = &set;
+  for (int b = 0; b < set.size(); ++b) {
+    if (!bodies_.moves(b)) continue;
+    Frame<double>& f = bodies_.frames[at(b)];
+    f.x = set.position[at(b)];
+    f.R = set.orientation[at(b)].toRotationMatrix();
+    f.v = set.motion[at(b)].velocity;
+    f.W = set.motion[at(b)].angular_velocity;
+    bodies_.w[at(b)] = f.R.transpose() * f.W;
+  }
+}
+
+void SteppedBodies::read_positions(const contact::BodySet& set) {
+  for (int b = 0; b < set.size(); ++b) {
+    if (!bodies_.moves(b)) continue;
+    bodies_.frames[at(b)].x = set.position[at(b)];
+    bodies_.frames[at(b)].R = set.orientation[at(b)].toRotationMatrix();
+  }
+}
+
+void SteppedBodies::set_velocity(int body, const Vector3d& velocity,
+                                 const Vector3d& angular_velocity) {
+  contact::RigidBody& motion = set_->motion[at(body)];
+  Frame<double>& f = bodies_.frames[at(body)];
+  motion.velocity = f.v = velocity;
+  motion.angular_velocity = f.W = angular_velocity;
+  bodies_.w[at(body)] = f.R.transpose() * f.W;
+}
+
+void SteppedBodies::push(int body, double dt, const Vector3d& force, const Vector3d& torque) {
+  if (!bodies_.moves(body)) return;
+  const contact::RigidBody& motion = set_->motion[at(body)];
+  set_velocity(body, motion.velocity + dt * motion.inverse_mass * force,
+               motion.angular_velocity + dt * (motion.inverse_inertia * torque));
+}
+
+}  // namespace tether::scene::mechanics

@@ -1,0 +1,41 @@
+// Tether: the program. SPDX-License-Identifier: BSD-3-Clause
+#include <exception>
+#include <iostream>
+#include <string>
+
+#include "commands.hpp"
+#include "contact_command.hpp"
+
+namespace {
+
+/// A message of several problems starts each of them on its line.
+void complain(const std::exception& e) { std::cerr << "tether: " << e.what() << "\n"; }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Keeps a computed motion on the constraints that it must obey", "tether"};
+  app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 good; 1 an expectation is not met or a contact problem not solved; 2 a file, "
+      "a "
+      "scene or an option is wrong; 3 a run could not go on; 128 and its number: a signal.");
+  int status = 0;
+  tether::scene::add_run_command(app, &status);
+  tether::scene::add_plan_command(app, &status);
+  tether::scene::add_check_command(app, &status);
+  tether::scene::add_cost_command(app, &status);
+  tether::scene::add_contact_command(app, &status);
+  const std::string version = "tether " TETHER_VERSION;
+  app.set_version_flag("--version", version);
+  for (CLI::App* command : app.get_subcommands({})) command->set_version_flag("--version", version);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? tether::scene::kGood : tether::scene::kWrong;
+  } catch (const std::exception& e) {
+    complain(e);
+    return tether::scene::kWrong;
+  }
+  return status;
+}

@@ -1,0 +1,143 @@
+// Tether: a run as a table. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "effects/list.hpp"
+#include "output/whole_file.hpp"
+#include "recorder.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+/// The table has the first of them: one of a million columns serves nobody.
+constexpr std::size_t kMostBodies = 200;
+
+class CsvRecorder : public Recorder {
+ public:
+  CsvRecorder(const Scene& scene, const std::string& file, double start_energy,
+              const Resume& resume)
+      : file_(file), start_energy_(start_energy) {
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+      if (!scene.bodies[i].fixed) moving_.push_back(i);
+    bodies_ = moving_.size();
+    moving_.resize(std::min(bodies_, kMostBodies));
+    for (const effects::Effect* each : effects::all()) each->add_columns(scene, columns_);
+    make_folder_of(file);
+    const std::string first = header(scene);
+    const long kept = resume.restarted ? length_up_to(resume.time, first) : 0;
+    // Cut where the run goes on, never emptied: what is kept is safe at every moment.
+    out_.reset(std::fopen(file.c_str(), kept > 0 ? "r+b" : "wb"));
+    if (!out_) fail();
+    if (kept == 0) {
+      put(first);
+      return;
+    }
+    if (ftruncate(fileno(out_.get()), kept) != 0 || std::fseek(out_.get(), kept, SEEK_SET) != 0)
+      fail();
+  }
+
+  void record(const Engine& engine, const Diagnostics& d) override {
+    line_.clear();
+    const auto add = [&](double x) { fmt::format_to(std::back_inserter(line_), ",{}", x); };
+    const auto add3 = [&](const Eigen::Vector3d& v) { add(v.x()), add(v.y()), add(v.z()); };
+    fmt::format_to(std::back_inserter(line_), "{}", engine.time());
+    const double energy = d.kinetic_energy + d.potential_energy;
+    add(d.kinetic_energy), add(d.potential_energy), add(energy), add(energy - start_energy_);
+    add3(d.momentum), add3(d.angular_momentum);
+    add(d.drift);
+    for (const mechanics::Column& column : columns_) add(column.value(d));
+    for (const std::size_t i : moving_) {
+      const BodyState& b = engine.bodies()[i];
+      add3(b.position);
+      add(b.orientation.w()), add3(b.orientation.vec());
+      add3(b.velocity), add3(b.angular_velocity);
+    }
+    line_ += '\n';
+    put(line_);
+  }
+
+  void keep() override {
+    if (std::fflush(out_.get()) != 0) fail();
+    fsync(fileno(out_.get()));  // devices have none
+  }
+
+  void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) override {
+    if (std::fflush(out_.get()) != 0) fail();
+    written.push_back(file_);
+    if (bodies_ > moving_.size())
+      remarks.push_back(
+          fmt::format("{} has the first {} of {} moving bodies; VTK files have all of them (--vtk)",
+                      file_, moving_.size(), bodies_));
+    if (lacks_rows_)
+      remarks.push_back(fmt::format(
+          "{} lacks rows from before the restart: it was no longer there, or cut", file_));
+  }
+
+ private:
+  std::string header(const Scene& scene) const {
+    std::string text =
+        "time_s,kinetic_energy_J,potential_energy_J,energy_J,energy_change_J,momentum_x,momentum_y,"
+        "momentum_z,angular_momentum_x,angular_momentum_y,angular_momentum_z,drift";
+    for (const mechanics::Column& column : columns_) text += "," + column.name;
+    for (const std::size_t i : moving_)
+      for (const char* column :
+           {"x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s",
+            "wx_rad_per_s", "wy_rad_per_s", "wz_rad_per_s"})
+        text += fmt::format(",{}.{}", scene.bodies[i].name, column);
+    return text + '\n';
+  }
+
+  /// Bytes of the rows of an earlier run that are kept, so that a run in two parts leaves the table
+  /// of one; 0: there is no such table.
+  long length_up_to(double time, const std::string& first) {
+    std::ifstream in(file_, std::ios::binary);
+    std::string line;
+    lacks_rows_ = true;
+    if (!std::getline(in, line) || line + '\n' != first) return 0;
+    auto length = static_cast<long>(first.size());
+    while (std::getline(in, line) && !in.eof()) {  // a row without its end is cut
+      const double at = std::strtod(line.c_str(), nullptr);
+      if (at > time) break;
+      lacks_rows_ = at != time;
+      length += static_cast<long>(line.size()) + 1;
+    }
+    return length;
+  }
+
+  void put(const std::string& text) {
+    if (std::fwrite(text.data(), 1, text.size(), out_.get()) != text.size()) fail();
+  }
+  [[noreturn]] void fail() const {
+    throw std::runtime_error(fmt::format("cannot write {}: {}", file_, std::strerror(errno)));
+  }
+
+  std::string file_, line_;
+  double start_energy_;
+  std::vector<std::size_t> moving_;  // those in the table
+  std::size_t bodies_ = 0;           // that move
+  std::vector<mechanics::Column> columns_;
+  bool lacks_rows_ = false;
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::unique_ptr<std::FILE, Close> out_;
+};
+
+}  // namespace
+
+std::unique_ptr<Recorder> make_csv_recorder(const Scene& scene, const std::string& file,
+                                            double start_energy, const Resume& resume) {
+  return std::make_unique<CsvRecorder>(scene, file, start_energy, resume);
+}
+
+}  // namespace tether::scene

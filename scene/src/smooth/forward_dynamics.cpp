@@ -1,0 +1,85 @@
+// Tether: accelerations and multipliers of a state. SPDX-License-Identifier: BSD-3-Clause
+#include "forward_dynamics.hpp"
+
+namespace tether::scene::smooth {
+
+namespace {
+
+constexpr double kEpsilon = 1e-11;  // of the diagonal of G M^-1 G^T
+
+}  // namespace
+
+void JointGradient::form(const JointRows& rows, const MovingBodies& bodies) {
+  G.setZero(rows.count(), 6 * bodies.count());
+  GM.resize(rows.count(), 6 * bodies.count());
+  rows.each([&](const auto& row) {
+    JointRows::each_unit_load(row, bodies.all(),
+                              [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+                                const int slot = bodies.all().inertia[at(body)].slot;
+                                G.block<1, 3>(row.row + i, 6 * slot) += force.transpose();
+                                G.block<1, 3>(row.row + i, 6 * slot + 3) += torque.transpose();
+                              });
+  });
+  for (int k = 0; k < bodies.count(); ++k) {
+    GM.middleCols<3>(6 * k) = G.middleCols<3>(6 * k) / bodies.inertia(k).mass;
+    GM.middleCols<3>(6 * k + 3).noalias() = G.middleCols<3>(6 * k + 3) * bodies.inertia(k).inverse;
+  }
+  S.noalias() = GM * G.transpose();
+}
+
+ForwardDynamics::ForwardDynamics(JointRows& rows, MovingBodies& bodies)
+    : rows_(rows), bodies_(bodies), factor_(rows.count()) {
+  rows.set_time(0.0);
+  bodies_.set_state(bodies_.start().data());
+  gradient_.form(rows_, bodies_);
+  const int m = rows.count(), n = 6 * bodies.count();
+  lambda_.setZero(m);
+  gamma_.setZero(m);
+  right_.setZero(m);
+  scratch_.setZero(m);
+  a_.setZero(n);
+  free_.setZero(n);
+  size_of_row_ = gradient_.S.diagonal();
+  epsilon_ = kEpsilon * size_of_row_;
+}
+
+void ForwardDynamics::solve(const std::vector<Load6>& loads) {
+  for (int k = 0; k < bodies_.count(); ++k) {
+    const Inertia& inertia = bodies_.inertia(k);
+    free_.segment<3>(6 * k) = loads[at(k)].force / inertia.mass;
+    free_.segment<3>(6 * k + 3) = inertia.inverse * loads[at(k)].torque_body;
+    bodies_.frame(k).a.setZero();
+    bodies_.frame(k).alpha.setZero();
+  }
+  a_ = free_;
+  if (rows_.count() == 0) return;
+  gradient_.form(rows_, bodies_);
+  const Bodies& bodies = bodies_.all();
+  rows_.each([&](const auto& row) {
+    row.template rows<2>(bodies.frames[at(row.first)], bodies.frames[at(row.second)],
+                         gamma_.data() + row.row);
+  });
+  right_ = -gamma_;
+  right_.noalias() -= gradient_.G * free_;
+  regular_ = gradient_.S;
+  regular_.diagonal() += epsilon_;
+  factor_.compute(regular_);
+  lambda_.setZero();
+  for (int pass = 0; pass < 3; ++pass) {
+    scratch_ = right_;
+    scratch_.noalias() -= gradient_.S * lambda_;
+    factor_.solveInPlace(scratch_);
+    lambda_ += scratch_;
+  }
+  a_.noalias() += gradient_.GM.transpose() * lambda_;
+}
+
+void ForwardDynamics::set_accelerations() {
+  for (int k = 0; k < bodies_.count(); ++k) {
+    Frame<double>& f = bodies_.frame(k);
+    f.a = a_.segment<3>(6 * k);
+    f.alpha = f.R * a_.segment<3>(6 * k + 3);
+  }
+}
+
+}  // namespace tether::scene::smooth

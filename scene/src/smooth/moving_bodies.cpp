@@ -1,0 +1,119 @@
+// Tether: the bodies of a smooth scene and their unknowns. SPDX-License-Identifier: BSD-3-Clause
+#include "moving_bodies.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <stdexcept>
+
+#include "mechanics/quaternions.hpp"
+
+namespace tether::scene::smooth {
+
+namespace {
+
+Inertia inertia_of(const Body& body) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> moments(body.inertia, Eigen::EigenvaluesOnly);
+  if (!(body.mass > 0) || !(moments.eigenvalues()[0] > 0))
+    throw std::invalid_argument(
+        "body \"" + body.name +
+        "\" moves, so the smooth engine needs its mass and all three moments of inertia > 0 "
+        "(a point mass: give it a small sphere)");
+  return {-1, body.mass, body.inertia, body.inertia.inverse()};
+}
+
+}  // namespace
+
+MovingBodies::MovingBodies(const Scene& scene) {
+  const std::size_t count = scene.bodies.size();
+  bodies_.inertia.resize(count + 1);
+  bodies_.frames.resize(count + 1);
+  bodies_.w.assign(count + 1, Vector3d::Zero());
+  for (std::size_t b = 0; b <= count; ++b) {
+    Frame<double>& f = bodies_.frames[b];
+    f.x = f.v = f.W = f.a = f.alpha = Vector3d::Zero();
+    f.R = Matrix3d::Identity();
+    if (b == count) continue;  // the world
+    const Body& body = scene.bodies[b];
+    f.x = body.position;
+    f.R = body.orientation.normalized().toRotationMatrix();
+    if (body.fixed) {
+      if (!body.velocity.isZero(0.0) || !body.angular_velocity.isZero(0.0))
+        throw std::invalid_argument("body \"" + body.name +
+                                    "\" is fixed but has a velocity: a fixed body stands still");
+      continue;
+    }
+    bodies_.inertia[b] = inertia_of(body);
+    bodies_.inertia[b].slot = bodies_.moving++;
+    body_of_slot_.push_back(static_cast<int>(b));
+    const Eigen::Quaterniond q = body.orientation.normalized();
+    const Vector3d w = f.R.transpose() * body.angular_velocity;
+    for (int k = 0; k < 3; ++k) start_.push_back(body.position[k]);
+    start_.insert(start_.end(), {q.w(), q.x(), q.y(), q.z()});
+    for (int k = 0; k < 3; ++k) start_.push_back(body.velocity[k]);
+    for (int k = 0; k < 3; ++k) start_.push_back(w[k]);
+  }
+  if (bodies_.moving == 0) throw std::invalid_argument("the scene has no body that can move");
+  bodies_.turns.resize(at(bodies_.moving));
+}
+
+void MovingBodies::set_state(const double* y) {
+  for (int k = 0; k < count(); ++k) {
+    const int b = body(k);
+    Frame<double>& f = bodies_.frames[at(b)];
+    const double* s = y + kBody * k;
+    f.x = Eigen::Map<const Vector3d>(s + kPosition);
+    f.R = rotation(s + kQuaternion);
+    f.v = Eigen::Map<const Vector3d>(s + kVelocity);
+    bodies_.w[at(b)] = Eigen::Map<const Vector3d>(s + kSpin);
+    f.W = f.R * bodies_.w[at(b)];
+  }
+}
+
+void MovingBodies::set_accelerations(const double* yp) {
+  for (int k = 0; k < count(); ++k) {
+    Frame<double>& f = frame(k);
+    f.a = Eigen::Map<const Vector3d>(yp + kBody * k + kVelocity);
+    f.alpha = f.R * Eigen::Map<const Vector3d>(yp + kBody * k + kSpin);
+  }
+}
+
+void MovingBodies::set_turns(const double* y) {
+  for (int k = 0; k < count(); ++k)
+    bodies_.turns[at(k)] = turn_of_quaternion(y + kBody * k + kQuaternion);
+}
+
+void MovingBodies::read(const double* y, std::vector<BodyState>& out) const {
+  for (int k = 0; k < count(); ++k) {
+    const double* s = y + kBody * k;
+    BodyState& state = out[at(body(k))];
+    state.position = Eigen::Map<const Vector3d>(s + kPosition);
+    state.orientation = Eigen::Quaterniond(s[3], s[4], s[5], s[6]).normalized();
+    state.velocity = Eigen::Map<const Vector3d>(s + kVelocity);
+    state.angular_velocity = state.orientation * Vector3d(Eigen::Map<const Vector3d>(s + kSpin));
+  }
+}
+
+double MovingBodies::kinetic_energy() const {
+  double sum = 0;
+  for (int k = 0; k < count(); ++k) {
+    const Vector3d& w = spin(k);
+    sum += 0.5 * (inertia(k).mass * frame(k).v.squaredNorm() + w.dot(inertia(k).inertia * w));
+  }
+  return sum;
+}
+
+Vector3d MovingBodies::momentum() const {
+  Vector3d sum = Vector3d::Zero();
+  for (int k = 0; k < count(); ++k) sum += inertia(k).mass * frame(k).v;
+  return sum;
+}
+
+Vector3d MovingBodies::angular_momentum() const {
+  Vector3d sum = Vector3d::Zero();
+  for (int k = 0; k < count(); ++k)
+    sum += inertia(k).mass * frame(k).x.cross(frame(k).v) +
+           frame(k).R * (inertia(k).inertia * spin(k));
+  return sum;
+}
+
+}  // namespace tether::scene::smooth

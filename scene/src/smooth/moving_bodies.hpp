@@ -1,0 +1,45 @@
+// Tether: the bodies of a smooth scene and their unknowns. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/scene/engine.hpp>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "mechanics/bodies.hpp"
+#include "mechanics/entries.hpp"
+
+namespace tether::scene::smooth {
+
+using namespace mechanics;
+
+/// y holds for each moving body x, q (wxyz, body to world), v, w (body axes), by slot.
+class MovingBodies {
+ public:
+  /// Throws std::invalid_argument, naming a body without mass or inertia or a fixed one that moves.
+  explicit MovingBodies(const Scene& scene);
+
+  const Bodies& all() const { return bodies_; }
+  int count() const { return bodies_.moving; }
+  int body(int slot) const { return body_of_slot_[at(slot)]; }
+  const Inertia& inertia(int slot) const { return bodies_.inertia[at(body(slot))]; }
+  const Frame<double>& frame(int slot) const { return bodies_.frames[at(body(slot))]; }
+  Frame<double>& frame(int slot) { return bodies_.frames[at(body(slot))]; }
+  const Vector3d& spin(int slot) const { return bodies_.w[at(body(slot))]; }  ///< body axes
+  const std::vector<double>& start() const { return start_; }                 ///< y at t = 0
+
+  void set_state(const double* y);           ///< frames, without accelerations
+  void set_accelerations(const double* yp);  ///< of the state that is set
+  void set_turns(const double* y);           ///< for derivatives by quaternions
+  void read(const double* y, std::vector<BodyState>& out) const;
+
+  double kinetic_energy() const;
+  Vector3d momentum() const;
+  Vector3d angular_momentum() const;  ///< about the origin
+
+ private:
+  Bodies bodies_;
+  std::vector<int> body_of_slot_;
+  std::vector<double> start_;
+};
+
+}  // namespace tether::scene::smooth

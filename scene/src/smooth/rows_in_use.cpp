@@ -1,0 +1,158 @@
+// Tether: which rows of the joints are used. SPDX-License-Identifier: BSD-3-Clause
+//
+// A combination n of rows with n^T G = 0 at the start is one of three things:
+//  - implied for good: with the other rows at zero, its g stays zero. To second order that means
+//    n^T gamma(v) = 0 for every velocity v that the joints allow (G v = 0);
+//  - a dead point: some v has n^T gamma(v) != 0. Its rows are needed later;
+//  - a contradiction, which shows in g.
+//
+// The projection gets as many rows as there are without the first kind. Off the constraints n^T G
+// is small, but not zero: on all rows it would chase the rounding of g in a direction in which
+// nothing has to move (Bricard's linkage, tolerance 1e-7: 60820 steps; this way 514). Which rows
+// these are is chosen along the motion, those with the longest pivots.
+//
+// Near a dead point g says almost nothing about one direction, and its rounding, magnified by
+// 1 / pivot, exceeds what a tight tolerance allows. For these few steps rows with such pivots are
+// not used; another one stands twice in the place of each. No more steps than that: a slider-crank
+// whose lengths differ by 1e-6 turns back at a pivot of 1.4e-3, and the rows must see it.
+#include "rows_in_use.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace tether::scene::smooth {
+
+namespace {
+
+constexpr double kDependent = 1e-9;    // pivot of rows of unit length
+constexpr double kSecondOrder = 1e-7;  // of n^T gamma, relative to |gamma|
+constexpr int kMostTrials = 8;         // velocities
+constexpr double kRounding = 1e-11;    // of g, with room for the next steps
+constexpr double kWeakest = 1e-3, kGood = 0.3;
+constexpr double kMuchWorse = 0.1;
+constexpr int kWait = 4;  // steps between looks while all pivots are good
+
+}  // namespace
+
+RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
+    : rows_(rows), bodies_(bodies), count_(rows.count()) {
+  if (rows.count() > 0) {
+    rows_.set_time(0.0);
+    bodies_.set_state(bodies_.start().data());
+    gradient_.form(rows_, bodies_);
+    const Eigen::VectorXd length = gradient_.G.rowwise().norm().cwiseMax(1e-300);
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+    qr.setThreshold(kDependent);
+    qr.compute((length.cwiseInverse().asDiagonal() * gradient_.G).transpose());
+    count_ = static_cast<int>(qr.rank()) + count_needed_beyond(qr.rank(), length, qr);
+  }
+  used_.assign(at(count_), 0);
+  place_of_used_.assign(at(rows.count()), -1);
+  carries_.assign(at(rows.count()), 0);
+  choose();
+}
+
+// Of the combinations n those that are dead points: n^T gamma(v) != 0 for some of a few velocities.
+int RowsInUse::count_needed_beyond(Eigen::Index r, const Eigen::VectorXd& length,
+                                   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr) {
+  const int m = rows_.count();
+  const Eigen::Index dependent = m - r, n = gradient_.G.cols(), freedoms = n - r;
+  const int trials = static_cast<int>(std::min<Eigen::Index>(kMostTrials, 2 * freedoms));
+  if (dependent <= 0 || trials <= 0) return 0;
+  // The combinations N, of scaled rows: G^T P = Q (R11 R12; 0 0), N = P (-R11^-1 R12; 1).
+  Eigen::MatrixXd N(m, dependent);
+  N.topRows(r) = -qr.matrixR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(
+      qr.matrixR().topRightCorner(r, dependent));
+  N.bottomRows(dependent).setIdentity();
+  N = (qr.colsPermutation() * N).eval();
+  const Eigen::MatrixXd Q = qr.householderQ() * Eigen::MatrixXd::Identity(n, n);
+  Eigen::MatrixXd second(dependent, trials);
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(m);
+  rows_.hold_motions();
+  for (int trial = 0; trial < trials; ++trial) {
+    Eigen::VectorXd mix(freedoms);  // fixed numbers without a pattern
+    for (Eigen::Index i = 0; i < freedoms; ++i)
+      mix[i] = std::sin(1.0 + 12.9898 * static_cast<double>(i) + 78.233 * trial);
+    const Eigen::VectorXd v = Q.rightCols(freedoms) * mix.normalized();
+    for (int k = 0; k < bodies_.count(); ++k) {
+      Frame<double>& f = bodies_.frame(k);
+      f.v = v.segment<3>(6 * k);
+      f.W = f.R * v.segment<3>(6 * k + 3);
+      f.a = f.alpha = Vector3d::Zero();
+    }
+    const Bodies& bodies = bodies_.all();
+    rows_.each([&](const auto& row) {
+      row.template rows<2>(bodies.frames[at(row.first)], bodies.frames[at(row.second)],
+                           values.data() + row.row);
+    });
+    const Eigen::VectorXd gamma = values.cwiseQuotient(length);
+    second.col(trial) = N.transpose() * gamma / std::max(gamma.norm(), 1e-12);
+  }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(second);
+  int needed = 0;
+  for (Eigen::Index i = 0; i < svd.singularValues().size(); ++i)
+    needed += svd.singularValues()[i] > kSecondOrder;
+  return needed;
+}
+
+void RowsInUse::choose(double tolerance) {
+  weak_ = std::min(kWeakest, kRounding / tolerance);
+  choose();
+}
+
+void RowsInUse::choose() {
+  if (count_ == 0) return;
+  gradient_.form(rows_, bodies_);
+  Eigen::MatrixXd& G = gradient_.G;
+  for (int i = 0; i < rows_.count(); ++i) G.row(i) /= std::max(G.row(i).norm(), 1e-300);
+  row_choice_.compute(G.transpose());
+  const auto& order = row_choice_.colsPermutation().indices();
+  const Eigen::Index most = std::min<Eigen::Index>(count_, row_choice_.matrixR().rows());
+  Eigen::Index count = 0;
+  double pivot = 1.0;
+  while (count < most) {
+    pivot = std::abs(row_choice_.matrixR()(count, count));
+    if (pivot < weak_) break;
+    ++count;
+  }
+  for (Eigen::Index k = 0; k < count_; ++k)
+    used_[static_cast<std::size_t>(k)] = order[k < count ? k : 0];
+  std::sort(used_.begin(), used_.end());
+  std::fill(place_of_used_.begin(), place_of_used_.end(), -1);
+  for (int k = count_ - 1; k >= 0; --k) place_of_used_[at(used_[at(k)])] = k;
+  wait_ = pivot > kGood ? kWait : 1;
+  weakest_ = count_ <= row_choice_.matrixR().rows()
+                 ? std::abs(row_choice_.matrixR()(count_ - 1, count_ - 1))
+                 : 0;
+  choose_multipliers();
+}
+
+// A change costs IDA a new matrix, so the rows stay while others are not much better.
+void RowsInUse::choose_multipliers() {
+  const auto& order = row_choice_.colsPermutation().indices();
+  const auto last = [this](const auto& qr) {
+    return count_ <= qr.matrixR().rows() ? std::abs(qr.matrixR()(count_ - 1, count_ - 1)) : 0.0;
+  };
+  if (count_ == rows_.count()) {
+    std::fill(carries_.begin(), carries_.end(), char(1));
+    return;
+  }
+  Eigen::Index k = 0;
+  carried_gradient_.resize(gradient_.G.cols(), count_);
+  for (int i = 0; i < rows_.count(); ++i)
+    if (carries_[at(i)]) carried_gradient_.col(k++) = gradient_.G.row(i).transpose();
+  if (k == count_) {
+    carried_rows_.compute(carried_gradient_);
+    if (last(carried_rows_) > kMuchWorse * last(row_choice_)) return;
+  }
+  ++multiplier_choices_;
+  std::fill(carries_.begin(), carries_.end(), char(0));
+  for (Eigen::Index i = 0; i < count_; ++i) carries_[static_cast<std::size_t>(order[i])] = 1;
+}
+
+void RowsInUse::look() {
+  if (--wait_ <= 0) choose();
+}
+
+}  // namespace tether::scene::smooth

@@ -1,0 +1,82 @@
+// Tether: a scene while it is read. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fmt/format.h>
+
+#include <map>
+#include <set>
+#include <string>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "fields.hpp"
+
+namespace tether::scene::files {
+
+/// The scene under construction, with what every part of the reader needs.
+struct Reader {
+  const std::string& file;
+  Report& report;
+  Scene scene;
+  std::map<std::string, int> bodies;  ///< by name
+  std::set<std::string> materials;    ///< of bodies
+
+  Fields fields(const Value* table, std::string path) const {
+    return {table, std::move(path), file, report};
+  }
+
+  /// Reads the elements of [[key]]; `path` of one without a name: key and number.
+  template <class Read>
+  void each(Fields& root, std::string_view key, Read read) {
+    int number = 0;
+    for (const Value* table : root.tables(key)) {
+      Fields in = fields(table, fmt::format("{} {}", key, ++number));
+      read(in);
+      in.finish();
+    }
+  }
+
+  /// `; did you mean ...?`; nothing for problems beyond those shown: each hint looks at all names.
+  template <class Names>
+  std::string hint_of(const std::string& wrong, const Names& names) const {
+    if (report.full()) return "";
+    std::vector<std::string> all;
+    for (const auto& each : names) all.push_back(name_of(each));
+    return hint(wrong, all);
+  }
+
+  /// The body that `key` names.
+  int body(Fields& in, std::string_view key) const;
+  /// bodies = ["a", "world"]
+  void two_bodies(Fields& in, int& first, int& second) const;
+
+ private:
+  static const std::string& name_of(const std::string& name) { return name; }
+  static const std::string& name_of(const Body& body) { return body.name; }
+};
+
+/// The field `name` of an element of [[kind]], which names it in messages from here on.
+std::string read_name(Fields& in, const std::string& kind);
+
+/// at = [[x, y, z], [x, y, z]]: on the first and on the second body; reported and left alone
+/// where it is missing or wrong.
+void read_two_points(Fields& in, Eigen::Vector3d& first, Eigen::Vector3d& second);
+
+/// Names of elements of [[kind]] that stand twice, and those of which no body can move.
+template <class Connection>
+void check_connections(const Scene& scene, const std::vector<Connection>& all, const char* kind,
+                       Report& report) {
+  const auto moves = [&](int body) {
+    return body >= 0 && !scene.bodies[static_cast<std::size_t>(body)].fixed;
+  };
+  std::set<std::string> names;
+  for (const Connection& each : all) {
+    const std::string path = fmt::format("{} \"{}\"", kind, each.name);
+    if (!names.insert(each.name).second)
+      report.add(each.place, path + ": name", "", "another one has it already");
+    if (!moves(each.first) && !moves(each.second))
+      report.add(each.place, path + ": bodies", "", "one of them must be able to move");
+  }
+}
+
+}  // namespace tether::scene::files
