@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
-#include <mover.hpp>
+#include <movers/mover.hpp>
 #include <problems/andrews.hpp>
 #include <problems/car_axis.hpp>
 #include <problems/pendulum.hpp>

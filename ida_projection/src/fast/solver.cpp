@@ -6,8 +6,8 @@
 #include <tether/ida_projection/fast.hpp>
 #include <tether/linalg/small_lu.hpp>
 
-#include "../sundials_build.hpp"
 #include "arguments.hpp"
+#include "host/sundials_build.hpp"
 
 namespace tether::ida_projection {
 

@@ -3,8 +3,8 @@
 
 #include <tether/ida_projection/fast.hpp>
 
-#include "../sundials_build.hpp"
 #include "arguments.hpp"
+#include "host/sundials_build.hpp"
 #include "kernels.hpp"
 
 namespace tether::ida_projection {

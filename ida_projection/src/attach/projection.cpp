@@ -1,0 +1,183 @@
+// Tether: attaching the projection to IDA. SPDX-License-Identifier: BSD-3-Clause
+#include <new>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <tether/ida_projection/projection.hpp>
+
+#include "attach/impl.hpp"
+#include "host/sundials_build.hpp"
+
+namespace tether::ida_projection {
+
+const char* to_string(Status status) {
+  switch (status) {
+    case Status::unused:
+      return "unused";
+    case Status::success:
+      return "success";
+    case Status::not_converged:
+      return "not converged";
+    case Status::move_too_long:
+      return "move too long";
+    case Status::inconsistent:
+      return "inconsistent constraints";
+    case Status::not_finite:
+      return "not finite";
+    case Status::callback_recoverable:
+      return "callback failed, recoverable";
+    case Status::corrector_failed:
+      return "corrector failed";
+    case Status::collapsed:
+      return "steps collapsed";
+    case Status::doubtful:
+      return "doubtful";
+    case Status::callback_fatal:
+      return "callback failed";
+    case Status::late_attach:
+      return "attached too late";
+    case Status::simultaneous_sensitivities:
+      return "simultaneous sensitivities";
+    case Status::never_called:
+      return "never called";
+    case Status::out_of_memory:
+      return "out of memory";
+    case Status::internal_error:
+      return "internal error";
+  }
+  return "unknown";
+}
+
+Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
+    : constraints(std::move(set)),
+      ida_mem_(ida_mem),
+      options_(std::move(options)),
+      smoother_(ida_mem, options_),
+      order_limit_(ida_mem, options_),
+      frequency_(options_.frequency) {
+  if (ida_mem == nullptr) reject("ida_mem is null; pass what IDACreate returned");
+  N_Vector like = nullptr, yppred, yyn, ypn, res;
+  void* user_data;
+  sunrealtype t, cj;
+  if (IDAGetNonlinearSystemData(ida_mem, &t, &like, &yppred, &yyn, &ypn, &res, &cj, &user_data) !=
+          0 ||
+      like == nullptr)
+    reject("ida_mem is not initialised; call IDAInit before");
+  validate(constraints, options_, like);
+
+  contiguous_ = is_contiguous(like);
+  size_ = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
+  if (std::holds_alternative<UserProjection>(constraints.jacobian))
+    mover_ = make_user_mover(constraints, options_, statistics_, like);
+  else if (constraints.total_count() > 0)
+    mover_ = std::holds_alternative<Gradients>(constraints.jacobian)
+                 ? make_gradient_mover(constraints, options_, statistics_, like)
+             : has_sparse_rows(constraints)
+                 ? make_sparse_mover(constraints, options_, statistics_, size_)
+                 : make_dense_mover(constraints, options_, statistics_, size_);
+  if (mover_) {
+    delta_ = OwnedVector(like);
+    newton_ = OwnedVector(like);
+    saved_ = OwnedVector(like);
+    weights_ = OwnedVector(like);
+    if (contiguous_) {
+      delta_entries_ = N_VGetArrayPointer(delta_);
+      newton_entries_ = N_VGetArrayPointer(newton_);
+      saved_entries_ = N_VGetArrayPointer(saved_);
+    }
+    if (options_.id != nullptr) {
+      set_id(options_.id);
+      options_.id = id_;  // the caller's vector may go
+    }
+    if (contiguous_ && options_.hold_vector != nullptr && options_.hold.empty()) {
+      const double* free = N_VGetArrayPointer(options_.hold_vector);
+      for (int j = 0; j < size_; ++j) options_.hold.push_back(free[j] == 0.0);
+    }
+  }
+
+  inner_ = options_.nonlinear_solver;
+  if (inner_ == nullptr) {
+    own_inner_.reset(SUNNonlinSol_Newton(like, like->sunctx));
+    inner_ = own_inner_.get();
+  }
+  if (inner_ != nullptr) solver_.reset(make_solver(*this, inner_, like->sunctx));
+  if (!solver_) throw std::bad_alloc();
+  attach();
+}
+
+// IDA lets go of its own solver before it finds out that another one takes no functions: that is
+// asked before.
+void Projection::Impl::attach() {
+  const SUNNonlinSolSysFn nothing = [](N_Vector, N_Vector, void*) { return 0; };
+  const SUNNonlinSolConvTestFn converged = [](SUNNonlinearSolver, N_Vector, N_Vector, sunrealtype,
+                                              N_Vector, void*) { return 0; };
+  const auto require = [](int flag, const char* what) {
+    if (flag != 0)
+      reject("options.nonlinear_solver refuses " + std::string(what) + ", flag " +
+             std::to_string(flag) + "; IDA needs all of its functions");
+  };
+  require(SUNNonlinSolSetSysFn(solver_.get(), nothing), "a system function");
+  require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
+  require(SUNNonlinSolSetMaxIters(solver_.get(), maximum_iterations_), "a number of iterations");
+  IDAGetNumSteps(ida_mem_, &steps_at_attach_);
+  const StepData step = step_data();
+  lifetime_.watch(step.y_predicted, step.yp_predicted, [this] {
+    std::string ignored;
+    guarded([this] { return look_for_bypass(), 0; }, ignored);
+  });
+  const int flag = IDASetNonlinearSolver(ida_mem_, solver_.get());
+  if (flag != 0)
+    reject("IDASetNonlinearSolver returned " + std::to_string(flag) + "; call IDAInit before");
+}
+
+Projection::Impl::~Impl() {
+  std::string ignored;
+  guarded([this] { return look_for_bypass(), 0; }, ignored);
+}
+
+Statistics Projection::Impl::statistics() {
+  look_for_bypass();
+  Statistics s = statistics_;
+  s.steps_without_plugin = steps_unseen_;
+  const long moved = s.projections + s.chord_projections - s.failures();
+  s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
+  s.seconds = timed_.total(s.projections);
+  return s;
+}
+
+void Projection::Impl::reset_statistics() {
+  statistics_ = Statistics{};
+  move_sum_ = 0.0;
+  timed_ = SampledTime();
+}
+
+Projection::Projection(void* ida_mem, Constraints constraints, Options options,
+                       const SundialsBuild& built) {
+  check_running_sundials(built);
+  impl_ = std::make_unique<Impl>(ida_mem, std::move(constraints), std::move(options));
+}
+Projection::~Projection() = default;
+Projection::Projection(Projection&&) noexcept = default;
+Projection& Projection::operator=(Projection&&) noexcept = default;
+
+ConsistencyReport Projection::make_consistent(double t0, N_Vector yy, N_Vector yp,
+                                              const Consistency& how) {
+  return impl_->make_consistent(t0, yy, yp, how);
+}
+ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
+  return impl_->project(t, yy, yp);
+}
+int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask) {
+  return impl_->solve_and_project(tout, tret, yret, ypret, itask);
+}
+Statistics Projection::statistics() const { return impl_->statistics(); }
+void Projection::reset_statistics() { impl_->reset_statistics(); }
+Status Projection::status() const {
+  impl_->look_for_bypass();
+  return impl_->status == Status::success ? impl_->warning_status : impl_->status;
+}
+const std::string& Projection::message() const {
+  impl_->look_for_bypass();
+  return impl_->message.empty() ? impl_->warning : impl_->message;
+}
+const Constraints& Projection::constraints() const { return impl_->constraints; }
+
+}  // namespace tether::ida_projection

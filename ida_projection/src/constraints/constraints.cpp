@@ -1,0 +1,154 @@
+// Tether: constraint sets, their union and the check of a caller's Jacobian.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <tether/ida_projection/constraints.hpp>
+
+#include "constraints/evaluator.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+bool empty(const Constraints& set) { return set.count == 0 && set.joined.empty(); }
+
+const char* kind(const Constraints& set) {
+  if (std::holds_alternative<Gradients>(set.jacobian)) return "Gradients";
+  if (std::holds_alternative<UserProjection>(set.jacobian)) return "UserProjection";
+  return "";
+}
+
+}  // namespace
+
+std::string Constraints::name(int row) const {
+  if (row >= 0 && row < count)
+    return static_cast<std::size_t>(row) < names.size() ? names[static_cast<std::size_t>(row)]
+                                                        : "row " + std::to_string(row);
+  int first = count;
+  for (const Constraints& part : joined) {
+    const int rows = part.total_count();
+    if (row >= first && row < first + rows) {
+      const std::string found = part.name(row - first);
+      // Unnamed rows are numbered in the whole set, not in the part.
+      return found.rfind("row ", 0) == 0 ? "row " + std::to_string(row) : found;
+    }
+    first += rows;
+  }
+  return "row " + std::to_string(row);
+}
+
+std::string wrong_length(const Constraints& set, long unknowns) {
+  if (set.count > 0 && (unknowns < set.least_unknowns || unknowns > set.most_unknowns)) {
+    const bool exact = set.least_unknowns == set.most_unknowns;
+    return "constraint \"" + set.name(0) + "\" needs " +
+           (exact                           ? "exactly "
+            : unknowns < set.least_unknowns ? "at least "
+                                            : "at most ") +
+           std::to_string(unknowns < set.least_unknowns ? set.least_unknowns : set.most_unknowns) +
+           " unknowns; y has " + std::to_string(unknowns);
+  }
+  for (const Constraints& part : set.joined) {
+    std::string refusal = wrong_length(part, unknowns);
+    if (!refusal.empty()) return refusal;
+  }
+  return "";
+}
+
+Constraints operator+(Constraints a, const Constraints& b) {
+  if (empty(b)) return a;
+  if (empty(a)) return b;
+  const std::string left = kind(a), right = kind(b);
+  if (left == "UserProjection" || right == "UserProjection")
+    throw std::invalid_argument(
+        "Constraints +: a UserProjection cannot be joined; it must project onto all rows itself");
+  if (left != right)
+    throw std::invalid_argument(
+        "Constraints +: rows given as Gradients join only rows given as Gradients; give both sets "
+        "the same kind of Jacobian");
+  a.joined.push_back(b);
+  return a;
+}
+
+JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,
+                              double tolerance) {
+  if (!(tolerance > 0.0))
+    throw std::invalid_argument("check_jacobian: tolerance = " + std::to_string(tolerance) +
+                                "; it must be > 0");
+  if (kind(constraints)[0] != '\0')
+    throw std::invalid_argument(
+        std::string("check_jacobian: rows are given as ") + kind(constraints) +
+        "; it works for DenseJacobian, SparseJacobian and FiniteDifferences");
+  const std::string refusal = wrong_length(constraints, static_cast<long>(y.size()));
+  if (!refusal.empty()) throw std::invalid_argument("check_jacobian: " + refusal);
+  Statistics counts;
+  Evaluator evaluator(constraints, counts);
+  const int n = static_cast<int>(y.size());
+  const int m = evaluator.rows();
+  const auto require = [&](Status status) {
+    if (status != Status::success)
+      throw std::invalid_argument("check_jacobian: " + evaluator.message());
+  };
+
+  std::vector<int> columns(static_cast<std::size_t>(n));
+  for (int j = 0; j < n; ++j) columns[static_cast<std::size_t>(j)] = j;
+  const Eigen::VectorXd scale = y.cwiseAbs().cwiseMax(1.0), increments = 1e-7 * scale;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> given(m, n),
+      expected(m, n);
+  require(evaluator.jacobian(t, y.data(), n, increments.data(), columns, given.data()));
+
+  // Central differences with steps h and h/2, extrapolated: error O(h^4).
+  Eigen::VectorXd at = y, plus(m), minus(m);
+  for (int j = 0; j < n; ++j) {
+    Eigen::VectorXd slope[2];
+    for (int k = 0; k < 2; ++k) {
+      const double h = 1e-3 * scale[j] / (k + 1);
+      at[j] = y[j] + h;
+      require(evaluator.value(t, at.data(), n, plus.data()));
+      at[j] = y[j] - h;
+      require(evaluator.value(t, at.data(), n, minus.data()));
+      at[j] = y[j];
+      slope[k] = (plus - minus) / (2.0 * h);
+    }
+    expected.col(j) = (4.0 * slope[1] - slope[0]) / 3.0;
+  }
+
+  JacobianReport report;
+  for (int i = 0; i < m; ++i) {
+    const double largest = (expected.row(i).transpose().cwiseProduct(scale)).cwiseAbs().maxCoeff();
+    for (int j = 0; j < n; ++j) {
+      const double size = std::max(largest, std::abs(given(i, j)) * scale[j]);
+      const double difference = std::abs(given(i, j) - expected(i, j)) * scale[j];
+      double relative = size > 0.0 ? difference / size : 0.0;
+      if (std::isnan(difference)) relative = std::numeric_limits<double>::infinity();
+      if (relative > report.worst) {
+        report.worst = relative;
+        report.row = i;
+        report.column = j;
+        report.given = given(i, j);
+        report.expected = expected(i, j);
+      }
+    }
+  }
+  report.correct = report.worst <= tolerance;
+  if (report.correct) {
+    report.row = report.column = -1;
+  } else {
+    std::ostringstream text;
+    text.precision(10);
+    text << "row " << report.row << " (" << constraints.name(report.row) << "), column "
+         << report.column << ": given " << report.given << ", differences give " << report.expected;
+    report.message = text.str();
+  }
+  return report;
+}
+
+JacobianReport check_jacobian(const Constraints& constraints, double t,
+                              const std::vector<double>& y, double tolerance) {
+  return check_jacobian(constraints, t, ConstVector(y.data(), static_cast<Eigen::Index>(y.size())),
+                        tolerance);
+}
+
+}  // namespace tether::ida_projection

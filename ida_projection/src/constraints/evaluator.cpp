@@ -1,0 +1,206 @@
+// Tether: evaluation of joined constraint sets on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "constraints/evaluator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::ida_projection {
+
+namespace {
+
+/// Index of the first entry that is not finite, or -1. The sum is finite only if all entries are
+/// (or if huge entries of both signs overflow, which the search then sorts out).
+long first_not_finite(const double* a, long n) {
+  double sum = 0.0;
+  for (long i = 0; i < n; ++i) sum += a[i];
+  if (std::isfinite(sum)) return -1;
+  for (long i = 0; i < n; ++i)
+    if (!std::isfinite(a[i])) return i;
+  return -1;
+}
+
+}  // namespace
+
+bool all_finite(const double* a, std::size_t n) {
+  return first_not_finite(a, static_cast<long>(n)) < 0;
+}
+
+bool has_sparse_rows(const Constraints& set) {
+  return std::holds_alternative<SparseJacobian>(set.jacobian) ||
+         std::any_of(set.joined.begin(), set.joined.end(), has_sparse_rows);
+}
+
+bool has_values(const Constraints& set) {
+  return !std::holds_alternative<Gradients>(set.jacobian) &&
+         !std::holds_alternative<UserProjection>(set.jacobian);
+}
+
+Evaluator::Evaluator(const Constraints& constraints, Statistics& statistics)
+    : constraints_(constraints), statistics_(statistics) {
+  flatten(constraints);
+  g_base_.resize(static_cast<std::size_t>(rows_));
+  g_shifted_.resize(static_cast<std::size_t>(rows_));
+}
+
+void Evaluator::flatten(const Constraints& set) {
+  if (set.count > 0) {
+    parts_.push_back({&set, rows_});
+    rows_ += set.count;
+    if (std::holds_alternative<FiniteDifferences>(set.jacobian)) uses_differences_ = true;
+  }
+  for (const Constraints& part : set.joined) flatten(part);
+}
+
+Status Evaluator::checked(int flag, const char* what, const Part& part) {
+  if (flag == 0) return Status::success;
+  message_ = std::string(what) + " of " + constraints_.name(part.first_row) +
+             (thrown_.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown_);
+  thrown_.clear();
+  if (flag < 0) fatal_ = true;
+  return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
+}
+
+Status Evaluator::value(double t, const double* y, int n, double* g) {
+  if (fatal_) return Status::callback_fatal;
+  ++statistics_.value_evaluations;
+  const ConstVector state(y, n);
+  for (const Part& part : parts_) {
+    const int flag = guarded(
+        [&] { return part.set->value(t, state, Vector(g + part.first_row, part.set->count)); },
+        thrown_);
+    if (flag != 0) return checked(flag, "value", part);
+  }
+  const long bad = first_not_finite(g, rows_);
+  if (bad < 0) return Status::success;
+  message_ = "g of " + constraints_.name(static_cast<int>(bad)) +
+             " is not finite at t = " + std::to_string(t);
+  return Status::not_finite;
+}
+
+// Entries that are not finite are found by the factors, which scan them anyway.
+Status Evaluator::dense(const Part& part, double t, const double* y, int n, const double* scale,
+                        const std::vector<int>& columns, double* C) {
+  const auto* given = std::get_if<DenseJacobian>(&part.set->jacobian);
+  if (given == nullptr) return differences(part, t, y, n, scale, columns, C);
+  const int flag = guarded(
+      [&] { return given->fill(t, ConstVector(y, n), Matrix(C, part.set->count, n)); }, thrown_);
+  return checked(flag, "jacobian", part);
+}
+
+Status Evaluator::sparse(const Part& part, double t, const double* y, int n, double* entries) {
+  const SparseJacobian& given = *part.sparse();
+  const auto count = static_cast<Eigen::Index>(given.columns.size());
+  const int flag =
+      guarded([&] { return given.fill(t, ConstVector(y, n), Vector(entries, count)); }, thrown_);
+  return checked(flag, "jacobian", part);
+}
+
+Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
+                           const std::vector<int>& columns, double* C) {
+  if (fatal_) return Status::callback_fatal;
+  ++statistics_.jacobian_evaluations;
+  std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
+  for (const Part& part : parts_) {
+    double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
+    const SparseJacobian* given = part.sparse();
+    if (given != nullptr) entries_.assign(given->columns.size(), 0.0);
+    const Status status = given != nullptr ? sparse(part, t, y, n, entries_.data())
+                                           : dense(part, t, y, n, scale, columns, block);
+    if (status != Status::success) return status;
+    for (int i = 0; given != nullptr && i < part.set->count; ++i)
+      for (int e = given->starts[static_cast<std::size_t>(i)];
+           e < given->starts[static_cast<std::size_t>(i) + 1]; ++e)
+        block[static_cast<std::ptrdiff_t>(i) * n + given->columns[static_cast<std::size_t>(e)]] =
+            entries_[static_cast<std::size_t>(e)];
+  }
+  return Status::success;
+}
+
+Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
+                           const std::vector<int>& columns, double* entries, double* full) {
+  if (fatal_) return Status::callback_fatal;
+  ++statistics_.jacobian_evaluations;
+  for (const Part& part : parts_) {
+    const SparseJacobian* given = part.sparse();
+    double*& at = given != nullptr ? entries : full;
+    const std::ptrdiff_t size = given != nullptr
+                                    ? static_cast<std::ptrdiff_t>(given->columns.size())
+                                    : static_cast<std::ptrdiff_t>(part.set->count) * n;
+    std::fill(at, at + size, 0.0);
+    const Status status =
+        given != nullptr ? sparse(part, t, y, n, at) : dense(part, t, y, n, scale, columns, at);
+    if (status != Status::success) return status;
+    at += size;
+  }
+  return Status::success;
+}
+
+Status Evaluator::differences(const Part& part, double t, const double* y, int n,
+                              const double* scale, const std::vector<int>& columns, double* C) {
+  const int m = part.set->count;
+  const auto evaluate = [&](const double* at, double* g) {
+    ++statistics_.value_evaluations;
+    const int flag =
+        guarded([&] { return part.set->value(t, ConstVector(at, n), Vector(g, m)); }, thrown_);
+    return checked(flag, "value (differences)", part);
+  };
+
+  const double kRootEpsilon = std::sqrt(std::numeric_limits<double>::epsilon());
+  double largest = 0.0;
+  for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(y[j]));
+  y_shifted_.assign(y, y + n);
+  Status status = evaluate(y, g_base_.data());
+  for (std::size_t k = 0; k < columns.size() && status == Status::success; ++k) {
+    const auto j = static_cast<std::size_t>(columns[k]);
+    // About one tolerance: less would drown in the rounding of g where y_j passes zero.
+    double increment = std::max(kRootEpsilon * std::abs(y[j]), std::min(scale[j], 1e-4 * largest));
+    if (increment == 0.0) increment = kRootEpsilon;
+    y_shifted_[j] = y[j] + increment;
+    increment = y_shifted_[j] - y[j];  // what the machine really added
+    status = evaluate(y_shifted_.data(), g_shifted_.data());
+    y_shifted_[j] = y[j];
+    for (int i = 0; i < m; ++i)
+      C[static_cast<std::size_t>(i) * static_cast<std::size_t>(n) + j] =
+          (g_shifted_[static_cast<std::size_t>(i)] - g_base_[static_cast<std::size_t>(i)]) /
+          increment;
+  }
+  return status;
+}
+
+void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
+                          std::vector<char>& filled) {
+  double largest = 0.0;
+  for (int j = 0; j < n; ++j) largest = std::max({largest, std::abs(y[j]), scale[j]});
+  for (const Part& part : parts_) {
+    if (!std::holds_alternative<FiniteDifferences>(part.set->jacobian)) continue;
+    const int m = part.set->count;
+    const auto evaluate = [&](double* g) {
+      if (fatal_) return false;
+      ++statistics_.value_evaluations;
+      const int flag = guarded(
+          [&] { return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(g, m)); },
+          thrown_);
+      return checked(flag, "value", part) == Status::success;
+    };
+    y_shifted_.assign(y, y + n);
+    const bool known = evaluate(g_base_.data());
+    for (std::size_t j = 0; j < y_shifted_.size(); ++j) {
+      bool same = known;
+      for (const double change : {1e-2, -3e-2}) {
+        y_shifted_[j] = y[j] + change * (largest > 0.0 ? largest : 1.0);
+        same = same && evaluate(g_shifted_.data());
+        for (int i = 0; i < m; ++i) {
+          const auto k = static_cast<std::size_t>(i);
+          if (same && g_shifted_[k] == g_base_[k]) continue;
+          filled[(static_cast<std::size_t>(part.first_row) + k) * static_cast<std::size_t>(n) + j] =
+              1;
+        }
+      }
+      y_shifted_[j] = y[j];
+    }
+  }
+}
+
+}  // namespace tether::ida_projection

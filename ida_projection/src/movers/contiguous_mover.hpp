@@ -1,0 +1,210 @@
+// Tether: the move onto the constraints on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Notation as in ida_projection/README.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w
+// the error weights, s the size of the corrector's changes. The move itself is in
+// contiguous_mover.cpp, its metric in contiguous_metric.cpp, what follows the polish in
+// contiguous_settle.cpp; here stands what they share.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "movers/mover.hpp"
+#include "rows/row_blocks.hpp"
+#include "rows/sparse_rows.hpp"
+#include "step/frequency.hpp"
+
+namespace tether::ida_projection {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kLargestFloor = 0.1;  // tolerances
+// Factors of an earlier step (Rows::keeps_factors) leave the part slope * age of a move.
+constexpr double kUnknownSlope = 0.03;
+constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
+constexpr double kLong = 1.0;   // tolerances: such a move is made with fresh factors
+
+/// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
+template <class Rows>
+class ContiguousMover final : public Mover {
+ public:
+  ContiguousMover(const Constraints& constraints, const Options& options, Statistics& statistics,
+                  int size, int reported)
+      : options_(options),
+        statistics_(statistics),
+        evaluator_(constraints, statistics),
+        monitor_(options),
+        n_(size),
+        m_(evaluator_.rows()),
+        reported_(reported >= 0 ? reported : m_),
+        inverse_n_(1.0 / size),
+        keeps_factors_(Rows::keeps_factors(m_)),
+        blocks_(constraints, evaluator_, size) {
+    const auto n = static_cast<std::size_t>(n_);
+    const auto m = static_cast<std::size_t>(m_);
+    scale_.assign(n, 0.0);
+    trial_scale_.assign(n, 0.0);
+    y_.assign(n, 0.0);
+    WT_.assign(n, 0.0);
+    g_.assign(m, 0.0);
+    start_.assign(n, 0.0);
+  }
+
+  Move measure(const Candidate& candidate) override;
+  Move move(const Candidate& candidate) override;
+  // Which of the thin rows count was judged at another point.
+  bool may_follow() override { return reusable_ && !thin_ && wear_.usable(); }
+  Move follow(const Candidate& candidate, bool again) override;
+  Status set_algebraic(const Candidate& candidate, N_Vector id) override;
+  Status settle(const Candidate& candidate, N_Vector change) override;
+  double remaining_drift(const Candidate& candidate) override {
+    for (int i = 0; i < n_; ++i)
+      y_[static_cast<std::size_t>(i)] = candidate.base_entries[i] + candidate.correction_entries[i];
+    return value(candidate.t) == Status::success ? drift() : -1.0;
+  }
+  bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
+  void accept() override { std::swap(scale_, trial_scale_); }
+  bool fatal() const override { return evaluator_.fatal(); }
+  void forget_failure() override { evaluator_.forget(); }
+  Status finish(const Candidate& candidate) override {
+    const bool unseen = keeps_factors() && move_length_ > kSafe * options_.tolerance;
+    return unseen ? take_back(candidate) : Status::success;
+  }
+  void reset() override {
+    reusable_ = false;
+    std::fill(scale_.begin(), scale_.end(), 0.0);
+    std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
+    monitor_.reset();
+    if constexpr (Rows::kThinRows) blocks_.trust.reset();
+    staleness_ = -1.0;
+    measured_ = 0.0;
+    settles_ = 0;
+    wear_ = FactorWear();
+  }
+
+ private:
+  using Block = typename Rows::Block;
+
+  void load(const Candidate& candidate);
+  const std::vector<double>& WT();
+  void set_metric(bool for_factors);
+  // Rows that need RowTrust are judged anew in each step.
+  bool keeps_factors() const { return keeps_factors_ && !thin_; }
+  bool may_reuse() const { return keeps_factors() && reusable_ && !blocks_.dropped_rows(); }
+  Status take_back(const Candidate& candidate);
+  double rate() const { return slope_ * age_; }
+  void set_group_metric();
+  Status structure(const Candidate& candidate, const double* id);
+  Status value(double t);
+  Status factor(double t);
+  double solve();
+  double first_solve();
+  bool must_learn(double length) const;
+  Status learn_trust(double t, double length);
+  void restart(const Candidate& candidate);
+  Move newton(const Candidate& candidate, double drift_before);
+  Move newton_with_firm_rows(const Candidate& candidate, const Move& failed);
+  bool too_long(double length, double& limit) const;
+  bool contradicts();
+  bool rounding_only() const;
+  double rounding_length();
+  void apply(double factor, double* correction);
+  double drift() const;
+  double size_of_y() const;
+
+  const Options& options_;
+  Statistics& statistics_;
+  Evaluator evaluator_;
+  Monitor monitor_;
+  int n_, m_;
+  int reported_;  // rows whose drift is told; the others are equations of F
+  double inverse_n_;
+  bool keeps_factors_;  // over several steps
+  Rows blocks_;
+  bool thin_ = false;          // the last factor() found rows that need RowTrust
+  bool firm_only_ = false;     // this attempt does without them
+  std::vector<double> start_;  // the correction before the move, kept where there are thin rows
+  bool start_known_ = false;
+  std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
+  std::vector<double> y_, WT_, g_;
+  std::vector<double> group_sum_;
+  std::vector<int> group_members_;
+  const double* w_ = nullptr;
+  double move_length_ = 0.0;  // of the last first move, in tolerances
+  double staleness_ = -1.0;   // of factors, for each tolerance of distance; < 0: not measured
+  double measured_ = 0.0;     // longest distance at which it was looked for
+  long settles_ = 0;
+  bool reusable_ = false;  // factors of an earlier step are there
+  bool reused_ = false;    // and are in use for this one
+  double slope_ = 0.0;     // they leave slope_ * age_ of a move
+  int age_ = 0;            // candidates since they were made
+  FactorWear wear_;        // for follow()
+  const double* ycor_ = nullptr;
+  bool WT_known_ = false;
+};
+
+// WT = 1/w. A weight of zero means that the error of this component does not count at all.
+template <class Rows>
+const std::vector<double>& ContiguousMover<Rows>::WT() {
+  if (!WT_known_)
+    for (std::size_t i = 0; i < WT_.size(); ++i) WT_[i] = w_[i] > 0.0 ? 1.0 / w_[i] : 0.0;
+  WT_known_ = true;
+  return WT_;
+}
+
+template <class Rows>
+Status ContiguousMover<Rows>::value(double t) {
+  const Status status = evaluator_.value(t, y_.data(), n_, g_.data());
+  if (status != Status::success) message_ = evaluator_.message();
+  return status;
+}
+
+// Returns the WRMS length of dy in the error norm. Algebraic columns do not count there: they
+// follow the others.
+template <class Rows>
+double ContiguousMover<Rows>::solve() {
+  ++statistics_.iterations;
+  blocks_.solve(g_);
+  const Block& counted = blocks_.d.rows.empty() ? blocks_.a : blocks_.d;
+  double sum = 0.0;
+  const double* dy = counted.dy.data();
+  counted.for_columns([&sum, dy, w = w_](int k, int i) {
+    const double move = dy[k] * w[i];
+    sum += move * move;
+  });
+  return std::sqrt(sum * inverse_n_);
+}
+
+template <class Rows>
+void ContiguousMover<Rows>::apply(double factor, double* correction) {
+  for (const Block* block : {&blocks_.d, &blocks_.a}) {
+    if (block->rows.empty()) continue;
+    double* __restrict y = y_.data();
+    double* __restrict ycor = correction;
+    const double* __restrict dy = block->dy.data();
+    block->for_columns([=](int k, int i) {
+      const double move = factor * dy[k];
+      ycor[i] -= move;
+      y[i] -= move;
+    });
+  }
+}
+
+template <class Rows>
+double ContiguousMover<Rows>::drift() const {
+  double largest = 0.0;
+  for (int i = 0; i < reported_; ++i)
+    largest = std::max(largest, std::abs(g_[static_cast<std::size_t>(i)]));
+  return largest;
+}
+
+// WRMS |y| in tolerances.
+template <class Rows>
+double ContiguousMover<Rows>::size_of_y() const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < y_.size(); ++i) sum += (y_[i] * w_[i]) * (y_[i] * w_[i]);
+  return std::sqrt(sum * inverse_n_);
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,88 @@
+// Tether: what the polish left is taken back onto the constraints, on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "movers/contiguous_mover.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr long kMeasureEvery = 64;
+// Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
+// moves would not be enough.
+constexpr double kWorn = 0.06, kSlow = 0.1;
+
+}  // namespace
+
+template <class Rows>
+Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
+  const double* e = N_VGetArrayPointer(change);
+  for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
+  if (keeps_factors()) return take_back(candidate);
+  double sum = 0.0;
+  for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
+  const double reach = move_length_ + std::sqrt(sum * inverse_n_);
+  // The factors belong to a point `reach` away: each move leaves about staleness_ reach of itself.
+  const bool measure =
+      staleness_ < 0.0 || reach > 4.0 * measured_ || ++settles_ % kMeasureEvery == 0;
+  double previous = 0.0;
+  for (int k = 0; k < options_.maximum_iterations; ++k) {
+    const Status status = value(candidate.t);
+    if (status != Status::success) return status;
+    const double length = solve();
+    apply(1.0, candidate.correction_entries);
+    const double floor = 1e2 * kEpsilon * size_of_y();
+    const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
+    if (k > 0) {
+      measured_ = std::max(measured_, reach);
+      staleness_ = std::max({staleness_, 0.0, rounding ? 0.0 : length / (reach * previous)});
+    }
+    if (rounding) break;
+    if ((k > 0 || !measure) && 4.0 * staleness_ * reach * length <= options_.tolerance) break;
+    previous = length;
+  }
+  return Status::success;
+}
+
+// The same with kept factors, which leave a part of each move that grows with their age. Only what
+// is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
+// two moves with the same factors, that makes the next one so. Where too much is left, or a move is
+// long, factors are made anew.
+template <class Rows>
+Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
+  const double floor = 1e2 * kEpsilon * size_of_y();
+  double previous = -1.0;  // length of the move before, by the same factors
+  for (int k = 0; k <= options_.maximum_iterations; ++k) {
+    Status status = value(candidate.t);
+    if (status != Status::success) return status;
+    double length = solve();
+    double part = previous > 0.0 && length > floor ? length / previous : 0.0;
+    if (part > 0.0) slope_ = part / age_;
+    if (age_ > 0 && (part > kSlow || length > kLong)) {
+      set_metric(true);
+      if ((status = factor(candidate.t)) != Status::success) return status;
+      length = first_solve();
+      part = 0.0;
+      previous = -1.0;
+    }
+    apply(1.0, candidate.correction_entries);
+    const bool small = length <= std::max(floor, kSafe * options_.tolerance);
+    if (small || (part > 0.0 && part * length <= kSafe * options_.tolerance)) {
+      if (part > kWorn) reusable_ = false;
+      return Status::success;
+    }
+    previous = length;
+  }
+  reusable_ = false;
+  if (previous <= std::min(kLargestFloor, rounding_length())) return Status::success;
+  message_ = "after " + std::to_string(options_.maximum_iterations) +
+             " moves with kept factors the next one still is " + std::to_string(previous) +
+             " tolerances long (Options::maximum_iterations)";
+  return Status::not_converged;
+}
+
+template Status ContiguousMover<RowBlocks>::settle(const Candidate&, N_Vector);
+template Status ContiguousMover<SparseRows>::settle(const Candidate&, N_Vector);
+template Status ContiguousMover<RowBlocks>::take_back(const Candidate&);
+template Status ContiguousMover<SparseRows>::take_back(const Candidate&);
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,407 @@
+// Tether: the move onto few constraints on any N_Vector. SPDX-License-Identifier: BSD-3-Clause
+//
+// Only N_Vector operations: the same code serves serial, OpenMP, MPI, device and custom vectors.
+// The m gradients, scaled by the metric and to unit length, are orthogonalised by modified
+// Gram-Schmidt with pivoting, each twice ("twice is enough"); their Gram matrix is never formed.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "attach/impl.hpp"
+#include "step/frequency.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+class GradientMover final : public Mover {
+ public:
+  GradientMover(const Constraints& constraints, const Options& options, Statistics& statistics,
+                N_Vector like)
+      : options_(options),
+        statistics_(statistics),
+        constraints_(constraints),
+        monitor_(options),
+        y_(like),
+        scale_(like),
+        trial_(like),
+        D_(like),
+        WT_(like),
+        free_(like),
+        dy_(like),
+        work_(like),
+        length_(static_cast<double>(N_VGetLength(like))) {
+    flatten(constraints);
+    const auto m = static_cast<std::size_t>(m_);
+    for (std::size_t i = 0; i < m; ++i) owned_.emplace_back(like);
+    for (const OwnedVector& q : owned_) gradients_.push_back(q);
+    g_.assign(m, 0.0);
+    z_.assign(m, 0.0);
+    terms_.assign(m, 0.0);
+    norm_.assign(m, 0.0);
+    tolerance_norm_.assign(m, 0.0);
+    left_.assign(m, 0.0);
+    R_.assign(m * m, 0.0);
+    pivot_.assign(m, 0);
+    N_VConst(1.0, free_);
+    if (options_.hold_vector != nullptr) N_VScale(1.0, options_.hold_vector, free_);
+    reset();
+  }
+
+  void accept() override { std::swap(scale_, trial_); }
+  void reset() override {
+    N_VConst(0.0, scale_);
+    N_VConst(0.0, trial_);
+    monitor_.reset();
+    wear_ = FactorWear();
+    factored_ = false;
+  }
+
+  // Algebraic components are held unless a row contains them.
+  Status set_algebraic(const Candidate& candidate, N_Vector id) override {
+    if (id == nullptr) return Status::success;
+    load(candidate);
+    const Status status = fill(candidate.t);
+    if (status != Status::success) return status;
+    double largest = 0.0;
+    for (N_Vector row : gradients_) {
+      N_VProd(id, row, work_);
+      N_VLinearSum(1.0, row, -1.0, work_, work_);
+      largest = std::max(largest, N_VMaxNorm(work_));
+    }
+    if (largest == 0.0) N_VProd(free_, id, free_);
+    return Status::success;
+  }
+
+  Status settle(const Candidate& candidate, N_Vector change) override {
+    N_VLinearSum(1.0, y_, 1.0, change, y_);
+    const Status status = value(candidate.t);
+    if (status != Status::success) return status;
+    solve(candidate.weights);
+    N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
+    return Status::success;
+  }
+
+  double remaining_drift(const Candidate& candidate) override {
+    N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
+    return value(candidate.t) == Status::success ? drift() : -1.0;
+  }
+
+  Move measure(const Candidate& candidate) override {
+    Move result;
+    load(candidate);
+    if ((result.status = value(candidate.t)) != Status::success) return result;
+    result.drift_before = result.drift_after = drift();
+    if (result.drift_before == 0.0) return result;
+    set_metric();
+    sums_terms_ = static_cast<N_Vector>(y_)->ops->nvl1norm != nullptr;
+    result.status = factor(candidate.t);
+    sums_terms_ = false;
+    if (result.status != Status::success) return result;
+    if (rounding_only()) return result;
+    result.length = solve(candidate.weights);
+    result.floor = 4.0 * kEpsilon * N_VWrmsNorm(y_, candidate.weights);
+    if (contradicts()) result.status = Status::inconsistent;
+    return result;
+  }
+
+  bool may_follow() override { return factored_ && wear_.usable(); }
+  Move follow(const Candidate& candidate, bool again) override {
+    if (again)
+      N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
+    else
+      load(candidate);
+    return move_with_old_factors(
+        wear_, [&] { return value(candidate.t); }, [&] { return solve(candidate.weights); },
+        [&] {
+          N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
+          N_VLinearSum(1.0, y_, -1.0, dy_, y_);
+        },
+        [&] { return drift(); }, 1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights),
+        options_.largest_move);
+  }
+
+  Move move(const Candidate& candidate) override {
+    Move result;
+    load(candidate);
+    set_metric();
+    if ((result.status = value(candidate.t)) != Status::success) return result;
+    result.drift_before = result.drift_after = drift();
+    monitor_.start();
+    bool have_factors = false, fresh = false;
+    for (;;) {
+      if (!have_factors) {
+        if ((result.status = factor(candidate.t)) != Status::success) return result;
+        have_factors = fresh = true;
+      }
+      const double length = solve(candidate.weights);
+      if (++result.moves == 1) {
+        result.length = length;
+        const double limit =
+            length <= options_.largest_move
+                ? options_.largest_move
+                : options_.largest_move *
+                      std::max(1.0, N_VWrmsNorm(candidate.correction, candidate.weights));
+        if (!(length <= limit)) {
+          if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
+            result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
+            message_ = "the move onto the constraints is " + std::to_string(length) +
+                       " tolerances long, the limit is " + std::to_string(limit) +
+                       " (Options::largest_move)";
+            return result;
+          }
+          N_VLinearSum(1.0, candidate.correction, -limit / length, dy_, candidate.correction);
+          result.left = length - limit;
+          result.length = limit;
+          result.capped = true;
+          result.status = Status::success;
+          return result;
+        }
+      }
+      N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
+      N_VLinearSum(1.0, y_, -1.0, dy_, y_);
+      const double floor = std::min(0.1, 1e3 * kEpsilon * N_VWrmsNorm(y_, candidate.weights));
+      const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
+      if (verdict == Monitor::Verdict::done) break;
+      if (verdict == Monitor::Verdict::failed) {
+        result.status = Status::not_converged;
+        message_ = "move " + std::to_string(result.moves) + " onto the constraints still is " +
+                   std::to_string(length) + " tolerances long; check the gradients";
+        return result;
+      }
+      if ((result.status = value(candidate.t)) != Status::success) return result;
+      result.drift_after = drift();
+      fresh = false;
+      have_factors = verdict != Monitor::Verdict::refactor;
+    }
+    result.status = contradicts() ? Status::inconsistent : Status::success;
+    return result;
+  }
+
+ private:
+  struct Part {
+    const Gradients* rows;
+    int first, count;
+  };
+
+  void flatten(const Constraints& set) {
+    if (set.count > 0) {
+      parts_.push_back({&std::get<Gradients>(set.jacobian), m_, set.count});
+      m_ += set.count;
+    }
+    for (const Constraints& part : set.joined) flatten(part);
+  }
+
+  double& R(int i, int j) { return R_[static_cast<std::size_t>(i * m_ + j)]; }
+
+  // y = base + correction, WT = 1/w (0 where w = 0), s <- max(0.8 s, |correction|).
+  void load(const Candidate& candidate) {
+    N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
+    N_VConst(0.0, WT_);
+    if (static_cast<N_Vector>(WT_)->ops->nvinvtest != nullptr)
+      (void)N_VInvTest(candidate.weights, WT_);
+    else
+      N_VInv(candidate.weights, WT_);
+    N_VAbs(candidate.correction, work_);
+    larger(0.8, scale_, work_, trial_);
+  }
+  // z = max(a x, y) elementwise, for x, y >= 0: (a x + y + |a x - y|) / 2. z may be x.
+  void larger(double a, const OwnedVector& x, const OwnedVector& y, OwnedVector& z) {
+    N_VLinearSum(a, x, -1.0, y, dy_);
+    N_VAbs(dy_, dy_);
+    N_VLinearSum(0.5 * a, x, 0.5, y, z);
+    N_VLinearSum(1.0, z, 0.5, dy_, z);
+  }
+  void set_metric() {
+    if (options_.metric == Metric::local_correction)
+      larger(1e-3, WT_, trial_, D_);
+    else
+      N_VScale(1.0, WT_, D_);
+    N_VProd(D_, free_, D_);
+  }
+
+  Status failed(int flag, const char* what, const std::string& thrown) {
+    message_ = std::string(what) +
+               (thrown.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown);
+    if (flag < 0) fatal_ = true;
+    return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
+  }
+
+  Status value(double t) {
+    if (fatal_) return Status::callback_fatal;
+    ++statistics_.value_evaluations;
+    std::string thrown;
+    for (const Part& part : parts_) {
+      const int flag =
+          guarded([&] { return part.rows->value(t, y_, g_.data() + part.first); }, thrown);
+      if (flag != 0) return failed(flag, "Gradients::value", thrown);
+    }
+    for (int i = 0; i < m_; ++i)
+      if (!std::isfinite(g_[static_cast<std::size_t>(i)])) {
+        message_ = "g of " + constraints_.name(i) + " is not finite";
+        return Status::not_finite;
+      }
+    return Status::success;
+  }
+
+  Status fill(double t) {
+    if (fatal_) return Status::callback_fatal;
+    ++statistics_.jacobian_evaluations;
+    std::string thrown;
+    for (N_Vector row : gradients_) N_VConst(0.0, row);
+    for (const Part& part : parts_) {
+      const int flag =
+          guarded([&] { return part.rows->fill(t, y_, gradients_.data() + part.first); }, thrown);
+      if (flag != 0) return failed(flag, "Gradients::fill", thrown);
+    }
+    return Status::success;
+  }
+
+  double norm(N_Vector v) { return std::sqrt(N_VDotProd(v, v)); }
+
+  // Rows S C D orthogonalised in place: S C D = L Q^T with L lower triangular in pivot order.
+  Status factor(double t) {
+    factored_ = false;
+    const Status status = fill(t);
+    if (status != Status::success) return status;
+    ++statistics_.factorizations;
+    std::vector<double>& left = left_;
+    for (int i = 0; i < m_; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (sums_terms_) {
+        N_VProd(gradients_[k], y_, work_);
+        terms_[k] = N_VL1Norm(work_);
+      }
+      N_VProd(gradients_[k], WT_, work_);
+      tolerance_norm_[k] = norm(work_);
+      N_VProd(gradients_[k], D_, gradients_[k]);
+      norm_[k] = norm(gradients_[k]);
+      if (!std::isfinite(norm_[k])) {
+        message_ = "the gradient of " + constraints_.name(i) + " is not finite";
+        return Status::not_finite;
+      }
+      if (norm_[k] > std::numeric_limits<double>::min())
+        N_VScale(1.0 / norm_[k], gradients_[k], gradients_[k]);
+      left[k] = norm_[k] > std::numeric_limits<double>::min() ? 1.0 : 0.0;
+      pivot_[k] = i;
+    }
+    std::fill(R_.begin(), R_.end(), 0.0);
+    rank_ = 0;
+    for (int k = 0; k < m_; ++k) {
+      int best = k;
+      for (int i = k + 1; i < m_; ++i)
+        if (left[static_cast<std::size_t>(pivot_[static_cast<std::size_t>(i)])] >
+            left[static_cast<std::size_t>(pivot_[static_cast<std::size_t>(best)])])
+          best = i;
+      std::swap(pivot_[static_cast<std::size_t>(best)], pivot_[static_cast<std::size_t>(k)]);
+      const auto p = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(k)]);
+      if (left[p] == 0.0) break;
+      // Second orthogonalisation of the pivot against what is there.
+      for (int i = 0; i < k; ++i) {
+        N_Vector q = gradients_[static_cast<std::size_t>(pivot_[static_cast<std::size_t>(i)])];
+        const double r = N_VDotProd(q, gradients_[p]);
+        R(static_cast<int>(p), i) += r;
+        N_VLinearSum(1.0, gradients_[p], -r, q, gradients_[p]);
+      }
+      const double r = norm(gradients_[p]);
+      if (!(r > m_ * 1e-12)) break;
+      R(static_cast<int>(p), k) = r;
+      N_VScale(1.0 / r, gradients_[p], gradients_[p]);
+      rank_ = k + 1;
+      for (int i = k + 1; i < m_; ++i) {
+        const auto row = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(i)]);
+        const double share = N_VDotProd(gradients_[p], gradients_[row]);
+        R(static_cast<int>(row), k) = share;
+        N_VLinearSum(1.0, gradients_[row], -share, gradients_[p], gradients_[row]);
+        left[row] = norm(gradients_[row]);
+      }
+    }
+    if (rank_ < m_) ++statistics_.rank_drops;
+    factored_ = true;
+    wear_.renewed();
+    return Status::success;
+  }
+
+  double solve(N_Vector weights) {
+    ++statistics_.iterations;
+    N_VConst(0.0, dy_);
+    for (int k = 0; k < m_; ++k) {
+      const auto row = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(k)]);
+      double left =
+          norm_[row] > std::numeric_limits<double>::min() ? g_[row] / norm_[row] : g_[row];
+      for (int i = 0; i < std::min(k, rank_); ++i)
+        left -= R(static_cast<int>(row), i) * z_[static_cast<std::size_t>(i)];
+      if (k < rank_) {
+        z_[static_cast<std::size_t>(k)] = left / R(static_cast<int>(row), k);
+        N_VLinearSum(1.0, dy_, z_[static_cast<std::size_t>(k)], gradients_[row], dy_);
+      } else {
+        z_[static_cast<std::size_t>(k)] = std::abs(left);  // what this dropped row leaves unsolved
+      }
+    }
+    N_VProd(dy_, D_, dy_);
+    return N_VWrmsNorm(dy_, weights);
+  }
+
+  bool contradicts() {
+    for (int k = rank_; k < m_; ++k) {
+      const int row = pivot_[static_cast<std::size_t>(k)];
+      const auto r = static_cast<std::size_t>(row);
+      const double left = z_[static_cast<std::size_t>(k)] *
+                          (norm_[r] > std::numeric_limits<double>::min() ? norm_[r] : 1.0);
+      if (left <= 0.5 * std::sqrt(length_) * tolerance_norm_[r] + 1e2 * kEpsilon * norm_[r])
+        continue;
+      contradicting_rows_ = {row};
+      for (int i = 0; i < rank_; ++i)
+        if (std::abs(R(row, i)) > 1e-3)
+          contradicting_rows_.push_back(pivot_[static_cast<std::size_t>(i)]);
+      std::sort(contradicting_rows_.begin(), contradicting_rows_.end());
+      message_ = "rows contradict each other:";
+      for (int i : contradicting_rows_)
+        message_ += " " + std::to_string(i) + " (" + constraints_.name(i) + ")";
+      return true;
+    }
+    return false;
+  }
+
+  // Does the rounding of its own terms explain every g_i? It grows with the root of their number.
+  bool rounding_only() const {
+    const double unit = 64.0 * kEpsilon;
+    for (std::size_t i = 0; i < g_.size(); ++i)
+      if (!(std::abs(g_[i]) <= unit * terms_[i])) return false;
+    return true;
+  }
+
+  double drift() const {
+    double largest = 0.0;
+    for (double g : g_) largest = std::max(largest, std::abs(g));
+    return largest;
+  }
+
+  const Options& options_;
+  Statistics& statistics_;
+  const Constraints& constraints_;
+  Monitor monitor_;
+  std::vector<Part> parts_;
+  int m_ = 0, rank_ = 0;
+  OwnedVector y_, scale_, trial_, D_, WT_, free_, dy_, work_;
+  std::vector<OwnedVector> owned_;
+  std::vector<N_Vector> gradients_;  // raw handles of owned_, as the callback wants them
+  std::vector<double> g_, z_, norm_, tolerance_norm_, left_, R_;
+  std::vector<int> pivot_;
+  double length_;
+  FactorWear wear_;  // for follow()
+  bool factored_ = false;
+  bool sums_terms_ = false;    // measure() asks for them
+  std::vector<double> terms_;  // sum_j |C_ij y_j|
+};
+
+}  // namespace
+
+std::unique_ptr<Mover> make_gradient_mover(const Constraints& constraints, const Options& options,
+                                           Statistics& statistics, N_Vector like) {
+  return std::make_unique<GradientMover>(constraints, options, statistics, like);
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,149 @@
+// Tether: the move of a point onto the constraints, whatever way they are given.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tether/ida_projection/options.hpp>
+#include <tether/ida_projection/projection.hpp>
+#include <tether/ida_projection/statistics.hpp>
+#include <vector>
+
+#include "constraints/evaluator.hpp"
+
+namespace tether::ida_projection {
+
+/// The candidate y = base + correction at time t, and IDA's reciprocal error weights 1/WT.
+struct Candidate {
+  double t;
+  N_Vector base;        ///< IDA's prediction
+  N_Vector correction;  ///< the corrector's ycor; the move is subtracted from it
+  N_Vector weights;
+  /// The entries of the three, for contiguous vectors; see with_entries().
+  double* base_entries = nullptr;
+  double* correction_entries = nullptr;
+  const double* weight_entries = nullptr;
+
+  Candidate& with_entries() {
+    base_entries = N_VGetArrayPointer(base);
+    correction_entries = N_VGetArrayPointer(correction);
+    weight_entries = N_VGetArrayPointer(weights);
+    return *this;
+  }
+};
+
+/// How far y' points out of the constraints.
+struct Tangency {
+  std::vector<double> rate;       ///< sum_j C_ij y'_j
+  std::vector<double> terms;      ///< sum_j |C_ij y'_j|; < 0: the row contains algebraic variables
+  std::vector<double> tolerance;  ///< |row_i(C WT)|, a move of one tolerance
+};
+
+struct Move {
+  Status status = Status::unused;
+  double length = 0.0;        ///< WRMS length of the whole move, in tolerances
+  double drift_before = 0.0;  ///< largest |g_i| at the candidate
+  double drift_after = 0.0;   ///< the same where g was evaluated last; see remaining_drift()
+  int moves = 0;              ///< Newton moves made
+  double floor = 0.0;         ///< measure(): length that rounding of y alone explains
+  bool capped = false;
+  double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
+};
+
+/// Moves candidates onto the constraints and remembers what the metric needs.
+class Mover {
+ public:
+  virtual ~Mover() = default;
+
+  /// Length of the first Newton move from the candidate; the candidate is not changed.
+  virtual Move measure(const Candidate& candidate) = 0;
+
+  /// Moves the candidate: correction <- correction - dy.
+  virtual Move move(const Candidate& candidate) = 0;
+
+  /// Are there factors of an earlier step that may serve the next candidate, too?
+  virtual bool may_follow() { return false; }
+  /// The move with them. Another status than success: they left too much (frequency.hpp); then the
+  /// correction has to be put back. `again`: the correction was changed after such a move.
+  virtual Move follow(const Candidate&, bool /*again*/) { return {}; }
+
+  /// C y' row by row with C as it was evaluated last, over the first `reported` rows. False: not
+  /// known. `id` as in set_algebraic().
+  virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {
+    return false;
+  }
+
+  /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
+  virtual double remaining_drift(const Candidate& candidate) = 0;
+
+  /// Says which components are algebraic (1 differential, 0 algebraic; null: none). Called once,
+  /// before the first move() of a run, with the candidate at which the structure is looked at.
+  virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;
+
+  /// The correction was changed by `change` after a successful move(): takes back what leaves the
+  /// constraints, with the factors at hand.
+  virtual Status settle(const Candidate& candidate, N_Vector change) = 0;
+
+  /// No settle() follows the last move(): takes back what it left for that.
+  virtual Status finish(const Candidate&) { return Status::success; }
+
+  /// The attempt that used the last candidate was accepted: keep what it taught the metric.
+  virtual void accept() {}
+  /// A new run starts: forget what the last one taught.
+  virtual void reset() {}
+
+  /// Did a callback ask for the end of the run since forget_failure(), in whatever evaluation?
+  virtual bool fatal() const { return fatal_; }
+  virtual void forget_failure() { fatal_ = false; }
+
+  const std::string& message() const { return message_; }
+  const std::vector<int>& contradicting_rows() const { return contradicting_rows_; }
+
+ protected:
+  std::string message_;
+  bool fatal_ = false;
+  std::vector<int> contradicting_rows_;
+};
+
+/// Factories; `size` is N. The options and statistics outlive the mover. Drift is that of the first
+/// `reported` rows (-1: of all).
+std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size,
+                                        int reported = -1);
+std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size,
+                                         int reported = -1);
+std::unique_ptr<Mover> make_gradient_mover(const Constraints&, const Options&, Statistics&,
+                                           N_Vector like);
+std::unique_ptr<Mover> make_user_mover(const Constraints&, const Options&, Statistics&,
+                                       N_Vector like);
+
+/// Watches a sequence of Newton moves: is it done, still converging, or broken?
+/// Lengths are in tolerances. Rates below are squares of distances: theta bounds d_{k+1}/d_k^2.
+class Monitor {
+ public:
+  enum class Verdict { done, go_on, refactor, failed };
+
+  explicit Monitor(const Options& options) : options_(&options) {}
+  void reset() { *this = Monitor(*options_); }
+
+  /// A new candidate.
+  void start() {
+    previous_ = -1.0;
+    moves_ = 0;
+    ++candidates_;
+  }
+
+  /// After a move of this length; `fresh`: the factors belong to the point that was left;
+  /// `floor`: length below which rounding of y rules.
+  Verdict judge(double length, bool fresh, double floor);
+
+ private:
+  const Options* options_;
+  double theta_ = -1.0;    // largest d_2 / d_1^2 seen; < 0: not measured yet
+  double measured_ = 0.0;  // longest first move at which theta was looked for: no rounding there
+  double previous_ = -1.0;
+  int moves_ = 0;
+  long candidates_ = 0;
+  static constexpr long kMeasureEvery = 64;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,387 @@
+// Tether: rows whose algebraic variables F determines, joined with the equations that do so.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "rows/equations.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "rows/row_blocks.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr double kPresent = 1e-6;    // of a row's largest entry; smaller ones are rounding
+constexpr double kExplained = 1e-5;  // of a row, left by the equations that explain it
+constexpr double kRestricts = 1e-2;  // of a row: the candidate is off the set by its own error
+
+std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
+// Central differences of the chosen equations of F. False: F failed.
+bool slopes(const Residual& residual, const std::vector<int>& equations,
+            const std::vector<double>& y, const std::vector<double>& WT, Dense* h) {
+  const std::size_t n = y.size();
+  std::vector<double> point = y, plus(n), minus(n);
+  double largest = 0.0;
+  for (double value : y) largest = std::max(largest, std::abs(value));
+  h->setZero(static_cast<Eigen::Index>(equations.size()), static_cast<Eigen::Index>(n));
+  for (std::size_t j = 0; j < n; ++j) {
+    double change = std::max(1e-5 * std::abs(y[j]), std::min(WT[j], 1e-5 * largest));
+    if (!(change > 0.0)) change = 1e-8;
+    point[j] = y[j] + change;
+    const double high = point[j];
+    if (!residual(point.data(), plus.data())) return false;
+    point[j] = y[j] - change;
+    if (!residual(point.data(), minus.data())) return false;
+    for (std::size_t i = 0; i < equations.size(); ++i) {
+      const std::size_t e = at(equations[i]);
+      (*h)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          (plus[e] - minus[e]) / (high - point[j]);
+    }
+    point[j] = y[j];
+  }
+  return h->allFinite();
+}
+
+// Which unknowns the equations notice, by large changes near a point where nothing is zero.
+std::vector<std::vector<int>> patterns(const Residual& residual, const std::vector<int>& equations,
+                                       std::vector<double> point) {
+  const std::size_t n = point.size();
+  double largest = 0.0;
+  for (double value : point) largest = std::max(largest, std::abs(value));
+  std::vector<std::vector<int>> columns(equations.size());
+  std::vector<double> base(n), changed(n);
+  const bool known = residual(point.data(), base.data());
+  for (std::size_t j = 0; j < n; ++j) {
+    const double value = point[j];
+    bool same = known;
+    std::vector<char> notices(equations.size(), 0);
+    for (const double change : {1e-2, -3e-2}) {
+      point[j] = value + change * (largest > 0.0 ? largest : 1.0);
+      same = same && residual(point.data(), changed.data());
+      for (std::size_t i = 0; i < equations.size(); ++i)
+        if (!same || changed[at(equations[i])] != base[at(equations[i])]) notices[i] = 1;
+    }
+    point[j] = value;
+    for (std::size_t i = 0; i < equations.size(); ++i)
+      if (notices[i]) columns[i].push_back(static_cast<int>(j));
+  }
+  return columns;
+}
+
+// A point at which no unknown is zero by chance.
+std::vector<double> further_away(const std::vector<double>& y, const std::vector<double>& WT) {
+  double largest = 0.0;
+  for (double value : y) largest = std::max(largest, std::abs(value));
+  std::vector<double> reach = WT;
+  for (double& length : reach) length = std::max(length, 1e-5 * largest);
+  return some_tolerances_away(y, reach);
+}
+
+// Columns in tolerances, rows to length 1, entries of rounding size to zero.
+void scale(const std::vector<double>& WT, Dense* a) {
+  for (Eigen::Index j = 0; j < a->cols(); ++j) a->col(j) *= WT[at(j)] > 0.0 ? WT[at(j)] : 1.0;
+  for (Eigen::Index i = 0; i < a->rows(); ++i) {
+    const double length = a->row(i).norm();
+    if (length > 0.0) a->row(i) /= length;
+    for (Eigen::Index j = 0; j < a->cols(); ++j)
+      if (std::abs((*a)(i, j)) < kPresent) (*a)(i, j) = 0.0;
+  }
+}
+
+Dense select(const Dense& from, const std::vector<int>& rows, const std::vector<int>& columns) {
+  Dense out(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size()));
+  for (Eigen::Index i = 0; i < out.rows(); ++i)
+    for (Eigen::Index j = 0; j < out.cols(); ++j) out(i, j) = from(rows[at(i)], columns[at(j)]);
+  return out;
+}
+
+// What the orthonormal rows collected so far leave of a row; twice is enough.
+class Span {
+ public:
+  Eigen::VectorXd rest(Eigen::VectorXd row) const {
+    for (int pass = 0; pass < 2; ++pass)
+      for (const Eigen::VectorXd& unit : units_) row -= unit.dot(row) * unit;
+    return row;
+  }
+  // True: the row was not in the span, and is now.
+  bool add(const Eigen::VectorXd& row, double smallest) {
+    const Eigen::VectorXd left = rest(row);
+    const double length = left.norm();
+    if (!(length > smallest)) return false;
+    units_.push_back(left / length);
+    return true;
+  }
+
+ private:
+  std::vector<Eigen::VectorXd> units_;
+};
+
+// C and h at one point, scaled, and the shares x of h that make up the algebraic part of rows of C.
+struct Point {
+  Dense C, h;
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;  // of h_a^T
+
+  bool evaluate(Evaluator& rows, const Residual& residual, const std::vector<int>& equations,
+                double t, const std::vector<double>& y, const std::vector<double>& WT,
+                const std::vector<int>& free, const std::vector<int>& algebraic) {
+    const auto n = static_cast<int>(y.size());
+    Dense given = Dense::Zero(rows.rows(), n), all;
+    if (rows.jacobian(t, y.data(), n, WT.data(), free, given.data()) != Status::success)
+      return false;
+    if (!given.allFinite() || !slopes(residual, equations, y, WT, &all)) return false;
+    C = Dense::Zero(given.rows(), n);
+    h = Dense::Zero(all.rows(), n);
+    for (int j : free) {
+      C.col(j) = given.col(j);
+      h.col(j) = all.col(j);
+    }
+    scale(WT, &C);
+    scale(WT, &h);
+    std::vector<int> every(at(h.rows()));
+    for (std::size_t i = 0; i < every.size(); ++i) every[i] = static_cast<int>(i);
+    factors.setThreshold(kPresent);
+    factors.compute(select(h, every, algebraic).transpose());
+    return true;
+  }
+
+  // False: h leaves something of the row's algebraic part.
+  bool explain(int row, const std::vector<int>& algebraic, Eigen::VectorXd* x) const {
+    Eigen::VectorXd part(static_cast<Eigen::Index>(algebraic.size()));
+    for (Eigen::Index k = 0; k < part.size(); ++k) part[k] = C(row, algebraic[at(k)]);
+    *x = factors.solve(part);
+    const double largest = x->size() > 0 ? x->lpNorm<Eigen::Infinity>() : 0.0;
+    for (double& share : *x)
+      if (std::abs(share) < kPresent * largest) share = 0.0;
+    Eigen::VectorXd made = Eigen::VectorXd::Zero(part.size());
+    for (Eigen::Index i = 0; i < x->size(); ++i)
+      for (Eigen::Index k = 0; k < part.size(); ++k) made[k] += (*x)[i] * h(i, algebraic[at(k)]);
+    return (made - part).norm() <= kExplained * part.norm();
+  }
+};
+
+}  // namespace
+
+bool contain_algebraic(Evaluator& rows, double t, const std::vector<double>& y,
+                       const std::vector<double>& WT, const std::vector<bool>& hold,
+                       const double* id) {
+  const auto n = static_cast<int>(y.size());
+  std::vector<int> algebraic;
+  for (int j = 0; j < n; ++j)
+    if (id[j] == 0.0 && (hold.empty() || !hold[at(j)])) algebraic.push_back(j);
+  if (algebraic.empty()) return false;
+  Dense C = Dense::Zero(rows.rows(), n);
+  for (const std::vector<double>& point : {y, further_away(y, WT)}) {
+    if (rows.jacobian(t, point.data(), n, WT.data(), algebraic, C.data()) != Status::success)
+      continue;
+    for (int j : algebraic)
+      if (!(C.col(j).array() == 0.0).all()) return true;
+  }
+  return false;
+}
+
+JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
+                                      const std::vector<char>& derivative_free, double t,
+                                      const std::vector<double>& y, const std::vector<double>& WT,
+                                      const std::vector<bool>& hold, const double* id) {
+  JoinedEquations found;
+  const auto n = static_cast<int>(y.size());
+  std::vector<int> equations, free, algebraic, differential;
+  for (int j = 0; j < n; ++j) {
+    if (derivative_free[at(j)]) equations.push_back(j);
+    if (!hold.empty() && hold[at(j)]) continue;
+    free.push_back(j);
+    (id[j] == 0.0 ? algebraic : differential).push_back(j);
+  }
+  if (equations.empty() || algebraic.empty()) return found;
+
+  // Looked at away from the candidate for what there is, at the candidate for what it amounts to.
+  Point away, here;
+  const bool far =
+      away.evaluate(rows, residual, equations, t, further_away(y, WT), WT, free, algebraic);
+  if ((!far && !away.evaluate(rows, residual, equations, t, some_tolerances_away(y, WT), WT, free,
+                              algebraic)) ||
+      !here.evaluate(rows, residual, equations, t, y, WT, free, algebraic))
+    return found;
+
+  const int m = rows.rows();
+  const auto contains = [&](int i, int j) { return away.C(i, j) != 0.0 || here.C(i, j) != 0.0; };
+  const auto hangs_on = [&](int i) {
+    return std::any_of(algebraic.begin(), algebraic.end(), [&](int j) { return contains(i, j); });
+  };
+  Span plain;  // rows of differential variables alone
+  std::vector<int> hanging;
+  for (int i = 0; i < m; ++i) {
+    if (hangs_on(i))
+      hanging.push_back(i);
+    else
+      plain.add(here.C.row(i).transpose(), kPresent);
+  }
+
+  // Which rows say something new about y_d, and on which equations they hang.
+  std::vector<char> used(equations.size(), 0);
+  std::vector<int> joint;
+  for (int i : hanging) {
+    Eigen::VectorXd x, x_here;
+    if (!away.explain(i, algebraic, &x) || !here.explain(i, algebraic, &x_here)) continue;
+    Eigen::VectorXd reduced = here.C.row(i).transpose() - here.h.transpose() * x_here;
+    for (int j : algebraic) reduced[j] = 0.0;
+    if (!(plain.rest(reduced).norm() > kRestricts * (1.0 + x_here.norm()))) continue;
+    joint.push_back(i);
+    for (Eigen::Index e = 0; e < x.size(); ++e)
+      if (x[e] != 0.0 || x_here[e] != 0.0) used[at(e)] = 1;
+  }
+  if (joint.empty()) return found;
+
+  found.moves.assign(at(n), 0);
+  const auto mark = [&](const Dense& a, int i) {
+    for (int j : algebraic)
+      if (a(i, j) != 0.0) found.moves[at(j)] = 1;
+  };
+  for (int i : joint) {
+    mark(away.C, i);
+    mark(here.C, i);
+  }
+  for (std::size_t e = 0; e < used.size(); ++e)
+    if (used[e]) {
+      mark(away.h, static_cast<int>(e));
+      mark(here.h, static_cast<int>(e));
+    }
+  // Rows that contain no other algebraic variables move with them; equations that they repeat would
+  // only be dropped again.
+  Span together;
+  const auto follows = [&](int j) { return id[j] == 0.0 && !found.moves[at(j)]; };
+  for (int i = 0; i < m; ++i) {
+    bool other = false;
+    for (int j : algebraic) other = other || (follows(j) && contains(i, j));
+    if (!other) together.add(here.C.row(i).transpose(), kPresent);
+  }
+  for (std::size_t e = 0; e < used.size(); ++e) {
+    const auto k = static_cast<Eigen::Index>(e);
+    if (!used[e] || !together.add(here.h.row(k).transpose(), kExplained)) continue;
+    found.equations.push_back(equations[e]);
+  }
+  found.columns = patterns(residual, found.equations, further_away(y, WT));
+  return found;
+}
+
+namespace {
+
+/// The equations and their differences; columns in groups that share no equation.
+class Differences {
+ public:
+  Differences(const JoinedEquations& found, Residual residual,
+              std::function<const double*()> weights, int size)
+      : equations_(found.equations),
+        columns_(found.columns),
+        residual_(std::move(residual)),
+        weights_(std::move(weights)),
+        group_of_(at(size), -1),
+        point_(at(size)),
+        base_(at(size)),
+        shifted_(at(size)),
+        change_(at(size)),
+        size_(at(size)) {
+    for (int j = 0; j < size; ++j) assign_group(j);
+  }
+
+  int value(const double* y, double* g) {
+    if (!residual_(y, base_.data())) return 1;
+    for (std::size_t i = 0; i < equations_.size(); ++i) g[i] = base_[at(equations_[i])];
+    return 0;
+  }
+
+  // Central differences: rows that nearly depend on each other magnify what one-sided ones leave.
+  int entries(const double* y, double* values) {
+    constexpr double kIncrement = 1e-5;  // of the largest |y_j| so far
+    std::copy(y, y + point_.size(), point_.begin());
+    double largest = 0.0;
+    for (double value : point_) largest = std::max(largest, std::abs(value));
+    const double* w = weights_();
+    for (int group = 0; group < groups_; ++group) {
+      for (std::size_t j = 0; j < point_.size(); ++j) {
+        if (group_of_[j] != group) continue;
+        const double tolerance = w != nullptr && w[j] > 0.0 ? 1.0 / w[j] : largest;
+        size_[j] = std::max(size_[j], std::abs(y[j]));
+        change_[j] = std::max(kIncrement * size_[j], std::min(tolerance, kIncrement * largest));
+        if (!(change_[j] > 0.0)) change_[j] = kIncrement;
+        point_[j] = y[j] - change_[j];
+      }
+      if (!residual_(point_.data(), base_.data())) return 1;
+      for (std::size_t j = 0; j < point_.size(); ++j) {
+        if (group_of_[j] != group) continue;
+        const double low = point_[j];
+        point_[j] = y[j] + change_[j];
+        change_[j] = point_[j] - low;
+      }
+      if (!residual_(point_.data(), shifted_.data())) return 1;
+      double* entry = values;
+      for (std::size_t i = 0; i < equations_.size(); ++i) {
+        const std::size_t e = at(equations_[i]);
+        for (int j : columns_[i]) {
+          if (group_of_[at(j)] == group) *entry = (shifted_[e] - base_[e]) / change_[at(j)];
+          ++entry;
+        }
+      }
+      for (std::size_t j = 0; j < point_.size(); ++j)
+        if (group_of_[j] == group) point_[j] = y[j];
+    }
+    return 0;
+  }
+
+ private:
+  // The first group with no column that meets column j in an equation.
+  void assign_group(int j) {
+    std::vector<char> taken(at(groups_) + 1, 0);
+    bool used = false;
+    for (const std::vector<int>& columns : columns_) {
+      if (!std::binary_search(columns.begin(), columns.end(), j)) continue;
+      used = true;
+      for (int other : columns)
+        if (group_of_[at(other)] >= 0) taken[at(group_of_[at(other)])] = 1;
+    }
+    if (!used) return;
+    const auto free = std::find(taken.begin(), taken.end(), 0);
+    group_of_[at(j)] = static_cast<int>(free - taken.begin());
+    groups_ = std::max(groups_, group_of_[at(j)] + 1);
+  }
+
+  std::vector<int> equations_;
+  std::vector<std::vector<int>> columns_;
+  Residual residual_;
+  std::function<const double*()> weights_;
+  std::vector<int> group_of_;  // of each column; -1: in no equation
+  int groups_ = 0;
+  std::vector<double> point_, base_, shifted_, change_;
+  std::vector<double> size_;  // largest |y_j| so far
+};
+
+}  // namespace
+
+Constraints as_constraints(const JoinedEquations& found, Residual residual,
+                           std::function<const double*()> weights, int size) {
+  const auto equations =
+      std::make_shared<Differences>(found, std::move(residual), std::move(weights), size);
+  Constraints set;
+  set.count = static_cast<int>(found.equations.size());
+  for (int i : found.equations) set.names.push_back("equation " + std::to_string(i) + " of F");
+  set.value = [equations](double, ConstVector y, Vector g) {
+    return equations->value(y.data(), g.data());
+  };
+  SparseJacobian jacobian;
+  jacobian.starts.push_back(0);
+  for (const std::vector<int>& columns : found.columns) {
+    jacobian.columns.insert(jacobian.columns.end(), columns.begin(), columns.end());
+    jacobian.starts.push_back(static_cast<int>(jacobian.columns.size()));
+  }
+  jacobian.fill = [equations](double, ConstVector y, Vector entries) {
+    return equations->entries(y.data(), entries.data());
+  };
+  set.jacobian = std::move(jacobian);
+  return set;
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,170 @@
+// Tether: the rows of C split into those for differential and for algebraic variables.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "rows/row_blocks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tether::ida_projection {
+
+std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT) {
+  for (std::size_t i = 0; i < y.size(); ++i)
+    y[i] += (0.7 + 0.6 * std::sin(1.0 + 3.7 * static_cast<double>(i))) *
+            std::max(1e-3 * std::abs(y[i]), 10.0 * (WT[i] > 0.0 ? WT[i] : 1e-6));
+  return y;
+}
+
+RowBlocks::RowBlocks(const Constraints& constraints, const Evaluator& evaluator, int n)
+    : constraints_(constraints),
+      m_(evaluator.rows()),
+      n_(n),
+      rank_tolerance_(evaluator.uses_differences() ? 1e-6 : std::max(m_, n) * 1e-13),
+      C_(static_cast<std::size_t>(m_) * static_cast<std::size_t>(n), 0.0) {}
+
+Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<double>& y0,
+                            const std::vector<double>& WT, const std::vector<bool>& hold,
+                            const double* id) {
+  structured_ = false;
+  const auto n = static_cast<std::size_t>(n_);
+  std::vector<char> filled(static_cast<std::size_t>(m_) * n, 0);
+  std::vector<double> y = y0;
+  std::vector<int> all(n);
+  for (std::size_t j = 0; j < n; ++j) all[j] = static_cast<int>(j);
+  for (int pass = 0; pass < 2; ++pass) {
+    if (pass == 1) y = some_tolerances_away(std::move(y), WT);
+    Status status = evaluator.jacobian(t, y.data(), n_, WT.data(), all, C_.data());
+    const bool evaluated = status == Status::success;
+    if (evaluated && !all_finite(C_.data(), C_.size())) status = Status::not_finite;
+    if (status != Status::success && pass == 0) {
+      message = evaluated ? "the constraint Jacobian C has an entry that is not finite"
+                          : evaluator.message();
+      return status;
+    }
+    if (status == Status::success)
+      for (std::size_t e = 0; e < filled.size(); ++e) filled[e] |= C_[e] != 0.0;
+  }
+
+  evaluator.sensitive(t, y0.data(), n_, WT.data(), filled);
+
+  const auto held = [&](std::size_t j) { return !hold.empty() && hold[j]; };
+  const auto algebraic = [&](std::size_t j) { return id != nullptr && id[j] == 0.0; };
+  const auto fills = [&](int i, std::size_t j) {
+    return filled[static_cast<std::size_t>(i) * n + j] != 0;
+  };
+
+  std::vector<char> row_is_algebraic(static_cast<std::size_t>(m_), 0);
+  std::vector<char> column_used(n, 0);
+  for (int i = 0; i < m_; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      if (fills(i, j) && !held(j)) {
+        column_used[j] = 1;
+        if (algebraic(j)) row_is_algebraic[static_cast<std::size_t>(i)] = 1;
+      }
+  for (Block* block : {&d, &a}) {
+    block->rows.clear();
+    block->columns.clear();
+  }
+  for (int i = 0; i < m_; ++i)
+    (row_is_algebraic[static_cast<std::size_t>(i)] ? a : d).rows.push_back(i);
+  for (std::size_t j = 0; j < n; ++j)
+    if (column_used[j]) (algebraic(j) ? a : d).columns.push_back(static_cast<int>(j));
+  // More rows than algebraic columns to satisfy them with: all rows over all columns together.
+  if (a.rows.size() > a.columns.size()) {
+    for (int i : a.rows) d.rows.push_back(i);
+    for (int j : a.columns) d.columns.push_back(j);
+    std::sort(d.rows.begin(), d.rows.end());
+    std::sort(d.columns.begin(), d.columns.end());
+    a.rows.clear();
+    a.columns.clear();
+  }
+  for (Block* block : {&d, &a}) {
+    block->solver.resize(static_cast<int>(block->rows.size()),
+                         static_cast<int>(block->columns.size()));
+    block->resize();
+  }
+  columns_.clear();
+  for (std::size_t j = 0; j < n; ++j)
+    if (column_used[j]) columns_.push_back(static_cast<int>(j));
+
+  for (int i = 0; i < m_; ++i) {
+    bool free = false;
+    for (std::size_t j = 0; j < n; ++j) free = free || (fills(i, j) && !held(j));
+    if (!free) {
+      message = constraints_.name(i) + " depends on no component that is free to move";
+      return Status::inconsistent;
+    }
+  }
+  structured_ = true;
+  return Status::success;
+}
+
+Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
+  return evaluator.jacobian(t, y, n_, WT, columns_, C_.data());
+}
+
+Status RowBlocks::learn_trust(Evaluator& evaluator, double t, const double* y, const double* WT,
+                              double length) {
+  if (!trust.wants_to_learn(length)) return Status::success;
+  C_after_.resize(C_.size());
+  const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_after_.data());
+  Block& block = counted();
+  if (status == Status::success)
+    trust.learn(block.solver, block.rows, block.columns, n_, C_, C_after_, length);
+  return status;
+}
+
+bool RowBlocks::factor() {
+  for (Block* block : {&d, &a})
+    if (!block->rows.empty() && !block->solver.factor(C_.data(), n_, block->rows.data(),
+                                                      block->columns.data(), rank_tolerance_))
+      return false;
+  return true;
+}
+
+void RowBlocks::solve(const std::vector<double>& g) {
+  if (a.rows.empty()) {  // then d has every row, in order
+    d.solver.solve(g.data(), d.dy.data());
+    return;
+  }
+  for (std::size_t i = 0; i < d.rows.size(); ++i) d.g[i] = g[static_cast<std::size_t>(d.rows[i])];
+  d.solve();
+  for (std::size_t i = 0; i < a.rows.size(); ++i) {
+    const double* c = row(a.rows[i]);
+    double rest = g[static_cast<std::size_t>(a.rows[i])];
+    for (std::size_t k = 0; k < d.columns.size(); ++k) rest -= c[d.columns[k]] * d.dy[k];
+    a.g[i] = rest;
+  }
+  a.solve();
+}
+
+double RowBlocks::terms(int i, const double* y) const {
+  const double* c = row(i);
+  double sum = 0.0;
+  for (int j = 0; j < n_; ++j) sum += std::abs(c[j] * y[j]);
+  return sum;
+}
+
+double RowBlocks::times(int i, const double* y) const {
+  const double* c = row(i);
+  double sum = 0.0;
+  for (int j = 0; j < n_; ++j) sum += c[j] * y[j];
+  return sum;
+}
+
+bool RowBlocks::contradict(const std::vector<double>& WT) {
+  for (const Block* block : {&d, &a}) {
+    const auto in_tolerances = [&](int i) {
+      double sum = 0.0;
+      for (int j : block->columns) {
+        const double c = row(i)[j] * WT[static_cast<std::size_t>(j)];
+        sum += c * c;
+      }
+      return std::sqrt(sum);
+    };
+    if (contradicts(*block, constraints_, n_, in_tolerances, &contradiction)) return true;
+  }
+  return false;
+}
+
+}  // namespace tether::ida_projection

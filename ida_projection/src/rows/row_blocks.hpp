@@ -1,0 +1,169 @@
+// Tether: the rows of C split into those for differential and for algebraic variables.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <tether/linalg/minimum_norm.hpp>
+#include <vector>
+
+#include "constraints/evaluator.hpp"
+#include "rows/row_trust.hpp"
+
+namespace tether::ida_projection {
+
+/// One set of rows solved for one set of columns.
+template <class Solver>
+struct BlockOf {
+  std::vector<int> rows, columns;
+  Solver solver;
+  std::vector<double> g, dy;
+  int first = -1;  // of columns that follow each other without a gap; -1: they do not
+
+  /// After rows, columns and the solver were set up.
+  void resize() {
+    g.assign(rows.size(), 0.0);
+    dy.assign(columns.size(), 0.0);
+    const bool adjacent = !columns.empty() &&
+                          columns.back() - columns.front() + 1 == static_cast<int>(columns.size());
+    first = adjacent ? columns.front() : -1;
+  }
+
+  double* D() { return solver.metric(); }
+  void solve() { solver.solve(g.data(), dy.data()); }
+
+  /// body(k, j) for each column j = columns[k]. Adjacent columns make a plain loop, which the
+  /// compiler can turn into vector code.
+  template <class Body>
+  void for_columns(Body&& body) const {
+    const int count = static_cast<int>(columns.size());
+    if (first >= 0) {
+      for (int k = 0; k < count; ++k) body(k, first + k);
+    } else {
+      for (int k = 0; k < count; ++k) body(k, columns[static_cast<std::size_t>(k)]);
+    }
+  }
+};
+
+/// Rows that a block dropped and that ask for what its kept rows exclude.
+struct Contradiction {
+  std::vector<int> rows;
+  std::string message;
+};
+
+/// After solve(): do dropped rows of the block ask for what the kept ones exclude? Up to what a
+/// tolerance-size move explains, they must follow from them. in_tolerances(row): |row_i(C WT)| over
+/// the block's columns. n: unknowns.
+template <class Solver, class Norm>
+bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, int n,
+                 Norm in_tolerances, Contradiction* found) {
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  constexpr double kContradiction =
+      0.5;  // a tolerance-size move could not have caused a larger one
+  const Solver& solver = block.solver;
+  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
+    const int row = block.rows[static_cast<std::size_t>(solver.pivot(k))];
+    const double norm = solver.row_norm(solver.pivot(k));
+    const double row_in_tolerances = in_tolerances(row);
+    const bool vanished = !(norm > std::numeric_limits<double>::min());
+    const double left = solver.inconsistency(k) * (vanished ? 1.0 : norm);
+    const double allowed =
+        vanished ? 1e-12
+                 : kContradiction * std::sqrt(n) * row_in_tolerances + 1e2 * kEpsilon * norm;
+    if (left <= allowed) continue;
+
+    found->rows = {row};
+    if (vanished) {
+      found->message =
+          constraints.name(row) + ": the gradient vanishes although g = " + std::to_string(left);
+      return true;
+    }
+    const std::vector<double> share = solver.dependence(k);
+    for (int i = 0; i < solver.rank(); ++i)
+      if (std::abs(share[static_cast<std::size_t>(i)]) > 1e-3)
+        found->rows.push_back(block.rows[static_cast<std::size_t>(solver.pivot(i))]);
+    std::sort(found->rows.begin(), found->rows.end());
+    found->message = "rows contradict each other:";
+    for (int i : found->rows)
+      found->message += " " + std::to_string(i) + " (" + constraints.name(i) + ")";
+    found->message += "; a distance of " +
+                      std::to_string(left / (std::sqrt(n) * std::max(row_in_tolerances, 1e-300))) +
+                      " tolerances stays unsolved";
+    return true;
+  }
+  return false;
+}
+
+/// y moved by some tolerances in no special direction: a velocity that happens to be zero at y is
+/// not zero there. WT = 0: unweighted.
+std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT);
+
+/// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
+/// differential columns ("d"); then rows that contain algebraic variables ("B") are solved for
+/// these columns ("a") alone, so that no position or velocity is bent to repair a multiplier.
+/// Where no variable is algebraic, B is empty and this is one minimum-norm solve. C is dense.
+class RowBlocks {
+ public:
+  using Block = BlockOf<linalg::MinimumNorm>;
+  /// Few rows: factors are cheap beside F, and a step older they may leave half of a move. Many:
+  /// an orthogonal factorisation costs some m / 2 solves.
+  static bool keeps_factors(int rows) { return rows > 64; }
+  /// The solver's pivots tell which rows need RowTrust.
+  static constexpr bool kThinRows = true;
+
+  RowBlocks(const Constraints& constraints, const Evaluator& evaluator, int n);
+
+  Block d, a;
+
+  /// Finds A, B, d and a from the entries that C can fill: those not zero at y or at a point some
+  /// tolerances away, so that a velocity that happens to be zero is not taken for a structural
+  /// zero. `id`: 1 differential, 0 algebraic, null: none algebraic.
+  Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
+                   const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
+  bool structured() const { return structured_; }
+
+  /// C at y; WT: only differences need it. The text of a failure is the evaluator's.
+  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
+  /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
+  bool factor();
+  /// d.dy and a.dy for the values g, with the C that was factored.
+  void solve(const std::vector<double>& g);
+  int rank() const { return d.solver.rank() + a.solver.rank(); }
+  /// The rows whose move is measured in tolerances.
+  Block& counted() { return d.rows.empty() ? a : d; }
+  /// After a move of this length with the C at hand: C at y, where it is time to learn from it.
+  Status learn_trust(Evaluator& evaluator, double t, const double* y, const double* WT,
+                     double length);
+  RowTrust trust;
+  bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
+
+  /// sum_j |C_ij y_j| and sum_j C_ij y_j.
+  double terms(int i, const double* y) const;
+  double times(int i, const double* y) const;
+  /// f(column, entry) for the entries of row i.
+  template <class Visit>
+  void visit_row(int i, Visit f) const {
+    for (int j = 0; j < n_; ++j) f(j, row(i)[j]);
+  }
+
+  /// After solve(): as contradicts() above, for both blocks.
+  bool contradict(const std::vector<double>& WT);
+
+  Contradiction contradiction;
+  std::string message;
+
+ private:
+  const double* row(int i) const { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
+
+  const Constraints& constraints_;
+  int m_, n_;
+  double rank_tolerance_;
+  std::vector<double> C_;        // m x n, row-major
+  std::vector<double> C_after_;  // work space of learn_trust()
+  std::vector<int> columns_;     // every column that C can fill and that is free
+  bool structured_ = false;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,221 @@
+// Tether: RowBlocks for sparse rows. SPDX-License-Identifier: BSD-3-Clause
+#include "rows/sparse_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tether::ida_projection {
+
+namespace {
+
+// Sine of the angle at which a row counts as dependent: its square is what A A^T tells from zero.
+constexpr double kRankTolerance = 1e-6;
+constexpr double kSolved = 1e-8;  // of g: Newton's next move takes the rest
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+SparseRows::SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n)
+    : constraints_(constraints), m_(evaluator.rows()), n_(n) {
+  for (const Evaluator::Part& part : evaluator.parts()) {
+    const SparseJacobian* sparse = part.sparse();
+    const int first = static_cast<int>(columns_of_.size());
+    for (int i = 0; i < part.set->count; ++i)
+      rows_.push_back(sparse != nullptr ? Row{first + sparse->starts[at(i)],
+                                              first + sparse->starts[at(i) + 1], -1}
+                                        : Row{0, 0, full_++});
+    if (sparse != nullptr)
+      columns_of_.insert(columns_of_.end(), sparse->columns.begin(), sparse->columns.end());
+  }
+  entries_.assign(columns_of_.size(), 0.0);
+  full_rows_.assign(at(full_) * at(n_), 0.0);
+}
+
+template <class Visit>
+void SparseRows::visit(int i, Visit f) const {
+  const Row& row = rows_[at(i)];
+  for (int e = row.begin; e < row.end; ++e) f(columns_of_[at(e)], entries_[at(e)]);
+  if (row.full < 0) return;
+  const double* full = full_rows_.data() + at(row.full) * at(n_);
+  for (int j = 0; j < n_; ++j) f(j, full[j]);
+}
+
+// Entries not zero at y or at a point some tolerances away.
+Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y0,
+                                     const std::vector<double>& WT) {
+  full_fills_.assign(full_rows_.size(), 0);
+  entry_fills_.assign(entries_.size(), 0);
+  columns_.resize(at(n_));
+  for (int j = 0; j < n_; ++j) columns_[at(j)] = j;
+  std::vector<double> y = y0;
+  for (int pass = 0; pass < 2; ++pass) {
+    if (pass == 1) y = some_tolerances_away(std::move(y), WT);
+    Status status = evaluate(evaluator, t, y.data(), WT.data());
+    const bool evaluated = status == Status::success;
+    if (evaluated && !(all_finite(entries_.data(), entries_.size()) &&
+                       all_finite(full_rows_.data(), full_rows_.size())))
+      status = Status::not_finite;
+    if (status != Status::success && pass == 0) {
+      message = evaluated ? "the constraint Jacobian C has an entry that is not finite"
+                          : evaluator.message();
+      return status;
+    }
+    if (status != Status::success) continue;
+    for (std::size_t e = 0; e < full_fills_.size(); ++e) full_fills_[e] |= full_rows_[e] != 0.0;
+    for (std::size_t e = 0; e < entry_fills_.size(); ++e) entry_fills_[e] |= entries_[e] != 0.0;
+  }
+  return Status::success;
+}
+
+bool SparseRows::fills(const Row& row, int j) const {
+  return row.full < 0 || full_fills_[at(row.full) * at(n_) + at(j)] != 0;
+}
+
+Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<double>& y,
+                             const std::vector<double>& WT, const std::vector<bool>& hold,
+                             const double* id) {
+  structured_ = false;
+  const Status status = find_full_columns(evaluator, t, y, WT);
+  if (status != Status::success) return status;
+  for (int i = 0; i < m_; ++i) {
+    bool free = false;
+    visit(i, [&](int j, double) {
+      free = free || (fills(rows_[at(i)], j) && (hold.empty() || !hold[at(j)]));
+    });
+    if (free) continue;
+    message = constraints_.name(i) + " depends on no component that is free to move";
+    return Status::inconsistent;
+  }
+  split(hold, id);
+  set_up(d, &gather_d_);
+  set_up(a, &gather_a_);
+  moved_.assign(a.rows.empty() ? 0 : at(n_), 0.0);
+  columns_ = d.columns;
+  columns_.insert(columns_.end(), a.columns.begin(), a.columns.end());
+  structured_ = true;
+  return Status::success;
+}
+
+void SparseRows::split(const std::vector<bool>& hold, const double* id) {
+  std::vector<char> used(at(n_), 0), algebraic_row(at(m_), 0);
+  // An entry of the pattern that is zero wherever it was looked at makes no row algebraic.
+  for (int i = 0; i < m_; ++i) {
+    int entry = rows_[at(i)].begin;
+    visit(i, [&](int j, double) {
+      const bool is_zero = rows_[at(i)].full < 0 && entry_fills_[at(entry++)] == 0;
+      if (!fills(rows_[at(i)], j) || (!hold.empty() && hold[at(j)])) return;
+      const bool is_algebraic = id != nullptr && id[j] == 0.0;
+      used[at(j)] |= !(is_algebraic && is_zero);
+      algebraic_row[at(i)] |= is_algebraic && !is_zero;
+    });
+  }
+  for (Block* block : {&d, &a}) {
+    block->rows.clear();
+    block->columns.clear();
+  }
+  for (const bool full : {false, true})
+    for (int i = 0; i < m_; ++i)
+      if ((rows_[at(i)].full >= 0) == full) (algebraic_row[at(i)] ? a : d).rows.push_back(i);
+  for (int j = 0; j < n_; ++j)
+    if (used[at(j)]) (id != nullptr && id[j] == 0.0 ? a : d).columns.push_back(j);
+  if (a.rows.size() <= a.columns.size()) return;
+  // More rows than algebraic columns to satisfy them with: all rows over all columns together.
+  d.rows.insert(d.rows.end(), a.rows.begin(), a.rows.end());
+  d.columns.insert(d.columns.end(), a.columns.begin(), a.columns.end());
+  std::sort(d.columns.begin(), d.columns.end());
+  std::stable_sort(d.rows.begin(), d.rows.end(), [this](int i, int j) {
+    return (rows_[at(i)].full >= 0) < (rows_[at(j)].full >= 0);
+  });
+  a.rows.clear();
+  a.columns.clear();
+}
+
+void SparseRows::set_up(Block& block, std::vector<int>* gather) {
+  std::vector<int> local(at(n_), -1), starts{0}, columns;
+  for (std::size_t k = 0; k < block.columns.size(); ++k)
+    local[at(block.columns[k])] = static_cast<int>(k);
+  gather->clear();
+  int full = 0;
+  for (const int i : block.rows) {
+    const Row& row = rows_[at(i)];
+    if (row.full >= 0) {
+      ++full;
+      continue;
+    }
+    for (int e = row.begin; e < row.end; ++e)
+      if (local[at(columns_of_[at(e)])] >= 0) {
+        columns.push_back(local[at(columns_of_[at(e)])]);
+        gather->push_back(e);
+      }
+    starts.push_back(static_cast<int>(columns.size()));
+  }
+  block.solver.resize(static_cast<int>(block.columns.size()), std::move(starts), std::move(columns),
+                      full);
+  block.resize();
+}
+
+Status SparseRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
+  return evaluator.jacobian(t, y, n_, WT, columns_, entries_.data(), full_rows_.data());
+}
+
+void SparseRows::load(Block& block, const std::vector<int>& gather) {
+  double* to = block.solver.entries();
+  for (std::size_t k = 0; k < gather.size(); ++k) to[k] = entries_[at(gather[k])];
+  const int sparse = block.solver.sparse_rows();
+  for (int k = sparse; k < block.solver.rows(); ++k) {
+    const double* from = full_rows_.data() + at(rows_[at(block.rows[at(k)])].full) * at(n_);
+    double* row = block.solver.full_row(k - sparse);
+    block.for_columns([=](int c, int j) { row[c] = from[j]; });
+  }
+}
+
+bool SparseRows::factor() {
+  if (!d.rows.empty()) {
+    load(d, gather_d_);
+    if (!d.solver.factor(kRankTolerance)) return false;
+  }
+  if (a.rows.empty()) return true;
+  load(a, gather_a_);
+  return a.solver.factor(kRankTolerance);
+}
+
+void SparseRows::solve(const std::vector<double>& g) {
+  for (std::size_t k = 0; k < d.rows.size(); ++k) d.g[k] = g[at(d.rows[k])];
+  d.solver.solve(d.g.data(), d.dy.data(), kSolved);
+  if (a.rows.empty()) return;
+  d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
+  for (std::size_t k = 0; k < a.rows.size(); ++k)
+    a.g[k] = g[at(a.rows[k])] - times(a.rows[k], moved_.data());
+  a.solver.solve(a.g.data(), a.dy.data(), kSolved);
+}
+
+double SparseRows::terms(int i, const double* y) const {
+  double sum = 0.0;
+  visit(i, [&](int j, double c) { sum += std::abs(c * y[j]); });
+  return sum;
+}
+
+double SparseRows::times(int i, const double* y) const {
+  double sum = 0.0;
+  visit(i, [&](int j, double c) { sum += c * y[j]; });
+  return sum;
+}
+
+bool SparseRows::contradict(const std::vector<double>& WT) {
+  for (const Block* block : {&d, &a}) {
+    const auto in_tolerances = [&](int i) {
+      double sum = 0.0;
+      visit(i, [&](int j, double c) {
+        if (std::binary_search(block->columns.begin(), block->columns.end(), j))
+          sum += c * WT[at(j)] * (c * WT[at(j)]);
+      });
+      return std::sqrt(sum);
+    };
+    if (contradicts(*block, constraints_, n_, in_tolerances, &contradiction)) return true;
+  }
+  return false;
+}
+
+}  // namespace tether::ida_projection

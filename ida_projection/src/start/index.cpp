@@ -1,0 +1,99 @@
+// Tether: whether F is of index 1 in its own variables. SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "attach/impl.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr int kLargestSize = 200;    // unknowns; the full QR beyond would be felt
+constexpr double kDependent = 1e-6;  // of the largest pivot; difference quotients are this good
+constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
+
+// Columns that the matrix does not determine: those with an entry in a null vector. Rows and
+// columns scaled to 1, as their units differ. Empty: none, or not known.
+std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
+  if (!a.allFinite()) return {};
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int i = 0; i < a.rows(); ++i) {
+      const double largest = a.row(i).lpNorm<Eigen::Infinity>();
+      if (largest > 0.0) a.row(i) /= largest;
+    }
+    for (int j = 0; j < a.cols(); ++j) {
+      const double largest = a.col(j).lpNorm<Eigen::Infinity>();
+      if (largest > 0.0) a.col(j) /= largest;
+    }
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
+  qr.setThreshold(kDependent);
+  const Eigen::Index n = a.cols(), rank = qr.rank();
+  if (rank == n) return {};
+  // R11 z1 + R12 z2 = 0, in the order of the pivots.
+  Eigen::MatrixXd null = Eigen::MatrixXd::Identity(n, n).rightCols(n - rank);
+  null.topRows(rank) = -qr.matrixR()
+                            .topLeftCorner(rank, rank)
+                            .triangularView<Eigen::Upper>()
+                            .solve(qr.matrixR().topRightCorner(rank, n - rank));
+  null = qr.colsPermutation() * null;
+  std::vector<char> found(static_cast<std::size_t>(n));
+  for (Eigen::Index j = 0; j < n; ++j)
+    found[static_cast<std::size_t>(j)] = null.row(j).lpNorm<Eigen::Infinity>() > kDependent;
+  return found;
+}
+
+}  // namespace
+
+// F determines y'_d and y_a, its index is 1 at most, where the matrix of F_y'_j (j differential)
+// and F_y_j (j algebraic) is regular. It is singular for multipliers of position or velocity rows
+// (index 2 and 3), and where combinations of differential variables are algebraic. The columns are
+// differences of IDA's own residual callback, F(t, ypred + ycor, yppred + cj ycor), with ypred
+// shifted by -ycor (and put back bit for bit) where only y' is to feel ycor. Algebraic variables
+// that the matrix leaves free carry rounding divided by the step: undetermined_.
+bool Projection::Impl::index_exceeds_one(const Candidate& candidate) {
+  if (!contiguous_ || size_ > kLargestSize) return false;
+  const double cj = step_data().cj;
+  OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base);
+  N_VConst(0.0, ycor);
+  N_VScale(1.0, candidate.base, saved_);
+  double* e = N_VGetArrayPointer(ycor);
+  double* predicted = N_VGetArrayPointer(candidate.base);
+  const double* original = N_VGetArrayPointer(saved_);
+  const double* w = N_VGetArrayPointer(candidate.weights);
+  const double* before = N_VGetArrayPointer(base);
+  const double* after = N_VGetArrayPointer(shifted);
+  const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
+  const auto residual = [&](N_Vector into) {
+    ++statistics_.residual_evaluations;
+    return this->residual(ycor, into) == 0;
+  };
+
+  bool known = true;
+  Eigen::MatrixXd slopes(size_, size_);
+  for (int j = 0; j < size_ && known; ++j) {
+    const bool differential = id == nullptr || id[j] != 0.0;
+    const double tolerance = w[j] > 0.0 ? 1.0 / w[j] : 1.0;
+    const double change = std::max(
+        tolerance, differential ? 1e-3 / std::abs(cj) : kIncrement * std::abs(original[j]));
+    const double low = differential ? original[j] - change : original[j];
+    predicted[j] = differential ? low + change : low;  // F sees this y_j twice, bit for bit
+    known = residual(base);
+    predicted[j] = low;
+    e[j] = change;
+    known = residual(shifted) && known;
+    e[j] = 0.0;
+    predicted[j] = original[j];
+    for (int i = 0; i < size_; ++i) slopes(i, j) = (after[i] - before[i]) / change;
+  }
+  N_VScale(1.0, saved_, candidate.base);
+  const std::vector<char> left =
+      known ? undetermined_columns(std::move(slopes)) : std::vector<char>();
+  undetermined_.clear();
+  for (int j = 0; id != nullptr && j < static_cast<int>(left.size()); ++j)
+    if (left[static_cast<std::size_t>(j)] && id[j] == 0.0) undetermined_.push_back(j);
+  return !left.empty();
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,58 @@
+// Tether: steps between full projections, Options::frequency. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+
+#include "attach/impl.hpp"
+
+namespace tether::ida_projection {
+
+double Projection::Impl::step_size() const {
+  sunrealtype h = 0.0;
+  IDAGetCurrentStep(ida_mem_, &h);
+  return h;
+}
+
+// False: this attempt is done, left alone or moved with the factors at hand.
+bool Projection::Impl::needs_projection(const Candidate& candidate, const StepData& step,
+                                        double tolerance) {
+  const FrequencyPolicy::Need need = frequency_.need(last_steps_, repeated_, std::abs(step_size()));
+  if (need == FrequencyPolicy::Need::projection) return true;
+  if (need == FrequencyPolicy::Need::nothing) {
+    if (engaged_ && !leave_alone(candidate, step, tolerance)) return true;
+    frequency_.left_alone();
+    ++statistics_.left_alone;
+    return false;
+  }
+  return !(engaged_ && mover_->may_follow() && follow(candidate, step, tolerance));
+}
+
+// Only the iteration that removes noise. False: old factors misled the corrector, which a projected
+// step looks into.
+bool Projection::Impl::leave_alone(const Candidate& candidate, const StepData& step,
+                                   double tolerance) {
+  if (!wants_polish(0.0)) return true;
+  corrector_was_right_ = true;
+  keep_corrector(candidate);
+  if (!add_newton_step(candidate, step.cj, tolerance) || corrector_was_right_) return true;
+  N_VScale(1.0, newton_, candidate.correction);
+  return false;
+}
+
+// One g and one solve, and the same again after the iteration at the moved point. Without that
+// iteration, or with one before the move, stiff components do not answer to the move and oscillate.
+bool Projection::Impl::follow(const Candidate& candidate, const StepData& step, double tolerance) {
+  corrector_was_right_ = true;
+  keep_corrector(candidate);
+  const Move move = mover_->follow(candidate, false);
+  bool done = move.status == Status::success;
+  if (done && wants_polish(move.length) && add_newton_step(candidate, step.cj, tolerance))
+    done = corrector_was_right_ && mover_->follow(candidate, true).status == Status::success;
+  if (!done) {
+    N_VScale(1.0, newton_, candidate.correction);
+    return false;
+  }
+  ++statistics_.chord_projections;
+  note(move, step);
+  return true;
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,187 @@
+// Tether: smooth step sizes through IDA's public settings. SPDX-License-Identifier: BSD-3-Clause
+//
+// IDA has no hook for a step-size controller. At the end of a step it computes its own ratio
+//
+//     tmp = (2 err + 1e-4)^(-1 / (k + 1))
+//
+// and grows by min(tmp, eta_max) where tmp >= eta_max_fx, shrinks by tmp between eta_min and
+// eta_low where tmp <= eta_min_fx, and keeps h otherwise. All of these can be set while the step's
+// correction is being computed, so that the ratio wanted comes out, up to two limits: never more
+// than tmp, and never growth where tmp < 1. A ratio below 1 where tmp >= 1 takes IDASetMaxStep, or
+// error weights that are larger for the rest of the attempt.
+#include "step/step_smoothing.hpp"
+
+#include <ida/ida.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr double kFilter = 4.0;     // b
+constexpr double kAnyRatio = 1e30;  // eta_max_fx that is never reached: keep h
+
+// IDA's defaults.
+constexpr double kLowestFixed = 1.0, kHighestFixed = 2.0, kLargest = 2.0, kLow = 0.9, kMin = 0.5;
+
+}  // namespace
+
+StepSmoother::StepSmoother(void* ida_mem, const Options& options)
+    : ida_mem_(ida_mem),
+      wanted_(options.step_smoothing),
+      setpoint_(options.smoothing_setpoint),
+      max_step_(options.maximum_step),
+      max_order_(options.maximum_order) {}
+
+void StepSmoother::reset() {
+  const bool was_on = on_;
+  on_ = owns_max_step_ = wanted_;
+  pending_ = has_previous_ = false;
+  steps_ = -1;
+  known_ = block_ = 0;
+  block_sum_ = 0.0;
+  ratio_ = 1.0;
+  if (on_ || was_on) set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
+}
+
+// sigma_k = prod_i i h / (h + h_{-1} + .. + h_{-i}), i = 1 .. k (Brenan, Campbell and
+// Petzold, 5.2).
+double StepSmoother::error_constant(double h, int order) const {
+  double sigma = 1.0, sum = h;
+  for (int i = 1; i <= order; ++i) {
+    sum += i <= known_ ? past_[static_cast<std::size_t>(i - 1)] : h;
+    sigma *= i * h / sum;
+  }
+  return sigma;
+}
+
+// c_k = max(|alpha_k + alpha_s - alpha_0|, alpha_k), by which the error test multiplies |ycor|.
+double StepSmoother::test_constant(double h, int order) const {
+  double sum = h, newest = 1.0, alpha_0 = -1.0, alpha_s = -1.0;  // i = 0
+  for (int i = 1; i <= order; ++i) {
+    sum += i <= known_ ? past_[static_cast<std::size_t>(i - 1)] : h;
+    newest = h / sum;
+    if (i == order) break;
+    alpha_0 -= newest;
+    alpha_s -= 1.0 / (i + 1);
+  }
+  return std::max(std::abs(newest + alpha_s - alpha_0), newest);
+}
+
+void StepSmoother::attempt_was_accepted() {
+  for (std::size_t i = past_.size() - 1; i > 0; --i) past_[i] = past_[i - 1];
+  past_[0] = h_;
+  known_ = std::min(known_ + 1, kMaximumOrder);
+  block_sum_ += log_c_;
+  ++block_;
+  if (order_ >= max_order_) {
+    previous_ = log_c_;
+    has_previous_ = true;
+  }
+}
+
+double StepSmoother::filter(double log_c, int order) const {
+  const double before = has_previous_ ? previous_ : log_c;
+  const double log_ratio = (log_c + before) / (kFilter * (order + 1)) - std::log(ratio_) / kFilter;
+  return 1.0 + std::atan(std::exp(log_ratio) - 1.0);
+}
+
+double StepSmoother::control(long steps, double norm) {
+  sunrealtype h = 0.0;
+  int order = 1;
+  IDAGetCurrentStep(ida_mem_, &h);
+  IDAGetCurrentOrder(ida_mem_, &order);
+  h = std::abs(h);
+  if (pending_) {
+    if (steps > steps_) {
+      attempt_was_accepted();
+    } else {
+      has_previous_ = false;  // rejected: IDA has cut the step by its own rule
+      ratio_ = 1.0;
+      block_ = 0;
+      block_sum_ = 0.0;
+    }
+    if (order != order_) {
+      has_previous_ = false;
+      ratio_ = 1.0;
+    } else if (known_ > 0 && h != past_[0]) {
+      ratio_ = h / past_[0];
+    } else if (order >= max_order_) {
+      ratio_ = 1.0;
+    }
+    if (order != order_ || known_ == 0 || h != past_[0]) {
+      if (order == order_ && order < max_order_ && block_ > 0) {
+        previous_ = block_sum_ / block_;
+        has_previous_ = true;
+      }
+      block_ = 0;
+      block_sum_ = 0.0;
+    }
+  }
+
+  const double error = error_constant(h, order) * norm;
+  const double own_ratio = std::pow(2.0 * error + 1e-4, -1.0 / (order + 1));  // IDA's tmp
+  const double log_c = -std::log(setpoint_ * error + 1e-4);
+  pending_ = true;
+  steps_ = steps;
+  h_ = h;
+  order_ = order;
+  log_c_ = log_c;
+  if (!std::isfinite(log_c)) {
+    hold();
+  } else if (order >= max_order_) {
+    return request(filter(log_c, order), h, own_ratio, norm);
+  } else if (block_ + 1 >= order + 2) {  // with this one, k + 2 steps of one size
+    return request(filter((block_sum_ + log_c) / (block_ + 1), order), h, own_ratio, norm);
+  } else {
+    hold();
+  }
+  return 1.0;
+}
+
+// Keep h, or reduce it by IDA's own rule.
+void StepSmoother::hold() { set(kLowestFixed, kAnyRatio, kLargest, 0.0, max_step_); }
+
+double StepSmoother::request(double ratio, double h, double own_ratio, double norm) {
+  if (own_ratio < 1.0) {
+    if (ratio < 1.0)
+      set(kLowestFixed, kAnyRatio, kLargest, ratio, max_step_);
+    else
+      set(0.0, kAnyRatio, kLargest, 0.0, max_step_);
+  } else if (ratio > 1.0) {
+    set(kLowestFixed, 1.0, ratio, 0.0, max_step_);
+  } else if (!owns_max_step_) {
+    return gentle_reduction(ratio, h, norm);
+  } else {
+    const double longest = h * ratio;
+    set(kLowestFixed, 1.0, kLargest, 0.0, max_step_ > 0.0 ? std::min(max_step_, longest) : longest);
+  }
+  return 1.0;
+}
+
+// IDA reduces h by any ratio asked for where its own is below 1, which it is for an error above
+// 0.5. Weights that make it so change no decision on the order, which compares errors; the error
+// test has to be passed all the same.
+double StepSmoother::gentle_reduction(double ratio, double h, double norm) {
+  constexpr double kAsked = 0.55, kPassed = 0.95;
+  const double factor = kAsked / (error_constant(h, order_) * norm);
+  if (!(factor > 1.0) || factor * test_constant(h, order_) * norm > kPassed) {
+    hold();
+    return 1.0;
+  }
+  set(kLowestFixed, kAnyRatio, kLargest, ratio, max_step_);
+  return factor;
+}
+
+void StepSmoother::set(double lowest_fixed, double highest_fixed, double largest, double low,
+                       double max_step) {
+  IDASetEtaFixedStepBounds(ida_mem_, lowest_fixed, highest_fixed);
+  IDASetEtaMax(ida_mem_, largest);
+  IDASetEtaLow(ida_mem_, low > 0.0 ? low : kLow);
+  IDASetEtaMin(ida_mem_, low > 0.0 ? low : kMin);
+  if (owns_max_step_) IDASetMaxStep(ida_mem_, max_step);
+}
+
+}  // namespace tether::ida_projection
