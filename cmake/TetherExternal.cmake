@@ -4,9 +4,9 @@
 #   tether_find_hdf5()     tether::hdf5, for contact_io
 #   tether_find_bullet()   tether::bullet, Bullet's LinearMath in double precision, for
 #                          contact_collision
-# Where one is not found, there is no target.
+# Where one is not found, there is no target. Functions, because FindHDF5 changes variables of its caller.
 
-macro(tether_find_hdf5)
+function(tether_find_hdf5)
   if(NOT TARGET tether::hdf5)
     find_package(HDF5 QUIET COMPONENTS C)
     if(HDF5_FOUND)
@@ -16,9 +16,9 @@ macro(tether_find_hdf5)
       target_compile_definitions(tether::hdf5 INTERFACE ${HDF5_C_DEFINITIONS})
     endif()
   endif()
-endmacro()
+endfunction()
 
-macro(tether_find_bullet)
+function(tether_find_bullet)
   if(NOT TARGET tether::bullet)
     find_path(TETHER_BULLET_INCLUDE_DIR LinearMath/btConvexHullComputer.h PATH_SUFFIXES bullet)
     find_library(TETHER_BULLET_LINEAR_MATH LinearMath-float64)
@@ -30,4 +30,4 @@ macro(tether_find_bullet)
       target_compile_definitions(tether::bullet INTERFACE BT_USE_DOUBLE_PRECISION)
     endif()
   endif()
-endmacro()
+endfunction()
