@@ -9,10 +9,18 @@
 
 namespace tether::linalg {
 
+namespace {
+
+// Of factor_kept(): the square of this sine A A^T gives to 1e-10 of itself.
+constexpr double kLeastSine = 1e-3, kLeastShare = 1.0 / 3.0;
+
+}  // namespace
+
 struct MinimumNorm::Large {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
   Eigen::VectorXd work, rhs;
+  Eigen::MatrixXd kept, L;  // of factor_kept(): columns are the rows of A; lower triangle
 };
 
 MinimumNorm::MinimumNorm() = default;
@@ -27,6 +35,7 @@ void MinimumNorm::resize(int rows, int columns) {
                                 ", columns = " + std::to_string(columns) + "; both must be >= 0");
   m_ = rows;
   n_ = columns;
+  kept_ = false;
   set_rank(0);
   const auto m = static_cast<std::size_t>(rows);
   inconsistency_.assign(m, 0.0);
@@ -44,6 +53,8 @@ void MinimumNorm::resize(int rows, int columns) {
     large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
     large_->work.resize(std::max(rows, columns));
     large_->rhs.resize(std::max(rows, columns));
+    large_->kept.resize(columns, std::min(rows, columns));
+    large_->L.resize(std::min(rows, columns), std::min(rows, columns));
   }
 }
 
@@ -78,15 +89,21 @@ bool MinimumNorm::factor(const double* wide, int width, const int* rows, const i
     set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
     return true;
   }
-  for (int i = 0; i < m_; ++i) {
-    const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
-    for (int j = 0; j < n_; ++j) large_->A(i, j) = c[columns[j]];
-  }
+  gather_large(wide, width, rows, columns);
   return factor_large(rank_tolerance);
 }
 
-bool MinimumNorm::factor_large(double rank_tolerance) {
-  auto& [A, qr, work, rhs] = *large_;
+void MinimumNorm::gather_large(const double* wide, int width, const int* rows, const int* columns) {
+  for (int i = 0; i < m_; ++i) {
+    const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
+    double* a = large_->A.row(i).data();
+    for (int j = 0; j < n_; ++j) a[j] = c[columns[j]];
+  }
+}
+
+// Rows of C to unit rows of C D.
+bool MinimumNorm::scale_large() {
+  auto& A = large_->A;
   const Eigen::Map<const Eigen::VectorXd> D(metric_.data(), n_);
   for (int i = 0; i < m_; ++i) {
     A.row(i) = A.row(i).cwiseProduct(D.transpose());
@@ -95,6 +112,35 @@ bool MinimumNorm::factor_large(double rank_tolerance) {
     row_norm_[static_cast<std::size_t>(i)] = length;
     A.row(i) *= length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
   }
+  return true;
+}
+
+bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns) {
+  const int r = rank_;
+  if (kernel_ != nullptr || r == 0) return false;
+  if (!kept_) decided_least_ = independent_part(r - 1);
+  if (decided_least_ < kLeastSine) return false;
+  gather_large(wide, width, rows, columns);
+  kept_ = false;
+  if (!scale_large()) return false;
+  auto& large = *large_;
+  for (int k = 0; k < r; ++k) large.kept.col(k) = large.A.row(pivot(k)).transpose();
+  Eigen::Ref<Eigen::MatrixXd> L = large.L.topLeftCorner(r, r);
+  L.setZero();
+  L.selfadjointView<Eigen::Lower>().rankUpdate(large.kept.leftCols(r).transpose());
+  const double least = std::max(kLeastSine, kLeastShare * decided_least_);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(L);
+  if (in_place.info() != Eigen::Success || !(L.diagonal().minCoeff() >= least)) return false;
+  kept_ = true;
+  rank_ = factored_rank_ = r;
+  least_square_ = std::pow(L.diagonal().minCoeff(), 2);
+  return true;
+}
+
+bool MinimumNorm::factor_large(double rank_tolerance) {
+  kept_ = false;
+  if (!scale_large()) return false;
+  auto& [A, qr, work, rhs, kept, L] = *large_;
   qr.setThreshold(rank_tolerance);
   qr.compute(A.transpose());
   set_rank(qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0);
@@ -107,7 +153,7 @@ double MinimumNorm::scaled(const double* g, int i) const {
 }
 
 void MinimumNorm::solve(const double* g, double* dy) {
-  kernel_ != nullptr ? solve_small(g, dy) : solve_large(g, dy);
+  kernel_ != nullptr ? solve_small(g, dy) : kept_ ? solve_kept(g, dy) : solve_large(g, dy);
 }
 
 void MinimumNorm::solve_small(const double* g, double* dy) {
@@ -130,8 +176,26 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
   kernel_->combine(s, rank_, z, metric_.data(), dy, n_);
 }
 
+// du = A^T (A A^T)^-1 b over the rows that take part; the others' inconsistency is b - A du.
+void MinimumNorm::solve_kept(const double* g, double* dy) {
+  auto& large = *large_;
+  auto z = large.rhs.head(rank_);
+  for (int k = 0; k < rank_; ++k) z[k] = scaled(g, pivot(k));
+  const auto L = large.L.topLeftCorner(rank_, rank_).triangularView<Eigen::Lower>();
+  L.solveInPlace(z);
+  L.adjoint().solveInPlace(z);
+  Eigen::Map<Eigen::VectorXd> du(dy, n_);
+  du.noalias() = large.kept.leftCols(rank_) * z;
+  for (int k = rank_; k < m_; ++k) {
+    const int i = pivot(k);
+    inconsistency_[static_cast<std::size_t>(k)] =
+        std::abs(scaled(g, i) - large.A.row(i).dot(du.transpose()));
+  }
+  for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
+}
+
 void MinimumNorm::solve_large(const double* g, double* dy) {
-  auto& [A, qr, work, rhs] = *large_;
+  auto& [A, qr, work, rhs, kept, L] = *large_;
   const auto& R = qr.matrixQR();
   for (int k = 0; k < rank_; ++k) rhs[k] = scaled(g, pivot(k));
   R.topLeftCorner(rank_, rank_)
@@ -176,6 +240,11 @@ std::vector<double> MinimumNorm::dependence(int k) const {
     }
     const auto length = [&](int row) { return std::sqrt(s.square[s.pivot[row]]); };
     for (int j = 0; j < r; ++j) x[j] *= length(j) / length(k);
+  } else if (kept_) {
+    const auto L = large_->L.topLeftCorner(r, r).triangularView<Eigen::Lower>();
+    x.noalias() = large_->kept.leftCols(r).transpose() * large_->A.row(pivot(k)).transpose();
+    L.solveInPlace(x);
+    L.adjoint().solveInPlace(x);
   } else {
     x = large_->qr.matrixQR().col(k).head(r);
     large_->qr.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solveInPlace(x);
@@ -184,7 +253,8 @@ std::vector<double> MinimumNorm::dependence(int k) const {
 }
 
 double MinimumNorm::independent_part(int k) const {
-  return kernel_ != nullptr ? std::sqrt(small_->ratio[k]) : std::abs(large_->qr.matrixQR()(k, k));
+  if (kernel_ != nullptr) return std::sqrt(small_->ratio[k]);
+  return kept_ ? large_->L(k, k) : std::abs(large_->qr.matrixQR()(k, k));
 }
 
 double MinimumNorm::condition() const {

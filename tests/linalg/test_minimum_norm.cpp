@@ -251,3 +251,58 @@ TEST_CASE("fewer rows than the rank: the solution of these rows alone") {
     CHECK((solve(solver, c.g) - all).cwiseAbs().maxCoeff() == 0.0);
   }
 }
+
+TEST_CASE("rows known to be independent: as factored anew, until one depends on the others") {
+  const int m = 90, n = 80, rank = 60;
+  Case c = random_case(m, n, 3);
+  c.D = 2.0 + Eigen::ArrayXd::LinSpaced(n, 0.0, 9.0).sin();
+  std::vector<int> rows(m), columns(n);
+  for (int i = 0; i < m; ++i) rows[static_cast<std::size_t>(i)] = i;
+  for (int j = 0; j < n; ++j) columns[static_cast<std::size_t>(j)] = j;
+  std::mt19937 random(8);
+  RowMajor share(m - rank, rank);
+  for (int j = 0; j < rank; ++j) share.col(j) = random_vector(m - rank, random);
+  const auto complete = [&] { c.C.bottomRows(m - rank) = share * c.C.topRows(rank); };
+  complete();
+  MinimumNorm kept(m, n), anew(m, n);
+  const auto factor = [&](MinimumNorm& solver) {
+    std::copy_n(c.D.data(), n, solver.metric());
+    return solver.factor(c.C.data(), n, rows.data(), columns.data(), 1e-10);
+  };
+  const auto factor_kept = [&] {
+    std::copy_n(c.D.data(), n, kept.metric());
+    return kept.factor_kept(c.C.data(), n, rows.data(), columns.data());
+  };
+  CHECK_FALSE(factor_kept());  // nothing is known yet
+  REQUIRE(factor(kept));
+  REQUIRE(kept.rank() == rank);
+
+  for (int j = 0; j < n; ++j)
+    c.C.col(j) += 0.01 * c.C.col(j).cwiseProduct(random_vector(m, random));
+  complete();
+  c.g = c.C * c.D.cwiseProduct(random_vector(n, random));
+  c.g[m - 1] += 1e-3 * c.C.row(m - 1).norm();
+  REQUIRE(factor(anew));
+  REQUIRE(factor_kept());
+  CHECK(kept.rank() == rank);
+  const Eigen::VectorXd dy = solve(kept, c.g);
+  const Eigen::VectorXd left = c.C * dy - c.g;
+  for (int k = 0; k < rank; ++k) CHECK(std::abs(left[kept.pivot(k)]) <= 1e-9);
+  double largest = 0.0;
+  for (int k = rank; k < m; ++k) {
+    const int i = kept.pivot(k);
+    CHECK(kept.inconsistency(k) * kept.row_norm(i) == Approx(std::abs(left[i])).margin(1e-9));
+    largest = std::max(largest, kept.inconsistency(k));
+  }
+  CHECK(largest > 1e-6);
+  c.g = c.C * c.D.cwiseProduct(random_vector(n, random));
+  const Eigen::VectorXd same = solve(kept, c.g);
+  CHECK(distance(same, solve(anew, c.g), c.D) <= 1e-9 * length(same, c.D));
+
+  c.C.row(kept.pivot(3)) = 2.0 * c.C.row(kept.pivot(1));
+  CHECK_FALSE(factor_kept());
+  REQUIRE(factor(kept));
+  CHECK(kept.rank() >= rank - 1);
+  c.C(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(factor_kept());
+}

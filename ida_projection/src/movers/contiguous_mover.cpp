@@ -49,20 +49,34 @@ Status ContiguousMover<Rows>::factor(double t) {
     message_ = evaluator_.message();
     return status;
   }
-  ++statistics_.factorizations;
+  const bool known = keeps_rank_ && lasting_ && reusable_;
   reusable_ = false;
-  if (!blocks_.factor()) {
+  weighed_ = false;
+  if (known && blocks_.factor_kept()) {
+    thin_ = false;
+    ++statistics_.refactorizations;
+  } else if (!decide()) {
     message_ =
         "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
     return Status::not_finite;
   }
-  if (blocks_.dropped_rows()) ++statistics_.rank_drops;
-  if constexpr (Rows::kThinRows) thin_ = RowTrust::has_thin_rows(blocks_.counted().solver);
   reusable_ = true;
   slope_ = kUnknownSlope;
   age_ = 0;
   wear_.renewed();
   return Status::success;
+}
+
+// Factors from which it can be seen which rows are independent. False: an entry is not finite.
+template <class Rows>
+bool ContiguousMover<Rows>::decide() {
+  ++statistics_.factorizations;
+  if (!blocks_.factor()) return false;
+  if (blocks_.dropped_rows()) ++statistics_.rank_drops;
+  if constexpr (Rows::kThinRows) thin_ = RowTrust::has_thin_rows(blocks_.counted().solver);
+  lasting_ = !thin_;
+  decided_ = true;
+  return true;
 }
 
 // The first solve() after factor(): decides which of the thin rows take part until the next one.
@@ -84,6 +98,7 @@ double ContiguousMover<Rows>::first_solve() {
       solver.use_rank(all);
       const int trusted = blocks_.trust.trusted_rows(solver, firm_length);
       solver.use_rank(trusted);
+      lasting_ = RowTrust::lasting(solver, firm, trusted);
       if (trusted > firm) {
         --statistics_.iterations;
         if (whole && trusted < all) ++statistics_.rank_drops;
@@ -179,6 +194,7 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   result.drift_before = result.drift_after = drift();
   if (result.drift_before == 0.0) return result;
   set_metric(true);
+  lasting_ = false;
   if ((result.status = factor(candidate.t)) != Status::success) return result;
   if (rounding_only()) return result;
   firm_only_ = false;
@@ -207,6 +223,7 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   load(candidate);
   reused_ = may_reuse();
   ++age_;
+  decided_ = false;
   set_metric(!reused_);
   if ((result.status = value(candidate.t)) != Status::success) return result;
   firm_only_ = start_known_ = false;
@@ -214,7 +231,8 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
   if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
-  if (result.status == Status::success && !result.capped && contradicts())
+  // Kept factors are in use only while dropped rows ask for less than that.
+  if (result.status == Status::success && !result.capped && !reused_ && contradicts())
     result.status = Status::inconsistent;
   return result;
 }
@@ -280,9 +298,14 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       have_factors = false;
       continue;
     }
-    if (reused_ && !(length <= kLong)) {
+    const bool follow = dropped_follow();
+    if (reused_ && !(length <= kLong && follow)) {
       set_metric(true);
       reused_ = have_factors = false;
+      continue;
+    }
+    if (!follow && keeps_rank_) {
+      lasting_ = have_factors = false;
       continue;
     }
     ++result.moves;

@@ -40,6 +40,7 @@ class ContiguousMover final : public Mover {
         reported_(reported >= 0 ? reported : m_),
         inverse_n_(1.0 / size),
         keeps_factors_(Rows::keeps_factors(m_)),
+        keeps_rank_(Rows::keeps_rank(m_)),
         blocks_(constraints, evaluator_, size) {
     const auto n = static_cast<std::size_t>(n_);
     const auto m = static_cast<std::size_t>(m_);
@@ -68,7 +69,10 @@ class ContiguousMover final : public Mover {
   bool fatal() const override { return evaluator_.fatal(); }
   void forget_failure() override { evaluator_.forget(); }
   Status finish(const Candidate& candidate) override {
-    const bool unseen = keeps_factors() && move_length_ > kSafe * options_.tolerance;
+    // Where a move costs little beside the step, what Newton's method left is taken, too.
+    if (keeps_rank_) return take_rest(candidate, move_length_);
+    if (!keeps_factors()) return Status::success;
+    const bool unseen = move_length_ > kSafe * options_.tolerance || !dropped_follow();
     return unseen ? take_back(candidate) : Status::success;
   }
   void reset() override {
@@ -79,6 +83,7 @@ class ContiguousMover final : public Mover {
     if constexpr (Rows::kThinRows) blocks_.trust.reset();
     staleness_ = -1.0;
     measured_ = 0.0;
+    usual_ = 0.0;
     settles_ = 0;
     wear_ = FactorWear();
   }
@@ -89,15 +94,18 @@ class ContiguousMover final : public Mover {
   void load(const Candidate& candidate);
   const std::vector<double>& WT();
   void set_metric(bool for_factors);
-  // Rows that need RowTrust are judged anew in each step.
-  bool keeps_factors() const { return keeps_factors_ && !thin_; }
-  bool may_reuse() const { return keeps_factors() && reusable_ && !blocks_.dropped_rows(); }
+  bool keeps_factors() const { return keeps_factors_ && lasting_; }
+  bool may_reuse() const { return keeps_factors() && reusable_; }
+  double left_of_dropped();
+  bool dropped_follow();
   Status take_back(const Candidate& candidate);
+  Status take_rest(const Candidate& candidate, double reach);
   double rate() const { return slope_ * age_; }
   void set_group_metric();
   Status structure(const Candidate& candidate, const double* id);
   Status value(double t);
   Status factor(double t);
+  bool decide();
   double solve();
   double first_solve();
   bool must_learn(double length) const;
@@ -121,8 +129,11 @@ class ContiguousMover final : public Mover {
   int reported_;  // rows whose drift is told; the others are equations of F
   double inverse_n_;
   bool keeps_factors_;  // over several steps
+  bool keeps_rank_;     // over several steps: which rows count
   Rows blocks_;
   bool thin_ = false;          // the last factor() found rows that need RowTrust
+  bool lasting_ = false;       // which rows it has kept is right for the next steps, too
+  bool decided_ = false;       // it found that out for this candidate
   bool firm_only_ = false;     // this attempt does without them
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;
@@ -134,6 +145,8 @@ class ContiguousMover final : public Mover {
   double move_length_ = 0.0;  // of the last first move, in tolerances
   double staleness_ = -1.0;   // of factors, for each tolerance of distance; < 0: not measured
   double measured_ = 0.0;     // longest distance at which it was looked for
+  double usual_ = 0.0;        // left_of_dropped() after the moves, with decided_
+  bool weighed_ = false;      // the blocks know what a tolerance is for their dropped rows
   long settles_ = 0;
   bool reusable_ = false;  // factors of an earlier step are there
   bool reused_ = false;    // and are in use for this one
@@ -174,6 +187,27 @@ double ContiguousMover<Rows>::solve() {
     sum += move * move;
   });
   return std::sqrt(sum * inverse_n_);
+}
+
+// After solve(): the largest distance, in tolerances, that the dropped rows ask for beyond the
+// others.
+template <class Rows>
+double ContiguousMover<Rows>::left_of_dropped() {
+  if (!blocks_.dropped_rows()) return 0.0;
+  if (!weighed_) blocks_.weigh_dropped(WT());
+  weighed_ = true;
+  const double left = blocks_.left_of_dropped();
+  if (decided_) usual_ = left;
+  return left;
+}
+
+// Rows that an earlier step has dropped are satisfied only while they depend on the others. Where
+// they ask for more than they did then, one may have become independent.
+template <class Rows>
+bool ContiguousMover<Rows>::dropped_follow() {
+  const double left = left_of_dropped();
+  if (decided_ || left <= std::max(kSafe * options_.tolerance, 2.0 * usual_)) return true;
+  return left <= 1e2 * kEpsilon * size_of_y();
 }
 
 template <class Rows>

@@ -7,6 +7,8 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kMeasureEvery = 64;
+// Where a move costs little beside the factors so much of Options::tolerance is left.
+constexpr double kCheapRest = 1e-4;
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
 constexpr double kWorn = 0.06, kSlow = 0.1;
@@ -20,15 +22,27 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
   if (keeps_factors()) return take_back(candidate);
   double sum = 0.0;
   for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
-  const double reach = move_length_ + std::sqrt(sum * inverse_n_);
-  // The factors belong to a point `reach` away: each move leaves about staleness_ reach of itself.
+  return take_rest(candidate, move_length_ + std::sqrt(sum * inverse_n_));
+}
+
+// With factors that belong to a point `reach` tolerances away.
+template <class Rows>
+Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach) {
+  // Each move leaves about staleness_ reach of itself.
   const bool measure =
       staleness_ < 0.0 || reach > 4.0 * measured_ || ++settles_ % kMeasureEvery == 0;
+  const double enough = (keeps_rank_ ? kCheapRest : 1.0) * options_.tolerance;
   double previous = 0.0;
   for (int k = 0; k < options_.maximum_iterations; ++k) {
     const Status status = value(candidate.t);
     if (status != Status::success) return status;
-    const double length = solve();
+    double length = solve();
+    if (keeps_rank_ && !dropped_follow()) {
+      lasting_ = false;
+      const Status made = factor(candidate.t);
+      if (made != Status::success) return made;
+      length = first_solve();
+    }
     apply(1.0, candidate.correction_entries);
     const double floor = 1e2 * kEpsilon * size_of_y();
     const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
@@ -37,7 +51,10 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
       staleness_ = std::max({staleness_, 0.0, rounding ? 0.0 : length / (reach * previous)});
     }
     if (rounding) break;
-    if ((k > 0 || !measure) && 4.0 * staleness_ * reach * length <= options_.tolerance) break;
+    // Where moves are cheap only what is seen on this candidate counts.
+    const double expected = keeps_rank_ ? length * (k > 0 ? length / previous : kUnknownSlope)
+                                        : 4.0 * staleness_ * reach * length;
+    if ((k > 0 || keeps_rank_ || !measure) && expected <= enough) break;
     previous = length;
   }
   return Status::success;
@@ -45,8 +62,8 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
 
 // The same with kept factors, which leave a part of each move that grows with their age. Only what
 // is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
-// two moves with the same factors, that makes the next one so. Where too much is left, or a move is
-// long, factors are made anew.
+// two moves with the same factors, that makes the next one so; and dropped rows that follow the
+// others. Where too much is left, also of dropped rows, or a move is long, factors are made anew.
 template <class Rows>
 Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
   const double floor = 1e2 * kEpsilon * size_of_y();
@@ -57,16 +74,18 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
     double length = solve();
     double part = previous > 0.0 && length > floor ? length / previous : 0.0;
     if (part > 0.0) slope_ = part / age_;
-    if (age_ > 0 && (part > kSlow || length > kLong)) {
+    bool follow = dropped_follow();
+    if (age_ > 0 && (part > kSlow || length > kLong || (k > 0 && !follow))) {
       set_metric(true);
       if ((status = factor(candidate.t)) != Status::success) return status;
       length = first_solve();
+      follow = dropped_follow();
       part = 0.0;
       previous = -1.0;
     }
     apply(1.0, candidate.correction_entries);
     const bool small = length <= std::max(floor, kSafe * options_.tolerance);
-    if (small || (part > 0.0 && part * length <= kSafe * options_.tolerance)) {
+    if (follow && (small || (part > 0.0 && part * length <= kSafe * options_.tolerance))) {
       if (part > kWorn) reusable_ = false;
       return Status::success;
     }

@@ -122,6 +122,14 @@ bool RowBlocks::factor() {
   return true;
 }
 
+bool RowBlocks::factor_kept() {
+  for (Block* block : {&d, &a})
+    if (!block->rows.empty() &&
+        !block->solver.factor_kept(C_.data(), n_, block->rows.data(), block->columns.data()))
+      return false;
+  return true;
+}
+
 void RowBlocks::solve(const std::vector<double>& g) {
   if (a.rows.empty()) {  // then d has every row, in order
     d.solver.solve(g.data(), d.dy.data());
@@ -152,19 +160,27 @@ double RowBlocks::times(int i, const double* y) const {
   return sum;
 }
 
+// |row_i(C WT)| over the block's columns.
+double RowBlocks::in_tolerances(const Block& block, int i, const std::vector<double>& WT) const {
+  double sum = 0.0;
+  for (int j : block.columns) {
+    const double c = row(i)[j] * WT[static_cast<std::size_t>(j)];
+    sum += c * c;
+  }
+  return std::sqrt(sum);
+}
+
 bool RowBlocks::contradict(const std::vector<double>& WT) {
   for (const Block* block : {&d, &a}) {
-    const auto in_tolerances = [&](int i) {
-      double sum = 0.0;
-      for (int j : block->columns) {
-        const double c = row(i)[j] * WT[static_cast<std::size_t>(j)];
-        sum += c * c;
-      }
-      return std::sqrt(sum);
-    };
-    if (contradicts(*block, constraints_, n_, in_tolerances, &contradiction)) return true;
+    const auto norm = [&](int i) { return in_tolerances(*block, i, WT); };
+    if (contradicts(*block, constraints_, n_, norm, &contradiction)) return true;
   }
   return false;
+}
+
+void RowBlocks::weigh_dropped(const std::vector<double>& WT) {
+  for (Block* block : {&d, &a})
+    ida_projection::weigh_dropped(*block, n_, [&](int i) { return in_tolerances(*block, i, WT); });
 }
 
 }  // namespace tether::ida_projection

@@ -21,11 +21,13 @@ struct BlockOf {
   Solver solver;
   std::vector<double> g, dy;
   int first = -1;  // of columns that follow each other without a gap; -1: they do not
+  std::vector<double> tolerances;  // of each row, once it is dropped, for a distance of 1
 
   /// After rows, columns and the solver were set up.
   void resize() {
     g.assign(rows.size(), 0.0);
     dy.assign(columns.size(), 0.0);
+    tolerances.assign(rows.size(), 0.0);
     const bool adjacent = !columns.empty() &&
                           columns.back() - columns.front() + 1 == static_cast<int>(columns.size());
     first = adjacent ? columns.front() : -1;
@@ -96,6 +98,31 @@ bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, i
   return false;
 }
 
+/// Before left_of_dropped(), for the present factors; arguments as of contradicts().
+template <class Solver, class Norm>
+void weigh_dropped(BlockOf<Solver>& block, int n, Norm in_tolerances) {
+  const Solver& solver = block.solver;
+  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
+    const auto i = static_cast<std::size_t>(solver.pivot(k));
+    const double norm = solver.row_norm(solver.pivot(k));
+    const bool vanished = !(norm > std::numeric_limits<double>::min());
+    // A row that vanishes has no distance: what contradicts() tolerates stands for one tolerance.
+    block.tolerances[i] =
+        vanished ? 1e12 : norm / (std::sqrt(n) * std::max(in_tolerances(block.rows[i]), 1e-300));
+  }
+}
+
+/// After solve(): the largest inconsistency of a dropped row, in tolerances.
+template <class Solver>
+double left_of_dropped(const BlockOf<Solver>& block) {
+  const Solver& solver = block.solver;
+  double largest = 0.0;
+  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k)
+    largest = std::max(largest, solver.inconsistency(k) *
+                                    block.tolerances[static_cast<std::size_t>(solver.pivot(k))]);
+  return largest;
+}
+
 /// y moved by some tolerances in no special direction: a velocity that happens to be zero at y is
 /// not zero there. WT = 0: unweighted.
 std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT);
@@ -107,9 +134,11 @@ std::vector<double> some_tolerances_away(std::vector<double> y, const std::vecto
 class RowBlocks {
  public:
   using Block = BlockOf<linalg::MinimumNorm>;
-  /// Few rows: factors are cheap beside F, and a step older they may leave half of a move. Many:
-  /// an orthogonal factorisation costs some m / 2 solves.
-  static bool keeps_factors(int rows) { return rows > 64; }
+  /// Factors of the rows that an earlier step has kept are so cheap that none serve two steps.
+  static bool keeps_factors(int) { return false; }
+  /// An orthogonal factorisation of many rows costs ten times what is needed where it is known
+  /// which of them are independent.
+  static bool keeps_rank(int rows) { return rows > 64; }
   /// The solver's pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = true;
 
@@ -128,6 +157,8 @@ class RowBlocks {
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
   /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
   bool factor();
+  /// The same with the rows that the last factor() has kept. False: factor() is due.
+  bool factor_kept();
   /// d.dy and a.dy for the values g, with the C that was factored.
   void solve(const std::vector<double>& g);
   int rank() const { return d.solver.rank() + a.solver.rank(); }
@@ -150,11 +181,16 @@ class RowBlocks {
 
   /// After solve(): as contradicts() above, for both blocks.
   bool contradict(const std::vector<double>& WT);
+  void weigh_dropped(const std::vector<double>& WT);
+  double left_of_dropped() const {
+    return std::max(ida_projection::left_of_dropped(d), ida_projection::left_of_dropped(a));
+  }
 
   Contradiction contradiction;
   std::string message;
 
  private:
+  double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   const double* row(int i) const { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
 
   const Constraints& constraints_;

@@ -25,6 +25,12 @@ class RowTrust {
 
   static bool has_thin_rows(const Solver& solver) { return solver.least_square() < kThin * kThin; }
   static int firm_rows(const Solver& solver) { return rows_from(solver, kThin); }
+  /// Of thin rows only `trusted` count now: will that be so in the next steps, whatever their
+  /// moves are? Only where all thin rows are left out, and none is independent enough to count
+  /// whenever moves are short.
+  static bool lasting(const Solver& solver, int firm, int trusted) {
+    return trusted == firm && solver.independent_part(firm) <= kDependent;
+  }
   /// Rows to be trusted for a move of this length (tolerances) by the firm rows.
   int trusted_rows(const Solver& solver, double length) const;
 
@@ -38,6 +44,7 @@ class RowTrust {
   void reset() { *this = RowTrust(); }
 
  private:
+  static constexpr double kDependent = 1e-5;
   static constexpr double kShort = 1e-3;  // tolerances: over less than that C does not turn visibly
 
   static int rows_from(const Solver& solver, double smallest) {

@@ -203,19 +203,27 @@ double SparseRows::times(int i, const double* y) const {
   return sum;
 }
 
+// |row_i(C WT)| over the block's columns.
+double SparseRows::in_tolerances(const Block& block, int i, const std::vector<double>& WT) const {
+  double sum = 0.0;
+  visit(i, [&](int j, double c) {
+    if (std::binary_search(block.columns.begin(), block.columns.end(), j))
+      sum += c * WT[at(j)] * (c * WT[at(j)]);
+  });
+  return std::sqrt(sum);
+}
+
 bool SparseRows::contradict(const std::vector<double>& WT) {
   for (const Block* block : {&d, &a}) {
-    const auto in_tolerances = [&](int i) {
-      double sum = 0.0;
-      visit(i, [&](int j, double c) {
-        if (std::binary_search(block->columns.begin(), block->columns.end(), j))
-          sum += c * WT[at(j)] * (c * WT[at(j)]);
-      });
-      return std::sqrt(sum);
-    };
-    if (contradicts(*block, constraints_, n_, in_tolerances, &contradiction)) return true;
+    const auto norm = [&](int i) { return in_tolerances(*block, i, WT); };
+    if (contradicts(*block, constraints_, n_, norm, &contradiction)) return true;
   }
   return false;
+}
+
+void SparseRows::weigh_dropped(const std::vector<double>& WT) {
+  for (Block* block : {&d, &a})
+    ida_projection::weigh_dropped(*block, n_, [&](int i) { return in_tolerances(*block, i, WT); });
 }
 
 }  // namespace tether::ida_projection

@@ -17,6 +17,7 @@ class SparseRows {
   /// C and its factors cost four solves and more: they serve several steps. Of few rows nothing
   /// would be gained that makes up for a metric of an earlier step.
   static bool keeps_factors(int rows) { return rows > 64; }
+  static bool keeps_rank(int) { return false; }
   static constexpr bool kThinRows = false;
 
   SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n);
@@ -28,12 +29,17 @@ class SparseRows {
   bool structured() const { return structured_; }
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
   bool factor();
+  bool factor_kept() { return false; }
   void solve(const std::vector<double>& g);
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
   double terms(int i, const double* y) const;
   double times(int i, const double* y) const;
   bool contradict(const std::vector<double>& WT);
+  void weigh_dropped(const std::vector<double>& WT);
+  double left_of_dropped() const {
+    return std::max(ida_projection::left_of_dropped(d), ida_projection::left_of_dropped(a));
+  }
   /// f(column, entry) for the entries of row i.
   template <class Visit>
   void visit_row(int i, Visit f) const {
@@ -55,6 +61,7 @@ class SparseRows {
   };
   template <class Visit>
   void visit(int i, Visit f) const;  // f(column, entry) of row i
+  double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   Status find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y,
                            const std::vector<double>& WT);
   bool fills(const Row& row, int j) const;

@@ -31,6 +31,8 @@ std::vector<Entry> entries(const Statistics& s) {
       count("evaluations of g", "value_evaluations", s.value_evaluations),
       count("evaluations of C", "jacobian_evaluations", s.jacobian_evaluations),
       count("factorizations of C", "factorizations", s.factorizations),
+      count("factorizations of rows known to be independent", "refactorizations",
+            s.refactorizations),
       count("extra corrector iterations", "extra_iterations", s.extra_iterations),
       count("corrections repeated", "corrections_repeated", s.corrections_repeated),
       count("refreshes of algebraic variables", "refreshes", s.refreshes),

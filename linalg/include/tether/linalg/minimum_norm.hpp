@@ -57,6 +57,12 @@ class MinimumNorm {
   bool factor(const double* wide, int width, const int* rows, const int* columns,
               double rank_tolerance);
 
+  /// The same with the rows that the last factor() and use_rank() let take part, in their order,
+  /// from A A^T = L L^T of these alone: beyond the small sizes some tenth of the work. False: an
+  /// entry is not finite, a row depends on those before it but for a sine below 1e-3 or a third of
+  /// what factor() found least, or the system is small: then factor() is due.
+  bool factor_kept(const double* wide, int width, const int* rows, const int* columns);
+
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
   /// Dropped rows take no part; see inconsistency().
   void solve(const double* g, double* dy);
@@ -69,8 +75,8 @@ class MinimumNorm {
   int dropped() const { return m_ - rank_; }
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
   int pivot(int k) const;
-  /// |R_kk|, k < rank(): how much of a unit row is independent of those before it; no larger than
-  /// the one before.
+  /// |R_kk|, k < rank(): how much of a unit row is independent of those before it; from factor() no
+  /// larger than the one before.
   double independent_part(int k) const;
   /// The square of the smallest one that factor() has kept; 1 for rank 0.
   double least_square() const { return least_square_; }
@@ -87,7 +93,10 @@ class MinimumNorm {
 
  private:
   void set_rank(int rank);
+  void gather_large(const double* wide, int width, const int* rows, const int* columns);
+  bool scale_large();
   bool factor_large(double rank_tolerance);
+  void solve_kept(const double* g, double* dy);
   void solve_large(const double* g, double* dy);
   void solve_small(const double* g, double* dy);
   double scaled(const double* g, int i) const;
@@ -97,7 +106,9 @@ class MinimumNorm {
   std::unique_ptr<small::Storage> small_;
   struct TETHER_HIDDEN Large;  // Eigen's types stay inside the library: see eigen.hpp
   std::unique_ptr<Large> large_;
+  bool kept_ = false;  // the factors are those of factor_kept()
   double least_square_ = 1.0;
+  double decided_least_ = 1.0;  // least independent part of the rows at the last factor()
   std::vector<double> metric_;  // D, padded with zeros to the kernel's stride
 
   std::vector<double> row_norm_, inconsistency_;
