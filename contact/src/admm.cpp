@@ -51,7 +51,7 @@ void Admm::start(Search& search, const PackedVector* x) {
     const double* w = r_[at(i)].v;
     double gamma[2];
     system.gamma(i, gamma);
-    const double mu = system.law() == Law::frictionless ? 0 : system.problem().local(i).mu;
+    const double mu = system.friction(i);
     const double s = slip(w[1], w[2], gamma[0], gamma[1]), f = 1 / d_[at(i)];
     v_[at(i)].v[0] = x[i].v[0] - f * (w[0] + mu * s);
     v_[at(i)].v[1] = x[i].v[1] - f * (w[1] + s * gamma[0]);
@@ -68,7 +68,7 @@ void Admm::run(Search& search, int most, bool accelerate, bool windowed) {
   const Problem& problem = system.problem();
   const double cost = 25 * static_cast<double>(lu_.size()) + 5 * std::sqrt(lu_.operations() * lu_.size()) +
                       (accelerate ? 0.8 * 4 * n_ * kDepth : 0);
-  const bool frictionless = system.law() == Law::frictionless;
+  const bool frictionless = !system.law().friction;
   double least_f = std::numeric_limits<double>::infinity(), last_error = 0, last_f = 0;
   double window_error = std::numeric_limits<double>::infinity();
   int next_test = 1;

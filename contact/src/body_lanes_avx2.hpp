@@ -8,7 +8,7 @@
 // For the one file that is compiled for AVX2 function by function: everything is inlined there.
 #define TETHER_AVX2 static inline __attribute__((always_inline, target("avx2,fma")))
 
-namespace tether::contact::detail {
+namespace tether::contact::detail::avx2 {
 namespace {
 
 using v4 = __m256d;
@@ -115,5 +115,19 @@ TETHER_AVX2 Vector turn(const BodyInertia* const* I, const Vector& q) {
           xz * q.x + yz * q.y + zz * q.z};
 }
 
+// Squares of velocities, lane by lane.
+struct Sums {
+  v4 sum, most;
+};
+TETHER_AVX2 void add(Sums& s, v4 square) {
+  s.sum = s.sum + square;
+  s.most = most(square, s.most);
+}
+TETHER_AVX2 Squares total(const Sums& s) {
+  const double pair = s.most[0] > s.most[1] ? s.most[0] : s.most[1];
+  const double other = s.most[2] > s.most[3] ? s.most[2] : s.most[3];
+  return {(s.sum[0] + s.sum[1]) + (s.sum[2] + s.sum[3]), pair > other ? pair : other};
+}
+
 }  // namespace
-}  // namespace tether::contact::detail
+}  // namespace tether::contact::detail::avx2

@@ -10,7 +10,7 @@ bool solve_convex_relaxation(Search& search, Packed& x) {
   System& system = search.system;
   const Problem& p = system.problem();
   const int n = system.size();
-  const bool frictionless = search.options.law == Law::frictionless;
+  const bool frictionless = !search.system.law().friction;
   Packed y = x, w(at(n)), next(at(n));
   // Largest eigenvalue bound: row sums of block norms.
   double L = 0;

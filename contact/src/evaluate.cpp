@@ -28,7 +28,7 @@ Residuals evaluate(const Problem& problem, Law law, const linalg::VectorView& im
     const double* xi = x[static_cast<std::size_t>(i)].v;
     const double* wi = w[static_cast<std::size_t>(i)].v;
     const double* bi = problem.packed_b()[static_cast<std::size_t>(i)].v;
-    const double mu = law == Law::frictionless ? 0 : L.mu, t = std::hypot(xi[1], xi[2]);
+    const double mu = system.friction(i), t = std::hypot(xi[1], xi[2]);
     r.signorini = std::max(r.signorini, std::abs(std::min(L.a * xi[0], wi[0])));
     r.cone = std::max({r.cone, L.a * (t - mu * xi[0]), -L.a * xi[0]});
     for (int c = 0; c < 3; ++c) {

@@ -22,7 +22,7 @@ namespace {
 // The islands of BodySolver with their velocity scales.
 class Scales {
  public:
-  Scales(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts, Law law,
+  Scales(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts, bool friction,
          const std::vector<LocalBlock>& blocks) {
     const std::size_t n = contacts.size();
     std::vector<int> first(n), second(n);
@@ -51,7 +51,7 @@ class Scales {
         const double ratio = 0.5 * (blocks[i].T[0] + blocks[i].T[2]) * blocks[i].inv_a;
         const double bt = std::sqrt(std::max(0.0, square - bn * bn));
         needed = std::max(needed, detail::needed_change(bn, bt,
-                                                        law == Law::frictionless ? 0 : contacts[i].mu,
+                                                        friction ? contacts[i].mu : 0,
                                                         ratio));
         bb += square;
         speed = std::max(speed, detail::speed_before(sides[i], contacts[i].bias));
@@ -122,7 +122,8 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     const detail::Side side = detail::side(bodies, c, !detail::moves(bodies[at(c.first)]));
     blocks.emplace_back(F * detail::diagonal_block(side) * F.transpose(), c.mu);
   }
-  const Scales scales(bodies, contacts, law, blocks);
+  const detail::LawKernels& rule = detail::kernels(law);
+  const Scales scales(bodies, contacts, rule.friction, blocks);
   Residuals r;
   r.fixed_point = 0;
   r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
@@ -132,7 +133,7 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     const Eigen::Matrix3d F = tangent_frame(c.normal);
     const LocalBlock& L = blocks[i];
     const Eigen::Vector3d x = F * impulses[i], u = F * relative(c);
-    const double mu = law == Law::frictionless ? 0 : c.mu, t = x.tail<2>().norm();
+    const double mu = rule.friction ? c.mu : 0, t = x.tail<2>().norm();
     r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], u[0])));
     r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
     r.dissipation += x.dot(u);
@@ -149,19 +150,10 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     if (!(error <= r.fixed_point)) r.fixed_point = error;
     if (error != error) return {};  // velocities out of range
     // Natural map, and the nearest slip that the law allows.
-    double gamma[2] = {0, 0};
-    if (law == Law::maximum_dissipation) {
-      gamma[0] = mu * L.inv_a * L.c[0];
-      gamma[1] = mu * L.inv_a * L.c[1];
-    }
-    Eigen::Vector3d z = x - u;
-    if (law == Law::frictionless) {
-      z << std::max(z[0], 0.0), 0, 0;
-    } else {
-      const double slip = detail::slip(u[1], u[2], gamma[0], gamma[1]);
-      z -= slip * Eigen::Vector3d(mu, gamma[0], gamma[1]);
-      detail::project_cone(mu, z.data());
-    }
+    double gamma[2];
+    rule.gamma(L, gamma);
+    Eigen::Vector3d z;
+    rule.natural_point(L, x.data(), u.data(), z.data());
     map += (x - z).squaredNorm();
     xx += x.squaredNorm();
     ww += u.squaredNorm();

@@ -145,7 +145,7 @@ bool InteriorPoint::start_near(Search& search, const PackedVector* start, double
     const double* w = w_[at(i)].v;
     double* x = x_[at(i)].v;
     double* u = u_[at(i)].v;
-    flat_[at(i)] = system.law() == Law::frictionless || !(mu > 0);
+    flat_[at(i)] = !(system.friction(i) > 0);
     if (flat_[at(i)]) {
       x[0] = std::max(start[i].v[0], 0.0);
       u[0] = std::max(w[0], 0.0);

@@ -7,21 +7,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "law_coulomb.hpp"
-#include "law_frictionless.hpp"
-#include "law_maximum_dissipation.hpp"
+#include "law/law.hpp"
 #include "refuse.hpp"
 
 namespace tether::contact {
-
-const char* name(Law law) {
-  switch (law) {
-    case Law::maximum_dissipation: return "maximum_dissipation";
-    case Law::coulomb: return "coulomb";
-    case Law::frictionless: return "frictionless";
-  }
-  return "?";
-}
 
 const char* name(Regime regime) {
   switch (regime) {
@@ -90,32 +79,8 @@ Eigen::Matrix3d LocalBlock::matrix() const {
 
 namespace {
 
-// The kernels are inlined here once more, so that they are cloned for the machine.
-TETHER_CLONES Regime solve_dissipation(const LocalBlock& L, const double* b, double* x,
-                                       double& lambda, int& evaluations) {
-  return detail::MaximumDissipation::solve(L, b[0], b[1], b[2], x, lambda, evaluations);
-}
-TETHER_CLONES Regime solve_coulomb(const LocalBlock& L, const double* b, double* x, double& lambda,
-                                   int& evaluations) {
-  return detail::Coulomb::solve(L, b[0], b[1], b[2], x, lambda, evaluations);
-}
-
 void solve_ordinary(Law law, const LocalBlock& block, const Eigen::Vector3d& b, LocalState& s) {
-  switch (law) {
-    case Law::maximum_dissipation:
-      if ((block.null[0] || block.null[1]) &&
-          detail::MaximumDissipation::singular(block, b[0], b[1], b[2], s.x, s.regime, s.evaluations)) {
-        return;
-      }
-      s.regime = solve_dissipation(block, b.data(), s.x, s.lambda, s.evaluations);
-      return;
-    case Law::coulomb:
-      s.regime = solve_coulomb(block, b.data(), s.x, s.lambda, s.evaluations);
-      return;
-    case Law::frictionless:
-      s.regime = detail::Frictionless::solve(block, b[0], b[1], b[2], s.x, s.lambda, s.evaluations);
-      return;
-  }
+  s.regime = detail::kernels(law).solve(block, b.data(), s.x, s.lambda, s.evaluations);
 }
 
 // In units in which the traces and the largest component of b are near 1: the same bits.
@@ -225,7 +190,7 @@ PlanarContact solve_planar(Law law, const linalg::Matrix<2, 2>& A, const linalg:
                   "A must be positive semidefinite");
   PlanarContact out;
   if (!(b[0] > 0)) return out;
-  if (law == Law::frictionless || mu == 0) {
+  if (!detail::kernels(law).friction || mu == 0) {
     out.impulse << b[0] / a, 0;
     out.regime = Regime::sliding;
     return out;

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "local_geometry.hpp"
+#include "law/local_geometry.hpp"
 #include "refuse.hpp"
 
 namespace tether::contact {

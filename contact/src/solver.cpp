@@ -126,12 +126,11 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   out.replaced.clear();
   for (std::size_t i = 0; i < n; ++i) {
     const double* r = search.best[i].v;
-    const double reach = problem.locals()[i].mu * r[0];
+    const double reach = system.friction(static_cast<int>(i)) * r[0];
     const double t2 = r[1] * r[1] + r[2] * r[2];
     out.regimes[i] = !(r[0] > 0) ? Regime::separating
-                     : (options.law == Law::frictionless || t2 >= reach * reach * (1 - 1e-9))
-                         ? Regime::sliding
-                         : Regime::sticking;
+                     : t2 >= reach * reach * (1 - 1e-9) ? Regime::sliding
+                                                        : Regime::sticking;
     if (system.any_replaced() && system.replaced(static_cast<int>(i))) {
       out.replaced.push_back(static_cast<int>(i));
     }
@@ -163,7 +162,7 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
   for (std::size_t i = 0; i < n; ++i) {
     if (search.system.at_rest(static_cast<int>(i))) {
       x[i] = {};
-    } else if (options.law == Law::frictionless) {
+    } else if (!search.system.law().friction) {
       x[i].v[1] = x[i].v[2] = 0;
       x[i].v[0] = std::max(x[i].v[0], 0.0);
     } else {

@@ -1,6 +1,8 @@
 // Tether: what the solver says in words. SPDX-License-Identifier: BSD-3-Clause
 #include "solver_words.hpp"
 
+#include "law/law.hpp"
+
 namespace tether::contact {
 
 const char* name(Measure measure) {
@@ -70,7 +72,7 @@ const char* advice(Status status, const Options& options) {
     case Status::solved:
       return "";
     case Status::cycling:
-      return options.law == Law::maximum_dissipation && options.strict
+      return kernels(options.law).replacement != nullptr && options.strict
                  ? "no fixed point was found; try strict = false, or Law::coulomb"
                  : "no fixed point was found; try another start, a shorter time step or "
                    "Method::convex_relaxation";

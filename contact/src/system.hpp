@@ -7,18 +7,14 @@
 #include <tether/contact/solver.hpp>
 
 #include "criterion.hpp"
-#include "local_geometry.hpp"
+#include "law/cone.hpp"
+#include "law/law.hpp"
 
 namespace tether::contact::detail {
 
 using Packed = std::vector<PackedVector>;
 
 inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-// What a test leaves behind: norms, and the largest error of a contact relative to its island.
-struct Test {
-  double natural = 0, fixed = 0, x = 0, w = 0;
-};
 
 // Proximal term (tau / 2) |x - anchor|^2 in the metric of the diagonal blocks; none if anchor = null.
 struct Proximal {
@@ -39,12 +35,14 @@ class System {
   // Impulses of the given problem in these units, and back. Exact.
   void to_own_units(PackedVector* x) const;
   void to_given_units(PackedVector* x) const;
-  Law law() const { return law_; }
+  const LawKernels& law() const { return *law_; }
+  // The friction coefficient of contact i that counts: 0 under a law without friction.
+  double friction(int i) const { return law_->friction ? problem_->local(i).mu : 0; }
   int size() const { return n_; }
   double norm_b() const { return norm_b_; }
   bool replaced(int i) const { return any_replaced_ && rule_[at(i)] != 0; }
   bool any_replaced() const { return any_replaced_; }
-  // The Coulomb rule at contact i instead of maximum_dissipation.
+  // The law that replaces this one, at contact i.
   void replace(int i);
   double weight(int i) const { return weight_[at(i)]; }
   const std::vector<double>& weights() const { return weight_; }
@@ -70,19 +68,21 @@ class System {
   // b = 0 in the island of contact i: the solution is x = 0, and nothing else is judged as one.
   bool at_rest(int i) const { return inverse_scale_[at(i)] == kAtRest; }
 
-  // gamma of contact i in its own frame: mu c / a for maximum_dissipation, 0 for the Coulomb rule.
-  void gamma(int i, double* out) const;
+  // gamma of contact i in its own frame: slip is opposite to x_t / |x_t| + gamma.
+  void gamma(int i, double* out) const { law_of(i).gamma(problem_->local(i), out); }
 
   int sweeps = 0;
 
  private:
   void choose_units(const Problem& problem);
   Test natural_map_given(const PackedVector* x, PackedVector* scratch);
+  const LawKernels& law_of(int i) const { return replaced(i) ? *law_->replacement : *law_; }
+  const AssembledKernels& kernels() const { return any_replaced_ ? *law_->mixed : law_->assembled; }
 
   const Problem* problem_ = nullptr;
   Problem rescaled_;             // empty where the given units serve
   std::vector<int> mass_, speed_;  // exponents of the units of each island; empty: those given
-  Law law_ = Law::coulomb;
+  const LawKernels* law_ = nullptr;
   int n_ = 0;
   double norm_b_ = 0;
   bool any_replaced_ = false;
@@ -96,47 +96,6 @@ class System {
 
 // w = A x - b
 void velocities(const Problem& problem, const PackedVector* x, PackedVector* w);
-
-// |x_t| <= mu x_n, the nearest point (Euclid).
-TETHER_INLINE void project_cone(double mu, double* v) {
-  const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
-  if (t <= mu * v[0]) return;
-  if (mu * t <= -v[0]) {
-    v[0] = v[1] = v[2] = 0;
-    return;
-  }
-  const double n = (v[0] + mu * t) / (1 + mu * mu), f = t > 0 ? mu * n / t : 0;
-  v[0] = n;
-  v[1] *= f;
-  v[2] *= f;
-}
-
-// Radially: keeps x_n.
-TETHER_INLINE void clip_cone(double mu, double* v) {
-  if (!(v[0] > 0)) {
-    v[0] = v[1] = v[2] = 0;
-    return;
-  }
-  const double t2 = v[1] * v[1] + v[2] * v[2], r = mu * v[0];
-  if (t2 <= r * r) return;
-  const double f = r / std::sqrt(t2);
-  v[1] *= f;
-  v[2] *= f;
-}
-
-// s >= 0 with s = |w_t + s gamma|, the slip variable of the law; 0 for e >= 1 without such s.
-TETHER_INLINE double slip(double w0, double w1, double g0, double g1) {
-  const double ww = w0 * w0 + w1 * w1, gg = g0 * g0 + g1 * g1;
-  if (gg == 0) return std::sqrt(ww);
-  const double wg = w0 * g0 + w1 * g1, q = 1 - gg;
-  const double D = wg * wg + q * ww;
-  if (!(D >= 0)) return std::sqrt(ww);
-  const double root = std::sqrt(D);
-  // q s^2 - 2 wg s - ww = 0
-  if (wg + root > 0 && q > 0) return (wg + root) / q;
-  if (root - wg > 0) return ww / (root - wg);
-  return std::sqrt(ww);
-}
 
 double dot(const double* p, const double* q, int n);
 void axpy(double a, const double* p, double* q, int n);  // q += a p

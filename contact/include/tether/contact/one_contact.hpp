@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <tether/export.hpp>
 #include <tether/linalg/eigen.hpp>
+#include <vector>
 
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
@@ -22,8 +23,11 @@ enum class Law : std::uint8_t {
 
 enum class Regime : std::uint8_t { separating, sticking, sliding };
 
+/// Throws std::invalid_argument unless `law` is one of laws().
 const char* name(Law law);
 const char* name(Regime regime);
+/// Every law, in the order of its enumerators: what readers and command lines offer by name().
+const std::vector<Law>& laws();
 
 /// Factors of one symmetric 3x3 block A = [a c'; c T] and its friction coefficient, in the frame in
 /// which B = T - c c'/a is diagonal: B = V diag(beta) V', g = V' mu c / a, e = |g| (eccentricity of

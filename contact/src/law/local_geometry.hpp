@@ -4,12 +4,12 @@
 #include <cmath>
 #include <tether/contact/one_contact.hpp>
 
-#include "vector.hpp"
+#include "../vector.hpp"
 
 namespace tether::contact::detail {
 
-// Between these nothing that a solve multiplies leaves the range of doubles: powers of A and b up to
-// the eighth (law_coulomb.hpp), a grazing b_n aside.
+// Between these nothing that a solve multiplies leaves the range of doubles: powers of A and b up
+// to the eighth (law_coulomb.hpp), a grazing b_n aside.
 constexpr double kLeastOrdinary = 0x1p-30, kMostOrdinary = 0x1p30;
 
 // The block in other units: A times 2^p, exactly.
@@ -123,6 +123,21 @@ inline bool derivative_sliding(const LocalBlock& L, const LocalRhs& r, const dou
   }
   derivative_from_local(L, Y, out);
   return true;
+}
+
+// Of the solution x with that regime, for a law that keeps impulses in the cone.
+inline void cone_derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
+                            Regime regime, bool dissipation, LocalDerivative& out) {
+  if (regime == Regime::separating || L.mu == 0) {
+    for (double& d : out.d) d = 0;
+    if (regime != Regime::separating) out.d[0] = L.inv_a;
+    return;
+  }
+  if (regime == Regime::sliding &&
+      derivative_sliding(L, to_local(L, bn, b0, b1), x, dissipation, out)) {
+    return;
+  }
+  derivative_sticking(L, out);
 }
 
 }  // namespace tether::contact::detail

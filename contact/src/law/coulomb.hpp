@@ -1,6 +1,7 @@
 // Tether: the classical Coulomb law for one contact. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "cone.hpp"
 #include "local_geometry.hpp"
 
 namespace tether::contact::detail {
@@ -13,6 +14,8 @@ namespace tether::contact::detail {
 // impulse is taken.
 struct Coulomb {
   static constexpr Law kLaw = Law::coulomb;
+  static constexpr const char* kName = "coulomb";
+  static constexpr bool kFriction = true;
   static constexpr int kMaxEvaluations = 80;
   static constexpr int kFastEvaluations = 8;
   static constexpr double kManyBranches = 0.8;
@@ -48,6 +51,16 @@ struct Coulomb {
     return slide(L, r, bn, l, x);
   }
 
+  // A null direction has a raised beta: nothing else is special about it.
+  static TETHER_INLINE bool solve_singular(const LocalBlock&, double, double, double, double*,
+                                           Regime&, int&) {
+    return false;
+  }
+  static TETHER_INLINE void gamma(const LocalBlock&, double* out) { out[0] = out[1] = 0; }
+  static TETHER_INLINE void natural_point(const LocalBlock& L, const double* x, const double* w,
+                                          double* v) {
+    cone_natural_point(L.mu, 0, 0, x, w, v);
+  }
   static void derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
                          Regime regime, LocalDerivative& out);
 

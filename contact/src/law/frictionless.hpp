@@ -7,6 +7,8 @@ namespace tether::contact::detail {
 
 struct Frictionless {
   static constexpr Law kLaw = Law::frictionless;
+  static constexpr const char* kName = "frictionless";
+  static constexpr bool kFriction = false;
 
   static TETHER_INLINE Regime solve(const LocalBlock& L, double bn, double, double, double* x,
                                     double&, int&) {
@@ -15,6 +17,16 @@ struct Frictionless {
     return bn > 0 ? Regime::sliding : Regime::separating;
   }
 
+  static TETHER_INLINE bool solve_singular(const LocalBlock&, double, double, double, double*,
+                                           Regime&, int&) {
+    return false;
+  }
+  static TETHER_INLINE void gamma(const LocalBlock&, double* out) { out[0] = out[1] = 0; }
+  static TETHER_INLINE void natural_point(const LocalBlock&, const double* x, const double* w,
+                                          double* v) {
+    v[0] = x[0] - w[0] > 0 ? x[0] - w[0] : 0;
+    v[1] = v[2] = 0;
+  }
   static void derivative(const LocalBlock& L, double, double, double, const double*, Regime regime,
                          LocalDerivative& out) {
     for (double& d : out.d) d = 0;

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "cone.hpp"
 #include "local_geometry.hpp"
 
 namespace tether::contact::detail {
@@ -14,6 +15,8 @@ namespace tether::contact::detail {
 // and inversion (root beyond 90 degrees). No trigonometric function is called.
 struct MaximumDissipation {
   static constexpr Law kLaw = Law::maximum_dissipation;
+  static constexpr const char* kName = "maximum_dissipation";
+  static constexpr bool kFriction = true;
   static constexpr int kMaxEvaluations = 80;
 
   static TETHER_INLINE Regime solve(const LocalBlock& L, double bn, double b0, double b1, double* x,
@@ -156,9 +159,19 @@ struct MaximumDissipation {
   // Singular block: where b lies in the range, E does not depend on the null direction, and the
   // admissible point of least |y| that minimises it is taken. (solve() weighs the null direction
   // with the raised beta; |y| may be so large that this costs energy.) false: not such a case.
-  static bool singular(const LocalBlock& L, double bn, double b0, double b1, double* x,
-                       Regime& regime, int& evaluations);
+  static bool solve_singular(const LocalBlock& L, double bn, double b0, double b1, double* x,
+                             Regime& regime, int& evaluations);
 
+  static TETHER_INLINE void gamma(const LocalBlock& L, double* out) {
+    out[0] = L.mu * L.inv_a * L.c[0];
+    out[1] = L.mu * L.inv_a * L.c[1];
+  }
+  static TETHER_INLINE void natural_point(const LocalBlock& L, const double* x, const double* w,
+                                          double* v) {
+    double g[2];
+    gamma(L, g);
+    cone_natural_point(L.mu, g[0], g[1], x, w, v);
+  }
   static void derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
                          Regime regime, LocalDerivative& out);
 };

@@ -1,0 +1,135 @@
+// Tether: maximum dissipation: rare branches and kernels. SPDX-License-Identifier: BSD-3-Clause
+#include "maximum_dissipation.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "coulomb.hpp"
+#include "define_law.hpp"
+#include "maximum_dissipation_lanes.hpp"
+
+namespace tether::contact::detail {
+
+// Not inlined into kernels that are built for several machines: its bits are the same on all.
+__attribute__((noinline)) void MaximumDissipation::derivative(const LocalBlock& L, double bn,
+                                                              double b0, double b1, const double* x,
+                                                              Regime regime, LocalDerivative& out) {
+  cone_derivative(L, bn, b0, b1, x, regime, true, out);
+}
+
+Regime MaximumDissipation::in_other_units(const LocalBlock& L, double bn, double b0, double b1,
+                                          double* x, int& evaluations) {
+  const LocalRhs r = to_local(L, bn, b0, b1);
+  const double h = std::max(std::abs(r.h0), std::abs(r.h1)), trace = L.beta[0] + L.beta[1];
+  if (!(h > 0) || !std::isfinite(h) || !std::isfinite(trace)) {
+    x[0] = x[1] = x[2] = std::numeric_limits<double>::quiet_NaN();  // sweeps have overflowed
+    return Regime::sliding;
+  }
+  const int p = -std::ilogb(trace), q = -std::ilogb(h);
+  double none = -1;
+  for (int c = 0; c < 3; ++c) x[c] = std::ldexp(x[c], q - p);
+  const Regime regime = solve(rescaled(L, p), std::ldexp(bn, q), std::ldexp(b0, q),
+                              std::ldexp(b1, q), x, none, evaluations);
+  for (int c = 0; c < 3; ++c) x[c] = std::ldexp(x[c], p - q);
+  return regime;
+}
+
+Regime MaximumDissipation::near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0,
+                                          double y1, double* x) {
+  // Axes: along g and across it, on the side of y. In units of k: A = 1 / (e^2 - 1) and B = 1 /
+  // sqrt(e^2 - 1), so that no product leaves the range where k is tiny.
+  const double e = L.e, d0 = L.g[0] / e, d1 = L.g[1] / e;
+  const double side = d0 * y1 - d1 * y0 < 0 ? -1 : 1;
+  const double a0 = -side * d1, a1 = side * d0;
+  const double A = 1 / (e * e - 1), B = 1 / std::sqrt(e * e - 1);
+  const double c0 = e * A * d0, c1 = e * A * d1;
+  const double p0 = 0.5 * (-A * d0 + B * a0), p1 = 0.5 * (-A * d1 + B * a1);
+  const double q0 = 0.5 * (-A * d0 - B * a0), q1 = 0.5 * (-A * d1 - B * a1);
+  const double b0 = r.k * L.beta[0], b1 = r.k * L.beta[1];
+  const double z = std::abs(a0 * (y0 / r.k) + a1 * (y1 / r.k)) / B;
+  double s = z + std::hypot(z, 1.0);
+  for (int n = 0; n < 30; ++n) {
+    const double is = 1 / s;
+    y0 = c0 + p0 * s + q0 * is;
+    y1 = c1 + p1 * s + q1 * is;
+    const double G0 = b0 * y0 - r.h0, G1 = b1 * y1 - r.h1;
+    const double t0 = p0 - q0 * is * is, t1 = p1 - q1 * is * is;
+    const double f = G0 * t0 + G1 * t1;
+    const double df = b0 * t0 * t0 + b1 * t1 * t1 + 2 * is * is * is * (G0 * q0 + G1 * q1);
+    double next = s - f / df;
+    if (!(next > 1)) next = 0.5 * (1 + s);
+    const bool done = std::abs(next - s) <= 1e-13 * s;
+    s = next;
+    if (done) break;
+  }
+  y0 = r.k * (c0 + p0 * s + q0 / s);
+  y1 = r.k * (c1 + p1 * s + q1 / s);
+  from_local(L, std::hypot(y0, y1) / L.mu, y0, y1, x);
+  return Regime::sliding;
+}
+
+bool MaximumDissipation::solve_singular(const LocalBlock& L, double bn, double b0, double b1,
+                                        double* x, Regime& regime, int& evaluations) {
+  if (!(bn > 0) || L.mu == 0) return false;
+  const LocalRhs r = to_local(L, bn, b0, b1);
+  const double h[2] = {r.h0, r.h1};
+  const double s = bn * L.inv_a;
+  const double noise =
+      1e-14 * (std::abs(b0) + std::abs(b1) + (std::abs(L.c[0]) + std::abs(L.c[1])) * s);
+  for (int i = 0; i < 2; ++i)
+    if (L.null[i] && std::abs(h[i]) > noise) return false;
+  double y[2] = {0, 0};
+  if (!(L.null[0] && L.null[1])) {
+    const int j = L.null[0] ? 0 : 1, i = 1 - j;
+    y[i] = h[i] / L.beta[i];
+    const double left = r.k - L.g[i] * y[i];
+    if (std::abs(y[i]) > left) {
+      // On the conic: (1 - g_j^2) y_j^2 + 2 g_j left y_j + y_i^2 - left^2 = 0, left >= g_j y_j.
+      const double A = 1 - L.g[j] * L.g[j], H = L.g[j] * left, C = (y[i] - left) * (y[i] + left);
+      const double D = H * H - A * C;
+      bool found = false;
+      if (D >= 0) {
+        const double q = -(H + std::copysign(std::sqrt(D), H));
+        for (double z : {q / A, C / q}) {
+          if (!std::isfinite(z) || L.g[j] * z > left || (found && std::abs(z) > std::abs(y[j])))
+            continue;
+          y[j] = z;
+          found = true;
+        }
+      }
+      if (!found) {  // out of reach: on the arc, where the null direction hardly counts
+        LocalBlock weak = L;
+        weak.beta[j] = 1e-4 * L.beta[j];
+        double none = -1;
+        regime = solve(weak, bn, b0, b1, x, none, evaluations);
+        return true;
+      }
+      // Scaled onto the conic: cone and plane hold to round-off.
+      const double length = std::sqrt(y[0] * y[0] + y[1] * y[1]);
+      const double f = 1 / (length + L.g[0] * y[0] + L.g[1] * y[1]);
+      if (f > 0 && std::isfinite(f)) {
+        from_local(L, s * length * f, r.k * y[0] * f, r.k * y[1] * f, x);
+        regime = Regime::sliding;
+        return true;
+      }
+      return false;
+    }
+  }
+  from_local(L, 0, y[0], y[1], x);
+  x[0] = (bn - L.c[0] * x[1] - L.c[1] * x[2]) * L.inv_a;
+  regime = Regime::sticking;
+  return true;
+}
+
+namespace {
+
+using Mix = Mixed<MaximumDissipation, Coulomb>;
+TETHER_LAW_KERNELS(MaximumDissipation, MaximumDissipationLanes)
+TETHER_ASSEMBLED_KERNELS(mixed, Mix)
+
+}  // namespace
+
+extern const LawKernels kCoulomb, kMaximumDissipation;
+constexpr LawKernels kMaximumDissipation = all_kernels(&kCoulomb, &mixed);
+
+}  // namespace tether::contact::detail
