@@ -2,7 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
-#include "anderson.hpp"
+#include <tether/linalg/anderson.hpp>
 #include "search.hpp"
 
 namespace tether::contact::detail {

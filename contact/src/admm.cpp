@@ -16,14 +16,14 @@ void Admm::reset(int contacts) {
 
 bool Admm::factor(Search& search) {
   const Problem& p = search.system.problem();
-  lu_.order(p);
-  lu_.analyse(p, nullptr);
+  lu_.order(pattern(p));
+  lu_.analyse(pattern(p), nullptr);
   for (int i = 0; i < n_; ++i) {
     const LocalBlock& L = p.local(i);
     d_[at(i)] = kRho * (L.a + L.T[0] + L.T[2]) / 3;
   }
   for (int r = 0; r < n_; ++r) {
-    const int i = lu_.contact(r);
+    const int i = lu_.block_row(r);
     lu_.begin_row(r);
     for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
       const int j = p.columns()[at(k)];

@@ -1,8 +1,8 @@
 // Tether: alternating directions with one factorisation. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "anderson.hpp"
-#include "block_lu.hpp"
+#include <tether/linalg/anderson.hpp>
+#include <tether/linalg/block_lu.hpp>
 #include "search.hpp"
 
 namespace tether::contact::detail {

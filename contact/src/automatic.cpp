@@ -331,7 +331,7 @@ Status Automatic::run_part(Search& search, const Packed& start) {
 
 Status Automatic::run(Search& search) {
   bool replaceable = false;
-  if (options_.law == Law::maximum_dissipation && !options_.strict) {
+  if (search.system.law().replacement && !options_.strict) {
     for (int i = 0; i < contacts_; ++i)
       replaceable = replaceable || search.system.problem().local(i).e > kCoupled;
   }

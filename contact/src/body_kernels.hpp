@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <tether/contact/one_contact.hpp>
 
-#include "vector.hpp"
+#include <tether/linalg/vector_code.hpp>
 
 // Vector code for four contacts at a time, chosen when the program runs. -DTETHER_GROUPS=0: none.
 #ifndef TETHER_GROUPS

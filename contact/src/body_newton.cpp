@@ -70,8 +70,9 @@ bool BodyNewton::order(const Problem& problem) {
       start_.push_back(static_cast<int>(columns_.size()));
     }
   }
-  lu_.order(start_, columns_);
-  lu_.analyse(start_, columns_, nullptr);
+  const BlockPattern nodes{static_cast<int>(start_.size()) - 1, start_.data(), columns_.data()};
+  lu_.order(nodes);
+  lu_.analyse(nodes, nullptr);
   place_.resize(form_->contacts.size());
   for (std::size_t i = 0; i < place_.size(); ++i) {
     const int* body = form_->contacts[i].body;
@@ -113,7 +114,7 @@ void BodyNewton::add(int i, const PackedBlock& D, const PackedBlock& L, const Pa
 
 bool BodyNewton::factor() {
   for (int row = 0; row < lu_.size(); ++row) {
-    const int node = lu_.contact(row);
+    const int node = lu_.block_row(row);
     lu_.begin_row(row);
     for (int k = start_[at(node)]; k < start_[at(node + 1)]; ++k)
       lu_.add(columns_[at(k)], values_[at(k)].column);

@@ -2,9 +2,9 @@
 // BSD-3-Clause
 #pragma once
 
+#include <tether/linalg/block_lu.hpp>
 #include <vector>
 
-#include "block_lu.hpp"
 #include "body_form.hpp"
 
 namespace tether::contact::detail {

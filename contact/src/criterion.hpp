@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "vector.hpp"
+#include <tether/linalg/vector_code.hpp>
 
 namespace tether::contact::detail {
 

@@ -149,7 +149,7 @@ bool InteriorPoint::factor_contacts(const System& system) {
   const Problem& p = system.problem();
   PackedBlock scaled;
   for (int row = 0; row < n_; ++row) {
-    const int i = lu_.contact(row);
+    const int i = lu_.block_row(row);
     lu_.begin_row(row);
     for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
       const int j = p.columns()[at(k)];

@@ -1,9 +1,9 @@
 // Tether: interior points for the exact cones. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "block_lu.hpp"
+#include <tether/linalg/block_lu.hpp>
 #include "body_newton.hpp"
-#include "cone_scaling.hpp"
+#include <tether/linalg/cone_scaling.hpp>
 #include "proximal_newton.hpp"
 #include "search.hpp"
 

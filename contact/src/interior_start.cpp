@@ -24,15 +24,15 @@ bool InteriorPoint::order_bodies(Search& search) {
 void InteriorPoint::order(Search& search) {
   if (ordered_ || order_bodies(search)) return;
   search.counts.work += 100 * static_cast<double>(search.system.problem().blocks().size());
-  lu_.order(search.system.problem());
-  lu_.analyse(search.system.problem(), nullptr);
+  lu_.order(pattern(search.system.problem()));
+  lu_.analyse(pattern(search.system.problem()), nullptr);
   ordered_ = true;
   find_flat(search.system);
 }
 
 void InteriorPoint::find_flat(const System& system) {
   for (int i = 0; i < n_; ++i)
-    flat_[at(i)] = system.law() == Law::frictionless || !(system.problem().local(i).mu > 0);
+    flat_[at(i)] = !(system.friction(i) > 0);
 }
 
 // A, shifted.
@@ -51,7 +51,7 @@ bool InteriorPoint::factor_stuck(const Problem& p) {
     return bodies_.factor();
   }
   for (int row = 0; row < n_; ++row) {
-    const int i = lu_.contact(row);
+    const int i = lu_.block_row(row);
     lu_.begin_row(row);
     for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
       PackedBlock block = p.blocks()[at(k)];

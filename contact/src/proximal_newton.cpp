@@ -46,17 +46,17 @@ double ProximalNewton::residual(Search& search, const Packed& x, Packed& z, cons
 bool ProximalNewton::direction(Search& search, double tau) {
   const Problem& p = search.system.problem();
   if (!ordered_) {
-    lu_.order(p);
+    lu_.order(pattern(p));
     ordered_ = true;
   }
   for (int i = 0; i < n_; ++i) active_[at(i)] = regimes_[at(i)] != Regime::separating;
-  lu_.analyse(p, active_.data());
+  lu_.analyse(pattern(p), active_.data());
   const double scale = 1 / (1 + tau);
   for (int i = 0; i < n_; ++i)
     for (int c = 0; c < 4; ++c) dx_[at(i)].v[c] = z_[at(i)].v[c] - x_[at(i)].v[c];
   bool regular = true;
   for (int r = 0; r < lu_.size(); ++r) {
-    const int i = lu_.contact(r);
+    const int i = lu_.block_row(r);
     const double* P = derivatives_[at(i)].d;
     double rhs[3] = {0, 0, 0};
     lu_.begin_row(r);

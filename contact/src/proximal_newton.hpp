@@ -1,8 +1,8 @@
 // Tether: proximal point iteration with semismooth Newton inside. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "anderson.hpp"
-#include "block_lu.hpp"
+#include <tether/linalg/anderson.hpp>
+#include <tether/linalg/block_lu.hpp>
 #include "search.hpp"
 
 namespace tether::contact::detail {

@@ -15,24 +15,6 @@ TETHER_CLONES void multiply(const View& s, const PackedVector* x, PackedVector* 
   for (int i = 0; i < s.n; ++i) row(s, x, i, w[i].v);
 }
 
-TETHER_CLONES double dot_kernel(const double* p, const double* q, int n) {
-  v4 sum0 = {0, 0, 0, 0}, sum1 = {0, 0, 0, 0};
-  int i = 0;
-  for (; i + 8 <= n; i += 8) {
-    sum0 += *reinterpret_cast<const v4*>(p + i) * *reinterpret_cast<const v4*>(q + i);
-    sum1 += *reinterpret_cast<const v4*>(p + i + 4) * *reinterpret_cast<const v4*>(q + i + 4);
-  }
-  for (; i + 4 <= n; i += 4)
-    sum0 += *reinterpret_cast<const v4*>(p + i) * *reinterpret_cast<const v4*>(q + i);
-  sum0 += sum1;
-  return (sum0[0] + sum0[1]) + (sum0[2] + sum0[3]);
-}
-
-TETHER_CLONES void axpy_kernel(double a, const double* p, double* q, int n) {
-  for (int i = 0; i < n; i += 4)
-    *reinterpret_cast<v4*>(q + i) += a * *reinterpret_cast<const v4*>(p + i);
-}
-
 View view(const Problem& p, const char* rule, double* lambda, const double* weight,
           const Proximal& proximal = {}) {
   return {p.contacts(),       p.row_start().data(), p.columns().data(), p.blocks().data(),
@@ -42,10 +24,6 @@ View view(const Problem& p, const char* rule, double* lambda, const double* weig
 }
 
 }  // namespace
-
-// Arrays of whole PackedVectors: lengths are multiples of 4, storage is aligned.
-double dot(const double* p, const double* q, int n) { return dot_kernel(p, q, n); }
-void axpy(double a, const double* p, double* q, int n) { axpy_kernel(a, p, q, n); }
 
 // Powers of two that bring the largest trace of a block and the largest component of b near 1, if they
 // are out of the ordinary in an island: of the whole problem, or where that does not do of each

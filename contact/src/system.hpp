@@ -5,16 +5,18 @@
 #include <array>
 #include <limits>
 #include <tether/contact/solver.hpp>
+#include <tether/linalg/friction_cone.hpp>
 
 #include "criterion.hpp"
-#include "law/cone.hpp"
 #include "law/law.hpp"
 
 namespace tether::contact::detail {
 
-using Packed = std::vector<PackedVector>;
+using Packed = linalg::PackedVectors;
 
-inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
+inline linalg::BlockPattern pattern(const Problem& p) {
+  return {p.contacts(), p.row_start().data(), p.columns().data()};
+}
 
 // Proximal term (tau / 2) |x - anchor|^2 in the metric of the diagonal blocks; none if anchor = null.
 struct Proximal {
@@ -96,8 +98,5 @@ class System {
 
 // w = A x - b
 void velocities(const Problem& problem, const PackedVector* x, PackedVector* w);
-
-double dot(const double* p, const double* q, int n);
-void axpy(double a, const double* p, double* q, int n);  // q += a p
 
 }  // namespace tether::contact::detail

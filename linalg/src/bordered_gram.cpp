@@ -3,14 +3,13 @@
 #include "bordered_gram.hpp"
 
 #include <algorithm>
+#include <tether/linalg/block3.hpp>
 
 namespace tether::linalg {
 
 namespace {
 
 constexpr double kDependent = 10.0;  // eps, as in GramFactor
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

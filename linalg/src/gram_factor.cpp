@@ -5,10 +5,9 @@
 // products is kept: row k of A meets the rows before it in the columns that they share.
 #include "gram_factor.hpp"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
-#include <numeric>
+
+#include "elimination.hpp"
 
 namespace tether::linalg {
 
@@ -18,29 +17,22 @@ constexpr double kDependent = 16.0;  // eps (1 + |c|^2)
 constexpr double kThin = 1e6;        // eps
 constexpr int kTogether = 4;         // columns of L that are applied in one pass
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-// The rows of each column, ascending, one column after the other; starts has n + 1 entries.
-void transpose(int n, const std::vector<int>& row_starts, const std::vector<int>& columns,
-               std::vector<int>& starts, std::vector<int>& rows) {
-  starts.assign(at(n) + 1, 0);
-  for (const int j : columns) ++starts[at(j) + 1];
-  std::partial_sum(starts.begin(), starts.end(), starts.begin());
-  std::vector<int> next(starts.begin(), starts.end() - 1);
-  rows.resize(columns.size());
-  for (int i = 0; i + 1 < static_cast<int>(row_starts.size()); ++i)
-    for (int e = row_starts[at(i)]; e < row_starts[at(i) + 1]; ++e)
-      rows[at(next[at(columns[at(e)])]++)] = i;
-}
-
 }  // namespace
 
 void GramFactor::analyse(int n, const std::vector<int>& starts, const std::vector<int>& columns) {
   m_ = static_cast<int>(starts.size()) - 1;
   n_ = n;
-  order(starts, columns);
+  std::vector<int> gram_starts, gram_rows;
+  find_gram(starts, columns, gram_starts, gram_rows);
+  const BlockPattern gram{m_, gram_starts.data(), gram_rows.data()};
+  row_at_ = minimum_degree_order(gram);
+  place_.resize(at(m_));
+  for (int k = 0; k < m_; ++k) place_[at(row_at_[at(k)])] = k;
   list_columns(starts, columns);
-  find_factor_pattern();
+  find_fill(gram, row_at_, place_, column_starts_, column_rows_);
+  transpose(m_, column_starts_, column_rows_, row_starts_, row_columns_);
+  filled_.assign(at(m_), 0);
+  L_.assign(column_rows_.size(), 0.0);
   find_supernodes();
   work_.assign(at(m_), 0.0);  // zero between calls of factor()
   solution_.assign(at(m_), 0.0);
@@ -48,15 +40,13 @@ void GramFactor::analyse(int n, const std::vector<int>& starts, const std::vecto
   dependent_.assign(at(m_), 0);
 }
 
-// place_: approximate minimum degree of the pattern of A A^T.
-void GramFactor::order(const std::vector<int>& starts, const std::vector<int>& columns) {
+// The pattern of A A^T: of each row first the rows before it, then itself and those after it.
+void GramFactor::find_gram(const std::vector<int>& starts, const std::vector<int>& columns,
+                           std::vector<int>& gram_starts, std::vector<int>& gram_rows) const {
   std::vector<int> column_starts, rows, seen(at(m_), -1), passed(at(n_), 0);
   transpose(n_, starts, columns, column_starts, rows);
-  // Column i of the lower triangle: rows after i that share a column with it, and the diagonal,
-  // without which Eigen's ordering gives up.
-  std::vector<int> gram_starts{0}, gram_rows;
+  std::vector<int> later_starts{0}, later;  // rows after i that share a column with it
   for (int i = 0; i < m_; ++i) {
-    gram_rows.push_back(i);
     seen[at(i)] = i;
     for (int e = starts[at(i)]; e < starts[at(i) + 1]; ++e) {
       const int j = columns[at(e)];
@@ -64,24 +54,22 @@ void GramFactor::order(const std::vector<int>& starts, const std::vector<int>& c
       for (int p = first; p < column_starts[at(j) + 1]; ++p)
         if (seen[at(rows[at(p)])] != i) {
           seen[at(rows[at(p)])] = i;
-          gram_rows.push_back(rows[at(p)]);
+          later.push_back(rows[at(p)]);
         }
     }
-    gram_starts.push_back(static_cast<int>(gram_rows.size()));
+    later_starts.push_back(static_cast<int>(later.size()));
   }
-  const std::vector<double> ones(gram_rows.size(), 1.0);
-  using Pattern = Eigen::SparseMatrix<double>;
-  const Eigen::Map<const Pattern> gram(m_, m_, static_cast<int>(gram_rows.size()),
-                                       gram_starts.data(), gram_rows.data(), ones.data());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> inverse;
-  Pattern whole;
-  whole = gram.selfadjointView<Eigen::Lower>();
-  Eigen::internal::minimum_degree_ordering(whole, inverse);
-  place_.resize(at(m_));
-  row_at_.resize(at(m_));
-  for (int k = 0; k < m_; ++k) {
-    row_at_[at(k)] = inverse.indices()[k];
-    place_[at(row_at_[at(k)])] = k;
+  std::vector<int> earlier_starts, earlier;
+  transpose(m_, later_starts, later, earlier_starts, earlier);
+  gram_starts.assign(1, 0);
+  gram_rows.clear();
+  for (int i = 0; i < m_; ++i) {
+    gram_rows.insert(gram_rows.end(), earlier.begin() + earlier_starts[at(i)],
+                     earlier.begin() + earlier_starts[at(i) + 1]);
+    gram_rows.push_back(i);
+    gram_rows.insert(gram_rows.end(), later.begin() + later_starts[at(i)],
+                     later.begin() + later_starts[at(i) + 1]);
+    gram_starts.push_back(static_cast<int>(gram_rows.size()));
   }
 }
 
@@ -99,27 +87,6 @@ void GramFactor::list_columns(const std::vector<int>& starts, const std::vector<
   transpose(n_, entry_starts_, entry_column_, member_starts_, member_);
   met_.assign(at(n_), 0);
   member_value_.assign(entry_.size(), 0.0);
-}
-
-// Row k of L has the columns on the elimination tree's paths from the entries of row k of A A^T.
-// The rows that share a column lie on one path: it starts at the first of them.
-void GramFactor::find_factor_pattern() {
-  std::vector<int> parent(at(m_), -1), seen(at(m_), -1), starts{0}, columns;
-  for (int k = 0; k < m_; ++k) {
-    seen[at(k)] = k;
-    for (int p = entry_starts_[at(k)]; p < entry_starts_[at(k) + 1]; ++p)
-      for (int j = member_[at(member_starts_[at(entry_column_[at(p)])])]; seen[at(j)] != k;
-           j = parent[at(j)]) {
-        if (parent[at(j)] == -1) parent[at(j)] = k;
-        seen[at(j)] = k;
-        columns.push_back(j);
-      }
-    starts.push_back(static_cast<int>(columns.size()));
-  }
-  transpose(m_, starts, columns, column_starts_, column_rows_);
-  transpose(m_, column_starts_, column_rows_, row_starts_, row_columns_);  // now ascending
-  filled_.assign(at(m_), 0);
-  L_.assign(column_rows_.size(), 0.0);
 }
 
 // Column j + 1 has the rows of column j without its own.

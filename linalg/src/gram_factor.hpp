@@ -35,9 +35,9 @@ class GramFactor {
 
  private:
   int place_of(int i) const { return place_[static_cast<std::size_t>(i)]; }
-  void order(const std::vector<int>& starts, const std::vector<int>& columns);
+  void find_gram(const std::vector<int>& starts, const std::vector<int>& columns,
+                 std::vector<int>& gram_starts, std::vector<int>& gram_rows) const;
   void list_columns(const std::vector<int>& starts, const std::vector<int>& columns);
-  void find_factor_pattern();
   void find_supernodes();
   double eliminate(int k, double d);
   double coefficients_square(int k);

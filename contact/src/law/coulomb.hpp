@@ -1,7 +1,7 @@
 // Tether: the classical Coulomb law for one contact. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "cone.hpp"
+#include <tether/linalg/friction_cone.hpp>
 #include "local_geometry.hpp"
 
 namespace tether::contact::detail {

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <tether/contact/one_contact.hpp>
 
-#include "../vector.hpp"
+#include <tether/linalg/vector_code.hpp>
 
 namespace tether::contact::detail {
+
+using namespace linalg;  // blocks, cones, vector code: shared with the projection's side
 
 // Between these nothing that a solve multiplies leaves the range of doubles: powers of A and b up
 // to the eighth (law_coulomb.hpp), a grazing b_n aside.

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "cone.hpp"
+#include <tether/linalg/friction_cone.hpp>
 #include "local_geometry.hpp"
 
 namespace tether::contact::detail {

@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/linalg/anderson.hpp>
+#include <tether/linalg/block3.hpp>
+#include <tether/linalg/block_lu.hpp>
+#include <tether/linalg/cone_scaling.hpp>
+#include <tether/linalg/friction_cone.hpp>
 #include <tether/linalg/minimum_norm.hpp>
 #include <tether/linalg/small_lu.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>

@@ -5,6 +5,7 @@
 #include <memory>
 #include <tether/contact/one_contact.hpp>
 #include <tether/export.hpp>
+#include <tether/linalg/block3.hpp>
 #include <tether/linalg/eigen.hpp>
 #include <utility>
 #include <vector>
@@ -16,14 +17,8 @@ namespace detail {
 struct BodyForm;
 }
 
-/// One 3x3 block as three columns of four doubles (the fourth is 0): a vector register each.
-struct alignas(32) PackedBlock {
-  double column[12] = {};
-};
-/// Three components of one contact and a zero.
-struct alignas(32) PackedVector {
-  double v[4] = {};
-};
+using linalg::PackedBlock;
+using linalg::PackedVector;
 
 struct MatrixBlock {
   int row = 0, column = 0;

@@ -1,30 +1,30 @@
 // Tether: Anderson acceleration of a fixed-point map. SPDX-License-Identifier: BSD-3-Clause
-#include "anderson.hpp"
+#include <tether/linalg/anderson.hpp>
 
 #include <algorithm>
 #include <cmath>
 
-namespace tether::contact::detail {
+namespace tether::linalg {
 
-void Anderson::reset(int contacts, int depth) {
-  contacts_ = contacts;
+void Anderson::reset(int size, int depth) {
+  size_ = size;
   depth_ = depth;
   if (df_.size() < at(depth)) {
     df_.resize(at(depth));
     dg_.resize(at(depth));
   }
   for (int k = 0; k < depth; ++k) {
-    df_[at(k)].resize(at(contacts));
-    dg_[at(k)].resize(at(contacts));
+    df_[at(k)].resize(at(size));
+    dg_[at(k)].resize(at(size));
   }
-  f_.resize(at(contacts));
-  g_.resize(at(contacts));
+  f_.resize(at(size));
+  g_.resize(at(size));
   next_ = 0;
   clear();
 }
 
 void Anderson::step(const PackedVector* g, const PackedVector* f, PackedVector* x) {
-  const int n = 4 * contacts_;
+  const int n = 4 * size_;
   const double* gv = g->v;
   const double* fv = f->v;
   if (primed_) {
@@ -44,9 +44,9 @@ void Anderson::step(const PackedVector* g, const PackedVector* f, PackedVector* 
   } else {
     next_ = 0;
   }
-  std::copy(g, g + contacts_, g_.begin());
-  std::copy(f, f + contacts_, f_.begin());
-  std::copy(g, g + contacts_, x);
+  std::copy(g, g + size_, g_.begin());
+  std::copy(f, f + size_, f_.begin());
+  std::copy(g, g + size_, x);
   primed_ = true;
   if (count_ == 0) return;
 
@@ -86,4 +86,4 @@ void Anderson::step(const PackedVector* g, const PackedVector* f, PackedVector* 
   }
 }
 
-}  // namespace tether::contact::detail
+}  // namespace tether::linalg

@@ -3,10 +3,9 @@
 #pragma once
 
 #include <cmath>
+#include <tether/linalg/vector_code.hpp>
 
-#include "../vector.hpp"
-
-namespace tether::contact::detail {
+namespace tether::linalg {
 
 // |x_t| <= mu x_n, the nearest point (Euclid).
 TETHER_INLINE void project_cone(double mu, double* v) {
@@ -59,4 +58,4 @@ TETHER_INLINE void cone_natural_point(double mu, double g0, double g1, const dou
   project_cone(mu, v);
 }
 
-}  // namespace tether::contact::detail
+}  // namespace tether::linalg

@@ -1,4 +1,4 @@
-// Tether: what the inner loops are compiled with. SPDX-License-Identifier: BSD-3-Clause
+// Tether: how inner loops are compiled. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 // Inner loops are built twice where the compiler can choose at run time (GCC, x86-64): once for
@@ -6,7 +6,7 @@
 // cannot run the resolvers, so they get the base version. A level or a feature is asked for, not a
 // processor: "arch=haswell" is chosen on Intel's Haswell line only, never on AMD's.
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__linux__) && \
-    !defined(TETHER_CONTACT_NO_CLONES)
+    !defined(TETHER_NO_CLONES)
 #if __GNUC__ >= 12
 #define TETHER_CLONES __attribute__((target_clones("arch=x86-64-v3", "default")))
 #else

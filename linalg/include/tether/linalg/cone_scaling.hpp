@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tether::contact::detail {
+namespace tether::linalg {
 
 // Points x of the cone |x_t| <= x_n have four entries, x_n, x_t and the gap x_n - |x_t|: close to
 // the cone the difference of the first three has lost its digits.
@@ -82,4 +82,4 @@ struct ConeScaling {
   }
 };
 
-}  // namespace tether::contact::detail
+}  // namespace tether::linalg

@@ -1,12 +1,15 @@
 // Tether: sparse LU with 3x3 blocks. SPDX-License-Identifier: BSD-3-Clause
-#include "block_lu.hpp"
+#include <tether/linalg/block_lu.hpp>
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tether/linalg/vector_code.hpp>
+#include <utility>
 
-namespace tether::contact::detail {
+#include "elimination.hpp"
+
+namespace tether::linalg {
 namespace {
 
 typedef double v4 __attribute__((vector_size(32)));
@@ -14,8 +17,7 @@ typedef double v4 __attribute__((vector_size(32)));
 TETHER_INLINE void subtract_product(const double* A, const double* B, double* C) {
   const v4* a = reinterpret_cast<const v4*>(A);
   v4* c = reinterpret_cast<v4*>(C);
-  for (int j = 0; j < 3; ++j)
-    c[j] -= a[0] * B[4 * j] + a[1] * B[4 * j + 1] + a[2] * B[4 * j + 2];
+  for (int j = 0; j < 3; ++j) c[j] -= a[0] * B[4 * j] + a[1] * B[4 * j + 1] + a[2] * B[4 * j + 2];
 }
 
 TETHER_INLINE void subtract_apply(const double* A, const double* x, double* y) {
@@ -102,9 +104,9 @@ TETHER_CLONES void eliminate(const Rows& s) {
   }
 }
 
-TETHER_CLONES void substitute(int n, const int* lower_start, const int* lower,
-                              const PackedBlock* L, const int* upper_start, const int* upper,
-                              const PackedBlock* U, const BlockPivot* pivot, PackedVector* y) {
+TETHER_CLONES void substitute(int n, const int* lower_start, const int* lower, const PackedBlock* L,
+                              const int* upper_start, const int* upper, const PackedBlock* U,
+                              const BlockPivot* pivot, PackedVector* y) {
   for (int r = 0; r < n; ++r)
     for (int m = lower_start[r]; m < lower_start[r + 1]; ++m)
       subtract_apply(L[m].column, y[lower[m]].v, y[r].v);
@@ -117,88 +119,42 @@ TETHER_CLONES void substitute(int n, const int* lower_start, const int* lower,
 
 }  // namespace
 
-void BlockLu::order(const std::vector<int>& start, const std::vector<int>& columns) {
-  const int n = static_cast<int>(start.size()) - 1;
-  full_order_.resize(at(n));
-  for (int i = 0; i < n; ++i) full_order_[at(i)] = i;
-  // A dense matrix has nothing to order.
-  if (columns.size() < at(n) * at(n)) {
-    Eigen::SparseMatrix<double, Eigen::ColMajor, int> pattern(n, n);
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(columns.size());
-    for (int i = 0; i < n; ++i)
-      for (int k = start[at(i)]; k < start[at(i + 1)]; ++k) entries.emplace_back(i, columns[at(k)], 1.0);
-    pattern.setFromTriplets(entries.begin(), entries.end());
-    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
-    Eigen::AMDOrdering<int>()(pattern, permutation);
-    for (int i = 0; i < n; ++i) full_order_[at(i)] = permutation.indices()[i];
+void BlockLu::order(const BlockPattern& pattern) {
+  if (static_cast<double>(pattern.starts[pattern.size]) <
+      static_cast<double>(pattern.size) * pattern.size) {
+    full_order_ = minimum_degree_order(pattern);
+  } else {  // full: nothing to order
+    full_order_.resize(at(pattern.size));
+    std::iota(full_order_.begin(), full_order_.end(), 0);
   }
   analysed_ = false;
 }
 
-void BlockLu::analyse(const std::vector<int>& start, const std::vector<int>& columns,
-                      const char* active) {
-  const int n = static_cast<int>(start.size()) - 1;
+void BlockLu::analyse(const BlockPattern& pattern, const char* active) {
+  const int n = pattern.size;
   if (analysed_) {
     bool same = true;
-    for (int i = 0; i < n && same; ++i) same = (active == nullptr || active[i]) == (active_[at(i)] != 0);
+    for (int i = 0; i < n && same; ++i)
+      same = (active == nullptr || active[i]) == (active_[at(i)] != 0);
     if (same) return;
   }
   active_.resize(at(n));
   for (int i = 0; i < n; ++i) active_[at(i)] = active == nullptr || active[i] ? 1 : 0;
-  contact_.clear();
+  block_row_.clear();
   position_.assign(at(n), -1);
   for (int i : full_order_) {
     if (!active_[at(i)]) continue;
-    position_[at(i)] = static_cast<int>(contact_.size());
-    contact_.push_back(i);
+    position_[at(i)] = static_cast<int>(block_row_.size());
+    block_row_.push_back(i);
   }
-  n_ = static_cast<int>(contact_.size());
-
-  // S_k = later neighbours of k and of the children of k in the elimination tree.
-  std::vector<int> mark(at(n_), -1), first_child(at(n_), -1), sibling(at(n_), -1);
-  upper_start_.assign(1, 0);
-  upper_.clear();
+  n_ = static_cast<int>(block_row_.size());
+  find_fill(pattern, block_row_, position_, upper_start_, upper_);
   operations_ = 0;
   for (int k = 0; k < n_; ++k) {
-    const std::size_t begin = upper_.size();
-    mark[at(k)] = k;
-    const int i = contact_[at(k)];
-    for (int p = start[at(i)]; p < start[at(i + 1)]; ++p) {
-      const int j = position_[at(columns[at(p)])];
-      if (j > k && mark[at(j)] != k) {
-        mark[at(j)] = k;
-        upper_.push_back(j);
-      }
-    }
-    for (int c = first_child[at(k)]; c >= 0; c = sibling[at(c)]) {
-      for (int p = upper_start_[at(c)]; p < upper_start_[at(c + 1)]; ++p) {
-        const int j = upper_[at(p)];
-        if (j > k && mark[at(j)] != k) {
-          mark[at(j)] = k;
-          upper_.push_back(j);
-        }
-      }
-    }
-    std::sort(upper_.begin() + static_cast<std::ptrdiff_t>(begin), upper_.end());
-    const double count = static_cast<double>(upper_.size() - begin);
+    const double count = upper_start_[at(k + 1)] - upper_start_[at(k)];
     operations_ += count * count + 2 * count + 1;
-    if (upper_.size() > begin) {
-      const int parent = upper_[begin];
-      sibling[at(k)] = first_child[at(parent)];
-      first_child[at(parent)] = k;
-    }
-    upper_start_.push_back(static_cast<int>(upper_.size()));
   }
-  lower_start_.assign(at(n_ + 1), 0);
-  for (int j : upper_) ++lower_start_[at(j + 1)];
-  for (int k = 0; k < n_; ++k) lower_start_[at(k + 1)] += lower_start_[at(k)];
-  lower_.resize(upper_.size());
-  std::vector<int>& fill = mark;
-  for (int k = 0; k < n_; ++k) fill[at(k)] = lower_start_[at(k)];
-  for (int k = 0; k < n_; ++k)
-    for (int p = upper_start_[at(k)]; p < upper_start_[at(k + 1)]; ++p)
-      lower_[at(fill[at(upper_[at(p)])]++)] = k;
+  transpose(n_, upper_start_, upper_, lower_start_, lower_);
   U_.resize(upper_.size());
   L_.resize(upper_.size());
   pivot_.resize(at(n_));
@@ -207,8 +163,8 @@ void BlockLu::analyse(const std::vector<int>& start, const std::vector<int>& col
   analysed_ = true;
 }
 
-void BlockLu::add(int contact, const double* block) {
-  double* w = work_[at(position_[at(contact)])].column;
+void BlockLu::add(int block_column, const double* block) {
+  double* w = work_[at(position_[at(block_column)])].column;
   for (int c = 0; c < 12; ++c) w[c] += block[c];
 }
 
@@ -228,10 +184,10 @@ bool BlockLu::end_row() {
 }
 
 void BlockLu::solve(PackedVector* x) {
-  for (int r = 0; r < n_; ++r) rhs_[at(r)] = x[contact_[at(r)]];
+  for (int r = 0; r < n_; ++r) rhs_[at(r)] = x[block_row_[at(r)]];
   substitute(n_, lower_start_.data(), lower_.data(), L_.data(), upper_start_.data(), upper_.data(),
              U_.data(), pivot_.data(), rhs_.data());
-  for (int r = 0; r < n_; ++r) x[contact_[at(r)]] = rhs_[at(r)];
+  for (int r = 0; r < n_; ++r) x[block_row_[at(r)]] = rhs_[at(r)];
 }
 
-}  // namespace tether::contact::detail
+}  // namespace tether::linalg

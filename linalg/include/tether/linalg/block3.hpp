@@ -1,0 +1,38 @@
+// Tether: 3x3 blocks and vectors of three, padded to a vector register. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <tether/export.hpp>
+#include <vector>
+
+TETHER_EXPORT_BEGIN
+namespace tether::linalg {
+
+/// One 3x3 block as three columns of four doubles (the fourth is 0): a vector register each.
+struct alignas(32) PackedBlock {
+  double column[12] = {};
+};
+/// Three components and a zero.
+struct alignas(32) PackedVector {
+  double v[4] = {};
+};
+using PackedVectors = std::vector<PackedVector>;
+
+/// Of a square matrix of blocks with a symmetric pattern and a diagonal without gaps: block columns
+/// columns[starts[i] .. starts[i + 1]) of block row i, i = 0 .. size - 1.
+struct BlockPattern {
+  int size;
+  const int* starts;
+  const int* columns;
+};
+
+inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// p.q, and q += a p, over arrays of whole PackedVectors: n is a multiple of 4, storage is aligned
+/// to 32 bytes.
+double dot(const double* p, const double* q, int n);
+void axpy(double a, const double* p, double* q, int n);
+
+}  // namespace tether::linalg
+TETHER_EXPORT_END

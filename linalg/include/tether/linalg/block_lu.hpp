@@ -1,0 +1,54 @@
+// Tether: sparse LU with 3x3 blocks. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/export.hpp>
+#include <tether/linalg/block3.hpp>
+#include <vector>
+
+TETHER_EXPORT_BEGIN
+namespace tether::linalg {
+
+/// A diagonal block D as P D = L U: unit lower triangle, upper triangle with the reciprocals of its
+/// diagonal, row k of P D is row order[k] of D.
+struct BlockPivot {
+  double l10, l20, l21, u01, u02, u12, reciprocal[3];
+  int order[3];
+};
+
+/// L U of 3x3 blocks: unsymmetric values on a symmetric pattern, pivots are the diagonal blocks in
+/// approximate minimum-degree order (elimination.hpp). order() once for a pattern, analyse() for
+/// each set of active rows, then every row: begin_row, add for each of its blocks, end_row.
+class BlockLu {
+ public:
+  void order(const BlockPattern& pattern);
+  /// Rows and columns with active != 0 (null: all). Does nothing if the set is the last one.
+  void analyse(const BlockPattern& pattern, const char* active);
+  double operations() const { return operations_; }  ///< sum of |S_k|^2 over the pivots
+
+  int size() const { return n_; }
+  int block_row(int row) const { return block_row_[at(row)]; }  ///< elimination order -> block row
+  int position(int block_row) const { return position_[at(block_row)]; }  ///< -1: not active
+
+  /// Rows one after the other, in elimination order; `block` has 3 columns of 4.
+  void begin_row(int row) { row_ = row; }
+  void add(int block_column, const double* block);
+  bool end_row();  ///< eliminates; false: singular pivot
+
+  /// Solves in place; vector indexed by block row, inactive entries untouched.
+  void solve(PackedVector* x);
+
+ private:
+  int n_ = 0, row_ = 0;
+  double operations_ = 0;
+  bool analysed_ = false;
+  std::vector<int> full_order_;
+  std::vector<char> active_;
+  std::vector<int> block_row_, position_;
+  std::vector<int> upper_start_, upper_, lower_start_, lower_;
+  std::vector<PackedBlock> U_, L_, work_;
+  std::vector<BlockPivot> pivot_;
+  PackedVectors rhs_;
+};
+
+}  // namespace tether::linalg
+TETHER_EXPORT_END
