@@ -6,6 +6,7 @@
 // ns: per contact and sweep, the least of R rounds, from the difference of S and 3 S sweeps, so
 // that set-up and results cancel; "setup" is what remains for S sweeps. One and T threads
 // alternate. --residual: what is reached with at most 100, 300, 1000, 3000 sweeps instead.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -63,46 +64,24 @@ void residuals(random::Packing p, bool spheres, double tolerance, double mu) {
   std::fflush(stdout);
 }
 
-int usage(const char* option) {
-  std::fprintf(
-      stderr,
-      "contact_scale: %s: no such option, or its value is missing or out of range\n"
-      "usage: contact_scale [--least CONTACTS] [--most CONTACTS] [--sweeps N] [--rounds N] "
-      "[--threads 1..256] [--shuffle 0|1] [--residual R] [--mu MU]\n",
-      option);
-  return 2;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   double least = 0, most = 1e6, tolerance = 0, mu = 0.4;
   int sweeps = 20, rounds = 0, many = 2;
   bool shuffle = false;
-  for (int i = 1; i < argc; i += 2) {
-    const std::string name = argv[i];
-    char* end = nullptr;
-    const double value = i + 1 < argc ? std::strtod(argv[i + 1], &end) : -1;
-    if (end == nullptr || *end != '\0' || !(value >= 0 && value <= 1e9)) return usage(argv[i]);
-    if (name == "--least")
-      least = value;
-    else if (name == "--most")
-      most = value;
-    else if (name == "--residual")
-      tolerance = value;
-    else if (name == "--mu")
-      mu = value;
-    else if (name == "--sweeps" && value >= 1)
-      sweeps = static_cast<int>(value);
-    else if (name == "--rounds")
-      rounds = static_cast<int>(value);
-    else if (name == "--threads" && value >= 1 && value <= 256)
-      many = static_cast<int>(value);
-    else if (name == "--shuffle")
-      shuffle = value != 0;
-    else
-      return usage(argv[i]);
-  }
+  CLI::App app("Sweeps over packings between bodies: time, memory and bits by size and threads");
+  app.add_option("--least", least, "Contacts of the smallest packing")->check(CLI::NonNegativeNumber);
+  app.add_option("--most", most, "Contacts of the largest packing")->check(CLI::NonNegativeNumber);
+  app.add_option("--residual", tolerance, "Residuals over sweeps instead, down to this one")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--mu", mu, "Friction coefficient with --residual")->check(CLI::NonNegativeNumber);
+  app.add_option("--sweeps", sweeps, "Sweeps of a run")->check(CLI::Range(1, 1000000));
+  app.add_option("--rounds", rounds, "Runs of which the fastest counts; 0: by size")
+      ->check(CLI::Range(0, 1000000));
+  app.add_option("--threads", many, "Threads of the second run")->check(CLI::Range(1, 256));
+  app.add_option("--shuffle", shuffle, "1: bodies in random order");
+  CLI11_PARSE(app, argc, argv);
   if (tolerance > 0) {
     std::printf("bodies   contacts    mu  residual (sweeps) with at most 100, 300, 1000, 3000\n");
   } else {

@@ -4,6 +4,7 @@
 //
 // Times: nanoseconds per solve over 4096 contacts, best of 60. --check N: N random problems a class
 // against a dense scan of P points with local refinement.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -96,17 +97,11 @@ Cost measure(const Sample& sample, Law law, bool golden) {
 int main(int argc, char** argv) {
   long check = 0;
   int points = 180;
-  for (int i = 1; i < argc; ++i) {
-    const std::string option = argv[i];
-    if (option == "--check" && i + 1 < argc) {
-      check = std::atol(argv[++i]);
-    } else if (option == "--points" && i + 1 < argc) {
-      points = std::atoi(argv[++i]);
-    } else {
-      std::fprintf(stderr, "usage: one_contact [--check N] [--points P]\n");
-      return 2;
-    }
-  }
+  CLI::App app("One contact: nanoseconds and evaluations of each law by class and regime");
+  app.add_option("--check", check, "Problems of each class that are compared with the reference")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--points", points, "Angles of the reference's search")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
   std::printf("%-20s %-15s %-10s %6s %6s %6s %8s %6s %5s\n", "law", "class", "regime", "cold", "warm", "repeat", "golden", "evals", "most");
   for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
     std::vector<double> cold, warm, golden;

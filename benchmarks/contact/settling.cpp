@@ -10,6 +10,7 @@
 //
 // Angular velocities decay by 2/s in all runs: without rolling and spinning resistance, of which
 // Coulomb's law knows nothing, a sphere on the floor rolls for ever.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -324,24 +325,22 @@ void bullet_run(const Start& start, double duration, int iterations, bool two_di
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int spheres = argc > 1 ? std::atoi(argv[1]) : 10000;
-  const double duration = argc > 2 ? std::atof(argv[2]) : 1;
-  const double rest = argc > 3 ? std::atof(argv[3]) : 30;
+  int spheres = 10000;
+  double duration = 1, rest = 30;
+  std::vector<std::string> more;
+  CLI::App app("Spheres that settle in a box, beside Bullet's dynamics where they are installed");
+  app.add_option("spheres", spheres, "Number of spheres")->check(CLI::PositiveNumber);
+  app.add_option("seconds", duration, "Time of the comparison")->check(CLI::PositiveNumber);
+  app.add_option("rest", rest, "Time in which the heap may come to rest; 0: not tried")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("more", more, "Tolerances, and the word alone: without Bullet")
+      ->check(CLI::PositiveNumber | CLI::IsMember({"alone"}));
+  CLI11_PARSE(app, argc, argv);
   std::vector<double> tolerances;
-  bool alone = false;
-  for (int k = 4; k < argc; ++k) {
-    if (std::string(argv[k]) == "alone")
-      alone = true;
-    else
-      tolerances.push_back(std::atof(argv[k]));
-  }
+  for (const std::string& word : more)
+    if (word != "alone") tolerances.push_back(std::stod(word));
+  const bool alone = tolerances.size() < more.size();
   if (tolerances.empty()) tolerances = {1e-1, 1e-2, 1e-3};
-  const bool positive = std::all_of(tolerances.begin(), tolerances.end(),
-                                    [](double t) { return t > 0 && std::isfinite(t); });
-  if (spheres < 1 || !(duration > 0) || !(rest >= 0) || !positive) {
-    std::fprintf(stderr, "settling [spheres] [seconds] [rest] [tolerance ...] [alone]\n");
-    return 2;
-  }
   const Start start = start_of(spheres);
   std::printf("%d spheres, %g s, step %g s, friction %g\n\n", spheres, duration, kStep, kFriction);
   std::printf("%-28s %9s %9s %10s %9s %10s %9s\n", "", "ms/step", "us/cont.", "residual",

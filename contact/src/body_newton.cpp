@@ -70,9 +70,9 @@ bool BodyNewton::order(const Problem& problem) {
       start_.push_back(static_cast<int>(columns_.size()));
     }
   }
-  const BlockPattern nodes{static_cast<int>(start_.size()) - 1, start_.data(), columns_.data()};
-  lu_.order(nodes);
-  lu_.analyse(nodes, nullptr);
+  const BlockPattern pattern{static_cast<int>(start_.size()) - 1, start_.data(), columns_.data()};
+  lu_.order(pattern);
+  lu_.analyse(pattern, nullptr);
   place_.resize(form_->contacts.size());
   for (std::size_t i = 0; i < place_.size(); ++i) {
     const int* body = form_->contacts[i].body;
