@@ -6,7 +6,7 @@
 #include <tether/contact/polyhedra.hpp>
 #include <unordered_map>
 
-#include "polyhedron.hpp"
+#include "collision/polyhedron.hpp"
 
 namespace tether::contact {
 

@@ -1,5 +1,5 @@
 // Tether: convex polyhedra. SPDX-License-Identifier: BSD-3-Clause
-#include "polyhedron.hpp"
+#include "collision/polyhedron.hpp"
 
 #include <LinearMath/btConvexHullComputer.h>
 

@@ -32,7 +32,8 @@ class Tokens {
       text_.append(part.data(), count);
       if (std::memchr(part.data(), '\0', count) != nullptr) break;
       if (!regular && text_.size() > kMostOfPipe) {
-        fail("oversized: more than " + std::to_string(kMostOfPipe) + " bytes, and not a regular file");
+        fail("oversized: more than " + std::to_string(kMostOfPipe) +
+             " bytes, and not a regular file");
       }
     }
     if (file.bad()) fail("cannot be read");
@@ -40,7 +41,9 @@ class Tokens {
     end_ = at_ + text_.size();
   }
 
-  [[noreturn]] void fail(const std::string& what) const { throw std::runtime_error(path_ + ": " + what); }
+  [[noreturn]] void fail(const std::string& what) const {
+    throw std::runtime_error(path_ + ": " + what);
+  }
 
   bool empty() {
     skip();
@@ -77,7 +80,8 @@ class Tokens {
     double value = 0;
     const auto [stop, error] = std::from_chars(begin, end_, value);
     if (error == std::errc::result_out_of_range) {
-      fail(std::string("out of the range of double precision in ") + what + ": '" + word(at_) + "'");
+      fail(std::string("out of the range of double precision in ") + what + ": '" + word(at_) +
+           "'");
     }
     if (error != std::errc() || (stop != end_ && !separates(*stop))) {
       fail(std::string("not a number in ") + what + ": '" + word(at_) + "'");
@@ -85,7 +89,9 @@ class Tokens {
     at_ = stop;
     return value;
   }
-  static bool separates(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\0'; }
+  static bool separates(char c) {
+    return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\0';
+  }
   std::string word(const char* begin) const {
     return std::string(begin, std::min<std::size_t>(20, static_cast<std::size_t>(end_ - begin)));
   }
@@ -111,11 +117,13 @@ Problem read_dat(const std::string& path) {
   }
   std::vector<MatrixBlock> blocks;
   if (storage == 0) {
-    if (in.integer("matrix rows", 0, rows) != rows || in.integer("matrix columns", 0, columns) != columns) {
+    if (in.integer("matrix rows", 0, rows) != rows ||
+        in.integer("matrix columns", 0, columns) != columns) {
       in.fail("matrix sizes do not match");
     }
     // An entry takes two characters at least; a small file cannot claim a large matrix.
-    if (size > 0 && in.left() / (2 * size) < size - 1) in.fail("truncated: the file ends in the matrix");
+    if (size > 0 && in.left() / (2 * size) < size - 1)
+      in.fail("truncated: the file ends in the matrix");
     Eigen::MatrixXd A(size, size);
     for (long c = 0; c < size; ++c)
       for (long r = 0; r < size; ++r) A(r, c) = in.finite("matrix");
@@ -141,15 +149,19 @@ Problem read_dat(const std::string& path) {
         }
       }
     }
-    const long filled1 = in.integer("filled1", 0, n + 1L), filled2 = in.integer("filled2", 0, count);
-    if (filled1 != n + 1L || filled2 != count) in.fail("filled1 and filled2 do not match the blocks");
+    const long filled1 = in.integer("filled1", 0, n + 1L),
+               filled2 = in.integer("filled2", 0, count);
+    if (filled1 != n + 1L || filled2 != count)
+      in.fail("filled1 and filled2 do not match the blocks");
     std::vector<long> start;
     for (long i = 0; i < filled1; ++i) {
       start.push_back(in.integer("row pointers", i == 0 ? 0 : start.back(), count));
     }
-    if (start.front() != 0 || start.back() != count) in.fail("row pointers do not match the blocks");
+    if (start.front() != 0 || start.back() != count)
+      in.fail("row pointers do not match the blocks");
     std::vector<int> column;
-    for (long k = 0; k < count; ++k) column.push_back(static_cast<int>(in.integer("block columns", 0, n - 1L)));
+    for (long k = 0; k < count; ++k)
+      column.push_back(static_cast<int>(in.integer("block columns", 0, n - 1L)));
     int row = 0;
     for (long k = 0; k < count; ++k) {
       while (start[static_cast<std::size_t>(row + 1)] <= k) ++row;
@@ -163,7 +175,8 @@ Problem read_dat(const std::string& path) {
   Eigen::VectorXd b(size), mu(n);
   for (long i = 0; i < size; ++i) b[i] = -in.finite("q");
   for (int i = 0; i < n; ++i) mu[i] = in.finite("mu");
-  if (!in.empty()) in.integer("trailing number", std::numeric_limits<int>::min(), std::numeric_limits<int>::max());
+  if (!in.empty())
+    in.integer("trailing number", std::numeric_limits<int>::min(), std::numeric_limits<int>::max());
   if (!in.empty()) in.fail("oversized: data after the friction coefficients");
   try {
     return Problem::sparse(d, std::move(blocks), b, mu);
@@ -177,7 +190,8 @@ namespace {
 // With 17 digits, as "%.17g " would in the C locale.
 void put(std::FILE* file, double value) {
   char text[32];
-  char* end = std::to_chars(text, text + sizeof text - 1, value, std::chars_format::general, 17).ptr;
+  char* end =
+      std::to_chars(text, text + sizeof text - 1, value, std::chars_format::general, 17).ptr;
   *end++ = ' ';
   std::fwrite(text, 1, static_cast<std::size_t>(end - text), file);
 }
@@ -188,7 +202,8 @@ void write_dat(const Problem& problem, const std::string& path, DatStorage stora
   std::FILE* file = std::fopen(path.c_str(), "w");
   if (!file) throw std::runtime_error(path + ": cannot be written");
   const int n = problem.contacts(), d = problem.dimension(), size = d * n;
-  std::fprintf(file, "%d\n%d\n%d\n%d\n%d\n", d, n, storage == DatStorage::dense ? 0 : 1, size, size);
+  std::fprintf(file, "%d\n%d\n%d\n%d\n%d\n", d, n, storage == DatStorage::dense ? 0 : 1, size,
+               size);
   if (storage == DatStorage::dense) {
     std::fprintf(file, "%d %d\n", size, size);
     const linalg::MatrixX A = problem.dense_matrix();

@@ -79,7 +79,8 @@ struct Native<double> {
 };
 
 constexpr hssize_t kMostEntries = hssize_t{1} << 31;
-constexpr hsize_t kBestCompression = 1032;  // of deflate; other filters are not expected to do better
+constexpr hsize_t kBestCompression =
+    1032;  // of deflate; other filters are not expected to do better
 
 // What `set` claims to hold, in entries, once that is known to fit the bytes that the file has for
 // it: a damaged extent must not ask for memory.
@@ -93,8 +94,9 @@ std::size_t believable_count(hid_t file, hid_t set, const std::string& full) {
   }
   const hsize_t stored = std::min(H5Dget_storage_size(set), file_size);
   if (static_cast<hsize_t>(count) * sizeof(T) > kBestCompression * stored) {
-    throw std::runtime_error(full + " says that it has " + std::to_string(count) + " entries, but the file holds " +
-                             std::to_string(stored) + " bytes of it");
+    throw std::runtime_error(full + " says that it has " + std::to_string(count) +
+                             " entries, but the file holds " + std::to_string(stored) +
+                             " bytes of it");
   }
   return static_cast<std::size_t>(count);
 }
@@ -114,12 +116,14 @@ std::vector<T> read(hid_t file, const std::string& path, const std::string& name
 
 int read_integer(hid_t file, const std::string& path, const std::string& name) {
   const std::vector<int> v = read<int>(file, path, name);
-  if (v.size() != 1) throw std::runtime_error(path + ": /fclib_local/" + name + " is not a single number");
+  if (v.size() != 1)
+    throw std::runtime_error(path + ": /fclib_local/" + name + " is not a single number");
   return v[0];
 }
 
 template <class T>
-void write(hid_t file, const std::string& path, const std::string& name, const T* data, std::size_t count) {
+void write(hid_t file, const std::string& path, const std::string& name, const T* data,
+           std::size_t count) {
   const hsize_t size = count;
   Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose);
   Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
@@ -148,9 +152,12 @@ Problem read_fclib(const std::string& path) {
   const std::vector<int> p = read<int>(file, path, "W/p"), i = read<int>(file, path, "W/i");
   const std::vector<double> x = read<double>(file, path, "W/x");
   const std::size_t size = mu.size() * static_cast<std::size_t>(d);
-  if (q.size() != size) fail("q has " + std::to_string(q.size()) + " entries, " + std::to_string(size) + " are expected");
+  if (q.size() != size)
+    fail("q has " + std::to_string(q.size()) + " entries, " + std::to_string(size) +
+         " are expected");
   if (m < 0 || static_cast<std::size_t>(m) != size || m != n) {
-    fail("W is " + std::to_string(m) + " x " + std::to_string(n) + ", " + std::to_string(size) + " are expected");
+    fail("W is " + std::to_string(m) + " x " + std::to_string(n) + ", " + std::to_string(size) +
+         " are expected");
   }
   if (nz < -2) fail("W/nz is " + std::to_string(nz));
 
@@ -165,16 +172,19 @@ Problem read_fclib(const std::string& path) {
       last[static_cast<std::size_t>(br)] = static_cast<int>(blocks.size());
       blocks.push_back({br, bc, Eigen::Matrix3d::Zero()});
     }
-    blocks[static_cast<std::size_t>(last[static_cast<std::size_t>(br)])].value(r % d, c % d) += value;
+    blocks[static_cast<std::size_t>(last[static_cast<std::size_t>(br)])].value(r % d, c % d) +=
+        value;
   };
   if (nz >= 0) {
     const std::size_t count = static_cast<std::size_t>(nz);
-    if (x.size() < count || p.size() < count || i.size() < count) fail("truncated: W has fewer than nz entries");
+    if (x.size() < count || p.size() < count || i.size() < count)
+      fail("truncated: W has fewer than nz entries");
     for (std::size_t k = 0; k < count; ++k) put(i[k], p[k], x[k]);
   } else {
     if (p.size() < size + 1) fail("truncated: W/p is too short");
     const std::size_t count = p[size] < 0 ? 0 : static_cast<std::size_t>(p[size]);
-    if (p[size] < 0 || x.size() < count || i.size() < count) fail("truncated: W has fewer entries than W/p says");
+    if (p[size] < 0 || x.size() < count || i.size() < count)
+      fail("truncated: W has fewer entries than W/p says");
     for (std::size_t k = 0; k < size; ++k) {
       if (p[k] < 0 || p[k] > p[k + 1] || static_cast<std::size_t>(p[k + 1]) > count) {
         fail("W/p must ascend from 0 to the number of entries");
@@ -186,8 +196,10 @@ Problem read_fclib(const std::string& path) {
       }
     }
   }
-  const Eigen::VectorXd b = -Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size()));
-  const Eigen::VectorXd friction = Eigen::Map<const Eigen::VectorXd>(mu.data(), static_cast<Eigen::Index>(mu.size()));
+  const Eigen::VectorXd b =
+      -Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size()));
+  const Eigen::VectorXd friction =
+      Eigen::Map<const Eigen::VectorXd>(mu.data(), static_cast<Eigen::Index>(mu.size()));
   try {
     return Problem::sparse(d, std::move(blocks), b, friction);
   } catch (const std::invalid_argument& e) {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "law.hpp"
-#include "rows.hpp"
+#include "law/law.hpp"
+#include "law/rows.hpp"
 
 // Included by the file of each law, which instantiates the kernels with TETHER_ASSEMBLED_KERNELS.
 

@@ -1,11 +1,11 @@
 // Tether: Coulomb's law: all of its solutions, and kernels. SPDX-License-Identifier: BSD-3-Clause
-#include "coulomb.hpp"
+#include "law/coulomb.hpp"
 
 #include <algorithm>
 #include <limits>
 
-#include "coulomb_lanes.hpp"
-#include "define_law.hpp"
+#include "law/coulomb_lanes.hpp"
+#include "law/define_law.hpp"
 
 namespace tether::contact::detail {
 
@@ -277,7 +277,6 @@ TETHER_LAW_KERNELS(Coulomb, CoulombLanes)
 
 }  // namespace
 
-extern const LawKernels kCoulomb;
-constexpr LawKernels kCoulomb = all_kernels(nullptr, nullptr);
+constexpr LawKernels Coulomb::kKernels = all_kernels(nullptr, nullptr);
 
 }  // namespace tether::contact::detail

@@ -1,10 +1,12 @@
 // Tether: the classical Coulomb law for one contact. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "law/local_geometry.hpp"
 #include <tether/linalg/friction_cone.hpp>
-#include "local_geometry.hpp"
 
 namespace tether::contact::detail {
+
+struct LawKernels;
 
 // Sliding: w_t = -lambda x_t, so y_i = h_i / (beta_i + lambda) and the cone gives the secular
 // equation |y| + g.y = k (README, section 4). With p = (beta_0 + lambda)(beta_1 + lambda), z = p y
@@ -16,6 +18,7 @@ struct Coulomb {
   static constexpr Law kLaw = Law::coulomb;
   static constexpr const char* kName = "coulomb";
   static constexpr bool kFriction = true;
+  static const LawKernels kKernels;
   static constexpr int kMaxEvaluations = 80;
   static constexpr int kFastEvaluations = 8;
   static constexpr double kManyBranches = 0.8;

@@ -1,8 +1,8 @@
 // Tether: Coulomb's law for four contacts at a time. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "coulomb.hpp"
-#include "lanes.hpp"
+#include "law/coulomb.hpp"
+#include "law/lanes.hpp"
 
 #if TETHER_GROUPS
 

@@ -1,9 +1,9 @@
 // Tether: instantiates the kernels of a friction law. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "assembled_kernels.hpp"
-#include "general_pass.hpp"
-#include "group_pass.hpp"
+#include "law/assembled_kernels.hpp"
+#include "law/general_pass.hpp"
+#include "law/group_pass.hpp"
 
 namespace tether::contact::detail {
 namespace {

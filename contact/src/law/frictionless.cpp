@@ -1,7 +1,7 @@
 // Tether: contact without friction: kernels. SPDX-License-Identifier: BSD-3-Clause
-#include "frictionless.hpp"
+#include "law/frictionless.hpp"
 
-#include "define_law.hpp"
+#include "law/define_law.hpp"
 
 namespace tether::contact::detail {
 
@@ -28,7 +28,6 @@ TETHER_LAW_KERNELS(Frictionless, FrictionlessLanes)
 
 }  // namespace
 
-extern const LawKernels kFrictionless;
-constexpr LawKernels kFrictionless = all_kernels(nullptr, nullptr);
+constexpr LawKernels Frictionless::kKernels = all_kernels(nullptr, nullptr);
 
 }  // namespace tether::contact::detail

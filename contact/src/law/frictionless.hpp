@@ -1,14 +1,17 @@
 // Tether: contact without friction. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "local_geometry.hpp"
+#include "law/local_geometry.hpp"
 
 namespace tether::contact::detail {
+
+struct LawKernels;
 
 struct Frictionless {
   static constexpr Law kLaw = Law::frictionless;
   static constexpr const char* kName = "frictionless";
   static constexpr bool kFriction = false;
+  static const LawKernels kKernels;
 
   static TETHER_INLINE Regime solve(const LocalBlock& L, double bn, double, double, double* x,
                                     double&, int&) {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "../body_pass.hpp"
-#include "local_geometry.hpp"
+#include "kernels/body_pass.hpp"
+#include "law/local_geometry.hpp"
 
 namespace tether::contact::detail {
 namespace {

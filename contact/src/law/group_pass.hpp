@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "lanes.hpp"
-#include "local_geometry.hpp"
+#include "law/lanes.hpp"
+#include "law/local_geometry.hpp"
 
 #if TETHER_GROUPS
 

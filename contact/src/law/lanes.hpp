@@ -2,10 +2,10 @@
 // BSD-3-Clause
 #pragma once
 
-#include "../body_kernels.hpp"
+#include "kernels/body_kernels.hpp"
 
 #if TETHER_GROUPS
-#include "../body_lanes_avx2.hpp"
+#include "kernels/body_lanes_avx2.hpp"
 
 // The laws are those of the scalar files, with choices instead of branches: in a packing the
 // regimes of neighbours are hard to predict, and a wrong guess costs more than the arithmetic that

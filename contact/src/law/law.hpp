@@ -3,12 +3,13 @@
 
 #include <tether/contact/problem.hpp>
 
-#include "../body_kernels.hpp"
-#include "local_geometry.hpp"
+#include "kernels/body_kernels.hpp"
+#include "law/local_geometry.hpp"
 
 // A law is a struct of static members in a file of this folder:
 //
 //   kLaw, kName, kFriction       its enumerator, its name in files, whether mu counts at all
+//   kKernels                     its kernels, defined in its .cpp file
 //   solve(L, bn, b0, b1, x, lambda, evaluations)   one contact, warm-started from x and lambda
 //   solve_singular(L, bn, b0, b1, x, regime, evaluations)   the same for a singular block, or false
 //   derivative(L, bn, b0, b1, x, regime, out)      dx/db of that solution
@@ -17,7 +18,7 @@
 //                                distance from x is the residual `natural_map`
 //
 // and for four contacts at a time a struct of the members `rare` and `slide` (lanes.hpp). The .cpp
-// file of the law instantiates its kernels with TETHER_LAW (define_law.hpp); what is missing does
+// file of the law instantiates its kernels (define_law.hpp); what is missing does
 // not compile. A new law: its file, and a line in `Law` (one_contact.hpp) and in laws.cpp.
 
 namespace tether::contact::detail {
@@ -60,6 +61,13 @@ struct GroupKernels {
                   Coupled);  // null: sweep
 };
 
+// Programs that need no kernels need not link them: traits and kernels are apart.
+struct LawTraits {
+  Law law;
+  const char* name;
+  bool friction;
+};
+
 struct LawKernels {
   Law law;
   const char* name;
@@ -76,6 +84,7 @@ struct LawKernels {
   const AssembledKernels* mixed;
 };
 
+const LawTraits& traits(Law law);
 const LawKernels& kernels(Law law);
 
 }  // namespace tether::contact::detail

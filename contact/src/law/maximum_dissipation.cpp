@@ -1,12 +1,12 @@
 // Tether: maximum dissipation: rare branches and kernels. SPDX-License-Identifier: BSD-3-Clause
-#include "maximum_dissipation.hpp"
+#include "law/maximum_dissipation.hpp"
 
 #include <algorithm>
 #include <limits>
 
-#include "coulomb.hpp"
-#include "define_law.hpp"
-#include "maximum_dissipation_lanes.hpp"
+#include "law/coulomb.hpp"
+#include "law/define_law.hpp"
+#include "law/maximum_dissipation_lanes.hpp"
 
 namespace tether::contact::detail {
 
@@ -129,7 +129,6 @@ TETHER_ASSEMBLED_KERNELS(mixed, Mix)
 
 }  // namespace
 
-extern const LawKernels kCoulomb, kMaximumDissipation;
-constexpr LawKernels kMaximumDissipation = all_kernels(&kCoulomb, &mixed);
+constexpr LawKernels MaximumDissipation::kKernels = all_kernels(&Coulomb::kKernels, &mixed);
 
 }  // namespace tether::contact::detail

@@ -3,10 +3,12 @@
 
 #include <limits>
 
+#include "law/local_geometry.hpp"
 #include <tether/linalg/friction_cone.hpp>
-#include "local_geometry.hpp"
 
 namespace tether::contact::detail {
+
+struct LawKernels;
 
 // Sliding minimises the energy on the arc of the conic that sees the unconstrained minimum
 // y* = h / beta. With u at angle phi from u0 = y*/|y*| and t = tan(phi/2), the derivative along
@@ -17,6 +19,7 @@ struct MaximumDissipation {
   static constexpr Law kLaw = Law::maximum_dissipation;
   static constexpr const char* kName = "maximum_dissipation";
   static constexpr bool kFriction = true;
+  static const LawKernels kKernels;
   static constexpr int kMaxEvaluations = 80;
 
   static TETHER_INLINE Regime solve(const LocalBlock& L, double bn, double b0, double b1, double* x,

@@ -1,8 +1,8 @@
 // Tether: maximum dissipation for four contacts at a time. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "lanes.hpp"
-#include "maximum_dissipation.hpp"
+#include "law/lanes.hpp"
+#include "law/maximum_dissipation.hpp"
 
 #if TETHER_GROUPS
 

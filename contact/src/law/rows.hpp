@@ -2,7 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
-#include "law.hpp"
+#include "law/law.hpp"
 
 namespace tether::contact::detail {
 namespace {

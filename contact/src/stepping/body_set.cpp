@@ -5,7 +5,7 @@
 #include <string>
 #include <tether/contact/stepping.hpp>
 
-#include "rotation.hpp"
+#include "stepping/rotation.hpp"
 
 namespace tether::contact {
 

@@ -1,5 +1,5 @@
 // Tether: which balls are near each other. SPDX-License-Identifier: BSD-3-Clause
-#include "broadphase.hpp"
+#include "stepping/broadphase.hpp"
 
 #include <algorithm>
 #include <cmath>

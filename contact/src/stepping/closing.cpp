@@ -1,5 +1,5 @@
 // Tether: gaps that inelastic impacts close. SPDX-License-Identifier: BSD-3-Clause
-#include "closing.hpp"
+#include "stepping/closing.hpp"
 
 namespace tether::contact::detail {
 

@@ -4,9 +4,9 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "impacts.hpp"
-#include "moving_islands.hpp"
-#include "near_contacts.hpp"
+#include "stepping/impacts.hpp"
+#include "stepping/moving_islands.hpp"
+#include "stepping/near_contacts.hpp"
 
 namespace tether::contact::detail {
 

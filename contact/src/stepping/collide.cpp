@@ -1,5 +1,5 @@
 // Tether: where two shapes are near each other. SPDX-License-Identifier: BSD-3-Clause
-#include "collide.hpp"
+#include "stepping/collide.hpp"
 
 #include <algorithm>
 #include <cmath>

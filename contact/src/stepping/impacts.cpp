@@ -1,5 +1,5 @@
 // Tether: contacts that close within a step. SPDX-License-Identifier: BSD-3-Clause
-#include "impacts.hpp"
+#include "stepping/impacts.hpp"
 
 #include <cmath>
 

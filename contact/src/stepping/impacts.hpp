@@ -4,7 +4,7 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "near_contacts.hpp"
+#include "stepping/near_contacts.hpp"
 
 namespace tether::contact::detail {
 

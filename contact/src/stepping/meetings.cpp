@@ -1,5 +1,5 @@
 // Tether: how materials meet. SPDX-License-Identifier: BSD-3-Clause
-#include "meetings.hpp"
+#include "stepping/meetings.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Tether: contacts of a set of bodies. SPDX-License-Identifier: BSD-3-Clause
-#include "near_contacts.hpp"
+#include "stepping/near_contacts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "collide.hpp"
+#include "stepping/collide.hpp"
 
 namespace tether::contact::detail {
 

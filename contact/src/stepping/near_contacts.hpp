@@ -5,8 +5,8 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "broadphase.hpp"
-#include "meetings.hpp"
+#include "stepping/broadphase.hpp"
+#include "stepping/meetings.hpp"
 
 namespace tether::contact::detail {
 

@@ -1,10 +1,10 @@
 // Tether: restitution that cannot create energy. SPDX-License-Identifier: BSD-3-Clause
-#include "restitution.hpp"
+#include "stepping/restitution.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "rotation.hpp"
+#include "stepping/rotation.hpp"
 
 namespace tether::contact::detail {
 

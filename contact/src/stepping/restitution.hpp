@@ -4,8 +4,8 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "impacts.hpp"
-#include "moving_islands.hpp"
+#include "stepping/impacts.hpp"
+#include "stepping/moving_islands.hpp"
 
 namespace tether::contact::detail {
 

@@ -1,5 +1,5 @@
 // Tether: rotation of one rigid body over one step. SPDX-License-Identifier: BSD-3-Clause
-#include "rotation.hpp"
+#include "stepping/rotation.hpp"
 
 #include <Eigen/LU>
 #include <cmath>

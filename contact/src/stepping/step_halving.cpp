@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "stepper_parts.hpp"
+#include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
 

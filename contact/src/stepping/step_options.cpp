@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stepper_parts.hpp"
+#include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
 namespace detail {

@@ -1,7 +1,7 @@
 // Tether: the stages of a step. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
-#include "stepper_parts.hpp"
+#include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
 

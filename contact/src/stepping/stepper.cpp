@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "stepper_parts.hpp"
+#include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
 

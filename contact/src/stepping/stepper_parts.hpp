@@ -5,11 +5,11 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "closing.hpp"
-#include "impacts.hpp"
-#include "near_contacts.hpp"
-#include "restitution.hpp"
-#include "rotation.hpp"
+#include "stepping/closing.hpp"
+#include "stepping/impacts.hpp"
+#include "stepping/near_contacts.hpp"
+#include "stepping/restitution.hpp"
+#include "stepping/rotation.hpp"
 
 namespace tether::contact {
 

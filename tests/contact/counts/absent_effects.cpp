@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "../../../contact/src/body_kernels.hpp"
-#include "../../../contact/src/stepping/restitution.hpp"
-#include "../../../contact/src/stepping/rotation.hpp"
+#include "kernels/body_kernels.hpp"
+#include "stepping/restitution.hpp"
+#include "stepping/rotation.hpp"
 
 namespace tether::contact {
 namespace {

@@ -1,0 +1,171 @@
+// Tether: solves of the parts of a problem where sweeps do not settle. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "assembled/local_solves.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "assembled/automatic.hpp"
+
+namespace tether::contact::detail {
+
+struct LocalSolves::Part {
+  Search search;
+  Automatic automatic;
+};
+
+LocalSolves::LocalSolves() = default;
+LocalSolves::~LocalSolves() = default;
+
+void LocalSolves::reset(int contacts) {
+  n_ = contacts;
+  layers_ = 1;
+  most_ = 0;
+  solved_ = false;
+  z_.resize(at(n_));
+  error_.resize(at(n_));
+  place_.resize(at(n_));
+}
+
+// Parts: connected sets of contacts with an error near the largest and of `layers_` of neighbours.
+// False: there are none small enough.
+bool LocalSolves::find_parts(Search& search, const Packed& x) {
+  constexpr int kLargest = 300;  // contacts of a part
+  const System& system = search.system;
+  const Problem& p = system.problem();
+  search.system.blocks(x.data(), z_.data());
+  search.counts.work += search.sweep_cost;
+  most_ = 0;
+  for (int i = 0; i < n_; ++i) {
+    double d2 = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double d = z_[at(i)].v[c] - x[at(i)].v[c];
+      d2 += d * d;
+    }
+    const double weight = system.weight(i);
+    error_[at(i)] = weight * weight * std::sqrt(d2) * system.inverse_scale(i);
+    most_ = std::max(most_, error_[at(i)]);
+  }
+  if (!(most_ > 0) || !std::isfinite(most_)) return false;
+  // Where many contacts have errors of one size there is no part to solve: solving some of them
+  // only disturbs the others.
+  constexpr double kNearLargest = 0.1, kFew = 0.03;
+  int many = 0;
+  for (double e : error_) many += e > kNearLargest * most_;
+  if (many > kFew * n_) return false;
+  constexpr int kOutside = -1, kReached = -2;
+  for (double cut : {0.3, 0.6, 0.9}) {
+    std::fill(place_.begin(), place_.end(), kOutside);
+    std::vector<int> reached;
+    for (int i = 0; i < n_; ++i)
+      if (error_[at(i)] > cut * most_) reached.push_back(i);
+    for (int i : reached) place_[at(i)] = kReached;
+    std::size_t begin = 0;
+    for (int layer = 0; layer < layers_; ++layer) {
+      const std::size_t end = reached.size();
+      for (; begin < end; ++begin)
+        for (int k = p.row_start()[at(reached[begin])]; k < p.row_start()[at(reached[begin] + 1)];
+             ++k) {
+          const int j = p.columns()[at(k)];
+          if (place_[at(j)] != kOutside) continue;
+          place_[at(j)] = kReached;
+          reached.push_back(j);
+        }
+    }
+    if (static_cast<int>(reached.size()) > n_ / 3) continue;
+    list_.clear();
+    start_.assign(1, 0);
+    for (int seed : reached) {
+      if (place_[at(seed)] != kReached) continue;
+      const std::size_t first = list_.size();
+      list_.push_back(seed);
+      place_[at(seed)] = 0;
+      for (std::size_t k = first; k < list_.size(); ++k)
+        for (int q = p.row_start()[at(list_[k])]; q < p.row_start()[at(list_[k] + 1)]; ++q) {
+          const int j = p.columns()[at(q)];
+          if (place_[at(j)] != kReached) continue;
+          place_[at(j)] = 0;
+          list_.push_back(j);
+        }
+      if (list_.size() - first > kLargest) {
+        list_.resize(first);
+        continue;
+      }
+      std::sort(list_.begin() + static_cast<std::ptrdiff_t>(first), list_.end());
+      start_.push_back(static_cast<int>(list_.size()));
+    }
+    if (start_.size() > 1) return true;
+  }
+  return false;
+}
+
+bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x) {
+  constexpr double kGain = 1e-3;  // of the error
+  const System& system = search.system;
+  const Problem& p = system.problem();
+  const int first = start_[at(part)], m = start_[at(part + 1)] - first;
+  const int* contacts = list_.data() + first;
+  std::fill(place_.begin(), place_.end(), -1);
+  for (int r = 0; r < m; ++r) place_[at(contacts[r])] = r;
+  std::vector<MatrixBlock> blocks;
+  Eigen::VectorXd b(3 * m), mu(m);
+  Packed start(at(m));
+  for (int r = 0; r < m; ++r) {
+    const int i = contacts[r];
+    double rest[3] = {p.packed_b()[at(i)].v[0], p.packed_b()[at(i)].v[1], p.packed_b()[at(i)].v[2]};
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      const int j = p.columns()[at(k)];
+      const double* A = p.blocks()[at(k)].column;
+      if (place_[at(j)] < 0) {
+        for (int c = 0; c < 3; ++c)
+          for (int q = 0; q < 3; ++q) rest[q] -= A[4 * c + q] * x[at(j)].v[c];
+        continue;
+      }
+      MatrixBlock block{r, place_[at(j)], Eigen::Matrix3d()};
+      for (int c = 0; c < 3; ++c)
+        for (int q = 0; q < 3; ++q) block.value(q, c) = A[4 * c + q];
+      blocks.push_back(block);
+    }
+    for (int q = 0; q < 3; ++q) b[3 * r + q] = rest[q];
+    mu[r] = p.mu(i);
+    start[at(r)] = x[at(i)];
+  }
+  search.counts.work += 200.0 * static_cast<double>(blocks.size());
+  if (!b.allFinite()) return false;
+  const Problem problem = Problem::sparse(3, std::move(blocks), b, mu);
+  Options options = search.options;
+  options.history = false;
+  options.tolerance = kGain * most_;
+  options.max_work = budget;
+  Search& local = part_->search;
+  local.reset(problem, options, Measure::fixed_point);
+  local.system.belong_to(system, contacts);
+  local.system.to_own_units(start.data());
+  part_->automatic.reset(m, options, false);
+  const bool solved = part_->automatic.run_part(local, start) == Status::solved;
+  search.counts.add(local.counts);
+  if (!solved) return false;
+  local.system.to_given_units(local.best.data());
+  for (int r = 0; r < m; ++r) x[at(contacts[r])] = local.best[at(r)];
+  return true;
+}
+
+bool LocalSolves::run(Search& search, Packed& x, double budget) {
+  constexpr int kMostLayers = 3;
+  const double before = most_;
+  if (!find_parts(search, x)) return false;
+  // What comes back after it was solved hangs on more of its neighbours.
+  if (solved_ && most_ < 0.5 * before)
+    layers_ = 1;
+  else if (solved_)
+    layers_ = std::min(kMostLayers, layers_ + 1);
+  if (!part_) part_ = std::make_unique<Part>();
+  bool any = false;
+  for (int part = 0; part + 1 < static_cast<int>(start_.size()) && !search.exhausted(); ++part)
+    any = solve_part(search, part, budget, x) || any;
+  if (!any) layers_ = layers_ > 1 ? layers_ - 1 : 2;
+  solved_ = any;
+  return any;
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,40 @@
+// Tether: the best point so far and the work spent on it. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+
+#include "assembled/system.hpp"
+
+namespace tether::contact::detail {
+
+// Stages improve the same best point; none may overwrite it by a worse one (README, section 6).
+// All decisions use residuals and operation counts, never the clock.
+struct Search {
+  System system;
+  Options options;
+  Measure measure = Measure::natural_map;
+  Counts counts;
+  std::vector<HistoryEntry> history;
+  Packed best;
+  double best_error = std::numeric_limits<double>::infinity();
+  double work_end = 0;                   // of the present attempt
+  double sweep_cost = 0, test_cost = 0;  // estimated ns
+
+  void reset(const Problem& problem, const Options& o, Measure m);
+  // Measures x, keeps it if it is the best.
+  double test(const PackedVector* x, Method stage);
+  bool solved() const { return best_error <= options.tolerance; }
+  bool exhausted() const {
+    return counts.work > work_end ||
+           (best_error <= options.enough && counts.work > 0.25 * options.max_work);
+  }
+  void count_sweep(double factor = 1) {
+    ++counts.sweeps;
+    counts.work += factor * sweep_cost;
+  }
+
+ private:
+  Packed scratch_;
+};
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,255 @@
+// Tether: solver of contact problems. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/solver.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <unordered_map>
+
+#include "assembled/automatic.hpp"
+#include "assembled/solver_words.hpp"
+#include "assembled/stages/convex_relaxation.hpp"
+#include "problem/refuse.hpp"
+
+namespace tether::contact {
+
+using detail::at;
+using detail::Packed;
+
+namespace {
+
+void check(const Options& o) {
+  using detail::require;
+  require(o.tolerance > 0 && std::isfinite(o.tolerance), "tolerance", o.tolerance,
+          "must be finite and > 0");
+  require(o.relaxation > 0 && o.relaxation < 2, "relaxation", o.relaxation,
+          "must lie between 0 and 2");
+  require(o.method != Method::jacobi || o.relaxation <= 1, "relaxation", o.relaxation,
+          "must lie in (0, 1] for jacobi");
+  require(o.max_sweeps >= 1, "max_sweeps", o.max_sweeps, "must be >= 1");
+  require(o.max_work > 0, "max_work", o.max_work, "must be > 0");
+  require(o.enough >= 0, "enough", o.enough, "must be >= 0");
+  require(o.anderson_depth >= 1 && o.anderson_depth <= detail::Anderson::kMaxDepth,
+          "anderson_depth", o.anderson_depth, "must lie in 1 .. 20");
+}
+
+}  // namespace
+
+struct Solver::Implementation {
+  Options options;
+  detail::Search search;
+  detail::Automatic stages;
+  Packed x, z;
+  std::unordered_map<std::uint64_t, PackedVector> memory;
+
+  void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
+  Status automatic();
+  Status plain();
+  void finish(const Problem& problem, Status status, Solution& out);
+};
+
+Status Solver::Implementation::automatic() {
+  // Nothing is allocated before a first sweep has failed.
+  search.test(x.data(), Method::gauss_seidel);
+  if (search.solved()) return Status::solved;
+  search.system.sweep(x.data());
+  search.count_sweep();
+  search.test(x.data(), Method::gauss_seidel);
+  if (search.solved()) return Status::solved;
+  return stages.run(search);
+}
+
+// gauss_seidel, sor, jacobi
+Status Solver::Implementation::plain() {
+  detail::System& system = search.system;
+  const Problem& problem = system.problem();
+  double damping = 1;
+  if (options.method == Method::jacobi) {
+    // Largest eigenvalue of D^-1 A <= most blocks in a row for A = J M^-1 J'.
+    int most = 1;
+    for (int i = 0; i < system.size(); ++i)
+      most = std::max(most, problem.row_start()[at(i + 1)] - problem.row_start()[at(i)]);
+    damping = options.relaxation * std::min(1.0, 1.8 / most);
+  } else if (options.method == Method::sor) {
+    damping = options.relaxation;
+  }
+  z.resize(x.size());
+  search.test(x.data(), options.method);
+  int next_test = 1, window = 2000, window_end = 2000;
+  double window_error = search.best_error;
+  for (int sweep = 1; sweep <= options.max_sweeps && !search.solved(); ++sweep) {
+    search.count_sweep();
+    if (options.method == Method::gauss_seidel) {
+      system.sweep(x.data());
+    } else {
+      if (options.method == Method::jacobi) {
+        system.blocks(x.data(), z.data());
+      } else {
+        z = x;
+        system.sweep(z.data());
+      }
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        for (int c = 0; c < 3; ++c) x[i].v[c] += damping * (z[i].v[c] - x[i].v[c]);
+        detail::clip_cone(problem.locals()[i].mu, x[i].v);
+      }
+    }
+    if (sweep >= next_test || sweep == options.max_sweeps) {
+      search.test(x.data(), options.method);
+      next_test = sweep + 1 + sweep / 8;
+    }
+    if (search.exhausted()) return Status::work_limit;
+    if (sweep >= window_end) {
+      if (search.best_error > 0.999 * window_error) return stages.give_up(search);
+      window_error = search.best_error;
+      window *= 2;
+      window_end = sweep + window;
+    }
+  }
+  return search.solved() ? Status::solved : Status::work_limit;
+}
+
+void Solver::Implementation::finish(const Problem& problem, Status status, Solution& out) {
+  detail::System& system = search.system;
+  const std::size_t n = x.size();
+  out.status = status;
+  out.error = search.best_error;
+  out.counts = search.counts;
+  out.history.swap(search.history);
+  problem.unpack(search.best, out.impulses);
+  detail::velocities(problem, search.best.data(), x.data());
+  problem.unpack(x, out.velocities);
+  out.infeasible_direction.clear();
+  for (const PackedVector& d : stages.proof())
+    out.infeasible_direction.insert(out.infeasible_direction.end(), d.v, d.v + problem.dimension());
+  out.regimes.resize(n);
+  out.replaced.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double* r = search.best[i].v;
+    const double reach = system.friction(static_cast<int>(i)) * r[0];
+    const double t2 = r[1] * r[1] + r[2] * r[2];
+    out.regimes[i] = !(r[0] > 0)                        ? Regime::separating
+                     : t2 >= reach * reach * (1 - 1e-9) ? Regime::sliding
+                                                        : Regime::sticking;
+    if (system.any_replaced() && system.replaced(static_cast<int>(i))) {
+      out.replaced.push_back(static_cast<int>(i));
+    }
+  }
+  out.advice = detail::advice(status, options);
+}
+
+void Solver::Implementation::solve(const Problem& problem, const linalg::VectorView* start,
+                                   Solution& out) {
+  const std::size_t n = static_cast<std::size_t>(problem.contacts());
+  search.reset(problem, options,
+               options.measure == Measure::automatic ? Measure::fixed_point : options.measure);
+  stages.reset(problem.contacts(), options);
+  if (start) {
+    if (start->size() != problem.b().size())
+      detail::refuse_size("start", start->size(), problem.b().size(), "as many as b has");
+    detail::require_finite("start", *start);
+    x = problem.pack(*start);
+  } else {
+    x.assign(n, PackedVector());
+    if (options.warm_start) {
+      for (std::size_t i = 0; i < n; ++i) {
+        const auto found = memory.find(problem.id(static_cast<int>(i)));
+        if (found != memory.end()) x[i] = found->second;
+      }
+    }
+  }
+  search.system.to_own_units(x.data());
+  for (std::size_t i = 0; i < n; ++i) {
+    if (search.system.at_rest(static_cast<int>(i))) {
+      x[i] = {};
+    } else if (!search.system.law().friction) {
+      x[i].v[1] = x[i].v[2] = 0;
+      x[i].v[0] = std::max(x[i].v[0], 0.0);
+    } else {
+      detail::clip_cone(problem.locals()[i].mu, x[i].v);
+    }
+  }
+  Status status = Status::unsolved;
+  switch (options.method) {
+    case Method::automatic:
+      status = automatic();
+      break;
+    case Method::gauss_seidel:
+    case Method::sor:
+    case Method::jacobi:
+      status = plain();
+      break;
+    case Method::anderson: {
+      search.test(x.data(), Method::anderson);
+      if (search.solved()) {
+        status = Status::solved;
+        break;
+      }
+      stages.prepare(search);
+      stages.sweeps.start(x.data());
+      detail::AcceleratedSweeps::Leave leave;
+      leave.most_sweeps = options.max_sweeps;
+      stages.sweeps.run(search, leave);
+      status = search.solved() ? Status::solved : stages.give_up(search);
+      break;
+    }
+    case Method::admm:
+      search.test(x.data(), Method::admm);
+      stages.prepare(search);
+      stages.admm.start(search, x.data());
+      if (!search.solved()) stages.admm.run(search, options.max_sweeps, true, false);
+      status = search.solved() ? Status::solved : stages.give_up(search);
+      break;
+    case Method::proximal_newton:
+      search.test(x.data(), Method::gauss_seidel);
+      stages.prepare(search);
+      search.system.sweep(x.data());
+      search.count_sweep();
+      search.test(x.data(), Method::gauss_seidel);
+      if (!search.solved()) stages.newton.run(search, x.data(), 60);
+      status = search.solved() ? Status::solved : stages.give_up(search);
+      break;
+    case Method::interior_point:
+      search.test(x.data(), Method::interior_point);
+      stages.prepare(search);
+      if (!search.solved()) stages.interior.run(search, options.max_sweeps);
+      status = search.solved() ? Status::solved : stages.give_up(search);
+      break;
+    case Method::convex_relaxation: {
+      const bool done = detail::solve_convex_relaxation(search, x);
+      search.test(x.data(), Method::convex_relaxation);
+      status = search.solved() ? Status::solved : done ? Status::relaxed : Status::work_limit;
+      break;
+    }
+  }
+  search.system.to_given_units(search.best.data());
+  if (options.warm_start) {
+    memory.clear();
+    for (std::size_t i = 0; i < n; ++i) memory[problem.id(static_cast<int>(i))] = search.best[i];
+  }
+  finish(problem, status, out);
+}
+
+Solver::Solver(const Options& options) : implementation_(new Implementation) {
+  check(options);
+  implementation_->options = options;
+}
+Solver::~Solver() = default;
+Solver::Solver(Solver&&) noexcept = default;
+Solver& Solver::operator=(Solver&&) noexcept = default;
+
+Solution Solver::solve(const Problem& problem) {
+  Solution out;
+  implementation_->solve(problem, nullptr, out);
+  return out;
+}
+Solution Solver::solve(const Problem& problem, const linalg::VectorView& start) {
+  Solution out;
+  implementation_->solve(problem, &start, out);
+  return out;
+}
+void Solver::solve(const Problem& problem, Solution& solution) {
+  implementation_->solve(problem, nullptr, solution);
+}
+const Options& Solver::options() const { return implementation_->options; }
+
+}  // namespace tether::contact

@@ -1,0 +1,183 @@
+// Tether: Gauss-Seidel sweeps with safeguarded Anderson acceleration. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "assembled/stages/accelerated_sweeps.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::contact::detail {
+
+void AcceleratedSweeps::reset(int contacts, int depth) {
+  n_ = contacts;
+  depth_ = depth;
+  x_.resize(at(n_));
+  g_.resize(at(n_));
+  f_.resize(at(n_));
+  regime_.assign(at(n_), -1);
+  anderson_.reset(n_, depth);
+}
+
+void AcceleratedSweeps::start(const PackedVector* x) {
+  std::copy(x, x + n_, x_.begin());
+  anderson_.clear();
+  sweeps_ = quiet_ = slow_ = 0;
+  quiet_asked_ = kLeastQuiet;
+  accelerate_ = n_ <= kFew;
+  eager_ = accelerate_;
+  earlier_ = {};
+  later_ = {kRecent / 2, 0};
+}
+
+// What was seen of the rate is the past; when the next test is due is not.
+void AcceleratedSweeps::replace(const PackedVector* x) {
+  std::copy(x, x + n_, x_.begin());
+  anderson_.clear();
+  slow_ = 0;
+  eager_ = false;
+  least_f_ = window_f_ = std::numeric_limits<double>::infinity();
+  earlier_ = {};
+  later_ = {sweeps_, 0};
+}
+
+// x_n > 0 and the cone: 0 separated, 1 sticking, 2 sliding. Counts what is not as in the last
+// sweep.
+int AcceleratedSweeps::toggles(const System& system) {
+  int count = 0;
+  for (int i = 0; i < n_; ++i) {
+    const double* g = g_[at(i)].v;
+    const double reach = system.problem().locals()[at(i)].mu * g[0];
+    const bool inside = g[1] * g[1] + g[2] * g[2] < reach * reach * (1 - 1e-10);
+    const char regime = !(g[0] > 0) ? 0 : inside ? 1 : 2;
+    count += regime != regime_[at(i)];
+    regime_[at(i)] = regime;
+  }
+  return count;
+}
+
+// Extrapolation serves where the contacts have settled: across a change of regime it throws sweeps
+// back, and where they toggle for good it keeps them toggling. So it begins after a few quiet
+// sweeps and ends with the quiet; each failure doubles the quiet that is asked for, a tenth of |f|
+// pays it back.
+bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
+  const bool calm = toggled <= std::max(kToggles, static_cast<int>(kToggledShare * n_));
+  quiet_ = calm ? quiet_ + 1 : 0;
+  if (eager_ && sweep == 1) {
+    least_f_ = begun_f_ = f;
+    window_end_ = kWindow;
+  }
+  if (eager_ && sweep < kWindow) {
+    if (f > 2 * least_f_) {
+      anderson_.clear();
+      least_f_ = f;
+      return false;
+    }
+    least_f_ = std::min(least_f_, f);
+    return true;
+  }
+  if (eager_) window_f_ = std::numeric_limits<double>::infinity();
+  eager_ = false;
+  if (!accelerate_) {
+    if (quiet_ < quiet_asked_) return false;
+    accelerate_ = true;
+    anderson_.clear();
+    least_f_ = begun_f_ = window_f_ = f;
+    window_end_ = sweep + kWindow;
+    return true;
+  }
+  bool failed = !calm || f > 2 * least_f_;
+  if (!failed && sweep >= window_end_) {
+    failed = f > 0.7 * window_f_;
+    window_f_ = f;
+    window_end_ = sweep + kWindow;
+  }
+  if (failed) {
+    accelerate_ = false;
+    quiet_ = 0;
+    quiet_asked_ = std::min(2 * quiet_asked_, kMostQuiet);
+    return false;
+  }
+  if (f < 0.1 * begun_f_) {
+    begun_f_ = f;
+    quiet_asked_ = kLeastQuiet;
+  }
+  least_f_ = std::min(least_f_, f);
+  return true;
+}
+
+// Sweeps to the tolerance by the rate of |f| over the last ten, or over the last half or three
+// quarters of all: where contacts toggle the one is noise, where they have just settled the other
+// is the past.
+double AcceleratedSweeps::forecast(int sweep, double f, double log_gain) const {
+  double most = std::numeric_limits<double>::infinity();
+  if (sweep <= kRecent) return 0;
+  const auto left = [&](double earlier, int sweeps) {
+    const double rate = std::log(f / earlier) / sweeps;
+    return rate < std::log(0.995) || (sweeps > 200 && rate < -1e-4) ? log_gain / rate : most;
+  };
+  double best = left(recent_[sweep % kRecent], kRecent);
+  if (earlier_.sweep > 0) best = std::min(best, left(earlier_.f, sweep - earlier_.sweep));
+  return best;
+}
+
+void AcceleratedSweeps::run(Search& search, const Leave& leave) {
+  System& system = search.system;
+  const double accelerated_cost = 0.8 * 4 * n_ * depth_;
+  const double begin = search.counts.work;
+  double last_error = 0, last_f = 0;
+  int next_test = sweeps_ + 1;
+  const int first = sweeps_;
+  for (;;) {
+    const int sweep = ++sweeps_;
+    std::copy(x_.begin(), x_.end(), g_.begin());
+    system.sweep(g_.data());
+    search.count_sweep();
+    double f2 = 0;
+    for (int i = 0; i < n_; ++i) {
+      const double weight = system.weight(i);
+      for (int c = 0; c < 3; ++c) {
+        const double f = weight * (g_[at(i)].v[c] - x_[at(i)].v[c]);
+        f_[at(i)].v[c] = f;
+        f2 += f * f;
+      }
+    }
+    const double f = std::sqrt(f2);
+    if (sweep >= next_test || last_error * f < 1.5 * search.options.tolerance * last_f) {
+      last_error = search.test(g_.data(), Method::anderson);
+      last_f = f;
+      if (search.solved()) return;
+      next_test = std::max(next_test, sweep + 1 + sweep / 8);
+    }
+    if (search.exhausted()) return;
+    if (leave.most_sweeps > 0 && sweep - first >= leave.most_sweeps) return;
+    if (leave.most_work > 0 && search.counts.work - begin >= leave.most_work) return;
+    // Near the tolerance sweeps get more time: their rate is irregular, other stages have a fixed
+    // cost.
+    const double patience = last_error < 30 * search.options.tolerance ? 3 : 1;
+    if (leave.price > 0 && search.counts.work - begin >= patience * leave.least_work) {
+      const double left = forecast(sweep, f, std::log(search.options.tolerance / last_error));
+      // What is spent already counts as well: at the price of the other stages only a sure end is
+      // waited for.
+      const double allowed =
+          std::max(0.1 * leave.price, leave.price - (search.counts.work - begin));
+      const bool slow = left * (search.sweep_cost + accelerated_cost) > allowed;
+      slow_ = slow ? slow_ + 1 : 0;
+      // Forecasts are noise: they have to agree for a while.
+      if (slow_ > std::min(sweep / 8, kPersuaded)) return;
+    }
+    recent_[sweep % kRecent] = f;
+    if (sweep >= 2 * later_.sweep) {
+      earlier_ = later_;
+      later_ = {sweep, f};
+    }
+    if (!extrapolates(sweep, f, toggles(system))) {
+      std::copy(g_.begin(), g_.end(), x_.begin());
+      continue;
+    }
+    search.counts.work += accelerated_cost;
+    anderson_.step(g_.data(), f_.data(), x_.data());
+    for (int i = 0; i < n_; ++i) clip_cone(system.problem().locals()[at(i)].mu, x_[at(i)].v);
+  }
+}
+
+}  // namespace tether::contact::detail

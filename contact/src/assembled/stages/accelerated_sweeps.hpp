@@ -1,0 +1,51 @@
+// Tether: Gauss-Seidel sweeps with safeguarded Anderson acceleration. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include "assembled/search.hpp"
+#include <tether/linalg/anderson.hpp>
+
+namespace tether::contact::detail {
+
+class AcceleratedSweeps {
+ public:
+  void reset(int contacts, int depth);
+  void start(const PackedVector* x);    // next iterate; forgets what was seen of others
+  void replace(const PackedVector* x);  // next iterate, near the last one
+  const PackedVector* point() const { return g_.data(); }
+
+  struct Leave {            // conditions under which the stage gives way; work in estimated ns
+    double price = 0;       // of the other stages: leave if the predicted rest costs more; 0: stay
+    double least_work = 0;  // spent here before leaving is considered
+    double most_work = 0;   // > 0: leave after so much
+    int most_sweeps = 0;    // > 0: leave after so many
+  };
+  // Until solved, exhausted, or the conditions hold.
+  void run(Search& search, const Leave& leave);
+
+ private:
+  static constexpr int kToggles = 4, kLeastQuiet = 3, kMostQuiet = 320, kWindow = 60, kRecent = 10,
+                       kPersuaded = 40, kFew = 500;
+  static constexpr double kToggledShare = 0.003;
+
+  int toggles(const System& system);
+  bool extrapolates(int sweep, double f, int toggled);
+  double forecast(int sweep, double f, double log_gain) const;
+
+  int n_ = 0, depth_ = 10;
+  Anderson anderson_;
+  std::vector<char> regime_;  // of each contact after the last sweep
+  // f: weighted change of a sweep.
+  bool accelerate_ = false, eager_ = false;
+  int sweeps_ = 0, quiet_ = 0, slow_ = 0, quiet_asked_ = kLeastQuiet, window_end_ = 0;
+  double least_f_ = 0, begun_f_ = 0, window_f_ = 0;
+  double recent_[kRecent] = {};
+  struct Mark {
+    int sweep = 0;
+    double f = 0;
+  };
+  Mark earlier_, later_;
+  Packed x_, g_, f_;
+};
+
+}  // namespace tether::contact::detail

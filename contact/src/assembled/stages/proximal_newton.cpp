@@ -1,0 +1,242 @@
+// Tether: proximal point iteration with semismooth Newton inside. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "assembled/stages/proximal_newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tether::contact::detail {
+namespace {
+
+// out = P B for row-major P and packed B.
+TETHER_INLINE void multiply(const double* P, const double* B, double scale, double* out) {
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r)
+      out[4 * c + r] =
+          scale * (P[3 * r] * B[4 * c] + P[3 * r + 1] * B[4 * c + 1] + P[3 * r + 2] * B[4 * c + 2]);
+    out[4 * c + 3] = 0;
+  }
+}
+
+}  // namespace
+
+void ProximalNewton::reset(int contacts) {
+  n_ = contacts;
+  for (Packed* p :
+       {&x_, &z_, &dx_, &trial_, &trial_z_, &swept_, &swept_z_, &anchor_, &f_, &saved_, &start_})
+    p->resize(at(n_));
+  regimes_.resize(at(n_));
+  derivatives_.resize(at(n_));
+  active_.resize(at(n_));
+  anderson_.reset(n_, kDepth);
+  ordered_ = false;
+}
+
+double ProximalNewton::cost(const Search& search) const {
+  const double blocks = static_cast<double>(search.system.problem().blocks().size());
+  const double operations =
+      ordered_ ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
+  return 4 * operations + 3.5 * search.sweep_cost + 25 * blocks;
+}
+
+double ProximalNewton::residual(Search& search, const Packed& x, Packed& z,
+                                const Proximal& proximal, bool derive) {
+  search.counts.work += search.sweep_cost;
+  return search.system.blocks(x.data(), z.data(), proximal, derive ? regimes_.data() : nullptr,
+                              derive ? derivatives_.data() : nullptr);
+}
+
+// F + dx + Phi'/(1+tau) sum_{j != i} A_ij dx_j = 0 with F = x - z; separated contacts are known.
+bool ProximalNewton::direction(Search& search, double tau) {
+  const Problem& p = search.system.problem();
+  if (!ordered_) {
+    lu_.order(pattern(p));
+    ordered_ = true;
+  }
+  for (int i = 0; i < n_; ++i) active_[at(i)] = regimes_[at(i)] != Regime::separating;
+  lu_.analyse(pattern(p), active_.data());
+  const double scale = 1 / (1 + tau);
+  for (int i = 0; i < n_; ++i)
+    for (int c = 0; c < 4; ++c) dx_[at(i)].v[c] = z_[at(i)].v[c] - x_[at(i)].v[c];
+  bool regular = true;
+  for (int r = 0; r < lu_.size(); ++r) {
+    const int i = lu_.block_row(r);
+    const double* P = derivatives_[at(i)].d;
+    double rhs[3] = {0, 0, 0};
+    lu_.begin_row(r);
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      const int j = p.columns()[at(k)];
+      const double* A = p.blocks()[at(k)].column;
+      if (active_[at(j)]) {
+        alignas(32) double block[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+        if (j != i) multiply(P, A, scale, block);
+        lu_.add(j, block);
+      } else {
+        const double* d = dx_[at(j)].v;
+        for (int c = 0; c < 3; ++c) rhs[c] += A[c] * d[0] + A[4 + c] * d[1] + A[8 + c] * d[2];
+      }
+    }
+    regular = lu_.end_row() && regular;
+    for (int c = 0; c < 3; ++c)
+      dx_[at(i)].v[c] -=
+          scale * (P[3 * c] * rhs[0] + P[3 * c + 1] * rhs[1] + P[3 * c + 2] * rhs[2]);
+  }
+  ++search.counts.factorisations;
+  search.counts.work += cost(search);
+  if (!regular) return false;
+  lu_.solve(dx_.data());
+  double sum = 0;
+  for (int i = 0; i < n_; ++i)
+    for (int c = 0; c < 3; ++c) sum += dx_[at(i)].v[c] * dx_[at(i)].v[c];
+  return std::isfinite(sum);
+}
+
+int ProximalNewton::inner(Search& search, double tau) {
+  const Proximal proximal{tau, anchor_.data()};
+  double res = residual(search, x_, z_, proximal, true);
+  const double target = 0.1 * res;
+  if (res == 0) return 1;
+  std::copy(x_.begin(), x_.end(), start_.begin());
+  for (int iteration = 1; iteration <= 12; ++iteration) {
+    if (!direction(search, tau)) return -1;
+    bool accepted = false;
+    for (double t : {1.0, 0.4, 0.16, 0.064}) {
+      for (int i = 0; i < n_; ++i) {
+        for (int c = 0; c < 3; ++c) trial_[at(i)].v[c] = x_[at(i)].v[c] + t * dx_[at(i)].v[c];
+      }
+      double found = residual(search, trial_, trial_z_, proximal, false);
+      if (!(found <= target)) {
+        std::copy(trial_.begin(), trial_.end(), swept_.begin());
+        search.system.sweep(swept_.data(), proximal);
+        search.count_sweep();
+        const double other = residual(search, swept_, swept_z_, proximal, false);
+        if (!(found <= other)) {
+          std::swap(trial_, swept_);
+          found = other;
+        }
+      }
+      if (found < (1 - 0.1 * t) * res) {
+        std::swap(x_, trial_);
+        accepted = true;
+        break;
+      }
+    }
+    if (!accepted) {
+      // Watchdog: a few full steps, each followed by a sweep, may cross a kink.
+      std::copy(x_.begin(), x_.end(), saved_.begin());
+      for (int step = 0; step < 4 && !accepted; ++step) {
+        if (step > 0) {
+          residual(search, x_, z_, proximal, true);
+          if (!direction(search, tau)) break;
+        }
+        for (int i = 0; i < n_; ++i) {
+          for (int c = 0; c < 3; ++c) x_[at(i)].v[c] += dx_[at(i)].v[c];
+        }
+        search.system.sweep(x_.data(), proximal);
+        search.count_sweep();
+        accepted = residual(search, x_, trial_z_, proximal, false) < 0.9 * res;
+        if (search.exhausted()) break;
+      }
+      if (!accepted) {
+        std::copy(saved_.begin(), saved_.end(), x_.begin());
+        return -1;
+      }
+    }
+    res = residual(search, x_, z_, proximal, true);
+    // x may be outside of the cone by round-off; the block solutions z never are.
+    search.test(z_.data(), Method::proximal_newton);
+    if (search.solved() || search.exhausted()) return iteration;
+    if (res <= target) return iteration;
+  }
+  return 13;
+}
+
+int ProximalNewton::correct(Search& search, double tau, const PackedVector* anchor, Packed& x,
+                            int most) {
+  constexpr double kExact = 0.1;  // residual / proximal term
+  const auto& locals = search.system.problem().locals();
+  std::copy(anchor, anchor + n_, anchor_.begin());
+  std::copy(x.begin(), x.end(), x_.begin());
+  for (int i = 0; i < n_; ++i) clip_cone(locals[at(i)].mu, x_[at(i)].v);
+  const Proximal proximal{tau, anchor_.data()};
+  double res = residual(search, x_, z_, proximal, true);
+  for (int step = 1; step <= most; ++step) {
+    if (!direction(search, tau)) return 0;
+    double move = 0;
+    for (int i = 0; i < n_; ++i)
+      for (int c = 0; c < 3; ++c) x_[at(i)].v[c] += dx_[at(i)].v[c];
+    const double next = residual(search, x_, z_, proximal, true);
+    for (int i = 0; i < n_; ++i)
+      for (int c = 0; c < 3; ++c) {
+        const double d = search.system.weight(i) * (z_[at(i)].v[c] - anchor_[at(i)].v[c]);
+        move += d * d;
+      }
+    if (next <= kExact * tau * std::sqrt(move)) {
+      std::copy(z_.begin(), z_.end(), x.begin());
+      return step;
+    }
+    // The first step may cross kinks; after it the iteration converges or has failed.
+    if (!(next < (step == 1 ? 10 : 0.5) * res)) return 0;
+    res = next;
+  }
+  return 0;
+}
+
+void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
+  ++search.counts.newton_phases;
+  std::copy(x, x + n_, x_.begin());
+  const auto& locals = search.system.problem().locals();
+  double tau = 1e-4, tau_failed = 0;
+  double least_step = std::numeric_limits<double>::infinity();
+  double reference = search.best_error;
+  int since_gain = 0, failures = 0;
+  anderson_.clear();
+  for (int outer = 0; outer < most; ++outer) {
+    std::copy(x_.begin(), x_.end(), anchor_.begin());
+    const int steps = inner(search, tau);
+    if (search.solved() || search.exhausted()) return;
+    if (search.best_error < 0.97 * reference) {
+      reference = search.best_error;
+      since_gain = 0;
+    } else if (++since_gain >= 15) {
+      return;
+    }
+    if (steps < 0) {
+      tau_failed = tau;
+      tau = std::min(5 * tau, 10.0);
+      std::copy(anchor_.begin(), anchor_.end(), x_.begin());
+      anderson_.clear();
+      if (++failures >= 4) return;
+      continue;
+    }
+    failures = 0;
+    if (steps <= 2) {
+      tau *= 0.05;
+    } else if (steps <= 4) {
+      tau *= 0.2;
+    }
+    tau_failed *= 0.8;
+    tau = std::max({tau, 2.5 * tau_failed, 1e-12});
+    double f2 = 0;
+    for (int i = 0; i < n_; ++i) {
+      const double weight = search.system.weight(i);
+      for (int c = 0; c < 3; ++c) {
+        const double f = weight * (x_[at(i)].v[c] - anchor_[at(i)].v[c]);
+        f_[at(i)].v[c] = f;
+        f2 += f * f;
+      }
+    }
+    const double f = std::sqrt(f2);
+    if (f > 2 * least_step) {
+      anderson_.clear();
+      least_step = f;
+      continue;
+    }
+    least_step = std::min(least_step, f);
+    std::copy(x_.begin(), x_.end(), trial_.begin());
+    anderson_.step(trial_.data(), f_.data(), x_.data());
+    for (int i = 0; i < n_; ++i) clip_cone(locals[at(i)].mu, x_[at(i)].v);
+  }
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,175 @@
+// Tether: residuals of impulses between bodies. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/body_solver.hpp>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "assembled/system.hpp"
+#include "body_sweeps/contact_graph.hpp"
+#include "problem/contact_side.hpp"
+#include "problem/criterion.hpp"
+#include "problem/refuse.hpp"
+
+namespace tether::contact {
+
+using detail::at;
+
+namespace {
+
+// The islands of BodySolver with their velocity scales.
+class Scales {
+ public:
+  Scales(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+         bool friction, const std::vector<LocalBlock>& blocks) {
+    const std::size_t n = contacts.size();
+    std::vector<int> first(n), second(n);
+    std::vector<detail::Side> sides;
+    for (std::size_t i = 0; i < n; ++i) {
+      const PointContact& c = contacts[i];
+      const bool turned = !detail::moves(bodies[at(c.first)]);
+      sides.push_back(detail::side(bodies, c, turned));
+      first[i] = turned ? c.second : c.first;
+      second[i] = sides[i].second ? (turned ? c.first : c.second) : -1;
+    }
+    detail::ContactGraph graph;
+    graph.build(static_cast<int>(bodies.size()), first, second,
+                std::vector<detail::Kind>(n, detail::Kind::general), false);
+    island_.resize(n);
+    coupled_.resize(n);
+    for (const detail::Island& island : graph.islands) {
+      double needed = 0, bb = 0, speed = 0;
+      for (int place = island.contact_begin; place < island.contact_begin + island.contacts;
+           ++place) {
+        const std::size_t i = at(graph.order[at(place)]);
+        island_[i] = static_cast<int>(inverse_.size());
+        coupled_[i] = static_cast<double>(graph.coupled[at(place)]);
+        const Eigen::Vector3d u = detail::velocity_before(sides[i], contacts[i].bias);
+        const double bn = -u.dot(sides[i].n), square = u.squaredNorm();
+        const double ratio = 0.5 * (blocks[i].T[0] + blocks[i].T[2]) * blocks[i].inv_a;
+        const double bt = std::sqrt(std::max(0.0, square - bn * bn));
+        needed =
+            std::max(needed, detail::needed_change(bn, bt, friction ? contacts[i].mu : 0, ratio));
+        bb += square;
+        speed = std::max(speed, detail::speed_before(sides[i], contacts[i].bias));
+      }
+      inverse_.push_back(detail::inverse_scale(needed, bb));
+      floor_.push_back(detail::round_off(speed));
+    }
+  }
+  double coupled(std::size_t i) const { return coupled_[i]; }
+  double relative(std::size_t i, double error) const {
+    const std::size_t k = at(island_[i]);
+    return error * error <= floor_[k] ? 0 : error * inverse_[k];
+  }
+
+ private:
+  std::vector<int> island_;
+  std::vector<double> coupled_, inverse_, floor_;
+};
+
+}  // namespace
+
+Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+                   Law law, const std::vector<Eigen::Vector3d>& impulses) {
+  if (impulses.size() != contacts.size()) {
+    throw std::invalid_argument("impulses has " + std::to_string(impulses.size()) +
+                                " entries: " + std::to_string(contacts.size()) +
+                                " are needed, one for each contact");
+  }
+  const int m = static_cast<int>(bodies.size());
+  for (std::size_t k = 0; k < bodies.size(); ++k) detail::check(k, bodies[k]);
+  for (std::size_t i = 0; i < contacts.size(); ++i) detail::check(i, contacts[i], m);
+  // Nothing can be said of an answer that is not finite.
+  for (const Eigen::Vector3d& p : impulses)
+    if (!p.allFinite()) return {};
+  std::vector<Eigen::Vector3d> v(bodies.size()), w(bodies.size());
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    v[k] = bodies[k].velocity;
+    w[k] = bodies[k].angular_velocity;
+  }
+  const auto relative = [&](const PointContact& c) {
+    Eigen::Vector3d u = v[at(c.first)] + w[at(c.first)].cross(c.r1) + c.bias * c.normal;
+    if (c.second >= 0) u -= v[at(c.second)] + w[at(c.second)].cross(c.r2);
+    return u;
+  };
+  double bb = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    bb += relative(c).squaredNorm();
+  }
+  std::vector<Eigen::Vector3d> before;
+  for (const PointContact& c : contacts) before.push_back(relative(c));
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    const Eigen::Vector3d& p = impulses[i];
+    v[at(c.first)] += bodies[at(c.first)].inverse_mass * p;
+    w[at(c.first)] += bodies[at(c.first)].inverse_inertia * c.r1.cross(p);
+    if (c.second < 0) continue;
+    v[at(c.second)] -= bodies[at(c.second)].inverse_mass * p;
+    w[at(c.second)] -= bodies[at(c.second)].inverse_inertia * c.r2.cross(p);
+  }
+  std::vector<LocalBlock> blocks;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    if (!detail::moves(bodies[at(c.first)]) &&
+        (c.second < 0 || !detail::moves(bodies[at(c.second)])))
+      detail::refuse_fixed(i);
+    const Eigen::Matrix3d F = tangent_frame(c.normal);
+    const detail::Side side = detail::side(bodies, c, !detail::moves(bodies[at(c.first)]));
+    blocks.emplace_back(F * detail::diagonal_block(side) * F.transpose(), c.mu);
+  }
+  const detail::LawKernels& rule = detail::kernels(law);
+  const Scales scales(bodies, contacts, rule.friction, blocks);
+  Residuals r;
+  r.fixed_point = 0;
+  r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
+  double map = 0, xx = 0, ww = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const PointContact& c = contacts[i];
+    const Eigen::Matrix3d F = tangent_frame(c.normal);
+    const LocalBlock& L = blocks[i];
+    const Eigen::Vector3d x = F * impulses[i], u = F * relative(c);
+    const double mu = rule.friction ? c.mu : 0, t = x.tail<2>().norm();
+    r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], u[0])));
+    r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
+    r.dissipation += x.dot(u);
+    r.energy_change += 0.5 * x.dot(u + F * before[i]);
+    // Block fixed point (README, section 6).
+    const double theta = scales.coupled(i);
+    const Eigen::Matrix3d D = L.matrix();
+    LocalState state;
+    for (int k = 0; k < 3; ++k) state.x[k] = x[k];
+    solve_local(law, L, D * x - u / theta, state);
+    const double change = (D * (x - Eigen::Vector3d(state.x[0], state.x[1], state.x[2]))).norm();
+    const double outside = L.a * std::max(t - mu * x[0], -x[0]);
+    const double error = scales.relative(i, theta * std::max(change, outside));
+    if (!(error <= r.fixed_point)) r.fixed_point = error;
+    if (error != error) return {};  // velocities out of range
+    // Natural map, and the nearest slip that the law allows.
+    double gamma[2];
+    rule.gamma(L, gamma);
+    Eigen::Vector3d z;
+    rule.natural_point(L, x.data(), u.data(), z.data());
+    map += (x - z).squaredNorm();
+    xx += x.squaredNorm();
+    ww += u.squaredNorm();
+    if (mu == 0 || !(x[0] > 0)) continue;
+    double misfit = u.tail<2>().norm();
+    if (t > 0 && t >= mu * x[0] * (1 - 1e-9)) {
+      const Eigen::Vector2d d = -(x.tail<2>() / t + Eigen::Vector2d(gamma[0], gamma[1]));
+      const double dd = d.squaredNorm();
+      const double s = dd > 0 ? std::max(0.0, u.tail<2>().dot(d) / dd) : 0;
+      misfit = (u.tail<2>() - s * d).norm();
+    }
+    r.alignment = std::max(r.alignment, misfit);
+  }
+  const auto over = [](double p, double q) { return q > 0 ? p / q : p; };
+  r.natural_map = over(std::sqrt(map), std::sqrt(std::max({bb, xx, ww})));
+  r.natural_map_data = over(std::sqrt(map), std::sqrt(bb));
+  return r;
+}
+
+}  // namespace tether::contact

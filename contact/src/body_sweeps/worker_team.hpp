@@ -1,0 +1,84 @@
+// Tether: threads that wait for work and meet inside it. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace tether::contact::detail {
+
+// All threads meet; the last one to come lets the others go. Waiting spins for about the time by
+// which the shares of a colour differ, then sleeps: a thread that only yields may share a core with
+// the one that it waits for, while a sleeping one is woken on a core that is free.
+class Barrier {
+ public:
+  void reset(int threads) { threads_ = threads; }
+  void wait() {
+    if (threads_ == 1) return;
+    const int round = round_.load();
+    if (come_.fetch_add(1) + 1 == threads_) {
+      come_.store(0);
+      round_.store(round + 1);
+      if (sleepers_.load() > 0) wake();
+      return;
+    }
+    for (int spins = 0; spins < 400; ++spins) {
+      if (round_.load(std::memory_order_acquire) != round) return;
+#if defined(__x86_64__) || defined(__i386__)
+      __builtin_ia32_pause();
+#endif
+    }
+    sleep(round);
+  }
+
+ private:
+  void wake();
+  void sleep(int round);
+
+  int threads_ = 1;
+  alignas(64) std::atomic<int> come_{0};
+  alignas(64) std::atomic<int> round_{0};
+  std::atomic<int> sleepers_{0};
+  std::mutex mutex_;
+  std::condition_variable woken_;
+};
+
+// Threads are started when they are first needed and sleep between runs.
+class WorkerTeam {
+ public:
+  ~WorkerTeam();
+
+  // Calls work(thread) for thread = 0 (the caller) .. threads - 1; returns when all have ended.
+  // `work` must not throw.
+  template <class Work>
+  void run(int threads, Work& work) {
+    barrier.reset(threads);
+    if (threads > 1) {
+      start(
+          threads, [](void* w, int thread) { (*static_cast<Work*>(w))(thread); }, &work);
+    }
+    work(0);
+    if (threads > 1) join();
+  }
+
+  Barrier barrier;
+
+ private:
+  using Call = void (*)(void*, int);
+  void start(int threads, Call call, void* work);
+  void join();
+  void live(int thread);
+
+  std::vector<std::thread> threads_;
+  std::mutex mutex_;
+  std::condition_variable wake_, done_;
+  Call call_ = nullptr;
+  void* work_ = nullptr;
+  long run_ = 0;
+  int wanted_ = 0, busy_ = 0;
+  bool end_ = false;
+};
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,45 @@
+// Tether: when a contact problem counts as solved: a criterion without units (README, section 6).
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include <tether/linalg/vector_code.hpp>
+
+namespace tether::contact::detail {
+
+constexpr double kRoundOff = 0.5 * std::numeric_limits<double>::epsilon();
+// Velocities of an island of bodies that are less than this of its largest speed are round-off of
+// the bodies' velocities.
+constexpr double kSpeedRoundOff = 32 * kRoundOff;
+
+// The change of velocity that a contact needs on its own: its approach, and of its slip what
+// friction can take away, mu T/a times the approach. A slip that friction cannot stop says nothing
+// about how exact impulses have to be. bt: |b_t|, ratio: (T00 + T11) / 2a.
+TETHER_INLINE double needed_change(double bn, double bt, double mu, double ratio) {
+  if (!(bn > 0)) return 0;
+  const double reach = mu * ratio * bn;
+  return bn + (bt < reach ? bt : reach);
+}
+
+// 1 / velocity scale where nothing moves: finite with a factor to spare, so that 0 times it is 0.
+constexpr double kAtRest = 0x1p1000;
+
+// 1 / velocity scale of an island, from the largest needed change and |b|^2. Where nothing
+// approaches x = 0 is a solution, any other is judged by |b|. Where nothing moves only x = 0 is
+// one.
+inline double inverse_scale(double needed, double bb) {
+  if (!(bb < std::numeric_limits<double>::infinity()))
+    return std::numeric_limits<double>::quiet_NaN();  // out of range: nothing counts as solved
+  const double scale = needed > 0 ? needed : std::sqrt(bb);
+  return scale * kAtRest > 1 ? 1 / scale : kAtRest;
+}
+
+// Squares of velocities that are round-off beside the square of a speed.
+inline double round_off(double speed) {
+  return speed < std::numeric_limits<double>::infinity() ? kSpeedRoundOff * kSpeedRoundOff * speed
+                                                         : 0;
+}
+
+}  // namespace tether::contact::detail

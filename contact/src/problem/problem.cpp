@@ -1,0 +1,203 @@
+// Tether: storage of contact problems. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/problem.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "law/local_geometry.hpp"
+#include "problem/refuse.hpp"
+
+namespace tether::contact {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+int dimension_of(const linalg::VectorView& b, const linalg::VectorView& mu) {
+  for (int d : {3, 2}) {
+    if (b.size() == d * mu.size()) return d;
+  }
+  throw std::invalid_argument("b has " + std::to_string(b.size()) +
+                              " entries: 3 (or 2, in the plane) are needed for each of " +
+                              std::to_string(mu.size()) + " friction coefficients mu");
+}
+
+// Connected components of the blocks that are not zero.
+std::vector<int> find_islands(int n, const std::vector<int>& row_start,
+                              const std::vector<int>& columns,
+                              const std::vector<PackedBlock>& blocks) {
+  std::vector<int> parent(at(n));
+  for (int i = 0; i < n; ++i) parent[at(i)] = i;
+  const auto root = [&](int i) {
+    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
+    return i;
+  };
+  for (int i = 0; i < n; ++i) {
+    for (int k = row_start[at(i)]; k < row_start[at(i + 1)]; ++k) {
+      const int p = root(i), q = root(columns[at(k)]);
+      if (p == q) continue;
+      bool joined = false;
+      for (double v : blocks[at(k)].column) joined = joined || v != 0;
+      if (joined) parent[at(std::max(p, q))] = std::min(p, q);
+    }
+  }
+  // A root precedes the contacts of its island.
+  int count = 0;
+  std::vector<int> island(at(n));
+  for (int i = 0; i < n; ++i) island[at(i)] = root(i) == i ? count++ : island[at(root(i))];
+  return island;
+}
+
+}  // namespace
+
+Problem Problem::dense(const linalg::MatrixView& A, const linalg::VectorView& b,
+                       const linalg::VectorView& mu) {
+  const int d = dimension_of(b, mu), n = static_cast<int>(mu.size());
+  if (A.rows() != b.size() || A.cols() != b.size()) {
+    const std::string size = std::to_string(b.size());
+    throw std::invalid_argument("A is " + std::to_string(A.rows()) + " x " +
+                                std::to_string(A.cols()) + ": must be " + size + " x " + size +
+                                ", as b has " + size + " entries");
+  }
+  detail::require_finite("A", A);
+  std::vector<MatrixBlock> blocks;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const auto part = A.block(d * i, d * j, d, d);
+      if (i != j && (part.array() == 0).all()) continue;
+      MatrixBlock block{i, j, Eigen::Matrix3d::Zero()};
+      block.value.topLeftCorner(d, d) = part;
+      blocks.push_back(block);
+    }
+  }
+  return sparse(d, std::move(blocks), b, mu);
+}
+
+Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const linalg::VectorView& b,
+                        const linalg::VectorView& mu) {
+  const int n = static_cast<int>(mu.size()), d = dimension;
+  detail::require(d == 2 || d == 3, "dimension", d, "must be 2 or 3");
+  detail::require(mu.size() <= std::numeric_limits<int>::max() / 3, "size of mu",
+                  static_cast<double>(mu.size()), "must be at most 715827882");
+  if (b.size() != d * mu.size()) {
+    detail::refuse_size(
+        "b", b.size(), d * mu.size(),
+        std::to_string(d) + " for each of " + std::to_string(n) + " friction coefficients mu");
+  }
+  detail::require_finite("b", b);
+  const std::size_t given = blocks.size();
+  for (std::size_t k = 0; k < given; ++k) {
+    const MatrixBlock& block = blocks[k];
+    if (block.row < 0 || block.row >= n || block.column < 0 || block.column >= n) {
+      throw std::invalid_argument("block (" + std::to_string(block.row) + ", " +
+                                  std::to_string(block.column) +
+                                  "): row and column must lie in 0 .. " + std::to_string(n - 1));
+    }
+    if (!block.value.topLeftCorner(d, d).allFinite()) {
+      detail::require_finite(
+          "A", block.value.topLeftCorner(d, d),
+          "block (" + std::to_string(block.row) + ", " + std::to_string(block.column) + "): ");
+    }
+    // A zero on the other side keeps the pattern symmetric.
+    if (block.row != block.column) {
+      blocks.push_back({blocks[k].column, blocks[k].row, Eigen::Matrix3d::Zero()});
+    }
+  }
+  for (int i = 0; i < n; ++i) blocks.push_back({i, i, Eigen::Matrix3d::Zero()});
+  std::stable_sort(blocks.begin(), blocks.end(), [](const MatrixBlock& p, const MatrixBlock& q) {
+    return p.row != q.row ? p.row < q.row : p.column < q.column;
+  });
+
+  Problem out;
+  out.dimension_ = d;
+  out.b_ = b;
+  out.row_start_.assign(at(n + 1), 0);
+  for (std::size_t k = 0; k < blocks.size();) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    const int row = blocks[k].row, column = blocks[k].column;
+    for (; k < blocks.size() && blocks[k].row == row && blocks[k].column == column; ++k) {
+      sum.topLeftCorner(d, d) += blocks[k].value.topLeftCorner(d, d);
+    }
+    // The plane is a 3-D contact whose second tangent is decoupled and at rest.
+    if (d == 2 && row == column) sum(2, 2) = sum(1, 1) > 0 ? sum(1, 1) : sum(0, 0);
+    if (!sum.allFinite()) {
+      detail::require_finite(
+          "sum of blocks", sum,
+          "block (" + std::to_string(row) + ", " + std::to_string(column) + "): ");
+    }
+    PackedBlock packed;
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r) packed.column[4 * c + r] = sum(r, c);
+    out.columns_.push_back(column);
+    out.blocks_.push_back(packed);
+    ++out.row_start_[at(row + 1)];
+    if (row == column) {
+      try {
+        out.local_.emplace_back(sum, mu[row]);
+      } catch (const std::invalid_argument& e) {
+        throw std::invalid_argument("contact " + std::to_string(row) + ": " + e.what());
+      }
+    }
+  }
+  for (int i = 0; i < n; ++i) out.row_start_[at(i + 1)] += out.row_start_[at(i)];
+  out.islands_ = find_islands(n, out.row_start_, out.columns_, out.blocks_);
+  out.packed_b_ = out.pack(b);
+  return out;
+}
+
+void Problem::set_ids(std::vector<std::uint64_t> ids) {
+  if (ids.size() != local_.size()) {
+    detail::refuse_size("ids", static_cast<Eigen::Index>(ids.size()), contacts(),
+                        "one for each contact");
+  }
+  ids_ = std::move(ids);
+}
+
+Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const {
+  Problem out = *this;
+  out.body_form_.reset();  // of other units
+  for (int i = 0; i < contacts(); ++i) {
+    const std::size_t island = at(islands_[at(i)]);
+    out.local_[at(i)] = detail::rescaled(local_[at(i)], mass[island]);
+    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k)
+      for (double& v : out.blocks_[at(k)].column) v = std::ldexp(v, mass[island]);
+    for (double& v : out.packed_b_[at(i)].v) v = std::ldexp(v, speed[island]);
+  }
+  out.unpack(out.packed_b_, out.b_);
+  return out;
+}
+
+linalg::MatrixX Problem::dense_matrix() const {
+  const int n = contacts(), d = dimension_;
+  linalg::MatrixX A = linalg::MatrixX::Zero(d * n, d * n);
+  for (int i = 0; i < n; ++i) {
+    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k) {
+      for (int c = 0; c < d; ++c)
+        for (int r = 0; r < d; ++r)
+          A(d * i + r, d * columns_[at(k)] + c) = blocks_[at(k)].column[4 * c + r];
+    }
+  }
+  return A;
+}
+
+std::vector<PackedVector> Problem::pack(const linalg::VectorView& x) const {
+  const int n = contacts(), d = dimension_;
+  if (x.size() != d * n) {
+    detail::refuse_size("impulses", x.size(), d * n, std::to_string(d) + " for each contact");
+  }
+  std::vector<PackedVector> out(at(n));
+  for (int i = 0; i < n; ++i)
+    for (int r = 0; r < d; ++r) out[at(i)].v[r] = x[d * i + r];
+  return out;
+}
+
+void Problem::unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const {
+  const int n = contacts(), d = dimension_;
+  out.resize(d * n);
+  for (int i = 0; i < n; ++i)
+    for (int r = 0; r < d; ++r) out[d * i + r] = x[at(i)].v[r];
+}
+
+}  // namespace tether::contact
