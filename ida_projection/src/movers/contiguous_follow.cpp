@@ -10,6 +10,7 @@ Move ContiguousMover<Rows>::follow(const Candidate& candidate, bool again) {
   if (!again) {
     set_metric(false);
     ++age_;
+    decided_ = false;
   }
   return move_with_old_factors(
       wear_, [&] { return value(candidate.t); }, [&] { return solve(); },
