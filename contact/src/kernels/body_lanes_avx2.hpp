@@ -3,7 +3,7 @@
 
 #include <immintrin.h>
 
-#include "kernels/body_kernels.hpp"
+#include "kernels/body_contacts.hpp"
 
 // For the one file that is compiled for AVX2 function by function: everything is inlined there.
 #define TETHER_AVX2 static inline __attribute__((always_inline, target("avx2,fma")))

@@ -1,7 +1,7 @@
 // Tether: what all passes over contacts between bodies share. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "kernels/body_kernels.hpp"
+#include "kernels/body_contacts.hpp"
 
 namespace tether::contact::detail {
 namespace {

@@ -2,7 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
-#include "kernels/body_kernels.hpp"
+#include "kernels/body_contacts.hpp"
 
 #if TETHER_GROUPS
 #include "kernels/body_lanes_avx2.hpp"

@@ -3,7 +3,7 @@
 
 #include <tether/contact/problem.hpp>
 
-#include "kernels/body_kernels.hpp"
+#include "kernels/body_contacts.hpp"
 #include "law/local_geometry.hpp"
 
 // A law is a struct of static members in a file of this folder:

@@ -76,24 +76,8 @@ struct Squares {
   double sum = 0, most = 0;
 };
 
-// One pass of Gauss-Seidel; returns |D dx|^2, D the diagonal block.
-Squares sweep(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end);
-Squares sweep(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end);
-Squares sweep(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end);
-
-// Changes nothing; the errors |theta D dx|^2 of the contacts (README, section 6). coupled: theta of
-// each contact.
+// theta of each contact (README, section 6).
 using Coupled = const float*;
-Squares test(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end, Coupled);
-Squares test(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end, Coupled);
-Squares test(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end, Coupled);
-
-// Groups of four; false: this machine has no code for them.
-bool groups_are_served();
-Squares sweep(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end);
-Squares sweep(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end);
-Squares test(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end, Coupled);
-Squares test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end, Coupled);
 
 // v += p / m, w += I^-1 q
 TETHER_INLINE void push(BodyState& s, const BodyInertia& I, const double* p, const double* q) {
