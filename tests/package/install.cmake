@@ -1,5 +1,6 @@
 # Installs the build tree TREE: all of it into PREFIX/all, and each of COMPONENTS with those that it
 # stands on into a prefix of its own. SPDX-License-Identifier: BSD-3-Clause
+cmake_minimum_required(VERSION 3.23)  # a script of its own: policies
 file(REMOVE_RECURSE ${PREFIX})
 
 function(install_tree prefix)
