@@ -43,10 +43,10 @@ class FrictionEffect : public Effect {
     lines.push_back(
         {"friction", fmt::format("{}, law {}", range(scene.pairs, &Pair::friction), word(law))});
   }
-  void configure(const Scene& scene, contact::SteppingOptions& options) const override {
+  void configure_contact(const Scene& scene, contact::SteppingOptions& options) const override {
     options.law = in_contact(scene.stepping.value_or(SteppingOptions{}).law);
   }
-  void configure(const Pair& pair, contact::Meeting& meeting) const override {
+  void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {
     meeting.friction = pair.friction;
   }
 };

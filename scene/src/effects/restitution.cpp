@@ -37,13 +37,13 @@ class RestitutionEffect : public Effect {
                     [](const Pair& pair) { return pair.restitution > 0; }))
       lines.push_back({"restitution", range(scene.pairs, &Pair::restitution)});
   }
-  void configure(const Scene& scene, contact::SteppingOptions& options) const override {
+  void configure_contact(const Scene& scene, contact::SteppingOptions& options) const override {
     const SteppingOptions wanted = scene.stepping.value_or(SteppingOptions{});
     options.restitution_law = in_contact(wanted.restitution_law);
     options.restitution_threshold = wanted.restitution_threshold;
     options.impact_threshold = wanted.impact_threshold;
   }
-  void configure(const Pair& pair, contact::Meeting& meeting) const override {
+  void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {
     meeting.restitution = pair.restitution;
   }
 };

@@ -91,7 +91,7 @@ Mapped map_scene(const Scene& scene) {
     contact::Meeting meeting;
     meeting.first = material.at(pair.first);
     meeting.second = material.at(pair.second);
-    for (const effects::Effect* each : effects::all()) each->configure(pair, meeting);
+    for (const effects::Effect* each : effects::all()) each->configure_pair(pair, meeting);
     out.meetings.push_back(meeting);
   }
 
@@ -103,7 +103,10 @@ Mapped map_scene(const Scene& scene) {
   out.options.acceptance = options.acceptance;
   out.options.max_halvings = options.max_halvings;
   out.options.threads = options.threads;
-  for (const effects::Effect* each : effects::all()) each->configure(scene, out.options);
+  for (const effects::Effect* each : effects::all()) {
+    each->configure(scene, out.options);
+    if (!scene.pairs.empty()) each->configure_contact(scene, out.options);
+  }
   return out;
 }
 
