@@ -225,15 +225,24 @@ bool Automatic::rescue(Search& search, Rotation& r) {
 // path of interior points ends where contacts that stick and slide admit no solution, and sweeps
 // hardly move. The proximal problems have a path, and factorisations by bodies are cheap.
 void Automatic::few_bodies(Search& search) {
-  constexpr int kSweeps = 30;
+  // Sweeps as long as they forecast less than a run of interior points: one body on hundreds of
+  // points, which slides on all of them, is solved by them.
+  constexpr double kStay = 5, kSteps = 20;  // factorisations
+  AcceleratedSweeps::Leave leave;
+  leave.price = kSteps * interior.cost(search);
+  leave.least_work = kStay * interior.cost(search);
+  sweeps.run(search, leave);
+  if (search.solved() || search.exhausted()) return;
+  interior.stick(search);
+  if (search.solved()) return;
+  constexpr int kRun = 40;
+  constexpr double kShare = 0.25;
+  // Where their path ends is no better start than where the sweeps were.
   x_ = search.best;
-  for (int k = 0; k < kSweeps; ++k) {
-    search.system.sweep(x_.data());
-    search.count_sweep();
-    if (k % 10 == 9) search.test(x_.data(), Method::gauss_seidel);
-    if (search.solved()) return;
-  }
-  interior.run_proximal(search, search.best.data(), 4000, newton);
+  if (kRun * interior.cost(search) < kShare * (search.work_end - search.counts.work))
+    interior.run(search, kRun);
+  if (search.solved()) return;
+  interior.run_proximal(search, x_.data(), 4000, newton);
 }
 
 // Stages in rotation (README, section 10).

@@ -33,7 +33,10 @@ BodyOptions contact_options(const SteppingOptions& o) {
   b.max_sweeps = o.max_sweeps;
   b.max_assembled = o.max_assembled;
   b.max_work = o.max_work;
-  if (o.acceptance > 1) b.enough = accepted_residual(o);
+  if (o.acceptance > 1) {
+    b.max_work *= 0.2;
+    b.enough = accepted_residual(o);
+  }
   b.threads = o.threads;
   return b;
 }
@@ -44,7 +47,7 @@ double threshold_speed(double threshold, const SteppingOptions& o) {
 
 BodyOptions patient_options(const SteppingOptions& o) {
   BodyOptions b = contact_options(o);
-  b.max_work *= 25;
+  b.max_work = 5 * o.max_work;
   b.enough = std::max(kRough, o.tolerance);
   return b;
 }

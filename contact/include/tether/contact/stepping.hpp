@@ -84,7 +84,7 @@ struct SteppingOptions {
   double acceptance = 1;
   /// Where it is above that, too, the step is taken in two halves, they in quarters, ... so many
   /// times. The shortest parts, and all with an impact, which is as hard in a shorter step, accept
-  /// up to 1e-4 and are given 25 times max_work where they are above that; above it even so, the
+  /// up to 1e-4 and are given five times max_work where they are above that; above it even so, the
   /// shortest part is used all the same and counted as `unsolved`. 0: at once.
   int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
@@ -106,7 +106,8 @@ struct SteppingOptions {
   int min_sweeps = 8;     ///< see BodyOptions: at rest they wipe out what the tolerance allows
   int max_sweeps = 1000;  ///< see BodyOptions
   int max_assembled = 1000;
-  double max_work = 4e7;  ///< see BodyOptions: bounds the time of a step
+  /// See BodyOptions: bounds the time of a step. With acceptance > 1 a fifth of it comes first.
+  double max_work = 2e8;
   int threads = 1;
 };
 
