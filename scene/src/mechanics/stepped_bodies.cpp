@@ -4,21 +4,13 @@
 
 #include <Eigen/LU>
 
+#include "placed_bodies.hpp"
+
 namespace tether::scene::mechanics {
 
-SteppedBodies::SteppedBodies(const Scene& scene) {
-  const std::size_t count = scene.bodies.size();
-  bodies_.inertia.resize(count + 1);
-  bodies_.frames.resize(count + 1);
-  bodies_.w.assign(count + 1, Vector3d::Zero());
-  for (std::size_t b = 0; b <= count; ++b) {
-    Frame<double>& f = bodies_.frames[b];
-    f.x = f.v = f.W = f.a = f.alpha = Vector3d::Zero();
-    f.R = Matrix3d::Identity();
-    if (b == count) continue;  // the world
+SteppedBodies::SteppedBodies(const Scene& scene) : bodies_(placed_bodies(scene)) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const Body& body = scene.bodies[b];
-    f.x = body.position;
-    f.R = body.orientation.normalized().toRotationMatrix();
     if (body.fixed) continue;
     bodies_.inertia[b] = {bodies_.moving++, body.mass, body.inertia, body.inertia.inverse()};
   }

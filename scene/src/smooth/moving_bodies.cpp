@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <stdexcept>
 
+#include "mechanics/placed_bodies.hpp"
 #include "mechanics/quaternions.hpp"
 
 namespace tether::scene::smooth {
@@ -23,19 +24,9 @@ Inertia inertia_of(const Body& body) {
 
 }  // namespace
 
-MovingBodies::MovingBodies(const Scene& scene) {
-  const std::size_t count = scene.bodies.size();
-  bodies_.inertia.resize(count + 1);
-  bodies_.frames.resize(count + 1);
-  bodies_.w.assign(count + 1, Vector3d::Zero());
-  for (std::size_t b = 0; b <= count; ++b) {
-    Frame<double>& f = bodies_.frames[b];
-    f.x = f.v = f.W = f.a = f.alpha = Vector3d::Zero();
-    f.R = Matrix3d::Identity();
-    if (b == count) continue;  // the world
+MovingBodies::MovingBodies(const Scene& scene) : bodies_(mechanics::placed_bodies(scene)) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const Body& body = scene.bodies[b];
-    f.x = body.position;
-    f.R = body.orientation.normalized().toRotationMatrix();
     if (body.fixed) {
       if (!body.velocity.isZero(0.0) || !body.angular_velocity.isZero(0.0))
         throw std::invalid_argument("body \"" + body.name +
@@ -46,7 +37,7 @@ MovingBodies::MovingBodies(const Scene& scene) {
     bodies_.inertia[b].slot = bodies_.moving++;
     body_of_slot_.push_back(static_cast<int>(b));
     const Eigen::Quaterniond q = body.orientation.normalized();
-    const Vector3d w = f.R.transpose() * body.angular_velocity;
+    const Vector3d w = bodies_.frames[b].R.transpose() * body.angular_velocity;
     for (int k = 0; k < 3; ++k) start_.push_back(body.position[k]);
     start_.insert(start_.end(), {q.w(), q.x(), q.y(), q.z()});
     for (int k = 0; k < 3; ++k) start_.push_back(body.velocity[k]);
