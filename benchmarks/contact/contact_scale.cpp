@@ -71,7 +71,8 @@ int main(int argc, char** argv) {
   int sweeps = 20, rounds = 0, many = 2;
   bool shuffle = false;
   CLI::App app("Sweeps over packings between bodies: time, memory and bits by size and threads");
-  app.add_option("--least", least, "Contacts of the smallest packing")->check(CLI::NonNegativeNumber);
+  app.add_option("--least", least, "Contacts of the smallest packing")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--most", most, "Contacts of the largest packing")->check(CLI::NonNegativeNumber);
   app.add_option("--residual", tolerance, "Residuals over sweeps instead, down to this one")
       ->check(CLI::NonNegativeNumber);

@@ -84,7 +84,8 @@ Cost measure(const Sample& sample, Law law, bool golden) {
     double sink = 0;
     for (int round = 0; round < 3; ++round) {
       const double t0 = seconds();
-      for (std::size_t i = 0; i < n; ++i) sink += solve_one_golden_section(sample.blocks[i], sample.b[i]).impulse[0];
+      for (std::size_t i = 0; i < n; ++i)
+        sink += solve_one_golden_section(sample.blocks[i], sample.b[i]).impulse[0];
       cost.golden = std::min(cost.golden, 1e9 * (seconds() - t0) / static_cast<double>(n));
     }
     if (sink == 1) std::printf(" ");
@@ -100,9 +101,11 @@ int main(int argc, char** argv) {
   CLI::App app("One contact: nanoseconds and evaluations of each law by class and regime");
   app.add_option("--check", check, "Problems of each class that are compared with the reference")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--points", points, "Angles of the reference's search")->check(CLI::PositiveNumber);
+  app.add_option("--points", points, "Angles of the reference's search")
+      ->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
-  std::printf("%-20s %-15s %-10s %6s %6s %6s %8s %6s %5s\n", "law", "class", "regime", "cold", "warm", "repeat", "golden", "evals", "most");
+  std::printf("%-20s %-15s %-10s %6s %6s %6s %8s %6s %5s\n", "law", "class", "regime", "cold",
+              "warm", "repeat", "golden", "evals", "most");
   for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
     std::vector<double> cold, warm, golden;
     for (const std::string& kind : random::classes()) {
@@ -111,7 +114,9 @@ int main(int argc, char** argv) {
         if (sample.blocks.size() < kContacts) continue;
         const bool sliding = std::string(regime) == "sliding";
         const Cost c = measure(sample, law, law == Law::maximum_dissipation && sliding);
-        std::printf("%-20s %-15s %-10s %6.0f %6.0f %6.0f %8.0f %6.2f %5d\n", name(law), kind.c_str(), regime, c.cold, c.warm, c.repeat, c.golden, c.evaluations, c.most);
+        std::printf("%-20s %-15s %-10s %6.0f %6.0f %6.0f %8.0f %6.2f %5d\n", name(law),
+                    kind.c_str(), regime, c.cold, c.warm, c.repeat, c.golden, c.evaluations,
+                    c.most);
         if (sliding && kind != "mu_zero") {
           cold.push_back(c.cold);
           warm.push_back(c.warm);
@@ -122,8 +127,11 @@ int main(int argc, char** argv) {
     std::sort(cold.begin(), cold.end());
     std::sort(warm.begin(), warm.end());
     std::sort(golden.begin(), golden.end());
-    std::printf("%s, sliding, median over classes: cold %.0f ns, warm %.0f ns", name(law), cold[cold.size() / 2], warm[warm.size() / 2]);
-    if (!golden.empty()) std::printf(", golden section to 1e-10 takes %.1f times as long (least %.1f)", golden[golden.size() / 2], golden.front());
+    std::printf("%s, sliding, median over classes: cold %.0f ns, warm %.0f ns", name(law),
+                cold[cold.size() / 2], warm[warm.size() / 2]);
+    if (!golden.empty())
+      std::printf(", golden section to 1e-10 takes %.1f times as long (least %.1f)",
+                  golden[golden.size() / 2], golden.front());
     std::printf("\n");
   }
   if (check > 0) {
@@ -145,7 +153,8 @@ int main(int argc, char** argv) {
           if (!first) first = why;
         }
       }
-      std::printf("%-15s %10ld %9ld %9.2f %6d %s\n", kind.c_str(), check, failures, evaluations / static_cast<double>(check), most, first ? first : "");
+      std::printf("%-15s %10ld %9ld %9.2f %6d %s\n", kind.c_str(), check, failures,
+                  evaluations / static_cast<double>(check), most, first ? first : "");
       std::fflush(stdout);
     }
   }

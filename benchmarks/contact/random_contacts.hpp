@@ -1,4 +1,5 @@
-// Tether: random one-contact problems and an independent reference. SPDX-License-Identifier: BSD-3-Clause
+// Tether: random one-contact problems and an independent reference. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <Eigen/Dense>
@@ -19,7 +20,7 @@ struct Contact {
 
 inline const std::vector<std::string>& classes() {
   static const std::vector<std::string> names = {
-      "condition_1e1", "condition_1e4", "condition_1e8", "condition_1e10", "boxes",      "rods",
+      "condition_1e1", "condition_1e4", "condition_1e8", "condition_1e10", "boxes",   "rods",
       "hyperbolic",    "bn_to_zero",    "mu_zero",       "mu_1000",        "singular"};
   return names;
 }
@@ -29,7 +30,10 @@ class Generator {
   explicit Generator(std::uint64_t seed) : engine_(seed) {}
 
   double uniform(double lo, double hi) { return lo + (hi - lo) * (engine_() >> 11) * 0x1p-53; }
-  double normal() { return std::sqrt(-2 * std::log(1 - uniform(0, 1))) * std::cos(6.283185307179586 * uniform(0, 1)); }
+  double normal() {
+    return std::sqrt(-2 * std::log(1 - uniform(0, 1))) *
+           std::cos(6.283185307179586 * uniform(0, 1));
+  }
   Eigen::Vector3d vector() { return {normal(), normal(), normal()}; }
   Eigen::Matrix3d rotation() {
     Eigen::Vector4d q(normal(), normal(), normal(), normal());
@@ -50,7 +54,8 @@ class Generator {
     const Eigen::Vector3d inertia(s[1] + s[2], s[0] + s[2], s[0] + s[1]);
     Eigen::Matrix3d X;
     X << 0, -r[2], r[1], r[2], 0, -r[0], -r[1], r[0], 0;
-    const Eigen::Matrix3d A = Eigen::Matrix3d::Identity() / m - X * inertia.cwiseInverse().asDiagonal() * X;
+    const Eigen::Matrix3d A =
+        Eigen::Matrix3d::Identity() / m - X * inertia.cwiseInverse().asDiagonal() * X;
     const Eigen::Matrix3d R = rotation(), B = R * A * R.transpose();
     return 0.5 * (B + B.transpose());
   }
@@ -61,7 +66,9 @@ class Generator {
     if (kind.rfind("condition_", 0) == 0) {
       c.A = spectrum(std::stod(kind.substr(10)));
     } else if (kind == "boxes") {
-      const auto size = [&] { return Eigen::Vector3d(uniform(0.2, 1), uniform(0.2, 1), uniform(0.2, 1)); };
+      const auto size = [&] {
+        return Eigen::Vector3d(uniform(0.2, 1), uniform(0.2, 1), uniform(0.2, 1));
+      };
       c.A = body(size(), uniform(0.1, 10)) + body(size(), uniform(0.1, 10));
     } else if (kind == "rods") {
       c.A = body({1, 0.02, 0.02}, 1);
@@ -88,7 +95,8 @@ class Generator {
     }
     c.b = vector();
     if (uniform(0, 1) < 0.5) c.b = c.A * c.b;
-    if (kind == "bn_to_zero") c.b[0] = (uniform(0, 1) < 0.5 ? -1 : 1) * std::pow(10, -uniform(1, 18));
+    if (kind == "bn_to_zero")
+      c.b[0] = (uniform(0, 1) < 0.5 ? -1 : 1) * std::pow(10, -uniform(1, 18));
     return c;
   }
 
@@ -96,9 +104,10 @@ class Generator {
   std::mt19937_64 engine_;
 };
 
-// The problem reduced to the plane w_n = 0: energy 1/2 y'By - h.y on the disc |y| <= mu (b_n - c.y) / a.
-// Dense scan of the boundary with local refinement, and the interior minimum; shares nothing with
-// the library. Energies are compared in long double: at condition 1e10 y'By cancels ten digits.
+// The problem reduced to the plane w_n = 0: energy 1/2 y'By - h.y on the disc |y| <= mu (b_n - c.y)
+// / a. Dense scan of the boundary with local refinement, and the interior minimum; shares nothing
+// with the library. Energies are compared in long double: at condition 1e10 y'By cancels ten
+// digits.
 struct Reduced {
   using Wide = long double;
   using Matrix2 = Eigen::Matrix<Wide, 2, 2>;
@@ -198,7 +207,8 @@ inline const char* failure(const Contact& p, const Eigen::Vector3d& x, int point
   if (!(p.b[0] > 0)) return x.isZero(0) ? nullptr : "impulse at a separating contact";
   const Reduced r(p);
   const Eigen::Vector2d y = x.tail<2>();
-  const double scale = r.a * std::abs(x[0]) + std::abs(r.c[0] * y[0]) + std::abs(r.c[1] * y[1]) + p.b[0];
+  const double scale =
+      r.a * std::abs(x[0]) + std::abs(r.c[0] * y[0]) + std::abs(r.c[1] * y[1]) + p.b[0];
   if (!(x[0] >= 0)) return "pulls";
   if (std::abs(r.a * x[0] + r.c.dot(y) - p.b[0]) > 1e-12 * scale) return "plane";
   if (std::hypot(y[0], y[1]) > p.mu * x[0] * (1 + 1e-12)) return "cone";

@@ -270,7 +270,8 @@ TEST_CASE("bad input: body form") {
                Contains("body 0: least eigenvalue of inverse_inertia = -2") && Contains(">= 0"));
     CHECK(refused([&](B& b, C&) {  // a rod does not turn about its axis
             b[0].inverse_inertia = scale * Vector3d(1, 1, 0).asDiagonal().toDenseMatrix();
-          }).empty());
+          })
+              .empty());
   }
   for (double bad : {kNan, kInfinity}) {
     CHECK_THAT(refused([&](B& b, C&) { b[0].inverse_mass = bad; }),

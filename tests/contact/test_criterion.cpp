@@ -71,7 +71,8 @@ Problem boxes(double mass, double mu) {
 // An independent judge: the largest violation of a condition on impulses and velocities, in long
 // double, over the largest |b_i| (frictionless: b_n) of the island. Impulses become velocities by
 // the sum of the block norms of their row.
-long double violation(const Problem& p, Law law, const VectorXd& x, const std::vector<int>& replaced) {
+long double violation(const Problem& p, Law law, const VectorXd& x,
+                      const std::vector<int>& replaced) {
   using Wide = long double;
   const int n = p.contacts(), d = p.dimension();
   std::vector<std::array<Wide, 3>> w(static_cast<std::size_t>(n)), X = w;
@@ -94,7 +95,8 @@ long double violation(const Problem& p, Law law, const VectorXd& x, const std::v
           norm += a * a;
         }
       reach[at(i)] += std::sqrt(norm);
-      if (norm > 0) std::replace(island.begin(), island.end(), int(island[at(j)]), int(island[at(i)]));
+      if (norm > 0)
+        std::replace(island.begin(), island.end(), int(island[at(j)]), int(island[at(i)]));
     }
     for (int c = 0; c < d; ++c) w[at(i)][at(c)] -= p.b()[d * i + c];
   }
@@ -113,15 +115,15 @@ long double violation(const Problem& p, Law law, const VectorXd& x, const std::v
     if (law == Law::maximum_dissipation && !other)
       for (int c = 0; c < 2; ++c) g[c] = mu * Wide(p.local(i).c[c]) / Wide(p.local(i).a);
     const Wide t = std::hypot(xi[1], xi[2]);
-    Wide bad = std::max({-wi[0], D * (t - mu * xi[0]), -D * xi[0],
-                         std::min(D * xi[0], std::abs(wi[0]))});
+    Wide bad =
+        std::max({-wi[0], D * (t - mu * xi[0]), -D * xi[0], std::min(D * xi[0], std::abs(wi[0]))});
     if (mu > 0 && xi[0] > 0) {
       Wide misfit = std::hypot(wi[1], wi[2]);
       if (t > 0) {  // on the cone: w_t = -s (u + gamma), s >= 0
         const Wide u0 = xi[1] / t + g[0], u1 = xi[2] / t + g[1], uu = u0 * u0 + u1 * u1;
         const Wide s = uu > 0 ? std::max(Wide(0), -(wi[1] * u0 + wi[2] * u1) / uu) : 0;
-        misfit = std::min(misfit, std::max(std::hypot(wi[1] + s * u0, wi[2] + s * u1),
-                                           D * (mu * xi[0] - t)));
+        misfit = std::min(
+            misfit, std::max(std::hypot(wi[1] + s * u0, wi[2] + s * u1), D * (mu * xi[0] - t)));
       }
       bad = std::max(bad, std::min(misfit, D * (1 + mu) * xi[0]));
     }
@@ -163,8 +165,8 @@ TEST_CASE("criterion: other units change nothing, at any scale") {
               Solver(with(law, 1e-8)).solve(in_units(p, std::ldexp(1, A), std::ldexp(1, b)));
           INFO(name(law) << ", 2^" << A << " A, 2^" << b << " b: " << name(t.status));
           CHECK(t.status == s.status);
-          CHECK(violation(p, law, std::ldexp(1, A) * (std::ldexp(1, -b) * t.impulses), t.replaced) <=
-                10 * 1e-8);
+          CHECK(violation(p, law, std::ldexp(1, A) * (std::ldexp(1, -b) * t.impulses),
+                          t.replaced) <= 10 * 1e-8);
         }
       }
     }
@@ -254,8 +256,8 @@ TEST_CASE("criterion: a body between closing walls is infeasible, with the proof
             Options o = with(law, tolerance, method);
             o.max_sweeps = 3000;
             const Solution s = Solver(o).solve(p);
-            INFO(name(law) << ", " << name(method) << ", mu " << mu << ", " << mass << " kg: "
-                           << name(s.status) << " " << s.error);
+            INFO(name(law) << ", " << name(method) << ", mu " << mu << ", " << mass
+                           << " kg: " << name(s.status) << " " << s.error);
             REQUIRE(s.status == Status::infeasible);
             REQUIRE(s.infeasible_direction.size() == 9);
             const Eigen::Map<const VectorXd> d(s.infeasible_direction.data(), 9);
@@ -284,7 +286,8 @@ TEST_CASE("criterion: b = 0 is solved by x = 0 from any start") {
   }
 }
 
-TEST_CASE("criterion: random small problems, never a wrong solved, never a value that is not finite") {
+TEST_CASE(
+    "criterion: random small problems, never a wrong solved, never a value that is not finite") {
   int solved = 0;
   for (int k = 0; k < 3000; ++k) {
     random::Generator g(1000 + static_cast<std::uint64_t>(k));

@@ -110,7 +110,8 @@ TEST_CASE("damaged fclib files are refused") {
   write_fclib(p, file.path);
   const std::string good = slurp(file.path);
   for (double part : {0.0, 0.1, 0.3, 0.5, 0.7, 0.9}) {
-    spill(file.path, good.substr(0, static_cast<std::size_t>(part * static_cast<double>(good.size()))));
+    spill(file.path,
+          good.substr(0, static_cast<std::size_t>(part * static_cast<double>(good.size()))));
     CHECK_THROWS_AS(read_fclib(file.path), std::runtime_error);
   }
   spill(file.path, "this is not HDF5");
@@ -123,11 +124,13 @@ TEST_CASE("damaged fclib files are refused") {
 namespace {
 
 template <class T>
-void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& values, hsize_t claimed = 0) {
+void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& values,
+         hsize_t claimed = 0) {
   const hsize_t size = claimed > 0 ? claimed : values.size();
   const hid_t space = H5Screate_simple(1, &size, nullptr), links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
-  const hid_t set = H5Dcreate2(file, ("/fclib_local/" + name).c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t set = H5Dcreate2(file, ("/fclib_local/" + name).c_str(), type, space, links,
+                               H5P_DEFAULT, H5P_DEFAULT);
   if (claimed == 0) H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
   H5Dclose(set);
   H5Pclose(links);
@@ -152,19 +155,25 @@ void write_columns(const std::string& path, const std::vector<int>& pointers, hs
 
 }  // namespace
 
-TEST_CASE("fclib: column pointers that decrease or exceed are refused, and sizes that the file cannot hold") {
+TEST_CASE(
+    "fclib: column pointers that decrease or exceed are refused, and sizes that the file cannot "
+    "hold") {
   Temporary file("test_contact_hostile.hdf5");
   write_columns(file.path, {0, 1, 2, 3});
   CHECK(read_fclib(file.path).contacts() == 1);
-  for (const std::vector<int>& pointers :
-       {std::vector<int>{0, 100000000, 2, 3}, {0, 2, 1, 3}, {-1, 1, 2, 3}, {0, 1, 100000000, 3}, {0, -5, 2, 3}}) {
+  for (const std::vector<int>& pointers : {std::vector<int>{0, 100000000, 2, 3},
+                                           {0, 2, 1, 3},
+                                           {-1, 1, 2, 3},
+                                           {0, 1, 100000000, 3},
+                                           {0, -5, 2, 3}}) {
     write_columns(file.path, pointers);
     CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("W/p must ascend from 0"));
   }
   write_columns(file.path, {0, 1, 2, 100000000});
   CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("fewer entries than W/p says"));
   write_columns(file.path, {0, 1, 2, 3}, hsize_t{1} << 30);
-  CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("1073741824 entries, but the file holds 0 bytes"));
+  CHECK_THROWS_WITH(read_fclib(file.path),
+                    Catch::Contains("1073741824 entries, but the file holds 0 bytes"));
 }
 
 #endif

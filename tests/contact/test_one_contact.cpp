@@ -1,4 +1,5 @@
-// Tether: the one-contact laws against an independent reference. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the one-contact laws against an independent reference. SPDX-License-Identifier:
+// BSD-3-Clause
 #include <cstdlib>
 #include <tether/contact.hpp>
 
@@ -59,8 +60,7 @@ TEST_CASE("coulomb: friction opposes slip, cone and plane hold") {
         if (s.regime == Regime::sliding && t > 0) {
           const Eigen::Vector2d u = x.tail<2>() / t;
           const double along = w.tail<2>().dot(u), across = w[2] * u[0] - w[1] * u[1];
-          good = good && along <= tol && std::abs(across) <= tol &&
-                 t >= p.mu * x[0] * (1 - 1e-9);
+          good = good && along <= tol && std::abs(across) <= tol && t >= p.mu * x[0] * (1 - 1e-9);
         }
       } else {
         good = good && w[0] >= -tol;
@@ -76,7 +76,8 @@ TEST_CASE("coulomb: started at any of its solutions, a strongly coupled contact 
   // Solutions from sign changes of |y| + g.y - k on a fine logarithmic grid of lambda; they share
   // nothing with the count by curvature that the library relies on.
   int several = 0;
-  for (const std::string kind : {"condition_1e1", "condition_1e4", "condition_1e8", "rods", "hyperbolic", "mu_1000", "singular"}) {
+  for (const std::string kind : {"condition_1e1", "condition_1e4", "condition_1e8", "rods",
+                                 "hyperbolic", "mu_1000", "singular"}) {
     random::Generator generator(23);
     for (int k = 0; k < std::min(samples() / 10, 2000); ++k) {
       random::Contact p = generator(kind);
@@ -86,11 +87,14 @@ TEST_CASE("coulomb: started at any of its solutions, a strongly coupled contact 
       const Eigen::Vector2d beta(L.beta[0], L.beta[1]), g(L.g[0], L.g[1]);
       Eigen::Matrix2d V;
       V << L.cosine, -L.sine, L.sine, L.cosine;
-      const Eigen::Vector2d h = V.transpose() * (p.b.tail<2>() - Eigen::Vector2d(L.c[0], L.c[1]) * (p.b[0] / L.a));
+      const Eigen::Vector2d h =
+          V.transpose() * (p.b.tail<2>() - Eigen::Vector2d(L.c[0], L.c[1]) * (p.b[0] / L.a));
       const double limit = p.mu * p.b[0] / L.a;
       const auto y = [&](double l) -> Eigen::Vector2d { return h.array() / (beta.array() + l); };
       const auto excess = [&](double l) { return y(l).norm() + g.dot(y(l)) - limit; };
-      const double first = 1e-7 * beta.minCoeff(), last = std::max(1e6 * beta.maxCoeff(), 4 * (1 + L.e) * h.norm() / std::abs(limit));
+      const double first = 1e-7 * beta.minCoeff(),
+                   last =
+                       std::max(1e6 * beta.maxCoeff(), 4 * (1 + L.e) * h.norm() / std::abs(limit));
       double left = 0, at_left = excess(0);
       int found = (at_left <= 0) + (p.b[0] <= 0);
       const double factor = std::pow(last / first, 1e-3);
@@ -148,7 +152,8 @@ TEST_CASE("rotating the tangents and scaling the units changes nothing else") {
       if (law == Law::coulomb && LocalBlock(p.A, p.mu).e > 0.8) continue;
       const double angle = generator.uniform(0, 6.28), s = std::exp(generator.uniform(-5, 5));
       Matrix3d R = Matrix3d::Identity();
-      R.bottomRightCorner<2, 2>() << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+      R.bottomRightCorner<2, 2>() << std::cos(angle), -std::sin(angle), std::sin(angle),
+          std::cos(angle);
       const Vector3d x = solve_one(law, p.A, p.b, p.mu).impulse;
       const Vector3d y = solve_one(law, s * (R * p.A * R.transpose()), R * p.b, p.mu).impulse;
       REQUIRE((s * y - R * x).norm() <= 1e-9 * x.norm() + 1e-300);
@@ -184,7 +189,8 @@ TEST_CASE("a sphere: both laws are radial return") {
       if (length > most) expected.tail<2>() *= most / length;
     }
     for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
-      REQUIRE((solve_one(law, A, b, mu).impulse - expected).norm() <= 1e-12 * (expected.norm() + 1e-300));
+      REQUIRE((solve_one(law, A, b, mu).impulse - expected).norm() <=
+              1e-12 * (expected.norm() + 1e-300));
     }
   }
 }
@@ -227,6 +233,7 @@ TEST_CASE("waLBerla's case: b_n > 0 while the unconstrained normal impulse is ne
   const Vector3d b(0.1, 1, 0.3);
   REQUIRE(A.inverse().row(0).dot(b) < 0);
   for (double mu : {0.0, 0.3, 1.0, 2.0, 1e3}) {
-    CHECK(random::failure({A, b, mu}, solve_one(Law::maximum_dissipation, A, b, mu).impulse, 2000) == nullptr);
+    CHECK(random::failure({A, b, mu}, solve_one(Law::maximum_dissipation, A, b, mu).impulse,
+                          2000) == nullptr);
   }
 }

@@ -58,8 +58,9 @@ random::Packing close_packing(int cells, bool spheres, double mu, std::uint64_t 
 
 }  // namespace
 
-// Six of the eight take 0.2 to 1.17 times the work of the best stage, the others 1.46 and 1.77: with
-// much friction the number of sweeps until contacts settle is chance, and any step aside is another throw.
+// Six of the eight take 0.2 to 1.17 times the work of the best stage, the others 1.46 and 1.77:
+// with much friction the number of sweeps until contacts settle is chance, and any step aside is
+// another throw.
 TEST_CASE("packings: automatic solves all, most at little more than the cost of its best stage") {
   double ratios = 1;
   int count = 0;
@@ -108,9 +109,9 @@ TEST_CASE("packings: the few contacts that toggle are solved as problems of thei
       o.method = Method::anderson;  // the same sweeps, without
       o.max_work = 1e9;
       const Solution alone = Solver(o).solve(p);
-      INFO((spheres ? "spheres" : "bodies") << ", seed " << seed << ": " << name(s.status) << " "
-                                            << s.error << ", " << s.counts.work << " and "
-                                            << alone.counts.work);
+      INFO((spheres ? "spheres" : "bodies")
+           << ", seed " << seed << ": " << name(s.status) << " " << s.error << ", " << s.counts.work
+           << " and " << alone.counts.work);
       CHECK(s.status == Status::solved);
       CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1e-6);
       ratios *= s.counts.work / alone.counts.work;

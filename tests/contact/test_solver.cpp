@@ -49,7 +49,8 @@ TEST_CASE("the convex relaxation is never called solved when the law is violated
   random::Generator g(1);
   random::Assembly sliding = random::stack(1, 1, 0.3);
   sliding.bodies[0].velocity << 1, 0, -0.1, 0, 0, 0;
-  const Solution s = Solver(with(Law::coulomb, 1e-9, Method::convex_relaxation)).solve(sliding.problem());
+  const Solution s =
+      Solver(with(Law::coulomb, 1e-9, Method::convex_relaxation)).solve(sliding.problem());
   CHECK(s.status == Status::relaxed);
   CHECK(s.error > 1e-6);
   CHECK_FALSE(s.advice.empty());
@@ -187,12 +188,16 @@ TEST_CASE("a wedge that slides without friction") {
     body.velocity << 0, 0, -g, 0, 0, 0;
     a.bodies.push_back(body);
   }
-  a.contacts.push_back(BodyContact::at_point(0, 1, Vector3d::Zero(), Vector3d::Zero(), {std::sin(alpha), 0, std::cos(alpha)}, 0));
-  a.contacts.push_back(BodyContact::at_point(1, -1, Vector3d::Zero(), Vector3d::Zero(), {0, 0, 1}, 0));
+  a.contacts.push_back(BodyContact::at_point(0, 1, Vector3d::Zero(), Vector3d::Zero(),
+                                             {std::sin(alpha), 0, std::cos(alpha)}, 0));
+  a.contacts.push_back(
+      BodyContact::at_point(1, -1, Vector3d::Zero(), Vector3d::Zero(), {0, 0, 1}, 0));
   const Solution s = Solver(with(Law::maximum_dissipation, 1e-13)).solve(a.problem());
   REQUIRE(s.status == Status::solved);
   const double v = velocities_after(a.bodies, a.contacts, s.impulses)[1][0];
-  CHECK(-v == Approx(m * g * std::sin(alpha) * std::cos(alpha) / (M + m * std::pow(std::sin(alpha), 2))).epsilon(1e-9));
+  CHECK(-v ==
+        Approx(m * g * std::sin(alpha) * std::cos(alpha) / (M + m * std::pow(std::sin(alpha), 2)))
+            .epsilon(1e-9));
 }
 
 TEST_CASE("high mass ratios") {
@@ -208,8 +213,8 @@ TEST_CASE("high mass ratios") {
         }
         for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
           const Solution s = Solver(with(law)).solve(a.problem());
-          INFO(n << " boxes, ratio " << ratio << ", push " << push << ", " << name(law) << ": " << name(s.status)
-                 << " " << s.error);
+          INFO(n << " boxes, ratio " << ratio << ", push " << push << ", " << name(law) << ": "
+                 << name(s.status) << " " << s.error);
           CHECK(s.status == Status::solved);
           CHECK(s.counts.work < 2e7);  // 20 ms
           CHECK(s.replaced.empty());
@@ -262,10 +267,12 @@ TEST_CASE("reversed order: the same velocities where everything sticks") {
     random::Assembly a = random::stack(5, ratio), r = a;
     std::reverse(r.contacts.begin(), r.contacts.end());
     for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
-      const Solution s = Solver(with(law, 1e-11)).solve(a.problem()), t = Solver(with(law, 1e-11)).solve(r.problem());
+      const Solution s = Solver(with(law, 1e-11)).solve(a.problem()),
+                     t = Solver(with(law, 1e-11)).solve(r.problem());
       REQUIRE(s.status == Status::solved);
       REQUIRE(t.status == Status::solved);
-      const auto v = velocities_after(a.bodies, a.contacts, s.impulses), w = velocities_after(r.bodies, r.contacts, t.impulses);
+      const auto v = velocities_after(a.bodies, a.contacts, s.impulses),
+                 w = velocities_after(r.bodies, r.contacts, t.impulses);
       for (std::size_t k = 0; k < v.size(); ++k) CHECK((v[k] - w[k]).norm() < 1e-7);
     }
   }
@@ -279,7 +286,8 @@ TEST_CASE("turned tangents and other units change nothing else") {
     VectorXd mu(p.contacts());
     for (int i = 0; i < p.contacts(); ++i) mu[i] = p.mu(i);
     // Kilograms to grams, metres to millimetres.
-    const Solution t = Solver(with(Law::coulomb, 1e-11)).solve(Problem::dense(1e-3 * p.dense_matrix(), 1e3 * p.b(), mu));
+    const Solution t = Solver(with(Law::coulomb, 1e-11))
+                           .solve(Problem::dense(1e-3 * p.dense_matrix(), 1e3 * p.b(), mu));
     REQUIRE(s.status == Status::solved);
     REQUIRE(t.status == Status::solved);
     CHECK(evaluate(p, Law::coulomb, 1e-6 * t.impulses).natural_map_data < 1e-8);
@@ -287,7 +295,8 @@ TEST_CASE("turned tangents and other units change nothing else") {
     const Problem q = random::shuffled(p, g, &order);
     const Solution u = Solver(with(Law::coulomb, 1e-11)).solve(q);
     REQUIRE(u.status == Status::solved);
-    CHECK(std::abs(evaluate(q, Law::coulomb, u.impulses).energy_change - evaluate(p, Law::coulomb, s.impulses).energy_change) <=
+    CHECK(std::abs(evaluate(q, Law::coulomb, u.impulses).energy_change -
+                   evaluate(p, Law::coulomb, s.impulses).energy_change) <=
           1e-2 * std::abs(evaluate(p, Law::coulomb, s.impulses).energy_change));
   }
 }

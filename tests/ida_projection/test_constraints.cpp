@@ -187,7 +187,8 @@ TEST_CASE("builders: an index beyond the unknowns is refused before anything is 
   };
   CHECK(contains(refused(tp::quaternion_norm(1)), "\"quaternion norm\" needs at least 5 unknowns"));
   CHECK(contains(refused(tp::quaternion_norm(100000000)), "at least 100000004"));
-  CHECK(contains(refused(tp::quaternion_norm(std::numeric_limits<int>::max())), "at least 2147483651"));
+  CHECK(contains(refused(tp::quaternion_norm(std::numeric_limits<int>::max())),
+                 "at least 2147483651"));
   CHECK(contains(refused(tp::energy(H, dH, 0.0, 9)), "\"energy\" needs at least 10 unknowns"));
   CHECK(contains(refused(tp::energy(H, dH, 0.0, 2)), "at least 3 unknowns; y has 2"));
   CHECK(contains(refused(tp::linear_invariant({1.0, 1.0, 1.0}, 1.0)),

@@ -1,4 +1,5 @@
-// Tether: counts memory allocations of the whole process, and lets one fail. SPDX-License-Identifier: BSD-3-Clause
+// Tether: counts memory allocations of the whole process, and lets one fail.
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 namespace tether::test {

@@ -30,7 +30,8 @@ inline RowMajor random_matrix(int m, int n, std::mt19937& random) {
 /// Random rows, metric over six decades, right-hand side of size 1.
 inline Case random_case(int m, int n, unsigned seed) {
   std::mt19937 random(seed);
-  Case c{random_matrix(m, n, random), random_vector(n, random, -3.0, 3.0), random_vector(m, random)};
+  Case c{random_matrix(m, n, random), random_vector(n, random, -3.0, 3.0),
+         random_vector(m, random)};
   c.D = c.D.unaryExpr([](double x) { return std::pow(10.0, x); });
   return c;
 }
@@ -67,8 +68,8 @@ inline Eigen::VectorXd solve(linalg::MinimumNorm& solver, const Eigen::VectorXd&
 
 /// Sizes on both sides of the border between the small kernel and Eigen, and of padded lengths.
 inline std::vector<std::pair<int, int>> sizes() {
-  return {{1, 1}, {1, 2}, {3, 3}, {3, 4}, {2, 5}, {5, 7}, {4, 8}, {13, 14}, {15, 16}, {16, 17},
-          {12, 31}, {16, 32}, {17, 32}, {16, 33}, {17, 33}, {30, 60}};
+  return {{1, 1},   {1, 2},   {3, 3},   {3, 4},   {2, 5},   {5, 7},   {4, 8},   {13, 14},
+          {15, 16}, {16, 17}, {12, 31}, {16, 32}, {17, 32}, {16, 33}, {17, 33}, {30, 60}};
 }
 
 /// |a - b| in the metric D, where D > 0.

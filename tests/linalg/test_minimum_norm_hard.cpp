@@ -33,8 +33,7 @@ TEST_CASE("near rank loss: backward stable up to condition 1e12") {
       // The last row differs from a combination of two others by `gap`, orthogonally to all.
       Eigen::VectorXd across = random_vector(n, random);
       const RowMajor others = c.C.topRows(m - 1);
-      across -= others.transpose() *
-                (others * others.transpose()).ldlt().solve(others * across);
+      across -= others.transpose() * (others * others.transpose()).ldlt().solve(others * across);
       across.normalize();
       c.C.row(m - 1) = c.C.row(0) + c.C.row(1);
       c.C.row(m - 1) += gap * c.C.row(m - 1).norm() * across.transpose();

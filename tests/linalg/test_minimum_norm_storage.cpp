@@ -31,7 +31,8 @@ TEST_CASE("kept factors solve any number of right-hand sides") {
 
 TEST_CASE("resize to and fro across the border forgets nothing it needs") {
   MinimumNorm solver;
-  for (const auto& [m, n] : {std::pair<int, int>{3, 5}, {20, 40}, {2, 3}, {16, 32}, {17, 33}, {3, 5}}) {
+  for (const auto& [m, n] :
+       {std::pair<int, int>{3, 5}, {20, 40}, {2, 3}, {16, 32}, {17, 33}, {3, 5}}) {
     INFO(m << " x " << n);
     const Case c = random_case(m, n, 61);
     solver.resize(m, n);
@@ -62,8 +63,7 @@ TEST_CASE("both sides of the border give the same answer") {
   CHECK(small.rank() == large.rank());
   CHECK(distance(solve(small, c.g), solve(large, c.g).head(32), c.D) <=
         1e-11 * length(solve(small, c.g), c.D));
-  for (int i = 0; i < 16; ++i)
-    CHECK(small.row_norm(i) == Approx(large.row_norm(i)).epsilon(1e-14));
+  for (int i = 0; i < 16; ++i) CHECK(small.row_norm(i) == Approx(large.row_norm(i)).epsilon(1e-14));
 }
 
 TEST_CASE("a moved solver takes its factors along") {

@@ -1,5 +1,5 @@
-/* Included before everything else in a SUNDIALS example: IDAInit and IDAInitB make their vectors fast
- * first, and SUNLinSol_Dense is the fast solver where the matrix is small enough.
+/* Included before everything else in a SUNDIALS example: IDAInit and IDAInitB make their vectors
+ * fast first, and SUNLinSol_Dense is the fast solver where the matrix is small enough.
  * SPDX-License-Identifier: BSD-3-Clause */
 #ifndef TETHER_TESTS_FAST_H
 #define TETHER_TESTS_FAST_H

@@ -58,7 +58,7 @@ void BodySolver::Implementation::read_contacts() {
     turned[i] = !a;
     first[i] = a ? c.first : c.second;
     second[i] = a && b ? c.second : -1;
-    kind[i] = !detail::traits(options.law).friction || c.mu == 0                 ? Kind::smooth
+    kind[i] = !detail::traits(options.law).friction || c.mu == 0                  ? Kind::smooth
               : round(c.first, c.r1, c.normal) && round(c.second, c.r2, c.normal) ? Kind::sphere
                                                                                   : Kind::general;
   }

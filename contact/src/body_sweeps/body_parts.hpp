@@ -8,10 +8,10 @@
 #include <tether/contact/body_solver.hpp>
 #include <vector>
 
+#include "body_sweeps/body_kernels.hpp"
 #include "body_sweeps/contact_graph.hpp"
 #include "body_sweeps/impulse_memory.hpp"
 #include "body_sweeps/worker_team.hpp"
-#include "body_sweeps/body_kernels.hpp"
 #include "problem/criterion.hpp"
 
 namespace tether::contact::detail {

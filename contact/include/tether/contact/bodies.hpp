@@ -13,14 +13,15 @@ using Matrix6d = linalg::Matrix<6, 6>;
 using Vector6d = linalg::Matrix<6, 1>;
 using Matrix36d = linalg::Matrix<3, 6>;
 
-/// Inverse mass matrix (symmetric, positive semidefinite) and velocity (linear, angular) before the impulses. Zero inverse: fixed.
+/// Inverse mass matrix (symmetric, positive semidefinite) and velocity (linear, angular) before the
+/// impulses. Zero inverse: fixed.
 struct Body {
   Matrix6d inverse_mass = Matrix6d::Zero();
   Vector6d velocity = Vector6d::Zero();
 };
 
-/// Relative velocity J1 v1 + J2 v2 in the contact frame (normal, tangent, tangent), positive normal:
-/// the bodies separate. `bias` is added to it before the solve: w = J v + bias.
+/// Relative velocity J1 v1 + J2 v2 in the contact frame (normal, tangent, tangent), positive
+/// normal: the bodies separate. `bias` is added to it before the solve: w = J v + bias.
 struct BodyContact {
   int first = 0, second = -1;  ///< indices of bodies; -1: the fixed world
   Matrix36d J1 = Matrix36d::Zero(), J2 = Matrix36d::Zero();

@@ -60,7 +60,8 @@ struct BodyOptions {
   double enough = 0;      ///< as Options::enough, for each assembled island
 };
 
-/// What a warm start begins with: the impulses of the last solve by id, in the order of its contacts.
+/// What a warm start begins with: the impulses of the last solve by id, in the order of its
+/// contacts.
 struct WarmStart {
   std::vector<std::uint64_t> ids;
   std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`, N s

@@ -20,7 +20,8 @@ Problem read_fclib(const std::string& path);
 Problem read_problem(const std::string& path);
 
 enum class DatStorage { dense, blocks };
-void write_dat(const Problem& problem, const std::string& path, DatStorage storage = DatStorage::blocks);
+void write_dat(const Problem& problem, const std::string& path,
+               DatStorage storage = DatStorage::blocks);
 void write_fclib(const Problem& problem, const std::string& path);
 bool has_fclib();
 

@@ -39,7 +39,7 @@ struct LocalBlock {
   double T[3];  ///< T00, T01, T11, with the raised beta
   /// e <= 2 sqrt(q) / (1 + q), q = beta_min / beta_max: the Coulomb law has one solution (README).
   bool unique;
-  bool null[2];  ///< beta was below 1e-12 trace(A)
+  bool null[2];   ///< beta was below 1e-12 trace(A)
   bool ordinary;  ///< trace(A) is so near to 1 that no product of a solve leaves the range
 
   LocalBlock() = default;

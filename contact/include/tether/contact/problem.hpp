@@ -1,4 +1,5 @@
-// Tether: a frictional contact problem given by its Delassus matrix. SPDX-License-Identifier: BSD-3-Clause
+// Tether: a frictional contact problem given by its Delassus matrix. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <cstdint>
@@ -64,8 +65,8 @@ class Problem {
   const std::vector<PackedVector>& packed_b() const { return packed_b_; }
   /// The same in other units, exactly: in island k, A times 2^mass[k] and b times 2^speed[k].
   Problem rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const;
-  /// Island of each contact: contacts with a block that is not zero between them share one. Numbered
-  /// from 0 in the order of their first contacts.
+  /// Island of each contact: contacts with a block that is not zero between them share one.
+  /// Numbered from 0 in the order of their first contacts.
   const std::vector<int>& islands() const { return islands_; }
 
   /// Its factors where delassus() has made it, else null; the solver's own.

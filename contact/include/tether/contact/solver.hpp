@@ -21,26 +21,27 @@ enum class Measure : std::uint8_t {
 };
 
 enum class Method : std::uint8_t {
-  automatic,          ///< sweeps, Anderson, ADMM, interior points and proximal Newton in rotation
-  gauss_seidel,       ///< plain sweeps
-  sor,                ///< x <- clip((1 - omega) x + omega sweep)
-  jacobi,             ///< all blocks from the old x, damped
-  anderson,           ///< Gauss-Seidel with safeguarded Anderson acceleration
-  admm,               ///< alternating directions only
-  proximal_newton,    ///< one sweep, then proximal semismooth Newton only
-  interior_point,     ///< interior points of the exact cones only
-  convex_relaxation   ///< min 1/2 x'Ax - b'x over the cones: never without being asked for
+  automatic,         ///< sweeps, Anderson, ADMM, interior points and proximal Newton in rotation
+  gauss_seidel,      ///< plain sweeps
+  sor,               ///< x <- clip((1 - omega) x + omega sweep)
+  jacobi,            ///< all blocks from the old x, damped
+  anderson,          ///< Gauss-Seidel with safeguarded Anderson acceleration
+  admm,              ///< alternating directions only
+  proximal_newton,   ///< one sweep, then proximal semismooth Newton only
+  interior_point,    ///< interior points of the exact cones only
+  convex_relaxation  ///< min 1/2 x'Ax - b'x over the cones: never without being asked for
 };
 
 enum class Status : std::uint8_t {
   unsolved,
-  solved,     ///< measure <= tolerance, and round-off of A x - b does not exceed it
-  stalled,    ///< no progress any more
-  cycling,    ///< the iteration repeats without progress; often no solution of the law is near
-  work_limit, ///< max_work or max_sweeps reached while there was progress
-  relaxed,    ///< convex_relaxation converged, but its answer violates the law (see error)
-  round_off,  ///< what is left is what round-off makes of A x - b: no smaller tolerance can be reached
-  infeasible  ///< no impulses keep every w_n >= 0, see Solution::infeasible_direction
+  solved,      ///< measure <= tolerance, and round-off of A x - b does not exceed it
+  stalled,     ///< no progress any more
+  cycling,     ///< the iteration repeats without progress; often no solution of the law is near
+  work_limit,  ///< max_work or max_sweeps reached while there was progress
+  relaxed,     ///< convex_relaxation converged, but its answer violates the law (see error)
+  round_off,   ///< what is left is what round-off makes of A x - b: no smaller tolerance can be
+               ///< reached
+  infeasible   ///< no impulses keep every w_n >= 0, see Solution::infeasible_direction
 };
 
 const char* name(Measure measure);
@@ -53,23 +54,24 @@ struct Options {
   Measure measure = Measure::automatic;
   Method method = Method::automatic;
   /// true: the law is never replaced. false: where maximum_dissipation does not converge, contacts
-  /// with eccentricity > 0.98 get the Coulomb rule in a second attempt; Solution::replaced lists them.
+  /// with eccentricity > 0.98 get the Coulomb rule in a second attempt; Solution::replaced lists
+  /// them.
   bool strict = false;
-  double relaxation = 1.0;    ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
-  int max_sweeps = 200000;    ///< of the plain methods and anderson
-  double max_work = 1e10;     ///< automatic: estimated nanoseconds, counted from operations
-  /// An error with which the solve ends, as work_limit, once a quarter of max_work is spent: what is
-  /// hard to solve is then not worth all of it. 0: none.
+  double relaxation = 1.0;  ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
+  int max_sweeps = 200000;  ///< of the plain methods and anderson
+  double max_work = 1e10;   ///< automatic: estimated nanoseconds, counted from operations
+  /// An error with which the solve ends, as work_limit, once a quarter of max_work is spent: what
+  /// is hard to solve is then not worth all of it. 0: none.
   double enough = 0;
-  int anderson_depth = 10;    ///< 1 .. 20
-  bool warm_start = false;    ///< start from the impulses of the previous solve, found by contact id
-  bool history = false;       ///< record Solution::history
+  int anderson_depth = 10;  ///< 1 .. 20
+  bool warm_start = false;  ///< start from the impulses of the previous solve, found by contact id
+  bool history = false;     ///< record Solution::history
 };
 
 struct HistoryEntry {
   Method stage = Method::automatic;
-  int iteration = 0;   ///< sweeps, ADMM iterations or factorisations so far
-  double error = 0;    ///< best measure so far
+  int iteration = 0;  ///< sweeps, ADMM iterations or factorisations so far
+  double error = 0;   ///< best measure so far
 };
 
 struct Counts {
@@ -102,9 +104,9 @@ struct Solution {
   std::string advice;  ///< what to try when it is not solved
 };
 
-/// Iterates on a Problem and keeps its workspace between solves; results depend only on the problem,
-/// the options and, with warm_start, the previous solution: never on the clock. Not for use by two
-/// threads at once.
+/// Iterates on a Problem and keeps its workspace between solves; results depend only on the
+/// problem, the options and, with warm_start, the previous solution: never on the clock. Not for
+/// use by two threads at once.
 class Solver {
  public:
   explicit Solver(const Options& options = {});  ///< throws std::invalid_argument on illegal values

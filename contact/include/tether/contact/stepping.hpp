@@ -28,7 +28,8 @@ const char* name(Gyroscopic gyroscopic);
 
 /// What an impact gives back (README, section 14).
 enum class RestitutionLaw : std::uint8_t {
-  /// Normal velocities: w_n+ + e w_n- >= 0 complementary to x_n, together with friction in one solve.
+  /// Normal velocities: w_n+ + e w_n- >= 0 complementary to x_n, together with friction in one
+  /// solve.
   newton,
   /// Impulses: those without restitution, and e times as much more; slip is given back as well.
   poisson
@@ -79,8 +80,8 @@ struct SteppingOptions {
   Law law = Law::coulomb;
   /// Of the contact problem; see BodyOptions::tolerance.
   double tolerance = 1e-9;
-  /// A problem that ends above the tolerance is used and counted as `accepted` if its residual is at
-  /// most acceptance * tolerance and at most 1e-4. 1: none is.
+  /// A problem that ends above the tolerance is used and counted as `accepted` if its residual is
+  /// at most acceptance * tolerance and at most 1e-4. 1: none is.
   double acceptance = 1;
   /// Where it is above that, too, the step is taken in two halves, they in quarters, ... so many
   /// times. The shortest parts, and all with an impact, which is as hard in a shorter step, accept
@@ -92,7 +93,7 @@ struct SteppingOptions {
   /// max_depenetration_speed). That speed moves bodies but is no velocity of theirs: it enters no
   /// energy. 0: penetrations stay.
   double error_reduction = 0.2;
-  double max_depenetration_speed = 1;   ///< m/s
+  double max_depenetration_speed = 1;  ///< m/s
   RestitutionLaw restitution_law = RestitutionLaw::newton;
   /// Approaches slower than this times sqrt(g s) do not bounce: g gravity (none: all bounce), s the
   /// reach of the smaller shape from its origin. A drop from h bounces if h > threshold^2 s / 2.
@@ -144,8 +145,8 @@ struct StepperMemory {
   };
   long steps = 0;
   WarmStart contacts, corrections, bounces, closings;  ///< of the contact problems of a step
-  std::vector<Spin> spins;                   ///< of bodies that turn with their momentum kept
-  StepContacts last;                         ///< contacts of the last step, and what became of it:
+  std::vector<Spin> spins;  ///< of bodies that turn with their momentum kept
+  StepContacts last;        ///< contacts of the last step, and what became of it:
   double penetration = 0, residual = 0;
   Status status = Status::solved;
 };
