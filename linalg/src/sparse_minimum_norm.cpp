@@ -19,6 +19,7 @@ constexpr double kSmallestEps = 1e-13;  // A A^T of unit rows carries some 1e-15
 constexpr double kHalving = 0.5;        // a step that leaves more of the residual is the last one
 constexpr int kProximalSteps = 8;
 constexpr int kGradientSteps = 10;
+constexpr int kFilters = 3;
 
 double dot(const double* a, const double* b, std::size_t n) {
   double sum = 0.0;
@@ -178,8 +179,8 @@ void SparseMinimumNorm::couple_full() {
 bool SparseMinimumNorm::factor(double rank_tolerance) {
   if (!scale_sparse() || !scale_full()) return false;
   couple_full();
-  const double eps = std::max(rank_tolerance * rank_tolerance, kSmallestEps);
-  const int dependent = gram_->factor(A_.data(), norm_.data(), eps);
+  eps_ = std::max(rank_tolerance * rank_tolerance, kSmallestEps);
+  const int dependent = gram_->factor(A_.data(), norm_.data(), eps_);
   dropped_.clear();
   for (int i = 0; dependent > 0 && i < rows(); ++i)
     if (gram_->dependent(i)) dropped_.push_back(i);
@@ -282,6 +283,40 @@ void SparseMinimumNorm::find_inconsistencies(const double* g) {
   for (const int i : dropped_) {
     const auto k = static_cast<std::size_t>(i);
     inconsistency_.push_back(std::abs(norm_[k] > 0.0 ? z_[k] : g[i]));
+  }
+}
+
+// Proximal steps on A A^T x = A u. Rounding of A (u - A^T x), over eps, stays in the null space of
+// A^T; x <- x - eps M^-1 x takes most of that away, and eps / s^2 of the rest, which further steps
+// bring back: they start from so small a residual that their own rounding counts for nothing.
+void SparseMinimumNorm::multipliers(const double* dy, double* x) {
+  const std::size_t m = Ap_.size();
+  std::fill(x, x + m, 0.0);
+  add_multipliers(dy, x);
+  for (int k = 0; k < kFilters; ++k) {
+    std::copy(x, x + m, MAp_.begin());
+    gram_->solve(MAp_.data());
+    for (std::size_t i = 0; i < m; ++i) x[i] -= eps_ * MAp_[i];
+  }
+  add_multipliers(dy, x);
+  for (std::size_t i = 0; i < m; ++i) x[i] *= inverse_norm_[i];
+}
+
+// x <- x + M^-1 A (u - A^T x), D u = dy, as long as the steps halve.
+void SparseMinimumNorm::add_multipliers(const double* dy, double* x) {
+  const std::size_t m = Ap_.size();
+  double before = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kProximalSteps; ++k) {
+    transposed(x, step_.data());
+    for (std::size_t j = 0; j < width(); ++j)
+      p_[j] = (metric_[j] > 0.0 ? dy[j] / metric_[j] : 0.0) - step_[j];
+    multiply(p_.data(), MAp_.data());
+    gram_->solve(MAp_.data());
+    const double step = std::sqrt(dot(MAp_.data(), MAp_.data(), m));
+    if (!(step < kHalving * before)) return;
+    before = step;
+    for (std::size_t i = 0; i < m; ++i) x[i] += MAp_[i];
+    if (step <= kTolerance * std::sqrt(dot(x, x, m))) return;
   }
 }
 

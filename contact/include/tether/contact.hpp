@@ -4,6 +4,7 @@
 #include <tether/contact/bodies.hpp>
 #include <tether/contact/body_solver.hpp>
 #include <tether/contact/evaluate.hpp>
+#include <tether/contact/joints.hpp>
 #include <tether/contact/one_contact.hpp>
 #include <tether/contact/problem.hpp>
 #include <tether/contact/shapes.hpp>

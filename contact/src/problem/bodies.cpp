@@ -1,8 +1,6 @@
 // Tether: the Delassus matrix of bodies in contact. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/bodies.hpp>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
 #include <cmath>
@@ -10,22 +8,22 @@
 #include <string>
 
 #include "problem/body_form.hpp"
+#include "problem/inverse_mass_root.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
 namespace {
-
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
+}  // namespace
 
-void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
+void detail::check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     const auto where = [k] { return "body " + std::to_string(k) + ": "; };
     if (!bodies[k].inverse_mass.allFinite())
-      detail::require_finite("inverse_mass", bodies[k].inverse_mass, where());
+      require_finite("inverse_mass", bodies[k].inverse_mass, where());
     if (!bodies[k].inverse_mass.isZero(0))
-      detail::require_semidefinite("inverse_mass", bodies[k].inverse_mass, where);
-    if (!bodies[k].velocity.allFinite())
-      detail::require_finite("velocity", bodies[k].velocity, where());
+      require_semidefinite("inverse_mass", bodies[k].inverse_mass, where);
+    if (!bodies[k].velocity.allFinite()) require_finite("velocity", bodies[k].velocity, where());
   }
   const int n = static_cast<int>(bodies.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {
@@ -37,13 +35,11 @@ void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& cont
                                   ", the second one -1 for the world");
     }
     const auto where = [k] { return "contact " + std::to_string(k) + ": "; };
-    if (!c.J1.allFinite()) detail::require_finite("J1", c.J1, where());
-    if (!c.J2.allFinite()) detail::require_finite("J2", c.J2, where());
-    if (!c.bias.allFinite()) detail::require_finite("bias", c.bias, where());
+    if (!c.J1.allFinite()) require_finite("J1", c.J1, where());
+    if (!c.J2.allFinite()) require_finite("J2", c.J2, where());
+    if (!c.bias.allFinite()) require_finite("bias", c.bias, where());
   }
 }
-
-}  // namespace
 
 Eigen::Matrix3d tangent_frame(const Eigen::Vector3d& n) {
   // Duff et al., Building an orthonormal basis, revisited: no branch, no loss of accuracy.
@@ -79,21 +75,12 @@ BodyContact BodyContact::at_point(int first, int second, const Eigen::Vector3d& 
 
 namespace {
 
-// C with C C' = inverse mass.
-Matrix6d root(const Matrix6d& inverse_mass) {
-  using Plain = Eigen::Matrix<double, 6, 6>;
-  const Eigen::LLT<Plain> cholesky((Plain(inverse_mass)));
-  if (cholesky.info() == Eigen::Success) return Plain(cholesky.matrixL());
-  const Eigen::SelfAdjointEigenSolver<Plain> eigen((Plain(inverse_mass)));
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-}
-
 std::shared_ptr<const detail::BodyForm> body_form(const std::vector<Body>& bodies,
                                                   const std::vector<BodyContact>& contacts) {
   auto form = std::make_shared<detail::BodyForm>();
   form->bodies = static_cast<int>(bodies.size());
   std::vector<Matrix6d> C;
-  for (const Body& body : bodies) C.push_back(root(body.inverse_mass));
+  for (const Body& body : bodies) C.push_back(detail::inverse_mass_root(body.inverse_mass));
   form->contacts.resize(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const BodyContact& c = contacts[i];
@@ -116,7 +103,7 @@ std::shared_ptr<const detail::BodyForm> body_form(const std::vector<Body>& bodie
 }  // namespace
 
 Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
-  check(bodies, contacts);
+  detail::check(bodies, contacts);
   const int n = static_cast<int>(contacts.size());
   struct Side {
     int contact;
@@ -153,7 +140,7 @@ Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>
 std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
                                        const std::vector<BodyContact>& contacts,
                                        const linalg::VectorView& impulses) {
-  check(bodies, contacts);
+  detail::check(bodies, contacts);
   if (impulses.size() != 3 * static_cast<Eigen::Index>(contacts.size())) {
     detail::refuse_size("impulses", impulses.size(), 3 * static_cast<Eigen::Index>(contacts.size()),
                         "3 for each contact");

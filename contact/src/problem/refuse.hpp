@@ -49,6 +49,8 @@ void require_semidefinite(const char* argument, const Eigen::Matrix<double, n, n
   refuse(where() + "least eigenvalue of " + argument, least, "must be >= 0");
 }
 
+// Of delassus(): also contacts between bodies that do not exist, or of one body.
+void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts);
 // Body k of BodySolver, and contact i between `count` bodies.
 void check(std::size_t k, const RigidBody& body);
 void check(std::size_t i, const PointContact& contact, int count);

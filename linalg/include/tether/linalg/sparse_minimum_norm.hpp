@@ -64,6 +64,11 @@ class SparseMinimumNorm {
   /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() says what was reached.
   void solve(const double* g, double* dy, double tolerance = kTolerance);
 
+  /// The least x (m entries, each measured in the inverse unit of its row's |row_i(C D)|) with
+  /// D^2 C^T x = dy, for dy that solve() has given or a sum of such: what the rows pull with. Rows
+  /// that are given k times get a k-th each. Does not allocate, leaves residual() as it is.
+  void multipliers(const double* dy, double* x);
+
   int rank() const { return rows() - dropped(); }
   int dropped() const { return static_cast<int>(dropped_.size()); }
   /// k < rank(): kept rows; k >= rank(): dropped ones.
@@ -98,6 +103,7 @@ class SparseMinimumNorm {
   bool proximal_steps(double* left);
   void gradient_steps(double* left);
   void find_inconsistencies(const double* g);
+  void add_multipliers(const double* dy, double* x);
 
   int n_ = 0, sparse_ = 0, full_ = 0, iterations_ = 0;
   std::vector<int> starts_{0}, column_;
@@ -107,6 +113,7 @@ class SparseMinimumNorm {
   std::vector<double> z_, step_;       // M^-1 (b - A du), and A^T of it
   std::vector<double> p_, Ap_, MAp_;   // conjugate gradients: direction, A p, M^-1 A p
   double size_ = 0.0, tolerance_ = 0.0, residual_ = 0.0;  // size_ = |b|
+  double eps_ = 0.0;
   std::unique_ptr<BorderedGram> gram_;
   std::vector<int> dropped_, order_;
   std::vector<double> inconsistency_;

@@ -1,0 +1,101 @@
+// Tether: joints and contacts in one solve. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tether/contact/bodies.hpp>
+#include <tether/contact/solver.hpp>
+#include <tether/export.hpp>
+#include <vector>
+
+TETHER_EXPORT_BEGIN
+namespace tether::contact {
+
+/// Rows that hold whatever their impulse x is,
+///
+///     sum over bodies of G v  +  compliance x  =  rate,
+///
+/// G (1 x 6) the row on the velocity (linear, angular about the centre, world axes) of one body.
+/// The impulse acts on that body as G' x. Keeps its storage when it is filled anew.
+class JointRows {
+ public:
+  struct Term {
+    int body;
+    Vector6d G;
+  };
+
+  void clear();
+  /// Starts a row of joint number `joint`, which is how messages call it. compliance >= 0, in
+  /// velocity over impulse of the row; rate: of a prescribed motion. Throws std::invalid_argument
+  /// on values that are not finite.
+  void add(int joint, double rate = 0, double compliance = 0);
+  /// The row that was added last, on one more body. -1, the world, is left out.
+  void on(int body, const Vector6d& G);
+
+  int count() const { return static_cast<int>(rate_.size()); }
+  int joint(int row) const { return joint_[static_cast<std::size_t>(row)]; }
+  double rate(int row) const { return rate_[static_cast<std::size_t>(row)]; }
+  double compliance(int row) const { return compliance_[static_cast<std::size_t>(row)]; }
+  const Term* begin(int row) const { return terms_.data() + start_[static_cast<std::size_t>(row)]; }
+  const Term* end(int row) const {
+    return terms_.data() + start_[static_cast<std::size_t>(row) + 1];
+  }
+
+ private:
+  std::vector<int> start_{0}, joint_;
+  std::vector<double> rate_, compliance_;
+  std::vector<Term> terms_;
+};
+
+struct JointSolution {
+  /// Of the contacts; infeasible also where `blocked` or `contradicting` names any.
+  Status status = Status::unsolved;
+  double error = 0;  ///< of the contacts, as Solution::error, the worst island
+  /// Of the rows: |G v + compliance x - rate|, the largest, over the largest speed that the rows of
+  /// its mechanism see (sum of |G| |v|, |rate|). 0 without rows.
+  double joint_error = 0;
+  linalg::VectorX impulses;  ///< of the contacts: 3 each (normal, tangent, tangent), N s
+  /// Of the rows, in the inverse units of their velocities. Where rows depend on each other, the
+  /// least ones, rows measured by |G C|, C C' the inverse mass; equal rows get equal shares.
+  linalg::VectorX joint_impulses;
+  std::vector<Vector6d> velocities;  ///< of the bodies, after all impulses
+  /// Contacts that approach though the joints hold their normal velocity: no impulse changes it.
+  std::vector<int> blocked;
+  /// Joints (numbers of JointRows::add, ascending) with rows that no velocities satisfy together;
+  /// the velocities are those of the least squares of the residuals then.
+  std::vector<int> contradicting;
+  int islands = 0;  ///< of contacts, that joints or bodies connect
+  Counts counts;
+  std::string advice;
+};
+
+/// Bilateral rows and frictional contacts at one instant (README, section 16). The joints are
+/// eliminated by the sparse factors of G M^-1 G' (linalg::SparseMinimumNorm): contacts see
+///
+///     A = J P J',   P = M^-1 - M^-1 G' (G M^-1 G' + compliance)^-1 G M^-1,
+///
+/// which Solver takes as it is, island by island. Rows may depend on each other, P does not change.
+/// A contact whose normal velocity the joints hold (A_nn = 0) has no impulse: it is left out where
+/// it does not approach, else named in `blocked`.
+///
+/// Good for islands of some hundred contacts: A is dense over the contacts of a mechanism. Keep one
+/// for a run of problems: it holds the analysis of the rows while their pattern is the same.
+class JointSolver {
+ public:
+  explicit JointSolver(const Options& options = {});  ///< throws std::invalid_argument
+  ~JointSolver();
+  JointSolver(JointSolver&&) noexcept;
+  JointSolver& operator=(JointSolver&&) noexcept;
+
+  /// From the velocities of the bodies before the impulses. Throws std::invalid_argument on indices
+  /// that do not exist and values that are not finite.
+  JointSolution solve(const std::vector<Body>& bodies, const JointRows& joints,
+                      const std::vector<BodyContact>& contacts);
+
+ private:
+  struct TETHER_HIDDEN Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace tether::contact
+TETHER_EXPORT_END

@@ -1,0 +1,68 @@
+// Tether: contacts of bodies that joints hold. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/joints.hpp>
+#include <vector>
+
+#include "joints/mechanisms.hpp"
+
+namespace tether::contact::detail {
+
+/// Solves the contacts of one island after the other as problems A = J P J', see JointSolver.
+class JointedContacts {
+ public:
+  explicit JointedContacts(const Options& options);
+  void set_options(const Options& options) { solver_ = Solver(options); }
+
+  struct Result {
+    Status status = Status::solved;
+    double error = 0;
+    int islands = 0;
+    std::vector<int> blocked;  ///< ascending
+    Counts counts;
+    std::string advice;
+  };
+  /// Changes velocities that the joints already allow, v, by impulses that keep them so, and adds
+  /// what the joints do to the pulls. x (3 each, contact frame): where to start from, and the
+  /// impulses found.
+  const Result& solve(Mechanisms& mechanisms, const std::vector<BodyContact>& contacts,
+                      std::vector<Vector6d>& v, linalg::VectorX& x);
+
+ private:
+  /// One body of a contact that moves, and the contact's rows on its u. node: its mechanism, or,
+  /// after all of them, the body itself.
+  struct Side {
+    int contact, body, node;
+    Matrix36d H;
+  };
+  struct HeldSlip {
+    int place;  // in members_
+    Eigen::Vector2d direction;
+  };
+  int node_of(const Mechanisms& mechanisms, int body) const;
+  void find_islands(const Mechanisms& mechanisms, const std::vector<BodyContact>& contacts);
+  void collect_sides(const Mechanisms& mechanisms, const std::vector<BodyContact>& contacts);
+  void assemble(Mechanisms& mechanisms);
+  void add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end);
+  void clear_held_slips();
+  void drop_held(const std::vector<BodyContact>& contacts, const std::vector<Vector6d>& v);
+  Eigen::Vector3d approach(int place, const BodyContact& contact,
+                           const std::vector<Vector6d>& v) const;
+  void solve_kept(const std::vector<BodyContact>& contacts, const std::vector<Vector6d>& v,
+                  linalg::VectorX& x);
+  void apply(Mechanisms& mechanisms, const linalg::VectorX& x, std::vector<Vector6d>& v);
+
+  Solver solver_;
+  Result result_;
+  std::vector<int> parent_, first_of_, order_, island_start_;  // contacts island by island
+  // Of the present island: its contacts, those of them that are solved (places in members_), the
+  // sides of all, and A, and its diagonal without joints (normals, and sums of
+  // both tangents).
+  std::vector<int> members_, kept_;
+  std::vector<Side> sides_;
+  std::vector<HeldSlip> held_slips_;
+  Eigen::MatrixXd A_, answer_;
+  Eigen::VectorXd alone_, slip_alone_;
+};
+
+}  // namespace tether::contact::detail

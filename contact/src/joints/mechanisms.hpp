@@ -1,0 +1,63 @@
+// Tether: all bodies, and what joints make of their velocities. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/joints.hpp>
+#include <vector>
+
+#include "joints/mechanism.hpp"
+
+namespace tether::contact::detail {
+
+/// The mechanisms of a set of bodies; which there are is found once for a pattern of rows.
+class Mechanisms {
+ public:
+  /// Factors of the rows, for bodies of these inverse masses. Throws std::invalid_argument on rows
+  /// that name bodies that do not exist, and on values that are not finite.
+  void update(const std::vector<Body>& bodies, const JointRows& joints);
+
+  int count() const { return static_cast<int>(list_.size()); }
+  Mechanism& operator[](int m) { return *list_[static_cast<std::size_t>(m)]; }
+  /// Of a body: -1 where no joint holds it, or it does not move.
+  int mechanism_of(int body) const { return mechanism_[static_cast<std::size_t>(body)]; }
+  /// Its place in Mechanism::bodies().
+  int place_of(int body) const { return place_[static_cast<std::size_t>(body)]; }
+  bool moves(int body) const { return moves_[static_cast<std::size_t>(body)] != 0; }
+  const Matrix6d& root(int body) const { return root_[static_cast<std::size_t>(body)]; }
+  int bodies() const { return static_cast<int>(mechanism_.size()); }
+
+  /// What the rows have changed of u of mechanism m since clear_pulls(): Mechanism::entries()
+  /// numbers.
+  std::vector<double>& pull(int m) { return pulls_[static_cast<std::size_t>(m)]; }
+  void clear_pulls();
+  /// v changes by the least that makes all rows hold, Gv + compliance x = rate; x what the pulls
+  /// so far say.
+  void satisfy(const JointRows& joints, std::vector<Vector6d>& v);
+  /// Of the last satisfy(): numbers of the joints, ascending, with rows that cannot all hold.
+  const std::vector<int>& contradicting() const { return contradicting_; }
+  /// JointSolution::joint_error of these velocities.
+  double error(const JointRows& joints, const std::vector<Vector6d>& v);
+  /// The impulses that make the pulls, by row.
+  void impulses(double* x);
+  /// v of the bodies of mechanism m changes by C u.
+  void add(int m, const double* u, std::vector<Vector6d>& v) const;
+
+ private:
+  bool is_same(const std::vector<Body>& bodies, const JointRows& joints) const;
+  void analyse(const std::vector<Body>& bodies, const JointRows& joints);
+  double defect(int m, const JointRows& joints, const std::vector<Vector6d>& v);
+  void find_contradicting(int m, const JointRows& joints, double scale);
+
+  std::vector<std::unique_ptr<Mechanism>> list_;
+  std::vector<int> mechanism_, place_;
+  std::vector<char> moves_;
+  std::vector<Matrix6d> root_;
+  std::vector<Matrix6d> inverse_mass_;  // that root_ belongs to
+  std::vector<int> pattern_, fresh_;    // of the rows
+  std::vector<std::vector<double>> pulls_;
+  std::vector<double> b_, u_, x_;
+  std::vector<int> contradicting_;
+};
+
+}  // namespace tether::contact::detail
