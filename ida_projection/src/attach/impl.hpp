@@ -124,6 +124,7 @@ class Projection::Impl {
   StepData step_data() const;
   void account_for_previous_attempt(const StepData& step);
   void look_for_refusals();
+  void look_at_linear_solver();
   bool struggling() const;
   bool in_trouble() const;
   Status engage_if_index_is_high(const Candidate& candidate);
@@ -230,6 +231,8 @@ class Projection::Impl {
   SUNNonlinSolLSolveFn linear_solve_ = nullptr;
   bool has_setup_ = false;  // IDA's linear solver has factors, or a preconditioner, to be made anew
   bool iterative_ = false;  // it is a Krylov method
+  bool solver_known_ = false;
+  Metric wanted_metric_;
   bool initialized_ = false;
   int maximum_iterations_ = 4;
   bool heard_ = false;  // IDASetMaxNonlinIters reached us

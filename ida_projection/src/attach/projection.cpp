@@ -52,7 +52,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       options_(std::move(options)),
       smoother_(ida_mem, options_),
       order_limit_(ida_mem, options_),
-      frequency_(options_.frequency) {
+      frequency_(options_.frequency),
+      wanted_metric_(options_.metric) {
   if (ida_mem == nullptr) reject("ida_mem is null; pass what IDACreate returned");
   N_Vector like = nullptr, yppred, yyn, ypn, res;
   void* user_data;

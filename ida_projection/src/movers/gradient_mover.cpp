@@ -15,6 +15,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kNothing = 1e-9;  // tolerances: no move at all
 
 class GradientMover final : public Mover {
  public:
@@ -50,6 +51,7 @@ class GradientMover final : public Mover {
     reset();
   }
 
+  void expect_no_settle(bool none) override { no_settle_ = none; }
   void accept() override { std::swap(scale_, trial_); }
   void reset() override {
     N_VConst(0.0, scale_);
@@ -95,7 +97,14 @@ class GradientMover final : public Mover {
     if ((result.status = value(candidate.t)) != Status::success) return result;
     result.drift_before = result.drift_after = drift();
     if (result.drift_before == 0.0) return result;
-    set_metric();
+    if (factors_last() && wear_.usable()) {
+      const double length = solve(candidate.weights);
+      if (length <= kNothing) {
+        result.length = length;
+        return result;
+      }
+    }
+    set_metric(candidate);
     sums_terms_ = static_cast<N_Vector>(y_)->ops->nvl1norm != nullptr;
     result.status = factor(candidate.t);
     sums_terms_ = false;
@@ -120,13 +129,49 @@ class GradientMover final : public Mover {
           N_VLinearSum(1.0, y_, -1.0, dy_, y_);
         },
         [&] { return drift(); }, 1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights),
-        options_.largest_move);
+        options_.largest_move, kMayFollowLeave);
   }
 
   Move move(const Candidate& candidate) override {
     Move result;
+    if (factors_last() && wear_.usable()) {
+      result = chord_moves(candidate);
+      if (result.status == Status::success || fatal_) return result;
+    }
+    const double moved = result.length;
+    result = newton(candidate);
+    result.length += moved;
+    return result;
+  }
+
+ private:
+  struct Part {
+    const Gradients* rows;
+    int first, count;
+  };
+
+  // Error weights change slowly, and so do factors in their metric. What follows a polish is taken
+  // back with the factors of the step alone.
+  bool factors_last() const { return no_settle_ && !local() && factored_ && rank_ == m_; }
+
+  // A short move by factors of an earlier step leaves a part of itself that their age tells; where
+  // that is too much Newton's method goes on from where it ends.
+  Move chord_moves(const Candidate& candidate) {
+    constexpr double kShort = 0.1, kSafe = 0.25;
     load(candidate);
-    set_metric();
+    return move_with_old_factors(
+        wear_, [&] { return value(candidate.t); }, [&] { return solve(candidate.weights); },
+        [&] {
+          N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
+          N_VLinearSum(1.0, y_, -1.0, dy_, y_);
+        },
+        [&] { return drift(); }, 0.0, kShort, kSafe * options_.tolerance);
+  }
+
+  Move newton(const Candidate& candidate) {
+    Move result;
+    load(candidate);
+    set_metric(candidate);
     if ((result.status = value(candidate.t)) != Status::success) return result;
     result.drift_before = result.drift_after = drift();
     monitor_.start();
@@ -180,12 +225,6 @@ class GradientMover final : public Mover {
     return result;
   }
 
- private:
-  struct Part {
-    const Gradients* rows;
-    int first, count;
-  };
-
   void flatten(const Constraints& set) {
     if (set.count > 0) {
       parts_.push_back({&std::get<Gradients>(set.jacobian), m_, set.count});
@@ -196,14 +235,10 @@ class GradientMover final : public Mover {
 
   double& R(int i, int j) { return R_[static_cast<std::size_t>(i * m_ + j)]; }
 
-  // y = base + correction, WT = 1/w (0 where w = 0), s <- max(0.8 s, |correction|).
+  // y = base + correction, s <- max(0.8 s, |correction|).
   void load(const Candidate& candidate) {
     N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
-    N_VConst(0.0, WT_);
-    if (static_cast<N_Vector>(WT_)->ops->nvinvtest != nullptr)
-      (void)N_VInvTest(candidate.weights, WT_);
-    else
-      N_VInv(candidate.weights, WT_);
+    if (!local()) return;
     N_VAbs(candidate.correction, work_);
     larger(0.8, scale_, work_, trial_);
   }
@@ -214,8 +249,15 @@ class GradientMover final : public Mover {
     N_VLinearSum(0.5 * a, x, 0.5, y, z);
     N_VLinearSum(1.0, z, 0.5, dy_, z);
   }
-  void set_metric() {
-    if (options_.metric == Metric::local_correction)
+  bool local() const { return options_.metric == Metric::local_correction; }
+  // WT = 1/w (0 where w = 0), D.
+  void set_metric(const Candidate& candidate) {
+    N_VConst(0.0, WT_);
+    if (static_cast<N_Vector>(WT_)->ops->nvinvtest != nullptr)
+      (void)N_VInvTest(candidate.weights, WT_);
+    else
+      N_VInv(candidate.weights, WT_);
+    if (local())
       larger(1e-3, WT_, trial_, D_);
     else
       N_VScale(1.0, WT_, D_);
@@ -326,7 +368,7 @@ class GradientMover final : public Mover {
 
   double solve(N_Vector weights) {
     ++statistics_.iterations;
-    N_VConst(0.0, dy_);
+    if (rank_ == 0) N_VConst(0.0, dy_);
     for (int k = 0; k < m_; ++k) {
       const auto row = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(k)]);
       double left =
@@ -335,7 +377,10 @@ class GradientMover final : public Mover {
         left -= R(static_cast<int>(row), i) * z_[static_cast<std::size_t>(i)];
       if (k < rank_) {
         z_[static_cast<std::size_t>(k)] = left / R(static_cast<int>(row), k);
-        N_VLinearSum(1.0, dy_, z_[static_cast<std::size_t>(k)], gradients_[row], dy_);
+        if (k == 0)
+          N_VScale(z_[0], gradients_[row], dy_);
+        else
+          N_VLinearSum(1.0, dy_, z_[static_cast<std::size_t>(k)], gradients_[row], dy_);
       } else {
         z_[static_cast<std::size_t>(k)] = std::abs(left);  // what this dropped row leaves unsolved
       }
@@ -393,6 +438,7 @@ class GradientMover final : public Mover {
   double length_;
   FactorWear wear_;  // for follow()
   bool factored_ = false;
+  bool no_settle_ = false;
   bool sums_terms_ = false;    // measure() asks for them
   std::vector<double> terms_;  // sum_j |C_ij y_j|
 };

@@ -84,6 +84,9 @@ class Mover {
   /// constraints, with the factors at hand.
   virtual Status settle(const Candidate& candidate, N_Vector change) = 0;
 
+  /// Will settle() never be called in this run? Then factors may serve more than one step.
+  virtual void expect_no_settle(bool) {}
+
   /// No settle() follows the last move(): takes back what it left for that.
   virtual Status finish(const Candidate&) { return Status::success; }
 

@@ -44,7 +44,8 @@ int Projection::Impl::initialize() {
     return kFatal;
   }
   initialized_ = true;
-  engaged_ = false;
+  engaged_ = iterative_ = solver_known_ = false;
+  options_.metric = wanted_metric_;
   rejections_ = rejections_before_ = window_begin_ = refused_steps_ = 0;
   rejected_in_step_ = collapsed_ = false;
   warning.clear();
@@ -190,6 +191,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   int flag = correct(candidate, tolerance, call_setup);
   if (!mover_) return flag;
   if (flag != 0) return corrector_failed(flag);
+  if (!solver_known_) look_at_linear_solver();
 
   const StepData step = step_data();
   account_for_previous_attempt(step);
@@ -320,6 +322,21 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   pending_ = false;
 }
 
+// There is no getter for the type of IDA's linear solver, but direct ones count no iterations and
+// iterative ones, with a Jacobian of their own or without, do from the first right-hand side that
+// is not zero.
+void Projection::Impl::look_at_linear_solver() {
+  long iterations = 0, preconditioners = 0, jacobians = 0;
+  IDAGetNumLinIters(ida_mem_, &iterations);
+  IDAGetNumPrecEvals(ida_mem_, &preconditioners);
+  IDAGetNumJacEvals(ida_mem_, &jacobians);
+  iterative_ = iterations > 0 || preconditioners > 0;
+  solver_known_ = iterative_ || (jacobians > 0 && last_steps_ > 0);
+  if (wanted_metric_ == Metric::automatic)
+    options_.metric = iterative_ ? Metric::error_weights : Metric::local_correction;
+  mover_->expect_no_settle(iterative_);
+}
+
 // IDA may double its step right after a doubling was refused, and raises the order only after k + 2
 // steps of one size: one failed error test a step at order 1 can go on for ever.
 void Projection::Impl::look_for_refusals() {
@@ -369,8 +386,6 @@ void Projection::Impl::begin_smoothing() {
 
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
 Status Projection::Impl::engage(const Candidate& candidate) {
-  long linear_iterations = 0;  // none are counted by direct solvers
-  iterative_ = IDAGetNumLinIters(ida_mem_, &linear_iterations) == 0 && linear_iterations > 0;
   if (options_.id == nullptr && !id_) {
     const Status derived = derive_id(candidate);
     if (derived != Status::success) return derived;

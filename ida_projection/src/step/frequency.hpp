@@ -78,14 +78,15 @@ class FactorWear {
   bool doubted_ = false;
 };
 
+constexpr double kMayFollowLeave = 0.02;  // tolerances
+
 /// Mover::follow(), y and g being the mover's own: value() evaluates g, solve() returns the length
 /// of the move for it, apply() makes that move, drift() is the largest |g_i|. Lengths in
-/// tolerances.
+/// tolerances. `may_be_left`: of the drift, after success.
 template <class Value, class Solve, class Apply, class Drift>
 Move move_with_old_factors(FactorWear& wear, Value value, Solve solve, Apply apply, Drift drift,
-                           double floor, double longest) {
+                           double floor, double longest, double may_be_left) {
   constexpr int kMostMoves = 3;
-  constexpr double kMayBeLeft = 0.02;  // tolerances
 
   Move result;
   double previous = 0.0;
@@ -102,8 +103,8 @@ Move move_with_old_factors(FactorWear& wear, Value value, Solve solve, Apply app
     }
     apply();
     ++result.moves;
-    const bool look = result.moves == 1 && wear.must_look(length, kMayBeLeft);
-    if (length <= floor || (!look && wear.rate() * length <= kMayBeLeft)) {
+    const bool look = result.moves == 1 && wear.must_look(length, may_be_left);
+    if (length <= floor || (!look && wear.rate() * length <= may_be_left)) {
       result.status = Status::success;
       break;
     }

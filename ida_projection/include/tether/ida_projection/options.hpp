@@ -18,6 +18,10 @@ enum class Metric {
   local_correction,
   /// D_i = WT_i, the weights of the error test (Hanson and Krogh).
   error_weights,
+  /// local_correction with a direct linear solver, error_weights with an iterative one: s has a kink
+  /// wherever the correction changes its sign along a grid, the move then has rough parts, and they
+  /// take a Krylov method the most iterations.
+  automatic,
 };
 
 /// What happens when a move is longer than Options::largest_move allows.
@@ -40,7 +44,7 @@ struct Progress {
 /// Every knob of the projection. "Tolerances" below are units of the error test: the WRMS norm
 /// sqrt(sum (dy_i / WT_i)^2 / N) with WT_i = rtol |y_i| + atol_i, in which IDA accepts about 1.
 struct Options {
-  Metric metric = Metric::local_correction;
+  Metric metric = Metric::automatic;
 
   /// Estimated distance left to the constraints is at most this many tolerances; > 0.
   double tolerance = 1e-4;
