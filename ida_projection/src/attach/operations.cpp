@@ -32,14 +32,15 @@ int shielded(SUNNonlinearSolver solver, Call call) noexcept {
 
 // The operations that IDA calls on us; the rest goes to the decorated solver.
 SUNNonlinearSolver_Type get_type(SUNNonlinearSolver s) {
-  return SUNNonlinSolGetType(self(s).inner());
+  return SUNNonlinSolGetType(self(s).corrector().inner());
 }
 int initialize(SUNNonlinearSolver s) {
   return shielded(s, [](Projection::Impl& ours) { return ours.initialize(); });
 }
 int setup(SUNNonlinearSolver s, N_Vector y, void* mem) {
-  return shielded(s,
-                  [&](Projection::Impl& ours) { return SUNNonlinSolSetup(ours.inner(), y, mem); });
+  return shielded(s, [&](Projection::Impl& ours) {
+    return SUNNonlinSolSetup(ours.corrector().inner(), y, mem);
+  });
 }
 int solve(SUNNonlinearSolver s, N_Vector y0, N_Vector ycor, N_Vector w, sunrealtype tolerance,
 #if SUNDIALS_VERSION_MAJOR >= 7
@@ -53,34 +54,34 @@ int solve(SUNNonlinearSolver s, N_Vector y0, N_Vector ycor, N_Vector w, sunrealt
   });
 }
 int set_system(SUNNonlinearSolver s, SUNNonlinSolSysFn f) {
-  self(s).set_system(f);
-  return SUNNonlinSolSetSysFn(self(s).inner(), f);
+  self(s).corrector().set_system(f);
+  return SUNNonlinSolSetSysFn(self(s).corrector().inner(), f);
 }
 int set_linear_setup(SUNNonlinearSolver s, SUNNonlinSolLSetupFn f) {
-  self(s).set_has_setup(f != nullptr);
-  return SUNNonlinSolSetLSetupFn(self(s).inner(), f);
+  self(s).corrector().set_has_setup(f != nullptr);
+  return SUNNonlinSolSetLSetupFn(self(s).corrector().inner(), f);
 }
 int set_linear_solve(SUNNonlinearSolver s, SUNNonlinSolLSolveFn f) {
-  self(s).set_linear_solve(f);
-  return SUNNonlinSolSetLSolveFn(self(s).inner(), f);
+  self(s).corrector().set_linear_solve(f);
+  return SUNNonlinSolSetLSolveFn(self(s).corrector().inner(), f);
 }
 int set_convergence_test(SUNNonlinearSolver s, SUNNonlinSolConvTestFn f, void* data) {
-  return SUNNonlinSolSetConvTestFn(self(s).inner(), f, data);
+  return SUNNonlinSolSetConvTestFn(self(s).corrector().inner(), f, data);
 }
 int set_maximum_iterations(SUNNonlinearSolver s, int n) {
-  self(s).note_maximum_iterations(n);
-  return SUNNonlinSolSetMaxIters(self(s).inner(), n);
+  self(s).corrector().set_maximum_iterations(n);
+  return SUNNonlinSolSetMaxIters(self(s).corrector().inner(), n);
 }
 int get_iterations(SUNNonlinearSolver s, long* n) {
-  const int flag = SUNNonlinSolGetNumIters(self(s).inner(), n);
-  *n += self(s).extra_iterations_of_last_solve();
+  const int flag = SUNNonlinSolGetNumIters(self(s).corrector().inner(), n);
+  *n += self(s).iterations_after_correction();
   return flag;
 }
 int get_current_iteration(SUNNonlinearSolver s, int* n) {
-  return SUNNonlinSolGetCurIter(self(s).inner(), n);
+  return SUNNonlinSolGetCurIter(self(s).corrector().inner(), n);
 }
 int get_failures(SUNNonlinearSolver s, long* n) {
-  return SUNNonlinSolGetNumConvFails(self(s).inner(), n);
+  return SUNNonlinSolGetNumConvFails(self(s).corrector().inner(), n);
 }
 int free_solver(SUNNonlinearSolver) { return 0; }  // the Projection owns it
 

@@ -1,6 +1,5 @@
 // Tether: attaching the projection to IDA. SPDX-License-Identifier: BSD-3-Clause
 #include <new>
-#include <sunnonlinsol/sunnonlinsol_newton.h>
 #include <tether/ida_projection/projection.hpp>
 
 #include "attach/impl.hpp"
@@ -46,60 +45,66 @@ const char* to_string(Status status) {
   return "unknown";
 }
 
-Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
-    : constraints(std::move(set)),
-      ida_mem_(ida_mem),
-      options_(std::move(options)),
-      smoother_(ida_mem, options_),
-      order_limit_(ida_mem, options_),
-      frequency_(options_.frequency),
-      wanted_metric_(options_.metric) {
+namespace {
+
+// A vector of the host's problem; refuses an IDA that has none.
+N_Vector vector_of(void* ida_mem) {
   if (ida_mem == nullptr) reject("ida_mem is null; pass what IDACreate returned");
-  N_Vector like = nullptr, yppred, yyn, ypn, res;
-  void* user_data;
-  sunrealtype t, cj;
-  if (IDAGetNonlinearSystemData(ida_mem, &t, &like, &yppred, &yyn, &ypn, &res, &cj, &user_data) !=
-          0 ||
-      like == nullptr)
-    reject("ida_mem is not initialised; call IDAInit before");
-  validate(constraints, options_, like);
+  N_Vector y_predicted = Ida(ida_mem).step().y_predicted;
+  if (y_predicted == nullptr) reject("ida_mem is not initialised; call IDAInit before");
+  return y_predicted;
+}
+
+std::unique_ptr<Mover> make_mover(const Constraints& constraints, const Options& options,
+                                  Statistics& statistics, N_Vector like, int size) {
+  if (std::holds_alternative<UserProjection>(constraints.jacobian))
+    return make_user_mover(constraints, options, statistics, like);
+  if (constraints.total_count() == 0) return nullptr;
+  if (std::holds_alternative<Gradients>(constraints.jacobian))
+    return make_gradient_mover(constraints, options, statistics, like);
+  return has_sparse_rows(constraints) ? make_sparse_mover(constraints, options, statistics, size)
+                                      : make_dense_mover(constraints, options, statistics, size);
+}
+
+}  // namespace
+
+Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
+    : constraints_(std::move(set)),
+      options_(std::move(options)),
+      ida_(ida_mem),
+      report_(options_, statistics_),
+      corrector_(options_.nonlinear_solver, vector_of(ida_mem)),
+      variables_(options_, statistics_),
+      polish_(options_, statistics_, corrector_, variables_),
+      control_(ida_, options_, statistics_),
+      frequency_(options_.frequency),
+      joined_(constraints_, options_, statistics_, corrector_, variables_),
+      point_(constraints_, options_),
+      rejections_(constraints_),
+      first_steps_(constraints_, statistics_),
+      bypass_(ida_),
+      wanted_metric_(options_.metric) {
+  N_Vector like = vector_of(ida_mem);
+  validate(constraints_, options_, like);
 
   contiguous_ = is_contiguous(like);
   size_ = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
-  if (std::holds_alternative<UserProjection>(constraints.jacobian))
-    mover_ = make_user_mover(constraints, options_, statistics_, like);
-  else if (constraints.total_count() > 0)
-    mover_ = std::holds_alternative<Gradients>(constraints.jacobian)
-                 ? make_gradient_mover(constraints, options_, statistics_, like)
-             : has_sparse_rows(constraints)
-                 ? make_sparse_mover(constraints, options_, statistics_, size_)
-                 : make_dense_mover(constraints, options_, statistics_, size_);
-  if (mover_) {
-    delta_ = OwnedVector(like);
-    newton_ = OwnedVector(like);
-    saved_ = OwnedVector(like);
+  own_mover_ = make_mover(constraints_, options_, statistics_, like, size_);
+  mover_ = own_mover_.get();
+  if (mover_ != nullptr) {
+    polish_.allocate(like, contiguous_);
     weights_ = OwnedVector(like);
-    if (contiguous_) {
-      delta_entries_ = N_VGetArrayPointer(delta_);
-      newton_entries_ = N_VGetArrayPointer(newton_);
-      saved_entries_ = N_VGetArrayPointer(saved_);
-    }
     if (options_.id != nullptr) {
-      set_id(options_.id);
-      options_.id = id_;  // the caller's vector may go
+      variables_.set(options_.id);
+      options_.id = variables_.vector();  // the caller's vector may go
     }
     if (contiguous_ && options_.hold_vector != nullptr && options_.hold.empty()) {
       const double* free = N_VGetArrayPointer(options_.hold_vector);
       for (int j = 0; j < size_; ++j) options_.hold.push_back(free[j] == 0.0);
     }
   }
-
-  inner_ = options_.nonlinear_solver;
-  if (inner_ == nullptr) {
-    own_inner_.reset(SUNNonlinSol_Newton(like, like->sunctx));
-    inner_ = own_inner_.get();
-  }
-  if (inner_ != nullptr) solver_.reset(make_solver(*this, inner_, like->sunctx));
+  if (corrector_.inner() != nullptr)
+    solver_.reset(make_solver(*this, corrector_.inner(), like->sunctx));
   if (!solver_) throw std::bad_alloc();
   attach();
 }
@@ -117,14 +122,14 @@ void Projection::Impl::attach() {
   };
   require(SUNNonlinSolSetSysFn(solver_.get(), nothing), "a system function");
   require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
-  require(SUNNonlinSolSetMaxIters(solver_.get(), maximum_iterations_), "a number of iterations");
-  IDAGetNumSteps(ida_mem_, &steps_at_attach_);
-  const StepData step = step_data();
-  lifetime_.watch(step.y_predicted, step.yp_predicted, [this] {
-    std::string ignored;
-    guarded([this] { return look_for_bypass(), 0; }, ignored);
-  });
-  const int flag = IDASetNonlinearSolver(ida_mem_, solver_.get());
+  require(SUNNonlinSolSetMaxIters(solver_.get(), corrector_.maximum_iterations()),
+          "a number of iterations");
+  if (mover_ != nullptr)
+    bypass_.begin([this] {
+      std::string ignored;
+      guarded([this] { return look_for_bypass(), 0; }, ignored);
+    });
+  const int flag = IDASetNonlinearSolver(ida_.mem(), solver_.get());
   if (flag != 0)
     reject("IDASetNonlinearSolver returned " + std::to_string(flag) + "; call IDAInit before");
 }
@@ -134,10 +139,15 @@ Projection::Impl::~Impl() {
   guarded([this] { return look_for_bypass(), 0; }, ignored);
 }
 
+const Report& Projection::Impl::report() {
+  look_for_bypass();
+  return report_;
+}
+
 Statistics Projection::Impl::statistics() {
   look_for_bypass();
   Statistics s = statistics_;
-  s.steps_without_plugin = steps_unseen_;
+  s.steps_without_plugin = bypass_.steps();
   const long moved = s.projections + s.chord_projections - s.failures();
   s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
   s.seconds = timed_.total(s.projections);
@@ -171,14 +181,8 @@ int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, 
 }
 Statistics Projection::statistics() const { return impl_->statistics(); }
 void Projection::reset_statistics() { impl_->reset_statistics(); }
-Status Projection::status() const {
-  impl_->look_for_bypass();
-  return impl_->status == Status::success ? impl_->warning_status : impl_->status;
-}
-const std::string& Projection::message() const {
-  impl_->look_for_bypass();
-  return impl_->message.empty() ? impl_->warning : impl_->message;
-}
-const Constraints& Projection::constraints() const { return impl_->constraints; }
+Status Projection::status() const { return impl_->report().told(); }
+const std::string& Projection::message() const { return impl_->report().text(); }
+const Constraints& Projection::constraints() const { return impl_->constraints(); }
 
 }  // namespace tether::ida_projection

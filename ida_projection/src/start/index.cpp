@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "attach/impl.hpp"
+#include "start/algebraic.hpp"
 
 namespace tether::ida_projection {
 
@@ -52,27 +52,29 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
 // differences of IDA's own residual callback, F(t, ypred + ycor, yppred + cj ycor), with ypred
 // shifted by -ycor (and put back bit for bit) where only y' is to feel ycor. Algebraic variables
 // that the matrix leaves free carry rounding divided by the step: undetermined_.
-bool Projection::Impl::index_exceeds_one(const Candidate& candidate) {
-  if (!contiguous_ || size_ > kLargestSize) return false;
-  const double cj = step_data().cj;
-  OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base);
+bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corrector, double cj) {
+  if (candidate.base_entries == nullptr) return false;
+  const int size = static_cast<int>(N_VGetLength(candidate.base));
+  if (size > kLargestSize) return false;
+  OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base),
+      saved(candidate.base);
   N_VConst(0.0, ycor);
-  N_VScale(1.0, candidate.base, saved_);
+  N_VScale(1.0, candidate.base, saved);
   double* e = N_VGetArrayPointer(ycor);
   double* predicted = N_VGetArrayPointer(candidate.base);
-  const double* original = N_VGetArrayPointer(saved_);
+  const double* original = N_VGetArrayPointer(saved);
   const double* w = N_VGetArrayPointer(candidate.weights);
   const double* before = N_VGetArrayPointer(base);
   const double* after = N_VGetArrayPointer(shifted);
-  const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
+  const double* id = mask();
   const auto residual = [&](N_Vector into) {
     ++statistics_.residual_evaluations;
-    return this->residual(ycor, into) == 0;
+    return corrector.residual(ycor, into) == 0;
   };
 
   bool known = true;
-  Eigen::MatrixXd slopes(size_, size_);
-  for (int j = 0; j < size_ && known; ++j) {
+  Eigen::MatrixXd slopes(size, size);
+  for (int j = 0; j < size && known; ++j) {
     const bool differential = id == nullptr || id[j] != 0.0;
     const double tolerance = w[j] > 0.0 ? 1.0 / w[j] : 1.0;
     const double change = std::max(
@@ -85,15 +87,26 @@ bool Projection::Impl::index_exceeds_one(const Candidate& candidate) {
     known = residual(shifted) && known;
     e[j] = 0.0;
     predicted[j] = original[j];
-    for (int i = 0; i < size_; ++i) slopes(i, j) = (after[i] - before[i]) / change;
+    for (int i = 0; i < size; ++i) slopes(i, j) = (after[i] - before[i]) / change;
   }
-  N_VScale(1.0, saved_, candidate.base);
+  N_VScale(1.0, saved, candidate.base);
   const std::vector<char> left =
       known ? undetermined_columns(std::move(slopes)) : std::vector<char>();
   undetermined_.clear();
   for (int j = 0; id != nullptr && j < static_cast<int>(left.size()); ++j)
     if (left[static_cast<std::size_t>(j)] && id[j] == 0.0) undetermined_.push_back(j);
   return !left.empty();
+}
+
+void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& corrector,
+                                       double cj) {
+  if (!index_known_) high_index_ = exceeds_one(candidate, corrector, cj);
+  index_known_ = true;
+}
+
+void AlgebraicVariables::forget_index() {
+  high_index_ = index_known_ = false;
+  undetermined_.clear();
 }
 
 }  // namespace tether::ida_projection

@@ -5,16 +5,11 @@
 
 namespace tether::ida_projection {
 
-double Projection::Impl::step_size() const {
-  sunrealtype h = 0.0;
-  IDAGetCurrentStep(ida_mem_, &h);
-  return h;
-}
-
 // False: this attempt is done, left alone or moved with the factors at hand.
 bool Projection::Impl::needs_projection(const Candidate& candidate, const StepData& step,
                                         double tolerance) {
-  const FrequencyPolicy::Need need = frequency_.need(last_steps_, repeated_, std::abs(step_size()));
+  const FrequencyPolicy::Need need =
+      frequency_.need(attempts_.steps, attempts_.repeated, std::abs(ida_.step_size()));
   if (need == FrequencyPolicy::Need::projection) return true;
   if (need == FrequencyPolicy::Need::nothing) {
     if (engaged_ && !leave_alone(candidate, step, tolerance)) return true;
@@ -30,24 +25,24 @@ bool Projection::Impl::needs_projection(const Candidate& candidate, const StepDa
 bool Projection::Impl::leave_alone(const Candidate& candidate, const StepData& step,
                                    double tolerance) {
   if (!wants_polish(0.0)) return true;
-  corrector_was_right_ = true;
-  keep_corrector(candidate);
-  if (!add_newton_step(candidate, step.cj, tolerance) || corrector_was_right_) return true;
-  N_VScale(1.0, newton_, candidate.correction);
+  polish_.keep(candidate);
+  if (!polish_.add_newton_step(candidate, step.cj, tolerance) || polish_.corrector_was_right())
+    return true;
+  polish_.restore(candidate);
   return false;
 }
 
 // One g and one solve, and the same again after the iteration at the moved point. Without that
 // iteration, or with one before the move, stiff components do not answer to the move and oscillate.
 bool Projection::Impl::follow(const Candidate& candidate, const StepData& step, double tolerance) {
-  corrector_was_right_ = true;
-  keep_corrector(candidate);
+  polish_.keep(candidate);
   const Move move = mover_->follow(candidate, false);
   bool done = move.status == Status::success;
-  if (done && wants_polish(move.length) && add_newton_step(candidate, step.cj, tolerance))
-    done = corrector_was_right_ && mover_->follow(candidate, true).status == Status::success;
+  if (done && wants_polish(move.length) && polish_.add_newton_step(candidate, step.cj, tolerance))
+    done =
+        polish_.corrector_was_right() && mover_->follow(candidate, true).status == Status::success;
   if (!done) {
-    N_VScale(1.0, newton_, candidate.correction);
+    polish_.restore(candidate);
     return false;
   }
   ++statistics_.chord_projections;

@@ -14,9 +14,9 @@
 //
 // Krylov methods solve to a tolerance that suits IDA's own test: delta would be noise as long as
 // what it is to remove.
-#include <cmath>
+#include "step/polish.hpp"
 
-#include "attach/impl.hpp"
+#include <cmath>
 
 namespace tether::ida_projection {
 
@@ -28,61 +28,65 @@ constexpr double kAnswered = 0.1;  // tolerances: a shorter move needs no answer
 
 }  // namespace
 
-bool Projection::Impl::wants_polish(double length) const {
-  if (linear_solve_ == nullptr || iterative_) return false;
-  if (options_.extra_iterations == 0) return has_algebraic_ && options_.refresh_algebraic;
+void Polish::allocate(N_Vector like, bool contiguous) {
+  contiguous_ = contiguous;
+  delta_ = OwnedVector(like);
+  corrected_ = OwnedVector(like);
+  work_ = OwnedVector(like);
+  if (!contiguous) return;
+  size_ = static_cast<int>(N_VGetLength(like));
+  delta_entries_ = N_VGetArrayPointer(delta_);
+  corrected_entries_ = N_VGetArrayPointer(corrected_);
+  work_entries_ = N_VGetArrayPointer(work_);
+}
+
+bool Polish::wanted(double length, bool smoothing) const {
+  if (!corrector_.solves() || iterative_) return false;
+  if (options_.extra_iterations == 0) return variables_.any() && options_.refresh_algebraic;
   // After two iterations of its own the corrector leaves nothing worth another one, unless the move
   // asks for an answer of the algebraic variables. Whether it made them varies from run to run,
   // which smooth step sizes are not meant to.
-  if (smoother_.on()) return true;
-  long iterations = 0;
-  SUNNonlinSolGetNumIters(inner_, &iterations);
-  return iterations <= 1 || (has_algebraic_ && length > kAnswered);
+  if (smoothing) return true;
+  return corrector_.iterations() <= 1 || (variables_.any() && length > kAnswered);
+}
+
+void Polish::keep(const Candidate& candidate) {
+  corrector_was_right_ = true;
+  if (contiguous_)
+    for (int j = 0; j < size_; ++j) corrected_entries_[j] = candidate.correction_entries[j];
+  else
+    N_VScale(1.0, candidate.correction, corrected_);
 }
 
 // F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N) through IDA's own callback, which adds ycor to
 // IDA's ypred and yppred: ypred is shifted by -dy for the call and put back bit for bit.
-bool Projection::Impl::newton_step_at_moved_point(const Candidate& candidate) {
+bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
   if (contiguous_) {
     double* base = candidate.base_entries;
     for (int j = 0; j < size_; ++j) {
-      saved_entries_[j] = base[j];
-      base[j] += candidate.correction_entries[j] - newton_entries_[j];
+      work_entries_[j] = base[j];
+      base[j] += candidate.correction_entries[j] - corrected_entries_[j];
     }
-    const bool evaluated = residual(newton_, delta_) == 0;
+    const bool evaluated = corrector_.residual(corrected_, delta_) == 0;
     for (int j = 0; j < size_; ++j) {
-      base[j] = saved_entries_[j];
+      base[j] = work_entries_[j];
       delta_entries_[j] = -delta_entries_[j];
     }
-    return evaluated && solve_linear(delta_);
+    return evaluated && corrector_.solve_linear(delta_);
   }
-  N_VScale(1.0, candidate.base, saved_);
-  N_VLinearSum(1.0, candidate.correction, -1.0, newton_, delta_);
+  N_VScale(1.0, candidate.base, work_);
+  N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
   N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
-  const bool evaluated = residual(newton_, delta_) == 0;
-  N_VScale(1.0, saved_, candidate.base);
+  const bool evaluated = corrector_.residual(corrected_, delta_) == 0;
+  N_VScale(1.0, work_, candidate.base);
   N_VScale(-1.0, delta_, delta_);
-  return evaluated && solve_linear(delta_);
+  return evaluated && corrector_.solve_linear(delta_);
 }
 
-bool Projection::Impl::solve_linear(N_Vector rhs) {
-  const int flag = linear_solve_(rhs, mem_);
-  if (flag < 0) stop(flag, "IDA's linear solver failed for good, flag " + std::to_string(flag));
-  return flag == 0;
-}
-
-Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance) {
-  // A refinement: where F or the linear solver fails here, the move itself stands, unless the
-  // failure is to end the run; then stop() has kept it.
-  return add_newton_step(candidate, cj, tolerance) ? mover_->settle(candidate, delta_)
-                                                   : mover_->finish(candidate);
-}
-
-// ycor <- ycor + delta, as far as delta is to be trusted. False: there is none.
-bool Projection::Impl::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
+bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
   if (!newton_step_at_moved_point(candidate)) return false;
   ++statistics_.residual_evaluations;
-  extra_iterations_of_last_solve_ = 1;
+  iterations_ = 1;
 
   // IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
   // equations contain y'; algebraic ones take the plain solution.
@@ -92,20 +96,20 @@ bool Projection::Impl::add_newton_step(const Candidate& candidate, double cj, do
   const double length = differential_length(candidate);
   corrector_was_right_ = length <= kMisled * tolerance;
   const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
-  apply_delta(candidate, differential ? 1.0 : 0.0, algebraic);
+  apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
-  if (has_algebraic_ && algebraic > 0.0) ++statistics_.refreshes;
+  if (variables_.any() && algebraic > 0.0) ++statistics_.refreshes;
   return true;
 }
 
 // WRMS length of delta over the differential variables.
-double Projection::Impl::differential_length(const Candidate& candidate) {
+double Polish::differential_length(const Candidate& candidate) {
   if (!contiguous_) {
-    if (!has_algebraic_) return N_VWrmsNorm(delta_, candidate.weights);
-    N_VProd(id_, delta_, saved_);
-    return N_VWrmsNorm(saved_, candidate.weights);
+    if (!variables_.any()) return N_VWrmsNorm(delta_, candidate.weights);
+    N_VProd(variables_.id(), delta_, work_);
+    return N_VWrmsNorm(work_, candidate.weights);
   }
-  const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
+  const double* id = variables_.mask();
   double sum = 0.0;
   for (int j = 0; j < size_; ++j) {
     const double change = delta_entries_[j] * candidate.weight_entries[j];
@@ -116,10 +120,9 @@ double Projection::Impl::differential_length(const Candidate& candidate) {
 
 // delta_d <- differential * delta_d, delta_a <- algebraic * delta_a, ycor <- ycor + delta; a factor
 // of 0 also removes what is not finite.
-void Projection::Impl::apply_delta(const Candidate& candidate, double differential,
-                                   double algebraic) {
+void Polish::apply(const Candidate& candidate, double differential, double algebraic) {
   if (contiguous_) {
-    const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
+    const double* id = variables_.mask();
     for (int j = 0; j < size_; ++j) {
       const double factor = id == nullptr || id[j] != 0.0 ? differential : algebraic;
       double& delta = delta_entries_[j];
@@ -128,9 +131,9 @@ void Projection::Impl::apply_delta(const Candidate& candidate, double differenti
     }
     return;
   }
-  if (has_algebraic_) {
-    N_VProd(id_, delta_, saved_);
-    N_VLinearSum(algebraic, delta_, differential - algebraic, saved_, delta_);
+  if (variables_.any()) {
+    N_VProd(variables_.id(), delta_, work_);
+    N_VLinearSum(algebraic, delta_, differential - algebraic, work_, delta_);
   } else {
     N_VScale(differential, delta_, delta_);
   }

@@ -1,54 +1,100 @@
-// Tether: what steers IDA's step sizes and orders, at the end of a successful solve.
-// SPDX-License-Identifier: BSD-3-Clause
-#include "attach/impl.hpp"
+// Tether: what steers IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
+#include "step/step_control.hpp"
 
 namespace tether::ida_projection {
 
+namespace {
+
+constexpr int kTrapped = 10;      // steps in a row with failed error tests
+constexpr int kRefused = 3;       // failed error tests in one step
+constexpr int kOftenRefused = 4;  // steps for each failed error test, of the run so far
+
+// In the norm of IDA's error test.
+double error_norm(N_Vector v, N_Vector weights, N_Vector differential) {
+  return differential != nullptr ? N_VWrmsNormMask(v, weights, differential)
+                                 : N_VWrmsNorm(v, weights);
+}
+
+}  // namespace
+
+void StepControl::reset() {
+  weights_factor_ = 1.0;
+  smoother_.reset();
+  order_limit_.reset();
+  refused_in_row_ = 0;
+  last_error_failures_ = 0;
+}
+
 // IDA computes its weights anew for a new step, but not for another attempt at the same one.
-void Projection::Impl::restore_weights(N_Vector weights) {
+void StepControl::restore_weights(N_Vector weights, long last_steps) {
   if (weights_factor_ == 1.0) return;
-  long steps = 0;
-  IDAGetNumSteps(ida_mem_, &steps);
-  if (steps == last_steps_) N_VScale(1.0 / weights_factor_, weights, weights);
+  if (ida_.steps() == last_steps) N_VScale(1.0 / weights_factor_, weights, weights);
   weights_factor_ = 1.0;
 }
 
-// In the norm of IDA's error test.
-double Projection::Impl::error_norm(N_Vector v, N_Vector weights) const {
-  const bool suppressed = engaged_ && id_ && has_algebraic_ && options_.suppress_algebraic;
-  return suppressed ? N_VWrmsNormMask(v, weights, id_) : N_VWrmsNorm(v, weights);
-}
-
 // |ycor| decides the next step size, and what it is beside the second difference the order.
-void Projection::Impl::control_step(const Candidate& candidate) {
-  if (!engaged_ && !smoother_.on()) return;
-  long steps = 0;
-  IDAGetNumSteps(ida_mem_, &steps);
+void StepControl::control(const Candidate& candidate, bool engaged, N_Vector differential) {
+  if (!engaged && !smoother_.on()) return;
+  const long steps = ida_.steps();
+  const auto norm = [&] {
+    return error_norm(candidate.correction, candidate.weights, differential);
+  };
   if (smoother_.on()) {
     order_limit_.end();
-    weights_factor_ = smoother_.control(steps, error_norm(candidate.correction, candidate.weights));
+    weights_factor_ = smoother_.control(steps, norm());
   } else {
-    compare_slopes(candidate, steps);
-    const double norm =
-        order_limit_.lowering() ? error_norm(candidate.correction, candidate.weights) : 0.0;
-    weights_factor_ = order_limit_.control(steps, step_data().t, norm);
+    compare_slopes(candidate, steps, differential);
+    weights_factor_ =
+        order_limit_.control(steps, ida_.step().t, order_limit_.lowering() ? norm() : 0.0);
     statistics_.order_limited = order_limit_.begun();
   }
   if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
 }
 
 // y' of two steps in a row, now and then, for the order.
-void Projection::Impl::compare_slopes(const Candidate& candidate, long steps) {
+void StepControl::compare_slopes(const Candidate& candidate, long steps, N_Vector differential) {
   const bool keeps = order_limit_.keeps_slope(steps);
   if (!keeps && !(kept_slope_ && order_limit_.compares_slopes(steps))) return;
-  const StepData step = step_data();
-  if (!kept_slope_) kept_slope_ = OwnedVector(candidate.base);
-  N_Vector slope = keeps ? kept_slope_ : delta_;
+  const StepData step = ida_.step();
+  if (!kept_slope_) {
+    kept_slope_ = OwnedVector(candidate.base);
+    slope_ = OwnedVector(candidate.base);
+  }
+  N_Vector slope = keeps ? kept_slope_ : slope_;
   N_VLinearSum(1.0, step.yp_predicted, step.cj, candidate.correction, slope);
   if (keeps) return;
   N_VLinearSum(1.0, slope, -1.0, kept_slope_, slope);
-  order_limit_.note_differences(steps, error_norm(candidate.correction, candidate.weights),
-                                step_size() * error_norm(slope, candidate.weights));
+  order_limit_.note_differences(
+      steps, error_norm(candidate.correction, candidate.weights, differential),
+      ida_.step_size() * error_norm(slope, candidate.weights, differential));
+}
+
+// IDA may double its step right after a doubling was refused, and raises the order only after k + 2
+// steps of one size: one failed error test a step at order 1 can go on for ever.
+void StepControl::look_for_refusals(bool engaged) {
+  if (smoother_.on()) return;
+  const long failures = ida_.error_test_failures();
+  refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;
+  last_error_failures_ = failures;
+  if (engaged && refused_in_row_ >= kTrapped) begin_smoothing();
+}
+
+bool StepControl::struggling() const {
+  if (!options_.suppress_algebraic) return false;
+  return refused_in_row_ >= kTrapped ||
+         ida_.error_test_failures() - last_error_failures_ >= kRefused;
+}
+
+bool StepControl::in_trouble(long steps) const {
+  if (!options_.suppress_algebraic) return false;
+  const long failures = ida_.error_test_failures();
+  return statistics_.corrector_failures > 0 || (failures > 1 && kOftenRefused * failures > steps);
+}
+
+void StepControl::begin_smoothing() {
+  if (smoother_.on() || !options_.smooth_where_needed) return;
+  smoother_.begin();
+  ++statistics_.smoothing_begun;
 }
 
 }  // namespace tether::ida_projection

@@ -1,34 +1,39 @@
-// Tether: another nonlinear solver in the plugin's place is noticed. SPDX-License-Identifier:
-// BSD-3-Clause
-#include <cstdio>
-
-#include "attach/impl.hpp"
+// Tether: another nonlinear solver in the plugin's place is noticed.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "watch/bypass.hpp"
 
 namespace tether::ida_projection {
 
+void BypassWatch::begin(std::function<void()> at_end) {
+  watching_ = true;
+  steps_at_attach_ = ida_.steps();
+  const StepData step = ida_.step();
+  lifetime_.watch(step.y_predicted, step.yp_predicted, std::move(at_end));
+}
+
 // After an attempt IDA has accepted at most one step that the plugin has not heard of: IDA's count
 // has to be the one at the last attempt, or one more, or none after IDAReInit.
-long Projection::Impl::steps_without_plugin() const {
-  if (!mover_ || !lifetime_.alive()) return steps_unseen_;
+long BypassWatch::steps_without_plugin(long last_steps, bool initialized) const {
+  if (!watching_ || !lifetime_.alive()) return steps_unseen_;
   long steps = 0;
-  if (IDAGetNumSteps(ida_mem_, &steps) != 0 || steps == 0) return steps_unseen_;
-  const long expected = initialized_ ? last_steps_ + 1 : steps_at_attach_;
+  if (IDAGetNumSteps(ida_.mem(), &steps) != 0 || steps == 0) return steps_unseen_;
+  const long expected = initialized ? last_steps + 1 : steps_at_attach_;
   if (steps > expected) return steps - expected;
-  const bool begun_anew = steps < (initialized_ ? last_steps_ : steps_at_attach_);
+  const bool begun_anew = steps < (initialized ? last_steps : steps_at_attach_);
   return begun_anew ? steps : steps_unseen_;
 }
 
-// Status and text once it happened; said once.
-void Projection::Impl::look_for_bypass() {
-  steps_unseen_ = steps_without_plugin();
+void BypassWatch::look(long last_steps, bool initialized, Report& report) {
+  steps_unseen_ = steps_without_plugin(last_steps, initialized);
   if (steps_unseen_ == 0) return;
-  status = Status::never_called;
-  message = "IDA took " + std::to_string(steps_unseen_) +
-            " steps without the plugin, which projected none of them: another nonlinear solver was "
-            "attached after it; make the Projection last, or hand that solver over in "
-            "Options::nonlinear_solver";
-  if (!said_bypass_) say_once(message);
-  said_bypass_ = true;
+  report.status = Status::never_called;
+  report.message =
+      "IDA took " + std::to_string(steps_unseen_) +
+      " steps without the plugin, which projected none of them: another nonlinear solver was "
+      "attached after it; make the Projection last, or hand that solver over in "
+      "Options::nonlinear_solver";
+  if (!said_) report.say(report.message);
+  said_ = true;
 }
 
 }  // namespace tether::ida_projection

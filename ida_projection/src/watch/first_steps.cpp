@@ -1,10 +1,10 @@
 // Tether: rows that F does not keep, and tolerances above the solution, are seen in the first
 // steps. SPDX-License-Identifier: BSD-3-Clause
+#include "watch/first_steps.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <sstream>
-
-#include "attach/impl.hpp"
 
 namespace tether::ida_projection {
 
@@ -20,95 +20,110 @@ constexpr double kMoves = 0.05;                 // of y in a step: it is no stat
 
 }  // namespace
 
-// After a successful move; the corrector's own correction is in newton_.
-void Projection::Impl::look_at_first_steps(const Candidate& candidate, const StepData& step) {
-  if (last_steps_ < kSettled || repeated_ || warning_status != Status::success) return;
-  if (last_steps_ >= kFirstLook && last_steps_ <= kLastLook && last_steps_ % 2 == 0)
-    look_at_tolerances(candidate, step);
+void FirstSteps::reset() {
+  row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), 0);
+  looks_ = small_looks_ = 0;
+}
+
+std::string FirstSteps::look(const Candidate& candidate, const StepData& step, long steps, double h,
+                             N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
+                             Corrector& corrector) {
+  std::string found;
+  if (steps < kSettled) return found;
+  if (steps >= kFirstLook && steps <= kLastLook && steps % 2 == 0)
+    found = look_at_tolerances(candidate, step, h, corrected);
   // In forms of index 2 and more y' and multipliers carry the error of derivatives that F lacks.
-  if (high_index_ || !index_known_) return;
-  if (contiguous_ && has_values(constraints) && looks_ < kLooks)
-    look_for_false_rows(candidate, step);
+  if (!found.empty() || variables.high_index() || !variables.index_known()) return found;
+  if (candidate.base_entries != nullptr && has_values(constraints_) && looks_ < kLooks)
+    found = look_for_false_rows(candidate, step, h, corrected, variables.mask(), mover, corrector);
+  return found;
 }
 
 // With |y| below a tolerance in the norm of the error test, y = 0 would pass as well.
-void Projection::Impl::look_at_tolerances(const Candidate& candidate, const StepData& step) {
-  N_VLinearSum(1.0, candidate.base, 1.0, newton_, saved_);
-  const double size = N_VWrmsNorm(saved_, candidate.weights);
-  N_VLinearSum(1.0, step.yp_predicted, step.cj, newton_, saved_);
-  const double change = std::abs(step_size()) * N_VWrmsNorm(saved_, candidate.weights);
-  if (!(size < 1.0) || !(change > kMoves * size)) return;
-  if (++small_looks_ < (kLastLook - kFirstLook) / 2 + 1) return;
+std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const StepData& step,
+                                           double h, N_Vector corrected) {
+  if (!work_) work_ = OwnedVector(candidate.base);
+  N_VLinearSum(1.0, candidate.base, 1.0, corrected, work_);
+  const double size = N_VWrmsNorm(work_, candidate.weights);
+  N_VLinearSum(1.0, step.yp_predicted, step.cj, corrected, work_);
+  const double change = std::abs(h) * N_VWrmsNorm(work_, candidate.weights);
+  if (!(size < 1.0) || !(change > kMoves * size)) return {};
+  if (++small_looks_ < (kLastLook - kFirstLook) / 2 + 1) return {};
   std::ostringstream out;
   out << "the whole solution is " << size << " tolerances long at t = " << step.t
       << ", so that IDA's error test cannot see it: reduce atol";
-  warn(Status::doubtful, out.str());
+  return out.str();
 }
 
 // C y' + g_t = 0 at the corrector's point, where y' fulfils F. C y' costs a product with the C at
 // hand; only where a row stands out is g evaluated.
-void Projection::Impl::look_for_false_rows(const Candidate& candidate, const StepData& step) {
-  const auto n = static_cast<std::size_t>(size_);
-  corrected_.resize(n);
+std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const StepData& step,
+                                            double h, N_Vector corrected, const double* id,
+                                            Mover& mover, Corrector& corrector) {
+  const auto n = static_cast<std::size_t>(N_VGetLength(candidate.base));
+  point_.resize(n);
   slope_.resize(n);
   const double* predicted = N_VGetArrayPointer(step.yp_predicted);
+  const double* ycor = N_VGetArrayPointer(corrected);
   for (std::size_t j = 0; j < n; ++j) {
-    corrected_[j] = candidate.base_entries[j] + newton_entries_[j];
-    slope_[j] = predicted[j] + step.cj * newton_entries_[j];
+    point_[j] = candidate.base_entries[j] + ycor[j];
+    slope_[j] = predicted[j] + step.cj * ycor[j];
   }
-  const double* id = has_algebraic_ ? N_VGetArrayPointer(id_) : nullptr;
-  if (!mover_->tangency(slope_, id, tangency_)) return;
-  const double felt = kFelt * std::sqrt(static_cast<double>(size_));
+  if (!mover.tangency(slope_, id, tangency_)) return {};
+  const double felt = kFelt * std::sqrt(static_cast<double>(n));
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
     const double rate = std::abs(tangency_.rate[i]);
     int& doubts = row_doubts_[i];  // with the sign of the rate: noise changes it
     const bool doubtful = tangency_.terms[i] >= 0.0 && rate > kNoInvariant * tangency_.terms[i] &&
-                          rate * std::abs(step_size()) > felt * tangency_.tolerance[i];
+                          rate * std::abs(h) > felt * tangency_.tolerance[i];
     if (!doubtful)
       doubts = 0;
     else
       doubts = tangency_.rate[i] > 0.0 ? std::max(doubts, 0) + 1 : std::min(doubts, 0) - 1;
     if (std::abs(doubts) < kDoubts) continue;
     doubts = 0;
-    const std::string text = false_row(static_cast<int>(i), tangency_, step);
-    if (!text.empty()) return warn(Status::doubtful, text);
-    if (++looks_ >= kLooks) return;
+    std::string text = false_row(static_cast<int>(i), step, h, corrector);
+    if (!text.empty()) return text;
+    if (++looks_ >= kLooks) return {};
   }
+  return {};
 }
 
 // What is wrong with the row: dg/dt along y' and g_t by central differences of g, which know no C.
-std::string Projection::Impl::false_row(int row, const Tangency& seen, const StepData& step) {
+std::string FirstSteps::false_row(int row, const StepData& step, double h, Corrector& corrector) {
   const auto i = static_cast<std::size_t>(row);
-  Evaluator evaluator(constraints, statistics_);
-  std::vector<double> plus(row_doubts_.size()), minus(row_doubts_.size()), y(corrected_);
+  const auto size = static_cast<int>(point_.size());
+  Evaluator evaluator(constraints_, statistics_);
+  std::vector<double> plus(row_doubts_.size()), minus(row_doubts_.size()), y(point_);
   double fastest = 1.0 / std::max(1.0, std::abs(step.t));
   for (std::size_t j = 0; j < y.size(); ++j)
-    fastest = std::max(fastest, std::abs(slope_[j]) / std::max(1.0, std::abs(corrected_[j])));
-  const double h = std::cbrt(2e-16) / fastest;
+    fastest = std::max(fastest, std::abs(slope_[j]) / std::max(1.0, std::abs(point_[j])));
+  const double dt = std::cbrt(2e-16) / fastest;
   const auto difference = [&](bool along, double* slope) {
     const auto at = [&](double change, std::vector<double>& g) {
-      for (std::size_t j = 0; along && j < y.size(); ++j) y[j] = corrected_[j] + change * slope_[j];
-      return evaluator.value(step.t + change, y.data(), size_, g.data()) == Status::success;
+      for (std::size_t j = 0; along && j < y.size(); ++j) y[j] = point_[j] + change * slope_[j];
+      return evaluator.value(step.t + change, y.data(), size, g.data()) == Status::success;
     };
-    const bool known = at(h, plus) && at(-h, minus);
-    *slope = known ? (plus[i] - minus[i]) / (2.0 * h) : 0.0;
-    y = corrected_;
+    const bool known = at(dt, plus) && at(-dt, minus);
+    *slope = known ? (plus[i] - minus[i]) / (2.0 * dt) : 0.0;
+    y = point_;
     return known;
   };
   double along = 0.0, in_time = 0.0;
   const bool known = difference(true, &along) && difference(false, &in_time);
-  if (evaluator.fatal()) stop(-1, evaluator.message());
+  if (evaluator.fatal()) corrector.stop(-1, evaluator.message());
   if (!known) return {};
-  const double terms = seen.terms[i] + std::abs(in_time);
-  const double felt = kFelt * std::sqrt(static_cast<double>(size_)) * seen.tolerance[i];
+  const double terms = tangency_.terms[i] + std::abs(in_time);
+  const double felt = kFelt * std::sqrt(static_cast<double>(size)) * tangency_.tolerance[i];
   std::ostringstream out;
-  if (std::abs(along) > kNoInvariant * terms && std::abs(along * step_size()) > felt) {
-    out << "F does not keep row " << row << " (" << constraints.name(row) << "): at t = " << step.t
+  if (std::abs(along) > kNoInvariant * terms && std::abs(along * h) > felt) {
+    out << "F does not keep row " << row << " (" << constraints_.name(row) << "): at t = " << step.t
         << " C y' + g_t = " << along << ", its terms sum up to " << terms
         << " in absolute value; check the row, its constants and F";
     return out.str();
   }
-  if (std::abs(seen.rate[i] + in_time - along) > kNoInvariant * terms && size_ <= kSearchLimit) {
+  if (std::abs(tangency_.rate[i] + in_time - along) > kNoInvariant * terms &&
+      size <= kSearchLimit) {
     const std::string found = wrong_entry(step.t);
     if (!found.empty())
       return "check_jacobian finds at t = " + std::to_string(step.t) + ": " + found;
@@ -117,9 +132,9 @@ std::string Projection::Impl::false_row(int row, const Tangency& seen, const Ste
 }
 
 // The wrong entry of C by check_jacobian at the corrector's point; empty: none.
-std::string Projection::Impl::wrong_entry(double t) {
+std::string FirstSteps::wrong_entry(double t) const {
   try {
-    const JacobianReport report = check_jacobian(constraints, t, corrected_, 1e-3);
+    const JacobianReport report = check_jacobian(constraints_, t, point_, 1e-3);
     return report.correct ? std::string() : report.message;
   } catch (const std::invalid_argument&) {  // g refuses a point nearby: nothing is known
     return {};

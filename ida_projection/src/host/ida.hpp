@@ -1,0 +1,55 @@
+// Tether: IDA's memory through its public getters. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ida/ida.h>
+
+namespace tether::ida_projection {
+
+/// What IDA's public getters tell inside a solve.
+struct StepData {
+  double t = 0.0, cj = 0.0;
+  N_Vector y_predicted = nullptr, yp_predicted = nullptr;
+};
+
+/// The host's ida_mem, not owned.
+class Ida {
+ public:
+  explicit Ida(void* mem) : mem_(mem) {}
+
+  void* mem() const { return mem_; }
+  long steps() const { return count(IDAGetNumSteps); }
+  long setups() const { return count(IDAGetNumLinSolvSetups); }
+  long error_test_failures() const { return count(IDAGetNumErrTestFails); }
+  double step_size() const {
+    sunrealtype h = 0.0;
+    IDAGetCurrentStep(mem_, &h);
+    return h;
+  }
+  int order() const {
+    int k = 0;
+    IDAGetCurrentOrder(mem_, &k);
+    return k;
+  }
+  StepData step() const {
+    StepData step;
+    N_Vector yyn, ypn, res;
+    void* user_data;
+    sunrealtype t = 0.0, cj = 0.0;
+    IDAGetNonlinearSystemData(mem_, &t, &step.y_predicted, &step.yp_predicted, &yyn, &ypn, &res,
+                              &cj, &user_data);
+    step.t = t;
+    step.cj = cj;
+    return step;
+  }
+
+ private:
+  long count(int (*get)(void*, long*)) const {
+    long n = 0;
+    get(mem_, &n);
+    return n;
+  }
+
+  void* mem_;
+};
+
+}  // namespace tether::ida_projection

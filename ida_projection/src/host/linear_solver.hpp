@@ -1,0 +1,29 @@
+// Tether: the kind of IDA's linear solver. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "host/ida.hpp"
+
+namespace tether::ida_projection {
+
+/// There is no getter for the type of IDA's linear solver, but direct ones count no iterations and
+/// iterative ones, with a Jacobian of their own or without, do from the first right-hand side that
+/// is not zero.
+class LinearSolverKind {
+ public:
+  /// After a correction; `steps`: accepted before it.
+  void look(const Ida& ida, long steps) {
+    long iterations = 0, preconditioners = 0, jacobians = 0;
+    IDAGetNumLinIters(ida.mem(), &iterations);
+    IDAGetNumPrecEvals(ida.mem(), &preconditioners);
+    IDAGetNumJacEvals(ida.mem(), &jacobians);
+    iterative_ = iterations > 0 || preconditioners > 0;
+    known_ = iterative_ || (jacobians > 0 && steps > 0);
+  }
+  bool known() const { return known_; }
+  bool iterative() const { return iterative_; }
+
+ private:
+  bool known_ = false, iterative_ = false;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,68 @@
+// Tether: rows that are moved together with equations of F. SPDX-License-Identifier: BSD-3-Clause
+#include "start/joined_rows.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "rows/equations.hpp"
+
+namespace tether::ida_projection {
+
+// F(t, y, y'_pred), N values, through IDA's own callback: ypred is replaced for the call.
+bool JoinedRows::residual_at(const double* y, double* f) {
+  if (!none_) {
+    none_ = OwnedVector(present_.base);
+    f_ = OwnedVector(present_.base);
+    kept_ = OwnedVector(present_.base);
+    N_VConst(0.0, none_);
+  }
+  const auto size = static_cast<std::ptrdiff_t>(N_VGetLength(present_.base));
+  N_VScale(1.0, present_.base, kept_);
+  std::copy(y, y + size, present_.base_entries);
+  ++statistics_.residual_evaluations;
+  const bool evaluated = corrector_.residual(none_, f_) == 0;
+  N_VScale(1.0, kept_, present_.base);
+  const double* values = N_VGetArrayPointer(f_);
+  std::copy(values, values + size, f);
+  return evaluated;
+}
+
+void JoinedRows::forget() {
+  mover_.reset();
+  moved_id_ = OwnedVector();
+}
+
+void JoinedRows::join(const Candidate& candidate, double cj) {
+  forget();  // of an attempt that failed
+  if (candidate.base_entries == nullptr || !variables_.any() || !has_values(constraints_)) return;
+  const auto size = static_cast<int>(N_VGetLength(candidate.base));
+  if (size > options_.derive_id_limit) return;
+  const auto n = static_cast<std::size_t>(size);
+  std::vector<double> y(n), WT(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
+    WT[j] = candidate.weight_entries[j] > 0.0 ? 1.0 / candidate.weight_entries[j] : 0.0;
+  }
+  Evaluator rows(constraints_, statistics_);
+  const Residual residual = [this](const double* at, double* f) { return residual_at(at, f); };
+  const double* id = variables_.mask();
+  JoinedEquations found;
+  if (contain_algebraic(rows, candidate.t, y, WT, options_.hold, id))
+    found = find_joined_equations(rows, residual,
+                                  variables_.derivative_free_equations(candidate, corrector_, cj),
+                                  candidate.t, y, WT, options_.hold, id);
+  if (rows.fatal()) corrector_.stop(-1, rows.message());
+  if (found.moves.empty()) return;
+  moved_id_ = OwnedVector(candidate.base);
+  for (std::size_t j = 0; j < n; ++j)
+    N_VGetArrayPointer(moved_id_)[j] = found.moves[j] ? 1.0 : id[j];
+  if (found.equations.empty()) return;
+  joined_ = constraints_ + as_constraints(
+                               found, residual, [this] { return present_.weight_entries; }, size);
+  mover_ = has_sparse_rows(constraints_)
+               ? make_sparse_mover(joined_, options_, statistics_, size, rows.rows())
+               : make_dense_mover(joined_, options_, statistics_, size, rows.rows());
+  mover_->reset();
+}
+
+}  // namespace tether::ida_projection

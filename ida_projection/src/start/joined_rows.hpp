@@ -1,0 +1,50 @@
+// Tether: rows that are moved together with equations of F. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+
+#include "host/owned_vector.hpp"
+#include "movers/mover.hpp"
+#include "start/algebraic.hpp"
+#include "step/corrector.hpp"
+
+namespace tether::ida_projection {
+
+/// Rows that hang on algebraic variables which equations of F determine are moved together with
+/// these equations.
+class JoinedRows {
+ public:
+  JoinedRows(const Constraints& constraints, const Options& options, Statistics& statistics,
+             Corrector& corrector, const AlgebraicVariables& variables)
+      : constraints_(constraints),
+        options_(options),
+        statistics_(statistics),
+        corrector_(corrector),
+        variables_(variables) {}
+
+  /// F is evaluated and weighed as in the attempt at this candidate.
+  void begin(const Candidate& present) { present_ = present; }
+  /// Looks for such equations at the candidate.
+  void join(const Candidate& candidate, double cj);
+  void forget();
+  /// Moves the rows and the equations; null: the caller's rows move alone.
+  Mover* mover() const { return mover_.get(); }
+  /// 1 where a variable moves with the rest, 0 where it follows; null: all move.
+  N_Vector moved_id() const { return moved_id_ ? moved_id_ : variables_.id(); }
+
+ private:
+  bool residual_at(const double* y, double* f);
+
+  const Constraints& constraints_;
+  const Options& options_;
+  Statistics& statistics_;
+  Corrector& corrector_;
+  const AlgebraicVariables& variables_;
+  Candidate present_{};
+  Constraints joined_;           // the caller's rows and equations of F
+  OwnedVector moved_id_;         // id, with 1 where an algebraic variable moves with the rest
+  OwnedVector none_, f_, kept_;  // of residual_at(): ycor = 0, F, the prediction
+  std::unique_ptr<Mover> mover_;
+};
+
+}  // namespace tether::ida_projection

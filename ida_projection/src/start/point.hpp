@@ -1,0 +1,40 @@
+// Tether: the nearest point on the constraints, for starts and output points.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/ida_projection/projection.hpp>
+#include <vector>
+
+#include "movers/mover.hpp"
+#include "start/gauss_newton.hpp"
+
+namespace tether::ida_projection {
+
+/// Moves single points, far ones too, in the error weights.
+class PointProjection {
+ public:
+  PointProjection(const Constraints& constraints, const Options& options)
+      : constraints_(constraints), given_(options) {}
+
+  /// `weights`: reciprocal error weights; `id` as in Mover::set_algebraic(); `hold`: components
+  /// that stay, beside those of the options. y changes only on success.
+  void project(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id, N_Vector weights,
+               ConsistencyReport& report);
+  /// The part of yp along the constraints at y; `report` changes where a callback ends the run.
+  /// False: not found, or not looked for.
+  bool tangent(double t, N_Vector y, N_Vector yp, ConsistencyReport& report);
+
+ private:
+  void project_values(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id,
+                      N_Vector weights, ConsistencyReport& report);
+
+  const Constraints& constraints_;
+  const Options& given_;
+  std::unique_ptr<GaussNewton> nearest_;
+  std::unique_ptr<Mover> mover_;  // for gradients and user projections
+  Options options_;
+  Statistics statistics_;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,72 @@
+// Tether: the nonlinear solver that the plugin decorates. SPDX-License-Identifier: BSD-3-Clause
+#include "step/corrector.hpp"
+
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+
+namespace tether::ida_projection {
+
+Corrector::Corrector(SUNNonlinearSolver solver, N_Vector like) : inner_(solver) {
+  if (inner_ != nullptr) return;
+  own_.reset(SUNNonlinSol_Newton(like, like->sunctx));
+  inner_ = own_.get();
+}
+
+bool Corrector::is_reached_by(const Ida& ida) {
+  heard_ = false;
+  IDASetMaxNonlinIters(ida.mem(), maximum_iterations_);
+  return heard_;
+}
+
+int Corrector::initialize() {
+  failures_in_row_ = 0;
+  rounding_fails_ = false;
+  return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
+}
+
+void Corrector::begin(void* mem) {
+  mem_ = mem;
+  stop_flag_ = 0;
+}
+
+int Corrector::correct(const Candidate& candidate, double tolerance, bool call_setup,
+                       const std::vector<int>& rounding) {
+  N_Vector weights = candidate.weights;
+  if (rounding_fails_ && !rounding.empty()) {
+    if (!weights_) weights_ = OwnedVector(weights);
+    N_VScale(1.0, weights, weights_);
+    double* entries = N_VGetArrayPointer(weights_);
+    for (const int j : rounding) entries[j] = 0.0;
+    weights = weights_;
+  }
+  const int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, weights,
+                                     tolerance, call_setup, mem_);
+  failures_in_row_ = flag == 0 ? 0 : failures_in_row_ + 1;
+  if (failures_in_row_ >= 2) rounding_fails_ = true;
+  return flag;
+}
+
+int Corrector::residual(N_Vector ycor, N_Vector into) {
+  if (stopped()) return stop_flag_;
+  const int flag = system_(ycor, into, mem_);
+  if (flag < 0) stop(flag, "F, IDA's residual function, returned a negative flag");
+  return flag;
+}
+
+bool Corrector::solve_linear(N_Vector rhs) {
+  const int flag = linear_solve_(rhs, mem_);
+  if (flag < 0) stop(flag, "IDA's linear solver failed for good, flag " + std::to_string(flag));
+  return flag == 0;
+}
+
+long Corrector::iterations() const {
+  long n = 0;
+  SUNNonlinSolGetNumIters(inner_, &n);
+  return n;
+}
+
+void Corrector::stop(int flag, const std::string& text) {
+  stop_flag_ = flag;
+  stop_text_ = text;
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,78 @@
+// Tether: the nonlinear solver that the plugin decorates. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "host/ida.hpp"
+#include "host/owned_vector.hpp"
+#include "movers/mover.hpp"
+
+namespace tether::ida_projection {
+
+/// IDA's corrector: the decorated solver with the functions that IDA hands over to it, which the
+/// plugin uses as well. A negative flag of any of them is kept: it ends the run.
+class Corrector {
+ public:
+  /// `solver`: the caller's; null: SUNDIALS' Newton iteration, made here. inner() is null where
+  /// that fails.
+  Corrector(SUNNonlinearSolver solver, N_Vector like);
+
+  SUNNonlinearSolver inner() const { return inner_; }
+  void set_system(SUNNonlinSolSysFn f) { system_ = f; }
+  void set_linear_solve(SUNNonlinSolLSolveFn f) { linear_solve_ = f; }
+  void set_has_setup(bool has) { has_setup_ = has; }
+  void set_maximum_iterations(int n) {
+    maximum_iterations_ = n;
+    heard_ = true;
+  }
+  int maximum_iterations() const { return maximum_iterations_; }
+  /// Does IDASetMaxNonlinIters arrive here?
+  bool is_reached_by(const Ida& ida);
+
+  int initialize();  ///< a new run starts
+  /// A new attempt; `mem`: IDA's memory in it.
+  void begin(void* mem);
+  /// The correction of the candidate. Where it fails although IDA has already cut the step for
+  /// that, its convergence test from then on leaves out `rounding`: algebraic variables of index 2
+  /// or more, whose rounding, divided by the step, fails it, and nothing but they depends on them.
+  int correct(const Candidate& candidate, double tolerance, bool call_setup,
+              const std::vector<int>& rounding);
+  /// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be
+  /// evaluated. Once it asked for the end of the run it is not called again.
+  int residual(N_Vector ycor, N_Vector into);
+  bool solve_linear(N_Vector rhs);
+  long iterations() const;  ///< of the last correction
+
+  bool has_setup() const { return has_setup_; }
+  bool solves() const { return linear_solve_ != nullptr; }
+
+  void stop(int flag, const std::string& text);
+  bool stopped() const { return stop_flag_ < 0; }
+  int stop_flag() const { return stop_flag_; }
+  const std::string& stop_text() const { return stop_text_; }
+  void forget_stop() { stop_flag_ = 0; }
+
+ private:
+  struct Free {
+    void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFree(solver); }
+  };
+
+  std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, Free> own_;
+  SUNNonlinearSolver inner_ = nullptr;
+  SUNNonlinSolSysFn system_ = nullptr;
+  SUNNonlinSolLSolveFn linear_solve_ = nullptr;
+  bool has_setup_ = false;  // IDA's linear solver has factors, or a preconditioner, to be made anew
+  int maximum_iterations_ = 4;
+  bool heard_ = false;
+  void* mem_ = nullptr;
+  int stop_flag_ = 0;  // < 0: a callback ended the run in an evaluation of the plugin's own
+  std::string stop_text_;
+  int failures_in_row_ = 0;
+  bool rounding_fails_ = false;
+  OwnedVector weights_;  // without those that rounding fails
+};
+
+}  // namespace tether::ida_projection

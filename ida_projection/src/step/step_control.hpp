@@ -1,0 +1,55 @@
+// Tether: what steers IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "host/ida.hpp"
+#include "host/owned_vector.hpp"
+#include "movers/mover.hpp"
+#include "step/order_limit.hpp"
+#include "step/step_smoothing.hpp"
+
+namespace tether::ida_projection {
+
+/// Smooth step sizes, the limit of the order, and the rejections by which IDA asks for them.
+class StepControl {
+ public:
+  StepControl(const Ida& ida, const Options& options, Statistics& statistics)
+      : ida_(ida),
+        options_(options),
+        statistics_(statistics),
+        smoother_(ida.mem(), options),
+        order_limit_(ida.mem(), options) {}
+
+  void reset();  ///< a new run starts
+
+  /// At the begin of a solve: takes back what the last one did to the weights of the same step.
+  void restore_weights(N_Vector weights, long last_steps);
+  /// At the end of a successful one. `engaged`: the projection acts; `differential`: the variables
+  /// of IDA's error test (null: all).
+  void control(const Candidate& candidate, bool engaged, N_Vector differential);
+  double weights_factor() const { return weights_factor_; }
+
+  bool smoothing() const { return smoother_.on(); }
+  void begin_smoothing();
+  /// For each new step.
+  void look_for_refusals(bool engaged);
+  /// Before the first move: does IDA fail on algebraic variables in its error test, which would be
+  /// taken out of it with that move?
+  bool struggling() const;
+  /// Before the first move: has the corrector failed, or the error test in a fourth of all steps?
+  bool in_trouble(long steps) const;
+
+ private:
+  void compare_slopes(const Candidate& candidate, long steps, N_Vector differential);
+
+  const Ida& ida_;
+  const Options& options_;
+  Statistics& statistics_;
+  StepSmoother smoother_;
+  OrderLimit order_limit_;
+  OwnedVector kept_slope_, slope_;  // y' of a step and of the next one, for the order
+  double weights_factor_ = 1.0;     // by which IDA's weights were multiplied in the last solve
+  int refused_in_row_ = 0;          // accepted steps that needed more than one attempt
+  long last_error_failures_ = 0;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,38 @@
+// Tether: what makes IDA reject most steps is looked for. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "host/ida.hpp"
+#include "movers/mover.hpp"
+#include "start/algebraic.hpp"
+#include "step/corrector.hpp"
+
+namespace tether::ida_projection {
+
+/// Counts the attempts that IDA repeats; where they are most of a stretch, looks for the cause.
+class RejectionWatch {
+ public:
+  explicit RejectionWatch(const Constraints& constraints) : constraints_(constraints) {}
+
+  void reset();  ///< a new run starts
+  /// At each new attempt: was the last one rejected? `steps`: accepted before it.
+  void count(bool repeated, long steps);
+  /// Were there rejections in most steps of a stretch?
+  bool collapsed() const { return collapsed_; }
+  /// What is wrong, at the corrector's point, where y' = yppred + cj ycor fulfils F.
+  std::string cause(const Candidate& candidate, const StepData& step,
+                    const AlgebraicVariables& variables, Corrector& corrector) const;
+
+ private:
+  std::string suspected_row(const Candidate& candidate, const StepData& step) const;
+  std::string squared_row(const Candidate& candidate, Corrector& corrector) const;
+
+  const Constraints& constraints_;
+  long rejections_ = 0, rejections_before_ = 0;  // attempts that IDA repeated
+  long window_begin_ = 0;                        // accepted steps when they were last looked at
+  long refused_steps_ = 0;                       // of these, steps with a rejection
+  bool rejected_in_step_ = false, collapsed_ = false;
+};
+
+}  // namespace tether::ida_projection

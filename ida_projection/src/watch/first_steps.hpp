@@ -1,0 +1,49 @@
+// Tether: doubts in rows and tolerances, in the first steps. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/ida.hpp"
+#include "host/owned_vector.hpp"
+#include "movers/mover.hpp"
+#include "start/algebraic.hpp"
+#include "step/corrector.hpp"
+
+namespace tether::ida_projection {
+
+/// Rows that F does not keep, wrong entries of C, tolerances above the solution.
+class FirstSteps {
+ public:
+  static constexpr long kSteps =
+      100;  ///< accepted steps in which rows and tolerances are looked at
+
+  FirstSteps(const Constraints& constraints, Statistics& statistics)
+      : constraints_(constraints), statistics_(statistics) {}
+
+  void reset();  ///< a new run starts
+  /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
+  /// ycor. Returns what is wrong; empty: nothing is seen.
+  std::string look(const Candidate& candidate, const StepData& step, long steps, double h,
+                   N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
+                   Corrector& corrector);
+
+ private:
+  std::string look_at_tolerances(const Candidate& candidate, const StepData& step, double h,
+                                 N_Vector corrected);
+  std::string look_for_false_rows(const Candidate& candidate, const StepData& step, double h,
+                                  N_Vector corrected, const double* id, Mover& mover,
+                                  Corrector& corrector);
+  std::string false_row(int row, const StepData& step, double h, Corrector& corrector);
+  std::string wrong_entry(double t) const;
+
+  const Constraints& constraints_;
+  Statistics& statistics_;
+  Tangency tangency_;                  // of the caller's rows
+  std::vector<int> row_doubts_;        // steps in a row in which F did not seem to keep a row
+  int looks_ = 0, small_looks_ = 0;    // at doubts in rows; at a solution below its tolerances
+  std::vector<double> point_, slope_;  // y and y' as the corrector left them
+  OwnedVector work_;
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,58 @@
+// Tether: status and message of the plugin, and warnings said once.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <sundials/sundials_nonlinearsolver.h>
+#include <tether/ida_projection/options.hpp>
+#include <tether/ida_projection/projection.hpp>
+#include <tether/ida_projection/statistics.hpp>
+
+namespace tether::ida_projection {
+
+constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
+constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
+
+/// Outcomes of solves, counted in the statistics; what Projection::status() and message() tell.
+class Report {
+ public:
+  Report(const Options& options, Statistics& statistics)
+      : options_(options), statistics_(statistics) {}
+
+  Status status = Status::unused;
+  std::string message;
+  std::string advice;  ///< what message() says while nothing is wrong
+
+  /// Status, text and count of an outcome in the attempt at the step after `steps`; the code that
+  /// IDA wants.
+  int finish(Status outcome, const std::string& text, long steps);
+  /// The same for an exception, which must not pass through IDA's C functions.
+  int caught(Status outcome, const char* text) noexcept;
+  /// What makes IDA reject most steps, or results doubtful.
+  void warn(Status kind, const std::string& text);
+  /// On stderr, where Options::print_warnings allows it.
+  void say(const std::string& text) const;
+  /// A new run starts.
+  void reset();
+
+  Status warning() const { return warning_status_; }
+  Status told() const { return status == Status::success ? warning_status_ : status; }
+  const std::string& text() const { return message.empty() ? warning_ : message; }
+
+ private:
+  void count(Status outcome);
+  void count_failure_in_step(const std::string& text, long steps);
+  void print_fatal(const char* text) noexcept;
+
+  const Options& options_;
+  Statistics& statistics_;
+  std::string warning_;
+  Status warning_status_ = Status::success;
+  Status said_warning_ = Status::success;
+  bool printed_ = false;
+  long failing_step_ = -1;
+  int failures_in_step_ = 0;
+  bool said_failures_ = false;
+};
+
+}  // namespace tether::ida_projection
