@@ -118,8 +118,7 @@ End run(const Burgers& host, double tolerance, int rows) {
   }
 #endif
   N_Vector yp = N_VClone(y), f = N_VClone(y);
-  for (int i = 0; i < n; ++i)
-    N_VGetArrayPointer(y)[i] = 1.5 + std::sin(kTurn * (i + 0.5) / n);
+  for (int i = 0; i < n; ++i) N_VGetArrayPointer(y)[i] = 1.5 + std::sin(kTurn * (i + 0.5) / n);
   N_VConst(0.0, yp);
   burgers(0.0, y, yp, f, nullptr);
   N_VScale(-1.0, f, yp);

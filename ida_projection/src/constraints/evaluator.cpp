@@ -170,7 +170,7 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
 }
 
 void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
-                          std::vector<char>& filled) {
+                          const std::function<void(int, int)>& found) {
   double largest = 0.0;
   for (int j = 0; j < n; ++j) largest = std::max({largest, std::abs(y[j]), scale[j]});
   for (const Part& part : parts_) {
@@ -193,9 +193,7 @@ void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
         same = same && evaluate(g_shifted_.data());
         for (int i = 0; i < m; ++i) {
           const auto k = static_cast<std::size_t>(i);
-          if (same && g_shifted_[k] == g_base_[k]) continue;
-          filled[(static_cast<std::size_t>(part.first_row) + k) * static_cast<std::size_t>(n) + j] =
-              1;
+          if (!same || g_shifted_[k] != g_base_[k]) found(part.first_row + i, static_cast<int>(j));
         }
       }
       y_shifted_[j] = y[j];

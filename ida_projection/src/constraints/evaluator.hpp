@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <string>
 #include <tether/ida_projection/constraints.hpp>
 #include <tether/ida_projection/projection.hpp>
@@ -66,10 +67,10 @@ class Evaluator {
   };
   const std::vector<Part>& parts() const { return parts_; }
 
-  /// Which entries g can fill as a function of y (m x n, row-major, added to `filled`), for the
-  /// sets that leave C to differences: those where g notices a large change of y_j, or cannot take
-  /// it.
-  void sensitive(double t, const double* y, int n, const double* scale, std::vector<char>& filled);
+  /// found(row, column) for the entries that g can fill as a function of y, for the sets that leave
+  /// C to differences: those where g notices a large change of y_j, or cannot take it.
+  void sensitive(double t, const double* y, int n, const double* scale,
+                 const std::function<void(int, int)>& found);
 
   /// Which row the last not_finite or failing callback belongs to, or what it threw.
   const std::string& message() const { return message_; }

@@ -10,6 +10,7 @@ namespace {
 
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
 constexpr double kForLater = 0.1;
+constexpr int kQuick = 3;  // moves with a whole C
 constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
 
 }  // namespace
@@ -44,7 +45,13 @@ template <class Rows>
 Status ContiguousMover<Rows>::factor(double t) {
   // Only differences need to know how large a tolerance is.
   const double* WT = evaluator_.uses_differences() ? this->WT().data() : nullptr;
-  const Status status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
+  Status status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
+  if (status == Status::success && blocks_.outgrown()) {
+    blocks_.rearrange();
+    reusable_ = lasting_ = false;
+    set_metric(true);
+    status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
+  }
   if (status != Status::success) {
     message_ = evaluator_.message();
     return status;
@@ -231,6 +238,7 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
   if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
+  if (broken || result.moves > kQuick) blocks_.look_again_soon();
   // Kept factors are in use only while dropped rows ask for less than that.
   if (result.status == Status::success && !result.capped && !reused_ && contradicts())
     result.status = Status::inconsistent;

@@ -46,8 +46,7 @@ class GradientMover final : public Mover {
     left_.assign(m, 0.0);
     R_.assign(m * m, 0.0);
     pivot_.assign(m, 0);
-    N_VConst(1.0, free_);
-    if (options_.hold_vector != nullptr) N_VScale(1.0, options_.hold_vector, free_);
+    free_all();
     reset();
   }
 
@@ -61,19 +60,16 @@ class GradientMover final : public Mover {
     factored_ = false;
   }
 
-  // Algebraic components are held unless a row contains them.
+  // Algebraic components are held as long as no row contains them.
   Status set_algebraic(const Candidate& candidate, N_Vector id) override {
+    id_ = id;
+    free_all();
     if (id == nullptr) return Status::success;
     load(candidate);
     const Status status = fill(candidate.t);
     if (status != Status::success) return status;
-    double largest = 0.0;
-    for (N_Vector row : gradients_) {
-      N_VProd(id, row, work_);
-      N_VLinearSum(1.0, row, -1.0, work_, work_);
-      largest = std::max(largest, N_VMaxNorm(work_));
-    }
-    if (largest == 0.0) N_VProd(free_, id, free_);
+    holds_algebraic_ = !contains_algebraic();
+    if (holds_algebraic_) N_VProd(free_, id, free_);
     return Status::success;
   }
 
@@ -106,7 +102,7 @@ class GradientMover final : public Mover {
     }
     set_metric(candidate);
     sums_terms_ = static_cast<N_Vector>(y_)->ops->nvl1norm != nullptr;
-    result.status = factor(candidate.t);
+    result.status = factor(candidate);
     sums_terms_ = false;
     if (result.status != Status::success) return result;
     if (rounding_only()) return result;
@@ -178,7 +174,7 @@ class GradientMover final : public Mover {
     bool have_factors = false, fresh = false;
     for (;;) {
       if (!have_factors) {
-        if ((result.status = factor(candidate.t)) != Status::success) return result;
+        if ((result.status = factor(candidate)) != Status::success) return result;
         have_factors = fresh = true;
       }
       const double length = solve(candidate.weights);
@@ -223,6 +219,22 @@ class GradientMover final : public Mover {
     }
     result.status = contradicts() ? Status::inconsistent : Status::success;
     return result;
+  }
+
+  void free_all() {
+    holds_algebraic_ = false;
+    N_VConst(1.0, free_);
+    if (options_.hold_vector != nullptr) N_VScale(1.0, options_.hold_vector, free_);
+  }
+
+  // After fill().
+  bool contains_algebraic() {
+    for (N_Vector row : gradients_) {
+      N_VProd(id_, row, work_);
+      N_VLinearSum(1.0, row, -1.0, work_, work_);
+      if (N_VMaxNorm(work_) > 0.0) return true;
+    }
+    return false;
   }
 
   void flatten(const Constraints& set) {
@@ -304,10 +316,14 @@ class GradientMover final : public Mover {
   double norm(N_Vector v) { return std::sqrt(N_VDotProd(v, v)); }
 
   // Rows S C D orthogonalised in place: S C D = L Q^T with L lower triangular in pivot order.
-  Status factor(double t) {
+  Status factor(const Candidate& candidate) {
     factored_ = false;
-    const Status status = fill(t);
+    const Status status = fill(candidate.t);
     if (status != Status::success) return status;
+    if (holds_algebraic_ && contains_algebraic()) {
+      free_all();
+      set_metric(candidate);
+    }
     ++statistics_.factorizations;
     std::vector<double>& left = left_;
     for (int i = 0; i < m_; ++i) {
@@ -439,8 +455,10 @@ class GradientMover final : public Mover {
   FactorWear wear_;  // for follow()
   bool factored_ = false;
   bool no_settle_ = false;
-  bool sums_terms_ = false;    // measure() asks for them
-  std::vector<double> terms_;  // sum_j |C_ij y_j|
+  N_Vector id_ = nullptr;         // the caller's of set_algebraic()
+  bool holds_algebraic_ = false;  // no row has contained one so far
+  bool sums_terms_ = false;       // measure() asks for them
+  std::vector<double> terms_;     // sum_j |C_ij y_j|
 };
 
 }  // namespace

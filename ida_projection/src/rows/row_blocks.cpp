@@ -27,7 +27,7 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
                             const double* id) {
   structured_ = false;
   const auto n = static_cast<std::size_t>(n_);
-  std::vector<char> filled(static_cast<std::size_t>(m_) * n, 0);
+  filled_.assign(static_cast<std::size_t>(m_) * n, 0);
   std::vector<double> y = y0;
   std::vector<int> all(n);
   for (std::size_t j = 0; j < n; ++j) all[j] = static_cast<int>(j);
@@ -42,33 +42,53 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
       return status;
     }
     if (status == Status::success)
-      for (std::size_t e = 0; e < filled.size(); ++e) filled[e] |= C_[e] != 0.0;
+      for (std::size_t e = 0; e < filled_.size(); ++e) filled_[e] |= C_[e] != 0.0;
   }
+  evaluator.sensitive(t, y0.data(), n_, WT.data(), [this](int i, int j) { notice(i, j); });
 
-  evaluator.sensitive(t, y0.data(), n_, WT.data(), filled);
+  held_.assign(n, 0);
+  for (std::size_t j = 0; j < hold.size(); ++j) held_[j] = hold[j] ? 1 : 0;
+  id_.assign(id, id != nullptr ? id + n : id);
+  without_.assign(static_cast<std::size_t>(m_), 0);
+  for (int i = 0; i < m_; ++i) {
+    bool held = false, free = false;
+    for (int j = 0; j < n_; ++j)
+      if (fills(i, j)) (held_[static_cast<std::size_t>(j)] ? held : free) = true;
+    if (!held || free) continue;
+    message = constraints_.name(i) + " depends on no component that is free to move";
+    return Status::inconsistent;
+  }
+  rearrange();
+  structured_ = true;
+  return Status::success;
+}
 
-  const auto held = [&](std::size_t j) { return !hold.empty() && hold[j]; };
-  const auto algebraic = [&](std::size_t j) { return id != nullptr && id[j] == 0.0; };
-  const auto fills = [&](int i, std::size_t j) {
-    return filled[static_cast<std::size_t>(i) * n + j] != 0;
-  };
-
-  std::vector<char> row_is_algebraic(static_cast<std::size_t>(m_), 0);
-  std::vector<char> column_used(n, 0);
-  for (int i = 0; i < m_; ++i)
-    for (std::size_t j = 0; j < n; ++j)
-      if (fills(i, j) && !held(j)) {
-        column_used[j] = 1;
-        if (algebraic(j)) row_is_algebraic[static_cast<std::size_t>(i)] = 1;
-      }
+void RowBlocks::rearrange() {
+  const auto n = static_cast<std::size_t>(n_);
+  outgrown_ = false;
+  std::vector<char> row_is_algebraic(static_cast<std::size_t>(m_), 0), used(n, 0);
+  for (int i = 0; i < m_; ++i) {
+    bool empty = true;
+    for (int j = 0; j < n_; ++j) {
+      if (!fills(i, j) || held_[static_cast<std::size_t>(j)]) continue;
+      empty = false;
+      used[static_cast<std::size_t>(j)] = 1;
+      if (is_algebraic(j) && !without_[static_cast<std::size_t>(i)])
+        row_is_algebraic[static_cast<std::size_t>(i)] = 1;
+    }
+    // A row that vanishes here may come to hang on any of them.
+    for (int j = 0; empty && j < n_; ++j)
+      if (!held_[static_cast<std::size_t>(j)] && !is_algebraic(j))
+        used[static_cast<std::size_t>(j)] = 1;
+  }
   for (Block* block : {&d, &a}) {
     block->rows.clear();
     block->columns.clear();
   }
   for (int i = 0; i < m_; ++i)
     (row_is_algebraic[static_cast<std::size_t>(i)] ? a : d).rows.push_back(i);
-  for (std::size_t j = 0; j < n; ++j)
-    if (column_used[j]) (algebraic(j) ? a : d).columns.push_back(static_cast<int>(j));
+  for (int j = 0; j < n_; ++j)
+    if (used[static_cast<std::size_t>(j)]) (is_algebraic(j) ? a : d).columns.push_back(j);
   // More rows than algebraic columns to satisfy them with: all rows over all columns together.
   if (a.rows.size() > a.columns.size()) {
     for (int i : a.rows) d.rows.push_back(i);
@@ -84,23 +104,65 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
     block->resize();
   }
   columns_.clear();
-  for (std::size_t j = 0; j < n; ++j)
-    if (column_used[j]) columns_.push_back(static_cast<int>(j));
+  for (int j = 0; j < n_; ++j)
+    if (used[static_cast<std::size_t>(j)]) columns_.push_back(j);
+  watch();
+}
 
-  for (int i = 0; i < m_; ++i) {
-    bool free = false;
-    for (std::size_t j = 0; j < n; ++j) free = free || (fills(i, j) && !held(j));
-    if (!free) {
-      message = constraints_.name(i) + " depends on no component that is free to move";
-      return Status::inconsistent;
-    }
-  }
-  structured_ = true;
-  return Status::success;
+// Entries that are zero so far and would bring a new column, or an algebraic one into a row that
+// has none.
+void RowBlocks::watch() {
+  watched_.clear();
+  std::vector<char> used(static_cast<std::size_t>(n_), 0);
+  for (int j : columns_) used[static_cast<std::size_t>(j)] = 1;
+  const auto row_watches = [this](int i, const auto& wanted) {
+    for (int j = 0; j < n_; ++j)
+      if (!held_[static_cast<std::size_t>(j)] && !fills(i, j) && wanted(j))
+        watched_.push_back(static_cast<std::size_t>(i) * static_cast<std::size_t>(n_) +
+                           static_cast<std::size_t>(j));
+  };
+  const bool split = !a.rows.empty() || std::none_of(d.columns.begin(), d.columns.end(),
+                                                     [this](int j) { return is_algebraic(j); });
+  for (int i : d.rows)
+    row_watches(
+        i, [&](int j) { return !used[static_cast<std::size_t>(j)] || (split && is_algebraic(j)); });
+  for (int i : a.rows) row_watches(i, [&](int j) { return !used[static_cast<std::size_t>(j)]; });
+  mixed_.clear();
+  for (int i = 0; split && i < m_; ++i)
+    for (int j : columns_)
+      if (fills(i, j) && is_algebraic(j)) {
+        mixed_.push_back(i);
+        break;
+      }
+}
+
+// Where a row's algebraic part vanishes, it is one for the differential columns.
+bool RowBlocks::loses_algebraic_part(int i) const {
+  return std::all_of(columns_.begin(), columns_.end(),
+                     [&](int j) { return !is_algebraic(j) || row(i)[j] == 0.0; });
 }
 
 Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
-  return evaluator.jacobian(t, y, n_, WT, columns_, C_.data());
+  const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_.data());
+  if (status != Status::success || !structured_) return status;
+  for (int i : mixed_) {
+    char& without = without_[static_cast<std::size_t>(i)];
+    const char now = loses_algebraic_part(i) ? 1 : 0;
+    outgrown_ |= now != without;
+    without = now;
+  }
+  if (watched_.empty()) return status;
+  if (evaluator.uses_differences() && look_.due()) look_beyond(evaluator, t, y, WT);
+  for (const std::size_t e : watched_) {
+    if (C_[e] != 0.0) filled_[e] = 1;
+    outgrown_ |= filled_[e] != 0;
+  }
+  return status;
+}
+
+// Columns that differences do not visit leave no entry in C.
+void RowBlocks::look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT) {
+  evaluator.sensitive(t, y, n_, WT, [this](int i, int j) { notice(i, j); });
 }
 
 Status RowBlocks::learn_trust(Evaluator& evaluator, double t, const double* y, const double* WT,

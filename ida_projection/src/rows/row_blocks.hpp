@@ -123,6 +123,22 @@ double left_of_dropped(const BlockOf<Solver>& block) {
   return largest;
 }
 
+/// When to look again which entries of C differences have to visit, that is, which ones g can fill
+/// by now: at the C evaluations number 16, 32, 64, ..., and with the next one after a failure.
+class LookAgain {
+ public:
+  bool due() {
+    if (++evaluations_ < next_) return false;
+    next_ = std::max(kFirst, 2 * evaluations_);
+    return true;
+  }
+  void soon() { next_ = 0; }
+
+ private:
+  static constexpr long kFirst = 16;
+  long evaluations_ = 0, next_ = kFirst;
+};
+
 /// y moved by some tolerances in no special direction: a velocity that happens to be zero at y is
 /// not zero there. WT = 0: unweighted.
 std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT);
@@ -155,6 +171,12 @@ class RowBlocks {
 
   /// C at y; WT: only differences need it. The text of a failure is the evaluator's.
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
+  /// Has evaluate() met an entry that structure() took for zero and that belongs to another block
+  /// or to none? Then rearrange(), fill D and evaluate again.
+  bool outgrown() const { return outgrown_; }
+  void rearrange();
+  /// A move failed: perhaps for want of entries that g could not fill before.
+  void look_again_soon() { look_.soon(); }
   /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
   bool factor();
   /// The same with the rows that the last factor() has kept. False: factor() is due.
@@ -192,13 +214,34 @@ class RowBlocks {
  private:
   double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   const double* row(int i) const { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
+  bool is_algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
+  bool fills(int i, int j) const {
+    return filled_[static_cast<std::size_t>(i) * static_cast<std::size_t>(n_) +
+                   static_cast<std::size_t>(j)] != 0;
+  }
+  void notice(int i, int j) {
+    filled_[static_cast<std::size_t>(i) * static_cast<std::size_t>(n_) +
+            static_cast<std::size_t>(j)] = 1;
+  }
+  void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
+  void watch();
+  bool loses_algebraic_part(int i) const;
 
   const Constraints& constraints_;
   int m_, n_;
   double rank_tolerance_;
-  std::vector<double> C_;        // m x n, row-major
-  std::vector<double> C_after_;  // work space of learn_trust()
-  std::vector<int> columns_;     // every column that C can fill and that is free
+  std::vector<double> C_;             // m x n, row-major
+  std::vector<double> C_after_;       // work space of learn_trust()
+  std::vector<int> columns_;          // every column that C can fill and that is free
+  std::vector<char> filled_;          // m x n: entries seen not to be zero, or not constant
+  std::vector<char> held_;            // of each column
+  std::vector<double> id_;            // empty: none algebraic
+  std::vector<std::size_t> watched_;  // entries of C that would change the blocks, zero so far
+  // Rows whose algebraic part can be filled: of these the ones where it is zero at present.
+  std::vector<int> mixed_;
+  std::vector<char> without_;  // of each row
+  LookAgain look_;
+  bool outgrown_ = false;
   bool structured_ = false;
 };
 

@@ -66,7 +66,14 @@ Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::
     for (std::size_t e = 0; e < full_fills_.size(); ++e) full_fills_[e] |= full_rows_[e] != 0.0;
     for (std::size_t e = 0; e < entry_fills_.size(); ++e) entry_fills_[e] |= entries_[e] != 0.0;
   }
+  if (evaluator.uses_differences()) look_beyond(evaluator, t, y0.data(), WT.data());
   return Status::success;
+}
+
+void SparseRows::look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT) {
+  evaluator.sensitive(t, y, n_, WT, [this](int i, int j) {
+    full_fills_[at(rows_[at(i)].full) * at(n_) + at(j)] = 1;
+  });
 }
 
 bool SparseRows::fills(const Row& row, int j) const {
@@ -77,39 +84,53 @@ Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<d
                              const std::vector<double>& WT, const std::vector<bool>& hold,
                              const double* id) {
   structured_ = false;
+  outgrown_ = false;
   const Status status = find_full_columns(evaluator, t, y, WT);
   if (status != Status::success) return status;
+  held_.assign(at(n_), 0);
+  for (std::size_t j = 0; j < hold.size(); ++j) held_[j] = hold[j] ? 1 : 0;
+  id_.assign(id, id != nullptr ? id + n_ : id);
+  without_.assign(at(m_), 0);
   for (int i = 0; i < m_; ++i) {
-    bool free = false;
+    bool held = false, free = false;
     visit(i, [&](int j, double) {
-      free = free || (fills(rows_[at(i)], j) && (hold.empty() || !hold[at(j)]));
+      if (fills(rows_[at(i)], j)) (held_[at(j)] ? held : free) = true;
     });
-    if (free) continue;
+    if (free || (!held && rows_[at(i)].full >= 0)) continue;
     message = constraints_.name(i) + " depends on no component that is free to move";
     return Status::inconsistent;
   }
-  split(hold, id);
+  rearrange();
+  structured_ = true;
+  return Status::success;
+}
+
+void SparseRows::rearrange() {
+  outgrown_ = false;
+  split();
   set_up(d, &gather_d_);
   set_up(a, &gather_a_);
   moved_.assign(a.rows.empty() ? 0 : at(n_), 0.0);
   columns_ = d.columns;
   columns_.insert(columns_.end(), a.columns.begin(), a.columns.end());
-  structured_ = true;
-  return Status::success;
+  watch();
 }
 
-void SparseRows::split(const std::vector<bool>& hold, const double* id) {
+void SparseRows::split() {
   std::vector<char> used(at(n_), 0), algebraic_row(at(m_), 0);
   // An entry of the pattern that is zero wherever it was looked at makes no row algebraic.
   for (int i = 0; i < m_; ++i) {
     int entry = rows_[at(i)].begin;
+    bool empty = rows_[at(i)].full >= 0;
     visit(i, [&](int j, double) {
       const bool is_zero = rows_[at(i)].full < 0 && entry_fills_[at(entry++)] == 0;
-      if (!fills(rows_[at(i)], j) || (!hold.empty() && hold[at(j)])) return;
-      const bool is_algebraic = id != nullptr && id[j] == 0.0;
-      used[at(j)] |= !(is_algebraic && is_zero);
-      algebraic_row[at(i)] |= is_algebraic && !is_zero;
+      if (!fills(rows_[at(i)], j) || held_[at(j)]) return;
+      empty = false;
+      used[at(j)] |= !(is_algebraic(j) && is_zero);
+      algebraic_row[at(i)] |= is_algebraic(j) && !is_zero && !without_[at(i)];
     });
+    // A row that vanishes here may come to hang on any of them.
+    for (int j = 0; empty && j < n_; ++j) used[at(j)] |= !held_[at(j)] && !is_algebraic(j);
   }
   for (Block* block : {&d, &a}) {
     block->rows.clear();
@@ -119,7 +140,7 @@ void SparseRows::split(const std::vector<bool>& hold, const double* id) {
     for (int i = 0; i < m_; ++i)
       if ((rows_[at(i)].full >= 0) == full) (algebraic_row[at(i)] ? a : d).rows.push_back(i);
   for (int j = 0; j < n_; ++j)
-    if (used[at(j)]) (id != nullptr && id[j] == 0.0 ? a : d).columns.push_back(j);
+    if (used[at(j)]) (is_algebraic(j) ? a : d).columns.push_back(j);
   if (a.rows.size() <= a.columns.size()) return;
   // More rows than algebraic columns to satisfy them with: all rows over all columns together.
   d.rows.insert(d.rows.end(), a.rows.begin(), a.rows.end());
@@ -130,6 +151,47 @@ void SparseRows::split(const std::vector<bool>& hold, const double* id) {
   });
   a.rows.clear();
   a.columns.clear();
+}
+
+// As in RowBlocks: entries, zero so far, that would bring a new column, or an algebraic one into a
+// row that has none.
+void SparseRows::watch() {
+  watched_entries_.clear();
+  watched_full_.clear();
+  std::vector<char> used(at(n_), 0), whole(at(m_), 0);
+  for (int j : columns_) used[at(j)] = 1;
+  const bool split = !a.rows.empty() || std::none_of(d.columns.begin(), d.columns.end(),
+                                                     [this](int j) { return is_algebraic(j); });
+  for (int i : d.rows) whole[at(i)] = split;
+  for (int i = 0; i < m_; ++i) {
+    const Row& row = rows_[at(i)];
+    const auto matters = [&](int j) {
+      return !held_[at(j)] && (!used[at(j)] || (whole[at(i)] != 0 && is_algebraic(j)));
+    };
+    for (int e = row.begin; e < row.end; ++e)
+      if (!entry_fills_[at(e)] && matters(columns_of_[at(e)])) watched_entries_.push_back(at(e));
+    for (int j = 0; row.full >= 0 && j < n_; ++j)
+      if (!fills(row, j) && matters(j)) watched_full_.push_back(at(row.full) * at(n_) + at(j));
+  }
+  mixed_.clear();
+  for (int i = 0; split && !id_.empty() && i < m_; ++i) {
+    bool mixed = false;
+    int entry = rows_[at(i)].begin;
+    visit(i, [&](int j, double) {
+      const bool seen = rows_[at(i)].full >= 0 || entry_fills_[at(entry++)] != 0;
+      mixed = mixed || (seen && fills(rows_[at(i)], j) && is_algebraic(j) && !held_[at(j)]);
+    });
+    if (mixed) mixed_.push_back(i);
+  }
+}
+
+// Where a row's algebraic part vanishes, it is one for the differential columns.
+bool SparseRows::loses_algebraic_part(int i) const {
+  bool lost = true;
+  visit(i, [&](int j, double c) {
+    lost = lost && (c == 0.0 || !is_algebraic(j) || held_[at(j)]);
+  });
+  return lost;
 }
 
 void SparseRows::set_up(Block& block, std::vector<int>* gather) {
@@ -157,7 +219,25 @@ void SparseRows::set_up(Block& block, std::vector<int>* gather) {
 }
 
 Status SparseRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
-  return evaluator.jacobian(t, y, n_, WT, columns_, entries_.data(), full_rows_.data());
+  const Status status =
+      evaluator.jacobian(t, y, n_, WT, columns_, entries_.data(), full_rows_.data());
+  if (status != Status::success || !structured_) return status;
+  for (int i : mixed_) {
+    const char now = loses_algebraic_part(i) ? 1 : 0;
+    outgrown_ |= now != without_[at(i)];
+    without_[at(i)] = now;
+  }
+  if (!watched_full_.empty() && evaluator.uses_differences() && look_.due())
+    look_beyond(evaluator, t, y, WT);
+  for (const std::size_t e : watched_entries_) {
+    if (entries_[e] != 0.0) entry_fills_[e] = 1;
+    outgrown_ |= entry_fills_[e] != 0;
+  }
+  for (const std::size_t e : watched_full_) {
+    if (full_rows_[e] != 0.0) full_fills_[e] = 1;
+    outgrown_ |= full_fills_[e] != 0;
+  }
+  return status;
 }
 
 void SparseRows::load(Block& block, const std::vector<int>& gather) {

@@ -28,6 +28,9 @@ class SparseRows {
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
+  bool outgrown() const { return outgrown_; }
+  void rearrange();
+  void look_again_soon() { look_.soon(); }
   bool factor();
   bool factor_kept() { return false; }
   void solve(const std::vector<double>& g);
@@ -65,7 +68,11 @@ class SparseRows {
   Status find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y,
                            const std::vector<double>& WT);
   bool fills(const Row& row, int j) const;
-  void split(const std::vector<bool>& hold, const double* id);
+  void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
+  void split();
+  void watch();
+  bool loses_algebraic_part(int i) const;
+  bool is_algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
   void set_up(Block& block, std::vector<int>* gather);
   void load(Block& block, const std::vector<int>& gather);
 
@@ -79,6 +86,14 @@ class SparseRows {
   std::vector<int> columns_;                 // every column that differences must visit
   std::vector<int> gather_d_, gather_a_;     // entry of C of each entry of a block
   std::vector<double> moved_;                // d.dy at its columns, 0 elsewhere; where B exists
+  std::vector<char> held_;                   // of each column
+  std::vector<double> id_;                   // empty: none algebraic
+  // Entries, zero so far, that would change the blocks: of the sparse rows and of the full ones.
+  std::vector<std::size_t> watched_entries_, watched_full_;
+  std::vector<int> mixed_;     // as in RowBlocks
+  std::vector<char> without_;  // of each row
+  LookAgain look_;
+  bool outgrown_ = false;
   bool structured_ = false;
 };
 

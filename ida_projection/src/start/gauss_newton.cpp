@@ -37,6 +37,8 @@ class GaussNewtonOn final : public GaussNewton {
   using Block = typename Rows::Block;
 
   bool evaluate(double t, const std::vector<double>& y, ConsistencyReport& report);
+  Status evaluate_jacobian(double t, const std::vector<double>& y);
+  void fill_metric();
   double correction();  // solves for the present g, returns its length
   double largest(const std::vector<double>& g) const;
 
@@ -53,6 +55,22 @@ bool GaussNewtonOn<Rows>::evaluate(double t, const std::vector<double>& y,
   report.status = evaluator_.value(t, y.data(), n_, g_.data());
   if (report.status != Status::success) report.message = evaluator_.message();
   return report.status == Status::success;
+}
+
+template <class Rows>
+Status GaussNewtonOn<Rows>::evaluate_jacobian(double t, const std::vector<double>& y) {
+  const Status status = blocks_.evaluate(evaluator_, t, y.data(), WT_.data());
+  if (status != Status::success || !blocks_.outgrown()) return status;
+  blocks_.rearrange();
+  fill_metric();
+  return blocks_.evaluate(evaluator_, t, y.data(), WT_.data());
+}
+
+template <class Rows>
+void GaussNewtonOn<Rows>::fill_metric() {
+  for (Block* block : {&blocks_.d, &blocks_.a})
+    for (std::size_t k = 0; k < block->columns.size(); ++k)
+      block->D()[k] = WT_[static_cast<std::size_t>(block->columns[k])];
 }
 
 template <class Rows>
@@ -86,9 +104,7 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
     report.message = blocks_.message;
     return;
   }
-  for (Block* block : {&blocks_.d, &blocks_.a})
-    for (std::size_t k = 0; k < block->columns.size(); ++k)
-      block->D()[k] = WT_[static_cast<std::size_t>(block->columns[k])];
+  fill_metric();
 
   if (!evaluate(t, y, report)) return;
   report.drift_before = report.drift_after = largest(g_);
@@ -101,7 +117,7 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
       report.status = Status::not_converged;
       break;
     }
-    report.status = blocks_.evaluate(evaluator_, t, y.data(), WT_.data());
+    report.status = evaluate_jacobian(t, y);
     if (report.status != Status::success || !blocks_.factor()) {
       report.message = report.status != Status::success
                            ? evaluator_.message()
@@ -181,7 +197,7 @@ bool GaussNewtonOn<Rows>::tangent(double t, const std::vector<double>& y, double
   std::vector<double> plus(g_.size()), minus(g_.size());
   if (evaluator_.value(t + h, y.data(), n_, plus.data()) != Status::success ||
       evaluator_.value(t - h, y.data(), n_, minus.data()) != Status::success ||
-      blocks_.evaluate(evaluator_, t, y.data(), WT_.data()) != Status::success || !blocks_.factor())
+      evaluate_jacobian(t, y) != Status::success || !blocks_.factor())
     return false;
   std::vector<double> defect(g_.size());
   for (std::size_t i = 0; i < g_.size(); ++i) {
