@@ -1,37 +1,37 @@
 // Tether: gaps that inelastic impacts close. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping/closing.hpp"
 
+#include <algorithm>
+
 namespace tether::contact::detail {
 
 namespace {
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
-void Closing::begin(const std::vector<Impact>& impacts, const BodySet& bodies,
-                    const StepContacts& contacts) {
+bool Closing::find(const Impacts& impacts, const BodySet& bodies, double dt,
+                   const StepContacts& contacts, std::vector<RigidBody>& move) {
   closes_.clear();
   bounces_.clear();
-  for (const Impact& i : impacts) {
+  for (const Impact& i : impacts.list()) {
     if (i.restitution > 0)
       bounces_.push_back(i.contact);
     else if (contacts.gaps[at(i.contact)] > 0)
-      closes_.push_back(i.contact);
+      closes_.push_back(i);
   }
-  if (!closes_.empty()) free_ = bodies.motion;
-}
-
-bool Closing::find(const BodySet& bodies, double dt, const StepContacts& contacts,
-                   std::vector<RigidBody>& move) {
   if (closes_.empty()) return false;
   islands_.join(bodies, contacts);
   marked_.assign(bodies.motion.size(), 0);
   const auto mark = [&](int contact) -> char& {
     return marked_[at(islands_.root(bodies, contacts.points[at(contact)]))];
   };
-  for (const int c : closes_) mark(c) = 1;
+  for (const Impact& i : closes_) mark(i.contact) = 1;
   for (const int c : bounces_) mark(c) = 0;
-  // Contacts of the others are left out. It starts from the impulses that the first solve has
-  // found.
+  // Contacts of the others are left out. Impulses start as the first solve has found them, but
+  // where a gap is left, which takes its part of the approach.
+  part_.assign(contacts.points.size(), 1);
+  for (const Impact& i : closes_)
+    part_[at(i.contact)] = std::max(0.0, 1 - contacts.gaps[at(i.contact)] / (dt * i.comes));
   points_.clear();
   start_.ids.clear();
   start_.impulses.clear();
@@ -40,10 +40,10 @@ bool Closing::find(const BodySet& bodies, double dt, const StepContacts& contact
     points_.push_back(contacts.points[k]);
     points_.back().bias = contacts.gaps[k] > 0 ? contacts.gaps[k] / dt : 0;
     start_.ids.push_back(points_.back().id);
-    start_.impulses.push_back(contacts.impulses[k]);
+    start_.impulses.push_back(part_[k] * contacts.impulses[k]);
   }
   solver_.set_warm_start(start_);
-  solver_.solve(free_, points_, solution_);
+  solver_.solve(impacts.free(), points_, solution_);
   move.resize(bodies.motion.size());
   for (std::size_t i = 0; i < move.size(); ++i) {
     move[i].velocity.setZero();

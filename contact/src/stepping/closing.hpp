@@ -17,21 +17,15 @@ class Closing {
  public:
   explicit Closing(const BodyOptions& options) : solver_(options) {}
 
-  /// After the impacts are chosen, before the solve: velocities with the forces of the step.
-  void begin(const std::vector<Impact>& impacts, const BodySet& bodies,
-             const StepContacts& contacts);
   /// After the solve. Fills `move`: velocities to add for this step; false: there are none.
-  bool find(const BodySet& bodies, double dt, const StepContacts& contacts,
+  bool find(const Impacts& impacts, const BodySet& bodies, double dt, const StepContacts& contacts,
             std::vector<RigidBody>& move);
 
-  /// All that one step leaves to the next.
-  WarmStart warm_start() const { return solver_.warm_start(); }
-  void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
-
  private:
-  std::vector<RigidBody> free_;
-  std::vector<int> closes_, bounces_;  // contacts
-  std::vector<char> marked_;           // islands
+  std::vector<Impact> closes_;
+  std::vector<int> bounces_;  // contacts
+  std::vector<char> marked_;  // islands
+  std::vector<double> part_;  // of the impulse that is left, for each contact
   MovingIslands islands_;
   std::vector<PointContact> points_;
   WarmStart start_;

@@ -30,6 +30,11 @@ void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
     c.bias = 0;
     list_.push_back({static_cast<int>(k), came, comes, epsilon});
   }
+  if (!list_.empty()) free_ = bodies.motion;
+}
+
+double Impacts::least_speed(const NearContacts& near, const PointContact& c) const {
+  return threshold_ * std::sqrt(near.size(c));
 }
 
 }  // namespace tether::contact::detail

@@ -30,15 +30,22 @@ class Impacts {
       : threshold_(threshold), restitution_threshold_(restitution_threshold) {}
 
   /// Start of a step: velocities that bodies come with, before forces.
-  void remember(const BodySet& bodies) { coming_ = bodies.motion; }
+  void remember(const BodySet& bodies) { remember(bodies.motion); }
+  void remember(const std::vector<RigidBody>& coming) { coming_ = coming; }
   const std::vector<RigidBody>& coming() const { return coming_; }
   /// After the contacts are found.
   void choose(const NearContacts& near, const BodySet& bodies, double dt, StepContacts& contacts);
   const std::vector<Impact>& list() const { return list_; }
+  /// Velocities with the forces of the step, before impulses; where there are impacts.
+  const std::vector<RigidBody>& free() const { return free_; }
+  /// An impact that the first ones have caused.
+  void add(const Impact& later) { list_.push_back(later); }
+  /// Approach, m/s, from which on it is an impact.
+  double least_speed(const NearContacts& near, const PointContact& c) const;
 
  private:
   double threshold_, restitution_threshold_;
-  std::vector<RigidBody> coming_;
+  std::vector<RigidBody> coming_, free_;
   std::vector<Impact> list_;
 };
 

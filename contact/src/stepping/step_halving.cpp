@@ -56,7 +56,7 @@ bool Stepper::Implementation::shortest() const {
 // Accepts the solution, or not; one that a shorter step replaces leaves no trace.
 void Stepper::Implementation::judge() {
   const bool solved = solution.status == Status::solved;
-  const double most = std::max(accepted_residual(options), shortest() ? detail::kRough : 0.0);
+  const double most = std::max(accepted_residual(options), shortest() ? detail::kGood : 0.0);
   failed = !solved && !(solution.error <= most);
   if (failed && may_halve) return;
   counts.accepted += !solved && !failed;

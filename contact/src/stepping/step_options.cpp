@@ -35,7 +35,7 @@ BodyOptions contact_options(const SteppingOptions& o) {
   b.max_work = o.max_work;
   if (o.acceptance > 1) {
     b.max_work *= 0.2;
-    b.enough = accepted_residual(o);
+    b.enough = std::min(accepted_residual(o), std::max(kGood, o.tolerance));
   }
   b.threads = o.threads;
   return b;
@@ -48,7 +48,7 @@ double threshold_speed(double threshold, const SteppingOptions& o) {
 BodyOptions patient_options(const SteppingOptions& o) {
   BodyOptions b = contact_options(o);
   b.max_work = 5 * o.max_work;
-  b.enough = std::max(kRough, o.tolerance);
+  b.enough = std::max(kGood, o.tolerance);
   return b;
 }
 
@@ -60,6 +60,16 @@ BodyOptions correction_options(const SteppingOptions& o) {
   b.tolerance = 1e-2;
   b.min_sweeps = 0;
   b.max_sweeps = 10;
+  b.max_assembled = 0;
+  return b;
+}
+
+// Of positions only: an error of the approach is so much of its way in the step, and the next step
+// sees it as a gap or a penetration. A few sweeps do.
+BodyOptions closing_options(const SteppingOptions& o) {
+  BodyOptions b = contact_options(o);
+  b.min_sweeps = 0;
+  b.max_sweeps = std::min(60, o.max_sweeps);
   b.max_assembled = 0;
   return b;
 }
@@ -85,7 +95,7 @@ const char* name(RestitutionLaw law) {
 }
 
 double accepted_residual(const SteppingOptions& o) {
-  return std::max(o.tolerance, std::min(o.acceptance * o.tolerance, detail::kRough));
+  return std::max(o.tolerance, std::min(o.acceptance * o.tolerance, detail::kUseful));
 }
 
 }  // namespace tether::contact

@@ -31,6 +31,7 @@ void Stepper::Implementation::make_stages() {
     if (restitution) add_stage("restitution", &I::choose_bounces);
     add_stage("contact", &I::solve_contacts);
     if (restitution) add_stage("restitution", &I::rebound);
+    add_stage(impact, &I::take_later_impacts);
     if (closing) add_stage("penetration", &I::close_gaps);
     if (correction) add_stage("penetration", &I::correct_penetration);
   }
@@ -74,10 +75,7 @@ void Stepper::Implementation::find_contacts() {
   }
 }
 
-void Stepper::Implementation::choose_impacts() {
-  impacts->choose(*near, bodies, dt, contacts);
-  if (closing) closing->begin(impacts->list(), bodies, contacts);
-}
+void Stepper::Implementation::choose_impacts() { impacts->choose(*near, bodies, dt, contacts); }
 
 void Stepper::Implementation::solve_problem() {
   solver->solve(bodies.motion, contacts.points, solution);
@@ -95,7 +93,8 @@ void Stepper::Implementation::solve_contacts() {
     return;
   }
   solve_problem();
-  if (shortest() && solution.status != Status::solved && !(solution.error <= detail::kRough)) {
+  if (shortest() && solution.status != Status::solved &&
+      !(solution.error <= std::max(accepted_residual(options), detail::kGood))) {
     solver->set_options(detail::patient_options(options));
     solve_problem();
     solver->set_options(detail::contact_options(options));
@@ -109,8 +108,16 @@ void Stepper::Implementation::solve_contacts() {
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
 }
 
+void Stepper::Implementation::take_later_impacts() {
+  if (impacts->list().empty()) return;
+  const detail::LaterImpacts::Counts taken = later->take(*near, *impacts, dt, bodies, contacts);
+  counts.contact_problems += taken.problems;
+  counts.sweeps += taken.sweeps;
+  counts.bounces += taken.bounces;
+}
+
 void Stepper::Implementation::close_gaps() {
-  if (!closing->find(bodies, dt, contacts, closing_move)) return;
+  if (!closing->find(*impacts, bodies, dt, contacts, closing_move)) return;
   for (const int i : moving)
     shift(i, closing_move[at(i)].velocity, closing_move[at(i)].angular_velocity);
 }

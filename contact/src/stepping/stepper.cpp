@@ -13,11 +13,14 @@ namespace tether::contact {
 void Stepper::Implementation::make_solvers() {
   const BodyOptions o = detail::contact_options(options);
   solver = std::make_unique<BodySolver>(o);
+  later = std::make_unique<detail::LaterImpacts>(
+      detail::threshold_speed(options.impact_threshold, options),
+      detail::threshold_speed(options.restitution_threshold, options), options.restitution_law, o);
   if (near->any_restitution())
     restitution = std::make_unique<detail::Restitution>(options.restitution_law, o);
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
     correction = std::make_unique<BodySolver>(detail::correction_options(options));
-    closing = std::make_unique<detail::Closing>(o);
+    closing = std::make_unique<detail::Closing>(detail::closing_options(options));
   }
 }
 
@@ -87,7 +90,6 @@ StepperMemory Stepper::memory() const {
   if (s.solver) m.contacts = s.solver->warm_start();
   if (s.correction) m.corrections = s.correction->warm_start();
   if (s.restitution) m.bounces = s.restitution->warm_start();
-  if (s.closing) m.closings = s.closing->warm_start();
   for (const detail::FreeSpin& each : s.free_spin)
     m.spins.push_back({each.L, each.w, {each.q.x(), each.q.y(), each.q.z(), each.q.w()}});
   m.last = s.contacts;
@@ -108,7 +110,6 @@ void Stepper::set_memory(const StepperMemory& m) {
   if (s.solver) s.solver->set_warm_start(m.contacts);
   if (s.correction) s.correction->set_warm_start(m.corrections);
   if (s.restitution) s.restitution->set_warm_start(m.bounces);
-  if (s.closing) s.closing->set_warm_start(m.closings);
   for (std::size_t k = 0; k < m.spins.size(); ++k) {
     const std::array<double, 4>& q = m.spins[k].orientation;
     s.free_spin[k] = {m.spins[k].momentum, m.spins[k].angular_velocity, {q[3], q[0], q[1], q[2]}};

@@ -7,6 +7,7 @@
 
 #include "stepping/closing.hpp"
 #include "stepping/impacts.hpp"
+#include "stepping/later_impacts.hpp"
 #include "stepping/near_contacts.hpp"
 #include "stepping/restitution.hpp"
 #include "stepping/rotation.hpp"
@@ -15,8 +16,11 @@ namespace tether::contact {
 
 namespace detail {
 
-/// Residual above which an answer is none.
-constexpr double kRough = 1e-4;
+/// Parts of the largest velocity that a contact needs. A better answer than `kGood` is worth no
+/// more work where the tolerance is not met. Answers within `kUseful` are as good as the step: it
+/// moves bodies by velocities of its end, an error of half of what it changes them by, while one
+/// contact is off by so much in a problem that is not solved.
+constexpr double kGood = 1e-4, kUseful = 1e-2;
 
 /// Throws std::invalid_argument.
 void check(const SteppingOptions& o);
@@ -25,6 +29,8 @@ BodyOptions contact_options(const SteppingOptions& o);
 /// Of contact problems that a shorter step would not make easier.
 BodyOptions patient_options(const SteppingOptions& o);
 BodyOptions correction_options(const SteppingOptions& o);
+/// Of gaps that inelastic impacts close.
+BodyOptions closing_options(const SteppingOptions& o);
 /// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
 double threshold_speed(double threshold, const SteppingOptions& o);
 
@@ -54,6 +60,7 @@ struct Stepper::Implementation {
   std::unique_ptr<BodySolver> solver;
   std::unique_ptr<detail::Impacts> impacts;
   std::unique_ptr<detail::Restitution> restitution;
+  std::unique_ptr<detail::LaterImpacts> later;
   StepContacts contacts;
   BodySolution solution;
 
@@ -95,6 +102,7 @@ struct Stepper::Implementation {
   void choose_bounces() { restitution->choose(impacts->list(), bodies, contacts); }
   void solve_contacts();
   void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
+  void take_later_impacts();
   void close_gaps();
   void correct_penetration();
   void shift(int body, const Eigen::Vector3d& v, const Eigen::Vector3d& w);

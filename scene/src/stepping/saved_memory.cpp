@@ -52,7 +52,6 @@ void put_memory(std::ostream& out, const StepperMemory& m) {
   put(out, m.contacts);
   put(out, m.corrections);
   put(out, m.bounces);
-  put(out, m.closings);
   binary::put(out, static_cast<std::uint64_t>(m.spins.size()));
   for (const StepperMemory::Spin& spin : m.spins) {
     binary::put_array(out, spin.momentum, spin.angular_velocity);
@@ -67,14 +66,14 @@ void put_memory(std::ostream& out, const StepperMemory& m) {
   binary::put(out, m.penetration, m.residual, static_cast<std::int32_t>(m.status));
 }
 
-StepperMemory get_memory(std::istream& in, int bodies) {
+StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
   StepperMemory m;
   m.steps = static_cast<long>(binary::get<std::int64_t>(in));
   if (m.steps < 0) throw std::runtime_error("the saved state is damaged: it has no time");
   m.contacts = get_warm_start(in);
   m.corrections = get_warm_start(in);
   m.bounces = get_warm_start(in);
-  m.closings = get_warm_start(in);
+  if (format == MemoryFormat::with_closings) get_warm_start(in);
   for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
     StepperMemory::Spin& spin = m.spins.emplace_back();
     binary::get_array(in, spin.momentum, spin.angular_velocity);

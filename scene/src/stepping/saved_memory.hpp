@@ -1,14 +1,18 @@
 // Tether: what a stepper remembers, in a saved state. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <istream>
 #include <ostream>
 #include <tether/contact/stepping.hpp>
 
 namespace tether::scene::stepping {
 
+/// With a fourth warm start, of which nothing hung, or without it.
+enum class MemoryFormat : std::uint8_t { with_closings, now };
+
 void put_memory(std::ostream& out, const contact::StepperMemory& memory);
 /// Throws std::runtime_error on what no stepper of so many bodies has written.
-contact::StepperMemory get_memory(std::istream& in, int bodies);
+contact::StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format);
 
 }  // namespace tether::scene::stepping

@@ -53,7 +53,9 @@ std::uint64_t fingerprint(const Scene& scene, double step) {
   return hash;
 }
 
-constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '2'};
+// The last letter is the format, see MemoryFormat.
+constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '3'};
+constexpr char kWithClosings = '2';
 
 }  // namespace
 
@@ -182,8 +184,13 @@ void SteppingEngine::save(std::ostream& out) const {
 
 void SteppingEngine::restore(std::istream& in, Restore how) {
   char magic[sizeof kMagic];
-  if (!in.read(magic, sizeof magic) || std::memcmp(magic, kMagic, sizeof magic) != 0)
+  if (!in.read(magic, sizeof magic) || std::memcmp(magic, kMagic, sizeof magic - 1) != 0)
     throw std::runtime_error("this is no saved state of the stepping engine");
+  const char format = magic[sizeof magic - 1];
+  if (format != kMagic[sizeof magic - 1] && format != kWithClosings)
+    throw std::runtime_error(
+        std::string("the saved state has format ") + format +
+        ", and this version reads 2 and 3: read it with the version that wrote it");
   const bool same = binary::get<std::uint64_t>(in) == fingerprint_;
   if (binary::get<std::uint64_t>(in) != bodies_.size() || (!same && how == Restore::exact))
     throw std::runtime_error("the saved state is of another scene or another step");
@@ -195,7 +202,9 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
         !s.velocity.allFinite() || !s.angular_velocity.allFinite())
       throw std::runtime_error("the saved state is damaged");
   }
-  const contact::StepperMemory memory = get_memory(in, static_cast<int>(bodies_.size()));
+  const contact::StepperMemory memory =
+      get_memory(in, static_cast<int>(bodies_.size()),
+                 format == kWithClosings ? MemoryFormat::with_closings : MemoryFormat::now);
   contact::BodySet& b = stepper_.bodies();
   for (std::size_t i = 0; i < states.size(); ++i) {
     b.position[i] = states[i].position;

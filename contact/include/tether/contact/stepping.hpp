@@ -81,12 +81,13 @@ struct SteppingOptions {
   /// Of the contact problem; see BodyOptions::tolerance.
   double tolerance = 1e-9;
   /// A problem that ends above the tolerance is used and counted as `accepted` if its residual is
-  /// at most acceptance * tolerance and at most 1e-4. 1: none is.
+  /// at most acceptance * tolerance and at most 1e-2, see README, section 13; from 1e-4 on no more
+  /// work is spent on a better answer. 1: none is.
   double acceptance = 1;
   /// Where it is above that, too, the step is taken in two halves, they in quarters, ... so many
   /// times. The shortest parts, and all with an impact, which is as hard in a shorter step, accept
-  /// up to 1e-4 and are given five times max_work where they are above that; above it even so, the
-  /// shortest part is used all the same and counted as `unsolved`. 0: at once.
+  /// at least up to 1e-4 and are given five times max_work where they are above that; above it even
+  /// so, the shortest part is used all the same and counted as `unsolved`. 0: at once.
   int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
   /// A penetration of depth d is reduced by the speed min(error_reduction d / dt,
@@ -144,9 +145,9 @@ struct StepperMemory {
     std::array<double, 4> orientation;  ///< x, y, z, w
   };
   long steps = 0;
-  WarmStart contacts, corrections, bounces, closings;  ///< of the contact problems of a step
-  std::vector<Spin> spins;  ///< of bodies that turn with their momentum kept
-  StepContacts last;        ///< contacts of the last step, and what became of it:
+  WarmStart contacts, corrections, bounces;  ///< of the contact problems of a step
+  std::vector<Spin> spins;                   ///< of bodies that turn with their momentum kept
+  StepContacts last;                         ///< contacts of the last step, and what became of it:
   double penetration = 0, residual = 0;
   Status status = Status::solved;
 };

@@ -120,8 +120,8 @@ struct SteppingOptions {
   /// Of sqrt(gravity * size of the smaller body): slower approaches do not bounce, or do not end as
   /// one whole impact.
   double restitution_threshold = 0.01, impact_threshold = 0.01;
-  double acceptance = 1000;  ///< of the tolerance: what is used, and counted, all the same
-  int max_halvings = 2;      ///< of a step whose contact problem is not solved
+  double acceptance = 1e7;  ///< of the tolerance: what is used, and counted, all the same
+  int max_halvings = 2;     ///< of a step whose contact problem is not solved
   OnFailure on_failure = OnFailure::stop;
   int threads = 1;
 };
