@@ -65,12 +65,13 @@ BodyOptions correction_options(const SteppingOptions& o) {
 }
 
 // Of positions only: an error of the approach is so much of its way in the step, and the next step
-// sees it as a gap or a penetration. A few sweeps do.
+// sees it as a gap or a penetration. A few sweeps do; small islands, which are cheap, are solved,
+// so that a stack that lands does not depend on the order of its boxes.
 BodyOptions closing_options(const SteppingOptions& o) {
   BodyOptions b = contact_options(o);
   b.min_sweeps = 0;
   b.max_sweeps = std::min(60, o.max_sweeps);
-  b.max_assembled = 0;
+  b.max_assembled = std::min(128, o.max_assembled);
   return b;
 }
 
