@@ -137,3 +137,32 @@ TEST_CASE("a start off the constraints is explained once on stderr") {
   silent.print_warnings = false;
   CHECK(run(problem, 1e-8, problem.recommended_constraints(), 2000, silent, 0.3).printed.empty());
 }
+
+TEST_CASE("rows with a kink on the set, |g| and max, are suspected by name") {
+  struct Kink {
+    std::string name;
+    double (*f)(double);
+    double (*df)(double);
+  };
+  const Kink kinks[] = {{"absolute", [](double u) { return std::abs(u); },
+                         [](double u) { return u < 0.0 ? -1.0 : 1.0; }},
+                        {"larger", [](double u) { return std::max(u, -3.0 * u); },
+                         [](double u) { return u < 0.0 ? -3.0 : 1.0; }},
+                        {"of two", [](double u) { return std::max(u, u * u - 0.5 * u); },
+                         [](double u) { return u < 0.0 ? 2.0 * u - 0.5 : 1.0; }}};
+  // Moves may get along with a kink; where they do not, the reason is given.
+  for (const Kink& kink : kinks) {
+    int named = 0;
+    for (const double tolerance : {1e-5, 1e-6, 1e-7}) {
+      INFO(kink.name << ", tolerance " << tolerance);
+      const Ended end =
+          run(swing(50.0), tolerance, length_through(kink.name, kink.f, kink.df), 4000);
+      INFO(end.flag << " " << end.message);
+      if (end.status == tp::Status::success) continue;
+      ++named;
+      CHECK(contains(end.message, kink.name));
+      CHECK(contains(end.message, "|.| or max"));
+    }
+    CHECK(named > 0);
+  }
+}

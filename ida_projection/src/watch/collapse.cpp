@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "watch/collapse.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <vector>
@@ -13,6 +14,32 @@ namespace {
 constexpr long kWindow = 200;          // accepted steps
 constexpr int kLargestSearch = 2000;   // unknowns up to which columns are looked at one by one
 constexpr double kNoInvariant = 1e-2;  // of the terms of C y'; the corrector knows y' better
+
+const char* const kKink =
+    "; its slopes to both sides differ there: a row with |.| or max has no derivative on the set, "
+    "write it without";
+
+// Is the entry that check_jacobian calls wrong the slope of g to one side only?
+bool has_kink(const Constraints& constraints, const JacobianReport& report, double t,
+              std::vector<double> y) {
+  constexpr double kReach = 1e-4, kDiffer = 0.1;
+  Statistics ignored;
+  Evaluator evaluator(constraints, ignored);
+  const auto n = static_cast<int>(y.size());
+  const auto j = static_cast<std::size_t>(report.column);
+  const double here = y[j], reach = kReach * std::max(1.0, std::abs(here));
+  std::vector<double> g(static_cast<std::size_t>(evaluator.rows()));
+  double at[3];
+  for (int k = 0; k < 3; ++k) {
+    y[j] = here + (k - 1) * reach;
+    if (evaluator.value(t, y.data(), n, g.data()) != Status::success) return false;
+    at[k] = g[static_cast<std::size_t>(report.row)];
+  }
+  const double left = (at[1] - at[0]) / reach, right = (at[2] - at[1]) / reach;
+  const double size = kDiffer * std::max(std::abs(left), std::abs(right));
+  return std::abs(left - right) > size &&
+         std::min(std::abs(report.given - left), std::abs(report.given - right)) <= size;
+}
 
 }  // namespace
 
@@ -114,7 +141,9 @@ std::string RejectionWatch::suspected_row(const Candidate& candidate, const Step
   }
   try {
     const JacobianReport report = check_jacobian(constraints_, candidate.t, y, 1e-3);
-    if (!report.correct) return "check_jacobian finds there: " + report.message;
+    if (!report.correct)
+      return "check_jacobian finds there: " + report.message +
+             (has_kink(constraints_, report, candidate.t, y) ? kKink : "");
   } catch (const std::exception&) {  // g refuses a point nearby: nothing is known
     return {};
   }
