@@ -19,11 +19,13 @@ double bias(double gap, double dt) { return gap > 0 ? gap / dt : 0; }
 
 }  // namespace
 
-LaterImpacts::LaterImpacts(double threshold, double restitution_threshold, RestitutionLaw law,
+LaterImpacts::LaterImpacts(double threshold, double restitution_threshold,
                            const BodyOptions& options)
-    : pass_impacts_(threshold, restitution_threshold),
-      restitution_(law, options),
-      solver_(cold(options)) {}
+    : pass_impacts_(threshold, restitution_threshold), solver_(cold(options)) {}
+
+void LaterImpacts::add_restitution(RestitutionLaw law, const BodyOptions& options) {
+  restitution_ = std::make_unique<Restitution>(law, options);
+}
 
 // Marks the islands where the one solve has stopped a contact at gap / dt that closes only because
 // of an impact, by more than the least speed of an impact. False: there are none.
@@ -131,7 +133,7 @@ void LaterImpacts::pass_time(const StepContacts& contacts) {
 bool LaterImpacts::solve_pass(const NearContacts& near, double dt, BodySet& bodies,
                               StepContacts& contacts, Counts& counts) {
   pass_impacts_.choose(near, bodies, dt, part_);
-  restitution_.choose(pass_impacts_.list(), bodies, part_);
+  if (restitution_) restitution_->choose(pass_impacts_.list(), bodies, part_);
   solver_.solve(bodies.motion, part_.points, solution_);
   ++counts.problems;
   counts.sweeps += solution_.sweeps;
@@ -142,7 +144,7 @@ bool LaterImpacts::solve_pass(const NearContacts& near, double dt, BodySet& bodi
     bodies.motion[i].angular_velocity = solution_.angular_velocities[i];
   }
   part_.impulses = solution_.impulses;
-  bounces_ = restitution_.apply(bodies, part_);
+  bounces_ = restitution_ ? restitution_->apply(bodies, part_) : 0;
   for (std::size_t k = 0; k < member_.size(); ++k)
     contacts.impulses[at(members_[at(member_[k])].contact)] += part_.impulses[k];
   pass_time(contacts);

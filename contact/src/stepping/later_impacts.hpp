@@ -1,6 +1,7 @@
 // Tether: impacts that impacts cause. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
@@ -21,14 +22,15 @@ namespace tether::contact::detail {
 /// kMostContacts keep the one solve: their impacts do not end one by one.
 class LaterImpacts {
  public:
-  static constexpr int kPasses = 16, kMostContacts = 64;
+  static constexpr int kPasses = 16, kMostContacts = 16;
   struct Counts {
     int problems = 0, sweeps = 0, bounces = 0;
   };
 
   /// Thresholds: see Impacts.
-  LaterImpacts(double threshold, double restitution_threshold, RestitutionLaw law,
-               const BodyOptions& options);
+  LaterImpacts(double threshold, double restitution_threshold, const BodyOptions& options);
+  /// Where anything bounces.
+  void add_restitution(RestitutionLaw law, const BodyOptions& options);
 
   /// After the solve and what bounces in it. Changes velocities and impulses, and adds to
   /// `impacts`, where there are later ones whose problems are all solved.
@@ -69,7 +71,7 @@ class LaterImpacts {
   std::vector<Impact> taken_;
   std::vector<RigidBody> first_;
   std::vector<Eigen::Vector3d> first_impulses_;
-  Restitution restitution_;
+  std::unique_ptr<Restitution> restitution_;
   BodySolver solver_;
   BodySolution solution_;
   int bounces_ = 0;  // of the last pass

@@ -15,9 +15,11 @@ void Stepper::Implementation::make_solvers() {
   solver = std::make_unique<BodySolver>(o);
   later = std::make_unique<detail::LaterImpacts>(
       detail::threshold_speed(options.impact_threshold, options),
-      detail::threshold_speed(options.restitution_threshold, options), options.restitution_law, o);
-  if (near->any_restitution())
+      detail::threshold_speed(options.restitution_threshold, options), o);
+  if (near->any_restitution()) {
     restitution = std::make_unique<detail::Restitution>(options.restitution_law, o);
+    later->add_restitution(options.restitution_law, o);
+  }
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
     correction = std::make_unique<BodySolver>(detail::correction_options(options));
     closing = std::make_unique<detail::Closing>(detail::closing_options(options));
