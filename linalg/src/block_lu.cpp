@@ -117,16 +117,37 @@ TETHER_CLONES void substitute(int n, const int* lower_start, const int* lower, c
   }
 }
 
+std::vector<int> elimination_order(const BlockPattern& pattern) {
+  if (static_cast<double>(pattern.starts[pattern.size]) <
+      static_cast<double>(pattern.size) * pattern.size)
+    return minimum_degree_order(pattern);
+  std::vector<int> order(at(pattern.size));  // full: nothing to order
+  std::iota(order.begin(), order.end(), 0);
+  return order;
+}
+
+// Of an elimination with these columns of its factor.
+double count_operations(const std::vector<int>& starts) {
+  double operations = 0;
+  for (std::size_t k = 0; k + 1 < starts.size(); ++k) {
+    const double count = starts[k + 1] - starts[k];
+    operations += count * count + 2 * count + 1;
+  }
+  return operations;
+}
+
 }  // namespace
 
+double elimination_operations(const BlockPattern& pattern) {
+  const std::vector<int> order = elimination_order(pattern);
+  std::vector<int> position(at(pattern.size)), starts, rows;
+  for (int k = 0; k < pattern.size; ++k) position[at(order[at(k)])] = k;
+  find_fill(pattern, order, position, starts, rows);
+  return count_operations(starts);
+}
+
 void BlockLu::order(const BlockPattern& pattern) {
-  if (static_cast<double>(pattern.starts[pattern.size]) <
-      static_cast<double>(pattern.size) * pattern.size) {
-    full_order_ = minimum_degree_order(pattern);
-  } else {  // full: nothing to order
-    full_order_.resize(at(pattern.size));
-    std::iota(full_order_.begin(), full_order_.end(), 0);
-  }
+  full_order_ = elimination_order(pattern);
   analysed_ = false;
 }
 
@@ -149,11 +170,7 @@ void BlockLu::analyse(const BlockPattern& pattern, const char* active) {
   }
   n_ = static_cast<int>(block_row_.size());
   find_fill(pattern, block_row_, position_, upper_start_, upper_);
-  operations_ = 0;
-  for (int k = 0; k < n_; ++k) {
-    const double count = upper_start_[at(k + 1)] - upper_start_[at(k)];
-    operations_ += count * count + 2 * count + 1;
-  }
+  operations_ = count_operations(upper_start_);
   transpose(n_, upper_start_, upper_, lower_start_, lower_);
   U_.resize(upper_.size());
   L_.resize(upper_.size());

@@ -214,6 +214,22 @@ TEST_CASE("an island does not depend on others") {
   }
 }
 
+TEST_CASE("assembly: predicted from the fill, a long stack is assembled early") {
+  // Factorisations of a chain are cheap at any length.
+  for (int boxes : {10, 100, 1000}) {
+    const random::RigidAssembly a = random::rigid_stack(boxes, 1e4);
+    for (int threads : {1, 2}) {
+      BodyOptions o;
+      o.threads = threads;
+      const BodySolution s = BodySolver(o).solve(a.bodies, a.contacts);
+      INFO(boxes << " boxes, " << s.sweeps << " sweeps: " << name(s.status) << " " << s.error);
+      CHECK(s.status == Status::solved);
+      CHECK(s.assembled_islands == 1);
+      CHECK(s.sweeps <= 160);
+    }
+  }
+}
+
 TEST_CASE("an island that fails is counted, the others are solved") {
   random::RigidAssembly a = random::rigid_stack(10, 1000);
   for (int k = 0; k < 5; ++k) a.add(random::rigid_stack(1, 1));

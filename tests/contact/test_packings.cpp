@@ -120,3 +120,22 @@ TEST_CASE("packings: the few contacts that toggle are solved as problems of thei
   }
   CHECK(std::pow(ratios, 1.0 / count) < 0.8);
 }
+
+TEST_CASE("packings: bodies that sweeps leave unsolved are assembled, 1200 contacts by default") {
+  for (bool spheres : {true, false}) {
+    const random::Packing p = close_packing(5, spheres, 1, spheres ? 33 : 2);
+    REQUIRE(p.contacts.size() > 1000);
+    BodyOptions o;
+    o.law = Law::coulomb;
+    const BodySolution s = BodySolver(o).solve(p.bodies, p.contacts);
+    INFO((spheres ? "spheres" : "bodies") << ": " << name(s.status) << " " << s.error);
+    CHECK(s.status == Status::solved);
+    CHECK(s.assembled_islands == 1);
+    CHECK(evaluate(p.bodies, p.contacts, o.law, s.impulses).fixed_point <= 1e-6);
+    o.max_assembled = 1000;
+    CHECK(BodySolver(o).solve(p.bodies, p.contacts).assembled_islands == 0);
+    o.max_assembled = 100000;
+    o.max_work = 1e6;  // not enough for anything on the problem
+    CHECK(BodySolver(o).solve(p.bodies, p.contacts).assembled_islands == 0);
+  }
+}

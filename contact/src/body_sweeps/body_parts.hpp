@@ -25,6 +25,7 @@ struct IslandResult {
   double relative(double square) const {
     return square <= floor ? 0 : std::sqrt(square) * inverse_scale;
   }
+  bool assemblable = false;  // unsolved, and a Problem of it is allowed and affordable
   bool assembled = false;
   bool saved = false;  // an earlier point was the best and is unpacked already
 };
@@ -136,10 +137,7 @@ struct BodySolver::Implementation {
   void together(int k, const Team& team);
   void alone(int k, Worker& worker);
   void unpack(const Island& island, const Team& team);
-  bool assemblable(int k) const {
-    return results[at(k)].status != Status::solved &&
-           graph.islands[at(k)].contacts <= options.max_assembled;
-  }
+  bool assemblable(int k) const { return results[at(k)].assemblable; }
   void iterate(int k, const Team& team);
   void save(const Island& island, const Team& team);
   void extrapolate(const Island& island, const Team& team, double beta);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body_sweeps/assembly_price.hpp"
 #include "body_sweeps/body_parts.hpp"
 
 namespace tether::contact {
@@ -9,12 +10,11 @@ namespace tether::contact {
 namespace {
 
 // Forecasts of the sweeps that are still needed are made after 5, 10, 20, 40, ... sweeps. More than
-// kSlow: momentum is used. More than kPatience for each contact of the island (about what its
-// assembly and solution cost, measured on stacks and packings of 8 to 1400 contacts), after one
-// sweep for each contact: assembled.
+// kSlow: momentum is used. More than assembly and solution are predicted to cost, after sweeps for
+// kTried of that: assembled.
 constexpr int kFirstForecast = 5;
 constexpr int kFew = 64;  // see BodyOptions::min_sweeps
-constexpr double kSlow = 15, kPatience = 7;
+constexpr double kSlow = 15, kTried = 0.25;
 constexpr detail::BodyInertia kNoInertia = {};
 
 // Nesterov's momentum on the sweeps. A sweep is no gradient step, but the same rule serves: where a
@@ -66,7 +66,10 @@ class Momentum {
 // rise in a long run.
 class BestPoint {
  public:
-  BestPoint(bool wanted, int max_sweeps) : wanted_(wanted), max_sweeps_(max_sweeps) {}
+  static constexpr int kFirst = 64;  // sweeps before the first look
+
+  explicit BestPoint(int max_sweeps) : max_sweeps_(max_sweeps) {}
+  void want() { wanted_ = true; }
   void forecast(double sweeps) { slow_ = !(sweeps <= max_sweeps_); }
   // change: sum of squares that the last sweep changed.
   bool look(int sweeps, double change) {
@@ -91,10 +94,10 @@ class BestPoint {
 
  private:
   static constexpr double kNone = std::numeric_limits<double>::infinity();
-  static constexpr int kFirst = 64, kApart = 8, kLong = 256, kOld = 120;
+  static constexpr int kApart = 8, kLong = 256, kOld = 120;
   static constexpr double kLess = 0.64;
 
-  bool wanted_, slow_ = false;
+  bool wanted_ = false, slow_ = false;
   int max_sweeps_, next_ = kFirst;
   double change_ = kNone, last_ = kNone, residual_ = kNone;
 };
@@ -210,7 +213,8 @@ void BodySolver::Implementation::rest(const Island& island, const Team& team, in
 // Sweeps until the island is solved, max_sweeps are reached, or it should be assembled.
 void BodySolver::Implementation::iterate(int k, const Team& team) {
   const Island& island = graph.islands[at(k)];
-  const bool small = island.contacts <= options.max_assembled;
+  const bool permitted = island.contacts <= options.max_assembled;
+  detail::AssemblyPrice price(graph, island, first, second);
   int turn = 0;
   IslandResult r;
   const PassResult b = pass(island, team, turn, [&](int c) { return pack(c, *team.worker); });
@@ -223,11 +227,12 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
   int forecast = kFirstForecast, failed_tests = 0;
   int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   Momentum momentum;
-  BestPoint best(!small, options.max_sweeps);
+  BestPoint best(options.max_sweeps);
   for (;;) {
     const PassResult change = pass(island, team, turn, [&](int c) { return sweep(c, team); });
     const double sum = change.sum;
     ++r.sweeps;
+    if (r.sweeps == BestPoint::kFirst && !(permitted && price.within(options.max_work))) best.want();
     const bool last = r.sweeps >= options.max_sweeps;
     // What a sweep changes is close to the residual, which costs another pass.
     if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
@@ -254,8 +259,11 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
       const double more =
           rate < 0 ? std::log(bound / change.most) / rate : std::numeric_limits<double>::infinity();
       if (r.sweeps > kFirstForecast) {
-        const bool tried = r.sweeps >= island.contacts && momentum.on();
-        if (small && tried && more > kPatience * island.contacts) break;
+        if (permitted && momentum.on() && more > r.sweeps / kTried) {
+          const double assembly = price.sweeps();
+          const bool tried = r.sweeps > kTried * assembly;
+          if (tried && more > assembly && price.within(options.max_work)) break;
+        }
         if (more > kSlow && !momentum.on()) momentum.start();
       }
       best.forecast(r.sweeps + more);
@@ -264,6 +272,7 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
     }
     if (momentum.on()) extrapolate(island, team, momentum.next(sum));
   }
+  r.assemblable = r.status != Status::solved && permitted && price.within(options.max_work);
   if (team.thread == 0) results[at(k)] = r;
 }
 

@@ -50,5 +50,8 @@ class BlockLu {
   PackedVectors rhs_;
 };
 
+/// BlockLu::operations() of a pattern, without the storage of its factors.
+double elimination_operations(const BlockPattern& pattern);
+
 }  // namespace tether::linalg
 TETHER_EXPORT_END

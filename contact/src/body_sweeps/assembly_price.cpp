@@ -1,0 +1,89 @@
+// Tether: what an island would cost as a Problem. SPDX-License-Identifier: BSD-3-Clause
+#include "body_sweeps/assembly_price.hpp"
+
+#include <algorithm>
+#include <tether/linalg/block_lu.hpp>
+
+namespace tether::contact::detail {
+namespace {
+
+// Measured on stacks, lattices and packings of 8 to 7600 contacts (ns).
+constexpr double kBodySweep = 50;     // a contact
+constexpr double kAssembly = 250;     // a block
+constexpr double kSteps = 10;         // factorisations from sticking to a solution, mostly
+constexpr double kMostSteps = 20;     // of a run of interior points
+constexpr double kLeastSweeps = 500;  // on the Problem, after which packings begin to end
+constexpr int kMany = 4;              // contacts a body, from which on equations are by bodies
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Rows of a pattern with sorted columns from lists with repetitions.
+struct Pattern {
+  std::vector<int> starts{0}, columns;
+  void close_row() {
+    const auto begin = columns.begin() + starts.back();
+    std::sort(begin, columns.end());
+    columns.erase(std::unique(begin, columns.end()), columns.end());
+    starts.push_back(static_cast<int>(columns.size()));
+  }
+  double operations() const {
+    return linalg::elimination_operations(
+        {static_cast<int>(starts.size()) - 1, starts.data(), columns.data()});
+  }
+};
+
+}  // namespace
+
+AssemblyPrice::AssemblyPrice(const ContactGraph& graph, const Island& island,
+                             const std::vector<int>& first, const std::vector<int>& second)
+    : graph_(graph), island_(island), first_(first), second_(second) {
+  for (int place = 0; place < island.contacts; ++place)
+    blocks_ += static_cast<double>(graph.coupled[at(island.contact_begin + place)]);
+}
+
+// 4 ns for each product of blocks, and what is linear (InteriorPoint::cost, BodyNewton::cost).
+double AssemblyPrice::factorisation() {
+  if (factorisation_ >= 0) return factorisation_;
+  const int n = island_.contacts, bodies = island_.body_end - island_.body_begin;
+  std::vector<std::vector<int>> of(at(bodies));  // contacts of each body
+  const auto contact = [&](int place) { return graph_.order[at(island_.contact_begin + place)]; };
+  const auto local = [&](int body) { return graph_.slot[at(body)] - island_.body_begin; };
+  for (int place = 0; place < n; ++place)
+    for (int body : {first_[at(contact(place))], second_[at(contact(place))]})
+      if (body >= 0) of[at(local(body))].push_back(place);
+  Pattern pattern;
+  const bool by_bodies = n >= kMany * bodies;
+  if (by_bodies) {
+    for (int body = 0; body < bodies; ++body) {
+      pattern.columns.push_back(body);
+      for (int place : of[at(body)])
+        for (int other : {first_[at(contact(place))], second_[at(contact(place))]})
+          if (other >= 0) pattern.columns.push_back(local(other));
+      pattern.close_row();
+    }
+  } else {
+    for (int place = 0; place < n; ++place) {
+      for (int body : {first_[at(contact(place))], second_[at(contact(place))]})
+        if (body >= 0)
+          pattern.columns.insert(pattern.columns.end(), of[at(local(body))].begin(),
+                                 of[at(local(body))].end());
+      pattern.close_row();
+    }
+  }
+  constexpr double kNodes = 2;  // a body has six rows: two blocks
+  const double operations = pattern.operations() * (by_bodies ? kNodes * kNodes * kNodes : 1);
+  factorisation_ = 4 * operations + (by_bodies ? 800.0 * n : 32 * blocks_ + 240.0 * n);
+  return factorisation_;
+}
+
+double AssemblyPrice::sweeps() {
+  return (kAssembly * blocks_ + kSteps * factorisation()) / (kBodySweep * island_.contacts);
+}
+
+bool AssemblyPrice::within(double work) {
+  const double left = work - kAssembly * blocks_;
+  const double sweep = 2.2 * blocks_ + 30.0 * island_.contacts;  // Search::sweep_cost
+  return kLeastSweeps * sweep <= left || (left > 0 && kMostSteps * factorisation() <= left);
+}
+
+}  // namespace tether::contact::detail
