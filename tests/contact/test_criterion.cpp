@@ -203,7 +203,8 @@ TEST_CASE("criterion: a fast slip makes no error of its direction") {
   for (int k = 0; k < 300; ++k) {
     const Problem p = random::cluster(g, k % 2 ? 0.01 : 0.1, 3, 6).problem();
     for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
-      const Solution s = Solver(with(law, 1e-6)).solve(p), exact = Solver(with(law, 1e-11)).solve(p);
+      const Solution s = Solver(with(law, 1e-6)).solve(p),
+                     exact = Solver(with(law, 1e-11)).solve(p);
       REQUIRE(s.status == Status::solved);
       REQUIRE(exact.status == Status::solved);
       CHECK((s.velocities - exact.velocities).norm() <= 5e-6 * p.b().norm());

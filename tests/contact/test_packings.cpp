@@ -58,12 +58,13 @@ random::Packing close_packing(int cells, bool spheres, double mu, std::uint64_t 
 
 }  // namespace
 
-// Six of the eight take 0.2 to 1.17 times the work of the best stage, the others 1.46 and 1.77:
-// with much friction the number of sweeps until contacts settle is chance, and any step aside is
-// another throw.
-TEST_CASE("packings: automatic solves all, most at little more than the cost of its best stage") {
+// Seven of the eight take 0.38 to 1.10 times the work of the best stage, one 1.35: with much
+// friction the number of sweeps until contacts settle is chance, and any step aside is another
+// throw.
+TEST_CASE(
+    "packings: automatic solves all, all but one at most at 1.2 times the cost of its best stage") {
   double ratios = 1;
-  int count = 0;
+  int count = 0, above = 0;
   for (bool spheres : {true, false}) {
     for (double mu : {0.4, 0.7}) {
       for (std::uint64_t seed : {1, 2}) {
@@ -86,13 +87,15 @@ TEST_CASE("packings: automatic solves all, most at little more than the cost of 
           if (other.status == Status::solved) best = std::min(best, other.counts.work);
         }
         UNSCOPED_INFO(s.counts.work / best);
-        CHECK(s.counts.work < 2 * best);
+        CHECK(s.counts.work < 1.4 * best);
+        above += s.counts.work > 1.2 * best;
         ratios *= s.counts.work / best;
         ++count;
       }
     }
   }
-  CHECK(std::pow(ratios, 1.0 / count) < 1.2);
+  CHECK(above <= 1);
+  CHECK(std::pow(ratios, 1.0 / count) < 1);
 }
 
 TEST_CASE("packings: the few contacts that toggle are solved as problems of their own") {

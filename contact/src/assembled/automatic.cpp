@@ -100,17 +100,21 @@ bool Automatic::mostly_sticks(Search& search) {
   return against <= search.system.size() / 4;
 }
 
-// Half a factorisation of sweeps by a guess of the fill, then its exact price; after as much again
-// the point where all stick, if a factorisation is cheap or that point looks admissible.
+// Half a factorisation of sweeps by a guess of the fill, then its exact price, for which the matrix
+// is ordered: where it looks dear not before that is a small part of all; after as much again the
+// point where all stick, if a factorisation is cheap or that point looks admissible.
 bool Automatic::sweep_first(Search& search, const Rotation& r) {
   constexpr double kLookAround = 0.5;  // factorisations
   constexpr double kWorth = 3;
+  constexpr double kSmallPart = 0.1;
   const double begin = search.counts.work;
   for (int look = 0; look < 2; ++look) {
     AcceleratedSweeps::Leave leave;
     const double price = interior.cost(search);
     leave.price = kWorth * price;
     leave.least_work = kLookAround * price - (search.counts.work - begin);
+    if (look == 0 && interior.cost_by_width(search) > kDear * search.sweep_cost)
+      leave.least_work = std::max(leave.least_work, interior.order_cost(search) / kSmallPart);
     sweeps.run(search, leave);
     if (search.solved() || search.exhausted()) return search.solved();
     if (look == 0) interior.order(search);

@@ -232,7 +232,8 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
     const PassResult change = pass(island, team, turn, [&](int c) { return sweep(c, team); });
     const double sum = change.sum;
     ++r.sweeps;
-    if (r.sweeps == BestPoint::kFirst && !(permitted && price.within(options.max_work))) best.want();
+    if (r.sweeps == BestPoint::kFirst && !(permitted && price.within(options.max_work)))
+      best.want();
     const bool last = r.sweeps >= options.max_sweeps;
     // What a sweep changes is close to the residual, which costs another pass.
     if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {

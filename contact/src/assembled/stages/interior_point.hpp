@@ -30,6 +30,10 @@ class InteriorPoint {
   void order(Search& search);
   // Estimated ns of one step; by a guess of the fill before order().
   double cost(const Search& search) const;
+  // Estimated ns of order().
+  double order_cost(const Search& search) const;
+  // A guess of cost() that no order is needed for, from the width of the graph.
+  double cost_by_width(const Search& search) const;
   // True, and ordered, where bodies have so many contacts that equations of bodies take the place
   // of those of contacts.
   bool order_bodies(Search& search);

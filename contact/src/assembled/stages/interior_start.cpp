@@ -21,9 +21,44 @@ bool InteriorPoint::order_bodies(Search& search) {
   return true;
 }
 
+double InteriorPoint::order_cost(const Search& search) const {
+  return 100 * static_cast<double>(search.system.problem().blocks().size());
+}
+
+// Breadth-first levels, whose ends separate the graph: a front of a nested elimination is as wide
+// as a level, and the widest front takes most of the work.
+double InteriorPoint::cost_by_width(const Search& search) const {
+  constexpr double kOfBand =
+      0.1;  // of the work of eliminating level by level, as measured on packings
+  const linalg::BlockPattern p = pattern(search.system.problem());
+  std::vector<int> reached;
+  std::vector<char> seen(at(n_), 0);
+  reached.reserve(at(n_));
+  double operations = 0;
+  for (int seed = 0; seed < n_; ++seed) {
+    if (seen[at(seed)]) continue;
+    seen[at(seed)] = 1;
+    reached.push_back(seed);
+    std::size_t begin = reached.size() - 1;
+    while (begin < reached.size()) {
+      const std::size_t end = reached.size();
+      const double width = static_cast<double>(end - begin);
+      operations += width * width * width;
+      for (; begin < end; ++begin)
+        for (int k = p.starts[reached[begin]]; k < p.starts[reached[begin] + 1]; ++k) {
+          const int j = p.columns[k];
+          if (seen[at(j)]) continue;
+          seen[at(j)] = 1;
+          reached.push_back(j);
+        }
+    }
+  }
+  return 4 * kOfBand * operations;
+}
+
 void InteriorPoint::order(Search& search) {
   if (ordered_ || order_bodies(search)) return;
-  search.counts.work += 100 * static_cast<double>(search.system.problem().blocks().size());
+  search.counts.work += order_cost(search);
   lu_.order(pattern(search.system.problem()));
   lu_.analyse(pattern(search.system.problem()), nullptr);
   ordered_ = true;
