@@ -17,4 +17,18 @@ problems::Problem spherical_pendulum(const std::string& form, double t_end);
 /// mechanism.hpp. Rows "sphere" (positions, then velocities), "energy".
 problems::Problem points_on_sphere(int count, const std::string& form, double t_end);
 
+/// Four point vortices in the plane, of strengths of both signs; 8 unknowns. Rows "all": impulse
+/// (2), angular impulse, Hamiltonian.
+problems::Problem vortices(double t_end);
+
+/// A symmetric top under gravity (moments of inertia 1, 1, 0.5; m g l = 1) by a quaternion and its
+/// angular velocity in the body. Rows "all": norm, energy, momentum about the vertical and the
+/// axis.
+problems::Problem lagrange_top(double t_end);
+
+/// Three bodies of mass 1 on the figure eight of Chenciner and Montgomery (Annals of Mathematics
+/// 152 (2000) 881-901); 12 unknowns. Rows "all": centre of mass and momentum, energy, angular
+/// momentum.
+problems::Problem figure_eight(double t_end);
+
 }  // namespace tether::test

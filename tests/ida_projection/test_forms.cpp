@@ -109,3 +109,21 @@ TEST_CASE(
     for (const double tolerance : {1e-3, 2e-5, 3e-7, 4e-9}) compare(problem, tolerance, &mean);
   CHECK(std::exp(mean.steps / mean.runs) <= 1.0);
 }
+
+TEST_CASE("vortices, a top, the figure eight, points on a sphere: the same") {
+  Mean mean;
+  std::vector<Problem> problems;
+  for (const Problem& problem : {vortices(20.0), lagrange_top(10.0), figure_eight(8.0)}) {
+    for (const double g :
+         value(problem.recommended_constraints(), 0.0, problem.y0.data(), problem.size))
+      CHECK(std::abs(g) < 1e-14);
+    CHECK(tp::check_jacobian(problem.recommended_constraints(), 0.0, problem.y0, 1e-6).correct);
+    problems.push_back(with_reference(problem, problem, problem.recommended));
+  }
+  const Problem reduced = points_on_sphere(12, "index 0", 3.0);
+  for (const char* form : {"index 0", "index 1"})
+    problems.push_back(with_reference(points_on_sphere(12, form, 3.0), reduced, {"sphere"}));
+  for (const Problem& problem : problems)
+    for (const double tolerance : {1e-3, 1e-5, 1e-7, 1e-9}) compare(problem, tolerance, &mean);
+  CHECK(std::exp(mean.steps / mean.runs) <= 1.1);
+}
