@@ -36,7 +36,8 @@ TETHER_AVX2 Squares pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* e
                       p.y - pn * n.y - (u.y - un * n.y) * inv_t,
                       p.z - pn * n.z - (u.z - un * n.z) * inv_t};
     const v4 tt = dot(t, t), reach = load(c.mu) * xn;
-    const v4 scale = choose(less(reach * reach, tt), reach / root(tt), one);
+    const v4 slides = less(reach * reach, tt);
+    const v4 scale = choose(slides, reach / root(or_one(slides, tt)), one);
     const Vector d = {xn * n.x + scale * t.x - p.x, xn * n.y + scale * t.y - p.y,
                       xn * n.z + scale * t.z - p.z};
     const v4 dn = dot(d, n), dd = dot(d, d);

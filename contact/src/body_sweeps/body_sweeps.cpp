@@ -256,9 +256,11 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
     }
     if (r.sweeps == forecast) {
       // Linear convergence as since half as many sweeps: how many more?
-      const double rate = std::log(sum / earlier) / (0.5 * r.sweeps);
-      const double more =
-          rate < 0 ? std::log(bound / change.most) / rate : std::numeric_limits<double>::infinity();
+      const bool known = sum > 0 && std::isfinite(earlier);
+      const double rate = known ? std::log(sum / earlier) / (0.5 * r.sweeps) : 0;
+      const double more = !known     ? 0
+                          : rate < 0 ? std::log(bound / change.most) / rate
+                                     : std::numeric_limits<double>::infinity();
       if (r.sweeps > kFirstForecast) {
         if (permitted && momentum.on() && more > r.sweeps / kTried) {
           const double assembly = price.sweeps();

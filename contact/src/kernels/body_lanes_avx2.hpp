@@ -23,6 +23,7 @@ TETHER_AVX2 v4 both(v4 a, v4 b) { return _mm256_and_pd(a, b); }
 TETHER_AVX2 v4 either(v4 a, v4 b) { return _mm256_or_pd(a, b); }
 TETHER_AVX2 v4 without(v4 a, v4 b) { return _mm256_andnot_pd(b, a); }  // a and not b
 TETHER_AVX2 v4 choose(v4 mask, v4 a, v4 b) { return _mm256_blendv_pd(b, a, mask); }
+TETHER_AVX2 v4 or_one(v4 mask, v4 a) { return choose(mask, a, all(1)); }
 TETHER_AVX2 v4 least(v4 a, v4 b) { return _mm256_min_pd(a, b); }  // b if one is NaN
 TETHER_AVX2 v4 most(v4 a, v4 b) { return _mm256_max_pd(a, b); }
 TETHER_AVX2 v4 size(v4 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }

@@ -23,14 +23,17 @@ struct CoulombLanes {
     // A tenth of the range in which several solutions may exist is left to the whole law.
     v4 rare = both(less(all(Coulomb::kManyBranches * Coulomb::kManyBranches), L.ee),
                    either(less(L.g0 * h0, zero), less(L.g1 * h1, zero)));
-    const v4 h = root(h0 * h0 + h1 * h1), ik = all(1) / k, e = root(L.ee);
+    const v4 h = root(h0 * h0 + h1 * h1), e = root(L.ee);
     const v4 beta_min = least(L.beta0, L.beta1), beta_max = most(L.beta0, L.beta1);
-    rare = either(rare, at_most(all(1e60) * beta_max, h * ik));
+    const v4 grazing = at_most(all(1e60) * beta_max * k, h);
+    k = choose(grazing, all(1), k);
+    const v4 ik = all(1) / k;
+    rare = either(rare, grazing);
     wanted = without(wanted, rare);
     v4 lo = most((all(1) - e) * h * ik - beta_max, zero);
     v4 hi = most((all(1) + e) * h * ik - beta_min, lo);
     const v4 gh = L.g0 * h0 + L.g1 * h1;
-    const v4 mean = (L.beta0 * h0 * h0 + L.beta1 * h1 * h1) / (h * h);
+    const v4 mean = (L.beta0 * h0 * h0 + L.beta1 * h1 * h1) / most(h * h, all(1e-300));
     const v4 guess = least(most((h + gh) * ik - mean, lo), hi);
     v4 l = choose(both(less(lo, lambda), less(lambda, hi)), lambda, guess);
     const v4 stop = choose(less(beta_max, all(1e3) * beta_min), all(3e-8), all(1e-12));
@@ -41,8 +44,8 @@ struct CoulombLanes {
       const v4 q = z + L.g0 * z0 + L.g1 * z1;
       const v4 excess = q - k * p;
       const v4 slope = (e0 + e1) * q * z - p * (z0 * h0 + z1 * h1 + z * gh);
-      const v4 step = excess * q * z / (k * slope);
-      const v4 above = less(zero, excess), rising = less(zero, slope);
+      const v4 above = less(zero, excess), rising = less(zero, k * slope);
+      const v4 step = excess * q * z / or_one(rising, k * slope);
       lo = choose(above, l, lo);
       hi = choose(above, hi, l);
       v4 next = l + step;

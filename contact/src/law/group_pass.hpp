@@ -89,7 +89,11 @@ TETHER_AVX2 Squares pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup*
     v4 z0 = (bn - L.c0 * y0 - L.c1 * y1) * L.inv_a, z1 = y0, z2 = y1, l = lambda;
     v4 rare = Lanes::rare(L, h0, h1, touching);
     if (lanes(sliding)) {
-      const Sliding r = Lanes::slide(L, bn, k, h0, h1, s0, s1, length, x1, x2, lambda, sliding);
+      // The other lanes compute, too: on ones, so that they neither divide by zero nor overflow.
+      const Sliding r =
+          Lanes::slide(L, or_one(sliding, bn), or_one(sliding, k), or_one(sliding, h0),
+                       or_one(sliding, h1), or_one(sliding, s0), or_one(sliding, s1),
+                       or_one(sliding, length), x1, x2, lambda, sliding);
       z0 = choose(sliding, r.x0, z0);
       z1 = choose(sliding, r.x1, z1);
       z2 = choose(sliding, r.x2, z2);

@@ -61,8 +61,8 @@ struct MaximumDissipation {
       g2 = -g2;
     }
     // Far end of the arc: T^2 = (1 - kappa) / (1 + kappa), and before the asymptote for e >= 1.
-    double far2 = kappa > -1 ? (1 - kappa) / (1 + kappa) : std::numeric_limits<double>::infinity();
-    double far = far2 < 1 ? std::sqrt(far2) : (far2 > 1e300 ? 1e150 : std::sqrt(far2));
+    // kappa is above 1 by rounding only.
+    double far = kappa > -1 ? (kappa < 1 ? std::sqrt((1 - kappa) / (1 + kappa)) : 0.0) : 1e150;
     if (L.e >= 1) {
       // (1 - g1) t^2 + 2 g2 t + (1 + g1) > 0, positive at t = 0
       const double A = 1 - g1, D = g2 * g2 - A * (1 + g1);
@@ -99,7 +99,7 @@ struct MaximumDissipation {
         q4 = -p0;
         lo = 1 / far;
         hi = 1;
-        t = t > 0 ? 1 / t : 1;
+        t = t > 1e-300 ? 1 / t : (t > 0 ? 1e300 : 1);
       } else {
         hi = 1;
       }

@@ -16,7 +16,7 @@ struct MaximumDissipationLanes {
   TETHER_AVX2 Sliding slide(const LaneBlocks& L, v4 bn, v4 k, v4 h0, v4 h1, v4 s0, v4 s1, v4 length,
                             v4 w0, v4 w1, v4 lambda, v4 wanted) {
     const v4 zero = all(0), one = all(1);
-    const v4 il = one / length, u0 = s0 * il, u1 = s1 * il;
+    const v4 il = one / most(length, all(1e-300)), u0 = s0 * il, u1 = s1 * il;
     const v4 kappa = (k * L.beta0 * L.beta1 - L.g0 * s0 - L.g1 * s1) * il;
     const v4 p1 = u0 * h0 + u1 * h1, p2 = u0 * h1 - u1 * h0;
     const v4 g1 = u0 * L.g0 + u1 * L.g1;
@@ -34,19 +34,22 @@ struct MaximumDissipationLanes {
     q2 = q2 * side;
     q4 = q4 * side;
     g2 = g2 * side;
-    v4 far = root(least((one - kappa) / (one + kappa), all(1e300)));
-    far = choose(less(all(-1), kappa), far, all(1e150));
+    const v4 bounded = less(all(-1), kappa);
+    v4 far = root(most((one - kappa) / or_one(bounded, one + kappa), zero));
+    far = choose(bounded, far, all(1e150));
     const v4 open = at_most(one, L.ee);
     if (lanes(both(open, wanted))) {  // before the asymptote
       const v4 A = one - g1, D = g2 * g2 - A * (one + g1), r = root(most(D, zero));
-      const v4 cut = choose(less(g2, zero), (one + g1) / (r - g2),
-                            choose(less(A, zero), -(g2 + r) / A, all(-1)));
+      const v4 before = less(g2, zero), beyond = less(A, zero);
+      const v4 cut = choose(before, (one + g1) / or_one(before, r - g2),
+                            choose(beyond, -(g2 + r) / or_one(beyond, A), all(-1)));
       const v4 use = both(both(open, at_most(zero, D)), both(less(zero, cut), less(cut, far)));
       far = choose(use, cut, far);
     }
     // Warm start: the direction of the present impulse.
     const v4 w = root(w0 * w0 + w1 * w1), down = w + u0 * w0 + u1 * w1;
-    v4 t = choose(less(all(1e-12) * w, down), side * (u0 * w1 - u1 * w0) / down, zero);
+    const v4 ahead = less(all(1e-12) * w, down);
+    v4 t = choose(ahead, side * (u0 * w1 - u1 * w0) / or_one(ahead, down), zero);
     const v4 inverted = both(less(one, far), less(q0 + q1 + q2 + q3 + q4, zero));
     v4 lo = zero, hi = least(far, one);
     if (lanes(both(inverted, wanted))) {
@@ -56,9 +59,9 @@ struct MaximumDissipationLanes {
       q2 = choose(inverted, -q2, q2);
       q3 = choose(inverted, -r1, q3);
       q4 = choose(inverted, -r0, q4);
-      lo = choose(inverted, one / far, lo);
+      lo = choose(inverted, one / most(far, one), lo);
       hi = choose(inverted, one, hi);
-      t = choose(inverted, choose(less(zero, t), one / t, one), t);
+      t = choose(inverted, choose(less(zero, t), one / most(t, all(1e-300)), one), t);
     }
     t = least(most(t, lo), hi);
     const v4 d1 = 2.0 * q2, d2 = 3.0 * q3, d3 = 4.0 * q4;
@@ -69,7 +72,7 @@ struct MaximumDissipationLanes {
       const v4 below = less(f, zero);
       lo = choose(below, t, lo);
       hi = choose(below, hi, t);
-      const v4 step = -f / d, rising = less(zero, d), length_ = size(step);
+      const v4 rising = less(zero, d), step = -f / or_one(rising, d), length_ = size(step);
       v4 next = t + step;
       const v4 small = both(at_most(length_, all(1e-8)), rising);
       const v4 inside = both(both(less(lo, next), less(next, hi)), rising);

@@ -112,6 +112,7 @@ double AcceleratedSweeps::forecast(int sweep, double f, double log_gain) const {
   double most = std::numeric_limits<double>::infinity();
   if (sweep <= kRecent) return 0;
   const auto left = [&](double earlier, int sweeps) {
+    if (!(f > 0 && earlier > 0)) return most;
     const double rate = std::log(f / earlier) / sweeps;
     return rate < std::log(0.995) || (sweeps > 200 && rate < -1e-4) ? log_gain / rate : most;
   };

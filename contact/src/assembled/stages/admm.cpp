@@ -126,8 +126,10 @@ void Admm::run(Search& search, int most, bool accelerate, bool windowed) {
     if (windowed && iteration % 40 == 0) {
       // Stay while the error halves, or is predicted to reach the tolerance in three windows.
       const double rate = last_error / window_error;
-      const double left = std::log(search.options.tolerance / last_error) / std::log(rate);
-      if (rate > 0.5 && !(rate < 1 && left < 3)) return;
+      const auto left = [&] {
+        return std::log(search.options.tolerance / last_error) / std::log(rate);
+      };
+      if (rate > 0.5 && !(rate < 1 && left() < 3)) return;
       window_error = last_error;
     }
     if (!accelerate || f > 2 * least_f) {

@@ -99,7 +99,7 @@ bool InteriorPoint::scale(const System& system) {
     Sides& sides = sides_[at(i)];
     sides = {};
     if (flat_[at(i)]) {
-      s.set_flat(x_[at(i)].v[0], u[0]);
+      if (!s.set_flat(x_[at(i)].v[0], u[0])) return false;
       sides.left.column[0] = sides.right.column[0] = 1 / s.d[0];
       continue;
     }

@@ -28,12 +28,18 @@ inline double longest(const double* x, double determinant, const double* d) {
   // det(x + t d) = a t^2 + 2 b t + c
   const double a = d[0] * d[0] - d[1] * d[1] - d[2] * d[2];
   const double b = x[0] * d[0] - x[1] * d[1] - x[2] * d[2], c = determinant;
-  double t = d[0] < 0 ? -x[0] / d[0] : std::numeric_limits<double>::infinity();
+  double t = std::numeric_limits<double>::infinity();
+  // Quotients beyond 1e300 are as good as infinite, and are not formed: they would overflow.
+  const auto take = [&t](double above, double below) {
+    if (above == 0 || (above > 0) != (below > 0)) return;
+    if (1e-300 * std::abs(above) < std::abs(below)) t = std::min(t, above / below);
+  };
+  if (d[0] < 0) take(-x[0], d[0]);
   const double D = b * b - a * c;
   if (D >= 0) {
     const double q = -(b + std::copysign(std::sqrt(D), b));
-    if (c / q > 0) t = std::min(t, c / q);
-    if (q / a > 0) t = std::min(t, q / a);
+    take(c, q);
+    take(q, a);
   }
   return t;
 }
@@ -46,15 +52,18 @@ struct ConeScaling {
   double d[3];  // eigenvalues of W
   double lambda[3], lambda_det;
 
-  // A single nonnegative number in place of the cone.
-  void set_flat(double x, double u) {
+  // A single positive number in place of the cone. false: one of both is not.
+  bool set_flat(double x, double u) {
+    if (!(x > 0 && u > 0)) return false;
     *this = {
         {1, 0, 0, 0, 1, 0, 0, 0, 1}, {std::sqrt(u / x), 1, 1}, {std::sqrt(x * u), 0, 0}, x * u};
+    return true;
   }
   // false: x or u is not inside of the cone.
   bool set(const double* x, const double* u) {
-    const double dx = std::sqrt(determinant(x)), du = std::sqrt(determinant(u));
-    if (!(dx > 0 && du > 0)) return false;
+    const double square_x = determinant(x), square_u = determinant(u);
+    if (!(square_x > 0 && square_u > 0)) return false;
+    const double dx = std::sqrt(square_x), du = std::sqrt(square_u);
     const double half = std::sqrt(0.5 * (1 + product(x, u) / (dx * du)));
     const double w1 = (u[1] / du - x[1] / dx) / (2 * half);
     const double w2 = (u[2] / du - x[2] / dx) / (2 * half);
