@@ -17,10 +17,22 @@ void put(std::ostream& out, const T&... values) {
   (out.write(reinterpret_cast<const char*>(&values), sizeof values), ...);
 }
 
+/// A bool of any byte but 0 and 1 would be undefined.
+template <class T>
+void get_one(std::istream& in, T& value) {
+  if constexpr (std::is_same_v<T, bool>) {
+    const int byte = in.get();
+    if (in && byte > 1) throw std::runtime_error("the saved state is damaged");
+    value = byte == 1;
+  } else {
+    in.read(reinterpret_cast<char*>(&value), sizeof value);
+  }
+}
+
 template <class... T>
 void get(std::istream& in, T&... values) {
   static_assert((std::is_arithmetic_v<T> && ...));
-  (in.read(reinterpret_cast<char*>(&values), sizeof values), ...);
+  (get_one(in, values), ...);
   if (!in) throw std::runtime_error("the saved state is cut off");
 }
 

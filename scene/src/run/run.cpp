@@ -232,6 +232,15 @@ class Run {
     engine_->restore(in, how);
     if (in.peek() != std::char_traits<char>::eof())
       throw std::runtime_error("the saved state " + file + " is longer than this scene needs");
+    const double time = engine_->time();
+    // What a run sums up is finite, or it has ended; its last stop lies behind it.
+    for (const double x : {s.start_energy, s.end_energy, s.lowest_change, s.largest_change, s.drift,
+                           s.penetration, time})
+      if (!std::isfinite(x) || std::isnan(s.residual))
+        throw std::runtime_error("the saved state " + file + " is damaged");
+    if (!(done_ >= 0 && last_record_ >= 0 && last_record_ <= time) ||
+        !(done_ <= time || same_time(done_, time)))
+      throw std::runtime_error("the saved state " + file + " is damaged: it is of no one time");
     resume_ = {true, last_record_};
     recorded_ = true;
     if (done_ >= scene_.end)

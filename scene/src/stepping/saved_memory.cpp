@@ -2,6 +2,7 @@
 #include "saved_memory.hpp"
 
 #include <stdexcept>
+#include <string_view>
 
 #include "output/binary.hpp"
 
@@ -12,6 +13,12 @@ using contact::StepperMemory;
 using contact::WarmStart;
 
 namespace {
+
+template <class... Vector>
+void demand_finite(const Vector&... vectors) {
+  if (!(vectors.allFinite() && ...))
+    throw std::runtime_error("the saved state is damaged: a number in it is not finite");
+}
 
 void put(std::ostream& out, const WarmStart& start) {
   binary::put(out, static_cast<std::uint64_t>(start.ids.size()));
@@ -27,6 +34,7 @@ WarmStart get_warm_start(std::istream& in) {
   for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
     start.ids.push_back(binary::get<std::uint64_t>(in));
     binary::get_array(in, start.impulses.emplace_back());
+    demand_finite(start.impulses.back());
   }
   return start;
 }
@@ -40,6 +48,7 @@ PointContact get_contact(std::istream& in, int bodies) {
   PointContact c;
   binary::get(in, c.first, c.second, c.mu, c.bias, c.id);
   binary::get_array(in, c.r1, c.r2, c.normal);
+  demand_finite(c.r1, c.r2, c.normal, Eigen::Vector2d(c.mu, c.bias));
   if (c.first < 0 || c.first >= bodies || c.second < -1 || c.second >= bodies)
     throw std::runtime_error("the saved state is damaged: it has contacts of no bodies");
   return c;
@@ -78,15 +87,20 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
     StepperMemory::Spin& spin = m.spins.emplace_back();
     binary::get_array(in, spin.momentum, spin.angular_velocity);
     for (double& x : spin.orientation) binary::get(in, x);
+    demand_finite(spin.momentum, spin.angular_velocity,
+                  Eigen::Map<const Eigen::Vector4d>(spin.orientation.data()));
   }
   for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
     m.last.points.push_back(get_contact(in, bodies));
     binary::get(in, m.last.gaps.emplace_back());
     binary::get_array(in, m.last.impulses.emplace_back());
+    demand_finite(m.last.impulses.back());
   }
   std::int32_t status = 0;
   binary::get(in, m.penetration, m.residual, status);
   m.status = static_cast<contact::Status>(status);
+  if (contact::name(m.status) == std::string_view("?"))
+    throw std::runtime_error("the saved state is damaged: no contact problem ends so");
   return m;
 }
 

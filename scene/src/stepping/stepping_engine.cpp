@@ -7,6 +7,7 @@
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
+#include <tether/scene/run.hpp>
 #include <utility>
 
 #include "output/binary.hpp"
@@ -205,6 +206,8 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
   const contact::StepperMemory memory =
       get_memory(in, static_cast<int>(bodies_.size()),
                  format == kWithClosings ? MemoryFormat::with_closings : MemoryFormat::now);
+  if (!(std::abs(time) <= kMostSteps * stepper_.options().step))
+    throw std::runtime_error("the saved state is damaged: it has no time");
   contact::BodySet& b = stepper_.bodies();
   for (std::size_t i = 0; i < states.size(); ++i) {
     b.position[i] = states[i].position;
@@ -220,6 +223,8 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
   } catch (const std::invalid_argument&) {
     throw std::runtime_error("the saved state is of another scene");
   }
+  if (same && this->time() != time)
+    throw std::runtime_error("the saved state is damaged: its steps lead to another time");
   contacts_of_ = -1;
   read_bodies();
 }
