@@ -1,8 +1,10 @@
 // Saved states: a run that is continued has the bits and the files of one in one piece.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -317,4 +319,33 @@ TEST_CASE("an interrupted run leaves whole files, and goes on with the bits of o
     CHECK(content(whole / "a.csv") == content(part / "a.csv"));
     CHECK(content(whole / "a.state") == content(part / "a.state"));
   }
+}
+
+TEST_CASE("a state is replaced whole or not at all: on a disk that is full the old one stays") {
+  Scene scene = parse_scene(tumble(3, 0.4, 0.2, "momentum"), "full.toml");
+  scene.output.state = (folder("full") / "a.state").string();
+  scene.end = 0.1;
+  run(scene);
+  const std::string before = content(scene.output.state);
+  RunOptions options;
+  options.restart = scene.output.state;
+  scene.end = 0.2;
+  // A limit of file sizes is the full disk of a test.
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit usual{};
+  REQUIRE(getrlimit(RLIMIT_FSIZE, &usual) == 0);
+  rlimit small = usual;
+  small.rlim_cur = before.size() / 2;
+  REQUIRE(setrlimit(RLIMIT_FSIZE, &small) == 0);
+  bool told = false;
+  try {
+    run(scene, options);
+  } catch (const std::runtime_error& e) {
+    told = std::string(e.what()).find("cannot write") != std::string::npos;
+  }
+  setrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, handler);
+  CHECK(told);
+  CHECK(content(scene.output.state) == before);
+  CHECK(run(scene, options).failure == "");
 }

@@ -5,6 +5,7 @@
 
 #include "commands.hpp"
 #include "contact_command.hpp"
+#include "standard_streams.hpp"
 
 namespace {
 
@@ -14,6 +15,8 @@ void complain(const std::exception& e) { std::cerr << "tether: " << e.what() << 
 }  // namespace
 
 int main(int argc, char** argv) {
+  using namespace tether::scene;
+  guard_standard_streams();
   CLI::App app{"Keeps a computed motion on the constraints that it must obey", "tether"};
   app.require_subcommand(1);
   app.footer(
@@ -32,10 +35,11 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? tether::scene::kGood : tether::scene::kWrong;
+    return flushed(app.exit(e) == 0 ? kGood : kWrong);
   } catch (const std::exception& e) {
+    if (const int lost = flushed(kWrong); lost != kWrong) return lost;
     complain(e);
-    return tether::scene::kWrong;
+    return kWrong;
   }
-  return status;
+  return flushed(status);
 }

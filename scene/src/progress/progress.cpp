@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <string>
 
 namespace tether {
 
@@ -13,6 +14,9 @@ namespace {
 
 constexpr int kWidth = 30;
 constexpr std::chrono::milliseconds kRedraw(200), kLine(10000);
+
+// Where nobody reads, nothing is shown: fmt::print would throw, and end the job.
+void print(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 }  // namespace
 
@@ -45,17 +49,17 @@ void Progress::show(Clock::time_point now) {
   const double share = std::min(1.0, (done_work_ + share_ * run_work_) / all_work_);
   if (terminal_) {
     const int filled = static_cast<int>(share * kWidth);
-    fmt::print(stderr, "\r\033[K[{:#<{}}{:<{}}] {:3.0f} %  {}", "", filled, "", kWidth - filled,
-               100.0 * share, what_);
+    print(fmt::format("\r\033[K[{:#<{}}{:<{}}] {:3.0f} %  {}", "", filled, "", kWidth - filled,
+                      100.0 * share, what_));
     std::fflush(stderr);
     visible_ = true;
   } else {
-    fmt::print(stderr, "{:3.0f} %  {}\n", 100.0 * share, what_);
+    print(fmt::format("{:3.0f} %  {}\n", 100.0 * share, what_));
   }
 }
 
 void Progress::hide() {
-  if (visible_) fmt::print(stderr, "\r\033[K");
+  if (visible_) print("\r\033[K");
   visible_ = false;
 }
 

@@ -13,6 +13,7 @@
 
 #include "effects/list.hpp"
 #include "output/whole_file.hpp"
+#include "record/number_at.hpp"
 #include "recorder.hpp"
 
 namespace tether::scene {
@@ -106,8 +107,8 @@ class CsvRecorder : public Recorder {
     if (!std::getline(in, line) || line + '\n' != first) return 0;
     auto length = static_cast<long>(first.size());
     while (std::getline(in, line) && !in.eof()) {  // a row without its end is cut
-      const double at = std::strtod(line.c_str(), nullptr);
-      if (at > time) break;
+      const double at = number_at(line, 0);
+      if (!(at <= time)) break;
       lacks_rows_ = at != time;
       length += static_cast<long>(line.size()) + 1;
     }

@@ -11,6 +11,7 @@
 #include "geometry/mesh.hpp"
 #include "output/output_names.hpp"
 #include "output/whole_file.hpp"
+#include "record/number_at.hpp"
 #include "recorder.hpp"
 
 namespace tether::scene {
@@ -211,7 +212,7 @@ class VtkRecorder : public Recorder {
     while (std::getline(in, line)) {
       const std::string start = "<DataSet timestep=\"";
       if (line.compare(0, start.size(), start) != 0) continue;
-      if (std::strtod(line.c_str() + start.size(), nullptr) > time) break;
+      if (!(number_at(line, start.size()) <= time)) break;
       sets_ += line + '\n';
       const std::size_t number = line.rfind('_');
       if (number != std::string::npos)

@@ -1,0 +1,16 @@
+// Tether: what the program is started with: descriptors, and where its text goes.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace tether::scene {
+
+/// Descriptors 0 to 2 that are closed become /dev/null, so that no file of a run gets their number
+/// and what is printed. A pipe that is closed and a limit of file sizes become errors of the write
+/// in place of signals: a run whose reader has left still ends with whole files.
+void guard_standard_streams();
+
+/// `status`, or what the program exits with since its text was lost: 128 + SIGPIPE without a word
+/// when the reader of a pipe has left, as shells know it, else kWrong with the reason.
+int flushed(int status);
+
+}  // namespace tether::scene
