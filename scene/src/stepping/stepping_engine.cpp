@@ -93,7 +93,13 @@ void SteppingEngine::advance(double t) {
   const double slack = 1e-9 * stepper_.options().step;
   while (time() < t - slack) {
     if (interrupted()) break;
-    stepper_.step();
+    try {
+      stepper_.step();
+    } catch (const std::invalid_argument& e) {  // by contacts whose gap or place is no number
+      std::ostringstream text;
+      text << "t = " << time() << " s: the motion has left the range of numbers: " << e.what();
+      throw SimulationError(text.str());
+    }
     if (on_failure_ == OnFailure::stop && !stepper_.succeeded()) {
       read_bodies();
       report_failure();
