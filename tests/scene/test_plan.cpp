@@ -40,6 +40,12 @@ const std::string kFloor = "[[body]]\nfixed = true\nshape = \"plane\"\nmaterial 
 const std::string kPair = "[[pair]]\nbetween = [\"a\", \"b\"]\n";
 const std::string kGravity = "[scene]\ngravity = [0, 0, -9.81]\n";
 
+const std::string kHinge =
+    "[[joint]]\nkind = \"hinge\"\nbodies = [\"body 1\", \"world\"]\nat = [0, 0, 0]\n"
+    "axis = [0, 0, 1]\n";
+const std::string kBall =
+    "[[joint]]\nkind = \"ball\"\nbodies = [\"box\", \"world\"]\nat = [0, 0, 0]\n";
+
 }  // namespace
 
 TEST_CASE("the plan lists exactly the effects that the scene names") {
@@ -67,12 +73,8 @@ TEST_CASE("the plan lists exactly the effects that the scene names") {
   CHECK(effects(kSphere + spring + "damping = 1\nstiffness = 1\n") == Names{"springs", "dampers"});
   CHECK(effects(kSphere + spring + "stiffness = 0\n") == Names{"springs"});
 
-  const std::string hinge =
-      "[[joint]]\nkind = \"hinge\"\nbodies = [\"body 1\", \"world\"]\nat = [0, 0, 0]\naxis = [0, "
-      "0, "
-      "1]\n";
-  CHECK(effects(kSphere + hinge) == Names{"joints"});
-  CHECK(effects(kSphere + hinge + "motion = { rate_rad = 1 }\n") ==
+  CHECK(effects(kSphere + kHinge) == Names{"joints"});
+  CHECK(effects(kSphere + kHinge + "motion = { rate_rad = 1 }\n") ==
         Names{"joints", "prescribed motion"});
   CHECK(effects(kJointed) == Names{"gravity", "gyroscopic term", "joints", "prescribed motion",
                                    "springs", "dampers", "drag", "loads", "invariants"});
@@ -99,12 +101,15 @@ TEST_CASE("the plan chooses the engine and counts") {
   std::string spheres = kFloor + kPair + "[[pair]]\nbetween = [\"a\", \"a\"]\n";
   for (int i = 0; i < 3; ++i) spheres += kSphere;
   CHECK(plan(spheres).pairs == 6);
+
+  const Plan both = plan(kTouching + kBall);
+  CHECK(both.engine == EngineKind::stepping);
+  CHECK(both.rows == 3);
+  CHECK(both.why == "bodies touch; it has joints, too");
+  CHECK(plan("[stepping]\n" + kSphere + kHinge).engine == EngineKind::stepping);
 }
 
 TEST_CASE("what no engine has is refused by name") {
-  const std::string ball =
-      "[[joint]]\nkind = \"ball\"\nbodies = [\"box\", \"world\"]\nat = [0, 0, 0]\n";
-  CHECK(refusal(kTouching + ball).find("contacts ([[pair]]) and joints") != std::string::npos);
   CHECK(refusal("[smooth]\n" + kSphere + kFloor + kPair).find("smooth engine") !=
         std::string::npos);
   CHECK(refusal(kTouching + "[[invariant]]\nkind = \"energy\"\n").find("project = false") !=

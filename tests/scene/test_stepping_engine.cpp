@@ -210,7 +210,7 @@ TEST_CASE("stepping engine: what it does not have is refused by name") {
   Joint joint;
   joint.first = 1;
   scene.joints = {joint};
-  CHECK_THROWS_WITH(make_stepping_engine(scene), Catch::Contains("joints"));
+  CHECK_NOTHROW(make_stepping_engine(scene));
   scene.joints.clear();
   scene.invariants = {Invariant{}};
   CHECK_THROWS_WITH(make_stepping_engine(scene), Catch::Contains("invariants"));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "stepping/impacts.hpp"
+#include "stepping/joint_part.hpp"
 #include "stepping/moving_islands.hpp"
 #include "stepping/near_contacts.hpp"
 
@@ -16,6 +17,11 @@ namespace tether::contact::detail {
 class Closing {
  public:
   explicit Closing(const BodyOptions& options) : solver_(options) {}
+
+  void set_joints(JointPart& joints, const BodyOptions& options) {
+    solver_.set_joints(joints.make_islands(options));
+    islands_.set_links(joints.links());
+  }
 
   /// After the solve. Fills `move`: velocities to add for this step; false: there are none.
   bool find(const Impacts& impacts, const BodySet& bodies, double dt, const StepContacts& contacts,
@@ -29,7 +35,7 @@ class Closing {
   MovingIslands islands_;
   std::vector<PointContact> points_;
   WarmStart start_;
-  BodySolver solver_;
+  StepSolver solver_;
   BodySolution solution_;
 };
 

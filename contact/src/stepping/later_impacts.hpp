@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stepping/impacts.hpp"
+#include "stepping/joint_part.hpp"
 #include "stepping/moving_islands.hpp"
 #include "stepping/near_contacts.hpp"
 #include "stepping/restitution.hpp"
@@ -31,6 +32,13 @@ class LaterImpacts {
   LaterImpacts(double threshold, double restitution_threshold, const BodyOptions& options);
   /// Where anything bounces.
   void add_restitution(RestitutionLaw law, const BodyOptions& options);
+
+  /// After the above.
+  void set_joints(JointPart& joints, const BodyOptions& options) {
+    solver_.set_joints(joints.make_islands(options));
+    if (restitution_) restitution_->set_joints(joints, options);
+    islands_.set_links(joints.links());
+  }
 
   /// After the solve and what bounces in it. Changes velocities and impulses, and adds to
   /// `impacts`, where there are later ones whose problems are all solved.
@@ -72,7 +80,7 @@ class LaterImpacts {
   std::vector<RigidBody> first_;
   std::vector<Eigen::Vector3d> first_impulses_;
   std::unique_ptr<Restitution> restitution_;
-  BodySolver solver_;
+  StepSolver solver_;
   BodySolution solution_;
   int bounces_ = 0;  // of the last pass
 };

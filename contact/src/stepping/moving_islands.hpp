@@ -3,16 +3,21 @@
 
 #include <numeric>
 #include <tether/contact/stepping.hpp>
+#include <utility>
 #include <vector>
 
 namespace tether::contact::detail {
 
-/// Sets of moving bodies that contacts connect.
+/// Sets of moving bodies that contacts and links connect.
 class MovingIslands {
  public:
+  void set_links(std::vector<std::pair<int, int>> links) { links_ = std::move(links); }
+
   void join(const BodySet& bodies, const StepContacts& contacts) {
     parent_.resize(bodies.motion.size());
     std::iota(parent_.begin(), parent_.end(), 0);
+    for (const auto& [first, second] : links_)
+      parent_[static_cast<std::size_t>(root(first))] = root(second);
     for (const PointContact& c : contacts.points)
       if (moves(bodies, c.first) && moves(bodies, c.second))
         parent_[static_cast<std::size_t>(root(c.first))] = root(c.second);
@@ -32,6 +37,7 @@ class MovingIslands {
     return bodies.mass[static_cast<std::size_t>(body)] > 0;
   }
   std::vector<int> parent_;
+  std::vector<std::pair<int, int>> links_;
 };
 
 }  // namespace tether::contact::detail

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "stepping/impacts.hpp"
+#include "stepping/joint_part.hpp"
 #include "stepping/moving_islands.hpp"
 
 namespace tether::contact::detail {
@@ -18,6 +19,11 @@ namespace tether::contact::detail {
 class Restitution {
  public:
   Restitution(RestitutionLaw law, const BodyOptions& options);
+
+  void set_joints(JointPart& joints, const BodyOptions& options) {
+    solver_.set_joints(joints.make_islands(options));
+    islands_.set_links(joints.links());
+  }
 
   /// After the impacts are chosen: those that bounce.
   void choose(const std::vector<Impact>& impacts, const BodySet& bodies, StepContacts& contacts);
@@ -48,7 +54,7 @@ class Restitution {
   std::vector<Eigen::Vector3d> added_;
   MovingIslands islands_;
   std::vector<double> constant_, linear_, square_, scale_;  // of each island; see limit_energy
-  BodySolver solver_;
+  StepSolver solver_;
   BodySolution solution_;
 };
 

@@ -15,6 +15,7 @@ void Stepper::Implementation::step() {
 }
 
 void Stepper::Implementation::advance(double time, double length, int halvings) {
+  part_start = time;
   dt = length;
   may_halve = halvings > 0;
   if (run_stages(time)) return;

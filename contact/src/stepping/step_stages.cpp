@@ -13,8 +13,12 @@ void Stepper::Implementation::make_stages() {
     if (bodies.mass[at(i)] == 0) continue;
     moving.push_back(i);
     const bool round = detail::is_isotropic(bodies.inertia[at(i)]);
-    (round ? round_bodies : long_bodies).push_back(i);
+    if (!round) long_bodies.push_back(i);
+    if (joints && joints->holds(i)) continue;
+    free.push_back(i);
+    (round ? free_round : free_long).push_back(i);
   }
+  if (joints) add_stage("joints", &I::begin_joints);
   const char* impact = restitution ? "restitution" : "collision";
   if (near) add_stage(impact, &I::remember_velocities);
   if (options.gravity) add_stage("gravity", &I::apply_gravity);
@@ -25,8 +29,10 @@ void Stepper::Implementation::make_stages() {
     if (options.gyroscopic == Gyroscopic::implicit_step)
       add_stage("gyroscopic term", &I::gyrate_implicit);
   }
+  if (joints) add_stage("joints", &I::predict_joints);
   if (near) {
     add_stage("collision", &I::find_contacts);
+    if (joints) add_stage("joints", &I::leave_out_joined);
     add_stage(impact, &I::choose_impacts);
     if (restitution) add_stage("restitution", &I::choose_bounces);
     add_stage("contact", &I::solve_contacts);
@@ -34,16 +40,18 @@ void Stepper::Implementation::make_stages() {
     add_stage(impact, &I::take_later_impacts);
     if (closing) add_stage("penetration", &I::close_gaps);
     if (correction) add_stage("penetration", &I::correct_penetration);
+    if (joints) add_stage("joints", &I::put_back_joints);
   }
   add_stage("motion", &I::move);
-  if (!round_bodies.empty()) add_stage("motion", &I::turn_round);
-  if (!long_bodies.empty()) {
-    if (options.gyroscopic == Gyroscopic::momentum) free_spin.resize(long_bodies.size());
+  if (!free_round.empty()) add_stage("motion", &I::turn_round);
+  if (!free_long.empty()) {
+    if (options.gyroscopic == Gyroscopic::momentum) free_spin.resize(free_long.size());
     if (options.gyroscopic == Gyroscopic::momentum)
       add_stage("gyroscopic term", &I::turn_keeping_momentum);
     else
       add_stage("motion", &I::turn_plain);
   }
+  if (joints) add_stage("joints", &I::move_joints);
 }
 
 void Stepper::Implementation::apply_gravity() {
@@ -154,8 +162,27 @@ void Stepper::Implementation::shift(int body, const Vector3d& v, const Vector3d&
   spin = turn * spin;
 }
 
+// Contacts of bodies that a joint connects.
+void Stepper::Implementation::leave_out_joined() {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = contacts.points[k];
+    if (joints->are_joined(c.first, c.second)) continue;
+    contacts.points[kept] = c;
+    contacts.gaps[kept++] = contacts.gaps[k];
+  }
+  contacts.points.resize(kept);
+  contacts.gaps.resize(kept);
+}
+
+void Stepper::Implementation::move_joints() {
+  if (joints->move(bodies, part_start, dt, contacts)) return;
+  succeeded = false;
+  if (status == Status::solved) status = Status::stalled;
+}
+
 void Stepper::Implementation::move() {
-  for (const int i : moving) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
+  for (const int i : free) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
 }
 
 // To world axes, after orientations were set from outside.
@@ -166,7 +193,7 @@ void Stepper::Implementation::turn_inertias() {
 }
 
 void Stepper::Implementation::turn_round() {
-  for (const int i : round_bodies) {
+  for (const int i : free_round) {
     const Vector3d& w = bodies.motion[at(i)].angular_velocity;
     if (w.isZero(0)) continue;
     linalg::Quaternion& q = bodies.orientation[at(i)];
@@ -175,7 +202,7 @@ void Stepper::Implementation::turn_round() {
 }
 
 void Stepper::Implementation::turn_plain() {
-  for (const int i : long_bodies) {
+  for (const int i : free_long) {
     RigidBody& b = bodies.motion[at(i)];
     linalg::Quaternion& q = bodies.orientation[at(i)];
     q = (detail::exponential(dt * b.angular_velocity) * q).normalized();
@@ -184,8 +211,8 @@ void Stepper::Implementation::turn_plain() {
 }
 
 void Stepper::Implementation::turn_keeping_momentum() {
-  for (std::size_t k = 0; k < long_bodies.size(); ++k) {
-    const int i = long_bodies[k];
+  for (std::size_t k = 0; k < free_long.size(); ++k) {
+    const int i = free_long[k];
     RigidBody& b = bodies.motion[at(i)];
     linalg::Quaternion& q = bodies.orientation[at(i)];
     detail::turn_with_momentum(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)], dt, q,

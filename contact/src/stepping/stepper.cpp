@@ -12,7 +12,7 @@ namespace tether::contact {
 // New ones: nothing of the past is left.
 void Stepper::Implementation::make_solvers() {
   const BodyOptions o = detail::contact_options(options);
-  solver = std::make_unique<BodySolver>(o);
+  solver = std::make_unique<detail::StepSolver>(o);
   later = std::make_unique<detail::LaterImpacts>(
       detail::threshold_speed(options.impact_threshold, options),
       detail::threshold_speed(options.restitution_threshold, options), o);
@@ -21,9 +21,19 @@ void Stepper::Implementation::make_solvers() {
     later->add_restitution(options.restitution_law, o);
   }
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
-    correction = std::make_unique<BodySolver>(detail::correction_options(options));
+    correction = std::make_unique<detail::StepSolver>(detail::correction_options(options));
     closing = std::make_unique<detail::Closing>(detail::closing_options(options));
   }
+  if (joints) give_joints();
+}
+
+void Stepper::Implementation::give_joints() {
+  const BodyOptions o = detail::contact_options(options);
+  solver->set_joints(joints->make_islands(o));
+  if (restitution) restitution->set_joints(*joints, o);
+  if (correction) correction->set_joints(joints->make_islands(detail::correction_options(options)));
+  if (closing) closing->set_joints(*joints, detail::closing_options(options));
+  later->set_joints(*joints, o);
 }
 
 Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
@@ -68,6 +78,13 @@ double Stepper::penetration() const { return implementation_->deepest; }
 double Stepper::residual() const { return implementation_->residual; }
 Status Stepper::status() const { return implementation_->status; }
 bool Stepper::succeeded() const { return implementation_->succeeded; }
+double Stepper::joint_drift() const {
+  return implementation_->joints ? implementation_->joints->drift() : 0;
+}
+const std::vector<double>& Stepper::joint_impulses() const {
+  static const std::vector<double> none;
+  return implementation_->joints ? implementation_->joints->impulses() : none;
+}
 const StepCounts& Stepper::counts() const { return implementation_->counts; }
 const SteppingOptions& Stepper::options() const { return implementation_->options; }
 

@@ -7,6 +7,7 @@
 
 #include "stepping/closing.hpp"
 #include "stepping/impacts.hpp"
+#include "stepping/joint_part.hpp"
 #include "stepping/later_impacts.hpp"
 #include "stepping/near_contacts.hpp"
 #include "stepping/restitution.hpp"
@@ -51,28 +52,31 @@ struct Stepper::Implementation {
   std::vector<Stage> stages;
   std::size_t after_forces = 0;  // where the next force goes
   std::vector<Force> force;
-  std::vector<int> moving, round_bodies, long_bodies;  // of inertia 1 or not
-
-  std::vector<detail::FreeSpin> free_spin;  // of long_bodies
+  std::vector<int> moving, long_bodies;  // long: of inertia other than 1
+  // Those that no joint moves: all, round and long ones.
+  std::vector<int> free, free_round, free_long;
+  std::vector<detail::FreeSpin> free_spin;  // of free_long
 
   // Only with meetings.
   std::unique_ptr<detail::NearContacts> near;
-  std::unique_ptr<BodySolver> solver;
+  std::unique_ptr<detail::StepSolver> solver;
   std::unique_ptr<detail::Impacts> impacts;
   std::unique_ptr<detail::Restitution> restitution;
   std::unique_ptr<detail::LaterImpacts> later;
   StepContacts contacts;
   BodySolution solution;
 
-  // Of the step: the length of the part that is taken, and what is worst of all its parts.
-  double dt = 0;
+  std::unique_ptr<detail::JointPart> joints;  // only where they have been added
+
+  // Of the step: start and length of the part that is taken, what is worst of all its parts.
+  double part_start = 0, dt = 0;
   bool may_halve = false, failed = false, succeeded = true;
   Status status = Status::solved;
   double residual = 0, deepest = 0;
 
   // Only with error reduction.
   std::unique_ptr<detail::Closing> closing;
-  std::unique_ptr<BodySolver> correction;
+  std::unique_ptr<detail::StepSolver> correction;
   BodySolution correction_solution;
   std::vector<RigidBody> at_rest, closing_move;
   bool corrects = false;
@@ -86,6 +90,7 @@ struct Stepper::Implementation {
   void turn_inertias();
 
   void make_solvers();
+  void give_joints();
   void step();
   void advance(double time, double length, int halvings);
   bool run_stages(double time);
@@ -94,6 +99,11 @@ struct Stepper::Implementation {
   void judge();
 
   void remember_velocities() { impacts->remember(bodies); }
+  void begin_joints() { joints->begin(bodies, part_start); }
+  void predict_joints() { joints->predict(bodies, part_start, dt); }
+  void put_back_joints() { joints->put_back(bodies, part_start); }
+  void leave_out_joined();
+  void move_joints();
   void apply_gravity();
   void gyrate_explicit();
   void gyrate_implicit();

@@ -60,23 +60,19 @@ EngineKind choose(const Scene& s, std::string& why) {
   const auto refuse = [&](bool wrong, const std::string& text) {
     if (wrong) refusal += (refusal.empty() ? "" : "\n") + text;
   };
-  const bool contact = !s.pairs.empty(), joints = !s.joints.empty();
+  const bool contact = !s.pairs.empty();
   const bool projected = std::any_of(s.invariants.begin(), s.invariants.end(),
                                      [](const Invariant& each) { return each.project; });
   refuse(s.smooth && s.stepping, "the scene has options for both engines, [smooth] and [stepping]");
-  refuse(contact && joints,
-         "the scene has contacts ([[pair]]) and joints: no engine has both yet; leave out one of "
-         "them");
   refuse(contact && s.smooth,
          "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping]");
-  refuse(s.stepping && joints, "the stepping engine ([stepping]) has no joints yet: use [smooth]");
   refuse((contact || s.stepping) && projected,
          "the stepping engine projects no invariants: give them project = false, or, without "
          "contacts, use [smooth]");
   if (!refusal.empty()) throw std::invalid_argument(refusal);
 
   if (contact) {
-    why = "bodies touch";
+    why = s.joints.empty() ? "bodies touch" : "bodies touch; it has joints, too";
     return EngineKind::stepping;
   }
   why = s.stepping ? "the scene asks for it"
@@ -117,7 +113,8 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan) {
                        plan.unknowns, number(plan.rows, "row") + " of joints",
                        number(plan.invariants, "invariant") + " kept");
   else
-    out << fmt::format("unknowns  {} velocities; {} of bodies can touch\n", plan.unknowns,
+    out << fmt::format("unknowns  {} velocities{}; {} of bodies can touch\n", plan.unknowns,
+                       plan.rows > 0 ? ", with " + number(plan.rows, "row") + " of joints" : "",
                        plan.pairs == 1 ? "1 pair" : fmt::format("{} pairs", plan.pairs));
   out << "effects   " << (plan.effects.empty() ? "none: bodies move freely\n" : "");
   const char* indent = "";

@@ -31,12 +31,6 @@ contact::ShapeKind kind(ShapeKind k) {
 }
 
 void refuse(const Scene& scene) {
-  if (!scene.joints.empty())
-    throw std::invalid_argument(
-        "the stepping engine has no joints yet (the scene has " +
-        std::to_string(scene.joints.size()) +
-        "): leave out the pairs, then the smooth engine takes the joints, or replace the joints by "
-        "springs");
   for (const Invariant& each : scene.invariants)
     if (each.project)
       throw std::invalid_argument(

@@ -12,6 +12,7 @@
 
 #include "output/binary.hpp"
 #include "saved_memory.hpp"
+#include "stepped_joints.hpp"
 
 #if defined(TETHER_HAVE_COLLISION)
 #include <tether/contact/polyhedra.hpp>
@@ -69,6 +70,7 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
       stepper_(make_stepper(scene, std::move(mapped))),
       fingerprint_(fingerprint(scene, stepper_.options().step)),
       bodies_(scene.bodies.size()) {
+  if (!scene.joints.empty()) stepper_.add_joints(std::make_unique<SteppedJoints>(scene));
   add_forces(scene);
   read_bodies();
 }
@@ -93,19 +95,23 @@ void SteppingEngine::advance(double t) {
   const double slack = 1e-9 * stepper_.options().step;
   while (time() < t - slack) {
     if (interrupted()) break;
-    try {
-      stepper_.step();
-    } catch (const std::invalid_argument& e) {  // by contacts whose gap or place is no number
-      std::ostringstream text;
-      text << "t = " << time() << " s: the motion has left the range of numbers: " << e.what();
-      throw SimulationError(text.str());
-    }
+    step();
     if (on_failure_ == OnFailure::stop && !stepper_.succeeded()) {
       read_bodies();
       report_failure();
     }
   }
   read_bodies();
+}
+
+void SteppingEngine::step() {
+  try {
+    stepper_.step();
+  } catch (const std::invalid_argument& e) {  // by contacts whose gap or place is no number
+    std::ostringstream text;
+    text << "t = " << time() << " s: the motion has left the range of numbers: " << e.what();
+    throw SimulationError(text.str());
+  }
 }
 
 void SteppingEngine::report_failure() const {
@@ -117,6 +123,8 @@ void SteppingEngine::report_failure() const {
        << std::ldexp(stepper_.options().step, -stepper_.options().max_halvings)
        << " s; raise stepping.tolerance or stepping.max_halvings, reduce stepping.step, or set "
           "on_failure = \"warn\"";
+  if (stepper_.joint_drift() > 0)
+    text << "; joints are off by up to " << stepper_.joint_drift() << " m or rad";
   throw SimulationError(text.str());
 }
 
@@ -138,6 +146,7 @@ Diagnostics SteppingEngine::diagnostics() const {
   d.contacts = static_cast<int>(stepper_.contacts().points.size());
   d.penetration = stepper_.penetration();
   d.residual = stepper_.residual();
+  d.drift = stepper_.joint_drift();
   return d;
 }
 

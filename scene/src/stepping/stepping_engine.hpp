@@ -27,6 +27,7 @@ class SteppingEngine final : public Engine {
 
  private:
   SteppingEngine(const Scene& scene, Mapped mapped);
+  void step();
   void report_failure() const;
   void read_bodies();
 

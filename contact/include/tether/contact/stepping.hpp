@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <tether/contact/body_solver.hpp>
+#include <tether/contact/joint_equations.hpp>
 #include <tether/contact/shapes.hpp>
 #include <tether/export.hpp>
 #include <tether/linalg/eigen.hpp>
@@ -181,6 +182,12 @@ class Stepper {
   /// Forces act in the order in which they were added, after gravity. `effect` must outlive this.
   void add_force(const char* effect, Force force);
 
+  /// Bodies held by joints, before forces are added: once. Bodies that are off their joints, here
+  /// or at the start of a step, are put back by the least move; where joints contradict each other,
+  /// this and step() throw std::invalid_argument and name them. Bodies that a joint of three rows
+  /// or more connects pass through each other.
+  void add_joints(std::unique_ptr<JointEquations> joints);
+
   void step();
 
   double time() const;  ///< steps * dt
@@ -193,6 +200,11 @@ class Stepper {
   Status status() const;
   /// Solved or accepted, in all of its parts.
   bool succeeded() const;
+  /// Largest |g| of a joint's rows at the end of the last step, m or rad; 0 without joints.
+  double joint_drift() const;
+  /// Of the last part of the last step, by row of the joints, N s or N m s: see
+  /// JointSolution::joint_impulses.
+  const std::vector<double>& joint_impulses() const;
   const StepCounts& counts() const;
   std::vector<StageCost> costs() const;
   const SteppingOptions& options() const;

@@ -1,0 +1,152 @@
+// Tether: islands of contacts and joints in a step. SPDX-License-Identifier: BSD-3-Clause
+#include "joints/joint_islands.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+Options solver_options(const BodyOptions& o) {
+  Options out;
+  out.law = o.law;
+  out.measure = Measure::fixed_point;
+  out.tolerance = o.tolerance;
+  out.strict = o.strict;
+  out.max_work = o.max_work;
+  out.enough = o.enough;
+  return out;
+}
+
+}  // namespace
+
+StepJointIslands::StepJointIslands(Mechanisms& mechanisms, const BodyOptions& options)
+    : mechanisms_(mechanisms),
+      law_(options.law),
+      warm_(options.warm_start),
+      solver_(solver_options(options)) {}
+
+void StepJointIslands::set_options(const BodyOptions& options) {
+  solver_.set_options(solver_options(options));
+}
+
+void StepJointIslands::set_warm_start(const WarmStart& start) {
+  memory_.clear();
+  for (std::size_t k = 0; k < start.ids.size(); ++k) memory_.add(start.ids[k], start.impulses[k]);
+}
+
+// Of moving bodies, by contacts and mechanisms.
+void StepJointIslands::find_islands(const std::vector<PointContact>& contacts) {
+  const int n = mechanisms_.bodies();
+  parent_.resize(at(n));
+  std::iota(parent_.begin(), parent_.end(), 0);
+  const auto root = [&](int i) {
+    while (parent_[at(i)] != i) i = parent_[at(i)] = parent_[at(parent_[at(i)])];
+    return i;
+  };
+  const auto moves = [&](int body) { return body >= 0 && mechanisms_.moves(body); };
+  for (int m = 0; m < mechanisms_.count(); ++m)
+    for (const int body : mechanisms_[m].bodies())
+      parent_[at(root(body))] = root(mechanisms_[m].bodies().front());
+  for (const PointContact& c : contacts)
+    if (moves(c.first) && moves(c.second)) parent_[at(root(c.first))] = root(c.second);
+  has_joints_.assign(at(n), 0);
+  for (int m = 0; m < mechanisms_.count(); ++m)
+    has_joints_[at(root(mechanisms_[m].bodies().front()))] = 1;
+  jointed_.clear();
+  rest_.clear();
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const int body = moves(contacts[k].first) ? contacts[k].first : contacts[k].second;
+    const bool joints = moves(body) && has_joints_[at(root(body))];
+    (joints ? jointed_ : rest_).push_back(static_cast<int>(k));
+  }
+}
+
+void StepJointIslands::solve_jointed(const std::vector<RigidBody>& bodies,
+                                     const std::vector<PointContact>& contacts) {
+  v_.resize(bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    v_[i] << bodies[i].velocity, bodies[i].angular_velocity;
+  contacts_.clear();
+  x_.setZero(3 * static_cast<Eigen::Index>(jointed_.size()));
+  memory_.rewind();
+  for (const int k : jointed_) {
+    const PointContact& p = contacts[at(k)];
+    const double mu = law_ == Law::frictionless ? 0 : p.mu;
+    const auto row = 3 * static_cast<Eigen::Index>(contacts_.size());
+    contacts_.push_back(BodyContact::at_point(p.first, p.second, p.r1, p.r2, p.normal, mu));
+    contacts_.back().bias[0] = p.bias;
+    if (const Vector3d* last = warm_ ? memory_.find(p.id) : nullptr)
+      x_.segment<3>(row) = tangent_frame(p.normal) * *last;
+  }
+  result_ = solver_.solve(mechanisms_, contacts_, v_, x_);
+}
+
+void StepJointIslands::merge(const std::vector<RigidBody>& bodies,
+                             const std::vector<PointContact>& contacts, BodySolution& out) {
+  out.velocities = solution_.velocities;
+  out.angular_velocities = solution_.angular_velocities;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const int body = static_cast<int>(i);
+    int root = body;
+    while (parent_[at(root)] != root) root = parent_[at(root)];
+    if (!mechanisms_.moves(body) || !has_joints_[at(root)]) continue;
+    out.velocities[i] = v_[i].head<3>();
+    out.angular_velocities[i] = v_[i].tail<3>();
+  }
+  out.impulses.resize(contacts.size());
+  out.regimes.resize(contacts.size());
+  for (std::size_t k = 0; k < rest_.size(); ++k) {
+    out.impulses[at(rest_[k])] = solution_.impulses[k];
+    out.regimes[at(rest_[k])] = solution_.regimes[k];
+  }
+  for (std::size_t k = 0; k < jointed_.size(); ++k) {
+    const PointContact& p = contacts[at(jointed_[k])];
+    const Vector3d x = x_.segment<3>(3 * static_cast<Eigen::Index>(k));
+    out.impulses[at(jointed_[k])] = tangent_frame(p.normal).transpose() * x;
+    const bool slides = x.tail<2>().norm() >= p.mu * x[0] * (1 - 1e-12);
+    out.regimes[at(jointed_[k])] = x[0] == 0 ? Regime::separating
+                                   : slides  ? Regime::sliding
+                                             : Regime::sticking;
+  }
+  out.status = result_.status == Status::solved ? solution_.status : result_.status;
+  out.error = solution_.error > result_.error ? solution_.error : result_.error;
+  out.islands = solution_.islands + result_.islands;
+  out.assembled_islands = solution_.assembled_islands + result_.islands;
+  out.failed_islands = solution_.failed_islands + (result_.status != Status::solved);
+  out.sweeps = std::max(solution_.sweeps, result_.counts.sweeps);
+}
+
+void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& bodies,
+                             const std::vector<PointContact>& contacts, BodySolution& out) {
+  find_islands(contacts);
+  if (jointed_.empty()) {
+    others.solve(bodies, contacts, out);
+    return remember(contacts, out);
+  }
+  points_.clear();
+  for (const int k : rest_) points_.push_back(contacts[at(k)]);
+  others.solve(bodies, points_, solution_);
+  solve_jointed(bodies, contacts);
+  merge(bodies, contacts, out);
+  remember(contacts, out);
+  start_.ids = memory_.ids();
+  start_.impulses = memory_.impulses();
+  others.set_warm_start(start_);
+}
+
+// All contacts, here and in the other solver: the next time they may be in islands of the other
+// kind, and a run that goes on from a saved state finds the same.
+void StepJointIslands::remember(const std::vector<PointContact>& contacts,
+                                const BodySolution& out) {
+  std::swap(memory_, before_);
+  memory_.clear();
+  for (std::size_t k = 0; k < contacts.size(); ++k) memory_.add(contacts[k].id, out.impulses[k]);
+}
+
+}  // namespace tether::contact::detail

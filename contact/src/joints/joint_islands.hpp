@@ -1,0 +1,52 @@
+// Tether: islands of contacts and joints in a step. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "body_sweeps/impulse_memory.hpp"
+#include "joints/jointed_contacts.hpp"
+#include "joints/mechanisms.hpp"
+#include "stepping/joint_part.hpp"
+
+namespace tether::contact::detail {
+
+/// Splits contacts by whether a mechanism is in their island.
+class StepJointIslands final : public JointIslands {
+ public:
+  /// The mechanisms belong to the joints of the stepper, and are as they left them last.
+  StepJointIslands(Mechanisms& mechanisms, const BodyOptions& options);
+
+  void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
+             const std::vector<PointContact>& contacts, BodySolution& out) override;
+  void set_options(const BodyOptions& options) override;
+  void scale_warm_start(double factor) override { memory_.scale(factor); }
+  void take_back() override { std::swap(memory_, before_); }
+  void forget() override { memory_.clear(); }
+  void set_warm_start(const WarmStart& start) override;
+
+ private:
+  void find_islands(const std::vector<PointContact>& contacts);
+  void solve_jointed(const std::vector<RigidBody>& bodies,
+                     const std::vector<PointContact>& contacts);
+  void remember(const std::vector<PointContact>& contacts, const BodySolution& out);
+  void merge(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+             BodySolution& out);
+
+  Mechanisms& mechanisms_;
+  Law law_;
+  bool warm_;
+  JointedContacts solver_;
+  JointedContacts::Result result_;
+  std::vector<int> parent_;
+  std::vector<char> has_joints_;     // of the root of an island
+  std::vector<int> jointed_, rest_;  // contacts
+  std::vector<PointContact> points_;
+  BodySolution solution_;  // of rest_
+  std::vector<BodyContact> contacts_;
+  std::vector<Vector6d> v_;
+  linalg::VectorX x_;
+  ImpulseMemory memory_, before_;  // of the last solve, and of the one before it
+  WarmStart start_;
+};
+
+}  // namespace tether::contact::detail

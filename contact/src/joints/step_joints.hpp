@@ -1,0 +1,86 @@
+// Tether: joints in a step. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/joint_equations.hpp>
+#include <tether/contact/stepping.hpp>
+#include <utility>
+#include <vector>
+
+#include "joints/mechanisms.hpp"
+#include "stepping/joint_part.hpp"
+
+namespace tether::contact::detail {
+
+/// README, section 16. A step starts on the joints, G v = rate. With the rows G of its start, joint
+/// impulses make its end meet g = 0 (as SHAKE does): first without contacts, so that contacts solve
+/// for velocities that the joints allow, then for what the contacts have changed. Velocities are
+/// put onto the rows of the end (RATTLE). All of these are impulses along G': linear and angular
+/// momentum of a mechanism that nothing else holds stay.
+class StepJoints final : public JointPart {
+ public:
+  StepJoints(std::unique_ptr<JointEquations> equations, const BodySet& bodies,
+             Gyroscopic gyroscopic);
+
+  bool holds(int body) const override { return mechanisms_.mechanism_of(body) >= 0; }
+  const std::vector<std::pair<int, int>>& links() const override { return links_; }
+  bool are_joined(int first, int second) const override;
+  std::unique_ptr<JointIslands> make_islands(const BodyOptions& options) override;
+
+  /// Start of a step, before its forces: where the bodies have been moved from outside, they are
+  /// put back onto the joints by the least move, and their velocities. Throws std::invalid_argument
+  /// on joints that contradict each other.
+  void begin(BodySet& bodies, double t) override;
+  /// Before the contacts are solved: velocities that meet the joints at the end of the step.
+  void predict(BodySet& bodies, double t, double dt) override;
+  /// Where something has moved the bodies since begin(): the least move back onto the joints.
+  void put_back(BodySet& bodies, double t) override;
+  /// Moves the bodies of the mechanisms to the end of the step. False: it does not meet the joints
+  /// to round-off.
+  bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) override;
+
+  /// Largest |g| at the end of the last step, m or rad.
+  double drift() const override { return drift_; }
+  /// Of the last step, by row.
+  const std::vector<double>& impulses() const override { return impulses_; }
+
+ private:
+  struct Place {
+    Eigen::Vector3d position;
+    linalg::Quaternion orientation;
+  };
+  void factor(const BodySet& bodies, double t);
+  bool moved_since(const BodySet& bodies, double t) const;
+  void take_velocities(const BodySet& bodies);
+  void give_velocities(BodySet& bodies) const;
+  double size(const BodySet& bodies) const;
+  double least_move(const BodySet& bodies, double t, double dt);
+  void turn_back(BodySet& bodies, int body, const Eigen::Vector3d& turn) const;
+  bool project_positions(BodySet& bodies, double t);
+  [[noreturn]] void refuse(const BodySet& bodies, double t);
+  [[noreturn]] void refuse_rates();
+  void store(const BodySet& bodies);
+  void restore(BodySet& bodies) const;
+  void advance_bodies(BodySet& bodies, double dt) const;
+  bool meet(BodySet& bodies, double t, double dt);
+  void find_impulses(const BodySet& bodies, const StepContacts& contacts);
+
+  std::unique_ptr<JointEquations> equations_;
+  Gyroscopic gyroscopic_;
+  Mechanisms mechanisms_;
+  JointRows rows_;
+  std::vector<Body> bodies_;  // inverse masses
+  std::vector<int> held_;     // bodies of mechanisms
+  std::vector<char> round_;   // of them: of inertia 1
+  std::vector<std::pair<int, int>> links_, joined_;
+  std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
+  std::vector<double> g_, b_, u_, x_, impulses_;
+  std::vector<Place> place_;  // of held_, at the start of the step
+  // Of all bodies, and the time: what the factors belong to.
+  std::vector<Eigen::Vector3d> position_;
+  std::vector<linalg::Quaternion> orientation_;
+  double time_ = 0, drift_ = 0;
+  double left_ = 0;  // of the last least_move(): what no move takes back, in its metric
+};
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,28 @@
+// Tether: joints are added to a Stepper. SPDX-License-Identifier: BSD-3-Clause
+//
+// Apart from stepper.cpp, so that who adds none links nothing of them.
+#include <stdexcept>
+#include <utility>
+
+#include "joints/step_joints.hpp"
+#include "stepping/stepper_parts.hpp"
+
+namespace tether::contact {
+
+void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
+  Implementation& s = *implementation_;
+  if (s.joints || !s.force.empty())
+    throw std::invalid_argument("Stepper::add_joints: once, and before add_force");
+  if (!joints || joints->rows() == 0) return;
+  s.joints =
+      std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
+  s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
+  if (s.solver) s.give_joints();
+  for (std::vector<int>* list : {&s.moving, &s.long_bodies, &s.free, &s.free_round, &s.free_long})
+    list->clear();
+  s.free_spin.clear();
+  s.stages.clear();
+  s.make_stages();
+}
+
+}  // namespace tether::contact

@@ -1,0 +1,87 @@
+// Tether: what joints do in a step, as the stages call it. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/stepping.hpp>
+#include <utility>
+#include <vector>
+
+namespace tether::contact::detail {
+
+/// Contact problems of islands with joints. Abstract, as JointPart: who adds no joints to a Stepper
+/// links nothing of them.
+class JointIslands {
+ public:
+  virtual ~JointIslands() = default;
+  /// As BodySolver::solve, which `others` is, for all islands that no joint takes part in. Joints
+  /// keep the velocities that they have: v+ - v satisfies G (v+ - v) = 0.
+  virtual void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
+                     const std::vector<PointContact>& contacts, BodySolution& out) = 0;
+  virtual void set_options(const BodyOptions& options) = 0;
+  virtual void scale_warm_start(double factor) = 0;
+  virtual void take_back() = 0;
+  virtual void forget() = 0;
+  virtual void set_warm_start(const WarmStart& start) = 0;
+};
+
+class JointPart {
+ public:
+  virtual ~JointPart() = default;
+  virtual bool holds(int body) const = 0;
+  /// Pairs that connect the bodies of each mechanism.
+  virtual const std::vector<std::pair<int, int>>& links() const = 0;
+  /// Bodies that a joint of three rows or more connects pass through each other.
+  virtual bool are_joined(int first, int second) const = 0;
+  virtual std::unique_ptr<JointIslands> make_islands(const BodyOptions& options) = 0;
+
+  virtual void begin(BodySet& bodies, double t) = 0;
+  virtual void predict(BodySet& bodies, double t, double dt) = 0;
+  virtual void put_back(BodySet& bodies, double t) = 0;
+  virtual bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) = 0;
+  virtual double drift() const = 0;
+  virtual const std::vector<double>& impulses() const = 0;
+};
+
+/// A BodySolver, and JointIslands where there are joints.
+class StepSolver {
+ public:
+  explicit StepSolver(const BodyOptions& options = {}) : solver_(options) {}
+  void set_joints(std::unique_ptr<JointIslands> joints) { joints_ = std::move(joints); }
+
+  void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+             BodySolution& out) {
+    if (joints_)
+      joints_->solve(solver_, bodies, contacts, out);
+    else
+      solver_.solve(bodies, contacts, out);
+  }
+  const BodyOptions& options() const { return solver_.options(); }
+  void set_options(const BodyOptions& options) {
+    solver_.set_options(options);
+    if (joints_) joints_->set_options(options);
+  }
+  void scale_warm_start(double factor) {
+    solver_.scale_warm_start(factor);
+    if (joints_) joints_->scale_warm_start(factor);
+  }
+  void take_back() {
+    solver_.take_back();
+    if (joints_) joints_->take_back();
+  }
+  void forget() {
+    solver_.forget();
+    if (joints_) joints_->forget();
+  }
+  /// Of all contacts.
+  WarmStart warm_start() const { return solver_.warm_start(); }
+  void set_warm_start(const WarmStart& start) {
+    solver_.set_warm_start(start);
+    if (joints_) joints_->set_warm_start(start);
+  }
+
+ private:
+  BodySolver solver_;
+  std::unique_ptr<JointIslands> joints_;
+};
+
+}  // namespace tether::contact::detail

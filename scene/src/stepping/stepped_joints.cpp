@@ -1,0 +1,52 @@
+// Tether: the joints of a scene, as the contact library's steps take them.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stepped_joints.hpp"
+
+namespace tether::scene::stepping {
+
+using namespace mechanics;
+
+SteppedJoints::SteppedJoints(const Scene& scene) : bodies_(scene), rows_(scene, bodies_.bodies()) {}
+
+void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) {
+  bodies_.read_positions(bodies);
+  rows_.set_time(t);
+  const Bodies& all = bodies_.bodies();
+  rows_.each([&](const auto& row) {
+    row.template rows<0>(all.frames[at(row.first)], all.frames[at(row.second)], g + row.row);
+  });
+}
+
+// What a multiplier pulls with is the gradient of its row. JointRows::each goes kind by kind, and
+// rows are numbered joint by joint.
+void SteppedJoints::add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) {
+  bodies_.read_positions(bodies);
+  rows_.set_time(t);
+  const Bodies& all = bodies_.bodies();
+  gradients_.resize(at(rows_.count()));
+  rows_.each([&](const auto& row) {
+    const Frame<double>&A = all.frames[at(row.first)], &B = all.frames[at(row.second)];
+    double unit[3] = {0, 0, 0}, by_time[3];
+    row.rate_by_time(by_time);
+    for (int i = 0; i < row.count; ++i) {
+      unit[i] = 1;
+      Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
+      row.pull(A, B, unit, a, b);
+      unit[i] = 0;
+      gradients_[at(row.row + i)] = {row.joint, row.first, row.second, -by_time[i], a, b};
+    }
+  });
+  const auto add = [&](int body, const Wrench<double>& w) {
+    if (body == all.world()) return;
+    contact::Vector6d G;
+    G << w.force, w.torque;
+    out.on(body, G);
+  };
+  for (const Gradient& each : gradients_) {
+    out.add(each.joint, each.rate);
+    add(each.first, each.on_first);
+    add(each.second, each.on_second);
+  }
+}
+
+}  // namespace tether::scene::stepping

@@ -1,0 +1,38 @@
+// Tether: the joints of a scene, as the contact library's steps take them.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tether/contact/joint_equations.hpp>
+#include <tether/contact/stepping.hpp>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "joints/joint_rows.hpp"
+#include "mechanics/stepped_bodies.hpp"
+
+namespace tether::scene::stepping {
+
+/// The rows that the smooth engine has (joints::JointRows), at the positions of a BodySet with the
+/// bodies of the scene.
+class SteppedJoints final : public contact::JointEquations {
+ public:
+  explicit SteppedJoints(const Scene& scene);
+
+  int rows() const override { return rows_.count(); }
+  void values(const contact::BodySet& bodies, double t, double* g) override;
+  void add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) override;
+  std::string name(int joint) const override { return "joint \"" + rows_.name(joint) + "\""; }
+
+ private:
+  struct Gradient {
+    int joint, first, second;
+    double rate;
+    mechanics::Wrench<double> on_first, on_second;
+  };
+  mechanics::SteppedBodies bodies_;
+  joints::JointRows rows_;
+  std::vector<Gradient> gradients_;  // by row
+};
+
+}  // namespace tether::scene::stepping
