@@ -16,6 +16,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kSampleEvery = 16;
+constexpr double kAsideFromTest = 1.6;   // multipliers of index 2: see README, section 9
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 }  // namespace
@@ -299,7 +300,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     variables_.look_at_index(candidate, corrector_, cj);
   else
     variables_.note_index_as_low();
-  if (variables_.high_index()) control_.begin_smoothing();
+  if (variables_.high_index()) control_.begin_smoothing(kAsideFromTest);
   joined_.join(candidate, cj);
   mover_ = joined_.mover() != nullptr ? joined_.mover() : own_mover_.get();
   if (corrector_.stopped()) return Status::callback_fatal;

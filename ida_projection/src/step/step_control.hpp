@@ -29,7 +29,8 @@ class StepControl {
   double weights_factor() const { return weights_factor_; }
 
   bool smoothing() const { return smoother_.on(); }
-  void begin_smoothing();
+  /// Errors are steered to a `care`-th of what smoothing asks for.
+  void begin_smoothing(double care);
   /// For each new step.
   void look_for_refusals(bool engaged);
   /// Before the first move: does IDA fail on algebraic variables in its error test, which would be

@@ -42,7 +42,7 @@ void StepSmoother::reset() {
   steps_ = -1;
   known_ = block_ = 0;
   block_sum_ = 0.0;
-  ratio_ = 1.0;
+  ratio_ = care_ = 1.0;
   if (on_ || was_on) set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
 }
 
@@ -123,7 +123,7 @@ double StepSmoother::control(long steps, double norm) {
 
   const double error = error_constant(h, order) * norm;
   const double own_ratio = std::pow(2.0 * error + 1e-4, -1.0 / (order + 1));  // IDA's tmp
-  const double log_c = -std::log(setpoint_ * error + 1e-4);
+  const double log_c = -std::log(setpoint_ * care_ * error + 1e-4);
   pending_ = true;
   steps_ = steps;
   h_ = h;

@@ -22,8 +22,11 @@ class StepSmoother {
   /// Before the first step: on only if Options::step_smoothing says so.
   void reset();
   /// From here on, in the middle of a run; leaves IDASetMaxStep alone, which the host may have
-  /// used.
-  void begin() { on_ = true; }
+  /// used. The setpoint is `care` times Options::smoothing_setpoint.
+  void begin(double care) {
+    on_ = true;
+    care_ = care;
+  }
   bool on() const { return on_; }
   /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
   /// norm of IDA's error test. Returns by how much IDA's error weights are to be multiplied for
@@ -44,7 +47,7 @@ class StepSmoother {
 
   void* ida_mem_;
   bool wanted_, on_ = false, owns_max_step_ = false;
-  double setpoint_, max_step_;
+  double setpoint_, care_ = 1.0, max_step_;
   int max_order_;
 
   // the attempt that IDA has not yet judged
