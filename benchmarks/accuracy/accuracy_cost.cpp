@@ -142,11 +142,11 @@ class Report {
              details("Why ours is beyond 100 tolerances", unmet(points));
     for (const Point& point : points) {
       csv_ += csv_line(point);
-      json_ += (json_.empty() ? "" : ",\n") + json_point(point);
+      json_.push_back(json_point(point));
     }
   }
 
-  void finish(const std::string& versions) {
+  void finish(const Json& versions) {
     std::string matrices;
     fmt::print("CPU at equal error, 1e-3 to 1e-9, all problems\n{}", comparison_.summary().text());
     for (const auto& [pair, standing] : comparison_.standings()) {
@@ -160,14 +160,15 @@ class Report {
                                       "<details><summary>Point by point</summary>" + matrices +
                                       "</details>\n" + html_);
     if (!arguments_.json.empty())
-      write_file(arguments_.json, "{\"versions\":{" + versions + "},\n\"ratios\":[" +
-                                      comparison_.json() + "],\n\"runs\":[" + json_ + "]}\n");
+      write_json(arguments_.json,
+                 Json{{"versions", versions}, {"ratios", comparison_.json()}, {"runs", json_}});
   }
 
  private:
   const Arguments& arguments_;
   Comparison comparison_;
-  std::string html_, csv_, json_;
+  std::string html_, csv_;
+  Json json_ = Json::array();
 };
 
 int run(const Arguments& arguments) {
@@ -180,13 +181,12 @@ int run(const Arguments& arguments) {
   const Codes codes = wanted_codes(arguments.peers);
   check_writable(arguments);
   std::vector<std::string> peers;
-  std::string versions;
+  Json versions = Json::object();
   for (const auto& code : codes) {
     const std::string base = base_name(code->name());
     if (is_peer(base) && std::find(peers.begin(), peers.end(), base) == peers.end())
       peers.push_back(base);
-    versions += (versions.empty() ? "" : ",") + json_string(code->name()) + ":" +
-                json_string(code->version());
+    versions[code->name()] = code->version();
   }
   Plan plan;
   plan.tolerances = tolerance_ladder(loose, tight, arguments.count);

@@ -156,27 +156,15 @@ std::string html_escape(const std::string& text) {
   return out;
 }
 
-std::string json_string(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 0x20)
-      out += ' ';
-    else
-      out += c;
-  }
-  return out + "\"";
-}
-
-std::string json_number(double value) {
-  return std::isfinite(value) ? fmt::format("{:.6g}", value) : "null";
-}
-
 void write_file(const std::string& path, const std::string& text) {
   std::ofstream file(path);
   file << text;
   file.flush();
   if (!file) throw std::runtime_error("cannot write " + path);
+}
+
+void write_json(const std::string& path, const Json& value) {
+  write_file(path, value.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace tether::bench

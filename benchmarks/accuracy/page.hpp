@@ -1,10 +1,13 @@
 // Tether: pictures and tables of a comparison as text. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 namespace tether::bench {
+
+using Json = nlohmann::ordered_json;
 
 /// A line of a picture; both axes are logarithmic.
 struct Line {
@@ -27,10 +30,9 @@ struct Table {
 };
 
 std::string html_escape(const std::string& text);
-std::string json_string(const std::string& text);
-std::string json_number(double value);  ///< null for NaN and infinities
-
 /// Throws std::runtime_error naming the file.
 void write_file(const std::string& path, const std::string& text);
+/// NaN and infinities are null.
+void write_json(const std::string& path, const Json& value);
 
 }  // namespace tether::bench

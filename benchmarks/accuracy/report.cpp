@@ -50,9 +50,11 @@ std::string Comparison::note(const Pair& pair, const std::string& problem, int d
     standing.worst = ratio;
     standing.worst_at = problem + " at " + at;
   }
-  json_ += fmt::format("{}{{\"problem\":{},\"ours\":{},\"code\":{},\"error\":{},\"ratio\":{}}}",
-                       json_.empty() ? "" : ",\n", json_string(problem), json_string(pair.first),
-                       json_string(pair.second), at, json_number(ratio));
+  json_.push_back({{"problem", problem},
+                   {"ours", pair.first},
+                   {"code", pair.second},
+                   {"error", std::pow(10.0, -decade)},
+                   {"ratio", ratio}});
   return number(ratio, "{:.2f}");
 }
 
@@ -213,22 +215,30 @@ std::string csv_line(const Point& p) {
       orders(p, ";", [](std::size_t k, long n) { return fmt::format("{}:{}", k, n); }), status);
 }
 
-std::string json_point(const Point& p) {
-  const std::string drift = join(p, ",", [](const std::string& name, double value) {
-    return json_string(name) + ":" + json_number(value);
-  });
-  return fmt::format(
-      "{{\"problem\":{},\"code\":{},\"form\":{},\"tolerance\":{},\"error\":{},\"scd\":{},"
-      "\"cpu_ms\":{},\"steps\":{},\"F\":{},\"J\":{},\"factorizations\":{},\"projections\":{},"
-      "\"error_failures\":{},\"solver_failures\":{},\"to_best_peer\":{},\"to_plain_ida\":{},"
-      "\"drift\":{{{}}},\"orders\":{{{}}},\"status\":{}}}",
-      json_string(p.problem), json_string(p.code), json_string(p.form), json_number(p.tolerance),
-      p.run.failed ? "null" : json_number(p.run.error), json_number(p.scd),
-      json_number(p.run.cpu_ms), p.run.steps, p.run.residuals, p.run.jacobians,
-      p.run.factorizations, p.run.projections, p.run.error_failures, p.run.solver_failures,
-      json_number(p.to_peers), json_number(p.to_plain), drift,
-      orders(p, ",", [](std::size_t k, long n) { return fmt::format("\"{}\":{}", k, n); }),
-      json_string(p.status));
+Json json_point(const Point& p) {
+  Json drift = Json::object(), orders = Json::object();
+  for (const auto& [name, value] : p.drift) drift[name] = value;
+  for (std::size_t k = 0; k < p.orders.size(); ++k)
+    if (p.orders[k] > 0) orders[std::to_string(k)] = p.orders[k];
+  return {{"problem", p.problem},
+          {"code", p.code},
+          {"form", p.form},
+          {"tolerance", p.tolerance},
+          {"error", p.run.failed ? Json() : Json(p.run.error)},
+          {"scd", p.scd},
+          {"cpu_ms", p.run.cpu_ms},
+          {"steps", p.run.steps},
+          {"F", p.run.residuals},
+          {"J", p.run.jacobians},
+          {"factorizations", p.run.factorizations},
+          {"projections", p.run.projections},
+          {"error_failures", p.run.error_failures},
+          {"solver_failures", p.run.solver_failures},
+          {"to_best_peer", p.to_peers},
+          {"to_plain_ida", p.to_plain},
+          {"drift", drift},
+          {"orders", orders},
+          {"status", p.status}};
 }
 
 }  // namespace tether::bench

@@ -34,8 +34,8 @@ class Comparison {
   /// Ratio of two codes: a line for each problem, a column for each decade.
   Table point_by_point(const Pair& pair) const;
   const std::map<Pair, Standing>& standings() const { return standings_; }
-  /// {"problem":..,"ours":..,"code":..,"error":..,"ratio":..}, joined with commas.
-  std::string json() const { return json_; }
+  /// An array of {problem, ours, code, error, ratio}.
+  const Json& json() const { return json_; }
 
  private:
   // Takes a ratio in and returns it as text.
@@ -44,7 +44,7 @@ class Comparison {
   std::vector<std::string> peers_;  // without plain IDA
   std::map<Pair, Standing> standings_;
   std::map<Pair, std::vector<std::vector<std::string>>> lines_;
-  std::string json_;
+  Json json_ = Json::array();
 };
 
 /// Our runs: how many met 100 tolerances and how many did not, for each code and form. (Fast ones
@@ -58,6 +58,6 @@ Table work_at(const std::vector<Point>& points, double tolerance);
 std::string picture(const Case& which, const std::vector<Point>& points);
 std::string csv_head();
 std::string csv_line(const Point& point);
-std::string json_point(const Point& point);
+Json json_point(const Point& point);
 
 }  // namespace tether::bench

@@ -132,7 +132,8 @@ int main(int argc, char** argv) {
   table.head = {"problem, form", "code",        "error scatter", "slope",  "steps scatter",
                 "/ IDA error",   "/ IDA steps", "CPU / IDA",     "failed", "goal"};
   std::string pictures,
-      lines = "problem,form,code,error_scatter,slope,steps_scatter,cpu,failures\n", items;
+      lines = "problem,form,code,error_scatter,slope,steps_scatter,cpu,failures\n";
+  Json items = Json::array();
   std::vector<Case> cases;
   try {
     cases = catalogue(only, skip);
@@ -160,12 +161,14 @@ int main(int argc, char** argv) {
         lines += fmt::format("{},{},{},{:.5g},{:.5g},{:.5g},{:.5g},{}\n", which.name, problem.form,
                              s.code, error.scatter, error.slope, steps.scatter, s.cpu.value(),
                              s.failures);
-        items += fmt::format(
-            "{}{{\"problem\":{},\"form\":{},\"code\":{},\"error_scatter\":{},\"slope\":{},"
-            "\"steps_scatter\":{},\"cpu\":{},\"failures\":{}}}",
-            items.empty() ? "" : ",\n", json_string(which.name), json_string(problem.form),
-            json_string(s.code), json_number(error.scatter), json_number(error.slope),
-            json_number(steps.scatter), json_number(s.cpu.value()), s.failures);
+        items.push_back({{"problem", which.name},
+                         {"form", problem.form},
+                         {"code", s.code},
+                         {"error_scatter", error.scatter},
+                         {"slope", error.slope},
+                         {"steps_scatter", steps.scatter},
+                         {"cpu", s.cpu.value()},
+                         {"failures", s.failures}});
         points.push_back({s.code, s.code, powers(s.log_tolerance), powers(s.log_error), true});
       }
       pictures += svg(which.name + ", " + problem.form, "tolerance", "end error (mixed)", points);
@@ -178,7 +181,7 @@ int main(int argc, char** argv) {
   fmt::print("{}", table.text());
   try {
     if (!csv.empty()) write_file(csv, lines);
-    if (!json.empty()) write_file(json, "[" + items + "]\n");
+    if (!json.empty()) write_json(json, items);
     if (!html.empty())
       write_file(html, "<h2>Computational stability</h2>\n" + table.html() + pictures);
   } catch (const std::exception& error) {

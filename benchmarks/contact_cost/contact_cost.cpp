@@ -72,7 +72,6 @@ std::string page(const std::string& title, const Report& report) {
 
 int run(const Arguments& a) {
   Report solvers, steps;
-  solvers.json = "[]";
   if (a.folder.empty()) {
     solvers.text = "contact solvers left out: no folder of problems\n";
   } else {
@@ -96,8 +95,7 @@ int run(const Arguments& a) {
     write_pictures(a.svg, solvers);
     write_pictures(a.svg, steps);
   }
-  if (!a.json.empty())
-    write_file(a.json, "{\"solvers\":" + solvers.json + ",\n\"steps\":" + steps.json + "}\n");
+  if (!a.json.empty()) write_json(a.json, Json{{"solvers", solvers.json}, {"steps", steps.json}});
   if (!a.html.empty())
     write_file(a.html, page("Contact solvers: residual against time", solvers) +
                            page("Stepping scheme: error against time", steps));

@@ -5,11 +5,14 @@
 #include <utility>
 #include <vector>
 
+#include "accuracy/page.hpp"
+
 namespace tether::bench {
 
 /// What one part has to say, in every form.
 struct Report {
-  std::string text, csv, html, json;                          ///< json: an array of runs
+  std::string text, csv, html;
+  Json json = Json::array();                                  ///< of runs
   std::vector<std::pair<std::string, std::string>> pictures;  ///< file name, SVG
 };
 

@@ -176,16 +176,18 @@ std::string csv(const std::vector<Run>& runs) {
   return out;
 }
 
-std::string json(const std::vector<Run>& runs) {
-  std::string out;
+Json json(const std::vector<Run>& runs) {
+  Json out = Json::array();
   for (const Run& r : runs)
-    out += fmt::format(
-        "{}{{\"problem\":{},\"contacts\":{},\"law\":{},\"solver\":{},\"tolerance\":{},\"status\":{}"
-        ",\"ms\":{},\"error\":{}}}",
-        out.empty() ? "" : ",\n", json_string(r.problem), r.contacts, json_string(name(r.law)),
-        json_string(r.solver), json_number(r.tolerance), json_string(r.status), json_number(r.ms),
-        json_number(r.error));
-  return "[" + out + "]";
+    out.push_back({{"problem", r.problem},
+                   {"contacts", r.contacts},
+                   {"law", name(r.law)},
+                   {"solver", r.solver},
+                   {"tolerance", r.tolerance},
+                   {"status", r.status},
+                   {"ms", r.ms},
+                   {"error", r.error}});
+  return out;
 }
 
 std::vector<std::filesystem::path> files_of(const std::string& folder) {

@@ -20,7 +20,6 @@ namespace tether::bench {
 
 Report step_cost(const std::vector<std::string>& scenes) {
   Report report;
-  report.json = "[]";
   if (!scenes.empty()) report.text = "scenes left out: built without the scene library\n";
   return report;
 }
@@ -74,12 +73,13 @@ void add(Report& report, const std::string& name, const scene::CostTable& table,
     report.csv +=
         fmt::format("{},{:g},{:.4e},{:.4e},{},{:.3e},{}\n", name, row.setting, row.error,
                     1e3 * row.seconds, row.steps, row.penetration, failed ? "failed" : "ok");
-    report.json += fmt::format(
-        "{}{{\"scene\":{},\"step\":{},\"error\":{},\"ms\":{},\"steps\":{},\"depth\":{},\"failure\":"
-        "{}}}",
-        report.json.empty() ? "" : ",\n", json_string(name), json_number(row.setting),
-        failed ? "null" : json_number(row.error), json_number(1e3 * row.seconds), row.steps,
-        json_number(row.penetration), json_string(row.failure));
+    report.json.push_back({{"scene", name},
+                           {"step", row.setting},
+                           {"error", failed ? Json() : Json(row.error)},
+                           {"ms", 1e3 * row.seconds},
+                           {"steps", row.steps},
+                           {"depth", row.penetration},
+                           {"failure", row.failure}});
     if (failed) continue;
     line.x.push_back(1e3 * row.seconds);
     line.y.push_back(std::max(row.error, 1e-17));
@@ -114,7 +114,6 @@ Report step_cost(const std::vector<std::string>& scenes) {
       report.text += fmt::format("{} left out: {}\n", name, e.what());
     }
   }
-  report.json = "[" + report.json + "]";
   return report;
 }
 

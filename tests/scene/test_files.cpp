@@ -85,7 +85,7 @@ TEST_CASE("every field of a scene is read") {
   CHECK(s.expect[2].place.line > s.expect[1].place.line);
 
   const Scene t = parse_scene(kTouching, "box.toml");
-  CHECK(t.stepping->law == ContactLaw::maximum_dissipation);
+  CHECK(t.stepping->law == tether::contact::Law::maximum_dissipation);
   CHECK(t.stepping->gyroscopic == Gyroscopic::implicit_step);
   CHECK(t.stepping->restitution_law == RestitutionLaw::poisson);
   CHECK(t.stepping->restitution_threshold == 0.02);

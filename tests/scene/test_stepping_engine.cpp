@@ -165,7 +165,7 @@ TEST_CASE("stepping engine: springs, dampers, loads and drag") {
 TEST_CASE("stepping engine: what is named with zero strength equals what is not named") {
   const auto a = make_stepping_engine(balls_on_floor(0, 0));
   Scene frictionless = balls_on_floor(0.3, 0);
-  frictionless.stepping->law = ContactLaw::frictionless;
+  frictionless.stepping->law = tether::contact::Law::frictionless;
   const auto b = make_stepping_engine(frictionless);
   a->advance(1);
   b->advance(1);

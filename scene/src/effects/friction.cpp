@@ -2,7 +2,6 @@
 //
 // |tangential impulse| <= friction * normal impulse, by the law of [stepping].
 #include <algorithm>
-#include <stdexcept>
 #include <tether/scene/words.hpp>
 
 #include "mechanics/effect.hpp"
@@ -14,18 +13,6 @@ using namespace mechanics;
 
 namespace {
 
-contact::Law in_contact(ContactLaw law) {
-  switch (law) {
-    case ContactLaw::coulomb:
-      return contact::Law::coulomb;
-    case ContactLaw::maximum_dissipation:
-      return contact::Law::maximum_dissipation;
-    case ContactLaw::frictionless:
-      return contact::Law::frictionless;
-  }
-  throw std::invalid_argument("unknown contact law");
-}
-
 class FrictionEffect : public Effect {
  public:
   void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
@@ -35,16 +22,13 @@ class FrictionEffect : public Effect {
     out.field("friction", pair.friction);
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const ContactLaw law = scene.stepping.value_or(SteppingOptions{}).law;
-    if (law == ContactLaw::frictionless ||
+    const contact::Law law = scene.stepping.value_or(SteppingOptions{}).law;
+    if (law == contact::Law::frictionless ||
         std::none_of(scene.pairs.begin(), scene.pairs.end(),
                      [](const Pair& pair) { return pair.friction > 0; }))
       return;
     lines.push_back(
         {"friction", fmt::format("{}, law {}", range(scene.pairs, &Pair::friction), word(law))});
-  }
-  void configure_contact(const Scene& scene, contact::SteppingOptions& options) const override {
-    options.law = in_contact(scene.stepping.value_or(SteppingOptions{}).law);
   }
   void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {
     meeting.friction = pair.friction;

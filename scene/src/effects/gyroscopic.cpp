@@ -51,20 +51,6 @@ class GyroscopicTorque : public Force {
   std::vector<int> bodies_;
 };
 
-contact::Gyroscopic in_contact(Gyroscopic g) {
-  switch (g) {
-    case Gyroscopic::none:
-      return contact::Gyroscopic::none;
-    case Gyroscopic::explicit_step:
-      return contact::Gyroscopic::explicit_step;
-    case Gyroscopic::implicit_step:
-      return contact::Gyroscopic::implicit_step;
-    case Gyroscopic::momentum:
-      return contact::Gyroscopic::momentum;
-  }
-  throw std::invalid_argument("unknown gyroscopic step");
-}
-
 class GyroscopicEffect : public Effect {
  public:
   void plan(const Scene& scene, EngineKind engine,
@@ -78,9 +64,6 @@ class GyroscopicEffect : public Effect {
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies&) const override {
     std::vector<int> bodies = precessing(scene);
     return bodies.empty() ? nullptr : std::make_unique<GyroscopicTorque>(std::move(bodies));
-  }
-  void configure(const Scene& scene, contact::SteppingOptions& options) const override {
-    options.gyroscopic = in_contact(scene.stepping.value_or(SteppingOptions{}).gyroscopic);
   }
 };
 

@@ -3,7 +3,6 @@
 // Newton's law: normal velocity after an impact = -restitution * the one before; Poisson's: the
 // same of impulses.
 #include <algorithm>
-#include <stdexcept>
 
 #include "mechanics/effect.hpp"
 #include "range.hpp"
@@ -13,16 +12,6 @@ namespace tether::scene::effects {
 using namespace mechanics;
 
 namespace {
-
-contact::RestitutionLaw in_contact(RestitutionLaw law) {
-  switch (law) {
-    case RestitutionLaw::newton:
-      return contact::RestitutionLaw::newton;
-    case RestitutionLaw::poisson:
-      return contact::RestitutionLaw::poisson;
-  }
-  throw std::invalid_argument("unknown law of restitution");
-}
 
 class RestitutionEffect : public Effect {
  public:
@@ -36,12 +25,6 @@ class RestitutionEffect : public Effect {
     if (std::any_of(scene.pairs.begin(), scene.pairs.end(),
                     [](const Pair& pair) { return pair.restitution > 0; }))
       lines.push_back({"restitution", range(scene.pairs, &Pair::restitution)});
-  }
-  void configure_contact(const Scene& scene, contact::SteppingOptions& options) const override {
-    const SteppingOptions wanted = scene.stepping.value_or(SteppingOptions{});
-    options.restitution_law = in_contact(wanted.restitution_law);
-    options.restitution_threshold = wanted.restitution_threshold;
-    options.impact_threshold = wanted.impact_threshold;
   }
   void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {
     meeting.restitution = pair.restitution;

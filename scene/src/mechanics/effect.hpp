@@ -69,8 +69,6 @@ class Effect {
   }
   /// Its part in the contact library's step.
   virtual void configure(const Scene&, contact::SteppingOptions&) const {}
-  /// The same where bodies touch: nothing of contact runs in a scene without pairs.
-  virtual void configure_contact(const Scene&, contact::SteppingOptions&) const {}
   virtual void configure_pair(const Pair&, contact::Meeting&) const {}
 };
 

@@ -12,24 +12,6 @@ namespace tether::scene::stepping {
 
 namespace {
 
-contact::ShapeKind kind(ShapeKind k) {
-  switch (k) {
-    case ShapeKind::sphere:
-      return contact::ShapeKind::sphere;
-    case ShapeKind::plane:
-      return contact::ShapeKind::plane;
-    case ShapeKind::box:
-      return contact::ShapeKind::box;
-    case ShapeKind::capsule:
-      return contact::ShapeKind::capsule;
-    case ShapeKind::convex:
-      return contact::ShapeKind::convex;
-    case ShapeKind::points:
-      return contact::ShapeKind::points;
-  }
-  throw std::invalid_argument("unknown kind of shape");
-}
-
 void refuse(const Scene& scene) {
   for (const Invariant& each : scene.invariants)
     if (each.project)
@@ -66,20 +48,7 @@ Mapped map_scene(const Scene& scene) {
     }
     const auto found = material.find(body.material);
     if (found == material.end()) continue;
-    for (const Shape& shape : body.shapes) {
-      contact::Surface surface;
-      surface.body = index;
-      surface.material = found->second;
-      surface.shape.kind = kind(shape.kind);
-      surface.shape.radius = shape.radius;
-      surface.shape.length = shape.length;
-      surface.shape.size = shape.size;
-      surface.shape.normal = shape.normal;
-      surface.shape.points = shape.points;
-      surface.shape.position = shape.position;
-      surface.shape.orientation = shape.orientation;
-      out.surfaces.push_back(std::move(surface));
-    }
+    for (const Shape& shape : body.shapes) out.surfaces.push_back({index, shape, found->second});
   }
   for (const Pair& pair : scene.pairs) {
     contact::Meeting meeting;
@@ -89,18 +58,9 @@ Mapped map_scene(const Scene& scene) {
     out.meetings.push_back(meeting);
   }
 
-  const SteppingOptions options = scene.stepping.value_or(SteppingOptions{});
-  out.options.step = options.step;
-  out.options.tolerance = options.tolerance;
-  out.options.error_reduction = options.error_reduction;
-  out.options.max_depenetration_speed = options.max_depenetration_speed;
-  out.options.acceptance = options.acceptance;
-  out.options.max_halvings = options.max_halvings;
-  out.options.threads = options.threads;
-  for (const effects::Effect* each : effects::all()) {
-    each->configure(scene, out.options);
-    if (!scene.pairs.empty()) each->configure_contact(scene, out.options);
-  }
+  out.options = scene.stepping.value_or(SteppingOptions{});
+  out.options.gravity.reset();
+  for (const effects::Effect* each : effects::all()) each->configure(scene, out.options);
   return out;
 }
 

@@ -28,6 +28,8 @@ function(contact_code name scene result)
   count(COMMAND ${PROGRAM} run ${WORK}/${name}.toml --quiet TOGGLE "tether::scene::run*"
     FUNCTIONS functions)
   list(FILTER functions INCLUDE REGEX "tether::contact::")
+  # Shapes are data of the scene: the standard library's copies of them are no code of contacts.
+  list(FILTER functions EXCLUDE REGEX "^[^(]*std::.*tether::contact::Shape|^tether::contact::Shape::(Shape|~Shape)")
   set(${result} "${functions}" PARENT_SCOPE)
 endfunction()
 

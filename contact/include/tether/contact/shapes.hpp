@@ -1,6 +1,7 @@
 // Tether: shapes of rigid bodies, and where they touch. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <tether/export.hpp>
 #include <tether/linalg/eigen.hpp>
@@ -10,6 +11,10 @@ TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 enum class ShapeKind : std::uint8_t { sphere, plane, box, capsule, convex, points };
+
+inline constexpr std::array<ShapeKind, 6> kShapeKinds{ShapeKind::sphere, ShapeKind::plane,
+                                                      ShapeKind::box,    ShapeKind::capsule,
+                                                      ShapeKind::convex, ShapeKind::points};
 
 const char* name(ShapeKind kind);
 

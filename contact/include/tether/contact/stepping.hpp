@@ -25,6 +25,9 @@ enum class Gyroscopic : std::uint8_t {
   momentum        ///< keeps angular momentum and energy to round-off
 };
 
+inline constexpr std::array<Gyroscopic, 4> kGyroscopics{
+    Gyroscopic::none, Gyroscopic::explicit_step, Gyroscopic::implicit_step, Gyroscopic::momentum};
+
 const char* name(Gyroscopic gyroscopic);
 
 /// What an impact gives back (README, section 14).
@@ -35,6 +38,9 @@ enum class RestitutionLaw : std::uint8_t {
   /// Impulses: those without restitution, and e times as much more; slip is given back as well.
   poisson
 };
+
+inline constexpr std::array<RestitutionLaw, 2> kRestitutionLaws{RestitutionLaw::newton,
+                                                                RestitutionLaw::poisson};
 
 const char* name(RestitutionLaw law);
 

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tether/contact/shapes.hpp>
+#include <tether/contact/stepping.hpp>
 #include <tether/export.hpp>
 #include <tether/linalg/eigen.hpp>
 #include <tether/scene/joint.hpp>
@@ -14,19 +16,11 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
-enum class ShapeKind : std::uint8_t { sphere, plane, box, capsule, convex, points };
-
-/// In the axes of its body, moved by `position` and turned by `orientation`.
-struct Shape {
-  ShapeKind kind = ShapeKind::sphere;
-  double radius = 0;  ///< sphere, capsule: m
-  double length = 0;  ///< capsule: between the centres of its caps (axis z), m
-  Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box: full edges, m
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the solid half-space
-  std::vector<Eigen::Vector3d> points;                ///< convex: vertices; points: touching points
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  linalg::Quaternion orientation = linalg::Quaternion::Identity();
-};
+/// Shapes, friction laws, restitution and steps are those of the contact library.
+using contact::Gyroscopic;
+using contact::RestitutionLaw;
+using contact::Shape;
+using contact::ShapeKind;
 
 struct Drag {
   double linear = 0, quadratic = 0;  ///< force -(linear + quadratic |v|) v: N s/m, N s^2/m^2
@@ -94,9 +88,6 @@ struct Invariant {
 };
 
 enum class Formulation : std::uint8_t { index1, index0, stabilised_index2 };
-enum class Gyroscopic : std::uint8_t { none, explicit_step, implicit_step, momentum };
-enum class ContactLaw : std::uint8_t { coulomb, maximum_dissipation, frictionless };
-enum class RestitutionLaw : std::uint8_t { newton, poisson };
 enum class OnFailure : std::uint8_t { stop, warn };
 
 /// Scenes without contact: IDA with projection.
@@ -108,22 +99,14 @@ struct SmoothOptions {
   int max_steps = 1000000;  ///< between two stops (records, expectations); then the run is given up
 };
 
-/// Scenes with contact: impulse-velocity steps.
-struct SteppingOptions {
-  double step = 1e-3;  ///< s
-  ContactLaw law = ContactLaw::coulomb;
-  double tolerance = 1e-9;
-  Gyroscopic gyroscopic = Gyroscopic::momentum;
-  double error_reduction = 0.2;        ///< part of a penetration that one step removes
-  double max_depenetration_speed = 1;  ///< m/s
-  RestitutionLaw restitution_law = RestitutionLaw::newton;
-  /// Of sqrt(gravity * size of the smaller body): slower approaches do not bounce, or do not end as
-  /// one whole impact.
-  double restitution_threshold = 0.01, impact_threshold = 0.01;
-  double acceptance = 1e7;  ///< of the tolerance: what is used, and counted, all the same
-  int max_halvings = 2;     ///< of a step whose contact problem is not solved
+/// Scenes with contact: impulse-velocity steps. Gravity is that of the scene.
+struct SteppingOptions : contact::SteppingOptions {
   OnFailure on_failure = OnFailure::stop;
-  int threads = 1;
+
+  SteppingOptions() {
+    acceptance = 1e7;
+    max_halvings = 2;
+  }
 };
 
 struct Output {

@@ -4,8 +4,10 @@
 
 #include <array>
 #include <string_view>
+#include <tether/contact/one_contact.hpp>
 #include <tether/scene/scene.hpp>
 #include <utility>
+#include <vector>
 
 namespace tether::scene {
 
@@ -13,16 +15,33 @@ namespace tether::scene {
 template <class E>
 struct Words;
 
+/// Values of the contact library with their names there.
+template <class E, class Values>
+std::vector<std::pair<std::string_view, E>> named(const Values& values) {
+  std::vector<std::pair<std::string_view, E>> list;
+  for (const E value : values) list.emplace_back(name(value), value);
+  return list;
+}
+
 template <>
 struct Words<ShapeKind> {
-  static constexpr std::array<std::pair<std::string_view, ShapeKind>, 6> list{{
-      {"sphere", ShapeKind::sphere},
-      {"plane", ShapeKind::plane},
-      {"box", ShapeKind::box},
-      {"capsule", ShapeKind::capsule},
-      {"convex", ShapeKind::convex},
-      {"points", ShapeKind::points},
-  }};
+  inline static const auto list = named<ShapeKind>(contact::kShapeKinds);
+};
+
+template <>
+struct Words<Gyroscopic> {
+  inline static const auto list = named<Gyroscopic>(contact::kGyroscopics);
+};
+
+template <>
+struct Words<RestitutionLaw> {
+  inline static const auto list = named<RestitutionLaw>(contact::kRestitutionLaws);
+};
+
+/// Every friction law of the contact library can be named in a scene.
+template <>
+struct Words<contact::Law> {
+  inline static const auto list = named<contact::Law>(contact::laws());
 };
 
 template <>
@@ -45,33 +64,6 @@ struct Words<Formulation> {
       {"index1", Formulation::index1},
       {"index0", Formulation::index0},
       {"stabilised_index2", Formulation::stabilised_index2},
-  }};
-};
-
-template <>
-struct Words<Gyroscopic> {
-  static constexpr std::array<std::pair<std::string_view, Gyroscopic>, 4> list{{
-      {"none", Gyroscopic::none},
-      {"explicit", Gyroscopic::explicit_step},
-      {"implicit", Gyroscopic::implicit_step},
-      {"momentum", Gyroscopic::momentum},
-  }};
-};
-
-template <>
-struct Words<ContactLaw> {
-  static constexpr std::array<std::pair<std::string_view, ContactLaw>, 3> list{{
-      {"coulomb", ContactLaw::coulomb},
-      {"maximum_dissipation", ContactLaw::maximum_dissipation},
-      {"frictionless", ContactLaw::frictionless},
-  }};
-};
-
-template <>
-struct Words<RestitutionLaw> {
-  static constexpr std::array<std::pair<std::string_view, RestitutionLaw>, 2> list{{
-      {"newton", RestitutionLaw::newton},
-      {"poisson", RestitutionLaw::poisson},
   }};
 };
 
