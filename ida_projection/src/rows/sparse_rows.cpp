@@ -188,9 +188,7 @@ void SparseRows::watch() {
 // Where a row's algebraic part vanishes, it is one for the differential columns.
 bool SparseRows::loses_algebraic_part(int i) const {
   bool lost = true;
-  visit(i, [&](int j, double c) {
-    lost = lost && (c == 0.0 || !is_algebraic(j) || held_[at(j)]);
-  });
+  visit(i, [&](int j, double c) { lost = lost && (c == 0.0 || !is_algebraic(j) || held_[at(j)]); });
   return lost;
 }
 
