@@ -7,6 +7,7 @@
 #include <tether/ida_projection/projection.hpp>
 #include <type_traits>
 
+#include "host/corrector.hpp"
 #include "host/ida.hpp"
 #include "host/linear_solver.hpp"
 #include "host/owned_vector.hpp"
@@ -15,7 +16,6 @@
 #include "start/algebraic.hpp"
 #include "start/joined_rows.hpp"
 #include "start/point.hpp"
-#include "step/corrector.hpp"
 #include "step/frequency.hpp"
 #include "step/polish.hpp"
 #include "step/step_control.hpp"

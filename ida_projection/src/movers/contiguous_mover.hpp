@@ -11,10 +11,10 @@
 #include <cmath>
 #include <limits>
 
+#include "movers/factor_wear.hpp"
 #include "movers/mover.hpp"
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
-#include "step/frequency.hpp"
 
 namespace tether::ida_projection {
 

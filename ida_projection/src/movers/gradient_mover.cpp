@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "attach/impl.hpp"
-#include "step/frequency.hpp"
+#include "host/owned_vector.hpp"
+#include "movers/factor_wear.hpp"
 
 namespace tether::ida_projection {
 

@@ -10,27 +10,9 @@
 #include <vector>
 
 #include "constraints/evaluator.hpp"
+#include "host/candidate.hpp"
 
 namespace tether::ida_projection {
-
-/// The candidate y = base + correction at time t, and IDA's reciprocal error weights 1/WT.
-struct Candidate {
-  double t;
-  N_Vector base;        ///< IDA's prediction
-  N_Vector correction;  ///< the corrector's ycor; the move is subtracted from it
-  N_Vector weights;
-  /// The entries of the three, for contiguous vectors; see with_entries().
-  double* base_entries = nullptr;
-  double* correction_entries = nullptr;
-  const double* weight_entries = nullptr;
-
-  Candidate& with_entries() {
-    base_entries = N_VGetArrayPointer(base);
-    correction_entries = N_VGetArrayPointer(correction);
-    weight_entries = N_VGetArrayPointer(weights);
-    return *this;
-  }
-};
 
 /// How far y' points out of the constraints.
 struct Tangency {
@@ -63,8 +45,8 @@ class Mover {
 
   /// Are there factors of an earlier step that may serve the next candidate, too?
   virtual bool may_follow() { return false; }
-  /// The move with them. Another status than success: they left too much (frequency.hpp); then the
-  /// correction has to be put back. `again`: the correction was changed after such a move.
+  /// The move with them. Another status than success: they left too much (factor_wear.hpp); then
+  /// the correction has to be put back. `again`: the correction was changed after such a move.
   virtual Move follow(const Candidate&, bool /*again*/) { return {}; }
 
   /// C y' row by row with C as it was evaluated last, over the first `reported` rows. False: not

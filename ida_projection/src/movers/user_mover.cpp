@@ -1,5 +1,6 @@
 // Tether: a projection that the caller does himself. SPDX-License-Identifier: BSD-3-Clause
-#include "attach/impl.hpp"
+#include "host/owned_vector.hpp"
+#include "movers/mover.hpp"
 
 namespace tether::ida_projection {
 

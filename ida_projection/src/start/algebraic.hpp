@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
-#include "step/corrector.hpp"
 
 namespace tether::ida_projection {
 

@@ -3,10 +3,10 @@
 
 #include <memory>
 
+#include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
-#include "step/corrector.hpp"
 
 namespace tether::ida_projection {
 

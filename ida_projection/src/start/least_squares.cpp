@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "attach/impl.hpp"
+#include "host/owned_vector.hpp"
 
 namespace tether::ida_projection {
 

@@ -1,10 +1,11 @@
 // Tether: one Newton iteration after the move. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "host/candidate.hpp"
+#include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
-#include "step/corrector.hpp"
 
 namespace tether::ida_projection {
 

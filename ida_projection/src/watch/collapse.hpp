@@ -3,10 +3,10 @@
 
 #include <string>
 
+#include "host/corrector.hpp"
 #include "host/ida.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
-#include "step/corrector.hpp"
 
 namespace tether::ida_projection {
 

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "host/corrector.hpp"
 #include "host/ida.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
-#include "step/corrector.hpp"
 
 namespace tether::ida_projection {
 

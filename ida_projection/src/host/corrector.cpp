@@ -1,5 +1,5 @@
 // Tether: the nonlinear solver that the plugin decorates. SPDX-License-Identifier: BSD-3-Clause
-#include "step/corrector.hpp"
+#include "host/corrector.hpp"
 
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 

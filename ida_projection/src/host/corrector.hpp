@@ -6,9 +6,9 @@
 #include <type_traits>
 #include <vector>
 
+#include "host/candidate.hpp"
 #include "host/ida.hpp"
 #include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
 
 namespace tether::ida_projection {
 

@@ -1,0 +1,83 @@
+// Tether: moves with factors of an earlier step. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "movers/mover.hpp"
+
+namespace tether::ida_projection {
+
+/// How much of a move do factors of C leave that were made `age` candidates ago? The part
+/// slope * age, with the slope from second moves, which are asked for where it matters.
+class FactorWear {
+ public:
+  static constexpr double kWornOut = 0.2;  // of a move: then factors are renewed
+
+  void renewed() { age_ = 0; }
+  /// Another candidate. False: the factors are worn; factors made anew may live longer.
+  bool usable() {
+    ++age_;
+    ++unlooked_;
+    if (rate() <= kWornOut) return true;
+    slope_ *= kHope;
+    doubted_ = true;
+    return false;
+  }
+  double rate() const { return slope_ * age_; }
+  /// Would a second move pay after a first one of this length, `limit` being what may be left?
+  bool must_look(double length, double limit) const {
+    const bool matters = rate() * length > 0.25 * limit && age_ > 2 * looked_age_;
+    return slope_ < 0.0 || doubted_ || matters || unlooked_ > kLookEvery;
+  }
+  /// The second move was this part of the first one.
+  void looked(double part) {
+    slope_ = part / age_;
+    looked_age_ = age_;
+    unlooked_ = 0;
+    doubted_ = false;
+  }
+
+ private:
+  static constexpr int kLookEvery = 16;  // candidates
+  static constexpr double kHope = 0.9;
+
+  double slope_ = -1.0;  // < 0: not known yet
+  int age_ = 0, looked_age_ = 0, unlooked_ = 0;
+  bool doubted_ = false;
+};
+
+constexpr double kMayFollowLeave = 0.02;  // tolerances
+
+/// Mover::follow(), y and g being the mover's own: value() evaluates g, solve() returns the length
+/// of the move for it, apply() makes that move, drift() is the largest |g_i|. Lengths in
+/// tolerances. `may_be_left`: of the drift, after success.
+template <class Value, class Solve, class Apply, class Drift>
+Move move_with_old_factors(FactorWear& wear, Value value, Solve solve, Apply apply, Drift drift,
+                           double floor, double longest, double may_be_left) {
+  constexpr int kMostMoves = 3;
+
+  Move result;
+  double previous = 0.0;
+  while (result.moves < kMostMoves) {
+    const Status status = value();
+    if (status != Status::success) break;
+    const double length = solve();
+    if (!(length <= longest)) break;
+    if (result.moves == 0) {
+      result.length = length;
+      result.drift_before = drift();
+    } else {
+      wear.looked(length / previous);
+    }
+    apply();
+    ++result.moves;
+    const bool look = result.moves == 1 && wear.must_look(length, may_be_left);
+    if (length <= floor || (!look && wear.rate() * length <= may_be_left)) {
+      result.status = Status::success;
+      break;
+    }
+    if (wear.rate() > FactorWear::kWornOut) break;
+    previous = length;
+  }
+  return result;
+}
+
+}  // namespace tether::ida_projection
