@@ -300,6 +300,36 @@ TEST_CASE("what no motion of a net can give is told by rows, in any units of the
   }
 }
 
+TEST_CASE("multipliers: the least ones, also where rows are given ten times") {
+  for (const int copies : {1, 3, 10}) {
+    const SparseCase c = banded(20, 0, 3);
+    SparseCase many = c;
+    many.dense.C = c.dense.C.replicate(copies, 1);
+    for (int k = 1; k < copies; ++k) {
+      const int before = static_cast<int>(many.columns.size());
+      many.columns.insert(many.columns.end(), c.columns.begin(), c.columns.end());
+      for (std::size_t i = 1; i < c.starts.size(); ++i) many.starts.push_back(before + c.starts[i]);
+    }
+    SparseMinimumNorm solver = factored(many);
+    const Eigen::VectorXd wanted = Eigen::VectorXd::LinSpaced(20, -1, 2);
+    const Eigen::VectorXd dy =
+        c.dense.D.cwiseAbs2().asDiagonal() * (c.dense.C.transpose() * wanted);
+    Eigen::VectorXd x(20 * copies);
+    solver.multipliers(dy.data(), x.data());
+    const RowMajor A = c.dense.C * c.dense.D.asDiagonal();
+    const Eigen::VectorXd norms = A.rowwise().norm();
+    const RowMajor unit = norms.cwiseInverse().asDiagonal() * A;
+    const Eigen::VectorXd singular = unit.jacobiSvd().singularValues();
+    const double condition = singular.maxCoeff() / singular.minCoeff();
+    INFO(copies << " copies, condition " << condition);
+    // In the units of the rows.
+    const Eigen::VectorXd scaled = norms.cwiseProduct(wanted);
+    for (int k = 0; k < copies; ++k)
+      CHECK((norms.cwiseProduct(x.segment(20 * k, 20)) - scaled / copies).norm() <
+            1e-12 * condition * scaled.norm());
+  }
+}
+
 TEST_CASE("a long band: little fill, no allocation once resized") {
   const SparseCase c = banded(400, 1, 2);
   SparseMinimumNorm solver = factored(c);
