@@ -291,6 +291,36 @@ TEST_CASE("joints and contact: a driven slider grazes the floor that it does not
   CHECK(engine->counts().unsolved == 0);
 }
 
+TEST_CASE("joints and contact: bodies that a joint connects pass through each other") {
+  Scene s = stepping(1e-3, Vector3d(0, 0, -kGravity));
+  for (int k = 0; k < 2; ++k) {
+    Body half = ball(k == 0 ? "first" : "second", {0.05 * k, 0, 1});
+    touch_sphere(half, 0.1);
+    add(s, half);
+  }
+  s.joints.push_back(joint(JointKind::ball, 0, 1, {0.025, 0, 1}));
+  s.pairs.emplace_back();
+  s.pairs.back().first = s.pairs.back().second = "part";
+  const auto engine = make_engine(s);
+  engine->advance(0.1);
+  const Diagnostics now = engine->diagnostics();
+  CHECK(now.contacts == 0);
+  CHECK(now.penetration == 0);
+  CHECK(engine->bodies()[0].velocity.z() == Approx(-0.1 * kGravity).epsilon(1e-12));
+}
+
+TEST_CASE("joints and contact: a motor that drives a body into the floor is told so") {
+  Scene s = stepping(1e-3, Vector3d(0, 0, -kGravity));
+  Body arm = ball("arm", {1, 0, 0.3});
+  touch_sphere(arm, 0.1);
+  add(s, arm);
+  s.joints.push_back(hinge(0, kWorld, {0, 0, 0.3}, kY));
+  s.joints.back().motion.emplace().rate = 1;
+  add_wall(s, {0, 0, 0}, Vector3d::UnitZ(), 0.3);
+  const auto engine = make_engine(s);
+  CHECK_THROWS_WITH(engine->advance(1), Catch::Matchers::Contains("drive them into each other"));
+}
+
 TEST_CASE("joints and contact: a run that goes on from a saved state has the same bits") {
   const Scene s = ladder(60, 0.2, 2e-3);
   const auto whole = make_engine(s), first = make_engine(s), second = make_engine(s);

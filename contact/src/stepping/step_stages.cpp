@@ -32,7 +32,6 @@ void Stepper::Implementation::make_stages() {
   if (joints) add_stage("joints", &I::predict_joints);
   if (near) {
     add_stage("collision", &I::find_contacts);
-    if (joints) add_stage("joints", &I::leave_out_joined);
     add_stage(impact, &I::choose_impacts);
     if (restitution) add_stage("restitution", &I::choose_bounces);
     add_stage("contact", &I::solve_contacts);
@@ -76,6 +75,7 @@ void Stepper::Implementation::gyrate_implicit() {
 
 void Stepper::Implementation::find_contacts() {
   near->find(bodies, dt, contacts);
+  if (joints) leave_out_joined();
   for (std::size_t k = 0; k < contacts.gaps.size(); ++k) {
     const double gap = contacts.gaps[k];
     deepest = std::max(deepest, -gap);

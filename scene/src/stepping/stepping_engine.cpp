@@ -123,6 +123,9 @@ void SteppingEngine::report_failure() const {
        << std::ldexp(stepper_.options().step, -stepper_.options().max_halvings)
        << " s; raise stepping.tolerance or stepping.max_halvings, reduce stepping.step, or set "
           "on_failure = \"warn\"";
+  if (stepper_.status() == contact::Status::infeasible)
+    text << "; no impulses keep the bodies apart: joints, prescribed motions or fixed bodies drive "
+            "them into each other";
   if (stepper_.joint_drift() > 0)
     text << "; joints are off by up to " << stepper_.joint_drift() << " m or rad";
   throw SimulationError(text.str());
