@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
   int points = 180;
   CLI::App app("One contact: nanoseconds and evaluations of each law by class and regime");
   app.add_option("--check", check, "Problems of each class that are compared with the reference")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0L, 1000000000L));
   app.add_option("--points", points, "Angles of the reference's search")
       ->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);

@@ -2,7 +2,7 @@
 #
 #   gnuplot -c drift.gp pendulum_drift.csv out.svg  pendulum duration tolerance
 #
-# Columns of panels: the two forms. Rows: length and energy (slides 12, 21 and 23 of the seed).
+# Columns of panels: the two forms. Rows: length and energy.
 load system('dirname '.ARG0).'/style.gp'
 set terminal svg size 900,560 font 'Helvetica,13' background rgb 'white'
 set output ARG2
@@ -67,6 +67,6 @@ unset border; unset tics; unset xlabel; unset grid; unset logscale
 set xrange [0:1]; set yrange [0:1]
 set key center center horizontal maxrows 1 Left reverse samplen 2.5 width 1
 set label 1 sprintf("%s pendulum, %s s, tolerance %s: largest drift in each window of time", \
-  p eq 'seed' ? "The seed's" : 'Unit', d, tolerance) at screen 0.5,0.972 center
+  p eq 'earth' ? "Earth" : 'Unit', d, tolerance) at screen 0.5,0.972 center
 plot for [i=1:3] NaN with lines ls i title word(legend, i)
 unset multiplot

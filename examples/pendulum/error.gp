@@ -2,7 +2,7 @@
 #
 #   gnuplot -c error.gp pendulum.csv out.svg  pendulum duration  pendulum duration
 #
-# Two panels, each for one pendulum ("seed" or "unit") and one duration in seconds of the CSV file.
+# Two panels, each for one pendulum ("earth" or "unit") and one duration in seconds of the CSV file.
 # One line for each form and set of constraints, one point for each tolerance; a run that failed
 # interrupts its line.
 load system('dirname '.ARG0).'/style.gp'
@@ -38,7 +38,7 @@ set lmargin at screen 0.085
 set rmargin at screen 0.52
 set ylabel 'end error' offset 0.3
 p = ARG3; d = ARG4
-set title sprintf('%s pendulum, %s s', p eq 'seed' ? "The seed's" : 'Unit', d) offset 0,-0.6
+set title sprintf('%s pendulum, %s s', p eq 'earth' ? "Earth" : 'Unit', d) offset 0,-0.6
 plot for [i=1:6] csv skip 1 using (cpu(p, d, i)):10 with linespoints ls i
 
 set lmargin at screen 0.56
@@ -46,7 +46,7 @@ set rmargin at screen 0.985
 unset ylabel
 set format y ''
 p = ARG5; d = ARG6
-set title sprintf('%s pendulum, %s s', p eq 'seed' ? "The seed's" : 'Unit', d) offset 0,-0.6
+set title sprintf('%s pendulum, %s s', p eq 'earth' ? "Earth" : 'Unit', d) offset 0,-0.6
 plot for [i=1:6] csv skip 1 using (cpu(p, d, i)):10 with linespoints ls i
 
 # The legend, below both.

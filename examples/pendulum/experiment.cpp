@@ -73,10 +73,10 @@ std::vector<Experiment> plan(const Settings& settings) {
     e.cases = all_cases(tolerances, is_long ? 1e-12 : 1e-13);
     return e;
   };
-  std::vector<Experiment> experiments = {experiment("seed", 1.1, 9.80665, 10.0, 9),
+  std::vector<Experiment> experiments = {experiment("earth", 1.1, 9.80665, 10.0, 9),
                                          experiment("unit", 1.0, 1.0, 100.0, 7)};
   if (settings.long_runs) {
-    experiments.push_back(experiment("seed", 1.1, 9.80665, 1000.0, 1));
+    experiments.push_back(experiment("earth", 1.1, 9.80665, 1000.0, 1));
     experiments.push_back(experiment("unit", 1.0, 1.0, 1000.0, 2));
   }
   return experiments;

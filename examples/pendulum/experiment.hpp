@@ -8,7 +8,7 @@
 
 namespace pendulum {
 
-/// The seed's three situations (slides 12, 21 and 23).
+/// Three situations, as in Hanson and Krogh.
 enum class Invariants { none, without_energy, with_energy };
 
 /// One run: which equations, which constraints, how accurate.
@@ -26,7 +26,7 @@ struct Case {
 
 /// A pendulum that starts horizontally at rest, watched for some time.
 struct Experiment {
-  std::string pendulum;           ///< "seed" or "unit"
+  std::string pendulum;           ///< "earth" (1.1 m, standard gravity) or "unit" (1 m, 1 m/s^2)
   double length = 1.0;            ///< L, m
   double gravity = 1.0;           ///< g, m/s^2
   double duration = 10.0;         ///< s

@@ -29,7 +29,7 @@ bool gnuplot(const std::string& script, const std::vector<std::string>& argument
   return waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-/// The longest watch of the seed's pendulum.
+/// The longest watch of the pendulum on earth.
 const Experiment& longest(const std::vector<Results>& all) {
   const Experiment* best = &all.front().experiment;
   for (const Results& results : all)

@@ -71,7 +71,7 @@ const char* describe(Invariants invariants) {
 
 std::string title(const Experiment& e) {
   return fmt::format("{} pendulum, L = {:g} m, g = {:g} m/s^2, {:g} s",
-                     e.pendulum == "seed" ? "The seed's" : "Unit", e.length, e.gravity, e.duration);
+                     e.pendulum == "earth" ? "Earth" : "Unit", e.length, e.gravity, e.duration);
 }
 
 void print_costs(const Results& results) {

@@ -8,6 +8,7 @@
 #include <problems/pendulum.hpp>
 #include <problems/rigid_body.hpp>
 #include <problems/robertson.hpp>
+#include <utility>
 
 #include "host.hpp"
 #include "support/catch.hpp"
@@ -51,7 +52,7 @@ tp::Constraints circle_by_gradient() {
     N_VScale(1.0, y, c[0]);
     return 0;
   };
-  set.jacobian = rows;
+  set.jacobian = std::move(rows);
   return set;
 }
 
