@@ -47,6 +47,7 @@ void refused(const std::vector<double>& point, double tolerance, const tp::Const
   CHECK_FALSE(start);
   CHECK(start.status == why);
   CHECK(same_bits(host.state(), point));
+  CHECK(host.steps() == 0);  // IDA is as the caller had it, not where it was probed
 }
 
 }  // namespace

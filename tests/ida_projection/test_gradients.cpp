@@ -134,6 +134,21 @@ TEST_CASE("gradients: the same motion as the dense path, dense LU") {
     }
 }
 
+TEST_CASE("gradients: capped moves go a part of the way") {
+  Problem near = tether::test::circle(5.0);
+  near.y0 = {1.0 + 1e-5, 0.0};
+  near.yp0 = {0.0, 1.0 + 1e-5};
+  tp::Options options;
+  options.long_move = tp::LongMove::cap;
+  options.largest_move = 0.5;
+  Host host(near, 1e-6);
+  host.attach(as_gradients(on_circle(), 2), options);
+  host.step();
+  const std::vector<double> y = host.state();
+  CHECK(host.projection().statistics().moves_capped >= 1);
+  CHECK(std::hypot(y[0], y[1]) - 1.0 > 1e-6);
+}
+
 TEST_CASE("gradients: redundant rows, inconsistent rows") {
   const Problem body = rigid_body("regular", 10.0);
   const tp::Constraints once = body.recommended_constraints();
