@@ -149,6 +149,21 @@ TEST_CASE("gradients: capped moves go a part of the way") {
   CHECK(std::hypot(y[0], y[1]) - 1.0 > 1e-6);
 }
 
+TEST_CASE("gradients: a value that is no number fails the step by name") {
+  tp::Constraints rows = as_gradients(on_circle(), 2);
+  tp::Gradients gradients = std::get<tp::Gradients>(rows.jacobian);
+  const auto value = gradients.value;
+  gradients.value = [value](double t, N_Vector y, double* g) {
+    value(t, y, g);
+    if (t > 0.0) g[0] = std::nan("");
+  };
+  rows.jacobian = std::move(gradients);
+  const Run run = integrate(tether::test::circle(5.0), 1e-6, rows, {}, false);
+  CHECK(run.flag < 0);
+  CHECK(run.statistics.not_finite > 0);
+  CHECK(run.status == tp::Status::not_finite);
+}
+
 TEST_CASE("gradients: redundant rows, inconsistent rows") {
   const Problem body = rigid_body("regular", 10.0);
   const tp::Constraints once = body.recommended_constraints();
@@ -170,6 +185,7 @@ TEST_CASE("gradients: redundant rows, inconsistent rows") {
       integrate(tether::test::circle(5.0), 1e-6, as_gradients(on_circle() + other, 2), {}, false);
   CHECK(refused.flag < 0);
   CHECK(refused.status == tp::Status::inconsistent);
+  CHECK(refused.statistics.inconsistent == 1);  // a shorter step cures nothing: none is tried
   CHECK(contains(refused.message, "other circle"));
   CHECK(refused.steps == 0);
 }

@@ -16,7 +16,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kSampleEvery = 16;
-constexpr double kAsideFromTest = 1.6;   // multipliers of index 2: see README, section 9
+constexpr double kAsideFromTest = 1.5;   // multipliers of index 2: see README, section 9
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 }  // namespace
