@@ -195,6 +195,21 @@ TEST_CASE("largest_move: a start too far away is rejected, or approached in capp
   }
 }
 
+TEST_CASE("extra_iterations = 0: no residual is evaluated beside IDA's") {
+  tp::Options options;
+  options.extra_iterations = 0;
+  options.smooth_where_needed = false;  // it looks at F once
+  Host host(tether::test::circle(5.0), 1e-6);
+  options.id = host.vector({1.0, 1.0});
+  host.attach(on_circle(), options);
+  REQUIRE(host.finish() >= 0);
+  const tp::Statistics s = host.projection().statistics();
+  CHECK(s.projections > 10);
+  CHECK(s.extra_iterations == 0);
+  CHECK(s.refreshes == 0);
+  CHECK(s.residual_evaluations == 0);
+}
+
 TEST_CASE("capped moves that fall behind are failures of the step, not silent drift") {
   const Problem problem = pendulum(1.0, 1.0, 30.0, "index 1");
   tp::Options options;
