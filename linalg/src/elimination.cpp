@@ -10,10 +10,13 @@ namespace tether::linalg {
 
 std::vector<int> minimum_degree_order(const BlockPattern& pattern) {
   const int n = pattern.size, entries = pattern.starts[n];
-  const std::vector<double> ones(at(entries), 1.0);
-  using Pattern = Eigen::SparseMatrix<double>;
-  Pattern whole =
-      Eigen::Map<const Pattern>(n, n, entries, pattern.starts, pattern.columns, ones.data());
+  // Entry by entry, since Eigen's own copies ask for ascending columns, which the order does not
+  // need.
+  Eigen::SparseMatrix<double> whole(n, n);
+  whole.resizeNonZeros(entries);
+  std::copy(pattern.starts, pattern.starts + n + 1, whole.outerIndexPtr());
+  std::copy(pattern.columns, pattern.columns + entries, whole.innerIndexPtr());
+  std::fill(whole.valuePtr(), whole.valuePtr() + entries, 1.0);
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
   Eigen::internal::minimum_degree_ordering(whole, permutation);
   return {permutation.indices().data(), permutation.indices().data() + n};
