@@ -34,7 +34,7 @@ set ytics 100; unset mytics
 set xlabel 'CPU time / ms' offset 0,0.3
 unset key
 
-set lmargin at screen 0.085
+set lmargin at screen 0.1
 set rmargin at screen 0.52
 set ylabel 'end error' offset 0.3
 p = ARG3; d = ARG4
