@@ -115,6 +115,7 @@ Problem read_dat(const std::string& path) {
             std::to_string(n) + " contacts of dimension " + std::to_string(d) + " need " +
             std::to_string(size));
   }
+  Eigen::MatrixXd A;
   std::vector<MatrixBlock> blocks;
   if (storage == 0) {
     if (in.integer("matrix rows", 0, rows) != rows ||
@@ -124,17 +125,9 @@ Problem read_dat(const std::string& path) {
     // An entry takes two characters at least; a small file cannot claim a large matrix.
     if (size > 0 && in.left() / (2 * size) < size - 1)
       in.fail("truncated: the file ends in the matrix");
-    Eigen::MatrixXd A(size, size);
+    A.resize(size, size);
     for (long c = 0; c < size; ++c)
       for (long r = 0; r < size; ++r) A(r, c) = in.finite("matrix");
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) {
-        const auto part = A.block(d * i, d * j, d, d);
-        if (i != j && (part.array() == 0).all()) continue;
-        MatrixBlock block{i, j, Eigen::Matrix3d::Zero()};
-        block.value.topLeftCorner(d, d) = part;
-        blocks.push_back(block);
-      }
   } else {
     const long most = std::numeric_limits<int>::max();
     const long count = in.integer("number of blocks", 0, most);
@@ -179,7 +172,7 @@ Problem read_dat(const std::string& path) {
     in.integer("trailing number", std::numeric_limits<int>::min(), std::numeric_limits<int>::max());
   if (!in.empty()) in.fail("oversized: data after the friction coefficients");
   try {
-    return Problem::sparse(d, std::move(blocks), b, mu);
+    return storage == 0 ? Problem::dense(A, b, mu) : Problem::sparse(d, std::move(blocks), b, mu);
   } catch (const std::invalid_argument& e) {
     in.fail(e.what());
   }

@@ -1,14 +1,11 @@
 // Tether: the move onto few constraints on any N_Vector. SPDX-License-Identifier: BSD-3-Clause
-//
-// Only N_Vector operations: the same code serves serial, OpenMP, MPI, device and custom vectors.
-// The m gradients, scaled by the metric and to unit length, are orthogonalised by modified
-// Gram-Schmidt with pivoting, each twice ("twice is enough"); their Gram matrix is never formed.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "host/owned_vector.hpp"
 #include "movers/factor_wear.hpp"
+#include "rows/gradient_rows.hpp"
 
 namespace tether::ida_projection {
 
@@ -33,19 +30,10 @@ class GradientMover final : public Mover {
         free_(like),
         dy_(like),
         work_(like),
-        length_(static_cast<double>(N_VGetLength(like))) {
-    flatten(constraints);
-    const auto m = static_cast<std::size_t>(m_);
-    for (std::size_t i = 0; i < m; ++i) owned_.emplace_back(like);
-    for (const OwnedVector& q : owned_) gradients_.push_back(q);
-    g_.assign(m, 0.0);
-    z_.assign(m, 0.0);
-    terms_.assign(m, 0.0);
-    norm_.assign(m, 0.0);
-    tolerance_norm_.assign(m, 0.0);
-    left_.assign(m, 0.0);
-    R_.assign(m * m, 0.0);
-    pivot_.assign(m, 0);
+        rows_(constraints.total_count(), like),
+        g_(static_cast<std::size_t>(rows_.rows()), 0.0),
+        terms_(g_) {
+    flatten(constraints, 0);
     free_all();
     reset();
   }
@@ -118,20 +106,18 @@ class GradientMover final : public Mover {
       N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
     else
       load(candidate);
-    return move_with_old_factors(
-        wear_, [&] { return value(candidate.t); }, [&] { return solve(candidate.weights); },
-        [&] {
-          N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
-          N_VLinearSum(1.0, y_, -1.0, dy_, y_);
-        },
-        [&] { return drift(); }, 1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights),
-        options_.largest_move, kMayFollowLeave);
+    return chord_moves(candidate, 1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights),
+                       options_.largest_move, kMayFollowLeave);
   }
 
+  // A short move by factors of an earlier step leaves a part of itself that their age tells; where
+  // that is too much Newton's method goes on from where it ends.
   Move move(const Candidate& candidate) override {
+    constexpr double kShort = 0.1, kSafe = 0.25;
     Move result;
     if (factors_last() && wear_.usable()) {
-      result = chord_moves(candidate);
+      load(candidate);
+      result = chord_moves(candidate, 0.0, kShort, kSafe * options_.tolerance);
       if (result.status == Status::success || fatal_) return result;
     }
     const double moved = result.length;
@@ -143,25 +129,26 @@ class GradientMover final : public Mover {
  private:
   struct Part {
     const Gradients* rows;
-    int first, count;
+    int first;
   };
 
   // Error weights change slowly, and so do factors in their metric. What follows a polish is taken
   // back with the factors of the step alone.
-  bool factors_last() const { return no_settle_ && !local() && factored_ && rank_ == m_; }
+  bool factors_last() const {
+    return no_settle_ && !local() && factored_ && rows_.rank() == rows_.rows();
+  }
 
-  // A short move by factors of an earlier step leaves a part of itself that their age tells; where
-  // that is too much Newton's method goes on from where it ends.
-  Move chord_moves(const Candidate& candidate) {
-    constexpr double kShort = 0.1, kSafe = 0.25;
-    load(candidate);
+  // After load(): moves with the factors at hand.
+  Move chord_moves(const Candidate& candidate, double floor, double longest, double may_be_left) {
     return move_with_old_factors(
         wear_, [&] { return value(candidate.t); }, [&] { return solve(candidate.weights); },
-        [&] {
-          N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
-          N_VLinearSum(1.0, y_, -1.0, dy_, y_);
-        },
-        [&] { return drift(); }, 0.0, kShort, kSafe * options_.tolerance);
+        [&] { apply(candidate); }, [&] { return drift(); }, floor, longest, may_be_left);
+  }
+
+  // The whole move dy.
+  void apply(const Candidate& candidate) {
+    N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
+    N_VLinearSum(1.0, y_, -1.0, dy_, y_);
   }
 
   Move newton(const Candidate& candidate) {
@@ -201,8 +188,7 @@ class GradientMover final : public Mover {
           return result;
         }
       }
-      N_VLinearSum(1.0, candidate.correction, -1.0, dy_, candidate.correction);
-      N_VLinearSum(1.0, y_, -1.0, dy_, y_);
+      apply(candidate);
       const double floor = std::min(0.1, 1e3 * kEpsilon * N_VWrmsNorm(y_, candidate.weights));
       const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
       if (verdict == Monitor::Verdict::done) break;
@@ -229,7 +215,7 @@ class GradientMover final : public Mover {
 
   // After fill().
   bool contains_algebraic() {
-    for (N_Vector row : gradients_) {
+    for (N_Vector row : rows_.gradients()) {
       N_VProd(id_, row, work_);
       N_VLinearSum(1.0, row, -1.0, work_, work_);
       if (N_VMaxNorm(work_) > 0.0) return true;
@@ -237,15 +223,13 @@ class GradientMover final : public Mover {
     return false;
   }
 
-  void flatten(const Constraints& set) {
-    if (set.count > 0) {
-      parts_.push_back({&std::get<Gradients>(set.jacobian), m_, set.count});
-      m_ += set.count;
-    }
-    for (const Constraints& part : set.joined) flatten(part);
+  // Returns the number of the row after those of the set.
+  int flatten(const Constraints& set, int first) {
+    if (set.count > 0) parts_.push_back({&std::get<Gradients>(set.jacobian), first});
+    first += set.count;
+    for (const Constraints& part : set.joined) first = flatten(part, first);
+    return first;
   }
-
-  double& R(int i, int j) { return R_[static_cast<std::size_t>(i * m_ + j)]; }
 
   // y = base + correction, s <- max(0.8 s, |correction|).
   void load(const Candidate& candidate) {
@@ -292,7 +276,7 @@ class GradientMover final : public Mover {
           guarded([&] { return part.rows->value(t, y_, g_.data() + part.first); }, thrown);
       if (flag != 0) return failed(flag, "Gradients::value", thrown);
     }
-    for (int i = 0; i < m_; ++i)
+    for (int i = 0; i < rows_.rows(); ++i)
       if (!std::isfinite(g_[static_cast<std::size_t>(i)])) {
         message_ = "g of " + constraints_.name(i) + " is not finite";
         return Status::not_finite;
@@ -304,18 +288,15 @@ class GradientMover final : public Mover {
     if (fatal_) return Status::callback_fatal;
     ++statistics_.jacobian_evaluations;
     std::string thrown;
-    for (N_Vector row : gradients_) N_VConst(0.0, row);
+    for (N_Vector row : rows_.gradients()) N_VConst(0.0, row);
     for (const Part& part : parts_) {
-      const int flag =
-          guarded([&] { return part.rows->fill(t, y_, gradients_.data() + part.first); }, thrown);
+      const int flag = guarded(
+          [&] { return part.rows->fill(t, y_, rows_.gradients().data() + part.first); }, thrown);
       if (flag != 0) return failed(flag, "Gradients::fill", thrown);
     }
     return Status::success;
   }
 
-  double norm(N_Vector v) { return std::sqrt(N_VDotProd(v, v)); }
-
-  // Rows S C D orthogonalised in place: S C D = L Q^T with L lower triangular in pivot order.
   Status factor(const Candidate& candidate) {
     factored_ = false;
     const Status status = fill(candidate.t);
@@ -325,105 +306,37 @@ class GradientMover final : public Mover {
       set_metric(candidate);
     }
     ++statistics_.factorizations;
-    std::vector<double>& left = left_;
-    for (int i = 0; i < m_; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (sums_terms_) {
-        N_VProd(gradients_[k], y_, work_);
-        terms_[k] = N_VL1Norm(work_);
+    if (sums_terms_)
+      for (std::size_t i = 0; i < terms_.size(); ++i) {
+        N_VProd(rows_.gradients()[i], y_, work_);
+        terms_[i] = N_VL1Norm(work_);
       }
-      N_VProd(gradients_[k], WT_, work_);
-      tolerance_norm_[k] = norm(work_);
-      N_VProd(gradients_[k], D_, gradients_[k]);
-      norm_[k] = norm(gradients_[k]);
-      if (!std::isfinite(norm_[k])) {
-        message_ = "the gradient of " + constraints_.name(i) + " is not finite";
-        return Status::not_finite;
-      }
-      if (norm_[k] > std::numeric_limits<double>::min())
-        N_VScale(1.0 / norm_[k], gradients_[k], gradients_[k]);
-      left[k] = norm_[k] > std::numeric_limits<double>::min() ? 1.0 : 0.0;
-      pivot_[k] = i;
+    const int bad = rows_.factor(D_, WT_);
+    if (bad >= 0) {
+      message_ = "the gradient of " + constraints_.name(bad) + " is not finite";
+      return Status::not_finite;
     }
-    std::fill(R_.begin(), R_.end(), 0.0);
-    rank_ = 0;
-    for (int k = 0; k < m_; ++k) {
-      int best = k;
-      for (int i = k + 1; i < m_; ++i)
-        if (left[static_cast<std::size_t>(pivot_[static_cast<std::size_t>(i)])] >
-            left[static_cast<std::size_t>(pivot_[static_cast<std::size_t>(best)])])
-          best = i;
-      std::swap(pivot_[static_cast<std::size_t>(best)], pivot_[static_cast<std::size_t>(k)]);
-      const auto p = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(k)]);
-      if (left[p] == 0.0) break;
-      // Second orthogonalisation of the pivot against what is there.
-      for (int i = 0; i < k; ++i) {
-        N_Vector q = gradients_[static_cast<std::size_t>(pivot_[static_cast<std::size_t>(i)])];
-        const double r = N_VDotProd(q, gradients_[p]);
-        R(static_cast<int>(p), i) += r;
-        N_VLinearSum(1.0, gradients_[p], -r, q, gradients_[p]);
-      }
-      const double r = norm(gradients_[p]);
-      if (!(r > m_ * 1e-12)) break;
-      R(static_cast<int>(p), k) = r;
-      N_VScale(1.0 / r, gradients_[p], gradients_[p]);
-      rank_ = k + 1;
-      for (int i = k + 1; i < m_; ++i) {
-        const auto row = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(i)]);
-        const double share = N_VDotProd(gradients_[p], gradients_[row]);
-        R(static_cast<int>(row), k) = share;
-        N_VLinearSum(1.0, gradients_[row], -share, gradients_[p], gradients_[row]);
-        left[row] = norm(gradients_[row]);
-      }
-    }
-    if (rank_ < m_) ++statistics_.rank_drops;
+    if (rows_.rank() < rows_.rows()) ++statistics_.rank_drops;
     factored_ = true;
     wear_.renewed();
     return Status::success;
   }
 
+  // Returns the WRMS length of dy in the error norm.
   double solve(N_Vector weights) {
     ++statistics_.iterations;
-    if (rank_ == 0) N_VConst(0.0, dy_);
-    for (int k = 0; k < m_; ++k) {
-      const auto row = static_cast<std::size_t>(pivot_[static_cast<std::size_t>(k)]);
-      double left =
-          norm_[row] > std::numeric_limits<double>::min() ? g_[row] / norm_[row] : g_[row];
-      for (int i = 0; i < std::min(k, rank_); ++i)
-        left -= R(static_cast<int>(row), i) * z_[static_cast<std::size_t>(i)];
-      if (k < rank_) {
-        z_[static_cast<std::size_t>(k)] = left / R(static_cast<int>(row), k);
-        if (k == 0)
-          N_VScale(z_[0], gradients_[row], dy_);
-        else
-          N_VLinearSum(1.0, dy_, z_[static_cast<std::size_t>(k)], gradients_[row], dy_);
-      } else {
-        z_[static_cast<std::size_t>(k)] = std::abs(left);  // what this dropped row leaves unsolved
-      }
-    }
-    N_VProd(dy_, D_, dy_);
+    rows_.solve(g_, D_, dy_);
     return N_VWrmsNorm(dy_, weights);
   }
 
   bool contradicts() {
-    for (int k = rank_; k < m_; ++k) {
-      const int row = pivot_[static_cast<std::size_t>(k)];
-      const auto r = static_cast<std::size_t>(row);
-      const double left = z_[static_cast<std::size_t>(k)] *
-                          (norm_[r] > std::numeric_limits<double>::min() ? norm_[r] : 1.0);
-      if (left <= 0.5 * std::sqrt(length_) * tolerance_norm_[r] + 1e2 * kEpsilon * norm_[r])
-        continue;
-      contradicting_rows_ = {row};
-      for (int i = 0; i < rank_; ++i)
-        if (std::abs(R(row, i)) > 1e-3)
-          contradicting_rows_.push_back(pivot_[static_cast<std::size_t>(i)]);
-      std::sort(contradicting_rows_.begin(), contradicting_rows_.end());
-      message_ = "rows contradict each other:";
-      for (int i : contradicting_rows_)
-        message_ += " " + std::to_string(i) + " (" + constraints_.name(i) + ")";
-      return true;
-    }
-    return false;
+    std::vector<int> found = rows_.contradicting();
+    if (found.empty()) return false;
+    contradicting_rows_ = std::move(found);
+    message_ = "rows contradict each other:";
+    for (const int i : contradicting_rows_)
+      message_ += " " + std::to_string(i) + " (" + constraints_.name(i) + ")";
+    return true;
   }
 
   // Does the rounding of its own terms explain every g_i? It grows with the root of their number.
@@ -445,20 +358,16 @@ class GradientMover final : public Mover {
   const Constraints& constraints_;
   Monitor monitor_;
   std::vector<Part> parts_;
-  int m_ = 0, rank_ = 0;
   OwnedVector y_, scale_, trial_, D_, WT_, free_, dy_, work_;
-  std::vector<OwnedVector> owned_;
-  std::vector<N_Vector> gradients_;  // raw handles of owned_, as the callback wants them
-  std::vector<double> g_, z_, norm_, tolerance_norm_, left_, R_;
-  std::vector<int> pivot_;
-  double length_;
-  FactorWear wear_;  // for follow()
+  GradientRows rows_;
+  std::vector<double> g_;
+  std::vector<double> terms_;  // sum_j |C_ij y_j|
+  FactorWear wear_;            // for follow()
   bool factored_ = false;
   bool no_settle_ = false;
   N_Vector id_ = nullptr;         // the caller's of set_algebraic()
   bool holds_algebraic_ = false;  // no row has contained one so far
   bool sums_terms_ = false;       // measure() asks for them
-  std::vector<double> terms_;     // sum_j |C_ij y_j|
 };
 
 }  // namespace
