@@ -14,7 +14,7 @@ struct Case {
   std::vector<problems::Problem> forms;
 };
 
-/// Every case; a new problem is a file in benchmarks/problems and an entry here.
+/// Every case; a new problem is a file in examples/problems and an entry here.
 std::vector<Case> catalogue();
 
 /// Those whose name contains one of `only` (all when it is empty) and none of `skip`; "_" may stand

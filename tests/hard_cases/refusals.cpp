@@ -9,7 +9,8 @@
 #include "hard_case.hpp"
 #include <tether/ida_projection.hpp>
 
-#include "problems/rows.hpp"
+#include <problems/rows.hpp>
+
 #include "projection/context.hpp"
 
 namespace tether::hard_cases {
