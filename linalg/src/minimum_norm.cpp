@@ -5,6 +5,7 @@
 #include <string>
 #include <tether/linalg/minimum_norm.hpp>
 
+#include "kept_rows.hpp"
 #include "small_orthogonal.hpp"
 
 namespace tether::linalg {
@@ -20,7 +21,7 @@ struct MinimumNorm::Large {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
   Eigen::VectorXd work, rhs;
-  Eigen::MatrixXd kept, L;  // of factor_kept(): columns are the rows of A; lower triangle
+  KeptRows kept;  // of factor_kept()
 };
 
 MinimumNorm::MinimumNorm() = default;
@@ -53,8 +54,7 @@ void MinimumNorm::resize(int rows, int columns) {
     large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
     large_->work.resize(std::max(rows, columns));
     large_->rhs.resize(std::max(rows, columns));
-    large_->kept.resize(columns, std::min(rows, columns));
-    large_->L.resize(std::min(rows, columns), std::min(rows, columns));
+    large_->kept.resize(rows, columns);
   }
 }
 
@@ -107,7 +107,10 @@ bool MinimumNorm::scale_large() {
   const Eigen::Map<const Eigen::VectorXd> D(metric_.data(), n_);
   for (int i = 0; i < m_; ++i) {
     A.row(i) = A.row(i).cwiseProduct(D.transpose());
-    const double length = small::careful_norm(A.row(i).data(), n_);
+    const double square = A.row(i).squaredNorm();
+    const double length = square > 1e-280 && square < 1e280
+                              ? std::sqrt(square)
+                              : small::careful_norm(A.row(i).data(), n_);
     if (!std::isfinite(length)) return false;
     row_norm_[static_cast<std::size_t>(i)] = length;
     A.row(i) *= length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
@@ -120,27 +123,22 @@ bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, co
   if (kernel_ != nullptr || r == 0) return false;
   if (!kept_) decided_least_ = independent_part(r - 1);
   if (decided_least_ < kLeastSine) return false;
-  gather_large(wide, width, rows, columns);
   kept_ = false;
-  if (!scale_large()) return false;
-  auto& large = *large_;
-  for (int k = 0; k < r; ++k) large.kept.col(k) = large.A.row(pivot(k)).transpose();
-  Eigen::Ref<Eigen::MatrixXd> L = large.L.topLeftCorner(r, r);
-  L.setZero();
-  L.selfadjointView<Eigen::Lower>().rankUpdate(large.kept.leftCols(r).transpose());
-  const double least = std::max(kLeastSine, kLeastShare * decided_least_);
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(L);
-  if (in_place.info() != Eigen::Success || !(L.diagonal().minCoeff() >= least)) return false;
+  KeptRows& kept = large_->kept;
+  if (!kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data())) return false;
+  if (!kept.factor(large_->qr.colsPermutation().indices().data(), r)) return false;
+  const double least = kept.least_part(r);
+  if (!(least >= std::max(kLeastSine, kLeastShare * decided_least_))) return false;
   kept_ = true;
   rank_ = factored_rank_ = r;
-  least_square_ = std::pow(L.diagonal().minCoeff(), 2);
+  least_square_ = least * least;
   return true;
 }
 
 bool MinimumNorm::factor_large(double rank_tolerance) {
   kept_ = false;
   if (!scale_large()) return false;
-  auto& [A, qr, work, rhs, kept, L] = *large_;
+  auto& [A, qr, work, rhs, kept] = *large_;
   qr.setThreshold(rank_tolerance);
   qr.compute(A.transpose());
   set_rank(qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0);
@@ -178,24 +176,19 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
 
 // du = A^T (A A^T)^-1 b over the rows that take part; the others' inconsistency is b - A du.
 void MinimumNorm::solve_kept(const double* g, double* dy) {
-  auto& large = *large_;
-  auto z = large.rhs.head(rank_);
+  double* z = large_->rhs.data();
   for (int k = 0; k < rank_; ++k) z[k] = scaled(g, pivot(k));
-  const auto L = large.L.topLeftCorner(rank_, rank_).triangularView<Eigen::Lower>();
-  L.solveInPlace(z);
-  L.adjoint().solveInPlace(z);
-  Eigen::Map<Eigen::VectorXd> du(dy, n_);
-  du.noalias() = large.kept.leftCols(rank_) * z;
+  large_->kept.solve(rank_, z, dy);
   for (int k = rank_; k < m_; ++k) {
     const int i = pivot(k);
     inconsistency_[static_cast<std::size_t>(k)] =
-        std::abs(scaled(g, i) - large.A.row(i).dot(du.transpose()));
+        std::abs(scaled(g, i) - large_->kept.times(i, dy));
   }
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
 
 void MinimumNorm::solve_large(const double* g, double* dy) {
-  auto& [A, qr, work, rhs, kept, L] = *large_;
+  auto& [A, qr, work, rhs, kept] = *large_;
   const auto& R = qr.matrixQR();
   for (int k = 0; k < rank_; ++k) rhs[k] = scaled(g, pivot(k));
   R.topLeftCorner(rank_, rank_)
@@ -241,10 +234,7 @@ std::vector<double> MinimumNorm::dependence(int k) const {
     const auto length = [&](int row) { return std::sqrt(s.square[s.pivot[row]]); };
     for (int j = 0; j < r; ++j) x[j] *= length(j) / length(k);
   } else if (kept_) {
-    const auto L = large_->L.topLeftCorner(r, r).triangularView<Eigen::Lower>();
-    x.noalias() = large_->kept.leftCols(r).transpose() * large_->A.row(pivot(k)).transpose();
-    L.solveInPlace(x);
-    L.adjoint().solveInPlace(x);
+    large_->kept.dependence(pivot(k), r, x.data());
   } else {
     x = large_->qr.matrixQR().col(k).head(r);
     large_->qr.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solveInPlace(x);
@@ -254,7 +244,7 @@ std::vector<double> MinimumNorm::dependence(int k) const {
 
 double MinimumNorm::independent_part(int k) const {
   if (kernel_ != nullptr) return std::sqrt(small_->ratio[k]);
-  return kept_ ? large_->L(k, k) : std::abs(large_->qr.matrixQR()(k, k));
+  return kept_ ? large_->kept.independent_part(k) : std::abs(large_->qr.matrixQR()(k, k));
 }
 
 double MinimumNorm::condition() const {

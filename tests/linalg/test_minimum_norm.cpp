@@ -252,9 +252,15 @@ TEST_CASE("fewer rows than the rank: the solution of these rows alone") {
   }
 }
 
-TEST_CASE("rows known to be independent: as factored anew, until one depends on the others") {
+namespace {
+
+/// `few`: rows of eight entries, and two of them in each row that depends on others.
+void compare_kept_with_new_factors(bool few) {
   const int m = 90, n = 80, rank = 60;
   Case c = random_case(m, n, 3);
+  for (int i = 0; few && i < m; ++i)
+    for (int j = 0; j < n; ++j)
+      if ((7 * i + 3 * j) % 10 != 0) c.C(i, j) = 0.0;
   c.D = 2.0 + Eigen::ArrayXd::LinSpaced(n, 0.0, 9.0).sin();
   std::vector<int> rows(m), columns(n);
   for (int i = 0; i < m; ++i) rows[static_cast<std::size_t>(i)] = i;
@@ -262,6 +268,9 @@ TEST_CASE("rows known to be independent: as factored anew, until one depends on 
   std::mt19937 random(8);
   RowMajor share(m - rank, rank);
   for (int j = 0; j < rank; ++j) share.col(j) = random_vector(m - rank, random);
+  for (int i = 0; few && i < m - rank; ++i)
+    for (int j = 0; j < rank; ++j)
+      if (j % 30 != i) share(i, j) = 0.0;
   const auto complete = [&] { c.C.bottomRows(m - rank) = share * c.C.topRows(rank); };
   complete();
   MinimumNorm kept(m, n), anew(m, n);
@@ -305,4 +314,35 @@ TEST_CASE("rows known to be independent: as factored anew, until one depends on 
   CHECK(kept.rank() >= rank - 1);
   c.C(0, 0) = std::numeric_limits<double>::quiet_NaN();
   CHECK_FALSE(factor_kept());
+}
+
+}  // namespace
+
+TEST_CASE("rows known to be independent: as factored anew, until one depends on the others") {
+  compare_kept_with_new_factors(false);
+}
+
+TEST_CASE("rows of few entries known to be independent: the same") {
+  compare_kept_with_new_factors(true);
+}
+
+TEST_CASE("rows known to be independent: lengths whose squares are no numbers") {
+  const int m = 20, n = 60;
+  Case c = random_case(m, n, 5);
+  c.D.setOnes();
+  std::vector<int> rows(m), columns(n);
+  for (int i = 0; i < m; ++i) rows[static_cast<std::size_t>(i)] = i;
+  for (int j = 0; j < n; ++j) columns[static_cast<std::size_t>(j)] = j;
+  MinimumNorm kept(m, n), anew(m, n);
+  for (MinimumNorm* solver : {&kept, &anew}) std::copy_n(c.D.data(), n, solver->metric());
+  REQUIRE(kept.factor(c.C.data(), n, rows.data(), columns.data(), 1e-10));
+  for (int i = 0; i < m; ++i) {
+    const double unit = i % 3 == 0 ? 1e-200 : i % 3 == 1 ? 1e200 : 1.0;
+    c.C.row(i) *= unit;
+    c.g[i] *= unit;
+  }
+  REQUIRE(anew.factor(c.C.data(), n, rows.data(), columns.data(), 1e-10));
+  REQUIRE(kept.factor_kept(c.C.data(), n, rows.data(), columns.data()));
+  const Eigen::VectorXd same = solve(kept, c.g);
+  CHECK(distance(same, solve(anew, c.g), c.D) <= 1e-9 * length(same, c.D));
 }

@@ -139,7 +139,9 @@ Status ContiguousMover<Rows>::learn_trust(double t, double length) {
 
 template <class Rows>
 bool ContiguousMover<Rows>::contradicts() {
-  if (!blocks_.dropped_rows() || !blocks_.contradict(WT())) return false;
+  if (!blocks_.dropped_rows()) return false;
+  if (weighed_ && blocks_.left_of_dropped() <= kContradiction) return false;
+  if (!blocks_.contradict(WT())) return false;
   message_ = blocks_.contradiction.message;
   contradicting_rows_ = blocks_.contradiction.rows;
   return true;

@@ -55,6 +55,9 @@ struct Contradiction {
   std::string message;
 };
 
+/// Of a tolerance: a move of that size could not have made rows contradict each other by more.
+constexpr double kContradiction = 0.5;
+
 /// After solve(): do dropped rows of the block ask for what the kept ones exclude? Up to what a
 /// tolerance-size move explains, they must follow from them. in_tolerances(row): |row_i(C WT)| over
 /// the block's columns. n: unknowns.
@@ -62,8 +65,6 @@ template <class Solver, class Norm>
 bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, int n,
                  Norm in_tolerances, Contradiction* found) {
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-  constexpr double kContradiction =
-      0.5;  // a tolerance-size move could not have caused a larger one
   const Solver& solver = block.solver;
   for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
     const int row = block.rows[static_cast<std::size_t>(solver.pivot(k))];
@@ -154,7 +155,7 @@ class RowBlocks {
   static bool keeps_factors(int) { return false; }
   /// An orthogonal factorisation of many rows costs ten times what is needed where it is known
   /// which of them are independent.
-  static bool keeps_rank(int rows) { return rows > 64; }
+  static bool keeps_rank(int rows) { return rows > 16; }
   /// The solver's pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = true;
 

@@ -58,9 +58,9 @@ class MinimumNorm {
               double rank_tolerance);
 
   /// The same with the rows that the last factor() and use_rank() let take part, in their order,
-  /// from A A^T = L L^T of these alone: beyond the small sizes some tenth of the work. False: an
-  /// entry is not finite, a row depends on those before it but for a sine below 1e-3 or a third of
-  /// what factor() found least, or the system is small: then factor() is due.
+  /// from A A^T = L L^T of these alone: some tenth of the work, less where rows have few entries.
+  /// False: an entry is not finite, a row depends on those before it but for a sine below 1e-3 or a
+  /// third of what factor() found least, or the system is small: then factor() is due.
   bool factor_kept(const double* wide, int width, const int* rows, const int* columns);
 
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
