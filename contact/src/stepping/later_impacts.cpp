@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "stepping/step_energy.hpp"
+
 namespace tether::contact::detail {
 
 namespace {
@@ -130,10 +132,10 @@ void LaterImpacts::pass_time(const StepContacts& contacts) {
   }
 }
 
-bool LaterImpacts::solve_pass(const NearContacts& near, double dt, BodySet& bodies,
-                              StepContacts& contacts, Counts& counts) {
+bool LaterImpacts::solve_pass(const NearContacts& near, const Impacts& impacts, double dt,
+                              BodySet& bodies, StepContacts& contacts, Counts& counts) {
   pass_impacts_.choose(near, bodies, dt, part_);
-  if (restitution_) restitution_->choose(pass_impacts_.list(), bodies, part_);
+  if (restitution_) restitution_->choose(pass_impacts_, impacts, bodies, part_);
   solver_.solve(bodies.motion, part_.points, solution_);
   ++counts.problems;
   counts.sweeps += solution_.sweeps;
@@ -151,16 +153,43 @@ bool LaterImpacts::solve_pass(const NearContacts& near, double dt, BodySet& bodi
   return true;
 }
 
-bool LaterImpacts::run_passes(const NearContacts& near, double dt, BodySet& bodies,
-                              StepContacts& contacts, Counts& counts) {
+bool LaterImpacts::run_passes(const NearContacts& near, const Impacts& impacts, double dt,
+                              BodySet& bodies, StepContacts& contacts, Counts& counts) {
   for (int pass = 0; pass < kPasses; ++pass) {
     const bool closing = gather(bodies, dt, contacts, pass == kPasses - 1);
     if (pass > 0 && !closing) break;
-    if (!solve_pass(near, dt, bodies, contacts, counts)) return false;
+    if (!solve_pass(near, impacts, dt, bodies, contacts, counts)) return false;
     if (pass > 0) counts.bounces += bounces_;  // those of the first pass were counted before
     pass_impacts_.remember(bodies);
   }
   return true;
+}
+
+// Passes see bodies where the step began, and lift them for all of it: an island that gains energy
+// by them keeps the one solve, which does not.
+void LaterImpacts::keep_energy(const Impacts& impacts, BodySet& bodies, StepContacts& contacts) {
+  add_of_forces(impacts, force_);
+  gain_.assign(bodies.motion.size(), 0);
+  kinetic_.assign(bodies.motion.size(), 0);
+  const auto takes_part = [&](std::size_t i) {
+    return bodies.mass[i] > 0 && marked_[at(islands_.root(static_cast<int>(i)))] == 2;
+  };
+  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
+    if (!takes_part(i)) continue;
+    const std::size_t r = at(islands_.root(static_cast<int>(i)));
+    gain_[r] += kinetic_gain(bodies, i, bodies.motion[i], impacts.coming()[i]) -
+                work(bodies, i, force_[i], bodies.motion[i]);
+    kinetic_[r] += kinetic_gain(bodies, i, impacts.coming()[i], RigidBody());
+  }
+  const auto gains = [&](int root) { return gain_[at(root)] > 1e-12 * kinetic_[at(root)]; };
+  for (std::size_t i = 0; i < bodies.motion.size(); ++i)
+    if (takes_part(i) && gains(islands_.root(static_cast<int>(i)))) bodies.motion[i] = first_[i];
+  const auto root = [&](int k) { return islands_.root(bodies, contacts.points[at(k)]); };
+  for (const Member& m : members_)
+    if (gains(m.root)) contacts.impulses[at(m.contact)] = first_impulses_[at(m.contact)];
+  taken_.erase(std::remove_if(taken_.begin(), taken_.end(),
+                              [&](const Impact& i) { return gains(root(i.contact)); }),
+               taken_.end());
 }
 
 LaterImpacts::Counts LaterImpacts::take(const NearContacts& near, Impacts& impacts, double dt,
@@ -170,7 +199,8 @@ LaterImpacts::Counts LaterImpacts::take(const NearContacts& near, Impacts& impac
   first_ = bodies.motion;
   first_impulses_ = contacts.impulses;
   start(near, impacts, dt, bodies, contacts);
-  if (run_passes(near, dt, bodies, contacts, counts)) {
+  if (run_passes(near, impacts, dt, bodies, contacts, counts)) {
+    keep_energy(impacts, bodies, contacts);
     for (const Impact& i : taken_) impacts.add(i);
   } else {
     bodies.motion = first_;

@@ -62,10 +62,12 @@ class LaterImpacts {
   static std::size_t root(const Member& m) { return static_cast<std::size_t>(m.root); }
   bool gather(const BodySet& bodies, double dt, const StepContacts& contacts, bool all);
   void pass_time(const StepContacts& contacts);
-  bool solve_pass(const NearContacts& near, double dt, BodySet& bodies, StepContacts& contacts,
-                  Counts& counts);
-  bool run_passes(const NearContacts& near, double dt, BodySet& bodies, StepContacts& contacts,
-                  Counts& counts);
+  bool solve_pass(const NearContacts& near, const Impacts& impacts, double dt, BodySet& bodies,
+                  StepContacts& contacts, Counts& counts);
+  bool run_passes(const NearContacts& near, const Impacts& impacts, double dt, BodySet& bodies,
+                  StepContacts& contacts, Counts& counts);
+
+  void keep_energy(const Impacts& impacts, BodySet& bodies, StepContacts& contacts);
 
   MovingIslands islands_;
   std::vector<char> marked_;     // islands, by their root
@@ -77,7 +79,8 @@ class LaterImpacts {
   StepContacts part_;        // of a pass
   Impacts pass_impacts_;
   std::vector<Impact> taken_;
-  std::vector<RigidBody> first_;
+  std::vector<RigidBody> first_, force_;
+  std::vector<double> gain_, kinetic_;  // of islands, J
   std::vector<Eigen::Vector3d> first_impulses_;
   std::unique_ptr<Restitution> restitution_;
   StepSolver solver_;

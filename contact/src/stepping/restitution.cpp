@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "stepping/rotation.hpp"
+#include "stepping/step_energy.hpp"
 
 namespace tether::contact::detail {
 
@@ -29,22 +30,31 @@ BodyOptions cold(BodyOptions options) {
 Restitution::Restitution(RestitutionLaw law, const BodyOptions& options)
     : law_(law), solver_(cold(options)) {}
 
-void Restitution::choose(const std::vector<Impact>& impacts, const BodySet& bodies,
+void Restitution::choose(const Impacts& chosen, const Impacts& forces, const BodySet& bodies,
                          StepContacts& contacts) {
   bounces_.clear();
-  for (const Impact& i : impacts) {
+  biased_.clear();
+  for (const Impact& i : chosen.list()) {
     if (i.restitution == 0) continue;
     PointContact& c = contacts.points[at(i.contact)];
     // The speed that the forces of this step added is not given back: a body at rest would hop.
     const double speed = i.restitution * std::min(i.came, i.comes);
     bounces_.push_back({i.contact, speed, speed / i.comes});
-    if (law_ == RestitutionLaw::newton) c.bias = -speed;
+    if (law_ != RestitutionLaw::newton) continue;
+    c.bias = -speed;
+    biased_.push_back(i.contact);
   }
-  if (!bounces_.empty()) before_ = bodies.motion;
+  if (bounces_.empty()) return;
+  before_ = bodies.motion;
+  came_ = chosen.coming();
+  add_of_forces(forces, force_);
 }
 
-// Energy of an island against `before_` as a function of the scale s of `change_`, from `now`:
-// constant + linear s + square s^2.
+// What an island gains in the step as a function of the scale s of `change_`, from `now`: kinetic
+// energy against `came_` less the work of the forces, which is their impulse times the velocities
+// that bodies move with (in a later pass of a step: less the work that they would do without it).
+// constant + linear s + square s^2. Without restitution it is at most 0:
+// -|M^-1 (f dt + J'x)|^2 / 2 in the metric of the masses, and what friction takes.
 void Restitution::sum_energies(const BodySet& bodies, const std::vector<RigidBody>& now) {
   const std::size_t n = now.size();
   constant_.assign(n, 0);
@@ -56,18 +66,21 @@ void Restitution::sum_energies(const BodySet& bodies, const std::vector<RigidBod
     const auto spin_of = [&](const Vector3d& w) {
       return spin(bodies.inertia[i], bodies.orientation[i], w);
     };
-    const RigidBody &is = now[i], &was = before_[i], &d = change_[i];
+    const RigidBody &is = now[i], &was = came_[i], &d = change_[i], &f = force_[i];
     const std::size_t r = at(islands_.root(static_cast<int>(i)));
-    constant_[r] += 0.5 * m * (is.velocity - was.velocity).dot(is.velocity + was.velocity) +
-                    0.5 * spin_of(is.angular_velocity - was.angular_velocity)
-                              .dot(is.angular_velocity + was.angular_velocity);
+    RigidBody counted = f;  // in earlier passes
+    counted.velocity -= before_[i].velocity - was.velocity;
+    counted.angular_velocity -= before_[i].angular_velocity - was.angular_velocity;
+    constant_[r] += kinetic_gain(bodies, i, is, was) - work(bodies, i, f, is) +
+                    work(bodies, i, counted, before_[i]);
     const Vector3d L = spin_of(d.angular_velocity);
-    linear_[r] += m * is.velocity.dot(d.velocity) + is.angular_velocity.dot(L);
+    linear_[r] += m * (is.velocity - f.velocity).dot(d.velocity) +
+                  (is.angular_velocity - f.angular_velocity).dot(L);
     square_[r] += 0.5 * (m * d.velocity.squaredNorm() + d.angular_velocity.dot(L));
   }
 }
 
-// Does an island end with more energy than before the impulses?
+// Does an island gain energy in the step?
 bool Restitution::gains_energy(const BodySet& bodies) {
   change_ = bodies.motion;
   for (std::size_t i = 0; i < change_.size(); ++i) {
@@ -117,7 +130,7 @@ void Restitution::add_impulses_again(BodySet& bodies, StepContacts& contacts) {
 // From the solution with restitution to the one without it, in `bodies` and `contacts`, and the
 // difference in `change_` and `added_`.
 void Restitution::solve_without(BodySet& bodies, StepContacts& contacts) {
-  for (const Bounce& b : bounces_) contacts.points[at(b.contact)].bias = 0;
+  for (const int k : biased_) contacts.points[at(k)].bias = 0;
   change_ = bodies.motion;
   added_ = contacts.impulses;
   solver_.solve(before_, contacts.points, solution_);

@@ -14,8 +14,8 @@ namespace tether::contact::detail {
 /// with, in the one solve that friction takes part in. `poisson`: the contact problem without
 /// restitution, impulses x; then epsilon x at the contacts that bounce; then the contact problem
 /// once more, for contacts which that pressed together. In both, what restitution adds to the
-/// solution without it is scaled down where an island of bodies would end with more energy than it
-/// had before the impulses.
+/// solution without it is scaled down where an island of bodies would end the step with more energy
+/// than it began it with and the forces of the step add on the way that the new velocities go.
 class Restitution {
  public:
   Restitution(RestitutionLaw law, const BodyOptions& options);
@@ -25,8 +25,10 @@ class Restitution {
     islands_.set_links(joints.links());
   }
 
-  /// After the impacts are chosen: those that bounce.
-  void choose(const std::vector<Impact>& impacts, const BodySet& bodies, StepContacts& contacts);
+  /// After the impacts are chosen: those that bounce. `chosen` has the velocities that bodies came
+  /// with; `forces` those before and after the forces of the step.
+  void choose(const Impacts& chosen, const Impacts& forces, const BodySet& bodies,
+              StepContacts& contacts);
   /// After the solve. Changes velocities and impulses; returns the number of bounces.
   int apply(BodySet& bodies, StepContacts& contacts);
 
@@ -48,9 +50,11 @@ class Restitution {
   void add_change(BodySet& bodies, StepContacts& contacts);
 
   RestitutionLaw law_;
-  std::vector<Bounce> bounces_;
-  // Velocities before the impulses; what restitution adds to those without it, and to impulses.
-  std::vector<RigidBody> before_, change_;
+  std::vector<Bounce> bounces_;  // those that press, once the problem is solved
+  std::vector<int> biased_;      // contacts
+  // Velocities before the impulses, those that energy is compared with, what the forces of the step
+  // add; what restitution adds to velocities without it, and to impulses.
+  std::vector<RigidBody> before_, came_, force_, change_;
   std::vector<Eigen::Vector3d> added_;
   MovingIslands islands_;
   std::vector<double> constant_, linear_, square_, scale_;  // of each island; see limit_energy

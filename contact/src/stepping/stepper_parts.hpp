@@ -109,7 +109,7 @@ struct Stepper::Implementation {
   void gyrate_implicit();
   void find_contacts();
   void choose_impacts();
-  void choose_bounces() { restitution->choose(impacts->list(), bodies, contacts); }
+  void choose_bounces() { restitution->choose(*impacts, *impacts, bodies, contacts); }
   void solve_contacts();
   void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
   void take_later_impacts();
