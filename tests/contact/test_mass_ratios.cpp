@@ -78,8 +78,91 @@ TEST_CASE("mass ratios: stacks of 100 and 200 boxes, at rest and leaning") {
   }
 }
 
+namespace {
+
+// Largest component of A x - b and of u |A| |x|, with long sums.
+struct Rest {
+  double velocity = 0, rounding = 0;
+};
+Rest rest_of(const Problem& p, const Eigen::VectorXd& x) {
+  Rest out;
+  for (int i = 0; i < p.contacts(); ++i)
+    for (int r = 0; r < 3; ++r) {
+      long double w = -p.b()[3 * i + r], size = 0;
+      for (int k = p.row_start()[static_cast<std::size_t>(i)];
+           k < p.row_start()[static_cast<std::size_t>(i + 1)]; ++k)
+        for (int c = 0; c < 3; ++c) {
+          const std::size_t block = static_cast<std::size_t>(k);
+          const long double term = static_cast<long double>(p.blocks()[block].column[4 * c + r]) *
+                                   x[3 * p.columns()[block] + c];
+          w += term;
+          size += std::abs(term);
+        }
+      out.velocity = std::max(out.velocity, static_cast<double>(std::abs(w)));
+      out.rounding = std::max(out.rounding, static_cast<double>(0x1p-53L * size));
+    }
+  return out;
+}
+
+// The same contacts in another order.
+Stack shuffled(Stack s) {
+  std::uint32_t state = 12345;
+  for (std::size_t k = s.contacts.size(); k-- > 1;) {
+    state = 1664525u * state + 1013904223u;
+    std::swap(s.contacts[k], s.contacts[state % (k + 1)]);
+  }
+  return s;
+}
+
+}  // namespace
+
+// Impulses of single contacts are 1e10 times the velocity that counts: double sums of A x - b are
+// off by 8e-6 of it, x itself by 3e-7.
+TEST_CASE("mass ratios: 1000 boxes, down to the round-off of the impulses") {
+  const int n = 1000;
+  for (const Masses& m : {masses()[0], masses()[2]}) {
+    for (double lean : {0.0, 0.1}) {
+      Stack s = stack(
+          n, [&](int k) { return m.of(k, n); }, lean > 0 ? 0.3 : 0.5, lean);
+      if (lean > 0) s = shuffled(s);
+      const Problem p = s.problem();
+      Options o;
+      o.law = Law::coulomb;
+      o.tolerance = 1e-6;
+      const Solution solution = Solver(o).solve(p);
+      INFO(m.name << ", lean " << lean << ": " << name(solution.status) << " " << solution.error);
+      CHECK(solution.status == Status::solved);
+      CHECK(evaluate(p, o.law, solution.impulses).fixed_point <= 1e-6);
+      CHECK(solution.counts.work < 3e8);
+      CHECK(solution.counts.factorisations < 40);
+      if (lean == 0) CHECK(rest_of(p, solution.impulses).velocity < 1e-6 * 9.81e-3);
+    }
+  }
+}
+
+TEST_CASE("mass ratios: what is called round-off is at most three units of that of the impulses") {
+  for (double ratio : {1e6, 1e9}) {
+    const int n = 100;
+    const Problem p = stack(
+                          n, [&](int k) { return k % 2 ? ratio : 1; }, 0.5, 0)
+                          .problem();
+    Options o;
+    o.law = Law::coulomb;
+    o.tolerance = 1e-13;
+    const Solution s = Solver(o).solve(p);
+    const Rest rest = rest_of(p, s.impulses);
+    INFO("1 : " << ratio << ": " << name(s.status) << " " << s.error << ", left "
+                << rest.velocity / rest.rounding << " units");
+    CHECK(s.status == Status::round_off);
+    CHECK(rest.velocity < 3 * rest.rounding);
+    CHECK(s.error < 4 * rest.rounding / 9.81e-3);
+    CHECK(s.counts.factorisations < 200);
+  }
+}
+
 TEST_CASE("mass ratios: a stack at rest carries its weight") {
-  const int n = 200;
+  // Contacts on each other may add up what each of them may leave.
+  const auto [n, off] = GENERATE(std::pair(200, 10), std::pair(1000, 1000));  // boxes, tolerances
   const Stack s = stack(
       n, [](int k) { return k % 2 ? 1e6 : 1; }, 0.5, 0);
   BodyOptions o;
@@ -92,8 +175,8 @@ TEST_CASE("mass ratios: a stack at rest carries its weight") {
     above += 9.81e-3 / s.bodies[static_cast<std::size_t>(k)].inverse_mass;
     double carried = 0;
     for (int c = 0; c < 4; ++c) carried += out.impulses[static_cast<std::size_t>(4 * k + c)].z();
-    CHECK(std::abs(carried - above) < 1e-5 * above);
-    CHECK(out.velocities[static_cast<std::size_t>(k)].norm() < 1e-6 * 9.81e-3 * 10);
+    CHECK(std::abs(carried - above) < off * 1e-6 * above);
+    CHECK(out.velocities[static_cast<std::size_t>(k)].norm() < off * 1e-6 * 9.81e-3);
   }
 }
 

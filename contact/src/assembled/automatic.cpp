@@ -19,6 +19,12 @@ constexpr double kDear = 30;
 // Below this error interior points start near the best point.
 constexpr double kNear = 1e-3, kRough = 1e-2;
 
+// unsolved: neither solved nor out of work.
+Status ended(const Search& search) {
+  if (search.solved()) return Status::solved;
+  return search.exhausted() ? Status::work_limit : Status::unsolved;
+}
+
 }  // namespace
 
 // Where a rotation stands.
@@ -58,11 +64,20 @@ bool Automatic::infeasible(Search& search) {
   return !pressed_.empty();
 }
 
-// Whether what is left is what round-off makes of A x - b. Factorised stages end within 6 to 20
-// units of it on stacks of 100 to 1000 boxes of masses 1 : 1e6 to 1 : 1e12.
-bool Automatic::at_round_off(const Search& search) const {
-  constexpr double kUnits = 32;
-  return search.best_error <= kUnits * search.system.rounding(search.best.data());
+// Whether what is left is what round-off makes of A x - b: its bound explains the error, and steps
+// with long sums gain nothing any more. They end within 1 to 3 units of it on stacks of 100 to 2000
+// boxes of masses 1 : 1e6 to 1 : 1e12.
+bool Automatic::at_round_off(Search& search) {
+  constexpr double kGain = 0.7;
+  constexpr int kSteps = 8;
+  while (search.explained_by_round_off() && !search.solved()) {
+    const double before = search.best_error;
+    prepare(search);
+    interior.run_near(search, search.best.data(), kSteps);
+    if (search.best_error > kGain * before) return true;
+    if (search.exhausted()) return false;
+  }
+  return false;
 }
 
 // Plain sweeps from the best point that keep moving are a cycle (or a wander), those that come to
@@ -70,6 +85,7 @@ bool Automatic::at_round_off(const Search& search) const {
 Status Automatic::give_up(Search& search) {
   if (infeasible(search)) return Status::infeasible;
   if (at_round_off(search)) return Status::round_off;
+  if (search.solved()) return Status::solved;
   if (search.exhausted()) return Status::work_limit;
   x_ = search.best;
   double change = 0, size = 0;
@@ -228,7 +244,7 @@ bool Automatic::rescue(Search& search, Rotation& r) {
 // Many contacts between few bodies, such as the bricks of a wall: impulses are far from unique, the
 // path of interior points ends where contacts that stick and slide admit no solution, and sweeps
 // hardly move. The proximal problems have a path, and factorisations by bodies are cheap.
-void Automatic::few_bodies(Search& search) {
+Status Automatic::few_bodies(Search& search) {
   // Sweeps as long as they forecast less than a run of interior points: one body on hundreds of
   // points, which slides on all of them, is solved by them.
   constexpr double kStay = 5, kSteps = 20;  // factorisations
@@ -236,17 +252,18 @@ void Automatic::few_bodies(Search& search) {
   leave.price = kSteps * interior.cost(search);
   leave.least_work = kStay * interior.cost(search);
   sweeps.run(search, leave);
-  if (search.solved() || search.exhausted()) return;
+  if (search.solved() || search.exhausted()) return ended(search);
   interior.stick(search);
-  if (search.solved()) return;
+  if (search.solved()) return Status::solved;
   constexpr int kRun = 40;
   constexpr double kShare = 0.25;
   // Where their path ends is no better start than where the sweeps were.
   x_ = search.best;
   if (kRun * interior.cost(search) < kShare * (search.work_end - search.counts.work))
     interior.run(search, kRun);
-  if (search.solved()) return;
-  interior.run_proximal(search, x_.data(), 4000, newton);
+  if (at_round_off(search)) return Status::round_off;
+  if (!search.solved()) interior.run_proximal(search, x_.data(), 4000, newton);
+  return ended(search);
 }
 
 // Stages in rotation (README, section 10).
@@ -264,9 +281,9 @@ Status Automatic::rotate(Search& search, bool last) {
     r.regular = r.regular && std::hypot(gamma[0], gamma[1]) < kStronglyCoupled;
   }
   if (r.regular && interior.order_bodies(search)) {
-    few_bodies(search);
-    if (search.solved()) return Status::solved;
-    if (search.exhausted()) return Status::work_limit;
+    const Status status = few_bodies(search);
+    if (status == Status::round_off && infeasible(search)) return Status::infeasible;
+    if (status != Status::unsolved) return status;
     sweeps.start(search.best.data());
   }
   for (;;) {
@@ -276,6 +293,7 @@ Status Automatic::rotate(Search& search, bool last) {
     const double before = search.best_error;
     if (interior_points(search, r, before)) return Status::solved;
     if (at_round_off(search)) return infeasible(search) ? Status::infeasible : Status::round_off;
+    if (search.solved()) return Status::solved;
     // Where factorisations are dear sweeps go on before stages that take many.
     if (r.first && r.regular && interior.cost(search) > kDear * search.sweep_cost) {
       r.first = false;
@@ -292,6 +310,7 @@ Status Automatic::rotate(Search& search, bool last) {
     if (search.solved()) return Status::solved;
     if (infeasible(search)) return Status::infeasible;
     if (at_round_off(search)) return infeasible(search) ? Status::infeasible : Status::round_off;
+    if (search.solved()) return Status::solved;
     if (search.exhausted()) return Status::work_limit;
     if (search.best_error < 0.9 * before) sweeps.start(search.best.data());
     r.kappa = std::min(64.0, 2 * r.kappa);

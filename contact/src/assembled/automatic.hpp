@@ -36,9 +36,10 @@ class Automatic {
   struct Rotation;
   Status rotate(Search& search, bool last);
   bool infeasible(Search& search);
-  bool at_round_off(const Search& search) const;
+  bool at_round_off(Search& search);
   bool mostly_sticks(Search& search);
-  void few_bodies(Search& search);
+  // unsolved: other stages may.
+  Status few_bodies(Search& search);
   bool replace_contacts(Search& search, double eccentricity, bool only_unconverged);
   bool sweep_first(Search& search, const Rotation& r);
   bool sweep_while_cheap(Search& search, Rotation& r);

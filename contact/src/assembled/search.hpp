@@ -23,6 +23,11 @@ struct Search {
   void reset(const Problem& problem, const Options& o, Measure m);
   // Measures x, keeps it if it is the best.
   double test(const PackedVector* x, Method stage);
+  // Whether errors near the tolerance are found with long sums, those of doubles being round-off.
+  bool near_round_off() const { return hidden_ > options.tolerance; }
+  // Whether round-off may be what is left of the best point, whose error is then found with long
+  // sums.
+  bool explained_by_round_off();
   bool solved() const { return best_error <= options.tolerance; }
   bool exhausted() const {
     return counts.work > work_end ||
@@ -34,7 +39,10 @@ struct Search {
   }
 
  private:
+  double fixed_point_error(const PackedVector* x, Method stage);
+
   Packed scratch_;
+  double hidden_ = 0;  // errors that round-off of double sums may make; 0: not near the tolerance
 };
 
 }  // namespace tether::contact::detail

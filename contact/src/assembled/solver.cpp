@@ -116,7 +116,10 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   out.counts = search.counts;
   out.history.swap(search.history);
   problem.unpack(search.best, out.impulses);
-  detail::velocities(problem, search.best.data(), x.data());
+  if (search.near_round_off())
+    detail::exact_velocities(problem, search.best.data(), x.data());
+  else
+    detail::velocities(problem, search.best.data(), x.data());
   problem.unpack(x, out.velocities);
   out.infeasible_direction.clear();
   for (const PackedVector& d : stages.proof())

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "law/exact_error.hpp"
 #include "law/rows.hpp"
 #include "problem/criterion.hpp"
 
@@ -158,6 +159,18 @@ void System::velocities(const PackedVector* x, PackedVector* w) const {
   detail::velocities(*problem_, x, w);
 }
 
+void exact_velocities(const Problem& problem, const PackedVector* x, PackedVector* w) {
+  const View s = view(problem, nullptr, nullptr, nullptr);
+  for (int i = 0; i < s.n; ++i) {
+    Wide sum[3];
+    wide_row(s, x, i, sum);
+    for (int c = 0; c < 3; ++c) w[i].v[c] = static_cast<double>(sum[c]);
+  }
+}
+void System::exact_velocities(const PackedVector* x, PackedVector* w) const {
+  detail::exact_velocities(*problem_, x, w);
+}
+
 Test System::natural_map(const PackedVector* x, PackedVector* scratch) {
   if (!mass_.empty()) return natural_map_given(x, scratch);
   const View s = view(*problem_, any_replaced_ ? rule_.data() : nullptr, nullptr, nullptr);
@@ -165,12 +178,18 @@ Test System::natural_map(const PackedVector* x, PackedVector* scratch) {
 }
 
 Test System::fixed_point(const PackedVector* x) {
+  Test out;
+  out.fixed = kernels().error(error_view(), x);
+  return out;
+}
+double System::exact_fixed_point(const PackedVector* x) {
+  return kernels().exact_error(error_view(), x);
+}
+View System::error_view() {
   View s = view(*problem_, rule_.data(), lambda_.data(), nullptr);
   s.share = share_.data();
   s.inverse_scale = inverse_scale_.data();
-  Test out;
-  out.fixed = kernels().error(s, x);
-  return out;
+  return s;
 }
 
 // The map hangs on the units, those given are meant. It is homogeneous in x and w together: all is

@@ -63,6 +63,9 @@ class System {
   Test natural_map(const PackedVector* x, PackedVector* scratch);
   Test fixed_point(const PackedVector* x);
   double measure(const Test& test, Measure measure) const;
+  // Both with long sums (law/exact_error.hpp): where rounding() is not far below what counts.
+  void exact_velocities(const PackedVector* x, PackedVector* w) const;
+  double exact_fixed_point(const PackedVector* x);
   // What round-off makes of w = A x - b, relative to the velocity scale of the island: the largest
   // component of u |A| |x|. A residual below it says nothing.
   double rounding(const PackedVector* x) const;
@@ -78,6 +81,7 @@ class System {
 
  private:
   void choose_units(const Problem& problem);
+  View error_view();
   Test natural_map_given(const PackedVector* x, PackedVector* scratch);
   const LawKernels& law_of(int i) const { return replaced(i) ? *law_->replacement : *law_; }
   const AssembledKernels& kernels() const { return any_replaced_ ? *law_->mixed : law_->assembled; }
@@ -99,5 +103,6 @@ class System {
 
 // w = A x - b
 void velocities(const Problem& problem, const PackedVector* x, PackedVector* w);
+void exact_velocities(const Problem& problem, const PackedVector* x, PackedVector* w);
 
 }  // namespace tether::contact::detail

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "body_sweeps/body_parts.hpp"
+#include "body_sweeps/wide_velocities.hpp"
 #include "problem/contact_side.hpp"
 
 namespace tether::contact {
@@ -73,10 +74,34 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
   const Team one{0, 1, nullptr, &worker};
   for (int c = island.chunk_begin; c < island.chunk_end; ++c) residual.add(test(c, one));
   r.error = r.relative(residual.most);
-  if (r.error <= options.tolerance) {
+  if (r.error <= options.tolerance)
     r.status = Status::solved;
-  } else if (r.status == Status::solved) {
-    r.status = Status::stalled;
+  else if (r.status == Status::solved)
+    judge_with_long_sums(k);
+}
+
+// Solved as a Problem, not by the velocities of the bodies: where impulses between heavy bodies act
+// on light ones these are the round-off of their double sums, and found with long ones.
+void BodySolver::Implementation::judge_with_long_sums(int k) {
+  const Island& island = graph.islands[at(k)];
+  IslandResult& r = results[at(k)];
+  std::vector<PointContact> here;
+  std::vector<Vector3d> impulses;
+  detail::WideVelocities velocities(*bodies);
+  for (int chunk = island.chunk_begin; chunk < island.chunk_end; ++chunk) {
+    visit(chunk, [&](int contact, Kind kind_, int place) {
+      here.push_back((*contacts)[at(contact)]);
+      const Vector3d p = impulse(kind_, place);
+      impulses.push_back(turned[at(contact)] ? Vector3d(-p) : p);
+      velocities.push(here.back(), impulses.back());
+    });
+  }
+  r.error = evaluate(*bodies, here, options.law, impulses).fixed_point;
+  r.status = r.error <= options.tolerance ? Status::solved : Status::stalled;
+  for (int s = island.body_begin; s < island.body_end; ++s) {
+    const int body = graph.body[at(s)];
+    detail::store(velocities.linear(body), state[at(s)].v);
+    detail::store(velocities.angular(body), state[at(s)].w);
   }
 }
 

@@ -142,6 +142,7 @@ struct BodySolver::Implementation {
   void save(const Island& island, const Team& team);
   void extrapolate(const Island& island, const Team& team, double beta);
   void assemble(int k, Worker& worker);
+  void judge_with_long_sums(int k);
 
   int cut(int begin, int end, int k, int parts) const;
   template <class Operation>

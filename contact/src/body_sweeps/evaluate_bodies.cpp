@@ -9,6 +9,8 @@
 
 #include "assembled/system.hpp"
 #include "body_sweeps/contact_graph.hpp"
+#include "body_sweeps/wide_velocities.hpp"
+#include "law/exact_error.hpp"
 #include "problem/contact_side.hpp"
 #include "problem/criterion.hpp"
 #include "problem/refuse.hpp"
@@ -85,32 +87,14 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
   // Nothing can be said of an answer that is not finite.
   for (const Eigen::Vector3d& p : impulses)
     if (!p.allFinite()) return {};
-  std::vector<Eigen::Vector3d> v(bodies.size()), w(bodies.size());
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    v[k] = bodies[k].velocity;
-    w[k] = bodies[k].angular_velocity;
-  }
-  const auto relative = [&](const PointContact& c) {
-    Eigen::Vector3d u = v[at(c.first)] + w[at(c.first)].cross(c.r1) + c.bias * c.normal;
-    if (c.second >= 0) u -= v[at(c.second)] + w[at(c.second)].cross(c.r2);
-    return u;
-  };
+  detail::WideVelocities velocities(bodies);
   double bb = 0;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PointContact& c = contacts[i];
-    bb += relative(c).squaredNorm();
-  }
   std::vector<Eigen::Vector3d> before;
-  for (const PointContact& c : contacts) before.push_back(relative(c));
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PointContact& c = contacts[i];
-    const Eigen::Vector3d& p = impulses[i];
-    v[at(c.first)] += bodies[at(c.first)].inverse_mass * p;
-    w[at(c.first)] += bodies[at(c.first)].inverse_inertia * c.r1.cross(p);
-    if (c.second < 0) continue;
-    v[at(c.second)] -= bodies[at(c.second)].inverse_mass * p;
-    w[at(c.second)] -= bodies[at(c.second)].inverse_inertia * c.r2.cross(p);
+  for (const PointContact& c : contacts) {
+    before.push_back(velocities.relative(c).cast<double>());
+    bb += before.back().squaredNorm();
   }
+  for (std::size_t i = 0; i < contacts.size(); ++i) velocities.push(contacts[i], impulses[i]);
   std::vector<LocalBlock> blocks;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const PointContact& c = contacts[i];
@@ -131,7 +115,9 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     const PointContact& c = contacts[i];
     const Eigen::Matrix3d F = tangent_frame(c.normal);
     const LocalBlock& L = blocks[i];
-    const Eigen::Vector3d x = F * impulses[i], u = F * relative(c);
+    const detail::Wide3 wide_x = F.cast<detail::Wide>() * impulses[i].cast<detail::Wide>();
+    const detail::Wide3 wide_u = F.cast<detail::Wide>() * velocities.relative(c);
+    const Eigen::Vector3d x = wide_x.cast<double>(), u = wide_u.cast<double>();
     const double mu = rule.friction ? c.mu : 0, t = x.tail<2>().norm();
     r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], u[0])));
     r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
@@ -139,18 +125,20 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     r.energy_change += 0.5 * x.dot(u + F * before[i]);
     // Block fixed point (README, section 6).
     const double theta = scales.coupled(i);
-    const Eigen::Matrix3d D = L.matrix();
+    const detail::Wide3 share = wide_u / static_cast<detail::Wide>(theta);
+    Eigen::Vector3d rhs;
+    detail::wide_rhs(L, wide_x.data(), share.data(), rhs.data());
     LocalState state;
     for (int k = 0; k < 3; ++k) state.x[k] = x[k];
-    solve_local(law, L, D * x - u / theta, state);
-    const double change = (D * (x - Eigen::Vector3d(state.x[0], state.x[1], state.x[2]))).norm();
-    const double outside = L.a * std::max(t - mu * x[0], -x[0]);
-    const double error = scales.relative(i, theta * std::max(change, outside));
+    solve_local(law, L, rhs, state);
+    double gamma[2];
+    rule.gamma(L, gamma);
+    const double error = scales.relative(
+        i, static_cast<double>(theta * detail::wide_error(L, mu, gamma, wide_x.data(), share.data(),
+                                                          state.x, state.regime)));
     if (!(error <= r.fixed_point)) r.fixed_point = error;
     if (error != error) return {};  // velocities out of range
     // Natural map, and the nearest slip that the law allows.
-    double gamma[2];
-    rule.gamma(L, gamma);
     Eigen::Vector3d z;
     rule.natural_point(L, x.data(), u.data(), z.data());
     map += (x - z).squaredNorm();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "law/exact_error.hpp"
 #include "law/law.hpp"
 #include "law/rows.hpp"
 
@@ -30,6 +31,9 @@ struct Plain {
   static TETHER_INLINE void natural_point(const char*, int, const LocalBlock& block,
                                           const double* x, const double* w, double* v) {
     L::natural_point(block, x, w, v);
+  }
+  static void gamma(const char*, int, const LocalBlock& block, double* out) {
+    L::gamma(block, out);
   }
 };
 
@@ -59,6 +63,9 @@ struct Mixed {
     } else {
       L::natural_point(block, x, w, v);
     }
+  }
+  static void gamma(const char* rule, int i, const LocalBlock& block, double* out) {
+    rule[i] ? Other::gamma(block, out) : L::gamma(block, out);
   }
 };
 
@@ -171,4 +178,8 @@ TETHER_INLINE double worst_error(const View& s, const PackedVector* x) {
   TETHER_CLONES double name##_error(const View& s, const PackedVector* x) {                     \
     return worst_error<name##_rule>(s, x);                                                      \
   }                                                                                             \
-  constexpr AssembledKernels name = {name##_sweep, name##_blocks, name##_natural, name##_error};
+  double name##_exact_error(const View& s, const PackedVector* x) {                             \
+    return exact_error<name##_rule>(s, x);                                                      \
+  }                                                                                             \
+  constexpr AssembledKernels name = {name##_sweep, name##_blocks, name##_natural, name##_error, \
+                                     name##_exact_error};

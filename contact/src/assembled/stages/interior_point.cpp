@@ -42,6 +42,7 @@ void InteriorPoint::reset(int contacts) {
   sides_.resize(at(n_));
   flat_.resize(at(n_));
   tau_ = 0;
+  exact_ = false;
   ordered_ = by_bodies_ = false;
   stuck_ = Stuck::untried;
 }
@@ -55,7 +56,10 @@ double InteriorPoint::cost(const Search& search) const {
 
 // w_: velocities at z_, of the proximal problem if there is one
 void InteriorPoint::velocities(const System& system) {
-  system.velocities(z_.data(), w_.data());
+  if (exact_)
+    system.exact_velocities(z_.data(), w_.data());
+  else
+    system.velocities(z_.data(), w_.data());
   if (!(tau_ > 0)) return;
   for (int i = 0; i < n_; ++i) {
     const double* z = z_[at(i)].v;
@@ -371,6 +375,7 @@ double InteriorPoint::follow(Search& search, int most, double target) {
     // Close to the cone only with nearly full steps: blocked ones would spoil the centring.
     const double fraction = longest > 0.9 ? std::max(0.9, 1 - mean / (speed * speed)) : 0.8;
     advance(std::min(1.0, fraction * longest));
+    exact_ = search.near_round_off();
     residual(system);
     double error;
     if (tau_ > 0) {

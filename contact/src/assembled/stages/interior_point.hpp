@@ -73,6 +73,7 @@ class InteriorPoint {
   double tau_ = 0;  // of the proximal term
   double shift_ =
       0;  // added to the Newton matrix, relative to A: bounds steps along its null space
+  bool exact_ = false;  // velocities by long sums
   bool ordered_ = false;
   BlockLu lu_;
   BodyNewton bodies_;
