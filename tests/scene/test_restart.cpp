@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <string>
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
@@ -295,6 +296,32 @@ TEST_CASE("rows and frames from behind a checkpoint, and a row that is cut, are 
       INFO(name);
       CHECK(content(entry.path()) == content(part / name));
     }
+}
+
+TEST_CASE("rows and frames behind an older checkpoint give way to those of the run that goes on") {
+  Scene scene = parse_scene(tumble(3, 0.4, 0.2, "momentum"), "older.toml");
+  scene.output.every = 0.02;
+  scene.output.checkpoint = 0.25;
+  const fs::path whole = folder("older");
+  outputs(scene, whole);
+  scene.output.vtk = (whole / "f.pvd").string();
+  const std::string older = (folder("older_state") / "state").string();
+  RunOptions options;
+  options.record = [&](const Engine& engine) {
+    if (engine.time() > 0.3 && !fs::exists(older)) fs::copy_file(scene.output.state, older);
+  };
+  REQUIRE(run(scene, options).failure == "");
+  REQUIRE(fs::exists(older));
+  std::map<fs::path, std::string> before;
+  for (const auto& entry : fs::recursive_directory_iterator(whole))
+    if (entry.is_regular_file()) before[entry.path()] = content(entry.path());
+  options = RunOptions{};
+  options.restart = older;
+  REQUIRE(run(scene, options).failure == "");
+  for (const auto& [path, text] : before) {
+    INFO(path);
+    CHECK(content(path) == text);
+  }
 }
 
 TEST_CASE("an interrupted run leaves whole files, and goes on with the bits of one that was not") {

@@ -103,17 +103,24 @@ TEST_CASE("expectations that hold and that do not") {
       "[[expect]]\ntime = 0\nquantity = \"position\"\nbody = \"rod\"\nvalue = [0.5, 0, 0]\nwithin "
       "= 0\n"  // holds
       "[[expect]]\nthroughout = true\nquantity = \"distance_moved\"\nbody = \"rod\"\nat_most = "
-      "1e-3\n"                                                                 // not
-      "[[expect]]\nquantity = \"energy_change\"\nvalue = 0\nwithin = 1e-4\n";  // holds
+      "1e-3\n"                                                                // not
+      "[[expect]]\nquantity = \"energy_change\"\nvalue = 0\nwithin = 1e-4\n"  // holds
+      "[[expect]]\nthroughout = true\nquantity = \"speed\"\nbody = \"rod\"\nat_least = "
+      "0.5\n"  // at the end, but not at the start
+      "[[expect]]\ntime = 0\nquantity = \"orientation\"\nbody = \"rod\"\nvalue = [-1, 0, 0, "
+      "0]\nwithin = 0\n";  // holds: the same as [1, 0, 0, 0]
   const Scene scene = parse_scene(rod(expect), "test.toml");
   const RunResult result = run(scene);
   REQUIRE(result.failure.empty());
-  REQUIRE(result.judgements.size() == 5);
+  REQUIRE(result.judgements.size() == 7);
   CHECK(result.judgements[0].met);
   CHECK_FALSE(result.judgements[1].met);
   CHECK(result.judgements[2].met);
   CHECK_FALSE(result.judgements[3].met);
   CHECK(result.judgements[4].met);
+  CHECK_FALSE(result.judgements[5].met);
+  CHECK(result.judgements[5].time == 0);
+  CHECK(result.judgements[6].met);
   for (const Judgement& each : result.judgements) CHECK(each.judged);
   CHECK_FALSE(result.met());
   CHECK(result.time == Approx(0.5));

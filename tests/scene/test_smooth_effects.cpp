@@ -1,6 +1,7 @@
 // Effects, forms and the engine of jointed scenes. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "smooth_runs.hpp"
@@ -223,6 +224,36 @@ TEST_CASE("the order of bodies does not matter", "[smooth]") {
   a->advance(3);
   b->advance(3);
   CHECK((a->bodies()[2].position - b->bodies()[0].position).norm() < 1e-7);
+}
+
+TEST_CASE("a saved run with a number that is not finite is refused, or does not move by it",
+          "[smooth]") {
+  const auto a = make_smooth_engine(pendulum(1e-6));
+  a->advance(0.1);
+  std::stringstream saved;
+  a->save(saved);
+  const std::string state = saved.str();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  int refused = 0;
+  for (std::size_t at = 0; at + 8 <= state.size(); ++at) {
+    INFO(at);
+    std::string bad = state;
+    bad.replace(at, 8, reinterpret_cast<const char*>(&nan), 8);
+    std::istringstream in(bad);
+    const auto b = make_smooth_engine(pendulum(1e-6));
+    try {
+      b->restore(in);
+    } catch (const std::runtime_error&) {
+      ++refused;
+      continue;
+    }
+    CHECK(std::isfinite(b->time()));
+    for (const BodyState& each : b->bodies()) {
+      CHECK(each.position.allFinite());
+      CHECK(each.velocity.allFinite());
+    }
+  }
+  CHECK(refused > 13);
 }
 
 TEST_CASE("a saved run and a restored one go on with the same bits", "[smooth]") {

@@ -1,5 +1,6 @@
 // The stepping engine of scenes. SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -100,6 +101,23 @@ TEST_CASE("stepping engine: states that are damaged or of another scene are refu
   const auto b = make_stepping_engine(other);
   std::istringstream whole(state);
   CHECK_THROWS_WITH(b->restore(whole), Catch::Contains("another scene"));
+}
+
+TEST_CASE("stepping engine: a state with a number that is not finite is refused") {
+  const Scene scene = balls_on_floor();
+  const auto a = make_stepping_engine(scene);
+  std::stringstream saved;
+  a->save(saved);
+  const std::string state = saved.str();
+  const std::size_t head = 8 + 3 * 8, numbers = scene.bodies.size() * 13;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t k = 0; k < numbers; ++k) {
+    INFO(k);
+    std::string bad = state;
+    bad.replace(head + 8 * k, 8, reinterpret_cast<const char*>(&nan), 8);
+    std::istringstream in(bad);
+    CHECK_THROWS_AS(a->restore(in), std::runtime_error);
+  }
 }
 
 TEST_CASE("stepping engine: states of the format before are read, others refused by name") {
