@@ -85,8 +85,15 @@ if(TARGET tether_ida_projection)
   # Debian has no sundials.pc, so the include directory is named; the host links its own IDA or IDAS.
   get_target_property(sundials_include tether::sundials_headers INTERFACE_INCLUDE_DIRECTORIES)
   list(TRANSFORM sundials_include PREPEND "-I")
+  # Programs in C link the runtime of C++ with a static library.
+  set(runtime "")
+  if(NOT BUILD_SHARED_LIBS)
+    set(runtime ${CMAKE_CXX_IMPLICIT_LINK_LIBRARIES})
+    list(FILTER runtime INCLUDE REGEX "^(std)?c[+][+]")
+    list(TRANSFORM runtime PREPEND -l)
+  endif()
   tether_pkg_config(ida_projection "Constraint projection for SUNDIALS IDA and IDAS"
-    "tether-linalg = ${PROJECT_VERSION}" CFLAGS ${sundials_include})
+    "tether-linalg = ${PROJECT_VERSION}" CFLAGS ${sundials_include} LIBS ${runtime})
 endif()
 # A static library leaves its own libraries to the program.
 set(hdf5_libs "")

@@ -22,4 +22,9 @@ if(TARGET tether::ida_projection)
     set_target_properties(pendulum_${solver} PROPERTIES LINKER_LANGUAGE CXX)
     add_test(NAME pendulum_${solver} COMMAND pendulum_${solver})
   endforeach()
+  # A program in C: the C++ runtime comes with the target.
+  add_executable(pendulum_in_c ${CMAKE_CURRENT_LIST_DIR}/../../examples/drop_in/in_c.c)
+  target_link_libraries(pendulum_in_c PRIVATE tether::ida_projection
+    $<IF:$<BOOL:${SUNDIALS_FOUND}>,SUNDIALS::ida,sundials_ida> m)
+  add_test(NAME pendulum_in_c COMMAND pendulum_in_c)
 endif()

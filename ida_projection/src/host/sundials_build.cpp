@@ -6,10 +6,11 @@
 #include <string>
 #include <sundials/sundials_version.h>
 
-namespace tether::ida_projection {
+const tether_sundials_build TETHER_SUNDIALS_BUILD = {SUNDIALS_VERSION_MAJOR, SUNDIALS_VERSION_MINOR,
+                                                     SUNDIALS_VERSION_PATCH,
+                                                     TETHER_SUNDIALS_INDEX_BITS};
 
-const SundialsBuild TETHER_SUNDIALS_BUILD = {SUNDIALS_VERSION_MAJOR, SUNDIALS_VERSION_MINOR,
-                                             SUNDIALS_VERSION_PATCH, TETHER_SUNDIALS_INDEX_BITS};
+namespace tether::ida_projection {
 
 void check_running_sundials(const SundialsBuild& built) {
   int major = 0, minor = 0, patch = 0;

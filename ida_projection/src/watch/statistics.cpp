@@ -1,5 +1,6 @@
 // Tether: printing of the projection's work counts. SPDX-License-Identifier: BSD-3-Clause
 #include <iomanip>
+#include <limits>
 #include <ostream>
 #include <sstream>
 #include <tether/ida_projection/statistics.hpp>
@@ -85,6 +86,12 @@ std::string Statistics::csv_header() {
   for (const Entry& entry : entries(Statistics{}))
     line += (line.empty() ? "" : ",") + std::string(entry.column);
   return line;
+}
+
+double Statistics::number(const std::string& column) const {
+  for (const Entry& entry : entries(*this))
+    if (column == entry.column) return entry.value;
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string Statistics::csv_row() const {

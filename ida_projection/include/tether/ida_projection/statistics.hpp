@@ -54,6 +54,8 @@ struct Statistics {
   std::string table() const;
   static std::string csv_header();
   std::string csv_row() const;
+  /// The number in that column of csv_header(); NaN if there is none.
+  double number(const std::string& column) const;
 };
 
 std::ostream& operator<<(std::ostream& out, const Statistics& statistics);

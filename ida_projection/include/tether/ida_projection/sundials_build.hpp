@@ -2,37 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <sundials/sundials_config.h>
-#include <tether/export.hpp>
+#include <tether/ida_projection/sundials_build.h>
 
-#if !defined(SUNDIALS_DOUBLE_PRECISION)
-#error "tether::ida_projection needs a SUNDIALS in double precision (SUNDIALS_PRECISION=double)"
-#endif
-#if defined(SUNDIALS_INT64_T)
-#define TETHER_SUNDIALS_INDEX_BITS 64
-#elif defined(SUNDIALS_INT32_T)
-#define TETHER_SUNDIALS_INDEX_BITS 32
-#else
-#error "tether::ida_projection: sundials_config.h has neither SUNDIALS_INT64_T nor SUNDIALS_INT32_T"
-#endif
-
-#define TETHER_SUNDIALS_NAME_OF(major, bits) tether_built_for_sundials_##major##_double_index##bits
-#define TETHER_SUNDIALS_NAME(major, bits) TETHER_SUNDIALS_NAME_OF(major, bits)
-#define TETHER_SUNDIALS_BUILD \
-  TETHER_SUNDIALS_NAME(SUNDIALS_VERSION_MAJOR, TETHER_SUNDIALS_INDEX_BITS)
-
-TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
-struct SundialsBuild {
-  int major, minor, patch, index_bits;
-};
-
-/// The SUNDIALS whose headers the library was compiled with. The header of its host spells the name
-/// with what the host sees; the layouts of SUNDIALS' structures change with all three parts, and a
-/// host that sees others does not link: "undefined reference to
-/// tether_built_for_sundials_7_double_index64" means that the library is for another SUNDIALS.
-extern "C" const SundialsBuild TETHER_SUNDIALS_BUILD;
+using SundialsBuild = ::tether_sundials_build;
 
 }  // namespace tether::ida_projection
-TETHER_EXPORT_END

@@ -1,0 +1,451 @@
+// Tether: the projection for programs in C. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <tether/ida_projection.h>
+#include <tether/ida_projection.hpp>
+#include <utility>
+#include <vector>
+
+#include "host/sundials_build.hpp"
+
+namespace ip = tether::ida_projection;
+
+struct tether_constraints {
+  ip::Constraints rows;
+};
+
+struct tether_projection {
+  ip::Projection projection;
+  std::string table;
+};
+
+namespace {
+
+static_assert(int(ip::Status::doubtful) == TETHER_DOUBTFUL &&
+              int(ip::Status::out_of_memory) == TETHER_OUT_OF_MEMORY &&
+              int(ip::Metric::automatic) == TETHER_METRIC_AUTOMATIC &&
+              int(ip::LongMove::cap) == TETHER_LONG_MOVE_CAP);
+
+// Plain storage: a string would register its destructor, which ends the program without memory.
+thread_local char last_error[2048];
+
+int fail(int flag, const char* text) noexcept {
+  std::strncpy(last_error, text, sizeof last_error - 1);
+  return flag;
+}
+
+// An argument in error, e.g. "tether_add_rows: count = 0, must be at least 1".
+int ill(const std::string& text) { return fail(TETHER_ILL_INPUT, text.c_str()); }
+int null(const char* function, const char* argument) {
+  return fail(TETHER_MEM_NULL, (std::string(function) + ": " + argument + " is null").c_str());
+}
+
+// Every function that C calls: no exception gets out.
+template <class Function>
+int guarded(Function&& function) noexcept {
+  try {
+    last_error[0] = 0;
+    return function();
+  } catch (const std::bad_alloc&) {
+    return fail(TETHER_MEM_FAIL, "out of memory");
+  } catch (const std::invalid_argument& error) {
+    return fail(TETHER_ILL_INPUT, error.what());
+  } catch (const std::exception& error) {
+    return fail(TETHER_INTERNAL_ERROR, error.what());
+  } catch (...) {
+    return fail(TETHER_INTERNAL_ERROR, "unknown exception");
+  }
+}
+
+int add(tether_constraints& set, const ip::Constraints& rows) {
+  set.rows = set.rows + rows;  // a copy: the set stays whole if memory runs out
+  return 0;
+}
+
+ip::Callable<double, ip::ConstVector, ip::Vector> value_of(tether_value_fn value, void* user_data) {
+  return [value, user_data](double t, ip::ConstVector y, ip::Vector g) {
+    return value(t, y.data(), g.data(), user_data);
+  };
+}
+
+int check_rows(const char* function, const tether_constraints* set, int count, bool value) {
+  if (set == nullptr) return null(function, "constraints");
+  if (count < 1)
+    return ill(std::string(function) + ": count = " + std::to_string(count) +
+               ", must be at least 1");
+  if (!value) return null(function, "value");
+  return 0;
+}
+
+// What the caller's structure holds; a structure of an older header lacks the last fields.
+bool read_options(const tether_options* given, long unknowns, ip::Options& options, int& flag) {
+  tether_options o;
+  tether_options_init(&o, sizeof o);
+  if (given != nullptr) {
+    if (given->size < sizeof(size_t) || given->size > sizeof o) {
+      flag = ill("tether_projection_new: options->size = " + std::to_string(given->size) +
+                 ": call tether_options_init(options, sizeof *options) first");
+      return false;
+    }
+    std::memcpy(&o, given, given->size);
+  }
+  const auto out_of_range = [&](const char* field, int value, const char* allowed) {
+    flag = ill(std::string("tether_projection_new: options->") + field + " = " +
+               std::to_string(value) + ", must be " + allowed);
+    return false;
+  };
+  if (o.metric < TETHER_METRIC_LOCAL_CORRECTION || o.metric > TETHER_METRIC_AUTOMATIC)
+    return out_of_range("metric", o.metric, "TETHER_METRIC_...");
+  if (o.long_move != TETHER_LONG_MOVE_REJECT && o.long_move != TETHER_LONG_MOVE_CAP)
+    return out_of_range("long_move", o.long_move, "TETHER_LONG_MOVE_...");
+  if ((o.hold != nullptr || o.group != nullptr) && unknowns < 1) {
+    flag = ill("tether_projection_new: unknowns = " + std::to_string(unknowns) +
+               ", must be the length of options->hold and group");
+    return false;
+  }
+  options.metric = static_cast<ip::Metric>(o.metric);
+  options.tolerance = o.tolerance;
+  options.maximum_iterations = o.maximum_iterations;
+  options.frequency = o.frequency;
+  options.largest_move = o.largest_move;
+  options.long_move = static_cast<ip::LongMove>(o.long_move);
+  options.id = o.id;
+  options.derive_id_limit = o.derive_id_limit;
+  options.suppress_algebraic = o.suppress_algebraic != 0;
+  options.refresh_algebraic = o.refresh_algebraic != 0;
+  options.extra_iterations = o.extra_iterations;
+  options.step_smoothing = o.step_smoothing != 0;
+  options.smooth_where_needed = o.smooth_where_needed != 0;
+  options.smoothing_setpoint = o.smoothing_setpoint;
+  options.maximum_step = o.maximum_step;
+  options.maximum_order = o.maximum_order;
+  options.limit_order = o.limit_order != 0;
+  if (o.hold != nullptr)
+    for (long i = 0; i < unknowns; ++i) options.hold.push_back(o.hold[i] != 0);
+  options.hold_vector = o.hold_vector;
+  if (o.group != nullptr) options.group.assign(o.group, o.group + unknowns);
+  options.nonlinear_solver = o.nonlinear_solver;
+  options.print_fatal = o.print_fatal != 0;
+  options.print_warnings = o.print_warnings != 0;
+  if (o.progress != nullptr)
+    options.progress = [call = o.progress, data = o.progress_data](const ip::Progress& p) {
+      call(p.t, p.step, p.order, p.drift, p.move, p.steps, data);
+    };
+  options.progress_interval = o.progress_interval;
+  return true;
+}
+
+int finish(const ip::ConsistencyReport& found, tether_report* report) {
+  if (report != nullptr) {
+    tether_report r{};
+    r.size = report->size;
+    r.status = static_cast<int>(found.status);
+    r.iterations = found.iterations;
+    r.move = found.move;
+    r.largest_change = found.largest_change;
+    r.changed_component = found.changed_component;
+    r.derivative_change = found.derivative_change;
+    r.drift_before = found.drift_before;
+    r.drift_after = found.drift_after;
+    r.residual_before = found.residual_before;
+    r.residual_after = found.residual_after;
+    r.rank = found.rank;
+    r.slow_convergence = found.slow_convergence ? 1 : 0;
+    std::memcpy(report, &r, report->size);
+  }
+  if (found) return 0;
+  fail(0, found.message.c_str());
+  return found.status == ip::Status::unused ? TETHER_INTERNAL_ERROR
+                                            : static_cast<int>(found.status);
+}
+
+bool bad_size(const char* function, const tether_report* report) {
+  if (report == nullptr || (report->size >= sizeof(size_t) && report->size <= sizeof *report))
+    return false;
+  ill(std::string(function) + ": report->size = " + std::to_string(report->size) +
+      ", must be sizeof(tether_report)");
+  return true;
+}
+
+}  // namespace
+
+extern "C" {
+
+const char* tether_last_error(void) { return last_error; }
+
+const char* tether_status_name(int status) {
+  return ip::to_string(static_cast<ip::Status>(status));
+}
+
+tether_constraints* tether_constraints_new(void) { return new (std::nothrow) tether_constraints; }
+
+void tether_constraints_free(tether_constraints* constraints) { delete constraints; }
+
+int tether_add_rows(tether_constraints* constraints, int count, tether_value_fn value,
+                    tether_jacobian_fn jacobian, void* user_data) {
+  return guarded([&] {
+    if (const int flag = check_rows("tether_add_rows", constraints, count, value != nullptr))
+      return flag;
+    ip::Constraints rows;
+    rows.count = count;
+    rows.value = value_of(value, user_data);
+    if (jacobian != nullptr)
+      rows.jacobian =
+          ip::DenseJacobian([jacobian, user_data](double t, ip::ConstVector y, ip::Matrix C) {
+            return jacobian(t, y.data(), C.data(), user_data);
+          });
+    return add(*constraints, rows);
+  });
+}
+
+int tether_add_sparse_rows(tether_constraints* constraints, int count, const int* starts,
+                           const int* columns, tether_value_fn value, tether_entries_fn entries,
+                           void* user_data) {
+  return guarded([&] {
+    const char* const function = "tether_add_sparse_rows";
+    if (const int flag = check_rows(function, constraints, count, value != nullptr)) return flag;
+    if (starts == nullptr) return null(function, "starts");
+    if (columns == nullptr) return null(function, "columns");
+    if (entries == nullptr) return null(function, "entries");
+    for (int i = 0; i <= count; ++i)
+      if (starts[i] < (i == 0 ? 0 : starts[i - 1]) || (i == 0 && starts[0] != 0))
+        return ill(std::string(function) + ": starts[" + std::to_string(i) +
+                   "] = " + std::to_string(starts[i]) + ", must begin with 0 and never decrease");
+    ip::SparseJacobian pattern;
+    pattern.starts.assign(starts, starts + count + 1);
+    pattern.columns.assign(columns, columns + starts[count]);
+    pattern.fill = [entries, user_data](double t, ip::ConstVector y, ip::Vector values) {
+      return entries(t, y.data(), values.data(), user_data);
+    };
+    ip::Constraints rows;
+    rows.count = count;
+    rows.value = value_of(value, user_data);
+    rows.jacobian = std::move(pattern);
+    return add(*constraints, rows);
+  });
+}
+
+int tether_add_gradients(tether_constraints* constraints, int count, tether_vector_value_fn value,
+                         tether_gradients_fn gradients, void* user_data) {
+  return guarded([&] {
+    const char* const function = "tether_add_gradients";
+    if (const int flag = check_rows(function, constraints, count, value != nullptr)) return flag;
+    if (gradients == nullptr) return null(function, "gradients");
+    ip::Gradients both;
+    both.value = [value, user_data](double t, N_Vector y, double* g) {
+      return value(t, y, g, user_data);
+    };
+    both.fill = [gradients, user_data](double t, N_Vector y, N_Vector* rows) {
+      return gradients(t, y, rows, user_data);
+    };
+    ip::Constraints rows;
+    rows.count = count;
+    rows.jacobian = std::move(both);
+    return add(*constraints, rows);
+  });
+}
+
+int tether_add_quaternion_norm(tether_constraints* constraints, int first) {
+  return guarded([&] {
+    if (constraints == nullptr) return null("tether_add_quaternion_norm", "constraints");
+    return add(*constraints, ip::quaternion_norm(first));
+  });
+}
+
+int tether_add_linear_invariant(tether_constraints* constraints, const sunrealtype* coefficients,
+                                long length, sunrealtype value) {
+  return guarded([&] {
+    const char* const function = "tether_add_linear_invariant";
+    if (constraints == nullptr) return null(function, "constraints");
+    if (coefficients == nullptr) return null(function, "coefficients");
+    if (length < 1)
+      return ill(std::string(function) + ": length = " + std::to_string(length) +
+                 ", must be the number of unknowns");
+    return add(*constraints, ip::linear_invariant({coefficients, coefficients + length}, value));
+  });
+}
+
+int tether_name_row(tether_constraints* constraints, int row, const char* name) {
+  return guarded([&] {
+    const char* const function = "tether_name_row";
+    if (constraints == nullptr) return null(function, "constraints");
+    if (name == nullptr) return null(function, "name");
+    const int all = constraints->rows.total_count();
+    if (row < 0 || row >= all)
+      return ill(std::string(function) + ": row = " + std::to_string(row) + ", must be in 0 .. " +
+                 std::to_string(all - 1));
+    ip::Constraints* part = &constraints->rows;
+    int first = 0;
+    for (std::size_t k = 0; row - first >= part->count; ++k) {
+      first += part->count;
+      part = &constraints->rows.joined[k];
+    }
+    std::string its = name;
+    for (std::size_t i = part->names.size(); i < static_cast<std::size_t>(part->count); ++i)
+      part->names.push_back("row " + std::to_string(first + static_cast<int>(i)));
+    part->names[static_cast<std::size_t>(row - first)] = std::move(its);
+    return 0;
+  });
+}
+
+int tether_count_rows(const tether_constraints* constraints) {
+  if (constraints == nullptr) return null("tether_count_rows", "constraints");
+  return constraints->rows.total_count();
+}
+
+int tether_options_init(tether_options* options, size_t size) {
+  return guarded([&] {
+    if (options == nullptr) return null("tether_options_init", "options");
+    const ip::Options defaults;
+    tether_options o{};
+    if (size < sizeof(size_t) || size > sizeof o)
+      return ill("tether_options_init: size = " + std::to_string(size) +
+                 ", must be sizeof(tether_options)");
+    o.size = size;
+    o.metric = static_cast<int>(defaults.metric);
+    o.tolerance = defaults.tolerance;
+    o.maximum_iterations = defaults.maximum_iterations;
+    o.frequency = defaults.frequency;
+    o.largest_move = defaults.largest_move;
+    o.long_move = static_cast<int>(defaults.long_move);
+    o.derive_id_limit = defaults.derive_id_limit;
+    o.suppress_algebraic = defaults.suppress_algebraic;
+    o.refresh_algebraic = defaults.refresh_algebraic;
+    o.extra_iterations = defaults.extra_iterations;
+    o.step_smoothing = defaults.step_smoothing;
+    o.smooth_where_needed = defaults.smooth_where_needed;
+    o.smoothing_setpoint = defaults.smoothing_setpoint;
+    o.maximum_step = defaults.maximum_step;
+    o.maximum_order = defaults.maximum_order;
+    o.limit_order = defaults.limit_order;
+    o.print_fatal = defaults.print_fatal;
+    o.print_warnings = defaults.print_warnings;
+    o.progress_interval = defaults.progress_interval;
+    std::memcpy(options, &o, size);
+    return 0;
+  });
+}
+
+tether_projection* tether_projection_new_for(void* ida_mem, const tether_constraints* constraints,
+                                             const tether_options* options, long unknowns,
+                                             const tether_sundials_build* host, int* flag) {
+  tether_projection* made = nullptr;
+  const int result = guarded([&] {
+    const char* const function = "tether_projection_new";
+    if (ida_mem == nullptr) return null(function, "ida_mem");
+    if (constraints == nullptr) return null(function, "constraints");
+    if (host == nullptr) return null(function, "host");
+    if (constraints->rows.total_count() == 0)
+      return ill(std::string(function) + ": constraints has no rows");
+    try {
+      ip::check_running_sundials(*host);
+    } catch (const std::runtime_error& error) {
+      return fail(TETHER_WRONG_SUNDIALS, error.what());
+    }
+    ip::Options chosen;
+    int wrong = 0;
+    if (!read_options(options, unknowns, chosen, wrong)) return wrong;
+    made = new tether_projection{{ida_mem, constraints->rows, std::move(chosen)}, {}};
+    return 0;
+  });
+  if (flag != nullptr) *flag = result;
+  return made;
+}
+
+void tether_projection_free(tether_projection* projection) { delete projection; }
+
+int tether_make_consistent(tether_projection* projection, sunrealtype t0, N_Vector yy, N_Vector yp,
+                           IDAResFn F, void* user_data, tether_report* report) {
+  return guarded([&] {
+    const char* const function = "tether_make_consistent";
+    if (projection == nullptr) return null(function, "projection");
+    if (bad_size(function, report)) return int{TETHER_ILL_INPUT};
+    ip::Consistency how;
+    how.residual = F;
+    how.user_data = user_data;
+    return finish(projection->projection.make_consistent(t0, yy, yp, how), report);
+  });
+}
+
+int tether_project(tether_projection* projection, sunrealtype t, N_Vector yy, N_Vector yp,
+                   tether_report* report) {
+  return guarded([&] {
+    if (projection == nullptr) return null("tether_project", "projection");
+    if (bad_size("tether_project", report)) return int{TETHER_ILL_INPUT};
+    return finish(projection->projection.project(t, yy, yp), report);
+  });
+}
+
+int tether_solve(tether_projection* projection, sunrealtype tout, sunrealtype* tret, N_Vector yret,
+                 N_Vector ypret, int itask) {
+  return guarded([&] {
+    if (projection == nullptr) return null("tether_solve", "projection");
+    return projection->projection.solve(tout, tret, yret, ypret, itask);
+  });
+}
+
+int tether_get_status(const tether_projection* projection) {
+  return guarded([&] {
+    if (projection == nullptr) return null("tether_get_status", "projection");
+    return static_cast<int>(projection->projection.status());
+  });
+}
+
+const char* tether_get_message(const tether_projection* projection) {
+  return projection == nullptr ? "" : projection->projection.message().c_str();
+}
+
+int tether_get_statistic(const tether_projection* projection, const char* name, double* value) {
+  return guarded([&] {
+    const char* const function = "tether_get_statistic";
+    if (projection == nullptr) return null(function, "projection");
+    if (name == nullptr) return null(function, "name");
+    if (value == nullptr) return null(function, "value");
+    const double found = projection->projection.statistics().number(name);
+    if (std::isnan(found))
+      return ill(std::string(function) + ": name = \"" + name + "\", must be one of " +
+                 ip::Statistics::csv_header());
+    *value = found;
+    return 0;
+  });
+}
+
+const char* tether_get_statistics_table(const tether_projection* projection) {
+  auto* const own = const_cast<tether_projection*>(projection);  // the text only
+  const int flag = guarded([&] {
+    if (own == nullptr) return null("tether_get_statistics_table", "projection");
+    own->table = own->projection.statistics().table();
+    return 0;
+  });
+  return flag == 0 ? own->table.c_str() : nullptr;
+}
+
+int tether_reset_statistics(tether_projection* projection) {
+  return guarded([&] {
+    if (projection == nullptr) return null("tether_reset_statistics", "projection");
+    projection->projection.reset_statistics();
+    return 0;
+  });
+}
+
+int tether_fast_vector(N_Vector y) {
+  return guarded([&] {
+    ip::fast_vector(y);
+    return 0;
+  });
+}
+
+SUNLinearSolver tether_fast_dense_solver(N_Vector y, SUNMatrix A) {
+  SUNLinearSolver solver = nullptr;
+  guarded([&] {
+    solver = ip::fast_dense_solver(y, A);
+    return 0;
+  });
+  return solver;
+}
+
+}  // extern "C"

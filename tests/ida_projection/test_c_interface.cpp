@@ -1,0 +1,366 @@
+// Tether: the functions for programs in C do what the C++ interface does, and report every error.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <problems/pendulum.hpp>
+#include <string>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <tether/ida_projection.h>
+#include <vector>
+
+#include "host.hpp"
+#include "linalg/allocations.hpp"
+#include "linalg/thrown.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+
+namespace {
+
+using Set = std::unique_ptr<tether_constraints, void (*)(tether_constraints*)>;
+using Attached = std::unique_ptr<tether_projection, void (*)(tether_projection*)>;
+
+Set new_set() { return Set(tether_constraints_new(), tether_constraints_free); }
+
+Attached attach(Host& host, const Set& set, const tether_options* options = nullptr,
+                int* flag = nullptr) {
+  return Attached(tether_projection_new(host.ida, set.get(), options, host.problem.size, flag),
+                  tether_projection_free);
+}
+
+// The unit circle in y[0], y[1]; user_data: calls until `value` returns what is said there.
+struct Calls {
+  long left = -1;
+  int then = 0;
+};
+
+int circle_value(sunrealtype, const sunrealtype* y, sunrealtype* g, void* user_data) {
+  auto* const calls = static_cast<Calls*>(user_data);
+  if (calls != nullptr && calls->left >= 0 && calls->left-- == 0) return calls->then;
+  g[0] = (y[0] * y[0] + y[1] * y[1] - 1) / 2;
+  return 0;
+}
+
+int circle_jacobian(sunrealtype, const sunrealtype* y, sunrealtype* C, void*) {
+  C[0] = y[0];
+  C[1] = y[1];
+  return 0;
+}
+
+int circle_vector_value(sunrealtype t, N_Vector y, sunrealtype* g, void* user_data) {
+  return circle_value(t, N_VGetArrayPointer(y), g, user_data);
+}
+
+int circle_gradient(sunrealtype t, N_Vector y, N_Vector* rows, void* user_data) {
+  return circle_jacobian(t, N_VGetArrayPointer(y), N_VGetArrayPointer(rows[0]), user_data);
+}
+
+/// y at the end, by the rows that `add` puts into a set.
+std::vector<double> end_by_c(const std::function<int(tether_constraints*)>& add) {
+  Host host(circle(20), 1e-6);
+  const Set set = new_set();
+  REQUIRE(add(set.get()) == 0);
+  const Attached projection = attach(host, set);
+  REQUIRE(projection != nullptr);
+  REQUIRE(host.finish() >= 0);
+  CHECK(tether_get_status(projection.get()) == TETHER_SUCCESS);
+  double projections = 0;
+  REQUIRE(tether_get_statistic(projection.get(), "projections", &projections) == 0);
+  CHECK(projections >= static_cast<double>(host.steps()));
+  return host.state();
+}
+
+std::vector<double> end_by_cpp(const tp::Constraints& rows) {
+  Host host(circle(20), 1e-6);
+  host.attach(rows);
+  REQUIRE(host.finish() >= 0);
+  return host.state();
+}
+
+tp::Constraints differences() {
+  tp::Constraints rows = on_circle();
+  rows.jacobian = tp::FiniteDifferences{};
+  return rows;
+}
+
+tp::Constraints gradients() {
+  tp::Constraints rows = on_circle();
+  rows.value = nullptr;
+  tp::Gradients both;
+  both.value = [](double t, N_Vector y, double* g) {
+    return circle_vector_value(t, y, g, nullptr);
+  };
+  both.fill = [](double t, N_Vector y, N_Vector* g) { return circle_gradient(t, y, g, nullptr); };
+  rows.jacobian = both;
+  return rows;
+}
+
+bool last_error_has(const std::string& part) { return contains(tether_last_error(), part); }
+
+}  // namespace
+
+TEST_CASE("C interface: every kind of rows gives the bits of the C++ interface") {
+  const int starts[] = {0, 2}, columns[] = {0, 1};
+  const auto dense = [](tether_constraints* set) {
+    return tether_add_rows(set, 1, circle_value, circle_jacobian, nullptr);
+  };
+  CHECK(same_bits(end_by_c(dense), end_by_cpp(on_circle())));
+  CHECK(same_bits(end_by_c([](tether_constraints* set) {
+                    return tether_add_rows(set, 1, circle_value, nullptr, nullptr);
+                  }),
+                  end_by_cpp(differences())));
+  CHECK(same_bits(end_by_c([&](tether_constraints* set) {
+                    return tether_add_sparse_rows(set, 1, starts, columns, circle_value,
+                                                  circle_jacobian, nullptr);
+                  }),
+                  end_by_cpp(as_sparse(on_circle(), 2))));
+  CHECK(same_bits(end_by_c([](tether_constraints* set) {
+                    return tether_add_gradients(set, 1, circle_vector_value, circle_gradient,
+                                                nullptr);
+                  }),
+                  end_by_cpp(gradients())));
+}
+
+TEST_CASE("C interface: the defaults are those of Options, and what is set is used") {
+  tether_options options;
+  REQUIRE(tether_options_init(&options, sizeof options) == 0);
+  const tp::Options defaults;
+  CHECK(options.metric == static_cast<int>(defaults.metric));
+  CHECK(options.tolerance == defaults.tolerance);
+  CHECK(options.frequency == defaults.frequency);
+  CHECK(options.smoothing_setpoint == defaults.smoothing_setpoint);
+  CHECK(options.hold == nullptr);
+
+  const Set set = new_set();
+  REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr) == 0);
+  const int hold[] = {0, 1};  // y[1] is not moved
+  options.hold = hold;
+  options.step_smoothing = 1;
+  long reports = 0;
+  options.progress = [](sunrealtype, sunrealtype step, int order, sunrealtype, sunrealtype, long,
+                        void* data) { *static_cast<long*>(data) += step > 0 && order > 0; };
+  options.progress_data = &reports;
+  Host host(circle(1), 1e-6);
+  {
+    const Attached projection = attach(host, set, &options);
+    REQUIRE(projection != nullptr);
+    REQUIRE(host.finish() >= 0);
+    CHECK(reports >= host.steps() - 1);  // the last one is reported with the next
+    CHECK(reports <= host.steps());
+  }
+  Host same(circle(1), 1e-6);
+  tp::Options wanted;
+  wanted.hold = {false, true};
+  wanted.step_smoothing = true;
+  same.attach(on_circle(), wanted);
+  REQUIRE(same.finish() >= 0);
+  CHECK(same_bits(host.state(), same.state()));
+}
+
+TEST_CASE("C interface: a structure of an older header keeps the defaults of what it lacks") {
+  tether_options options;
+  std::memset(&options, 0x55, sizeof options);
+  const std::size_t old = offsetof(tether_options, hold);
+  REQUIRE(tether_options_init(&options, old) == 0);
+  unsigned char behind = 0;
+  std::memcpy(&behind, reinterpret_cast<const unsigned char*>(&options) + old, 1);
+  CHECK(behind == 0x55);  // not written
+  const Set set = new_set();
+  REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr) == 0);
+  Host host(circle(1), 1e-6);
+  const Attached projection = attach(host, set, &options);
+  REQUIRE(projection != nullptr);
+  CHECK(host.finish() >= 0);
+}
+
+TEST_CASE("C interface: sets join in order, rows have names, counts say how many") {
+  const Set set = new_set();
+  CHECK(tether_count_rows(set.get()) == 0);
+  REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr) == 0);
+  const double sum[] = {1, 1};
+  REQUIRE(tether_add_linear_invariant(set.get(), sum, 2, 3) == 0);
+  CHECK(tether_count_rows(set.get()) == 2);
+  REQUIRE(tether_name_row(set.get(), 0, "circle") == 0);
+  REQUIRE(tether_name_row(set.get(), 1, "line") == 0);
+  Host host(circle(1), 1e-6);
+  const Attached projection = attach(host, set);
+  REQUIRE(projection != nullptr);
+  // x + y = 3 and the unit circle have no common point: by name.
+  const N_Vector y = host.vector({1, 0}), yp = host.vector({0, 1});
+  tether_report report;
+  report.size = sizeof report;
+  CHECK(tether_project(projection.get(), 0, y, yp, &report) > 0);
+  CHECK(report.status > TETHER_SUCCESS);
+  CHECK(N_VGetArrayPointer(y)[0] == 1);
+  CHECK(std::string(tether_last_error()).size() > 20);
+}
+
+TEST_CASE("C interface: consistent values are found and reported") {
+  const Set set = new_set();
+  REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr) == 0);
+  Host host(circle(1), 1e-6);
+  const Attached projection = attach(host, set);
+  REQUIRE(projection != nullptr);
+  const N_Vector y = host.vector({1.1, 0.2}), yp = host.vector({-0.2, 1.1});
+  tether_report report;
+  report.size = offsetof(tether_report, rank);  // an older one
+  report.rank = -7;
+  REQUIRE(tether_make_consistent(projection.get(), 0, y, yp, nullptr, nullptr, &report) == 0);
+  CHECK(report.drift_before == Approx(0.125));
+  CHECK(report.drift_after < 1e-10);
+  CHECK(report.rank == -7);
+  const double* at = N_VGetArrayPointer(y);
+  CHECK(std::abs(std::hypot(at[0], at[1]) - 1) < 1e-10);
+  sunrealtype t = 0;
+  REQUIRE(tether_solve(projection.get(), 0.5, &t, y, yp, IDA_NORMAL) >= 0);
+  CHECK(std::abs(std::hypot(at[0], at[1]) - 1) < 1e-12);
+  CHECK(tether_reset_statistics(projection.get()) == 0);
+  double calls = -1;
+  CHECK(tether_get_statistic(projection.get(), "solver_calls", &calls) == 0);
+  CHECK(calls == 0);
+  CHECK(contains(tether_get_statistics_table(projection.get()), "solver calls"));
+}
+
+TEST_CASE("C interface: what a callback returns ends the run or shortens the step") {
+  for (const int returned : {-1, 1}) {
+    Calls calls{6, returned};
+    const Set set = new_set();
+    REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, &calls) == 0);
+    Host host(circle(1), 1e-6);
+    tether_options options;
+    REQUIRE(tether_options_init(&options, sizeof options) == 0);
+    options.print_fatal = 0;
+    const Attached projection = attach(host, set, &options);
+    REQUIRE(projection != nullptr);
+    const int flag = host.finish();
+    double failures = 0;
+    if (returned < 0) {
+      CHECK(flag < 0);
+      CHECK(tether_get_status(projection.get()) == TETHER_CALLBACK_FATAL);
+      CHECK(std::string(tether_get_message(projection.get())) != "");
+      CHECK(tether_get_statistic(projection.get(), "callback_fatal", &failures) == 0);
+    } else {
+      CHECK(flag >= 0);
+      CHECK(tether_get_statistic(projection.get(), "callback_recoverable", &failures) == 0);
+    }
+    CHECK(failures == 1);
+  }
+}
+
+TEST_CASE("C interface: wrong arguments are refused by name and change nothing") {
+  const Set set = new_set();
+  const int starts[] = {0, 2, 1}, columns[] = {0, 1};
+  const double one[] = {1};
+  CHECK(tether_add_rows(nullptr, 1, circle_value, nullptr, nullptr) == TETHER_MEM_NULL);
+  CHECK(tether_add_rows(set.get(), 0, circle_value, nullptr, nullptr) == TETHER_ILL_INPUT);
+  CHECK(last_error_has("count = 0"));
+  CHECK(tether_add_rows(set.get(), 1, nullptr, nullptr, nullptr) == TETHER_MEM_NULL);
+  CHECK(last_error_has("value is null"));
+  CHECK(tether_add_sparse_rows(set.get(), 2, starts, columns, circle_value, circle_jacobian,
+                               nullptr) == TETHER_ILL_INPUT);
+  CHECK(last_error_has("starts[2] = 1"));
+  CHECK(tether_add_gradients(set.get(), 1, circle_vector_value, nullptr, nullptr) ==
+        TETHER_MEM_NULL);
+  CHECK(tether_add_linear_invariant(set.get(), one, 0, 1) == TETHER_ILL_INPUT);
+  CHECK(tether_add_quaternion_norm(set.get(), -1) == TETHER_ILL_INPUT);
+  CHECK(tether_name_row(set.get(), 0, "none") == TETHER_ILL_INPUT);
+  CHECK(last_error_has("row = 0"));
+  CHECK(tether_count_rows(set.get()) == 0);
+  CHECK(tether_options_init(nullptr, sizeof(tether_options)) == TETHER_MEM_NULL);
+
+  Host host(circle(1), 1e-6);
+  int flag = 0;
+  CHECK(attach(host, set, nullptr, &flag) == nullptr);
+  CHECK(flag == TETHER_ILL_INPUT);
+  CHECK(last_error_has("no rows"));
+  REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr) == 0);
+  // Rows and gradients do not join: the set stays what it was.
+  CHECK(tether_add_gradients(set.get(), 1, circle_vector_value, circle_gradient, nullptr) ==
+        TETHER_ILL_INPUT);
+  CHECK(tether_count_rows(set.get()) == 1);
+  const auto refused = [&](const tether_options& options, const char* part) {
+    int why = 0;
+    INFO(part);
+    CHECK(attach(host, set, &options, &why) == nullptr);
+    CHECK(why == TETHER_ILL_INPUT);
+    CHECK(last_error_has(part));
+  };
+  tether_options options;
+  REQUIRE(tether_options_init(&options, sizeof options) == 0);
+  options.metric = 7;
+  refused(options, "metric = 7");
+  REQUIRE(tether_options_init(&options, sizeof options) == 0);
+  options.long_move = -1;
+  refused(options, "long_move = -1");
+  REQUIRE(tether_options_init(&options, sizeof options) == 0);
+  options.tolerance = -1;
+  refused(options, "tolerance");
+  REQUIRE(tether_options_init(&options, sizeof options) == 0);
+  options.size = 0;
+  refused(options, "tether_options_init");
+  REQUIRE(tether_options_init(&options, sizeof options) == 0);
+  const int hold[] = {0, 1};
+  options.hold = hold;
+  CHECK(tether_projection_new(host.ida, set.get(), &options, 0, &flag) == nullptr);
+  CHECK(last_error_has("unknowns = 0"));
+  CHECK(tether_projection_new(nullptr, set.get(), nullptr, 2, &flag) == nullptr);
+  CHECK(flag == TETHER_MEM_NULL);
+
+  tether_sundials_build other = TETHER_SUNDIALS_BUILD;
+  ++other.major;
+  CHECK(tether_projection_new_for(host.ida, set.get(), nullptr, 2, &other, &flag) == nullptr);
+  CHECK(flag == TETHER_WRONG_SUNDIALS);
+
+  const Attached projection = attach(host, set, nullptr, &flag);
+  REQUIRE(projection != nullptr);
+  CHECK(flag == 0);
+  CHECK(std::string(tether_last_error()).empty());
+  double number = -1;
+  CHECK(tether_get_statistic(projection.get(), "steps", &number) == TETHER_ILL_INPUT);
+  CHECK(last_error_has("solver_calls"));
+  CHECK(number == -1);
+  tether_report report;
+  report.size = 3;
+  CHECK(tether_project(projection.get(), 0, host.y, nullptr, &report) == TETHER_ILL_INPUT);
+  CHECK(tether_project(nullptr, 0, host.y, nullptr, nullptr) == TETHER_MEM_NULL);
+  CHECK(tether_solve(nullptr, 0, nullptr, host.y, host.yp, IDA_NORMAL) == TETHER_MEM_NULL);
+  CHECK(tether_get_status(nullptr) == TETHER_MEM_NULL);
+  CHECK(std::string(tether_status_name(TETHER_NOT_CONVERGED)) != "");
+  CHECK(tether_fast_vector(nullptr) == TETHER_ILL_INPUT);
+  CHECK(tether_fast_dense_solver(host.y, nullptr) == nullptr);
+  tether_projection_free(nullptr);
+  tether_constraints_free(nullptr);
+}
+
+TEST_CASE("C interface: no exception passes where memory ends, and IDA is as it was") {
+  bool done = false;
+  long n = 0;
+  for (; !done && n < 300; ++n) {
+    Host host(circle(1), 1e-6);
+    const Set set = new_set();
+    REQUIRE(set != nullptr);
+    // SUNDIALS' own N_VClone does not survive it: made before.
+    const SUNNonlinearSolver newton = SUNNonlinSol_Newton(host.y, host.context);
+    tether_options options;
+    REQUIRE(tether_options_init(&options, sizeof options) == 0);
+    options.nonlinear_solver = newton;
+    Attached projection(nullptr, tether_projection_free);
+    fail_allocation(n);
+    int flag = tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr);
+    if (flag == 0) flag = tether_name_row(set.get(), 0, "a name that is too long for its string");
+    if (flag == 0) projection = attach(host, set, &options, &flag);
+    done = !allocation_failed();
+    fail_allocation(-1);
+    INFO("allocation " << n);
+    CHECK(flag == (done ? 0 : TETHER_MEM_FAIL));
+    CHECK((projection != nullptr) == done);
+    CHECK(host.finish() >= 0);
+    IDAFree(&host.ida);
+    projection.reset();
+    SUNNonlinSolFree(newton);
+  }
+  CHECK(done);
+  CHECK(n > 10);
+}
