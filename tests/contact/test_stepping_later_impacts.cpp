@@ -100,3 +100,33 @@ TEST_CASE("stepping: a row of balls with small gaps passes one impact after anot
   CHECK(s.counts().unsolved == 0);
   CHECK(s.counts().contact_problems <= n + 1);
 }
+
+TEST_CASE("stepping: a ball that is sent off stops at what it could not reach before") {
+  // Slow bodies have contacts near them only; a fast one sends the second through a gap that its
+  // own velocity would not have covered, and that one the third.
+  const double R = 0.1;
+  for (const double scale : {1e-3, 1.0, 1e3})
+    for (const double dt : {1e-2, 5e-3})
+      for (const double e : {0.0, 0.5}) {
+        Scene scene(dt);
+        scene.options.gravity.reset();
+        scene.friction(0.3, e);
+        const Vector3d along = Vector3d(1, -0.4, 0.2).normalized();
+        for (int k = 0; k < 4; ++k)
+          scene.sphere(R * scale, k == 0 ? 20 : 1,
+                       (k * (2 * R + 5e-3) - (k > 0 ? 4.9e-3 : 0)) * scale * along,
+                       k == 0 ? Vector3d(8 * scale * along) : Vector3d::Zero());
+        scene.surfaces.push_back({scene.bodies.add_fixed(4 * (2 * R + 5e-3) * scale * along),
+                                  tc::Shape::plane(-along), 1});
+        tc::Stepper s = scene.stepper();
+        double deepest = 0;
+        for (int k = 0; k < 8; ++k) {
+          s.step();
+          deepest = std::max(deepest, s.penetration());
+        }
+        CAPTURE(scale, dt, e);
+        CHECK(deepest < 2e-3 * R * scale);
+        CHECK(s.counts().unsolved == 0);
+        CHECK(s.counts().contact_problems < 60);
+      }
+}

@@ -200,3 +200,57 @@ TEST_CASE("stepping: a stack does not depend on the order of its boxes nor on it
     CHECK(difference < 1e-7);
   }
 }
+
+TEST_CASE("polyhedra: two edges side by side touch at both ends, at any small angle and size") {
+  // Two cards lean on each other, turned about the vertical: the edges meet at one end and are
+  // apart at the other.
+  const double lean = radians(15);
+  for (const double size : {1e-3, 1.0, 1e4})
+    for (const double yaw : {0.0, 1e-9, 1e-6, 3e-5, 1e-4, 1e-3, 1e-2}) {
+      const tc::Shape card = tc::Shape::box(size * Vector3d(0.02, 0.7, 1));
+      const auto leaning = [&](double side) {
+        const Quaterniond q = AngleAxisd(-side * yaw, Vector3d::UnitZ()) *
+                              AngleAxisd(-side * lean, Vector3d::UnitY());
+        const double reach = 0.01 * std::cos(lean) + 0.5 * std::sin(lean);
+        return pose(size * Vector3d(side * reach, 0, 0), q);
+      };
+      const tc::NearPoints near = points_of(card, leaning(-1), card, leaning(1), 0.01 * size);
+      CAPTURE(size, yaw);
+      REQUIRE(near.count == 2);
+      const double apart = 0.7 * std::sin(yaw);  // half of the length, twice the angle
+      const auto [least, most] = std::minmax(near.point[0].gap, near.point[1].gap);
+      CHECK(least == Approx(-apart * size).margin((0.3 * yaw * yaw + 1e-14) * size));
+      CHECK(most == Approx(apart * size).margin((0.3 * yaw * yaw + 1e-14) * size));
+      CHECK(std::abs(near.point[0].normal.x()) > 0.999);
+      CHECK(std::abs(near.point[0].on_first.y() - near.point[1].on_first.y()) > 0.69 * size);
+    }
+}
+
+TEST_CASE("polyhedra: beside two edges that cross, what may close meanwhile is a contact") {
+  // The upper box, tilted about a slanted axis, meets the rim of the lower one with an edge. It
+  // turns about that point by more than its tilt in a step, and may go no deeper than it is.
+  const Vector3d size(0.2, 0.15, 0.1);
+  int crossing = 0;
+  for (int k = 0; k < 200; ++k) {
+    Scene scene(5e-3);
+    scene.options.gravity.reset();
+    scene.options.error_reduction = 0;
+    scene.friction(0.3);
+    const Quaterniond q(AngleAxisd(0.06, Vector3d(std::cos(k), std::sin(k), 0.3).normalized()));
+    scene.surfaces.push_back({scene.bodies.add_fixed(Vector3d::Zero()), tc::Shape::box(size), 1});
+    const int box =
+        scene.box(size, 1, Vector3d(0.11 * std::cos(7 * k), 0.08 * std::sin(7 * k), 0.107), q);
+    const Vector3d w(20 * std::sin(3 * k), 20 * std::cos(5 * k), 0);
+    scene.bodies.motion[static_cast<std::size_t>(box)].angular_velocity = w;
+    tc::Stepper s = with_polyhedra(scene);
+    s.step();
+    const double before = s.penetration();
+    if (s.contacts().points.size() > 0 && before == 0) ++crossing;
+    double deepest = 0;
+    s.step();
+    deepest = s.penetration();
+    CAPTURE(k, before, deepest);
+    CHECK(deepest < before + 1e-3);
+  }
+  CHECK(crossing > 50);
+}

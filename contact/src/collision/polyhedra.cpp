@@ -20,6 +20,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 // Faces more oblique to each other than this have an edge contact between them.
 constexpr double kParallel = 0.99875;  // cos 0.05
 constexpr double kFlat = 1e-9;         // radian: along a face
+constexpr double kAcross = 0.05;       // radian: an edge farthest in a direction, as a whole
 // Of the smaller thickness: separations between which faces are preferred; corners that are one;
 // numbers that differ by rounding only, of which the first is taken in every attitude.
 constexpr double kTie = 1e-4, kSame = 1e-7, kRounding = 1e-12;
@@ -188,18 +189,29 @@ class Polyhedra final : public PairCollision {
     const EdgeAxis E = best_edges(a_, b_, rounding);
     if (E.separation >= margin) return;
     const double best = std::max(A.separation, B.separation);
-    if (E.separation > best + tie) return crossing_edges(E, tie, margin, out);
+    if (E.separation > best + tie) {
+      const int before = out.count;
+      crossing_edges(E, tie, margin, out);
+      // One point leaves bodies free to turn about it: what may close meanwhile is open now.
+      if (out.count > before) over_face(A, B, tie, margin, size, 0, out);
+      return;
+    }
     const Vector3d &nA = a_.face(A.face).normal, &nB = b_.face(B.face).normal;
     if (std::abs(A.separation - B.separation) < tie && -nA.dot(nB) < kParallel)
-      return edge_along_edge((nA - nB).normalized(), tie, margin, out);
-    // The first body's face unless the second one's is clearly better, so that touching faces keep
-    // their reference.
+      return edge_along_edge((nA - nB).normalized(), rounding, margin, out);
+    over_face(A, B, tie, margin, size, -kInfinity, out);
+  }
+
+  // The first body's face unless the second one's is clearly better, so that touching faces keep
+  // their reference.
+  void over_face(const FaceAxis& A, const FaceAxis& B, double tie, double margin, double size,
+                 double least, NearPoints& out) {
     if (A.separation >= B.separation - tie) {
       const int from = out.count;
-      clip(a_, A.face, b_, margin, size, 0, out);
+      clip(a_, A.face, b_, least, margin, size, 0, out);
       turn(out, from);
     } else {
-      clip(b_, B.face, a_, margin, size, 1 << 15, out);
+      clip(b_, B.face, a_, least, margin, size, 1 << 15, out);
     }
   }
 
@@ -229,8 +241,8 @@ class Polyhedra final : public PairCollision {
 
   // Points on faces of `other` over the reference face; on_first of a result is on `other`, its
   // normal is that of the reference face.
-  void clip(const Placed& reference, int face, const Placed& other, double margin, double size,
-            int mark, NearPoints& out) {
+  void clip(const Placed& reference, int face, const Placed& other, double least, double margin,
+            double size, int mark, NearPoints& out) {
     const Vector3d& n = reference.face(face).normal;
     const double offset = reference.face(face).offset;
     const double same = kSame * size;
@@ -246,7 +258,8 @@ class Polyhedra final : public PairCollision {
     merge(same);
     for (const Corner& c : polygon_) {
       const double gap = n.dot(c.point) - offset;
-      if (gap < margin) out.add(c.point, c.point - gap * n, n, gap, mark | c.feature);
+      if (gap > least && gap < margin)
+        out.add(c.point, c.point - gap * n, n, gap, mark | c.feature);
     }
   }
 
@@ -302,24 +315,33 @@ class Polyhedra final : public PairCollision {
       gap = apart.norm();
       n = apart / gap;
     }
-    if (gap < margin) out.add(p, q, n, gap, 1 + (E.first * 251 + E.second) % 65000);
+    if (gap < margin) out.add(p, q, n, gap, 0x7f10 + (E.first * 251 + E.second) % 0xef);
   }
 
-  // Vertices of `a` that are farthest in direction m.
-  static void farthest(const Placed& a, const Vector3d& m, double tie, std::vector<int>& list) {
-    double most = -kInfinity;
-    for (const Vector3d& v : a.now.vertices) most = std::max(most, m.dot(v));
-    list.clear();
-    for (int v = 0; v < static_cast<int>(a.now.vertices.size()); ++v)
-      if (m.dot(a.vertex(v)) > most - tie) list.push_back(v);
+  // The edge of `a` that is farthest in direction m: from the farthest vertex along the edge that
+  // lies most across m. A vertex alone (from == to) where none does.
+  static Polyhedron::Edge farthest(const Placed& a, const Vector3d& m, double rounding) {
+    int v = 0;
+    for (int k = 1; k < static_cast<int>(a.now.vertices.size()); ++k)
+      if (m.dot(a.vertex(k)) > m.dot(a.vertex(v)) + rounding) v = k;
+    Polyhedron::Edge best{v, v, -1, -1};
+    double slope = kAcross;
+    for (const Polyhedron::Edge& e : a.shape->edges) {
+      if (e.from != v && e.to != v) continue;
+      const Vector3d u = a.vertex(e.to) - a.vertex(e.from);
+      const double s = std::abs(m.dot(u)) / u.norm();
+      if (s >= slope - kRounding) continue;
+      slope = s;
+      best = e;
+    }
+    return best;
   }
 
   // m points from the first body to the second.
-  void edge_along_edge(const Vector3d& m, double tie, double margin, NearPoints& out) {
-    farthest(a_, m, 10 * tie, on_a_);
-    farthest(b_, -m, 10 * tie, on_b_);
-    const Vector3d p = a_.vertex(on_a_.front()), u = a_.vertex(on_a_.back()) - p;
-    const Vector3d q = b_.vertex(on_b_.front()), v = b_.vertex(on_b_.back()) - q;
+  void edge_along_edge(const Vector3d& m, double rounding, double margin, NearPoints& out) {
+    const Polyhedron::Edge e = farthest(a_, m, rounding), g = farthest(b_, -m, rounding);
+    const Vector3d p = a_.vertex(e.from), u = a_.vertex(e.to) - p;
+    const Vector3d q = b_.vertex(g.from), v = b_.vertex(g.to) - q;
     const auto add = [&](const Vector3d& x, const Vector3d& y, int feature) {
       const double gap = m.dot(y - x);
       if (gap < margin) out.add(x, y, -m, gap, feature);
@@ -331,7 +353,8 @@ class Polyhedra final : public PairCollision {
       if (vv > 0) y = q + std::clamp(v.dot(p - q) / vv, 0.0, 1.0) * v;
       return add(x, y, 0x7f00);
     }
-    if (u.cross(v).squaredNorm() > 1e-6 * uu * vv) {
+    // Edges that cross seen along m touch where they do; an angle in a plane with m opens a gap.
+    if (std::abs(m.dot(u.cross(v))) > 1e-3 * std::sqrt(uu * vv)) {
       Vector3d x, y;
       nearest(p, u, q, v, x, y);
       return add(x, y, 0x7f01);
@@ -430,7 +453,6 @@ class Polyhedra final : public PairCollision {
   Placed a_, b_;
   std::vector<Corner> polygon_, clipped_;
   std::vector<double> height_;
-  std::vector<int> on_a_, on_b_;
 };
 
 }  // namespace

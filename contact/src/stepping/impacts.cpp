@@ -6,14 +6,7 @@
 namespace tether::contact::detail {
 
 namespace {
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
 }  // namespace
-
-double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& c) {
-  const RigidBody &a = motion[at(c.first)], &b = motion[at(c.second)];
-  return c.normal.dot(a.velocity + a.angular_velocity.cross(c.r1) - b.velocity -
-                      b.angular_velocity.cross(c.r2));
-}
 
 void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
                      StepContacts& contacts) {

@@ -15,9 +15,6 @@ struct Impact {
   double came, comes, restitution;
 };
 
-/// Normal velocity of separation.
-double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& contact);
-
 /// README, section 13. An approach that ends within the step ends at once and as a whole, bias 0:
 /// with gap / dt, part of it would be left to the next step, and where slip stops or turns round in
 /// the impact the two parts do not add up to the whole, however short the step. Slower approaches

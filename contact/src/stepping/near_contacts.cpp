@@ -21,6 +21,12 @@ bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; 
 
 }  // namespace
 
+double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& c) {
+  const RigidBody &a = motion[at(c.first)], &b = motion[at(c.second)];
+  return c.normal.dot(a.velocity + a.angular_velocity.cross(c.r1) - b.velocity -
+                      b.angular_velocity.cross(c.r2));
+}
+
 NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
                            std::vector<Meeting> meetings, Law law, double near_part,
                            std::unique_ptr<PairCollision> polyhedra)
@@ -130,13 +136,17 @@ void NearContacts::place(const BodySet& bodies, double dt) {
       pose_[k].rotation = (q * s.shape.orientation).toRotationMatrix();
   }
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
-    const Surface& s = surface(bounded_[k]);
-    const RigidBody& b = bodies.motion[at(s.body)];
-    const double arm = reach_[k] + s.shape.position.norm();
     centre_[k] = pose_[at(bounded_[k])].position;
-    ball_[k] = reach_[k] + near_part_ * reach_[k] +
-               dt * (b.velocity.norm() + arm * b.angular_velocity.norm());
+    ball_[k] = reach_[k] + near_part_ * reach_[k] + way(bodies, k, dt);
   }
+}
+
+// That the bounded surface k covers at most.
+double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const {
+  const Surface& s = surface(bounded_[k]);
+  const RigidBody& b = bodies.motion[at(s.body)];
+  const double arm = reach_[k] + s.shape.position.norm();
+  return dt * (b.velocity.norm() + arm * b.angular_velocity.norm());
 }
 
 void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) {
@@ -176,18 +186,55 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   }
 }
 
-void NearContacts::find(const BodySet& bodies, double dt, StepContacts& out) {
-  out.points.clear();
-  out.gaps.clear();
-  place(bodies, dt);
+// Pairs of bounded surfaces, or of one and a plane, that `use(first, second)` wants.
+template <class Use>
+void NearContacts::pairs(const BodySet& bodies, StepContacts& out, const Use& use) {
   for (int p = 0; p < static_cast<int>(planes_.size()); ++p) {
     const Pose& plane = pose_[at(planes_[at(p)])];
     const Vector3d n = plane.rotation * surface(planes_[at(p)]).shape.normal;
     for (int k = 0; k < static_cast<int>(bounded_.size()); ++k)
-      if (!still_[at(k)] && n.dot(centre_[at(k)] - plane.position) < ball_[at(k)])
+      if (!still_[at(k)] && use(k, k) && n.dot(centre_[at(k)] - plane.position) < ball_[at(k)])
         pair(bodies, k, ~p, out);
   }
-  broadphase_.pairs(centre_, ball_, still_, [&](int a, int b) { pair(bodies, a, b, out); });
+  broadphase_.pairs(centre_, ball_, still_, [&](int a, int b) {
+    if (use(a, b)) pair(bodies, a, b, out);
+  });
+}
+
+void NearContacts::find(const BodySet& bodies, double dt, StepContacts& out) {
+  out.points.clear();
+  out.gaps.clear();
+  place(bodies, dt);
+  pairs(bodies, out, [](int, int) { return true; });
+}
+
+bool NearContacts::find_more(const BodySet& bodies, double dt, StepContacts& out) {
+  faster_.assign(bounded_.size(), 0);
+  bool any = false;
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    const double now = way(bodies, k, dt);
+    if (still_[k] || !(reach_[k] + now > ball_[k])) continue;
+    faster_[k] = 1;
+    any = true;
+    ball_[k] = reach_[k] + near_part_ * reach_[k] + now;
+  }
+  if (!any) return false;
+  more_.points.clear();
+  more_.gaps.clear();
+  pairs(bodies, more_, [&](int a, int b) { return faster_[at(a)] || faster_[at(b)]; });
+  known_.clear();
+  for (const PointContact& c : out.points) known_.push_back(c.id);
+  std::sort(known_.begin(), known_.end());
+  const std::size_t before = out.points.size();
+  for (std::size_t k = 0; k < more_.points.size(); ++k) {
+    const PointContact& c = more_.points[k];
+    if (more_.gaps[k] + dt * normal_velocity(bodies.motion, c) > -near_part_ * size(c) ||
+        std::binary_search(known_.begin(), known_.end(), c.id))
+      continue;
+    out.points.push_back(c);
+    out.gaps.push_back(more_.gaps[k]);
+  }
+  return out.points.size() > before;
 }
 
 }  // namespace tether::contact::detail

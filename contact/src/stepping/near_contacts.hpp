@@ -10,6 +10,9 @@
 
 namespace tether::contact::detail {
 
+/// Normal velocity of separation.
+double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& contact);
+
 /// Finds the points at which bodies are or, by their velocities, may come into contact in a step.
 class NearContacts {
  public:
@@ -19,6 +22,11 @@ class NearContacts {
 
   /// Fills points and gaps.
   void find(const BodySet& bodies, double dt, StepContacts& out);
+
+  /// After find(), with other velocities at the same places: adds points whose bodies were too slow
+  /// to reach each other and are no longer, if they would end the step deeper in each other than
+  /// near_part of their size. False: none.
+  bool find_more(const BodySet& bodies, double dt, StepContacts& out);
 
   const Surface& surface(int k) const { return surfaces_[static_cast<std::size_t>(k)]; }
   const Meeting& meeting(const PointContact& c) const;
@@ -30,6 +38,9 @@ class NearContacts {
   void find_foreign(const BodySet& bodies);
   int meeting_of(int a, int b) const;
   void place(const BodySet& bodies, double dt);
+  double way(const BodySet& bodies, std::size_t k, double dt) const;
+  template <class Use>
+  void pairs(const BodySet& bodies, StepContacts& out, const Use& use);
   void pair(const BodySet& bodies, int a, int b, StepContacts& out);
 
   std::vector<Surface> surfaces_;
@@ -47,7 +58,9 @@ class NearContacts {
   std::vector<double> reach_;
   std::vector<Eigen::Vector3d> centre_;
   std::vector<double> ball_;
-  std::vector<char> still_;
+  std::vector<char> still_, faster_;
+  StepContacts more_;
+  std::vector<std::uint64_t> known_;  // identities of contacts
   NearPoints near_;
 };
 

@@ -54,6 +54,20 @@ bool Stepper::Implementation::shortest() const {
   return options.max_halvings > 0 && (!may_halve || impact);
 }
 
+void Stepper::Implementation::remember_judgement() {
+  before_problem = {status, succeeded, residual, counts.bounces, counts.accepted, counts.unsolved};
+}
+
+void Stepper::Implementation::forget_problem() {
+  const Judgement& b = before_problem;
+  status = b.status;
+  succeeded = b.succeeded;
+  residual = b.residual;
+  counts.bounces = b.bounces;
+  counts.accepted = b.accepted;
+  counts.unsolved = b.unsolved;
+}
+
 // Accepts the solution, or not; one that a shorter step replaces leaves no trace.
 void Stepper::Implementation::judge() {
   const bool solved = solution.status == Status::solved;

@@ -37,6 +37,7 @@ void Stepper::Implementation::make_stages() {
     add_stage("contact", &I::solve_contacts);
     if (restitution) add_stage("restitution", &I::rebound);
     add_stage(impact, &I::take_later_impacts);
+    add_stage("collision", &I::meet_others);
     if (closing) add_stage("penetration", &I::close_gaps);
     if (correction) add_stage("penetration", &I::correct_penetration);
     if (joints) add_stage("joints", &I::put_back_joints);
@@ -76,10 +77,37 @@ void Stepper::Implementation::gyrate_implicit() {
 void Stepper::Implementation::find_contacts() {
   near->find(bodies, dt, contacts);
   if (joints) leave_out_joined();
+  set_gaps();
+  free_motion = bodies.motion;
+  remember_judgement();
+}
+
+void Stepper::Implementation::set_gaps() {
   for (std::size_t k = 0; k < contacts.gaps.size(); ++k) {
     const double gap = contacts.gaps[k];
     deepest = std::max(deepest, -gap);
     contacts.points[k].bias = gap > 0 ? gap / dt : 0;
+  }
+}
+
+// Bodies that impacts have sent where their velocities before did not take them: with what they
+// would go into, the problem is solved again. What is left after three times the next step sees.
+void Stepper::Implementation::meet_others() {
+  for (int again = 0; again < 3 && !failed; ++again) {
+    const std::size_t before = contacts.points.size();
+    if (!near->find_more(bodies, dt, contacts)) return;
+    if (joints) leave_out_joined();
+    if (contacts.points.size() == before) return;
+    bodies.motion = free_motion;
+    solver->take_back();
+    forget_problem();
+    set_gaps();
+    choose_impacts();
+    if (restitution) choose_bounces();
+    solve_contacts();
+    if (failed && may_halve) return;
+    if (restitution) rebound();
+    take_later_impacts();
   }
 }
 

@@ -74,11 +74,19 @@ struct Stepper::Implementation {
   Status status = Status::solved;
   double residual = 0, deepest = 0;
 
+  // As they were before the problem: what a second one of the same part replaces leaves no trace.
+  struct Judgement {
+    Status status;
+    bool succeeded;
+    double residual;
+    long bounces, accepted, unsolved;
+  } before_problem = {};
+
   // Only with error reduction.
   std::unique_ptr<detail::Closing> closing;
   std::unique_ptr<detail::StepSolver> correction;
   BodySolution correction_solution;
-  std::vector<RigidBody> at_rest, closing_move;
+  std::vector<RigidBody> at_rest, closing_move, free_motion;
   bool corrects = false;
 
   StepCounts counts;
@@ -97,6 +105,8 @@ struct Stepper::Implementation {
   void solve_problem();
   bool shortest() const;
   void judge();
+  void remember_judgement();
+  void forget_problem();
 
   void remember_velocities() { impacts->remember(bodies); }
   void begin_joints() { joints->begin(bodies, part_start); }
@@ -108,11 +118,13 @@ struct Stepper::Implementation {
   void gyrate_explicit();
   void gyrate_implicit();
   void find_contacts();
+  void set_gaps();
   void choose_impacts();
   void choose_bounces() { restitution->choose(*impacts, *impacts, bodies, contacts); }
   void solve_contacts();
   void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
   void take_later_impacts();
+  void meet_others();
   void close_gaps();
   void correct_penetration();
   void shift(int body, const Eigen::Vector3d& v, const Eigen::Vector3d& w);
