@@ -38,7 +38,7 @@ bool Closing::find(const Impacts& impacts, const BodySet& bodies, double dt,
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
     if (!mark(static_cast<int>(k))) continue;
     points_.push_back(contacts.points[k]);
-    points_.back().bias = contacts.gaps[k] > 0 ? contacts.gaps[k] / dt : 0;
+    points_.back().bias = depenetration_.bias(contacts.gaps[k], dt);
     start_.ids.push_back(points_.back().id);
     start_.impulses.push_back(part_[k] * contacts.impulses[k]);
   }

@@ -212,8 +212,9 @@ bool NearContacts::find_more(const BodySet& bodies, double dt, StepContacts& out
   faster_.assign(bounded_.size(), 0);
   bool any = false;
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    if (still_[k]) continue;
     const double now = way(bodies, k, dt);
-    if (still_[k] || !(reach_[k] + now > ball_[k])) continue;
+    if (!(reach_[k] + now > ball_[k])) continue;
     faster_[k] = 1;
     any = true;
     ball_[k] = reach_[k] + near_part_ * reach_[k] + now;

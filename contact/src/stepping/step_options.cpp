@@ -64,6 +64,14 @@ BodyOptions correction_options(const SteppingOptions& o) {
   return b;
 }
 
+Depenetration depenetration(const SteppingOptions& o) {
+  return {o.error_reduction, o.max_depenetration_speed};
+}
+
+double negligible_depth(const SteppingOptions& o, double dt) {
+  return o.gravity ? o.tolerance * o.gravity->norm() * dt * dt : 0;
+}
+
 // Of positions only: an error of the approach is so much of its way in the step, and the next step
 // sees it as a gap or a penetration. A few sweeps do; small islands, which are cheap, are solved,
 // so that a stack that lands does not depend on the order of its boxes.

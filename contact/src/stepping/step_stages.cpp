@@ -153,28 +153,33 @@ void Stepper::Implementation::take_later_impacts() {
 }
 
 void Stepper::Implementation::close_gaps() {
-  if (!closing->find(*impacts, bodies, dt, contacts, closing_move)) return;
+  closes = closing->find(*impacts, bodies, dt, contacts, closing_move);
+  if (!closes) return;
   for (const int i : moving)
     shift(i, closing_move[at(i)].velocity, closing_move[at(i)].angular_velocity);
 }
 
 // The least move (in the metric of the masses) that takes penetrations back; contacts that are open
-// may close by as much as they are open. Its velocity is not kept.
+// may close by as much as they are open. Its velocity is not kept. Islands whose gaps have just
+// been closed are left out: that has taken theirs back.
 void Stepper::Implementation::correct_penetration() {
-  corrects = deepest > 0;
+  corrects = false;
+  if (!(deepest > detail::negligible_depth(options, dt))) return;
+  const detail::Depenetration take_back = detail::depenetration(options);
+  deep_points.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    if (closes && closing->treats(bodies, contacts.points[k])) continue;
+    deep_points.push_back(contacts.points[k]);
+    deep_points.back().bias = take_back.bias(contacts.gaps[k], dt);
+    corrects = corrects || contacts.gaps[k] < 0;
+  }
   if (!corrects) return;
   at_rest.resize(bodies.motion.size());
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
     at_rest[i].inverse_mass = bodies.motion[i].inverse_mass;
     at_rest[i].inverse_inertia = bodies.motion[i].inverse_inertia;
   }
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    const double gap = contacts.gaps[k];
-    contacts.points[k].bias =
-        gap > 0 ? gap / dt
-                : std::max(options.error_reduction * gap / dt, -options.max_depenetration_speed);
-  }
-  correction->solve(at_rest, contacts.points, correction_solution);
+  correction->solve(at_rest, deep_points, correction_solution);
   for (const int i : moving)
     shift(i, correction_solution.velocities[at(i)], correction_solution.angular_velocities[at(i)]);
 }

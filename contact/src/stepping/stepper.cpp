@@ -22,7 +22,8 @@ void Stepper::Implementation::make_solvers() {
   }
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
     correction = std::make_unique<detail::StepSolver>(detail::correction_options(options));
-    closing = std::make_unique<detail::Closing>(detail::closing_options(options));
+    closing = std::make_unique<detail::Closing>(detail::closing_options(options),
+                                                detail::depenetration(options));
   }
   if (joints) give_joints();
 }

@@ -30,6 +30,9 @@ BodyOptions contact_options(const SteppingOptions& o);
 /// Of contact problems that a shorter step would not make easier.
 BodyOptions patient_options(const SteppingOptions& o);
 BodyOptions correction_options(const SteppingOptions& o);
+Depenetration depenetration(const SteppingOptions& o);
+/// Depth that the residual itself allows in a step: m.
+double negligible_depth(const SteppingOptions& o, double dt);
 /// Of gaps that inelastic impacts close.
 BodyOptions closing_options(const SteppingOptions& o);
 /// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
@@ -87,7 +90,8 @@ struct Stepper::Implementation {
   std::unique_ptr<detail::StepSolver> correction;
   BodySolution correction_solution;
   std::vector<RigidBody> at_rest, closing_move, free_motion;
-  bool corrects = false;
+  std::vector<PointContact> deep_points;
+  bool closes = false, corrects = false;
 
   StepCounts counts;
 

@@ -36,7 +36,7 @@ Squares sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
 Squares test(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
 
 Restitution::Restitution(RestitutionLaw, const BodyOptions&) { absent("restitution"); }
-void Restitution::choose(const std::vector<Impact>&, const BodySet&, StepContacts&) {
+void Restitution::choose(const Impacts&, const Impacts&, const BodySet&, StepContacts&) {
   absent("restitution");
 }
 int Restitution::apply(BodySet&, StepContacts&) { absent("restitution"); }
