@@ -19,7 +19,25 @@ void read_scene_table(Fields& root, Reader& r) {
   r.scene.name = in.text("name", "");
   r.scene.end = in.number("end", r.scene.end, kPositive, "s");
   for (const effects::Effect* each : effects::all()) each->read_scene(in, r.scene);
+  r.scene.engine = in.word("engine", r.scene.engine);
   in.finish();
+}
+
+void read_event(Fields& root, Reader& r) {
+  const Value* event = root.table("event");
+  if (event == nullptr) return;
+  Fields in = r.fields(event, "event");
+  EventOptions o;
+  o.tolerance =
+      in.number("tolerance", o.tolerance, {1e-13, 1e-1, false, "a number from 1e-13 to 0.1"},
+                "relative, and absolute in SI");
+  o.max_step = in.number("max_step", o.max_step, kNotNegative, "s; 0: free");
+  o.max_events = in.count("max_events", o.max_events, 1, 2000000000);
+  o.max_steps = in.count("max_steps", o.max_steps, 1, 2000000000);
+  in.finish();
+  r.scene.event = o;
+  if (r.scene.smooth || r.scene.stepping)
+    root.wrong("event", "a scene has one of [smooth], [stepping] and [event]");
 }
 
 void read_engine(Fields& root, Reader& r) {
@@ -122,6 +140,7 @@ Scene read(std::string_view text, const std::string& name) {
   });
   for (const effects::Effect* each : effects::all()) each->read(root, r);
   read_engine(root, r);
+  read_event(root, r);
   read_output(root, r);
   r.each(root, "expect", [&](Fields& in) { read_expect(in, r); });
   root.finish();

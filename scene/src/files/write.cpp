@@ -110,6 +110,14 @@ void write_stepping(const SteppingOptions& o, Writer& out) {
   out.field("threads", o.threads);
 }
 
+void write_event(const EventOptions& o, Writer& out) {
+  out.table("event");
+  out.field("tolerance", o.tolerance);
+  out.field("max_step", o.max_step, "s; 0: free");
+  out.field("max_events", o.max_events);
+  out.field("max_steps", o.max_steps);
+}
+
 void write_output(const Output& o, Writer& out) {
   out.table("output");
   out.field("csv", o.csv);
@@ -140,9 +148,11 @@ std::string write_scene(const Scene& scene) {
   out.table("scene");
   out.field("name", scene.name);
   out.field("end", scene.end, "s");
+  out.raw("engine", toml_word(scene.engine));
   for (const effects::Effect* each : effects::all()) each->write_scene(scene, out);
   if (scene.smooth) write_smooth(*scene.smooth, out);
   if (scene.stepping) write_stepping(*scene.stepping, out);
+  if (scene.event) write_event(*scene.event, out);
   write_output(scene.output, out);
   for (const Body& body : scene.bodies) write_body(body, out);
   for (const Pair& pair : scene.pairs) {

@@ -9,6 +9,8 @@ std::unique_ptr<Engine> make_engine(const Scene& scene) {
       return make_smooth_engine(scene);
     case EngineKind::stepping:
       return make_stepping_engine(scene);
+    case EngineKind::event:
+      return make_event_engine(scene);
   }
   return nullptr;
 }

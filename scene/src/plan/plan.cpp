@@ -55,7 +55,7 @@ int smooth_unknowns(const Scene& s, const Plan& plan) {
   return 13 * plan.moving + (keeps_energy && works ? 1 : 0) + multipliers * plan.rows;
 }
 
-EngineKind choose(const Scene& s, std::string& why) {
+EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   std::string refusal;
   const auto refuse = [&](bool wrong, const std::string& text) {
     if (wrong) refusal += (refusal.empty() ? "" : "\n") + text;
@@ -63,22 +63,36 @@ EngineKind choose(const Scene& s, std::string& why) {
   const bool contact = !s.pairs.empty();
   const bool projected = std::any_of(s.invariants.begin(), s.invariants.end(),
                                      [](const Invariant& each) { return each.project; });
-  refuse(s.smooth && s.stepping, "the scene has options for both engines, [smooth] and [stepping]");
-  refuse(contact && s.smooth,
-         "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping]");
-  refuse((contact || s.stepping) && projected,
+  const auto asks = [&](EngineChoice which, bool options) { return s.engine == which || options; };
+  const bool smooth = asks(EngineChoice::smooth, s.smooth.has_value());
+  const bool stepping = asks(EngineChoice::stepping, s.stepping.has_value());
+  const bool event = asks(EngineChoice::event, s.event.has_value());
+  refuse(
+      smooth + stepping + event > 1,
+      smooth && stepping && !event
+          ? "the scene has options for both engines, [smooth] and [stepping]"
+          : "the scene asks for more than one engine: by engine, [smooth], [stepping] or [event]");
+  refuse(contact && smooth,
+         "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping] or [event]");
+  refuse((contact || stepping) && !event && projected,
          "the stepping engine projects no invariants: give them project = false, or, without "
          "contacts, use [smooth]");
+  no_event = contact || event ? event_engine_refusal(s) : std::string("nothing touches");
+  refuse(event && !no_event.empty(), no_event);
   if (!refusal.empty()) throw std::invalid_argument(refusal);
 
+  if (event) {
+    why = contact ? "bodies touch, and the scene asks for it" : "the scene asks for it";
+    return EngineKind::event;
+  }
   if (contact) {
     why = s.joints.empty() ? "bodies touch" : "bodies touch; it has joints, too";
     return EngineKind::stepping;
   }
-  why = s.stepping ? "the scene asks for it"
-        : s.smooth ? "nothing touches, and the scene asks for it"
-                   : "nothing touches";
-  return s.stepping ? EngineKind::stepping : EngineKind::smooth;
+  why = stepping ? "the scene asks for it"
+        : smooth ? "nothing touches, and the scene asks for it"
+                 : "nothing touches";
+  return stepping ? EngineKind::stepping : EngineKind::smooth;
 }
 
 }  // namespace
@@ -87,7 +101,7 @@ int joint_rows(const Joint& joint) { return joints::row_count(joint); }
 
 Plan make_plan(const Scene& scene) {
   Plan plan;
-  plan.engine = choose(scene, plan.why);
+  plan.engine = choose(scene, plan.why, plan.no_event);
   for (const effects::Effect* each : effects::all()) each->plan(scene, plan.engine, plan.effects);
   for (const Body& body : scene.bodies) {
     ++plan.bodies;
@@ -97,15 +111,24 @@ Plan make_plan(const Scene& scene) {
   for (const Joint& joint : scene.joints) plan.rows += joint_rows(joint);
   for (const Invariant& each : scene.invariants)
     if (each.project) plan.invariants += each.kind == InvariantKind::energy ? 1 : 3;
-  plan.unknowns =
-      plan.engine == EngineKind::stepping ? 6 * plan.moving : smooth_unknowns(scene, plan);
+  plan.unknowns = plan.engine == EngineKind::stepping ? 6 * plan.moving
+                  : plan.engine == EngineKind::event  ? 13 * plan.moving + 1
+                                                      : smooth_unknowns(scene, plan);
   plan.pairs = contact_pairs(scene);
   return plan;
 }
 
 std::ostream& operator<<(std::ostream& out, const Plan& plan) {
   const bool smooth = plan.engine == EngineKind::smooth;
-  out << fmt::format("engine    {} ({})\n", smooth ? "smooth" : "stepping", plan.why);
+  const bool event = plan.engine == EngineKind::event;
+  out << fmt::format("engine    {} ({})\n",
+                     smooth  ? "smooth"
+                     : event ? "event"
+                             : "stepping",
+                     plan.why);
+  if (plan.engine == EngineKind::stepping && plan.pairs > 0)
+    out << (plan.no_event.empty() ? "          engine = \"event\" could move it, too\n"
+                                  : "          " + plan.no_event + "\n");
   out << fmt::format("bodies    {}, {} of them moving; {}\n", plan.bodies, plan.moving,
                      number(plan.shapes, "shape"));
   if (smooth)
@@ -113,7 +136,8 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan) {
                        plan.unknowns, number(plan.rows, "row") + " of joints",
                        number(plan.invariants, "invariant") + " kept");
   else
-    out << fmt::format("unknowns  {} velocities{}; {} of bodies can touch\n", plan.unknowns,
+    out << fmt::format("unknowns  {}{}{}; {} of bodies can touch\n", plan.unknowns,
+                       event ? "" : " velocities",
                        plan.rows > 0 ? ", with " + number(plan.rows, "row") + " of joints" : "",
                        plan.pairs == 1 ? "1 pair" : fmt::format("{} pairs", plan.pairs));
   out << "effects   " << (plan.effects.empty() ? "none: bodies move freely\n" : "");

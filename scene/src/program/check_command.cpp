@@ -20,6 +20,7 @@ struct Arguments {
 Scene with_options(Scene scene, EngineKind engine) {
   if (engine == EngineKind::smooth && !scene.smooth) scene.smooth.emplace();
   if (engine == EngineKind::stepping && !scene.stepping) scene.stepping.emplace();
+  if (engine == EngineKind::event && !scene.event) scene.event.emplace();
   return scene;
 }
 

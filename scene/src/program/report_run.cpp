@@ -70,7 +70,13 @@ void print_summary(const Scene& scene, const RunResult& r) {
   fmt::print(
       "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
       s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
-  if (c.contact_problems > 0) {
+  if (r.engine == "event") {
+    fmt::print("  events       {}, {} of them impacts; {} contact problems\n", c.events, c.impacts,
+               c.contact_problems);
+    fmt::print("  drift        {:.2e} m; penetration {:.2e} m\n", s.drift, s.penetration);
+    fmt::print("  work         {} steps, {} residuals, {} Jacobians, {} failed error tests\n",
+               c.steps, c.residual_evaluations, c.jacobian_evaluations, c.error_test_failures);
+  } else if (c.contact_problems > 0) {
     fmt::print("  contacts     at most {}; penetration {:.2e} m; residual {:.2e}\n", s.contacts,
                s.penetration, s.residual);
     fmt::print("  work         {} steps, {} contact problems, {} sweeps, {} unsolved\n", c.steps,

@@ -59,7 +59,13 @@ std::uint64_t hash_of_motion(const Scene& scene) {
   moving.end = 1;
   moving.output = Output{};
   moving.expect.clear();
-  if (make_plan(scene).engine == EngineKind::smooth) {
+  const EngineKind engine = make_plan(scene).engine;
+  moving.engine = EngineChoice::automatic;
+  if (engine == EngineKind::event) {
+    if (!moving.event) moving.event.emplace();
+    moving.event->max_steps = EventOptions{}.max_steps;
+    moving.event->max_events = EventOptions{}.max_events;
+  } else if (engine == EngineKind::smooth) {
     if (!moving.smooth) moving.smooth.emplace();
     moving.smooth->max_steps = SmoothOptions{}.max_steps;
   } else {

@@ -32,6 +32,26 @@ struct ContactState {
   double gap = 0;                                     ///< m; < 0: penetration
 };
 
+/// What happened to one contact at an instant of the event engine. An instant may have several.
+struct ContactEvent {
+  enum class Kind : std::uint8_t {
+    impact,  ///< a gap closes with speed
+    touch,   ///< a gap closes without
+    lift,    ///< a normal force vanishes
+    slip,    ///< a stuck contact begins to slide
+    stop,    ///< a slip vanishes
+    rest,    ///< impacts accumulate: `time` is when the last one is over
+    jam,     ///< sliding has no forces any more: an impact without collision
+    border   ///< a contact leaves its face
+  };
+  double time = 0;  ///< s
+  Kind kind = Kind::impact;
+  int first = -1, second = -1;   ///< bodies
+  double before = 0, after = 0;  ///< normal velocities of an impact, m/s
+  double lost = 0;               ///< energy of all contacts of the instant, in its first event, J
+};
+const char* name(ContactEvent::Kind kind);
+
 struct Diagnostics {
   double kinetic_energy = 0, potential_energy = 0;  ///< J; potential: gravity and springs
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
@@ -44,8 +64,9 @@ struct Diagnostics {
 struct Counts {
   long steps = 0, residual_evaluations = 0, jacobian_evaluations = 0, projections = 0;
   long contact_problems = 0, sweeps = 0, unsolved = 0, error_test_failures = 0;
-  long accepted = 0;  ///< contact problems above the tolerance, within what is accepted
-  long halved = 0;    ///< steps, or parts of them, taken in two halves
+  long accepted = 0;             ///< contact problems above the tolerance, within what is accepted
+  long halved = 0;               ///< steps, or parts of them, taken in two halves
+  long events = 0, impacts = 0;  ///< of the event engine
 };
 
 /// Seconds on the clock spent on one effect since the start.
@@ -72,6 +93,8 @@ class Engine {
   virtual const std::vector<BodyState>& bodies() const = 0;
   virtual Diagnostics diagnostics() const = 0;
   virtual const std::vector<ContactState>& contacts() const = 0;
+  /// Since the start, or the state that was restored.
+  virtual const std::vector<ContactEvent>& events() const;
   virtual Counts counts() const = 0;
   virtual std::vector<EffectCost> costs() const = 0;
   /// Changes nothing. An engine of the same scene that restores the state goes on with the bits of
@@ -95,6 +118,9 @@ class Engine {
 /// Each throws std::invalid_argument, naming what the scene asks for and the engine does not have.
 std::unique_ptr<Engine> make_smooth_engine(const Scene& scene);
 std::unique_ptr<Engine> make_stepping_engine(const Scene& scene);
+std::unique_ptr<Engine> make_event_engine(const Scene& scene);
+/// Why the event engine cannot move the scene; empty: it can.
+std::string event_engine_refusal(const Scene& scene);
 
 }  // namespace tether::scene
 TETHER_EXPORT_END

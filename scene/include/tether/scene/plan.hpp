@@ -13,7 +13,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
-enum class EngineKind : std::uint8_t { smooth, stepping };
+enum class EngineKind : std::uint8_t { smooth, stepping, event };
 
 /// An effect that the scene names.
 struct Effect {
@@ -24,13 +24,14 @@ struct Effect {
 /// Exactly what the scene names is on. Sizes that do not apply are zero.
 struct Plan {
   EngineKind engine = EngineKind::smooth;
-  std::string why;  ///< the engine
+  std::string why;       ///< the engine
+  std::string no_event;  ///< why the event engine is not to be had; empty: it is
   std::vector<Effect> effects;
 
   int bodies = 0, moving = 0, shapes = 0;
   int rows = 0;        ///< constraints of joints on positions
   int unknowns = 0;    ///< smooth: of IDA, at most (rows that others imply are left out there);
-                       ///< stepping: velocities
+                       ///< stepping: velocities; event: coordinates, velocities and work
   int invariants = 0;  ///< rows that the projection keeps beside those of the joints
   long pairs = 0;      ///< of bodies whose materials meet
 };

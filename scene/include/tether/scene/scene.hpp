@@ -109,6 +109,18 @@ struct SteppingOptions : contact::SteppingOptions {
   }
 };
 
+/// Scenes with contact whose impacts, slips and stops are found to a tolerance: IDA with projection
+/// between them.
+struct EventOptions {
+  double tolerance = 1e-6;    ///< of the motion and of event times (SI)
+  double max_step = 0;        ///< s; 0: free
+  int max_events = 1000000;   ///< then the run is given up
+  int max_steps = 100000000;  ///< of IDA
+};
+
+/// What a scene asks for: `automatic` leaves it to the plan.
+enum class EngineChoice : std::uint8_t { automatic, smooth, stepping, event };
+
 struct Output {
   std::string csv, vtk, svg, state;  ///< file names; empty: not written
   double every = 0;                  ///< s between records; 0: end / 1000
@@ -178,8 +190,10 @@ struct Scene {
   std::vector<Load> loads;
   std::vector<CentralGravity> central_gravity;
   std::vector<Invariant> invariants;
-  std::optional<SmoothOptions> smooth;      ///< at most one of the two is given;
-  std::optional<SteppingOptions> stepping;  ///< neither: the plan chooses with defaults
+  EngineChoice engine = EngineChoice::automatic;
+  std::optional<SmoothOptions> smooth;      ///< at most one of the three is given;
+  std::optional<SteppingOptions> stepping;  ///< none: the plan chooses with defaults
+  std::optional<EventOptions> event;
   Output output;
   std::vector<Expect> expect;
 };

@@ -68,6 +68,16 @@ struct Words<Formulation> {
 };
 
 template <>
+struct Words<EngineChoice> {
+  static constexpr std::array<std::pair<std::string_view, EngineChoice>, 4> list{{
+      {"automatic", EngineChoice::automatic},
+      {"smooth", EngineChoice::smooth},
+      {"stepping", EngineChoice::stepping},
+      {"event", EngineChoice::event},
+  }};
+};
+
+template <>
 struct Words<OnFailure> {
   static constexpr std::array<std::pair<std::string_view, OnFailure>, 2> list{{
       {"stop", OnFailure::stop},

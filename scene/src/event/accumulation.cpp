@@ -1,0 +1,51 @@
+// Tether: impacts that accumulate. SPDX-License-Identifier: BSD-3-Clause
+//
+// Impacts k of one contact at times t_k with approach speeds w_k: where the ratios r of intervals
+// and of speeds agree and stay below 1, the last of them is over at
+//
+//   t_k + (t_k - t_k-1) r / (1 - r).
+//
+// From an impact on whose bounces nobody can see, it is completed without restitution: what the
+// normal impulses of all later ones amount to is what the closed contact carries until then.
+#include <algorithm>
+#include <cmath>
+
+#include "driver.hpp"
+
+namespace tether::scene::event {
+
+namespace {
+
+constexpr double kAgree = 0.05;       // of ratios
+constexpr double kUnresolved = 1e-5;  // m/s in the units of the model: heights near round-off
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+void Driver::remember(int contact, double approach) {
+  Bounces& b = bounces_[at(contact)];
+  for (int k = 2; k > 0; --k) {
+    b.time[k] = b.time[k - 1];
+    b.speed[k] = b.speed[k - 1];
+  }
+  b.time[0] = event_time_;
+  b.speed[0] = approach;
+  b.count = std::min(b.count + 1, 3);
+}
+
+bool Driver::has_accumulated(int contact, double approach, double& rest) const {
+  const Bounces& b = bounces_[at(contact)];
+  const double restitution = model_.law(contact).restitution;
+  if (b.count < 3 || approach * restitution > std::max(options_.tolerance, kUnresolved))
+    return false;
+  const double dt = event_time_ - b.time[0], last = b.time[0] - b.time[1];
+  const double r = approach / b.speed[0], previous = b.speed[0] / b.speed[1];
+  if (!(r < 1 && std::abs(r - previous) < kAgree * (1 - previous) && dt > 0 &&
+        std::abs(dt / last - r) < kAgree))
+    return false;
+  rest = dt * r / (1 - r);
+  return true;
+}
+
+}  // namespace tether::scene::event

@@ -1,0 +1,85 @@
+// Tether: what the projection keeps while contacts stay as they are. SPDX-License-Identifier:
+// BSD-3-Clause
+//
+// Gaps and joints, their rates, the slips of stuck contacts, the rows of the model itself, and
+// energy less work.
+#include <cmath>
+
+#include "motion.hpp"
+
+namespace tether::scene::event {
+
+int Motion::constraint_count() const {
+  return static_cast<int>(positions_in_use_.size() + rates_in_use_.size()) + model_.own_rows() +
+         (keeps_energy_ ? 1 : 0);
+}
+
+void Motion::keep_energy_of(double t, const VectorXd& y) {
+  set(t, y.data());
+  kept_energy_ = model_.energy() - y[work()];
+}
+
+// Of all rows, at the state that is set; slips have no position.
+void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
+  positions.setZero(rows_);
+  gather();
+  rates = R_ * u_;
+  if (joints_ > 0) {
+    positions.head(joints_) = joint_g_;
+    rates.head(joints_) += joint_rate_;
+  }
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const int row = row_of_[k];
+    positions[row] = looks_[k].gap;
+    rates[row] += looks_[k].normal_rate;
+    if (modes_[index(closed_[k])].mode == Mode::stick)
+      rates.segment(row + 1, tangents_) += looks_[k].slip_rate;
+  }
+}
+
+void Motion::constraints(double t, const double* y, double* g) {
+  set(t, y);
+  VectorXd positions, rates;
+  values_of_rows(positions, rates);
+  for (const int row : positions_in_use_) *g++ = positions[row];
+  for (const int row : rates_in_use_) *g++ = rates[row];
+  model_.own_values(g);
+  g += model_.own_rows();
+  if (keeps_energy_) *g = model_.energy() - y[work()] - kept_energy_;
+}
+
+void Motion::constraint_gradient(double t, const double* y,
+                                 Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
+  set(t, y);
+  VectorXd positions, rates, moved;
+  values_of_rows(positions, rates);
+  int out = 0;
+  Eigen::RowVectorXd line(nu_);
+  for (const int row : positions_in_use_) {
+    line = R_.row(row);
+    model_.to_coordinates(line.data(), C.row(out++).data());
+  }
+  const int first_rate = out;
+  for (const int row : rates_in_use_) C.row(out++).segment(nq_, nu_) = R_.row(row);
+  for (int k = 0; k < model_.own_rows(); ++k) model_.own_gradient(k, C.row(out++).data());
+  if (keeps_energy_) {
+    model_.energy_gradient(C.row(out).data(), C.row(out).data() + nq_);
+    if (works_) C(out, work()) = -1;
+  }
+  if (rates_in_use_.empty() || u_.isZero(0)) return;
+  // Rates by coordinates: differences, which Newton's moves onto the rows need not be better than.
+  VectorXd near = Eigen::Map<const VectorXd>(y, size());
+  for (int j = 0; j < nq_; ++j) {
+    const double step = 1e-7 * std::max(1.0, std::abs(y[j]));
+    near[j] = y[j] + step;
+    set(t, near.data());
+    values_of_rows(positions, moved);
+    near[j] = y[j];
+    for (std::size_t k = 0; k < rates_in_use_.size(); ++k)
+      C(first_rate + static_cast<int>(k), j) =
+          (moved[rates_in_use_[k]] - rates[rates_in_use_[k]]) / step;
+  }
+  set(t, y);
+}
+
+}  // namespace tether::scene::event

@@ -1,0 +1,295 @@
+// Tether: event-driven motion of a model with contacts. SPDX-License-Identifier: BSD-3-Clause
+#include "driver.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tether/scene/engine.hpp>
+
+namespace tether::scene::event {
+
+namespace {
+
+// IDA bounds the error of a step; as in the smooth engine.
+double local_tolerance(double tolerance) {
+  const double tighter = std::min(1.0, std::pow(tolerance / 1e-4, 1.0 / 6.0));
+  return std::max(std::max(tighter * 0.1 * tolerance, std::min(0.1 * tolerance, 1e-11)), 1e-13);
+}
+
+// The first steps of a bounce are of order 1: some ten times (h / T)^2 is their error in its length
+// T. A way of less than kLeastWay (m in the units of the model) is lost in rounding.
+constexpr double kFlightError = 0.01, kLeastWay = 1e-15;
+constexpr long kMostAtOneTime = 300;
+constexpr long kAnchor = 5000;  // steps
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+Driver::Driver(Model& model, const DriverOptions& options, double t, const VectorXd& y)
+    : model_(model),
+      options_(options),
+      local_(local_tolerance(options.tolerance)),
+      bands_{options.tolerance, options.tolerance, options.tolerance},
+      motion_(model, options.tolerance),
+      watcher_(motion_, bands_),
+      time_(t),
+      event_time_(t),
+      bounces_(at(model.contacts())) {
+  y_.setZero(motion_.size());
+  y_.head(motion_.work()) = y;
+  model_.set(t, y_.data(), y_.data() + motion_.coordinates());
+  model_.settle();
+  first_energy_ = model_.energy();
+  const std::vector<int> close = touching(-1);
+  collide(close, EventKind::impact, -1);
+  motion_.choose(t, y_, decide(touching(-1), -1, {}));
+  begin_phase();
+}
+
+// Contacts with no gap, closed ones among them.
+std::vector<int> Driver::touching(int always) const {
+  std::vector<int> out;
+  for (int i = 0; i < model_.contacts(); ++i) {
+    double rate = 0;
+    const bool closed = motion_.modes()[at(i)].mode != Mode::open;
+    if (i == always || closed || std::abs(model_.gap(i, rate)) <= bands_.gap) out.push_back(i);
+  }
+  return out;
+}
+
+void Driver::begin_phase() {
+  motion_.keep_energy_of(event_time_, y_);
+  if (!move_onto_constraints(motion_, local_, event_time_, y_))
+    fail("the state cannot be moved onto joints and closed contacts");
+  start_phase();
+}
+
+// Everything from (event_time_, y_), the modes and the energy that is kept: whoever has these goes
+// on with the same bits.
+void Driver::start_phase() {
+  motion_.choose(event_time_, y_, std::vector<ContactMode>(motion_.modes()));
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  std::vector<bool> leaving(at(model_.contacts()), false);
+  for (int i = 0; i < model_.contacts(); ++i) {
+    double rate = 0;
+    const double gap = model_.gap(i, rate);
+    leaving[at(i)] = motion_.modes()[at(i)].mode == Mode::open && std::abs(gap) <= bands_.gap &&
+                     rate > bands_.speed;
+  }
+  if (phase_) counts_.phases.add(phase_->counts());
+  phase_.reset();
+  const double first = longest_first_step(leaving);
+  phase_ = std::make_unique<Phase>(motion_, local_, options_.max_step, event_time_, y_, first);
+  watcher_.begin(event_time_, y_, leaving);
+  next_.reset();
+}
+
+// A bounce that is shorter than the tolerance's first step must be resolved all the same.
+double Driver::longest_first_step(const std::vector<bool>& leaving) {
+  VectorXd rate(motion_.size());
+  motion_.rate(event_time_, y_.data(), rate.data());
+  const VectorXd a = motion_.acceleration();
+  double longest = 0;
+  ContactLook look;
+  for (int i = 0; i < model_.contacts(); ++i) {
+    if (!leaving[at(i)]) continue;
+    model_.look(i, look);
+    double speed = 0;
+    model_.gap(i, speed);
+    const double back = -(look.normal.dot(a) + look.normal_rest);
+    if (!(back > 0)) continue;
+    const double part = std::min(1e-3, std::sqrt(kFlightError * options_.tolerance));
+    const double first = std::max(part * 2 * speed / back, kLeastWay / speed);
+    longest = longest > 0 ? std::min(longest, first) : first;
+  }
+  return longest;
+}
+
+void Driver::advance(double t, const std::function<bool()>& interrupted) {
+  while (time_ < t) {
+    const double end = next_ ? next_->time : phase_->step_end();
+    const double reached = phase_->start() + end;
+    if (reached > time_ || (next_ && reached >= time_)) {
+      if (reached > t) {
+        time_ = t;
+        return;
+      }
+      time_ = reached;
+      if (next_) {
+        const Zero zero = *next_;
+        handle(zero);
+      }
+      if (interrupted && interrupted()) return;
+      continue;
+    }
+    if (phase_->counts().steps >= kAnchor) {
+      anchor();
+      continue;
+    }
+    phase_->step();
+    if (counts_.phases.steps + phase_->counts().steps > options_.max_steps)
+      fail(fmt::format("max_steps = {} steps are taken", options_.max_steps));
+    next_ = watcher_.look(*phase_);
+    if (!next_) turn_slips();
+  }
+}
+
+// A phase without events may be long; a saved state is arrived at again from its start.
+void Driver::anchor() {
+  event_time_ = phase_->start() + phase_->step_end();
+  phase_->projected_at(phase_->step_end(), y_);
+  start_phase();
+}
+
+Driver::Memory Driver::memory() const {
+  return {event_time_, motion_.kept_energy(), lost_,          first_energy_,  y_, motion_.modes(),
+          bounces_,    at_one_time_,          counts_.events, counts_.impacts};
+}
+
+Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
+    : model_(model),
+      options_(options),
+      local_(local_tolerance(options.tolerance)),
+      bands_{options.tolerance, options.tolerance, options.tolerance},
+      motion_(model, options.tolerance),
+      watcher_(motion_, bands_),
+      time_(memory.time),
+      event_time_(memory.time),
+      y_(memory.y),
+      bounces_(memory.bounces),
+      lost_(memory.lost),
+      first_energy_(memory.first_energy),
+      at_one_time_(memory.at_one_time) {
+  counts_.events = memory.events;
+  counts_.impacts = memory.impacts;
+  model_.set(time_, y_.data(), y_.data() + motion_.coordinates());
+  model_.settle();
+  motion_.keep_energy(memory.kept_energy);
+  motion_.choose(time_, y_, memory.modes);
+  start_phase();
+}
+
+VectorXd Driver::state() {
+  VectorXd y = y_;
+  const double since = time_ - phase_->start();
+  if (since > 0 && phase_->step_end() > 0)
+    phase_->projected_at(std::min(std::max(since, phase_->step_begin()), phase_->step_end()), y);
+  model_.set(time_, y.data(), y.data() + motion_.coordinates());
+  return y;
+}
+
+// The direction in which a contact slides, for the moment when its slip vanishes.
+void Driver::turn_slips() {
+  for (std::size_t k = 0; k < motion_.closed().size(); ++k) {
+    const int i = motion_.closed()[k];
+    if (motion_.modes()[at(i)].mode != Mode::slide) continue;
+    const VectorXd s = motion_.slip(static_cast<int>(k));
+    if (s.norm() > 10 * bands_.speed) motion_.turn(i, s.normalized());
+  }
+}
+
+void Driver::record(EventKind kind, int contact, double before, double after, double lost) {
+  EventRecord r;
+  r.time = event_time_;
+  r.kind = kind;
+  r.contact = contact;
+  r.before = before;
+  r.after = after;
+  r.lost = lost;
+  events_.push_back(r);
+}
+
+void Driver::handle(const Zero& zero) {
+  const double now = phase_->start() + zero.time;
+  at_one_time_ = now > event_time_ ? 0 : at_one_time_ + 1;
+  if (at_one_time_ > kMostAtOneTime)
+    fail(fmt::format("more than {} events at one time", kMostAtOneTime));
+  if (++counts_.events > options_.max_events)
+    fail(fmt::format("max_events = {} events are over", options_.max_events));
+  event_time_ = now;
+  y_ = zero.y;
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  model_.settle();
+  const bool closing = zero.what == Watch::gap;
+  const std::vector<int> close = touching(zero.contact);
+  if (closing)
+    collide(close, EventKind::touch, zero.contact);
+  else
+    record(zero.what == Watch::normal_force ? EventKind::lift
+           : zero.what == Watch::cone       ? EventKind::slip
+                                            : EventKind::stop,
+           zero.contact, 0, 0, 0);
+  std::vector<ContactMode> modes =
+      decide(close, closing ? -1 : zero.contact,
+             closing ? std::optional<Watch>() : std::optional<Watch>(zero.what));
+  motion_.choose(event_time_, y_, std::move(modes));
+  begin_phase();
+}
+
+// Newton's law w_n+ = -e w_n- where impulses act, and Coulomb's cone, in one problem.
+void Driver::collide(const std::vector<int>& touching, EventKind otherwise, int contact) {
+  if (touching.empty()) return;
+  ContactRows rows(model_, touching);
+  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
+  const VectorXd before = rows.velocities(u);
+  const int block = rows.size(), n = static_cast<int>(touching.size());
+  bool hits = false;
+  for (int k = 0; k < n; ++k) hits = hits || before[block * k] < -bands_.speed;
+  if (!hits) {
+    if (contact >= 0) record(otherwise, contact, 0, 0, 0);
+    return;
+  }
+  VectorXd b = -before, mu(n), rest = VectorXd::Zero(n);
+  for (int k = 0; k < n; ++k) {
+    const int i = touching[at(k)];
+    const ContactLaw law = model_.law(i);
+    mu[k] = law.friction;
+    const double approach = before[block * k];
+    if (approach >= -bands_.speed) continue;
+    double over = 0;
+    const bool accumulated = law.restitution > 0 && has_accumulated(i, -approach, over);
+    if (accumulated) rest[k] = over;
+    if (!accumulated) b[block * k] -= law.restitution * approach;
+    if (!accumulated) remember(i, -approach);
+  }
+  ++counts_.contact_problems;
+  const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
+  if (!answer.solved)
+    fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", n, answer.error));
+  const double energy = model_.energy();
+  y_.segment(motion_.coordinates(), motion_.velocities()) += rows.change(answer.x);
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  const double lost = energy - model_.energy();
+  lost_ += lost;
+  const VectorXd after = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
+  bool first = true;
+  for (int k = 0; k < n; ++k) {
+    if (before[block * k] >= -bands_.speed && answer.x[block * k] <= 0) continue;
+    if (before[block * k] < -bands_.speed) ++counts_.impacts;
+    record(rest[k] > 0 ? EventKind::rest : EventKind::impact, touching[at(k)], before[block * k],
+           after[block * k], first ? lost : 0);
+    if (rest[k] > 0) events_.back().time = event_time_ + rest[k];
+    first = false;
+  }
+}
+
+void Driver::fail(const std::string& what) const {
+  throw SimulationError(fmt::format(
+      "t = {:.12g} s: {}. Try another [event] tolerance, or the stepping engine", time_, what));
+}
+
+DriverCounts Driver::counts() const {
+  DriverCounts all = counts_;
+  if (phase_) all.phases.add(phase_->counts());
+  all.evaluations = motion_.evaluations();
+  return all;
+}
+
+double Driver::ledger_error() {
+  const VectorXd y = state();
+  return model_.energy() - y[motion_.work()] + lost_ - first_energy_;
+}
+
+}  // namespace tether::scene::event

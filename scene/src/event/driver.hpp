@@ -1,0 +1,111 @@
+// Tether: event-driven motion of a model with contacts. SPDX-License-Identifier: BSD-3-Clause
+//
+//   while t < end:  step of IDA;  the first zero of a watched function in it?
+//   at a zero:      impacts of closing contacts through joints and closed contacts
+//                   modes of those that stay closed, by Coulomb's law for accelerations; the mode
+//                   that was left is not taken again
+//                   the state onto the new constraints, a new phase
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "event.hpp"
+#include "friction_solve.hpp"
+#include "motion.hpp"
+#include "phase.hpp"
+#include "watch.hpp"
+
+namespace tether::scene::event {
+
+struct DriverOptions {
+  double tolerance = 1e-6;  ///< of the motion, in the units of the model
+  double max_step = 0;      ///< s; 0: free
+  long max_events = 1000000;
+  long max_steps = 100000000;  ///< of IDA
+};
+
+struct DriverCounts {
+  PhaseCounts phases;
+  long evaluations = 0;  ///< of the accelerations, for whatever they were needed
+  long contact_problems = 0;
+  long events = 0, impacts = 0;
+};
+
+/// The last impacts of one contact, the latest first.
+struct Bounces {
+  double time[3] = {0, 0, 0}, speed[3] = {0, 0, 0};
+  int count = 0;
+};
+
+class Driver {
+ public:
+  /// `y`: q, then u. Moves it onto joints and closed contacts. Throws std::invalid_argument where
+  /// bodies overlap.
+  Driver(Model& model, const DriverOptions& options, double t, const VectorXd& y);
+
+  /// Goes on with the bits of the driver that made the memory.
+  struct Memory;
+  Driver(Model& model, const DriverOptions& options, const Memory& memory);
+  Memory memory() const;  ///< of the start of the present phase
+
+  /// To time t; early where `interrupted`. Throws SimulationError.
+  void advance(double t, const std::function<bool()>& interrupted = {});
+  double time() const { return time_; }
+  /// The state there: q, u, work of forces without potential.
+  VectorXd state();
+  const std::vector<EventRecord>& events() const { return events_; }
+  DriverCounts counts() const;
+  const Motion& motion() const { return motion_; }
+  Motion& motion() { return motion_; }
+  /// Energy that events took so far, J.
+  double lost() const { return lost_; }
+  /// Energy less work and losses since the start, less that of the start: what is unaccounted for.
+  double ledger_error();
+
+ private:
+  void begin_phase();
+  void start_phase();
+  void handle(const Zero& zero);
+  void anchor();
+  void collide(const std::vector<int>& touching, EventKind kind, int contact);
+  bool has_accumulated(int contact, double approach, double& rest) const;
+  void remember(int contact, double approach);
+  std::vector<ContactMode> decide(const std::vector<int>& touching, int left_contact,
+                                  std::optional<Watch> left);
+  std::vector<int> touching(int always) const;
+  double longest_first_step(const std::vector<bool>& leaving);
+  void turn_slips();
+  void record(EventKind kind, int contact, double before, double after, double lost);
+  [[noreturn]] void fail(const std::string& what) const;
+
+  Model& model_;
+  DriverOptions options_;
+  double local_;  // tolerance of IDA
+  Bands bands_;
+  Motion motion_;
+  Watcher watcher_;
+  double time_, event_time_;
+  VectorXd y_;  // at the start of the phase
+  std::unique_ptr<Phase> phase_;
+  std::optional<Zero> next_;
+  std::vector<Bounces> bounces_;
+  std::vector<EventRecord> events_;
+  double lost_ = 0, first_energy_ = 0;
+  DriverCounts counts_;
+  long at_one_time_ = 0;
+};
+
+/// All that a phase depends on. IDA's history is not in it: a phase is repeated from its start.
+struct Driver::Memory {
+  double time = 0, kept_energy = 0, lost = 0, first_energy = 0;
+  VectorXd y;
+  std::vector<ContactMode> modes;
+  std::vector<Bounces> bounces;
+  long at_one_time = 0, events = 0, impacts = 0;
+};
+
+}  // namespace tether::scene::event

@@ -1,0 +1,20 @@
+// Tether: what happened at an instant, in the units of the model. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <tether/scene/engine.hpp>
+
+namespace tether::scene::event {
+
+using EventKind = ContactEvent::Kind;
+
+/// Of one contact. Several contacts may have events of one time.
+struct EventRecord {
+  double time = 0;
+  EventKind kind = EventKind::impact;
+  int contact = -1;
+  double before = 0, after = 0;  ///< normal velocities
+  double lost = 0;               ///< energy of all contacts of this instant, in its first record
+};
+
+}  // namespace tether::scene::event

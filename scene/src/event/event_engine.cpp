@@ -1,0 +1,274 @@
+// Tether: the engine of scenes whose events are found to a tolerance. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <algorithm>
+#include <istream>
+#include <ostream>
+#include <stdexcept>
+
+#include "driver.hpp"
+#include "output/binary.hpp"
+#include "scaled_scene.hpp"
+#include "scene_model.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+using namespace event;
+using mechanics::at;
+
+constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '1'};
+
+DriverOptions driver_options(const Scene& scene) {
+  const EventOptions o = scene.event.value_or(EventOptions{});
+  DriverOptions out;
+  out.tolerance = o.tolerance;
+  out.max_step = o.max_step;
+  out.max_events = o.max_events;
+  out.max_steps = o.max_steps;
+  return out;
+}
+
+// The state that is saved is the start of the present phase and the time reached, as that of the
+// smooth engine: IDA's history cannot be given to it.
+class EventEngine : public Engine {
+ public:
+  explicit EventEngine(const Scene& scene)
+      : units_(smooth::units_of(scene)),
+        scene_(scaled(scene, units_)),
+        options_(driver_options(scene_)),
+        model_(scene_),
+        driver_(std::make_unique<Driver>(model_, options_, 0.0, model_.start())) {
+    bodies_.resize(scene.bodies.size());
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+      bodies_[b].position = scene.bodies[b].position;
+      bodies_[b].orientation = scene.bodies[b].orientation.normalized();
+    }
+    look();
+  }
+
+  const char* name() const override { return "event"; }
+  double time() const override { return units_.time * driver_->time(); }
+
+  void advance(double t) override {
+    try {
+      driver_->advance(t / units_.time, [this] { return interrupted(); });
+    } catch (const SimulationError&) {
+      look();
+      throw;
+    }
+    look();
+  }
+
+  const std::vector<BodyState>& bodies() const override { return bodies_; }
+  Diagnostics diagnostics() const override { return diagnostics_; }
+  const std::vector<ContactState>& contacts() const override { return contacts_; }
+  const std::vector<ContactEvent>& events() const override { return events_; }
+
+  Counts counts() const override {
+    const DriverCounts c = driver_->counts();
+    Counts out;
+    out.steps = c.phases.steps;
+    out.residual_evaluations = c.phases.residuals;
+    out.jacobian_evaluations = c.phases.jacobians;
+    out.projections = c.phases.projections;
+    out.error_test_failures = c.phases.error_test_failures;
+    out.contact_problems = c.contact_problems;
+    out.events = c.events;
+    out.impacts = c.impacts;
+    return out;
+  }
+  std::vector<EffectCost> costs() const override { return {}; }
+
+  void save(std::ostream& out) const override;
+  void restore(std::istream& in, Restore how) override;
+
+ private:
+  void look();
+  void look_at_contacts();
+  void look_at_events();
+
+  smooth::Units units_;
+  Scene scene_;  // in these units, as everything here but what is shown
+  DriverOptions options_;
+  SceneModel model_;
+  std::unique_ptr<Driver> driver_;
+  VectorXd now_;
+  std::vector<BodyState> bodies_;
+  std::vector<ContactState> contacts_;
+  std::vector<ContactEvent> events_;
+  Diagnostics diagnostics_;
+};
+
+void EventEngine::look() {
+  now_ = driver_->state();
+  const smooth::MovingBodies& bodies = model_.bodies();
+  bodies.read(model_.bodies_state(), bodies_);
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    if (!scene_.bodies[b].fixed) smooth::to_si(units_, bodies_[b]);
+  Diagnostics d;
+  d.potential_energy = model_.potential();
+  d.kinetic_energy = bodies.kinetic_energy();
+  d.momentum = bodies.momentum();
+  d.angular_momentum = bodies.angular_momentum();
+  look_at_contacts();
+  d.contacts = static_cast<int>(contacts_.size());
+  for (int i = 0; i < model_.contacts(); ++i)
+    if (model_.pair(i).inside(bodies.all())) {
+      double rate = 0;
+      d.penetration = std::max(d.penetration, -model_.gap(i, rate) * units_.length);
+    }
+  VectorXd g, rate, rest;
+  MatrixXd W;
+  model_.joints(g, W, rate, rest);
+  if (g.size() > 0) d.drift = g.cwiseAbs().maxCoeff() * units_.length;
+  smooth::to_si(units_, d);
+  diagnostics_ = d;
+  look_at_events();
+}
+
+// Impulses: what the forces of now do in a second.
+void EventEngine::look_at_contacts() {
+  contacts_.clear();
+  const event::Motion& motion = driver_->motion();
+  for (const int i : motion.closed()) {
+    const FeaturePair& pair = model_.pair(i);
+    const Touch touch = pair.look(model_.bodies().all());
+    ContactState c;
+    c.first = pair.first;
+    c.second = pair.second;
+    c.point = units_.length * touch.point;
+    c.normal = touch.normal;
+    c.gap = units_.length * touch.gap;
+    contacts_.push_back(c);
+  }
+}
+
+void EventEngine::look_at_events() {
+  const std::vector<EventRecord>& all = driver_->events();
+  for (std::size_t k = events_.size(); k < all.size(); ++k) {
+    const EventRecord& from = all[k];
+    ContactEvent e;
+    e.time = units_.time * from.time;
+    e.kind = from.kind;
+    e.first = model_.pair(from.contact).first;
+    e.second = model_.pair(from.contact).second;
+    e.before = units_.speed() * from.before;
+    e.after = units_.speed() * from.after;
+    e.lost = units_.energy() * from.lost;
+    events_.push_back(e);
+  }
+}
+
+void EventEngine::save(std::ostream& out) const {
+  const Driver::Memory m = driver_->memory();
+  out.write(kMagic, sizeof kMagic);
+  binary::put(out, static_cast<std::uint64_t>(m.y.size()),
+              static_cast<std::uint64_t>(m.modes.size()), units_.length, units_.time, units_.mass,
+              m.time, driver_->time(), m.kept_energy, m.lost, m.first_energy,
+              static_cast<std::int64_t>(m.at_one_time), static_cast<std::int64_t>(m.events),
+              static_cast<std::int64_t>(m.impacts));
+  binary::put_array(out, m.y, now_);
+  for (std::size_t i = 0; i < m.modes.size(); ++i) {
+    binary::put(out, static_cast<std::int32_t>(m.modes[i].mode),
+                static_cast<std::int32_t>(m.modes[i].direction.size()));
+    for (const double x : m.modes[i].direction) binary::put(out, x);
+    const Bounces& b = m.bounces[i];
+    for (int k = 0; k < 3; ++k) binary::put(out, b.time[k], b.speed[k]);
+    binary::put(out, static_cast<std::int32_t>(b.count));
+  }
+}
+
+void EventEngine::restore(std::istream& in, Restore how) {
+  char magic[sizeof kMagic];
+  in.read(magic, sizeof magic);
+  if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
+    throw std::runtime_error("this is not a state of the event engine");
+  std::uint64_t size = 0, contacts = 0;
+  smooth::Units units;
+  Driver::Memory m;
+  double reached = 0;
+  std::int64_t at_one_time = 0, events = 0, impacts = 0;
+  binary::get(in, size, contacts, units.length, units.time, units.mass, m.time, reached,
+              m.kept_energy, m.lost, m.first_energy, at_one_time, events, impacts);
+  if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass ||
+      size != static_cast<std::uint64_t>(now_.size()) ||
+      contacts != static_cast<std::uint64_t>(model_.contacts()))
+    throw std::runtime_error("the saved state is of another scene: of another size");
+  m.at_one_time = static_cast<long>(at_one_time);
+  m.events = static_cast<long>(events);
+  m.impacts = static_cast<long>(impacts);
+  m.y.resize(now_.size());
+  VectorXd saved(now_.size());
+  binary::get_array(in, m.y, saved);
+  for (std::uint64_t i = 0; i < contacts; ++i) {
+    std::int32_t mode = 0, directions = 0, count = 0;
+    binary::get(in, mode, directions);
+    if (mode < 0 || mode > 2 || directions < 0 || directions > 2)
+      throw std::runtime_error("the saved state is damaged");
+    ContactMode& each = m.modes.emplace_back();
+    each.mode = static_cast<Mode>(mode);
+    each.direction.resize(directions);
+    for (double& x : each.direction) binary::get(in, x);
+    Bounces& b = m.bounces.emplace_back();
+    for (int k = 0; k < 3; ++k) binary::get(in, b.time[k], b.speed[k]);
+    binary::get(in, count);
+    b.count = count;
+  }
+  if (!m.y.allFinite() || !saved.allFinite() || !(reached >= m.time))
+    throw std::runtime_error("the saved state is damaged");
+  events_.clear();
+  if (how == Restore::near) {
+    driver_ =
+        std::make_unique<Driver>(model_, options_, reached, VectorXd(saved.head(saved.size() - 1)));
+    return look();
+  }
+  driver_ = std::make_unique<Driver>(model_, options_, m);
+  try {
+    driver_->advance(reached);
+  } catch (const SimulationError& e) {
+    throw std::runtime_error(std::string("the saved state cannot be arrived at again: ") +
+                             e.what());
+  }
+  look();
+  if (driver_->time() != reached || now_ != saved)
+    throw std::runtime_error(
+        "the saved state is of another build or machine: the same steps lead to other bits here");
+}
+
+}  // namespace
+
+const char* name(ContactEvent::Kind kind) {
+  switch (kind) {
+    case ContactEvent::Kind::impact:
+      return "impact";
+    case ContactEvent::Kind::touch:
+      return "touch";
+    case ContactEvent::Kind::lift:
+      return "lift";
+    case ContactEvent::Kind::slip:
+      return "slip";
+    case ContactEvent::Kind::stop:
+      return "stop";
+    case ContactEvent::Kind::rest:
+      return "rest";
+    case ContactEvent::Kind::jam:
+      return "jam";
+    case ContactEvent::Kind::border:
+      return "border";
+  }
+  return "?";
+}
+
+const std::vector<ContactEvent>& Engine::events() const {
+  static const std::vector<ContactEvent> none;
+  return none;
+}
+
+std::unique_ptr<Engine> make_event_engine(const Scene& scene) {
+  const std::string no = event_engine_refusal(scene);
+  if (!no.empty()) throw std::invalid_argument(no);
+  return std::make_unique<EventEngine>(scene);
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,143 @@
+// Tether: pairs of features that can touch, with their gaps and rates. SPDX-License-Identifier:
+// BSD-3-Clause
+//
+// The first feature is a point of the first body with a radius (the centre of a sphere; a vertex
+// has radius 0), the second a plane, a point or a line of the second body. Each kind has
+//   look(A, B)   gap, gap', gap'' (without accelerations where the frames have none), the normal n
+//                from second to first, the contact point p and its velocity
+// and an `inside(A, B)`: whether the second feature is the one that is nearest there; a plane may
+// be a face with a border.
+//
+//   plane   gap = n.(c - b) - r                         n' = W_B x n
+//   point   gap = |d| - r - r_B,  d = c - b             gap'' = n.d'' + (|d'|^2 - gap'^2) / |d|
+//   line    the same of d without its part along the line, in axes that turn with B
+#pragma once
+
+#include <cmath>
+#include <variant>
+#include <vector>
+
+#include "mechanics/bodies.hpp"
+
+namespace tether::scene::event {
+
+using namespace mechanics;
+
+/// What a kind tells of the state of its two bodies.
+struct Touch {
+  double gap = 0, rate = 0, second = 0;
+  Vector3d normal = Vector3d::UnitZ(), point = Vector3d::Zero();
+  Vector3d point_velocity = Vector3d::Zero();  ///< of the contact point as it moves over the bodies
+};
+
+/// The half-space n.(x - b) <= 0 of the second body, or a face of it: where all border.x <= limit.
+struct PlaneFeature {
+  Vector3d at, normal;
+  std::vector<std::pair<Vector3d, double>> border;  ///< in the axes of the body
+
+  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+             double radius) const {
+    const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
+    const Jet<double> n = direction<2>(B, normal);
+    const Vector3d d = c.x - b.x, d1 = c.x1 - b.x1, d2 = c.x2 - b.x2;
+    Touch t;
+    t.gap = n.x.dot(d) - radius;
+    t.rate = n.x1.dot(d) + n.x.dot(d1);
+    t.second = n.x2.dot(d) + 2 * n.x1.dot(d1) + n.x.dot(d2);
+    t.normal = n.x;
+    t.point = c.x - radius * n.x;
+    t.point_velocity = c.x1 - radius * n.x1;
+    return t;
+  }
+  bool inside(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
+    if (border.empty()) return true;
+    const Vector3d local = point_in(B, mechanics::point<0>(A, centre).x);
+    for (const auto& [outward, limit] : border)
+      if (outward.dot(local) > limit) return false;
+    return true;
+  }
+};
+
+/// A point of the second body with a radius.
+struct PointFeature {
+  Vector3d at;
+  double radius = 0;
+
+  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+             double radius_first) const {
+    const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
+    const Vector3d d = c.x - b.x, d1 = c.x1 - b.x1, d2 = c.x2 - b.x2;
+    const double D = d.norm();
+    Touch t;
+    t.normal = d / D;
+    t.gap = D - radius_first - radius;
+    t.rate = t.normal.dot(d1);
+    t.second = t.normal.dot(d2) + (d1.squaredNorm() - t.rate * t.rate) / D;
+    const Vector3d n1 = (d1 - t.normal * t.rate) / D;
+    // Between the surfaces, by their radii: at a gap of 0 it is the point of contact.
+    t.point = b.x + radius * t.normal;
+    t.point_velocity = b.x1 + radius * n1;
+    return t;
+  }
+  bool inside(const Frame<double>&, const Frame<double>&, const Vector3d&) const { return true; }
+};
+
+/// A line of the second body through `at` along `along`, with a radius; from 0 to `length` along
+/// it.
+struct LineFeature {
+  Vector3d at, along;
+  double length = 0, radius = 0;
+
+  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+             double radius_first) const {
+    const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
+    const Jet<double> e = direction<2>(B, along);
+    const Vector3d s = c.x - b.x, s1 = c.x1 - b.x1, s2 = c.x2 - b.x2;
+    // d = s - (s.e) e, which is at right angles to e.
+    const double k = s.dot(e.x), k1 = s1.dot(e.x) + s.dot(e.x1),
+                 k2 = s2.dot(e.x) + 2 * s1.dot(e.x1) + s.dot(e.x2);
+    const Vector3d d = s - k * e.x, d1 = s1 - k1 * e.x - k * e.x1,
+                   d2 = s2 - k2 * e.x - 2 * k1 * e.x1 - k * e.x2;
+    const double D = d.norm();
+    Touch t;
+    t.normal = d / D;
+    t.gap = D - radius_first - radius;
+    t.rate = t.normal.dot(d1);
+    t.second = t.normal.dot(d2) + (d1.squaredNorm() - t.rate * t.rate) / D;
+    const Vector3d n1 = (d1 - t.normal * t.rate) / D;
+    t.point = c.x - radius_first * t.normal;
+    t.point_velocity = c.x1 - radius_first * n1;
+    return t;
+  }
+  bool inside(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
+    const Vector3d s = mechanics::point<0>(A, centre).x - mechanics::point<0>(B, at).x;
+    const double k = s.dot(times(B.R, along));
+    return k >= 0 && k <= length;
+  }
+};
+
+/// One potential contact of a scene.
+struct FeaturePair {
+  int first = 0, second = 0;  ///< bodies, as in Bodies
+  Vector3d centre = Vector3d::Zero();
+  double radius = 0;  ///< of the first feature
+  std::variant<PlaneFeature, PointFeature, LineFeature> on_second;
+  double friction = 0, restitution = 0;
+
+  Touch look(const Bodies& bodies) const {
+    return std::visit(
+        [&](const auto& feature) {
+          return feature.look(bodies.frames[at(first)], bodies.frames[at(second)], centre, radius);
+        },
+        on_second);
+  }
+  bool inside(const Bodies& bodies) const {
+    return std::visit(
+        [&](const auto& feature) {
+          return feature.inside(bodies.frames[at(first)], bodies.frames[at(second)], centre);
+        },
+        on_second);
+  }
+};
+
+}  // namespace tether::scene::event

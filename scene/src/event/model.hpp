@@ -1,0 +1,69 @@
+// Tether: a mechanical system with contacts, as the event engine sees it. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+namespace tether::scene::event {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// One potential contact at the state that is set. `u`: the velocities of the model.
+struct ContactLook {
+  double gap = 0;                           ///< m; < 0: penetration
+  Eigen::RowVectorXd normal;                ///< gap' = normal u + normal_rate
+  double normal_rate = 0, normal_rest = 0;  ///< gap'' = normal u' + normal_rest
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>
+      tangents;                   ///< slip = tangents u + slip_rate
+  VectorXd slip_rate, slip_rest;  ///< slip' = tangents u' + slip_rest
+};
+
+/// Newton's restitution and Coulomb's friction of one contact.
+struct ContactLaw {
+  double friction = 0, restitution = 0;
+};
+
+/// q' = N(q) u, M(q) u' = h(t, q, u) + joints + contacts. Everything is asked of the state that was
+/// set last. One call treats the whole system.
+class Model {
+ public:
+  virtual ~Model() = default;
+
+  virtual int coordinates() const = 0;
+  virtual int velocities() const = 0;
+  virtual int joint_rows() const = 0;
+  virtual int contacts() const = 0;
+  virtual int tangents() const = 0;  ///< of a contact: 1 in the plane, 2 in space
+  virtual ContactLaw law(int contact) const = 0;
+
+  virtual void set(double t, const double* q, const double* u) = 0;
+  /// A smooth phase begins at the state that is set: tangents turn smoothly from here on.
+  virtual void settle() {}
+  virtual void rates(double* q_rate) const = 0;
+  /// X <- M^-1 X, `velocities()` rows.
+  virtual void divide_by_mass(Eigen::Ref<MatrixXd> X) const = 0;
+  /// Forces without joints and contacts, gyroscopic ones included.
+  virtual void forces(VectorXd& h) = 0;
+  /// g, and with W: g' = W u + rate, g'' = W u' + rest.
+  virtual void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) = 0;
+  virtual void look(int contact, ContactLook& out) = 0;
+  virtual double gap(int contact, double& rate) = 0;  ///< and its rate
+
+  /// The gradient by the coordinates of what has the velocity gradient `row`.
+  virtual void to_coordinates(const double* row, double* gradient) const = 0;
+  /// Rows that the coordinates obey by themselves, such as the length of a quaternion.
+  virtual int own_rows() const { return 0; }
+  virtual void own_values(double*) const {}
+  virtual void own_gradient(int /*row*/, double* /*q_gradient*/) const {}
+
+  virtual double energy() const = 0;  ///< kinetic and potential, J
+  /// Gradients of the energy: by velocities, and of the potential by coordinates.
+  virtual void energy_gradient(double* by_q, double* by_u) const = 0;
+  /// Whether forces without potential or driven joints may do work.
+  virtual bool does_work() const { return false; }
+  /// Of forces without potential, W.
+  virtual double power() const { return 0; }
+};
+
+}  // namespace tether::scene::event

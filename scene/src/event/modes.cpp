@@ -1,0 +1,88 @@
+// Tether: which contacts stay closed, stick and slide. SPDX-License-Identifier: BSD-3-Clause
+//
+// Coulomb's law for accelerations: with forces x, A x - b = (a_n, a_t) where a contact has no slip,
+// and (a_n, S d + a_t) where it slides along d, S far above all accelerations: the force then
+// opposes d, whatever the accelerations are, and A stays symmetric. Where sliding has no forces
+// (Painleve), x is of the size of S.
+#include <algorithm>
+#include <cmath>
+
+#include "driver.hpp"
+
+namespace tether::scene::event {
+
+namespace {
+
+constexpr double kFarAbove = 1e5;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int left_contact,
+                                        std::optional<Watch> left) {
+  std::vector<ContactMode> modes(at(model_.contacts()));
+  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  std::vector<int> candidates;
+  double rate = 0;
+  for (const int i : touching) {
+    if (i == left_contact && left == Watch::normal_force) continue;
+    model_.gap(i, rate);
+    if (std::abs(rate) <= bands_.speed) candidates.push_back(i);
+  }
+  if (candidates.empty()) return modes;
+  ContactRows rows(model_, candidates);
+  const int block = rows.size(), n = static_cast<int>(candidates.size());
+  const VectorXd velocities = rows.velocities(u);
+  const VectorXd free = rows.free_accelerations();
+  const double far = kFarAbove * std::max(free.cwiseAbs().maxCoeff(), 1e-12);
+  VectorXd b = -free, mu(n);
+  std::vector<VectorXd> slides(at(n));
+  for (int k = 0; k < n; ++k) {
+    const int i = candidates[at(k)];
+    mu[k] = model_.law(i).friction;
+    const VectorXd s = velocities.segment(block * k + 1, block - 1);
+    VectorXd& d = slides[at(k)];
+    if (i == left_contact && left == Watch::cone) {
+      // The force is on the border of the cone and opposes the slip that begins.
+      for (std::size_t c = 0; c < motion_.closed().size(); ++c)
+        if (motion_.closed()[c] == i) {
+          VectorXd rate_there(motion_.size());
+          motion_.rate(event_time_, y_.data(), rate_there.data());
+          d = -motion_.friction_force(static_cast<int>(c)).normalized();
+        }
+    } else if (s.norm() > bands_.speed && !(i == left_contact && left == Watch::slip)) {
+      d = s.normalized();
+    }
+    if (d.size() > 0) b.segment(block * k + 1, block - 1) -= far * d;
+  }
+  ++counts_.contact_problems;
+  const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
+  if (!answer.solved) fail("the forces of closed contacts are not solved");
+  for (int k = 0; k < n; ++k) {
+    const int i = candidates[at(k)];
+    ContactMode& mode = modes[at(i)];
+    const contact::Regime regime = answer.regimes[at(k)];
+    if (regime == contact::Regime::separating) continue;
+    const VectorXd& d = slides[at(k)];
+    if (d.size() > 0) {
+      mode.mode = Mode::slide;
+      mode.direction = d;
+      continue;
+    }
+    if (regime == contact::Regime::sticking && mu[k] > 0) {
+      mode.mode = Mode::stick;
+      continue;
+    }
+    const VectorXd a = answer.w.segment(block * k + 1, block - 1);
+    mode.mode = Mode::slide;
+    mode.direction = a.norm() > 0 ? VectorXd(a.normalized()) : VectorXd::Unit(block - 1, 0);
+    const bool same = i == left_contact && left == Watch::slip &&
+                      mode.direction.dot(motion_.modes()[at(i)].direction) > 0.5;
+    if (same && mu[k] > 0) mode.mode = Mode::stick;
+  }
+  return modes;
+}
+
+}  // namespace tether::scene::event

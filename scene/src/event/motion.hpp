@@ -1,0 +1,102 @@
+// Tether: the motion of a model while its closed contacts stay as they are.
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Unknowns y = (q, u, E_w), E_w the work of forces without potential. Each closed contact is stuck
+// or slides:
+//
+//   M u' = h + sum over rows of C lambda,   R u' = -r
+//
+//   joint    row W            column W'
+//   closed   row n            column n' where it sticks, n' - mu T' d where it slides, d = s / |s|
+//   stuck    rows T, too      columns T'
+//
+// lambda is eliminated: R M^-1 C lambda = -(r + R M^-1 h), in the sense of the shortest lambda
+// where rows depend on each other. So y' is a function of (t, y), and so is every force.
+#pragma once
+
+#include <Eigen/QR>
+#include <vector>
+
+#include "model.hpp"
+
+namespace tether::scene::event {
+
+enum class Mode : unsigned char { open, stick, slide };
+
+/// Mode of a contact, and where it slides to: a unit vector of its tangents.
+struct ContactMode {
+  Mode mode = Mode::open;
+  VectorXd direction;
+};
+
+class Motion {
+ public:
+  /// `speed`: below it the direction of slip is held, m/s.
+  Motion(Model& model, double speed);
+
+  Model& model() { return model_; }
+  int size() const { return nq_ + nu_ + 1; }
+  int coordinates() const { return nq_; }
+  int velocities() const { return nu_; }
+  int work() const { return nq_ + nu_; }  ///< index of the unknown E_w
+
+  /// The modes from now on, at the state y: rows that others imply are left out of constraints().
+  void choose(double t, const VectorXd& y, std::vector<ContactMode> modes);
+  const std::vector<ContactMode>& modes() const { return modes_; }
+  const std::vector<int>& closed() const { return closed_; }
+  /// Some closed contacts share their forces in more than one way.
+  bool is_hyperstatic() const { return hyperstatic_; }
+  /// A sliding contact has turned to this direction.
+  void turn(int contact, const VectorXd& direction) {
+    modes_[index(contact)].direction = direction;
+  }
+
+  /// y' at (t, y); afterwards acceleration() and force() are those there.
+  void rate(double t, const double* y, double* y_rate);
+  const VectorXd& acceleration() const { return a_; }
+  double normal_force(int closed) const { return lambda_[row_of_[index(closed)]]; }
+  VectorXd friction_force(int closed) const;  ///< by tangents
+  const ContactLook& look(int closed) const { return looks_[index(closed)]; }
+  VectorXd slip(int closed) const { return slip_of(looks_[index(closed)]); }
+  long evaluations() const { return evaluations_; }
+
+  /// The constraints of the phase on y: joints and gaps, their rates, slips of stuck contacts, own
+  /// rows of the model, energy.
+  int constraint_count() const;
+  void constraints(double t, const double* y, double* g);
+  void constraint_gradient(double t, const double* y,
+                           Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
+  /// Energy less work is that of this state from now on.
+  void keep_energy_of(double t, const VectorXd& y);
+  void keep_energy(double value) { kept_energy_ = value; }
+  double kept_energy() const { return kept_energy_; }
+  double energy() const { return model_.energy(); }  ///< of the state that was looked at last
+
+ private:
+  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
+  VectorXd slip_of(const ContactLook& look) const;
+  void set(double t, const double* y);
+  void gather();
+  void values_of_rows(VectorXd& positions, VectorXd& rates);
+  void choose_rows();
+
+  Model& model_;
+  double speed_;
+  int nq_, nu_, tangents_;
+  std::vector<ContactMode> modes_;  // of all contacts
+  std::vector<int> closed_, row_of_;
+  std::vector<ContactLook> looks_;  // of the closed ones
+  int rows_ = 0, joints_ = 0;
+  std::vector<int> positions_in_use_, rates_in_use_;  // rows of the projection
+  bool hyperstatic_ = false;
+  double kept_energy_ = 0;
+  bool keeps_energy_ = true, works_ = false;
+
+  VectorXd u_, h_, a_, lambda_, r_;
+  VectorXd joint_g_, joint_rate_, joint_rest_, row_scale_;
+  MatrixXd joint_W_, R_, C_, MC_, K_;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor_;
+  long evaluations_ = 0;
+};
+
+}  // namespace tether::scene::event

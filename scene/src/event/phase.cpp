@@ -1,0 +1,265 @@
+// Tether: one smooth phase in the hands of IDA and the projection. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "phase.hpp"
+
+#include <fmt/format.h>
+#include <ida/ida.h>
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_context.h>
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_dense.h>
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <tether/ida_projection.hpp>
+#include <tether/scene/engine.hpp>
+
+namespace tether::scene::event {
+
+namespace {
+
+// The first step's error is an eighth of what IDA allows.
+constexpr double kFirstError = 0.125, kFirstMove = 1e-2, kFirstAtRest = 1e-3;
+constexpr double kLook = 1e-5;   // the part of a move over which y'' is looked at
+constexpr double kNewton = 0.1;  // Newton's test, of the tolerance
+constexpr double kDifference = 1e-7;
+
+#ifdef SUN_COMM_NULL  // SUNDIALS 7
+void remember(int, const char*, const char*, const char* message, SUNErrCode, void* data,
+              SUNContext) {
+  *static_cast<std::string*>(data) = message ? message : "";
+}
+#else
+void remember(int, const char*, const char*, char* message, void* data) {
+  *static_cast<std::string*>(data) = message ? message : "";
+}
+#endif
+
+}  // namespace
+
+struct Phase::Ida {
+  Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
+      double longest_first);
+  ~Ida();
+  Ida(const Ida&) = delete;
+  Ida& operator=(const Ida&) = delete;
+
+  static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
+  static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
+                      void* self, N_Vector, N_Vector, N_Vector);
+  double first_step(const VectorXd& y0, const VectorXd& rate0) const;
+
+  Motion& motion;
+  double tolerance, start;
+  SUNContext context = nullptr;
+  N_Vector y = nullptr, yp = nullptr, id = nullptr;
+  SUNMatrix matrix = nullptr;
+  SUNLinearSolver solver = nullptr;
+  void* memory = nullptr;
+  std::optional<ida_projection::Projection> projection;
+  std::string message;
+  VectorXd rate, near, near_rate;
+};
+
+Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
+                double longest_first)
+    : motion(of), tolerance(tol), start(start_time) {
+#ifdef SUN_COMM_NULL
+  SUNContext_Create(SUN_COMM_NULL, &context);
+  SUNContext_ClearErrHandlers(context);
+#else
+  SUNContext_Create(nullptr, &context);
+#endif
+  const int N = motion.size();
+  rate.setZero(N);
+  near_rate.setZero(N);
+  VectorXd rate0(N);
+  motion.rate(start, y0.data(), rate0.data());
+  y = ida_projection::fast_vector(N_VNew_Serial(N, context));
+  yp = N_VClone(y);
+  id = N_VClone(y);
+  for (int i = 0; i < N; ++i) {
+    N_VGetArrayPointer(y)[i] = y0[i];
+    N_VGetArrayPointer(yp)[i] = rate0[i];
+    N_VGetArrayPointer(id)[i] = 1;
+  }
+  memory = IDACreate(context);
+#ifdef SUN_COMM_NULL
+  SUNContext_PushErrHandler(context, remember, &message);
+#else
+  IDASetErrHandlerFn(memory, remember, &message);
+#endif
+  IDAInit(memory, residual, 0.0, y, yp);
+  IDASetUserData(memory, this);
+  IDASStolerances(memory, tolerance, tolerance);
+  IDASetMaxNumSteps(memory, -1);
+  if (max_step > 0) IDASetMaxStep(memory, max_step);
+  double first = first_step(y0, rate0);
+  if (longest_first > 0) first = std::min(first, longest_first);
+  IDASetInitStep(memory, first);
+  matrix = SUNDenseMatrix(N, N, context);
+  solver = N <= ida_projection::kLargestFastDense ? ida_projection::fast_dense_solver(y, matrix)
+                                                  : SUNLinSol_Dense(y, matrix, context);
+  IDASetLinearSolver(memory, solver, matrix);
+  IDASetJacFn(memory, jacobian);
+  IDASetId(memory, id);
+  IDASetNonlinConvCoef(memory, kNewton);
+  ida_projection::Constraints constraints;
+  constraints.count = motion.constraint_count();
+  if (constraints.count == 0) return;
+  constraints.value = [this](double t, ida_projection::ConstVector at, ida_projection::Vector g) {
+    motion.constraints(start + t, at.data(), g.data());
+  };
+  constraints.jacobian = ida_projection::DenseJacobian(
+      [this](double t, ida_projection::ConstVector at, ida_projection::Matrix C) {
+        motion.constraint_gradient(start + t, at.data(), C);
+      });
+  ida_projection::Options options;
+  options.id = id;
+  options.print_fatal = false;
+  options.print_warnings = false;
+  options.long_move = ida_projection::LongMove::cap;
+  options.maximum_step = max_step;
+  projection.emplace(memory, constraints, options);
+}
+
+Phase::Ida::~Ida() {
+  IDAFree(&memory);
+  projection.reset();
+  SUNLinSolFree(solver);
+  SUNMatDestroy(matrix);
+  for (N_Vector v : {y, yp, id}) N_VDestroy(v);
+  SUNContext_Free(&context);
+}
+
+int Phase::Ida::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
+  Ida& me = *static_cast<Ida*>(self);
+  me.motion.rate(me.start + t, N_VGetArrayPointer(y), me.rate.data());
+  const double* derivative = N_VGetArrayPointer(yp);
+  double* out = N_VGetArrayPointer(r);
+  double sum = 0;
+  for (int i = 0; i < me.rate.size(); ++i) sum += out[i] = derivative[i] - me.rate[i];
+  return std::isfinite(sum) ? 0 : 1;
+}
+
+// cj - d(y')/dy by differences: Newton's matrix decides how fast it converges, not where to.
+int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SUNMatrix J,
+                         void* self, N_Vector, N_Vector, N_Vector) {
+  Ida& me = *static_cast<Ida*>(self);
+  const int N = me.motion.size();
+  me.near = Eigen::Map<const VectorXd>(N_VGetArrayPointer(y), N);
+  me.motion.rate(me.start + t, me.near.data(), me.rate.data());
+  for (int j = 0; j < N; ++j) {
+    double* column = SM_COLUMN_D(J, j);
+    if (j == me.motion.work()) {
+      std::fill(column, column + N, 0.0);
+      column[j] = cj;
+      continue;
+    }
+    const double kept = me.near[j], step = kDifference * std::max(1.0, std::abs(kept));
+    me.near[j] = kept + step;
+    me.motion.rate(me.start + t, me.near.data(), me.near_rate.data());
+    me.near[j] = kept;
+    for (int i = 0; i < N; ++i) column[i] = -(me.near_rate[i] - me.rate[i]) / step;
+    column[j] += cj;
+  }
+  return 0;
+}
+
+// At order 1 IDA's estimate of the error is h^2 |y''| / 4.
+double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
+  double speed = 0;
+  for (int i = 0; i < y0.size(); ++i)
+    speed = std::max(speed, std::abs(rate0[i]) / (1 + std::abs(y0[i])));
+  if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
+  const double look = kLook / speed;
+  const VectorXd ahead = y0 + look * rate0;
+  VectorXd rate_ahead(y0.size());
+  motion.rate(start + look, ahead.data(), rate_ahead.data());
+  double sum = 0;
+  for (int i = 0; i < y0.size(); ++i) {
+    const double change = (rate_ahead[i] - rate0[i]) / (tolerance * (1 + std::abs(y0[i])));
+    sum += change * change;
+  }
+  const double curvature = std::sqrt(sum / static_cast<double>(y0.size())) / look;
+  const double longest = kFirstMove / speed;
+  if (!std::isfinite(curvature)) return 0.5 * tolerance / speed;
+  return curvature > 0 ? std::min(longest, std::sqrt(4 * kFirstError / curvature)) : longest;
+}
+
+Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
+             double longest_first)
+    : motion_(motion),
+      start_(t),
+      ida_(std::make_unique<Ida>(motion, tolerance, max_step, t, y, longest_first)) {}
+
+Phase::~Phase() = default;
+
+void Phase::step() {
+  double t = 0;
+  ida_->message.clear();
+  const int flag = IDASolve(ida_->memory, end_ + 1, &t, ida_->y, ida_->yp, IDA_ONE_STEP);
+  if (flag < 0) {
+    char* name = IDAGetReturnFlagName(flag);
+    std::string text = fmt::format(
+        "the event engine's smooth phase that began at t = {:.9g} s stopped {:.3g} s "
+        "later: {}. {}",
+        start_, end_, name, ida_->message);
+    std::free(name);
+    if (ida_->projection && !ida_->projection->message().empty())
+      text += " Projection: " + ida_->projection->message();
+    throw SimulationError(text + " Try another [event] tolerance.");
+  }
+  begin_ = end_;
+  end_ = t;
+}
+
+void Phase::at(double time, VectorXd& y) const {
+  y.resize(motion_.size());
+  N_Vector out = N_VMake_Serial(motion_.size(), y.data(), ida_->context);
+  IDAGetDky(ida_->memory, time, 0, out);
+  N_VDestroy(out);
+}
+
+bool Phase::projected_at(double time, VectorXd& y) {
+  at(time, y);
+  if (!ida_->projection) return true;
+  N_Vector out = N_VMake_Serial(motion_.size(), y.data(), ida_->context);
+  const bool good = static_cast<bool>(ida_->projection->project(time, out));
+  N_VDestroy(out);
+  return good;
+}
+
+PhaseCounts Phase::counts() const {
+  PhaseCounts c;
+  IDAGetNumSteps(ida_->memory, &c.steps);
+  IDAGetNumResEvals(ida_->memory, &c.residuals);
+  IDAGetNumJacEvals(ida_->memory, &c.jacobians);
+  IDAGetNumErrTestFails(ida_->memory, &c.error_test_failures);
+  if (ida_->projection) c.projections = ida_->projection->statistics().projections;
+  return c;
+}
+
+// Newton's shortest moves; few, since only what an event left is mended.
+bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd& y) {
+  const int m = motion.constraint_count();
+  if (m == 0) return true;
+  VectorXd g(m);
+  Eigen::Matrix<double, -1, -1, Eigen::RowMajor> C(m, motion.size());
+  for (int pass = 0; pass < 12; ++pass) {
+    motion.constraints(t, y.data(), g.data());
+    if (!g.allFinite()) return false;
+    C.setZero();
+    motion.constraint_gradient(t, y.data(), C);
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
+    factor.setThreshold(1e-11);
+    factor.compute(C);
+    const VectorXd move = factor.solve(g);
+    y -= move;
+    if (move.cwiseAbs().maxCoeff() <= 1e-3 * tolerance * (1 + y.cwiseAbs().maxCoeff())) return true;
+  }
+  return false;
+}
+
+}  // namespace tether::scene::event

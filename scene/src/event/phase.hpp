@@ -1,0 +1,57 @@
+// Tether: one smooth phase in the hands of IDA and the projection. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <memory>
+
+#include "motion.hpp"
+
+namespace tether::scene::event {
+
+/// Work of IDA.
+struct PhaseCounts {
+  long steps = 0, residuals = 0, jacobians = 0, projections = 0, error_test_failures = 0;
+
+  void add(const PhaseCounts& more) {
+    steps += more.steps;
+    residuals += more.residuals;
+    jacobians += more.jacobians;
+    projections += more.projections;
+    error_test_failures += more.error_test_failures;
+  }
+};
+
+/// From (t, y) on, with the modes that `motion` has. Its clock starts at 0, so that steps far
+/// shorter than the rounding of t can be taken.
+class Phase {
+ public:
+  /// `tolerance`: rtol and atol of IDA; `longest_first`: the first step is no longer, 0: free.
+  Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
+        double longest_first);
+  ~Phase();
+  Phase(const Phase&) = delete;
+  Phase& operator=(const Phase&) = delete;
+
+  /// One step of IDA; throws SimulationError.
+  void step();
+  double start() const { return start_; }       ///< s
+  double step_begin() const { return begin_; }  ///< since the start, s
+  double step_end() const { return end_; }
+  /// y at a time of the last step, since the start: interpolated.
+  void at(double time, VectorXd& y) const;
+  /// The same, moved onto the constraints; false: it could not be.
+  bool projected_at(double time, VectorXd& y);
+  PhaseCounts counts() const;
+
+ private:
+  struct Ida;
+  Motion& motion_;
+  double start_, begin_ = 0, end_ = 0;
+  std::unique_ptr<Ida> ida_;
+};
+
+/// y moved onto the constraints of the motion at t in the weights of the tolerance, as for the
+/// start of a phase. False: it cannot be.
+bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd& y);
+
+}  // namespace tether::scene::event

@@ -1,0 +1,210 @@
+// Tether: the bodies, joints, forces and contacts of a scene as a model of the event engine.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene_model.hpp"
+
+#include <algorithm>
+
+#include "effects/list.hpp"
+#include "mechanics/quaternions.hpp"
+
+namespace tether::scene::event {
+
+namespace {
+
+using Row = Eigen::RowVectorXd;
+
+constexpr double kFarFromNormal = 0.1;  // squared sine: an axis that the tangents keep to
+
+/// Adds the velocity gradient of a force at a point, times the sign.
+void add_force(const Bodies& bodies, int body, const Vector3d& point, const Vector3d& force,
+               double sign, Eigen::Ref<Row> row) {
+  const int slot = bodies.inertia[at(body)].slot;
+  if (slot < 0) return;
+  const Frame<double>& f = bodies.frames[at(body)];
+  const Vector3d torque = (point - f.x).cross(force);
+  row.segment<3>(6 * slot) += sign * force.transpose();
+  row.segment<3>(6 * slot + 3) += sign * (f.R.transpose() * torque).transpose();
+}
+
+/// The rate of the velocity of a body's points where the contact point is, which moves with
+/// `point_velocity`, without accelerations of the body.
+struct Material {
+  Vector3d rest;
+  Material(const Frame<double>& f, const Vector3d& point_velocity)
+      : rest(f.W.cross(point_velocity - f.v)) {}
+};
+
+}  // namespace
+
+SceneModel::SceneModel(const Scene& scene)
+    : bodies_(scene),
+      rows_(scene, bodies_.all()),
+      forces_(effects::make_forces(scene, bodies_.all())),
+      pairs_(potential_contacts(scene)),
+      y_(bodies_.start()),
+      loads_(at(bodies_.count())) {
+  bodies_.set_state(y_.data());
+  axes_.assign(pairs_.size(), Vector3d::Zero());
+  settle();
+}
+
+SceneModel::~SceneModel() = default;
+
+VectorXd SceneModel::start() const {
+  const std::vector<double>& y = bodies_.start();
+  VectorXd out(coordinates() + velocities());
+  for (int k = 0; k < bodies_.count(); ++k) {
+    std::copy_n(y.data() + kBody * k, 7, out.data() + 7 * k);
+    std::copy_n(y.data() + kBody * k + kVelocity, 6, out.data() + coordinates() + 6 * k);
+  }
+  return out;
+}
+
+void SceneModel::set(double t, const double* q, const double* u) {
+  for (int k = 0; k < bodies_.count(); ++k) {
+    std::copy_n(q + 7 * k, 7, y_.data() + kBody * k);
+    std::copy_n(u + 6 * k, 6, y_.data() + kBody * k + kVelocity);
+  }
+  rows_.set_time(t);
+  bodies_.set_state(y_.data());
+  bodies_.set_turns(y_.data());
+}
+
+void SceneModel::settle() {
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const Vector3d normal = pairs_[i].look(bodies_.all()).normal;
+    if (axes_[i].cross(normal).squaredNorm() > kFarFromNormal) continue;
+    Eigen::Index least = 0;
+    normal.cwiseAbs().minCoeff(&least);
+    axes_[i] = Vector3d::Unit(least);
+  }
+}
+
+void SceneModel::rates(double* q_rate) const {
+  for (int k = 0; k < bodies_.count(); ++k) {
+    const double* s = y_.data() + kBody * k;
+    std::copy_n(s + kVelocity, 3, q_rate + 7 * k);
+    Eigen::Map<Eigen::Vector4d>(q_rate + 7 * k + 3) =
+        quaternion_rate(s + kQuaternion, Eigen::Map<const Vector3d>(s + kSpin));
+  }
+}
+
+void SceneModel::divide_by_mass(Eigen::Ref<MatrixXd> X) const {
+  for (int k = 0; k < bodies_.count(); ++k) {
+    const Inertia& inertia = bodies_.inertia(k);
+    X.middleRows<3>(6 * k) /= inertia.mass;
+    X.middleRows<3>(6 * k + 3) = (inertia.inverse * X.middleRows<3>(6 * k + 3)).eval();
+  }
+}
+
+void SceneModel::forces(VectorXd& h) {
+  for (Load6& load : loads_) load.force = load.torque_body = load.torque_world = Vector3d::Zero();
+  for (const auto& force : forces_) force->add(bodies_.all(), loads_);
+  h.resize(velocities());
+  for (int k = 0; k < bodies_.count(); ++k) {
+    const Load6& load = loads_[at(k)];
+    h.segment<3>(6 * k) = load.force;
+    h.segment<3>(6 * k + 3) = load.torque_body + bodies_.frame(k).R.transpose() * load.torque_world;
+  }
+}
+
+void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) {
+  const Bodies& bodies = bodies_.all();
+  g.resize(rows_.count());
+  W.setZero(rows_.count(), velocities());
+  rate.resize(rows_.count());
+  rest.resize(rows_.count());
+  rows_.each([&](const auto& row) {
+    const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
+    row.template rows<0>(A, B, g.data() + row.row);
+    row.template rows<2>(A, B, rest.data() + row.row);
+    row.rate_by_time(rate.data() + row.row);
+    joints::JointRows::each_unit_load(
+        row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+          const int slot = bodies.inertia[at(body)].slot;
+          W.block<1, 3>(row.row + i, 6 * slot) += force.transpose();
+          W.block<1, 3>(row.row + i, 6 * slot + 3) += torque.transpose();
+        });
+  });
+}
+
+void SceneModel::look(int contact, ContactLook& out) {
+  const FeaturePair& p = pair(contact);
+  const Bodies& bodies = bodies_.all();
+  const Touch touch = p.look(bodies);
+  const Material a(bodies.frames[at(p.first)], touch.point_velocity);
+  const Material b(bodies.frames[at(p.second)], touch.point_velocity);
+  const Vector3d rest = a.rest - b.rest;
+  out.gap = touch.gap;
+  out.normal.setZero(velocities());
+  add_force(bodies, p.first, touch.point, touch.normal, 1, out.normal);
+  add_force(bodies, p.second, touch.point, touch.normal, -1, out.normal);
+  out.normal_rate = 0;
+  out.normal_rest = touch.second;
+  // Where the point sticks, the tangents' own turning does not count.
+  const Vector3d t1 = touch.normal.cross(axes_[at(contact)]).normalized();
+  out.tangents.setZero(2, velocities());
+  out.slip_rate.setZero(2);
+  out.slip_rest.resize(2);
+  const Vector3d tangent[2] = {t1, touch.normal.cross(t1)};
+  for (int k = 0; k < 2; ++k) {
+    Row row = Row::Zero(velocities());
+    add_force(bodies, p.first, touch.point, tangent[k], 1, row);
+    add_force(bodies, p.second, touch.point, tangent[k], -1, row);
+    out.tangents.row(k) = row;
+    out.slip_rest[k] = tangent[k].dot(rest);
+  }
+}
+
+void SceneModel::to_coordinates(const double* row, double* gradient) const {
+  for (int k = 0; k < bodies_.count(); ++k) {
+    const double* q = y_.data() + kBody * k + kQuaternion;
+    std::copy_n(row + 6 * k, 3, gradient + 7 * k);
+    Eigen::Map<Eigen::RowVector4d>(gradient + 7 * k + 3) =
+        Eigen::Map<const Eigen::RowVector3d>(row + 6 * k + 3) * turn_of_quaternion(q);
+  }
+}
+
+void SceneModel::own_values(double* values) const {
+  for (int k = 0; k < bodies_.count(); ++k)
+    values[k] =
+        0.5 *
+        (Eigen::Map<const Eigen::Vector4d>(y_.data() + kBody * k + kQuaternion).squaredNorm() - 1);
+}
+
+void SceneModel::own_gradient(int row, double* gradient) const {
+  std::copy_n(y_.data() + kBody * row + kQuaternion, 4, gradient + 7 * row + 3);
+}
+
+double SceneModel::potential() const {
+  double sum = 0;
+  for (const auto& force : forces_) sum += force->potential(bodies_.all());
+  return sum;
+}
+
+double SceneModel::energy() const { return bodies_.kinetic_energy() + potential(); }
+
+void SceneModel::energy_gradient(double* by_q, double* by_u) const {
+  std::vector<double> row(at(kBody * bodies_.count()));
+  for (const auto& force : forces_) force->add_potential_gradient(bodies_.all(), row.data());
+  for (int k = 0; k < bodies_.count(); ++k) {
+    std::copy_n(row.data() + kBody * k, 7, by_q + 7 * k);
+    const Inertia& inertia = bodies_.inertia(k);
+    Eigen::Map<Vector3d>(by_u + 6 * k) = inertia.mass * bodies_.frame(k).v;
+    Eigen::Map<Vector3d>(by_u + 6 * k + 3) = inertia.inertia * bodies_.spin(k);
+  }
+}
+
+bool SceneModel::does_work() const {
+  return rows_.has_motion() || std::any_of(forces_.begin(), forces_.end(),
+                                           [](const auto& force) { return force->has_power(); });
+}
+
+double SceneModel::power() const {
+  double sum = 0;
+  for (const auto& force : forces_)
+    if (force->has_power()) sum += force->power(bodies_.all());
+  return sum;
+}
+
+}  // namespace tether::scene::event

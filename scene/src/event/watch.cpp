@@ -1,0 +1,182 @@
+// Tether: the functions of the state whose zeros are events. SPDX-License-Identifier: BSD-3-Clause
+#include "watch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tether::scene::event {
+
+namespace {
+
+constexpr int kMostIterations = 80;
+constexpr int kPolish = 3;
+
+/// A zero of f between a and b, where it has other signs; Illinois' rule.
+template <class F>
+double zero_between(const F& f, double a, double fa, double b, double fb, double resolution) {
+  int side = 0;
+  for (int k = 0; k < kMostIterations && std::abs(b - a) > resolution; ++k) {
+    double m = (fa * b - fb * a) / (fa - fb);
+    if (!(m > std::min(a, b) && m < std::max(a, b))) m = 0.5 * (a + b);
+    const double fm = f(m);
+    if (fm == 0) return m;
+    if ((fm > 0) == (fb > 0)) {
+      b = m;
+      fb = fm;
+      if (side == -1) fa *= 0.5;
+      side = -1;
+    } else {
+      a = m;
+      fa = fm;
+      if (side == 1) fb *= 0.5;
+      side = 1;
+    }
+  }
+  return std::abs(fa) < std::abs(fb) ? a : b;
+}
+
+}  // namespace
+
+void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leaving) {
+  functions_.clear();
+  force_ = 0;
+  const auto add = [&](Watch what, int contact, int closed, bool leaves) {
+    functions_.push_back({what, contact, closed, false, leaves, 0, 0, 0, 0});
+  };
+  const std::vector<int>& closed = motion_.closed();
+  for (int i = 0; i < motion_.model().contacts(); ++i)
+    if (motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::open)
+      add(Watch::gap, i, -1, leaving[static_cast<std::size_t>(i)]);
+  for (std::size_t k = 0; k < closed.size(); ++k) {
+    const int i = closed[k], place = static_cast<int>(k);
+    add(Watch::normal_force, i, place, false);
+    const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
+    if (stuck) add(Watch::cone, i, place, false);
+    if (!stuck && motion_.model().law(i).friction > 0) add(Watch::slip, i, place, false);
+  }
+  evaluate(t, y);
+  for (Function& f : functions_) f.armed = f.value > band(f);
+}
+
+double Watcher::band(const Function& f) const {
+  switch (f.what) {
+    case Watch::gap:
+      return f.leaving ? 0 : bands_.gap;
+    case Watch::slip:
+      return bands_.speed;
+    default:
+      return bands_.part * force_;
+  }
+}
+
+double Watcher::of_state(Function& f) {
+  switch (f.what) {
+    case Watch::gap:
+      return motion_.model().gap(f.contact, f.slope);
+    case Watch::normal_force:
+      return motion_.normal_force(f.closed);
+    case Watch::cone:
+      return motion_.model().law(f.contact).friction * motion_.normal_force(f.closed) -
+             motion_.friction_force(f.closed).norm();
+    case Watch::slip:
+      return motion_.slip(f.closed).dot(
+          motion_.modes()[static_cast<std::size_t>(f.contact)].direction);
+  }
+  return 0;
+}
+
+void Watcher::evaluate(double t, const VectorXd& y) {
+  rate_.resize(motion_.size());
+  if (motion_.closed().empty())
+    motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
+  else
+    motion_.rate(t, y.data(), rate_.data());
+  for (std::size_t k = 0; k < motion_.closed().size(); ++k)
+    force_ = std::max(force_, std::abs(motion_.normal_force(static_cast<int>(k))));
+  for (Function& f : functions_) {
+    f.before = f.value;
+    f.slope_before = f.slope;
+    f.value = of_state(f);
+  }
+}
+
+double Watcher::value(Function f, double t, const VectorXd& y) {
+  if (f.what == Watch::gap)
+    motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
+  else
+    motion_.rate(t, y.data(), rate_.data());
+  return of_state(f);
+}
+
+// Whether a gap that is positive at both ends of a step, and falls, then rises, can reach zero.
+bool Watcher::may_dip(const Function& f, double step) const {
+  return f.what == Watch::gap && f.armed && f.slope_before < 0 && f.slope > 0 && f.before > 0 &&
+         std::min(f.before, f.value) < step * std::max(-f.slope_before, f.slope);
+}
+
+// The least value of such a gap.
+double Watcher::dip(Phase& phase, const Function& f, double& when) {
+  const double a = phase.step_begin(), b = phase.step_end();
+  const auto slope = [&](double time) {
+    phase.at(time, y_);
+    motion_.model().set(phase.start() + time, y_.data(), y_.data() + motion_.coordinates());
+    double rate = 0;
+    motion_.model().gap(f.contact, rate);
+    return rate;
+  };
+  when = zero_between(slope, a, f.slope_before, b, f.slope, 1e-9 * (b - a));
+  phase.at(when, y_);
+  return value(f, phase.start() + when, y_);
+}
+
+Zero Watcher::locate(Phase& phase, const Function& f) {
+  double a = phase.step_begin(), b = phase.step_end();
+  double fa = f.before, fb = f.value;
+  const auto at = [&](double time) {
+    phase.at(time, y_);
+    return value(f, phase.start() + time, y_);
+  };
+  if (fb >= 0) fb = dip(phase, f, b);
+  Zero zero{f.what, f.contact, a, {}};
+  const double resolution = 4e-16 * b;
+  if (fa > 0) zero.time = zero_between(at, a, fa, b, fb, resolution);
+  // Newton in time, on the constraints: a move in space would not be the motion.
+  const double slope = fa > 0 && b > a ? (fb - fa) / (b - a) : 0;
+  phase.projected_at(zero.time, zero.y);
+  if (slope == 0) return zero;
+  double local = slope, last = value(f, phase.start() + zero.time, zero.y), last_time = zero.time;
+  for (int k = 0; k < kPolish; ++k) {
+    const double next = std::clamp(last_time - last / local, phase.step_begin(), phase.step_end());
+    if (std::abs(next - last_time) <= resolution) break;
+    phase.projected_at(next, zero.y);
+    const double now = value(f, phase.start() + next, zero.y);
+    if (now != last && next != last_time) local = (now - last) / (next - last_time);
+    last = now;
+    last_time = zero.time = next;
+    if (local == 0) break;
+  }
+  return zero;
+}
+
+std::optional<Zero> Watcher::look(Phase& phase) {
+  phase.at(phase.step_end(), y_);
+  const VectorXd at_end = y_;
+  evaluate(phase.start() + phase.step_end(), at_end);
+  std::optional<Zero> first;
+  for (Function& f : functions_) {
+    const double edge = band(f);
+    bool hit = f.value < (f.armed ? 0 : -edge);
+    if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
+      double when = 0;
+      hit = dip(phase, f, when) < -bands_.gap;  // else it only touches
+    }
+    if (!hit) continue;
+    Zero zero = locate(phase, f);
+    if (!first || zero.time < first->time) first = std::move(zero);
+  }
+  if (!first)
+    for (Function& f : functions_) f.armed = f.armed || f.value > band(f);
+  return first;
+}
+
+}  // namespace tether::scene::event

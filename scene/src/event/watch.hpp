@@ -1,0 +1,66 @@
+// Tether: the functions of the state whose zeros are events. SPDX-License-Identifier: BSD-3-Clause
+//
+//   open     gap
+//   closed   normal force; mu times it less |friction| where it sticks; slip along its direction
+//            where it slides
+//
+// A function counts once it is armed: at the start of a phase those that begin at zero are not,
+// until they exceed a band; they count, too, where they fall below minus the band.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "motion.hpp"
+#include "phase.hpp"
+
+namespace tether::scene::event {
+
+enum class Watch : unsigned char { gap, normal_force, cone, slip };
+
+/// The first zero in a step.
+struct Zero {
+  Watch what = Watch::gap;
+  int contact = -1;
+  double time = 0;  ///< since the start of the phase
+  VectorXd y;       ///< there, on the constraints
+};
+
+struct Bands {
+  double gap = 0, speed = 0;  ///< m, m/s
+  double part = 0;            ///< of the largest force
+};
+
+class Watcher {
+ public:
+  Watcher(Motion& motion, const Bands& bands) : motion_(motion), bands_(bands) {}
+
+  /// A phase begins at (t, y). `leaving`: contacts that move apart though their gaps are zero.
+  void begin(double t, const VectorXd& y, const std::vector<bool>& leaving);
+  /// The first event in the last step of the phase.
+  std::optional<Zero> look(Phase& phase);
+
+ private:
+  struct Function {
+    Watch what;
+    int contact, closed;  // closed: place among the closed contacts
+    bool armed, leaving;
+    double value, before;
+    double slope, slope_before;  // of a gap, m/s
+  };
+  void evaluate(double t, const VectorXd& y);
+  double value(Function f, double t, const VectorXd& y);
+  double of_state(Function& f);
+  double band(const Function& f) const;
+  Zero locate(Phase& phase, const Function& f);
+  bool may_dip(const Function& f, double step) const;
+  double dip(Phase& phase, const Function& f, double& when);
+
+  Motion& motion_;
+  Bands bands_;
+  std::vector<Function> functions_;
+  VectorXd rate_, y_;
+  double force_ = 0;  // the largest so far
+};
+
+}  // namespace tether::scene::event
