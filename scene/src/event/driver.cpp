@@ -54,7 +54,8 @@ std::vector<int> Driver::touching(int always) const {
   for (int i = 0; i < model_.contacts(); ++i) {
     double rate = 0;
     const bool closed = motion_.modes()[at(i)].mode != Mode::open;
-    if (i == always || closed || std::abs(model_.gap(i, rate)) <= bands_.gap) out.push_back(i);
+    const bool near = std::abs(model_.gap(i, rate)) <= bands_.gap && model_.margin(i) >= 0;
+    if (i == always || closed || near) out.push_back(i);
   }
   return out;
 }
@@ -218,6 +219,7 @@ void Driver::handle(const Zero& zero) {
     collide(close, EventKind::touch, zero.contact);
   else
     record(zero.what == Watch::normal_force ? EventKind::lift
+           : zero.what == Watch::border     ? EventKind::border
            : zero.what == Watch::cone       ? EventKind::slip
                                             : EventKind::stop,
            zero.contact, 0, 0, 0);

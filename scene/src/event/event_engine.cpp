@@ -114,7 +114,7 @@ void EventEngine::look() {
   look_at_contacts();
   d.contacts = static_cast<int>(contacts_.size());
   for (int i = 0; i < model_.contacts(); ++i)
-    if (model_.pair(i).inside(bodies.all())) {
+    if (model_.margin(i) > 0) {
       double rate = 0;
       d.penetration = std::max(d.penetration, -model_.gap(i, rate) * units_.length);
     }

@@ -13,7 +13,9 @@
 //   line    the same of d without its part along the line, in axes that turn with B
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <variant>
 #include <vector>
 
@@ -22,6 +24,8 @@
 namespace tether::scene::event {
 
 using namespace mechanics;
+
+constexpr double kNoBorder = std::numeric_limits<double>::infinity();
 
 /// What a kind tells of the state of its two bodies.
 struct Touch {
@@ -49,12 +53,13 @@ struct PlaneFeature {
     t.point_velocity = c.x1 - radius * n.x1;
     return t;
   }
-  bool inside(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
-    if (border.empty()) return true;
+  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
+    double least = kNoBorder;
+    if (border.empty()) return least;
     const Vector3d local = point_in(B, mechanics::point<0>(A, centre).x);
     for (const auto& [outward, limit] : border)
-      if (outward.dot(local) > limit) return false;
-    return true;
+      least = std::min(least, limit - outward.dot(local));
+    return least;
   }
 };
 
@@ -79,7 +84,9 @@ struct PointFeature {
     t.point_velocity = b.x1 + radius * n1;
     return t;
   }
-  bool inside(const Frame<double>&, const Frame<double>&, const Vector3d&) const { return true; }
+  double margin(const Frame<double>&, const Frame<double>&, const Vector3d&) const {
+    return kNoBorder;
+  }
 };
 
 /// A line of the second body through `at` along `along`, with a radius; from 0 to `length` along
@@ -109,10 +116,10 @@ struct LineFeature {
     t.point_velocity = c.x1 - radius_first * n1;
     return t;
   }
-  bool inside(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
+  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
     const Vector3d s = mechanics::point<0>(A, centre).x - mechanics::point<0>(B, at).x;
     const double k = s.dot(times(B.R, along));
-    return k >= 0 && k <= length;
+    return std::min(k, length - k);
   }
 };
 
@@ -131,10 +138,10 @@ struct FeaturePair {
         },
         on_second);
   }
-  bool inside(const Bodies& bodies) const {
+  double margin(const Bodies& bodies) const {
     return std::visit(
         [&](const auto& feature) {
-          return feature.inside(bodies.frames[at(first)], bodies.frames[at(second)], centre);
+          return feature.margin(bodies.frames[at(first)], bodies.frames[at(second)], centre);
         },
         on_second);
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 
 namespace tether::scene::event {
 
@@ -49,6 +50,9 @@ class Model {
   virtual void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) = 0;
   virtual void look(int contact, ContactLook& out) = 0;
   virtual double gap(int contact, double& rate) = 0;  ///< and its rate
+
+  /// How far the contact is inside the border of its features, m; infinite: they have none.
+  virtual double margin(int /*contact*/) { return std::numeric_limits<double>::infinity(); }
 
   /// The gradient by the coordinates of what has the velocity gradient `row`.
   virtual void to_coordinates(const double* row, double* gradient) const = 0;

@@ -27,7 +27,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   std::vector<int> candidates;
   double rate = 0;
   for (const int i : touching) {
-    if (i == left_contact && left == Watch::normal_force) continue;
+    if (i == left_contact && (left == Watch::normal_force || left == Watch::border)) continue;
     model_.gap(i, rate);
     if (std::abs(rate) <= bands_.speed) candidates.push_back(i);
   }

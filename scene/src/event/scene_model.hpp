@@ -43,6 +43,8 @@ class SceneModel final : public Model {
     return touch.gap;
   }
 
+  double margin(int contact) override { return pair(contact).margin(bodies_.all()); }
+
   void to_coordinates(const double* row, double* gradient) const override;
   int own_rows() const override { return bodies_.count(); }
   void own_values(double* values) const override;

@@ -41,7 +41,7 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   functions_.clear();
   force_ = 0;
   const auto add = [&](Watch what, int contact, int closed, bool leaves) {
-    functions_.push_back({what, contact, closed, false, leaves, 0, 0, 0, 0});
+    functions_.push_back({what, contact, closed, false, leaves, false, 0, 0, 0, 0});
   };
   const std::vector<int>& closed = motion_.closed();
   for (int i = 0; i < motion_.model().contacts(); ++i)
@@ -52,16 +52,22 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
     add(Watch::normal_force, i, place, false);
     const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
     if (stuck) add(Watch::cone, i, place, false);
+    if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place, false);
     if (!stuck && motion_.model().law(i).friction > 0) add(Watch::slip, i, place, false);
   }
   evaluate(t, y);
-  for (Function& f : functions_) f.armed = f.value > band(f);
+  for (Function& f : functions_) {
+    f.armed = f.value > band(f);
+    f.dormant = f.what == Watch::gap && f.value < -bands_.gap;
+  }
 }
 
 double Watcher::band(const Function& f) const {
   switch (f.what) {
     case Watch::gap:
       return f.leaving ? 0 : bands_.gap;
+    case Watch::border:
+      return bands_.gap;
     case Watch::slip:
       return bands_.speed;
     default:
@@ -78,6 +84,8 @@ double Watcher::of_state(Function& f) {
     case Watch::cone:
       return motion_.model().law(f.contact).friction * motion_.normal_force(f.closed) -
              motion_.friction_force(f.closed).norm();
+    case Watch::border:
+      return motion_.model().margin(f.contact);
     case Watch::slip:
       return motion_.slip(f.closed).dot(
           motion_.modes()[static_cast<std::size_t>(f.contact)].direction);
@@ -165,6 +173,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
   std::optional<Zero> first;
   for (Function& f : functions_) {
     const double edge = band(f);
+    if (f.dormant) continue;
     bool hit = f.value < (f.armed ? 0 : -edge);
     if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
       double when = 0;
@@ -172,10 +181,18 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     }
     if (!hit) continue;
     Zero zero = locate(phase, f);
+    if (f.what == Watch::gap && motion_.model().margin(f.contact) < 0) {
+      f.dormant = true;  // it passes beside the face
+      f.armed = false;
+      continue;
+    }
     if (!first || zero.time < first->time) first = std::move(zero);
   }
   if (!first)
-    for (Function& f : functions_) f.armed = f.armed || f.value > band(f);
+    for (Function& f : functions_) {
+      f.armed = f.armed || f.value > band(f);
+      f.dormant = f.dormant && !f.armed;
+    }
   return first;
 }
 

@@ -2,7 +2,7 @@
 //
 //   open     gap
 //   closed   normal force; mu times it less |friction| where it sticks; slip along its direction
-//            where it slides
+//            where it slides; its distance from the border of its face
 //
 // A function counts once it is armed: at the start of a phase those that begin at zero are not,
 // until they exceed a band; they count, too, where they fall below minus the band.
@@ -16,7 +16,7 @@
 
 namespace tether::scene::event {
 
-enum class Watch : unsigned char { gap, normal_force, cone, slip };
+enum class Watch : unsigned char { gap, normal_force, cone, slip, border };
 
 /// The first zero in a step.
 struct Zero {
@@ -45,6 +45,7 @@ class Watcher {
     Watch what;
     int contact, closed;  // closed: place among the closed contacts
     bool armed, leaving;
+    bool dormant;  // a gap that is negative beside its feature: no contact
     double value, before;
     double slope, slope_before;  // of a gap, m/s
   };
