@@ -57,8 +57,7 @@ struct PlaneFeature {
     double least = kNoBorder;
     if (border.empty()) return least;
     const Vector3d local = point_in(B, mechanics::point<0>(A, centre).x);
-    for (const auto& [outward, limit] : border)
-      least = std::min(least, limit - outward.dot(local));
+    for (const auto& [outward, limit] : border) least = std::min(least, limit - outward.dot(local));
     return least;
   }
 };
