@@ -1,8 +1,9 @@
 # Install rules: one component for each library, a package config, a version file, pkg-config files.
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Components: linalg (with the package files that all need), ida_projection, contact, contact_io and
-# contact_collision (on contact), scene (on all of these but contact_io). Each library builds alone
+# Components: linalg (with the package files that all need), ida_projection, reverse_ida (on it),
+# contact, contact_io and contact_collision (on contact), scene (on all of these but reverse_ida and
+# contact_io). Each library builds alone
 # (TETHER_BUILD_*) and installs alone on top of those that it stands on:
 #
 #   cmake --install build --component linalg
@@ -94,6 +95,14 @@ if(TARGET tether_ida_projection)
   endif()
   tether_pkg_config(ida_projection "Constraint projection for SUNDIALS IDA and IDAS"
     "tether-linalg = ${PROJECT_VERSION}" CFLAGS ${sundials_include} LIBS ${runtime})
+endif()
+if(TARGET tether_reverse_ida)
+  set(context "")
+  if(NOT BUILD_SHARED_LIBS)
+    set(context -lboost_context)
+  endif()
+  tether_pkg_config(reverse_ida "IDA by reverse communication" "tether-ida-projection = ${PROJECT_VERSION}"
+    LIBS ${context})
 endif()
 # A static library leaves its own libraries to the program.
 set(hdf5_libs "")

@@ -22,6 +22,12 @@ if(TARGET tether::ida_projection)
     set_target_properties(pendulum_${solver} PROPERTIES LINKER_LANGUAGE CXX)
     add_test(NAME pendulum_${solver} COMMAND pendulum_${solver})
   endforeach()
+  if(TARGET tether::reverse_ida)
+    add_executable(use_reverse_ida ${CMAKE_CURRENT_LIST_DIR}/reverse_ida.cpp)
+    target_link_libraries(use_reverse_ida PRIVATE tether::reverse_ida
+      $<IF:$<BOOL:${SUNDIALS_FOUND}>,SUNDIALS::ida,sundials_ida>)
+    add_test(NAME reverse_ida COMMAND use_reverse_ida)
+  endif()
   # A program in C: the C++ runtime comes with the target.
   add_executable(pendulum_in_c ${CMAKE_CURRENT_LIST_DIR}/../../examples/drop_in/in_c.c)
   target_link_libraries(pendulum_in_c PRIVATE tether::ida_projection

@@ -13,6 +13,7 @@ endfunction()
 
 install_tree(${PREFIX}/all)
 # What a component stands on beside linalg.
+set(reverse_ida ida_projection)
 set(contact_io contact)
 set(contact_collision contact)
 set(scene ida_projection contact contact_collision)

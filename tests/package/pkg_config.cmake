@@ -17,15 +17,18 @@ function(compile_and_run program source package)
   execute_process(COMMAND ${WORK}/${program} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
+# The host's own SUNDIALS, in the library folder beside its headers where that is not /usr.
+set(where "")
+if(NOT SUNDIALS STREQUAL "/usr/include")
+  get_filename_component(where ${SUNDIALS} DIRECTORY)
+  file(GLOB core ${where}/lib/libsundials_core.so)  # 7.x
+  set(where -L${where}/lib -Wl,-rpath,${where}/lib ${core})
+endif()
+
 foreach(component IN LISTS COMPONENTS)
-  if(component STREQUAL "ida_projection")
-    # The host's own SUNDIALS, in the library folder beside its headers where that is not /usr.
-    set(where "")
-    if(NOT SUNDIALS STREQUAL "/usr/include")
-      get_filename_component(where ${SUNDIALS} DIRECTORY)
-      file(GLOB core ${where}/lib/libsundials_core.so)  # 7.x
-      set(where -L${where}/lib -Wl,-rpath,${where}/lib ${core})
-    endif()
+  if(component STREQUAL "reverse_ida")
+    compile_and_run(reverse_ida reverse_ida.cpp tether-reverse-ida ${where} -lsundials_ida)
+  elseif(component STREQUAL "ida_projection")
     foreach(solver IN ITEMS ida idas)
       compile_and_run(pendulum_${solver} pendulum.cpp tether-ida-projection ${where} -lsundials_${solver})
     endforeach()

@@ -59,7 +59,7 @@ const char* tether_last_error(void);
 /* The name of a tether_status. */
 const char* tether_status_name(int status);
 
-/* ---- constraints g(t, y) = 0 ---------------------------------------------------------------- */
+/* ---- constraints g(t, y) = 0 ---- */
 
 typedef struct tether_constraints tether_constraints;
 
@@ -105,8 +105,7 @@ int tether_name_row(tether_constraints* constraints, int row, const char* name);
 /* Rows so far; TETHER_MEM_NULL for a null pointer. */
 int tether_count_rows(const tether_constraints* constraints);
 
-/* ---- options ----------------------------------------------------------------------------------
- */
+/* ---- options ---- */
 
 enum { TETHER_METRIC_LOCAL_CORRECTION, TETHER_METRIC_ERROR_WEIGHTS, TETHER_METRIC_AUTOMATIC };
 enum { TETHER_LONG_MOVE_REJECT, TETHER_LONG_MOVE_CAP };
@@ -143,8 +142,7 @@ typedef struct {
 /* The defaults: tether_options options; tether_options_init(&options, sizeof options); */
 int tether_options_init(tether_options* options, size_t size);
 
-/* ---- projection -------------------------------------------------------------------------------
- */
+/* ---- projection ---- */
 
 typedef struct tether_projection tether_projection;
 
@@ -202,18 +200,17 @@ int tether_get_statistic(const tether_projection* projection, const char* name, 
 const char* tether_get_statistics_table(const tether_projection* projection);
 int tether_reset_statistics(tether_projection* projection);
 
-/* ---- faster vectors and dense solver for small systems ----------------------------------------
- */
+/* ---- faster vectors and dense solver for small systems ---- */
 
 /* Both need no projection; see <tether/ida_projection/fast.hpp>. Results keep their bits. */
 int tether_fast_vector(N_Vector y);
 /* null on failure: see tether_last_error(). */
 SUNLinearSolver tether_fast_dense_solver(N_Vector y, SUNMatrix A);
 
-#if defined(__GNUC__)
-#pragma GCC visibility pop
-#endif
 #ifdef __cplusplus
 }
+#endif
+#if defined(__GNUC__)
+#pragma GCC visibility pop
 #endif
 #endif

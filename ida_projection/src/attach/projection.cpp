@@ -3,7 +3,6 @@
 #include <tether/ida_projection/projection.hpp>
 
 #include "attach/impl.hpp"
-#include "host/sundials_build.hpp"
 
 namespace tether::ida_projection {
 

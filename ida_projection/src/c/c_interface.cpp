@@ -7,10 +7,11 @@
 #include <string>
 #include <tether/ida_projection.h>
 #include <tether/ida_projection.hpp>
+#include <tether/ida_projection/c_options.hpp>
 #include <utility>
 #include <vector>
 
-#include "host/sundials_build.hpp"
+#include "c/guarded.hpp"
 
 namespace ip = tether::ida_projection;
 
@@ -23,96 +24,36 @@ struct tether_projection {
   std::string table;
 };
 
-namespace {
+namespace tether::ida_projection {
 
-static_assert(int(ip::Status::doubtful) == TETHER_DOUBTFUL &&
-              int(ip::Status::out_of_memory) == TETHER_OUT_OF_MEMORY &&
-              int(ip::Metric::automatic) == TETHER_METRIC_AUTOMATIC &&
-              int(ip::LongMove::cap) == TETHER_LONG_MOVE_CAP);
-
-// Plain storage: a string would register its destructor, which ends the program without memory.
-thread_local char last_error[2048];
-
-int fail(int flag, const char* text) noexcept {
-  std::strncpy(last_error, text, sizeof last_error - 1);
-  return flag;
-}
-
-// An argument in error, e.g. "tether_add_rows: count = 0, must be at least 1".
-int ill(const std::string& text) { return fail(TETHER_ILL_INPUT, text.c_str()); }
-int null(const char* function, const char* argument) {
-  return fail(TETHER_MEM_NULL, (std::string(function) + ": " + argument + " is null").c_str());
-}
-
-// Every function that C calls: no exception gets out.
-template <class Function>
-int guarded(Function&& function) noexcept {
-  try {
-    last_error[0] = 0;
-    return function();
-  } catch (const std::bad_alloc&) {
-    return fail(TETHER_MEM_FAIL, "out of memory");
-  } catch (const std::invalid_argument& error) {
-    return fail(TETHER_ILL_INPUT, error.what());
-  } catch (const std::exception& error) {
-    return fail(TETHER_INTERNAL_ERROR, error.what());
-  } catch (...) {
-    return fail(TETHER_INTERNAL_ERROR, "unknown exception");
-  }
-}
-
-int add(tether_constraints& set, const ip::Constraints& rows) {
-  set.rows = set.rows + rows;  // a copy: the set stays whole if memory runs out
-  return 0;
-}
-
-ip::Callable<double, ip::ConstVector, ip::Vector> value_of(tether_value_fn value, void* user_data) {
-  return [value, user_data](double t, ip::ConstVector y, ip::Vector g) {
-    return value(t, y.data(), g.data(), user_data);
-  };
-}
-
-int check_rows(const char* function, const tether_constraints* set, int count, bool value) {
-  if (set == nullptr) return null(function, "constraints");
-  if (count < 1)
-    return ill(std::string(function) + ": count = " + std::to_string(count) +
-               ", must be at least 1");
-  if (!value) return null(function, "value");
-  return 0;
-}
-
-// What the caller's structure holds; a structure of an older header lacks the last fields.
-bool read_options(const tether_options* given, long unknowns, ip::Options& options, int& flag) {
+// A structure of an older header lacks the last fields.
+Options options_of(const tether_options* given, long unknowns) {
   tether_options o;
   tether_options_init(&o, sizeof o);
   if (given != nullptr) {
-    if (given->size < sizeof(size_t) || given->size > sizeof o) {
-      flag = ill("tether_projection_new: options->size = " + std::to_string(given->size) +
-                 ": call tether_options_init(options, sizeof *options) first");
-      return false;
-    }
+    if (given->size < sizeof(size_t) || given->size > sizeof o)
+      throw std::invalid_argument("options->size = " + std::to_string(given->size) +
+                                  ": call tether_options_init(options, sizeof *options) first");
     std::memcpy(&o, given, given->size);
   }
-  const auto out_of_range = [&](const char* field, int value, const char* allowed) {
-    flag = ill(std::string("tether_projection_new: options->") + field + " = " +
-               std::to_string(value) + ", must be " + allowed);
-    return false;
+  const auto check = [](bool right, const char* name, long value, const char* allowed) {
+    if (!right)
+      throw std::invalid_argument(std::string(name) + " = " + std::to_string(value) + ", must be " +
+                                  allowed);
   };
-  if (o.metric < TETHER_METRIC_LOCAL_CORRECTION || o.metric > TETHER_METRIC_AUTOMATIC)
-    return out_of_range("metric", o.metric, "TETHER_METRIC_...");
-  if (o.long_move != TETHER_LONG_MOVE_REJECT && o.long_move != TETHER_LONG_MOVE_CAP)
-    return out_of_range("long_move", o.long_move, "TETHER_LONG_MOVE_...");
-  if ((o.hold != nullptr || o.group != nullptr) && unknowns < 1) {
-    flag = ill("tether_projection_new: unknowns = " + std::to_string(unknowns) +
-               ", must be the length of options->hold and group");
-    return false;
-  }
-  options.metric = static_cast<ip::Metric>(o.metric);
+  check(o.metric >= TETHER_METRIC_LOCAL_CORRECTION && o.metric <= TETHER_METRIC_AUTOMATIC,
+        "options->metric", o.metric, "TETHER_METRIC_...");
+  check(o.long_move == TETHER_LONG_MOVE_REJECT || o.long_move == TETHER_LONG_MOVE_CAP,
+        "options->long_move", o.long_move, "TETHER_LONG_MOVE_...");
+  check((o.hold == nullptr && o.group == nullptr) || unknowns > 0, "unknowns", unknowns,
+        "the length of options->hold and group");
+  Options options;
+  options.metric = static_cast<Metric>(o.metric);
   options.tolerance = o.tolerance;
   options.maximum_iterations = o.maximum_iterations;
   options.frequency = o.frequency;
   options.largest_move = o.largest_move;
-  options.long_move = static_cast<ip::LongMove>(o.long_move);
+  options.long_move = static_cast<LongMove>(o.long_move);
   options.id = o.id;
   options.derive_id_limit = o.derive_id_limit;
   options.suppress_algebraic = o.suppress_algebraic != 0;
@@ -132,11 +73,45 @@ bool read_options(const tether_options* given, long unknowns, ip::Options& optio
   options.print_fatal = o.print_fatal != 0;
   options.print_warnings = o.print_warnings != 0;
   if (o.progress != nullptr)
-    options.progress = [call = o.progress, data = o.progress_data](const ip::Progress& p) {
+    options.progress = [call = o.progress, data = o.progress_data](const Progress& p) {
       call(p.t, p.step, p.order, p.drift, p.move, p.steps, data);
     };
   options.progress_interval = o.progress_interval;
-  return true;
+  return options;
+}
+
+}  // namespace tether::ida_projection
+
+namespace {
+
+using ip::c::fail;
+using ip::c::guarded;
+using ip::c::ill;
+using ip::c::null;
+
+static_assert(int(ip::Status::doubtful) == TETHER_DOUBTFUL &&
+              int(ip::Status::out_of_memory) == TETHER_OUT_OF_MEMORY &&
+              int(ip::Metric::automatic) == TETHER_METRIC_AUTOMATIC &&
+              int(ip::LongMove::cap) == TETHER_LONG_MOVE_CAP);
+
+int add(tether_constraints& set, const ip::Constraints& rows) {
+  set.rows = set.rows + rows;  // a copy: the set stays whole if memory runs out
+  return 0;
+}
+
+ip::Callable<double, ip::ConstVector, ip::Vector> value_of(tether_value_fn value, void* user_data) {
+  return [value, user_data](double t, ip::ConstVector y, ip::Vector g) {
+    return value(t, y.data(), g.data(), user_data);
+  };
+}
+
+int check_rows(const char* function, const tether_constraints* set, int count, bool value) {
+  if (set == nullptr) return null(function, "constraints");
+  if (count < 1)
+    return ill(std::string(function) + ": count = " + std::to_string(count) +
+               ", must be at least 1");
+  if (!value) return null(function, "value");
+  return 0;
 }
 
 int finish(const ip::ConsistencyReport& found, tether_report* report) {
@@ -175,7 +150,7 @@ bool bad_size(const char* function, const tether_report* report) {
 
 extern "C" {
 
-const char* tether_last_error(void) { return last_error; }
+const char* tether_last_error(void) { return ip::c::last_error; }
 
 const char* tether_status_name(int status) {
   return ip::to_string(static_cast<ip::Status>(status));
@@ -346,9 +321,7 @@ tether_projection* tether_projection_new_for(void* ida_mem, const tether_constra
     } catch (const std::runtime_error& error) {
       return fail(TETHER_WRONG_SUNDIALS, error.what());
     }
-    ip::Options chosen;
-    int wrong = 0;
-    if (!read_options(options, unknowns, chosen, wrong)) return wrong;
+    ip::Options chosen = ip::options_of(options, unknowns);
     made = new tether_projection{{ida_mem, constraints->rows, std::move(chosen)}, {}};
     return 0;
   });

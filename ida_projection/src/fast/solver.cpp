@@ -7,7 +7,6 @@
 #include <tether/linalg/small_lu.hpp>
 
 #include "arguments.hpp"
-#include "host/sundials_build.hpp"
 
 namespace tether::ida_projection {
 

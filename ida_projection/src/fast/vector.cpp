@@ -4,7 +4,6 @@
 #include <tether/ida_projection/fast.hpp>
 
 #include "arguments.hpp"
-#include "host/sundials_build.hpp"
 #include "kernels.hpp"
 
 namespace tether::ida_projection {

@@ -1,6 +1,6 @@
 // Tether: the SUNDIALS that runs must be the one that the plugin was compiled with.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "host/sundials_build.hpp"
+#include <tether/ida_projection/sundials_build.hpp>
 
 #include <stdexcept>
 #include <string>

@@ -1,0 +1,135 @@
+// Tether: reverse communication for programs in C and Fortran. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <string>
+#include <tether/ida_projection/c_options.hpp>
+#include <tether/reverse_ida.h>
+#include <tether/reverse_ida.hpp>
+#include <utility>
+
+#include "c/guarded.hpp"
+
+namespace tr = tether::reverse_ida;
+using tether::ida_projection::c::fail;
+using tether::ida_projection::c::guarded;
+using tether::ida_projection::c::ill;
+using tether::ida_projection::c::null;
+
+struct tether_reverse {
+  tr::ReverseIda ida;
+  std::string message;
+};
+
+static_assert(int(tr::Request::reached) == TETHER_REACHED &&
+              int(tr::Request::residual) == TETHER_ASK_RESIDUAL &&
+              int(tr::Request::constraint_jacobian) == TETHER_ASK_CONSTRAINT_JACOBIAN &&
+              int(tr::Linear::own) == TETHER_LINEAR_OWN);
+
+namespace {
+
+template <class Call>
+int request(tether_reverse* reverse, const char* function, Call&& call) {
+  return guarded([&] {
+    if (reverse == nullptr) return null(function, "reverse");
+    try {
+      return static_cast<int>(call(reverse->ida));
+    } catch (const std::logic_error& error) {  // a call out of turn
+      return fail(TETHER_ILL_INPUT, error.what());
+    }
+  });
+}
+
+}  // namespace
+
+extern "C" {
+
+tether_reverse* tether_reverse_new_for(int n, double t0, const double* y, const double* yp,
+                                       const double* id, double rtol, double atol, int linear,
+                                       int constraints, const tether_options* options,
+                                       const tether_sundials_build* host, int* flag) {
+  tether_reverse* made = nullptr;
+  const int result = guarded([&] {
+    const char* const function = "tether_reverse_new";
+    if (n < 1) return ill(std::string(function) + ": n = " + std::to_string(n) + ", must be >= 1");
+    if (y == nullptr) return null(function, "y");
+    if (yp == nullptr) return null(function, "yp");
+    if (host == nullptr) return null(function, "host");
+    if (linear < TETHER_LINEAR_DIFFERENCES || linear > TETHER_LINEAR_OWN)
+      return ill(std::string(function) + ": linear = " + std::to_string(linear) +
+                 ", must be TETHER_LINEAR_...");
+    try {
+      tether::ida_projection::check_running_sundials(*host);
+    } catch (const std::runtime_error& error) {
+      return fail(TETHER_WRONG_SUNDIALS, error.what());
+    }
+    tr::Equations equations;
+    equations.t0 = t0;
+    equations.y.assign(y, y + n);
+    equations.yp.assign(yp, yp + n);
+    if (id != nullptr) equations.id.assign(id, id + n);
+    equations.rtol = rtol;
+    equations.atol = {atol};
+    equations.linear = static_cast<tr::Linear>(linear);
+    equations.constraints = constraints;
+    equations.options = tether::ida_projection::options_of(options, n);
+    made = new tether_reverse{tr::ReverseIda(std::move(equations)), {}};
+    return 0;
+  });
+  if (flag != nullptr) *flag = result;
+  return made;
+}
+
+void tether_reverse_free(tether_reverse* reverse) { delete reverse; }
+
+int tether_reverse_solve(tether_reverse* reverse, double tout, int one_step) {
+  return request(reverse, "tether_reverse_solve",
+                 [&](tr::ReverseIda& ida) { return ida.solve(tout, one_step != 0); });
+}
+
+int tether_reverse_make_consistent(tether_reverse* reverse) {
+  return request(reverse, "tether_reverse_make_consistent",
+                 [](tr::ReverseIda& ida) { return ida.make_consistent(); });
+}
+
+int tether_reverse_go_on(tether_reverse* reverse, int answer) {
+  return request(reverse, "tether_reverse_go_on",
+                 [&](tr::ReverseIda& ida) { return ida.go_on(answer); });
+}
+
+double tether_reverse_t(const tether_reverse* reverse) { return reverse ? reverse->ida.t() : 0.0; }
+
+double tether_reverse_cj(const tether_reverse* reverse) {
+  return reverse ? reverse->ida.cj() : 0.0;
+}
+
+const double* tether_reverse_y(const tether_reverse* reverse) {
+  return reverse ? reverse->ida.y() : nullptr;
+}
+
+const double* tether_reverse_yp(const tether_reverse* reverse) {
+  return reverse ? reverse->ida.yp() : nullptr;
+}
+
+const double* tether_reverse_rhs(const tether_reverse* reverse) {
+  return reverse ? reverse->ida.rhs() : nullptr;
+}
+
+double* tether_reverse_result(const tether_reverse* reverse) {
+  return reverse ? reverse->ida.result() : nullptr;
+}
+
+const char* tether_reverse_message(tether_reverse* reverse) {
+  const int flag = guarded([&] {
+    if (reverse == nullptr) return null("tether_reverse_message", "reverse");
+    reverse->message = reverse->ida.message();
+    return 0;
+  });
+  return flag == 0 ? reverse->message.c_str() : "";
+}
+
+const char* tether_reverse_last_error(void) { return tether::ida_projection::c::last_error; }
+
+void* tether_reverse_ida_mem(const tether_reverse* reverse) {
+  return reverse ? reverse->ida.ida_mem() : nullptr;
+}
+
+}  // extern "C"

@@ -1,0 +1,417 @@
+// Tether: IDA by reverse communication. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <functional>
+#include <ida/ida.h>
+#include <nvector/nvector_serial.h>
+#include <optional>
+#include <stdexcept>
+#include <sundials/sundials_config.h>
+#include <sundials/sundials_context.h>
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_dense.h>
+#include <tether/reverse_ida.hpp>
+
+#include "reverse/fiber.hpp"
+
+namespace tether::reverse_ida {
+
+namespace {
+
+namespace tp = ida_projection;
+
+constexpr std::size_t kStack = std::size_t{1} << 20;
+
+template <class T, void (*Free)(T)>
+struct Release {
+  void operator()(T object) const { Free(object); }
+};
+template <class Pointer, void (*Free)(Pointer)>
+using Owned = std::unique_ptr<std::remove_pointer_t<Pointer>, Release<Pointer, Free>>;
+
+void free_context(SUNContext context) { SUNContext_Free(&context); }
+void free_solver(SUNLinearSolver solver) { SUNLinSolFree(solver); }
+void free_ida(void* mem) { IDAFree(&mem); }
+
+struct FreeIda {
+  void operator()(void* mem) const { free_ida(mem); }
+};
+
+SUNContext new_context() {
+  SUNContext context = nullptr;
+#ifdef SUN_COMM_NULL  // SUNDIALS 7
+  const int flag = SUNContext_Create(SUN_COMM_NULL, &context);
+#else
+  const int flag = SUNContext_Create(nullptr, &context);
+#endif
+  if (flag != 0 || context == nullptr) throw std::bad_alloc();
+  return context;
+}
+
+template <class Pointer>
+Pointer made(Pointer pointer) {
+  if (pointer == nullptr) throw std::bad_alloc();
+  return pointer;
+}
+
+[[noreturn]] void refuse(const std::string& argument, const std::string& value,
+                         const std::string& allowed) {
+  throw std::invalid_argument("ReverseIda: " + argument + " = " + value + ", must be " + allowed);
+}
+
+void check(const Equations& e) {
+  const std::size_t n = e.y.size();
+  const auto length = [&](const char* name, std::size_t size, const char* allowed) {
+    refuse(std::string(name) + ".size()", std::to_string(size), allowed);
+  };
+  if (n == 0) length("y", n, "at least 1");
+  if (e.yp.size() != n) length("yp", e.yp.size(), "that of y");
+  if (e.atol.size() != 1 && e.atol.size() != n) length("atol", e.atol.size(), "1 or that of y");
+  if (!e.id.empty() && e.id.size() != n) length("id", e.id.size(), "0 or that of y");
+  const auto finite = [&](const char* name, const std::vector<double>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (!std::isfinite(values[i]))
+        refuse(std::string(name) + "[" + std::to_string(i) + "]", std::to_string(values[i]),
+               "finite");
+  };
+  finite("y", e.y), finite("yp", e.yp), finite("atol", e.atol), finite("id", e.id);
+  if (!std::isfinite(e.t0)) refuse("t0", std::to_string(e.t0), "finite");
+  if (!(e.rtol >= 0) || !std::isfinite(e.rtol)) refuse("rtol", std::to_string(e.rtol), ">= 0");
+  for (const double a : e.atol)
+    if (a < 0) refuse("atol", std::to_string(a), ">= 0");
+  if (e.constraints < 0) refuse("constraints", std::to_string(e.constraints), ">= 0");
+  if (!e.names.empty() && e.names.size() != static_cast<std::size_t>(e.constraints))
+    length("names", e.names.size(), "0 or the number of constraints");
+}
+
+}  // namespace
+
+const char* to_string(Request request) {
+  switch (request) {
+    case Request::reached:
+      return "reached";
+    case Request::failed:
+      return "failed";
+    case Request::residual:
+      return "residual";
+    case Request::jacobian:
+      return "jacobian";
+    case Request::setup:
+      return "setup";
+    case Request::solve:
+      return "solve";
+    case Request::constraints:
+      return "constraints";
+    case Request::constraint_jacobian:
+      return "constraint_jacobian";
+  }
+  return "unknown";
+}
+
+/// IDA and its data, and the fiber in which it runs. A call sets `command_`, enters the fiber, and
+/// returns when a function that IDA has called leaves it with a question, or the command is done.
+class ReverseIda::Implementation {
+ public:
+  explicit Implementation(Equations equations)
+      : equations_(std::move(equations)),
+        context_(new_context()),
+        y_(vector(equations_.y)),
+        yp_(vector(equations_.yp)),
+        fiber_(kStack, [this] { run_commands(); }) {
+    mem_.reset(made(IDACreate(context_.get())));
+    expect(IDAInit(mem_.get(), residual, equations_.t0, y_.get(), yp_.get()), "IDAInit");
+    expect(IDASetUserData(mem_.get(), this), "IDASetUserData");
+    set_tolerances();
+    set_linear_solver();
+    if (!equations_.id.empty()) {
+      id_.reset(vector(equations_.id));
+      expect(IDASetId(mem_.get(), id_.get()), "IDASetId");
+    }
+    if (equations_.constraints > 0) {
+      if (id_) equations_.options.id = id_.get();
+      equations_.options.print_fatal = false;  // message() has it
+      projection_.emplace(mem_.get(), constraints(), equations_.options);
+    }
+    at_rest(Request::reached);
+    t_ = equations_.t0;
+  }
+
+  /// IDA is led out of the function in which it waits before anything is freed.
+  ~Implementation() {
+    abandoned_ = true;
+    // IDA's errors from here on are this end.
+#if SUNDIALS_VERSION_MAJOR < 7
+    IDASetErrFile(mem_.get(), nullptr);
+#else
+    SUNContext_ClearErrHandlers(context_.get());
+#endif
+    if (started_)
+      while (!fiber_.ended()) fiber_.enter();
+  }
+
+  Implementation(const Implementation&) = delete;
+  Implementation& operator=(const Implementation&) = delete;
+
+  Request solve(double tout, bool one_step) {
+    const int task = one_step ? IDA_ONE_STEP : IDA_NORMAL;
+    return start([this, tout, task] {
+      double reached = t_;
+      flag_ = projection_ ? projection_->solve(tout, &reached, y_.get(), yp_.get(), task)
+                          : IDASolve(mem_.get(), tout, &reached, y_.get(), yp_.get(), task);
+      t_ = reached;
+      if (flag_ < 0) fail();
+    });
+  }
+
+  Request make_consistent() {
+    if (!projection_) throw std::logic_error("ReverseIda: make_consistent() needs constraints");
+    return start([this] {
+      const tp::ConsistencyReport report =
+          projection_->make_consistent(equations_.t0, y_.get(), yp_.get());
+      t_ = equations_.t0;
+      flag_ = report ? 0 : -1;
+      if (!report) message_ = report.message.empty() ? "no consistent values" : report.message;
+    });
+  }
+
+  Request go_on(int answer) {
+    if (request_ == Request::reached || request_ == Request::failed)
+      throw std::logic_error("ReverseIda: go_on() without a request");
+    answer_ = answer;
+    return resume();
+  }
+
+  const Equations& equations() const { return equations_; }
+  Request request() const { return request_; }
+  double t() const { return t_; }
+  double cj() const { return cj_; }
+  const double* y() const { return at_y_; }
+  const double* yp() const { return at_yp_; }
+  const double* rhs() const { return rhs_; }
+  double* result() const { return result_; }
+  std::size_t result_size() const { return result_size_; }
+  int flag() const { return flag_; }
+  const std::string& message() const { return message_; }
+  void* mem() const { return mem_.get(); }
+  const tp::Projection* projection() const { return projection_ ? &*projection_ : nullptr; }
+
+ private:
+  N_Vector vector(const std::vector<double>& values) const {
+    const N_Vector made_here =
+        made(N_VNew_Serial(static_cast<sunindextype>(values.size()), context_.get()));
+    std::memcpy(N_VGetArrayPointer(made_here), values.data(), values.size() * sizeof(double));
+    return made_here;
+  }
+
+  static void expect(int flag, const char* function) {
+    if (flag == IDA_MEM_FAIL) throw std::bad_alloc();
+    if (flag < 0)
+      throw std::runtime_error(std::string("ReverseIda: ") + function + " returned " +
+                               std::to_string(flag));
+  }
+
+  void set_tolerances() {
+    if (equations_.atol.size() == 1) {
+      expect(IDASStolerances(mem_.get(), equations_.rtol, equations_.atol[0]), "IDASStolerances");
+      return;
+    }
+    const Owned<N_Vector, N_VDestroy> atol(vector(equations_.atol));
+    expect(IDASVtolerances(mem_.get(), equations_.rtol, atol.get()), "IDASVtolerances");
+  }
+
+  void set_linear_solver() {
+    const auto n = static_cast<sunindextype>(equations_.y.size());
+    if (equations_.linear == Linear::own) {
+      matrix_.reset(made(SUNMatNewEmpty(context_.get())));
+      matrix_->ops->getid = [](SUNMatrix) { return SUNMATRIX_CUSTOM; };
+      matrix_->ops->zero = [](SUNMatrix) { return 0; };
+      matrix_->ops->destroy = SUNMatFreeEmpty;
+      solver_.reset(made(SUNLinSolNewEmpty(context_.get())));
+      solver_->content = this;
+      solver_->ops->gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
+      solver_->ops->setup = [](SUNLinearSolver, SUNMatrix) { return 0; };  // done by matrix()
+      solver_->ops->solve = linear_solve;
+      solver_->ops->free = [](SUNLinearSolver solver) {
+        solver->content = nullptr;
+        SUNLinSolFreeEmpty(solver);
+        return 0;
+      };
+    } else {
+      matrix_.reset(made(SUNDenseMatrix(n, n, context_.get())));
+      solver_.reset(made(SUNLinSol_Dense(y_.get(), matrix_.get(), context_.get())));
+    }
+    expect(IDASetLinearSolver(mem_.get(), solver_.get(), matrix_.get()), "IDASetLinearSolver");
+    if (equations_.linear != Linear::differences)
+      expect(IDASetJacFn(mem_.get(), matrix), "IDASetJacFn");
+  }
+
+  tp::Constraints constraints() {
+    tp::Constraints rows;
+    rows.count = equations_.constraints;
+    rows.names = equations_.names;
+    rows.value = [this](double t, tp::ConstVector y, tp::Vector g) {
+      set_point(t, y.data(), nullptr);
+      return ask(Request::constraints, g.data(), static_cast<std::size_t>(g.size()));
+    };
+    if (equations_.constraint_jacobian)
+      rows.jacobian = tp::DenseJacobian([this](double t, tp::ConstVector y, tp::Matrix C) {
+        set_point(t, y.data(), nullptr);
+        return ask(Request::constraint_jacobian, C.data(), static_cast<std::size_t>(C.size()));
+      });
+    return rows;
+  }
+
+  static int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
+    auto& self = *static_cast<Implementation*>(data);
+    self.set_point(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp));
+    return self.ask(Request::residual, N_VGetArrayPointer(r), self.equations_.y.size());
+  }
+
+  static int matrix(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J,
+                    void* data, N_Vector, N_Vector, N_Vector) {
+    auto& self = *static_cast<Implementation*>(data);
+    self.set_point(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp));
+    self.cj_ = cj;
+    if (self.equations_.linear == Linear::own) return self.ask(Request::setup, nullptr, 0);
+    const std::size_t n = self.equations_.y.size();
+    return self.ask(Request::jacobian, SUNDenseMatrix_Data(J), n * n);
+  }
+
+  static int linear_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
+    auto& self = *static_cast<Implementation*>(solver->content);
+    self.rhs_ = N_VGetArrayPointer(b);
+    self.at_yp_ = nullptr;
+    return self.ask(Request::solve, N_VGetArrayPointer(x), self.equations_.y.size());
+  }
+
+  void set_point(double t, const double* y, const double* yp) {
+    asked_t_ = t;
+    at_y_ = y;
+    at_yp_ = yp;
+    rhs_ = nullptr;
+  }
+
+  /// In the fiber: the caller's answer to a request.
+  int ask(Request request, double* result, std::size_t size) {
+    if (abandoned_) return -1;
+    request_ = request;
+    result_ = result;
+    result_size_ = size;
+    const double reached = t_;
+    t_ = asked_t_;
+    fiber_.leave();
+    t_ = reached;
+    return abandoned_ ? -1 : answer_;
+  }
+
+  template <class Command>
+  Request start(Command command) {
+    if (request_ != Request::reached && request_ != Request::failed)
+      throw std::logic_error(std::string("ReverseIda: the request \"") + to_string(request_) +
+                             "\" is open: answer it by go_on() first");
+    message_.clear();
+    flag_ = 0;
+    thrown_ = nullptr;
+    command_ = std::move(command);
+    return resume();
+  }
+
+  Request resume() {
+    waiting_ = false;
+    started_ = true;
+    fiber_.enter();
+    if (!waiting_) return request_;  // a request
+    command_ = nullptr;
+    at_rest(flag_ < 0 || thrown_ ? Request::failed : Request::reached);
+    if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+    return request_;
+  }
+
+  void at_rest(Request request) {
+    request_ = request;
+    at_y_ = N_VGetArrayPointer(y_.get());
+    at_yp_ = N_VGetArrayPointer(yp_.get());
+    rhs_ = nullptr;
+    result_ = nullptr;
+    result_size_ = 0;
+  }
+
+  /// The body of the fiber; nothing is thrown out of it.
+  void run_commands() noexcept {
+    while (!abandoned_) {
+      try {
+        command_();
+      } catch (...) {
+        thrown_ = std::current_exception();
+      }
+      waiting_ = true;
+      if (!abandoned_) fiber_.leave();
+    }
+  }
+
+  void fail() {
+    if (projection_) message_ = projection_->message();
+    if (!message_.empty()) return;
+    char* const name = IDAGetReturnFlagName(flag_);
+    message_ = std::string("IDASolve: ") + (name != nullptr ? name : "unknown flag");
+    std::free(name);
+  }
+
+  Equations equations_;
+  Owned<SUNContext, free_context> context_;
+  Owned<N_Vector, N_VDestroy> y_, yp_, id_;
+  Owned<SUNMatrix, SUNMatDestroy> matrix_;
+  Owned<SUNLinearSolver, free_solver> solver_;
+  std::unique_ptr<void, FreeIda> mem_;
+  std::optional<tp::Projection> projection_;
+
+  // The open request.
+  Request request_ = Request::reached;
+  double t_ = 0.0, asked_t_ = 0.0, cj_ = 0.0;
+  const double *at_y_ = nullptr, *at_yp_ = nullptr, *rhs_ = nullptr;
+  double* result_ = nullptr;
+  std::size_t result_size_ = 0;
+  int answer_ = 0;
+
+  // The command that runs, and its outcome.
+  std::function<void()> command_;
+  int flag_ = 0;
+  std::string message_;
+  std::exception_ptr thrown_;
+  bool waiting_ = false, abandoned_ = false, started_ = false;
+  Fiber fiber_;  // destroyed first
+};
+
+ReverseIda::ReverseIda(Equations equations, const ida_projection::SundialsBuild& host) {
+  ida_projection::check_running_sundials(host);
+  check(equations);
+  implementation_ = std::make_unique<Implementation>(std::move(equations));
+}
+
+ReverseIda::~ReverseIda() = default;
+ReverseIda::ReverseIda(ReverseIda&&) noexcept = default;
+ReverseIda& ReverseIda::operator=(ReverseIda&&) noexcept = default;
+
+Request ReverseIda::solve(double tout, bool one_step) {
+  return implementation_->solve(tout, one_step);
+}
+Request ReverseIda::make_consistent() { return implementation_->make_consistent(); }
+Request ReverseIda::go_on(int answer) { return implementation_->go_on(answer); }
+Request ReverseIda::request() const { return implementation_->request(); }
+double ReverseIda::t() const { return implementation_->t(); }
+double ReverseIda::cj() const { return implementation_->cj(); }
+const double* ReverseIda::y() const { return implementation_->y(); }
+const double* ReverseIda::yp() const { return implementation_->yp(); }
+const double* ReverseIda::rhs() const { return implementation_->rhs(); }
+double* ReverseIda::result() const { return implementation_->result(); }
+std::size_t ReverseIda::result_size() const { return implementation_->result_size(); }
+int ReverseIda::flag() const { return implementation_->flag(); }
+std::string ReverseIda::message() const { return implementation_->message(); }
+void* ReverseIda::ida_mem() const { return implementation_->mem(); }
+const ida_projection::Projection* ReverseIda::projection() const {
+  return implementation_->projection();
+}
+
+}  // namespace tether::reverse_ida
