@@ -58,6 +58,7 @@ class InteriorPoint {
   bool factor_contacts(const System& system);
   bool factor_bodies(const System& system);
   bool factor_stuck(const Problem& problem);
+  void take_bodies_if_cheaper(Search& search);
   void find_flat(const System& system);
   void diagonal(const System& system, int i, bool whole, PackedBlock& scaled) const;
   void solve(PackedVector* x) { by_bodies_ ? bodies_.solve(x) : lu_.solve(x); }

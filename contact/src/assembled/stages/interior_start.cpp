@@ -62,7 +62,22 @@ void InteriorPoint::order(Search& search) {
   lu_.order(pattern(search.system.problem()));
   lu_.analyse(pattern(search.system.problem()), nullptr);
   ordered_ = true;
+  take_bodies_if_cheaper(search);
   find_flat(search.system);
+}
+
+// With the fill of both known: four contacts a body cost a quarter in equations of bodies, 2.8 as
+// much as in those of contacts.
+void InteriorPoint::take_bodies_if_cheaper(Search& search) {
+  constexpr int kSome = 3;          // contacts for each body
+  constexpr double kClearly = 0.5;  // the digits cost refinements
+  const Problem& p = search.system.problem();
+  const BodyForm* form = p.body_form();
+  if (form == nullptr || n_ < kSome * form->bodies) return;
+  const double contacts = cost(search);
+  search.counts.work += 500.0 * n_;
+  bodies_.order(p);
+  by_bodies_ = bodies_.cost() + 3 * search.sweep_cost < kClearly * contacts;
 }
 
 void InteriorPoint::find_flat(const System& system) {
