@@ -1,4 +1,5 @@
 // Tether: constraints as gradients in N_Vectors of any kind. SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Dense>
 #include <cmath>
 #ifdef TETHER_TEST_OPENMP
 #include <nvector/nvector_openmp.h>
@@ -7,6 +8,7 @@
 #include <problems/pendulum.hpp>
 #include <problems/rigid_body.hpp>
 #include <sunlinsol/sunlinsol_spgmr.h>
+#include <sunmatrix/sunmatrix_dense.h>
 
 #include "host.hpp"
 #include "linalg/thrown.hpp"
@@ -218,6 +220,93 @@ TEST_CASE("gradients on custom vectors with algebraic variables") {
   const End custom = run(Kind::custom, problem, 1e-7, gradients);
   close(custom, serial, 1e-5);
   CHECK(custom.statistics.refreshes == 0);
+}
+
+namespace {
+
+/// LU of a dense matrix for vectors that hide their array; `solver->content` is the factors.
+SUNLinearSolver dense_solver_of_custom_vectors(SUNContext context) {
+  using Factors = Eigen::PartialPivLU<Eigen::MatrixXd>;
+  SUNLinearSolver solver = SUNLinSolNewEmpty(context);
+  solver->content = new Factors();
+  solver->ops->gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
+  solver->ops->setup = [](SUNLinearSolver s, SUNMatrix A) {
+    const Eigen::Index n = SUNDenseMatrix_Rows(A);
+    static_cast<Factors*>(s->content)
+        ->compute(Eigen::Map<Eigen::MatrixXd>(SUNDenseMatrix_Data(A), n, n));
+    return 0;
+  };
+  solver->ops->solve = [](SUNLinearSolver s, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
+    const auto& factors = *static_cast<Factors*>(s->content);
+    Eigen::Map<Eigen::VectorXd>(entries(x), factors.rows()) =
+        factors.solve(Eigen::Map<Eigen::VectorXd>(entries(b), factors.rows())).eval();
+    return 0;
+  };
+  solver->ops->free = [](SUNLinearSolver s) {
+    delete static_cast<Factors*>(s->content);
+    SUNLinSolFreeEmpty(s);
+    return decltype(SUNLinSolFree(s)){};
+  };
+  return solver;
+}
+
+int jacobian_of_custom_vectors(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vector,
+                               SUNMatrix J, void* data, N_Vector, N_Vector, N_Vector) {
+  static_cast<const Problem*>(data)->jacobian(t, cj, entries(y), entries(yp),
+                                              SUNDenseMatrix_Data(J));
+  return 0;
+}
+
+End run_with_direct_solver(Kind kind, Problem problem, double tolerance,
+                           const tp::Constraints& set) {
+  Context context;
+  N_Vector y = make_vector(kind, problem.y0, context), yp = make_vector(kind, problem.yp0, context);
+  N_Vector id = make_vector(kind, problem.id, context);
+  void* ida = IDACreate(context);
+  IDAInit(ida, residual, 0.0, y, yp);
+  IDASetUserData(ida, &problem);
+  IDASStolerances(ida, tolerance, tolerance);
+  SUNMatrix matrix = SUNDenseMatrix(problem.size, problem.size, context);
+  SUNLinearSolver solver = dense_solver_of_custom_vectors(context);
+  IDASetLinearSolver(ida, solver, matrix);
+  IDASetJacFn(ida, jacobian_of_custom_vectors);
+  End end{};
+  {
+    tp::Options options;
+    options.id = id;
+    tp::Projection projection(ida, set, options);
+    sunrealtype t = 0.0;
+    while (t < problem.t_end && end.flag >= 0)
+      end.flag = IDASolve(ida, problem.t_end, &t, y, yp, IDA_ONE_STEP);
+    IDAGetNumSteps(ida, &end.steps);
+    end.statistics = projection.statistics();
+    end.y.assign(entries(y), entries(y) + problem.size);
+    IDAFree(&ida);
+  }
+  SUNLinSolFree(solver);
+  SUNMatDestroy(matrix);
+  for (N_Vector v : {y, yp, id}) N_VDestroy(v);
+  return end;
+}
+
+}  // namespace
+
+TEST_CASE("gradients on custom vectors, direct solver: polished as on serial ones") {
+  for (const char* form : {"index 1", "index 0"}) {
+    INFO(form);
+    const Problem problem = pendulum(1.0, 1.0, 10.0, form);
+    REQUIRE(problem.jacobian);
+    const tp::Constraints rows =
+        as_gradients(problem.select({"position", "velocity", "energy"}), problem.size);
+    const End serial = run_with_direct_solver(Kind::serial, problem, 1e-6, rows);
+    const End custom = run_with_direct_solver(Kind::custom, problem, 1e-6, rows);
+    REQUIRE(serial.flag >= 0);
+    CHECK(custom.statistics.extra_iterations > custom.steps / 4);
+    CHECK(custom.statistics.extra_iterations == serial.statistics.extra_iterations);
+    CHECK(custom.steps == serial.steps);
+    for (std::size_t i = 0; i < serial.y.size(); ++i)
+      CHECK(std::abs(custom.y[i] - serial.y[i]) <= 1e-8);
+  }
 }
 
 TEST_CASE("dense constraints on OpenMP vectors: the same bits as on serial ones") {

@@ -106,3 +106,21 @@ TEST_CASE(
   REQUIRE(host.finish() >= 0);
   CHECK(host.steps() == steps);
 }
+
+TEST_CASE("where the oscillation has died out the limit ends, and the order rises again") {
+  const Problem p = driven_oscillators(20.0, 3e-3);
+  Host host(p, 1e-3);
+  host.attach(on_circle());
+  long limited_at = 0, low = 0, high = 0;
+  while (host.t < p.t_end) {
+    REQUIRE(host.step() >= 0);
+    int order = 0;
+    IDAGetLastOrder(host.ida, &order);
+    if (limited_at == 0 && host.projection().statistics().order_limited > 0)
+      limited_at = host.steps();
+    if (limited_at > 0) ++(order >= 3 ? high : low);
+  }
+  REQUIRE(limited_at > 0);
+  CHECK(low >= 40);
+  CHECK(high >= 20);
+}

@@ -199,6 +199,21 @@ TEST_CASE("IDA stuck before the first move: algebraic variables leave its error 
   }
 }
 
+TEST_CASE("IDA stuck in its first step: the third refusal is enough") {
+  // The index is 1, and the start satisfies the constraints: nothing else begins.
+  for (const double tolerance : {1e-8, 1e-9}) {
+    INFO("tolerance " << tolerance);
+    const Problem axis = car_axis("index 1 w");
+    Host host(axis, tolerance);
+    host.attach(axis.recommended_constraints());
+    REQUIRE(host.step() >= 0);
+    long refused = 0;
+    IDAGetNumErrTestFails(host.ida, &refused);
+    CHECK(refused == 3);
+    CHECK(host.projection().statistics().projections == 1);
+  }
+}
+
 TEST_CASE("forms of index 2 close to rounding: multipliers in Newton's test fail, and say so") {
   const Problem problem = pendulum(1.0, 9.81, 10.0, "GGL");
   const tp::Constraints rows = problem.recommended_constraints();

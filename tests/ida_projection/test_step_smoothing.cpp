@@ -161,6 +161,111 @@ TEST_CASE("smooth steps begin where hidden algebraic combinations make IDA refus
   }
 }
 
+TEST_CASE("smooth steps begin after ten refused ones in a row, where the index is not looked at") {
+  // The amplifier with unknowns that rest: above 200 of them the index is not looked at.
+  constexpr int kSize = 201;
+  const Problem small = transistor_amplifier();
+  Problem problem = ode(std::vector<double>(kSize, 0.0), 0.04,
+                        [](double, const double*, double* f) { std::fill(f, f + kSize, 0.0); });
+  std::copy(small.y0.begin(), small.y0.end(), problem.y0.begin());
+  std::copy(small.yp0.begin(), small.yp0.end(), problem.yp0.begin());
+  problem.residual = [small](double t, const double* y, const double* yp, double* r) {
+    small.residual(t, y, yp, r);
+    std::copy(yp + small.size, yp + kSize, r + small.size);
+  };
+  const tp::Constraints rows = small.recommended_constraints();
+  tp::Constraints set;
+  set.count = rows.total_count();
+  set.value = [rows, n = small.size](double t, tp::ConstVector y, tp::Vector g) {
+    g = value(rows, t, y.data(), n);
+  };
+  set.jacobian =
+      tp::DenseJacobian([rows, n = small.size](double t, tp::ConstVector y, tp::Matrix C) {
+        C.setZero();
+        C.leftCols(n) = jacobian(rows, t, y.data(), n);
+      });
+  Host host(problem, 1e-9);
+  host.attach(set);
+  long refused = 0, in_row = 0;
+  while (host.t < problem.t_end && host.projection().statistics().smoothing_begun == 0) {
+    REQUIRE(host.step() >= 0);
+    long failures = 0;
+    IDAGetNumErrTestFails(host.ida, &failures);
+    in_row = failures > refused ? in_row + 1 : 0;
+    refused = failures;
+    REQUIRE(in_row <= 11);
+  }
+  CHECK(host.projection().statistics().smoothing_begun == 1);
+}
+
+namespace {
+
+/// GGL pendulum beside z' = zs' - 5 (z - zs), zs = (1 - cos 5 t)^2, z >= 0: an inequality of IDA,
+/// which refuses attempts that the plugin has finished. `look` is called in each residual.
+Problem beside_an_inequality(std::function<void()> look) {
+  Problem p = pendulum(1.0, 1.0, 20.0, "GGL");
+  const int n = p.size++;
+  p.jacobian = nullptr;
+  p.reference.clear();
+  p.atol_scale.clear();
+  for (auto* values : {&p.y0, &p.yp0, &p.id}) values->push_back(values == &p.id ? 1.0 : 0.0);
+  p.residual = [residual = p.residual, n, look = std::move(look)](double t, const double* y,
+                                                                  const double* yp, double* r) {
+    look();
+    residual(t, y, yp, r);
+    const double c = 1.0 - std::cos(5.0 * t);
+    r[n] = yp[n] - 10.0 * c * std::sin(5.0 * t) + 5.0 * (y[n] - c * c);
+  };
+  return p;
+}
+
+}  // namespace
+
+TEST_CASE("another attempt at a step has IDA's own error weights, whatever the last one did") {
+  constexpr double kTolerance = 1e-6;
+  const Host* watched = nullptr;
+  std::vector<double> last;
+  double largest = 0.0;
+  const auto look = [&] {
+    if (watched == nullptr) return;
+    N_Vector weights = N_VClone(watched->y);
+    IDAGetErrWeights(watched->ida, weights);
+    for (std::size_t i = 0; i + 1 < last.size(); ++i) {
+      const double own = 1.0 / (kTolerance * (std::abs(last[i]) + 1.0));
+      largest = std::max(largest, std::abs(N_VGetArrayPointer(weights)[i] / own - 1.0));
+    }
+    N_VDestroy(weights);
+  };
+  const Problem problem = beside_an_inequality(look);
+  const int n = problem.size - 1;
+  const tp::Constraints rows = pendulum(1.0, 1.0, 20.0, "GGL").select({"position", "velocity"});
+  tp::Constraints set;
+  set.count = rows.total_count();
+  set.value = [rows, n](double t, tp::ConstVector y, tp::Vector g) {
+    g = value(rows, t, y.data(), n);
+  };
+  set.jacobian = tp::DenseJacobian([rows, n](double t, tp::ConstVector y, tp::Matrix C) {
+    C.setZero();
+    C.leftCols(n) = jacobian(rows, t, y.data(), n);
+  });
+  Host host(problem, kTolerance);
+  host.attach(set);
+  std::vector<double> signs(static_cast<std::size_t>(problem.size), 0.0);
+  signs.back() = 1.0;
+  REQUIRE(IDASetConstraints(host.ida, host.vector(signs)) == 0);
+  last = host.state();
+  watched = &host;
+  while (host.t < problem.t_end) {
+    REQUIRE(host.step() >= 0);
+    last = host.state();
+  }
+  long failures = 0;
+  IDAGetNumErrTestFails(host.ida, &failures);
+  CHECK(host.projection().statistics().smoothing_begun == 1);
+  CHECK(host.projection().statistics().solver_calls > host.steps() + failures + 5);
+  CHECK(largest <= 1e-9);
+}
+
 TEST_CASE("smooth steps begin in forms of index 2 and make them as accurate as those of index 1") {
   tp::Options ida_alone;
   ida_alone.smooth_where_needed = false;

@@ -11,8 +11,9 @@ namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kTiny = std::numeric_limits<double>::min();
-constexpr double kDependent = 1e-12;  // of a unit row, for each row
-constexpr double kInvolved = 1e-3;    // share of a kept row in a dropped one
+constexpr double kDependent = 1e-12;      // of a unit row, for each row
+constexpr double kInvolved = 1e-3;        // share of a kept row in a dropped one
+constexpr double kReorthogonalise = 0.1;  // of a unit row: where less is left, digits are lost
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -60,8 +61,8 @@ void GradientRows::orthogonalise() {
     std::swap(pivot_[at(best)], pivot_[at(k)]);
     const int p = pivot_[at(k)];
     if (left_[at(p)] == 0.0) break;
-    // Second orthogonalisation of the pivot against the rows before it.
-    for (int i = 0; i < k; ++i) {
+    // Where the rows before it have taken most of the pivot: once more against them.
+    for (int i = 0; left_[at(p)] < kReorthogonalise && i < k; ++i) {
       N_Vector q = gradients_[at(pivot_[at(i)])];
       const double r = N_VDotProd(q, gradients_[at(p)]);
       L(p, i) += r;

@@ -9,8 +9,8 @@ namespace tether::ida_projection {
 
 /// S C D = L Q^T with D the metric, S rows of unit length, L lower triangular in pivot order. Only
 /// N_Vector operations: the same code serves serial, OpenMP, MPI, device and custom vectors. The
-/// rows are orthogonalised by modified Gram-Schmidt with pivoting, each twice ("twice is enough");
-/// their Gram matrix is never formed.
+/// rows are orthogonalised by modified Gram-Schmidt with pivoting, twice those that lose nine
+/// tenths of their length ("twice is enough"); their Gram matrix is never formed.
 class GradientRows {
  public:
   GradientRows(int rows, N_Vector like);
