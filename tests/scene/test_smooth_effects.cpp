@@ -226,6 +226,56 @@ TEST_CASE("the order of bodies does not matter", "[smooth]") {
   CHECK((a->bodies()[2].position - b->bodies()[0].position).norm() < 1e-7);
 }
 
+TEST_CASE("a slider between two free bodies keeps momentum, angular momentum and energy",
+          "[smooth]") {
+  for (const Formulation form : kForms) {
+    Scene s = scene(1e-8);
+    s.smooth->formulation = form;
+    s.bodies = {rod("rail", {-1, 0, 0}, {1, 0, 0}, 2), rod("sled", {0.3, -0.2, 0}, {0.3, 0.4, 0})};
+    Joint slider = joint(JointKind::slider, 1, 0, {0.3, 0, 0});
+    slider.axis = Vector3d::UnitX();
+    s.joints = {slider};
+    // Both turn about the z axis through the origin, and the sled glides along the rail.
+    for (Body& each : s.bodies) turn_about(each, Vector3d::Zero(), 1.5);
+    s.bodies[1].velocity.x() += 0.4;
+    const auto engine = make_smooth_engine(s);
+    const Diagnostics start = engine->diagnostics();
+    engine->advance(1);
+    const Diagnostics end = engine->diagnostics();
+    INFO(static_cast<int>(form));
+    CHECK((end.momentum - start.momentum).norm() < 1e-6);
+    CHECK((end.angular_momentum - start.angular_momentum).norm() < 1e-6);
+    CHECK(std::abs(end.kinetic_energy - start.kinetic_energy) < 1e-6);
+    // The sled has moved along the rail, which has turned.
+    CHECK((engine->bodies()[1].position - engine->bodies()[0].position).norm() > 0.5);
+  }
+}
+
+TEST_CASE("a kept energy takes up the work of a driven distance", "[smooth]") {
+  // A pendulum on a rope that is drawn in and let out.
+  const auto end = [](bool kept) {
+    Scene s = scene(1e-9);
+    s.gravity = Vector3d(0, 0, -kGravity);
+    s.bodies = {ball("bob", {1, 0, 0})};
+    s.joints.push_back(joint(JointKind::distance, 0, kWorld, {1, 0, 0}));
+    s.joints.back().motion.emplace();
+    s.joints.back().motion->amplitude = 0.2;
+    s.joints.back().motion->frequency = 0.7;
+    s.bodies[0].velocity.x() = 0.2 * 2 * std::acos(-1.0) * 0.7;
+    if (kept) keep_energy(s);
+    const auto engine = make_smooth_engine(s);
+    engine->advance(2);
+    const Diagnostics d = engine->diagnostics();
+    CHECK(d.drift < 1e-7);
+    return std::make_pair(engine->bodies()[0].position, d.kinetic_energy + d.potential_energy);
+  };
+  const auto [with, energy] = end(true);
+  const auto [without, plain] = end(false);
+  CHECK((with - without).norm() < 1e-6);
+  CHECK(std::abs(energy - plain) < 1e-6);
+  CHECK(std::abs(energy) > 0.1);  // work has been done
+}
+
 TEST_CASE("a saved run with a number that is not finite is refused, or does not move by it",
           "[smooth]") {
   const auto a = make_smooth_engine(pendulum(1e-6));

@@ -5,8 +5,7 @@
 
 namespace tether::contact::detail {
 
-namespace {
-}  // namespace
+namespace {}  // namespace
 
 void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
                      StepContacts& contacts) {
