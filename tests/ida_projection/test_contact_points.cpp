@@ -160,3 +160,50 @@ TEST_CASE("rows that repeat an equation of F are solved for its algebraic variab
     CHECK(with.error <= 4.0 * without.error);
   }
 }
+
+TEST_CASE(
+    "a start off the contact, contact point included: consistent from the gap alone, or both") {
+  // Rows hang on the contact point, which F determines: they are solved together with F.
+  const auto residual = [](sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
+    static_cast<const Problem*>(data)->residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp),
+                                                N_VGetArrayPointer(r));
+    return 0;
+  };
+  const std::vector<std::vector<std::string>> choices = {{"gap"}, {"gap", "rate"}};
+  for (const auto& groups : choices)
+    for (const bool ellipsoid : {false, true})
+      for (const bool rolling : {false, true})
+        for (const std::string& form : contact_forms())
+          for (const double off : {1e-6, 1e-3, 3e-2}) {
+            Problem problem = ellipsoid ? ellipsoid_on_plane(form, rolling, 0.2)
+                                        : wheel_on_rail(form, rolling, 0.2);
+            INFO(problem.name << ", " << form << ", rolling " << rolling << ", off by " << off
+                              << ", " << groups.size() << " groups");
+            Host host(problem, 1e-6);
+            tp::Options options;
+            options.id = host.vector(problem.id);
+            host.attach(problem.select(groups), options);
+            for (int i = 0; i < problem.size; ++i) host.data()[i] += off * std::sin(1.0 + 3.0 * i);
+            tp::Consistency how;
+            how.residual = residual;
+            how.user_data = &problem;
+            const tp::ConsistencyReport report =
+                host.projection().make_consistent(0.0, host.y, host.yp, how);
+            INFO(report.message);
+            REQUIRE(report.status == tp::Status::success);
+            const auto size = [&](const char* group) {
+              return value(problem.select({group}), 0.0, host.data(), problem.size)
+                  .cwiseAbs()
+                  .maxCoeff();
+            };
+            CHECK(size("gap") <= 1e-9);
+            // Forms of index 1 leave a speed at which the bodies part as it is.
+            if (groups.size() == 2 || form == "index 2" || form == "GGL")
+              CHECK(size("rate") <= 1e-9);
+            CHECK(size("tangency") <= 1e-9);
+            CHECK(report.residual_after <= 1e-7);
+            CHECK(report.move <= 5.0 * off / 1e-6);
+            REQUIRE(host.finish() >= 0);
+            CHECK(host.steps() <= 100);
+          }
+}

@@ -32,6 +32,26 @@ double largest_residual(IDAResFn residual, void* user_data, double t, N_Vector y
 
 }  // namespace
 
+// A start whose rows hang on algebraic variables that F determines.
+struct Projection::Impl::JointStart {
+  double t = 0.0;
+  N_Vector y = nullptr;  // moved on success
+  const std::vector<bool>& hold;
+  ConsistencyReport report;
+};
+
+// Such rows are solved together with the equations of F, while IDA's residual callback is at hand.
+void Projection::Impl::project_jointly(const Candidate& candidate) {
+  if (joint_start_ == nullptr) return;
+  joined_.join(candidate, ida_.step().cj);
+  if (joined_.mover() != nullptr) {
+    PointProjection point(joined_.constraints(), options_);
+    point.project(joint_start_->t, joint_start_->y, joint_start_->hold, joined_.moved_id(),
+                  weights_, joint_start_->report);
+  }
+  joined_.forget();
+}
+
 // One step of IDA that goes nowhere: the decorated solver answers "no correction" and, on the way,
 // notes the error weights and which variables are algebraic. IDA must be reinitialised afterwards.
 bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
@@ -43,6 +63,92 @@ bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
   const double tiny = 1e-8 * std::max(1.0, std::abs(t0));
   IDASolve(ida_.mem(), t0 + tiny, &reached, y, ydot, IDA_ONE_STEP);
   return std::exchange(probe_, Probe::none) == Probe::answered;
+}
+
+// y' and the algebraic variables consistent with F; the reason of a failure, or nothing.
+std::string Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector ydot,
+                                              const Consistency& how, Status* failure) {
+  using Derivative = Consistency::Derivative;
+  bool found = how.derivative == Derivative::keep;
+  *failure = Status::callback_fatal;
+  if (how.derivative == Derivative::automatic || how.derivative == Derivative::calc_ic) {
+    IDAReInit(ida_.mem(), t0, y, ydot);
+    if (variables_.known()) {
+      IDASetId(ida_.mem(), variables_.vector());
+      const double direction =
+          how.direction != 0.0 ? how.direction : t0 + 1e-3 * std::max(1.0, std::abs(t0));
+      const int flag = IDACalcIC(ida_.mem(), IDA_YA_YDP_INIT, direction);
+      if (flag == IDA_RES_FAIL) return kResidualEnded;
+      found = flag == 0 && IDAGetConsistentIC(ida_.mem(), y, ydot) == 0;
+    }
+  }
+  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr && contiguous_) {
+    const Status solved =
+        consistent_derivative(how.residual, how.user_data, t0, y, ydot, variables_.vector(),
+                              weights_, how.maximum_iterations);
+    if (solved == Status::callback_fatal) return kResidualEnded;
+    found = solved == Status::success;
+  }
+  if (found) return "";
+  *failure = Status::not_converged;
+  return "y' consistent with F was not found; give Options::id and Consistency::residual, "
+         "or keep y' with Consistency::Derivative::keep";
+}
+
+// y onto the constraints, algebraic variables only where rows fix them, or F does. False: IDA could
+// not be started there.
+bool Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                                     ConsistencyReport* report) {
+  JointStart joint{t0, y, how.hold, {}};
+  joint_start_ = &joint;
+  const bool answered = IDAReInit(ida_.mem(), t0, y, ydot) == 0 && probe(t0, y, ydot);
+  joint_start_ = nullptr;
+  if (!answered) return false;
+  if (joint.report.status == Status::success)
+    *report = joint.report;
+  else if (!corrector_.stopped())
+    point_.project(t0, y, how.hold, variables_.id(), weights_, *report);
+  return true;
+}
+
+// Rows that contain algebraic variables move with these, and F with the rows: until neither moves
+// the other. The report has the first projection and the last drift.
+bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                                    ConsistencyReport* report) {
+  constexpr int kRounds = 8;
+  constexpr double kSettled = 1e-3;  // tolerances
+  OwnedVector before(y);
+  const auto fail = [report](Status why, const std::string& text) {
+    report->status = why;
+    report->message = text;
+    return false;
+  };
+  for (int round = 0; round < kRounds; ++round) {
+    N_VScale(1.0, y, before);
+    ConsistencyReport again;
+    if (!project_start(t0, y, ydot, how, &again)) {
+      if (broken_) return fail(report_.status, std::string(report_.message));
+      return fail(Status::internal_error,
+                  "IDA could not be started at the given values; set tolerances and the linear "
+                  "solver before make_consistent, and look at IDA's own message");
+    }
+    if (corrector_.stopped())
+      return fail(Status::callback_fatal, std::string(corrector_.stop_text()));
+    if (round == 0)
+      *report = again;
+    else
+      report->drift_after = again.drift_after;
+    if (again.status != Status::success) return fail(again.status, again.message);
+    N_VLinearSum(1.0, y, -1.0, before, before);
+    if (round > 0 && N_VWrmsNorm(before, weights_) <= kSettled) return true;
+    Status failure = Status::success;
+    const std::string reason = find_derivative(t0, y, ydot, how, &failure);
+    if (!reason.empty()) return fail(failure, reason);
+    if (how.derivative == Consistency::Derivative::keep) return true;
+  }
+  return fail(Status::not_converged,
+              "the algebraic variables that F asks for move y off the constraints again and again; "
+              "start closer, or give rows without algebraic variables");
 }
 
 ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Vector yp,
@@ -62,55 +168,14 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
 
   int flag = 0;
   corrector_.forget_stop();
-  if (IDAReInit(ida_.mem(), t0, yy, yp) != 0 || !probe(t0, yy, yp)) {
-    if (broken_) return fail(report_.status, std::string(report_.message));
-    return fail(Status::internal_error,
-                "IDA could not be started at the given values; set tolerances and the linear "
-                "solver before make_consistent, and look at IDA's own message");
-  }
-  if (corrector_.stopped())
-    return fail(Status::callback_fatal, std::string(corrector_.stop_text()));
-  report.residual_before = largest_residual(how.residual, how.user_data, t0, yy, yp, &flag);
-  if (flag < 0) return fail(Status::callback_fatal, kResidualEnded);
-
-  // y onto the constraints, algebraic variables only where rows fix them.
   OwnedVector y(yy), ydot(yp);
   N_VScale(1.0, yy, y);
   N_VScale(1.0, yp, ydot);
-  point_.project(t0, y, how.hold, variables_.id(), weights_, report);
-  if (report.status != Status::success) return fail(report.status, report.message);
-
-  // y' (and the algebraic variables) consistent with F.
-  using Derivative = Consistency::Derivative;
-  bool found = how.derivative == Derivative::keep;
-  if (how.derivative == Derivative::automatic || how.derivative == Derivative::calc_ic) {
-    IDAReInit(ida_.mem(), t0, y, ydot);
-    if (variables_.known()) {
-      IDASetId(ida_.mem(), variables_.vector());
-      const double direction =
-          how.direction != 0.0 ? how.direction : t0 + 1e-3 * std::max(1.0, std::abs(t0));
-      flag = IDACalcIC(ida_.mem(), IDA_YA_YDP_INIT, direction);
-      if (flag == IDA_RES_FAIL) return fail(Status::callback_fatal, kResidualEnded);
-      found = flag == 0 && IDAGetConsistentIC(ida_.mem(), y, ydot) == 0;
-    }
-  }
-  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr && contiguous_) {
-    const Status solved =
-        consistent_derivative(how.residual, how.user_data, t0, y, ydot, variables_.vector(),
-                              weights_, how.maximum_iterations);
-    if (solved == Status::callback_fatal) return fail(solved, kResidualEnded);
-    found = solved == Status::success;
-  }
-  if (!found)
-    return fail(Status::not_converged,
-                "y' consistent with F was not found; give Options::id and Consistency::residual, "
-                "or keep y' with Consistency::Derivative::keep");
-
-  // Rows that contain algebraic variables may have moved a little with them.
-  ConsistencyReport again;
-  point_.project(t0, y, how.hold, variables_.id(), weights_, again);
-  if (again.status == Status::callback_fatal) return fail(again.status, again.message);
-  if (again.status == Status::success) report.drift_after = again.drift_after;
+  const double residual_before = largest_residual(how.residual, how.user_data, t0, yy, yp, &flag);
+  if (flag < 0) return fail(Status::callback_fatal, kResidualEnded);
+  const bool settled = settle_start(t0, y, ydot, how, &report);
+  report.residual_before = residual_before;
+  if (!settled) return fail(report.status, std::string(report.message));
 
   OwnedVector change(yy);
   N_VLinearSum(1.0, y, -1.0, yy, change);

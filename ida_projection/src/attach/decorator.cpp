@@ -103,6 +103,8 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
   if (probe_ != Probe::none) {  // make_consistent wants to look around, not to step
     N_VScale(1.0, candidate.weights, weights_);
     if (!variables_.known()) derive_id(candidate);
+    candidate.t = ida_.step().t;
+    project_jointly(candidate);
     probe_ = Probe::answered;
     return 0;
   }

@@ -106,7 +106,15 @@ class Projection::Impl {
   bool follow(const Candidate& candidate, const StepData& step, double tolerance);
 
   // consistency.cpp
+  struct JointStart;
   bool probe(double t0, N_Vector yy, N_Vector yp);
+  void project_jointly(const Candidate& candidate);
+  std::string find_derivative(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                              Status* failure);
+  bool project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                     ConsistencyReport* report);
+  bool settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                    ConsistencyReport* report);
   void current_weights(N_Vector y);
 
   Constraints constraints_;
@@ -138,6 +146,7 @@ class Projection::Impl {
   bool broken_ = false;   // an exception left things half done: the run cannot go on
   bool engaged_ = false;  // the policy acts from the first move that was needed
   Probe probe_ = Probe::none;
+  JointStart* joint_start_ = nullptr;  // while make_consistent looks around
   Attempts attempts_;
   std::string capped_message_;
 
