@@ -173,6 +173,45 @@ TEST_CASE("criterion: other units change nothing, at any scale") {
   }
 }
 
+// b / A of 1e300 overflows where impulses add up, 1e-320 has a few digits: both in range on their
+// own.
+TEST_CASE("criterion: impulses outside of the range of doubles are no solution") {
+  for (Law law : {Law::coulomb, Law::maximum_dissipation, Law::frictionless}) {
+    for (bool large : {true, false}) {
+      const double of_A = large ? 0x1p-520 : 0x1p530, of_b = large ? 0x1p520 : 0x1p-530;
+      const Problem p = in_units(random::stack(3, 1, 0.5).problem(), of_A, of_b);
+      const Solution s = Solver(with(law, 1e-8)).solve(p);
+      INFO(name(law) << ", " << (large ? "large" : "small") << ": " << name(s.status) << " "
+                     << s.error);
+      CHECK(s.status == Status::unsolved);
+      CHECK(s.impulses.allFinite());
+      CHECK(s.velocities.allFinite());
+      CHECK_FALSE(s.error <= 1e-8);
+      CHECK_FALSE(s.advice.empty());
+    }
+  }
+}
+
+// Between walls impulses grow until they overflow.
+TEST_CASE("criterion: a body between closing walls at any scale has finite impulses") {
+  Body body;
+  body.inverse_mass.setIdentity();
+  std::vector<BodyContact> walls;
+  for (double side : {1.0, -1.0}) {
+    walls.push_back(BodyContact::at_point(0, -1, {0, 0, 0}, {0, 0, 0}, {side, 0, 0}, 5));
+    walls.back().bias[0] = -1;
+  }
+  for (int of_A : {-480, 0, 480})
+    for (int of_b : {-480, 0, 480}) {
+      const Problem p = in_units(delassus({body}, walls), std::ldexp(1, of_A), std::ldexp(1, of_b));
+      const Solution s = Solver(with(Law::coulomb, 1e-6)).solve(p);
+      INFO("2^" << of_A << " A, 2^" << of_b << " b: " << name(s.status));
+      CHECK(s.status == Status::infeasible);
+      CHECK(s.impulses.allFinite());
+      CHECK(s.velocities.allFinite());
+    }
+}
+
 TEST_CASE("criterion: no friction makes zero impulses a solution of an approach") {
   for (double mu : {1.0, 1e3, 1e6, 1e9, 1e12}) {
     const Problem p = boxes(1, mu);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <unordered_map>
 
@@ -45,8 +46,32 @@ struct Solver::Implementation {
   void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
   Status automatic();
   Status plain();
+  void to_given_units(Status& status);
   void finish(const Problem& problem, Status status, Solution& out);
 };
+
+// The best point. b / A may lie outside of the range of doubles where A and b do not: what
+// overflows is no answer, and digits that fall below are lost.
+void Solver::Implementation::to_given_units(Status& status) {
+  if (!search.system.in_other_units()) return;
+  z = search.best;
+  search.system.to_given_units(search.best.data());
+  bool finite = true;
+  for (const PackedVector& p : search.best)
+    for (double v : p.v) finite = finite && std::isfinite(v);
+  if (!finite) std::fill(search.best.begin(), search.best.end(), PackedVector());
+  x = search.best;
+  search.system.to_own_units(x.data());
+  const auto same = [](const PackedVector& p, const PackedVector& q) {
+    return p.v[0] == q.v[0] && p.v[1] == q.v[1] && p.v[2] == q.v[2];
+  };
+  if (std::equal(x.begin(), x.end(), z.begin(), same)) return;
+  z = search.best;
+  search.best_error = std::numeric_limits<double>::infinity();
+  search.test(x.data(), options.method);
+  search.best = z;
+  if (status == Status::solved && !search.solved()) status = Status::unsolved;
+}
 
 Status Solver::Implementation::automatic() {
   // Nothing is allocated before a first sweep has failed.
@@ -224,7 +249,7 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
       break;
     }
   }
-  search.system.to_given_units(search.best.data());
+  to_given_units(status);
   if (options.warm_start) {
     memory.clear();
     for (std::size_t i = 0; i < n; ++i) memory[problem.id(static_cast<int>(i))] = search.best[i];

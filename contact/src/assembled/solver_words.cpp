@@ -92,7 +92,7 @@ const char* advice(Status status, const Options& options) {
              "(infeasible_direction): "
              "lower the closing velocities, or let one of the contacts go";
     case Status::unsolved:
-      return "";
+      return "the impulses lie outside of the range of doubles: use other units";
   }
   return "";
 }

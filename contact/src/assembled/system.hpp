@@ -35,7 +35,8 @@ class System {
 
   // The problem that the stages see: the given one, or in units in which nothing leaves the range.
   const Problem& problem() const { return *problem_; }
-  // Impulses of the given problem in these units, and back. Exact.
+  bool in_other_units() const { return !mass_.empty(); }
+  // Impulses of the given problem in these units, and back. Exact within the range of doubles.
   void to_own_units(PackedVector* x) const;
   void to_given_units(PackedVector* x) const;
   const LawKernels& law() const { return *law_; }

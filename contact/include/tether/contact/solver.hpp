@@ -33,7 +33,7 @@ enum class Method : std::uint8_t {
 };
 
 enum class Status : std::uint8_t {
-  unsolved,
+  unsolved,    ///< not tried, or the impulses lie outside of the range of doubles in these units
   solved,      ///< measure <= tolerance, and round-off of A x - b does not exceed it
   stalled,     ///< no progress any more
   cycling,     ///< the iteration repeats without progress; often no solution of the law is near
