@@ -10,19 +10,26 @@ if ! command -v dpkg-query >/dev/null 2>&1; then
   exit 0
 fi
 
-missing=
-for package in $(sed 's/#.*//' "$here/packages.txt"); do
-  case $(dpkg-query -W -f='${Status}' "$package" 2>/dev/null || true) in
-    *' installed') ;;
-    *) missing="$missing $package" ;;
-  esac
-done
-missing=${missing# }
+# The packages of lines that match the pattern and are not installed.
+missing() {
+  sed 's/#.*//' "$here/packages.txt" | grep "$@" | while read -r package _; do
+    case $(dpkg-query -W -f='${Status}' "$package" 2>/dev/null || true) in
+      *' installed') ;;
+      *) printf '%s ' "$package" ;;
+    esac
+  done
+}
+required=$(missing -vE ' optional|^ *$' || true)
+optional=$(missing ' optional' || true)
+missing="$required$optional"
+missing=${missing% }
 [ -n "$missing" ] || exit 0
 
 if [ "$(id -u)" -ne 0 ]; then
   echo "tether: missing packages: $missing; install them with: sudo apt-get install --no-install-recommends $missing" >&2
-  exit 1
+  [ -z "$required" ] || exit 1
+  echo "tether: they are optional; going on without" >&2
+  exit 0
 fi
 
 echo "tether: installing $missing"
