@@ -7,6 +7,7 @@
 //
 // From an impact on whose bounces nobody can see, it is completed without restitution: what the
 // normal impulses of all later ones amount to is what the closed contact carries until then.
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -36,8 +37,7 @@ void Driver::remember(int contact, double approach) {
 
 bool Driver::has_accumulated(int contact, double approach, double& rest) const {
   const Bounces& b = bounces_[at(contact)];
-  const double restitution = model_.law(contact).restitution;
-  if (b.count < 3 || approach * restitution > std::max(options_.tolerance, kUnresolved))
+  if (b.count < 3 || approach * approach > b.speed[0] * std::max(options_.tolerance, kUnresolved))
     return false;
   const double dt = event_time_ - b.time[0], last = b.time[0] - b.time[1];
   const double r = approach / b.speed[0], previous = b.speed[0] / b.speed[1];
@@ -46,6 +46,30 @@ bool Driver::has_accumulated(int contact, double approach, double& rest) const {
     return false;
   rest = dt * r / (1 - r);
   return true;
+}
+
+// The contacts that touch and move apart no faster than `speed` stay together: impulses in both
+// directions. Returns the energy that is lost.
+double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
+  ContactRows rows(model_, touching);
+  const int block = rows.size();
+  const VectorXd w = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
+  std::vector<int> slow;
+  for (int k = 0; k < static_cast<int>(touching.size()); ++k)
+    if (std::abs(w[block * k]) <= speed) slow.push_back(block * k);
+  const int n = static_cast<int>(slow.size());
+  MatrixXd A(n, n);
+  VectorXd b(n), x = VectorXd::Zero(w.size());
+  for (int i = 0; i < n; ++i) {
+    b[i] = -w[slow[at(i)]];
+    for (int j = 0; j < n; ++j) A(i, j) = rows.A()(slow[at(i)], slow[at(j)]);
+  }
+  const VectorXd part = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(A).solve(b);
+  for (int i = 0; i < n; ++i) x[slow[at(i)]] = part[i];
+  const double energy = model_.energy();
+  y_.segment(motion_.coordinates(), motion_.velocities()) += rows.change(x);
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  return energy - model_.energy();
 }
 
 }  // namespace tether::scene::event

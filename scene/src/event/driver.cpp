@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <tether/scene/engine.hpp>
 
 namespace tether::scene::event {
@@ -21,7 +22,9 @@ double local_tolerance(double tolerance) {
 // T. A way of less than kLeastWay (m in the units of the model) is lost in rounding.
 constexpr double kFlightError = 0.01, kLeastWay = 1e-15;
 constexpr long kMostAtOneTime = 300;
-constexpr long kAnchor = 5000;  // steps
+constexpr double kStartTolerance = 1e-4;
+constexpr double kNoImpulse = 1e-9;  // of the largest of an impact
+constexpr long kAnchor = 5000;       // steps
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -41,11 +44,43 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   y_.head(motion_.work()) = y;
   model_.set(t, y_.data(), y_.data() + motion_.coordinates());
   model_.settle();
-  first_energy_ = model_.energy();
+  check_start();
   const std::vector<int> close = touching(-1);
   collide(close, EventKind::impact, -1);
-  motion_.choose(t, y_, decide(touching(-1), -1, {}));
+  // Figures of a scene are rounded: its energy is that of the start which joints allow.
+  const std::vector<ContactMode> modes = decide(touching(-1), -1, {});
+  motion_.choose(t, y_, modes);
+  motion_.leave_energy_free();
+  if (!move_onto_constraints(motion_, local_, t, y_))
+    throw std::invalid_argument("the start of the scene contradicts its joints or contacts");
+  model_.set(t, y_.data(), y_.data() + motion_.coordinates());
+  first_energy_ = model_.energy() + lost_;
+  motion_.choose(t, y_, modes);
   begin_phase();
+}
+
+void Driver::check_start() const {
+  VectorXd g, rate, rest;
+  MatrixXd W;
+  model_.joints(g, W, rate, rest);
+  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
+  const VectorXd speeds = W * u + rate;
+  const double size = std::max(1.0, y_.head(motion_.coordinates()).cwiseAbs().maxCoeff());
+  const double speed = u.size() > 0 ? std::max(1.0, u.cwiseAbs().maxCoeff()) : 1;
+  for (int i = 0; i < g.size(); ++i)
+    if (std::abs(g[i]) > kStartTolerance * size || std::abs(speeds[i]) > kStartTolerance * speed)
+      throw std::invalid_argument(fmt::format(
+          "the start of the scene contradicts {}: off by {:.3g} in position, {:.3g} in velocity "
+          "(at most {:g} is taken for rounding); give both bodies places, velocities and angular "
+          "velocities that the joint allows, and those of a prescribed motion",
+          model_.joint_name(i), g[i], speeds[i], kStartTolerance));
+  double slope = 0;
+  for (int i = 0; i < model_.contacts(); ++i) {
+    const double gap = model_.gap(i, slope);
+    if (std::isinf(model_.margin(i)) && gap < -kStartTolerance * size)
+      throw std::invalid_argument(fmt::format(
+          "bodies overlap at the start by {:.3g} (contact {}): give them places apart", -gap, i));
+  }
 }
 
 // Contacts with no gap, closed ones among them.
@@ -244,6 +279,7 @@ void Driver::collide(const std::vector<int>& touching, EventKind otherwise, int 
     return;
   }
   VectorXd b = -before, mu(n), rest = VectorXd::Zero(n);
+  double fastest = 0;  // of those whose impacts are over
   for (int k = 0; k < n; ++k) {
     const int i = touching[at(k)];
     const ContactLaw law = model_.law(i);
@@ -251,8 +287,9 @@ void Driver::collide(const std::vector<int>& touching, EventKind otherwise, int 
     const double approach = before[block * k];
     if (approach >= -bands_.speed) continue;
     double over = 0;
-    const bool accumulated = law.restitution > 0 && has_accumulated(i, -approach, over);
+    const bool accumulated = has_accumulated(i, -approach, over);
     if (accumulated) rest[k] = over;
+    if (accumulated) fastest = std::max(fastest, -approach);
     if (!accumulated) b[block * k] -= law.restitution * approach;
     if (!accumulated) remember(i, -approach);
   }
@@ -263,12 +300,15 @@ void Driver::collide(const std::vector<int>& touching, EventKind otherwise, int 
   const double energy = model_.energy();
   y_.segment(motion_.coordinates(), motion_.velocities()) += rows.change(answer.x);
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-  const double lost = energy - model_.energy();
+  double lost = energy - model_.energy();
+  if (fastest > 0) lost += come_to_rest(touching, fastest);
   lost_ += lost;
   const VectorXd after = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
   bool first = true;
+  double largest = 0;
+  for (int k = 0; k < n; ++k) largest = std::max(largest, answer.x[block * k]);
   for (int k = 0; k < n; ++k) {
-    if (before[block * k] >= -bands_.speed && answer.x[block * k] <= 0) continue;
+    if (before[block * k] >= -bands_.speed && answer.x[block * k] <= kNoImpulse * largest) continue;
     if (before[block * k] < -bands_.speed) ++counts_.impacts;
     record(rest[k] > 0 ? EventKind::rest : EventKind::impact, touching[at(k)], before[block * k],
            after[block * k], first ? lost : 0);

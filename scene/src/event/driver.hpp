@@ -67,12 +67,14 @@ class Driver {
   double ledger_error();
 
  private:
+  void check_start() const;
   void begin_phase();
   void start_phase();
   void handle(const Zero& zero);
   void anchor();
   void collide(const std::vector<int>& touching, EventKind kind, int contact);
   bool has_accumulated(int contact, double approach, double& rest) const;
+  double come_to_rest(const std::vector<int>& touching, double speed);
   void remember(int contact, double approach);
   std::vector<ContactMode> decide(const std::vector<int>& touching, int left_contact,
                                   std::optional<Watch> left);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <string>
 
 namespace tether::scene::event {
 
@@ -48,6 +49,7 @@ class Model {
   virtual void forces(VectorXd& h) = 0;
   /// g, and with W: g' = W u + rate, g'' = W u' + rest.
   virtual void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) = 0;
+  virtual std::string joint_name(int /*row*/) const { return "a joint"; }
   virtual void look(int contact, ContactLook& out) = 0;
   virtual double gap(int contact, double& rate) = 0;  ///< and its rate
 

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tether::scene::event {
 
 namespace {
 
 constexpr double kRank = 1e-10;  // of rows of unit length
+constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
 
 }  // namespace
 
@@ -55,7 +57,11 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   lambda_.setZero(rows_);
   set(t, y.data());
   gather();
-  choose_rows();
+  const int rank = choose_rows();
+  VectorXd y_rate(size());
+  rate(t, y.data(), y_rate.data());
+  // Of what stands still energy is known to rounding only, and says nothing of the state.
+  keeps_energy_ = rank < nu_ && a_.norm() + u_.norm() > kStill;
 }
 
 // Rows, columns and what is left of the second derivatives, at the state that is set.
@@ -66,6 +72,7 @@ void Motion::gather() {
     C_.leftCols(joints_) = joint_W_.transpose();
     r_.head(joints_) = joint_rest_;
   }
+  smallest_slip_ = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k];
     ContactLook& look = looks_[k];
@@ -86,16 +93,18 @@ void Motion::gather() {
     VectorXd s = slip_of(look);
     const double along = s.dot(mode.direction);
     if (along < speed_) s += (speed_ - along) * mode.direction;
+    smallest_slip_ = std::min(smallest_slip_, s.norm());
     C_.col(row) -= mu / s.norm() * look.tangents.transpose() * s;
   }
 }
 
-void Motion::choose_rows() {
+// The number of independent ones.
+int Motion::choose_rows() {
   positions_in_use_.clear();
   rates_in_use_.clear();
   row_scale_.setOnes(rows_);
   hyperstatic_ = false;
-  if (rows_ == 0) return;
+  if (rows_ == 0) return 0;
   MC_ = R_.transpose();
   model_.divide_by_mass(MC_);
   for (int i = 0; i < rows_; ++i) {
@@ -130,6 +139,7 @@ void Motion::choose_rows() {
     rates_in_use_.push_back(row);
   }
   hyperstatic_ = rank - rank_of_joints < rows_ - joints_;
+  return rank;
 }
 
 void Motion::rate(double t, const double* y, double* y_rate) {

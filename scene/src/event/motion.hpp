@@ -59,6 +59,8 @@ class Motion {
   const ContactLook& look(int closed) const { return looks_[index(closed)]; }
   VectorXd slip(int closed) const { return slip_of(looks_[index(closed)]); }
   long evaluations() const { return evaluations_; }
+  /// Of contacts that slide with friction, at the last state: forces turn within such a change.
+  double smallest_slip() const { return smallest_slip_; }
 
   /// The constraints of the phase on y: joints and gaps, their rates, slips of stuck contacts, own
   /// rows of the model, energy.
@@ -68,6 +70,7 @@ class Motion {
                            Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
   /// Energy less work is that of this state from now on.
   void keep_energy_of(double t, const VectorXd& y);
+  void leave_energy_free() { keeps_energy_ = false; }  ///< until modes are chosen again
   void keep_energy(double value) { kept_energy_ = value; }
   double kept_energy() const { return kept_energy_; }
   double energy() const { return model_.energy(); }  ///< of the state that was looked at last
@@ -78,7 +81,7 @@ class Motion {
   void set(double t, const double* y);
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
-  void choose_rows();
+  int choose_rows();
 
   Model& model_;
   double speed_;
@@ -97,6 +100,7 @@ class Motion {
   MatrixXd joint_W_, R_, C_, MC_, K_;
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor_;
   long evaluations_ = 0;
+  double smallest_slip_ = 0;
 };
 
 }  // namespace tether::scene::event

@@ -20,10 +20,10 @@ namespace tether::scene::event {
 namespace {
 
 // The first step's error is an eighth of what IDA allows.
-constexpr double kFirstError = 0.125, kFirstMove = 1e-2, kFirstAtRest = 1e-3;
+constexpr double kFirstError = 0.125, kFirstMove = 1e-2, kFirstAtRest = 1e-3, kFirstAtMost = 0.1;
 constexpr double kLook = 1e-5;   // the part of a move over which y'' is looked at
 constexpr double kNewton = 0.1;  // Newton's test, of the tolerance
-constexpr double kDifference = 1e-7;
+constexpr double kDifference = 1e-7, kOfSlip = 1e-3;
 
 #ifdef SUN_COMM_NULL  // SUNDIALS 7
 void remember(int, const char*, const char*, const char* message, SUNErrCode, void* data,
@@ -150,6 +150,8 @@ int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SU
   const int N = me.motion.size();
   me.near = Eigen::Map<const VectorXd>(N_VGetArrayPointer(y), N);
   me.motion.rate(me.start + t, me.near.data(), me.rate.data());
+  // Friction turns with the slip: differences are short against it.
+  const double longest = kOfSlip * me.motion.smallest_slip();
   for (int j = 0; j < N; ++j) {
     double* column = SM_COLUMN_D(J, j);
     if (j == me.motion.work()) {
@@ -157,7 +159,9 @@ int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SU
       column[j] = cj;
       continue;
     }
-    const double kept = me.near[j], step = kDifference * std::max(1.0, std::abs(kept));
+    const double kept = me.near[j];
+    double step = kDifference * std::max(1.0, std::abs(kept));
+    if (j >= me.motion.coordinates()) step = std::min(step, longest);
     me.near[j] = kept + step;
     me.motion.rate(me.start + t, me.near.data(), me.near_rate.data());
     me.near[j] = kept;
@@ -183,7 +187,7 @@ double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
     sum += change * change;
   }
   const double curvature = std::sqrt(sum / static_cast<double>(y0.size())) / look;
-  const double longest = kFirstMove / speed;
+  const double longest = std::min(kFirstMove / speed, kFirstAtMost);
   if (!std::isfinite(curvature)) return 0.5 * tolerance / speed;
   return curvature > 0 ? std::min(longest, std::sqrt(4 * kFirstError / curvature)) : longest;
 }

@@ -99,6 +99,7 @@ bool add(const Shape& a, const Shape& b, const FeaturePair& bodies, std::vector<
     for (const Knob& knob : knobs(a)) put(knob, plane_of(b));
     return a.kind != ShapeKind::plane;
   }
+  if (a.kind == ShapeKind::points && b.kind == ShapeKind::points) return true;  // never touch
   const bool has_points = is_round(a) || a.kind == ShapeKind::points;
   if (!has_points) return false;
   if (is_round(b)) {

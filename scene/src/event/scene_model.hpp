@@ -36,6 +36,7 @@ class SceneModel final : public Model {
   void divide_by_mass(Eigen::Ref<MatrixXd> X) const override;
   void forces(VectorXd& h) override;
   void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) override;
+  std::string joint_name(int row) const override { return "joint \"" + rows_.joint_of(row) + "\""; }
   void look(int contact, ContactLook& out) override;
   double gap(int contact, double& rate) override {
     const Touch touch = pair(contact).look(bodies_.all());
@@ -61,7 +62,6 @@ class SceneModel final : public Model {
   const smooth::MovingBodies& bodies() const { return bodies_; }
   const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
   double potential() const;
-  const std::string& joint_of(int row) const { return rows_.joint_of(row); }
 
  private:
   smooth::MovingBodies bodies_;

@@ -175,6 +175,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     const double edge = band(f);
     if (f.dormant) continue;
     bool hit = f.value < (f.armed ? 0 : -edge);
+    if (f.what == Watch::gap && !f.armed) hit = hit && f.slope < 0;  // else it is on its way out
     if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
       double when = 0;
       hit = dip(phase, f, when) < -bands_.gap;  // else it only touches

@@ -1,0 +1,159 @@
+// Joints, several contacts and friction in the event engine. SPDX-License-Identifier: BSD-3-Clause
+#include "event/driver.hpp"
+#include "event_runs.hpp"
+#include "woodpecker.hpp"
+
+using namespace event_runs;
+
+namespace {
+
+std::string cart(double friction) {
+  std::string text =
+      kFloor +
+      "[[body]]\nname = \"cart\"\nmass = 10\ninertia = [1, 1, 1]\nposition = [0, 0, 0.2]\n";
+  int k = 0;
+  for (const char* at :
+       {"[0.5, 0.4, 0.2]", "[0.5, -0.4, 0.2]", "[-0.5, 0.4, 0.2]", "[-0.5, -0.4, 0.2]"}) {
+    const std::string name = "wheel " + std::to_string(k++);
+    text += "[[body]]\nname = \"" + name +
+            "\"\nshape = \"sphere\"\nradius = 0.2\nmass = 1\ninertia = [0.01, 0.02, 0.01]\n"
+            "material = \"body\"\nposition = " +
+            at + "\n[[joint]]\nkind = \"hinge\"\nbodies = [\"" + name +
+            "\", \"cart\"]\nat = " + at + "\naxis = [0, 1, 0]\n";
+  }
+  return text + "[[pair]]\nbetween = [\"body\", \"body\"]\n" +
+         pair("friction = " + number(friction));
+}
+
+std::string step_ladder(double friction, double degrees) {
+  const double angle = degrees * M_PI / 180, c = std::cos(angle), s = std::sin(angle);
+  std::string text = kFloor;
+  for (const int side : {-1, 1})
+    text +=
+        std::string("[[body]]\nname = \"") + (side < 0 ? "left" : "right") +
+        "\"\nshape = \"points\"\npoints = [[0.5, 0, 0]]\nmass = 1\ninertia = [0.01, " +
+        number(1.0 / 12) + ", " + number(1.0 / 12) + "]\nmaterial = \"body\"\nposition = [" +
+        number(0.5 * side * c) + ", 0, " + number(0.5 * s) +
+        "]\norientation = { axis = [0, 1, 0], rad = " + number(side > 0 ? angle : M_PI - angle) +
+        " }\n";
+  return text + "[[joint]]\nkind = \"hinge\"\nbodies = [\"left\", \"right\"]\nat = [0, 0, " +
+         number(s) + "]\naxis = [0, 1, 0]\n[[pair]]\nbetween = [\"body\", \"body\"]\n" +
+         pair("friction = " + number(friction));
+}
+
+}  // namespace
+
+TEST_CASE("event: a cart on four hinged wheels rolls down a slope, wheels sharing its weight") {
+  const double slope = 10 * M_PI / 180;
+  const std::string gravity =
+      "[" + number(9.81 * std::sin(slope)) + ", 0, " + number(-9.81 * std::cos(slope)) + "]";
+  for (const double tolerance : kLadder) {
+    CAPTURE(tolerance);
+    const auto engine = run(cart(0.5), tolerance, 1, gravity);
+    CHECK(engine->events().empty());
+    CHECK(std::abs(engine->bodies()[1].position.x() - 0.7452762725242567) < 10 * tolerance);
+    CHECK(engine->diagnostics().drift < tolerance);
+    CHECK(std::abs(ledger(*engine, -9.81 * std::cos(slope) * -0.2 * 14)) < 10 * tolerance);
+  }
+  // It rolls from mu = .0220408725886 on.
+  const auto slip = [&](double friction) {
+    const auto engine = run(cart(friction), 1e-8, 0.1, gravity);
+    const BodyState& wheel = engine->bodies()[2];
+    return wheel.velocity.x() - 0.2 * wheel.angular_velocity.y();
+  };
+  CHECK(std::abs(slip(0.0221)) < 1e-8);
+  CHECK(slip(0.0219) > 1e-4);
+}
+
+TEST_CASE("event: a step ladder stands, slides or falls as its friction says") {
+  for (const double tolerance : kLadder) {
+    CAPTURE(tolerance);
+    const auto smooth = run(step_ladder(0, 60), tolerance, 0.5);
+    const auto flat = of_kind(*smooth, Kind::impact);
+    REQUIRE(!flat.empty() == false);  // its hinge meets no floor: it falls through
+    // At the flat position all turns into rotation.
+    const auto at_flat = run(step_ladder(0, 60), tolerance, 0.4810659304040532);
+    CHECK(std::abs(at_flat->bodies()[2].angular_velocity.y() + 5.048477754073601) <
+          10 * tolerance * 5);
+    CHECK(std::abs(at_flat->bodies()[2].position.z()) < 10 * tolerance);
+    const auto rough = run(step_ladder(0.3, 45), tolerance, 0.454673968534977);
+    CHECK(std::abs(rough->bodies()[2].position.z()) < 10 * tolerance);
+    CHECK(std::abs(std::abs(rough->bodies()[2].angular_velocity.y()) - 4.299638957499818) <
+          10 * tolerance * 5);
+  }
+  // Stands iff mu >= cot(th) / 2.
+  struct Case {
+    double degrees, limit;
+  };
+  for (const Case c : {Case{60, .2886751345948129}, Case{45, .5}}) {
+    const auto stands = run(step_ladder(c.limit + 1e-4, c.degrees), 1e-8, 1);
+    CHECK(stands->diagnostics().kinetic_energy < 1e-20);
+    const auto slides = run(step_ladder(c.limit - 1e-4, c.degrees), 1e-8, 1);
+    CHECK(slides->diagnostics().kinetic_energy > 1e-8);
+  }
+}
+
+TEST_CASE("event: a tilted block rocks with a speed ratio of 0.85 (Housner)") {
+  const double tilt = 0.2, c = std::cos(tilt), s = std::sin(tilt);
+  const double inertia = (0.16 + 1.44) / 12;
+  const std::string text =
+      kFloor +
+      "[[body]]\nname = \"block\"\nshape = \"points\"\npoints = [[0.2, 0, -0.6], [-0.2, 0, -0.6]]\n"
+      "mass = 1\ninertia = [" +
+      number(inertia) + ", " + number(inertia) + ", " + number(inertia) +
+      "]\nmaterial = \"body\"\nposition = [" + number(-(c * 0.2 - s * 0.6)) + ", 0, " +
+      number(s * 0.2 + c * 0.6) + "]\norientation = { axis = [0, 1, 0], rad = 0.2 }\n" +
+      pair("friction = 100");
+  const double times[] = {0.478068508074417337, 1.10515535689112196, 1.58307313798996064,
+                          1.96496438071558101,  2.27723015435507267, 2.53594550232646533,
+                          2.75205328528712692,  2.9335369516370769};
+  for (const double tolerance : kLadder) {
+    CAPTURE(tolerance);
+    const auto engine = run(text, tolerance, 3);
+    const auto impacts = of_kind(*engine, Kind::impact);
+    REQUIRE(impacts.size() == 8);
+    for (std::size_t k = 0; k < 8; ++k) {
+      CHECK(std::abs(impacts[k].time - times[k]) < 10 * tolerance);
+      // A foot is 0.4 m from the one that the block turns about.
+      CHECK(std::abs(impacts[k].before + 0.4 * 1.0108061836163 * std::pow(0.85, k)) <
+            10 * tolerance);
+    }
+  }
+}
+
+TEST_CASE("event: the woodpecker's first events and states (Glocker)") {
+  using namespace tether::scene::event;
+  struct Expected {
+    EventKind kind;
+    int contact;
+    double time;
+  };
+  const Expected expected[] = {{Kind::stop, 1, .021636314053},   {Kind::slip, 1, .061213931248},
+                               {Kind::lift, 1, .067023398145},   {Kind::impact, 2, .077877992290},
+                               {Kind::impact, 0, .080988805419}, {Kind::impact, 2, .081575328790},
+                               {Kind::lift, 2, .083416385579},   {Kind::impact, 1, .118675112949},
+                               {Kind::impact, 1, .121335470558}};
+  // By an independent code at two tolerances: y, phi_M, phi_S at 0.1 s.
+  const double y = -.00705933015, phi_M = .0207247690364, phi_S = .00752887681468;
+  for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
+    CAPTURE(tolerance);
+    woodpecker::Woodpecker model;
+    DriverOptions options;
+    options.tolerance = tolerance;
+    Driver driver(model, options, 0, woodpecker::Woodpecker::start());
+    driver.advance(0.1);
+    const VectorXd there = driver.state();
+    CHECK(std::abs(there[0] - y) < 10 * tolerance);
+    CHECK(std::abs(there[1] - phi_M) < 10 * tolerance);
+    CHECK(std::abs(there[2] - phi_S) < 10 * tolerance);
+    driver.advance(0.2);
+    REQUIRE(driver.events().size() >= 9);
+    for (std::size_t k = 0; k < 9; ++k) {
+      CHECK(driver.events()[k].kind == expected[k].kind);
+      CHECK(driver.events()[k].contact == expected[k].contact);
+      CHECK(std::abs(driver.events()[k].time - expected[k].time) < 10 * tolerance);
+    }
+    CHECK(std::abs(driver.ledger_error()) < 1e-12);
+    CHECK(driver.counts().phases.residuals < 5000);
+  }
+}
