@@ -5,6 +5,7 @@
 #include <limits>
 #include <problems/car_axis.hpp>
 #include <problems/kepler.hpp>
+#include <problems/link_chain.hpp>
 #include <problems/pendulum.hpp>
 
 #include "host.hpp"
@@ -82,12 +83,17 @@ void compare(const Problem& problem, double tolerance, Mean* mean) {
   INFO(problem.name << ", " << problem.form << ", tolerance " << tolerance);
   const tp::Constraints rows = problem.recommended_constraints();
   const Run dense = integrate(problem, tolerance, rows, {}, false);
-  const Run sparse = integrate(problem, tolerance, as_sparse(rows, problem.size), {}, false);
+  const Run sparse = integrate(
+      problem, tolerance,
+      problem.sparse_constraints ? *problem.sparse_constraints : as_sparse(rows, problem.size), {},
+      false);
   REQUIRE(dense.flag >= 0);
   REQUIRE(sparse.flag >= 0);
   double apart = 0.0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(problem.error_components); ++i)
     apart = std::max(apart, std::abs(dense.y[i] - sparse.y[i]) / (1.0 + std::abs(dense.y[i])));
+  // Where rounding has changed no decision of IDA's, and within what such changes do.
+  if (tolerance >= 1e-3 && problem.index < 2) CHECK(apart <= 1e-2 * tolerance);
   CHECK(apart <= 60.0 * tolerance);
   Run plain = integrate_suppressed(problem, tolerance);
   if (problem.index == 1) {
@@ -139,4 +145,11 @@ TEST_CASE("vortices, a top, the figure eight, points on a sphere: the same") {
   for (const Problem& problem : problems)
     for (const double tolerance : {1e-3, 1e-5, 1e-7, 1e-9}) compare(problem, tolerance, &mean);
   CHECK(std::exp(mean.steps / mean.runs) <= 1.1);
+}
+
+TEST_CASE("chain of 20 links, dense rows and sparse ones of few entries: the same") {
+  Mean mean;
+  const Problem problem = link_chain(20, 0.3);
+  for (const double tolerance : {1e-3, 1e-5, 1e-7}) compare(problem, tolerance, &mean);
+  CHECK(std::exp(mean.steps / mean.runs) <= 1.0);
 }

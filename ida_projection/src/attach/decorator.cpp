@@ -17,6 +17,7 @@ namespace {
 
 constexpr long kSampleEvery = 16;
 constexpr double kAsideFromTest = 1.5;   // multipliers of index 2: see README, section 9
+constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 }  // namespace
@@ -243,11 +244,18 @@ void Projection::Impl::judge_capped(Move& move) {
                     ", which the error test does not allow; use a larger largest_move";
 }
 
+// A few invariants of many unknowns, as on grids; rows of mechanisms are many and local.
+bool Projection::Impl::rows_of_field() const {
+  const bool gradients = std::holds_alternative<Gradients>(constraints_.jacobian);
+  return gradients || kFew * constraints_.total_count() <= N_VGetLength(weights_);
+}
+
 void Projection::Impl::look_at_linear_solver() {
   linear_solver_.look(ida_, attempts_.steps);
   const bool iterative = linear_solver_.iterative();
   if (wanted_metric_ == Metric::automatic)
-    options_.metric = iterative ? Metric::error_weights : Metric::local_correction;
+    options_.metric =
+        iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;
   polish_.note_linear_solver(iterative);
   mover_->expect_no_settle(iterative);
 }

@@ -85,6 +85,7 @@ class Projection::Impl {
   int correct(const Candidate& candidate, double tolerance, bool call_setup);
   int correct_and_move(Candidate& candidate, double tolerance, bool call_setup);
   void look_at_linear_solver();
+  bool rows_of_field() const;
   void account_for_previous_attempt(const StepData& step);
   int corrector_failed(int flag);
   int look_before_moving(const Candidate& candidate, bool& done);

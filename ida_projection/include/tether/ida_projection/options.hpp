@@ -18,8 +18,8 @@ enum class Metric {
   local_correction,
   /// D_i = WT_i, the weights of the error test (Hanson and Krogh).
   error_weights,
-  /// local_correction with a direct linear solver, error_weights with an iterative one: s has a
-  /// kink
+  /// local_correction, but error_weights where the linear solver is iterative and the rows are
+  /// Gradients or at most a 16th of the unknowns, as the invariants of a field: s has a kink
   /// wherever the correction changes its sign along a grid, the move then has rough parts, and they
   /// take a Krylov method the most iterations.
   automatic,
