@@ -1,4 +1,6 @@
 // Impacts of the event engine against closed forms. SPDX-License-Identifier: BSD-3-Clause
+#include <sstream>
+
 #include "event_runs.hpp"
 
 using namespace event_runs;
@@ -325,4 +327,68 @@ rest = 10
     CHECK(std::abs(impacts[0].time - 1.20286553850472322) < 10 * tolerance / 6e-3);
     CHECK(std::abs(impacts[0].before + 6.3834432936448e-3) < 10 * tolerance / 6e-3);
   }
+}
+
+TEST_CASE("event: a run that is cut inside accumulating impacts goes on with its bits") {
+  const std::string text =
+      "[scene]\nengine = \"event\"\nend = 2\ngravity = [0, 0, -9.81]\n" + ball(1, 0.5);
+  const Scene scene = parse_scene(text, "test");
+  const auto whole = make_engine(scene);
+  for (const double cut : {1.0, 1.35, 1.3545, 1.354565, 1.5}) {
+    CAPTURE(cut);
+    const auto first = make_engine(scene), second = make_engine(scene);
+    first->advance(cut);
+    std::stringstream state;
+    first->save(state);
+    second->restore(state);
+    CHECK(second->time() == first->time());
+    first->advance(2);
+    second->advance(2);
+    CHECK(second->bodies()[1].position == first->bodies()[1].position);
+    CHECK(second->bodies()[1].velocity == first->bodies()[1].velocity);
+    REQUIRE(second->events().size() <= first->events().size());
+    // The later ones are the same to the last bit, and none is told twice.
+    const std::size_t before = first->events().size() - second->events().size();
+    for (std::size_t k = 0; k < second->events().size(); ++k)
+      CHECK(second->events()[k].time == first->events()[before + k].time);
+  }
+  whole->advance(2);
+  CHECK(whole->counts().events == 19);
+}
+
+TEST_CASE("event: a storm of events is bounded by its work") {
+  const std::string text =
+      "[scene]\nengine = \"event\"\nend = 90\ngravity = [0, 0, -9.81]\n[event]\nmax_events = 50\n" +
+      ball(1, 0.99);
+  const auto engine = make_engine(parse_scene(text, "test"));
+  CHECK_THROWS_AS(engine->advance(90), SimulationError);
+  CHECK(engine->counts().events == 51);
+}
+
+TEST_CASE("event: the plan names the engine, and what it does not have is refused by name") {
+  const Scene bounces = parse_scene("[scene]\ngravity = [0, 0, -9.81]\n" + ball(1, 0.5), "test");
+  CHECK(make_plan(bounces).engine == EngineKind::stepping);
+  CHECK(make_plan(bounces).no_event.empty());
+  const std::string boxes = R"(
+[[body]]
+name = "a"
+shape = "box"
+size = [1, 1, 1]
+fixed = true
+material = "m"
+[[body]]
+name = "b"
+shape = "box"
+size = [1, 1, 1]
+density = 1
+position = [0, 0, 2]
+material = "m"
+[[pair]]
+between = ["m", "m"]
+)";
+  const Scene stack = parse_scene(boxes, "test");
+  CHECK(make_plan(stack).engine == EngineKind::stepping);
+  CHECK(make_plan(stack).no_event.find("box with box") != std::string::npos);
+  CHECK_THROWS_AS(make_plan(parse_scene("[scene]\nengine = \"event\"\n" + boxes, "test")),
+                  std::invalid_argument);
 }

@@ -112,6 +112,13 @@ TEST_CASE("event: a tilted block rocks with a speed ratio of 0.85 (Housner)") {
     const auto engine = run(text, tolerance, 3);
     const auto impacts = of_kind(*engine, Kind::impact);
     REQUIRE(impacts.size() == 8);
+    engine->advance(5);
+    const auto rests = of_kind(*engine, Kind::rest);
+    REQUIRE(rests.size() == 1);
+    CHECK(std::abs(rests[0].time - 3.9400541204745794) < 10 * tolerance * 3.94);
+    CHECK(engine->events().back().kind == Kind::rest);
+    CHECK(engine->bodies()[1].velocity.norm() < tolerance);
+    CHECK(std::abs(engine->bodies()[1].position.z() - 0.6) < tolerance);
     for (std::size_t k = 0; k < 8; ++k) {
       CHECK(std::abs(impacts[k].time - times[k]) < 10 * tolerance);
       // A foot is 0.4 m from the one that the block turns about.

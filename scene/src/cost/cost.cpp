@@ -66,6 +66,13 @@ double distance(const Samples& a, const Samples& b) {
 /// The scene with one setting, and nothing written.
 Scene with_setting(const Scene& scene, bool smooth, double setting) {
   Scene out = scene;
+  if (make_plan(scene).engine == EngineKind::event) {
+    out.output = Output{};
+    out.output.every = out.end;
+    out.event = scene.event.value_or(EventOptions{});
+    out.event->tolerance = setting;
+    return out;
+  }
   out.output = Output{};
   out.output.every = out.end;  // records cost time
   if (smooth) {
@@ -87,7 +94,7 @@ std::vector<double> default_settings(const Scene& scene, bool smooth) {
 struct Reference {
   Samples samples;
   std::string what;
-  double error = 0;
+  double error = 0;  // what it may be off
   double drift = 0;  // how far it left the joints
 };
 
@@ -203,6 +210,23 @@ Reference stepping_reference(const Scene& scene, double step, int samples) {
   return out;
 }
 
+/// The event engine at a tight tolerance, and how far a looser one is from it.
+Reference event_reference(const Scene& scene, double tolerance, int samples) {
+  constexpr int kTries = 3;
+  for (int k = 0; k < kTries; ++k, tolerance *= 10) {
+    const Measured tight = measure_once(with_setting(scene, true, tolerance), samples);
+    const Measured loose = measure_once(with_setting(scene, true, 10 * tolerance), samples);
+    if (!tight.result.failure.empty() || !loose.result.failure.empty()) continue;
+    Reference out;
+    out.samples = tight.samples;
+    out.error = distance(tight.samples, loose.samples);
+    out.what = fmt::format("the scene's events at a tolerance of {:g}", tolerance);
+    return out;
+  }
+  throw std::runtime_error(
+      "no reference: the event engine does not get to the end; give --reference");
+}
+
 CostRow measure_row(const Scene& scene, double setting, int samples, const Reference& reference) {
   CostRow row;
   row.setting = setting;
@@ -240,7 +264,8 @@ const CostRow* CostTable::cheapest(double wanted) const {
 
 CostTable cost(const Scene& scene, const CostOptions& options) {
   CostTable table;
-  table.smooth = make_plan(scene).engine == EngineKind::smooth;
+  const EngineKind engine = make_plan(scene).engine;
+  table.smooth = engine != EngineKind::stepping;
   std::vector<double> settings =
       options.settings.empty() ? default_settings(scene, table.smooth) : options.settings;
   std::sort(settings.begin(), settings.end(), std::greater<>());
@@ -255,9 +280,11 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
 
   tell("reference");
   const Reference reference =
-      table.smooth ? smooth_reference(scene, options.reference.value_or(1e-12), options.samples)
-                   : stepping_reference(scene, options.reference.value_or(settings.back() / 4),
-                                        options.samples);
+      engine == EngineKind::event
+          ? event_reference(scene, options.reference.value_or(1e-11), options.samples)
+      : table.smooth ? smooth_reference(scene, options.reference.value_or(1e-12), options.samples)
+                     : stepping_reference(scene, options.reference.value_or(settings.back() / 4),
+                                          options.samples);
   table.reference = reference.what;
   table.reference_error = reference.error;
   for (const double setting : settings) {

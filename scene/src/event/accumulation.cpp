@@ -48,15 +48,20 @@ bool Driver::has_accumulated(int contact, double approach, double& rest) const {
   return true;
 }
 
-// The contacts that touch and move apart no faster than `speed` stay together: impulses in both
-// directions. Returns the energy that is lost.
+// The contacts that touch and move apart no faster than `speed` stay together, and those that slip
+// no faster stick: impulses in both directions. Returns the energy that is lost.
 double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
   ContactRows rows(model_, touching);
   const int block = rows.size();
   const VectorXd w = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
   std::vector<int> slow;
-  for (int k = 0; k < static_cast<int>(touching.size()); ++k)
-    if (std::abs(w[block * k]) <= speed) slow.push_back(block * k);
+  for (int k = 0; k < static_cast<int>(touching.size()); ++k) {
+    if (std::abs(w[block * k]) > speed) continue;
+    slow.push_back(block * k);
+    if (!(model_.law(touching[at(k)]).friction > 0)) continue;
+    for (int j = 1; j < block; ++j)
+      if (std::abs(w[block * k + j]) <= speed) slow.push_back(block * k + j);
+  }
   const int n = static_cast<int>(slow.size());
   MatrixXd A(n, n);
   VectorXd b(n), x = VectorXd::Zero(w.size());

@@ -28,6 +28,10 @@ bool is_device(const std::string& file) {
 
 }  // namespace
 
+std::string event_file(const std::string& csv) {
+  return fs::path(csv).replace_extension(".events.csv").string();
+}
+
 std::string film_file(const std::string& vtk) {
   return fs::path(vtk).replace_extension(".pvd").string();
 }
@@ -57,6 +61,7 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
     for (const char* each : with) take(what, file + each);
   };
   take_all("csv", o.csv, {".lock"});
+  if (!o.csv.empty() && !is_device(o.csv)) take("csv", event_file(o.csv));
   take_all("svg", o.svg, {".lock", ".new", ".gp"});
   take_all("state", o.state, {".lock", ".new"});
   if (o.vtk.empty()) return;

@@ -82,7 +82,7 @@ std::string draw(const std::string& file, const Scene& scene, const CostTable& t
 int run_cost(const Arguments& arguments) {
   const Scene scene = read_scene(arguments.file);
   const bool smooth = !arguments.tolerances.empty(), stepping = !arguments.steps.empty();
-  const bool has_tolerance = make_plan(scene).engine == EngineKind::smooth;
+  const bool has_tolerance = make_plan(scene).engine != EngineKind::stepping;
   if (has_tolerance ? stepping : smooth)
     throw std::invalid_argument(has_tolerance
                                     ? "the scene runs on the smooth engine: use --tolerances"

@@ -28,6 +28,9 @@ class Recorder {
 /// Each may throw std::runtime_error where the file cannot be written.
 std::unique_ptr<Recorder> make_csv_recorder(const Scene& scene, const std::string& file,
                                             double start_energy, const Resume& resume);
+/// `now`: the time of the engine.
+std::unique_ptr<Recorder> make_event_recorder(const Scene& scene, const std::string& file,
+                                              const Resume& resume, double now);
 std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::string& file,
                                             const Resume& resume);
 std::unique_ptr<Recorder> make_picture_recorder(const Scene& scene, const std::string& file,
