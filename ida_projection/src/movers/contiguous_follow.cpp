@@ -6,7 +6,7 @@ namespace tether::ida_projection {
 
 template <class Rows>
 Move ContiguousMover<Rows>::follow(const Candidate& candidate, bool again) {
-  load(candidate);
+  at_.load(candidate);
   if (!again) {
     set_metric(false);
     ++age_;
@@ -15,7 +15,7 @@ Move ContiguousMover<Rows>::follow(const Candidate& candidate, bool again) {
   return move_with_old_factors(
       wear_, [&] { return value(candidate.t); }, [&] { return solve(); },
       [&] { apply(1.0, candidate.correction_entries); }, [&] { return drift(); },
-      1e2 * kEpsilon * size_of_y(), options_.largest_move, kMayFollowLeave);
+      1e2 * kEpsilon * at_.size(), options_.largest_move, kMayFollowLeave);
 }
 
 template Move ContiguousMover<RowBlocks>::follow(const Candidate&, bool);

@@ -15,28 +15,18 @@ constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
 
 }  // namespace
 
-// y = base + correction.
-template <class Rows>
-void ContiguousMover<Rows>::load(const Candidate& candidate) {
-  const double* base = candidate.base_entries;
-  ycor_ = candidate.correction_entries;
-  w_ = candidate.weight_entries;
-  double* y = y_.data();
-  for (int i = 0; i < n_; ++i) y[i] = base[i] + ycor_[i];
-  WT_known_ = false;
-}
-
 template <class Rows>
 Status ContiguousMover<Rows>::structure(const Candidate& candidate, const double* id) {
   reusable_ = false;
-  const Status status = blocks_.structure(evaluator_, candidate.t, y_, WT(), options_.hold, id);
+  const Status status =
+      blocks_.structure(evaluator_, candidate.t, at_.y, at_.WT(), options_.hold, id);
   if (status != Status::success) message_ = blocks_.message;
   return status;
 }
 
 template <class Rows>
 Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector id) {
-  load(candidate);
+  at_.load(candidate);
   const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
   return structure(candidate, mask);
 }
@@ -44,13 +34,13 @@ Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector
 template <class Rows>
 Status ContiguousMover<Rows>::factor(double t) {
   // Only differences need to know how large a tolerance is.
-  const double* WT = evaluator_.uses_differences() ? this->WT().data() : nullptr;
-  Status status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
+  const double* WT = evaluator_.uses_differences() ? at_.WT().data() : nullptr;
+  Status status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT);
   if (status == Status::success && blocks_.outgrown()) {
     blocks_.rearrange();
     reusable_ = lasting_ = false;
     set_metric(true);
-    status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
+    status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT);
   }
   if (status != Status::success) {
     message_ = evaluator_.message();
@@ -129,8 +119,8 @@ template <class Rows>
 Status ContiguousMover<Rows>::learn_trust(double t, double length) {
   if constexpr (Rows::kThinRows) {
     if (!thin_) return Status::success;
-    const double* WT = evaluator_.uses_differences() ? this->WT().data() : nullptr;
-    const Status status = blocks_.learn_trust(evaluator_, t, y_.data(), WT, length);
+    const double* WT = evaluator_.uses_differences() ? at_.WT().data() : nullptr;
+    const Status status = blocks_.learn_trust(evaluator_, t, at_.y.data(), WT, length);
     if (status != Status::success) message_ = evaluator_.message();
     return status;
   }
@@ -141,7 +131,7 @@ template <class Rows>
 bool ContiguousMover<Rows>::contradicts() {
   if (!blocks_.dropped_rows()) return false;
   if (weighed_ && blocks_.left_of_dropped() <= kContradiction) return false;
-  if (!blocks_.contradict(WT())) return false;
+  if (!blocks_.contradict(at_.WT())) return false;
   message_ = blocks_.contradiction.message;
   contradicting_rows_ = blocks_.contradiction.rows;
   return true;
@@ -152,7 +142,7 @@ bool ContiguousMover<Rows>::contradicts() {
 template <class Rows>
 bool ContiguousMover<Rows>::rounding_only() const {
   for (int i = 0; i < m_; ++i) {
-    const double terms = blocks_.terms(i, y_.data());
+    const double terms = blocks_.terms(i, at_.y.data());
     if (!(std::abs(g_[static_cast<std::size_t>(i)]) <= 64.0 * kEpsilon * terms)) return false;
   }
   return true;
@@ -166,7 +156,7 @@ double ContiguousMover<Rows>::rounding_length() {
   const std::vector<double> g = g_;
   std::vector<double> rounding(g.size());
   for (int i = 0; i < m_; ++i)
-    rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks_.terms(i, y_.data());
+    rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks_.terms(i, at_.y.data());
   double total = 0.0;
   const auto add = [&](auto&& length) {
     total += length(solve());
@@ -196,7 +186,7 @@ double ContiguousMover<Rows>::rounding_length() {
 template <class Rows>
 Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   Move result;
-  load(candidate);
+  at_.load(candidate);
   if (!blocks_.structured() && (result.status = structure(candidate, nullptr)) != Status::success)
     return result;
   if ((result.status = value(candidate.t)) != Status::success) return result;
@@ -208,7 +198,7 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   if (rounding_only()) return result;
   firm_only_ = false;
   result.length = first_solve();
-  result.floor = 4.0 * kEpsilon * size_of_y();
+  result.floor = 4.0 * kEpsilon * at_.size();
   if (contradicts()) result.status = Status::inconsistent;
   return result;
 }
@@ -219,7 +209,7 @@ bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
   if (length <= options_.largest_move) return false;
   double sum = 0.0;
   for (int j : blocks_.d.columns) {
-    const double change = ycor_[j] * w_[j];
+    const double change = at_.ycor[j] * at_.w[j];
     sum += change * change;
   }
   limit = options_.largest_move * std::max(1.0, std::sqrt(sum * inverse_n_));
@@ -229,7 +219,7 @@ bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
 template <class Rows>
 Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
-  load(candidate);
+  at_.load(candidate);
   reused_ = may_reuse();
   ++age_;
   decided_ = false;
@@ -250,10 +240,8 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
 // Back to the correction before the move.
 template <class Rows>
 void ContiguousMover<Rows>::restart(const Candidate& candidate) {
-  for (std::size_t i = 0; i < y_.size(); ++i) {
-    candidate.correction_entries[i] = start_[i];
-    y_[i] = candidate.base_entries[i] + start_[i];
-  }
+  for (std::size_t i = 0; i < start_.size(); ++i) candidate.correction_entries[i] = start_[i];
+  at_.restart(candidate);
 }
 
 // Where rows are nearly parallel they magnify the rounding of g beyond any tolerance. Such a row
@@ -276,7 +264,7 @@ Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, co
   return failed;
 }
 
-// Newton's method from y_, with g_ known there.
+// Newton's method from at_.y, with g_ known there.
 template <class Rows>
 Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_before) {
   Move result;
@@ -354,7 +342,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
     // A first move longer than the largest floor need not know it.
     const double floor = result.moves == 1 && length > kLargestFloor
                              ? 0.0
-                             : std::min(kLargestFloor, 1e3 * kEpsilon * size_of_y());
+                             : std::min(kLargestFloor, 1e3 * kEpsilon * at_.size());
     Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
     // Almost parallel rows magnify rounding: a move that it explains has converged.
     if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
@@ -381,8 +369,6 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   return result;
 }
 
-template void ContiguousMover<RowBlocks>::load(const Candidate&);
-template void ContiguousMover<SparseRows>::load(const Candidate&);
 template double ContiguousMover<RowBlocks>::first_solve();
 template double ContiguousMover<SparseRows>::first_solve();
 template double ContiguousMover<RowBlocks>::rounding_length();

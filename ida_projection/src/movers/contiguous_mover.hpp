@@ -3,7 +3,7 @@
 //
 // Notation as in ida_projection/README.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w
 // the error weights, s the size of the corrector's changes. The move itself is in
-// contiguous_mover.cpp, its metric in contiguous_metric.cpp, what follows the polish in
+// contiguous_mover.cpp, its metric in local_metric.hpp, what follows the polish in
 // contiguous_settle.cpp; here stands what they share.
 #pragma once
 
@@ -12,6 +12,8 @@
 #include <limits>
 
 #include "movers/factor_wear.hpp"
+#include "movers/loaded_candidate.hpp"
+#include "movers/local_metric.hpp"
 #include "movers/mover.hpp"
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
@@ -41,13 +43,11 @@ class ContiguousMover final : public Mover {
         inverse_n_(1.0 / size),
         keeps_factors_(Rows::keeps_factors(m_)),
         keeps_rank_(Rows::keeps_rank(m_)),
-        blocks_(constraints, evaluator_, size) {
+        blocks_(constraints, evaluator_, size),
+        at_(size),
+        metric_(options, size) {
     const auto n = static_cast<std::size_t>(n_);
     const auto m = static_cast<std::size_t>(m_);
-    scale_.assign(n, 0.0);
-    trial_scale_.assign(n, 0.0);
-    y_.assign(n, 0.0);
-    WT_.assign(n, 0.0);
     g_.assign(m, 0.0);
     start_.assign(n, 0.0);
   }
@@ -60,12 +60,11 @@ class ContiguousMover final : public Mover {
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
   Status settle(const Candidate& candidate, N_Vector change) override;
   double remaining_drift(const Candidate& candidate) override {
-    for (int i = 0; i < n_; ++i)
-      y_[static_cast<std::size_t>(i)] = candidate.base_entries[i] + candidate.correction_entries[i];
+    at_.restart(candidate);
     return value(candidate.t) == Status::success ? drift() : -1.0;
   }
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
-  void accept() override { std::swap(scale_, trial_scale_); }
+  void accept() override { metric_.accept(); }
   bool fatal() const override { return evaluator_.fatal(); }
   void forget_failure() override { evaluator_.forget(); }
   Status finish(const Candidate& candidate) override {
@@ -77,23 +76,23 @@ class ContiguousMover final : public Mover {
   }
   void reset() override {
     reusable_ = false;
-    std::fill(scale_.begin(), scale_.end(), 0.0);
-    std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
+    metric_.reset();
     monitor_.reset();
     if constexpr (Rows::kThinRows) blocks_.trust.reset();
-    staleness_ = -1.0;
-    measured_ = 0.0;
+    staleness_.reset();
     usual_ = 0.0;
-    settles_ = 0;
     wear_ = FactorWear();
   }
 
  private:
   using Block = typename Rows::Block;
 
-  void load(const Candidate& candidate);
-  const std::vector<double>& WT();
-  void set_metric(bool for_factors);
+  void set_metric(bool for_factors) {
+    if (for_factors)
+      metric_.fill(at_, blocks_.d, blocks_.a);
+    else
+      metric_.look(at_);
+  }
   bool keeps_factors() const { return keeps_factors_ && lasting_; }
   bool may_reuse() const { return keeps_factors() && reusable_; }
   double left_of_dropped();
@@ -101,7 +100,6 @@ class ContiguousMover final : public Mover {
   Status take_back(const Candidate& candidate);
   Status take_rest(const Candidate& candidate, double reach);
   double rate() const { return slope_ * age_; }
-  void set_group_metric();
   Status structure(const Candidate& candidate, const double* id);
   Status value(double t);
   Status factor(double t);
@@ -119,7 +117,6 @@ class ContiguousMover final : public Mover {
   double rounding_length();
   void apply(double factor, double* correction);
   double drift() const;
-  double size_of_y() const;
 
   const Options& options_;
   Statistics& statistics_;
@@ -137,38 +134,23 @@ class ContiguousMover final : public Mover {
   bool firm_only_ = false;     // this attempt does without them
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;
-  std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
-  std::vector<double> y_, WT_, g_;
-  std::vector<double> group_sum_;
-  std::vector<int> group_members_;
-  const double* w_ = nullptr;
+  LoadedCandidate at_;
+  LocalMetric metric_;
+  std::vector<double> g_;
   double move_length_ = 0.0;  // of the last first move, in tolerances
-  double staleness_ = -1.0;   // of factors, for each tolerance of distance; < 0: not measured
-  double measured_ = 0.0;     // longest distance at which it was looked for
-  double usual_ = 0.0;        // left_of_dropped() after the moves, with decided_
-  bool weighed_ = false;      // the blocks know what a tolerance is for their dropped rows
-  long settles_ = 0;
+  Staleness staleness_;
+  double usual_ = 0.0;     // left_of_dropped() after the moves, with decided_
+  bool weighed_ = false;   // the blocks know what a tolerance is for their dropped rows
   bool reusable_ = false;  // factors of an earlier step are there
   bool reused_ = false;    // and are in use for this one
   double slope_ = 0.0;     // they leave slope_ * age_ of a move
   int age_ = 0;            // candidates since they were made
   FactorWear wear_;        // for follow()
-  const double* ycor_ = nullptr;
-  bool WT_known_ = false;
 };
-
-// WT = 1/w. A weight of zero means that the error of this component does not count at all.
-template <class Rows>
-const std::vector<double>& ContiguousMover<Rows>::WT() {
-  if (!WT_known_)
-    for (std::size_t i = 0; i < WT_.size(); ++i) WT_[i] = w_[i] > 0.0 ? 1.0 / w_[i] : 0.0;
-  WT_known_ = true;
-  return WT_;
-}
 
 template <class Rows>
 Status ContiguousMover<Rows>::value(double t) {
-  const Status status = evaluator_.value(t, y_.data(), n_, g_.data());
+  const Status status = evaluator_.value(t, at_.y.data(), n_, g_.data());
   if (status != Status::success) message_ = evaluator_.message();
   return status;
 }
@@ -182,7 +164,7 @@ double ContiguousMover<Rows>::solve() {
   const Block& counted = blocks_.d.rows.empty() ? blocks_.a : blocks_.d;
   double sum = 0.0;
   const double* dy = counted.dy.data();
-  counted.for_columns([&sum, dy, w = w_](int k, int i) {
+  counted.for_columns([&sum, dy, w = at_.w](int k, int i) {
     const double move = dy[k] * w[i];
     sum += move * move;
   });
@@ -194,7 +176,7 @@ double ContiguousMover<Rows>::solve() {
 template <class Rows>
 double ContiguousMover<Rows>::left_of_dropped() {
   if (!blocks_.dropped_rows()) return 0.0;
-  if (!weighed_) blocks_.weigh_dropped(WT());
+  if (!weighed_) blocks_.weigh_dropped(at_.WT());
   weighed_ = true;
   const double left = blocks_.left_of_dropped();
   if (decided_) usual_ = left;
@@ -207,14 +189,14 @@ template <class Rows>
 bool ContiguousMover<Rows>::dropped_follow() {
   const double left = left_of_dropped();
   if (decided_ || left <= std::max(kSafe * options_.tolerance, 2.0 * usual_)) return true;
-  return left <= 1e2 * kEpsilon * size_of_y();
+  return left <= 1e2 * kEpsilon * at_.size();
 }
 
 template <class Rows>
 void ContiguousMover<Rows>::apply(double factor, double* correction) {
   for (const Block* block : {&blocks_.d, &blocks_.a}) {
     if (block->rows.empty()) continue;
-    double* __restrict y = y_.data();
+    double* __restrict y = at_.y.data();
     double* __restrict ycor = correction;
     const double* __restrict dy = block->dy.data();
     block->for_columns([=](int k, int i) {
@@ -231,14 +213,6 @@ double ContiguousMover<Rows>::drift() const {
   for (int i = 0; i < reported_; ++i)
     largest = std::max(largest, std::abs(g_[static_cast<std::size_t>(i)]));
   return largest;
-}
-
-// WRMS |y| in tolerances.
-template <class Rows>
-double ContiguousMover<Rows>::size_of_y() const {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < y_.size(); ++i) sum += (y_[i] * w_[i]) * (y_[i] * w_[i]);
-  return std::sqrt(sum * inverse_n_);
 }
 
 }  // namespace tether::ida_projection

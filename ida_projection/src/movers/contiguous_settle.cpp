@@ -6,7 +6,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr long kMeasureEvery = 64;
 // Where a move costs little beside the factors so much of Options::tolerance is left.
 constexpr double kCheapRest = 1e-4;
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
@@ -18,19 +17,17 @@ constexpr double kWorn = 0.06, kSlow = 0.1;
 template <class Rows>
 Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
-  for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += e[i];
+  for (std::size_t i = 0; i < at_.y.size(); ++i) at_.y[i] += e[i];
   if (keeps_factors()) return take_back(candidate);
   double sum = 0.0;
-  for (int j : blocks_.d.columns) sum += (e[j] * w_[j]) * (e[j] * w_[j]);
+  for (int j : blocks_.d.columns) sum += (e[j] * at_.w[j]) * (e[j] * at_.w[j]);
   return take_rest(candidate, move_length_ + std::sqrt(sum * inverse_n_));
 }
 
 // With factors that belong to a point `reach` tolerances away.
 template <class Rows>
 Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach) {
-  // Each move leaves about staleness_ reach of itself.
-  const bool measure =
-      staleness_ < 0.0 || reach > 4.0 * measured_ || ++settles_ % kMeasureEvery == 0;
+  const bool measure = staleness_.due(reach);
   const double enough = (keeps_rank_ ? kCheapRest : 1.0) * options_.tolerance;
   double previous = 0.0;
   for (int k = 0; k < options_.maximum_iterations; ++k) {
@@ -44,16 +41,13 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
       length = first_solve();
     }
     apply(1.0, candidate.correction_entries);
-    const double floor = 1e2 * kEpsilon * size_of_y();
+    const double floor = 1e2 * kEpsilon * at_.size();
     const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
-    if (k > 0) {
-      measured_ = std::max(measured_, reach);
-      staleness_ = std::max({staleness_, 0.0, rounding ? 0.0 : length / (reach * previous)});
-    }
+    if (k > 0) staleness_.measured(reach, previous, rounding ? 0.0 : length);
     if (rounding) break;
     // Where moves are cheap only what is seen on this candidate counts.
     const double expected = keeps_rank_ ? length * (k > 0 ? length / previous : kUnknownSlope)
-                                        : 4.0 * staleness_ * reach * length;
+                                        : staleness_.left(reach, length);
     if ((k > 0 || keeps_rank_ || !measure) && expected <= enough) break;
     previous = length;
   }
@@ -66,7 +60,7 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
 // others. Where too much is left, also of dropped rows, or a move is long, factors are made anew.
 template <class Rows>
 Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
-  const double floor = 1e2 * kEpsilon * size_of_y();
+  const double floor = 1e2 * kEpsilon * at_.size();
   double previous = -1.0;  // length of the move before, by the same factors
   for (int k = 0; k <= options_.maximum_iterations; ++k) {
     Status status = value(candidate.t);

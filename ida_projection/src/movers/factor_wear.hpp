@@ -1,6 +1,8 @@
 // Tether: moves with factors of an earlier step. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+
 #include "movers/mover.hpp"
 
 namespace tether::ida_projection {
@@ -42,6 +44,31 @@ class FactorWear {
   double slope_ = -1.0;  // < 0: not known yet
   int age_ = 0, looked_age_ = 0, unlooked_ = 0;
   bool doubted_ = false;
+};
+
+/// Factors that belong to a point `reach` tolerances away leave the part staleness * reach of a
+/// move. What was measured only ever makes it larger.
+class Staleness {
+ public:
+  void reset() { *this = Staleness(); }
+  /// Is it time to measure it by a second move?
+  bool due(double reach) {
+    return staleness_ < 0.0 || reach > 4.0 * measured_ || ++settles_ % kMeasureEvery == 0;
+  }
+  /// A second move, after a first one of length `move`, was `left` long.
+  void measured(double reach, double move, double left) {
+    measured_ = std::max(measured_, reach);
+    staleness_ = std::max({staleness_, 0.0, left / (reach * move)});
+  }
+  /// What a move of this length leaves.
+  double left(double reach, double length) const { return 4.0 * staleness_ * reach * length; }
+
+ private:
+  static constexpr long kMeasureEvery = 64;
+
+  double staleness_ = -1.0;  // for each tolerance of distance; < 0: not measured
+  double measured_ = 0.0;    // longest distance at which it was looked for
+  long settles_ = 0;
 };
 
 constexpr double kMayFollowLeave = 0.02;  // tolerances

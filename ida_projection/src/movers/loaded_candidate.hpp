@@ -1,0 +1,53 @@
+// Tether: a candidate on contiguous vectors, as a mover changes it. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "host/candidate.hpp"
+
+namespace tether::ida_projection {
+
+/// y = base + correction, and what a tolerance is.
+class LoadedCandidate {
+ public:
+  explicit LoadedCandidate(int size)
+      : y(static_cast<std::size_t>(size), 0.0), WT_(static_cast<std::size_t>(size), 0.0) {}
+
+  void load(const Candidate& candidate) {
+    ycor = candidate.correction_entries;
+    w = candidate.weight_entries;
+    WT_known_ = false;
+    restart(candidate);
+  }
+  /// y for the correction as it is now.
+  void restart(const Candidate& candidate) {
+    const double* base = candidate.base_entries;
+    const int n = static_cast<int>(y.size());
+    double* to = y.data();
+    for (int i = 0; i < n; ++i) to[i] = base[i] + candidate.correction_entries[i];
+  }
+  /// 1/w. A weight of zero means that the error of this component does not count at all.
+  const std::vector<double>& WT() {
+    if (!WT_known_)
+      for (std::size_t i = 0; i < WT_.size(); ++i) WT_[i] = w[i] > 0.0 ? 1.0 / w[i] : 0.0;
+    WT_known_ = true;
+    return WT_;
+  }
+  /// WRMS |y| in tolerances.
+  double size() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < y.size(); ++i) sum += (y[i] * w[i]) * (y[i] * w[i]);
+    return std::sqrt(sum * (1.0 / static_cast<double>(y.size())));
+  }
+
+  std::vector<double> y;
+  const double *w = nullptr, *ycor = nullptr;  ///< error weights; the corrector's change
+
+ private:
+  std::vector<double> WT_;
+  bool WT_known_ = false;
+};
+
+}  // namespace tether::ida_projection

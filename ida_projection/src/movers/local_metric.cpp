@@ -1,0 +1,87 @@
+// Tether: the metric of the move, on contiguous vectors. SPDX-License-Identifier: BSD-3-Clause
+#include "movers/local_metric.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rows/row_blocks.hpp"
+#include "rows/sparse_rows.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr double kMetricFloor = 1e-3;  // D_i >= kMetricFloor WT_i
+constexpr double kMetricDecay = 0.8;   // per accepted step
+
+}  // namespace
+
+void LocalMetric::reset() {
+  std::fill(scale_.begin(), scale_.end(), 0.0);
+  std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
+}
+
+// s <- max(0.8 s, |correction|)
+void LocalMetric::look(const LoadedCandidate& at) {
+  for (std::size_t i = 0; i < scale_.size(); ++i)
+    trial_scale_[i] = std::max(kMetricDecay * scale_[i], std::abs(at.ycor[i]));
+}
+
+template <class Block>
+void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
+  const bool local = options_.metric == Metric::local_correction;
+  for (Block* block : {&d, &a}) {
+    if (block->rows.empty()) continue;
+    double* __restrict D = block->D();
+    double* __restrict trial = trial_scale_.data();
+    const double* __restrict scale = scale_.data();
+    const double* __restrict w = at.w;
+    const double* __restrict ycor = at.ycor;
+    block->for_columns([=](int k, int i) {
+      const double s = std::max(kMetricDecay * scale[i], std::abs(ycor[i]));
+      trial[i] = s;
+      // WT = 0 (unweighted): such a component moves freely by what the corrector moved it.
+      const double weighted = 1.0 / (w[i] > 0.0 ? w[i] : 1.0);
+      const double weight = w[i] > 0.0 ? weighted : s;
+      D[k] = local ? std::max(s, kMetricFloor * weight) : weight;
+    });
+  }
+  if (!local || options_.group.empty()) return;
+  find_group_scales(at);
+  const std::vector<double>& WT = at.WT();
+  for (Block* block : {&d, &a}) {
+    double* D = block->D();
+    for (std::size_t c = 0; c < block->columns.size(); ++c) {
+      const auto i = static_cast<std::size_t>(block->columns[c]);
+      if (options_.group[i] < 0) continue;
+      D[c] = std::max(trial_scale_[i], kMetricFloor * (WT[i] > 0.0 ? WT[i] : trial_scale_[i]));
+    }
+  }
+}
+
+// One scale for each group: rms of |correction| in tolerances over its members.
+void LocalMetric::find_group_scales(LoadedCandidate& at) {
+  const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());
+  std::vector<double>& sum = group_sum_;  // no allocation after the first step
+  std::vector<int>& members = group_members_;
+  sum.assign(static_cast<std::size_t>(groups), 0.0);
+  members.assign(static_cast<std::size_t>(groups), 0);
+  for (std::size_t i = 0; i < scale_.size(); ++i) {
+    if (options_.group[i] < 0) continue;
+    const auto k = static_cast<std::size_t>(options_.group[i]);
+    const double s = std::max(kMetricDecay * scale_[i], std::abs(at.ycor[i]));
+    sum[k] += s * at.w[i] * s * at.w[i];
+    ++members[k];
+  }
+  const std::vector<double>& WT = at.WT();
+  for (std::size_t i = 0; i < scale_.size(); ++i) {
+    if (options_.group[i] < 0) continue;
+    const auto k = static_cast<std::size_t>(options_.group[i]);
+    trial_scale_[i] = WT[i] * std::sqrt(sum[k] / members[k]);
+  }
+}
+
+template void LocalMetric::fill(LoadedCandidate&, RowBlocks::Block&, RowBlocks::Block&);
+template void LocalMetric::fill(LoadedCandidate&, SparseRows::Block&, SparseRows::Block&);
+
+}  // namespace tether::ida_projection

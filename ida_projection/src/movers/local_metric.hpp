@@ -1,0 +1,37 @@
+// Tether: the metric of the move, on contiguous vectors. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/ida_projection/options.hpp>
+#include <utility>
+#include <vector>
+
+#include "movers/loaded_candidate.hpp"
+
+namespace tether::ida_projection {
+
+/// s, the size of the corrector's changes, and D made of it (README, section 3).
+class LocalMetric {
+ public:
+  LocalMetric(const Options& options, int size)
+      : options_(options),
+        scale_(static_cast<std::size_t>(size), 0.0),
+        trial_scale_(static_cast<std::size_t>(size), 0.0) {}
+
+  /// s with the present candidate, for accept(). Factors that are used again keep their D.
+  void look(const LoadedCandidate& at);
+  /// The same, and D of both blocks of rows: s or, where the error weights are asked for, WT.
+  template <class Block>
+  void fill(LoadedCandidate& at, Block& d, Block& a);
+  void accept() { std::swap(scale_, trial_scale_); }
+  void reset();
+
+ private:
+  void find_group_scales(LoadedCandidate& at);
+
+  const Options& options_;
+  std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
+  std::vector<double> group_sum_;
+  std::vector<int> group_members_;
+};
+
+}  // namespace tether::ida_projection
