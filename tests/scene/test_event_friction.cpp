@@ -194,3 +194,52 @@ TEST_CASE("event: forced vibration with friction keeps Den Hartog's amplitude") 
     CHECK(std::abs(engine->bodies()[1].position.x() - c.amplitude) < 10 * tolerance * 3);
   }
 }
+
+TEST_CASE("event: a ball rolls off a fixed ball, slips, then leaves it") {
+  const std::string text =
+      "[[body]]\nname = \"dome\"\nshape = \"sphere\"\nradius = 0.9\n"
+      "fixed = true\nmaterial = \"floor\"\n[[body]]\nname = \"ball\"\n"
+      "shape = \"sphere\"\nradius = 0.1\nmass = 1\nmaterial = \"body\"\n"
+      "position = [" +
+      number(std::sin(0.1)) + ", 0, " + number(std::cos(0.1)) + "]\n" + mu(0.5);
+  for (const double tolerance : kLadder) {
+    CAPTURE(tolerance);
+    const auto engine = run(text, tolerance, 1.2);
+    REQUIRE(engine->events().size() == 2);
+    CHECK(engine->events()[0].kind == Kind::slip);
+    CHECK(std::abs(engine->events()[0].time - 1.0177298331203609) < 10 * tolerance);
+    CHECK(engine->events()[1].kind == Kind::lift);
+    CHECK(std::abs(engine->events()[1].time - 1.0177298331203609 - 0.0895027866758545634) <
+          10 * tolerance);
+    CHECK(std::abs(engine->bodies()[1].angular_velocity.y() - 21.1227628130083677) <
+          10 * tolerance * 21);
+  }
+}
+
+TEST_CASE("event: sliding without forces ends by an impact without collision (Painleve)") {
+  // m = l = 1, 60 deg, slip -2: x = (0.649519052838, 0.875), and half of 0.875 * 2 is lost.
+  const auto text = [](double friction, double speed) {
+    const double angle = M_PI / 3;
+    return kFloor + "[[body]]\nname = \"rod\"\nshape = \"points\"\npoints = [[-0.5, 0, 0]]\n" +
+           "mass = 1\ninertia = [0.01, " + number(1.0 / 12) + ", " + number(1.0 / 12) +
+           "]\nmaterial = \"body\"\nposition = [" + number(0.5 * std::cos(angle)) + ", 0, " +
+           number(0.5 * std::sin(angle)) +
+           "]\norientation = { axis = [0, 1, 0], rad = " + number(-angle) + " }\nvelocity = [" +
+           number(speed) + ", 0, 0]\n" + mu(friction);
+  };
+  for (const double tolerance : kLadder) {
+    CAPTURE(tolerance);
+    const auto engine = run(text(1.5, -2), tolerance, 1e-9);
+    REQUIRE(engine->events().size() == 1);
+    CHECK(engine->events()[0].kind == Kind::jam);
+    CHECK(engine->events()[0].time == 0);
+    CHECK(std::abs(engine->events()[0].lost - 0.875) < 1e-9);
+    const Vector3d v = engine->bodies()[1].velocity;
+    CHECK(std::abs(v.x() - (-2 + 0.875)) < 1e-8);
+    CHECK(std::abs(v.z() - 0.649519052838) < 1e-8);
+  }
+  // The critical friction is 1.34715..; in the other direction nothing jams.
+  CHECK(of_kind(*run(text(1.34, -2), 1e-8, 0.001), Kind::jam).empty());
+  CHECK(of_kind(*run(text(1.36, -2), 1e-8, 0.001), Kind::jam).size() == 1);
+  CHECK(of_kind(*run(text(1.5, 2), 1e-8, 0.1), Kind::jam).empty());
+}

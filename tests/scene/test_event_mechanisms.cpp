@@ -164,3 +164,65 @@ TEST_CASE("event: the woodpecker's first events and states (Glocker)") {
     CHECK(driver.counts().phases.residuals < 5000);
   }
 }
+
+TEST_CASE("event: the woodpecker to 0.2 s takes less than 4000 residuals for an error of 1e-8") {
+  using namespace tether::scene::event;
+  woodpecker::Woodpecker model, exact_model;
+  DriverOptions options;
+  options.tolerance = 3e-9;
+  Driver driver(model, options, 0, woodpecker::Woodpecker::start());
+  options.tolerance = 1e-12;
+  Driver exact(exact_model, options, 0, woodpecker::Woodpecker::start());
+  driver.advance(0.2);
+  exact.advance(0.2);
+  const Eigen::Vector3d off = (driver.state() - exact.state()).head(3);
+  CHECK(off.cwiseQuotient(Eigen::Vector3d(0.01, 0.2, 0.2)).cwiseAbs().maxCoeff() < 1e-8);
+  CHECK(driver.counts().phases.residuals < 4000);
+  // Its limit cycle: two impacts of the beak are .14597606 s apart.
+  options.tolerance = 1e-6;
+  Driver cycle(model, options, 0, woodpecker::Woodpecker::start());
+  cycle.advance(8);
+  std::vector<double> beak;
+  for (const EventRecord& each : cycle.events())
+    if (each.kind == EventKind::impact && each.contact == 0) beak.push_back(each.time);
+  REQUIRE(beak.size() > 50);
+  CHECK(std::abs(beak.back() - beak[beak.size() - 2] - .14597606) < 1e-6);
+}
+
+TEST_CASE("event: a parallelogram of redundant joints hits a stop, each joint once or ten times") {
+  const double angle = M_PI / 3, s = std::sin(angle), c = std::cos(angle);
+  const auto text = [&](int copies) {
+    std::string t =
+        "[[body]]\nname = \"stop\"\nshape = \"plane\"\nnormal = [1, 0, 0]\n"
+        "position = [1, 0, 0]\nfixed = true\nmaterial = \"floor\"\n"
+        "[[body]]\nname = \"coupler\"\nshape = \"points\"\npoints = [[0, 0, 0]]\n"
+        "mass = 2\ninertia = [1, 1, 1]\nmaterial = \"body\"\nposition = [" +
+        number(1 + s) + ", 0, " + number(-c) + "]\n";
+    for (int k = 0; k < 3; ++k) {
+      const std::string crank = "crank " + std::to_string(k);
+      t += "[[body]]\nname = \"" + crank + "\"\nmass = 1\ninertia = [" + number(1.0 / 12) + ", " +
+           number(1.0 / 12) + ", 0.01]\nposition = [" + number(k + s / 2) + ", 0, " +
+           number(-c / 2) + "]\norientation = { axis = [0, 1, 0], rad = " + number(-angle) + " }\n";
+      for (int i = 0; i < copies; ++i)
+        t += "[[joint]]\nkind = \"hinge\"\nbodies = [\"" + crank + "\", \"world\"]\nat = [" +
+             number(k) + ", 0, 0]\naxis = [0, 1, 0]\n[[joint]]\nkind = \"hinge\"\nbodies = [\"" +
+             crank + "\", \"coupler\"]\nat = [" + number(k + s) + ", 0, " + number(-c) +
+             "]\naxis = [0, 1, 0]\n";
+    }
+    return t + pair("restitution = 0.5");
+  };
+  for (const double tolerance : kLadder)
+    for (const int copies : {1, 10}) {
+      if (copies == 10 && tolerance != 1e-8) continue;
+      CAPTURE(tolerance, copies);
+      const auto engine = run(text(copies), tolerance, 0.6);
+      REQUIRE(engine->events().size() == 1);
+      const ContactEvent& impact = engine->events()[0];
+      CHECK(std::abs(impact.time - .4982936597222794) < 10 * tolerance);
+      CHECK(std::abs(impact.before + 3.383045964807454) < 10 * tolerance);
+      CHECK(std::abs(impact.after - 3.383045964807454 / 2) < 10 * tolerance);
+      CHECK(std::abs(impact.lost - 0.75 * 1.5 * 3.383045964807454 * 3.383045964807454) <
+            100 * tolerance);
+      CHECK(engine->diagnostics().drift < tolerance);
+    }
+}

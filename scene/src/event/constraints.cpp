@@ -25,8 +25,8 @@ void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
   gather();
   rates = R_ * u_;
   if (joints_ > 0) {
-    positions.head(joints_) = joint_g_;
-    rates.head(joints_) += joint_rate_;
+    positions.head(joints_) = joint_g_.head(joints_);
+    rates.head(joints_) += joint_rate_.head(joints_);
   }
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k];

@@ -78,6 +78,7 @@ class Driver {
   void remember(int contact, double approach);
   std::vector<ContactMode> decide(const std::vector<int>& touching, int left_contact,
                                   std::optional<Watch> left);
+  void jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu);
   std::vector<int> touching(int always) const;
   double longest_first_step(const std::vector<bool>& leaving);
   void turn_slips();
@@ -99,6 +100,7 @@ class Driver {
   double lost_ = 0, first_energy_ = 0;
   DriverCounts counts_;
   long at_one_time_ = 0;
+  bool jammed_ = false;  // at this event
 };
 
 /// All that a phase depends on. IDA's history is not in it: a phase is repeated from its start.

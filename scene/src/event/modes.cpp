@@ -14,6 +14,7 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kFarAbove = 1e5;
+constexpr double kLeastApproach = 1e-12;  // of the slip
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -60,6 +61,14 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   ++counts_.contact_problems;
   const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
   if (!answer.solved) fail("the forces of closed contacts are not solved");
+  for (int k = 0; k < n && !jammed_; ++k)
+    if (slides[at(k)].size() > 0 && answer.regimes[at(k)] == contact::Regime::sticking &&
+        velocities.segment(block * k + 1, block - 1).norm() > bands_.speed) {
+      jam(rows, velocities, mu);
+      jammed_ = true;
+      return decide(this->touching(-1), -1, {});
+    }
+  jammed_ = false;
   for (int k = 0; k < n; ++k) {
     const int i = candidates[at(k)];
     ContactMode& mode = modes[at(i)];
@@ -83,6 +92,32 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     if (same && mu[k] > 0) mode.mode = Mode::stick;
   }
   return modes;
+}
+
+// Forces without bound stop the slip in no time: the impulses that keep the contacts from closing
+// at the least speed of approach.
+void Driver::jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu) {
+  const int block = rows.size();
+  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
+  VectorXd b = -velocities;
+  for (int k = 0; k < mu.size(); ++k)
+    b[block * k] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
+  ++counts_.contact_problems;
+  const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
+  if (!answer.solved) fail("an impact without collision is not solved");
+  const double energy = model_.energy();
+  y_.segment(motion_.coordinates(), motion_.velocities()) = u + rows.change(answer.x);
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  const double lost = energy - model_.energy();
+  lost_ += lost;
+  bool first = true;
+  for (int k = 0; k < mu.size(); ++k) {
+    if (answer.x[block * k] <= 0) continue;
+    record(EventKind::jam, rows.contacts()[at(k)], velocities[block * k],
+           rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()))[block * k],
+           first ? lost : 0);
+    first = false;
+  }
 }
 
 }  // namespace tether::scene::event

@@ -11,7 +11,38 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kRank = 1e-10;  // of rows of unit length
+constexpr double kIndependent = 1e-6;
 constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
+
+/// Rows that the earlier ones do not imply, in the metric of the masses; Gram and Schmidt, twice.
+class IndependentRows {
+ public:
+  IndependentRows(const Model& model, int velocities, int rows)
+      : model_(model),
+        basis_(velocities, std::min(velocities, rows)),
+        dual_(velocities, std::min(velocities, rows)) {}
+  int rank() const { return rank_; }
+
+  /// Whether the row, of length 1, adds to those before it.
+  bool add(VectorXd v) {
+    if (rank_ == basis_.cols()) return false;
+    for (int pass = 0; pass < 2; ++pass)
+      v -= basis_.leftCols(rank_) * (dual_.leftCols(rank_).transpose() * v);
+    MatrixXd w = v;
+    model_.divide_by_mass(w);
+    const double length = std::sqrt(std::max(0.0, v.dot(w.col(0))));
+    if (length < kIndependent) return false;
+    basis_.col(rank_) = v / length;
+    dual_.col(rank_) = w.col(0) / length;
+    ++rank_;
+    return true;
+  }
+
+ private:
+  const Model& model_;
+  MatrixXd basis_, dual_;
+  int rank_ = 0;
+};
 
 }  // namespace
 
@@ -21,8 +52,7 @@ Motion::Motion(Model& model, double speed)
       nq_(model.coordinates()),
       nu_(model.velocities()),
       tangents_(model.tangents()),
-      modes_(index(model.contacts())),
-      joints_(model.joint_rows()) {
+      modes_(index(model.contacts())) {
   u_.setZero(nu_);
   a_.setZero(nu_);
 }
@@ -43,6 +73,8 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
     if (modes_[index(i)].mode != Mode::open) closed_.push_back(i);
   looks_.resize(closed_.size());
   row_of_.resize(closed_.size());
+  set(t, y.data());
+  choose_joints();
   rows_ = joints_;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     row_of_[k] = rows_;
@@ -55,7 +87,6 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   C_.setZero(nu_, rows_);
   r_.setZero(rows_);
   lambda_.setZero(rows_);
-  set(t, y.data());
   gather();
   const int rank = choose_rows();
   VectorXd y_rate(size());
@@ -64,13 +95,44 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   keeps_energy_ = rank < nu_ && a_.norm() + u_.norm() > kStill;
 }
 
+// Redundant hinges, or ten copies of one, need no forces of their own.
+void Motion::choose_joints() {
+  joints_ = 0;
+  joints_in_use_.clear();
+  if (model_.joint_rows() == 0) return;
+  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  IndependentRows independent(model_, nu_, model_.joint_rows());
+  MatrixXd w(nu_, 1);
+  for (int i = 0; i < model_.joint_rows(); ++i) {
+    w.col(0) = joint_W_.row(i).transpose();
+    model_.divide_by_mass(w);
+    const double square = joint_W_.row(i).dot(w.col(0));
+    if (square > 0 && independent.add(joint_W_.row(i).transpose() / std::sqrt(square)))
+      joints_in_use_.push_back(i);
+  }
+  joints_ = static_cast<int>(joints_in_use_.size());
+}
+
+// Those in use, first.
+void Motion::look_at_joints() {
+  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  for (int k = 0; k < joints_; ++k) {
+    const int from = joints_in_use_[index(k)];
+    if (from == k) continue;
+    joint_g_[k] = joint_g_[from];
+    joint_W_.row(k) = joint_W_.row(from);
+    joint_rate_[k] = joint_rate_[from];
+    joint_rest_[k] = joint_rest_[from];
+  }
+}
+
 // Rows, columns and what is left of the second derivatives, at the state that is set.
 void Motion::gather() {
   if (joints_ > 0) {
-    model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
-    R_.topRows(joints_) = joint_W_;
-    C_.leftCols(joints_) = joint_W_.transpose();
-    r_.head(joints_) = joint_rest_;
+    look_at_joints();
+    R_.topRows(joints_) = joint_W_.topRows(joints_);
+    C_.leftCols(joints_) = joint_W_.topRows(joints_).transpose();
+    r_.head(joints_) = joint_rest_.head(joints_);
   }
   smallest_slip_ = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < closed_.size(); ++k) {
@@ -119,27 +181,17 @@ int Motion::choose_rows() {
   for (std::size_t k = 0; k < closed_.size(); ++k)
     if (modes_[index(closed_[k])].mode == Mode::stick)
       for (int j = 1; j <= tangents_; ++j) order.push_back(row_of_[k] + j);
-  // Gram and Schmidt in the metric of the masses, twice.
-  MatrixXd basis(nu_, rows_), dual(nu_, rows_);
-  int rank = 0, rank_of_joints = 0;
+  IndependentRows independent(model_, nu_, rows_);
+  int rank_of_joints = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
     const int row = order[k];
-    VectorXd v = row_scale_[row] * R_.row(row).transpose();
-    for (int pass = 0; pass < 2; ++pass)
-      v -= basis.leftCols(rank) * (dual.leftCols(rank).transpose() * v);
-    MatrixXd w = v;
-    model_.divide_by_mass(w);
-    const double length = std::sqrt(std::max(0.0, v.dot(w.col(0))));
-    if (length < 1e-6) continue;
-    basis.col(rank) = v / length;
-    dual.col(rank) = w.col(0) / length;
-    ++rank;
+    if (!independent.add(row_scale_[row] * R_.row(row).transpose())) continue;
     if (row < joints_) ++rank_of_joints;
     if (k < positions) positions_in_use_.push_back(row);
     rates_in_use_.push_back(row);
   }
-  hyperstatic_ = rank - rank_of_joints < rows_ - joints_;
-  return rank;
+  hyperstatic_ = independent.rank() - rank_of_joints < rows_ - joints_;
+  return independent.rank();
 }
 
 void Motion::rate(double t, const double* y, double* y_rate) {

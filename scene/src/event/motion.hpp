@@ -82,6 +82,8 @@ class Motion {
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
   int choose_rows();
+  void choose_joints();
+  void look_at_joints();
 
   Model& model_;
   double speed_;
@@ -90,6 +92,7 @@ class Motion {
   std::vector<int> closed_, row_of_;
   std::vector<ContactLook> looks_;  // of the closed ones
   int rows_ = 0, joints_ = 0;
+  std::vector<int> joints_in_use_;
   std::vector<int> positions_in_use_, rates_in_use_;  // rows of the projection
   bool hyperstatic_ = false;
   double kept_energy_ = 0;
