@@ -10,7 +10,11 @@ void Stepper::Implementation::step() {
   status = Status::solved;
   succeeded = true;
   residual = deepest = 0;
-  advance(static_cast<double>(counts.steps) * options.step, options.step, options.max_halvings);
+  const double start = static_cast<double>(counts.steps) * options.step;
+  if (options.accuracy > 0)
+    advance_accurately(start, options.step);
+  else
+    advance(start, options.step, options.max_halvings);
   ++counts.steps;
 }
 
@@ -54,12 +58,11 @@ bool Stepper::Implementation::shortest() const {
   return options.max_halvings > 0 && (!may_halve || impact);
 }
 
-void Stepper::Implementation::remember_judgement() {
-  before_problem = {status, succeeded, residual, counts.bounces, counts.accepted, counts.unsolved};
+Stepper::Implementation::Judgement Stepper::Implementation::judged() const {
+  return {status, succeeded, residual, counts.bounces, counts.accepted, counts.unsolved};
 }
 
-void Stepper::Implementation::forget_problem() {
-  const Judgement& b = before_problem;
+void Stepper::Implementation::set_judged(const Judgement& b) {
   status = b.status;
   succeeded = b.succeeded;
   residual = b.residual;

@@ -14,6 +14,7 @@ void check(const SteppingOptions& o) {
     if (!holds) throw std::invalid_argument(std::string("stepping: ") + what);
   };
   demand(o.step > 0 && std::isfinite(o.step), "step must be > 0 and finite");
+  demand(o.accuracy >= 0 && o.accuracy <= 0.1, "accuracy must lie in 0 .. 0.1");
   demand(!o.gravity || o.gravity->allFinite(), "gravity must be finite");
   demand(o.tolerance > 0, "tolerance must be > 0");
   demand(o.error_reduction >= 0 && o.error_reduction <= 1, "error_reduction must lie in 0 .. 1");

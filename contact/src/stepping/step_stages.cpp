@@ -79,7 +79,7 @@ void Stepper::Implementation::find_contacts() {
   if (joints) leave_out_joined();
   set_gaps();
   free_motion = bodies.motion;
-  remember_judgement();
+  before_problem = judged();
 }
 
 void Stepper::Implementation::set_gaps() {
@@ -100,7 +100,7 @@ void Stepper::Implementation::meet_others() {
     if (contacts.points.size() == before) return;
     bodies.motion = free_motion;
     solver->take_back();
-    forget_problem();
+    set_judged(before_problem);
     set_gaps();
     choose_impacts();
     if (restitution) choose_bounces();

@@ -1,10 +1,12 @@
 // Tether: impulse-velocity steps. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "stepping/collide.hpp"
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
@@ -37,6 +39,20 @@ void Stepper::Implementation::give_joints() {
   later->set_joints(*joints, o);
 }
 
+// Of bodies, m: the reach of their surfaces, or the radius of gyration.
+static std::vector<double> sizes(const BodySet& bodies, const std::vector<Surface>& surfaces) {
+  std::vector<double> out(bodies.mass.size(), 0);
+  for (const Surface& each : surfaces) {
+    const auto i = static_cast<std::size_t>(each.body);
+    if (i < out.size() && each.shape.kind != ShapeKind::plane)
+      out[i] = std::max(out[i], each.shape.position.norm() + detail::reach(each.shape));
+  }
+  for (std::size_t i = 0; i < out.size(); ++i)
+    if (out[i] == 0 && bodies.mass[i] > 0)
+      out[i] = std::sqrt(bodies.inertia[i].trace() / (2 * bodies.mass[i]));
+  return out;
+}
+
 Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
                  const SteppingOptions& options, std::unique_ptr<PairCollision> polyhedra)
     : implementation_(std::make_unique<Implementation>()) {
@@ -44,6 +60,7 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
   Implementation& s = *implementation_;
   s.bodies = std::move(bodies);
   s.options = options;
+  if (options.accuracy > 0) s.radius = sizes(s.bodies, surfaces);
   if (!meetings.empty() && !surfaces.empty()) {
     s.near = std::make_unique<detail::NearContacts>(s.bodies, std::move(surfaces),
                                                     std::move(meetings), options.law,
@@ -116,6 +133,7 @@ StepperMemory Stepper::memory() const {
   m.penetration = s.deepest;
   m.residual = s.residual;
   m.status = s.status;
+  m.control = s.control;
   return m;
 }
 
@@ -138,11 +156,13 @@ void Stepper::set_memory(const StepperMemory& m) {
   s.deepest = m.penetration;
   s.residual = m.residual;
   s.status = m.status;
+  s.control = m.control;
 }
 
 void Stepper::start_anew(long steps) {
   Implementation& s = *implementation_;
   s.counts.steps = steps;
+  s.control = {};
   s.free_spin.assign(s.free_spin.size(), {});
   s.turn_inertias();
   if (s.near) s.make_solvers();  // nothing of the past is left

@@ -1,6 +1,8 @@
 // Tether: what a step consists of. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <tether/contact/stepping.hpp>
 #include <vector>
@@ -22,6 +24,14 @@ namespace detail {
 /// moves bodies by velocities of its end, an error of half of what it changes them by, while one
 /// contact is off by so much in a problem that is not solved.
 constexpr double kGood = 1e-4, kUseful = 1e-2;
+
+/// Bodies, at the start of a part of a step or at its end.
+struct PartState {
+  std::vector<Eigen::Vector3d> position;
+  std::vector<linalg::Quaternion> orientation;
+  std::vector<RigidBody> motion;
+  std::vector<FreeSpin> spin;
+};
 
 /// Throws std::invalid_argument.
 void check(const SteppingOptions& o);
@@ -93,6 +103,17 @@ struct Stepper::Implementation {
   std::vector<PointContact> deep_points;
   bool closes = false, corrects = false;
 
+  // Only with an accuracy.
+  struct Active {
+    std::uint64_t id;
+    int what;              // 1: sticks, 2: slips, 3: an impact
+    Eigen::Vector3d slip;  // impulse against it
+  };
+  StepperMemory::Control control;
+  std::vector<double> radius;  // of bodies
+  detail::PartState part_before, part_whole;
+  std::array<std::vector<Active>, 3> active;
+
   StepCounts counts;
 
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -108,9 +129,24 @@ struct Stepper::Implementation {
   bool run_stages(double time);
   void solve_problem();
   bool shortest() const;
+  void remember_part(detail::PartState& p) const;
+  void restore_part(const detail::PartState& p);
+  void advance_part(double time, double length);
+  struct Moment {
+    double when, early;  // s
+  };
+  Moment moment(const detail::Impact& i, double length) const;
+  void list_active(double length, std::vector<Active>& list) const;
+  static bool same(const std::vector<Active>& a, const std::vector<Active>& b);
+  double first_impact(double length, double& at_once) const;
+  double part_error(const detail::PartState& whole, double length, bool smooth) const;
+  void extrapolate(const detail::PartState& whole);
+  double take_part(double time, double length, bool shortened, double shortest);
+  void advance_accurately(double start, double length);
+
   void judge();
-  void remember_judgement();
-  void forget_problem();
+  Judgement judged() const;
+  void set_judged(const Judgement& b);
 
   void remember_velocities() { impacts->remember(bodies); }
   void begin_joints() { joints->begin(bodies, part_start); }

@@ -60,6 +60,8 @@ void read_engine(Fields& root, Reader& r) {
   Fields in = r.fields(stepping, "stepping");
   SteppingOptions o;
   o.step = in.number("step", o.step, kPositive, "s");
+  o.accuracy = in.number("accuracy", o.accuracy, {0, 0.1, false, "a number from 0 to 0.1"},
+                         "of the size of each body; 0: none, steps are taken whole");
   o.law = in.word("law", o.law);
   o.tolerance = in.number("tolerance", o.tolerance, kPositivePart, "relative residual");
   o.gyroscopic = in.word("gyroscopic", o.gyroscopic);

@@ -96,6 +96,7 @@ void write_smooth(const SmoothOptions& o, Writer& out) {
 void write_stepping(const SteppingOptions& o, Writer& out) {
   out.table("stepping");
   out.field("step", o.step, "s");
+  out.field("accuracy", o.accuracy, "of the size of each body; 0: steps are taken whole");
   out.raw("law", toml_word(o.law));
   out.field("tolerance", o.tolerance);
   out.raw("gyroscopic", toml_word(o.gyroscopic));

@@ -95,6 +95,12 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   return stepping ? EngineKind::stepping : EngineKind::smooth;
 }
 
+// How steps are taken, after why there are any.
+std::string with_accuracy(const Scene& scene) {
+  const double accuracy = scene.stepping.value_or(SteppingOptions{}).accuracy;
+  return accuracy > 0 ? fmt::format("; steps in parts within an accuracy of {:g}", accuracy) : "";
+}
+
 }  // namespace
 
 int joint_rows(const Joint& joint) { return joints::row_count(joint); }
@@ -102,6 +108,7 @@ int joint_rows(const Joint& joint) { return joints::row_count(joint); }
 Plan make_plan(const Scene& scene) {
   Plan plan;
   plan.engine = choose(scene, plan.why, plan.no_event);
+  if (plan.engine == EngineKind::stepping) plan.why += with_accuracy(scene);
   for (const effects::Effect* each : effects::all()) each->plan(scene, plan.engine, plan.effects);
   for (const Body& body : scene.bodies) {
     ++plan.bodies;

@@ -56,8 +56,8 @@ std::uint64_t fingerprint(const Scene& scene, double step) {
 }
 
 // The last letter is the format, see MemoryFormat.
-constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '3'};
-constexpr char kWithClosings = '2';
+constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '4'};
+constexpr char kWithClosings = '2', kWithoutControl = '3';
 
 }  // namespace
 
@@ -206,10 +206,10 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
   if (!in.read(magic, sizeof magic) || std::memcmp(magic, kMagic, sizeof magic - 1) != 0)
     throw std::runtime_error("this is no saved state of the stepping engine");
   const char format = magic[sizeof magic - 1];
-  if (format != kMagic[sizeof magic - 1] && format != kWithClosings)
+  if (format != kMagic[sizeof magic - 1] && format != kWithClosings && format != kWithoutControl)
     throw std::runtime_error(
         std::string("the saved state has format ") + format +
-        ", and this version reads 2 and 3: read it with the version that wrote it");
+        ", and this version reads 2 to 4: read it with the version that wrote it");
   const bool same = binary::get<std::uint64_t>(in) == fingerprint_;
   if (binary::get<std::uint64_t>(in) != bodies_.size() || (!same && how == Restore::exact))
     throw std::runtime_error("the saved state is of another scene or another step");
@@ -223,7 +223,9 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
   }
   const contact::StepperMemory memory =
       get_memory(in, static_cast<int>(bodies_.size()),
-                 format == kWithClosings ? MemoryFormat::with_closings : MemoryFormat::now);
+                 format == kWithClosings     ? MemoryFormat::with_closings
+                 : format == kWithoutControl ? MemoryFormat::without_control
+                                             : MemoryFormat::now);
   if (!(std::abs(time) <= kMostSteps * stepper_.options().step))
     throw std::runtime_error("the saved state is damaged: it has no time");
   contact::BodySet& b = stepper_.bodies();

@@ -82,7 +82,12 @@ struct Meeting {
 using Force = std::function<void(BodySet& bodies, double time, double dt)>;
 
 struct SteppingOptions {
-  double step = 1e-3;                      ///< dt, s
+  double step = 1e-3;  ///< dt, s
+  /// > 0: each step is taken in parts whose error is at most this, of positions relative to the
+  /// size of each body (reach of its surfaces, or radius of gyration), of rotations in rad, and of
+  /// smooth velocities by what they move a body in the part; at most 0.1. See README, section 13.
+  /// 0: in one.
+  double accuracy = 0;
   std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: not evaluated
   Law law = Law::coulomb;
   /// Of the contact problem; see BodyOptions::tolerance.
@@ -140,6 +145,8 @@ struct StepCounts {
   long steps = 0, contact_problems = 0, sweeps = 0, assembled_islands = 0, bounces = 0;
   long accepted = 0;  ///< problems above the tolerance that were accepted
   long halved = 0;    ///< steps, or parts of steps, that were taken in two halves
+  long parts = 0;     ///< with an accuracy: parts that steps were taken in
+  long rejected = 0;  ///< and parts that were not accurate enough, or had an impact on the way
   long unsolved = 0;  ///< problems that were used though above what is accepted
 };
 
@@ -157,6 +164,11 @@ struct StepperMemory {
   StepContacts last;                         ///< contacts of the last step, and what became of it:
   double penetration = 0, residual = 0;
   Status status = Status::solved;
+  /// With an accuracy: length of the next part, s (0: not chosen), length and error (1: the
+  /// accuracy) of the last one, length that the impulses are of.
+  struct Control {
+    double next = 0, last = 0, error = 0, length = 0;
+  } control;
 };
 
 struct StageCost {

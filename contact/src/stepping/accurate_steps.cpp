@@ -1,0 +1,232 @@
+// Tether: steps in parts that keep an accuracy. SPDX-License-Identifier: BSD-3-Clause
+//
+// README, section 13. Each part is taken whole and in two halves. Where contacts do the same in all
+// three, 2 halves - whole is of order 2 (Deuflhard's extrapolation of the Euler step); else the
+// halves are kept. Lengths by H211b (Soederlind, Digital filters in adaptive time-stepping, 2003).
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stepping/stepper_parts.hpp"
+
+namespace tether::contact {
+
+using detail::PartState;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kSafety = 0.8;      // of the wanted accuracy
+constexpr double kShortest = 1e-9;   // of a step: parts that are accepted as they are
+constexpr double kAtOnce = 0.1;      // of the accuracy: what an impact may come too early
+constexpr int kManyImpacts = 1000;   // in a step: from then on they end it in as many parts at most
+constexpr double kSlips = 1 - 1e-6;  // of the cone
+
+Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaternion& to) {
+  linalg::Quaternion d = to * from.conjugate();
+  if (d.w() < 0) d.coeffs() = -d.coeffs();
+  const double sine = d.vec().norm();
+  return sine > 0 ? Vector3d(2 * std::atan2(sine, d.w()) / sine * d.vec())
+                  : Vector3d(Vector3d::Zero());
+}
+
+}  // namespace
+
+void Stepper::Implementation::remember_part(PartState& p) const {
+  p.position = bodies.position;
+  p.orientation = bodies.orientation;
+  p.motion = bodies.motion;
+  p.spin = free_spin;
+}
+
+void Stepper::Implementation::restore_part(const PartState& p) {
+  bodies.position = p.position;
+  bodies.orientation = p.orientation;
+  bodies.motion = p.motion;
+  free_spin = p.spin;
+}
+
+// With impulses of the last part as far as they go with its length.
+void Stepper::Implementation::advance_part(double time, double length) {
+  if (solver && control.length > 0)
+    solver->scale_warm_start(std::min(2.0, length / control.length));
+  control.length = length;
+  advance(time, length, options.max_halvings);
+}
+
+// What contacts have done in the part just taken.
+void Stepper::Implementation::list_active(double length, std::vector<Active>& list) const {
+  list.clear();
+  if (!near) return;
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = contacts.points[k];
+    const Vector3d& x = contacts.impulses[k];
+    if (x.isZero(0)) continue;
+    const double normal = c.normal.dot(x);
+    const Vector3d tangent = x - normal * c.normal;
+    const bool slips = c.mu > 0 && !(tangent.norm() < kSlips * c.mu * normal);
+    list.push_back({c.id, slips ? 2 : 1, slips ? tangent : Vector3d::Zero()});
+  }
+  for (const detail::Impact& i : impacts->list())
+    if (moment(i, length).early < length)
+      list.push_back({contacts.points[at(i.contact)].id, 3, Vector3d::Zero()});
+  std::sort(list.begin(), list.end(), [](const Active& a, const Active& b) {
+    return a.id != b.id ? a.id < b.id : a.what < b.what;
+  });
+}
+
+bool Stepper::Implementation::same(const std::vector<Active>& a, const std::vector<Active>& b) {
+  return a.size() == b.size() &&
+         std::equal(a.begin(), a.end(), b.begin(), [](const Active& p, const Active& q) {
+           return p.id == q.id && p.what == q.what &&
+                  (p.what != 2 || p.slip.isZero(0) || p.slip.dot(q.slip) > 0);
+         });
+}
+
+// After a part of this length: when within it an impact happens, and how much too early it may be
+// taken, by the speed that it takes. Forces add a t to the approach: gap = came t + a t^2, as a part
+// that ends there sees it.
+Stepper::Implementation::Moment Stepper::Implementation::moment(const detail::Impact& i,
+                                                                double length) const {
+  const PointContact& c = contacts.points[at(i.contact)];
+  const double gap = std::max(0.0, contacts.gaps[at(i.contact)]);
+  const double a = (i.comes - i.came) / length;
+  const double speed = std::sqrt(std::max(0.0, i.came * i.came + 4 * a * gap));
+  return {gap > 0 ? 2 * gap / (i.came + speed) : 0,
+          kAtOnce * options.accuracy * near->size(c) / std::max(speed, 1e-300)};
+}
+
+// Of those that matter. 0: now, within what the accuracy allows. Infinite: there is none.
+double Stepper::Implementation::first_impact(double length, double& at_once) const {
+  double first = std::numeric_limits<double>::infinity();
+  if (!near) return first;
+  for (const detail::Impact& i : impacts->list()) {
+    const Moment m = moment(i, length);
+    if (!(m.early < length)) continue;  // whenever in this part
+    at_once = std::min(at_once, m.early);
+    first = std::min(first, m.when > m.early ? (1 - 1e-3) * m.when : 0);
+  }
+  return first;
+}
+
+// Of the halves, in the bodies, from the whole part; 1: the accuracy. Relative to the size of each
+// body; velocities, where they are smooth, by what they move it in the part.
+double Stepper::Implementation::part_error(const PartState& whole, double length,
+                                           bool smooth) const {
+  double most = 0;
+  for (const int k : moving) {
+    const std::size_t i = at(k);
+    const double R = radius[i];
+    most = std::max({most, (bodies.position[i] - whole.position[i]).norm() / R,
+                     rotation_between(whole.orientation[i], bodies.orientation[i]).norm()});
+    if (!smooth) continue;
+    const RigidBody &now = bodies.motion[i], &was = whole.motion[i];
+    most = std::max({most, length * (now.velocity - was.velocity).norm() / R,
+                     length * (now.angular_velocity - was.angular_velocity).norm()});
+  }
+  return most / (kSafety * options.accuracy);
+}
+
+// 2 halves - whole. A body that no moment acts on keeps its momentum exactly, and its halves.
+void Stepper::Implementation::extrapolate(const PartState& whole) {
+  for (const int k : moving) {
+    const std::size_t i = at(k);
+    bodies.position[i] += bodies.position[i] - whole.position[i];
+    bodies.motion[i].velocity += bodies.motion[i].velocity - whole.motion[i].velocity;
+  }
+  const auto turn = [&](int k) {
+    const std::size_t i = at(k);
+    const Vector3d more = rotation_between(whole.orientation[i], bodies.orientation[i]);
+    if (!more.isZero(0))
+      bodies.orientation[i] = (detail::exponential(more) * bodies.orientation[i]).normalized();
+    Vector3d& w = bodies.motion[i].angular_velocity;
+    w += w - whole.motion[i].angular_velocity;
+  };
+  std::size_t next = 0;
+  for (const int k : moving) {
+    if (next < free_spin.size() && free_long[next] == k && !free_spin.empty()) {
+      const std::size_t s = next++;
+      if (free_spin[s].L == whole.spin[s].L) continue;
+    }
+    turn(k);
+  }
+  turn_inertias();
+}
+
+// One part, of at most this length. Returns the length that was taken.
+double Stepper::Implementation::take_part(double time, double length, bool shortened,
+                                          double shortest) {
+  const Judgement before = judged();
+  const double deep = deepest;
+  remember_part(part_before);
+  const auto back = [&] {
+    restore_part(part_before);
+    set_judged(before);
+    deepest = deep;
+  };
+  bool cut = shortened;
+  for (;;) {
+    advance_part(time, length);
+    if (!(length > shortest)) break;
+    double at_once = length;
+    const double impact = first_impact(length, at_once);
+    if (impact < length) {
+      back();
+      ++counts.rejected;
+      cut = true;
+      const bool now = !(impact > 0);
+      length = std::max(now ? std::min(at_once, length) : impact, shortest);
+      if (!now) continue;
+      advance_part(time, length);
+      break;
+    }
+    list_active(length, active[0]);
+    remember_part(part_whole);
+    back();
+    advance_part(time, length / 2);
+    list_active(length / 2, active[1]);
+    advance_part(time + length / 2, length / 2);
+    list_active(length / 2, active[2]);
+    const bool smooth = same(active[0], active[1]) && same(active[1], active[2]);
+    const double error = std::max(part_error(part_whole, length, smooth), 1e-4);
+    if (error > 1) {
+      back();
+      ++counts.rejected;
+      length = std::max(length * std::clamp(0.9 / (smooth ? std::sqrt(error) : error), 0.1, 0.7),
+                        shortest);
+      cut = false;
+      control.last = 0;
+      continue;
+    }
+    if (smooth) {
+      extrapolate(part_whole);
+      if (joints) joints->begin(bodies, time + length);
+    }
+    double factor = std::pow(error, -0.125);
+    factor *= control.last > 0
+                  ? std::pow(control.error, -0.125) * std::pow(length / control.last, -0.25)
+                  : factor;
+    const double next = length * std::clamp(factor, 0.3, 2.0);
+    control.next = cut ? std::max(control.next, next) : next;
+    control.last = length;
+    control.error = error;
+    break;
+  }
+  ++counts.parts;
+  return length;
+}
+
+void Stepper::Implementation::advance_accurately(double start, double length) {
+  double done = 0, shortest = kShortest * length;
+  for (int parts = 0; done < length; ++parts) {
+    if (parts == kManyImpacts) shortest = length / kManyImpacts;
+    const double left = length - done;
+    double part = control.next > 0 ? control.next : left;
+    const bool shortened = part > 0.5 * left;
+    if (shortened) part = part < left ? left / 2 : left;
+    const double taken = take_part(start + done, part, shortened, std::min(shortest, left));
+    done = taken < left ? done + taken : length;
+  }
+}
+
+}  // namespace tether::contact
