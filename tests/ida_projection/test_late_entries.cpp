@@ -3,6 +3,8 @@
 #include <cmath>
 #include <problems/rows.hpp>
 
+#include <problems/pendulum.hpp>
+
 #include "host.hpp"
 #include "support/catch.hpp"
 
@@ -179,4 +181,45 @@ TEST_CASE("products that vanish at the start: project() and make_consistent() th
       CHECK(std::abs(host.data()[1] - 1.0) < 1e-9);
     }
   }
+}
+
+TEST_CASE("a row that all but lacks an algebraic variable is solved for the others") {
+  // Position row + c d + e d^2, d = lam - (v^2 - y): zero on the set, and so is its slope where c
+  // is.
+  for (const auto& [c, e] : {std::make_pair(0.0, 1e-6), {1e-9, 0.0}, {1e-12, 1e-3}})
+    for (const char* form : {"index 1", "index 2", "GGL"})
+      for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+        INFO(form << ", tolerance " << tolerance << ", c = " << c << ", e = " << e);
+        const Problem problem = tether::problems::pendulum(1.0, 1.0, 10.0, form);
+        const int n = problem.size;
+        const tp::Constraints usual = problem.select({"position", "velocity"});
+        const auto defect = [](tp::ConstVector y) {
+          return y[4] - y[2] * y[2] - y[3] * y[3] + y[1];
+        };
+        tp::Constraints set;
+        set.count = usual.total_count();
+        set.value = [=, c = c, e = e](double t, tp::ConstVector y, tp::Vector g) {
+          g = value(usual, t, y.data(), n);
+          g[0] += c * defect(y) + e * defect(y) * defect(y);
+        };
+        set.jacobian =
+            tp::DenseJacobian([=, c = c, e = e](double t, tp::ConstVector y, tp::Matrix C) {
+              C = jacobian(usual, t, y.data(), n);
+              const double slope = c + 2.0 * e * defect(y);
+              C(0, 1) += slope;
+              C(0, 2) -= 2.0 * slope * y[2];
+              C(0, 3) -= 2.0 * slope * y[3];
+              C(0, 4) += slope;
+            });
+        const Run without = integrate(problem, tolerance, usual, {}, false);
+        for (const bool sparse : {false, true}) {
+          const Run run =
+              integrate(problem, tolerance, sparse ? as_sparse(set, n) : set, {}, false);
+          INFO((sparse ? "sparse: " : "dense: ") << run.message);
+          REQUIRE(run.flag >= 0);
+          CHECK(run.error <= 3.0 * without.error + tolerance);
+          CHECK(static_cast<double>(run.steps) <= 1.1 * static_cast<double>(without.steps));
+          CHECK(run.statistics.failures() == 0);
+        }
+      }
 }

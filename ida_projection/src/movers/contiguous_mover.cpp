@@ -33,8 +33,8 @@ Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector
 
 template <class Rows>
 Status ContiguousMover<Rows>::factor(double t) {
-  // Only differences need to know how large a tolerance is.
-  const double* WT = evaluator_.uses_differences() ? at_.WT().data() : nullptr;
+  // Only differences and mixed rows need to know how large a tolerance is.
+  const double* WT = evaluator_.uses_differences() || blocks_.mixed() ? at_.WT().data() : nullptr;
   Status status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT);
   if (status == Status::success && blocks_.outgrown()) {
     blocks_.rearrange();

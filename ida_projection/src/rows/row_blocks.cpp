@@ -136,10 +136,14 @@ void RowBlocks::watch() {
       }
 }
 
-// Where a row's algebraic part vanishes, it is one for the differential columns.
-bool RowBlocks::loses_algebraic_part(int i) const {
-  return std::all_of(columns_.begin(), columns_.end(),
-                     [&](int j) { return !is_algebraic(j) || row(i)[j] == 0.0; });
+bool RowBlocks::loses_algebraic_part(int i, const double* WT) const {
+  double part[2] = {0.0, 0.0};  // algebraic, differential
+  for (int j : columns_) {
+    const double entry = row(i)[j] * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
+    part[is_algebraic(j) ? 0 : 1] += entry * entry;
+  }
+  return ida_projection::loses_algebraic_part(part[0], part[1],
+                                              without_[static_cast<std::size_t>(i)] != 0);
 }
 
 Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
@@ -147,7 +151,7 @@ Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, cons
   if (status != Status::success || !structured_) return status;
   for (int i : mixed_) {
     char& without = without_[static_cast<std::size_t>(i)];
-    const char now = loses_algebraic_part(i) ? 1 : 0;
+    const char now = loses_algebraic_part(i, WT) ? 1 : 0;
     outgrown_ |= now != without;
     without = now;
   }

@@ -124,6 +124,15 @@ double left_of_dropped(const BlockOf<Solver>& block) {
   return largest;
 }
 
+/// Is a row one for the differential variables although it contains algebraic ones? Where their
+/// part (in tolerances, squared) is nothing beside the rest, solving for them would divide by
+/// nothing; what it leaves is then as small. `already`: it was so before.
+inline bool loses_algebraic_part(double algebraic, double differential, bool already) {
+  constexpr double kLost = 1e-3, kBack = 1e-2;
+  const double share = already ? kBack : kLost;
+  return algebraic <= share * share * differential;
+}
+
 /// When to look again which entries of C differences have to visit, that is, which ones g can fill
 /// by now: at the C evaluations number 16, 32, 64, ..., and with the next one after a failure.
 class LookAgain {
@@ -169,8 +178,10 @@ class RowBlocks {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
+  /// Do rows contain variables of both kinds?
+  bool mixed() const { return !mixed_.empty(); }
 
-  /// C at y; WT: only differences need it. The text of a failure is the evaluator's.
+  /// C at y; WT: only differences and mixed rows need it. The text of a failure is the evaluator's.
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
   /// Has evaluate() met an entry that structure() took for zero and that belongs to another block
   /// or to none? Then rearrange(), fill D and evaluate again.
@@ -226,7 +237,7 @@ class RowBlocks {
   }
   void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
   void watch();
-  bool loses_algebraic_part(int i) const;
+  bool loses_algebraic_part(int i, const double* WT) const;
 
   const Constraints& constraints_;
   int m_, n_;
@@ -238,7 +249,8 @@ class RowBlocks {
   std::vector<char> held_;            // of each column
   std::vector<double> id_;            // empty: none algebraic
   std::vector<std::size_t> watched_;  // entries of C that would change the blocks, zero so far
-  // Rows whose algebraic part can be filled: of these the ones where it is zero at present.
+  // Rows whose algebraic part can be filled: of these the ones where it is next to nothing at
+  // present.
   std::vector<int> mixed_;
   std::vector<char> without_;  // of each row
   LookAgain look_;

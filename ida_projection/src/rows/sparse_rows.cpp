@@ -185,11 +185,14 @@ void SparseRows::watch() {
   }
 }
 
-// Where a row's algebraic part vanishes, it is one for the differential columns.
-bool SparseRows::loses_algebraic_part(int i) const {
-  bool lost = true;
-  visit(i, [&](int j, double c) { lost = lost && (c == 0.0 || !is_algebraic(j) || held_[at(j)]); });
-  return lost;
+bool SparseRows::loses_algebraic_part(int i, const double* WT) const {
+  double part[2] = {0.0, 0.0};  // algebraic, differential
+  visit(i, [&](int j, double c) {
+    if (held_[at(j)]) return;
+    const double entry = c * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
+    part[is_algebraic(j) ? 0 : 1] += entry * entry;
+  });
+  return ida_projection::loses_algebraic_part(part[0], part[1], without_[at(i)] != 0);
 }
 
 void SparseRows::set_up(Block& block, std::vector<int>* gather) {
@@ -221,7 +224,7 @@ Status SparseRows::evaluate(Evaluator& evaluator, double t, const double* y, con
       evaluator.jacobian(t, y, n_, WT, columns_, entries_.data(), full_rows_.data());
   if (status != Status::success || !structured_) return status;
   for (int i : mixed_) {
-    const char now = loses_algebraic_part(i) ? 1 : 0;
+    const char now = loses_algebraic_part(i, WT) ? 1 : 0;
     outgrown_ |= now != without_[at(i)];
     without_[at(i)] = now;
   }

@@ -27,6 +27,7 @@ class SparseRows {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
+  bool mixed() const { return !mixed_.empty(); }
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
   bool outgrown() const { return outgrown_; }
   void rearrange();
@@ -71,7 +72,7 @@ class SparseRows {
   void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
   void split();
   void watch();
-  bool loses_algebraic_part(int i) const;
+  bool loses_algebraic_part(int i, const double* WT) const;
   bool is_algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
   void set_up(Block& block, std::vector<int>* gather);
   void load(Block& block, const std::vector<int>& gather);
