@@ -23,6 +23,10 @@ Solution Solver::solve(const Problem&, const linalg::VectorView&) { absent("asse
 Problem delassus(const std::vector<Body>&, const std::vector<BodyContact>&) {
   absent("assembled islands");
 }
+Residuals evaluate(const std::vector<RigidBody>&, const std::vector<PointContact>&, Law,
+                   const std::vector<Eigen::Vector3d>&) {
+  absent("assembled islands");
+}
 
 namespace detail {
 using S = const BodyArrays&;
