@@ -226,3 +226,41 @@ TEST_CASE("event: a parallelogram of redundant joints hits a stop, each joint on
       CHECK(engine->diagnostics().drift < tolerance);
     }
 }
+
+TEST_CASE("event: a box on four corners stands, slides, stops and is pulled loose") {
+  const auto box = [](const std::string& velocity, double friction) {
+    return kFloor + "[[body]]\nname = \"box\"\nshape = \"box\"\nsize = [1, 0.8, 0.5]\nmass = 2\n" +
+           "material = \"body\"\nposition = [0, 0, 0.25]\nvelocity = " + velocity + "\n" +
+           pair("friction = " + number(friction));
+  };
+  const std::string slope = "[4.905, 0, " + number(-9.81 * std::cos(M_PI / 6)) + "]";
+  for (const double tolerance : kLadder) {
+    CAPTURE(tolerance);
+    // On 30 deg it stands from mu = tan(30 deg) on: no split of the forces among the corners
+    // decides.
+    const auto stands = run(box("[0, 0, 0]", 0.58), tolerance, 2, slope);
+    CHECK(stands->events().empty());
+    CHECK(stands->bodies()[1].velocity.norm() < tolerance);
+    const auto slides = run(box("[0, 0, 0]", 0.5), tolerance, 2, slope);
+    const double a = 4.905 - 0.5 * 9.81 * std::cos(M_PI / 6);
+    CHECK(std::abs(slides->bodies()[1].position.x() - 2 * a) < 10 * tolerance);
+    const auto stops = run(box("[1, 0, 0]", 0.3), tolerance, 1);
+    REQUIRE(stops->events().size() == 1);
+    CHECK(stops->events()[0].kind == Kind::stop);
+    CHECK(std::abs(stops->events()[0].time - 1 / (0.3 * 9.81)) < 10 * tolerance);
+    CHECK(std::abs(stops->bodies()[1].position.x() - 0.5 / (0.3 * 9.81)) < 10 * tolerance);
+    // A spring of 4 N/m whose end moves at 1 m/s, low enough not to tip it: slip at mu m g / k.
+    const auto pulled = run(
+        box("[0, 0, 0]", 0.3) +
+            "[[body]]\nname = \"hook\"\nmass = 1\ninertia = [1, 1, 1]\nposition = [3, 0, 0.25]\n"
+            "velocity = [1, 0, 0]\n[[joint]]\nkind = \"slider\"\nbodies = [\"hook\", \"world\"]\n"
+            "axis = [1, 0, 0]\nmotion = { rate = 1 }\n[[spring]]\nbodies = [\"box\", \"hook\"]\n"
+            "at = [[0, 0, 0.25], [3, 0, 0.25]]\nstiffness = 4\n",
+        tolerance, 1.6);
+    REQUIRE(pulled->events().size() == 4);  // a line for each corner
+    for (const ContactEvent& each : pulled->events()) {
+      CHECK(each.kind == Kind::slip);
+      CHECK(std::abs(each.time - 0.3 * 2 * 9.81 / 4) < 10 * tolerance);
+    }
+  }
+}

@@ -250,9 +250,10 @@ void Driver::handle(const Zero& zero) {
   model_.settle();
   const bool closing = zero.what == Watch::gap;
   const std::vector<int> close = touching(zero.contact);
+  const std::vector<ContactMode> modes_before = motion_.modes();
   if (closing)
     collide(close, EventKind::touch, zero.contact);
-  else
+  else if (zero.what != Watch::support)
     record(zero.what == Watch::normal_force ? EventKind::lift
            : zero.what == Watch::border     ? EventKind::border
            : zero.what == Watch::cone       ? EventKind::slip
@@ -261,8 +262,22 @@ void Driver::handle(const Zero& zero) {
   std::vector<ContactMode> modes =
       decide(close, closing ? -1 : zero.contact,
              closing ? std::optional<Watch>() : std::optional<Watch>(zero.what));
+  if (zero.what == Watch::support) record_changes(modes_before, modes, zero.lag);
   motion_.choose(event_time_, y_, std::move(modes));
   begin_phase();
+}
+
+// Of contacts that share their forces.
+void Driver::record_changes(const std::vector<ContactMode>& before,
+                            const std::vector<ContactMode>& after, double lag) {
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    if (before[i].mode == after[i].mode) continue;
+    record(after[i].mode == Mode::open    ? EventKind::lift
+           : after[i].mode == Mode::slide ? EventKind::slip
+                                          : EventKind::stop,
+           static_cast<int>(i), 0, 0, 0);
+    events_.back().time -= lag;
+  }
 }
 
 // Newton's law w_n+ = -e w_n- where impulses act, and Coulomb's cone, in one problem.

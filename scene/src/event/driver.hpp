@@ -83,6 +83,8 @@ class Driver {
   double longest_first_step(const std::vector<bool>& leaving);
   void turn_slips();
   void record(EventKind kind, int contact, double before, double after, double lost);
+  void record_changes(const std::vector<ContactMode>& before, const std::vector<ContactMode>& after,
+                      double lag);
   [[noreturn]] void fail(const std::string& what) const;
 
   Model& model_;

@@ -16,6 +16,7 @@ constexpr double kRank = 1e-11;
 constexpr double kLocked = 1e-12;  // A_nn of the largest
 constexpr double kAgree = 1e-7;    // of the answer's size: the exact one against the library's
 constexpr double kSolve = 1e-12;
+constexpr double kFarAbove = 1e5;
 
 MatrixXd pseudo_solve(const MatrixXd& S, const MatrixXd& right) {
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
@@ -143,6 +144,23 @@ VectorXd ContactRows::free_accelerations() {
   model_.divide_by_mass(a);
   if (G_.rows() > 0) a -= MG_ * pseudo_solve(GMG_, G_ * a + joint_rest_);
   return L_ * a + rest_;
+}
+
+AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
+                                       const std::vector<VectorXd>& slides) {
+  const int block = rows.size(), n = static_cast<int>(rows.contacts().size());
+  AccelerationAnswer out;
+  const VectorXd free = rows.free_accelerations();
+  out.scale = free.cwiseAbs().maxCoeff();
+  out.far = kFarAbove * std::max(out.scale, 1e-12);
+  VectorXd b = -free, mu(n);
+  for (int k = 0; k < n; ++k) {
+    const std::size_t place = static_cast<std::size_t>(k);
+    mu[k] = model.law(rows.contacts()[place]).friction;
+    if (slides[place].size() > 0) b.segment(block * k + 1, block - 1) -= out.far * slides[place];
+  }
+  out.contacts = solve_friction(rows.A(), b, mu);
+  return out;
 }
 
 FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const VectorXd& mu) {

@@ -45,4 +45,16 @@ struct FrictionAnswer {
 /// Contacts that the joints lock (A_nn = 0) carry nothing.
 FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const VectorXd& mu);
 
+/// Coulomb's law for accelerations at the state that is set: w = A x - b = (a_n, a_t) where a
+/// contact has no slip, and (a_n, S d + a_t) where it slides along d (else empty), S far above all
+/// accelerations: the force then opposes d, whatever the accelerations are, and A stays symmetric.
+/// Where sliding has no forces (Painleve) the contact sticks, with x of the size of S.
+struct AccelerationAnswer {
+  FrictionAnswer contacts;
+  double scale = 0;  ///< of the accelerations without forces
+  double far = 0;    ///< S
+};
+AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
+                                       const std::vector<VectorXd>& slides);
+
 }  // namespace tether::scene::event

@@ -1,9 +1,6 @@
 // Tether: which contacts stay closed, stick and slide. SPDX-License-Identifier: BSD-3-Clause
 //
-// Coulomb's law for accelerations: with forces x, A x - b = (a_n, a_t) where a contact has no slip,
-// and (a_n, S d + a_t) where it slides along d, S far above all accelerations: the force then
-// opposes d, whatever the accelerations are, and A stays symmetric. Where sliding has no forces
-// (Painleve), x is of the size of S.
+// By Coulomb's law for accelerations, see solve_accelerations.
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +10,7 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kFarAbove = 1e5;
+constexpr double kStill = 3e-9;           // of the accelerations
 constexpr double kLeastApproach = 1e-12;  // of the slip
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -36,9 +33,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   ContactRows rows(model_, candidates);
   const int block = rows.size(), n = static_cast<int>(candidates.size());
   const VectorXd velocities = rows.velocities(u);
-  const VectorXd free = rows.free_accelerations();
-  const double far = kFarAbove * std::max(free.cwiseAbs().maxCoeff(), 1e-12);
-  VectorXd b = -free, mu(n);
+  VectorXd mu(n);
   std::vector<VectorXd> slides(at(n));
   for (int k = 0; k < n; ++k) {
     const int i = candidates[at(k)];
@@ -56,10 +51,10 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     } else if (s.norm() > bands_.speed && !(i == left_contact && left == Watch::slip)) {
       d = s.normalized();
     }
-    if (d.size() > 0) b.segment(block * k + 1, block - 1) -= far * d;
   }
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
+  const AccelerationAnswer solved = solve_accelerations(model_, rows, slides);
+  const FrictionAnswer& answer = solved.contacts;
   if (!answer.solved) fail("the forces of closed contacts are not solved");
   for (int k = 0; k < n && !jammed_; ++k)
     if (slides[at(k)].size() > 0 && answer.regimes[at(k)] == contact::Regime::sticking &&
@@ -80,11 +75,13 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
       mode.direction = d;
       continue;
     }
-    if (regime == contact::Regime::sticking && mu[k] > 0) {
+    // On the border of its cone a contact may be said to slide though nothing moves it.
+    const VectorXd a = answer.w.segment(block * k + 1, block - 1);
+    const bool still = a.norm() <= kStill * solved.scale;
+    if ((regime == contact::Regime::sticking || still) && mu[k] > 0) {
       mode.mode = Mode::stick;
       continue;
     }
-    const VectorXd a = answer.w.segment(block * k + 1, block - 1);
     mode.mode = Mode::slide;
     mode.direction = a.norm() > 0 ? VectorXd(a.normalized()) : VectorXd::Unit(block - 1, 0);
     const bool same = i == left_contact && left == Watch::slip &&

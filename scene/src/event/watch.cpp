@@ -1,6 +1,8 @@
 // Tether: the functions of the state whose zeros are events. SPDX-License-Identifier: BSD-3-Clause
 #include "watch.hpp"
 
+#include "friction_solve.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +12,8 @@ namespace {
 
 constexpr int kMostIterations = 80;
 constexpr int kPolish = 3;
+// Of accelerations, by the contact library's tolerance and by what stands for a large slip.
+constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
 /// A zero of f between a and b, where it has other signs; Illinois' rule.
 template <class F>
@@ -49,12 +53,14 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
       add(Watch::gap, i, -1, leaving[static_cast<std::size_t>(i)]);
   for (std::size_t k = 0; k < closed.size(); ++k) {
     const int i = closed[k], place = static_cast<int>(k);
-    add(Watch::normal_force, i, place, false);
+    const bool single = !motion_.is_hyperstatic();
+    if (single) add(Watch::normal_force, i, place, false);
     const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
-    if (stuck) add(Watch::cone, i, place, false);
+    if (stuck && single) add(Watch::cone, i, place, false);
     if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place, false);
     if (!stuck && motion_.model().law(i).friction > 0) add(Watch::slip, i, place, false);
   }
+  if (motion_.is_hyperstatic()) add(Watch::support, -1, -1, false);
   evaluate(t, y);
   for (Function& f : functions_) {
     f.armed = f.value > band(f);
@@ -68,6 +74,8 @@ double Watcher::band(const Function& f) const {
       return f.leaving ? 0 : bands_.gap;
     case Watch::border:
       return bands_.gap;
+    case Watch::support:
+      return 0;
     case Watch::slip:
       return bands_.speed;
     default:
@@ -86,11 +94,40 @@ double Watcher::of_state(Function& f) {
              motion_.friction_force(f.closed).norm();
     case Watch::border:
       return motion_.model().margin(f.contact);
+    case Watch::support:
+      return support();
     case Watch::slip:
       return motion_.slip(f.closed).dot(
           motion_.modes()[static_cast<std::size_t>(f.contact)].direction);
   }
   return 0;
+}
+
+// What is left of a band, of the accelerations, by those of contacts that are to have none.
+double Watcher::support() {
+  ContactRows rows(motion_.model(), motion_.closed());
+  const int block = rows.size();
+  std::vector<VectorXd> slides(motion_.closed().size());
+  bool sliding = false;
+  for (std::size_t k = 0; k < slides.size(); ++k) {
+    const ContactMode& mode = motion_.modes()[static_cast<std::size_t>(motion_.closed()[k])];
+    if (mode.mode != Mode::slide) continue;
+    const VectorXd s = motion_.slip(static_cast<int>(k));
+    slides[k] = s.dot(mode.direction) > bands_.speed ? VectorXd(s.normalized()) : mode.direction;
+    sliding = true;
+  }
+  const AccelerationAnswer answer = solve_accelerations(motion_.model(), rows, slides);
+  if (!answer.contacts.solved) return -answer.scale;
+  double largest = 0;
+  for (std::size_t k = 0; k < slides.size(); ++k) {
+    const int row = block * static_cast<int>(k);
+    largest = std::max(largest, std::abs(answer.contacts.w[row]));
+    if (slides[k].size() == 0)
+      largest = std::max(largest, answer.contacts.w.segment(row + 1, block - 1).norm());
+  }
+  const double noise = std::max(sliding ? kSlidingNoise : kNoise, 100 * answer.contacts.error);
+  support_band_ = std::max(0.1 * bands_.part, noise) * answer.scale;
+  return support_band_ - largest;
 }
 
 void Watcher::evaluate(double t, const VectorXd& y) {
@@ -166,6 +203,19 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
   return zero;
 }
 
+// Accelerations of contacts that can no longer rest begin at zero and grow; by their rate where
+// they leave the band.
+double Watcher::lag(Phase& phase, const Function& f, double time) {
+  const double later = time + 0.01 * (phase.step_end() - time);
+  if (!(later > time)) return 0;
+  VectorXd y;
+  phase.projected_at(time, y);
+  const double here = value(f, phase.start() + time, y);
+  phase.projected_at(later, y);
+  const double growth = (here - value(f, phase.start() + later, y)) / (later - time);
+  return growth > 0 ? std::min(support_band_ / growth, phase.start() + time) : 0;
+}
+
 std::optional<Zero> Watcher::look(Phase& phase) {
   phase.at(phase.step_end(), y_);
   const VectorXd at_end = y_;
@@ -182,6 +232,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     }
     if (!hit) continue;
     Zero zero = locate(phase, f);
+    if (f.what == Watch::support) zero.lag = lag(phase, f, zero.time);
     if (f.what == Watch::gap && motion_.model().margin(f.contact) < 0) {
       f.dormant = true;  // it passes beside the face
       f.armed = false;

@@ -3,6 +3,8 @@
 //   open     gap
 //   closed   normal force; mu times it less |friction| where it sticks; slip along its direction
 //            where it slides; its distance from the border of its face
+//   support  closed contacts that share their forces in more than one way: single forces mean
+//            nothing there; what counts is whether Coulomb's law has any that leave them at rest
 //
 // A function counts once it is armed: at the start of a phase those that begin at zero are not,
 // until they exceed a band; they count, too, where they fall below minus the band.
@@ -16,7 +18,7 @@
 
 namespace tether::scene::event {
 
-enum class Watch : unsigned char { gap, normal_force, cone, slip, border };
+enum class Watch : unsigned char { gap, normal_force, cone, slip, border, support };
 
 /// The first zero in a step.
 struct Zero {
@@ -24,6 +26,7 @@ struct Zero {
   int contact = -1;
   double time = 0;  ///< since the start of the phase
   VectorXd y;       ///< there, on the constraints
+  double lag = 0;   ///< how much earlier the function was zero that is told by its band only, s
 };
 
 struct Bands {
@@ -52,7 +55,9 @@ class Watcher {
   void evaluate(double t, const VectorXd& y);
   double value(Function f, double t, const VectorXd& y);
   double of_state(Function& f);
+  double support();
   double band(const Function& f) const;
+  double lag(Phase& phase, const Function& f, double time);
   Zero locate(Phase& phase, const Function& f);
   bool may_dip(const Function& f, double step) const;
   double dip(Phase& phase, const Function& f, double& when);
@@ -61,7 +66,8 @@ class Watcher {
   Bands bands_;
   std::vector<Function> functions_;
   VectorXd rate_, y_;
-  double force_ = 0;  // the largest so far
+  double force_ = 0;         // the largest so far
+  double support_band_ = 0;  // of accelerations
 };
 
 }  // namespace tether::scene::event
