@@ -84,8 +84,8 @@ bool Stepper::Implementation::same(const std::vector<Active>& a, const std::vect
 }
 
 // After a part of this length: when within it an impact happens, and how much too early it may be
-// taken, by the speed that it takes. Forces add a t to the approach: gap = came t + a t^2, as a part
-// that ends there sees it.
+// taken, by the speed that it takes. Forces add a t to the approach: gap = came t + a t^2, as a
+// part that ends there sees it.
 Stepper::Implementation::Moment Stepper::Implementation::moment(const detail::Impact& i,
                                                                 double length) const {
   const PointContact& c = contacts.points[at(i.contact)];
