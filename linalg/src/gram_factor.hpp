@@ -11,7 +11,7 @@ namespace tether::linalg {
 ///     d_k = eps + min_c |a_k - A_before^T c|^2 + eps |c|^2 ,   w_k = b_k - c . b_before ,
 ///
 /// c the coefficients of row k over the rows before it: d_k tells whether it depends on them, w_k
-/// whether b_k is what they make of it.
+/// whether b_k agrees with that combination of theirs.
 class GramFactor {
  public:
   /// Rows in compressed form, n columns.

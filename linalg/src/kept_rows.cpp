@@ -103,7 +103,7 @@ void KeptRows::multiply_dense(int rank) {
   L.selfadjointView<Eigen::Lower>().rankUpdate(spread_.leftCols(rank).transpose());
 }
 
-// Column by column: what is zero in row j takes no part.
+// Column by column; columns that are zero in row j are skipped.
 bool KeptRows::factor_sparse(int rank) {
   for (int j = 0; j < rank; ++j) {
     const int rest = rank - j;

@@ -1,6 +1,6 @@
 // Tether: LU factors of small dense matrices. SPDX-License-Identifier: BSD-3-Clause
 //
-// Compiled without contraction to fused multiply-adds: bits are part of what small_lu.hpp promises.
+// Compiled without contraction to fused multiply-adds: small_lu.hpp promises the bits.
 #include <cmath>
 #include <cstddef>
 #include <tether/linalg/small_lu.hpp>
@@ -37,7 +37,7 @@ int SmallLU::factor(double* a, int n) {
     for (int j = k + 1; j < n; ++j) {
       double* changed = column(j);
       const double share = changed[k];
-      if (share == 0.0) continue;  // also what keeps infinite entries of L out of zeros
+      if (share == 0.0) continue;  // and 0 * infinity would be NaN
       for (int i = k + 1; i < n; ++i) changed[i] -= share * pivots[i];
     }
   }

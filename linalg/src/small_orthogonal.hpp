@@ -99,7 +99,8 @@ bool gather_rows(Storage& s, int m, int n, const double* wide, int width, const 
   return true;
 }
 
-/// Removes from row i what lies along the k rows already chosen; L grows by it. Returns |row|^2.
+/// Removes the components of row i along the k rows already chosen and stores them in L. Returns
+/// |row|^2.
 template <int Stride>
 double reorthogonalise(Storage& s, int i, int k) {
   Row<Stride> a(s.u + i * Stride);
@@ -117,7 +118,7 @@ template <int Stride>
 int factor(Storage& s, int m, int n, double rank_tolerance) {
   const double* square = s.square;
   const double smallest = rank_tolerance * rank_tolerance;
-  double left[Storage::kRows];     // |what is left of row i|^2 / |a_i|^2
+  double left[Storage::kRows];     // |remaining part of row i|^2 / |a_i|^2
   double inverse[Storage::kRows];  // 1 / |a_i|^2
   for (int i = 0; i < m; ++i) {
     s.pivot[i] = i;

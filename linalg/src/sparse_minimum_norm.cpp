@@ -27,7 +27,7 @@ double dot(const double* a, const double* b, std::size_t n) {
   return sum;
 }
 
-// Scales a to unit length and returns what that was; 0 where it vanishes, NaN where it is not
+// Scales a to unit length and returns its former length; 0 if it vanishes, NaN if it is not
 // finite. Squares that would overflow or vanish are avoided by a first scaling.
 double normalise(double* a, std::size_t n) {
   double sum = dot(a, a, n), first = 1.0;
@@ -274,7 +274,7 @@ void SparseMinimumNorm::solve(const double* g, double* dy, double tolerance) {
   for (std::size_t j = 0; j < width(); ++j) dy[j] = du_[j] * metric_[j];
 }
 
-// L^-1 (b - A du): entry k is what row k differs by from the combination of rows before it.
+// L^-1 (b - A du): entry k is the difference of row k from the combination of rows before it.
 void SparseMinimumNorm::find_inconsistencies(const double* g) {
   inconsistency_.clear();
   if (dropped_.empty()) return;
@@ -320,7 +320,7 @@ void SparseMinimumNorm::add_multipliers(const double* dy, double* x) {
   }
 }
 
-// Two rounds, the second one for what eps has left.
+// Two rounds; the second one removes the error due to eps.
 std::vector<double> SparseMinimumNorm::dependence(int k) const {
   const int row = pivot(k);
   std::vector<double> rest(width(), 0.0), share(norm_.size(), 0.0), z(norm_.size()), part(width());

@@ -19,7 +19,7 @@ class Automatic {
   Status run(Search& search);
   // A part of a larger problem, from `start`: the stages once, without replacements of the law.
   Status run_part(Search& search, const Packed& start);
-  // What the failed iteration looks like.
+  // Symptoms of the failed iteration.
   Status give_up(Search& search);
 
   // The normal impulses that prove infeasibility; empty: none are known.

@@ -1,4 +1,4 @@
-// Tether: what the solver says in words. SPDX-License-Identifier: BSD-3-Clause
+// Tether: names and advice of the solver. SPDX-License-Identifier: BSD-3-Clause
 #include "assembled/solver_words.hpp"
 
 #include "law/law.hpp"

@@ -1,11 +1,11 @@
-// Tether: what the solver says in words. SPDX-License-Identifier: BSD-3-Clause
+// Tether: names and advice of the solver. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/contact/solver.hpp>
 
 namespace tether::contact::detail {
 
-// What to try next; empty if there is nothing to advise.
+// Advice for an unsolved problem; empty if there is none.
 const char* advice(Status status, const Options& options);
 
 }  // namespace tether::contact::detail

@@ -1,4 +1,4 @@
-// Tether: what the stages of the solver share: kernels on a problem under a law.
+// Tether: kernels on a problem under a law, shared by the stages of the solver.
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 

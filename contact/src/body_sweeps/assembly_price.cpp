@@ -1,4 +1,4 @@
-// Tether: what an island would cost as a Problem. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the predicted cost of an island as a Problem. SPDX-License-Identifier: BSD-3-Clause
 #include "body_sweeps/assembly_price.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Tether: what an island would cost as a Problem. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the predicted cost of an island as a Problem. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "body_sweeps/contact_graph.hpp"
@@ -14,7 +14,7 @@ class AssemblyPrice {
   AssemblyPrice(const ContactGraph& graph, const Island& island, const std::vector<int>& first,
                 const std::vector<int>& second);
 
-  // Of a solution by few factorisations, in sweeps on the bodies.
+  // Cost of a solution by few factorisations, in sweeps over the bodies.
   double sweeps();
   // Whether `work` suffices for the stages of Solver to get anywhere.
   bool within(double work);

@@ -1,4 +1,4 @@
-// Tether: what the parts of BodySolver share. SPDX-License-Identifier: BSD-3-Clause
+// Tether: data shared by the parts of BodySolver. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <exception>
@@ -43,7 +43,7 @@ struct PassResult : Squares {
   }
 };
 
-// What each thread has of its own.
+// Data of one thread.
 struct Worker {
   alignas(64) BodyState nowhere = {};
   std::unique_ptr<Solver> solver;
@@ -56,7 +56,7 @@ struct Worker {
   std::string bad_reason;
 };
 
-// Who works on an island: all threads, or one.
+// The threads that work on an island: all, or one.
 struct Team {
   int thread, threads;
   Barrier* barrier;

@@ -60,7 +60,7 @@ void BodySolver::Implementation::unpack(const Island& island, const Team& team) 
   }
 }
 
-// A large island by all threads; what has to be assembled is left to alone().
+// A large island by all threads; islands to be assembled are left to alone().
 void BodySolver::Implementation::together(int k, const Team& team) {
   const Island& island = graph.islands[at(k)];
   const int begin = island.body_begin, end = island.body_end;

@@ -198,7 +198,7 @@ void BodySolver::Implementation::save(const Island& island, const Team& team) {
   team.meet();
 }
 
-// b = 0: no impulses, whatever the last solve has left.
+// b = 0: no impulses; those of the last solve are dropped.
 void BodySolver::Implementation::rest(const Island& island, const Team& team, int& turn) {
   pass(island, team, turn, [&](int chunk) {
     visit(chunk, [&](int, Kind k, int place) { set_impulse(k, place, Vector3d::Zero()); });
@@ -235,7 +235,7 @@ void BodySolver::Implementation::iterate(int k, const Team& team) {
     if (r.sweeps == BestPoint::kFirst && !(permitted && price.within(options.max_work)))
       best.want();
     const bool last = r.sweeps >= options.max_sweeps;
-    // What a sweep changes is close to the residual, which costs another pass.
+    // The change by a sweep is close to the residual, which would cost another pass.
     if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
       double residual = pass(island, team, turn, [&](int c) { return test(c, team); }).most;
       r.saved = last && !best.last_is_best(residual);

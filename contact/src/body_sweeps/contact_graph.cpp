@@ -14,7 +14,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 // above.
 constexpr int kOneChunk = 256, kLeast = 64, kMost = 384;
 
-// Colours of chunks that are found by bit masks; what does not fit gets a colour of its own.
+// Number of colours in the bit masks of chunks; chunks beyond get a colour of their own.
 constexpr int kMasked = 63;
 
 }  // namespace

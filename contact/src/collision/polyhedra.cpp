@@ -21,7 +21,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 constexpr double kParallel = 0.99875;  // cos 0.05
 constexpr double kFlat = 1e-9;         // radian: along a face
 constexpr double kAcross = 0.05;       // radian: an edge farthest in a direction, as a whole
-// Of the smaller thickness: separations between which faces are preferred; corners that are one;
+// Parts of the smaller thickness: separations between which faces are preferred; merged corners;
 // numbers that differ by rounding only, of which the first is taken in every attitude.
 constexpr double kTie = 1e-4, kSame = 1e-7, kRounding = 1e-12;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -215,7 +215,7 @@ class Polyhedra final : public PairCollision {
     }
   }
 
-  // Of the faces that reach farthest against n the one that lies most against it. A face that lies
+  // Among the faces farthest along -n, the one most nearly perpendicular to n. A face that lies
   // more against n may still end above the lowest corner.
   int lowest_face(const Placed& other, const Vector3d& n, double same) {
     double lowest = kInfinity;
@@ -359,7 +359,7 @@ class Polyhedra final : public PairCollision {
       nearest(p, u, q, v, x, y);
       return add(x, y, 0x7f01);
     }
-    // The ends of what the edges share, by their places along the first.
+    // Ends of the overlap of the edges, by their places along the first.
     const double from = std::max(0.0, std::min(u.dot(q - p), u.dot(q + v - p)) / uu);
     const double to = std::min(1.0, std::max(u.dot(q - p), u.dot(q + v - p)) / uu);
     if (from > to) {  // one beyond the other: end to end

@@ -23,7 +23,7 @@ struct Polyhedron {
   double size = 0;  // smallest width across a face, m: the scale of its tolerances
 };
 
-/// Of a box or a convex shape. Throws std::invalid_argument if the points are flat.
+/// The polyhedron of a box or a convex shape. Throws std::invalid_argument if the points are flat.
 Polyhedron make_polyhedron(const Shape& shape);
 
 /// The same at a pose, into storage that is used again.

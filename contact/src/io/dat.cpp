@@ -71,7 +71,7 @@ class Tokens {
   void skip() {
     while (at_ != end_ && (*at_ == ' ' || *at_ == '\n' || *at_ == '\t' || *at_ == '\r')) ++at_;
   }
-  // The same in every locale, whatever the host has set.
+  // Independent of the locale that the host has set.
   double number(const char* what) {
     skip();
     if (at_ == end_) fail(std::string("truncated: the file ends in ") + what);

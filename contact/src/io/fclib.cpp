@@ -56,7 +56,7 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
-// HDF5 prints errors on its own unless told not to.
+// HDF5 prints errors by itself by default.
 struct Quiet {
   H5E_auto2_t function = nullptr;
   void* data = nullptr;

@@ -40,7 +40,7 @@ void StepJointIslands::set_warm_start(const WarmStart& start) {
   for (std::size_t k = 0; k < start.ids.size(); ++k) memory_.add(start.ids[k], start.impulses[k]);
 }
 
-// Of moving bodies, by contacts and mechanisms.
+// Islands of moving bodies, connected by contacts and mechanisms.
 void StepJointIslands::find_islands(const std::vector<PointContact>& contacts) {
   const int n = mechanisms_.bodies();
   parent_.resize(at(n));

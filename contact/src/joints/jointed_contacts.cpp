@@ -25,7 +25,7 @@ double normal_speed(const BodyContact& c, const std::vector<Vector6d>& v) {
   return w;
 }
 
-// What its terms could add up to, row by row.
+// Upper bound of the sum of its terms, row by row.
 Eigen::Vector3d largest_speeds(const BodyContact& c, const std::vector<Vector6d>& v) {
   Eigen::Vector3d w = c.bias.cwiseAbs() + c.J1.cwiseAbs() * v[at(c.first)].cwiseAbs();
   if (c.second >= 0) w += c.J2.cwiseAbs() * v[at(c.second)].cwiseAbs();

@@ -13,7 +13,7 @@ namespace tether::contact::detail {
 ///
 ///     E u = rate,   E = (G C, sqrt(c)),   P~ = 1 - E' (E E')^+ E
 ///
-/// What rows do is the least change of u, by linalg::SparseMinimumNorm.
+/// Rows change u by the least amount (linalg::SparseMinimumNorm).
 class Mechanism {
  public:
   /// Bodies and rows by their indices, ascending; place[body]: its place in `bodies`, where it
@@ -37,7 +37,7 @@ class Mechanism {
   /// The least impulses with E' x = u, u from least() or a sum of such. x by rows().
   void impulses(const double* u, double* x) { factor_.multipliers(u, x); }
 
-  /// After least(): what is left of row k of rows(), in the units of u.
+  /// After least(): residual of row k of rows(), in the units of u.
   double left(int k) const { return factor_.residual(k); }
   double row_norm(int k) const { return factor_.row_norm(k); }
 

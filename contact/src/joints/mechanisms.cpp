@@ -1,4 +1,4 @@
-// Tether: all bodies, and what joints make of their velocities. SPDX-License-Identifier:
+// Tether: all bodies, and their velocities under joints. SPDX-License-Identifier:
 // BSD-3-Clause
 #include "joints/mechanisms.hpp"
 

@@ -1,4 +1,4 @@
-// Tether: all bodies, and what joints make of their velocities. SPDX-License-Identifier:
+// Tether: all bodies, and their velocities under joints. SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 
@@ -19,7 +19,7 @@ class Mechanisms {
 
   int count() const { return static_cast<int>(list_.size()); }
   Mechanism& operator[](int m) { return *list_[static_cast<std::size_t>(m)]; }
-  /// Of a body: -1 where no joint holds it, or it does not move.
+  /// Mechanism of a body; -1: no joint holds it, or it does not move.
   int mechanism_of(int body) const { return mechanism_[static_cast<std::size_t>(body)]; }
   /// Its place in Mechanism::bodies().
   int place_of(int body) const { return place_[static_cast<std::size_t>(body)]; }
@@ -34,7 +34,7 @@ class Mechanisms {
   /// v changes by the least that makes all rows hold, Gv + compliance x = rate; x what the pulls
   /// so far say.
   void satisfy(const JointRows& joints, std::vector<Vector6d>& v);
-  /// Of the last satisfy(): numbers of the joints, ascending, with rows that cannot all hold.
+  /// Joints (ascending) with rows that cannot all hold, in the last satisfy().
   const std::vector<int>& contradicting() const { return contradicting_; }
   /// JointSolution::joint_error of these velocities.
   double error(const JointRows& joints, const std::vector<Vector6d>& v);

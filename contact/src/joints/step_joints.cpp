@@ -77,7 +77,7 @@ std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& option
   return std::make_unique<StepJointIslands>(mechanisms_, options);
 }
 
-// Of the positions at time t.
+// Equations of the positions at time t.
 void StepJoints::factor(const BodySet& bodies, double t) {
   rows_.clear();
   equations_->add_rows(bodies, t, rows_);
@@ -174,7 +174,7 @@ bool StepJoints::project_positions(BodySet& bodies, double t) {
 void StepJoints::begin(BodySet& bodies, double t) {
   if (!moved_since(bodies, t)) return;
   factor(bodies, t);
-  // What a step has left stays as it is to the last bit, also in a run that goes on with it.
+  // The result of a step stays the same to the last bit, also in a continued run.
   if (!(least_move(bodies, t, 1) + left_ <= kMet * size(bodies))) {
     if (!project_positions(bodies, t)) refuse(bodies, t);
     factor(bodies, t);
@@ -277,7 +277,7 @@ void StepJoints::put_back(BodySet& bodies, double t) {
   }
 }
 
-// What has changed the momenta since predict(), other than contacts.
+// Changes of the momenta since predict(), other than by contacts.
 void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contacts) {
   for (std::size_t k = 0; k < held_.size(); ++k) {
     const std::size_t i = at(held_[k]);

@@ -41,7 +41,7 @@ class StepJoints final : public JointPart {
 
   /// Largest |g| at the end of the last step, m or rad.
   double drift() const override { return drift_; }
-  /// Of the last step, by row.
+  /// Impulses of the last step, by row.
   const std::vector<double>& impulses() const override { return impulses_; }
 
  private:
@@ -76,7 +76,7 @@ class StepJoints final : public JointPart {
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
   std::vector<double> g_, b_, u_, x_, impulses_;
   std::vector<Place> place_;  // of held_, at the start of the step
-  // Of all bodies, and the time: what the factors belong to.
+  // Positions of all bodies and the time for which the factors were made.
   std::vector<Eigen::Vector3d> position_;
   std::vector<linalg::Quaternion> orientation_;
   double time_ = 0, drift_ = 0;

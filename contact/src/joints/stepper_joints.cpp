@@ -1,6 +1,6 @@
 // Tether: joints are added to a Stepper. SPDX-License-Identifier: BSD-3-Clause
 //
-// Apart from stepper.cpp, so that who adds none links nothing of them.
+// Apart from stepper.cpp, so that programs without joints link nothing of them.
 #include <stdexcept>
 #include <utility>
 

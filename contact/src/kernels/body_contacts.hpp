@@ -67,11 +67,11 @@ struct BodyArrays {
   BodyState* state;
   const BodyInertia* inertia;
   const BodyState* fixed;  // bodies that do not move; the first one is the world
-  BodyState* nowhere;      // takes what is written to them, one for each thread
+  BodyState* nowhere;      // target of writes to them, one for each thread
   const BodyInertia* no_inertia;
 };
 
-// Of velocities squared, over the contacts of a pass: sum and largest.
+// Squared velocities over the contacts of a pass: sum and largest.
 struct Squares {
   double sum = 0, most = 0;
 };

@@ -1,4 +1,5 @@
-// Tether: what all passes over contacts between bodies share. SPDX-License-Identifier: BSD-3-Clause
+// Tether: code shared by all passes over contacts between bodies. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include "kernels/body_contacts.hpp"

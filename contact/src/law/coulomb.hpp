@@ -102,7 +102,7 @@ struct Coulomb {
     return false;
   }
 
-  // y = z / q scaled onto cone and plane: |y| + g.y = k holds to round-off whatever lambda is.
+  // y = z / q scaled onto cone and plane: |y| + g.y = k holds to round-off for every lambda.
   // Where q cancels, z / p, which is on the cone.
   static TETHER_INLINE Regime slide(const LocalBlock& L, const LocalRhs& r, double bn, double l,
                                     double* x) {

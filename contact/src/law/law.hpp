@@ -1,4 +1,5 @@
-// Tether: what a friction law is, and the list of laws. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the interface of a friction law, and the list of laws. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <tether/contact/problem.hpp>
@@ -23,7 +24,7 @@
 
 namespace tether::contact::detail {
 
-// What the sweeps over an assembled problem need to know.
+// Arguments of the sweeps over an assembled problem.
 struct View {
   int n;
   const int* start;
@@ -40,7 +41,7 @@ struct View {
   const double* inverse_scale;
 };
 
-// What a test leaves behind: norms, and the largest error of a contact relative to its island.
+// Results of a test: norms, and the largest error of a contact relative to its island.
 struct Test {
   double natural = 0, fixed = 0, x = 0, w = 0;
 };

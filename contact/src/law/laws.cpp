@@ -12,7 +12,7 @@ namespace detail {
 
 namespace {
 
-// In the order of their enumerators.
+// Laws in the order of their enumerators.
 template <class... L>
 struct List {
   static constexpr LawTraits kTraits[] = {{L::kLaw, L::kName, L::kFriction}...};

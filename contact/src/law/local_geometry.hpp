@@ -127,7 +127,7 @@ inline bool derivative_sliding(const LocalBlock& L, const LocalRhs& r, const dou
   return true;
 }
 
-// Of the solution x with that regime, for a law that keeps impulses in the cone.
+// Error of the solution x in that regime, for a law that keeps impulses in the cone.
 inline void cone_derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
                             Regime regime, bool dissipation, LocalDerivative& out) {
   if (regime == Regime::separating || L.mu == 0) {

@@ -39,7 +39,7 @@ void require_semidefinite(const char* argument, const Eigen::Matrix<double, n, n
     }
   }
   if (!(trace > 0)) return;
-  // A Cholesky factor of what is raised a little costs far less than eigenvalues.
+  // A Cholesky factor of a slightly raised matrix costs far less than eigenvalues.
   Eigen::Matrix<double, n, n> raised = A / trace;
   raised.diagonal().array() += kSmall;
   if (Eigen::LLT<Eigen::Matrix<double, n, n>>(raised).info() == Eigen::Success) return;
@@ -49,7 +49,7 @@ void require_semidefinite(const char* argument, const Eigen::Matrix<double, n, n
   refuse(where() + "least eigenvalue of " + argument, least, "must be >= 0");
 }
 
-// Of delassus(): also contacts between bodies that do not exist, or of one body.
+// For delassus(): also refuses contacts between bodies that do not exist, or of one body.
 void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts);
 // Body k of BodySolver, and contact i between `count` bodies.
 void check(std::size_t k, const RigidBody& body);

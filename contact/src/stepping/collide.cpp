@@ -119,7 +119,7 @@ void with_plane(const Shape& a, const Pose& A, const Shape& plane, const Pose& P
   }
 }
 
-// Of radii r1, r2 about points that are the nearest of two shapes.
+// Spheres of radii r1, r2 about the nearest points of two shapes.
 void ball_ball(const Vector3d& c1, double r1, const Vector3d& c2, double r2, double margin,
                int feature, NearPoints& out) {
   const Vector3d d = c1 - c2;

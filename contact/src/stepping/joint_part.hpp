@@ -1,4 +1,5 @@
-// Tether: what joints do in a step, as the stages call it. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the part of joints in a step, as the stages call it. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <memory>
@@ -72,7 +73,7 @@ class StepSolver {
     solver_.forget();
     if (joints_) joints_->forget();
   }
-  /// Of all contacts.
+  /// Impulses of all contacts.
   WarmStart warm_start() const { return solver_.warm_start(); }
   void set_warm_start(const WarmStart& start) {
     solver_.set_warm_start(start);

@@ -62,7 +62,7 @@ bool LaterImpacts::find_islands(const NearContacts& near, const Impacts& impacts
 // From the velocities before the impulses.
 void LaterImpacts::start(const NearContacts& near, const Impacts& impacts, double dt,
                          BodySet& bodies, StepContacts& contacts) {
-  constexpr double kPart = 1e-6;  // of the fastest impact: what rounding leaves is no approach
+  constexpr double kPart = 1e-6;  // of the fastest impact: slower approaches are rounding
   double fastest = 0;
   for (const Impact& i : impacts.list()) fastest = std::max(fastest, i.comes);
   members_.clear();

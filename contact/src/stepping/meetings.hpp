@@ -10,12 +10,12 @@ namespace tether::contact::detail {
 /// numbered.
 class Meetings {
  public:
-  /// Of a pair that is named more than once the last one counts. Throws std::invalid_argument.
+  /// If a pair is named more than once, the last one counts. Throws std::invalid_argument.
   explicit Meetings(std::vector<Meeting> meetings);
 
   /// Number of a material among those that meet any; -1: it meets none.
   int row(int material) const;
-  /// Of two such numbers (or -1): index of their meeting, -1: they pass through each other.
+  /// Index of the meeting of two such numbers (or -1); -1: they pass through each other.
   int find(int row, int other) const;
   const Meeting& operator[](int index) const { return list_[static_cast<std::size_t>(index)]; }
   const std::vector<Meeting>& list() const { return list_; }

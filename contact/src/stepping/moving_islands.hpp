@@ -27,7 +27,7 @@ class MovingIslands {
     while (up(body) != body) body = up(body) = up(up(body));
     return body;
   }
-  /// Of the bodies of a contact, one of which moves.
+  /// Island of a contact's bodies, one of which moves.
   int root(const BodySet& bodies, const PointContact& c) {
     return root(moves(bodies, c.first) ? c.first : c.second);
   }

@@ -30,7 +30,7 @@ class NearContacts {
 
   const Surface& surface(int k) const { return surfaces_[static_cast<std::size_t>(k)]; }
   const Meeting& meeting(const PointContact& c) const;
-  /// Of the smaller of its shapes: farthest point from its origin, m.
+  /// Distance of the farthest point of its smaller shape from that shape's origin, m.
   double size(const PointContact& c) const;
   bool any_restitution() const;
 

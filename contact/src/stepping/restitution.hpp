@@ -32,7 +32,7 @@ class Restitution {
   /// After the solve. Changes velocities and impulses; returns the number of bounces.
   int apply(BodySet& bodies, StepContacts& contacts);
 
-  /// Of its second solve: all that one step leaves to the next.
+  /// Warm start of its second solve.
   WarmStart warm_start() const { return solver_.warm_start(); }
   void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
 

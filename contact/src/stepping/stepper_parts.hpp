@@ -1,4 +1,4 @@
-// Tether: what a step consists of. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the parts of a step. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <array>
@@ -35,22 +35,22 @@ struct PartState {
 
 /// Throws std::invalid_argument.
 void check(const SteppingOptions& o);
-/// Of the contact problem of a step, and of the one that takes penetrations back.
+/// Options of the contact problem of a step, and of the one that reduces penetrations.
 BodyOptions contact_options(const SteppingOptions& o);
-/// Of contact problems that a shorter step would not make easier.
+/// Options of contact problems that a shorter step would not make easier.
 BodyOptions patient_options(const SteppingOptions& o);
 BodyOptions correction_options(const SteppingOptions& o);
 Depenetration depenetration(const SteppingOptions& o);
 /// Depth that the residual itself allows in a step: m.
 double negligible_depth(const SteppingOptions& o, double dt);
-/// Of gaps that inelastic impacts close.
+/// Options of the problem that finds the gaps closed by inelastic impacts.
 BodyOptions closing_options(const SteppingOptions& o);
 /// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
 double threshold_speed(double threshold, const SteppingOptions& o);
 
 }  // namespace detail
 
-// A step is the list of stages, made once from what the scene asks for.
+// A step is the list of stages, made once from the options and the bodies.
 struct Stepper::Implementation {
   using Method = void (Implementation::*)();
   struct Stage {

@@ -218,7 +218,7 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
   Move move = mover_->move(candidate);
   if (move.capped) {
     judge_capped(move);
-    return move;  // what follows would make the whole move
+    return move;  // the steps below would make the whole move
   }
   if (move.status == Status::success)
     move.status =
@@ -328,7 +328,7 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
   if (sampled) s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
 }
 
-// What a successful move, full or not, leaves in the counts.
+// Counts of a successful move, full or not.
 void Projection::Impl::note(const Move& move, const StepData& step) {
   Statistics& s = statistics_;
   s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);

@@ -31,7 +31,7 @@ namespace tether::ida_projection {
 /// The nonlinear solver that IDA sees; its operations call `implementation`.
 SUNNonlinearSolver make_solver(Projection::Impl& implementation, SUNNonlinearSolver inner,
                                SUNContext context);
-/// Rejects what cannot work, naming the option, its value and what would be right.
+/// Rejects values that cannot work, naming the option, its value and the allowed ones.
 void validate(const Constraints& constraints, const Options& options, N_Vector like);
 
 /// The decorator of IDA's nonlinear solver: puts the parts of a projected step together.

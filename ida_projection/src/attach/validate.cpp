@@ -1,4 +1,5 @@
-// Tether: checks of what the caller attaches. SPDX-License-Identifier: BSD-3-Clause
+// Tether: checks of the constraints and options that a caller attaches. SPDX-License-Identifier:
+// BSD-3-Clause
 #include <stdexcept>
 #include <sundials/sundials_config.h>
 

@@ -158,7 +158,7 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
     double increment = std::max(kRootEpsilon * std::abs(y[j]), std::min(scale[j], 1e-4 * largest));
     if (increment == 0.0) increment = kRootEpsilon;
     y_shifted_[j] = y[j] + increment;
-    increment = y_shifted_[j] - y[j];  // what the machine really added
+    increment = y_shifted_[j] - y[j];  // the increment after rounding
     status = evaluate(y_shifted_.data(), g_shifted_.data());
     y_shifted_[j] = y[j];
     for (int i = 0; i < m; ++i)

@@ -28,7 +28,7 @@ int guarded(Call&& call, std::string& message) noexcept {
   }
 }
 
-/// Are there rows with a SparseJacobian in the set or in what is joined to it?
+/// Are there rows with a SparseJacobian in the set or in the sets joined to it?
 bool has_sparse_rows(const Constraints& set);
 /// Is g given by Constraints::value, and C by entries or differences?
 bool has_values(const Constraints& set);

@@ -1,4 +1,4 @@
-// Tether: what is refused, by name. SPDX-License-Identifier: BSD-3-Clause
+// Tether: arguments that are refused, by name. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <sundials/sundials_nvector.h>

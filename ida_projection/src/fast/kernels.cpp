@@ -149,7 +149,7 @@ struct Kernels {
   }
   static sunrealtype wl2_norm(N_Vector X, N_Vector W) { return root(square_sum(X, W)); }
 
-  // What the mask leaves out adds 0, which changes no sum of squares.
+  // Masked elements add 0, which changes no sum of squares.
   static sunrealtype wrms_norm_mask(N_Vector X, N_Vector W, N_Vector Mask) {
     const sunindextype n = length(X);
     const double *x = data(X), *w = data(W), *mask = data(Mask);

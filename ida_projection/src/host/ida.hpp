@@ -5,7 +5,7 @@
 
 namespace tether::ida_projection {
 
-/// What IDA's public getters tell inside a solve.
+/// Values of IDA's public getters inside a solve.
 struct StepData {
   double t = 0.0, cj = 0.0;
   N_Vector y_predicted = nullptr, yp_predicted = nullptr;

@@ -10,7 +10,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-/// A watched vector, its own operations, and who waits for its end.
+/// A watched vector, its own operations, and the observers of its end.
 struct Watched {
   N_Vector vector;
   void (*destroy)(N_Vector);

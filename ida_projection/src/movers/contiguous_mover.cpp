@@ -86,7 +86,7 @@ double ContiguousMover<Rows>::first_solve() {
     const int all = solver.rank();
     if (!firm_only_ && blocks_.trust.trusted_rows(solver, length) == all) return length;
     const bool whole = !blocks_.dropped_rows();
-    // Nothing magnifies what the firm rows ask for.
+    // Nothing magnifies the right-hand side of the firm rows.
     const int firm = RowTrust::firm_rows(solver);
     solver.use_rank(firm);
     const double firm_length = solve();

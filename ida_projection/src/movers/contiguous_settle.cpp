@@ -1,4 +1,4 @@
-// Tether: what the polish left is taken back onto the constraints, on contiguous vectors.
+// Tether: moves a polished candidate back onto the constraints, on contiguous vectors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include "movers/contiguous_mover.hpp"
 

@@ -1,4 +1,4 @@
-// Tether: the move of a point onto the constraints, whatever way they are given.
+// Tether: the move of a point onto the constraints, for every storage of their rows.
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
@@ -32,7 +32,7 @@ struct Move {
   double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
 };
 
-/// Moves candidates onto the constraints and remembers what the metric needs.
+/// Moves candidates onto the constraints and keeps the data of the metric.
 class Mover {
  public:
   virtual ~Mover() = default;
@@ -69,15 +69,15 @@ class Mover {
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 
-  /// No settle() follows the last move(): takes back what it left for that.
+  /// No settle() follows the last move(): completes it.
   virtual Status finish(const Candidate&) { return Status::success; }
 
-  /// The attempt that used the last candidate was accepted: keep what it taught the metric.
+  /// The attempt that used the last candidate was accepted: keep its effect on the metric.
   virtual void accept() {}
-  /// A new run starts: forget what the last one taught.
+  /// A new run starts: reset the metric.
   virtual void reset() {}
 
-  /// Did a callback ask for the end of the run since forget_failure(), in whatever evaluation?
+  /// Did a callback ask for the end of the run since forget_failure(), in any evaluation?
   virtual bool fatal() const { return fatal_; }
   virtual void forget_failure() { fatal_ = false; }
 

@@ -90,7 +90,7 @@ void GradientRows::solve(const std::vector<double>& g, N_Vector D, N_Vector dy) 
     double left = norm_[at(row)] > kTiny ? g[at(row)] / norm_[at(row)] : g[at(row)];
     for (int i = 0; i < std::min(k, rank_); ++i) left -= L(row, i) * z_[at(i)];
     if (k >= rank_) {
-      z_[at(k)] = std::abs(left);  // what this dropped row leaves unsolved
+      z_[at(k)] = std::abs(left);  // residual of this dropped row
       continue;
     }
     z_[at(k)] = left / L(row, k);

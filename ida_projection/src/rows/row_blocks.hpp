@@ -49,13 +49,13 @@ struct BlockOf {
   }
 };
 
-/// Rows that a block dropped and that ask for what its kept rows exclude.
+/// Dropped rows of a block that contradict its kept rows.
 struct Contradiction {
   std::vector<int> rows;
   std::string message;
 };
 
-/// Of a tolerance: a move of that size could not have made rows contradict each other by more.
+/// Part of a tolerance: a move of that size cannot make rows contradict each other by more.
 constexpr double kContradiction = 0.5;
 
 /// After solve(): do dropped rows of the block ask for what the kept ones exclude? Up to what a

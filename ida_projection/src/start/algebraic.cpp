@@ -55,7 +55,7 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
       // y'_j changes by cj times this.
       change[k].push_back(sizes[k] * irregular *
                           std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(cj)));
-      // What F sees in all evaluations, bit for bit.
+      // The arguments of F in all evaluations, bit for bit.
       y[k].push_back((saved_entries[j] - change[k][j]) + change[k][j]);
     }
     std::copy(y[k].begin(), y[k].end(), predicted);
@@ -111,7 +111,7 @@ std::vector<char> AlgebraicVariables::derivative_free_equations(const Candidate&
       const double change = size * (1.0 + 0.5 * std::sin(1.0 + 2.3 * static_cast<double>(j))) *
                             std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(cj));
       const double low = saved_entries[j] - change;
-      candidate.base_entries[j] = low + change;  // what F sees in both evaluations
+      candidate.base_entries[j] = low + change;  // the argument of F in both evaluations
       e[j] = change;
       lower[j] = low;
     }

@@ -1,4 +1,5 @@
-// Tether: what an attempt needs between full projections. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the kind of projection of an attempt between full ones. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 namespace tether::ida_projection {

@@ -36,7 +36,7 @@ class Polish {
 
   N_Vector delta() const { return delta_; }          ///< of add_newton_step()
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor
-  /// Did it find what IDA's convergence test promised?
+  /// Was the correction as small as IDA's convergence test predicted?
   bool corrector_was_right() const { return corrector_was_right_; }
   long iterations() const { return iterations_; }  ///< in this solve()
 

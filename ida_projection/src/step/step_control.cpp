@@ -1,4 +1,4 @@
-// Tether: what steers IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
+// Tether: control of IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
 #include "step/step_control.hpp"
 
 namespace tether::ida_projection {

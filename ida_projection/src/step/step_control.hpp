@@ -1,4 +1,4 @@
-// Tether: what steers IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
+// Tether: control of IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "host/ida.hpp"
@@ -21,7 +21,7 @@ class StepControl {
 
   void reset();  ///< a new run starts
 
-  /// At the begin of a solve: takes back what the last one did to the weights of the same step.
+  /// At the begin of a solve: restores the weights that the last one changed in the same step.
   void restore_weights(N_Vector weights, long last_steps);
   /// At the end of a successful one. `engaged`: the projection acts; `differential`: the variables
   /// of IDA's error test (null: all).

@@ -1,4 +1,4 @@
-// Tether: what makes IDA reject most steps is looked for.
+// Tether: search for the reason why IDA rejects most steps.
 // SPDX-License-Identifier: BSD-3-Clause
 #include "watch/collapse.hpp"
 

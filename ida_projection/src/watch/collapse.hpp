@@ -1,4 +1,4 @@
-// Tether: what makes IDA reject most steps is looked for. SPDX-License-Identifier: BSD-3-Clause
+// Tether: search for the reason why IDA rejects most steps. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ class RejectionWatch {
   void count(bool repeated, long steps);
   /// Were there rejections in most steps of a stretch?
   bool collapsed() const { return collapsed_; }
-  /// What is wrong, at the corrector's point, where y' = yppred + cj ycor fulfils F.
+  /// The fault found at the corrector's point, where y' = yppred + cj ycor fulfils F.
   std::string cause(const Candidate& candidate, const StepData& step,
                     const AlgebraicVariables& variables, Corrector& corrector) const;
 

@@ -23,7 +23,7 @@ class FirstSteps {
 
   void reset();  ///< a new run starts
   /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
-  /// ycor. Returns what is wrong; empty: nothing is seen.
+  /// ycor. Returns the fault found; empty: none.
   std::string look(const Candidate& candidate, const StepData& step, long steps, double h,
                    N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
                    Corrector& corrector);

@@ -28,7 +28,7 @@ class Report {
   int finish(Status outcome, const std::string& text, long steps);
   /// The same for an exception, which must not pass through IDA's C functions.
   int caught(Status outcome, const char* text) noexcept;
-  /// What makes IDA reject most steps, or results doubtful.
+  /// The reason why IDA rejects most steps, or results are doubtful.
   void warn(Status kind, const std::string& text);
   /// On stderr, where Options::print_warnings allows it.
   void say(const std::string& text) const;

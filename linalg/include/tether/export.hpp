@@ -1,8 +1,8 @@
 // Tether: which symbols the libraries show. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-/// The libraries are compiled with hidden visibility; what stands between these two lines of a
-/// public header is seen from outside: functions, and classes with all that belongs to them
+/// The libraries are compiled with hidden visibility; the declarations between these two lines of
+/// a public header are visible from outside: functions, and classes with all that belongs to them
 /// (vtables and type information, too, so that exceptions are caught by type on the other side).
 /// TETHER_HIDDEN takes an inner class out of that. What templates of Eigen make of them stays
 /// inside: cmake/TetherPrivate.cmake.

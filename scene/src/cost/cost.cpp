@@ -154,14 +154,14 @@ Reference smooth_reference(const Scene& scene, double tolerance, int samples) {
   const bool take_own = 10 * own->error < other->error;
   Reference out = take_own ? *own : *other;
   const Reference& witness = take_own ? *other : *own;
-  // What neither estimate explains counts as an error of the reference.
+  // A difference that neither estimate explains counts as an error of the reference.
   out.error = std::max(out.error, apart - witness.error);
   out.what += fmt::format(" ({:.1e} from {}, whose joints drift by {:.1e})", apart, witness.what,
                           witness.drift);
   return out;
 }
 
-/// What first order leads to at step 0: 2 x(h) - x(2h), for rotations the same turn once more.
+/// First-order extrapolation to step 0: 2 x(h) - x(2h); rotations are extrapolated by their angle.
 Samples extrapolated(const Samples& fine, const Samples& coarse) {
   Samples out = fine;
   const std::size_t count = std::min(fine.positions.size(), coarse.positions.size());
@@ -233,7 +233,7 @@ CostRow measure_row(const Scene& scene, double setting, int samples, const Refer
   const Measured m = measure_once(scene, samples);
   const RunResult& r = m.result;
   row.failure = r.failure;
-  // On the safe side: what the reference is off may add to what is seen.
+  // On the safe side: the error of the reference may add to the difference found.
   row.error = distance(m.samples, reference.samples) + reference.error;
   row.drift = r.summary.drift;
   row.penetration = r.summary.penetration;

@@ -15,7 +15,7 @@ const std::vector<const Effect*>& all();
 std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
                                                            const mechanics::Bodies& bodies);
 
-/// What all of them leave of momentum and angular momentum.
+/// Components of momentum and angular momentum that all effects together conserve.
 mechanics::Momenta momenta_of(const Scene& scene);
 
 }  // namespace tether::scene::effects

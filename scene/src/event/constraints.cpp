@@ -1,4 +1,4 @@
-// Tether: what the projection keeps while contacts stay as they are. SPDX-License-Identifier:
+// Tether: the constraints of the projection between events. SPDX-License-Identifier:
 // BSD-3-Clause
 //
 // Gaps and joints, their rates, the slips of stuck contacts, the rows of the model itself, and
@@ -19,7 +19,7 @@ void Motion::keep_energy_of(double t, const VectorXd& y) {
   kept_energy_ = model_.energy() - y[work()];
 }
 
-// Of all rows, at the state that is set; slips have no position.
+// Values of all rows at the state that is set; slips have no position.
 void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
   positions.setZero(rows_);
   gather();

@@ -63,7 +63,8 @@ class Driver {
   Motion& motion() { return motion_; }
   /// Energy that events took so far, J.
   double lost() const { return lost_; }
-  /// Energy less work and losses since the start, less that of the start: what is unaccounted for.
+  /// Energy less work and losses since the start, less that of the start: the energy that is
+  /// unaccounted for.
   double ledger_error();
 
  private:

@@ -1,4 +1,4 @@
-// Tether: what happened at an instant, in the units of the model. SPDX-License-Identifier:
+// Tether: the record of an event, in the units of the model. SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 
@@ -8,7 +8,7 @@ namespace tether::scene::event {
 
 using EventKind = ContactEvent::Kind;
 
-/// Of one contact. Several contacts may have events of one time.
+/// Event of one contact. Several contacts may have events of one time.
 struct EventRecord {
   double time = 0;
   EventKind kind = EventKind::impact;

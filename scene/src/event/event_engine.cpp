@@ -89,7 +89,7 @@ class EventEngine : public Engine {
   void look_at_events();
 
   smooth::Units units_;
-  Scene scene_;  // in these units, as everything here but what is shown
+  Scene scene_;  // in these units, as everything here but the results
   DriverOptions options_;
   SceneModel model_;
   std::unique_ptr<Driver> driver_;
@@ -127,7 +127,7 @@ void EventEngine::look() {
   look_at_events();
 }
 
-// Impulses: what the forces of now do in a second.
+// Impulses: the present forces times one second.
 void EventEngine::look_at_contacts() {
   contacts_.clear();
   const event::Motion& motion = driver_->motion();

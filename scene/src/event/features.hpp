@@ -27,7 +27,7 @@ using namespace mechanics;
 
 constexpr double kNoBorder = std::numeric_limits<double>::infinity();
 
-/// What a kind tells of the state of its two bodies.
+/// Quantities of a kind at the state of its two bodies.
 struct Touch {
   double gap = 0, rate = 0, second = 0;
   Vector3d normal = Vector3d::UnitZ(), point = Vector3d::Zero();

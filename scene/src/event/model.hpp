@@ -68,7 +68,7 @@ class Model {
   virtual void energy_gradient(double* by_q, double* by_u) const = 0;
   /// Whether forces without potential or driven joints may do work.
   virtual bool does_work() const { return false; }
-  /// Of forces without potential, W.
+  /// Power of forces without potential, W.
   virtual double power() const { return 0; }
 };
 

@@ -19,7 +19,7 @@ namespace tether::scene::event {
 
 namespace {
 
-// The first step's error is an eighth of what IDA allows.
+// The first step's error is an eighth of the error that IDA allows.
 constexpr double kFirstError = 0.125, kFirstMove = 1e-2, kFirstAtRest = 1e-3, kFirstAtMost = 0.1;
 constexpr double kLook = 1e-5;   // the part of a move over which y'' is looked at
 constexpr double kNewton = 0.1;  // Newton's test, of the tolerance

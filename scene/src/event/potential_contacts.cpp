@@ -86,7 +86,7 @@ std::vector<PlaneFeature> faces_of_box(const Shape& shape) {
 
 bool is_round(const Shape& shape) { return shape.kind == ShapeKind::sphere; }
 
-/// What a pair of shapes adds; false: its contact is not of the engine's kinds.
+/// Adds the contacts of a pair of shapes; false: their contact is not of the engine's kinds.
 bool add(const Shape& a, const Shape& b, const FeaturePair& bodies, std::vector<FeaturePair>& out) {
   const auto put = [&](const Knob& knob, auto feature) {
     FeaturePair pair = bodies;

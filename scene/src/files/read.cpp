@@ -179,7 +179,7 @@ Scene parse_scene(std::string_view text, const std::string& name) {
 Scene read_scene(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) files::refuse({path, 0, 0}, "cannot be opened");
-  // By blocks: of a folder, or of what is cut off while it is read, this fails without a throw.
+  // By blocks: reading a folder, or a file that is truncated meanwhile, fails without a throw.
   std::string text;
   std::vector<char> block(std::size_t{1} << 16);
   while (in && text.size() <= kLargestFile) {

@@ -10,7 +10,7 @@ namespace tether::scene::files {
 
 /// One [[body]], but for the fields of effects.
 Body read_body(Fields& in, const Reader& r);
-/// What no single field shows: names, pairs of materials, bodies that cannot move, times.
+/// Checks across fields: names, pairs of materials, bodies that cannot move, times.
 void check(const Scene& scene, Report& report);
 
 }  // namespace tether::scene::files

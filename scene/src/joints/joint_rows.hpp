@@ -15,7 +15,7 @@ class RowBuilder;
 class JointRows {
  public:
   JointRows() = default;
-  /// `bodies`: at t = 0. Throws std::invalid_argument, naming the joint and what is wrong.
+  /// `bodies`: at t = 0. Throws std::invalid_argument, naming the joint and the fault.
   JointRows(const Scene& scene, const Bodies& bodies);
   JointRows(const JointRows&) = delete;  // rows keep pointers to the motions
   JointRows& operator=(const JointRows&) = delete;

@@ -1,4 +1,4 @@
-// Tether: one kind of joint, as everybody who deals with joints sees it. SPDX-License-Identifier:
+// Tether: the interface of one kind of joint. SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 
@@ -32,7 +32,7 @@ class JointType {
   /// At t = 0, in world axes.
   virtual void add_rows(RowBuilder& rows) const = 0;
 
-  /// What a motion prescribes.
+  /// The quantity that a motion prescribes.
   enum class MotionOf { nothing, angle, length };
   virtual MotionOf motion() const { return MotionOf::nothing; }
 

@@ -1,4 +1,4 @@
-// Tether: one effect, as everybody who deals with a scene sees it. SPDX-License-Identifier:
+// Tether: the interface of one effect. SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 
@@ -45,7 +45,7 @@ class Effect {
   virtual void write_scene(const Scene&, files::Writer&) const {}
   virtual void write_body(const Body&, files::Writer&) const {}
   virtual void write_pair(const Pair&, files::Writer&) const {}
-  /// What no single field shows.
+  /// Checks across the fields of a scene.
   virtual void check(const Scene&, files::Report&) const {}
   virtual void check_body(const Body&, files::Report&) const {}
 

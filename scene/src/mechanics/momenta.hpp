@@ -33,7 +33,7 @@ class FreeAxes {
   std::string reason_;
 };
 
-/// Each effect tells here what it does to momentum and to angular momentum about the origin.
+/// The change that an effect causes in momentum and in angular momentum about the origin.
 struct Momenta {
   explicit Momenta(const Scene& of) : scene(of) {}
 

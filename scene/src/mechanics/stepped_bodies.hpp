@@ -16,7 +16,7 @@ class SteppedBodies {
   explicit SteppedBodies(const Scene& scene);
 
   const Bodies& bodies() const { return bodies_; }
-  /// Takes over positions and velocities; `set` is changed by what follows.
+  /// Takes over positions and velocities; later calls change `set`.
   void read(contact::BodySet& set);
   /// Positions only, for energies.
   void read_positions(const contact::BodySet& set);

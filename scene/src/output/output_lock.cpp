@@ -59,7 +59,7 @@ void OutputLock::take(const std::string& file) {
     }
     const std::string self = fmt::format("{}\n", getpid());
     if (ftruncate(descriptor, 0) != 0 || write(descriptor, self.data(), self.size()) < 0) {
-      // Only for the message of who is kept out.
+      // Only for the message to a run that is refused.
     }
     held_.push_back({name, descriptor});
     return;

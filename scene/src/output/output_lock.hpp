@@ -7,7 +7,7 @@
 namespace tether::scene {
 
 /// Holds FILE.lock for each file that a run writes. The system lets go of it when the process ends,
-/// however it ends: a lock file that is left behind keeps nobody out.
+/// however it ends: a lock file that is left behind locks nothing.
 class OutputLock {
  public:
   OutputLock() = default;

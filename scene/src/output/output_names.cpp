@@ -41,7 +41,7 @@ std::string film_folder(const std::string& vtk) {
 }
 
 void check_names(const Output& o, const std::vector<std::string>& inputs) {
-  std::map<std::string, std::string> taken;  // name: what it is
+  std::map<std::string, std::string> taken;  // name: its purpose
   for (const std::string& input : inputs)
     if (!input.empty()) taken.emplace(one_name(input), "an input of this run: " + input);
   const auto take = [&](const char* what, const std::string& file) {

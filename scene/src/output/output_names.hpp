@@ -16,7 +16,7 @@ std::string film_folder(const std::string& vtk);
 /// Throws std::invalid_argument if two outputs have a name in common, or one that of an input.
 void check_names(const Output& output, const std::vector<std::string>& inputs);
 
-/// One name for each output that is asked for: who holds it, holds all its files.
+/// One name for each requested output; its lock covers all files of that output.
 std::vector<std::string> names(const Output& output);
 
 }  // namespace tether::scene

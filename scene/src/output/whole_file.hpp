@@ -9,12 +9,12 @@ namespace tether::scene {
 /// Makes the folder of a file. Throws std::runtime_error.
 void make_folder_of(const std::string& file);
 
-/// Replaces the file in one go: who reads it finds the old content or all of the new one, after a
-/// loss of power, too. What is there and no regular file (/dev/stdout) is written to. Throws
+/// Replaces the file atomically: a reader finds the old content or all of the new one, also after a
+/// loss of power. A target that is not a regular file (/dev/stdout) is written to. Throws
 /// std::runtime_error.
 void write_whole(const std::string& file, std::string_view content);
 
-/// The same for what must be a regular file, if it is there.
+/// The same, but an existing target must be a regular file.
 void write_whole_regular(const std::string& file, std::string_view content);
 
 }  // namespace tether::scene

@@ -1,14 +1,14 @@
 // Tether: the subcommands of the program that work on scene files. SPDX-License-Identifier:
 // BSD-3-Clause
 //
-// Each sets *status to what the program exits with.
+// Each sets *status to the exit code of the program.
 #pragma once
 
 #include <CLI/CLI.hpp>
 
 namespace tether::scene {
 
-/// What `tether` exits with.
+/// Exit codes of `tether`.
 enum ExitCode : int {
   kGood = 0,
   kNotMet = 1,   ///< an [[expect]] does not hold, a contact problem is not solved

@@ -5,7 +5,7 @@
 
 namespace tether::scene {
 
-/// Adds the subcommand; after parsing, *status is what main returns.
+/// Adds the subcommand; after parsing, *status is the exit code.
 void add_contact_command(CLI::App& app, int* status);
 
 }  // namespace tether::scene

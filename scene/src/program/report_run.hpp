@@ -7,11 +7,11 @@ namespace tether::scene {
 
 /// Energies, errors and work.
 void print_summary(const Scene& scene, const RunResult& result);
-/// What the engine took, and all of the program: `wall` seconds, reading and output included.
+/// Times of the engine and of the whole program: `wall` seconds, reading and output included.
 void print_times(const RunResult& result, double wall);
-/// Each [[expect]] with what was found.
+/// Each [[expect]] with the value found.
 void print_judgements(const Scene& scene, const RunResult& result);
-/// What each effect cost.
+/// Time spent on each effect.
 void print_costs(const RunResult& result);
 /// Files that were written, and remarks on those that were not.
 void print_files(const RunResult& result);

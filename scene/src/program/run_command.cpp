@@ -26,8 +26,8 @@ struct Arguments {
   bool force = false, quiet = false;
 };
 
-/// Names of a scene file stay inside the folder of the output, links and all: who runs a scene of
-/// somebody else's chooses what may be overwritten.
+/// File names given in a scene stay inside the output folder, links resolved: only the command line
+/// may choose to overwrite files elsewhere.
 void stay_inside(const std::string& folder, const Output& o) {
   namespace fs = std::filesystem;
   const fs::path inside = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder));
@@ -46,7 +46,7 @@ void stay_inside(const std::string& folder, const Output& o) {
   }
 }
 
-/// What the command line says goes before what the scene says.
+/// Settings of the command line override those of the scene.
 void overlay(const Arguments& arguments, Scene& scene) {
   Output& o = scene.output;
   Output by_scene = o;

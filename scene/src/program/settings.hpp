@@ -7,7 +7,7 @@
 
 namespace tether::scene {
 
-/// Refuses what is not a finite number > 0.
+/// Refuses all but finite numbers > 0.
 CLI::Validator positive_number();
 
 /// Each item is a number > 0 or a range "1e-3:1e-9", which gives both ends and what lies between

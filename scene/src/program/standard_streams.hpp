@@ -1,4 +1,4 @@
-// Tether: what the program is started with: descriptors, and where its text goes.
+// Tether: the descriptors that the program starts with, and its text output.
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 

@@ -15,7 +15,7 @@ namespace {
 constexpr int kWidth = 30;
 constexpr std::chrono::milliseconds kRedraw(200), kLine(10000);
 
-// Where nobody reads, nothing is shown: fmt::print would throw, and end the job.
+// Nothing is shown on a closed stream: fmt::print would throw and end the job.
 void print(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 }  // namespace

@@ -20,7 +20,7 @@ namespace tether::scene {
 
 namespace {
 
-/// The table has the first of them: one of a million columns serves nobody.
+/// The table has the first of them: a million columns are of no use.
 constexpr std::size_t kMostBodies = 200;
 
 class CsvRecorder : public Recorder {
@@ -36,7 +36,7 @@ class CsvRecorder : public Recorder {
     make_folder_of(file);
     const std::string first = header(scene);
     const long kept = resume.restarted ? length_up_to(resume.time, first) : 0;
-    // Cut where the run goes on, never emptied: what is kept is safe at every moment.
+    // Truncated where the run continues, never emptied: the kept rows are safe at every moment.
     out_.reset(std::fopen(file.c_str(), kept > 0 ? "r+b" : "wb"));
     if (!out_) fail();
     if (kept == 0) {

@@ -59,7 +59,7 @@ Outcome execute(const std::string& script) {
     return {126, ""};
   const Descriptor from(ends[0]);
   Descriptor to(ends[1]);
-  // Not what is in ~/.gnuplot.
+  // Without the settings in ~/.gnuplot.
   std::string program = "gnuplot", defaults = "--default-settings", standard = "-";
   char* const argv[] = {program.data(), defaults.data(), standard.data(), nullptr};
   posix_spawn_file_actions_t actions;

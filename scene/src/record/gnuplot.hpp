@@ -5,7 +5,7 @@
 
 namespace tether::scene {
 
-/// Runs a script and writes what it draws to `file`; empty on success, else why there is no picture
+/// Runs a script and writes its picture to `file`; empty on success, else why there is no picture
 /// (the script is left beside it then, ending .gp). Throws std::runtime_error where nothing can be
 /// written.
 std::string gnuplot(const std::string& script, const std::string& file);
@@ -13,7 +13,7 @@ std::string gnuplot(const std::string& script, const std::string& file);
 /// The same error before the work is done.
 void check_writable(const std::string& file);
 
-/// What all pictures have in common: terminal, axes, colours.
+/// Settings common to all pictures: terminal, axes, colours.
 std::string picture_head(int width, int height);
 
 }  // namespace tether::scene

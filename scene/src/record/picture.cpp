@@ -30,7 +30,7 @@ constexpr std::size_t kMostBodies = 300;    // drawn; of more, only the first
 constexpr std::size_t kMostRecords = 1024;  // kept; then every second one goes
 constexpr std::size_t kMostPaths = 30;
 
-/// Okabe and Ito: told apart by everybody.
+/// Okabe and Ito: safe for colour-blind readers.
 constexpr std::array<const char*, 7> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                  "#e69f00", "#56b4e9", "#999999"};
 
@@ -286,7 +286,7 @@ class PictureRecorder : public Recorder {
     return paths + text + plots + "\n";
   }
 
-  /// Where the centre of a body went, without what is drawn already; empty if it hardly moved.
+  /// Path of a body's centre, without parts drawn already; empty if it hardly moved.
   std::string path_of(std::size_t b) const {
     const double pixel = (high_ - low_).x() / 400;
     std::map<std::pair<long, long>, std::size_t> visited;  // cells of the picture, and when first
@@ -317,7 +317,7 @@ class PictureRecorder : public Recorder {
     std::string text = fmt::format("${} << EOD\n", name);
     const std::size_t step = 1 + instants_.size() / 200;
     for (std::size_t i = 0; i < instants_.size(); i += step) {
-      // Of errors the largest between two points; else what is there.
+      // Errors: the largest between two points; else the value itself.
       double shown = value(instants_[i].d);
       if (peaks)
         for (std::size_t k = i; k < std::min(i + step, instants_.size()); ++k)

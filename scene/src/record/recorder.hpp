@@ -8,7 +8,7 @@
 
 namespace tether::scene {
 
-/// Where a run goes on from: recorders keep what they wrote up to then and drop what came later.
+/// Start of a continued run: recorders keep their output up to then and drop later parts.
 struct Resume {
   bool restarted = false;
   double time = 0;  // s, of the last record that a run in one piece has, too

@@ -205,7 +205,7 @@ class VtkRecorder : public Recorder {
     return out;
   }
 
-  /// Takes over what an earlier run recorded, so that both make one film.
+  /// Takes over the frames of an earlier run, so that both make one film.
   void keep_up_to(double time) {
     std::ifstream in(file_, std::ios::binary);
     std::string line;

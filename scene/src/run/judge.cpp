@@ -17,7 +17,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<double> list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-/// What is no number is larger than any.
+/// The larger one; NaN counts as infinity.
 double larger(double a, double b) {
   return std::isnan(a) || std::isnan(b) ? kInfinity : std::max(a, b);
 }
@@ -137,7 +137,7 @@ void Judge::save(std::ostream& out) const {
 void Judge::restore(std::istream& in) {
   std::size_t count = 0;
   binary::get(in, count);
-  // A scene may have gained or lost expectations: what was judged is kept only if none has.
+  // A scene may have gained or lost expectations: the judgements are kept only if none has.
   const bool same = count == judgements_.size();
   for (std::size_t i = 0; i < count; ++i) {
     Judgement j;

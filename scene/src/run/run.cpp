@@ -36,7 +36,7 @@ class Stopwatch {
   double wall_ = seconds(CLOCK_MONOTONIC), processor_ = seconds(CLOCK_PROCESS_CPUTIME_ID);
 };
 
-/// What a command line or a caller may have put over the scene.
+/// Checks values that a command line or a caller may have put over those of the scene.
 const Scene& checked(const Scene& scene) {
   const auto demand = [](bool holds, const char* what, double value, const std::string& range) {
     if (!holds) throw std::invalid_argument(fmt::format("{} = {}: {}", what, value, range));

@@ -27,7 +27,7 @@ struct SavedState {
   bool same = true;  ///< scene and version
 };
 
-/// Throws std::runtime_error on anything that write_state did not write, by name what is wrong; on
+/// Throws std::runtime_error, naming the fault, on anything that write_state did not write, and on
 /// a state of another scene or version unless `any_scene`.
 SavedState read_state(const std::string& file, std::uint64_t scene, bool any_scene);
 

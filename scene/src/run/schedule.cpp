@@ -7,7 +7,7 @@ namespace tether::scene {
 
 namespace {
 
-/// k * every, k = 1, 2, ..., up to the end, or what differs from it by rounding.
+/// k * every, k = 1, 2, ..., up to the end (to rounding).
 std::vector<double> multiples(double every, double end) {
   std::vector<double> times;
   const double count = end / every * (1 + 1e-12);

@@ -15,11 +15,11 @@
 
 namespace tether::scene::smooth {
 
-/// One run of IDA from a point on. What it does depends on that point alone, never on the times
+/// One run of IDA from a point on. Its steps depend on that point alone, never on the times
 /// that it is asked for: they are interpolated.
 class Integrator {
  public:
-  /// `y` and `yp` are consistent, but for what `make_consistent` repairs.
+  /// `y` and `yp` are consistent up to errors that `make_consistent` repairs.
   Integrator(System& system, const SmoothOptions& options, double t, const Eigen::VectorXd& y,
              const Eigen::VectorXd& yp);
   ~Integrator();

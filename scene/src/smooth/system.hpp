@@ -34,7 +34,7 @@ namespace tether::scene::smooth {
 
 class System {
  public:
-  /// `scene` is in these units already; they are for figures that are told to others.
+  /// `scene` is in these units already; they are for figures in messages.
   explicit System(const Scene& scene, const Units& units = {});
   System(const System&) = delete;
   System& operator=(const System&) = delete;

@@ -1,4 +1,4 @@
-// Tether: what a stepper remembers, in a saved state. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the memory of a stepper in a saved state. SPDX-License-Identifier: BSD-3-Clause
 #include "saved_memory.hpp"
 
 #include <cmath>

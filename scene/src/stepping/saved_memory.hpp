@@ -1,4 +1,4 @@
-// Tether: what a stepper remembers, in a saved state. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the memory of a stepper in a saved state. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace tether::scene::stepping {
 enum class MemoryFormat : std::uint8_t { with_closings, without_control, now };
 
 void put_memory(std::ostream& out, const contact::StepperMemory& memory);
-/// Throws std::runtime_error on what no stepper of so many bodies has written.
+/// Throws std::runtime_error on a memory that no stepper of so many bodies has written.
 contact::StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format);
 
 }  // namespace tether::scene::stepping

@@ -124,7 +124,7 @@ std::string Fields::text(std::string_view key, const std::string& otherwise) {
   return found->value.text;
 }
 
-// Who runs the scene of somebody else's must not be surprised: no way out of the folder, no pipe of
+// A scene from an untrusted source must not write elsewhere: no way out of the folder, no pipe of
 // a program that takes names for commands.
 std::string Fields::file_name(std::string_view key) {
   const std::string name = text(key, "");
@@ -185,7 +185,7 @@ Eigen::Vector3d Fields::direction(std::string_view key, const Eigen::Vector3d& o
     if (found != nullptr) wrong(*found, found->value, "must not be zero: it is a direction");
     return otherwise;
   }
-  // What was normalised once is left alone, so that a scene written and read again is the same.
+  // A normalised value is kept, so that a scene written and read again is the same.
   if (std::abs(length - 1) <= kUnitError) return v;
   const Eigen::Vector3d unit = (v / v.lpNorm<Eigen::Infinity>()).normalized();
   return std::abs(unit.stableNorm() - 1) <= kUnitError ? unit : unit.normalized();

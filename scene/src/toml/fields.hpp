@@ -14,7 +14,7 @@
 
 namespace tether::scene::files {
 
-/// What a number may be: finite, and between the bounds.
+/// The allowed values of a number: finite, and between the bounds.
 struct Range {
   double low, high;
   bool low_excluded;
@@ -24,7 +24,7 @@ struct Range {
 extern const Range kAny, kPositive, kNotNegative, kPart, kPositivePart;
 
 /// Reads fields by name. Each wrong one is reported and replaced by its default; `finish` reports
-/// the keys that nobody asked for.
+/// the keys that no reader has used.
 class Fields {
  public:
   /// `table` may be null (an absent table: everything has its default).
@@ -61,7 +61,7 @@ class Fields {
   E word(std::string_view key, E otherwise) {
     return word_of<E>(key).value_or(otherwise);
   }
-  /// These keys are not to be called unknown, though nobody reads them.
+  /// These keys are not reported as unknown, though no reader uses them.
   void pass_over(std::initializer_list<std::string_view> keys) {
     for (const std::string_view key : keys) find(key);
   }
@@ -76,7 +76,7 @@ class Fields {
   void missing(std::string_view key, std::string allowed);
   /// The field is there and wrong.
   void wrong(std::string_view key, std::string allowed);
-  /// Keys that nobody asked for.
+  /// Keys that no reader has used.
   void finish();
 
   Place place() const { return place_; }

@@ -16,7 +16,7 @@ struct Nesting {
 constexpr int kDeepest = 64;
 
 /// Stops looking beyond kDeepest. Of a text that is not TOML it may say anything: no deeper than
-/// what the parser reads before it refuses.
+/// the part that the parser reads before it refuses.
 Nesting nesting_of(std::string_view text);
 
 }  // namespace tether::scene::files

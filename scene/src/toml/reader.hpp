@@ -13,7 +13,7 @@
 
 namespace tether::scene::files {
 
-/// The scene under construction, with what every part of the reader needs.
+/// The scene under construction and the data shared by all parts of the reader.
 struct Reader {
   const std::string& file;
   Report& report;

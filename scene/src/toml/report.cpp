@@ -83,7 +83,7 @@ bool is_prefix(std::string_view a, std::string_view b) { return b.substr(0, a.si
 }  // namespace
 
 std::string nearest(std::string_view text, const std::vector<std::string>& candidates) {
-  constexpr std::size_t kLongest = 64;  // nobody misspells a longer key; bounds the work
+  constexpr std::size_t kLongest = 64;  // longer keys get no suggestion; bounds the work
   if (text.empty() || text.size() > kLongest) return "";
   std::string best;
   std::size_t least = 1 + std::max<std::size_t>(1, text.size() / 2);

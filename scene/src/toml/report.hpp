@@ -24,7 +24,7 @@ class Report {
 /// Throws a SceneError of one problem.
 [[noreturn]] void refuse(const Place& place, std::string why);
 
-/// The candidate that somebody who wrote `text` probably meant; empty: none is near.
+/// The candidate that `text` is probably a misspelling of; empty: none is near.
 std::string nearest(std::string_view text, const std::vector<std::string>& candidates);
 /// a, b, c
 std::string list(const std::vector<std::string>& words);

@@ -40,31 +40,32 @@ struct PointContact {
 
 struct BodyOptions {
   Law law = Law::maximum_dissipation;
-  /// Of each contact: its error in velocity over the largest velocity that a contact of its island
-  /// needs; Residuals::fixed_point.
+  /// Wanted Residuals::fixed_point of each contact: the error of its velocity over the largest
+  /// velocity that a contact of its island needs.
   double tolerance = 1e-6;
-  /// Of an island. Where they are reached and it is not assembled, the best point looked at is
-  /// returned.
+  /// Sweeps over one island. An island that needs more and is not assembled ends with the best
+  /// iterate found.
   int max_sweeps = 1000;
-  /// Of an island of more than 64 contacts, before it may be called solved. The tolerance is one of
-  /// the whole island: a single contact of many may be off by far more than its share. Such errors
-  /// fade within a few sweeps; errors common to many contacts are what the tolerance sees.
+  /// Sweeps before an island of more than 64 contacts may be called solved. The tolerance is
+  /// relative to the whole island, so a single contact of many may be off by far more than its
+  /// share; such local errors fade within a few sweeps, errors common to many contacts do not and
+  /// are seen by the tolerance.
   int min_sweeps = 0;
   int threads = 1;         ///< results have the same bits for every number of threads
   bool warm_start = true;  ///< contacts with an id start from their impulse of the previous solve
-  /// Islands that sweeps do not soon finish are assembled and given to Solver, whose stages also
-  /// serve stacks, large mass ratios and much friction: where the work that their graph predicts is
-  /// less than that of the sweeps which are left, or max_sweeps are reached, and max_work allows
-  /// it. Islands of more contacts never are: this bounds the memory, 1.3 kB a contact in a packing,
-  /// 20 to 30 kB where it comes to a factorisation. 0: never.
+  /// Largest number of contacts of an island that may be assembled and given to Solver, whose
+  /// stages also solve stacks, large mass ratios and high friction. That happens where the work
+  /// predicted from the contact graph is less than the work of the remaining sweeps, or max_sweeps
+  /// are used up, and max_work allows it. Bounds the memory: 1.3 kB a contact in a packing, 20 to
+  /// 30 kB with a factorisation. 0: never.
   int max_assembled = 100000;
   bool strict = false;    ///< as Options::strict, for assembled islands
   double max_work = 1e9;  ///< as Options::max_work, for each assembled island
   double enough = 0;      ///< as Options::enough, for each assembled island
 };
 
-/// What a warm start begins with: the impulses of the last solve by id, in the order of its
-/// contacts.
+/// Start of the next solve: the impulses of the last one and the ids of their contacts, in the
+/// order of that solve.
 struct WarmStart {
   std::vector<std::uint64_t> ids;
   std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`, N s
@@ -84,9 +85,9 @@ struct BodySolution {
   std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
 };
 
-/// Islands of bodies in contact, one by one: Gauss-Seidel on the velocities of the bodies, and
-/// Solver where that does not soon converge. What is found for an island does not depend on others,
-/// nor on the number of threads.
+/// Solves each island of bodies in contact by itself: Gauss-Seidel on the velocities of the bodies,
+/// and Solver where that converges slowly. The result of an island depends neither on the other
+/// islands nor on the number of threads.
 ///
 /// Keep one for a run of time steps: it holds the workspace, the threads and the impulses by id.
 /// Not for use by two threads at once.
@@ -100,7 +101,7 @@ class BodySolver {
   /// Throws std::invalid_argument on values that are not finite and indices that do not exist.
   BodySolution solve(const std::vector<RigidBody>& bodies,
                      const std::vector<PointContact>& contacts);
-  /// The same, into storage that is used again: nothing is allocated once all has grown, unless an
+  /// The same, into storage that is used again: allocates only while the storage grows and where an
   /// island has to be assembled.
   void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& solution);
@@ -110,11 +111,12 @@ class BodySolver {
 
   /// Multiplies the impulses that the next warm start will find, as for a changed time step.
   void scale_warm_start(double factor);
-  /// The last solve leaves nothing to the next one: as if it had not been. Once for each solve.
+  /// Undoes the effect of the last solve on the next warm start. At most once for each solve.
   void take_back();
-  /// Forgets them.
+  /// Drops all stored impulses: the next solve starts from zero.
   void forget();
-  /// All that one solve leaves to the next. Throws std::invalid_argument if the lengths differ.
+  /// The complete memory from one solve to the next. Throws std::invalid_argument if the lengths
+  /// of its arrays differ.
   WarmStart warm_start() const;
   void set_warm_start(const WarmStart& start);
 

@@ -11,8 +11,8 @@ namespace tether::contact {
 
 struct BodySet;
 
-/// Rows g(positions, orientations, t) = 0 between the bodies of a Stepper, written by who knows the
-/// joints. The same rows on the same bodies at all times.
+/// Joint constraints g(positions, orientations, t) = 0 between the bodies of a Stepper; implemented
+/// by the caller. Number of rows and bodies of each row do not change in time.
 class JointEquations {
  public:
   virtual ~JointEquations() = default;
@@ -21,7 +21,7 @@ class JointEquations {
   virtual void values(const BodySet& bodies, double t, double* g) = 0;
   /// Adds the rows G v = -dg/dt (t alone; positions held) to `rows`, in the order of values().
   virtual void add_rows(const BodySet& bodies, double t, JointRows& rows) = 0;
-  /// What messages call the joint whose number add_rows() gives.
+  /// Name, for messages, of the joint with that number in add_rows().
   virtual std::string name(int joint) const { return "joint " + std::to_string(joint); }
 };
 

@@ -11,7 +11,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// Rows that hold whatever their impulse x is,
+/// Bilateral constraints on velocities, whose impulse x may have either sign,
 ///
 ///     sum over bodies of G v  +  compliance x  =  rate,
 ///
@@ -25,11 +25,11 @@ class JointRows {
   };
 
   void clear();
-  /// Starts a row of joint number `joint`, which is how messages call it. compliance >= 0, in
-  /// velocity over impulse of the row; rate: of a prescribed motion. Throws std::invalid_argument
-  /// on values that are not finite.
+  /// Starts a row of joint number `joint` (used in messages). compliance >= 0, velocity over
+  /// impulse of the row; rate: velocity of a prescribed motion. Throws std::invalid_argument on
+  /// values that are not finite.
   void add(int joint, double rate = 0, double compliance = 0);
-  /// The row that was added last, on one more body. -1, the world, is left out.
+  /// Adds the term G v of one more body to the row added last; body -1, the world, is ignored.
   void on(int body, const Vector6d& G);
 
   int count() const { return static_cast<int>(rate_.size()); }
@@ -48,15 +48,15 @@ class JointRows {
 };
 
 struct JointSolution {
-  /// Of the contacts; infeasible also where `blocked` or `contradicting` names any.
+  /// Status of the contacts; infeasible also if `blocked` or `contradicting` is not empty.
   Status status = Status::unsolved;
-  double error = 0;  ///< of the contacts, as Solution::error, the worst island
-  /// Of the rows: |G v + compliance x - rate|, the largest, over the largest speed that the rows of
-  /// its mechanism see (sum of |G| |v|, |rate|). 0 without rows.
+  double error = 0;  ///< Solution::error of the contacts, of the worst island
+  /// Largest |G v + compliance x - rate| of a row over the largest speed in the rows of its
+  /// mechanism (sum of |G| |v|, |rate|). 0 without rows.
   double joint_error = 0;
   linalg::VectorX impulses;  ///< of the contacts: 3 each (normal, tangent, tangent), N s
-  /// Of the rows, in the inverse units of their velocities. Where rows depend on each other, the
-  /// least ones, rows measured by |G C|, C C' the inverse mass; equal rows get equal shares.
+  /// Impulses of the rows, N s or N m s. Dependent rows get those of least norm, each row measured
+  /// by |G C| with C C' the inverse mass: equal rows get equal shares.
   linalg::VectorX joint_impulses;
   std::vector<Vector6d> velocities;  ///< of the bodies, after all impulses
   /// Contacts that approach though the joints hold their normal velocity: no impulse changes it.
@@ -78,8 +78,9 @@ struct JointSolution {
 /// A contact whose normal velocity the joints hold (A_nn = 0) has no impulse: it is left out where
 /// it does not approach, else named in `blocked`.
 ///
-/// Good for islands of some hundred contacts: A is dense over the contacts of a mechanism. Keep one
-/// for a run of problems: it holds the analysis of the rows while their pattern is the same.
+/// Meant for islands of up to some hundred contacts: A is dense over the contacts of a mechanism.
+/// Keep one for a sequence of problems: it reuses the symbolic analysis while the pattern of the
+/// rows stays the same.
 class JointSolver {
  public:
   explicit JointSolver(const Options& options = {});  ///< throws std::invalid_argument

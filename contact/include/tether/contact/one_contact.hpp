@@ -9,7 +9,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// What an impulse x = (x_n, x_t) and the relative velocity after it, w = A x - b, must satisfy.
+/// The law that an impulse x = (x_n, x_t) and the relative velocity after it, w = A x - b, obey.
 /// Derivations: contact/README.md.
 enum class Law : std::uint8_t {
   /// Preclik and Ruede's MPCC: min 1/2 x'Ax - b'x over x_n >= 0, |x_t| <= mu x_n with

@@ -18,7 +18,7 @@ inline constexpr std::array<ShapeKind, 6> kShapeKinds{ShapeKind::sphere, ShapeKi
 
 const char* name(ShapeKind kind);
 
-/// In the axes of its body, moved by `position` and turned by `orientation`.
+/// Given in the axes of its body; `position` and `orientation` place it on the body.
 struct Shape {
   ShapeKind kind = ShapeKind::sphere;
   double radius = 0;  ///< sphere, capsule: m

@@ -15,9 +15,9 @@ namespace tether::contact {
 /// The number that is compared with Options::tolerance; see Residuals.
 enum class Measure : std::uint8_t {
   automatic,         ///< fixed_point
-  natural_map,       ///< as Siconos; hangs on the units of A and b: for comparisons only
-  natural_map_data,  ///< hangs on the units of A
-  fixed_point        ///< has no units
+  natural_map,       ///< as Siconos; depends on the units of A and b: for comparisons only
+  natural_map_data,  ///< depends on the units of A
+  fixed_point        ///< independent of units
 };
 
 enum class Method : std::uint8_t {
@@ -29,17 +29,17 @@ enum class Method : std::uint8_t {
   admm,              ///< alternating directions only
   proximal_newton,   ///< one sweep, then proximal semismooth Newton only
   interior_point,    ///< interior points of the exact cones only
-  convex_relaxation  ///< min 1/2 x'Ax - b'x over the cones: never without being asked for
+  convex_relaxation  ///< min 1/2 x'Ax - b'x over the cones: never chosen by `automatic`
 };
 
 enum class Status : std::uint8_t {
   unsolved,    ///< not tried, or the impulses lie outside of the range of doubles in these units
   solved,      ///< measure <= tolerance, and round-off of A x - b does not exceed it
-  stalled,     ///< no progress any more
-  cycling,     ///< the iteration repeats without progress; often no solution of the law is near
+  stalled,     ///< the iteration no longer makes progress
+  cycling,     ///< the iterates repeat without progress; often no solution of the law is near
   work_limit,  ///< max_work or max_sweeps reached while there was progress
   relaxed,     ///< convex_relaxation converged, but its answer violates the law (see error)
-  round_off,   ///< what is left is what round-off makes of A x - b: no smaller tolerance can be
+  round_off,   ///< the remaining error is the round-off of A x - b: a smaller tolerance cannot be
                ///< reached
   infeasible   ///< no impulses keep every w_n >= 0, see Solution::infeasible_direction
 };
@@ -60,8 +60,8 @@ struct Options {
   double relaxation = 1.0;  ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
   int max_sweeps = 200000;  ///< of the plain methods and anderson
   double max_work = 1e10;   ///< automatic: estimated nanoseconds, counted from operations
-  /// An error with which the solve ends, as work_limit, once a quarter of max_work is spent: what
-  /// is hard to solve is then not worth all of it. 0: none.
+  /// Once a quarter of max_work is spent, an error of at most this ends the solve, as work_limit:
+  /// a hard problem then does not use all of max_work. 0: off.
   double enough = 0;
   int anderson_depth = 10;  ///< 1 .. 20
   bool warm_start = false;  ///< start from the impulses of the previous solve, found by contact id
@@ -104,9 +104,9 @@ struct Solution {
   std::string advice;  ///< what to try when it is not solved
 };
 
-/// Iterates on a Problem and keeps its workspace between solves; results depend only on the
-/// problem, the options and, with warm_start, the previous solution: never on the clock. Not for
-/// use by two threads at once.
+/// Solves Problems and keeps its workspace between them. Results depend only on the problem, the
+/// options and, with warm_start, the previous solution, never on timing. Not for use by two threads
+/// at once.
 class Solver {
  public:
   explicit Solver(const Options& options = {});  ///< throws std::invalid_argument on illegal values

@@ -30,12 +30,12 @@ inline constexpr std::array<Gyroscopic, 4> kGyroscopics{
 
 const char* name(Gyroscopic gyroscopic);
 
-/// What an impact gives back (README, section 14).
+/// Law of restitution at impacts (README, section 14).
 enum class RestitutionLaw : std::uint8_t {
   /// Normal velocities: w_n+ + e w_n- >= 0 complementary to x_n, together with friction in one
   /// solve.
   newton,
-  /// Impulses: those without restitution, and e times as much more; slip is given back as well.
+  /// Impulses: (1 + e) times those without restitution; restores part of the slip, too.
   poisson
 };
 
@@ -90,34 +90,37 @@ struct SteppingOptions {
   double accuracy = 0;
   std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: not evaluated
   Law law = Law::coulomb;
-  /// Of the contact problem; see BodyOptions::tolerance.
+  /// BodyOptions::tolerance of the contact problems.
   double tolerance = 1e-9;
-  /// A problem that ends above the tolerance is used and counted as `accepted` if its residual is
-  /// at most acceptance * tolerance and at most 1e-2, see README, section 13; from 1e-4 on no more
-  /// work is spent on a better answer. 1: none is.
+  /// A contact problem that ends above the tolerance is used, and counted as `accepted`, if its
+  /// residual is at most min(acceptance * tolerance, 1e-2) (README, section 13). Below 1e-4 the
+  /// solver stops early instead of spending all of max_work. 1: nothing above the tolerance is
+  /// accepted.
   double acceptance = 1;
-  /// Where it is above that, too, the step is taken in two halves, they in quarters, ... so many
-  /// times. The shortest parts, and all with an impact, which is as hard in a shorter step, accept
-  /// at least up to 1e-4 and are given five times max_work where they are above that; above it even
-  /// so, the shortest part is used all the same and counted as `unsolved`. 0: at once.
+  /// A step whose problem is not accepted is repeated as two halves, each of these as two quarters,
+  /// and so on, at most this many times. The shortest parts, and parts with an impact (which a
+  /// shorter step does not make easier), accept residuals up to 1e-4 at least, after five times
+  /// max_work where needed. A shortest part above that is used all the same and counted as
+  /// `unsolved`. 0: no halving.
   int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
-  /// A penetration of depth d is reduced by the speed min(error_reduction d / dt,
-  /// max_depenetration_speed). That speed moves bodies but is no velocity of theirs: it enters no
-  /// energy. 0: penetrations stay.
+  /// A penetration of depth d is reduced at the speed min(error_reduction d / dt,
+  /// max_depenetration_speed). This speed changes positions only: it is not part of the bodies'
+  /// velocities and adds no energy. 0: penetrations stay.
   double error_reduction = 0.2;
   double max_depenetration_speed = 1;  ///< m/s
   RestitutionLaw restitution_law = RestitutionLaw::newton;
-  /// Approaches slower than this times sqrt(g s) do not bounce: g gravity (none: all bounce), s the
-  /// reach of the smaller shape from its origin. A drop from h bounces if h > threshold^2 s / 2.
+  /// Approaches slower than this times sqrt(g s) do not bounce: g is gravity (none: all bounce), s
+  /// the largest distance of a point of the smaller shape from its origin. A drop from height h
+  /// bounces if h > threshold^2 s / 2.
   double restitution_threshold = 0.01;
-  /// Faster approaches that end within a step do so as a whole, where they are; slower ones end at
-  /// the surface. Of sqrt(g s), as above.
+  /// Approaches faster than this times sqrt(g s) that would close within the step get their whole
+  /// impulse at the present gap; slower ones close the gap first (bias gap / dt).
   double impact_threshold = 0.01;
-  /// Points closer than this part of the size of the smaller shape, beyond what the velocities
-  /// cover within the step, are contacts.
+  /// Points are contacts if their gap is below this part of the size of the smaller shape plus the
+  /// distance that the velocities cover within the step.
   double near_part = 1e-3;
-  int min_sweeps = 8;     ///< see BodyOptions: at rest they wipe out what the tolerance allows
+  int min_sweeps = 8;     ///< see BodyOptions; remove slow creep of bodies at rest
   int max_sweeps = 1000;  ///< see BodyOptions
   int max_assembled = 1000;
   /// See BodyOptions: bounds the time of a step. With acceptance > 1 a fifth of it comes first.
@@ -125,7 +128,7 @@ struct SteppingOptions {
   int threads = 1;
 };
 
-/// What a problem may end at to be used: see SteppingOptions::acceptance.
+/// Largest residual of a contact problem that is used: see SteppingOptions::acceptance.
 double accepted_residual(const SteppingOptions& options);
 
 /// Contacts of the last step (of its last part, where it was taken in parts), side by side.
@@ -150,8 +153,9 @@ struct StepCounts {
   long unsolved = 0;  ///< problems that were used though above what is accepted
 };
 
-/// What a step leaves to the next one beside positions and velocities, and to those who look at it.
-/// A Stepper of the same scene that is given bodies and memory of another goes on with its bits.
+/// State of a Stepper beside positions and velocities: warm starts, kept momenta, and the contacts
+/// of the last step. A Stepper of the same scene that is given the bodies and the memory of another
+/// one continues its motion bit by bit.
 struct StepperMemory {
   /// The momentum of a body without torque, see rotation.hpp, and the state that it belongs to.
   struct Spin {
@@ -160,8 +164,8 @@ struct StepperMemory {
   };
   long steps = 0;
   WarmStart contacts, corrections, bounces;  ///< of the contact problems of a step
-  std::vector<Spin> spins;                   ///< of bodies that turn with their momentum kept
-  StepContacts last;                         ///< contacts of the last step, and what became of it:
+  std::vector<Spin> spins;                   ///< of bodies whose angular momentum is kept
+  StepContacts last;                         ///< contacts of the last step; then its outcome:
   double penetration = 0, residual = 0;
   Status status = Status::solved;
   /// With an accuracy: length of the next part, s (0: not chosen), length and error (1: the
@@ -182,15 +186,15 @@ struct StageCost {
 ///
 /// with impulses x of the contact problem w = J v+ + bias, bias_n = gap / dt for gaps >= 0, and
 /// e w_n- (newton) or 0 for impacts.
-/// What is not asked for is not in the list of stages that a step runs through: no gravity, no
-/// force, no meeting of materials, no friction, no restitution, no gyroscopic term.
+/// A step runs through a list of stages that holds only the effects that are asked for: gravity,
+/// forces, contact, friction, restitution, the gyroscopic term.
 ///
-/// Nothing is allocated once all storage has grown, unless an island has to be assembled
+/// Allocates only while the storage grows and where an island has to be assembled
 /// (BodyOptions::max_assembled). Not for use by two threads at once.
 class Stepper {
  public:
   /// Throws std::invalid_argument on indices that do not exist, values outside their range, planes
-  /// on bodies that move, and pairs of shapes that nobody serves (`polyhedra` absent).
+  /// on bodies that move, and pairs of shapes without a collision routine (`polyhedra` absent).
   Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
           const SteppingOptions& options, std::unique_ptr<PairCollision> polyhedra = nullptr);
   ~Stepper();
@@ -214,24 +218,24 @@ class Stepper {
   const StepContacts& contacts() const;
   double penetration() const;  ///< deepest at the start of the last step, m
   double residual() const;     ///< of its contact problem, the largest of its parts
-  /// Of its contact problem, the worst of its parts; solved if there were no contacts.
+  /// Status of the last step's contact problem, the worst of its parts; solved without contacts.
   Status status() const;
-  /// Solved or accepted, in all of its parts.
+  /// True if the contact problems of all parts of the last step were solved or accepted.
   bool succeeded() const;
   /// Largest |g| of a joint's rows at the end of the last step, m or rad; 0 without joints.
   double joint_drift() const;
-  /// Of the last part of the last step, by row of the joints, N s or N m s: see
+  /// Impulses of the joints in the last part of the last step, one for each row, N s or N m s: see
   /// JointSolution::joint_impulses.
   const std::vector<double>& joint_impulses() const;
   const StepCounts& counts() const;
   std::vector<StageCost> costs() const;
   const SteppingOptions& options() const;
 
-  /// To go on where another one stands, bit by bit; bodies() are copied by the caller.
-  /// set_memory() throws std::invalid_argument on a memory of other bodies.
+  /// Continue the motion of another Stepper bit by bit; the caller copies bodies() as well.
+  /// set_memory() throws std::invalid_argument if the memory belongs to other bodies.
   StepperMemory memory() const;
   void set_memory(const StepperMemory& memory);
-  /// Forgets what warm starts remember, sets the number of steps.
+  /// Drops all warm starts and sets the number of steps.
   void start_anew(long steps);
 
  private:

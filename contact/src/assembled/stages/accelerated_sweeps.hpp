@@ -10,7 +10,7 @@ namespace tether::contact::detail {
 class AcceleratedSweeps {
  public:
   void reset(int contacts, int depth);
-  void start(const PackedVector* x);    // next iterate; forgets what was seen of others
+  void start(const PackedVector* x);    // next iterate; forgets the rates of others
   void replace(const PackedVector* x);  // next iterate, near the last one
   const PackedVector* point() const { return g_.data(); }
 

@@ -132,7 +132,7 @@ bool InteriorPoint::scale(const System& system) {
   return true;
 }
 
-// The block on the diagonal of the Newton matrix, with A in it (whole) or what else is there.
+// The diagonal block of the Newton matrix, with A in it (whole) or without.
 void InteriorPoint::diagonal(const System& system, int i, bool whole, PackedBlock& scaled) const {
   const Problem& p = system.problem();
   PackedBlock block;
@@ -332,7 +332,7 @@ void InteriorPoint::advance(double step) {
   }
 }
 
-// Of the (proximal) problem at z, whose velocities velocities() has left in w_.
+// Residual of the (proximal) problem at z; velocities() has stored its velocities in w_.
 double InteriorPoint::natural_map(const System& system) const {
   double sum = 0;
   for (int i = 0; i < n_; ++i) {

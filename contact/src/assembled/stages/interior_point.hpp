@@ -11,7 +11,7 @@ namespace tether::contact::detail {
 
 // Follows x o u = nu e, nu -> 0, for x in K and u = w + s (mu, gamma) in K*, w = A x - b. With
 // s = s(u) the velocity w is an explicit function of u, so that one Newton matrix holds the law as
-// well; it is regular whatever the rank of A (README, section 9).
+// well; it is regular for every rank of A (README, section 9).
 class InteriorPoint {
  public:
   void reset(int contacts);
@@ -90,7 +90,7 @@ class InteriorPoint {
   // their gaps. r: residual of w(u) = A x - b; z: x as impulses, w: their velocities.
   Packed x_, u_, dx_, du_, r_, w_, z_, swept_, anchor_;
   // W dx and W^-1 du, the same of the predictor; in the frames of the scalings W dx, the aim
-  // lambda \ (...) and what the solution leaves of the equations.
+  // lambda \ (...) and the residual of the equations.
   Packed scaled_x_, scaled_u_, affine_x_, affine_u_, step_, aim_, defect_;
 };
 

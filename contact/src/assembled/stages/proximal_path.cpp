@@ -60,7 +60,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
     drifting = true;
     std::copy(point.begin(), point.end(), anchor_.begin());
     search.test(anchor_.data(), Method::interior_point);
-    // What single contacts are off by, sweeps take out.
+    // Sweeps remove errors of single contacts.
     std::copy(anchor_.begin(), anchor_.end(), swept_.begin());
     for (int k = 0; k < kSweeps && !search.solved(); ++k) {
       system.sweep(swept_.data());

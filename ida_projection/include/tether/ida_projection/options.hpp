@@ -28,8 +28,8 @@ enum class Metric {
 /// What happens when a move is longer than Options::largest_move allows.
 enum class LongMove {
   reject,  ///< recoverable failure: IDA retries with a smaller step
-  cap,     ///< scale the move down to the allowed length, as DASSLX does; a failure as above where
-           ///< more than a tolerance is left and more than after the last step
+  cap,     ///< scale the move down to the allowed length, as DASSLX does; a failure as above if the
+           ///< distance left exceeds both one tolerance and that left by the step before
 };
 
 /// One report of the progress callback.
@@ -42,7 +42,7 @@ struct Progress {
   long steps = 0;      ///< accepted steps so far
 };
 
-/// Every knob of the projection. "Tolerances" below are units of the error test: the WRMS norm
+/// Settings of the projection. "Tolerances" below are units of the error test: the WRMS norm
 /// sqrt(sum (dy_i / WT_i)^2 / N) with WT_i = rtol |y_i| + atol_i, in which IDA accepts about 1.
 struct Options {
   Metric metric = Metric::automatic;
@@ -53,11 +53,11 @@ struct Options {
   /// Newton moves at most in one step; >= 1.
   int maximum_iterations = 5;
 
-  /// n >= 1: accepted steps n, 2n, 3n, ... are projected with C evaluated and factorised anew. Of
-  /// the others one is left alone while the drift to be expected is below 0.003 tolerances, and
-  /// else moved with the factors at hand, which may leave 0.02; where these are worn, and after
-  /// steps that IDA rejected, it is projected in full after all. Spares C and its factors, up to
-  /// four fifths of them; the number of steps stays what it is with 1.
+  /// n >= 1: accepted steps n, 2n, 3n, ... are projected with C evaluated and factorised anew. Any
+  /// other step is not projected while its predicted drift is below 0.003 tolerances, and otherwise
+  /// moved with the existing factors, to 0.02 tolerances; it is projected in full if these factors
+  /// no longer converge well and after steps that IDA rejected. Saves up to four fifths of the
+  /// evaluations and factorisations of C; the number of steps stays that of frequency 1.
   int frequency = 1;
 
   /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in
@@ -80,9 +80,10 @@ struct Options {
   /// (one F, one back substitution with IDA's own factors).
   bool refresh_algebraic = true;
 
-  /// The same iteration also removes what IDA's convergence test left of the correction in the
-  /// differential variables. 0 or 1. Neither is done where IDA made two iterations of its own,
-  /// unless there are algebraic variables and the move was longer than a tenth of a tolerance.
+  /// 1: that iteration also removes the part of the correction in the differential variables that
+  /// IDA's convergence test left; 0: it does not. Both are skipped in steps where IDA itself made
+  /// two iterations, unless there are algebraic variables and the move was longer than a tenth of a
+  /// tolerance.
   int extra_iterations = 1;
 
   /// Choose step sizes with Soederlind's filter H211b instead of IDA's rule "keep h until it can be
@@ -91,18 +92,19 @@ struct Options {
   /// ida_projection/README.md). Owns IDA's IDASetEta... settings and IDASetMaxStep: give the
   /// longest step here (0: none), and IDASetMaxOrd's order, if it was called.
   bool step_smoothing = false;
-  /// The same from where the run stands, where IDA's rule is known to harm: F is not of index 1 in
-  /// its own variables (looked at once, up to 200 unknowns in serial vectors), or ten steps in a
-  /// row had a failed error test. IDASetMaxStep is left alone then.
+  /// Begin step_smoothing during the run where IDA's own rule is known to harm: F is not of index 1
+  /// in its own variables (tested once, up to 200 unknowns in serial vectors), or ten steps in a
+  /// row had a failed error test. IDASetMaxStep is not used then.
   bool smooth_where_needed = true;
   double smoothing_setpoint = 4.0;
   double maximum_step = 0.0;
   int maximum_order = 5;
 
-  /// Limit the order to 2 where higher ones excite fast oscillations that are below the tolerance
-  /// otherwise, which is seen by the differences of y (ida_projection/README.md, section 9); not
-  /// while step sizes are smoothed. Uses IDASetMaxOrd and IDASetEtaFixedStepBounds, and multiplies
-  /// the error weights in the three steps that lower the order.
+  /// Limit the order to 2 where higher orders excite fast oscillations that would otherwise stay
+  /// below the tolerance, as recognised from the differences of y (ida_projection/README.md,
+  /// section 9); not while step sizes are smoothed. Uses IDASetMaxOrd and
+  /// IDASetEtaFixedStepBounds, and multiplies the error weights in the three steps that lower the
+  /// order.
   bool limit_order = true;
 
   /// Components that a move must not change: true = held. Empty, or one entry for each unknown
@@ -120,11 +122,10 @@ struct Options {
   /// host afterwards.
   SUNNonlinearSolver nonlinear_solver = nullptr;
 
-  /// Print the message of a failure that ends the run to stderr, once, as SUNDIALS does with its
-  /// own.
+  /// Print the message of a failure that ends the run to stderr, once.
   bool print_fatal = true;
 
-  /// Say once on stderr what makes IDA reject most steps, or one step again and again.
+  /// Print once to stderr the cause found where IDA rejects most steps, or one step repeatedly.
   bool print_warnings = true;
 
   /// Called after every `progress_interval`-th accepted step; must not throw.

@@ -15,7 +15,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
-/// Outcome of the last thing that the plugin did. Negative values end the run.
+/// Outcome of the last action of the plugin. Negative values end the run.
 enum class Status {
   unused = 0,  ///< attached, IDA has not called yet
   success,
@@ -78,9 +78,9 @@ struct Consistency {
 /// Constraint projection inside IDA: decorates IDA's nonlinear solver, so that every candidate
 /// y = ypred + ycor is moved onto g(t, y) = 0 before IDA tests its error and accepts it
 /// (Hanson and Krogh). The object must live until IDAFree or the last IDASolve, whichever is first.
-/// A nonlinear solver that the host attaches later takes its place without a word of IDA's:
-/// status(), message() and statistics() compare IDA's steps with what the plugin has seen, IDAFree
-/// and the destructor do so as well, and it is said once on stderr (Options::print_warnings).
+/// A nonlinear solver that the host attaches later replaces it silently. status(), message(),
+/// statistics(), IDAFree and the destructor therefore compare IDA's steps with the calls that the
+/// plugin has had; a difference is printed once to stderr (Options::print_warnings).
 ///
 /// One call to add, after IDAInit and before IDACalcIC and the first IDASolve:
 ///

@@ -61,12 +61,12 @@ class SparseMinimumNorm {
   /// entry that is not finite; the factors are then unusable.
   bool factor(double rank_tolerance = 1e-6);
   /// dy (n entries) from the kept factors; g has m entries in the units of the rows. Stops at
-  /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() says what was reached.
+  /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() is the value reached.
   void solve(const double* g, double* dy, double tolerance = kTolerance);
 
   /// The least x (m entries, each measured in the inverse unit of its row's |row_i(C D)|) with
-  /// D^2 C^T x = dy, for dy that solve() has given or a sum of such: what the rows pull with. Rows
-  /// that are given k times get a k-th each. Does not allocate, leaves residual() as it is.
+  /// D^2 C^T x = dy, for dy from solve(), or a sum of such: the multipliers of the rows. Of a row
+  /// that is given k times each copy gets a k-th. Does not allocate, leaves residual() as it is.
   void multipliers(const double* dy, double* x);
 
   int rank() const { return rows() - dropped(); }

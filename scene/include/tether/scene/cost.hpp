@@ -37,8 +37,8 @@ struct CostOptions {
 struct CostTable {
   bool smooth = true;
   std::string reference;  ///< what the errors are measured against
-  /// What it may be off: its change from the next looser setting (smooth), or how far the limits of
-  /// pairs of steps are apart (stepping).
+  /// Estimated error of the reference: its change from the next looser setting (smooth), or the
+  /// distance between the limits extrapolated from pairs of steps (stepping).
   double reference_error = 0;
   std::vector<CostRow> rows;  ///< in the order of the settings, loosest first
   /// The cheapest row with an error of at most `wanted`; null: there is none.

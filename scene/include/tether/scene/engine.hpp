@@ -69,13 +69,13 @@ struct Counts {
   long events = 0, impacts = 0;  ///< of the event engine
 };
 
-/// Seconds on the clock spent on one effect since the start.
+/// Wall time spent on one effect since the start, s.
 struct EffectCost {
   std::string effect;
   double seconds = 0;
 };
 
-/// A run that cannot go on: what happened, when, and what to try.
+/// A run that cannot go on; what() says what happened, when, and what to try.
 class SimulationError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -97,15 +97,15 @@ class Engine {
   virtual const std::vector<ContactEvent>& events() const;
   virtual Counts counts() const = 0;
   virtual std::vector<EffectCost> costs() const = 0;
-  /// Changes nothing. An engine of the same scene that restores the state goes on with the bits of
-  /// this one.
+  /// Writes the state without changing it. An engine of the same scene that restores it continues
+  /// bit by bit.
   virtual void save(std::ostream& out) const = 0;
-  /// Throws std::runtime_error on a state of other bodies, and on one that this build does not
-  /// arrive at by the same bits; `near` goes on from the positions and velocities in it then.
+  /// Throws std::runtime_error on a state of other bodies and, with `exact`, on one that this build
+  /// cannot continue bit by bit; `near` then continues from its positions and velocities.
   enum class Restore : std::uint8_t { exact, near };
   virtual void restore(std::istream& in, Restore how = Restore::exact) = 0;
 
-  /// Asked after every step: where it says true, advance() returns early, at the end of that step.
+  /// Called after every step; if it returns true, advance() returns at the end of that step.
   void stop_when(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
 
  protected:

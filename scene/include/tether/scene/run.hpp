@@ -12,10 +12,10 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
-/// What became of an [[expect]]. Of one that holds `throughout`, the worst moment.
+/// Result of an [[expect]]; for one that holds `throughout`, at its worst moment.
 struct Judgement {
-  bool beyond = false;  ///< the scene ends before it (--end): it does not count
-  bool judged = false;  ///< the run came that far
+  bool beyond = false;  ///< its time lies after the end (--end): it does not count
+  bool judged = false;  ///< the run reached its time
   bool met = false;
   double time = 0;            ///< s
   std::vector<double> value;  ///< what was found
@@ -36,7 +36,7 @@ struct RunOptions {
   std::function<void(double time)> progress;  ///< called at each record
   std::vector<double> stops;                  ///< further times at which `record` is called, s
   std::function<void(const Engine&)> record;  ///< called at each record and stop
-  /// Asked after every step: where it says true, the run ends there, with all its files whole.
+  /// Called after every step; if it returns true, the run ends there, with all its files complete.
   std::function<bool()> interrupted;
 };
 
@@ -47,13 +47,13 @@ struct RunResult {
   double wall = 0;                           ///< s on the clock, of the engine
   double whole_wall = 0, whole_seconds = 0;  ///< of the whole run, with what it records
   std::string failure;                       ///< why the run could not go on; empty: it could
-  bool interrupted = false;                  ///< it was ended before its time
+  bool interrupted = false;                  ///< RunOptions::interrupted ended it
   Summary summary;
   Counts counts;
   std::vector<EffectCost> costs;
   std::vector<Judgement> judgements;  ///< one for each Scene::expect
   std::vector<std::string> written;   ///< files
-  std::vector<std::string> remarks;   ///< what is not in the files, and what to be careful of
+  std::vector<std::string> remarks;   ///< warnings, and data that the files do not contain
 
   bool met() const;  ///< every expectation that counts was judged and holds
 };
