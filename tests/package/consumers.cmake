@@ -28,9 +28,10 @@ if(TARGET tether::ida_projection)
       $<IF:$<BOOL:${SUNDIALS_FOUND}>,SUNDIALS::ida,sundials_ida>)
     add_test(NAME reverse_ida COMMAND use_reverse_ida)
   endif()
-  # A program in C: the C++ runtime comes with the target.
+  # A program in C; libraries that were compiled before do not tell CMake that they are C++.
   add_executable(pendulum_in_c ${CMAKE_CURRENT_LIST_DIR}/../../examples/drop_in/in_c.c)
   target_link_libraries(pendulum_in_c PRIVATE tether::ida_projection
     $<IF:$<BOOL:${SUNDIALS_FOUND}>,SUNDIALS::ida,sundials_ida> m)
+  set_target_properties(pendulum_in_c PROPERTIES LINKER_LANGUAGE CXX)
   add_test(NAME pendulum_in_c COMMAND pendulum_in_c)
 endif()
