@@ -76,19 +76,24 @@ struct End {
   tp::Statistics statistics;
 };
 
-/// With the matrix-free GMRES solver, which any vector type can use.
-End run(Kind kind, Problem problem, double tolerance, const tp::Constraints& set) {
+struct LinearSystem {
+  SUNLinearSolver solver;
+  SUNMatrix matrix;
+};
+
+/// To the end of the problem with the linear system that `attach(ida, y, context)` made.
+template <class Attach>
+End run_with(Kind kind, const Problem& problem, double tolerance, const tp::Constraints& set,
+             Attach attach) {
   Context context;
   N_Vector y = make_vector(kind, problem.y0, context), yp = make_vector(kind, problem.yp0, context);
   N_Vector id = make_vector(kind, problem.id, context);
   void* ida = IDACreate(context);
   IDAInit(ida, residual, 0.0, y, yp);
-  IDASetUserData(ida, &problem);
+  IDASetUserData(ida, const_cast<Problem*>(&problem));
   IDASStolerances(ida, tolerance, tolerance);
   IDASetMaxNumSteps(ida, 100000);
-  SUNLinearSolver solver = SUNLinSol_SPGMR(y, SUN_PREC_NONE, 10, context);
-  IDASetLinearSolver(ida, solver, nullptr);
-  IDASetEpsLin(ida, 1e-3);
+  const LinearSystem system = attach(ida, y, context);
   End end{};
   {
     tp::Options options;
@@ -103,9 +108,20 @@ End run(Kind kind, Problem problem, double tolerance, const tp::Constraints& set
     end.y.assign(entries(y), entries(y) + problem.size);
     IDAFree(&ida);
   }
-  SUNLinSolFree(solver);
+  SUNLinSolFree(system.solver);
+  if (system.matrix) SUNMatDestroy(system.matrix);
   for (N_Vector v : {y, yp, id}) N_VDestroy(v);
   return end;
+}
+
+/// With the matrix-free GMRES solver, which any vector type can use.
+End run(Kind kind, const Problem& problem, double tolerance, const tp::Constraints& set) {
+  return run_with(kind, problem, tolerance, set, [](void* ida, N_Vector y, SUNContext context) {
+    SUNLinearSolver solver = SUNLinSol_SPGMR(y, SUN_PREC_NONE, 10, context);
+    IDASetLinearSolver(ida, solver, nullptr);
+    IDASetEpsLin(ida, 1e-3);
+    return LinearSystem{solver, nullptr};
+  });
 }
 
 void close(const End& a, const End& b, double tolerance) {
@@ -257,36 +273,15 @@ int jacobian_of_custom_vectors(sunrealtype t, sunrealtype cj, N_Vector y, N_Vect
   return 0;
 }
 
-End run_with_direct_solver(Kind kind, Problem problem, double tolerance,
+End run_with_direct_solver(Kind kind, const Problem& problem, double tolerance,
                            const tp::Constraints& set) {
-  Context context;
-  N_Vector y = make_vector(kind, problem.y0, context), yp = make_vector(kind, problem.yp0, context);
-  N_Vector id = make_vector(kind, problem.id, context);
-  void* ida = IDACreate(context);
-  IDAInit(ida, residual, 0.0, y, yp);
-  IDASetUserData(ida, &problem);
-  IDASStolerances(ida, tolerance, tolerance);
-  SUNMatrix matrix = SUNDenseMatrix(problem.size, problem.size, context);
-  SUNLinearSolver solver = dense_solver_of_custom_vectors(context);
-  IDASetLinearSolver(ida, solver, matrix);
-  IDASetJacFn(ida, jacobian_of_custom_vectors);
-  End end{};
-  {
-    tp::Options options;
-    options.id = id;
-    tp::Projection projection(ida, set, options);
-    sunrealtype t = 0.0;
-    while (t < problem.t_end && end.flag >= 0)
-      end.flag = IDASolve(ida, problem.t_end, &t, y, yp, IDA_ONE_STEP);
-    IDAGetNumSteps(ida, &end.steps);
-    end.statistics = projection.statistics();
-    end.y.assign(entries(y), entries(y) + problem.size);
-    IDAFree(&ida);
-  }
-  SUNLinSolFree(solver);
-  SUNMatDestroy(matrix);
-  for (N_Vector v : {y, yp, id}) N_VDestroy(v);
-  return end;
+  return run_with(kind, problem, tolerance, set, [&](void* ida, N_Vector, SUNContext context) {
+    SUNMatrix matrix = SUNDenseMatrix(problem.size, problem.size, context);
+    SUNLinearSolver solver = dense_solver_of_custom_vectors(context);
+    IDASetLinearSolver(ida, solver, matrix);
+    IDASetJacFn(ida, jacobian_of_custom_vectors);
+    return LinearSystem{solver, matrix};
+  });
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <ida/ida.h>
 #include <nvector/nvector_serial.h>
-#include <sundials/sundials_context.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
@@ -14,6 +13,8 @@
 #include <string>
 #include <tether/ida_projection.hpp>
 #include <tether/scene/engine.hpp>
+
+#include "sundials/quiet_context.hpp"
 
 namespace tether::scene::event {
 
@@ -24,17 +25,6 @@ constexpr double kFirstError = 0.125, kFirstMove = 1e-2, kFirstAtRest = 1e-3, kF
 constexpr double kLook = 1e-5;   // the part of a move over which y'' is looked at
 constexpr double kNewton = 0.1;  // Newton's test, of the tolerance
 constexpr double kDifference = 1e-7, kOfSlip = 1e-3;
-
-#ifdef SUN_COMM_NULL  // SUNDIALS 7
-void remember(int, const char*, const char*, const char* message, SUNErrCode, void* data,
-              SUNContext) {
-  *static_cast<std::string*>(data) = message ? message : "";
-}
-#else
-void remember(int, const char*, const char*, char* message, void* data) {
-  *static_cast<std::string*>(data) = message ? message : "";
-}
-#endif
 
 }  // namespace
 
@@ -52,25 +42,18 @@ struct Phase::Ida {
 
   Motion& motion;
   double tolerance, start;
-  SUNContext context = nullptr;
+  QuietContext context;
   N_Vector y = nullptr, yp = nullptr, id = nullptr;
   SUNMatrix matrix = nullptr;
   SUNLinearSolver solver = nullptr;
   void* memory = nullptr;
   std::optional<ida_projection::Projection> projection;
-  std::string message;
   VectorXd rate, near, near_rate;
 };
 
 Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
                 double longest_first)
     : motion(of), tolerance(tol), start(start_time) {
-#ifdef SUN_COMM_NULL
-  SUNContext_Create(SUN_COMM_NULL, &context);
-  SUNContext_ClearErrHandlers(context);
-#else
-  SUNContext_Create(nullptr, &context);
-#endif
   const int N = motion.size();
   rate.setZero(N);
   near_rate.setZero(N);
@@ -85,11 +68,7 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
     N_VGetArrayPointer(id)[i] = 1;
   }
   memory = IDACreate(context);
-#ifdef SUN_COMM_NULL
-  SUNContext_PushErrHandler(context, remember, &message);
-#else
-  IDASetErrHandlerFn(memory, remember, &message);
-#endif
+  context.keep_messages_of(memory);
   IDAInit(memory, residual, 0.0, y, yp);
   IDASetUserData(memory, this);
   IDASStolerances(memory, tolerance, tolerance);
@@ -130,7 +109,6 @@ Phase::Ida::~Ida() {
   SUNLinSolFree(solver);
   SUNMatDestroy(matrix);
   for (N_Vector v : {y, yp, id}) N_VDestroy(v);
-  SUNContext_Free(&context);
 }
 
 int Phase::Ida::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
@@ -202,14 +180,14 @@ Phase::~Phase() = default;
 
 void Phase::step() {
   double t = 0;
-  ida_->message.clear();
+  ida_->context.message().clear();
   const int flag = IDASolve(ida_->memory, end_ + 1, &t, ida_->y, ida_->yp, IDA_ONE_STEP);
   if (flag < 0) {
     char* name = IDAGetReturnFlagName(flag);
     std::string text = fmt::format(
         "the event engine's smooth phase that began at t = {:.9g} s stopped {:.3g} s "
         "later: {}. {}",
-        start_, end_, name, ida_->message);
+        start_, end_, name, ida_->context.message());
     std::free(name);
     if (ida_->projection && !ida_->projection->message().empty())
       text += " Projection: " + ida_->projection->message();

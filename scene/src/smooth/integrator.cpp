@@ -3,7 +3,6 @@
 #include "integrator.hpp"
 
 #include <nvector/nvector_serial.h>
-#include <sundials/sundials_context.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #ifdef TETHER_SCENE_KLU
@@ -57,17 +56,6 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-#ifdef SUN_COMM_NULL  // SUNDIALS 7
-void remember(int, const char*, const char*, const char* message, SUNErrCode, void* data,
-              SUNContext) {
-  *static_cast<std::string*>(data) = message ? message : "";
-}
-#else
-void remember(int, const char*, const char*, char* message, void* data) {
-  *static_cast<std::string*>(data) = message ? message : "";
-}
-#endif
-
 #ifdef TETHER_SCENE_KLU
 // SUNDIALS calls KLU's singular matrix unrecoverable, and its next setups want the factors that
 // were not made. A predictor may meet a dead point exactly; another step passes by.
@@ -78,17 +66,6 @@ int factor_or_try_smaller_step(SUNLinearSolver solver, SUNMatrix matrix) {
 }
 #endif
 
-SUNContext make_context() {
-  SUNContext context = nullptr;
-#ifdef SUN_COMM_NULL
-  SUNContext_Create(SUN_COMM_NULL, &context);
-  SUNContext_ClearErrHandlers(context);
-#else
-  SUNContext_Create(nullptr, &context);
-#endif
-  return context;
-}
-
 }  // namespace
 
 Integrator::Integrator(System& system, const SmoothOptions& options, double t,
@@ -97,7 +74,6 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
       options_(options),
       t_(t),
       tolerance_(local_tolerance(options)),
-      context_(make_context()),
       watch_(system.effect_names().size()) {
   const int N = system.size();
   y_ = ida_projection::fast_vector(N_VNew_Serial(N, context_));
@@ -111,7 +87,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     N_VGetArrayPointer(atol_)[i] = system.absolute_tolerance(i, tolerance_);
   }
   ida_ = IDACreate(context_);
-  catch_messages();
+  context_.keep_messages_of(ida_);
   IDAInit(ida_, residual, t, y_, yp_);
   IDASetUserData(ida_, this);
   system.choose_rows(t, y.data(), tolerance_);
@@ -155,15 +131,6 @@ Integrator::~Integrator() {
   SUNLinSolFree(solver_);
   SUNMatDestroy(matrix_);
   for (N_Vector v : {y_, yp_, id_, atol_}) N_VDestroy(v);
-  SUNContext_Free(&context_);
-}
-
-void Integrator::catch_messages() {
-#ifdef SUN_COMM_NULL
-  SUNContext_PushErrHandler(context_, remember, &last_message_);
-#else
-  IDASetErrHandlerFn(ida_, remember, &last_message_);
-#endif
 }
 
 // IDA begins with half a tolerance / |y'|, at tight tolerances 1e-12 s. There the multipliers of
@@ -296,7 +263,8 @@ ida_projection::ConsistencyReport Integrator::make_consistent(double t) {
 int Integrator::step_past(double t, long& steps_left, const std::function<bool()>& interrupted) {
   while (step_end() < t && !anchor_is_due() && !(interrupted && interrupted())) {
     if (steps_left <= 0) {
-      last_message_ = "max_steps = " + std::to_string(options_.max_steps) + " steps are taken.";
+      context_.message() =
+          "max_steps = " + std::to_string(options_.max_steps) + " steps are taken.";
       return IDA_TOO_MUCH_WORK;
     }
     const long before = steps();
@@ -310,7 +278,7 @@ int Integrator::step_past(double t, long& steps_left, const std::function<bool()
 bool Integrator::advance(double t, long& steps_left, const std::function<bool()>& interrupted) {
   if (t - t_ <= 1e-13 * std::abs(t)) return true;
   const double begin = now();
-  last_message_.clear();
+  context_.message().clear();
   const double from = t_;
   int flag = step_past(t, steps_left, interrupted);
   const double to = std::min(t, step_end());
@@ -357,7 +325,7 @@ std::string Integrator::failure(int flag) const {
   char* name = IDAGetReturnFlagName(flag);
   std::string message = text + std::string(name) + ". ";
   std::free(name);
-  if (!last_message_.empty()) message += "IDA: " + last_message_ + " ";
+  if (!context_.message().empty()) message += "IDA: " + context_.message() + " ";
   if (projection_ && projection_->status() != ida_projection::Status::success &&
       !projection_->message().empty())
     message += "Projection: " + projection_->message() + " ";

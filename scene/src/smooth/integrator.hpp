@@ -11,6 +11,7 @@
 #include <sundials/sundials_matrix.h>
 #include <tether/ida_projection.hpp>
 
+#include "sundials/quiet_context.hpp"
 #include "system.hpp"
 
 namespace tether::scene::smooth {
@@ -54,7 +55,6 @@ class Integrator {
   static int weights(N_Vector y, N_Vector weights, void* self);
   double first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const;
   void prepare_matrix();
-  void catch_messages();
   int step_past(double t, long& steps_left, const std::function<bool()>& interrupted);
   std::string failure(int flag) const;
 
@@ -62,7 +62,7 @@ class Integrator {
   SmoothOptions options_;
   double t_;
   double tolerance_;  // of a step
-  SUNContext context_ = nullptr;
+  QuietContext context_;
   N_Vector y_ = nullptr, yp_ = nullptr, id_ = nullptr, atol_ = nullptr;
   SUNMatrix matrix_ = nullptr;
   SUNLinearSolver solver_ = nullptr;
@@ -71,7 +71,6 @@ class Integrator {
   Entries entries_;
   std::vector<sunindextype> column_starts_, row_indices_;  // sparse: the pattern
   int multiplier_choices_ = 0;                             // those that KLU's pivots are for
-  std::string last_message_;                               // IDA's
 
   Stopwatch watch_;
   double jacobian_seconds_ = 0, total_seconds_ = 0;  // wall clock
