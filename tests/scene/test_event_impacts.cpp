@@ -56,7 +56,7 @@ TEST_CASE("event: the impacts of a bouncing ball come to rest when their closed 
       time += 2 * c.e * speed / 9.81;
       speed *= c.e;
     }
-    const double last = std::max(tolerance, 1e-5) / c.e;
+    const double last = 0.5 * std::max(tolerance, 1e-5) / c.e;  // 0.5 m/s is the scene's speed
     CHECK(impacts.size() ==
           static_cast<std::size_t>(std::ceil(std::log(last / (9.81 * first)) / std::log(c.e))));
     CHECK(std::abs(ledger(*engine, 2 * 9.81 * 1.1)) < 1e-9);
@@ -71,22 +71,23 @@ TEST_CASE("event: a ball with restitution 0.99 rests after 90 s") {
   const auto rests = of_kind(*engine, Kind::rest);
   REQUIRE(rests.size() == 1);
   CHECK(std::abs(rests[0].time - 89.853204556160450) < 1e-7);
-  CHECK(engine->counts().impacts == 1294);  // to 1e-5 m/s
+  CHECK(engine->counts().impacts == 1363);  // to 5e-6 m/s
 }
 
 TEST_CASE("event: a ball of other units bounces alike") {
-  const double scale = GENERATE(1e-8, 1e-3, 1e5, 1e8);
-  CAPTURE(scale);
+  const double scale = GENERATE(1e-8, 1e-3, 7e-3, 3e-2, 1e5, 1e8);
+  const double tolerance = GENERATE(1e-4, 1e-6, 1e-8);
+  CAPTURE(scale, tolerance);
   // Lengths, and the time by the gravity of 9.81 m/s^2.
   const double clock = std::sqrt(scale);
   const std::string text =
       kFloor + "[[body]]\nname = \"ball\"\nshape = \"sphere\"\nradius = " + number(0.1 * scale) +
       "\nmass = 1\nmaterial = \"body\"\nposition = " + "[0, 0, " + number(1.1 * scale) + "]\n" +
       pair("restitution = 0.5");
-  const auto engine = run(text, 1e-8, 2 * clock);
+  const auto engine = run(text, tolerance, 2 * clock);
   const auto rests = of_kind(*engine, Kind::rest);
   REQUIRE(rests.size() == 1);
-  CHECK(std::abs(rests[0].time - 1.3545709229571927 * clock) < 1e-7 * clock);
+  CHECK(std::abs(rests[0].time - 1.3545709229571927 * clock) < 10 * tolerance * clock);
 }
 
 TEST_CASE("event: a rotating ball slips after its impact, then rolls (Capobianco)") {
@@ -353,7 +354,7 @@ TEST_CASE("event: a run that is cut inside accumulating impacts goes on with its
       CHECK(second->events()[k].time == first->events()[before + k].time);
   }
   whole->advance(2);
-  CHECK(whole->counts().events == 19);
+  CHECK(whole->counts().events == 20);
 }
 
 TEST_CASE("event: a storm of events is bounded by its work") {

@@ -141,8 +141,8 @@ TEST_CASE("event: the woodpecker's first events and states (Glocker)") {
                                {Kind::lift, 2, .083416385579},   {Kind::impact, 1, .118675112949},
                                {Kind::impact, 1, .121335470558}};
   // By an independent code at two tolerances: y, phi_M, phi_S at 0.1 s.
-  const double y = -.00705933015, phi_M = .0207247690364, phi_S = .00752887681468;
-  for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
+  const double y = -.00705933034423, phi_M = .0207247690364, phi_S = .00752887681468;
+  for (const double tolerance : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10}) {
     CAPTURE(tolerance);
     woodpecker::Woodpecker model;
     DriverOptions options;
@@ -150,9 +150,9 @@ TEST_CASE("event: the woodpecker's first events and states (Glocker)") {
     Driver driver(model, options, 0, woodpecker::Woodpecker::start());
     driver.advance(0.1);
     const VectorXd there = driver.state();
-    CHECK(std::abs(there[0] - y) < 10 * tolerance);
-    CHECK(std::abs(there[1] - phi_M) < 10 * tolerance);
-    CHECK(std::abs(there[2] - phi_S) < 10 * tolerance);
+    CHECK(std::abs(there[0] - y) < 10 * tolerance * 0.01);  // its way in a period is 2 cm
+    CHECK(std::abs(there[1] - phi_M) < 10 * tolerance * 0.2);
+    CHECK(std::abs(there[2] - phi_S) < 10 * tolerance * 0.2);
     driver.advance(0.2);
     REQUIRE(driver.events().size() >= 9);
     for (std::size_t k = 0; k < 9; ++k) {
@@ -169,7 +169,7 @@ TEST_CASE("event: the woodpecker to 0.2 s takes less than 4000 residuals for an 
   using namespace tether::scene::event;
   woodpecker::Woodpecker model, exact_model;
   DriverOptions options;
-  options.tolerance = 3e-9;
+  options.tolerance = 1e-8;
   Driver driver(model, options, 0, woodpecker::Woodpecker::start());
   options.tolerance = 1e-12;
   Driver exact(exact_model, options, 0, woodpecker::Woodpecker::start());

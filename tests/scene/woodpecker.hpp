@@ -32,6 +32,13 @@ class Woodpecker : public tether::scene::event::Model {
   int tangents() const override { return 1; }
   ContactLaw law(int contact) const override { return {0.3, contact == 0 ? 0.5 : 0.0}; }
 
+  // Places, speeds and the energy of its motion: tolerances are parts of them.
+  VectorXd sizes() const override {
+    VectorXd s(7);
+    s << 0.01, 0.2, 0.2, 1, 1, 1, 1e-3;
+    return s;
+  }
+
   void set(double, const double* q, const double* u) override {
     q_ = Eigen::Map<const Eigen::Vector3d>(q);
     u_ = Eigen::Map<const Eigen::Vector3d>(u);

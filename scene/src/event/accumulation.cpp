@@ -71,10 +71,7 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
   }
   const VectorXd part = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(A).solve(b);
   for (int i = 0; i < n; ++i) x[slow[at(i)]] = part[i];
-  const double energy = model_.energy();
-  y_.segment(motion_.coordinates(), motion_.velocities()) += rows.change(x);
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-  return energy - model_.energy();
+  return change_velocities(rows.change(x));
 }
 
 }  // namespace tether::scene::event

@@ -23,8 +23,7 @@ double local_tolerance(double tolerance) {
 constexpr double kFlightError = 0.01, kLeastWay = 1e-15;
 constexpr long kMostAtOneTime = 300;
 constexpr double kStartTolerance = 1e-4;
-constexpr double kNoImpulse = 1e-9;  // of the largest of an impact
-constexpr long kAnchor = 5000;       // steps
+constexpr long kAnchor = 5000;  // steps
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -34,9 +33,8 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
     : model_(model),
       options_(options),
       local_(local_tolerance(options.tolerance)),
-      bands_{options.tolerance, options.tolerance, options.tolerance},
-      motion_(model, options.tolerance),
-      watcher_(motion_, bands_),
+      motion_(model, options.tolerance, t, y),
+      watcher_(motion_),
       time_(t),
       event_time_(t),
       bounces_(at(model.contacts())) {
@@ -89,7 +87,7 @@ std::vector<int> Driver::touching(int always) const {
   for (int i = 0; i < model_.contacts(); ++i) {
     double rate = 0;
     const bool closed = motion_.modes()[at(i)].mode != Mode::open;
-    const bool near = std::abs(model_.gap(i, rate)) <= bands_.gap && model_.margin(i) >= 0;
+    const bool near = std::abs(model_.gap(i, rate)) <= bands().gap(i) && model_.margin(i) >= 0;
     if (i == always || closed || near) out.push_back(i);
   }
   return out;
@@ -111,8 +109,8 @@ void Driver::start_phase() {
   for (int i = 0; i < model_.contacts(); ++i) {
     double rate = 0;
     const double gap = model_.gap(i, rate);
-    leaving[at(i)] = motion_.modes()[at(i)].mode == Mode::open && std::abs(gap) <= bands_.gap &&
-                     rate > bands_.speed;
+    leaving[at(i)] = motion_.modes()[at(i)].mode == Mode::open && std::abs(gap) <= bands().gap(i) &&
+                     rate > bands().approach(i);
   }
   if (phase_) counts_.phases.add(phase_->counts());
   phase_.reset();
@@ -188,9 +186,8 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
     : model_(model),
       options_(options),
       local_(local_tolerance(options.tolerance)),
-      bands_{options.tolerance, options.tolerance, options.tolerance},
-      motion_(model, options.tolerance),
-      watcher_(motion_, bands_),
+      motion_(model, options.tolerance, memory.time, memory.y),
+      watcher_(motion_),
       time_(memory.time),
       event_time_(memory.time),
       y_(memory.y),
@@ -222,7 +219,7 @@ void Driver::turn_slips() {
     const int i = motion_.closed()[k];
     if (motion_.modes()[at(i)].mode != Mode::slide) continue;
     const VectorXd s = motion_.slip(static_cast<int>(k));
-    if (s.norm() > 10 * bands_.speed) motion_.turn(i, s.normalized());
+    if (s.norm() > 10 * bands().slip(i)) motion_.turn(i, s.normalized());
   }
 }
 
@@ -277,58 +274,6 @@ void Driver::record_changes(const std::vector<ContactMode>& before,
                                           : EventKind::stop,
            static_cast<int>(i), 0, 0, 0);
     events_.back().time -= lag;
-  }
-}
-
-// Newton's law w_n+ = -e w_n- where impulses act, and Coulomb's cone, in one problem.
-void Driver::collide(const std::vector<int>& touching, EventKind otherwise, int contact) {
-  if (touching.empty()) return;
-  ContactRows rows(model_, touching);
-  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
-  const VectorXd before = rows.velocities(u);
-  const int block = rows.size(), n = static_cast<int>(touching.size());
-  bool hits = false;
-  for (int k = 0; k < n; ++k) hits = hits || before[block * k] < -bands_.speed;
-  if (!hits) {
-    if (contact >= 0) record(otherwise, contact, 0, 0, 0);
-    return;
-  }
-  VectorXd b = -before, mu(n), rest = VectorXd::Zero(n);
-  double fastest = 0;  // of those whose impacts are over
-  for (int k = 0; k < n; ++k) {
-    const int i = touching[at(k)];
-    const ContactLaw law = model_.law(i);
-    mu[k] = law.friction;
-    const double approach = before[block * k];
-    if (approach >= -bands_.speed) continue;
-    double over = 0;
-    const bool accumulated = has_accumulated(i, -approach, over);
-    if (accumulated) rest[k] = over;
-    if (accumulated) fastest = std::max(fastest, -approach);
-    if (!accumulated) b[block * k] -= law.restitution * approach;
-    if (!accumulated) remember(i, -approach);
-  }
-  ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
-  if (!answer.solved)
-    fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", n, answer.error));
-  const double energy = model_.energy();
-  y_.segment(motion_.coordinates(), motion_.velocities()) += rows.change(answer.x);
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-  double lost = energy - model_.energy();
-  if (fastest > 0) lost += come_to_rest(touching, fastest);
-  lost_ += lost;
-  const VectorXd after = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
-  bool first = true;
-  double largest = 0;
-  for (int k = 0; k < n; ++k) largest = std::max(largest, answer.x[block * k]);
-  for (int k = 0; k < n; ++k) {
-    if (before[block * k] >= -bands_.speed && answer.x[block * k] <= kNoImpulse * largest) continue;
-    if (before[block * k] < -bands_.speed) ++counts_.impacts;
-    record(rest[k] > 0 ? EventKind::rest : EventKind::impact, touching[at(k)], before[block * k],
-           after[block * k], first ? lost : 0);
-    if (rest[k] > 0) events_.back().time = event_time_ + rest[k];
-    first = false;
   }
 }
 

@@ -68,12 +68,18 @@ class Driver {
   double ledger_error();
 
  private:
+  const Bands& bands() const { return motion_.bands(); }
   void check_start() const;
   void begin_phase();
   void start_phase();
   void handle(const Zero& zero);
   void anchor();
-  void collide(const std::vector<int>& touching, EventKind kind, int contact);
+  void collide(const std::vector<int>& touching, EventKind otherwise, int contact);
+  struct Impact;
+  Impact expect(const std::vector<int>& touching, const VectorXd& before, int block);
+  double change_velocities(const VectorXd& change);
+  void tell_impacts(const std::vector<int>& touching, const Impact& impact, const VectorXd& before,
+                    const VectorXd& after, const VectorXd& x, double lost);
   bool has_accumulated(int contact, double approach, double& rest) const;
   double come_to_rest(const std::vector<int>& touching, double speed);
   void remember(int contact, double approach);
@@ -91,7 +97,6 @@ class Driver {
   Model& model_;
   DriverOptions options_;
   double local_;  // tolerance of IDA
-  Bands bands_;
   Motion motion_;
   Watcher watcher_;
   double time_, event_time_;
@@ -104,6 +109,15 @@ class Driver {
   DriverCounts counts_;
   long at_one_time_ = 0;
   bool jammed_ = false;  // at this event
+};
+
+/// An impact of contacts that touch: the right hand side of its problem w = A x - b.
+struct Driver::Impact {
+  VectorXd b, mu;
+  std::vector<bool> hits;  ///< they close, and fast enough to count
+  bool any = false;
+  VectorXd rest;       ///< > 0: the contact's impacts are over after this time, s
+  double fastest = 0;  ///< of those that are over: speed of approach
 };
 
 /// All that a phase depends on. IDA's history is not in it: a phase is repeated from its start.

@@ -34,7 +34,7 @@ DriverOptions driver_options(const Scene& scene) {
 class EventEngine : public Engine {
  public:
   explicit EventEngine(const Scene& scene)
-      : units_(smooth::units_of(scene)),
+      : units_(event::units_of(scene)),
         scene_(scaled(scene, units_)),
         options_(driver_options(scene_)),
         model_(scene_),

@@ -38,6 +38,9 @@ class Model {
   virtual int contacts() const = 0;
   virtual int tangents() const = 0;  ///< of a contact: 1 in the plane, 2 in space
   virtual ContactLaw law(int contact) const = 0;
+  /// What tolerances are relative to where values are smaller: of each coordinate, of each velocity
+  /// and of the energy. 1 in units in which these are near 1.
+  virtual VectorXd sizes() const { return VectorXd::Ones(coordinates() + velocities() + 1); }
 
   virtual void set(double t, const double* q, const double* u) = 0;
   /// A smooth phase begins at the state that is set: tangents turn smoothly from here on.

@@ -27,7 +27,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   for (const int i : touching) {
     if (i == left_contact && (left == Watch::normal_force || left == Watch::border)) continue;
     model_.gap(i, rate);
-    if (std::abs(rate) <= bands_.speed) candidates.push_back(i);
+    if (std::abs(rate) <= bands().approach(i)) candidates.push_back(i);
   }
   if (candidates.empty()) return modes;
   ContactRows rows(model_, candidates);
@@ -48,7 +48,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
           motion_.rate(event_time_, y_.data(), rate_there.data());
           d = -motion_.friction_force(static_cast<int>(c)).normalized();
         }
-    } else if (s.norm() > bands_.speed && !(i == left_contact && left == Watch::slip)) {
+    } else if (s.norm() > bands().slip(i) && !(i == left_contact && left == Watch::slip)) {
       d = s.normalized();
     }
   }
@@ -58,7 +58,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   if (!answer.solved) fail("the forces of closed contacts are not solved");
   for (int k = 0; k < n && !jammed_; ++k)
     if (slides[at(k)].size() > 0 && answer.regimes[at(k)] == contact::Regime::sticking &&
-        velocities.segment(block * k + 1, block - 1).norm() > bands_.speed) {
+        velocities.segment(block * k + 1, block - 1).norm() > bands().slip(candidates[at(k)])) {
       jam(rows, velocities, mu);
       jammed_ = true;
       return decide(this->touching(-1), -1, {});
@@ -95,18 +95,13 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
 // at the least speed of approach.
 void Driver::jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu) {
   const int block = rows.size();
-  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
   VectorXd b = -velocities;
   for (int k = 0; k < mu.size(); ++k)
     b[block * k] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
   ++counts_.contact_problems;
   const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
   if (!answer.solved) fail("an impact without collision is not solved");
-  const double energy = model_.energy();
-  y_.segment(motion_.coordinates(), motion_.velocities()) = u + rows.change(answer.x);
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-  const double lost = energy - model_.energy();
-  lost_ += lost;
+  const double lost = change_velocities(rows.change(answer.x));
   bool first = true;
   for (int k = 0; k < mu.size(); ++k) {
     if (answer.x[block * k] <= 0) continue;

@@ -46,15 +46,16 @@ class IndependentRows {
 
 }  // namespace
 
-Motion::Motion(Model& model, double speed)
+Motion::Motion(Model& model, double tolerance, double t, const VectorXd& y)
     : model_(model),
-      speed_(speed),
       nq_(model.coordinates()),
       nu_(model.velocities()),
       tangents_(model.tangents()),
       modes_(index(model.contacts())) {
   u_.setZero(nu_);
   a_.setZero(nu_);
+  set(t, y.data());
+  bands_ = bands_of(model, tolerance);
 }
 
 void Motion::set(double t, const double* y) {
@@ -64,6 +65,16 @@ void Motion::set(double t, const double* y) {
 
 VectorXd Motion::slip_of(const ContactLook& look) const {
   return look.tangents * u_ + look.slip_rate;
+}
+
+// Slip that ends passes through zero within a step: its direction stays.
+VectorXd Motion::held_slip(int closed) const {
+  const int contact = closed_[index(closed)];
+  const VectorXd& direction = modes_[index(contact)].direction;
+  VectorXd s = slip_of(looks_[index(closed)]);
+  const double along = s.dot(direction), least = bands_.slip(contact);
+  if (along < least) s += (least - along) * direction;
+  return s;
 }
 
 void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes) {
@@ -151,10 +162,7 @@ void Motion::gather() {
     }
     const double mu = model_.law(closed_[k]).friction;
     if (mu == 0) continue;
-    // Slip that ends passes through zero within a step: its direction stays.
-    VectorXd s = slip_of(look);
-    const double along = s.dot(mode.direction);
-    if (along < speed_) s += (speed_ - along) * mode.direction;
+    const VectorXd s = held_slip(static_cast<int>(k));
     smallest_slip_ = std::min(smallest_slip_, s.norm());
     C_.col(row) -= mu / s.norm() * look.tangents.transpose() * s;
   }
@@ -228,10 +236,8 @@ VectorXd Motion::friction_force(int closed) const {
   const ContactMode& mode = modes_[index(closed_[index(closed)])];
   if (mode.mode == Mode::stick) return lambda_.segment(row + 1, tangents_);
   const double mu = model_.law(closed_[index(closed)]).friction;
-  VectorXd s = slip_of(looks_[index(closed)]);
   if (mu == 0) return VectorXd::Zero(tangents_);
-  const double along = s.dot(mode.direction);
-  if (along < speed_) s += (speed_ - along) * mode.direction;
+  const VectorXd s = held_slip(closed);
   return -mu * lambda_[row] / s.norm() * s;
 }
 

@@ -17,7 +17,7 @@
 #include <Eigen/QR>
 #include <vector>
 
-#include "model.hpp"
+#include "bands.hpp"
 
 namespace tether::scene::event {
 
@@ -31,10 +31,11 @@ struct ContactMode {
 
 class Motion {
  public:
-  /// `speed`: below it the direction of slip is held, m/s.
-  Motion(Model& model, double speed);
+  /// Sets the model to (t, q, u), where the bands are taken.
+  Motion(Model& model, double tolerance, double t, const VectorXd& y);
 
   Model& model() { return model_; }
+  const Bands& bands() const { return bands_; }
   int size() const { return nq_ + nu_ + 1; }
   int coordinates() const { return nq_; }
   int velocities() const { return nu_; }
@@ -78,6 +79,7 @@ class Motion {
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
   VectorXd slip_of(const ContactLook& look) const;
+  VectorXd held_slip(int closed) const;
   void set(double t, const double* y);
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
@@ -86,7 +88,7 @@ class Motion {
   void look_at_joints();
 
   Model& model_;
-  double speed_;
+  Bands bands_;
   int nq_, nu_, tangents_;
   std::vector<ContactMode> modes_;  // of all contacts
   std::vector<int> closed_, row_of_;

@@ -48,13 +48,14 @@ struct Phase::Ida {
   SUNLinearSolver solver = nullptr;
   void* memory = nullptr;
   std::optional<ida_projection::Projection> projection;
-  VectorXd rate, near, near_rate;
+  VectorXd rate, near, near_rate, sizes;
 };
 
 Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
                 double longest_first)
     : motion(of), tolerance(tol), start(start_time) {
   const int N = motion.size();
+  sizes = motion.model().sizes();
   rate.setZero(N);
   near_rate.setZero(N);
   VectorXd rate0(N);
@@ -71,7 +72,10 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
   context.keep_messages_of(memory);
   IDAInit(memory, residual, 0.0, y, yp);
   IDASetUserData(memory, this);
-  IDASStolerances(memory, tolerance, tolerance);
+  N_Vector absolute = N_VClone(y);
+  for (int i = 0; i < N; ++i) N_VGetArrayPointer(absolute)[i] = tolerance * sizes[i];
+  IDASVtolerances(memory, tolerance, absolute);
+  N_VDestroy(absolute);
   IDASetMaxNumSteps(memory, -1);
   if (max_step > 0) IDASetMaxStep(memory, max_step);
   double first = first_step(y0, rate0);
@@ -138,7 +142,7 @@ int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SU
       continue;
     }
     const double kept = me.near[j];
-    double step = kDifference * std::max(1.0, std::abs(kept));
+    double step = kDifference * std::max(me.sizes[j], std::abs(kept));
     if (j >= me.motion.coordinates()) step = std::min(step, longest);
     me.near[j] = kept + step;
     me.motion.rate(me.start + t, me.near.data(), me.near_rate.data());
@@ -153,7 +157,7 @@ int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SU
 double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
   double speed = 0;
   for (int i = 0; i < y0.size(); ++i)
-    speed = std::max(speed, std::abs(rate0[i]) / (1 + std::abs(y0[i])));
+    speed = std::max(speed, std::abs(rate0[i]) / (sizes[i] + std::abs(y0[i])));
   if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
   const double look = kLook / speed;
   const VectorXd ahead = y0 + look * rate0;
@@ -161,7 +165,7 @@ double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
   motion.rate(start + look, ahead.data(), rate_ahead.data());
   double sum = 0;
   for (int i = 0; i < y0.size(); ++i) {
-    const double change = (rate_ahead[i] - rate0[i]) / (tolerance * (1 + std::abs(y0[i])));
+    const double change = (rate_ahead[i] - rate0[i]) / (tolerance * (sizes[i] + std::abs(y0[i])));
     sum += change * change;
   }
   const double curvature = std::sqrt(sum / static_cast<double>(y0.size())) / look;
@@ -227,6 +231,7 @@ PhaseCounts Phase::counts() const {
 bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd& y) {
   const int m = motion.constraint_count();
   if (m == 0) return true;
+  const VectorXd sizes = motion.model().sizes();
   VectorXd g(m);
   Eigen::Matrix<double, -1, -1, Eigen::RowMajor> C(m, motion.size());
   for (int pass = 0; pass < 12; ++pass) {
@@ -236,10 +241,11 @@ bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd&
     motion.constraint_gradient(t, y.data(), C);
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
     factor.setThreshold(1e-11);
-    factor.compute(C);
+    factor.compute(C * sizes.asDiagonal());
     const VectorXd move = factor.solve(g);
-    y -= move;
-    if (move.cwiseAbs().maxCoeff() <= 1e-3 * tolerance * (1 + y.cwiseAbs().maxCoeff())) return true;
+    y -= sizes.cwiseProduct(move);
+    const double size = 1 + y.cwiseQuotient(sizes).cwiseAbs().maxCoeff();
+    if (move.cwiseAbs().maxCoeff() <= 1e-3 * tolerance * size) return true;
   }
   return false;
 }

@@ -1,9 +1,22 @@
 // Tether: a scene with its shapes in other units. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+
 #include "smooth/units.hpp"
 
 namespace tether::scene::event {
+
+/// As those of smooth::units_of where these are not SI; else never above 1 m, 1 s and 1 m/s, and
+/// below them natural ones: bands and tolerances of a toy of millimetres are parts of a millimetre.
+inline smooth::Units units_of(const Scene& scene) {
+  const smooth::Units usual = smooth::units_of(scene);
+  if (usual.length != 1 || usual.time != 1) return usual;
+  smooth::Units units = smooth::natural_units(scene);
+  units.length = std::min(1.0, units.length);
+  units.time = std::clamp(units.time, units.length, 1.0);
+  return units;
+}
 
 /// As smooth::in_units, with the shapes, and the longest step of [event].
 inline Scene scaled(const Scene& scene, const smooth::Units& u) {

@@ -64,22 +64,22 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   evaluate(t, y);
   for (Function& f : functions_) {
     f.armed = f.value > band(f);
-    f.dormant = f.what == Watch::gap && f.value < -bands_.gap;
+    f.dormant = f.what == Watch::gap && f.value < -bands().gap(f.contact);
   }
 }
 
 double Watcher::band(const Function& f) const {
   switch (f.what) {
     case Watch::gap:
-      return f.leaving ? 0 : bands_.gap;
+      return f.leaving ? 0 : bands().gap(f.contact);
     case Watch::border:
-      return bands_.gap;
+      return bands().gap(f.contact);
     case Watch::support:
       return 0;
     case Watch::slip:
-      return bands_.speed;
+      return bands().slip(f.contact);
     default:
-      return bands_.part * force_;
+      return bands().part * force_;
   }
 }
 
@@ -110,10 +110,12 @@ double Watcher::support() {
   std::vector<VectorXd> slides(motion_.closed().size());
   bool sliding = false;
   for (std::size_t k = 0; k < slides.size(); ++k) {
-    const ContactMode& mode = motion_.modes()[static_cast<std::size_t>(motion_.closed()[k])];
+    const int contact = motion_.closed()[k];
+    const ContactMode& mode = motion_.modes()[static_cast<std::size_t>(contact)];
     if (mode.mode != Mode::slide) continue;
     const VectorXd s = motion_.slip(static_cast<int>(k));
-    slides[k] = s.dot(mode.direction) > bands_.speed ? VectorXd(s.normalized()) : mode.direction;
+    const bool fast = s.dot(mode.direction) > bands().slip(contact);
+    slides[k] = fast ? VectorXd(s.normalized()) : mode.direction;
     sliding = true;
   }
   const AccelerationAnswer answer = solve_accelerations(motion_.model(), rows, slides);
@@ -126,7 +128,7 @@ double Watcher::support() {
       largest = std::max(largest, answer.contacts.w.segment(row + 1, block - 1).norm());
   }
   const double noise = std::max(sliding ? kSlidingNoise : kNoise, 100 * answer.contacts.error);
-  support_band_ = std::max(0.1 * bands_.part, noise) * answer.scale;
+  support_band_ = std::max(0.1 * bands().part, noise) * answer.scale;
   return support_band_ - largest;
 }
 
@@ -228,7 +230,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     if (f.what == Watch::gap && !f.armed) hit = hit && f.slope < 0;  // else it is on its way out
     if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
       double when = 0;
-      hit = dip(phase, f, when) < -bands_.gap;  // else it only touches
+      hit = dip(phase, f, when) < -bands().gap(f.contact);  // else it only touches
     }
     if (!hit) continue;
     Zero zero = locate(phase, f);

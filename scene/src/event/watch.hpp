@@ -29,14 +29,9 @@ struct Zero {
   double lag = 0;   ///< how much earlier the function was zero that is told by its band only, s
 };
 
-struct Bands {
-  double gap = 0, speed = 0;  ///< m, m/s
-  double part = 0;            ///< of the largest force
-};
-
 class Watcher {
  public:
-  Watcher(Motion& motion, const Bands& bands) : motion_(motion), bands_(bands) {}
+  explicit Watcher(Motion& motion) : motion_(motion) {}
 
   /// A phase begins at (t, y). `leaving`: contacts that move apart though their gaps are zero.
   void begin(double t, const VectorXd& y, const std::vector<bool>& leaving);
@@ -62,8 +57,9 @@ class Watcher {
   bool may_dip(const Function& f, double step) const;
   double dip(Phase& phase, const Function& f, double& when);
 
+  const Bands& bands() const { return motion_.bands(); }
+
   Motion& motion_;
-  Bands bands_;
   std::vector<Function> functions_;
   VectorXd rate_, y_;
   double force_ = 0;         // the largest so far

@@ -54,9 +54,13 @@ double time_of(const Scene& scene, double length, double mass) {
 
 }  // namespace
 
-Units units_of(const Scene& scene) {
+Units natural_units(const Scene& scene) {
   const double L = length_of(scene), M = mass_of(scene);
-  Units units{unit_near(L), unit_near(time_of(scene, L, M)), unit_near(M)};
+  return {unit_near(L), unit_near(time_of(scene, L, M)), unit_near(M)};
+}
+
+Units units_of(const Scene& scene) {
+  Units units = natural_units(scene);
   // Tolerances that are absolute in SI serve them, in positions and in velocities.
   const bool ordinary = within(units.length, kOrdinary) && within(units.time, kOrdinary) &&
                         within(units.speed(), kOrdinary);

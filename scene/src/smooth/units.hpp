@@ -13,6 +13,9 @@ using mechanics::Units;
 
 /// By the largest lever arms and distances of bodies that move, the shortest time that velocities
 /// and effects have at this size, and the heaviest body.
+Units natural_units(const Scene& scene);
+
+/// The same, but SI where all of them are ordinary; see Units.
 Units units_of(const Scene& scene);
 
 /// The scene with all numbers divided by their units; expectations, outputs and its end left out.

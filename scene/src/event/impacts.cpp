@@ -1,0 +1,94 @@
+// Tether: impacts of contacts that close. SPDX-License-Identifier: BSD-3-Clause
+//
+// Newton's law w_n+ = -e w_n- where impulses act, and Coulomb's cone, in one problem of all
+// contacts that touch.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "driver.hpp"
+
+namespace tether::scene::event {
+
+namespace {
+
+constexpr double kNoImpulse = 1e-9;  // of the largest of an impact
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+// Which of the contacts hit, and what their impacts restore.
+Driver::Impact Driver::expect(const std::vector<int>& touching, const VectorXd& before, int block) {
+  const int n = static_cast<int>(touching.size());
+  Impact out;
+  out.b = -before;
+  out.mu.resize(n);
+  out.rest.setZero(n);
+  out.hits.assign(touching.size(), false);
+  for (int k = 0; k < n; ++k) {
+    const int i = touching[at(k)];
+    const ContactLaw law = model_.law(i);
+    const double approach = -before[block * k];
+    out.mu[k] = law.friction;
+    if (approach <= bands().approach(i)) continue;
+    out.hits[at(k)] = out.any = true;
+    if (has_accumulated(i, approach, out.rest[k])) {
+      out.fastest = std::max(out.fastest, approach);
+      continue;
+    }
+    out.b[block * k] += law.restitution * approach;
+    remember(i, approach);
+  }
+  return out;
+}
+
+void Driver::collide(const std::vector<int>& touching, EventKind otherwise, int contact) {
+  if (touching.empty()) return;
+  ContactRows rows(model_, touching);
+  const auto u = y_.segment(motion_.coordinates(), motion_.velocities());
+  const VectorXd before = rows.velocities(u);
+  const Impact impact = expect(touching, before, rows.size());
+  if (!impact.any) {
+    if (contact >= 0) record(otherwise, contact, 0, 0, 0);
+    return;
+  }
+  ++counts_.contact_problems;
+  const FrictionAnswer answer = solve_friction(rows.A(), impact.b, impact.mu);
+  if (!answer.solved)
+    fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", touching.size(),
+                     answer.error));
+  double lost = change_velocities(rows.change(answer.x));
+  if (impact.fastest > 0) lost += come_to_rest(touching, impact.fastest);
+  tell_impacts(touching, impact, before, rows.velocities(u), answer.x, lost);
+}
+
+// Returns the energy that is lost.
+double Driver::change_velocities(const VectorXd& change) {
+  const double energy = model_.energy();
+  y_.segment(motion_.coordinates(), motion_.velocities()) += change;
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  const double lost = energy - model_.energy();
+  lost_ += lost;
+  return lost;
+}
+
+void Driver::tell_impacts(const std::vector<int>& touching, const Impact& impact,
+                          const VectorXd& before, const VectorXd& after, const VectorXd& x,
+                          double lost) {
+  const int n = static_cast<int>(touching.size()), block = static_cast<int>(x.size()) / n;
+  double largest = 0;
+  for (int k = 0; k < n; ++k) largest = std::max(largest, x[block * k]);
+  bool first = true;
+  for (int k = 0; k < n; ++k) {
+    if (!impact.hits[at(k)] && x[block * k] <= kNoImpulse * largest) continue;
+    if (impact.hits[at(k)]) ++counts_.impacts;
+    const bool over = impact.rest[k] > 0;
+    record(over ? EventKind::rest : EventKind::impact, touching[at(k)], before[block * k],
+           after[block * k], first ? lost : 0);
+    if (over) events_.back().time = event_time_ + impact.rest[k];
+    first = false;
+  }
+}
+
+}  // namespace tether::scene::event
