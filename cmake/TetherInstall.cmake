@@ -24,6 +24,10 @@ foreach(library IN LISTS tether_libraries)
     DESTINATION ${tether_cmake_dir} COMPONENT ${library})
 endforeach()
 
+if(TARGET tether_preload)
+  install(TARGETS tether_preload LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ida_projection)
+endif()
+
 # What the config has to find and include.
 set(tether_needs_scene ida_projection contact)
 if(TARGET tether_contact_collision)

@@ -1,0 +1,40 @@
+/* Tether: constraints for programs that cannot be recompiled. SPDX-License-Identifier:
+ * BSD-3-Clause */
+#ifndef TETHER_IDA_PRELOAD_H
+#define TETHER_IDA_PRELOAD_H
+
+#include <tether/ida_projection.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+#if defined(__GNUC__)
+#pragma GCC visibility push(default)
+#endif
+
+/* What a shared object of yours defines, so that libtether_preload attaches constraints to the IDA
+ * of a program that links SUNDIALS dynamically:
+ *
+ *   LD_PRELOAD=libtether_preload.so TETHER_CONSTRAINTS=./mine.so program
+ *
+ * Called once for each IDA object, before its first IDACalcIC or IDASolve. y: a copy of the initial
+ * values given to IDAInit. Add rows to `constraints` and set what you like in `options`, which has
+ * the defaults (and the program's own nonlinear solver, where it has one). Its tether_add_... come
+ * from the preloaded library: link nothing.
+ *
+ *   0    attach the rows; none: leave this IDA as it is
+ *   > 0  leave this IDA as it is
+ *   < 0  an error: IDACalcIC and IDASolve return IDA_ILL_INPUT
+ *
+ * So do rows that cannot be attached; the reason is on standard error. With TETHER_STATISTICS set,
+ * IDAFree writes the projection's statistics there. */
+int tether_preload(void* ida_mem, N_Vector y, tether_constraints* constraints,
+                   tether_options* options);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,178 @@
+// Tether: IDA's functions with a projection, for programs that are not recompiled.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+#include <cstdlib>
+#include <dlfcn.h>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <tether/ida_preload.h>
+
+#include "preload/sundials_in_use.hpp"
+
+namespace {
+
+using tether::ida_projection::preload::sundials_function;
+
+template <class T, void (*free)(T*)>
+struct Freed {
+  void operator()(T* object) const { free(object); }
+};
+template <class T, void (*free)(T*)>
+using Owned = std::unique_ptr<T, Freed<T, free>>;
+
+void destroy(_generic_N_Vector* v) { N_VDestroy(v); }
+
+struct Host {
+  Owned<_generic_N_Vector, destroy> start;  // IDAInit's y, until the rows are attached
+  SUNNonlinearSolver nonlinear_solver = nullptr;
+  bool asked = false, refused = false;
+  Owned<tether_projection, tether_projection_free> projection;
+};
+
+std::recursive_mutex mutex;
+std::map<void*, Host>& hosts() {
+  static auto* all = new std::map<void*, Host>();  // outlives every exit handler of the program
+  return *all;
+}
+thread_local bool attaching = false;  // the plugin itself calls IDA
+
+int complain(const char* what, const char* why) {
+  std::fprintf(stderr, "libtether_preload: %s: %s\n", what, why);
+  return IDA_ILL_INPUT;
+}
+
+/// The user's function; null without TETHER_CONSTRAINTS, or where it cannot be used (said once).
+decltype(&tether_preload) constraints_of_the_user(bool& failed) {
+  static bool wrong = false;
+  static const auto function = []() -> decltype(&tether_preload) {
+    const char* path = secure_getenv("TETHER_CONSTRAINTS");
+    if (!path || !*path) {
+      complain("TETHER_CONSTRAINTS", "not set, IDA runs as it is");
+      return nullptr;
+    }
+    void* object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    void* symbol = object ? dlsym(object, "tether_preload") : nullptr;
+    if (!symbol) {
+      const char* why = dlerror();
+      complain(path, why ? why : "tether_preload is null");
+      wrong = true;
+    }
+    return reinterpret_cast<decltype(&tether_preload)>(symbol);
+  }();
+  failed = wrong;
+  return function;
+}
+
+int attach(void* ida_mem, Host& host) {
+  bool failed = false;
+  const auto ask = constraints_of_the_user(failed);
+  if (failed) return IDA_ILL_INPUT;
+  if (!ask || !host.start) return IDA_SUCCESS;
+  const Owned<tether_constraints, tether_constraints_free> rows(tether_constraints_new());
+  if (!rows) return complain("no memory", tether_last_error());
+  tether_options options;
+  tether_options_init(&options, sizeof options);
+  options.nonlinear_solver = host.nonlinear_solver;
+  const int answer = ask(ida_mem, host.start.get(), rows.get(), &options);
+  if (answer < 0) return complain("tether_preload failed", tether_last_error());
+  if (answer > 0 || tether_count_rows(rows.get()) == 0) return IDA_SUCCESS;
+  int flag = 0;
+  const auto unknowns = static_cast<long>(N_VGetLength(host.start.get()));
+  host.projection.reset(tether_projection_new(ida_mem, rows.get(), &options, unknowns, &flag));
+  if (!host.projection) return complain("the constraints are not attached", tether_last_error());
+  return IDA_SUCCESS;
+}
+
+/// Once for each IDA object; a refusal stays one.
+int prepare(void* ida_mem) noexcept {
+  if (attaching || !ida_mem) return IDA_SUCCESS;
+  try {
+    const std::lock_guard<std::recursive_mutex> lock(mutex);
+    Host& host = hosts()[ida_mem];
+    if (!host.asked) {
+      host.asked = true;
+      attaching = true;
+      host.refused = attach(ida_mem, host) != IDA_SUCCESS;
+      attaching = false;
+      host.start.reset();
+    }
+    return host.refused ? IDA_ILL_INPUT : IDA_SUCCESS;
+  } catch (...) {
+    attaching = false;
+    return complain("the constraints are not attached", "out of memory");
+  }
+}
+
+void remember_start(void* ida_mem, N_Vector yy0) noexcept {
+  try {
+    const std::lock_guard<std::recursive_mutex> lock(mutex);
+    Host& host = hosts()[ida_mem];
+    host.start.reset(N_VClone(yy0));
+    if (host.start) N_VScale(1.0, yy0, host.start.get());
+  } catch (...) {
+    complain("IDAInit", "out of memory");
+  }
+}
+
+}  // namespace
+
+extern "C" {
+#pragma GCC visibility push(default)
+
+int IDAInit(void* ida_mem, IDAResFn res, sunrealtype t0, N_Vector yy0, N_Vector yp0) {
+  const auto next = sundials_function<decltype(IDAInit)>("IDAInit");
+  if (!next) return complain("IDAInit", "no SUNDIALS is loaded");
+  const int flag = next(ida_mem, res, t0, yy0, yp0);
+  if (flag == IDA_SUCCESS) remember_start(ida_mem, yy0);
+  return flag;
+}
+
+int IDASetNonlinearSolver(void* ida_mem, SUNNonlinearSolver solver) {
+  const auto next = sundials_function<decltype(IDASetNonlinearSolver)>("IDASetNonlinearSolver");
+  if (!next) return complain("IDASetNonlinearSolver", "no SUNDIALS is loaded");
+  const int flag = next(ida_mem, solver);
+  if (flag == IDA_SUCCESS && !attaching) {
+    const std::lock_guard<std::recursive_mutex> lock(mutex);
+    const auto host = hosts().find(ida_mem);
+    if (host != hosts().end()) host->second.nonlinear_solver = solver;
+  }
+  return flag;
+}
+
+int IDACalcIC(void* ida_mem, int icopt, sunrealtype tout1) {
+  const auto next = sundials_function<decltype(IDACalcIC)>("IDACalcIC");
+  if (!next) return complain("IDACalcIC", "no SUNDIALS is loaded");
+  const int flag = prepare(ida_mem);
+  return flag == IDA_SUCCESS ? next(ida_mem, icopt, tout1) : flag;
+}
+
+int IDASolve(void* ida_mem, sunrealtype tout, sunrealtype* tret, N_Vector yret, N_Vector ypret,
+             int itask) {
+  const auto next = sundials_function<decltype(IDASolve)>("IDASolve");
+  if (!next) return complain("IDASolve", "no SUNDIALS is loaded");
+  const int flag = prepare(ida_mem);
+  return flag == IDA_SUCCESS ? next(ida_mem, tout, tret, yret, ypret, itask) : flag;
+}
+
+void IDAFree(void** ida_mem) {
+  const auto next = sundials_function<decltype(IDAFree)>("IDAFree");
+  if (!next) return;
+  Host host;
+  if (ida_mem && *ida_mem) {
+    const std::lock_guard<std::recursive_mutex> lock(mutex);
+    const auto found = hosts().find(*ida_mem);
+    if (found != hosts().end()) {
+      host = std::move(found->second);
+      hosts().erase(found);
+    }
+  }
+  if (host.projection && std::getenv("TETHER_STATISTICS")) {
+    const char* table = tether_get_statistics_table(host.projection.get());
+    if (table) std::fputs(table, stderr);
+  }
+  next(ida_mem);
+}
+
+#pragma GCC visibility pop
+}
