@@ -6,6 +6,7 @@
 #include <tether/linalg/minimum_norm.hpp>
 
 #include "kept_rows.hpp"
+#include "small_kept_rows.hpp"
 #include "small_orthogonal.hpp"
 
 namespace tether::linalg {
@@ -43,7 +44,9 @@ void MinimumNorm::resize(int rows, int columns) {
   if (rows <= kSmallRows && columns <= kSmallColumns) {
     kernel_ = &small::kernel_for(columns);
     if (!small_) small_ = std::make_unique<small::Storage>();
+    if (!small_kept_) small_kept_ = std::make_unique<small::KeptRows>();
     small_->clear();
+    solve_small_kept_ = small::solve_kept_for(rows);
     metric_.assign(static_cast<std::size_t>(kernel_->stride), 0.0);
   } else {
     kernel_ = nullptr;
@@ -74,6 +77,7 @@ double* MinimumNorm::row(int i) {
 bool MinimumNorm::factor(const double* D, double rank_tolerance) {
   for (int j = 0; j < n_; ++j) metric_[static_cast<std::size_t>(j)] = D[j];
   set_rank(0);
+  kept_ = false;
   if (kernel_ == nullptr) return factor_large(rank_tolerance);
   if (!kernel_->form_rows(*small_, m_, metric_.data())) return false;
   set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
@@ -83,6 +87,7 @@ bool MinimumNorm::factor(const double* D, double rank_tolerance) {
 bool MinimumNorm::factor(const double* wide, int width, const int* rows, const int* columns,
                          double rank_tolerance) {
   set_rank(0);
+  kept_ = false;
   if (kernel_ != nullptr) {
     if (!kernel_->gather_rows(*small_, m_, n_, wide, width, rows, columns, metric_.data()))
       return false;
@@ -120,10 +125,12 @@ bool MinimumNorm::scale_large() {
 
 bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns) {
   const int r = rank_;
-  if (kernel_ != nullptr || r == 0) return false;
+  if (r == 0 || (kernel_ != nullptr && r < m_)) return false;
   if (!kept_) decided_least_ = independent_part(r - 1);
   if (decided_least_ < kLeastSine) return false;
   kept_ = false;
+  if (kernel_ != nullptr)
+    return kept_ = factor_kept_small({wide, width, rows, columns, metric_.data()});
   KeptRows& kept = large_->kept;
   if (!kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data())) return false;
   if (!kept.factor(large_->qr.colsPermutation().indices().data(), r)) return false;
@@ -135,8 +142,17 @@ bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, co
   return true;
 }
 
+bool MinimumNorm::factor_kept_small(const small::Gathered& from) {
+  small::Storage& s = *small_;
+  const double sine = std::max(kLeastSine, kLeastShare * decided_least_);
+  if (!small::factor_kept(*small_kept_, from, s.pivot, m_, n_, sine * sine, s.square, s.ratio))
+    return false;
+  std::fill_n(s.scale, m_, 1.0);
+  least_square_ = *std::min_element(s.ratio, s.ratio + m_);
+  return true;
+}
+
 bool MinimumNorm::factor_large(double rank_tolerance) {
-  kept_ = false;
   if (!scale_large()) return false;
   auto& [A, qr, work, rhs, kept] = *large_;
   qr.setThreshold(rank_tolerance);
@@ -151,7 +167,10 @@ double MinimumNorm::scaled(const double* g, int i) const {
 }
 
 void MinimumNorm::solve(const double* g, double* dy) {
-  kernel_ != nullptr ? solve_small(g, dy) : kept_ ? solve_kept(g, dy) : solve_large(g, dy);
+  if (kernel_ != nullptr && kept_)
+    solve_small_kept_(*small_kept_, small_->pivot, n_, g, metric_.data(), dy);
+  else
+    kernel_ != nullptr ? solve_small(g, dy) : kept_ ? solve_kept(g, dy) : solve_large(g, dy);
 }
 
 void MinimumNorm::solve_small(const double* g, double* dy) {

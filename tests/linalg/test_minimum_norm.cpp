@@ -346,3 +346,73 @@ TEST_CASE("rows known to be independent: lengths whose squares are no numbers") 
   const Eigen::VectorXd same = solve(kept, c.g);
   CHECK(distance(same, solve(anew, c.g), c.D) <= 1e-9 * length(same, c.D));
 }
+
+TEST_CASE("few rows known to be independent: as factored anew, every size, until one depends") {
+  for (int m = 1; m <= MinimumNorm::kSmallRows; ++m)
+    for (int n = m; n <= MinimumNorm::kSmallColumns; n += 1 + n / 8) {
+      INFO(label(m, n));
+      std::mt19937 random(static_cast<unsigned>(40 * m + n));
+      Case c = random_case(m, n, static_cast<unsigned>(100 * m + n));
+      c.D = c.D.array().pow(0.2);
+      // Every second row and column of a wider array; what is between must not be looked at.
+      const int width = 2 * n + 1;
+      std::vector<int> rows, columns;
+      for (int i = 0; i < m; ++i) rows.push_back(2 * (m - 1 - i));
+      for (int j = 0; j < n; ++j) columns.push_back(1 + 2 * j);
+      RowMajor wide = RowMajor::Constant(2 * m, width, std::numeric_limits<double>::quiet_NaN());
+      const auto entry = [&](int i, int j) -> double& {
+        return wide(rows[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
+      };
+      const auto spread = [&] {
+        for (int i = 0; i < m; ++i)
+          for (int j = 0; j < n; ++j) entry(i, j) = c.C(i, j);
+      };
+      MinimumNorm solver(m, n);
+      const auto kept = [&] {
+        return solver.factor_kept(wide.data(), width, rows.data(), columns.data());
+      };
+      spread();
+      CHECK_FALSE(kept());  // nothing is known yet
+      std::copy_n(c.D.data(), n, solver.metric());
+      REQUIRE(solver.factor(wide.data(), width, rows.data(), columns.data(), 1e-12));
+      if (solver.rank() < m || solver.independent_part(m - 1) < 0.02) continue;
+      std::vector<int> order;
+      for (int k = 0; k < m; ++k) order.push_back(solver.pivot(k));
+
+      // Other rows in their neighbourhood, in other units; another metric.
+      c.C += 1e-3 * random_matrix(m, n, random);
+      for (int i = 0; i < m; ++i) c.C.row(i) *= std::pow(10.0, 8 * ((i + n) % 3 - 1));
+      for (int i = 0; i < m; ++i) c.g[i] *= c.C.row(i).norm();
+      c.D = c.D.cwiseProduct(random_vector(n, random, 0.99, 1.01));
+      std::copy_n(c.D.data(), n, solver.metric());
+      spread();
+      REQUIRE(kept());
+      CHECK(solver.rank() == m);
+      const Eigen::VectorXd dy = solve(solver, c.g), expected = oracle(c);
+      const double sine = std::sqrt(solver.least_square());
+      CHECK(distance(dy, expected, c.D) <=
+            20.0 * n * kEpsilon / (sine * sine) * length(expected, c.D));
+      for (int k = 0; k < m; ++k) {
+        CHECK(solver.pivot(k) == order[static_cast<std::size_t>(k)]);
+        CHECK(solver.independent_part(k) <= 1.0 + 1e-14);
+        const Eigen::VectorXd row = c.C.row(k).transpose().cwiseProduct(c.D);
+        CHECK(solver.row_norm(k) == Approx(row.norm()).epsilon(1e-14));
+      }
+      CHECK(solver.condition() <= 1.0 / sine * (1.0 + 1e-12));
+
+      const double whole = entry(m - 1, n - 1);
+      for (const double wrong : {std::numeric_limits<double>::quiet_NaN(), 1e200}) {
+        entry(m - 1, n - 1) = wrong;
+        CHECK_FALSE(kept());
+      }
+      entry(m - 1, n - 1) = whole;
+      REQUIRE(solver.factor(wide.data(), width, rows.data(), columns.data(), 1e-12));
+      if (m == 1) continue;
+      c.C.row(m - 1) = c.C.row(0) + 1e-5 * c.C.row(0).norm() * c.C.row(m - 1).normalized();
+      spread();
+      CHECK_FALSE(kept());
+      REQUIRE(solver.factor(wide.data(), width, rows.data(), columns.data(), 1e-3));
+      REQUIRE(solver.rank() == m - 1);
+      CHECK_FALSE(kept());  // small systems with dropped rows are factored anew
+    }
+}

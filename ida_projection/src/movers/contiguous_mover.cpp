@@ -46,12 +46,12 @@ Status ContiguousMover<Rows>::factor(double t) {
     message_ = evaluator_.message();
     return status;
   }
-  const bool known = keeps_rank_ && lasting_ && reusable_;
+  const bool known = Rows::kKeepsRank && lasting_ && reusable_;
   reusable_ = false;
   weighed_ = false;
   if (known && blocks_.factor_kept()) {
     thin_ = false;
-    ++statistics_.refactorizations;
+    ++(Rows::many(m_) ? statistics_.refactorizations : statistics_.factorizations);
   } else if (!decide()) {
     message_ =
         "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
@@ -302,7 +302,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       reused_ = have_factors = false;
       continue;
     }
-    if (!follow && keeps_rank_) {
+    if (!follow && Rows::kKeepsRank) {
       lasting_ = have_factors = false;
       continue;
     }

@@ -42,7 +42,7 @@ class ContiguousMover final : public Mover {
         reported_(reported >= 0 ? reported : m_),
         inverse_n_(1.0 / size),
         keeps_factors_(Rows::keeps_factors(m_)),
-        keeps_rank_(Rows::keeps_rank(m_)),
+        takes_rest_(Rows::many(m_)),
         blocks_(constraints, evaluator_, size),
         at_(size),
         metric_(options, size) {
@@ -69,7 +69,7 @@ class ContiguousMover final : public Mover {
   void forget_failure() override { evaluator_.forget(); }
   Status finish(const Candidate& candidate) override {
     // Where a move costs little beside the step, what Newton's method left is taken, too.
-    if (keeps_rank_) return take_rest(candidate, move_length_);
+    if (takes_rest_) return take_rest(candidate, move_length_);
     if (!keeps_factors()) return Status::success;
     const bool unseen = move_length_ > kSafe * options_.tolerance || !dropped_follow();
     return unseen ? take_back(candidate) : Status::success;
@@ -126,7 +126,7 @@ class ContiguousMover final : public Mover {
   int reported_;  // rows whose drift is told; the others are equations of F
   double inverse_n_;
   bool keeps_factors_;  // over several steps
-  bool keeps_rank_;     // over several steps: which rows count
+  bool takes_rest_;     // what Newton's method leaves
   Rows blocks_;
   bool thin_ = false;          // the last factor() found rows that need RowTrust
   bool lasting_ = false;       // which rows it has kept is right for the next steps, too

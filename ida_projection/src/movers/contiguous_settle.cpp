@@ -28,13 +28,13 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
 template <class Rows>
 Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach) {
   const bool measure = staleness_.due(reach);
-  const double enough = (keeps_rank_ ? kCheapRest : 1.0) * options_.tolerance;
+  const double enough = (takes_rest_ ? kCheapRest : 1.0) * options_.tolerance;
   double previous = 0.0;
   for (int k = 0; k < options_.maximum_iterations; ++k) {
     const Status status = value(candidate.t);
     if (status != Status::success) return status;
     double length = solve();
-    if (keeps_rank_ && !dropped_follow()) {
+    if (takes_rest_ && !dropped_follow()) {
       lasting_ = false;
       const Status made = factor(candidate.t);
       if (made != Status::success) return made;
@@ -46,9 +46,9 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
     if (k > 0) staleness_.measured(reach, previous, rounding ? 0.0 : length);
     if (rounding) break;
     // Where moves are cheap only what is seen on this candidate counts.
-    const double expected = keeps_rank_ ? length * (k > 0 ? length / previous : kUnknownSlope)
+    const double expected = takes_rest_ ? length * (k > 0 ? length / previous : kUnknownSlope)
                                         : staleness_.left(reach, length);
-    if ((k > 0 || keeps_rank_ || !measure) && expected <= enough) break;
+    if ((k > 0 || takes_rest_ || !measure) && expected <= enough) break;
     previous = length;
   }
   return Status::success;

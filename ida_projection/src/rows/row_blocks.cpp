@@ -4,9 +4,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <utility>
 
 namespace tether::ida_projection {
+
+namespace {
+
+// Of C's entries; without a branch for each, as next to always none is.
+bool any_not_zero(const double* C, const std::vector<std::size_t>& entries) {
+  std::uint64_t bits = 0;
+  for (const std::size_t e : entries) {
+    std::uint64_t entry;
+    std::memcpy(&entry, C + e, sizeof entry);
+    bits |= entry << 1;  // but for the sign
+  }
+  return bits != 0;
+}
+
+}  // namespace
 
 std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT) {
   for (std::size_t i = 0; i < y.size(); ++i)
@@ -156,7 +173,9 @@ Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, cons
     without = now;
   }
   if (watched_.empty()) return status;
-  if (evaluator.uses_differences() && look_.due()) look_beyond(evaluator, t, y, WT);
+  const bool look = evaluator.uses_differences() && look_.due();
+  if (look) look_beyond(evaluator, t, y, WT);
+  if (!look && !any_not_zero(C_.data(), watched_)) return status;
   for (const std::size_t e : watched_) {
     if (C_[e] != 0.0) filled_[e] = 1;
     outgrown_ |= filled_[e] != 0;

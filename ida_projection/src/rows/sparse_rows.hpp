@@ -17,7 +17,8 @@ class SparseRows {
   /// C and its factors cost four solves and more: they serve several steps. Of few rows nothing
   /// would be gained that makes up for a metric of an earlier step.
   static bool keeps_factors(int rows) { return rows > 64; }
-  static bool keeps_rank(int) { return false; }
+  static constexpr bool kKeepsRank = false;
+  static bool many(int) { return false; }
   static constexpr bool kThinRows = false;
 
   SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n);

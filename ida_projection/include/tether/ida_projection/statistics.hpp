@@ -20,7 +20,7 @@ struct Statistics {
   long value_evaluations = 0;     ///< calls of g
   long jacobian_evaluations = 0;  ///< C, however formed
   long factorizations = 0;
-  long refactorizations = 0;  ///< factors of the rows that an earlier factorisation had kept
+  long refactorizations = 0;  ///< of more than 16 rows, where an earlier one had told which count
   long extra_iterations = 0;  ///< corrector iterations added
   long corrections_repeated =
       0;               ///< corrections redone with fresh factors: the old ones misled IDA

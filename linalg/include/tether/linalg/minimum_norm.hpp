@@ -12,6 +12,8 @@ namespace tether::linalg {
 namespace small {  // inside the library
 struct Storage;
 struct Kernel;
+struct KeptRows;
+struct Gathered;
 }  // namespace small
 
 /// Factors of an m x n matrix C in the metric D, kept until the next factor():
@@ -58,9 +60,10 @@ class MinimumNorm {
               double rank_tolerance);
 
   /// The same with the rows that the last factor() and use_rank() let take part, in their order,
-  /// from A A^T = L L^T of these alone: some tenth of the work, less where rows have few entries.
-  /// False: an entry is not finite, a row depends on those before it but for a sine below 1e-3 or a
-  /// third of what factor() found least, or the system is small: then factor() is due.
+  /// from A A^T of these alone: some tenth of the work, less where rows have few entries, and up to
+  /// 16 x 32 half of it, without the chain of one pivot after the other. False: an entry is not
+  /// finite, a row depends on those before it but for a sine below 1e-3 or a third of what factor()
+  /// found least, or a small system has dropped rows: then factor() is due.
   bool factor_kept(const double* wide, int width, const int* rows, const int* columns);
 
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
@@ -96,6 +99,7 @@ class MinimumNorm {
   void gather_large(const double* wide, int width, const int* rows, const int* columns);
   bool scale_large();
   bool factor_large(double rank_tolerance);
+  bool factor_kept_small(const small::Gathered& from);
   void solve_kept(const double* g, double* dy);
   void solve_large(const double* g, double* dy);
   void solve_small(const double* g, double* dy);
@@ -104,6 +108,9 @@ class MinimumNorm {
   int m_ = 0, n_ = 0, rank_ = 0, factored_rank_ = 0;
   const small::Kernel* kernel_ = nullptr;  // null: beyond the small sizes
   std::unique_ptr<small::Storage> small_;
+  std::unique_ptr<small::KeptRows> small_kept_;  // of factor_kept()
+  void (*solve_small_kept_)(const small::KeptRows&, const int* order, int n, const double* g,
+                            const double* D, double* dy) = nullptr;
   struct TETHER_HIDDEN Large;  // Eigen's types stay inside the library: see eigen.hpp
   std::unique_ptr<Large> large_;
   bool kept_ = false;  // the factors are those of factor_kept()

@@ -1,0 +1,113 @@
+// Tether: A A^T = L diag(d) L^T of a few rows, four rows at once. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "small_kept_rows.hpp"
+
+#include <cstddef>
+#include <tether/linalg/vector_code.hpp>
+
+namespace tether::linalg::small {
+
+namespace {
+
+typedef double v4 __attribute__((vector_size(32)));
+
+constexpr double kSmallestSquare = 1e-280, kLargestSquare = 1e280;
+
+// Columns of A D, in the order of the rows; places beyond m repeat the first row.
+template <int Lanes>
+TETHER_INLINE void gather(KeptRows& s, const Gathered& from, const int* order, int m, int n) {
+  const double* c[4 * Lanes];
+  for (int k = 0; k < 4 * Lanes; ++k)
+    c[k] = from.wide + static_cast<std::ptrdiff_t>(from.rows[order[k < m ? k : 0]]) * from.width;
+  v4* A = reinterpret_cast<v4*>(s.A);
+  for (int j = 0; j < n; ++j, A += Lanes) {
+    const int column = from.columns[j];
+    for (int v = 0; v < Lanes; ++v) {
+      const v4 four = {c[4 * v][column], c[4 * v + 1][column], c[4 * v + 2][column],
+                       c[4 * v + 3][column]};
+      A[v] = four * from.D[j];
+    }
+  }
+}
+
+// Columns 4 Block .. 4 Block + 3 of L, with U = diag(d) L^T beside it: column a is that of A A^T
+// less what the columns before it explain. Rows above the block need nothing.
+template <int Lanes, int Block>
+TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m, int n,
+                                double least, double* square, double* ratio) {
+  constexpr int kStride = 4 * Lanes, kRest = Lanes - Block;
+  for (int a = 4 * Block; a < m && a < 4 * Block + 4; ++a) {
+    v4 sum[kRest];
+    for (int v = 0; v < kRest; ++v) sum[v] = v4{0.0, 0.0, 0.0, 0.0};
+    for (int j = 0; j < n; ++j) {
+      const v4* column = reinterpret_cast<const v4*>(s.A + j * kStride) + Block;
+      const double entry = s.A[j * kStride + a];
+      for (int v = 0; v < kRest; ++v) sum[v] += column[v] * entry;
+    }
+    alignas(32) double diagonal[4];
+    *reinterpret_cast<v4*>(diagonal) = sum[0];
+    const double whole = diagonal[a - 4 * Block];
+    for (int k = 0; k < a; ++k) {
+      const v4* column = reinterpret_cast<const v4*>(s.L + k * kStride) + Block;
+      const double entry = U[k * kStride + a];
+      for (int v = 0; v < kRest; ++v) sum[v] -= column[v] * entry;
+    }
+    *reinterpret_cast<v4*>(diagonal) = sum[0];
+    const double d = diagonal[a - 4 * Block];
+    const double inverse = 1.0 / d;
+    for (int v = 0; v < kRest; ++v) {
+      reinterpret_cast<v4*>(U + a * kStride)[Block + v] = sum[v];
+      reinterpret_cast<v4*>(s.L + a * kStride)[Block + v] = sum[v] * inverse;
+    }
+    s.inverse[a] = inverse;
+    square[order[a]] = whole;
+    ratio[a] = d / whole;
+    // One comparison for what is not a number, too.
+    if (!(whole > kSmallestSquare && whole < kLargestSquare && d >= least * whole)) return false;
+  }
+  return true;
+}
+
+template <int Lanes>
+TETHER_INLINE bool factor(KeptRows& s, const Gathered& from, const int* order, int m, int n,
+                          double least, double* square, double* ratio) {
+  alignas(32) double U[4 * Lanes * 4 * Lanes];
+  gather<Lanes>(s, from, order, m, n);
+  bool good = factor_block<Lanes, 0>(s, U, order, m, n, least, square, ratio);
+  if constexpr (Lanes > 1)
+    good = good && factor_block<Lanes, 1>(s, U, order, m, n, least, square, ratio);
+  if constexpr (Lanes > 2)
+    good = good && factor_block<Lanes, 2>(s, U, order, m, n, least, square, ratio);
+  if constexpr (Lanes > 3)
+    good = good && factor_block<Lanes, 3>(s, U, order, m, n, least, square, ratio);
+  return good;
+}
+
+#define TETHER_FACTOR(Lanes)                                                                    \
+  TETHER_CLONES bool factor_##Lanes(KeptRows& s, const Gathered& from, const int* order, int m, \
+                                    int n, double least, double* square, double* ratio) {       \
+    return factor<Lanes>(s, from, order, m, n, least, square, ratio);                           \
+  }
+TETHER_FACTOR(1)
+TETHER_FACTOR(2)
+TETHER_FACTOR(3)
+TETHER_FACTOR(4)
+#undef TETHER_FACTOR
+
+}  // namespace
+
+bool factor_kept(KeptRows& s, const Gathered& from, const int* order, int m, int n, double least,
+                 double* square, double* ratio) {
+  switch (KeptRows::stride(m) / 4) {
+    case 1:
+      return factor_1(s, from, order, m, n, least, square, ratio);
+    case 2:
+      return factor_2(s, from, order, m, n, least, square, ratio);
+    case 3:
+      return factor_3(s, from, order, m, n, least, square, ratio);
+    default:
+      return factor_4(s, from, order, m, n, least, square, ratio);
+  }
+}
+
+}  // namespace tether::linalg::small
