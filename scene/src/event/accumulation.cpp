@@ -26,6 +26,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 void Driver::remember(int contact, double approach) {
   Bounces& b = bounces_[at(contact)];
+  if (b.count > 0 && b.time[0] == event_time_) return;
   for (int k = 2; k > 0; --k) {
     b.time[k] = b.time[k - 1];
     b.speed[k] = b.speed[k - 1];
@@ -63,6 +64,7 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
       if (std::abs(w[block * k + j]) <= speed) slow.push_back(block * k + j);
   }
   const int n = static_cast<int>(slow.size());
+  if (n == 0) return 0;
   MatrixXd A(n, n);
   VectorXd b(n), x = VectorXd::Zero(w.size());
   for (int i = 0; i < n; ++i) {

@@ -20,12 +20,20 @@ double local_tolerance(double tolerance) {
 
 // The first steps of a bounce are of order 1: some ten times (h / T)^2 is their error in its length
 // T. A way of less than kLeastWay (m in the units of the model) is lost in rounding.
-constexpr double kFlightError = 0.01, kLeastWay = 1e-15;
+constexpr double kFlightError = 0.003, kLeastWay = 1e-15;
 constexpr long kMostAtOneTime = 300;
 constexpr double kStartTolerance = 1e-4;
 constexpr long kAnchor = 5000;  // steps
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// Until a gap that falls with the acceleration `back` is zero, s; 0: never.
+double flight_time(double gap, double rate, double back) {
+  const double square = rate * rate + 2 * back * gap;
+  if (square < 0) return 0;
+  const double root = std::sqrt(square);
+  return rate > 0 ? (back > 0 ? (rate + root) / back : 0) : 2 * gap / (root - rate);
+}
 
 }  // namespace
 
@@ -103,7 +111,8 @@ void Driver::begin_phase() {
 // Everything from (event_time_, y_), the modes and the energy that is kept: whoever has these goes
 // on with the same bits.
 void Driver::start_phase() {
-  motion_.choose(event_time_, y_, std::vector<ContactMode>(motion_.modes()));
+  modes_ = motion_.modes();
+  motion_.choose(event_time_, y_, modes_);
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
   std::vector<bool> leaving(at(model_.contacts()), false);
   for (int i = 0; i < model_.contacts(); ++i) {
@@ -120,22 +129,26 @@ void Driver::start_phase() {
   next_.reset();
 }
 
-// A bounce that is shorter than the tolerance's first step must be resolved all the same.
+// A flight that is shorter than the tolerance's first step must be resolved all the same: bounces,
+// and the ways of contacts that are about to close.
 double Driver::longest_first_step(const std::vector<bool>& leaving) {
   VectorXd rate(motion_.size());
   motion_.rate(event_time_, y_.data(), rate.data());
   const VectorXd a = motion_.acceleration();
+  const double part = std::min(1e-3, std::sqrt(kFlightError * options_.tolerance));
   double longest = 0;
   ContactLook look;
   for (int i = 0; i < model_.contacts(); ++i) {
-    if (!leaving[at(i)]) continue;
-    model_.look(i, look);
+    if (motion_.modes()[at(i)].mode != Mode::open) continue;
     double speed = 0;
-    model_.gap(i, speed);
-    const double back = -(look.normal.dot(a) + look.normal_rest);
-    if (!(back > 0)) continue;
-    const double part = std::min(1e-3, std::sqrt(kFlightError * options_.tolerance));
-    const double first = std::max(part * 2 * speed / back, kLeastWay / speed);
+    const double gap = leaving[at(i)] ? 0 : model_.gap(i, speed);
+    if (leaving[at(i)]) model_.gap(i, speed);
+    const bool closing = gap > 0 && gap <= bands().gap(i) && speed < -bands().approach(i);
+    if (!leaving[at(i)] && !closing) continue;
+    model_.look(i, look);
+    const double flight = flight_time(gap, speed, -(look.normal.dot(a) + look.normal_rest));
+    if (!(flight > 0)) continue;
+    const double first = std::max(part * flight, kLeastWay / std::abs(speed));
     longest = longest > 0 ? std::min(longest, first) : first;
   }
   return longest;
@@ -178,7 +191,7 @@ void Driver::anchor() {
 }
 
 Driver::Memory Driver::memory() const {
-  return {event_time_, motion_.kept_energy(), lost_,          first_energy_,  y_, motion_.modes(),
+  return {event_time_, motion_.kept_energy(), lost_,          first_energy_,  y_, modes_,
           bounces_,    at_one_time_,          counts_.events, counts_.impacts};
 }
 

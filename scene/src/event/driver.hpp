@@ -74,9 +74,11 @@ class Driver {
   void start_phase();
   void handle(const Zero& zero);
   void anchor();
-  void collide(const std::vector<int>& touching, EventKind otherwise, int contact);
+  void collide(const std::vector<int>& near, EventKind otherwise, int contact);
+  std::vector<int> struck(const std::vector<int>& near, int first);
+  void strike(const std::vector<int>& set, bool plastic);
   struct Impact;
-  Impact expect(const std::vector<int>& touching, const VectorXd& before, int block);
+  Impact expect(const std::vector<int>& set, const VectorXd& before, int block, bool plastic);
   double change_velocities(const VectorXd& change);
   void tell_impacts(const std::vector<int>& touching, const Impact& impact, const VectorXd& before,
                     const VectorXd& after, const VectorXd& x, double lost);
@@ -100,7 +102,8 @@ class Driver {
   Motion motion_;
   Watcher watcher_;
   double time_, event_time_;
-  VectorXd y_;  // at the start of the phase
+  VectorXd y_;                      // at the start of the phase
+  std::vector<ContactMode> modes_;  // there; directions of slip turn since
   std::unique_ptr<Phase> phase_;
   std::optional<Zero> next_;
   std::vector<Bounces> bounces_;
@@ -115,9 +118,8 @@ class Driver {
 struct Driver::Impact {
   VectorXd b, mu;
   std::vector<bool> hits;  ///< they close, and fast enough to count
-  bool any = false;
-  VectorXd rest;       ///< > 0: the contact's impacts are over after this time, s
-  double fastest = 0;  ///< of those that are over: speed of approach
+  VectorXd rest;           ///< > 0: the contact's impacts are over after this time, s
+  double fastest = 0;      ///< of those that are over: speed of approach
 };
 
 /// All that a phase depends on. IDA's history is not in it: a phase is repeated from its start.

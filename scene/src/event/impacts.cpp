@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "driver.hpp"
 
@@ -13,26 +14,63 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kNoImpulse = 1e-9;  // of the largest of an impact
+constexpr int kMostRounds = 2000;    // of one instant
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
+// Contacts that are closed, and open ones that close. What moves apart takes no part: it may be
+// struck later.
+std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
+  std::vector<int> out;
+  bool any = false;
+  for (const int i : near) {
+    double rate = 0;
+    const double gap = model_.gap(i, rate), band = bands().approach(i);
+    const bool now = i == first || gap <= -rate * options_.tolerance;
+    const bool hits = rate < -band && now;
+    const bool rests = motion_.modes()[at(i)].mode != Mode::open && std::abs(rate) <= band;
+    if (hits || rests) out.push_back(i);
+    any = any || hits;
+  }
+  if (!any) out.clear();
+  return out;
+}
+
+// One impact may strike others that are near. With corners in turns there are infinitely many in no
+// time: those that are too slow to count, or very many, are not resolved.
+void Driver::collide(const std::vector<int>& near, EventKind otherwise, int contact) {
+  for (int round = 0; round <= kMostRounds; ++round) {
+    const std::vector<int> set = struck(near, round == 0 ? contact : -1);
+    if (set.empty()) {
+      if (round == 0 && contact >= 0) record(otherwise, contact, 0, 0, 0);
+      return;
+    }
+    if (round < kMostRounds)
+      strike(set, false);
+    else
+      strike(near, true);
+  }
+}
+
 // Which of the contacts hit, and what their impacts restore.
-Driver::Impact Driver::expect(const std::vector<int>& touching, const VectorXd& before, int block) {
-  const int n = static_cast<int>(touching.size());
+Driver::Impact Driver::expect(const std::vector<int>& set, const VectorXd& before, int block,
+                              bool plastic) {
+  const int n = static_cast<int>(set.size());
   Impact out;
   out.b = -before;
   out.mu.resize(n);
   out.rest.setZero(n);
-  out.hits.assign(touching.size(), false);
+  out.hits.assign(set.size(), false);
   for (int k = 0; k < n; ++k) {
-    const int i = touching[at(k)];
+    const int i = set[at(k)];
     const ContactLaw law = model_.law(i);
     const double approach = -before[block * k];
     out.mu[k] = law.friction;
     if (approach <= bands().approach(i)) continue;
-    out.hits[at(k)] = out.any = true;
+    out.hits[at(k)] = true;
+    if (plastic) continue;
     if (has_accumulated(i, approach, out.rest[k])) {
       out.fastest = std::max(out.fastest, approach);
       continue;
@@ -43,24 +81,19 @@ Driver::Impact Driver::expect(const std::vector<int>& touching, const VectorXd& 
   return out;
 }
 
-void Driver::collide(const std::vector<int>& touching, EventKind otherwise, int contact) {
-  if (touching.empty()) return;
-  ContactRows rows(model_, touching);
+void Driver::strike(const std::vector<int>& set, bool plastic) {
+  ContactRows rows(model_, set);
   const auto u = y_.segment(motion_.coordinates(), motion_.velocities());
   const VectorXd before = rows.velocities(u);
-  const Impact impact = expect(touching, before, rows.size());
-  if (!impact.any) {
-    if (contact >= 0) record(otherwise, contact, 0, 0, 0);
-    return;
-  }
+  const Impact impact = expect(set, before, rows.size(), plastic);
   ++counts_.contact_problems;
   const FrictionAnswer answer = solve_friction(rows.A(), impact.b, impact.mu);
   if (!answer.solved)
-    fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", touching.size(),
+    fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", set.size(),
                      answer.error));
   double lost = change_velocities(rows.change(answer.x));
-  if (impact.fastest > 0) lost += come_to_rest(touching, impact.fastest);
-  tell_impacts(touching, impact, before, rows.velocities(u), answer.x, lost);
+  if (impact.fastest > 0) lost += come_to_rest(set, impact.fastest);
+  tell_impacts(set, impact, before, rows.velocities(u), answer.x, lost);
 }
 
 // Returns the energy that is lost.

@@ -45,7 +45,7 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   functions_.clear();
   force_ = 0;
   const auto add = [&](Watch what, int contact, int closed, bool leaves) {
-    functions_.push_back({what, contact, closed, false, leaves, false, 0, 0, 0, 0});
+    functions_.push_back({what, contact, closed, false, leaves, false, 0, 0, 0, 0, 0});
   };
   const std::vector<int>& closed = motion_.closed();
   for (int i = 0; i < motion_.model().contacts(); ++i)
@@ -63,8 +63,14 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   if (motion_.is_hyperstatic()) add(Watch::support, -1, -1, false);
   evaluate(t, y);
   for (Function& f : functions_) {
-    f.armed = f.value > band(f);
-    f.dormant = f.what == Watch::gap && f.value < -bands().gap(f.contact);
+    const bool gap = f.what == Watch::gap;
+    f.dormant = gap && f.value < -bands().gap(f.contact);
+    if (gap && f.value < 0 && !f.dormant) {
+      f.level = f.value;
+      f.value = 0;
+    }
+    const bool closing = gap && f.value > 0 && f.slope < -bands().approach(f.contact);
+    f.armed = closing || f.value > band(f);
   }
 }
 
@@ -86,7 +92,7 @@ double Watcher::band(const Function& f) const {
 double Watcher::of_state(Function& f) {
   switch (f.what) {
     case Watch::gap:
-      return motion_.model().gap(f.contact, f.slope);
+      return motion_.model().gap(f.contact, f.slope) - f.level;
     case Watch::normal_force:
       return motion_.normal_force(f.closed);
     case Watch::cone:
@@ -161,8 +167,8 @@ bool Watcher::may_dip(const Function& f, double step) const {
          std::min(f.before, f.value) < step * std::max(-f.slope_before, f.slope);
 }
 
-// The least value of such a gap.
-double Watcher::dip(Phase& phase, const Function& f, double& when) {
+// The least or largest value of a gap that turns in the last step.
+double Watcher::turn(Phase& phase, const Function& f, double& when) {
   const double a = phase.step_begin(), b = phase.step_end();
   const auto slope = [&](double time) {
     phase.at(time, y_);
@@ -183,7 +189,8 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
     phase.at(time, y_);
     return value(f, phase.start() + time, y_);
   };
-  if (fb >= 0) fb = dip(phase, f, b);
+  if (fb >= 0) fb = turn(phase, f, b);
+  if (fa <= 0 && f.what == Watch::gap && f.slope_before > 0 && f.slope < 0) fa = turn(phase, f, a);
   Zero zero{f.what, f.contact, a, {}};
   const double resolution = 4e-16 * b;
   if (fa > 0) zero.time = zero_between(at, a, fa, b, fb, resolution);
@@ -230,7 +237,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     if (f.what == Watch::gap && !f.armed) hit = hit && f.slope < 0;  // else it is on its way out
     if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
       double when = 0;
-      hit = dip(phase, f, when) < -bands().gap(f.contact);  // else it only touches
+      hit = turn(phase, f, when) < -bands().gap(f.contact);  // else it only touches
     }
     if (!hit) continue;
     Zero zero = locate(phase, f);

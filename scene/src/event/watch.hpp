@@ -7,7 +7,8 @@
 //            nothing there; what counts is whether Coulomb's law has any that leave them at rest
 //
 // A function counts once it is armed: at the start of a phase those that begin at zero are not,
-// until they exceed a band; they count, too, where they fall below minus the band.
+// until they exceed a band; they count, too, where they fall below minus the band. A gap that is
+// negative within its band at the start counts from there: other contacts pressed it in.
 #pragma once
 
 #include <optional>
@@ -46,6 +47,7 @@ class Watcher {
     bool dormant;  // a gap that is negative beside its feature: no contact
     double value, before;
     double slope, slope_before;  // of a gap, m/s
+    double level;                // from which a gap counts, m
   };
   void evaluate(double t, const VectorXd& y);
   double value(Function f, double t, const VectorXd& y);
@@ -55,7 +57,7 @@ class Watcher {
   double lag(Phase& phase, const Function& f, double time);
   Zero locate(Phase& phase, const Function& f);
   bool may_dip(const Function& f, double step) const;
-  double dip(Phase& phase, const Function& f, double& when);
+  double turn(Phase& phase, const Function& f, double& when);
 
   const Bands& bands() const { return motion_.bands(); }
 
