@@ -26,6 +26,8 @@ endforeach()
 
 if(TARGET tether_preload)
   install(TARGETS tether_preload LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ida_projection)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/ida_projection/octave
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/tether COMPONENT ida_projection PATTERN check.sh EXCLUDE)
 endif()
 
 # What the config has to find and include.

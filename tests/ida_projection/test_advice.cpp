@@ -138,6 +138,18 @@ TEST_CASE("a start off the constraints is explained once on stderr") {
   CHECK(run(problem, 1e-8, problem.recommended_constraints(), 2000, silent, 0.3).printed.empty());
 }
 
+TEST_CASE("a healthy run says nothing while IDA looks for its first step") {
+  // Octave's ode15s begins with y' = 0 unless told otherwise, so that IDA tries long steps.
+  for (const double t_end : {2.0, 20.0, 74.0, 500.0}) {
+    Problem problem = pendulum(1.0, 1.0, t_end, "index 0");
+    problem.yp0.assign(problem.yp0.size(), 0.0);
+    const Ended end = run(problem, 1e-6, problem.recommended_constraints(), 2000);
+    INFO("to " << t_end << ": " << end.message << " | " << end.printed);
+    CHECK(end.flag >= 0);
+    CHECK(end.printed.empty());
+  }
+}
+
 TEST_CASE("rows with a kink on the set, |g| and max, are suspected by name") {
   struct Kink {
     std::string name;

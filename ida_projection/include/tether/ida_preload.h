@@ -31,6 +31,19 @@ extern "C" {
 int tether_preload(void* ida_mem, N_Vector y, tether_constraints* constraints,
                    tether_options* options);
 
+/* The rest is in libtether_preload, for tether_preload to call, and for modules of a host that has
+ * loaded the library by itself (dlopen with RTLD_LAZY | RTLD_GLOBAL, before what links SUNDIALS).
+ */
+
+/* What IDASolve and IDAGetDky return for this IDA is projected, too: interpolated points are off
+ * the constraints by a part of the tolerance. IDA's own steps are as without. */
+int tether_preload_project_output(void* ida_mem);
+
+typedef int (*tether_preload_fn)(void* ida_mem, N_Vector y, tether_constraints* constraints,
+                                 tether_options* options);
+/* Asked in place of the object that TETHER_CONSTRAINTS names; null: that one again. */
+void tether_preload_ask(tether_preload_fn ask);
+
 #if defined(__GNUC__)
 #pragma GCC visibility pop
 #endif

@@ -26,7 +26,7 @@ void destroy(_generic_N_Vector* v) { N_VDestroy(v); }
 struct Host {
   Owned<_generic_N_Vector, destroy> start;  // IDAInit's y, until the rows are attached
   SUNNonlinearSolver nonlinear_solver = nullptr;
-  bool asked = false, refused = false;
+  bool asked = false, refused = false, project_output = false;
   Owned<tether_projection, tether_projection_free> projection;
 };
 
@@ -35,7 +35,19 @@ std::map<void*, Host>& hosts() {
   static auto* all = new std::map<void*, Host>();  // outlives every exit handler of the program
   return *all;
 }
-thread_local bool attaching = false;  // the plugin itself calls IDA
+
+// The plugin's own calls for this IDA go straight through; a host's F may run another IDA
+// meanwhile.
+thread_local void* ours = nullptr;
+struct Ours {
+  explicit Ours(void* ida_mem) : before(ours) { ours = ida_mem; }
+  ~Ours() { ours = before; }
+  Ours(const Ours&) = delete;
+  Ours& operator=(const Ours&) = delete;
+  void* before;
+};
+
+tether_preload_fn registered = nullptr;
 
 int complain(const char* what, const char* why) {
   std::fprintf(stderr, "libtether_preload: %s: %s\n", what, why);
@@ -43,9 +55,10 @@ int complain(const char* what, const char* why) {
 }
 
 /// The user's function; null without TETHER_CONSTRAINTS, or where it cannot be used (said once).
-decltype(&tether_preload) constraints_of_the_user(bool& failed) {
+tether_preload_fn constraints_of_the_user(bool& failed) {
+  if (registered) return registered;
   static bool wrong = false;
-  static const auto function = []() -> decltype(&tether_preload) {
+  static const auto function = []() -> tether_preload_fn {
     const char* path = secure_getenv("TETHER_CONSTRAINTS");
     if (!path || !*path) {
       complain("TETHER_CONSTRAINTS", "not set, IDA runs as it is");
@@ -58,7 +71,7 @@ decltype(&tether_preload) constraints_of_the_user(bool& failed) {
       complain(path, why ? why : "tether_preload is null");
       wrong = true;
     }
-    return reinterpret_cast<decltype(&tether_preload)>(symbol);
+    return reinterpret_cast<tether_preload_fn>(symbol);
   }();
   failed = wrong;
   return function;
@@ -86,20 +99,18 @@ int attach(void* ida_mem, Host& host) {
 
 /// Once for each IDA object; a refusal stays one.
 int prepare(void* ida_mem) noexcept {
-  if (attaching || !ida_mem) return IDA_SUCCESS;
+  if (!ida_mem || ida_mem == ours) return IDA_SUCCESS;
   try {
     const std::lock_guard<std::recursive_mutex> lock(mutex);
     Host& host = hosts()[ida_mem];
     if (!host.asked) {
       host.asked = true;
-      attaching = true;
+      const Ours guard(ida_mem);
       host.refused = attach(ida_mem, host) != IDA_SUCCESS;
-      attaching = false;
       host.start.reset();
     }
     return host.refused ? IDA_ILL_INPUT : IDA_SUCCESS;
   } catch (...) {
-    attaching = false;
     return complain("the constraints are not attached", "out of memory");
   }
 }
@@ -115,10 +126,31 @@ void remember_start(void* ida_mem, N_Vector yy0) noexcept {
   }
 }
 
+tether_projection* projection_of_output(void* ida_mem) noexcept {
+  if (ida_mem == ours) return nullptr;
+  const std::lock_guard<std::recursive_mutex> lock(mutex);
+  const auto host = hosts().find(ida_mem);
+  return host != hosts().end() && host->second.project_output ? host->second.projection.get()
+                                                              : nullptr;
+}
+
 }  // namespace
 
 extern "C" {
 #pragma GCC visibility push(default)
+
+int tether_preload_project_output(void* ida_mem) {
+  const std::lock_guard<std::recursive_mutex> lock(mutex);
+  const auto host = hosts().find(ida_mem);
+  if (host == hosts().end()) return TETHER_MEM_NULL;
+  host->second.project_output = true;
+  return 0;
+}
+
+void tether_preload_ask(tether_preload_fn ask) {
+  const std::lock_guard<std::recursive_mutex> lock(mutex);
+  registered = ask;
+}
 
 int IDAInit(void* ida_mem, IDAResFn res, sunrealtype t0, N_Vector yy0, N_Vector yp0) {
   const auto next = sundials_function<decltype(IDAInit)>("IDAInit");
@@ -132,7 +164,7 @@ int IDASetNonlinearSolver(void* ida_mem, SUNNonlinearSolver solver) {
   const auto next = sundials_function<decltype(IDASetNonlinearSolver)>("IDASetNonlinearSolver");
   if (!next) return complain("IDASetNonlinearSolver", "no SUNDIALS is loaded");
   const int flag = next(ida_mem, solver);
-  if (flag == IDA_SUCCESS && !attaching) {
+  if (flag == IDA_SUCCESS && ida_mem != ours) {
     const std::lock_guard<std::recursive_mutex> lock(mutex);
     const auto host = hosts().find(ida_mem);
     if (host != hosts().end()) host->second.nonlinear_solver = solver;
@@ -152,7 +184,23 @@ int IDASolve(void* ida_mem, sunrealtype tout, sunrealtype* tret, N_Vector yret, 
   const auto next = sundials_function<decltype(IDASolve)>("IDASolve");
   if (!next) return complain("IDASolve", "no SUNDIALS is loaded");
   const int flag = prepare(ida_mem);
-  return flag == IDA_SUCCESS ? next(ida_mem, tout, tret, yret, ypret, itask) : flag;
+  if (flag != IDA_SUCCESS) return flag;
+  tether_projection* projection = projection_of_output(ida_mem);
+  if (!projection) return next(ida_mem, tout, tret, yret, ypret, itask);
+  const Ours guard(ida_mem);
+  return tether_solve(projection, tout, tret, yret, ypret, itask);
+}
+
+int IDAGetDky(void* ida_mem, sunrealtype t, int k, N_Vector dky) {
+  const auto next = sundials_function<decltype(IDAGetDky)>("IDAGetDky");
+  if (!next) return complain("IDAGetDky", "no SUNDIALS is loaded");
+  const int flag = next(ida_mem, t, k, dky);
+  if (flag != IDA_SUCCESS || k != 0) return flag;
+  tether_projection* projection = projection_of_output(ida_mem);
+  if (!projection) return flag;
+  const Ours guard(ida_mem);
+  if (tether_project(projection, t, dky, nullptr, nullptr) == 0) return flag;
+  return complain("the output is not on the constraints", tether_last_error());
 }
 
 void IDAFree(void** ida_mem) {

@@ -8,7 +8,9 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kSayAfter = 4;  // failures in one step; IDA gives up after ten
+// Failures in one step, of which IDA gives up after ten. It finds its first step by trying: a
+// thousandth of the interval at first, then a quarter of that each time.
+constexpr int kSayAfter = 4, kSayAfterAtFirst = 8;
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
 
@@ -74,7 +76,7 @@ void Report::print_fatal(const char* text) noexcept {
 void Report::count_failure_in_step(const std::string& text, long steps) {
   failures_in_step_ = steps == failing_step_ ? failures_in_step_ + 1 : 1;
   failing_step_ = steps;
-  if (failures_in_step_ < kSayAfter || said_failures_) return;
+  if (failures_in_step_ < (steps == 0 ? kSayAfterAtFirst : kSayAfter) || said_failures_) return;
   said_failures_ = true;
   std::ostringstream out;
   out << "step " << steps + 1 << " was tried " << failures_in_step_
