@@ -3,11 +3,18 @@
 //
 // Gaps and joints, their rates, the slips of stuck contacts, the rows of the model itself, and
 // energy less work.
+#include <Eigen/QR>
 #include <cmath>
 
 #include "motion.hpp"
 
 namespace tether::scene::event {
+
+namespace {
+
+constexpr double kRank = 1e-10;  // of rows of unit length
+
+}  // namespace
 
 int Motion::constraint_count() const {
   return static_cast<int>(positions_in_use_.size() + rates_in_use_.size()) + model_.own_rows() +
@@ -30,11 +37,26 @@ void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
   }
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k];
-    positions[row] = looks_[k].gap;
+    positions[row] = looks_[k].gap - levels_[index(closed_[k])];
     rates[row] += looks_[k].normal_rate;
     if (modes_[index(closed_[k])].mode == Mode::stick)
       rates.segment(row + 1, tangents_) += looks_[k].slip_rate;
   }
+}
+
+void Motion::settle_velocities(double t, VectorXd& y) {
+  if (rows_ == 0) return;
+  set(t, y.data());
+  VectorXd positions, rates;
+  values_of_rows(positions, rates);
+  MatrixXd columns = R_.transpose() * row_scale_.asDiagonal();
+  const MatrixXd rows = columns.transpose();
+  model_.divide_by_mass(columns);
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
+  factor.setThreshold(kRank);
+  factor.compute(rows * columns);
+  y.segment(nq_, nu_) -= columns * factor.solve(row_scale_.cwiseProduct(rates));
+  set(t, y.data());
 }
 
 void Motion::constraints(double t, const double* y, double* g) {

@@ -56,6 +56,7 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   // Figures of a scene are rounded: its energy is that of the start which joints allow.
   const std::vector<ContactMode> modes = decide(touching(-1), -1, {});
   motion_.choose(t, y_, modes);
+  motion_.set_levels(std::vector<double>(at(model_.contacts()), 0.0));
   motion_.leave_energy_free();
   if (!move_onto_constraints(motion_, local_, t, y_))
     throw std::invalid_argument("the start of the scene contradicts its joints or contacts");
@@ -102,10 +103,20 @@ std::vector<int> Driver::touching(int always) const {
 }
 
 void Driver::begin_phase() {
+  settle_velocities();
   motion_.keep_energy_of(event_time_, y_);
   if (!move_onto_constraints(motion_, local_, event_time_, y_))
     fail("the state cannot be moved onto joints and closed contacts");
   start_phase();
+}
+
+// What is left of the velocities of contacts that close: less than their bands.
+void Driver::settle_velocities() {
+  const double energy = model_.energy();
+  motion_.settle_velocities(event_time_, y_);
+  const double lost = energy - model_.energy();
+  lost_ += lost;
+  if (!events_.empty() && events_.back().time == event_time_) events_.back().lost += lost;
 }
 
 // Everything from (event_time_, y_), the modes and the energy that is kept: whoever has these goes
@@ -191,8 +202,9 @@ void Driver::anchor() {
 }
 
 Driver::Memory Driver::memory() const {
-  return {event_time_, motion_.kept_energy(), lost_,          first_energy_,  y_, modes_,
-          bounces_,    at_one_time_,          counts_.events, counts_.impacts};
+  return {event_time_,    motion_.kept_energy(), lost_,    first_energy_, y_,
+          modes_,         motion_.levels(),      bounces_, at_one_time_,  counts_.events,
+          counts_.impacts};
 }
 
 Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
@@ -214,6 +226,7 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
   model_.settle();
   motion_.keep_energy(memory.kept_energy);
   motion_.choose(time_, y_, memory.modes);
+  motion_.set_levels(memory.levels);
   start_phase();
 }
 

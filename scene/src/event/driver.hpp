@@ -71,6 +71,7 @@ class Driver {
   const Bands& bands() const { return motion_.bands(); }
   void check_start() const;
   void begin_phase();
+  void settle_velocities();
   void start_phase();
   void handle(const Zero& zero);
   void anchor();
@@ -127,6 +128,7 @@ struct Driver::Memory {
   double time = 0, kept_energy = 0, lost = 0, first_energy = 0;
   VectorXd y;
   std::vector<ContactMode> modes;
+  std::vector<double> levels;  ///< gaps of closed contacts
   std::vector<Bounces> bounces;
   long at_one_time = 0, events = 0, impacts = 0;
 };

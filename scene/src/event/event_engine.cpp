@@ -17,7 +17,7 @@ namespace {
 using namespace event;
 using mechanics::at;
 
-constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '1'};
+constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '2'};
 
 DriverOptions driver_options(const Scene& scene) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -173,6 +173,7 @@ void EventEngine::save(std::ostream& out) const {
     binary::put(out, static_cast<std::int32_t>(m.modes[i].mode),
                 static_cast<std::int32_t>(m.modes[i].direction.size()));
     for (const double x : m.modes[i].direction) binary::put(out, x);
+    binary::put(out, m.levels[i]);
     const Bounces& b = m.bounces[i];
     for (int k = 0; k < 3; ++k) binary::put(out, b.time[k], b.speed[k]);
     binary::put(out, static_cast<std::int32_t>(b.count));
@@ -210,6 +211,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
     each.mode = static_cast<Mode>(mode);
     each.direction.resize(directions);
     for (double& x : each.direction) binary::get(in, x);
+    binary::get(in, m.levels.emplace_back());
     Bounces& b = m.bounces.emplace_back();
     for (int k = 0; k < 3; ++k) binary::get(in, b.time[k], b.speed[k]);
     binary::get(in, count);

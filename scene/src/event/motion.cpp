@@ -51,7 +51,8 @@ Motion::Motion(Model& model, double tolerance, double t, const VectorXd& y)
       nq_(model.coordinates()),
       nu_(model.velocities()),
       tangents_(model.tangents()),
-      modes_(index(model.contacts())) {
+      modes_(index(model.contacts())),
+      levels_(index(model.contacts()), 0.0) {
   u_.setZero(nu_);
   a_.setZero(nu_);
   set(t, y.data());
@@ -78,13 +79,17 @@ VectorXd Motion::held_slip(int closed) const {
 }
 
 void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes) {
-  modes_ = std::move(modes);
   closed_.clear();
-  for (int i = 0; i < model_.contacts(); ++i)
-    if (modes_[index(i)].mode != Mode::open) closed_.push_back(i);
+  set(t, y.data());
+  for (int i = 0; i < model_.contacts(); ++i) {
+    if (modes[index(i)].mode == Mode::open) continue;
+    closed_.push_back(i);
+    double rate = 0;
+    if (modes_[index(i)].mode == Mode::open) levels_[index(i)] = model_.gap(i, rate);
+  }
+  modes_ = std::move(modes);
   looks_.resize(closed_.size());
   row_of_.resize(closed_.size());
-  set(t, y.data());
   choose_joints();
   rows_ = joints_;
   for (std::size_t k = 0; k < closed_.size(); ++k) {

@@ -42,7 +42,12 @@ class Motion {
   int work() const { return nq_ + nu_; }  ///< index of the unknown E_w
 
   /// The modes from now on, at the state y: rows that others imply are left out of constraints().
+  /// A contact that closes keeps the gap that it has: moving bodies would give or take energy.
   void choose(double t, const VectorXd& y, std::vector<ContactMode> modes);
+  const std::vector<double>& levels() const { return levels_; }  ///< gaps of closed contacts
+  void set_levels(std::vector<double> levels) { levels_ = std::move(levels); }
+  /// Takes what closed contacts and joints do not allow from the velocities, as impulses would.
+  void settle_velocities(double t, VectorXd& y);
   const std::vector<ContactMode>& modes() const { return modes_; }
   const std::vector<int>& closed() const { return closed_; }
   /// Some closed contacts share their forces in more than one way.
@@ -91,6 +96,7 @@ class Motion {
   Bands bands_;
   int nq_, nu_, tangents_;
   std::vector<ContactMode> modes_;  // of all contacts
+  std::vector<double> levels_;
   std::vector<int> closed_, row_of_;
   std::vector<ContactLook> looks_;  // of the closed ones
   int rows_ = 0, joints_ = 0;

@@ -234,7 +234,9 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     const double edge = band(f);
     if (f.dormant) continue;
     bool hit = f.value < (f.armed ? 0 : -edge);
-    if (f.what == Watch::gap && !f.armed) hit = hit && f.slope < 0;  // else it is on its way out
+    // Else it is on its way out; its first gaps are lost in rounding.
+    const bool from_zero = !f.armed || (f.leaving && f.value > -bands().gap(f.contact));
+    if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
     if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
       double when = 0;
       hit = turn(phase, f, when) < -bands().gap(f.contact);  // else it only touches
