@@ -1,0 +1,197 @@
+// Tether: contact problems for Python. SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <map>
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+#include <tether/contact.hpp>
+#include <tether/contact/files.hpp>
+
+#include "bind.hpp"
+
+namespace tether::python {
+
+namespace {
+
+namespace tc = tether::contact;
+
+constexpr std::array kMethods = {
+    tc::Method::automatic,       tc::Method::gauss_seidel,   tc::Method::sor,
+    tc::Method::jacobi,          tc::Method::anderson,       tc::Method::admm,
+    tc::Method::proximal_newton, tc::Method::interior_point, tc::Method::convex_relaxation};
+
+using View = Eigen::Map<const Eigen::VectorXd>;
+
+View vector(const char* argument, const Array& a) {
+  if (a.ndim() != 1)
+    refuse(std::string(argument) + " has shape " + shape(a) + ", must be a vector");
+  return {a.data(), a.size()};
+}
+
+int dimension(const Array& b, const Array& mu) {
+  for (const int d : {2, 3})
+    if (mu.size() > 0 && b.size() == d * mu.size()) return d;
+  refuse("b has " + std::to_string(b.size()) + " entries and mu " + std::to_string(mu.size()) +
+         ": must be two (plane) or three (space) for each contact");
+}
+
+/// The entries of a scipy.sparse matrix, in 2 x 2 or 3 x 3 blocks.
+tc::Problem sparse(const py::object& A, const Array& b, const Array& mu) {
+  const int d = dimension(b, mu);
+  const py::object entries = A.attr("tocoo")();
+  const auto size = entries.attr("shape").cast<std::array<py::ssize_t, 2>>();
+  if (size[0] != b.size() || size[1] != b.size())
+    refuse("A is " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + ", must be " +
+           std::to_string(b.size()) + " x " + std::to_string(b.size()) + " as b is long");
+  const auto rows = entries.attr("row").cast<py::array_t<long, py::array::forcecast>>();
+  const auto columns = entries.attr("col").cast<py::array_t<long, py::array::forcecast>>();
+  const auto values = entries.attr("data").cast<Array>();
+  std::map<std::pair<int, int>, tc::MatrixBlock> blocks;
+  for (py::ssize_t k = 0; k < values.size(); ++k) {
+    const long i = rows.at(k), j = columns.at(k);
+    const int row = static_cast<int>(i / d), column = static_cast<int>(j / d);
+    tc::MatrixBlock& block = blocks[{row, column}];
+    block.row = row;
+    block.column = column;
+    block.value(i % d, j % d) += values.at(k);
+  }
+  std::vector<tc::MatrixBlock> list;
+  list.reserve(blocks.size());
+  for (const auto& [place, block] : blocks) list.push_back(block);
+  return tc::Problem::sparse(d, std::move(list), vector("b", b), vector("mu", mu));
+}
+
+tc::Problem make_problem(const py::object& A, const Array& b, const Array& mu) {
+  vector("b", b), vector("mu", mu);
+  if (py::hasattr(A, "tocoo")) return sparse(A, b, mu);
+  const auto dense = py::array_t<double, py::array::f_style | py::array::forcecast>::ensure(A);
+  if (!dense) throw py::error_already_set();
+  if (dense.ndim() != 2)
+    refuse("A has " + std::to_string(dense.ndim()) + " axes, must be a matrix");
+  return tc::Problem::dense(
+      Eigen::Map<const Eigen::MatrixXd>(dense.data(), dense.shape(0), dense.shape(1)),
+      vector("b", b), vector("mu", mu));
+}
+
+py::dict residuals(const tc::Problem& problem, const std::string& law, const Array& impulses) {
+  const View x = vector("impulses", impulses);
+  if (x.size() != problem.b().size())
+    refuse("impulses has " + std::to_string(x.size()) + " entries, must have " +
+           std::to_string(problem.b().size()));
+  const tc::Residuals r = tc::evaluate(problem, named<tc::Law>("law", law, tc::laws()), x);
+  using namespace py::literals;
+  return py::dict("signorini"_a = r.signorini, "cone"_a = r.cone, "alignment"_a = r.alignment,
+                  "dissipation"_a = r.dissipation, "energy_change"_a = r.energy_change,
+                  "fixed_point"_a = r.fixed_point, "natural_map"_a = r.natural_map);
+}
+
+tc::Solution solve(const tc::Problem& problem, const std::string& law, double tolerance,
+                   const std::string& method, const py::object& start, double max_work,
+                   bool strict) {
+  tc::Options options;
+  options.law = named<tc::Law>("law", law, tc::laws());
+  options.method = named<tc::Method>("method", method, kMethods);
+  options.tolerance = tolerance;
+  options.max_work = max_work;
+  options.strict = strict;
+  tc::Solver solver(options);
+  if (start.is_none()) {
+    const py::gil_scoped_release others_run;
+    return solver.solve(problem);
+  }
+  const auto given = start.cast<Array>();
+  const View x = vector("start", given);
+  if (x.size() != problem.b().size())
+    refuse("start has " + std::to_string(x.size()) + " entries, must have " +
+           std::to_string(problem.b().size()));
+  const py::gil_scoped_release others_run;
+  return solver.solve(problem, x);
+}
+
+std::vector<std::string> regimes(const tc::Solution& s) {
+  std::vector<std::string> words;
+  words.reserve(s.regimes.size());
+  for (const tc::Regime regime : s.regimes) words.emplace_back(name(regime));
+  return words;
+}
+
+}  // namespace
+
+void bind_contact(py::module_& module) {
+  using namespace py::literals;
+  module.doc() =
+      "Frictional contact: w = A x - b, impulses x in the friction cones, A = J M^-1 J'.";
+
+  py::class_<tc::Problem>(module, "Problem", R"(A contact problem (A, b, mu).
+
+A: (d n, d n) array or scipy.sparse matrix in 1/kg, b: (d n,) in m/s, mu: (n,), with d = 3
+(normal, tangent, tangent) or d = 2 in the plane. Relative velocities after the impulses x are
+w = A x - b. Raises ValueError on sizes that do not match and values that are not finite.)")
+      .def(py::init(&make_problem), "A"_a, "b"_a, "mu"_a)
+      .def_property_readonly("contacts", &tc::Problem::contacts)
+      .def_property_readonly("dimension", &tc::Problem::dimension)
+      .def_property_readonly("A",
+                             [](const tc::Problem& p) { return Eigen::MatrixXd(p.dense_matrix()); })
+      .def_property_readonly("b", [](const tc::Problem& p) { return Eigen::VectorXd(p.b()); })
+      .def_property_readonly("mu",
+                             [](const tc::Problem& p) {
+                               Eigen::VectorXd mu(p.contacts());
+                               for (int i = 0; i < p.contacts(); ++i) mu[i] = p.mu(i);
+                               return mu;
+                             })
+      .def(
+          "residuals",
+          [](const tc::Problem& p, const Array& impulses, const std::string& law) {
+            return residuals(p, law, impulses);
+          },
+          "impulses"_a, "law"_a = "maximum_dissipation",
+          "How far any impulses are from a solution: velocities in m/s; fixed_point has no unit.")
+      .def("solve", &solve, "law"_a = "maximum_dissipation", py::kw_only(), "tolerance"_a = 1e-9,
+           "method"_a = "automatic", "start"_a = py::none(), "max_work"_a = 1e10,
+           "strict"_a = false,
+           R"(The impulses that obey the law: a Solution.
+
+law: maximum_dissipation (Preclik and Ruede), coulomb or frictionless. tolerance: of the relative
+error in velocity. start: impulses to begin with. max_work: about nanoseconds. strict: never
+replace the law at single contacts. What cannot be solved is a status, with advice.)");
+
+  py::class_<tc::Solution>(module, "Solution", "An answer and how good it is.")
+      .def_property_readonly("solved",
+                             [](const tc::Solution& s) { return s.status == tc::Status::solved; })
+      .def_property_readonly("status",
+                             [](const tc::Solution& s) { return std::string(name(s.status)); })
+      .def_property_readonly("impulses",
+                             [](const tc::Solution& s) { return Eigen::VectorXd(s.impulses); })
+      .def_property_readonly("velocities",
+                             [](const tc::Solution& s) { return Eigen::VectorXd(s.velocities); })
+      .def_property_readonly("regimes", &regimes, "separating, sticking or sliding")
+      .def_readonly("error", &tc::Solution::error)
+      .def_readonly("advice", &tc::Solution::advice)
+      .def_readonly("replaced", &tc::Solution::replaced)
+      .def_property_readonly("infeasible_direction",
+                             [](const tc::Solution& s) {
+                               return array(
+                                   s.infeasible_direction.data(),
+                                   static_cast<py::ssize_t>(s.infeasible_direction.size()));
+                             })
+      .def_property_readonly("work", [](const tc::Solution& s) { return s.counts.work; })
+      .def_property_readonly("sweeps", [](const tc::Solution& s) { return s.counts.sweeps; })
+      .def_property_readonly("factorisations",
+                             [](const tc::Solution& s) { return s.counts.factorisations; })
+      .def("__repr__", [](const tc::Solution& s) {
+        return "<Solution: " + std::string(name(s.status)) + ", error " + std::to_string(s.error) +
+               ">";
+      });
+
+  module.def("read", &tc::read_problem, "path"_a,
+             "A problem from a Siconos .dat or fclib .hdf5 file.");
+  module.def(
+      "laws",
+      [] {
+        std::vector<std::string> words;
+        for (const tc::Law law : tc::laws()) words.emplace_back(name(law));
+        return words;
+      },
+      "Names of the friction laws.");
+}
+
+}  // namespace tether::python
