@@ -141,8 +141,28 @@ struct Andrews {
     f[6] = om * v[5] * (v[5] + 2.0 * v[6]);
   }
 
-  void position(double, const double* q, double* r) const {
+  void position(double, const double* q, double* r) const { position_of(Arms(q), r); }
+  void gradient(double, const double* q, double* G) const { gradient_of(Arms(q), G); }
+  void velocity(double, const double* q, const double* v, double* r) const {
+    velocity_of(Arms(q), v, r);
+  }
+  void velocity_gradient(double, const double* q, const double* v, double* H) const {
+    velocity_gradient_of(Arms(q), v, H);
+  }
+  void position_with_gradient(double, const double* q, double* r, double* G) const {
     const Arms P(q);
+    position_of(P, r);
+    gradient_of(P, G);
+  }
+  void velocity_with_gradients(double, const double* q, const double* v, double* r, double* G,
+                               double* H) const {
+    const Arms P(q);
+    velocity_of(P, v, r);
+    gradient_of(P, G);
+    velocity_gradient_of(P, v, H);
+  }
+
+  static void position_of(const Arms& P, double* r) {
     pair_sums(P.x, P.y, r);
     r[0] -= xb;
     r[1] -= yb;
@@ -152,8 +172,7 @@ struct Andrews {
     r[5] -= ya;
   }
 
-  void gradient(double, const double* q, double* G) const {
-    const Arms P(q);
+  static void gradient_of(const Arms& P, double* G) {
     double x[7], y[7];
     for (int k = 0; k < 7; ++k) {
       x[k] = -P.y[k];
@@ -162,8 +181,7 @@ struct Andrews {
     pair_gradients(x, y, G);
   }
 
-  void velocity(double, const double* q, const double* v, double* r) const {
-    const Arms P(q);
+  static void velocity_of(const Arms& P, const double* v, double* r) {
     double rate[7], x[7], y[7];
     Arms::angles(v, rate);
     for (int k = 0; k < 7; ++k) {
@@ -173,8 +191,7 @@ struct Andrews {
     pair_sums(x, y, r);
   }
 
-  void velocity_gradient(double, const double* q, const double* v, double* H) const {
-    const Arms P(q);
+  static void velocity_gradient_of(const Arms& P, const double* v, double* H) {
     double rate[7], x[7], y[7];
     Arms::angles(v, rate);
     for (int k = 0; k < 7; ++k) {

@@ -41,28 +41,45 @@ struct CarAxis {
     f[3] -= kMass * kGravity;
   }
 
-  void position(double t, const double* q, double* r) const {
+  void position(double t, const double* q, double* r) const { position_of(Road(t), q, r); }
+  void gradient(double t, const double* q, double* G) const { gradient_of(Road(t), q, G); }
+  void velocity(double t, const double* q, const double* v, double* r) const {
+    velocity_of(Road(t), q, v, r);
+  }
+  void velocity_gradient(double t, const double*, const double* v, double* H) const {
+    velocity_gradient_of(Road(t), v, H);
+  }
+  void position_with_gradient(double t, const double* q, double* r, double* G) const {
     const Road b(t);
+    position_of(b, q, r);
+    gradient_of(b, q, G);
+  }
+  void velocity_with_gradients(double t, const double* q, const double* v, double* r, double* G,
+                               double* H) const {
+    const Road b(t);
+    velocity_of(b, q, v, r);
+    gradient_of(b, q, G);
+    velocity_gradient_of(b, v, H);
+  }
+
+  static void position_of(const Road& b, const double* q, double* r) {
     const double dx = q[0] - q[2], dy = q[1] - q[3];
     r[0] = b.x * q[0] + b.y * q[1];
     r[1] = dx * dx + dy * dy - kLength * kLength;
   }
 
-  void gradient(double t, const double* q, double* G) const {
-    const Road b(t);
+  static void gradient_of(const Road& b, const double* q, double* G) {
     G[0] = b.x;
     G[1] = b.y;
     axle(q, G + 4);
   }
 
-  void velocity(double t, const double* q, const double* v, double* r) const {
-    const Road b(t);
+  static void velocity_of(const Road& b, const double* q, const double* v, double* r) {
     r[0] = b.x * v[0] + b.y * v[1] + b.dx * q[0] + b.dy * q[1];
     r[1] = 2.0 * ((q[0] - q[2]) * (v[0] - v[2]) + (q[1] - q[3]) * (v[1] - v[3]));
   }
 
-  void velocity_gradient(double t, const double*, const double* v, double* H) const {
-    const Road b(t);
+  static void velocity_gradient_of(const Road& b, const double* v, double* H) {
     H[0] = b.dx;
     H[1] = b.dy;
     axle(v, H + 4);

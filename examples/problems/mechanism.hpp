@@ -8,9 +8,17 @@
 #include <problems/problem.hpp>
 #include <problems/rows.hpp>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace tether::problems {
+
+/// Does a system give values and gradients together?
+template <class System, class = void>
+struct SharesWork : std::false_type {};
+template <class System>
+struct SharesWork<System, std::void_t<decltype(&System::velocity_with_gradients)>>
+    : std::true_type {};
 
 /// Writes one mechanism in several forms. `System` is a small value (constants only) with
 ///
@@ -28,6 +36,11 @@ namespace tether::problems {
 ///   v,
 ///                                       n x n row-major, zero on entry
 ///
+/// and, where they share work, with the same bits
+///
+///   void position_with_gradient(t, q, r, G)
+///   void velocity_with_gradients(t, q, v, r, G, H)
+///
 /// and the forms are
 ///
 ///   "index 1"    (q, v, lam):    q' = v, M v' = f - s G^T lam, 0 = g'' with v' for a
@@ -44,6 +57,7 @@ namespace tether::problems {
 template <class System>
 class Mechanism {
  public:
+  static constexpr bool shares_work = SharesWork<System>::value;
   static constexpr int n = System::n, m = System::m;
   using MatrixN = Eigen::Matrix<double, n, n, Eigen::RowMajor>;
   using MatrixG = Eigen::Matrix<double, m, n, Eigen::RowMajor>;
@@ -347,6 +361,16 @@ class Mechanism {
           MatrixG G = MatrixG::Zero();
           system.gradient(t, y, G.data());
           Map(C, Eigen::OuterStride<>(N)) = G;
+        },
+        [system, N](double t, const double* y, double* r, double* C) {
+          MatrixG G = MatrixG::Zero();
+          if constexpr (shares_work) {
+            system.position_with_gradient(t, y, r, G.data());
+          } else {
+            system.position(t, y, r);
+            system.gradient(t, y, G.data());
+          }
+          Map(C, Eigen::OuterStride<>(N)) = G;
         }));
     p.rows.push_back(make_rows(
         "velocity", labels(row_names, " rate"),
@@ -355,6 +379,18 @@ class Mechanism {
           MatrixG G = MatrixG::Zero(), H = MatrixG::Zero();
           system.gradient(t, y, G.data());
           system.velocity_gradient(t, y, y + n, H.data());
+          Map(C, Eigen::OuterStride<>(N)) = H;
+          Map(C + n, Eigen::OuterStride<>(N)) = G;
+        },
+        [system, N](double t, const double* y, double* r, double* C) {
+          MatrixG G = MatrixG::Zero(), H = MatrixG::Zero();
+          if constexpr (shares_work) {
+            system.velocity_with_gradients(t, y, y + n, r, G.data(), H.data());
+          } else {
+            system.velocity(t, y, y + n, r);
+            system.gradient(t, y, G.data());
+            system.velocity_gradient(t, y, y + n, H.data());
+          }
           Map(C, Eigen::OuterStride<>(N)) = H;
           Map(C + n, Eigen::OuterStride<>(N)) = G;
         }));

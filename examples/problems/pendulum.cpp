@@ -224,11 +224,23 @@ Problem pendulum(double L, double g, double t_end, const std::string& form) {
       [](double, const double* y, double* C) {
         C[0] = y[0];
         C[1] = y[1];
+      },
+      [L2](double, const double* y, double* r, double* C) {
+        r[0] = (y[0] * y[0] + y[1] * y[1] - L2) / 2.0;
+        C[0] = y[0];
+        C[1] = y[1];
       }));
   p.rows.push_back(make_rows(
       "velocity", {"length rate"},
       [](double, const double* y, double* r) { r[0] = y[0] * y[2] + y[1] * y[3]; },
       [](double, const double* y, double* C) {
+        C[0] = y[2];
+        C[1] = y[3];
+        C[2] = y[0];
+        C[3] = y[1];
+      },
+      [](double, const double* y, double* r, double* C) {
+        r[0] = y[0] * y[2] + y[1] * y[3];
         C[0] = y[2];
         C[1] = y[3];
         C[2] = y[0];
@@ -271,6 +283,12 @@ Problem pendulum(double L, double g, double t_end, const std::string& form) {
         r[0] = (y[2] * y[2] + y[3] * y[3]) / 2.0 + g * y[1];
       },
       [g](double, const double* y, double* C) {
+        C[1] = g;
+        C[2] = y[2];
+        C[3] = y[3];
+      },
+      [g](double, const double* y, double* r, double* C) {
+        r[0] = (y[2] * y[2] + y[3] * y[3]) / 2.0 + g * y[1];
         C[1] = g;
         C[2] = y[2];
         C[3] = y[3];

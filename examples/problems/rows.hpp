@@ -27,6 +27,18 @@ Rows make_rows(std::string name, std::vector<std::string> row_names, Value value
   return rows;
 }
 
+/// The same; both(t, y, g, C) gives values and gradients together, with the same bits.
+template <class Value, class Gradient, class Both>
+Rows make_rows(std::string name, std::vector<std::string> row_names, Value value, Gradient gradient,
+               Both both) {
+  Rows rows =
+      make_rows(std::move(name), std::move(row_names), std::move(value), std::move(gradient));
+  std::get<ida_projection::DenseJacobian>(rows.constraints.jacobian).fill_with_value =
+      [both](double t, ida_projection::ConstVector y, ida_projection::Vector g,
+             ida_projection::Matrix C) { both(t, y.data(), g.data(), C.data()); };
+  return rows;
+}
+
 /// A problem whose unknowns are all compared: name, form, index, end and consistent start.
 inline Problem start_problem(std::string name, std::string form, int index, double t_end,
                              std::vector<double> y0, std::vector<double> yp0,

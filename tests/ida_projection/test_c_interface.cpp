@@ -107,6 +107,22 @@ TEST_CASE("C interface: every kind of rows gives the bits of the C++ interface")
     return tether_add_rows(set, 1, circle_value, circle_jacobian, nullptr);
   };
   CHECK(same_bits(end_by_c(dense), end_by_cpp(on_circle())));
+  const auto both = [](sunrealtype t, const sunrealtype* y, sunrealtype* g, sunrealtype* C,
+                       void*) {
+    const int flag = circle_value(t, y, g, nullptr);
+    return flag != 0 ? flag : circle_jacobian(t, y, C, nullptr);
+  };
+  CHECK(same_bits(end_by_c([&](tether_constraints* set) {
+                    const int flag = dense(set);
+                    return flag != 0 ? flag : tether_add_value_and_jacobian(set, both, nullptr);
+                  }),
+                  end_by_cpp(on_circle())));
+  CHECK(same_bits(end_by_c([&](tether_constraints* set) {
+                    const int flag = tether_add_sparse_rows(set, 1, starts, columns, circle_value,
+                                                            circle_jacobian, nullptr);
+                    return flag != 0 ? flag : tether_add_value_and_jacobian(set, both, nullptr);
+                  }),
+                  end_by_cpp(as_sparse(on_circle(), 2))));
   CHECK(same_bits(end_by_c([](tether_constraints* set) {
                     return tether_add_rows(set, 1, circle_value, nullptr, nullptr);
                   }),
@@ -263,6 +279,12 @@ TEST_CASE("C interface: wrong arguments are refused by name and change nothing")
   CHECK(last_error_has("starts[2] = 1"));
   CHECK(tether_add_gradients(set.get(), 1, circle_vector_value, nullptr, nullptr) ==
         TETHER_MEM_NULL);
+  CHECK(tether_add_value_and_jacobian(set.get(), nullptr, nullptr) == TETHER_MEM_NULL);
+  const auto both = [](sunrealtype, const sunrealtype*, sunrealtype*, sunrealtype*, void*) {
+    return 0;
+  };
+  CHECK(tether_add_value_and_jacobian(set.get(), both, nullptr) == TETHER_ILL_INPUT);
+  CHECK(last_error_has("must follow tether_add_rows"));
   CHECK(tether_add_linear_invariant(set.get(), one, 0, 1) == TETHER_ILL_INPUT);
   CHECK(tether_add_quaternion_norm(set.get(), -1) == TETHER_ILL_INPUT);
   CHECK(tether_name_row(set.get(), 0, "none") == TETHER_ILL_INPUT);

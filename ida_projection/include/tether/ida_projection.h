@@ -73,6 +73,9 @@ typedef int (*tether_jacobian_fn)(sunrealtype t, const sunrealtype* y, sunrealty
 /* The entries of a sparse C in the order of its pattern; zero on entry. */
 typedef int (*tether_entries_fn)(sunrealtype t, const sunrealtype* y, sunrealtype* entries,
                                  void* user_data);
+/* Both in one call, where they share work: g, and C (or its entries), zero on entry. */
+typedef int (*tether_value_and_jacobian_fn)(sunrealtype t, const sunrealtype* y, sunrealtype* g,
+                                            sunrealtype* C, void* user_data);
 /* For vectors of any type: the same g on every process, and `count` gradients dg_i/dy. */
 typedef int (*tether_vector_value_fn)(sunrealtype t, N_Vector y, sunrealtype* g, void* user_data);
 typedef int (*tether_gradients_fn)(sunrealtype t, N_Vector y, N_Vector* gradients, void* user_data);
@@ -91,6 +94,10 @@ int tether_add_rows(tether_constraints* constraints, int count, tether_value_fn 
 int tether_add_sparse_rows(tether_constraints* constraints, int count, const int* starts,
                            const int* columns, tether_value_fn value, tether_entries_fn entries,
                            void* user_data);
+/* g and C of the rows that the last call of one of these two added, together: used wherever both
+ * are needed at one point, beside the functions for one of them. C null there: refused. */
+int tether_add_value_and_jacobian(tether_constraints* constraints,
+                                  tether_value_and_jacobian_fn both, void* user_data);
 /* Rows on vectors of any type; a set has either these or the others. */
 int tether_add_gradients(tether_constraints* constraints, int count, tether_vector_value_fn value,
                          tether_gradients_fn gradients, void* user_data);

@@ -204,6 +204,29 @@ int tether_add_sparse_rows(tether_constraints* constraints, int count, const int
   });
 }
 
+int tether_add_value_and_jacobian(tether_constraints* constraints,
+                                  tether_value_and_jacobian_fn both, void* user_data) {
+  return guarded([&] {
+    const char* const function = "tether_add_value_and_jacobian";
+    if (constraints == nullptr) return null(function, "constraints");
+    if (both == nullptr) return null(function, "both");
+    ip::Constraints& rows = constraints->rows;
+    ip::Constraints& last = rows.joined.empty() ? rows : rows.joined.back();
+    const auto call = [both, user_data](double t, ip::ConstVector y, ip::Vector g, auto C) {
+      return both(t, y.data(), g.data(), C.data(), user_data);
+    };
+    if (auto* dense = std::get_if<ip::DenseJacobian>(&last.jacobian))
+      dense->fill_with_value = call;
+    else if (auto* sparse = std::get_if<ip::SparseJacobian>(&last.jacobian))
+      sparse->fill_with_value = call;
+    else
+      return ill(std::string(function) +
+                 ": the rows added last have no Jacobian; it must follow tether_add_rows with one, "
+                 "or tether_add_sparse_rows");
+    return 0;
+  });
+}
+
 int tether_add_gradients(tether_constraints* constraints, int count, tether_vector_value_fn value,
                          tether_gradients_fn gradients, void* user_data) {
   return guarded([&] {

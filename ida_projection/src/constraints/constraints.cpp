@@ -72,6 +72,56 @@ Constraints operator+(Constraints a, const Constraints& b) {
   return a;
 }
 
+namespace {
+
+std::string unequal(double together, double alone, const char* function) {
+  std::ostringstream text;
+  text.precision(10);
+  text << "fill_with_value gives " << together << ", " << function << " gives " << alone;
+  return text.str();
+}
+
+// fill_with_value against value and fill, up to the rounding of another order of operations.
+bool check_both(const Constraints& constraints, Evaluator& evaluator, double t, ConstVector y,
+                const Eigen::VectorXd& increments, const std::vector<int>& columns,
+                const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& C,
+                double tolerance, const std::function<void(Status)>& require,
+                JacobianReport& report) {
+  const int m = evaluator.rows(), n = static_cast<int>(y.size());
+  auto together = C;
+  Eigen::VectorXd alone(m), g(m);
+  require(evaluator.value(t, y.data(), n, alone.data()));
+  require(
+      evaluator.jacobian(t, y.data(), n, increments.data(), columns, together.data(), g.data()));
+  const auto differ = [tolerance](double a, double b, double size) {
+    return !(std::abs(a - b) <= tolerance * size);
+  };
+  for (int i = 0; i < m; ++i) {
+    const double terms = C.row(i).cwiseAbs().dot(y.cwiseAbs().cwiseMax(1.0));
+    const std::string row = "row " + std::to_string(i) + " (" + constraints.name(i) + ")";
+    if (differ(g[i], alone[i], std::max(terms, std::abs(alone[i])))) {
+      report.row = i;
+      report.given = g[i];
+      report.expected = alone[i];
+      report.message = row + ", g: " + unequal(g[i], alone[i], "value");
+      return false;
+    }
+    for (int j = 0; j < n; ++j) {
+      if (!differ(together(i, j), C(i, j), C.row(i).cwiseAbs().maxCoeff())) continue;
+      report.row = i;
+      report.column = j;
+      report.given = together(i, j);
+      report.expected = C(i, j);
+      report.message =
+          row + ", column " + std::to_string(j) + ": " + unequal(together(i, j), C(i, j), "fill");
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
 JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,
                               double tolerance) {
   if (!(tolerance > 0.0))
@@ -135,6 +185,9 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
   report.correct = report.worst <= tolerance;
   if (report.correct) {
     report.row = report.column = -1;
+    if (evaluator.gives_both())
+      report.correct = check_both(constraints, evaluator, t, y, increments, columns, given,
+                                  tolerance, require, report);
   } else {
     std::ostringstream text;
     text.precision(10);

@@ -49,6 +49,10 @@ void Evaluator::flatten(const Constraints& set) {
     parts_.push_back({&set, rows_});
     rows_ += set.count;
     if (std::holds_alternative<FiniteDifferences>(set.jacobian)) uses_differences_ = true;
+    if (const auto* given = std::get_if<DenseJacobian>(&set.jacobian))
+      gives_both_ |= static_cast<bool>(given->fill_with_value);
+    if (const auto* given = std::get_if<SparseJacobian>(&set.jacobian))
+      gives_both_ |= static_cast<bool>(given->fill_with_value);
   }
   for (const Constraints& part : set.joined) flatten(part);
 }
@@ -65,13 +69,30 @@ Status Evaluator::checked(int flag, const char* what, const Part& part) {
 Status Evaluator::value(double t, const double* y, int n, double* g) {
   if (fatal_) return Status::callback_fatal;
   ++statistics_.value_evaluations;
-  const ConstVector state(y, n);
   for (const Part& part : parts_) {
-    const int flag = guarded(
-        [&] { return part.set->value(t, state, Vector(g + part.first_row, part.set->count)); },
-        thrown_);
-    if (flag != 0) return checked(flag, "value", part);
+    const Status status = value_of(part, t, y, n, g);
+    if (status != Status::success) return status;
   }
+  return finite(t, g);
+}
+
+Status Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
+  const int flag = guarded(
+      [&] {
+        return part.set->value(t, ConstVector(y, n), Vector(g + part.first_row, part.set->count));
+      },
+      thrown_);
+  return flag == 0 ? Status::success : checked(flag, "value", part);
+}
+
+void Evaluator::count(bool with_value) {
+  ++statistics_.jacobian_evaluations;
+  if (!with_value) return;
+  ++statistics_.value_evaluations;
+  if (gives_both_) ++statistics_.joint_evaluations;
+}
+
+Status Evaluator::finite(double t, const double* g) {
   const long bad = first_not_finite(g, rows_);
   if (bad < 0) return Status::success;
   message_ = "g of " + constraints_.name(static_cast<int>(bad)) +
@@ -81,33 +102,62 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
 
 // Entries that are not finite are found by the factors, which scan them anyway.
 Status Evaluator::dense(const Part& part, double t, const double* y, int n, const double* scale,
-                        const std::vector<int>& columns, double* C) {
+                        const std::vector<int>& columns, double* C, double* g) {
   const auto* given = std::get_if<DenseJacobian>(&part.set->jacobian);
+  const int count = part.set->count;
+  if (g != nullptr && given != nullptr && given->fill_with_value) {
+    const int flag = guarded(
+        [&] {
+          return given->fill_with_value(t, ConstVector(y, n), Vector(g + part.first_row, count),
+                                        Matrix(C, count, n));
+        },
+        thrown_);
+    return flag == 0 ? Status::success : checked(flag, "value with jacobian", part);
+  }
+  if (g != nullptr) {
+    const Status status = value_of(part, t, y, n, g);
+    if (status != Status::success) return status;
+  }
   if (given == nullptr) return differences(part, t, y, n, scale, columns, C);
-  const int flag = guarded(
-      [&] { return given->fill(t, ConstVector(y, n), Matrix(C, part.set->count, n)); }, thrown_);
-  return checked(flag, "jacobian", part);
+  const int flag =
+      guarded([&] { return given->fill(t, ConstVector(y, n), Matrix(C, count, n)); }, thrown_);
+  return flag == 0 ? Status::success : checked(flag, "jacobian", part);
 }
 
-Status Evaluator::sparse(const Part& part, double t, const double* y, int n, double* entries) {
+Status Evaluator::sparse(const Part& part, double t, const double* y, int n, double* entries,
+                         double* g) {
   const SparseJacobian& given = *part.sparse();
   const auto count = static_cast<Eigen::Index>(given.columns.size());
+  if (g != nullptr && given.fill_with_value) {
+    const int flag = guarded(
+        [&] {
+          return given.fill_with_value(t, ConstVector(y, n),
+                                       Vector(g + part.first_row, part.set->count),
+                                       Vector(entries, count));
+        },
+        thrown_);
+    return flag == 0 ? Status::success : checked(flag, "value with jacobian", part);
+  }
+  if (g != nullptr) {
+    const Status status = value_of(part, t, y, n, g);
+    if (status != Status::success) return status;
+  }
   const int flag =
       guarded([&] { return given.fill(t, ConstVector(y, n), Vector(entries, count)); }, thrown_);
-  return checked(flag, "jacobian", part);
+  return flag == 0 ? Status::success : checked(flag, "jacobian", part);
 }
 
 Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
-                           const std::vector<int>& columns, double* C) {
+                           const std::vector<int>& columns, double* C, double* value) {
   if (fatal_) return Status::callback_fatal;
-  ++statistics_.jacobian_evaluations;
+  count(value != nullptr);
   std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
   for (const Part& part : parts_) {
     double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
     const SparseJacobian* given = part.sparse();
     if (given != nullptr) entries_.assign(given->columns.size(), 0.0);
-    const Status status = given != nullptr ? sparse(part, t, y, n, entries_.data())
-                                           : dense(part, t, y, n, scale, columns, block);
+    const Status status = given != nullptr ? sparse(part, t, y, n, entries_.data(), value)
+                                           : dense(part, t, y, n, scale, columns, block, value);
     if (status != Status::success) return status;
     for (int i = 0; given != nullptr && i < part.set->count; ++i)
       for (int e = given->starts[static_cast<std::size_t>(i)];
@@ -115,13 +165,14 @@ Status Evaluator::jacobian(double t, const double* y, int n, const double* scale
         block[static_cast<std::ptrdiff_t>(i) * n + given->columns[static_cast<std::size_t>(e)]] =
             entries_[static_cast<std::size_t>(e)];
   }
-  return Status::success;
+  return value == nullptr ? Status::success : finite(t, value);
 }
 
-Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
-                           const std::vector<int>& columns, double* entries, double* full) {
+Status Evaluator::entries(double t, const double* y, int n, const double* scale,
+                          const std::vector<int>& columns, double* entries, double* full,
+                          double* value) {
   if (fatal_) return Status::callback_fatal;
-  ++statistics_.jacobian_evaluations;
+  count(value != nullptr);
   for (const Part& part : parts_) {
     const SparseJacobian* given = part.sparse();
     double*& at = given != nullptr ? entries : full;
@@ -129,12 +180,12 @@ Status Evaluator::jacobian(double t, const double* y, int n, const double* scale
                                     ? static_cast<std::ptrdiff_t>(given->columns.size())
                                     : static_cast<std::ptrdiff_t>(part.set->count) * n;
     std::fill(at, at + size, 0.0);
-    const Status status =
-        given != nullptr ? sparse(part, t, y, n, at) : dense(part, t, y, n, scale, columns, at);
+    const Status status = given != nullptr ? sparse(part, t, y, n, at, value)
+                                           : dense(part, t, y, n, scale, columns, at, value);
     if (status != Status::success) return status;
     at += size;
   }
-  return Status::success;
+  return value == nullptr ? Status::success : finite(t, value);
 }
 
 Status Evaluator::differences(const Part& part, double t, const double* y, int n,

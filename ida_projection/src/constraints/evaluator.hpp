@@ -45,19 +45,23 @@ class Evaluator {
 
   int rows() const { return rows_; }
   bool uses_differences() const { return uses_differences_; }
+  /// Are there rows with a function that gives g and C together?
+  bool gives_both() const { return gives_both_; }
 
   /// g(t, y), m entries. success, not_finite, callback_recoverable or callback_fatal.
   Status value(double t, const double* y, int n, double* g);
 
   /// C(t, y), m x n row-major. `scale` (n entries, > 0) are the error weights WT for the difference
-  /// increments. `columns`: those that differences need to visit, all others stay zero.
+  /// increments. `columns`: those that differences need to visit, all others stay zero. `value`:
+  /// null, or receives g(t, y) as value() does, in one call of the rows that give both.
   Status jacobian(double t, const double* y, int n, const double* scale,
-                  const std::vector<int>& columns, double* C);
+                  const std::vector<int>& columns, double* C, double* value = nullptr);
 
   /// The same with the sparse sets' entries one after the other in `entries`, and the rows of all
   /// other sets one after the other in `full` (n entries each).
-  Status jacobian(double t, const double* y, int n, const double* scale,
-                  const std::vector<int>& columns, double* entries, double* full);
+  Status entries(double t, const double* y, int n, const double* scale,
+                 const std::vector<int>& columns, double* entries, double* full,
+                 double* value = nullptr);
 
   /// A set of the union and the first of its rows.
   struct Part {
@@ -83,9 +87,12 @@ class Evaluator {
  private:
   void flatten(const Constraints& set);
   Status checked(int flag, const char* what, const Part& part);
+  Status finite(double t, const double* g);
+  Status value_of(const Part& part, double t, const double* y, int n, double* g);
+  void count(bool with_value);
   Status dense(const Part& part, double t, const double* y, int n, const double* scale,
-               const std::vector<int>& columns, double* C);
-  Status sparse(const Part& part, double t, const double* y, int n, double* entries);
+               const std::vector<int>& columns, double* C, double* g);
+  Status sparse(const Part& part, double t, const double* y, int n, double* entries, double* g);
   Status differences(const Part& part, double t, const double* y, int n, const double* scale,
                      const std::vector<int>& columns, double* C);
 
@@ -95,7 +102,7 @@ class Evaluator {
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string message_, thrown_;
   int rows_ = 0;
-  bool uses_differences_ = false;
+  bool uses_differences_ = false, gives_both_ = false;
   bool fatal_ = false;
 };
 

@@ -31,21 +31,38 @@ Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector
   return structure(candidate, mask);
 }
 
+// C at the present y, and g if wanted.
 template <class Rows>
-Status ContiguousMover<Rows>::factor(double t) {
+Status ContiguousMover<Rows>::rows(double t, double* g) {
   // Only differences and mixed rows need to know how large a tolerance is.
   const double* WT = evaluator_.uses_differences() || blocks_.mixed() ? at_.WT().data() : nullptr;
-  Status status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT);
+  Status status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT, g);
   if (status == Status::success && blocks_.outgrown()) {
     blocks_.rearrange();
     reusable_ = lasting_ = false;
     set_metric(true);
     status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT);
   }
-  if (status != Status::success) {
-    message_ = evaluator_.message();
-    return status;
+  if (status != Status::success) message_ = evaluator_.message();
+  return status;
+}
+
+// g where C will be wanted, too.
+template <class Rows>
+Status ContiguousMover<Rows>::value_with_rows(double t) {
+  if (!evaluator_.gives_both()) return value(t);
+  const Status status = rows(t, g_.data());
+  rows_known_ = status == Status::success;
+  return status;
+}
+
+template <class Rows>
+Status ContiguousMover<Rows>::factor(double t) {
+  if (!rows_known_) {
+    const Status status = rows(t, nullptr);
+    if (status != Status::success) return status;
   }
+  rows_known_ = false;
   const bool known = Rows::kKeepsRank && lasting_ && reusable_;
   reusable_ = false;
   weighed_ = false;
@@ -189,7 +206,7 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   at_.load(candidate);
   if (!blocks_.structured() && (result.status = structure(candidate, nullptr)) != Status::success)
     return result;
-  if ((result.status = value(candidate.t)) != Status::success) return result;
+  if ((result.status = value_with_rows(candidate.t)) != Status::success) return result;
   result.drift_before = result.drift_after = drift();
   if (result.drift_before == 0.0) return result;
   set_metric(true);
@@ -224,7 +241,8 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   ++age_;
   decided_ = false;
   set_metric(!reused_);
-  if ((result.status = value(candidate.t)) != Status::success) return result;
+  result.status = reused_ ? value(candidate.t) : value_with_rows(candidate.t);
+  if (result.status != Status::success) return result;
   firm_only_ = start_known_ = false;
   result = newton(candidate, drift());
   const bool broken =
@@ -252,7 +270,7 @@ Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, co
   const std::string reason = message_;
   restart(candidate);
   Move result = failed;
-  if ((result.status = value(candidate.t)) != Status::success) return result;
+  if ((result.status = value_with_rows(candidate.t)) != Status::success) return result;
   firm_only_ = true;
   result = newton(candidate, failed.drift_before);
   if (result.status == Status::success && !result.capped) {

@@ -102,6 +102,8 @@ class ContiguousMover final : public Mover {
   double rate() const { return slope_ * age_; }
   Status structure(const Candidate& candidate, const double* id);
   Status value(double t);
+  Status rows(double t, double* g);
+  Status value_with_rows(double t);
   Status factor(double t);
   bool decide();
   double solve();
@@ -131,6 +133,7 @@ class ContiguousMover final : public Mover {
   bool thin_ = false;          // the last factor() found rows that need RowTrust
   bool lasting_ = false;       // which rows it has kept is right for the next steps, too
   bool decided_ = false;       // it found that out for this candidate
+  bool rows_known_ = false;    // C belongs to the present y
   bool firm_only_ = false;     // this attempt does without them
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;
@@ -150,6 +153,7 @@ class ContiguousMover final : public Mover {
 
 template <class Rows>
 Status ContiguousMover<Rows>::value(double t) {
+  rows_known_ = false;
   const Status status = evaluator_.value(t, at_.y.data(), n_, g_.data());
   if (status != Status::success) message_ = evaluator_.message();
   return status;

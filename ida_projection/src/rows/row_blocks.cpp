@@ -163,8 +163,9 @@ bool RowBlocks::loses_algebraic_part(int i, const double* WT) const {
                                               without_[static_cast<std::size_t>(i)] != 0);
 }
 
-Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
-  const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_.data());
+Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
+                           double* g) {
+  const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_.data(), g);
   if (status != Status::success || !structured_) return status;
   for (int i : mixed_) {
     char& without = without_[static_cast<std::size_t>(i)];

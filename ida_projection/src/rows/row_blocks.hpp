@@ -183,7 +183,9 @@ class RowBlocks {
   bool mixed() const { return !mixed_.empty(); }
 
   /// C at y; WT: only differences and mixed rows need it. The text of a failure is the evaluator's.
-  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
+  /// g: null, or receives the values, too.
+  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
+                  double* g = nullptr);
   /// Has evaluate() met an entry that structure() took for zero and that belongs to another block
   /// or to none? Then rearrange(), fill D and evaluate again.
   bool outgrown() const { return outgrown_; }

@@ -219,9 +219,10 @@ void SparseRows::set_up(Block& block, std::vector<int>* gather) {
   block.resize();
 }
 
-Status SparseRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT) {
+Status SparseRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
+                            double* g) {
   const Status status =
-      evaluator.jacobian(t, y, n_, WT, columns_, entries_.data(), full_rows_.data());
+      evaluator.entries(t, y, n_, WT, columns_, entries_.data(), full_rows_.data(), g);
   if (status != Status::success || !structured_) return status;
   for (int i : mixed_) {
     const char now = loses_algebraic_part(i, WT) ? 1 : 0;

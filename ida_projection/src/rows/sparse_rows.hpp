@@ -29,7 +29,8 @@ class SparseRows {
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
   bool mixed() const { return !mixed_.empty(); }
-  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT);
+  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
+                  double* g = nullptr);
   bool outgrown() const { return outgrown_; }
   void rearrange();
   void look_again_soon() { look_.soon(); }

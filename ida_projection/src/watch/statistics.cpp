@@ -31,6 +31,7 @@ std::vector<Entry> entries(const Statistics& s) {
       count("Newton moves", "iterations", s.iterations),
       count("evaluations of g", "value_evaluations", s.value_evaluations),
       count("evaluations of C", "jacobian_evaluations", s.jacobian_evaluations),
+      count("of both by one call", "joint_evaluations", s.joint_evaluations),
       count("factorizations of C", "factorizations", s.factorizations),
       count("factorizations of rows known to be independent", "refactorizations",
             s.refactorizations),

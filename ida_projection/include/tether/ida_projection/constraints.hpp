@@ -59,10 +59,17 @@ struct FiniteDifferences {};
 /// C written by the caller. C is zero on entry, so only the non-zero entries need be set.
 struct DenseJacobian {
   Callable<double, ConstVector, Matrix> fill;
+  /// Optional: g as Constraints::value writes it and C as `fill` does, in one call, for rows whose
+  /// value and gradient share work (angles, energies). Used wherever both are needed at one point;
+  /// the other two are needed still, for g alone and C alone.
+  Callable<double, ConstVector, Vector, Matrix> fill_with_value;
 
   DenseJacobian() = default;
   template <class F, class = std::enable_if_t<!std::is_same_v<std::decay_t<F>, DenseJacobian>>>
   DenseJacobian(F&& f) : fill(std::forward<F>(f)) {}
+  template <class F, class Both>
+  DenseJacobian(F&& f, Both&& both)
+      : fill(std::forward<F>(f)), fill_with_value(std::forward<Both>(both)) {}
 };
 
 /// Many rows with few entries each: C by its entries. The pattern is fixed and lists every entry
@@ -74,6 +81,8 @@ struct SparseJacobian {
   std::vector<int> starts;   ///< count + 1, from 0 to the number of entries
   std::vector<int> columns;  ///< of each entry
   Callable<double, ConstVector, Vector> fill;
+  /// Optional: g and the entries in one call, as DenseJacobian::fill_with_value.
+  Callable<double, ConstVector, Vector, Vector> fill_with_value;
 };
 
 /// Few constraints on any vector type (MPI, GPU, a framework's own): values and gradients through
@@ -127,14 +136,17 @@ struct JacobianReport {
   bool correct = true;
   double worst = 0.0;     ///< largest relative difference |C - C_difference| / (column scale)
   int row = -1;           ///< of the worst entry; -1 when C is correct
-  int column = -1;        ///< of the worst entry; -1 when C is correct
+  int column = -1;        ///< of the worst entry; -1 when C is correct, or for a value
   double given = 0.0;     ///< the caller's entry there
-  double expected = 0.0;  ///< central differences with extrapolation there
-  std::string message;    ///< "row 2 (energy), column 3: given 1.0, differences give 2.0"
+  double expected = 0.0;  ///< central differences with extrapolation there, or what `value` gives
+  /// "row 2 (energy), column 3: given 1.0, differences give 2.0", or, with column -1,
+  /// "row 2 (energy), g: fill_with_value gives 1.0, value gives 2.0".
+  std::string message;
 };
 
 /// Compares the caller's Jacobian with extrapolated central differences at (t, y), entry by entry.
-/// Works for DenseJacobian and SparseJacobian (an entry that the pattern lacks is wrong, too);
+/// Works for DenseJacobian and SparseJacobian (an entry that the pattern lacks is wrong, too, and
+/// so is a g or C of fill_with_value that differs from those of the functions for one of them);
 /// FiniteDifferences pass trivially. An entry is wrong when it differs by
 /// more than `tolerance` times the larger of its own size and its row's largest entry, both in
 /// the scale max(|y_j|, 1).

@@ -17,8 +17,9 @@ struct Statistics {
   long left_alone = 0;            ///< attempts not looked at (Options::frequency)
   long chord_projections = 0;     ///< moved with factors of an earlier step (Options::frequency)
   long iterations = 0;            ///< Newton moves
-  long value_evaluations = 0;     ///< calls of g
+  long value_evaluations = 0;     ///< g
   long jacobian_evaluations = 0;  ///< C, however formed
+  long joint_evaluations = 0;     ///< of both: g and C by one call, where rows have such a function
   long factorizations = 0;
   long refactorizations = 0;  ///< of more than 16 rows, where an earlier one had told which count
   long extra_iterations = 0;  ///< corrector iterations added
