@@ -103,6 +103,7 @@ const std::vector<double>& Stepper::joint_impulses() const {
   static const std::vector<double> none;
   return implementation_->joints ? implementation_->joints->impulses() : none;
 }
+double Stepper::last_part() const { return implementation_->dt; }
 const StepCounts& Stepper::counts() const { return implementation_->counts; }
 const SteppingOptions& Stepper::options() const { return implementation_->options; }
 

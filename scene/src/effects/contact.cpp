@@ -12,6 +12,8 @@ using namespace mechanics;
 
 namespace {
 
+constexpr std::size_t kMostColumns = 200;  // bodies that have some
+
 using Materials = std::pair<std::string, std::string>;
 
 Materials ordered(const std::string& a, const std::string& b) { return std::minmax(a, b); }
@@ -43,11 +45,24 @@ class ContactEffect : public Effect {
       lines.push_back(
           {"contact", fmt::format("{} pair{} of materials", count, count == 1 ? "" : "s")});
   }
-  void add_columns(const Scene&, std::vector<Column>& columns) const override {
-    columns.push_back(
-        {"contacts", [](const Diagnostics& d) { return static_cast<double>(d.contacts); }});
-    columns.push_back({"penetration_m", [](const Diagnostics& d) { return d.penetration; }});
-    columns.push_back({"residual", [](const Diagnostics& d) { return d.residual; }});
+  void add_columns(const Scene& scene, std::vector<Column>& columns) const override {
+    const auto add = [&](const char* name, auto value) {
+      columns.push_back({name, [value](const Diagnostics& d, const Forces&) { return value(d); }});
+    };
+    add("contacts", [](const Diagnostics& d) { return static_cast<double>(d.contacts); });
+    add("penetration_m", [](const Diagnostics& d) { return d.penetration; });
+    add("residual", [](const Diagnostics& d) { return d.residual; });
+    if (!scene.output.forces || scene.pairs.empty()) return;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+      const Body& body = scene.bodies[i];
+      if (body.fixed || body.material.empty() || ++count > kMostColumns) continue;
+      add_columns_of(
+          body.name + ".contact_f*_N", [i](const Forces& f) { return f.contact[i]; }, columns);
+      add_columns_of(
+          body.name + ".contact_m*_N_m", [i](const Forces& f) { return f.contact_moment[i]; },
+          columns);
+    }
   }
 };
 

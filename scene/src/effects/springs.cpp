@@ -61,9 +61,9 @@ S power_of_damper(const Item& each, const Frame<S>& A, const Frame<S>& B) {
   return S(-each.damping * along * along / dot(span.d, span.d));
 }
 
-class SpringForce : public Force {
+class SpringForces : public Force {
  public:
-  SpringForce(const std::vector<Spring>& springs, const Bodies& bodies) {
+  SpringForces(const std::vector<Spring>& springs, const Bodies& bodies) {
     for (const Spring& each : springs) {
       Item item;
       item.first = bodies.index(each.first);
@@ -110,6 +110,15 @@ class SpringForce : public Force {
       const auto [a, b] = pair_of<double>(each, frame_pair(bodies, each), false);
       gradient(bodies, each.first, a, row);
       gradient(bodies, each.second, b, row);
+    }
+  }
+  void report(const Bodies& bodies, Forces& forces) const override {
+    for (const Item& each : items_) {
+      const Span<double> span(each, bodies.frames[at(each.first)], bodies.frames[at(each.second)]);
+      const double length = span.d.norm();
+      const double rate = length > 0 ? span.d.dot(span.rate()) / length : 0;
+      forces.springs.push_back(
+          {each.stiffness * (length - each.rest) + each.damping * rate, span.a.x, span.b.x});
     }
   }
   bool has_power() const override { return damped_; }
@@ -266,6 +275,13 @@ class SpringEffect : public Effect {
     if (dampers > 0)
       lines.push_back({"dampers", fmt::format("{} damper{}", dampers, dampers == 1 ? "" : "s")});
   }
+  void add_columns(const Scene& scene, std::vector<Column>& columns) const override {
+    if (!scene.output.forces) return;
+    for (std::size_t i = 0; i < scene.springs.size(); ++i)
+      columns.push_back(
+          {scene.springs[i].name + ".tension_N",
+           [i](const Diagnostics&, const Forces& f) { return f.springs[i].tension; }});
+  }
   void take_lengths(const Scene& scene, Largest& length) const override {
     const auto arm = [&](int body, const Vector3d& point) {
       if (body < 0 || scene.bodies[at(body)].fixed) return;
@@ -306,7 +322,7 @@ class SpringEffect : public Effect {
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
     if (scene.springs.empty()) return nullptr;
-    return std::make_unique<SpringForce>(scene.springs, bodies);
+    return std::make_unique<SpringForces>(scene.springs, bodies);
   }
 };
 

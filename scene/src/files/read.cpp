@@ -92,7 +92,25 @@ void read_output(Fields& root, Reader& r) {
   o.state = in.file_name("state");
   o.every = in.number("every", o.every, kNotNegative, "s; 0: end / 1000");
   o.checkpoint = in.number("checkpoint", o.checkpoint, kNotNegative, "s; 0: only at the end");
+  o.forces = in.flag("forces", o.forces);
   in.finish();
+}
+
+/// The index of the element of [[kind]] that the field `kind` names.
+template <class Named>
+int named(Fields& in, Reader& r, const char* kind, const std::vector<Named>& all) {
+  if (!in.has(kind)) {
+    in.missing(kind, fmt::format("the name of a {}", kind));
+    return -1;
+  }
+  const std::string name = in.text(kind, "");
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].name == name) return static_cast<int>(i);
+    names.push_back(all[i].name);
+  }
+  in.wrong(kind, fmt::format("no such {}{}", kind, r.hint_of(name, names)));
+  return -1;
 }
 
 void read_expect(Fields& in, Reader& r) {
@@ -103,6 +121,10 @@ void read_expect(Fields& in, Reader& r) {
   if (!in.has("quantity")) in.missing("quantity", "what is judged, e.g. \"position\"");
   expect.quantity = in.word("quantity", expect.quantity);
   if (is_of_body(expect.quantity)) expect.body = r.body(in, "body");
+  if (is_force(expect.quantity) && is_of_body(expect.quantity) && in.has("against"))
+    expect.against = r.body(in, "against");
+  if (is_of_joint(expect.quantity)) expect.joint = named(in, r, "joint", r.scene.joints);
+  if (is_of_spring(expect.quantity)) expect.spring = named(in, r, "spring", r.scene.springs);
 
   const std::size_t size = components(expect.quantity);
   const Value* value = in.find("value");

@@ -127,6 +127,7 @@ void write_output(const Output& o, Writer& out) {
   out.field("state", o.state);
   out.field("every", o.every, "s; 0: end / 1000");
   out.field("checkpoint", o.checkpoint, "s; 0: only at the end");
+  out.field("forces", o.forces);
 }
 
 void write_expect(const Scene& scene, const Expect& e, Writer& out) {
@@ -135,6 +136,9 @@ void write_expect(const Scene& scene, const Expect& e, Writer& out) {
   out.field("throughout", e.throughout);
   out.raw("quantity", toml_word(e.quantity));
   if (e.body >= 0) out.field("body", scene.bodies[static_cast<std::size_t>(e.body)].name);
+  if (e.against >= 0) out.field("against", scene.bodies[static_cast<std::size_t>(e.against)].name);
+  if (e.joint >= 0) out.field("joint", scene.joints[static_cast<std::size_t>(e.joint)].name);
+  if (e.spring >= 0) out.field("spring", scene.springs[static_cast<std::size_t>(e.spring)].name);
   if (e.value.size() == 1) out.field("value", e.value.front());
   if (e.value.size() > 1) out.field("value", e.value);
   if (!e.value.empty()) out.field("within", e.within);

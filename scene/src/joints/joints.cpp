@@ -66,6 +66,21 @@ class JointEffect : public Effect {
     }
     if (!text.empty()) lines.push_back({"joints", text});
   }
+  void add_columns(const Scene& scene, std::vector<Column>& columns) const override {
+    if (!scene.output.forces) return;
+    for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+      const std::string name = joints::name_of(scene.joints[j], j);
+      add_columns_of(
+          name + ".f*_N", [j](const Forces& f) { return f.joints[j].force; }, columns);
+      add_columns_of(
+          name + ".m*_N_m", [j](const Forces& f) { return f.joints[j].moment; }, columns);
+      const JointType::MotionOf what = joints::type(scene.joints[j].kind).motion();
+      if (what == JointType::MotionOf::nothing) continue;
+      const bool angle = what == JointType::MotionOf::angle;
+      columns.push_back({name + (angle ? ".drive_N_m" : ".drive_N"),
+                         [j](const Diagnostics&, const Forces& f) { return f.joints[j].drive; }});
+    }
+  }
   void take_lengths(const Scene& scene, Largest& length) const override {
     const auto arm = [&](int body, const Vector3d& point) {
       if (body < 0 || scene.bodies[at(body)].fixed) return;

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -21,11 +22,20 @@ namespace tether::scene::mechanics {
 /// A line of the plan; `Effect` is the effect itself here.
 using PlannedEffect = scene::Effect;
 
-/// A column of the table of a run.
+/// A column of the table of a run. The forces are empty unless the output of the scene has them.
 struct Column {
   std::string name;
-  double (*value)(const Diagnostics&);
+  std::function<double(const Diagnostics&, const Forces&)> value;
 };
+
+/// Three columns, `name` with x, y, z in the place of "*".
+template <class Vector>
+void add_columns_of(const std::string& name, const Vector& vector, std::vector<Column>& columns) {
+  const std::size_t star = name.find('*');
+  for (int k = 0; k < 3; ++k)
+    columns.push_back({std::string(name).replace(star, 1, 1, "xyz"[k]),
+                       [vector, k](const Diagnostics&, const Forces& f) { return vector(f)[k]; }});
+}
 
 /// Gravity, contact, springs, ...: an effect answers here for its fields in scene files, its words
 /// in the plan, its units, the momenta that it leaves alone, and its forces. What it does not

@@ -1,6 +1,7 @@
 // Tether: the forces that one effect exerts in one scene. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/scene/engine.hpp>
 #include <vector>
 
 #include "entries.hpp"
@@ -30,6 +31,9 @@ class Force {
   virtual bool has_power() const { return false; }
   virtual double power(const Bodies&) const { return 0.0; }
   virtual void add_power_jacobian(const Bodies&, JacobianBlocks&) const {}
+
+  /// Adds what it knows of the forces of its items.
+  virtual void report(const Bodies&, Forces&) const {}
 
   enum class Stepping {
     by_contact,  ///< a part of the contact library's own step

@@ -19,6 +19,10 @@ SteppedBodies::SteppedBodies(const Scene& scene) : bodies_(placed_bodies(scene))
 
 void SteppedBodies::read(contact::BodySet& set) {
   set_ = &set;
+  look_at(set);
+}
+
+void SteppedBodies::look_at(const contact::BodySet& set) {
   for (int b = 0; b < set.size(); ++b) {
     if (!bodies_.moves(b)) continue;
     Frame<double>& f = bodies_.frames[at(b)];

@@ -18,6 +18,8 @@ class SteppedBodies {
   const Bodies& bodies() const { return bodies_; }
   /// Takes over positions and velocities; later calls change `set`.
   void read(contact::BodySet& set);
+  /// Both, for what changes nothing.
+  void look_at(const contact::BodySet& set);
   /// Positions only, for energies.
   void read_positions(const contact::BodySet& set);
 

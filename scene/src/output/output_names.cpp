@@ -32,6 +32,10 @@ std::string event_file(const std::string& csv) {
   return fs::path(csv).replace_extension(".events.csv").string();
 }
 
+std::string contact_file(const std::string& csv) {
+  return fs::path(csv).replace_extension(".contacts.csv").string();
+}
+
 std::string film_file(const std::string& vtk) {
   return fs::path(vtk).replace_extension(".pvd").string();
 }
@@ -62,6 +66,7 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
   };
   take_all("csv", o.csv, {".lock"});
   if (!o.csv.empty() && !is_device(o.csv)) take("csv", event_file(o.csv));
+  if (!o.csv.empty() && o.forces && !is_device(o.csv)) take("csv", contact_file(o.csv));
   take_all("svg", o.svg, {".lock", ".new", ".gp"});
   take_all("state", o.state, {".lock", ".new"});
   if (o.vtk.empty()) return;

@@ -7,9 +7,10 @@
 
 namespace tether::scene {
 
-/// The list of frames and the folder of a film.
-/// The table of events beside a table of records.
+/// The tables of events and of contacts beside a table of records.
 std::string event_file(const std::string& csv);
+std::string contact_file(const std::string& csv);
+/// The list of frames and the folder of a film.
 std::string film_file(const std::string& vtk);
 std::string film_folder(const std::string& vtk);
 

@@ -60,6 +60,13 @@ std::string bound(const Expect& e) {
   return out;
 }
 
+/// The body, joint or spring of a quantity.
+std::string subject(const Scene& scene, const Expect& e) {
+  if (e.joint >= 0) return scene.joints[static_cast<std::size_t>(e.joint)].name;
+  if (e.spring >= 0) return scene.springs[static_cast<std::size_t>(e.spring)].name;
+  return e.body >= 0 ? scene.bodies[static_cast<std::size_t>(e.body)].name : "";
+}
+
 }  // namespace
 
 void print_summary(const Scene& scene, const RunResult& r) {
@@ -116,15 +123,14 @@ void print_judgements(const Scene& scene, const RunResult& r) {
                                     [](const Judgement& j) { return j.beyond; });
   fmt::print("expectations: {} of {} met{}\n", met, scene.expect.size(),
              beyond > 0 ? fmt::format(", {} beyond the end", beyond) : "");
-  Table table({"", "t / s", "quantity", "body", "found", "expected", "error"});
+  Table table({"", "t / s", "quantity", "of", "found", "expected", "error"});
   for (std::size_t i = 0; i < scene.expect.size(); ++i) {
     const Expect& e = scene.expect[i];
     const Judgement& j = r.judgements[i];
     table.add({verdict(j),
                e.throughout ? fmt::format("to {:g}", e.time) : fmt::format("{:g}", e.time),
-               std::string(word(e.quantity)),
-               e.body >= 0 ? scene.bodies[static_cast<std::size_t>(e.body)].name : "",
-               text(j.value), bound(e), e.value.empty() ? "" : fmt::format("{:.1e}", j.error)});
+               std::string(word(e.quantity)), subject(scene, e), text(j.value), bound(e),
+               e.value.empty() ? "" : fmt::format("{:.1e}", j.error)});
   }
   table.print();
 }

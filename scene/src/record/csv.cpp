@@ -27,7 +27,7 @@ class CsvRecorder : public Recorder {
  public:
   CsvRecorder(const Scene& scene, const std::string& file, double start_energy,
               const Resume& resume)
-      : file_(file), start_energy_(start_energy) {
+      : file_(file), start_energy_(start_energy), forces_(scene.output.forces) {
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       if (!scene.bodies[i].fixed) moving_.push_back(i);
     bodies_ = moving_.size();
@@ -56,7 +56,8 @@ class CsvRecorder : public Recorder {
     add(d.kinetic_energy), add(d.potential_energy), add(energy), add(energy - start_energy_);
     add3(d.momentum), add3(d.angular_momentum);
     add(d.drift);
-    for (const mechanics::Column& column : columns_) add(column.value(d));
+    const Forces forces = forces_ ? total_forces(engine) : Forces();
+    for (const mechanics::Column& column : columns_) add(column.value(d, forces));
     for (const std::size_t i : moving_) {
       const BodyState& b = engine.bodies()[i];
       add3(b.position);
@@ -124,6 +125,7 @@ class CsvRecorder : public Recorder {
 
   std::string file_, line_;
   double start_energy_;
+  bool forces_;
   std::vector<std::size_t> moving_;  // those in the table
   std::size_t bodies_ = 0;           // that move
   std::vector<mechanics::Column> columns_;

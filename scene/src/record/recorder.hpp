@@ -31,6 +31,8 @@ std::unique_ptr<Recorder> make_csv_recorder(const Scene& scene, const std::strin
 /// `now`: the time of the engine.
 std::unique_ptr<Recorder> make_event_recorder(const Scene& scene, const std::string& file,
                                               const Resume& resume, double now);
+std::unique_ptr<Recorder> make_contact_recorder(const Scene& scene, const std::string& file,
+                                                const Resume& resume);
 std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::string& file,
                                             const Resume& resume);
 std::unique_ptr<Recorder> make_picture_recorder(const Scene& scene, const std::string& file,

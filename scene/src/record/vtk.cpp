@@ -95,7 +95,7 @@ void put(std::vector<float>& out, const Vector3d& v) {
 class VtkRecorder : public Recorder {
  public:
   VtkRecorder(const Scene& scene, const std::string& file, const Resume& resume)
-      : file_(film_file(file)), folder_(film_folder(file)) {
+      : file_(film_file(file)), folder_(film_folder(file)), forces_(scene.output.forces) {
     if (resume.restarted) keep_up_to(resume.time);
     make_folder_of(folder_ + "/x");
     std::size_t surfaces = 0;
@@ -117,6 +117,11 @@ class VtkRecorder : public Recorder {
       add("contacts", 1, engine.time(), contacts(engine));
     else
       remove_frame("contacts");
+    if (forces_) {
+      const Forces forces = engine.forces();
+      if (!forces.joints.empty()) add("joints", 2, engine.time(), joints(forces));
+      if (!forces.springs.empty()) add("springs", 3, engine.time(), springs(forces));
+    }
     ++number_;
   }
 
@@ -189,19 +194,53 @@ class VtkRecorder : public Recorder {
     return out;
   }
 
-  static PolyData contacts(const Engine& engine) {
+  PolyData contacts(const Engine& engine) const {
     PolyData out;
-    std::vector<float> impulse, normal, gap;
+    std::vector<float> impulse, normal, gap, force, slip;
     for (const ContactState& c : engine.contacts()) {
       out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
       put(out.points, c.point);
       put(impulse, c.impulse);
       put(normal, c.normal);
       gap.push_back(static_cast<float>(c.gap));
+      put(force, c.force);
+      put(slip, c.slip);
     }
     out.vectors("impulse", impulse);
     out.vectors("normal", normal);
     out.scalars("gap", gap);
+    if (!forces_) return out;
+    out.vectors("force", force);
+    out.vectors("slip", slip);
+    return out;
+  }
+
+  static PolyData joints(const Forces& forces) {
+    PolyData out;
+    std::vector<float> force, moment, drive;
+    for (const JointForce& each : forces.joints) {
+      out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
+      put(out.points, each.at);
+      put(force, each.force);
+      put(moment, each.moment);
+      drive.push_back(static_cast<float>(each.drive));
+    }
+    out.vectors("force", force);
+    out.vectors("moment", moment);
+    out.scalars("drive", drive);
+    return out;
+  }
+
+  // In the middle between its ends.
+  static PolyData springs(const Forces& forces) {
+    PolyData out;
+    std::vector<float> tension;
+    for (const SpringForce& each : forces.springs) {
+      out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
+      put(out.points, 0.5 * (each.at + each.at_second));
+      tension.push_back(static_cast<float>(each.tension));
+    }
+    out.scalars("tension", tension);
     return out;
   }
 
@@ -221,6 +260,7 @@ class VtkRecorder : public Recorder {
   }
 
   std::string file_, folder_, sets_;
+  bool forces_;
   long number_ = 0;
   std::vector<std::vector<Part>> meshes_;
 };

@@ -40,18 +40,45 @@ double size(const std::vector<double>& value) {
   return std::sqrt(square);
 }
 
+/// Calls f(force on the body, slip) for its contacts, with one other body where that is named.
+template <class F>
+void each_contact(const Expect& expect, const Engine& engine, const F& f) {
+  for (const ContactState& c : engine.contacts()) {
+    const bool first = c.first == expect.body;
+    if (!first && c.second != expect.body) continue;
+    if (expect.against >= 0 && expect.against != (first ? c.second : c.first)) continue;
+    f(first ? c.force : Eigen::Vector3d(-c.force), c.slip);
+  }
+}
+
+Eigen::Vector3d contact_force(const Expect& expect, const Engine& engine) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  each_contact(expect, engine,
+               [&](const Eigen::Vector3d& force, const Eigen::Vector3d&) { sum += force; });
+  return sum;
+}
+
+double contact_slip(const Expect& expect, const Engine& engine) {
+  double most = 0;
+  each_contact(expect, engine, [&](const Eigen::Vector3d& force, const Eigen::Vector3d& slip) {
+    if (!force.isZero(0)) most = std::max(most, slip.norm());
+  });
+  return most;
+}
+
 }  // namespace
 
-std::vector<double> measure(const Scene& scene, Quantity quantity, int body, const Engine& engine,
+std::vector<double> measure(const Scene& scene, const Expect& expect, const Engine& engine,
                             double start_energy) {
-  const auto index = static_cast<std::size_t>(std::max(body, 0));
+  const auto index = static_cast<std::size_t>(std::max(expect.body, 0));
   const auto state = [&]() -> const BodyState& { return engine.bodies()[index]; };
   const auto diagnostics = [&] { return engine.diagnostics(); };
   const auto energy = [&] {
     const Diagnostics d = engine.diagnostics();
     return d.kinetic_energy + d.potential_energy;
   };
-  switch (quantity) {
+  const auto joint = [&] { return engine.forces().joints[static_cast<std::size_t>(expect.joint)]; };
+  switch (expect.quantity) {
     case Quantity::position:
       return list(state().position);
     case Quantity::velocity:
@@ -86,6 +113,18 @@ std::vector<double> measure(const Scene& scene, Quantity quantity, int body, con
       return {diagnostics().penetration};
     case Quantity::residual:
       return {diagnostics().residual};
+    case Quantity::contact_force:
+      return list(contact_force(expect, engine));
+    case Quantity::contact_slip:
+      return {contact_slip(expect, engine)};
+    case Quantity::joint_force:
+      return list(joint().force);
+    case Quantity::joint_moment:
+      return list(joint().moment);
+    case Quantity::joint_drive:
+      return {joint().drive};
+    case Quantity::spring_force:
+      return {engine.forces().springs[static_cast<std::size_t>(expect.spring)].tension};
   }
   throw std::invalid_argument("unknown quantity");
 }
@@ -102,8 +141,7 @@ void Judge::look(double event, bool record, const Engine& engine, double start_e
     const Expect& expect = scene_.expect[i];
     const bool due = same_time(expect.time, event);
     if (!due && !(record && expect.throughout && event < expect.time)) continue;
-    const std::vector<double> value =
-        measure(scene_, expect.quantity, expect.body, engine, start_energy);
+    const std::vector<double> value = measure(scene_, expect, engine, start_energy);
     double error = 0, excess = -kInfinity;
     const auto over = [&](double by) { excess = larger(excess, by); };
     if (!expect.value.empty()) {

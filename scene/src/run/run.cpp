@@ -75,6 +75,8 @@ class Run {
       recorders_.push_back(make_csv_recorder(scene, o.csv, summary().start_energy, resume_));
     if (!o.csv.empty() && make_plan(scene).engine == EngineKind::event)
       recorders_.push_back(make_event_recorder(scene, event_file(o.csv), resume_, engine_->time()));
+    if (!o.csv.empty() && o.forces && !scene.pairs.empty())
+      recorders_.push_back(make_contact_recorder(scene, contact_file(o.csv), resume_));
     if (!o.vtk.empty()) recorders_.push_back(make_vtk_recorder(scene, o.vtk, resume_));
     if (!o.svg.empty())
       recorders_.push_back(make_picture_recorder(scene, o.svg, summary().start_energy));

@@ -7,6 +7,7 @@
 #include <ostream>
 
 #include "integrator.hpp"
+#include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
 #include "units.hpp"
 
@@ -76,6 +77,12 @@ class SmoothEngine : public Engine {
     return d;
   }
   const std::vector<ContactState>& contacts() const override { return no_contacts_; }
+  scene::Forces forces() const override {
+    const joints::Reactions reactions(scene_, mechanics::placed_bodies(scene_));
+    scene::Forces out = system_->forces(integrator_->time(), integrator_->y().data(), reactions);
+    to_si(units_, scene_, out);
+    return out;
+  }
 
   Counts counts() const override {
     Counts sum = before_;

@@ -94,4 +94,16 @@ Diagnostics System::diagnostics(double t, const double* y) {
   return d;
 }
 
+// Of the state: those among the unknowns are held to no tolerance.
+scene::Forces System::forces(double t, const double* y, const joints::Reactions& reactions) {
+  update(t, y);
+  sum_forces(nullptr);
+  torques_to_body_axes(loads_);
+  dynamics_.solve(loads_);
+  scene::Forces out;
+  out.joints = reactions.find(rows_, bodies_.all(), dynamics_.multipliers().data());
+  for (const auto& force : forces_) force->report(bodies_.all(), out);
+  return out;
+}
+
 }  // namespace tether::scene::smooth

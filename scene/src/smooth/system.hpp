@@ -26,6 +26,7 @@
 #include "acceleration_jacobian.hpp"
 #include "forward_dynamics.hpp"
 #include "jacobian_terms.hpp"
+#include "joints/reactions.hpp"
 #include "kept_invariants.hpp"
 #include "rows_in_use.hpp"
 #include "stopwatch.hpp"
@@ -75,6 +76,8 @@ class System {
 
   void bodies(const double* y, std::vector<BodyState>& out) const { bodies_.read(y, out); }
   Diagnostics diagnostics(double t, const double* y);  ///< drift in SI, the rest in units()
+  /// In units().
+  scene::Forces forces(double t, const double* y, const joints::Reactions& reactions);
   std::vector<std::string> effect_names() const;
 
  private:

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "effects/list.hpp"
+#include "joints/list.hpp"
 
 namespace tether::scene::smooth {
 
@@ -89,6 +90,22 @@ void to_si(const Units& u, BodyState& body) {
   body.position *= u.length;
   body.velocity *= u.speed();
   body.angular_velocity /= u.time;
+}
+
+void to_si(const Units& u, const Scene& scene, scene::Forces& forces) {
+  using Of = joints::JointType::MotionOf;
+  for (std::size_t j = 0; j < forces.joints.size(); ++j) {
+    JointForce& each = forces.joints[j];
+    each.drive *= joints::type(scene.joints[j].kind).motion() == Of::angle ? u.energy() : u.force();
+    each.force *= u.force();
+    each.moment *= u.energy();
+    each.at *= u.length;
+  }
+  for (SpringForce& each : forces.springs) {
+    each.tension *= u.force();
+    each.at *= u.length;
+    each.at_second *= u.length;
+  }
 }
 
 void to_si(const Units& u, Diagnostics& d) {

@@ -24,5 +24,6 @@ Scene in_units(const Scene& scene, const Units& units);
 /// Back to SI. `drift` is in SI already: its parts have several units.
 void to_si(const Units& units, BodyState& body);
 void to_si(const Units& units, Diagnostics& diagnostics);
+void to_si(const Units& units, const Scene& scene, scene::Forces& forces);
 
 }  // namespace tether::scene::smooth

@@ -6,7 +6,17 @@ namespace tether::scene::stepping {
 
 using namespace mechanics;
 
-SteppedJoints::SteppedJoints(const Scene& scene) : bodies_(scene), rows_(scene, bodies_.bodies()) {}
+SteppedJoints::SteppedJoints(const Scene& scene)
+    : bodies_(scene), rows_(scene, bodies_.bodies()), reactions_(scene, bodies_.bodies()) {}
+
+std::vector<JointForce> SteppedJoints::forces(const contact::BodySet& bodies, double t,
+                                              const std::vector<double>& impulses, double dt) {
+  bodies_.read_positions(bodies);
+  rows_.set_time(t);
+  std::vector<double> multipliers(at(rows_.count()), 0);
+  for (std::size_t i = 0; i < multipliers.size() && dt > 0; ++i) multipliers[i] = impulses[i] / dt;
+  return reactions_.find(rows_, bodies_.bodies(), multipliers.data());
+}
 
 void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) {
   bodies_.read_positions(bodies);

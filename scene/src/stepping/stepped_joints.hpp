@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "joints/joint_rows.hpp"
+#include "joints/reactions.hpp"
 #include "mechanics/stepped_bodies.hpp"
 
 namespace tether::scene::stepping {
@@ -22,6 +23,9 @@ class SteppedJoints final : public contact::JointEquations {
   int rows() const override { return rows_.count(); }
   void values(const contact::BodySet& bodies, double t, double* g) override;
   void add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) override;
+  /// Impulses by row, over dt, as forces at these positions.
+  std::vector<JointForce> forces(const contact::BodySet& bodies, double t,
+                                 const std::vector<double>& impulses, double dt);
   std::string name(int joint) const override { return "joint \"" + rows_.name(joint) + "\""; }
 
  private:
@@ -32,6 +36,7 @@ class SteppedJoints final : public contact::JointEquations {
   };
   mechanics::SteppedBodies bodies_;
   joints::JointRows rows_;
+  joints::Reactions reactions_;
   std::vector<Gradient> gradients_;  // by row
 };
 

@@ -12,7 +12,6 @@
 
 #include "output/binary.hpp"
 #include "saved_memory.hpp"
-#include "stepped_joints.hpp"
 
 #if defined(TETHER_HAVE_COLLISION)
 #include <tether/contact/polyhedra.hpp>
@@ -55,6 +54,13 @@ std::uint64_t fingerprint(const Scene& scene, double step) {
   return hash;
 }
 
+// Of the point at r from the centre of a body; -1: the world.
+Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
+  if (body < 0) return Vector3d::Zero();
+  const contact::RigidBody& motion = bodies.motion[static_cast<std::size_t>(body)];
+  return motion.velocity + motion.angular_velocity.cross(r);
+}
+
 // The last letter is the format, see MemoryFormat.
 constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '4'};
 constexpr char kWithClosings = '2', kWithoutControl = '3';
@@ -70,7 +76,11 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
       stepper_(make_stepper(scene, std::move(mapped))),
       fingerprint_(fingerprint(scene, stepper_.options().step)),
       bodies_(scene.bodies.size()) {
-  if (!scene.joints.empty()) stepper_.add_joints(std::make_unique<SteppedJoints>(scene));
+  if (!scene.joints.empty()) {
+    auto joints = std::make_unique<SteppedJoints>(scene);
+    joints_ = joints.get();
+    stepper_.add_joints(std::move(joints));
+  }
   add_forces(scene);
   read_bodies();
 }
@@ -158,6 +168,7 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
   contacts_of_ = stepper_.counts().steps;
   const contact::StepContacts& c = stepper_.contacts();
   const contact::BodySet& b = stepper_.bodies();
+  const double dt = stepper_.last_part();
   contacts_.resize(c.points.size());
   for (std::size_t k = 0; k < c.points.size(); ++k) {
     const contact::PointContact& p = c.points[k];
@@ -168,8 +179,21 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
     s.normal = p.normal;
     s.impulse = k < c.impulses.size() ? c.impulses[k] : Vector3d(Vector3d::Zero());
     s.gap = c.gaps[k];
+    s.force = dt > 0 ? Vector3d(s.impulse / dt) : Vector3d::Zero();
+    s.slip = velocity(b, p.first, p.r1) - velocity(b, p.second, p.r2);
+    s.slip -= p.normal.dot(s.slip) * p.normal;
   }
   return contacts_;
+}
+
+Forces SteppingEngine::forces() const {
+  Forces out;
+  if (joints_)
+    out.joints =
+        joints_->forces(stepper_.bodies(), time(), stepper_.joint_impulses(), stepper_.last_part());
+  stepped_.look_at(stepper_.bodies());
+  for (const auto& force : forces_) force->report(stepped_.bodies(), out);
+  return out;
 }
 
 Counts SteppingEngine::counts() const {

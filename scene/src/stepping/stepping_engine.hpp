@@ -7,6 +7,7 @@
 
 #include "effects/list.hpp"
 #include "map_scene.hpp"
+#include "stepped_joints.hpp"
 
 namespace tether::scene::stepping {
 
@@ -20,6 +21,7 @@ class SteppingEngine final : public Engine {
   const std::vector<BodyState>& bodies() const override { return bodies_; }
   Diagnostics diagnostics() const override;
   const std::vector<ContactState>& contacts() const override;
+  Forces forces() const override;
   Counts counts() const override;
   std::vector<EffectCost> costs() const override;
   void save(std::ostream& out) const override;
@@ -36,6 +38,7 @@ class SteppingEngine final : public Engine {
   mutable mechanics::SteppedBodies stepped_;  // the view of the forces
   std::vector<std::unique_ptr<mechanics::Force>> forces_;
   OnFailure on_failure_;
+  SteppedJoints* joints_ = nullptr;  // the stepper's
   contact::Stepper stepper_;
   std::uint64_t fingerprint_;  // of the scene, in saved states
   std::vector<BodyState> bodies_;

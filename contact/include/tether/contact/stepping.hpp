@@ -227,6 +227,9 @@ class Stepper {
   /// Impulses of the joints in the last part of the last step, one for each row, N s or N m s: see
   /// JointSolution::joint_impulses.
   const std::vector<double>& joint_impulses() const;
+  /// Length, s, of the last part of the last step, which impulses are of: forces are impulses over
+  /// it. 0 before the first step, and after set_memory().
+  double last_part() const;
   const StepCounts& counts() const;
   std::vector<StageCost> costs() const;
   const SteppingOptions& options() const;

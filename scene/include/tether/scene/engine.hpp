@@ -30,6 +30,35 @@ struct ContactState {
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< of the last step on `first`, N s
   double gap = 0;                                     ///< m; < 0: penetration
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< on `first`, N; see Forces
+  /// Velocity of `first` against `second` at the point, without its normal part, m/s.
+  Eigen::Vector3d slip = Eigen::Vector3d::Zero();
+};
+
+/// What a joint does to its first body (to the second the opposite), world axes.
+struct JointForce {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< N
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< about the joint's point `at`, N m
+  /// The part along the joint's own coordinate, positive where it increases it: hinge, the moment
+  /// about the axis, N m; slider, the force along the axis, N; distance, the force that pushes the
+  /// points apart, N. Hinges and sliders have it by motions, motors, limits and friction.
+  double drive = 0;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< the point, m
+};
+
+struct SpringForce {
+  double tension = 0;  ///< > 0: pulls its ends together, N
+  Eigen::Vector3d at = Eigen::Vector3d::Zero(), at_second = Eigen::Vector3d::Zero();  ///< ends, m
+};
+
+/// Forces at Engine::time(). In stepping they are means over the last step (its last part, where it
+/// was taken in parts): impulses over its length, which an impact is a part of; zero before the
+/// first.
+struct Forces {
+  std::vector<JointForce> joints;    ///< as Scene::joints
+  std::vector<SpringForce> springs;  ///< as Scene::springs
+  /// Sums over the contacts of each body, as Scene::bodies: N, N m about its centre of mass.
+  std::vector<Eigen::Vector3d> contact, contact_moment;
 };
 
 /// What happened to one contact at an instant of the event engine. An instant may have several.
@@ -93,6 +122,9 @@ class Engine {
   virtual const std::vector<BodyState>& bodies() const = 0;
   virtual Diagnostics diagnostics() const = 0;
   virtual const std::vector<ContactState>& contacts() const = 0;
+  /// Forces::joints and Forces::springs; see total_forces(). Throws SimulationError in an engine
+  /// that does not know them.
+  virtual Forces forces() const;
   /// Since the start, or the state that was restored.
   virtual const std::vector<ContactEvent>& events() const;
   virtual Counts counts() const = 0;
@@ -114,6 +146,9 @@ class Engine {
  private:
   std::function<bool()> interrupted_;
 };
+
+/// All of Forces.
+Forces total_forces(const Engine& engine);
 
 /// Each throws std::invalid_argument, naming what the scene asks for and the engine does not have.
 std::unique_ptr<Engine> make_smooth_engine(const Scene& scene);

@@ -69,8 +69,8 @@ constexpr double kMostRecords = 1e7;  ///< end / every, end / checkpoint
 /// and states that a run in one piece would have left.
 RunResult run(const Scene& scene, const RunOptions& options = {});
 
-/// The value of a quantity now; `start` is the state and `start_energy` the energy at t = 0.
-std::vector<double> measure(const Scene& scene, Quantity quantity, int body, const Engine& engine,
+/// The value now of the quantity that is expected; `start_energy`: at t = 0, J.
+std::vector<double> measure(const Scene& scene, const Expect& expect, const Engine& engine,
                             double start_energy);
 
 }  // namespace tether::scene

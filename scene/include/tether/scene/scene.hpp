@@ -125,6 +125,7 @@ struct Output {
   std::string csv, vtk, svg, state;  ///< file names; empty: not written
   double every = 0;                  ///< s between records; 0: end / 1000
   double checkpoint = 0;             ///< s between saved states; 0: only at the end
+  bool forces = false;  ///< in the table, in one of contacts beside it, and in the film
 };
 
 enum class Quantity : std::uint8_t {
@@ -134,6 +135,8 @@ enum class Quantity : std::uint8_t {
   angular_velocity,
   distance_moved,  // of a body
   speed,
+  contact_force,
+  contact_slip,
   kinetic_energy,
   potential_energy,
   energy,
@@ -143,7 +146,11 @@ enum class Quantity : std::uint8_t {
   drift,
   contacts,
   penetration,
-  residual
+  residual,
+  joint_force,
+  joint_moment,
+  joint_drive,
+  spring_force
 };
 
 /// Numbers that a quantity has.
@@ -154,6 +161,9 @@ constexpr int components(Quantity q) {
     case Quantity::angular_velocity:
     case Quantity::momentum:
     case Quantity::angular_momentum:
+    case Quantity::contact_force:
+    case Quantity::joint_force:
+    case Quantity::joint_moment:
       return 3;
     case Quantity::orientation:
       return 4;
@@ -162,21 +172,33 @@ constexpr int components(Quantity q) {
   }
 }
 
-/// Of one body; the others are of the scene.
-constexpr bool is_of_body(Quantity q) { return q <= Quantity::speed; }
+/// Of one body, one joint, one spring; the others are of the scene.
+constexpr bool is_of_body(Quantity q) { return q <= Quantity::contact_slip; }
+constexpr bool is_of_joint(Quantity q) {
+  return q >= Quantity::joint_force && q <= Quantity::joint_drive;
+}
+constexpr bool is_of_spring(Quantity q) { return q == Quantity::spring_force; }
+/// Of Forces, or of the forces and slips of contacts.
+constexpr bool is_force(Quantity q) {
+  return is_of_joint(q) || is_of_spring(q) || q == Quantity::contact_force ||
+         q == Quantity::contact_slip;
+}
 
 /// The scene as its own test: |quantity(time) - value| <= within in every component (orientation:
 /// wxyz, of either sign), and `at_most` / `at_least` bound the number itself or the norm of a
-/// vector. distance_moved is |x(time) - x(0)|, energy_change E(time) - E(0).
+/// vector. distance_moved is |x(time) - x(0)|, energy_change E(time) - E(0); contact_force the sum
+/// over the contacts of the body, contact_slip the largest |slip| of those with a force, both of
+/// those with the body `against` where one is named; joint_... and spring_force as in Forces.
 struct Expect {
   double time = 0;          ///< s; stepping: the first step boundary not before it
   bool throughout = false;  ///< holds at every record up to `time`, too
   Quantity quantity = Quantity::position;
-  int body = -1;
+  int body = -1, against = -1;  ///< against: -1, all
   std::vector<double> value;
   double within = 0;
   std::optional<double> at_most, at_least;
   Place place;
+  int joint = -1, spring = -1;  ///< of quantities of a joint, of a spring
 };
 
 struct Scene {
@@ -197,6 +219,9 @@ struct Scene {
   Output output;
   std::vector<Expect> expect;
 };
+
+/// Whether the output or an expectation of a scene is of forces.
+bool asks_for_forces(const Scene& scene);
 
 }  // namespace tether::scene
 TETHER_EXPORT_END

@@ -87,13 +87,15 @@ struct Words<OnFailure> {
 
 template <>
 struct Words<Quantity> {
-  static constexpr std::array<std::pair<std::string_view, Quantity>, 16> list{{
+  static constexpr std::array<std::pair<std::string_view, Quantity>, 22> list{{
       {"position", Quantity::position},
       {"velocity", Quantity::velocity},
       {"orientation", Quantity::orientation},
       {"angular_velocity", Quantity::angular_velocity},
       {"distance_moved", Quantity::distance_moved},
       {"speed", Quantity::speed},
+      {"contact_force", Quantity::contact_force},
+      {"contact_slip", Quantity::contact_slip},
       {"kinetic_energy", Quantity::kinetic_energy},
       {"potential_energy", Quantity::potential_energy},
       {"energy", Quantity::energy},
@@ -104,6 +106,10 @@ struct Words<Quantity> {
       {"contacts", Quantity::contacts},
       {"penetration", Quantity::penetration},
       {"residual", Quantity::residual},
+      {"joint_force", Quantity::joint_force},
+      {"joint_moment", Quantity::joint_moment},
+      {"joint_drive", Quantity::joint_drive},
+      {"spring_force", Quantity::spring_force},
   }};
 };
 
