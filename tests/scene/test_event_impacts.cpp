@@ -389,7 +389,13 @@ between = ["m", "m"]
 )";
   const Scene stack = parse_scene(boxes, "test");
   CHECK(make_plan(stack).engine == EngineKind::stepping);
-  CHECK(make_plan(stack).no_event.find("box with box") != std::string::npos);
-  CHECK_THROWS_AS(make_plan(parse_scene("[scene]\nengine = \"event\"\n" + boxes, "test")),
+  CHECK(make_plan(stack).no_event.empty());
+  std::string many = boxes;
+  for (int k = 0; k < 20; ++k)
+    many += "[[body]]\nshape = \"box\"\nsize = [1, 1, 1]\ndensity = 1\nposition = [0, 0, " +
+            std::to_string(4 + 2 * k) + "]\nmaterial = \"m\"\n";
+  CHECK(make_plan(parse_scene(many, "test")).no_event.find("potential contact") !=
+        std::string::npos);
+  CHECK_THROWS_AS(make_plan(parse_scene("[scene]\nengine = \"event\"\n" + many, "test")),
                   std::invalid_argument);
 }

@@ -19,6 +19,9 @@ struct Bands {
   double slip(int contact) const { return slips[static_cast<std::size_t>(contact)]; }
 };
 
+/// Of approach, in the units of the model: bounces of slower contacts are as high as rounding.
+constexpr double kLeastSpeed = 1e-7;
+
 /// At most 1; a power of 2, so that rounding does not show in it.
 inline double part_of(double length) {
   return length > 0 ? std::min(1.0, std::exp2(std::round(std::log2(length)))) : 1.0;
@@ -45,7 +48,7 @@ inline Bands bands_of(Model& model, double tolerance) {
     for (int k = 0; k < look.tangents.rows(); ++k)
       slip = std::max(slip, (look.tangents.row(k).transpose().array() * speeds).matrix().norm());
     out.gaps.push_back(tolerance * part_of(gap));
-    out.approaches.push_back(tolerance * part_of(approach));
+    out.approaches.push_back(std::max(tolerance, kLeastSpeed) * part_of(approach));
     out.slips.push_back(tolerance * part_of(slip));
   }
   return out;

@@ -96,7 +96,8 @@ std::vector<int> Driver::touching(int always) const {
   for (int i = 0; i < model_.contacts(); ++i) {
     double rate = 0;
     const bool closed = motion_.modes()[at(i)].mode != Mode::open;
-    const bool near = std::abs(model_.gap(i, rate)) <= bands().gap(i) && model_.margin(i) >= 0;
+    const bool near =
+        std::abs(model_.gap(i, rate)) <= bands().gap(i) && model_.margin(i) >= -bands().gap(i);
     if (i == always || closed || near) out.push_back(i);
   }
   return out;

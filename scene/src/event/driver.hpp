@@ -88,6 +88,7 @@ class Driver {
   void remember(int contact, double approach);
   std::vector<ContactMode> decide(const std::vector<int>& touching, int left_contact,
                                   std::optional<Watch> left);
+  bool leaves_its_feature(int contact);
   void jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu);
   std::vector<int> touching(int always) const;
   double longest_first_step(const std::vector<bool>& leaving);

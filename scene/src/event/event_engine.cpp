@@ -113,11 +113,14 @@ void EventEngine::look() {
   d.angular_momentum = bodies.angular_momentum();
   look_at_contacts();
   d.contacts = static_cast<int>(contacts_.size());
-  for (int i = 0; i < model_.contacts(); ++i)
-    if (model_.margin(i) > 0) {
-      double rate = 0;
+  // A point behind a face that has a border is not always in the body.
+  const std::vector<ContactMode>& modes = driver_->motion().modes();
+  for (int i = 0; i < model_.contacts(); ++i) {
+    const bool closed = modes[at(i)].mode != Mode::open;
+    double rate = 0;
+    if (closed || std::isinf(model_.margin(i)))
       d.penetration = std::max(d.penetration, -model_.gap(i, rate) * units_.length);
-    }
+  }
   VectorXd g, rate, rest;
   MatrixXd W;
   model_.joints(g, W, rate, rest);

@@ -11,32 +11,21 @@
 //   plane   gap = n.(c - b) - r                         n' = W_B x n
 //   point   gap = |d| - r - r_B,  d = c - b             gap'' = n.d'' + (|d'|^2 - gap'^2) / |d|
 //   line    the same of d without its part along the line, in axes that turn with B
+//   crossing: two lines, see there; the first feature is not a point then
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
+#include <utility>
 #include <variant>
 #include <vector>
 
-#include "mechanics/bodies.hpp"
+#include "crossing.hpp"
+#include "touch.hpp"
 
 namespace tether::scene::event {
 
-using namespace mechanics;
-
-constexpr double kNoBorder = std::numeric_limits<double>::infinity();
-
-/// Quantities of a kind at the state of its two bodies.
-struct Touch {
-  double gap = 0, rate = 0, second = 0;
-  Vector3d normal = Vector3d::UnitZ(), point = Vector3d::Zero();
-  Vector3d point_velocity = Vector3d::Zero();  ///< of the contact point as it moves over the bodies
-};
-
 /// The half-space n.(x - b) <= 0 of the second body, or a face of it: where all border.x <= limit.
 struct PlaneFeature {
-  Vector3d at, normal;
+  Vector3d at = Vector3d::Zero(), normal = Vector3d::UnitZ();
   std::vector<std::pair<Vector3d, double>> border;  ///< in the axes of the body
 
   Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
@@ -64,7 +53,7 @@ struct PlaneFeature {
 
 /// A point of the second body with a radius.
 struct PointFeature {
-  Vector3d at;
+  Vector3d at = Vector3d::Zero();
   double radius = 0;
 
   Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
@@ -91,7 +80,7 @@ struct PointFeature {
 /// A line of the second body through `at` along `along`, with a radius; from 0 to `length` along
 /// it.
 struct LineFeature {
-  Vector3d at, along;
+  Vector3d at = Vector3d::Zero(), along = Vector3d::UnitX();
   double length = 0, radius = 0;
 
   Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
@@ -126,8 +115,8 @@ struct LineFeature {
 struct FeaturePair {
   int first = 0, second = 0;  ///< bodies, as in Bodies
   Vector3d centre = Vector3d::Zero();
-  double radius = 0;  ///< of the first feature
-  std::variant<PlaneFeature, PointFeature, LineFeature> on_second;
+  double radius = 0;  ///< of the first feature, a point
+  std::variant<PlaneFeature, PointFeature, LineFeature, CrossingFeature> on_second;
   double friction = 0, restitution = 0;
 
   Touch look(const Bodies& bodies) const {

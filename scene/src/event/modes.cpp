@@ -11,6 +11,7 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kStill = 3e-9;           // of the accelerations
+constexpr double kAhead = 1e-5;           // s in the units of the model
 constexpr double kLeastApproach = 1e-12;  // of the slip
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -27,7 +28,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   for (const int i : touching) {
     if (i == left_contact && (left == Watch::normal_force || left == Watch::border)) continue;
     model_.gap(i, rate);
-    if (std::abs(rate) <= bands().approach(i)) candidates.push_back(i);
+    if (std::abs(rate) <= bands().approach(i) && !leaves_its_feature(i)) candidates.push_back(i);
   }
   if (candidates.empty()) return modes;
   ContactRows rows(model_, candidates);
@@ -89,6 +90,20 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     if (same && mu[k] > 0) mode.mode = Mode::stick;
   }
   return modes;
+}
+
+// It is at the border of its face or edge, and on its way out; another contact takes its place.
+bool Driver::leaves_its_feature(int contact) {
+  const double here = model_.margin(contact);
+  if (!(here <= bands().gap(contact))) return false;
+  const int nq = motion_.coordinates();
+  VectorXd ahead = y_, rate(nq);
+  model_.rates(rate.data());
+  ahead.head(nq) += kAhead * rate;
+  model_.set(event_time_, ahead.data(), ahead.data() + nq);
+  const double there = model_.margin(contact);
+  model_.set(event_time_, y_.data(), y_.data() + nq);
+  return there - here < -kAhead * bands().approach(contact);
 }
 
 // Forces without bound stop the slip in no time: the impulses that keep the contacts from closing

@@ -1,17 +1,17 @@
 // Tether: which features of a scene may touch. SPDX-License-Identifier: BSD-3-Clause
 //
-// The engine has contacts whose gaps are smooth: spheres, capsules' ends and vertices against
-// planes, spheres and points against spheres, capsules and the faces of boxes. Every vertex is a
-// contact of its own.
+// The engine has contacts whose gaps are smooth: points (vertices, centres of spheres, ends of
+// capsules) with planes, faces, lines and points, and lines (edges, axes of capsules) with lines.
+// Every such pair is a contact of its own.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <map>
 #include <set>
 #include <stdexcept>
-#include <tether/scene/words.hpp>
 
 #include "mechanics/placed_bodies.hpp"
+#include "outline.hpp"
 #include "scene_model.hpp"
 
 namespace tether::scene::event {
@@ -19,99 +19,72 @@ namespace tether::scene::event {
 namespace {
 
 /// More than these belong to stepping: every contact is looked at in every step.
-constexpr std::size_t kMostContacts = 400;
+constexpr std::size_t kMostContacts = 4000;
 constexpr long kMostMoving = 100;
-
-/// A point of a body with a radius.
-struct Knob {
-  Vector3d at;
-  double radius;
-};
-
-Vector3d placed(const Shape& shape, const Vector3d& local) {
-  return shape.position + shape.orientation * local;
-}
-
-/// The points by which a shape touches a plane; a plane has none.
-std::vector<Knob> knobs(const Shape& shape) {
-  std::vector<Knob> out;
-  switch (shape.kind) {
-    case ShapeKind::sphere:
-      out.push_back({shape.position, shape.radius});
-      break;
-    case ShapeKind::capsule:
-      for (const double end : {-0.5, 0.5})
-        out.push_back({placed(shape, {0, 0, end * shape.length}), shape.radius});
-      break;
-    case ShapeKind::box:
-      for (int k = 0; k < 8; ++k)
-        out.push_back(
-            {placed(shape, 0.5 * Vector3d((k & 1) != 0 ? shape.size.x() : -shape.size.x(),
-                                          (k & 2) != 0 ? shape.size.y() : -shape.size.y(),
-                                          (k & 4) != 0 ? shape.size.z() : -shape.size.z())),
-             0});
-      break;
-    case ShapeKind::convex:
-    case ShapeKind::points:
-      for (const Vector3d& p : shape.points) out.push_back({placed(shape, p), 0});
-      break;
-    case ShapeKind::plane:
-      break;
-  }
-  return out;
-}
 
 PlaneFeature plane_of(const Shape& shape) {
   return {shape.position, shape.orientation * shape.normal, {}};
 }
 
-std::vector<PlaneFeature> faces_of_box(const Shape& shape) {
-  std::vector<PlaneFeature> faces;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {-1.0, 1.0}) {
-      PlaneFeature face;
-      face.normal = shape.orientation * Vector3d(side * Vector3d::Unit(axis));
-      face.at = placed(shape, 0.5 * side * shape.size[axis] * Vector3d::Unit(axis));
-      for (int other = 0; other < 3; ++other) {
-        if (other == axis) continue;
-        for (const double way : {-1.0, 1.0}) {
-          const Vector3d outward = shape.orientation * Vector3d(way * Vector3d::Unit(other));
-          face.border.emplace_back(outward, outward.dot(shape.position) + 0.5 * shape.size[other]);
-        }
-      }
-      faces.push_back(face);
+/// The contacts of a pair of shapes, one after the other.
+class Contacts {
+ public:
+  Contacts(const FeaturePair& bodies, std::vector<FeaturePair>& out) : bodies_(bodies), out_(out) {}
+  Contacts swapped() const {
+    Contacts other(*this);
+    std::swap(other.bodies_.first, other.bodies_.second);
+    return other;
+  }
+
+  template <class Feature>
+  void put(const Knob& knob, Feature feature) {
+    out_.push_back(bodies_);
+    out_.back().centre = knob.at;
+    out_.back().radius = knob.radius;
+    out_.back().on_second.emplace<Feature>(std::move(feature));
+  }
+
+  /// Points of the first on faces and lines of the second. Sharp points and edges meet by chance
+  /// only.
+  void put_points(const Outline& a, const Outline& b) {
+    for (const Knob& knob : a.knobs) {
+      for (const PlaneFeature& face : b.faces) put(knob, face);
+      for (const Segment& s : b.segments)
+        if (knob.radius + s.radius > 0) put(knob, LineFeature{s.at, s.along, s.length, s.radius});
     }
-  return faces;
-}
+  }
+  void put_points_and_edges(const Outline& a, const Outline& b) {
+    for (const Knob& knob : a.knobs)
+      for (const Knob& other : b.knobs)
+        if (knob.radius + other.radius > 0) put(knob, PointFeature{other.at, other.radius});
+    // The sign of a normal is that of a sharp edge.
+    for (const Segment& s : a.segments)
+      for (const Segment& o : b.segments) {
+        if (s.is_sharp() && !o.is_sharp())
+          swapped().put(Knob{}, CrossingFeature{o, s});
+        else
+          put(Knob{}, CrossingFeature{s, o});
+      }
+  }
 
-bool is_round(const Shape& shape) { return shape.kind == ShapeKind::sphere; }
+ private:
+  FeaturePair bodies_;
+  std::vector<FeaturePair>& out_;
+};
 
-/// Adds the contacts of a pair of shapes; false: their contact is not of the engine's kinds.
-bool add(const Shape& a, const Shape& b, const FeaturePair& bodies, std::vector<FeaturePair>& out) {
-  const auto put = [&](const Knob& knob, auto feature) {
-    FeaturePair pair = bodies;
-    pair.centre = knob.at;
-    pair.radius = knob.radius;
-    pair.on_second = std::move(feature);
-    out.push_back(std::move(pair));
-  };
-  if (b.kind == ShapeKind::plane) {
-    for (const Knob& knob : knobs(a)) put(knob, plane_of(b));
-    return a.kind != ShapeKind::plane;
-  }
-  if (a.kind == ShapeKind::points && b.kind == ShapeKind::points) return true;  // never touch
-  const bool has_points = is_round(a) || a.kind == ShapeKind::points;
-  if (!has_points) return false;
-  if (is_round(b)) {
-    for (const Knob& knob : knobs(a)) put(knob, PointFeature{b.position, b.radius});
-    return true;
-  }
-  if (b.kind == ShapeKind::box && a.kind == ShapeKind::points) {
-    for (const Knob& knob : knobs(a))
-      for (const PlaneFeature& face : faces_of_box(b)) put(knob, face);
-    return true;
-  }
-  return false;
+void add(const Shape& a, const Shape& b, const FeaturePair& bodies, std::vector<FeaturePair>& out) {
+  const bool points = a.kind == ShapeKind::points && b.kind == ShapeKind::points;
+  if (points || (a.kind == ShapeKind::plane && b.kind == ShapeKind::plane)) return;  // never touch
+  const Outline of_a = outline_of(a), of_b = outline_of(b);
+  Contacts contacts(bodies, out), swapped = contacts.swapped();
+  if (b.kind == ShapeKind::plane)
+    for (const Knob& knob : of_a.knobs) contacts.put(knob, plane_of(b));
+  if (a.kind == ShapeKind::plane)
+    for (const Knob& knob : of_b.knobs) swapped.put(knob, plane_of(a));
+  if (a.kind == ShapeKind::plane || b.kind == ShapeKind::plane) return;
+  contacts.put_points(of_a, of_b);
+  swapped.put_points(of_b, of_a);
+  contacts.put_points_and_edges(of_a, of_b);
 }
 
 std::set<std::pair<int, int>> jointed(const Scene& scene) {
@@ -148,13 +121,7 @@ std::vector<FeaturePair> potential_contacts(const Scene& scene) {
           pair.restitution = found->second->restitution;
           pair.first = i;
           pair.second = j;
-          if (add(s, o, pair, out)) continue;
-          std::swap(pair.first, pair.second);
-          if (!add(o, s, pair, out))
-            throw std::invalid_argument(fmt::format(
-                "the event engine has no contact of {} with {} (bodies \"{}\" and \"{}\"): use "
-                "[stepping]",
-                word(s.kind), word(o.kind), a.name, b.name));
+          add(s, o, pair, out);
         }
       if (out.size() > kMostContacts)
         throw std::invalid_argument(fmt::format(

@@ -244,7 +244,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     if (!hit) continue;
     Zero zero = locate(phase, f);
     if (f.what == Watch::support) zero.lag = lag(phase, f, zero.time);
-    if (f.what == Watch::gap && motion_.model().margin(f.contact) < 0) {
+    if (f.what == Watch::gap && motion_.model().margin(f.contact) < -bands().gap(f.contact)) {
       f.dormant = true;  // it passes beside the face
       f.armed = false;
       continue;

@@ -1,0 +1,95 @@
+// Tether: contact of two edges that cross, or of the axes of round bars. SPDX-License-Identifier:
+// BSD-3-Clause
+//
+//   c = e x f, D = |c|, n = +- c / D, d = a - b        gap = n.d - r
+//   n' = (c' - D' n) / D,  D' = n.c'                   n'' = (c'' - D'' n - 2 D' n') / D
+//
+// a + s e the line of the first body, b + t f that of the second. Of sharp edges n points out of
+// the second body, and counts where it leads out of both of each edge's faces (their arcs on the
+// Gauss sphere cross); of round bars it points from the second to the first. Lines that are
+// parallel have no such contact: their ends do.
+#pragma once
+
+#include <array>
+
+#include "mechanics/frames.hpp"
+#include "touch.hpp"
+
+namespace tether::scene::event {
+
+/// A line of a body from `at` over `length` along `along` (a unit vector). Of the edge of a
+/// polyhedron, the directions into its two faces at right angles to it; else they are zero.
+struct Segment {
+  Vector3d at = Vector3d::Zero(), along = Vector3d::UnitX();
+  double length = 0, radius = 0;
+  std::array<Vector3d, 2> inward = {Vector3d::Zero(), Vector3d::Zero()};
+
+  bool is_sharp() const { return !inward[0].isZero(0); }
+};
+
+struct CrossingFeature {
+  Segment first, second;
+
+  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
+  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
+
+ private:
+  /// Out of the second body, or from it to the first one.
+  static double sign(const Frame<double>& B, const Segment& second, const Vector3d& c,
+                     const Vector3d& d) {
+    if (!second.is_sharp()) return d.dot(c) < 0 ? -1 : 1;
+    return c.dot(B.R * (second.inward[0] + second.inward[1])) > 0 ? -1 : 1;
+  }
+  static constexpr double kParallel = 1e-9;  // squared sine
+};
+
+inline Touch CrossingFeature::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
+                                   double) const {
+  using mechanics::direction;
+  const Jet<double> a = mechanics::point<2>(A, first.at), b = mechanics::point<2>(B, second.at);
+  const Jet<double> e = direction<2>(A, first.along), f = direction<2>(B, second.along);
+  const Vector3d d = a.x - b.x, d1 = a.x1 - b.x1, d2 = a.x2 - b.x2;
+  Vector3d c = e.x.cross(f.x), c1 = e.x1.cross(f.x) + e.x.cross(f.x1),
+           c2 = e.x2.cross(f.x) + 2 * e.x1.cross(f.x1) + e.x.cross(f.x2);
+  Touch t;
+  const double square = c.squaredNorm();
+  if (square < kParallel) {
+    t.gap = first.length + second.length;
+    t.point = a.x;
+    return t;
+  }
+  const double s = sign(B, second, c, d), D = std::sqrt(square), D1 = s * c.dot(c1) / D;
+  const Vector3d n = s * c / D, n1 = (s * c1 - s * D1 * n) / D;
+  const double along1 = s * D1;  // D' = n.c' of the signed c
+  const double along2 = n1.dot(s * c1) + n.dot(s * c2);
+  const Vector3d n2 = (s * c2 - along2 * n - 2 * along1 * n1) / D;
+  t.normal = n;
+  t.gap = n.dot(d) - first.radius - second.radius;
+  t.rate = n1.dot(d) + n.dot(d1);
+  t.second = n2.dot(d) + 2 * n1.dot(d1) + n.dot(d2);
+  // Where the first line is nearest to the second one, and how that point moves.
+  const double k = -d.cross(f.x).dot(c) / square;
+  const double k1 =
+      (-(d1.cross(f.x) + d.cross(f.x1)).dot(c) - d.cross(f.x).dot(c1) - 2 * k * c.dot(c1)) / square;
+  t.point = a.x + k * e.x - first.radius * n;
+  t.point_velocity = a.x1 + k1 * e.x + k * e.x1 - first.radius * n1;
+  return t;
+}
+
+inline double CrossingFeature::margin(const Frame<double>& A, const Frame<double>& B,
+                                      const Vector3d&) const {
+  const Vector3d d = mechanics::point<0>(A, first.at).x - mechanics::point<0>(B, second.at).x;
+  const Vector3d e = A.R * first.along, f = B.R * second.along, c = e.cross(f);
+  const double square = c.squaredNorm();
+  if (square < kParallel) return -(first.length + second.length);
+  const double s = -d.cross(f).dot(c) / square, t = -d.cross(e).dot(c) / square;
+  double least = std::min(std::min(s, first.length - s), std::min(t, second.length - t));
+  const Vector3d n = sign(B, second, c, d) * c / std::sqrt(square);
+  for (const Vector3d& inward : second.inward)
+    if (second.is_sharp()) least = std::min(least, -second.length * n.dot(B.R * inward));
+  for (const Vector3d& inward : first.inward)
+    if (first.is_sharp()) least = std::min(least, first.length * n.dot(A.R * inward));
+  return least;
+}
+
+}  // namespace tether::scene::event

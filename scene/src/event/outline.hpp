@@ -1,0 +1,28 @@
+// Tether: the features by which a shape touches others. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "crossing.hpp"
+#include "features.hpp"
+
+namespace tether::scene::event {
+
+/// A point of a body with a radius.
+struct Knob {
+  Vector3d at = Vector3d::Zero();
+  double radius = 0;
+};
+
+/// In the axes of the body. Points with a radius (spheres, ends of capsules) and vertices; edges
+/// and axes of capsules; faces with their borders.
+struct Outline {
+  std::vector<Knob> knobs;
+  std::vector<Segment> segments;
+  std::vector<PlaneFeature> faces;
+};
+
+Outline outline_of(const Shape& shape);
+
+}  // namespace tether::scene::event

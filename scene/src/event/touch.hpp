@@ -1,0 +1,23 @@
+// Tether: what a pair of features is at the state of its two bodies. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mechanics/bodies.hpp"
+
+namespace tether::scene::event {
+
+using namespace mechanics;
+
+constexpr double kNoBorder = std::numeric_limits<double>::infinity();
+
+struct Touch {
+  double gap = 0, rate = 0, second = 0;
+  Vector3d normal = Vector3d::UnitZ(), point = Vector3d::Zero();
+  Vector3d point_velocity = Vector3d::Zero();  ///< of the contact point as it moves over the bodies
+};
+
+}  // namespace tether::scene::event
