@@ -63,6 +63,29 @@ TEST_CASE("few bodies: the solution is that of the matrix without bodies, for le
   CHECK(few.counts.work < 0.3 * many.counts.work);
 }
 
+TEST_CASE(
+    "few bodies: proximal Newton steps are those of the matrix without bodies, for less work") {
+  for (const double mu : {0.2, 0.6}) {
+    const Pile p = pile(8, 30, mu, 21);
+    const Problem by_bodies = delassus(p.bodies, p.contacts);
+    Problem by_contacts = by_bodies;
+    by_contacts.set_body_form(nullptr);
+    Options options;
+    options.law = Law::coulomb;
+    options.method = Method::proximal_newton;
+    options.tolerance = 1e-9;
+    options.max_work = 3e9;
+    const Solution few = Solver(options).solve(by_bodies);
+    const Solution many = Solver(options).solve(by_contacts);
+    INFO("mu " << mu << ", work " << few.counts.work << " and " << many.counts.work);
+    CHECK(few.status == Status::solved);
+    CHECK(many.status == Status::solved);
+    CHECK(evaluate(by_contacts, Law::coulomb, few.impulses).fixed_point <= 1e-9);
+    CHECK(few.counts.factorisations <= 1.1 * many.counts.factorisations);
+    CHECK(few.counts.work < 0.4 * many.counts.work);
+  }
+}
+
 TEST_CASE("few bodies: where interior points end, proximal problems go on") {
   for (const double mu : {0.2, 0.6}) {
     const Pile p = pile(6, 40, mu, 7);

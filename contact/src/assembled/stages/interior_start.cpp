@@ -8,13 +8,8 @@ namespace tether::contact::detail {
 
 bool InteriorPoint::order_bodies(Search& search) {
   if (ordered_) return by_bodies_;
-  constexpr int kMany = 4;          // contacts for each body
-  constexpr double kClearly = 0.5;  // of a guess, and of factors whose digits need no refinement
-  const Problem& p = search.system.problem();
-  const BodyForm* form = p.body_form();
-  if (form == nullptr || n_ < kMany * form->bodies) return false;
-  bodies_.order(p);
-  if (!(bodies_.cost() + 3 * search.sweep_cost < kClearly * cost(search))) return false;
+  if (!bodies_serve(search.system.problem(), cost(search), 3 * search.sweep_cost, bodies_))
+    return false;
   search.counts.work += 500.0 * n_;
   ordered_ = by_bodies_ = true;
   find_flat(search.system);

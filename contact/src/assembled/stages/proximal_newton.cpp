@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tether::contact::detail {
 namespace {
+
+constexpr double kSweeps = 3.5;  // that a step costs besides its factorisation
 
 // out = P B for row-major P and packed B.
 TETHER_INLINE void multiply(const double* P, const double* B, double scale, double* out) {
@@ -22,21 +25,22 @@ TETHER_INLINE void multiply(const double* P, const double* B, double scale, doub
 
 void ProximalNewton::reset(int contacts) {
   n_ = contacts;
-  for (Packed* p :
-       {&x_, &z_, &dx_, &trial_, &trial_z_, &swept_, &swept_z_, &anchor_, &f_, &saved_, &start_})
+  for (Packed* p : {&x_, &z_, &dx_, &trial_, &trial_z_, &swept_, &swept_z_, &anchor_, &f_, &saved_,
+                    &start_, &rest_, &moved_})
     p->resize(at(n_));
   regimes_.resize(at(n_));
   derivatives_.resize(at(n_));
   active_.resize(at(n_));
   anderson_.reset(n_, kDepth);
-  ordered_ = false;
+  ordered_ = by_bodies_ = false;
 }
 
 double ProximalNewton::cost(const Search& search) const {
   const double blocks = static_cast<double>(search.system.problem().blocks().size());
+  if (ordered_ && by_bodies_) return bodies_.cost() + kSweeps * search.sweep_cost;
   const double operations =
       ordered_ ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
-  return 4 * operations + 3.5 * search.sweep_cost + 25 * blocks;
+  return 4 * operations + kSweeps * search.sweep_cost + 25 * blocks;
 }
 
 double ProximalNewton::residual(Search& search, const Packed& x, Packed& z,
@@ -46,18 +50,35 @@ double ProximalNewton::residual(Search& search, const Packed& x, Packed& z,
                               derive ? derivatives_.data() : nullptr);
 }
 
-// F + dx + Phi'/(1+tau) sum_{j != i} A_ij dx_j = 0 with F = x - z; separated contacts are known.
-bool ProximalNewton::direction(Search& search, double tau) {
+void ProximalNewton::order(const Search& search) {
+  if (ordered_) return;
   const Problem& p = search.system.problem();
-  if (!ordered_) {
-    lu_.order(pattern(p));
-    ordered_ = true;
-  }
-  for (int i = 0; i < n_; ++i) active_[at(i)] = regimes_[at(i)] != Regime::separating;
-  lu_.analyse(pattern(p), active_.data());
-  const double scale = 1 / (1 + tau);
+  by_bodies_ = bodies_serve(p, cost(search), kSweeps * search.sweep_cost, bodies_);
+  if (!by_bodies_) lu_.order(pattern(p));
+  ordered_ = true;
+}
+
+// F + dx + Phi'/(1+tau) sum_{j != i} A_ij dx_j = 0 with F = x - z.
+bool ProximalNewton::direction(Search& search, double tau) {
+  order(search);
   for (int i = 0; i < n_; ++i)
     for (int c = 0; c < 4; ++c) dx_[at(i)].v[c] = z_[at(i)].v[c] - x_[at(i)].v[c];
+  const double scale = 1 / (1 + tau);
+  const bool regular = by_bodies_ ? direction_by_bodies(search, scale)
+                                  : direction_by_contacts(search.system.problem(), scale);
+  ++search.counts.factorisations;
+  search.counts.work += cost(search);
+  if (!regular) return false;
+  double sum = 0;
+  for (int i = 0; i < n_; ++i)
+    for (int c = 0; c < 3; ++c) sum += dx_[at(i)].v[c] * dx_[at(i)].v[c];
+  return std::isfinite(sum);
+}
+
+// Separated contacts are known: dx = -F there.
+bool ProximalNewton::direction_by_contacts(const Problem& p, double scale) {
+  for (int i = 0; i < n_; ++i) active_[at(i)] = regimes_[at(i)] != Regime::separating;
+  lu_.analyse(pattern(p), active_.data());
   bool regular = true;
   for (int r = 0; r < lu_.size(); ++r) {
     const int i = lu_.block_row(r);
@@ -81,14 +102,67 @@ bool ProximalNewton::direction(Search& search, double tau) {
       dx_[at(i)].v[c] -=
           scale * (P[3 * c] * rhs[0] + P[3 * c + 1] * rhs[1] + P[3 * c + 2] * rhs[2]);
   }
-  ++search.counts.factorisations;
-  search.counts.work += cost(search);
-  if (!regular) return false;
-  lu_.solve(dx_.data());
-  double sum = 0;
-  for (int i = 0; i < n_; ++i)
-    for (int c = 0; c < 3; ++c) sum += dx_[at(i)].v[c] * dx_[at(i)].v[c];
-  return std::isfinite(sum);
+  if (regular) lu_.solve(dx_.data());
+  return regular;
+}
+
+// (D + L A) dx = -F, L = Phi'/(1+tau) and D = 1 - L A_ii: where a contact sticks D is tau/(1+tau),
+// and the digits that D^-1 costs come back by refinement.
+bool ProximalNewton::direction_by_bodies(Search& search, double scale) {
+  constexpr int kRefinements = 3;
+  constexpr double kExact = 1e-8;
+  const Problem& p = search.system.problem();
+  PackedBlock unit, left, D;
+  for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
+  bodies_.begin();
+  for (int i = 0; i < n_; ++i) {
+    const double* P = derivatives_[at(i)].d;
+    const LocalBlock& L = p.local(i);
+    const double block[12] = {L.a,    L.c[0], L.c[1], 0,      L.c[0], L.T[0],
+                              L.T[1], 0,      L.c[1], L.T[1], L.T[2], 0};
+    multiply(P, block, -scale, D.column);
+    for (int c = 0; c < 3; ++c) {
+      D.column[5 * c] += 1;
+      for (int r = 0; r < 3; ++r) left.column[4 * c + r] = scale * P[3 * r + c];
+    }
+    bodies_.add(i, D, left, unit);
+  }
+  if (!bodies_.factor()) return false;
+  rest_ = dx_;
+  bodies_.solve(dx_.data());
+  double before = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kRefinements; ++k) {
+    const double left_over = defect(search.system, scale);
+    search.counts.work += search.sweep_cost;
+    if (!(left_over > kExact && left_over < 0.5 * before)) break;
+    before = left_over;
+    bodies_.solve(moved_.data());
+    for (int i = 0; i < n_; ++i)
+      for (int c = 0; c < 3; ++c) dx_[at(i)].v[c] += moved_[at(i)].v[c];
+  }
+  return true;
+}
+
+// moved_ = rest_ - (1 + L (A - A_ii)) dx_, relative to rest_.
+double ProximalNewton::defect(const System& system, double scale) {
+  const Problem& p = system.problem();
+  system.velocities(dx_.data(), moved_.data());
+  double sum = 0, whole = 0;
+  for (int i = 0; i < n_; ++i) {
+    const LocalBlock& L = p.local(i);
+    const double *P = derivatives_[at(i)].d, *d = dx_[at(i)].v, *b = p.packed_b()[at(i)].v;
+    double* m = moved_[at(i)].v;
+    const double w[3] = {m[0] + b[0] - (L.a * d[0] + L.c[0] * d[1] + L.c[1] * d[2]),
+                         m[1] + b[1] - (L.c[0] * d[0] + L.T[0] * d[1] + L.T[1] * d[2]),
+                         m[2] + b[2] - (L.c[1] * d[0] + L.T[1] * d[1] + L.T[2] * d[2])};
+    for (int c = 0; c < 3; ++c) {
+      const double r = rest_[at(i)].v[c];
+      m[c] = r - d[c] - scale * (P[3 * c] * w[0] + P[3 * c + 1] * w[1] + P[3 * c + 2] * w[2]);
+      sum += m[c] * m[c];
+      whole += r * r;
+    }
+  }
+  return whole > 0 ? std::sqrt(sum / whole) : 0;
 }
 
 int ProximalNewton::inner(Search& search, double tau) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "assembled/search.hpp"
+#include "assembled/stages/body_newton.hpp"
 #include <tether/linalg/anderson.hpp>
 #include <tether/linalg/block_lu.hpp>
 
@@ -10,7 +11,8 @@ namespace tether::contact::detail {
 
 // Outer: x^{k+1} = solution of the problem with A + tau D and b + tau D x^k (D: diagonal blocks),
 // accelerated. Inner: Newton on F = x - Phi(D x - w), whose matrix I + Phi' (A - D) is regular by
-// the proximal term although A is not (README, section 8).
+// the proximal term although A is not (README, section 8). It is factorised by contacts, those that
+// part left out, or by bodies where these have so many contacts that it costs less.
 class ProximalNewton {
  public:
   static constexpr int kDepth = 6;
@@ -28,14 +30,21 @@ class ProximalNewton {
   // Solves the proximal problem at tau from x_ in place; Newton steps used, or -1.
   int inner(Search& search, double tau);
   bool direction(Search& search, double tau);
+  bool direction_by_contacts(const Problem& p, double scale);
+  bool direction_by_bodies(Search& search, double scale);
+  void order(const Search& search);
+  double defect(const System& system, double scale);
   double residual(Search& search, const Packed& x, Packed& z, const Proximal& proximal,
                   bool derive);
 
   int n_ = 0;
   bool ordered_ = false;
   BlockLu lu_;
+  BodyNewton bodies_;
+  bool by_bodies_ = false;
   Anderson anderson_;
-  Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_, f_, saved_, start_;
+  Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_, f_, saved_, start_, rest_,
+      moved_;
   std::vector<Regime> regimes_;
   std::vector<LocalDerivative> derivatives_;
   std::vector<char> active_;
