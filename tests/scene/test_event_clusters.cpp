@@ -151,6 +151,30 @@ TEST_CASE("event: corners that other contacts press in by less than a band bounc
     }
 }
 
+TEST_CASE("event: corners of a slider with clearance hit in turns until they rest (Flores)") {
+  // P. Flores, R. Leine, C. Glocker (2010), by an independent code.
+  Scene scene = read_scene(TETHER_SHIPPED_SCENES "/clearance.toml");
+  Eigen::VectorXd there;
+  for (const double tolerance : {1e-10, 1e-8, 1e-7, 1e-6}) {
+    CAPTURE(tolerance);
+    scene.event->tolerance = tolerance;
+    const auto engine = make_engine(scene);
+    engine->advance(scene.end);
+    const auto impacts = of_kind(*engine, Kind::impact);
+    REQUIRE(impacts.size() > 100);
+    CHECK(std::abs(impacts[0].time - .002690903648407578) < 10 * tolerance);
+    CHECK(std::abs(impacts[0].before + .84163384) < 10 * tolerance + 1e-8);
+    CHECK(std::abs(impacts[1].time - .00269225431092511) < 10 * tolerance);
+    CHECK(std::abs(impacts[1].before + 1.99247722) < 10 * tolerance + 1e-8);
+    const auto lifts = of_kind(*engine, Kind::lift);
+    REQUIRE(!lifts.empty());
+    CHECK(std::abs(lifts.back().time - .0150313284599) < 10 * tolerance);
+    if (there.size() == 0) there = state_of(*engine);
+    CHECK((state_of(*engine) - there).head(3).norm() < 10 * tolerance);
+    CHECK(engine->counts().events < 1000);
+  }
+}
+
 TEST_CASE("event: a hull of ten vertices rocks to rest and gains no energy from what closes") {
   // Closing contacts once moved the body onto its gaps, by less than the tolerance, and its energy
   // with them: it rocked for ever.
