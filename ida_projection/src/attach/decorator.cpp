@@ -293,7 +293,7 @@ void Projection::Impl::derive_id(const Candidate& candidate) {
 // corrector fail: too late for the policy to begin.
 Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
   if (!variables_.known()) derive_id(candidate);
-  variables_.look_at_index(candidate, corrector_, ida_.step().cj);
+  variables_.look_at_index(candidate, corrector_, ida_.step().cj, ida_.evaluations_for_jacobian());
   return variables_.high_index() && variables_.any() ? engage(candidate) : Status::success;
 }
 
@@ -307,7 +307,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   const double cj = ida_.step().cj;
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
   if (options_.smooth_where_needed)
-    variables_.look_at_index(candidate, corrector_, cj);
+    variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();
   if (variables_.high_index()) control_.begin_smoothing(kAsideFromTest);

@@ -20,6 +20,12 @@ class Ida {
   long steps() const { return count(IDAGetNumSteps); }
   long setups() const { return count(IDAGetNumLinSolvSetups); }
   long error_test_failures() const { return count(IDAGetNumErrTestFails); }
+  /// Evaluations of F for one Jacobian by differences; 0 where the caller gives it, or none is
+  /// made.
+  long evaluations_for_jacobian() const {
+    const long jacobians = count(IDAGetNumJacEvals);
+    return jacobians > 0 ? count(IDAGetNumLinResEvals) / jacobians : 0;
+  }
   double step_size() const {
     sunrealtype h = 0.0;
     IDAGetCurrentStep(mem_, &h);

@@ -30,7 +30,8 @@ class AlgebraicVariables {
   N_Vector vector() const { return id_; }
 
   /// Looks at F once in a run.
-  void look_at_index(const Candidate& candidate, Corrector& corrector, double cj);
+  /// `usual`: evaluations of F that a Jacobian takes in this run, see index.cpp.
+  void look_at_index(const Candidate& candidate, Corrector& corrector, double cj, long usual);
   void note_index_as_low() { index_known_ = true; }
   bool index_known() const { return index_known_; }
   bool high_index() const { return high_index_; }  ///< F is not of index 1 in its own variables
@@ -43,7 +44,8 @@ class AlgebraicVariables {
                                               double cj) const;
 
  private:
-  bool exceeds_one(const Candidate& candidate, Corrector& corrector, double cj);  // index.cpp
+  // index.cpp
+  bool exceeds_one(const Candidate& candidate, Corrector& corrector, double cj, long usual);
 
   const Options& options_;
   Statistics& statistics_;

@@ -9,7 +9,9 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kLargestSize = 200;    // unknowns; the full QR beyond would be felt
+// Unknowns. Beyond the first size the look would be felt, except where each Jacobian of IDA takes
+// as many evaluations as there are unknowns, and dense factors: it costs two of these.
+constexpr int kLargestSize = 200, kLargestDense = 2000;
 constexpr double kDependent = 1e-6;  // of the largest pivot; difference quotients are this good
 constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
 
@@ -52,10 +54,11 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
 // differences of IDA's own residual callback, F(t, ypred + ycor, yppred + cj ycor), with ypred
 // shifted by -ycor (and put back bit for bit) where only y' is to feel ycor. Algebraic variables
 // that the matrix leaves free carry rounding divided by the step: undetermined_.
-bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corrector, double cj) {
+bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corrector, double cj,
+                                     long usual) {
   if (candidate.base_entries == nullptr) return false;
   const int size = static_cast<int>(N_VGetLength(candidate.base));
-  if (size > kLargestSize) return false;
+  if (size > (usual >= size ? kLargestDense : kLargestSize)) return false;
   OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base),
       saved(candidate.base);
   N_VConst(0.0, ycor);
@@ -98,9 +101,9 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
   return !left.empty();
 }
 
-void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& corrector,
-                                       double cj) {
-  if (!index_known_) high_index_ = exceeds_one(candidate, corrector, cj);
+void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& corrector, double cj,
+                                       long usual) {
+  if (!index_known_) high_index_ = exceeds_one(candidate, corrector, cj, usual);
   index_known_ = true;
 }
 
