@@ -25,6 +25,7 @@ namespace {
 // IDA's own test promises that one more iteration changes y by at most its tolerance.
 constexpr double kMisled = 2.0;
 constexpr double kAnswered = 0.1;  // tolerances: a shorter move needs no answer of y_a
+constexpr double kAnsweredByMultipliers = 0.01;  // the same where they are of index 2
 
 }  // namespace
 
@@ -45,9 +46,12 @@ bool Polish::wanted(double length, bool smoothing) const {
   if (options_.extra_iterations == 0) return variables_.any() && options_.refresh_algebraic;
   // After two iterations of its own the corrector leaves nothing worth another one, unless the move
   // asks for an answer of the algebraic variables. Whether it made them varies from run to run,
-  // which smooth step sizes are not meant to.
-  if (smoothing) return true;
-  return corrector_.iterations() <= 1 || (variables_.any() && length > kAnswered);
+  // which smooth step sizes are not meant to, unless they are there for multipliers of index 2:
+  // those need two iterations in nearly every step, and answer to shorter moves.
+  const bool high_index = variables_.any() && variables_.high_index();
+  if (smoothing && !high_index) return true;
+  const double answered = smoothing ? kAnsweredByMultipliers : kAnswered;
+  return corrector_.iterations() <= 1 || (variables_.any() && length > answered);
 }
 
 void Polish::keep(const Candidate& candidate) {
