@@ -8,26 +8,40 @@
 #
 #   cmake --install build --component linalg
 #   cmake --install build --component contact
+#
+# With TETHER_DEBIAN_PACKAGES the components are those packages (TetherPackages.cmake).
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(tether_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tether)
 get_property(tether_libraries GLOBAL PROPERTY TETHER_LIBRARIES)
 
+# Components of what a library needs to run, and of what serves those who compile against it.
+macro(tether_components library)
+  set(tether_run ${library})
+  set(tether_dev ${library})
+  if(TETHER_DEBIAN_PACKAGES)
+    set(tether_run libtether)
+    set(tether_dev libtether-dev)
+  endif()
+endmacro()
+
 foreach(library IN LISTS tether_libraries)
+  tether_components(${library})
   install(TARGETS tether_${library} EXPORT tether-${library}-targets
-    RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ${library}
-    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${library} NAMELINK_COMPONENT ${library}
-    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${library}
-    FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${library})
+    RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ${tether_run}
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${tether_run} NAMELINK_COMPONENT ${tether_dev}
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${tether_dev}
+    FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${tether_dev})
   install(EXPORT tether-${library}-targets NAMESPACE tether::
-    DESTINATION ${tether_cmake_dir} COMPONENT ${library})
+    DESTINATION ${tether_cmake_dir} COMPONENT ${tether_dev})
 endforeach()
 
 if(TARGET tether_preload)
-  install(TARGETS tether_preload LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ida_projection)
+  tether_components(ida_projection)
+  install(TARGETS tether_preload LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${tether_run})
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/ida_projection/octave
-    DESTINATION ${CMAKE_INSTALL_DATADIR}/tether COMPONENT ida_projection PATTERN check.sh EXCLUDE)
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/tether COMPONENT ${tether_dev} PATTERN check.sh EXCLUDE)
 endif()
 
 # What the config has to find and include.
@@ -41,8 +55,9 @@ if(TARGET tether::hdf5)
 endif()
 foreach(library IN ITEMS contact_io contact_collision)
   if(TARGET tether_${library})
+    tether_components(${library})
     install(FILES ${CMAKE_CURRENT_LIST_DIR}/TetherExternal.cmake
-      DESTINATION ${tether_cmake_dir} COMPONENT ${library})
+      DESTINATION ${tether_cmake_dir} COMPONENT ${tether_dev})
   endif()
 endforeach()
 
@@ -51,12 +66,15 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/tether-config.cmake.in
   NO_CHECK_REQUIRED_COMPONENTS_MACRO)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/package/tether-config-version.cmake
   COMPATIBILITY SameMinorVersion)
+tether_components(linalg)
 install(FILES
     ${PROJECT_BINARY_DIR}/package/tether-config.cmake
     ${PROJECT_BINARY_DIR}/package/tether-config-version.cmake
-  DESTINATION ${tether_cmake_dir} COMPONENT linalg)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
-  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT linalg)
+  DESTINATION ${tether_cmake_dir} COMPONENT ${tether_dev})
+if(NOT TETHER_DEBIAN_PACKAGES)  # they have a copyright file each
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
+    DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT linalg)
+endif()
 
 # pkg-config: paths relative to the .pc file, so that an installed tree can be moved; absolute only
 # where the caller made them so.
@@ -79,16 +97,18 @@ function(tether_pkg_config library description requires)
   list(TRANSFORM arg_LIBS PREPEND " ")
   string(JOIN "" libs ${arg_LIBS})
   configure_file(${PROJECT_SOURCE_DIR}/cmake/tether.pc.in ${PROJECT_BINARY_DIR}/package/${name}.pc @ONLY)
+  tether_components(${library})
   install(FILES ${PROJECT_BINARY_DIR}/package/${name}.pc
-    DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT ${library})
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT ${tether_dev})
 endfunction()
 
 tether_pkg_config(linalg "Minimum-norm solves shared by Tether's libraries" "eigen3 >= 3.4")
 tether_pkg_config(contact "Rigid-body contact with the exact friction cone"
   "tether-linalg = ${PROJECT_VERSION}" LIBS ${CMAKE_THREAD_LIBS_INIT})
 if(TARGET tether_ida_projection)
+  tether_components(ida_projection)
   install(FILES ${PROJECT_SOURCE_DIR}/cmake/TetherSundials.cmake
-    DESTINATION ${tether_cmake_dir} COMPONENT ida_projection)
+    DESTINATION ${tether_cmake_dir} COMPONENT ${tether_dev})
   # Debian has no sundials.pc, so the include directory is named; the host links its own IDA or IDAS.
   get_target_property(sundials_include tether::sundials_headers INTERFACE_INCLUDE_DIRECTORIES)
   list(TRANSFORM sundials_include PREPEND "-I")

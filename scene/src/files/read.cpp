@@ -7,6 +7,7 @@
 #include <tether/scene/files.hpp>
 
 #include "effects/list.hpp"
+#include "repeat.hpp"
 #include "toml/document.hpp"
 #include "toml/reader.hpp"
 
@@ -141,8 +142,10 @@ void read_expect(Fields& in, Reader& r) {
   r.scene.expect.push_back(std::move(expect));
 }
 
-Scene read(std::string_view text, const std::string& name) {
-  const Value document = parse_document(text, name);
+}  // namespace
+
+Scene read(Value document, const std::string& name) {
+  repeat_elements(document, name);
   Report report;
   Reader r{name, report, {}, {}, {}};
   r.scene.file = name;
@@ -174,8 +177,6 @@ Scene read(std::string_view text, const std::string& name) {
   return std::move(r.scene);
 }
 
-}  // namespace
-
 }  // namespace tether::scene::files
 
 namespace tether::scene {
@@ -190,7 +191,7 @@ Scene parse_scene(std::string_view text, const std::string& name) {
   constexpr std::size_t kLargest = std::size_t{256} << 20;
   if (text.size() > kLargest) files::refuse({name, 0, 0}, "must be a file of at most 256 MiB");
   try {
-    return files::read(text, name);
+    return files::read(files::parse_document(text, name), name);
   } catch (const SceneError&) {
     throw;
   } catch (const std::exception& e) {  // out of memory

@@ -6,6 +6,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "commands.hpp"
+#include "scene_text.hpp"
 
 namespace tether::scene {
 
@@ -28,7 +29,7 @@ int check(const Arguments& arguments) {
   int status = kGood;
   for (const std::string& file : arguments.files) {
     try {
-      const Scene scene = read_scene(file);
+      const Scene scene = read_scene_argument(file);
       const Plan plan = make_plan(scene);
       if (arguments.print)
         fmt::print("{}", write_scene(with_options(scene, plan.engine)));
@@ -52,7 +53,8 @@ void add_check_command(CLI::App& app, int* status) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
       "check", "Reads scene files and names what is wrong, with line, field and what is allowed");
-  command->add_option("scenes", arguments->files, "Scene files (TOML)")->required();
+  command->add_option("scenes", arguments->files, "Scene files (TOML); - is the standard input")
+      ->required();
   command->add_flag("--print", arguments->print, "Print the scene with every default spelt out");
   command->footer("Exit code: 0 right, 2 wrong. The format: scene/README.md.");
   command->callback([arguments, status] { *status = check(*arguments); });

@@ -9,6 +9,7 @@
 
 #include "commands.hpp"
 #include "report_run.hpp"
+#include "scene_text.hpp"
 
 namespace tether::scene {
 
@@ -20,7 +21,7 @@ struct Arguments {
 };
 
 int plan(const Arguments& arguments) {
-  const Scene scene = read_scene(arguments.file);
+  const Scene scene = read_scene_argument(arguments.file);
   std::cout << make_plan(scene) << std::flush;
   if (!arguments.run) return kGood;
   Scene silent = scene;
@@ -37,7 +38,8 @@ void add_plan_command(CLI::App& app, int* status) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
       "plan", "Tells which effects a scene asks for, which engine moves it, and how large it is");
-  command->add_option("scene", arguments->file, "Scene file (TOML)")->required();
+  command->add_option("scene", arguments->file, "Scene file (TOML); - is the standard input")
+      ->required();
   command->add_flag("--run", arguments->run, "Run it, and tell what each effect cost");
   command->footer(
       "Exit code: 0, 2 the scene is wrong or no engine has it, 3 --run could not go on.");

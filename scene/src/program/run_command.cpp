@@ -8,19 +8,22 @@
 #include <optional>
 #include <progress.hpp>
 #include <tether/scene/files.hpp>
+#include <tether/scene/player.hpp>
 #include <tether/scene/run.hpp>
 
 #include "commands.hpp"
 #include "report_run.hpp"
+#include "scene_text.hpp"
 #include "settings.hpp"
 #include "signals.hpp"
+#include "standard_output_file.hpp"
 
 namespace tether::scene {
 
 namespace {
 
 struct Arguments {
-  std::string file, restart, folder;
+  std::string file, restart, folder, html;
   std::optional<std::string> csv, vtk, svg, state;
   std::optional<double> end, every;
   bool force = false, quiet = false;
@@ -62,7 +65,8 @@ void overlay(const Arguments& arguments, Scene& scene) {
   if (arguments.every) o.every = *arguments.every;
   if (!arguments.folder.empty())
     for (std::string* file : {&o.csv, &o.vtk, &o.svg, &o.state})
-      if (!file->empty()) *file = (std::filesystem::path(arguments.folder) / *file).string();
+      if (!file->empty() && *file != "-")
+        *file = (std::filesystem::path(arguments.folder) / *file).string();
   if (!arguments.end) return;
   // Records stay where they were, so that runs in parts make one table.
   if (o.every == 0) o.every = scene.end / 1000;
@@ -71,8 +75,14 @@ void overlay(const Arguments& arguments, Scene& scene) {
 
 int run_scene(const Arguments& arguments) {
   const auto begin = std::chrono::steady_clock::now();
-  Scene scene = read_scene(arguments.file);
+  Scene scene = read_scene_argument(arguments.file);
   overlay(arguments, scene);
+  std::string html = arguments.html;
+  if (!html.empty() && html != "-" && !arguments.folder.empty())
+    html = (std::filesystem::path(arguments.folder) / html).string();
+  StandardOutputFile standard_output(scene.output, html);
+  std::optional<Player> player;
+  if (!html.empty()) player.emplace(scene, html);
   tether::Progress bar(1);
   RunOptions options;
   options.restart = arguments.restart;
@@ -81,8 +91,16 @@ int run_scene(const Arguments& arguments) {
   catch_signals();
   bar.start(scene.name, scene.end, 1);
   if (!arguments.quiet) options.progress = [&](double t) { bar.at(t); };
-  const RunResult result = run(scene, options);
+  if (player) options.record = [&](const Engine& engine) { player->record(engine); };
+  RunResult result = run(scene, options);
+  if (player) {
+    player->write();
+    result.written.push_back(html);
+    if (!arguments.restart.empty())
+      result.remarks.push_back(html + " shows the motion from the restart on");
+  }
   bar.hide();
+  standard_output.copy();
   print_summary(scene, result);
   print_times(result,
               std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -103,13 +121,14 @@ void add_run_command(CLI::App& app, int* status) {
   auto a = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
       "run", "Moves a scene, records what its [output] names, and judges it by its [[expect]]");
-  command->add_option("scene", a->file, "Scene file (TOML)")->required();
+  command->add_option("scene", a->file, "Scene file (TOML); - is the standard input")->required();
   command->add_option("--restart", a->restart,
                       "Go on from a saved state; the bits are those of a run in one piece");
   command->add_option("--output", a->folder, "Folder of all files written");
   command->add_option("--csv", a->csv, "Table: energies, momenta, errors, states of the bodies");
   command->add_option("--vtk", a->vtk, "Film for ParaView (.pvd, with a folder of .vtp)");
   command->add_option("--svg", a->svg, "Picture (needs gnuplot)");
+  command->add_option("--html", a->html, "Page that plays the run in a browser, on its own");
   command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
   command->add_option("--every", a->every, "Time between records, s")->check(positive_number());
   command->add_option("--end", a->end, "End of the run, s")->check(positive_number());
@@ -121,7 +140,9 @@ void add_run_command(CLI::App& app, int* status) {
       "Exit code: 0 every expectation is met, 1 one is not, 2 the scene, a file or an option is\n"
       "wrong, 3 the run could not go on, 130 (143) ended by Ctrl-C (SIGTERM), with all files "
       "whole\n"
-      "and the state saved. Options go before what the scene says in [output].");
+      "and the state saved. Options go before what the scene says in [output]. One of --csv, "
+      "--svg, --html and "
+      "--state may\nbe -, the standard output; what the run says goes to the standard error then.");
   command->callback([a, status] { *status = run_scene(*a); });
 }
 

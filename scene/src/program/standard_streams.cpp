@@ -10,8 +10,11 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <stdexcept>
+#include <utility>
 
 #include "commands.hpp"
+#include "output/whole_file.hpp"
 
 namespace tether::scene {
 
@@ -23,7 +26,46 @@ void guard_standard_streams() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
+namespace {
+
+bool reader_left = false;
+
+}  // namespace
+
+StandardOutput::StandardOutput(std::string file) : file_(std::move(file)) {
+  if (file_ != "-") return;
+  std::fflush(stdout);
+  real_ = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+  if (real_ < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
+    throw std::runtime_error(std::string("no standard output: ") + std::strerror(errno));
+}
+
+StandardOutput::~StandardOutput() {
+  if (real_ < 0) return;
+  std::fflush(stdout);
+  dup2(real_, STDOUT_FILENO);
+  close(real_);
+}
+
+void StandardOutput::write(const std::string& content) {
+  if (file_ != "-") return write_whole(file_, content);
+  std::size_t at = 0;
+  while (at < content.size()) {
+    const ssize_t n = ::write(real_, content.data() + at, content.size() - at);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0 && errno == EPIPE) {
+      reader_left = true;
+      return;
+    }
+    if (n <= 0)
+      throw std::runtime_error(std::string("cannot write the standard output: ") +
+                               std::strerror(errno));
+    at += static_cast<std::size_t>(n);
+  }
+}
+
 int flushed(int status) {
+  if (reader_left) return kSignal + SIGPIPE;
   errno = 0;
   const bool failed = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
   if (!failed) return status;

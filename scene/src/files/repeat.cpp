@@ -1,0 +1,211 @@
+// Tether: elements of a scene that stand for many. SPDX-License-Identifier: BSD-3-Clause
+#include "repeat.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace tether::scene::files {
+
+namespace {
+
+constexpr std::array<const char*, 4> kRepeated = {"body", "joint", "spring", "load"};
+constexpr std::array<char, 3> kCounters = {'i', 'j', 'k'};
+constexpr long kMostDigits = 6;  // of N in {i+N}
+
+Entry* entry(Value& table, std::string_view key) {
+  for (Entry& each : table.entries)
+    if (each.key == key) return &each;
+  return nullptr;
+}
+
+std::size_t size_of(const Value& value) {
+  std::size_t size = 1;
+  for (const Value& each : value.items) size += size_of(each);
+  for (const Entry& each : value.entries) size += size_of(each.value);
+  return size;
+}
+
+bool is_vector(const Value& value) {
+  if (value.kind != Value::Kind::array || value.items.size() != 3) return false;
+  for (const Value& item : value.items)
+    if (item.kind != Value::Kind::number || !std::isfinite(item.number)) return false;
+  return true;
+}
+
+/// One direction of a repetition.
+struct Row {
+  long count = 0;
+  std::array<double, 3> step{};
+};
+
+class Repetition {
+ public:
+  Repetition(const Entry& repeat, std::string what, const std::string& file)
+      : place_{file, repeat.line, repeat.column}, what_(std::move(what)) {
+    const Value& value = repeat.value;
+    if (value.kind == Value::Kind::array && !value.items.empty() &&
+        value.items.size() <= kCounters.size())
+      for (const Value& each : value.items) add_row(each);
+    else if (value.kind == Value::Kind::table)
+      add_row(value);
+    else
+      wrong(
+          "must be { count = 30, step = [x, y, z] } or an array of up to three of them, for rows "
+          "of rows");
+    std::size_t all = 1;
+    for (const Row& row : rows_) {
+      all *= static_cast<std::size_t>(row.count);
+      if (all > kMostElements) wrong(fmt::format("makes more than {} elements", kMostElements));
+    }
+    count_ = all;
+  }
+
+  std::size_t count() const { return count_; }
+
+  /// The last direction is the fastest.
+  Value copy(const Value& element, std::size_t number) const {
+    std::array<long, 3> at{};
+    for (std::size_t r = rows_.size(); r-- > 0;) {
+      at[r] = static_cast<long>(number % static_cast<std::size_t>(rows_[r].count));
+      number /= static_cast<std::size_t>(rows_[r].count);
+    }
+    Value out = element;
+    for (std::size_t e = 0; e < out.entries.size(); ++e)
+      if (out.entries[e].key == "repeat")
+        out.entries.erase(out.entries.begin() + static_cast<std::ptrdiff_t>(e--));
+    for (const char* key : {"position", "at"})
+      if (Entry* found = entry(out, key)) shift(found->value, at);
+    Entry* name = entry(out, "name");
+    if (name != nullptr && name->value.kind == Value::Kind::text &&
+        filled(name->value.text, at) == name->value.text)
+      name->value.text += suffix(at);
+    fill(out, at);
+    return out;
+  }
+
+  [[noreturn]] void wrong(const std::string& why) const {
+    refuse(place_, fmt::format("{}: repeat {}", what_, why));
+  }
+
+ private:
+  void add_row(const Value& table) {
+    Row row;
+    bool counted = false;
+    if (table.kind != Value::Kind::table) wrong("must be a table { count = ..., step = [...] }");
+    for (const Entry& each : table.entries) {
+      const Value& v = each.value;
+      if (each.key == "count") {
+        counted = v.kind == Value::Kind::number && v.whole && v.number >= 1 &&
+                  v.number <= static_cast<double>(kMostElements);
+        if (!counted)
+          wrong(fmt::format("count = {}: must be a whole number from 1 to {}", shown(v),
+                            kMostElements));
+        row.count = static_cast<long>(v.number);
+      } else if (each.key == "step") {
+        if (!is_vector(v)) wrong(fmt::format("step = {}: must be [x, y, z], m", shown(v)));
+        for (std::size_t i = 0; i < 3; ++i) row.step[i] = v.items[i].number;
+      } else {
+        wrong(fmt::format("has no {}; it has count and step", each.key));
+      }
+    }
+    if (!counted) wrong("needs count, a whole number");
+    rows_.push_back(row);
+  }
+
+  /// Points of the world: [x, y, z] or an array of them. What is wrong is left to the reader.
+  void shift(Value& value, const std::array<long, 3>& at) const {
+    if (!is_vector(value)) {
+      if (value.kind != Value::Kind::array) return;
+      for (Value& each : value.items)
+        if (is_vector(each)) shift(each, at);
+      return;
+    }
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t r = 0; r < rows_.size(); ++r)
+        value.items[i].number += static_cast<double>(at[r]) * rows_[r].step[i];
+  }
+
+  std::string suffix(const std::array<long, 3>& at) const {
+    std::string out;
+    for (std::size_t r = 0; r < rows_.size(); ++r)
+      out += fmt::format("{}{}", r == 0 ? ' ' : '.', at[r] + 1);
+    return out;
+  }
+
+  /// {i}, {i+1}, {j-2}: numbers from 1 in the first, second, third direction. Other braces stay.
+  std::string filled(const std::string& text, const std::array<long, 3>& at) const {
+    std::string out;
+    for (std::size_t k = 0; k < text.size(); ++k) {
+      const std::size_t end = text[k] == '{' ? text.find('}', k) : std::string::npos;
+      const auto number =
+          end == std::string::npos ? std::nullopt : counted(text.substr(k + 1, end - k - 1), at);
+      if (!number) {
+        out += text[k];
+        continue;
+      }
+      out += fmt::format("{}", *number);
+      k = end;
+    }
+    return out;
+  }
+  std::optional<long> counted(const std::string& word, const std::array<long, 3>& at) const {
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      if (word.empty() || word[0] != kCounters[r]) continue;
+      if (word.size() == 1) return at[r] + 1;
+      const std::string digits = word.substr(2);
+      const bool sign = word[1] == '+' || word[1] == '-';
+      if (!sign || digits.empty() || digits.size() > kMostDigits ||
+          digits.find_first_not_of("0123456789") != std::string::npos)
+        return std::nullopt;
+      return at[r] + 1 + (word[1] == '+' ? 1 : -1) * std::stol(digits);
+    }
+    return std::nullopt;
+  }
+
+  // The depth of a document is bounded.
+  void fill(Value& value, const std::array<long, 3>& at) const {
+    if (value.kind == Value::Kind::text) value.text = filled(value.text, at);
+    for (Value& each : value.items) fill(each, at);
+    for (Entry& each : value.entries) fill(each.value, at);
+  }
+
+  Place place_;
+  std::string what_;
+  std::vector<Row> rows_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+void repeat_elements(Value& document, const std::string& file) {
+  std::size_t made = 0, copied = 0;
+  for (const char* kind : kRepeated) {
+    Entry* all = entry(document, kind);
+    if (all == nullptr || all->value.kind != Value::Kind::array) continue;
+    std::vector<Value> items;
+    for (std::size_t k = 0; k < all->value.items.size(); ++k) {
+      Value& item = all->value.items[k];
+      const Entry* repeat = item.kind == Value::Kind::table ? entry(item, "repeat") : nullptr;
+      if (repeat == nullptr) {
+        items.push_back(std::move(item));
+        continue;
+      }
+      const Repetition repetition(*repeat, fmt::format("{} {}", kind, k + 1), file);
+      made += repetition.count();
+      copied += repetition.count() * size_of(item);
+      if (made > kMostElements || copied > kMostCopied)
+        repetition.wrong(
+            fmt::format("makes more than {} elements of the scene, or {} numbers and "
+                        "texts in them",
+                        kMostElements, kMostCopied));
+      for (std::size_t n = 0; n < repetition.count(); ++n)
+        items.push_back(repetition.copy(item, n));
+    }
+    all->value.items = std::move(items);
+  }
+}
+
+}  // namespace tether::scene::files

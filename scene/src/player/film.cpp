@@ -1,0 +1,128 @@
+// Tether: the frames of a page: a bounded number of them over a run of any length.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "film.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "json.hpp"
+
+namespace tether::scene::player {
+
+namespace {
+
+/// Doubles beyond the range of single precision stay at its border.
+float single(double x) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(x, -kMost, kMost));
+}
+
+void add(const Eigen::Vector3d& v, std::vector<float>& out) {
+  for (int i = 0; i < 3; ++i) out.push_back(single(v[i]));
+}
+
+}  // namespace
+
+Film::Film(std::vector<std::size_t> moving, const View& view, std::size_t bytes)
+    : moving_(std::move(moving)), view_(view), most_bytes_(bytes) {}
+
+void Film::Frame::take_errors(const Frame& other) {
+  drift = std::max(drift, other.drift);
+  penetration = std::max(penetration, other.penetration);
+  residual = std::max(residual, other.residual);
+}
+
+Film::Frame Film::frame(const Engine& engine, const Diagnostics& d) const {
+  Frame out;
+  out.time = engine.time();
+  out.kinetic = d.kinetic_energy;
+  out.potential = d.potential_energy;
+  out.drift = d.drift;
+  out.penetration = d.penetration;
+  out.residual = d.residual;
+  const auto in_view = [&](const Eigen::Vector3d& x) -> Eigen::Vector3d {
+    return (x - view_.centre) / view_.length;
+  };
+  for (const std::size_t b : moving_) {
+    const BodyState& body = engine.bodies()[b];
+    add(in_view(body.position), out.positions);
+    const auto& q = body.orientation;
+    for (const double x : {q.w(), q.x(), q.y(), q.z()})
+      out.orientations.push_back(
+          static_cast<std::int16_t>(std::lround(32767 * std::clamp(x, -1.0, 1.0))));
+  }
+  for (const ContactState& contact : engine.contacts()) {
+    add(in_view(contact.point), out.contacts);
+    add(contact.impulse, out.contacts);
+    add(contact.normal, out.contacts);
+  }
+  return out;
+}
+
+void Film::record(const Engine& engine, const Diagnostics& d) {
+  Frame now = frame(engine, d);
+  last_kept_ = seen_++ % stride_ == 0;
+  if (!last_kept_) {
+    frames_.back().take_errors(now);
+    last_ = std::move(now);
+    return;
+  }
+  bytes_ += now.bytes();
+  frames_.push_back(std::move(now));
+  if (frames_.size() > kMostFrames || (bytes_ > most_bytes_ && frames_.size() > 2)) halve();
+}
+
+void Film::halve() {
+  std::vector<Frame> half;
+  for (std::size_t i = 0; i < frames_.size(); ++i)
+    if (i % 2 == 0)
+      half.push_back(std::move(frames_[i]));
+    else
+      half.back().take_errors(frames_[i]);
+  if (frames_.size() % 2 == 0) {  // the last record may be the end
+    last_ = std::move(frames_.back());
+    last_kept_ = false;
+  }
+  frames_ = std::move(half);
+  stride_ *= 2;
+  bytes_ = 0;
+  for (const Frame& each : frames_) bytes_ += each.bytes();
+}
+
+void Film::finish() {
+  if (!last_kept_) frames_.push_back(std::move(last_));
+  last_kept_ = true;
+}
+
+std::string Film::json_entries() const {
+  const auto column = [&](const char* name, auto value) {
+    std::vector<double> values;
+    for (const Frame& each : frames_) values.push_back(value(each));
+    return fmt::format("\"{}\":{}", name, json(values));
+  };
+  return fmt::format("{},{},{},{},{},{},{}", column("times", [](const Frame& f) { return f.time; }),
+                     column("kinetic", [](const Frame& f) { return f.kinetic; }),
+                     column("potential", [](const Frame& f) { return f.potential; }),
+                     column("drift", [](const Frame& f) { return f.drift; }),
+                     column("penetration", [](const Frame& f) { return f.penetration; }),
+                     column("residual", [](const Frame& f) { return f.residual; }),
+                     column("contacts", [](const Frame& f) {
+                       return static_cast<double>(f.contacts.size() / 9);
+                     }));
+}
+
+template <class T>
+std::string Film::joined(std::vector<T> Frame::*part) const {
+  std::vector<T> all;
+  for (const Frame& each : frames_) all.insert(all.end(), (each.*part).begin(), (each.*part).end());
+  return base64(all);
+}
+
+std::string Film::positions() const { return joined(&Frame::positions); }
+std::string Film::orientations() const { return joined(&Frame::orientations); }
+std::string Film::contacts() const { return joined(&Frame::contacts); }
+
+}  // namespace tether::scene::player

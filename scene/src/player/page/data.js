@@ -1,0 +1,72 @@
+// The data of the page and poses at any time. SPDX-License-Identifier: BSD-3-Clause
+//
+// Lengths are in units of the view: (x - centre) / length. Quaternions are [w, x, y, z], body to world.
+'use strict';
+
+function textOf(id) { return document.getElementById(id).textContent; }
+
+// Little-endian numbers in base 64; `read` names a method of DataView.
+function numbersOf(id, Type, read) {
+  const text = atob(textOf(id));
+  const view = new DataView(new ArrayBuffer(text.length));
+  for (let i = 0; i < text.length; ++i) view.setUint8(i, text.charCodeAt(i));
+  const out = new Type(text.length / Type.BYTES_PER_ELEMENT);
+  for (let i = 0; i < out.length; ++i) out[i] = view[read](i * Type.BYTES_PER_ELEMENT, true);
+  return out;
+}
+
+function readFilm() {
+  const data = JSON.parse(textOf('film-data'));
+  data.positions = numbersOf('film-positions', Float32Array, 'getFloat32');
+  data.orientations = numbersOf('film-orientations', Int16Array, 'getInt16');
+  data.contactNumbers = numbersOf('film-contacts', Float32Array, 'getFloat32');
+  data.moving = data.bodies.filter(b => b.film !== null).length;
+  data.firstContact = [0];
+  for (const count of data.contacts) data.firstContact.push(data.firstContact[data.firstContact.length - 1] + count);
+  data.largestImpulse = 0;
+  for (let k = 0; k < data.contactNumbers.length; k += 9)
+    data.largestImpulse = Math.max(data.largestImpulse, Math.hypot(...data.contactNumbers.subarray(k + 3, k + 6)));
+  data.start = data.times[0];
+  data.end = data.times[data.times.length - 1];
+  return data;
+}
+
+// The last frame not after `time`.
+function frameAt(data, time) {
+  let low = 0, high = data.times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (data.times[middle] <= time) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+// Poses of all bodies, 7 numbers each: between frames positions are linear, turns go the short way.
+function posesAt(data, time, poses) {
+  const a = frameAt(data, time), b = Math.min(a + 1, data.times.length - 1);
+  const span = data.times[b] - data.times[a];
+  const share = span > 0 ? Math.min(1, Math.max(0, (time - data.times[a]) / span)) : 0;
+  data.bodies.forEach((body, i) => {
+    const out = 7 * i;
+    if (body.film === null) {
+      for (let k = 0; k < 3; ++k) poses[out + k] = body.position[k];
+      for (let k = 0; k < 4; ++k) poses[out + 3 + k] = body.orientation[k];
+      return;
+    }
+    const pa = 3 * (a * data.moving + body.film), pb = 3 * (b * data.moving + body.film);
+    for (let k = 0; k < 3; ++k)
+      poses[out + k] = data.positions[pa + k] + share * (data.positions[pb + k] - data.positions[pa + k]);
+    const qa = 4 * (a * data.moving + body.film), qb = 4 * (b * data.moving + body.film);
+    let dot = 0, square = 0;
+    for (let k = 0; k < 4; ++k) dot += data.orientations[qa + k] * data.orientations[qb + k];
+    const sign = dot < 0 ? -1 : 1;
+    for (let k = 0; k < 4; ++k) {
+      const q = (1 - share) * data.orientations[qa + k] + share * sign * data.orientations[qb + k];
+      poses[out + 3 + k] = q;
+      square += q * q;
+    }
+    const norm = Math.sqrt(square) || 1;
+    for (let k = 0; k < 4; ++k) poses[out + 3 + k] /= norm;
+  });
+  return a;
+}
