@@ -21,6 +21,12 @@ void System::joint_values(double t, const double* y, double* g) {
 }
 
 void System::constraint_values(double t, const double* y, double* g) {
+  row_values(t, y, g);
+  if (invariants_.count() > 0) invariants_.values(t, y, g + first_invariant());
+}
+
+// Rows of joints on positions, on velocities, and norms of quaternions.
+void System::row_values(double t, const double* y, double* g) {
   joint_values(t, y, joint_values_.data());
   const int p = in_use_.count();
   for (int k = 0; k < p; ++k) {
@@ -31,21 +37,25 @@ void System::constraint_values(double t, const double* y, double* g) {
   for (int k = 0; k < moving(); ++k)
     norms[k] =
         0.5 * (Eigen::Map<const Eigen::Vector4d>(y + kBody * k + kQuaternion).squaredNorm() - 1.0);
-  if (invariants_.count() > 0) invariants_.values(t, y, norms + moving());
 }
 
-void System::constraint_jacobian(double t, const double* y, ConstraintRows C) {
+// `entries(row, slot, other)`: where the derivatives by the coordinates of body `slot` begin, from
+// its position on; `other` is the slot of the row's second body, -1 without.
+template <class Place>
+void System::row_jacobian(double t, const double* y, const Place& entries) {
   update(t, y);
   bodies_.set_turns(y);
   const Bodies& bodies = bodies_.all();
   const int p = in_use_.count();
-  const auto put = [&](int row, const Inertia& inertia, const Derivatives& d, int first) {
+  const auto put = [&](int row, const Inertia& inertia, const Inertia& other, const Derivatives& d,
+                       int first) {
     if (inertia.slot < 0) return;
-    const int column = kBody * inertia.slot;
-    C.row(row).segment<3>(column + kPosition) += d.segment<3>(first);
-    C.row(row).segment<4>(column + kQuaternion) +=
+    double* to = entries(row, inertia.slot, other.slot);
+    Eigen::Map<Eigen::RowVector3d>(to + kPosition) += d.segment<3>(first);
+    Eigen::Map<Eigen::RowVector4d>(to + kQuaternion) +=
         d.segment<3>(first + 3).transpose() * bodies.turns[at(inertia.slot)];
-    C.row(row).segment<6>(column + kVelocity) += d.segment<6>(first + 6);
+    if (row < p) return;  // no velocities in rows on positions
+    Eigen::Map<Eigen::Matrix<double, 1, 6>>(to + kVelocity) += d.segment<6>(first + 6);
   };
   rows_.each([&](const auto& row) {
     const Inertia &ia = bodies.inertia[at(row.first)], &ib = bodies.inertia[at(row.second)];
@@ -57,22 +67,60 @@ void System::constraint_jacobian(double t, const double* y, ConstraintRows C) {
     for (int i = 0; i < row.count; ++i) {
       const int place = in_use_.place_of(row.row + i);
       if (place < 0) continue;
-      put(place, ia, g[i].derivatives(), 0);
-      put(place, ib, g[i].derivatives(), kBodyDirections);
-      put(p + place, ia, rate[i].derivatives(), 0);
-      put(p + place, ib, rate[i].derivatives(), kBodyDirections);
+      put(place, ia, ib, g[i].derivatives(), 0);
+      put(place, ib, ia, g[i].derivatives(), kBodyDirections);
+      put(p + place, ia, ib, rate[i].derivatives(), 0);
+      put(p + place, ib, ia, rate[i].derivatives(), kBodyDirections);
     }
   });
+  for (int k = 0; k < moving(); ++k)
+    Eigen::Map<Eigen::RowVector4d>(entries(2 * p + k, k, -1) + kQuaternion) =
+        Eigen::Map<const Eigen::RowVector4d>(y + kBody * k + kQuaternion);
+}
+
+void System::constraint_jacobian(double t, const double* y, ConstraintRows C) {
+  row_jacobian(t, y, [&](int row, int slot, int) { return &C(row, kBody * slot); });
+  const int p = in_use_.count();
   for (int k = 0; k < p; ++k) {
     const int place = in_use_.place_of(in_use_.used()[at(k)]);
     if (place == k) continue;
     C.row(k) = C.row(place);
     C.row(p + k) = C.row(p + place);
   }
-  for (int k = 0; k < moving(); ++k)
-    C.row(2 * p + k).segment<4>(kBody * k + kQuaternion) =
-        Eigen::Map<const Eigen::RowVector4d>(y + kBody * k + kQuaternion);
-  if (invariants_.count() > 0) invariants_.jacobian(C, 2 * p + moving());
+  if (invariants_.count() > 0) invariants_.jacobian(C, first_invariant());
+}
+
+// The same rows with their entries only. A row on positions has a body's position and quaternion,
+// one on velocities its velocity, too, which come one after the other in y.
+ida_projection::SparseJacobian System::sparse_row_jacobian() {
+  const int p = in_use_.count();
+  std::vector<std::vector<int>> slots(at(first_invariant()));
+  rows_.each([&](const auto& row) {
+    for (int i = 0; i < row.count; ++i)
+      for (const int body : {row.first, row.second}) {
+        const int slot = bodies_.all().inertia[at(body)].slot;
+        if (slot < 0) continue;
+        slots[at(row.row + i)].push_back(slot);
+        slots[at(p + row.row + i)].push_back(slot);
+      }
+  });
+  for (int k = 0; k < moving(); ++k) slots[at(2 * p + k)] = {k};
+  const auto width = [p](int row) { return row < p || row >= 2 * p ? int{kVelocity} : int{kBody}; };
+  ida_projection::SparseJacobian jacobian;
+  jacobian.starts.push_back(0);
+  for (int row = 0; row < first_invariant(); ++row) {
+    std::sort(slots[at(row)].begin(), slots[at(row)].end());
+    for (const int slot : slots[at(row)])
+      for (int j = 0; j < width(row); ++j) jacobian.columns.push_back(kBody * slot + j);
+    jacobian.starts.push_back(static_cast<int>(jacobian.columns.size()));
+  }
+  jacobian.fill = [this, width, starts = jacobian.starts](double t, ida_projection::ConstVector y,
+                                                          ida_projection::Vector entries) {
+    row_jacobian(t, y.data(), [&](int row, int slot, int other) {
+      return entries.data() + starts[at(row)] + (other >= 0 && other < slot ? width(row) : 0);
+    });
+  };
+  return jacobian;
 }
 
 std::vector<std::string> System::constraint_names() const {
@@ -92,6 +140,10 @@ std::vector<std::string> System::constraint_names() const {
 }
 
 ida_projection::Constraints System::constraints() {
+  return in_use_.fixed() ? sparse_constraints() : dense_constraints();
+}
+
+ida_projection::Constraints System::dense_constraints() {
   ida_projection::Constraints all;
   all.count = constraint_count();
   all.names = constraint_names();
@@ -103,6 +155,34 @@ ida_projection::Constraints System::constraints() {
         constraint_jacobian(t, y.data(), ConstraintRows(C.data(), C.rows(), C.cols()));
       });
   return all;
+}
+
+// Invariants are full rows, joined to the others.
+ida_projection::Constraints System::sparse_constraints() {
+  const std::vector<std::string> names = constraint_names();
+  const auto invariant = names.begin() + first_invariant();
+  ida_projection::Constraints joints;
+  joints.count = first_invariant();
+  joints.names.assign(names.begin(), invariant);
+  joints.value = [this](double t, ida_projection::ConstVector y, ida_projection::Vector g) {
+    row_values(t, y.data(), g.data());
+  };
+  joints.jacobian = sparse_row_jacobian();
+  if (invariants_.count() == 0) return joints;
+  ida_projection::Constraints kept;
+  kept.count = invariants_.count();
+  kept.names.assign(invariant, names.end());
+  kept.value = [this](double t, ida_projection::ConstVector y, ida_projection::Vector g) {
+    update(t, y.data());
+    invariants_.values(t, y.data(), g.data());
+  };
+  kept.jacobian = ida_projection::DenseJacobian(
+      [this](double t, ida_projection::ConstVector y, ida_projection::Matrix C) {
+        update(t, y.data());
+        bodies_.set_turns(y.data());
+        invariants_.jacobian(ConstraintRows(C.data(), C.rows(), C.cols()), 0);
+      });
+  return joints + kept;
 }
 
 // Of rows with different units, in SI.

@@ -6,6 +6,7 @@ namespace tether::scene::smooth {
 namespace {
 
 constexpr double kEpsilon = 1e-11;  // of the diagonal of G M^-1 G^T
+constexpr int kManyRows = 48;
 
 }  // namespace
 
@@ -27,11 +28,10 @@ void JointGradient::form(const JointRows& rows, const MovingBodies& bodies) {
   S.noalias() = GM * G.transpose();
 }
 
-ForwardDynamics::ForwardDynamics(JointRows& rows, MovingBodies& bodies)
-    : rows_(rows), bodies_(bodies), factor_(rows.count()) {
+ForwardDynamics::ForwardDynamics(JointRows& rows, MovingBodies& bodies, bool gradient)
+    : rows_(rows), bodies_(bodies) {
   rows.set_time(0.0);
   bodies_.set_state(bodies_.start().data());
-  gradient_.form(rows_, bodies_);
   const int m = rows.count(), n = 6 * bodies.count();
   lambda_.setZero(m);
   gamma_.setZero(m);
@@ -39,6 +39,14 @@ ForwardDynamics::ForwardDynamics(JointRows& rows, MovingBodies& bodies)
   scratch_.setZero(m);
   a_.setZero(n);
   free_.setZero(n);
+  if (m >= kManyRows && !gradient) {
+    sparse_.emplace(rows_, bodies_);
+    change_.setZero(n);
+    sparse_->factor();
+    size_of_row_ = sparse_->size_of_rows();
+    return;
+  }
+  gradient_.form(rows_, bodies_);
   size_of_row_ = gradient_.S.diagonal();
   epsilon_ = kEpsilon * size_of_row_;
 }
@@ -53,12 +61,27 @@ void ForwardDynamics::solve(const std::vector<Load6>& loads) {
   }
   a_ = free_;
   if (rows_.count() == 0) return;
-  gradient_.form(rows_, bodies_);
   const Bodies& bodies = bodies_.all();
   rows_.each([&](const auto& row) {
     row.template rows<2>(bodies.frames[at(row.first)], bodies.frames[at(row.second)],
                          gamma_.data() + row.row);
   });
+  if (sparse_)
+    solve_sparse();
+  else
+    solve_dense();
+}
+
+void ForwardDynamics::solve_sparse() {
+  sparse_->factor();
+  sparse_->multiply(free_, right_);
+  right_ = -gamma_ - right_;
+  sparse_->solve(right_, change_, lambda_);
+  a_ += change_;
+}
+
+void ForwardDynamics::solve_dense() {
+  gradient_.form(rows_, bodies_);
   right_ = -gamma_;
   right_.noalias() -= gradient_.G * free_;
   regular_ = gradient_.S;

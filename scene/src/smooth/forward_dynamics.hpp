@@ -2,18 +2,21 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <optional>
 #include <vector>
 
 #include "joint_gradient.hpp"
+#include "sparse_joint_gradient.hpp"
 
 namespace tether::scene::smooth {
 
-/// M a = f + G^T lambda and G a = -gamma, with a diagonal term of 1e-11 in G M^-1 G^T, refined
-/// three times, so that it decides only where the rows do not.
+/// M a = f + G^T lambda and G a = -gamma. Few rows: dense, with a diagonal term of 1e-11 in
+/// G M^-1 G^T, refined three times, so that it decides only where the rows do not. Many: by the
+/// entries of G; gradient() and solve_rows() are then not to be had.
 class ForwardDynamics {
  public:
-  /// Sets the state at the start of the scene.
-  ForwardDynamics(JointRows& rows, MovingBodies& bodies);
+  /// Sets the state at the start of the scene. `gradient`: it will be asked for.
+  ForwardDynamics(JointRows& rows, MovingBodies& bodies, bool gradient);
 
   /// At the state that is set; torques in body axes. Leaves the accelerations of the frames at 0.
   void solve(const std::vector<Load6>& loads);
@@ -29,11 +32,15 @@ class ForwardDynamics {
   Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& right) const { return factor_.solve(right); }
 
  private:
+  void solve_dense();
+  void solve_sparse();
+
   const JointRows& rows_;
   MovingBodies& bodies_;
+  std::optional<SparseJointGradient> sparse_;
   JointGradient gradient_;
   Eigen::VectorXd size_of_row_, epsilon_, lambda_, a_;
-  Eigen::VectorXd gamma_, free_, right_, scratch_;
+  Eigen::VectorXd gamma_, free_, right_, scratch_, change_;
   Eigen::MatrixXd regular_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
 };

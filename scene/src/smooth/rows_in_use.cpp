@@ -20,6 +20,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace tether::scene::smooth {
 
@@ -32,11 +33,21 @@ constexpr double kRounding = 1e-11;    // of g, with room for the next steps
 constexpr double kWeakest = 1e-3, kGood = 0.3;
 constexpr double kMuchWorse = 0.1;
 constexpr int kWait = 4;  // steps between looks while all pivots are good
+// Rows of a tree are independent at every state; looking at them costs the cube of their number.
+constexpr int kTrustStructure = 48;
 
 }  // namespace
 
 RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
     : rows_(rows), bodies_(bodies), count_(rows.count()) {
+  if (rows.count() >= kTrustStructure && independent_by_structure()) {
+    fixed_ = true;
+    used_.resize(at(count_));
+    std::iota(used_.begin(), used_.end(), 0);
+    place_of_used_ = used_;
+    carries_.assign(at(count_), 1);
+    return;
+  }
   if (rows.count() > 0) {
     rows_.set_time(0.0);
     bodies_.set_state(bodies_.start().data());
@@ -51,6 +62,30 @@ RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
   place_of_used_.assign(at(rows.count()), -1);
   carries_.assign(at(rows.count()), 0);
   choose();
+}
+
+// Bodies as nodes, all that do not move as one, joints as edges: a forest. From its leaves inwards
+// each joint has rows of full rank on a body that no other joint left acts on.
+bool RowsInUse::independent_by_structure() const {
+  std::vector<int> parent(at(bodies_.count()) + 1);  // the last: all that do not move
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto tree_of = [&](int body) {
+    const int slot = bodies_.all().inertia[at(body)].slot;
+    int i = slot < 0 ? bodies_.count() : slot;
+    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
+    return i;
+  };
+  std::vector<char> seen;
+  bool forest = true;
+  rows_.each([&](const auto& row) {
+    if (row.joint >= static_cast<int>(seen.size())) seen.resize(at(row.joint) + 1, 0);
+    if (seen[at(row.joint)]) return;
+    seen[at(row.joint)] = 1;
+    const int a = tree_of(row.first), b = tree_of(row.second);
+    forest = forest && a != b;
+    parent[at(a)] = b;
+  });
+  return forest;
 }
 
 // Of the combinations n those that are dead points: n^T gamma(v) != 0 for some of a few velocities.
@@ -102,7 +137,7 @@ void RowsInUse::choose(double tolerance) {
 }
 
 void RowsInUse::choose() {
-  if (count_ == 0) return;
+  if (count_ == 0 || fixed_) return;
   gradient_.form(rows_, bodies_);
   Eigen::MatrixXd& G = gradient_.G;
   for (int i = 0; i < rows_.count(); ++i) G.row(i) /= std::max(G.row(i).norm(), 1e-300);

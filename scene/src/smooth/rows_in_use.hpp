@@ -20,6 +20,8 @@ class RowsInUse {
   const std::vector<int>& used() const { return used_; }
   int place_of(int row) const { return place_of_used_[at(row)]; }  ///< first in used(), or -1
   bool carries_multiplier(int row) const { return carries_[at(row)] != 0; }
+  /// All rows are used for the whole run, each in its own place.
+  bool fixed() const { return fixed_; }
   /// Grows when other rows carry multipliers: the matrix has other zeros then.
   int multiplier_choices() const { return multiplier_choices_; }
   /// How far the rows in use are from depending on each other: the length of what the last one adds
@@ -31,6 +33,7 @@ class RowsInUse {
   void look();  ///< after a step, at the state that is set
 
  private:
+  bool independent_by_structure() const;
   int count_needed_beyond(Eigen::Index rank, const Eigen::VectorXd& length,
                           const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr);
   void choose();
@@ -39,6 +42,7 @@ class RowsInUse {
   JointRows& rows_;
   MovingBodies& bodies_;
   double weak_ = 0;  // pivot below which a row is not used
+  bool fixed_ = false;
   int count_ = 0;
   std::vector<int> used_, place_of_used_;
   std::vector<char> carries_;

@@ -16,7 +16,7 @@ System::System(const Scene& scene, const Units& units)
       in_use_(rows_, bodies_),
       forces_(effects::make_forces(scene, bodies_.all())),
       invariants_(scene, bodies_, forces_, first_work()),
-      dynamics_(rows_, bodies_),
+      dynamics_(rows_, bodies_, form_ == Formulation::index0),
       terms_{bodies_, rows_, forces_} {
   size_ = first_multiplier();
   if (form_ == Formulation::index1) size_ += rows();

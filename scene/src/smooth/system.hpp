@@ -85,6 +85,13 @@ class System {
   int first_multiplier() const { return first_work() + (invariants_.has_work() ? 1 : 0); }
   int first_eta() const { return first_multiplier() + rows(); }
 
+  int first_invariant() const { return 2 * in_use_.count() + moving(); }  // of the constraints
+  void row_values(double t, const double* y, double* g);
+  template <class Place>
+  void row_jacobian(double t, const double* y, const Place& entries);
+  ida_projection::SparseJacobian sparse_row_jacobian();
+  ida_projection::Constraints dense_constraints(), sparse_constraints();
+
   void update(double t, const double* y);  // frames, without accelerations
   void add_multipliers(const double* lambda, std::vector<Load6>& loads) const;
   void sum_forces(Stopwatch* watch);

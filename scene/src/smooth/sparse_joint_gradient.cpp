@@ -1,0 +1,84 @@
+// Tether: the gradient of many joints and its factors. SPDX-License-Identifier: BSD-3-Clause
+#include "sparse_joint_gradient.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace tether::scene::smooth {
+
+namespace {
+
+using Row6 = Eigen::Matrix<double, 1, 6>;
+
+}  // namespace
+
+// put(row, where its entries of this body begin within the row, body's slot, force, torque)
+template <class Put>
+void SparseJointGradient::each_entry(const Put& put) const {
+  const Bodies& bodies = bodies_.all();
+  rows_.each([&](const auto& row) {
+    const int a = bodies.inertia[at(row.first)].slot, b = bodies.inertia[at(row.second)].slot;
+    JointRows::each_unit_load(
+        row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+          const int slot = bodies.inertia[at(body)].slot, other = body == row.first ? b : a;
+          put(row.row + i, other >= 0 && other < slot ? 6 : 0, slot, force, torque);
+        });
+  });
+}
+
+SparseJointGradient::SparseJointGradient(const JointRows& rows, const MovingBodies& bodies)
+    : rows_(rows), bodies_(bodies) {
+  for (int k = 0; k < bodies.count(); ++k)
+    roots_.emplace_back(bodies.inertia(k).inverse.llt().matrixL());
+  std::vector<std::vector<int>> slots(at(rows.count()));
+  each_entry([&](int row, int, int slot, const Vector3d&, const Vector3d&) {
+    slots[at(row)].push_back(slot);
+  });
+  std::vector<int> columns;
+  starts_.push_back(0);
+  for (std::vector<int>& of_row : slots) {
+    std::sort(of_row.begin(), of_row.end());
+    for (const int slot : of_row)
+      for (int j = 0; j < 6; ++j) columns.push_back(6 * slot + j);
+    starts_.push_back(static_cast<int>(columns.size()));
+  }
+  factors_.resize(6 * bodies.count(), starts_, std::move(columns), 0);
+  std::fill_n(factors_.metric(), 6 * bodies.count(), 1.0);
+  least_.setZero(6 * bodies.count());
+}
+
+void SparseJointGradient::factor() {
+  std::fill_n(factors_.entries(), starts_.back(), 0.0);
+  each_entry([&](int row, int offset, int slot, const Vector3d& force, const Vector3d& torque) {
+    Eigen::Map<Row6> to(factors_.entries() + starts_[at(row)] + offset);
+    to.head<3>() += force.transpose() / std::sqrt(bodies_.inertia(slot).mass);
+    to.tail<3>() += torque.transpose() * roots_[at(slot)];
+  });
+  factors_.factor();
+}
+
+void SparseJointGradient::solve(const Eigen::VectorXd& right, Eigen::VectorXd& a,
+                                Eigen::VectorXd& lambda) {
+  factors_.solve(right.data(), least_.data());
+  factors_.multipliers(least_.data(), lambda.data());
+  for (int k = 0; k < bodies_.count(); ++k) {
+    a.segment<3>(6 * k) = least_.segment<3>(6 * k) / std::sqrt(bodies_.inertia(k).mass);
+    a.segment<3>(6 * k + 3) = roots_[at(k)] * least_.segment<3>(6 * k + 3);
+  }
+}
+
+void SparseJointGradient::multiply(const Eigen::VectorXd& a, Eigen::VectorXd& rates) const {
+  rates.setZero();
+  each_entry([&](int row, int, int slot, const Vector3d& force, const Vector3d& torque) {
+    rates[row] += force.dot(a.segment<3>(6 * slot)) + torque.dot(a.segment<3>(6 * slot + 3));
+  });
+}
+
+Eigen::VectorXd SparseJointGradient::size_of_rows() const {
+  Eigen::VectorXd size(rows_.count());
+  for (int i = 0; i < rows_.count(); ++i) size[i] = std::pow(factors_.row_norm(i), 2);
+  return size;
+}
+
+}  // namespace tether::scene::smooth

@@ -1,0 +1,40 @@
+// Tether: the gradient of many joints and its factors. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/linalg/sparse_minimum_norm.hpp>
+#include <vector>
+
+#include "joints/joint_rows.hpp"
+#include "moving_bodies.hpp"
+
+namespace tether::scene::smooth {
+
+using joints::JointRows;
+
+/// C = G M^-1/2 with G as in JointGradient, by its entries: six for each row and body.
+class SparseJointGradient {
+ public:
+  SparseJointGradient(const JointRows& rows, const MovingBodies& bodies);
+
+  /// At the state that is set.
+  void factor();
+  /// Of least kinetic energy a^T M a / 2: a with G a = right, and lambda with M a = G^T lambda.
+  void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda);
+  /// Of G with each moving body's velocities.
+  void multiply(const Eigen::VectorXd& a, Eigen::VectorXd& rates) const;
+  /// Diagonal of G M^-1 G^T; after factor().
+  Eigen::VectorXd size_of_rows() const;
+
+ private:
+  template <class Put>
+  void each_entry(const Put& put) const;
+
+  const JointRows& rows_;
+  const MovingBodies& bodies_;
+  std::vector<Eigen::Matrix3d> roots_;  // L of each moving body's inverse inertia L L^T
+  std::vector<int> starts_;
+  linalg::SparseMinimumNorm factors_;
+  Eigen::VectorXd least_;
+};
+
+}  // namespace tether::scene::smooth
