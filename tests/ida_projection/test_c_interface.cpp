@@ -107,8 +107,7 @@ TEST_CASE("C interface: every kind of rows gives the bits of the C++ interface")
     return tether_add_rows(set, 1, circle_value, circle_jacobian, nullptr);
   };
   CHECK(same_bits(end_by_c(dense), end_by_cpp(on_circle())));
-  const auto both = [](sunrealtype t, const sunrealtype* y, sunrealtype* g, sunrealtype* C,
-                       void*) {
+  const auto both = [](sunrealtype t, const sunrealtype* y, sunrealtype* g, sunrealtype* C, void*) {
     const int flag = circle_value(t, y, g, nullptr);
     return flag != 0 ? flag : circle_jacobian(t, y, C, nullptr);
   };
