@@ -147,13 +147,4 @@ void BodyNewton::solve(PackedVector* y) {
   }
 }
 
-bool bodies_serve(const Problem& problem, double price, double besides, BodyNewton& bodies) {
-  constexpr int kMany = 4;          // contacts for each body
-  constexpr double kClearly = 0.5;  // of a guess, and of factors whose digits need no refinement
-  const BodyForm* form = problem.body_form();
-  if (form == nullptr || problem.contacts() < kMany * form->bodies) return false;
-  bodies.order(problem);
-  return bodies.cost() + besides < kClearly * price;
-}
-
 }  // namespace tether::contact::detail

@@ -44,8 +44,4 @@ class BodyNewton {
   Packed p_;
 };
 
-/// Orders `bodies`; true: they have so many contacts that equations of bodies, with `besides` ns of
-/// other work a step, take the place of those of contacts at a guess of `price` ns.
-bool bodies_serve(const Problem& problem, double price, double besides, BodyNewton& bodies);
-
 }  // namespace tether::contact::detail

@@ -35,23 +35,32 @@ double dot3(const double* x, const double* y) { return x[0] * y[0] + x[1] * y[1]
 
 void InteriorPoint::reset(int contacts) {
   n_ = contacts;
-  for (Packed* p : {&x_, &u_, &dx_, &du_, &r_, &w_, &z_, &swept_, &anchor_, &scaled_x_, &scaled_u_,
-                    &affine_x_, &affine_u_, &step_, &aim_, &defect_, &stuck_x_})
+  for (Packed* p : {
+           &point_.x,
+           &point_.u,
+           &change_.x,
+           &change_.u,
+           &r_,
+           &w_,
+           &z_,
+           &swept_,
+           &anchor_,
+           &scaled_.x,
+           &scaled_.u,
+           &affine_.x,
+           &affine_.u,
+           &step_,
+           &aim_,
+           &defect_,
+       })
     p->resize(at(n_));
   scaling_.resize(at(n_));
   sides_.resize(at(n_));
   flat_.resize(at(n_));
   tau_ = 0;
   exact_ = false;
-  ordered_ = by_bodies_ = false;
-  stuck_ = Stuck::untried;
-}
-
-double InteriorPoint::cost(const Search& search) const {
-  const double blocks = static_cast<double>(search.system.problem().blocks().size());
-  if (ordered_ && by_bodies_) return bodies_.cost() + 3 * search.sweep_cost;
-  const double operations = ordered_ ? lu_.operations() : blocks * blocks / std::max(1, n_);
-  return 4 * operations + 3 * search.sweep_cost + 25 * blocks + 150.0 * n_;
+  matrix_.reset();
+  sticking_.reset(contacts);
 }
 
 // w_: velocities at z_, of the proximal problem if there is one
@@ -73,12 +82,12 @@ void InteriorPoint::velocities(const System& system) {
 void InteriorPoint::residual(const System& system) {
   const Problem& p = system.problem();
   for (int i = 0; i < n_; ++i) {
-    const double* x = x_[at(i)].v;
+    const double* x = point_.x[at(i)].v;
     z_[at(i)] = {{flat_[at(i)] ? x[0] : x[0] / p.local(i).mu, x[1], x[2], 0}};
   }
   velocities(system);
   for (int i = 0; i < n_; ++i) {
-    const double* u = u_[at(i)].v;
+    const double* u = point_.u[at(i)].v;
     const double* w = w_[at(i)].v;
     double* r = r_[at(i)].v;
     if (flat_[at(i)]) {
@@ -98,16 +107,16 @@ void InteriorPoint::residual(const System& system) {
 // Scalings and both sides of the Newton matrix; false: a point has reached its cone.
 bool InteriorPoint::scale(const System& system) {
   for (int i = 0; i < n_; ++i) {
-    const double* u = u_[at(i)].v;
+    const double* u = point_.u[at(i)].v;
     ConeScaling& s = scaling_[at(i)];
     Sides& sides = sides_[at(i)];
     sides = {};
     if (flat_[at(i)]) {
-      if (!s.set_flat(x_[at(i)].v[0], u[0])) return false;
+      if (!s.set_flat(point_.x[at(i)].v[0], u[0])) return false;
       sides.left.column[0] = sides.right.column[0] = 1 / s.d[0];
       continue;
     }
-    if (!s.set(x_[at(i)].v, u)) return false;
+    if (!s.set(point_.x[at(i)].v, u)) return false;
     double gamma[2];
     system.gamma(i, gamma);
     const double slip = slip_of(u), c = kSmooth;
@@ -153,35 +162,36 @@ bool InteriorPoint::factor_contacts(const System& system) {
   const Problem& p = system.problem();
   PackedBlock scaled;
   for (int row = 0; row < n_; ++row) {
-    const int i = lu_.block_row(row);
-    lu_.begin_row(row);
+    const int i = matrix_.contacts().block_row(row);
+    matrix_.contacts().begin_row(row);
     for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
       const int j = p.columns()[at(k)];
       if (i != j)
         enclose(sides_[at(i)].left, p.blocks()[at(k)], sides_[at(j)].right, scaled);
       else
         diagonal(system, i, true, scaled);
-      lu_.add(j, scaled.column);
+      matrix_.contacts().add(j, scaled.column);
     }
-    if (!lu_.end_row()) return false;
+    if (!matrix_.contacts().end_row()) return false;
   }
   return true;
 }
 
 bool InteriorPoint::factor_bodies(const System& system) {
   PackedBlock scaled;
-  bodies_.begin();
+  matrix_.bodies().begin();
   for (int i = 0; i < n_; ++i) {
     diagonal(system, i, false, scaled);
-    bodies_.add(i, scaled, sides_[at(i)].left, sides_[at(i)].right);
+    matrix_.bodies().add(i, scaled, sides_[at(i)].left, sides_[at(i)].right);
   }
-  return bodies_.factor();
+  return matrix_.bodies().factor();
 }
 
 // Unknowns W dx in the frames of the scalings.
 bool InteriorPoint::factor(Search& search) {
   if (!scale(search.system)) return false;
-  const bool regular = by_bodies_ ? factor_bodies(search.system) : factor_contacts(search.system);
+  const bool regular =
+      matrix_.by_bodies() ? factor_bodies(search.system) : factor_contacts(search.system);
   ++search.counts.factorisations;
   ++search.counts.interior_steps;
   search.counts.work += cost(search);
@@ -196,8 +206,8 @@ void InteriorPoint::aim(double centre, bool correct) {
     const ConeScaling& s = scaling_[at(i)];
     const Sides& sides = sides_[at(i)];
     const double* l = s.lambda;
-    const double* f = affine_x_[at(i)].v;
-    const double* g = affine_u_[at(i)].v;
+    const double* f = affine_.x[at(i)].v;
+    const double* g = affine_.u[at(i)].v;
     double* y = aim_[at(i)].v;
     double* rhs = step_[at(i)].v;
     if (flat_[at(i)]) {
@@ -232,8 +242,8 @@ double InteriorPoint::expand(const System& system) {
     const ConeScaling& s = scaling_[at(i)];
     const double* xi = step_[at(i)].v;
     const double e[3] = {xi[0] / s.d[0], xi[1] / s.d[1], xi[2] / s.d[2]};
-    double* d = dx_[at(i)].v;
-    s.turn_back(xi, scaled_x_[at(i)].v);
+    double* d = change_.x[at(i)].v;
+    s.turn_back(xi, scaled_.x[at(i)].v);
     s.turn_back(e, d);
     z_[at(i)] = {{flat_[at(i)] ? d[0] : d[0] / p.local(i).mu, d[1], d[2], 0}};
   }
@@ -270,8 +280,8 @@ double InteriorPoint::expand(const System& system) {
       if (s.d[c] * s.d[c] < mean_diagonal(L)) e[c] = s.d[c] * (y[c] - xi[c]);
       g[c] = e[c] / s.d[c];
     }
-    s.turn_back(e, du_[at(i)].v);
-    s.turn_back(g, scaled_u_[at(i)].v);
+    s.turn_back(e, change_.u[at(i)].v);
+    s.turn_back(g, scaled_.u[at(i)].v);
   }
   return size > 0 ? std::sqrt(defect / size) : 0;
 }
@@ -281,10 +291,10 @@ void InteriorPoint::direction(const System& system, double centre, bool correct)
   constexpr double kRefine = 1e-6;
   constexpr int kRefinements = 3;
   aim(centre, correct);
-  solve(step_.data());
+  matrix_.solve(step_.data());
   double defect = expand(system);
   for (int k = 0; k < kRefinements && defect > kRefine; ++k) {
-    solve(defect_.data());
+    matrix_.solve(defect_.data());
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) step_[at(i)].v[c] += defect_[at(i)].v[c];
     const double before = defect;
@@ -297,7 +307,7 @@ double InteriorPoint::longest_step() const {
   double t = std::numeric_limits<double>::infinity();
   for (int i = 0; i < n_; ++i) {
     const ConeScaling& s = scaling_[at(i)];
-    for (const double* d : {scaled_x_[at(i)].v, scaled_u_[at(i)].v}) {
+    for (const double* d : {scaled_.x[at(i)].v, scaled_.u[at(i)].v}) {
       if (!flat_[at(i)]) {
         t = std::min(t, longest(s.lambda, s.lambda_det, d));
       } else if (d[0] < 0) {
@@ -311,12 +321,14 @@ double InteriorPoint::longest_step() const {
 double InteriorPoint::complementarity() const {
   double sum = 0;
   for (int i = 0; i < n_; ++i)
-    sum += flat_[at(i)] ? x_[at(i)].v[0] * u_[at(i)].v[0] : product(x_[at(i)].v, u_[at(i)].v);
+    sum += flat_[at(i)] ? point_.x[at(i)].v[0] * point_.u[at(i)].v[0]
+                        : product(point_.x[at(i)].v, point_.u[at(i)].v);
   return sum / n_;
 }
 
 void InteriorPoint::advance(double step) {
-  for (auto [point, change] : {std::pair(&x_, &dx_), std::pair(&u_, &du_)}) {
+  for (auto [point, change] :
+       {std::pair(&point_.x, &change_.x), std::pair(&point_.u, &change_.u)}) {
     for (int i = 0; i < n_; ++i) {
       double* x = (*point)[at(i)].v;
       const double d[3] = {step * (*change)[at(i)].v[0], step * (*change)[at(i)].v[1],
@@ -363,8 +375,8 @@ double InteriorPoint::follow(Search& search, int most, double target) {
     if (!factor(search)) break;
     direction(system, 0, false);
     const double affine = std::min(1.0, longest_step());
-    std::swap(affine_x_, scaled_x_);
-    std::swap(affine_u_, scaled_u_);
+    std::swap(affine_.x, scaled_.x);
+    std::swap(affine_.u, scaled_.u);
     // A blocked step leaves products x.u of different size behind.
     const double centre = last < 0.5 ? kCentreAfterBlocked : kLeastCentre;
     direction(system, std::max(centre, std::pow(1 - affine, 3)) * mean, true);

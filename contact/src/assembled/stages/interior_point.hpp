@@ -2,9 +2,9 @@
 #pragma once
 
 #include "assembled/search.hpp"
-#include "assembled/stages/body_newton.hpp"
+#include "assembled/stages/newton_matrix.hpp"
 #include "assembled/stages/proximal_newton.hpp"
-#include <tether/linalg/block_lu.hpp>
+#include "assembled/stages/sticking_point.hpp"
 #include <tether/linalg/cone_scaling.hpp>
 
 namespace tether::contact::detail {
@@ -29,9 +29,9 @@ class InteriorPoint {
   // Orders the matrix, so that cost() knows its fill.
   void order(Search& search);
   // Estimated ns of one step; by a guess of the fill before order().
-  double cost(const Search& search) const;
+  double cost(const Search& search) const { return matrix_.cost(search); }
   // Estimated ns of order().
-  double order_cost(const Search& search) const;
+  double order_cost(const Search& search) const { return matrix_.order_cost(search); }
   // A guess of cost() that no order is needed for, from the width of the graph.
   double cost_by_width(const Search& search) const;
   // True, and ordered, where bodies have so many contacts that equations of bodies take the place
@@ -57,11 +57,8 @@ class InteriorPoint {
   bool factor(Search& search);
   bool factor_contacts(const System& system);
   bool factor_bodies(const System& system);
-  bool factor_stuck(const Problem& problem);
-  void take_bodies_if_cheaper(Search& search);
   void find_flat(const System& system);
   void diagonal(const System& system, int i, bool whole, PackedBlock& scaled) const;
-  void solve(PackedVector* x) { by_bodies_ ? bodies_.solve(x) : lu_.solve(x); }
   void aim(double centre, bool correct);
   double expand(const System& system);
   void direction(const System& system, double centre, bool correct);
@@ -70,28 +67,28 @@ class InteriorPoint {
   void advance(double step);
   void residual(const System& system);
 
+  // A point, or a step, in the frame where the cone is its own dual: (mu x_n, x_t) and
+  // (u_n / mu, u_t), with their gaps.
+  struct Pair {
+    Packed x, u;
+  };
+
   int n_ = 0;
   double tau_ = 0;  // of the proximal term
   double shift_ =
       0;  // added to the Newton matrix, relative to A: bounds steps along its null space
   bool exact_ = false;  // velocities by long sums
-  bool ordered_ = false;
-  BlockLu lu_;
-  BodyNewton bodies_;
-  bool by_bodies_ = false;
-  // A x = b, how far it is outside of the cone at most, and the sum of its lengths.
-  enum class Stuck { untried, unknown, found } stuck_ = Stuck::untried;
-  Packed stuck_x_;
-  double outside_ = 0, stuck_size_ = 0;
+  NewtonMatrix matrix_{3, 150};
+  StickingPoint sticking_;
   std::vector<ConeScaling> scaling_;
   std::vector<Sides> sides_;
   std::vector<char> flat_;  // mu = 0: x_n and u_n alone
-  // x and u in the frame where the cone is its own dual, (mu x_n, x_t) and (u_n / mu, u_t), with
-  // their gaps. r: residual of w(u) = A x - b; z: x as impulses, w: their velocities.
-  Packed x_, u_, dx_, du_, r_, w_, z_, swept_, anchor_;
-  // W dx and W^-1 du, the same of the predictor; in the frames of the scalings W dx, the aim
-  // lambda \ (...) and the residual of the equations.
-  Packed scaled_x_, scaled_u_, affine_x_, affine_u_, step_, aim_, defect_;
+  Pair point_, change_;
+  Pair scaled_, affine_;  // W dx and W^-1 du; the same of the predictor
+  // r: residual of w(u) = A x - b; z: x as impulses, w: their velocities.
+  Packed r_, w_, z_, swept_, anchor_;
+  // In the frames of the scalings: W dx, the aim lambda \ (...) and the residual of the equations.
+  Packed step_, aim_, defect_;
 };
 
 // Slip variable: s = |u_t| wherever u lies on the cone, that is, for sliding contacts. Inside of
@@ -100,6 +97,5 @@ constexpr double kSmooth = 0.5;
 inline double slip_of(const double* u) {
   return std::sqrt(kSmooth * u[0] * u[0] + (1 - kSmooth) * (u[1] * u[1] + u[2] * u[2]));
 }
-inline double mean_diagonal(const LocalBlock& L) { return (L.a + L.T[0] + L.T[2]) / 3; }
 
 }  // namespace tether::contact::detail

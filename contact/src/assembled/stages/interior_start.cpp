@@ -7,17 +7,10 @@
 namespace tether::contact::detail {
 
 bool InteriorPoint::order_bodies(Search& search) {
-  if (ordered_) return by_bodies_;
-  if (!bodies_serve(search.system.problem(), cost(search), 3 * search.sweep_cost, bodies_))
-    return false;
-  search.counts.work += 500.0 * n_;
-  ordered_ = by_bodies_ = true;
+  if (matrix_.ordered()) return matrix_.by_bodies();
+  if (!matrix_.order_by_bodies(search)) return false;
   find_flat(search.system);
   return true;
-}
-
-double InteriorPoint::order_cost(const Search& search) const {
-  return 100 * static_cast<double>(search.system.problem().blocks().size());
 }
 
 // Breadth-first levels, whose ends separate the graph: a front of a nested elimination is as wide
@@ -52,109 +45,20 @@ double InteriorPoint::cost_by_width(const Search& search) const {
 }
 
 void InteriorPoint::order(Search& search) {
-  if (ordered_ || order_bodies(search)) return;
-  search.counts.work += order_cost(search);
-  lu_.order(pattern(search.system.problem()));
-  lu_.analyse(pattern(search.system.problem()), nullptr);
-  ordered_ = true;
-  take_bodies_if_cheaper(search);
+  if (matrix_.ordered()) return;
+  matrix_.order(search);
   find_flat(search.system);
-}
-
-// With the fill of both known: four contacts a body cost a quarter in equations of bodies, 2.8 as
-// much as in those of contacts.
-void InteriorPoint::take_bodies_if_cheaper(Search& search) {
-  constexpr int kSome = 3;          // contacts for each body
-  constexpr double kClearly = 0.5;  // the digits cost refinements
-  const Problem& p = search.system.problem();
-  const BodyForm* form = p.body_form();
-  if (form == nullptr || n_ < kSome * form->bodies) return;
-  const double contacts = cost(search);
-  search.counts.work += 500.0 * n_;
-  bodies_.order(p);
-  by_bodies_ = bodies_.cost() + 3 * search.sweep_cost < kClearly * contacts;
 }
 
 void InteriorPoint::find_flat(const System& system) {
   for (int i = 0; i < n_; ++i) flat_[at(i)] = !(system.friction(i) > 0);
 }
 
-// A, shifted.
-bool InteriorPoint::factor_stuck(const Problem& p) {
-  // Below the eigenvalues that light bodies between heavy ones leave (1e-12 of the largest for 200
-  // boxes of masses 1 : 1e6), above the rounding of A; by bodies above what cancels.
-  const double shift = by_bodies_ ? 1e-9 : 1e-12;
-  if (by_bodies_) {
-    PackedBlock unit, block;
-    for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
-    bodies_.begin();
-    for (int i = 0; i < n_; ++i) {
-      for (int c = 0; c < 3; ++c) block.column[5 * c] = shift * mean_diagonal(p.local(i));
-      bodies_.add(i, block, unit, unit);
-    }
-    return bodies_.factor();
-  }
-  for (int row = 0; row < n_; ++row) {
-    const int i = lu_.block_row(row);
-    lu_.begin_row(row);
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      PackedBlock block = p.blocks()[at(k)];
-      if (p.columns()[at(k)] == i)
-        for (int c = 0; c < 3; ++c) block.column[5 * c] += shift * mean_diagonal(p.local(i));
-      lu_.add(p.columns()[at(k)], block.column);
-    }
-    if (!lu_.end_row()) return false;
-  }
-  return true;
-}
-
-// A x = b: the point where everything sticks, in the frame where the cone is its own dual. Where it
-// is admissible it is the solution, and refinements remove the shift of the matrix.
 void InteriorPoint::stick(Search& search) {
-  if (stuck_ != Stuck::untried) return;
-  stuck_ = Stuck::unknown;
-  System& system = search.system;
-  const Problem& p = system.problem();
+  if (sticking_.tried()) return;
   order(search);
-  constexpr int kRefinements = 6;
-  if (!factor_stuck(p)) return;
-  ++search.counts.factorisations;
-  search.counts.work += cost(search);
-  for (int i = 0; i < n_; ++i) z_[at(i)] = p.packed_b()[at(i)];
-  solve(z_.data());
-  stuck_size_ = outside_ = 0;
-  for (int i = 0; i < n_; ++i) {
-    double* x = stuck_x_[at(i)].v;
-    for (int c = 0; c < 3; ++c) x[c] = z_[at(i)].v[c];
-    if (flat_[at(i)]) {
-      x[1] = x[2] = 0;
-    } else {
-      x[0] *= p.local(i).mu;
-    }
-    const double t = tangent(x);
-    stuck_size_ += std::abs(x[0]) + t;
-    outside_ = std::max(outside_, t - x[0]);
-  }
-  if (!std::isfinite(stuck_size_)) return;
-  stuck_ = Stuck::found;
-  double last = std::numeric_limits<double>::infinity();
-  for (int refinement = 0; refinement <= kRefinements && outside_ <= 0; ++refinement) {
-    for (int i = 0; i < n_; ++i) {
-      if (flat_[at(i)]) z_[at(i)].v[1] = z_[at(i)].v[2] = 0;
-      clip_cone(p.local(i).mu, z_[at(i)].v);
-    }
-    const double error = search.test(z_.data(), Method::interior_point);
-    exact_ = search.near_round_off();
-    // Errors of many contacts on each other add up: near round-off all digits are taken that cost
-    // a solve each.
-    if ((search.solved() && !exact_) || !(error < 0.5 * last)) return;
-    last = error;
-    velocities(system);
-    solve(w_.data());
-    search.count_sweep();
-    for (int i = 0; i < n_; ++i)
-      for (int c = 0; c < 3; ++c) z_[at(i)].v[c] -= w_[at(i)].v[c];
-  }
+  sticking_.find(search, matrix_, flat_);
+  if (sticking_.found() && sticking_.outside() <= 0) exact_ = search.near_round_off();
 }
 
 // The point where everything sticks, shifted into the cone; false if it is the solution or cannot
@@ -164,13 +68,13 @@ bool InteriorPoint::start(Search& search) {
   const double speed = system.norm_b() / std::sqrt(n_);
   if (!(speed > 0)) return false;
   stick(search);
-  if (search.solved() || stuck_ != Stuck::found) return false;
+  if (search.solved() || !sticking_.found()) return false;
   for (int i = 0; i < n_; ++i) {
-    double* x = x_[at(i)].v;
-    double* u = u_[at(i)].v;
-    for (int c = 0; c < 3; ++c) x[c] = stuck_x_[at(i)].v[c];
-    x[0] += outside_ +
-            0.1 * std::max(stuck_size_ / n_, speed / mean_diagonal(system.problem().local(i)));
+    double* x = point_.x[at(i)].v;
+    double* u = point_.u[at(i)].v;
+    for (int c = 0; c < 3; ++c) x[c] = sticking_.point()[at(i)].v[c];
+    x[0] += sticking_.outside() +
+            0.1 * std::max(sticking_.size() / n_, speed / mean_diagonal(system.problem().local(i)));
     x[3] = x[0] - tangent(x);
     u[0] = u[3] = speed;
     u[1] = u[2] = 0;
@@ -190,8 +94,8 @@ bool InteriorPoint::start_near(Search& search, const PackedVector* start, double
   for (int i = 0; i < n_; ++i) {
     const double mu = p.local(i).mu;
     const double* w = w_[at(i)].v;
-    double* x = x_[at(i)].v;
-    double* u = u_[at(i)].v;
+    double* x = point_.x[at(i)].v;
+    double* u = point_.u[at(i)].v;
     flat_[at(i)] = !(system.friction(i) > 0);
     if (flat_[at(i)]) {
       x[0] = std::max(start[i].v[0], 0.0);
@@ -216,8 +120,8 @@ bool InteriorPoint::start_near(Search& search, const PackedVector* start, double
   if (!(x_size > 0 && u_size > 0)) return false;
   const double nu = near * (x_size / n_) * (u_size / n_), ratio = u_size / x_size;
   for (int i = 0; i < n_; ++i) {
-    double* x = x_[at(i)].v;
-    double* u = u_[at(i)].v;
+    double* x = point_.x[at(i)].v;
+    double* u = point_.u[at(i)].v;
     const double x0 = x[3] + tangent(x), u0 = u[3] + tangent(u);
     x[3] = std::max(x[3], nu / (u0 + std::sqrt(nu * ratio)));
     u[3] = std::max(u[3], nu / (x0 + std::sqrt(nu / ratio)));

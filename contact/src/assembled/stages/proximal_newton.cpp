@@ -9,8 +9,6 @@
 namespace tether::contact::detail {
 namespace {
 
-constexpr double kSweeps = 3.5;  // that a step costs besides its factorisation
-
 // out = P B for row-major P and packed B.
 TETHER_INLINE void multiply(const double* P, const double* B, double scale, double* out) {
   for (int c = 0; c < 3; ++c) {
@@ -32,15 +30,7 @@ void ProximalNewton::reset(int contacts) {
   derivatives_.resize(at(n_));
   active_.resize(at(n_));
   anderson_.reset(n_, kDepth);
-  ordered_ = by_bodies_ = false;
-}
-
-double ProximalNewton::cost(const Search& search) const {
-  const double blocks = static_cast<double>(search.system.problem().blocks().size());
-  if (ordered_ && by_bodies_) return bodies_.cost() + kSweeps * search.sweep_cost;
-  const double operations =
-      ordered_ ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
-  return 4 * operations + kSweeps * search.sweep_cost + 25 * blocks;
+  matrix_.reset();
 }
 
 double ProximalNewton::residual(Search& search, const Packed& x, Packed& z,
@@ -50,22 +40,14 @@ double ProximalNewton::residual(Search& search, const Packed& x, Packed& z,
                               derive ? derivatives_.data() : nullptr);
 }
 
-void ProximalNewton::order(const Search& search) {
-  if (ordered_) return;
-  const Problem& p = search.system.problem();
-  by_bodies_ = bodies_serve(p, cost(search), kSweeps * search.sweep_cost, bodies_);
-  if (!by_bodies_) lu_.order(pattern(p));
-  ordered_ = true;
-}
-
 // F + dx + Phi'/(1+tau) sum_{j != i} A_ij dx_j = 0 with F = x - z.
 bool ProximalNewton::direction(Search& search, double tau) {
-  order(search);
+  matrix_.order_for_parts(search);
   for (int i = 0; i < n_; ++i)
     for (int c = 0; c < 4; ++c) dx_[at(i)].v[c] = z_[at(i)].v[c] - x_[at(i)].v[c];
   const double scale = 1 / (1 + tau);
-  const bool regular = by_bodies_ ? direction_by_bodies(search, scale)
-                                  : direction_by_contacts(search.system.problem(), scale);
+  const bool regular = matrix_.by_bodies() ? direction_by_bodies(search, scale)
+                                           : direction_by_contacts(search.system.problem(), scale);
   ++search.counts.factorisations;
   search.counts.work += cost(search);
   if (!regular) return false;
@@ -77,32 +59,33 @@ bool ProximalNewton::direction(Search& search, double tau) {
 
 // Separated contacts are known: dx = -F there.
 bool ProximalNewton::direction_by_contacts(const Problem& p, double scale) {
+  BlockLu& lu = matrix_.contacts();
   for (int i = 0; i < n_; ++i) active_[at(i)] = regimes_[at(i)] != Regime::separating;
-  lu_.analyse(pattern(p), active_.data());
+  lu.analyse(pattern(p), active_.data());
   bool regular = true;
-  for (int r = 0; r < lu_.size(); ++r) {
-    const int i = lu_.block_row(r);
+  for (int r = 0; r < lu.size(); ++r) {
+    const int i = lu.block_row(r);
     const double* P = derivatives_[at(i)].d;
     double rhs[3] = {0, 0, 0};
-    lu_.begin_row(r);
+    lu.begin_row(r);
     for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
       const int j = p.columns()[at(k)];
       const double* A = p.blocks()[at(k)].column;
       if (active_[at(j)]) {
         alignas(32) double block[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
         if (j != i) multiply(P, A, scale, block);
-        lu_.add(j, block);
+        lu.add(j, block);
       } else {
         const double* d = dx_[at(j)].v;
         for (int c = 0; c < 3; ++c) rhs[c] += A[c] * d[0] + A[4 + c] * d[1] + A[8 + c] * d[2];
       }
     }
-    regular = lu_.end_row() && regular;
+    regular = lu.end_row() && regular;
     for (int c = 0; c < 3; ++c)
       dx_[at(i)].v[c] -=
           scale * (P[3 * c] * rhs[0] + P[3 * c + 1] * rhs[1] + P[3 * c + 2] * rhs[2]);
   }
-  if (regular) lu_.solve(dx_.data());
+  if (regular) lu.solve(dx_.data());
   return regular;
 }
 
@@ -114,7 +97,7 @@ bool ProximalNewton::direction_by_bodies(Search& search, double scale) {
   const Problem& p = search.system.problem();
   PackedBlock unit, left, D;
   for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
-  bodies_.begin();
+  matrix_.bodies().begin();
   for (int i = 0; i < n_; ++i) {
     const double* P = derivatives_[at(i)].d;
     const LocalBlock& L = p.local(i);
@@ -125,18 +108,18 @@ bool ProximalNewton::direction_by_bodies(Search& search, double scale) {
       D.column[5 * c] += 1;
       for (int r = 0; r < 3; ++r) left.column[4 * c + r] = scale * P[3 * r + c];
     }
-    bodies_.add(i, D, left, unit);
+    matrix_.bodies().add(i, D, left, unit);
   }
-  if (!bodies_.factor()) return false;
+  if (!matrix_.bodies().factor()) return false;
   rest_ = dx_;
-  bodies_.solve(dx_.data());
+  matrix_.bodies().solve(dx_.data());
   double before = std::numeric_limits<double>::infinity();
   for (int k = 0; k < kRefinements; ++k) {
     const double left_over = defect(search.system, scale);
     search.counts.work += search.sweep_cost;
     if (!(left_over > kExact && left_over < 0.5 * before)) break;
     before = left_over;
-    bodies_.solve(moved_.data());
+    matrix_.bodies().solve(moved_.data());
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) dx_[at(i)].v[c] += moved_[at(i)].v[c];
   }

@@ -3,9 +3,8 @@
 #pragma once
 
 #include "assembled/search.hpp"
-#include "assembled/stages/body_newton.hpp"
+#include "assembled/stages/newton_matrix.hpp"
 #include <tether/linalg/anderson.hpp>
-#include <tether/linalg/block_lu.hpp>
 
 namespace tether::contact::detail {
 
@@ -24,7 +23,7 @@ class ProximalNewton {
   // of its proximal term. Returns how many and x; or 0, x as it was.
   int correct(Search& search, double tau, const PackedVector* anchor, Packed& x, int most);
   // Estimated ns of one Newton step.
-  double cost(const Search& search) const;
+  double cost(const Search& search) const { return matrix_.cost(search); }
 
  private:
   // Solves the proximal problem at tau from x_ in place; Newton steps used, or -1.
@@ -32,16 +31,12 @@ class ProximalNewton {
   bool direction(Search& search, double tau);
   bool direction_by_contacts(const Problem& p, double scale);
   bool direction_by_bodies(Search& search, double scale);
-  void order(const Search& search);
   double defect(const System& system, double scale);
   double residual(Search& search, const Packed& x, Packed& z, const Proximal& proximal,
                   bool derive);
 
   int n_ = 0;
-  bool ordered_ = false;
-  BlockLu lu_;
-  BodyNewton bodies_;
-  bool by_bodies_ = false;
+  NewtonMatrix matrix_{3.5, 0};
   Anderson anderson_;
   Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_, f_, saved_, start_, rest_,
       moved_;

@@ -1,0 +1,103 @@
+// Tether: the point where every contact sticks. SPDX-License-Identifier: BSD-3-Clause
+#include "assembled/stages/sticking_point.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tether/linalg/cone_scaling.hpp>
+
+namespace tether::contact::detail {
+
+void StickingPoint::reset(int contacts) {
+  tried_ = found_ = false;
+  for (Packed* p : {&x_, &z_, &w_}) p->resize(at(contacts));
+}
+
+// A, shifted.
+bool StickingPoint::factor(const Problem& p, NewtonMatrix& matrix) const {
+  // Below the eigenvalues that light bodies between heavy ones leave (1e-12 of the largest for 200
+  // boxes of masses 1 : 1e6), above the rounding of A; by bodies above what cancels.
+  const double shift = matrix.by_bodies() ? 1e-9 : 1e-12;
+  const int n = p.contacts();
+  if (matrix.by_bodies()) {
+    PackedBlock unit, block;
+    for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
+    matrix.bodies().begin();
+    for (int i = 0; i < n; ++i) {
+      for (int c = 0; c < 3; ++c) block.column[5 * c] = shift * mean_diagonal(p.local(i));
+      matrix.bodies().add(i, block, unit, unit);
+    }
+    return matrix.bodies().factor();
+  }
+  BlockLu& lu = matrix.contacts();
+  for (int row = 0; row < n; ++row) {
+    const int i = lu.block_row(row);
+    lu.begin_row(row);
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      PackedBlock block = p.blocks()[at(k)];
+      if (p.columns()[at(k)] == i)
+        for (int c = 0; c < 3; ++c) block.column[5 * c] += shift * mean_diagonal(p.local(i));
+      lu.add(p.columns()[at(k)], block.column);
+    }
+    if (!lu.end_row()) return false;
+  }
+  return true;
+}
+
+void StickingPoint::find(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat) {
+  if (tried_) return;
+  tried_ = true;
+  const Problem& p = search.system.problem();
+  const int n = p.contacts();
+  if (!factor(p, matrix)) return;
+  ++search.counts.factorisations;
+  search.counts.work += matrix.cost(search);
+  for (int i = 0; i < n; ++i) z_[at(i)] = p.packed_b()[at(i)];
+  matrix.solve(z_.data());
+  size_ = outside_ = 0;
+  for (int i = 0; i < n; ++i) {
+    double* x = x_[at(i)].v;
+    for (int c = 0; c < 3; ++c) x[c] = z_[at(i)].v[c];
+    if (flat[at(i)]) {
+      x[1] = x[2] = 0;
+    } else {
+      x[0] *= p.local(i).mu;
+    }
+    const double t = tangent(x);
+    size_ += std::abs(x[0]) + t;
+    outside_ = std::max(outside_, t - x[0]);
+  }
+  if (!std::isfinite(size_)) return;
+  found_ = true;
+  if (outside_ <= 0) refine(search, matrix, flat);
+}
+
+void StickingPoint::refine(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat) {
+  constexpr int kRefinements = 6;
+  System& system = search.system;
+  const Problem& p = system.problem();
+  const int n = p.contacts();
+  double last = std::numeric_limits<double>::infinity();
+  for (int refinement = 0; refinement <= kRefinements; ++refinement) {
+    for (int i = 0; i < n; ++i) {
+      if (flat[at(i)]) z_[at(i)].v[1] = z_[at(i)].v[2] = 0;
+      clip_cone(p.local(i).mu, z_[at(i)].v);
+    }
+    const double error = search.test(z_.data(), Method::interior_point);
+    const bool exact = search.near_round_off();
+    // Errors of many contacts on each other add up: near round-off all digits are taken that cost
+    // a solve each.
+    if ((search.solved() && !exact) || !(error < 0.5 * last)) return;
+    last = error;
+    if (exact)
+      system.exact_velocities(z_.data(), w_.data());
+    else
+      system.velocities(z_.data(), w_.data());
+    matrix.solve(w_.data());
+    search.count_sweep();
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < 3; ++c) z_[at(i)].v[c] -= w_[at(i)].v[c];
+  }
+}
+
+}  // namespace tether::contact::detail
