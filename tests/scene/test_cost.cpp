@@ -6,6 +6,7 @@
 #include <tether/scene/cost.hpp>
 #include <tether/scene/files.hpp>
 
+#include "cost/measure.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -20,9 +21,7 @@ struct Truth {
 using ClosedForm = std::function<Truth(double t)>;
 
 /// The largest error of the last body at all records.
-double true_error(Scene scene, double step, const ClosedForm& truth) {
-  scene.stepping->step = step;
-  scene.output.every = step;
+double true_error(const Scene& scene, const ClosedForm& truth) {
   double largest = 0;
   RunOptions options;
   options.record = [&](const Engine& engine) {
@@ -36,6 +35,34 @@ double true_error(Scene scene, double step, const ClosedForm& truth) {
   };
   REQUIRE(run(scene, options).failure == "");
   return largest;
+}
+
+double true_error(Scene scene, double step, const ClosedForm& truth) {
+  scene.stepping->step = step;
+  scene.output.every = step;
+  return true_error(scene, truth);
+}
+
+/// Whatever method and setting is named for a wanted error keeps it, by the closed form.
+void check_wanted(const std::string& text, const ClosedForm& truth, std::size_t least) {
+  const Scene scene = parse_scene(text, "cost.toml");
+  const CostTable table = cost(scene);
+  INFO(scene.name << ": " << table.reference << ", off by " << table.reference_error);
+  CHECK(table.no_events == "");
+  CHECK(table.rows.size() == 16);
+  std::size_t named = 0;
+  for (const double wanted : {3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7}) {
+    const CostRow* row = table.cheapest(wanted);
+    if (row == nullptr) continue;
+    ++named;
+    Scene chosen = costs::with_setting(scene, row->method, row->setting);
+    chosen.output.every = row->method == Method::steps ? row->setting : scene.end / 1999;
+    const double error = true_error(chosen, truth);
+    INFO("wanted " << wanted << ": " << name(row->method) << " " << row->setting << ", said "
+                   << row->error << ", true " << error);
+    CHECK(error <= 1.02 * wanted);
+  }
+  CHECK(named >= least);
 }
 
 void check_bounds(const std::string& text, const ClosedForm& truth) {
@@ -94,4 +121,79 @@ TEST_CASE("reported errors of steps bound the true ones: from sliding to rolling
                  return Truth{Vector3d(7 * s - 0.5 * a * s * s + 5 * (t - s), 0, radius),
                               Vector3d(0, 0.5 * w * s * s + 5 / radius * (t - s), 0)};
                });
+}
+
+TEST_CASE("what cost names keeps the wanted error: sliding to rest") {
+  const double a = 0.3 * 9.81, stop = 3 / a;
+  check_wanted(
+      "[scene]\nname = \"sliding\"\n" + kHead + kFloor +
+          "[[body]]\nshape = \"box\"\nsize = [0.4, 0.3, 0.1]\nmass = 2\nposition = [0, 0, "
+          "0.05]\nvelocity = [3, 0, 0]\nmaterial = \"a\"\n",
+      [=](double t) {
+        const double s = std::min(t, stop);
+        return Truth{Vector3d(3 * s - 0.5 * a * s * s, 0, 0.05), Vector3d::Zero()};
+      },
+      6);
+}
+
+TEST_CASE("what cost names keeps the wanted error: from sliding to rolling, by its events") {
+  const double a = 0.3 * 9.81, roll = 2 * 7 / (7 * a), radius = 0.5;
+  check_wanted(
+      "[scene]\nname = \"rolling\"\nengine = \"event\"\nend = 2\n"
+      "gravity = [0, 0, -9.81]\n" +
+          kFloor +
+          "[[body]]\nshape = \"sphere\"\nradius = 0.5\nmass = 1\nposition = [0, 0, "
+          "0.5]\nvelocity = [7, 0, 0]\nmaterial = \"a\"\n",
+      [=](double t) {
+        const double s = std::min(t, roll), w = 2.5 * a / radius;
+        return Truth{Vector3d(7 * s - 0.5 * a * s * s + 5 * (t - s), 0, radius),
+                     Vector3d(0, 0.5 * w * s * s + 5 / radius * (t - s), 0)};
+      },
+      5);
+}
+
+TEST_CASE("what cost names keeps the wanted error: a ball that bounces to rest") {
+  const double e = GENERATE(0.3, 0.7);
+  check_wanted(
+      "[scene]\nname = \"bouncing\"\n" + kHead +
+          "[[body]]\nname = \"floor\"\nshape = \"plane\"\nfixed = true\nmaterial = "
+          "\"a\"\n[[pair]]\nbetween = [\"a\", \"a\"]\nrestitution = " +
+          std::to_string(e) +
+          "\n[[body]]\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nposition = [0, 0, "
+          "0.6]\nmaterial = \"a\"\n",
+      [=](double t) {
+        double left = t, speed = 0, height = 0.5;
+        for (int k = 0; k < 200; ++k) {
+          const double flight = (speed + std::sqrt(speed * speed + 2 * 9.81 * height)) / 9.81;
+          if (left < flight)
+            return Truth{Vector3d(0, 0, 0.1 + height + speed * left - 4.905 * left * left),
+                         Vector3d::Zero()};
+          left -= flight;
+          speed = -e * (speed - 9.81 * flight);
+          height = 0;
+        }
+        return Truth{Vector3d(0, 0, 0.1), Vector3d::Zero()};
+      },
+      6);
+}
+
+TEST_CASE("cost compares what the scene's law allows, and says why not") {
+  CostOptions few;
+  few.steps = {4e-3, 2e-3};
+  few.tolerances = {1e-6};
+  few.samples = 50;
+  const std::string ball =
+      "[[body]]\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nposition = [0, 0, 0.6]\nmaterial = "
+      "\"a\"\n[[body]]\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n[[pair]]\nbetween = "
+      "[\"a\", "
+      "\"a\"]\nrestitution = 0.5\n";
+  const CostTable all = cost(parse_scene("[scene]\n" + kHead + ball, "test"), few);
+  REQUIRE(all.rows.size() == 3);
+  CHECK(all.rows[0].method == Method::events);
+  CHECK(all.rows[2].method == Method::steps);
+  CHECK(all.reference.find("events") != std::string::npos);
+  const CostTable other =
+      cost(parse_scene("[scene]\n" + kHead + "restitution_law = \"poisson\"\n" + ball, "test"), few);
+  CHECK(other.no_events.find("Newton") != std::string::npos);
+  CHECK(other.rows.size() == 2);
 }

@@ -104,6 +104,18 @@ std::string with_accuracy(const Scene& scene) {
   return accuracy > 0 ? fmt::format("; steps in parts within an accuracy of {:g}", accuracy) : "";
 }
 
+// Which engines could move the scene, too, or why not.
+std::string others(const Plan& plan) {
+  const bool free = plan.invariants == 0;  // only the smooth engine keeps some
+  if (plan.engine == EngineKind::event)
+    return "          [stepping] could move it, too, at fixed steps or within an accuracy\n";
+  if (plan.engine == EngineKind::smooth)
+    return free ? "          [stepping] and engine = \"event\" could move it, too\n" : "";
+  if (plan.pairs == 0) return free ? "          [smooth] could move it, too\n" : "";
+  return plan.no_event.empty() ? "          engine = \"event\" could move it, too\n"
+                               : "          " + plan.no_event + "\n";
+}
+
 }  // namespace
 
 int joint_rows(const Joint& joint) { return joints::row_count(joint); }
@@ -136,9 +148,7 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan) {
                      : event ? "event"
                              : "stepping",
                      plan.why);
-  if (plan.engine == EngineKind::stepping && plan.pairs > 0)
-    out << (plan.no_event.empty() ? "          engine = \"event\" could move it, too\n"
-                                  : "          " + plan.no_event + "\n");
+  out << others(plan);
   out << fmt::format("bodies    {}, {} of them moving; {}\n", plan.bodies, plan.moving,
                      number(plan.shapes, "shape"));
   if (smooth)

@@ -1,6 +1,7 @@
 // Tether: what accuracy costs in time. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,9 +13,16 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
+/// An engine and what is set of it: the tolerance of [smooth] or [event], or `step` (s) or
+/// `accuracy` of [stepping].
+enum class Method : std::uint8_t { smooth, events, steps, accuracy };
+const char* name(Method method);          ///< "events"
+const char* setting_name(Method method);  ///< "tolerance"
+
 /// One setting of a scene.
 struct CostRow {
-  double setting = 0;  ///< tolerance (smooth) or time step, s (stepping)
+  Method method = Method::smooth;
+  double setting = 0;
   /// Bound on the error: the largest distance of a body's centre (m) and angle of its orientation
   /// (rad) from the reference, whichever is larger, over `CostOptions::samples` equal times and all
   /// bodies, and what the reference may be off.
@@ -22,25 +30,34 @@ struct CostRow {
   double seconds = 0;  ///< processor time of the engine, the least of several runs
   double drift = 0, penetration = 0;
   long steps = 0;
+  long contact_problems = 0;
   int met = 0;          ///< expectations
   std::string failure;  ///< empty: it reached the end
 };
 
 struct CostOptions {
-  std::vector<double> settings;     ///< empty: a range around that of the scene
-  std::optional<double> reference;  ///< its tolerance or step; default 1e-12, or the finest / 4
-  int samples = 100;
+  /// Of the engine that the plan names, which runs alone then.
+  std::vector<double> settings;
+  /// Of each method. All empty: ranges for each that the scene can run with; contact: the event
+  /// engine where it has the scene, steps and steps in parts.
+  std::vector<double> tolerances, steps, accuracies;
+  /// Tolerance or step of the reference; default 1e-12 (smooth), 1e-11 (events), the finest step
+  /// / 4.
+  std::optional<double> reference;
+  int samples = 400;
   /// Before each part of the work: its name, and how many of all parts are done.
   std::function<void(const std::string& what, int done, int all)> progress;
 };
 
 struct CostTable {
-  bool smooth = true;
+  bool smooth = true;  ///< the plan's engine takes tolerances
+  std::string
+      no_events;  ///< why the event engine is not compared; empty: it is, or nothing touches
   std::string reference;  ///< what the errors are measured against
-  /// Estimated error of the reference: its change from the next looser setting (smooth), or the
-  /// distance between the limits extrapolated from pairs of steps (stepping).
+  /// Estimated error of the reference: its change from the next looser setting (smooth, events), or
+  /// the distance between the limits extrapolated from pairs of steps (stepping).
   double reference_error = 0;
-  std::vector<CostRow> rows;  ///< in the order of the settings, loosest first
+  std::vector<CostRow> rows;  ///< by method, in the order of the settings, loosest first
   /// The cheapest row with an error of at most `wanted`; null: there is none.
   const CostRow* cheapest(double wanted) const;
 };

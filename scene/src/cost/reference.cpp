@@ -1,0 +1,144 @@
+// Tether: what errors are measured against. SPDX-License-Identifier: BSD-3-Clause
+#include "reference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace tether::scene::costs {
+
+namespace {
+
+constexpr int kReferenceSteps = 20000;  // between two stops; then it is given up
+
+/// Plain IDA in the form that differentiates everything, which drifts least at tight tolerances.
+Scene plain(const Scene& scene, double tolerance) {
+  Scene out = with_setting(scene, Method::smooth, tolerance);
+  out.smooth->projection = false;
+  out.smooth->formulation = Formulation::index0;
+  for (Invariant& each : out.invariants) each.project = false;
+  out.smooth->max_steps = std::min(out.smooth->max_steps, kReferenceSteps);
+  return out;
+}
+
+Scene projected(const Scene& scene, double tolerance) {
+  Scene out = with_setting(scene, Method::smooth, tolerance);
+  out.smooth->max_steps = std::min(out.smooth->max_steps, kReferenceSteps);
+  return out;
+}
+
+/// The tightest run that gets through, and by how much the next looser one differs from it.
+std::optional<Reference> tightest(Scene (*make)(const Scene&, double), const Scene& scene,
+                                  const char* name, double tolerance, int samples) {
+  // Each ten times as loose; a mechanism at a dead point may get through from 1e-8 on only.
+  constexpr int kTries = 8;
+  std::optional<Reference> best;
+  for (int k = 0; k < kTries && tolerance < 0.1; ++k, tolerance *= 10) {
+    const Measured m = measure_once(make(scene, tolerance), samples);
+    if (!m.result.failure.empty()) continue;
+    if (best) {
+      best->error = distance(best->samples, m.samples);
+      return best;
+    }
+    best = Reference{m.samples, fmt::format("{}, tolerance {:g}", name, tolerance), 0,
+                     m.result.summary.drift};
+  }
+  return std::nullopt;
+}
+
+/// First-order extrapolation to step 0: 2 x(h) - x(2h); rotations are extrapolated by their angle.
+Samples extrapolated(const Samples& fine, const Samples& coarse) {
+  Samples out = fine;
+  const std::size_t count = std::min(fine.positions.size(), coarse.positions.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    out.positions[i] = 2 * fine.positions[i] - coarse.positions[i];
+    const Eigen::Quaterniond turn = coarse.orientations[i].conjugate() * fine.orientations[i];
+    out.orientations[i] = (fine.orientations[i] * turn).normalized();
+  }
+  return out;
+}
+
+}  // namespace
+
+// Plain IDA, unless the scene's own run settles ten times as well: then that, and what plain IDA
+// says of it. Where the two agree they are right, having little in common.
+Reference smooth_reference(const Scene& scene, double tolerance, int samples) {
+  const auto own = tightest(projected, scene, "the scene", tolerance, samples);
+  const auto other = tightest(plain, scene, "plain IDA, index 0", tolerance, samples);
+  if (!own && !other)
+    throw std::runtime_error(fmt::format(
+        "no reference: neither plain IDA nor the scene itself gets to the end at tolerances from "
+        "{:g}; give --reference",
+        tolerance));
+  if (!own || !other) {
+    Reference only = own ? *own : *other;
+    only.what += own ? " (plain IDA fails)" : "";
+    return only;
+  }
+  const double apart = distance(own->samples, other->samples);
+  const bool take_own = 10 * own->error < other->error;
+  Reference out = take_own ? *own : *other;
+  const Reference& witness = take_own ? *other : *own;
+  // A difference that neither estimate explains counts as an error of the reference.
+  out.error = std::max(out.error, apart - witness.error);
+  out.what += fmt::format(" ({:.1e} from {}, whose joints drift by {:.1e})", apart, witness.what,
+                          witness.drift);
+  return out;
+}
+
+// Steps h, 2h, 4h and 8h. How far the reference is off is estimated twice, at the finest steps and,
+// by what it must be there, at coarser ones: one of them may be small by chance. Where impacts or
+// chaos leave no order in the errors, the extrapolated points differ more than the runs themselves,
+// which are the reference then.
+Reference stepping_reference(const Scene& scene, double step, int samples) {
+  constexpr int kRuns = 4;
+  std::vector<Samples> runs;
+  for (int k = 0; k < kRuns; ++k) {
+    const double h = step * (1 << k);
+    Scene each = with_setting(scene, Method::steps, h);
+    if (k > 0) each.stepping->on_failure = OnFailure::warn;
+    const Measured m = measure_once(each, samples);
+    if (!m.result.failure.empty())
+      throw std::runtime_error(
+          fmt::format("no reference: at a step of {:g} s {}", h, m.result.failure));
+    runs.push_back(m.samples);
+  }
+  std::vector<Samples> limits;
+  for (int k = 0; k + 1 < kRuns; ++k)
+    limits.push_back(
+        extrapolated(runs[static_cast<std::size_t>(k)], runs[static_cast<std::size_t>(k) + 1]));
+  const double of_run = 1.5 * std::max(distance(runs[0], runs[1]), distance(runs[1], runs[2]) / 2);
+  const double of_limit =
+      std::max(distance(limits[0], limits[1]), distance(limits[1], limits[2]) / 2);
+  Reference out;
+  if (of_limit < of_run) {
+    out.samples = limits[0];
+    out.error = of_limit;
+    out.what = fmt::format("the limit of the scene at steps of {:g} and {:g} s", step, 2 * step);
+  } else {
+    out.samples = runs[0];
+    out.error = of_run;
+    out.what = fmt::format("the scene at a step of {:g} s", step);
+  }
+  return out;
+}
+
+/// The event engine at a tight tolerance, and how far a looser one is from it.
+std::optional<Reference> event_reference(const Scene& scene, double tolerance, int samples) {
+  constexpr int kTries = 3;
+  for (int k = 0; k < kTries; ++k, tolerance *= 10) {
+    const Measured tight = measure_once(with_setting(scene, Method::events, tolerance), samples);
+    const Measured loose =
+        measure_once(with_setting(scene, Method::events, 10 * tolerance), samples);
+    if (!tight.result.failure.empty() || !loose.result.failure.empty()) continue;
+    Reference out;
+    out.samples = tight.samples;
+    out.error = distance(tight.samples, loose.samples);
+    out.what = fmt::format("the scene's events at a tolerance of {:g}", tolerance);
+    return out;
+  }
+  return std::nullopt;
+}
+
+}  // namespace tether::scene::costs

@@ -1,0 +1,24 @@
+// Tether: what errors are measured against. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "measure.hpp"
+
+namespace tether::scene::costs {
+
+struct Reference {
+  Samples samples;
+  std::string what;
+  double error = 0;  // what it may be off
+  double drift = 0;  // how far it left the joints
+};
+
+/// Each throws std::runtime_error where there is none.
+Reference smooth_reference(const Scene& scene, double tolerance, int samples);
+Reference stepping_reference(const Scene& scene, double step, int samples);
+/// None: the event engine does not get to the end.
+std::optional<Reference> event_reference(const Scene& scene, double tolerance, int samples);
+
+}  // namespace tether::scene::costs
