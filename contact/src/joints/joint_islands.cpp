@@ -25,8 +25,11 @@ Options solver_options(const BodyOptions& o) {
 
 }  // namespace
 
-StepJointIslands::StepJointIslands(Mechanisms& mechanisms, const BodyOptions& options)
+StepJointIslands::StepJointIslands(Mechanisms& mechanisms, LawRows& laws, LawUse use,
+                                   const BodyOptions& options)
     : mechanisms_(mechanisms),
+      laws_(laws),
+      use_(use),
       law_(options.law),
       warm_(options.warm_start),
       solver_(solver_options(options)) {}
@@ -84,7 +87,31 @@ void StepJointIslands::solve_jointed(const std::vector<RigidBody>& bodies,
     if (const Vector3d* last = warm_ ? memory_.find(p.id) : nullptr)
       x_.segment<3>(row) = tangent_frame(p.normal) * *last;
   }
-  result_ = solver_.solve(mechanisms_, contacts_, v_, x_);
+  add_laws();
+  result_ = solver_.solve(mechanisms_, contacts_, own_, v_, x_);
+  take_laws();
+}
+
+void StepJointIslands::add_laws() {
+  law_of_.clear();
+  own_.clear();
+  if (use_ == LawUse::none || laws_.laws.count() == 0) return;
+  own_.assign(contacts_.size(), Vector3d::Zero());
+  const bool place = use_ == LawUse::limits;
+  for (int k = 0; k < laws_.laws.count(); ++k) {
+    if (!laws_.in(use_, k)) continue;
+    law_of_.push_back(k);
+    contacts_.push_back(laws_.contact(k, place, v_, mechanisms_, own_.emplace_back()));
+    const auto row = static_cast<Eigen::Index>(x_.size());
+    x_.conservativeResize(row + 3);
+    x_.segment<3>(row) = laws_.start(k, warm_ ? memory_.find(laws_.id(k)) : nullptr);
+  }
+}
+
+void StepJointIslands::take_laws() {
+  if (use_ != LawUse::all) return;
+  for (std::size_t l = 0; l < law_of_.size(); ++l)
+    laws_.impulses[at(law_of_[l])] = laws_.impulse(law_of_[l], law_impulse(l));
 }
 
 void StepJointIslands::merge(const std::vector<RigidBody>& bodies,
@@ -125,7 +152,8 @@ void StepJointIslands::merge(const std::vector<RigidBody>& bodies,
 void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& bodies,
                              const std::vector<PointContact>& contacts, BodySolution& out) {
   find_islands(contacts);
-  if (jointed_.empty()) {
+  const bool laws = use_ != LawUse::none && laws_.laws.count() > 0;
+  if (jointed_.empty() && !laws) {
     others.solve(bodies, contacts, out);
     return remember(contacts, out);
   }
@@ -147,6 +175,8 @@ void StepJointIslands::remember(const std::vector<PointContact>& contacts,
   std::swap(memory_, before_);
   memory_.clear();
   for (std::size_t k = 0; k < contacts.size(); ++k) memory_.add(contacts[k].id, out.impulses[k]);
+  for (std::size_t l = 0; l < law_of_.size(); ++l)
+    memory_.add(laws_.id(law_of_[l]), law_impulse(l));
 }
 
 }  // namespace tether::contact::detail

@@ -5,6 +5,7 @@
 
 #include "body_sweeps/impulse_memory.hpp"
 #include "joints/jointed_contacts.hpp"
+#include "joints/law_rows.hpp"
 #include "joints/mechanisms.hpp"
 #include "stepping/joint_part.hpp"
 
@@ -14,7 +15,7 @@ namespace tether::contact::detail {
 class StepJointIslands final : public JointIslands {
  public:
   /// The mechanisms belong to the joints of the stepper, and are as they left them last.
-  StepJointIslands(Mechanisms& mechanisms, const BodyOptions& options);
+  StepJointIslands(Mechanisms& mechanisms, LawRows& laws, LawUse use, const BodyOptions& options);
 
   void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
              const std::vector<PointContact>& contacts, BodySolution& out) override;
@@ -32,7 +33,15 @@ class StepJointIslands final : public JointIslands {
   void merge(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& out);
 
+  void add_laws();
+  Eigen::Vector3d law_impulse(std::size_t l) const {
+    return x_.segment<3>(3 * static_cast<Eigen::Index>(jointed_.size() + l));
+  }
+  void take_laws();
+
   Mechanisms& mechanisms_;
+  LawRows& laws_;
+  LawUse use_;
   Law law_;
   bool warm_;
   JointedContacts solver_;
@@ -41,8 +50,10 @@ class StepJointIslands final : public JointIslands {
   std::vector<char> has_joints_;     // of the root of an island
   std::vector<int> jointed_, rest_;  // contacts
   std::vector<PointContact> points_;
-  BodySolution solution_;  // of rest_
-  std::vector<BodyContact> contacts_;
+  BodySolution solution_;              // of rest_
+  std::vector<BodyContact> contacts_;  // jointed_, then laws
+  std::vector<int> law_of_;            // of the latter
+  std::vector<Eigen::Vector3d> own_;   // mobilities of contacts_; empty: none has any
   std::vector<Vector6d> v_;
   linalg::VectorX x_;
   ImpulseMemory memory_, before_;  // of the last solve, and of the one before it

@@ -61,7 +61,7 @@ JointSolution JointSolver::solve(const std::vector<Body>& bodies, const JointRow
 
   out.impulses.setZero(3 * static_cast<Eigen::Index>(contacts.size()));
   const detail::JointedContacts::Result& result =
-      implementation_->contacts.solve(mechanisms, contacts, out.velocities, out.impulses);
+      implementation_->contacts.solve(mechanisms, contacts, {}, out.velocities, out.impulses);
   if (!contacts.empty()) mechanisms.satisfy(joints, out.velocities);  // remove rounding errors
   out.joint_error = mechanisms.error(joints, out.velocities);
   out.joint_impulses.setZero(joints.count());

@@ -109,7 +109,7 @@ void JointedContacts::add_mechanism(Mechanisms& mechanisms, std::size_t begin, s
   }
 }
 
-void JointedContacts::assemble(Mechanisms& mechanisms) {
+void JointedContacts::assemble(Mechanisms& mechanisms, const std::vector<Eigen::Vector3d>& own) {
   const Eigen::Index n = static_cast<Eigen::Index>(members_.size());
   A_.setZero(3 * n, 3 * n);
   alone_.setZero(n);
@@ -126,6 +126,8 @@ void JointedContacts::assemble(Mechanisms& mechanisms) {
             sides_[q].H * sides_[p].H.transpose();
   }
   A_.triangularView<Eigen::StrictlyUpper>() = A_.transpose();
+  for (Eigen::Index i = 0; i < n && !own.empty(); ++i)
+    A_.diagonal().segment<3>(3 * i) += own[at(members_[static_cast<std::size_t>(i)])];
   clear_held_slips();
 }
 
@@ -244,6 +246,7 @@ void JointedContacts::apply(Mechanisms& mechanisms, const linalg::VectorX& x,
 
 const JointedContacts::Result& JointedContacts::solve(Mechanisms& mechanisms,
                                                       const std::vector<BodyContact>& contacts,
+                                                      const std::vector<Eigen::Vector3d>& own,
                                                       std::vector<Vector6d>& v,
                                                       linalg::VectorX& x) {
   result_ = {};
@@ -252,7 +255,7 @@ const JointedContacts::Result& JointedContacts::solve(Mechanisms& mechanisms,
   for (std::size_t k = 0; k + 1 < island_start_.size(); ++k) {
     members_.assign(order_.begin() + island_start_[k], order_.begin() + island_start_[k + 1]);
     collect_sides(mechanisms, contacts);
-    assemble(mechanisms);
+    assemble(mechanisms, own);
     drop_held(contacts, v);
     for (std::size_t l = 0, j = 0; l < members_.size(); ++l) {
       const bool keeps = j < kept_.size() && kept_[j] == static_cast<int>(l);

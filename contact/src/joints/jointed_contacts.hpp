@@ -24,9 +24,11 @@ class JointedContacts {
   };
   /// Changes velocities that the joints already allow, v, by impulses that keep them so, and adds
   /// what the joints do to the pulls. x (3 each, contact frame): where to start from, and the
-  /// impulses found.
+  /// impulses found. own: what an impulse moves a contact by besides the bodies, in each direction,
+  /// on the diagonal of A; empty: nothing.
   const Result& solve(Mechanisms& mechanisms, const std::vector<BodyContact>& contacts,
-                      std::vector<Vector6d>& v, linalg::VectorX& x);
+                      const std::vector<Eigen::Vector3d>& own, std::vector<Vector6d>& v,
+                      linalg::VectorX& x);
 
  private:
   /// One body of a contact that moves, and the contact's rows on its u. node: its mechanism, or,
@@ -42,7 +44,7 @@ class JointedContacts {
   int node_of(const Mechanisms& mechanisms, int body) const;
   void find_islands(const Mechanisms& mechanisms, const std::vector<BodyContact>& contacts);
   void collect_sides(const Mechanisms& mechanisms, const std::vector<BodyContact>& contacts);
-  void assemble(Mechanisms& mechanisms);
+  void assemble(Mechanisms& mechanisms, const std::vector<Eigen::Vector3d>& own);
   void add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end);
   void clear_held_slips();
   void drop_held(const std::vector<BodyContact>& contacts, const std::vector<Vector6d>& v);

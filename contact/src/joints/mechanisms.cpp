@@ -17,6 +17,9 @@ namespace {
 // Of the largest speed that the rows of a mechanism see: above what rounding leaves of rows that
 // depend on each other, below any motion that somebody has meant.
 constexpr double kContradiction = 1e-7;
+// The squares of smaller speeds vanish, and nothing relative is left: what comes to rest passes
+// there.
+constexpr double kLeast = 1e-150;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -170,8 +173,9 @@ void Mechanisms::find_contradicting(int m, const JointRows& joints, double scale
   for (std::size_t k = 0; k < mechanism.rows().size(); ++k) {
     const int i = static_cast<int>(k);
     const double norm = mechanism.row_norm(i);
-    const bool holds = norm > 0 ? std::abs(mechanism.left(i)) <= kContradiction * scale
-                                : b_[k] == 0;  // a row of zeros
+    const bool holds = norm > 0
+                           ? std::abs(mechanism.left(i)) <= std::max(kContradiction * scale, kLeast)
+                           : b_[k] == 0;  // a row of zeros
     if (!holds) contradicting_.push_back(joints.joint(mechanism.rows()[k]));
   }
 }

@@ -36,6 +36,7 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
                        Gyroscopic gyroscopic)
     : equations_(std::move(equations)),
       gyroscopic_(gyroscopic),
+      has_laws_(equations_->has_laws()),
       bodies_(bodies.motion.size()),
       v_(bodies.motion.size(), Vector6d::Zero()),
       g_(at(equations_->rows())),
@@ -73,8 +74,13 @@ bool StepJoints::are_joined(int first, int second) const {
                             std::pair<int, int>(std::minmax(first, second)));
 }
 
-std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& options) {
-  return std::make_unique<StepJointIslands>(mechanisms_, options);
+std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& options, LawUse laws) {
+  return std::make_unique<StepJointIslands>(mechanisms_, laws_, laws, options);
+}
+
+void StepJoints::list_laws(std::vector<int>& out) const {
+  for (int k = 0; k < laws_.laws.count(); ++k)
+    out.push_back(laws_.impulses[at(k)] == 0 ? 0 : laws_.at_bound(k) != 0 ? laws_.at_bound(k) : 2);
 }
 
 // Equations of the positions at time t.
@@ -172,6 +178,13 @@ bool StepJoints::project_positions(BodySet& bodies, double t) {
 }
 
 void StepJoints::begin(BodySet& bodies, double t) {
+  put_onto(bodies, t);
+  if (!has_laws_) return;
+  take_velocities(bodies);
+  laws_.remember(v_);
+}
+
+void StepJoints::put_onto(BodySet& bodies, double t) {
   if (!moved_since(bodies, t)) return;
   factor(bodies, t);
   // The result of a step stays the same to the last bit, also in a continued run.
@@ -260,6 +273,10 @@ void StepJoints::predict(BodySet& bodies, double t, double dt) {
   meet(bodies, t, dt);
   restore(bodies);
   give_velocities(bodies);
+  if (!has_laws_) return;
+  laws_.laws.clear();
+  equations_->add_laws(bodies, t, laws_.laws);
+  laws_.prepare(v_, dt);
 }
 
 void StepJoints::put_back(BodySet& bodies, double t) {
@@ -297,6 +314,10 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
       change_[at(p.second)].tail<3>() += p.r2.cross(x);
     }
   }
+  const JointRows& laws = laws_.laws.rows();
+  for (int k = 0; k < laws.count(); ++k)
+    for (const JointRows::Term* t = laws.begin(k); t != laws.end(k); ++t)
+      change_[at(t->body)] -= laws_.impulses[at(k)] * t->G;
   for (int m = 0; m < mechanisms_.count(); ++m) {
     std::vector<double>& u = mechanisms_.pull(m);
     const std::vector<int>& list = mechanisms_[m].bodies();

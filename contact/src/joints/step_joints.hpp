@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "joints/law_rows.hpp"
 #include "joints/mechanisms.hpp"
 #include "stepping/joint_part.hpp"
 
@@ -25,7 +26,7 @@ class StepJoints final : public JointPart {
   bool holds(int body) const override { return mechanisms_.mechanism_of(body) >= 0; }
   const std::vector<std::pair<int, int>>& links() const override { return links_; }
   bool are_joined(int first, int second) const override;
-  std::unique_ptr<JointIslands> make_islands(const BodyOptions& options) override;
+  std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
 
   /// Start of a step, before its forces: where the bodies have been moved from outside, they are
   /// put back onto the joints by the least move, and their velocities. Throws std::invalid_argument
@@ -39,6 +40,11 @@ class StepJoints final : public JointPart {
   /// to round-off.
   bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) override;
 
+  bool has_laws() const override { return has_laws_; }
+  void list_laws(std::vector<int>& out) const override;
+  const std::vector<Strike>& strikes() const override { return laws_.strikes; }
+  const std::vector<double>& law_impulses() const override { return laws_.impulses; }
+
   /// Largest |g| at the end of the last step, m or rad.
   double drift() const override { return drift_; }
   /// Impulses of the last step, by row.
@@ -49,6 +55,7 @@ class StepJoints final : public JointPart {
     Eigen::Vector3d position;
     linalg::Quaternion orientation;
   };
+  void put_onto(BodySet& bodies, double t);
   void factor(const BodySet& bodies, double t);
   bool moved_since(const BodySet& bodies, double t) const;
   void take_velocities(const BodySet& bodies);
@@ -68,6 +75,8 @@ class StepJoints final : public JointPart {
   std::unique_ptr<JointEquations> equations_;
   Gyroscopic gyroscopic_;
   Mechanisms mechanisms_;
+  bool has_laws_;
+  LawRows laws_;
   JointRows rows_;
   std::vector<Body> bodies_;  // inverse masses
   std::vector<int> held_;     // bodies of mechanisms

@@ -14,10 +14,22 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   if (s.joints || !s.force.empty())
     throw std::invalid_argument("Stepper::add_joints: once, and before add_force");
   if (!joints || joints->rows() == 0) return;
+  if (joints->has_laws() && s.options.law != Law::coulomb)
+    throw std::invalid_argument(
+        std::string(
+            "Stepper::add_joints: limits, motors and friction of joints need law = coulomb, "
+            "not ") +
+        name(s.options.law));
+  if (joints->has_laws() && s.options.restitution_law != RestitutionLaw::newton)
+    throw std::invalid_argument(
+        "Stepper::add_joints: limits, motors and friction of joints need restitution_law = newton");
   s.joints =
       std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
   s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
-  if (s.solver) s.give_joints();
+  if (s.solver)
+    s.give_joints();
+  else if (s.joints->has_laws())
+    s.make_solvers();
   for (std::vector<int>* list : {&s.moving, &s.long_bodies, &s.free, &s.free_round, &s.free_long})
     list->clear();
   s.free_spin.clear();

@@ -57,6 +57,7 @@ void Stepper::Implementation::advance_part(double time, double length) {
 // What contacts have done in the part just taken.
 void Stepper::Implementation::list_active(double length, std::vector<Active>& list) const {
   list.clear();
+  if (joints) list_laws(list);
   if (!near) return;
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
     const PointContact& c = contacts.points[k];
@@ -75,6 +76,14 @@ void Stepper::Implementation::list_active(double length, std::vector<Active>& li
   });
 }
 
+// Limits that press and laws at a bound: as contacts, behind all of them.
+void Stepper::Implementation::list_laws(std::vector<Active>& list) const {
+  std::vector<int> what;
+  joints->list_laws(what);
+  for (std::size_t k = 0; k < what.size(); ++k)
+    if (what[k] != 0) list.push_back({~std::uint64_t{0} - k, 10 + what[k], Vector3d::Zero()});
+}
+
 bool Stepper::Implementation::same(const std::vector<Active>& a, const std::vector<Active>& b) {
   return a.size() == b.size() &&
          std::equal(a.begin(), a.end(), b.begin(), [](const Active& p, const Active& q) {
@@ -83,29 +92,38 @@ bool Stepper::Implementation::same(const std::vector<Active>& a, const std::vect
          });
 }
 
-// After a part of this length: when within it an impact happens, and how much too early it may be
-// taken, by the speed that it takes. Forces add a t to the approach: gap = came t + a t^2, as a
-// part that ends there sees it.
+// When an approach over this gap ends in a part of this length, and how much too early it may be
+// ended, by the speed that it has then. Forces add a t to it: gap = came t + a t^2, as a part that
+// ends there sees it. size: what the accuracy is relative to.
+Stepper::Implementation::Moment Stepper::Implementation::moment(double gap, double came,
+                                                                double comes, double size,
+                                                                double length) const {
+  gap = std::max(0.0, gap);
+  const double a = (comes - came) / length;
+  const double speed = std::sqrt(std::max(0.0, came * came + 4 * a * gap));
+  return {gap > 0 ? 2 * gap / (came + speed) : 0,
+          kAtOnce * options.accuracy * size / std::max(speed, 1e-300)};
+}
+
 Stepper::Implementation::Moment Stepper::Implementation::moment(const detail::Impact& i,
                                                                 double length) const {
   const PointContact& c = contacts.points[at(i.contact)];
-  const double gap = std::max(0.0, contacts.gaps[at(i.contact)]);
-  const double a = (i.comes - i.came) / length;
-  const double speed = std::sqrt(std::max(0.0, i.came * i.came + 4 * a * gap));
-  return {gap > 0 ? 2 * gap / (i.came + speed) : 0,
-          kAtOnce * options.accuracy * near->size(c) / std::max(speed, 1e-300)};
+  return moment(contacts.gaps[at(i.contact)], i.came, i.comes, near->size(c), length);
 }
 
 // Of those that matter. 0: now, within what the accuracy allows. Infinite: there is none.
 double Stepper::Implementation::first_impact(double length, double& at_once) const {
   double first = std::numeric_limits<double>::infinity();
-  if (!near) return first;
-  for (const detail::Impact& i : impacts->list()) {
-    const Moment m = moment(i, length);
-    if (!(m.early < length)) continue;  // whenever in this part
+  const auto take = [&](const Moment& m) {
+    if (!(m.early < length)) return;  // whenever in this part
     at_once = std::min(at_once, m.early);
     first = std::min(first, m.when > m.early ? (1 - 1e-3) * m.when : 0);
-  }
+  };
+  if (joints)
+    for (const detail::Strike& s : joints->strikes())
+      take(moment(s.gap, s.came, s.comes, s.body < 0 ? 1 : radius[at(s.body)], length));
+  if (near)
+    for (const detail::Impact& i : impacts->list()) take(moment(i, length));
   return first;
 }
 

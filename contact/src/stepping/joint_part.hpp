@@ -9,6 +9,16 @@
 
 namespace tether::contact::detail {
 
+/// Laws of joints (JointLaws) in a problem: of velocities, of positions, that leaves them out.
+enum class LawUse { all, limits, none };
+
+/// A limit of a joint that is struck within a part of a step.
+struct Strike {
+  double gap;          ///< m or rad, at the start of the part
+  double came, comes;  ///< approach before and with the forces of the part, > 0
+  int body;            ///< one that moves along; -1: the coordinate is an angle
+};
+
 /// Contact problems of islands with joints. Abstract, as JointPart: who adds no joints to a Stepper
 /// links nothing of them.
 class JointIslands {
@@ -33,12 +43,19 @@ class JointPart {
   virtual const std::vector<std::pair<int, int>>& links() const = 0;
   /// Bodies that a joint of three rows or more connects pass through each other.
   virtual bool are_joined(int first, int second) const = 0;
-  virtual std::unique_ptr<JointIslands> make_islands(const BodyOptions& options) = 0;
+  virtual std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) = 0;
 
   virtual void begin(BodySet& bodies, double t) = 0;
   virtual void predict(BodySet& bodies, double t, double dt) = 0;
   virtual void put_back(BodySet& bodies, double t) = 0;
   virtual bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) = 0;
+  /// Whether there are laws; then contact problems are solved without contacts, too.
+  virtual bool has_laws() const = 0;
+  /// Sign of each law's impulse in the last part where its bound holds it, else 2 where it has one,
+  /// 0 where it has none.
+  virtual void list_laws(std::vector<int>& out) const = 0;
+  virtual const std::vector<Strike>& strikes() const = 0;
+  virtual const std::vector<double>& law_impulses() const = 0;
   virtual double drift() const = 0;
   virtual const std::vector<double>& impulses() const = 0;
 };

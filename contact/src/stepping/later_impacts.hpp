@@ -35,7 +35,7 @@ class LaterImpacts {
 
   /// After the above.
   void set_joints(JointPart& joints, const BodyOptions& options) {
-    solver_.set_joints(joints.make_islands(options));
+    solver_.set_joints(joints.make_islands(options, LawUse::none));
     if (restitution_) restitution_->set_joints(joints, options);
     islands_.set_links(joints.links());
   }

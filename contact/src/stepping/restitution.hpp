@@ -21,7 +21,7 @@ class Restitution {
   Restitution(RestitutionLaw law, const BodyOptions& options);
 
   void set_joints(JointPart& joints, const BodyOptions& options) {
-    solver_.set_joints(joints.make_islands(options));
+    solver_.set_joints(joints.make_islands(options, LawUse::none));
     islands_.set_links(joints.links());
   }
 

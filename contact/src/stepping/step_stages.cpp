@@ -20,7 +20,7 @@ void Stepper::Implementation::make_stages() {
   }
   if (joints) add_stage("joints", &I::begin_joints);
   const char* impact = restitution ? "restitution" : "collision";
-  if (near) add_stage(impact, &I::remember_velocities);
+  if (solver) add_stage(impact, &I::remember_velocities);
   if (options.gravity) add_stage("gravity", &I::apply_gravity);
   after_forces = stages.size();
   if (!long_bodies.empty()) {
@@ -41,6 +41,8 @@ void Stepper::Implementation::make_stages() {
     if (closing) add_stage("penetration", &I::close_gaps);
     if (correction) add_stage("penetration", &I::correct_penetration);
     if (joints) add_stage("joints", &I::put_back_joints);
+  } else if (solver) {
+    add_stage("joints", &I::solve_contacts);
   }
   add_stage("motion", &I::move);
   if (!free_round.empty()) add_stage("motion", &I::turn_round);
@@ -124,7 +126,7 @@ void Stepper::Implementation::solve_contacts() {
   contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
   std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
   failed = false;
-  if (contacts.points.empty()) {
+  if (contacts.points.empty() && !has_laws()) {
     solver->forget();
     return;
   }
@@ -145,7 +147,7 @@ void Stepper::Implementation::solve_contacts() {
 }
 
 void Stepper::Implementation::take_later_impacts() {
-  if (impacts->list().empty()) return;
+  if (impacts->list().empty() || has_laws()) return;
   const detail::LaterImpacts::Counts taken = later->take(*near, *impacts, dt, bodies, contacts);
   counts.contact_problems += taken.problems;
   counts.sweeps += taken.sweeps;

@@ -15,6 +15,11 @@ namespace tether::contact {
 void Stepper::Implementation::make_solvers() {
   const BodyOptions o = detail::contact_options(options);
   solver = std::make_unique<detail::StepSolver>(o);
+  if (!impacts)
+    impacts = std::make_unique<detail::Impacts>(
+        detail::threshold_speed(options.impact_threshold, options),
+        detail::threshold_speed(options.restitution_threshold, options));
+  if (!near) return give_joints();
   later = std::make_unique<detail::LaterImpacts>(
       detail::threshold_speed(options.impact_threshold, options),
       detail::threshold_speed(options.restitution_threshold, options), o);
@@ -32,9 +37,12 @@ void Stepper::Implementation::make_solvers() {
 
 void Stepper::Implementation::give_joints() {
   const BodyOptions o = detail::contact_options(options);
-  solver->set_joints(joints->make_islands(o));
+  solver->set_joints(joints->make_islands(o, detail::LawUse::all));
+  if (!near) return;
   if (restitution) restitution->set_joints(*joints, o);
-  if (correction) correction->set_joints(joints->make_islands(detail::correction_options(options)));
+  if (correction)
+    correction->set_joints(
+        joints->make_islands(detail::correction_options(options), detail::LawUse::limits));
   if (closing) closing->set_joints(*joints, detail::closing_options(options));
   later->set_joints(*joints, o);
 }
@@ -65,9 +73,6 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
     s.near = std::make_unique<detail::NearContacts>(s.bodies, std::move(surfaces),
                                                     std::move(meetings), options.law,
                                                     options.near_part, std::move(polyhedra));
-    s.impacts = std::make_unique<detail::Impacts>(
-        detail::threshold_speed(options.impact_threshold, options),
-        detail::threshold_speed(options.restitution_threshold, options));
     s.make_solvers();
   }
   s.make_stages();
@@ -102,6 +107,10 @@ double Stepper::joint_drift() const {
 const std::vector<double>& Stepper::joint_impulses() const {
   static const std::vector<double> none;
   return implementation_->joints ? implementation_->joints->impulses() : none;
+}
+const std::vector<double>& Stepper::law_impulses() const {
+  static const std::vector<double> none;
+  return implementation_->joints ? implementation_->joints->law_impulses() : none;
 }
 double Stepper::last_part() const { return implementation_->dt; }
 const StepCounts& Stepper::counts() const { return implementation_->counts; }
@@ -166,7 +175,7 @@ void Stepper::start_anew(long steps) {
   s.control = {};
   s.free_spin.assign(s.free_spin.size(), {});
   s.turn_inertias();
-  if (s.near) s.make_solvers();  // nothing of the past is left
+  if (s.solver) s.make_solvers();  // nothing of the past is left
 }
 
 }  // namespace tether::contact

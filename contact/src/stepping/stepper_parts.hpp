@@ -135,8 +135,10 @@ struct Stepper::Implementation {
   struct Moment {
     double when, early;  // s
   };
+  Moment moment(double gap, double came, double comes, double size, double length) const;
   Moment moment(const detail::Impact& i, double length) const;
   void list_active(double length, std::vector<Active>& list) const;
+  void list_laws(std::vector<Active>& list) const;
   static bool same(const std::vector<Active>& a, const std::vector<Active>& b);
   double first_impact(double length, double& at_once) const;
   double part_error(const detail::PartState& whole, double length, bool smooth) const;
@@ -162,7 +164,11 @@ struct Stepper::Implementation {
   void choose_impacts();
   void choose_bounces() { restitution->choose(*impacts, *impacts, bodies, contacts); }
   void solve_contacts();
-  void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
+  bool has_laws() const { return joints && joints->has_laws(); }
+  // A motor may give what energy is held against: with laws of joints the one solve stands.
+  void rebound() {
+    if (!has_laws()) counts.bounces += restitution->apply(bodies, contacts);
+  }
   void take_later_impacts();
   void meet_others();
   void close_gaps();

@@ -1,6 +1,8 @@
 // Tether: all effects. SPDX-License-Identifier: BSD-3-Clause
 #include "list.hpp"
 
+#include <algorithm>
+
 namespace tether::scene::effects {
 
 #define EFFECT(name) const Effect& name##_effect();
@@ -22,6 +24,12 @@ std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
   for (const Effect* each : all())
     if (auto force = each->make_force(scene, bodies)) forces.push_back(std::move(force));
   return forces;
+}
+
+bool has_joint_laws(const Scene& scene) {
+  const auto& list = all();
+  return std::any_of(list.begin(), list.end(),
+                     [&](const Effect* each) { return each->has_joint_laws(scene); });
 }
 
 mechanics::Momenta momenta_of(const Scene& scene) {

@@ -15,6 +15,9 @@ const std::vector<const Effect*>& all();
 std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
                                                            const mechanics::Bodies& bodies);
 
+/// Whether joints have limits, motors or friction, which stepping alone has.
+bool has_joint_laws(const Scene& scene);
+
 /// Components of momentum and angular momentum that all effects together conserve.
 mechanics::Momenta momenta_of(const Scene& scene);
 

@@ -11,6 +11,7 @@ class Hinge : public JointType {
  public:
   JointKind kind() const override { return JointKind::hinge; }
   MotionOf motion() const override { return MotionOf::angle; }
+  bool is_free() const override { return true; }
   void read(files::Fields& in, Joint& joint) const override {
     read_point(in, joint);
     read_axis(in, joint);

@@ -36,6 +36,9 @@ class JointType {
   enum class MotionOf { nothing, angle, length };
   virtual MotionOf motion() const { return MotionOf::nothing; }
 
+  /// Whether that quantity is free without a motion: limits, motors and friction act along it.
+  virtual bool is_free() const { return false; }
+
   virtual const Vector3d& point_on_second(const Joint& joint) const { return joint.at; }
   virtual void take_lengths(const Joint&, Largest&) const {}
   /// Of a joint to the world. Default: torques in all directions.

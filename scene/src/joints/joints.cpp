@@ -3,6 +3,7 @@
 // Their forces are the multipliers of their rows, which the smooth engine solves for.
 #include <tether/scene/words.hpp>
 
+#include "effects/list.hpp"
 #include "list.hpp"
 #include "mechanics/effect.hpp"
 #include "prescribed_motion.hpp"
@@ -14,7 +15,7 @@ using joints::JointType;
 
 namespace {
 
-void read_joint(files::Fields& in, files::Reader& r) {
+void read_one(files::Fields& in, files::Reader& r) {
   Joint joint;
   joint.place = in.place();
   joint.name = files::read_name(in, "joint");
@@ -25,7 +26,9 @@ void read_joint(files::Fields& in, files::Reader& r) {
   }
   const std::optional<JointKind> kind = in.word_of<JointKind>("kind");
   r.two_bodies(in, joint.first, joint.second);
-  if (!kind) return in.pass_over({"at", "axis", "length", "motion"});
+  if (!kind)
+    return in.pass_over({"at", "axis", "length", "motion", "limits", "limits_deg", "limits_rad",
+                         "limit_restitution", "motor", "friction"});
   joint.kind = *kind;
   const JointType& type = joints::type(*kind);
   type.read(in, joint);
@@ -34,13 +37,16 @@ void read_joint(files::Fields& in, files::Reader& r) {
       files::Fields fields = r.fields(motion, in.path() + ": motion");
       joint.motion = joints::read_motion(fields, type.motion() == JointType::MotionOf::angle);
     }
+  if (type.is_free())
+    for (const Effect* each : all())
+      each->read_joint(in, r, type.motion() == JointType::MotionOf::angle, joint);
   r.scene.joints.push_back(std::move(joint));
 }
 
 class JointEffect : public Effect {
  public:
   void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "joint", [&](files::Fields& in) { read_joint(in, r); });
+    r.each(root, "joint", [&](files::Fields& in) { read_one(in, r); });
   }
   void write(const Scene& scene, files::Writer& out) const override {
     for (const Joint& joint : scene.joints) {
@@ -52,6 +58,8 @@ class JointEffect : public Effect {
       type.write(joint, out);
       if (joint.motion)
         joints::write_motion(*joint.motion, type.motion() == JointType::MotionOf::angle, out);
+      for (const Effect* each : all())
+        each->write_joint(joint, type.motion() == JointType::MotionOf::angle, out);
     }
   }
   void check(const Scene& scene, files::Report& report) const override {

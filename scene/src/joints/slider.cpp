@@ -11,6 +11,7 @@ class Slider : public JointType {
  public:
   JointKind kind() const override { return JointKind::slider; }
   MotionOf motion() const override { return MotionOf::length; }
+  bool is_free() const override { return true; }
   void read(files::Fields& in, Joint& joint) const override {
     joint.at = in.vector("at", joint.at, files::kAny, "m");
     read_axis(in, joint);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <tether/contact/joint_laws.hpp>
 #include <tether/contact/stepping.hpp>
 #include <tether/scene/plan.hpp>
 #include <tether/scene/scene.hpp>
@@ -21,6 +22,28 @@ namespace tether::scene::mechanics {
 
 /// A line of the plan; `Effect` is the effect itself here.
 using PlannedEffect = scene::Effect;
+
+/// Laws along the coordinates of joints. `sign`: -1 where the law sees the coordinate backwards.
+struct JointLawList {
+  contact::JointLaws& laws;
+  std::vector<double>& signs;
+  std::function<void(double sign)> on;  ///< puts the law added last on the bodies of the joint
+
+  void limit(int joint, double gap, double restitution, double sign) {
+    laws.add_limit(joint, gap, restitution);
+    place(sign);
+  }
+  void bounded(int joint, double rate, double bound) {
+    laws.add_bounded(joint, rate, bound);
+    place(1);
+  }
+
+ private:
+  void place(double sign) {
+    signs.push_back(sign);
+    on(sign);
+  }
+};
 
 /// A column of the table of a run. The forces are empty unless the output of the scene has them.
 struct Column {
@@ -49,11 +72,14 @@ class Effect {
   virtual void read(files::Fields& /*root*/, files::Reader&) const {}
   virtual void read_scene(files::Fields&, Scene&) const {}
   virtual void read_body(files::Fields&, files::Reader&, Body&) const {}
+  /// `angle`: the joint turns; else it slides.
+  virtual void read_joint(files::Fields&, files::Reader&, bool /*angle*/, Joint&) const {}
   virtual void read_pair(files::Fields&, files::Reader&, Pair&) const {}
   /// The same, to be read again.
   virtual void write(const Scene&, files::Writer&) const {}
   virtual void write_scene(const Scene&, files::Writer&) const {}
   virtual void write_body(const Body&, files::Writer&) const {}
+  virtual void write_joint(const Joint&, bool /*angle*/, files::Writer&) const {}
   virtual void write_pair(const Pair&, files::Writer&) const {}
   /// Checks across the fields of a scene.
   virtual void check(const Scene&, files::Report&) const {}
@@ -63,6 +89,12 @@ class Effect {
   virtual void plan(const Scene&, EngineKind, std::vector<PlannedEffect>&) const {}
   /// Adds its columns to the table of a run.
   virtual void add_columns(const Scene&, std::vector<Column>&) const {}
+
+  /// A law along the free coordinate of a joint, which is now at `value`: JointLaws of the contact
+  /// library, each with its sign: the coordinate grows by +1.
+  virtual void add_laws(const Joint&, int /*joint*/, double /*value*/, JointLawList&) const {}
+  /// Whether the scene names a law of joints, which stepping alone has.
+  virtual bool has_joint_laws(const Scene&) const { return false; }
 
   /// Lengths (m) and rates (1/s) of the scene; `length` and `mass`: its size.
   virtual void take_lengths(const Scene&, Largest&) const {}

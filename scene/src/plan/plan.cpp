@@ -74,10 +74,16 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
           : "the scene asks for more than one engine: by engine, [smooth], [stepping] or [event]");
   refuse(contact && smooth,
          "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping] or [event]");
-  refuse((contact || stepping) && !event && projected,
+  const bool laws = effects::has_joint_laws(s);
+  const std::string has_laws =
+      "the joints of the scene have limits, motors or friction, which the ";
+  refuse(laws && smooth, has_laws + "smooth engine does not have: use [stepping]");
+  refuse((contact || stepping || laws) && !event && projected,
          "the stepping engine projects no invariants: give them project = false, or, without "
          "contacts, use [smooth]");
-  no_event = contact || event ? event_engine_refusal(s) : std::string("nothing touches");
+  no_event = laws               ? has_laws + "event engine does not have"
+             : contact || event ? event_engine_refusal(s)
+                                : std::string("nothing touches");
   refuse(event && !no_event.empty(), no_event);
   refuse(event && asks_for_forces(s),
          "the event engine does not tell forces ([output] forces, [[expect]] of forces and slips): "
@@ -90,6 +96,10 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   }
   if (contact) {
     why = s.joints.empty() ? "bodies touch" : "bodies touch; it has joints, too";
+    return EngineKind::stepping;
+  }
+  if (laws && !stepping) {
+    why = "joints have limits, motors or friction";
     return EngineKind::stepping;
   }
   why = stepping ? "the scene asks for it"

@@ -6,6 +6,7 @@
 #include <limits>
 #include <ostream>
 
+#include "effects/list.hpp"
 #include "integrator.hpp"
 #include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
@@ -254,6 +255,9 @@ std::unique_ptr<Engine> make_smooth_engine(const Scene& scene) {
   if (!scene.pairs.empty())
     throw std::invalid_argument(
         "the smooth engine has no contacts, but the scene has [[pair]] tables: use [stepping]");
+  if (effects::has_joint_laws(scene))
+    throw std::invalid_argument(
+        "the smooth engine has no limits, motors and friction of joints: use [stepping]");
   const SmoothOptions options = scene.smooth.value_or(SmoothOptions{});
   if (!(options.tolerance > 0 && options.tolerance < 1))
     throw std::invalid_argument("[smooth] tolerance must be between 0 and 1");

@@ -7,15 +7,26 @@ namespace tether::scene::stepping {
 using namespace mechanics;
 
 SteppedJoints::SteppedJoints(const Scene& scene)
-    : bodies_(scene), rows_(scene, bodies_.bodies()), reactions_(scene, bodies_.bodies()) {}
+    : bodies_(scene),
+      rows_(scene, bodies_.bodies()),
+      reactions_(scene, bodies_.bodies()),
+      laws_(scene, bodies_.bodies()) {}
+
+void SteppedJoints::add_laws(const contact::BodySet& bodies, double, contact::JointLaws& out) {
+  bodies_.read_positions(bodies);
+  laws_.add(bodies_.bodies(), out);
+}
 
 std::vector<JointForce> SteppedJoints::forces(const contact::BodySet& bodies, double t,
-                                              const std::vector<double>& impulses, double dt) {
+                                              const std::vector<double>& impulses,
+                                              const std::vector<double>& law_impulses, double dt) {
   bodies_.read_positions(bodies);
   rows_.set_time(t);
   std::vector<double> multipliers(at(rows_.count()), 0);
   for (std::size_t i = 0; i < multipliers.size() && dt > 0; ++i) multipliers[i] = impulses[i] / dt;
-  return reactions_.find(rows_, bodies_.bodies(), multipliers.data());
+  std::vector<JointForce> out = reactions_.find(rows_, bodies_.bodies(), multipliers.data());
+  laws_.add_forces(bodies_.bodies(), law_impulses, dt, out);
+  return out;
 }
 
 void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) {

@@ -8,6 +8,7 @@
 #include <tether/scene/scene.hpp>
 #include <vector>
 
+#include "joints/joint_laws.hpp"
 #include "joints/joint_rows.hpp"
 #include "joints/reactions.hpp"
 #include "mechanics/stepped_bodies.hpp"
@@ -25,7 +26,10 @@ class SteppedJoints final : public contact::JointEquations {
   void add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) override;
   /// Impulses by row, over dt, as forces at these positions.
   std::vector<JointForce> forces(const contact::BodySet& bodies, double t,
-                                 const std::vector<double>& impulses, double dt);
+                                 const std::vector<double>& impulses,
+                                 const std::vector<double>& law_impulses, double dt);
+  bool has_laws() const override { return laws_.any(); }
+  void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override;
   std::string name(int joint) const override { return "joint \"" + rows_.name(joint) + "\""; }
 
  private:
@@ -37,6 +41,7 @@ class SteppedJoints final : public contact::JointEquations {
   mechanics::SteppedBodies bodies_;
   joints::JointRows rows_;
   joints::Reactions reactions_;
+  joints::JointLaws laws_;
   std::vector<Gradient> gradients_;  // by row
 };
 

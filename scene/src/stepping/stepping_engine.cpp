@@ -189,8 +189,8 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
 Forces SteppingEngine::forces() const {
   Forces out;
   if (joints_)
-    out.joints =
-        joints_->forces(stepper_.bodies(), time(), stepper_.joint_impulses(), stepper_.last_part());
+    out.joints = joints_->forces(stepper_.bodies(), time(), stepper_.joint_impulses(),
+                                 stepper_.law_impulses(), stepper_.last_part());
   stepped_.look_at(stepper_.bodies());
   for (const auto& force : forces_) force->report(stepped_.bodies(), out);
   return out;

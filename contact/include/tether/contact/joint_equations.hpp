@@ -2,7 +2,7 @@
 #pragma once
 
 #include <string>
-#include <tether/contact/joints.hpp>
+#include <tether/contact/joint_laws.hpp>
 #include <tether/export.hpp>
 #include <vector>
 
@@ -21,6 +21,10 @@ class JointEquations {
   virtual void values(const BodySet& bodies, double t, double* g) = 0;
   /// Adds the rows G v = -dg/dt (t alone; positions held) to `rows`, in the order of values().
   virtual void add_rows(const BodySet& bodies, double t, JointRows& rows) = 0;
+  /// Whether add_laws() adds any, ever: limits, motors, friction of joints of three rows or more.
+  virtual bool has_laws() const { return false; }
+  /// Adds the laws of the step that starts at t with these positions, always as many.
+  virtual void add_laws(const BodySet& /*bodies*/, double /*t*/, JointLaws&) {}
   /// Name, for messages, of the joint with that number in add_rows().
   virtual std::string name(int joint) const { return "joint " + std::to_string(joint); }
 };

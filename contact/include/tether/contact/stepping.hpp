@@ -227,6 +227,8 @@ class Stepper {
   /// Impulses of the joints in the last part of the last step, one for each row, N s or N m s: see
   /// JointSolution::joint_impulses.
   const std::vector<double>& joint_impulses() const;
+  /// Those of the laws of joints, as JointEquations::add_laws has added them.
+  const std::vector<double>& law_impulses() const;
   /// Length, s, of the last part of the last step, which impulses are of: forces are impulses over
   /// it. 0 before the first step, and after set_memory().
   double last_part() const;

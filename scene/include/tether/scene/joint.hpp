@@ -18,6 +18,17 @@ struct Motion {
   double rate = 0, amplitude = 0, frequency = 0, phase = 0;  // m/s or rad/s; m or rad; Hz; rad
 };
 
+/// Of the angle of a hinge, the way of a slider; 0 at t = 0.
+struct JointLimits {
+  double lower = 0, upper = 0;  ///< rad (a turn apart at most), m
+  double restitution = 0;       ///< 0 .. 1
+};
+
+/// Drives the speed of a hinge or slider towards `rate`, with at most the force `bound`.
+struct JointMotor {
+  double rate = 0, bound = 0;  ///< rad/s, N m; m/s, N
+};
+
 enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal };
 
 /// The words of files for them.
@@ -42,6 +53,9 @@ struct Joint {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();      ///< hinge, slider, universal
   std::optional<double> length;                         ///< distance: default the one at t = 0
   std::optional<Motion> motion;
+  std::optional<JointLimits> limits;
+  std::optional<JointMotor> motor;
+  double friction = 0;  ///< of a hinge or slider: Coulomb's, at most this moment (N m) or force (N)
   Place place;
   /// Universal only: the arm of the cross on `second`, at right angles to `axis`, that on `first`.
   Eigen::Vector3d axis_second = Eigen::Vector3d::UnitX();

@@ -1,0 +1,49 @@
+// Tether: one-dimensional laws of joints. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/joints.hpp>
+#include <tether/export.hpp>
+#include <vector>
+
+TETHER_EXPORT_BEGIN
+namespace tether::contact {
+
+/// Laws on a speed s' = sum over bodies of G v of a joint, for one step; the impulse x along it
+/// acts on each body as G' x. They are solved with the contacts, in one problem:
+///
+///     limit     x >= 0,  s' >= -gap / dt,  complementary (struck: s' >= -e s'-, README section 16)
+///     bounded   |x| <= bound dt,  x opposes s' - rate, and is the bound where that is not 0
+///
+/// Bounded with rate 0 is Coulomb's friction of a joint, with another one a motor of limited force.
+class JointLaws {
+ public:
+  struct Law {
+    int joint;           ///< number, for messages
+    bool limit;          ///< else bounded
+    double gap;          ///< m or rad
+    double restitution;  ///< 0 .. 1
+    double rate;         ///< m/s or rad/s
+    double bound;        ///< N or N m
+  };
+
+  void clear();
+  /// `gap`: way to the limit, < 0 beyond it. Throws std::invalid_argument, as the others, on values
+  /// that are not finite or out of their range.
+  void add_limit(int joint, double gap, double restitution);
+  /// bound >= 0.
+  void add_bounded(int joint, double rate, double bound);
+  /// Adds the term G v of one more body to the law added last, which has at most two; body -1, the
+  /// world, is ignored.
+  void on(int body, const Vector6d& G);
+
+  int count() const { return rows_.count(); }
+  const Law& operator[](int law) const { return laws_[static_cast<std::size_t>(law)]; }
+  const JointRows& rows() const { return rows_; }  ///< one for each law
+
+ private:
+  JointRows rows_;
+  std::vector<Law> laws_;
+};
+
+}  // namespace tether::contact
+TETHER_EXPORT_END

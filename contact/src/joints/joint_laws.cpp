@@ -1,0 +1,46 @@
+// Tether: one-dimensional laws of joints. SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/joint_laws.hpp>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace tether::contact {
+
+namespace {
+
+void demand(bool holds, int joint, const char* what, double value, const char* range) {
+  if (!holds)
+    throw std::invalid_argument("joint " + std::to_string(joint) + ": " + what + " = " +
+                                std::to_string(value) + ": must be " + range);
+}
+
+}  // namespace
+
+void JointLaws::clear() {
+  rows_.clear();
+  laws_.clear();
+}
+
+void JointLaws::add_limit(int joint, double gap, double restitution) {
+  demand(std::isfinite(gap), joint, "gap", gap, "finite");
+  demand(restitution >= 0 && restitution <= 1, joint, "restitution", restitution, "0 to 1");
+  rows_.add(joint);
+  laws_.push_back({joint, true, gap, restitution, 0, 0});
+}
+
+void JointLaws::add_bounded(int joint, double rate, double bound) {
+  demand(bound >= 0 && std::isfinite(bound), joint, "bound", bound, ">= 0 and finite");
+  rows_.add(joint, rate);
+  laws_.push_back({joint, false, 0, 0, rate, bound});
+}
+
+void JointLaws::on(int body, const Vector6d& G) {
+  const int row = rows_.count() - 1;
+  if (row >= 0 && body >= 0 && rows_.end(row) - rows_.begin(row) >= 2)
+    throw std::invalid_argument("joint " + std::to_string(rows_.joint(row)) +
+                                ": a law is between two bodies at most");
+  rows_.on(body, G);
+}
+
+}  // namespace tether::contact

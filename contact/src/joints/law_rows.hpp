@@ -1,0 +1,53 @@
+// Tether: the laws of joints in a step, as rows of its contact problems.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <tether/contact/joint_laws.hpp>
+#include <vector>
+
+#include "joints/mechanisms.hpp"
+#include "stepping/joint_part.hpp"
+
+namespace tether::contact::detail {
+
+/// A row of one dimension is a contact in two directions of its own, which no body moves in
+/// (README, section 16): for a limit both tangents, without friction; for a bounded law the normal,
+/// in which its own mobility a is pressed with a N, so that x_n = N = bound dt and |x_t| <= N.
+class LawRows {
+ public:
+  /// Start of a part of a step: the speeds that bodies come with, before its forces.
+  void remember(const std::vector<Vector6d>& v) { coming_ = v; }
+  /// Afterwards: the laws at its start, and the velocities that its forces leave.
+  void prepare(const std::vector<Vector6d>& v, double dt);
+
+  JointLaws laws;
+  std::vector<double> impulses;  ///< of the last problem of velocities, by law
+
+  std::vector<Strike> strikes;  ///< of limits, in this part
+
+  bool in(LawUse use, int law) const {
+    return use == LawUse::all || (use == LawUse::limits && laws[law].limit);
+  }
+  std::uint64_t id(int law) const { return kFirstId + static_cast<std::uint64_t>(law); }
+  /// The contact of a law, and its own mobility in the directions that no body moves in. `place`:
+  /// the problem moves positions, from rest.
+  BodyContact contact(int law, bool place, const std::vector<Vector6d>& v,
+                      const Mechanisms& mechanisms, Eigen::Vector3d& own) const;
+  /// Its impulse in the contact frame, and back.
+  Eigen::Vector3d start(int law, const Eigen::Vector3d* last) const;
+  double impulse(int law, const Eigen::Vector3d& x) const { return laws[law].limit ? x[0] : x[1]; }
+  /// Whether the bound holds it: sign of the impulse then, else 0.
+  int at_bound(int law) const;
+
+ private:
+  static constexpr std::uint64_t kFirstId = std::uint64_t{1} << 63;
+  int moving_along(int law) const;
+  double speed(int law, const std::vector<Vector6d>& v) const;
+
+  std::vector<Vector6d> coming_;
+  std::vector<double> bias_;
+  double dt_ = 0;
+};
+
+}  // namespace tether::contact::detail

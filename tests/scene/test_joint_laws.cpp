@@ -1,0 +1,362 @@
+// Limits, motors and friction of joints. SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <sstream>
+#include <tether/scene/files.hpp>
+#include <tether/scene/plan.hpp>
+
+#include "mechanisms.hpp"
+#include "support/catch.hpp"
+
+using namespace mechanisms;
+using namespace tether::scene;
+
+namespace {
+
+const Vector3d kDown(0, 0, -kGravity);
+constexpr double kPi = 3.14159265358979323846;
+
+Scene steps_of(double step) {
+  Scene s;
+  s.stepping.emplace().step = step;
+  return s;
+}
+
+// A mass on a slider along the axis.
+Scene sliding(double step, double mass, const Vector3d& axis) {
+  Scene s = steps_of(step);
+  s.bodies.push_back(ball("carriage", {0, 0, 0}, mass, 0.01 * mass));
+  s.joints.push_back(joint(JointKind::slider, 0, kWorld, {0, 0, 0}));
+  s.joints[0].axis = axis;
+  return s;
+}
+
+// A flywheel on the axis z.
+Scene turning(double step, double inertia, double speed) {
+  Scene s = steps_of(step);
+  s.bodies.push_back(ball("wheel", {0, 0, 0}, 1, inertia));
+  s.bodies[0].angular_velocity = {0, 0, speed};
+  s.joints.push_back(hinge(0, kWorld, {0, 0, 0}));
+  return s;
+}
+
+// Times at which the angular velocity of body 0 about y jumps in sign at the limit.
+std::vector<double> bounces(const Scene& s, double end) {
+  const auto engine = make_engine(s);
+  std::vector<double> times;
+  double last = 0;
+  while (engine->time() < end) {
+    engine->advance(engine->time() + s.stepping->step);
+    const double now = engine->bodies()[0].angular_velocity.y();
+    const bool low = engine->bodies()[0].position.z() < -0.95;
+    if (last * now < 0 && low) times.push_back(engine->time());
+    last = now;
+  }
+  return times;
+}
+
+std::string refusal(const Scene& s) {
+  try {
+    make_engine(s);
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("a pendulum strikes its limit at the lowest point: oracle 14, order 1") {
+  const double exact[] = {.538218666720128926, 1.58544198624292315, 2.61574618289199347,
+                          3.63584806565328866};
+  double last = 0;
+  for (const double step : {1e-2, 1e-3, 1e-4}) {
+    Scene s = steps_of(step);
+    s.gravity = kDown;
+    const double angle = kPi / 3;
+    s.bodies.push_back(ball("bob", {std::sin(angle), 0, -std::cos(angle)}, 1, 1e-6));
+    s.joints.push_back(hinge(0, kWorld, {0, 0, 0}, {0, 1, 0}));
+    s.joints[0].limits = {-0.1, angle, 0.8};
+    const std::vector<double> found = bounces(s, 3.8);
+    REQUIRE(found.size() == 4);
+    double error = 0;
+    for (int k = 0; k < 4; ++k) error = std::max(error, std::abs(found[k] - exact[k]));
+    INFO(step << ": " << error);
+    CHECK(error < 10 * step);
+    if (last > 0) CHECK(error < 0.3 * last);
+    last = error;
+  }
+}
+
+TEST_CASE("a pendulum on a limit without restitution stops there, and the limit carries it") {
+  Scene s = steps_of(1e-3);
+  s.gravity = kDown;
+  s.bodies.push_back(ball("bob", {1, 0, 0}, 2, 1e-3));
+  s.joints.push_back(hinge(0, kWorld, {0, 0, 0}, {0, 1, 0}));
+  s.joints[0].limits = {-0.1, 0.5, 0};  // downwards
+  const auto engine = make_engine(s);
+  engine->advance(2);
+  const BodyState& b = engine->bodies()[0];
+  CHECK(std::abs(b.position.x() - std::cos(0.5)) < 1e-9);
+  CHECK(std::abs(b.position.z() + std::sin(0.5)) < 1e-9);
+  CHECK(b.velocity.norm() < 1e-9);
+  const JointForce f = engine->forces().joints[0];
+  CHECK((f.force - Vector3d(0, 0, 2 * kGravity)).norm() < 1e-6);
+  CHECK(std::abs(f.drive + 2 * kGravity * std::cos(0.5)) < 1e-6);
+}
+
+TEST_CASE("a motor below its limit of force drives the speed, above it gives that force") {
+  for (const double scale : {1e-6, 1.0, 1e6}) {  // of lengths, with times by its root
+    const double time = std::sqrt(scale), m = 2, g = kGravity;
+    for (const double bound : {15.0, 25.0, 1e12}) {
+      Scene s = sliding(1e-3 * time, m, {0, 0, 1});
+      s.gravity = kDown;
+      s.joints[0].motor = {0.5 * scale / time, bound};
+      const auto engine = make_engine(s);
+      engine->advance(0.4 * time);
+      const double a = bound / m - g, rise = std::max(0.5 / a, 0.0);
+      const bool fails = a < 0;
+      const double speed = fails ? a * 0.4 : 0.5;
+      const double way = fails ? 0.08 * a : 0.5 * 0.4 - 0.25 * rise;
+      INFO(scale << " " << bound);
+      CHECK(std::abs(engine->bodies()[0].velocity.z() * time / scale - speed) < 1e-9);
+      CHECK(std::abs(engine->bodies()[0].position.z() / scale - way) < 2e-3);
+      CHECK(std::abs(engine->forces().joints[0].drive - (fails ? bound : m * g)) < 1e-6);
+    }
+  }
+}
+
+TEST_CASE("a motor turns a wheel against a load: its moment is the load's, or its limit") {
+  for (const double bound : {2.0, 5.0}) {
+    Scene s = turning(1e-3, 0.4, 0);
+    s.loads.emplace_back().torque = {0, 0, -3};
+    s.joints[0].motor = {4, bound};
+    const auto engine = make_engine(s);
+    engine->advance(2);
+    const double speed = bound > 3 ? 4 : (bound - 3) / 0.4 * 2;
+    CHECK(std::abs(engine->bodies()[0].angular_velocity.z() - speed) < 1e-9);
+    CHECK(std::abs(engine->forces().joints[0].drive - std::min(bound, 3.0)) < 1e-7);
+  }
+}
+
+TEST_CASE("a sliding brake stops after m v / F and m v^2 / 2 F, and holds") {
+  for (const double step : {1e-2, 1e-3}) {
+    Scene s = sliding(step, 2, {1, 2, 2});
+    s.bodies[0].velocity = 3 * Vector3d(1, 2, 2) / 3;
+    s.joints[0].friction = 4;
+    const auto engine = make_engine(s);
+    engine->advance(1.5 - 2 * step);
+    CHECK(engine->bodies()[0].velocity.norm() > 0);
+    CHECK(std::abs(engine->forces().joints[0].drive + 4) < 1e-9);
+    engine->advance(1.5 + 2 * step);
+    CHECK(engine->bodies()[0].velocity.norm() < 1e-12);
+    engine->advance(3);
+    CHECK(std::abs(engine->bodies()[0].position.norm() - 2.25) < 2 * step);
+    CHECK(std::abs(engine->forces().joints[0].drive) < 1e-9);
+  }
+}
+
+TEST_CASE("a brake on a wheel stops it after I w / M; below its bound it carries the load") {
+  Scene s = turning(1e-3, 0.4, 10);
+  s.joints[0].friction = 2;
+  auto engine = make_engine(s);
+  engine->advance(1.999);
+  CHECK(engine->bodies()[0].angular_velocity.z() > 0);
+  engine->advance(2.001);
+  CHECK(std::abs(engine->bodies()[0].angular_velocity.z()) < 1e-10);
+  s.loads.emplace_back().torque = {0, 0, 1.9};
+  s.bodies[0].angular_velocity.setZero();
+  engine = make_engine(s);
+  engine->advance(1);
+  CHECK(engine->bodies()[0].angular_velocity.norm() < 1e-12);
+  CHECK(std::abs(engine->forces().joints[0].drive + 1.9) < 1e-9);
+  s.loads[0].torque = {0, 0, 2.4};
+  engine = make_engine(s);
+  engine->advance(1);
+  CHECK(std::abs(engine->bodies()[0].angular_velocity.z() - 1) < 1e-9);
+}
+
+TEST_CASE("motor and friction on one joint, and a limit beyond half a turn") {
+  Scene s = turning(1e-3, 0.4, 0);
+  s.joints[0].motor = {100, 5};
+  s.joints[0].friction = 2;
+  s.joints[0].limits = {-0.2, 1.5 * kPi, 0};
+  const auto engine = make_engine(s);
+  engine->advance(0.5);
+  CHECK(std::abs(engine->bodies()[0].angular_velocity.z() - 3 / 0.4 * 0.5) < 1e-8);
+  engine->advance(2);
+  const BodyState& b = engine->bodies()[0];
+  CHECK((b.orientation * Vector3d::UnitX() - Vector3d(0, -1, 0)).norm() < 1e-8);
+  CHECK(b.angular_velocity.norm() < 1e-9);
+}
+
+TEST_CASE("two bodies that strike the limit between them keep momenta and, at e = 1, energy") {
+  for (const double e : {0.0, 0.5, 1.0}) {
+    Scene s = steps_of(1e-4);
+    s.bodies.push_back(ball("first", {0.5, 0, 0}, 1, 0.1));
+    s.bodies.push_back(ball("second", {-0.5, 0, 0}, 3, 0.2));
+    // The hinge at the origin stays there: v = w x r.
+    s.bodies[0].angular_velocity = {0, 0, 2};
+    s.bodies[0].velocity = {0, 1, 0};
+    s.bodies[1].angular_velocity = {0, 0, -1};
+    s.bodies[1].velocity = {0, 0.5, 0};
+    s.joints.push_back(hinge(0, 1, {0, 0, 0}));
+    s.joints[0].limits = {-1, 0.3, e};
+    const auto engine = make_engine(s);
+    const Diagnostics before = engine->diagnostics();
+    engine->advance(0.05);
+    const auto relative = [&] {
+      return engine->bodies()[0].angular_velocity.z() - engine->bodies()[1].angular_velocity.z();
+    };
+    const double came = relative();
+    CHECK(came > 0);
+    engine->advance(0.2);
+    const Diagnostics after = engine->diagnostics();
+    CHECK(relative() <= 1e-6);
+    if (e == 1)
+      CHECK(std::abs(after.kinetic_energy - before.kinetic_energy) < 1e-3 * before.kinetic_energy);
+    if (e < 1) CHECK(after.kinetic_energy < before.kinetic_energy);
+    CHECK((after.momentum - before.momentum).norm() < 1e-11);
+    CHECK((after.angular_momentum - before.angular_momentum).norm() < 1e-11);
+  }
+}
+
+TEST_CASE("a motor presses a lever onto the floor: contact and motor in one solve") {
+  for (const double friction : {0.0, 0.5}) {
+    Scene s = steps_of(1e-3);
+    s.gravity = kDown;
+    s.bodies.push_back(rod("lever", {0, 0, 0.5}, {std::sqrt(0.75), 0, 0}, 2));
+    s.bodies[0].material = "part";
+    Shape tip;
+    tip.kind = ShapeKind::points;
+    tip.points = {{0.5, 0, 0}};
+    s.bodies[0].shapes.push_back(tip);
+    Body floor;
+    floor.name = "floor";
+    floor.fixed = true;
+    floor.material = "ground";
+    Shape plane;
+    plane.kind = ShapeKind::plane;
+    floor.shapes.push_back(plane);
+    s.bodies.push_back(floor);
+    s.pairs.emplace_back();
+    s.pairs[0].first = "part";
+    s.pairs[0].second = "ground";
+    s.pairs[0].friction = friction;
+    s.joints.push_back(hinge(0, kWorld, {0, 0, 0.5}, {0, 1, 0}));
+    s.joints[0].motor = {1, 7};  // about y: downwards
+    const auto engine = make_engine(s);
+    engine->advance(0.1);
+    CHECK(engine->bodies()[0].velocity.norm() < 1e-7);
+    const double arm = std::sqrt(0.75);
+    CHECK(std::abs(engine->forces().joints[0].drive - 7) < 1e-6);
+    // Moments about the hinge; friction has none of its own that the joint would not carry.
+    const Forces f = total_forces(*engine);
+    CHECK(std::abs(f.contact[0].z() * arm + f.contact[0].x() * 0.5 - 7 - 2 * kGravity * arm / 2) <
+          1e-6);
+    if (friction == 0) CHECK(std::abs(f.contact[0].z() - 7 / arm - kGravity) < 1e-6);
+  }
+}
+
+TEST_CASE("steps in parts within an accuracy meet limits and brakes") {
+  Scene s = sliding(0.05, 2, {1, 0, 0});
+  s.stepping->accuracy = 1e-4;
+  s.bodies[0].velocity = {3, 0, 0};
+  s.joints[0].friction = 4;
+  s.joints[0].limits = {-1, 1, 0.5};
+  const auto engine = make_engine(s);
+  engine->advance(1);
+  // v = sqrt(9 - 4) at the limit at t = (3 - sqrt 5) / 2, back with half of it.
+  const double v = std::sqrt(5.0), t1 = (3 - v) / 2, back = 0.5 * v, t = 0.5 * back;
+  CHECK(t1 + t < 1);
+  CHECK(std::abs(engine->bodies()[0].position.x() - (1 - back * back / 4)) < 2e-3);
+  CHECK(engine->bodies()[0].velocity.norm() < 1e-7);
+}
+
+TEST_CASE("a run of joint laws goes on from a saved state with the same bits") {
+  Scene s = turning(1e-3, 0.4, 3);
+  s.gravity = Vector3d(0, -9.81, 0);
+  s.bodies[0].position = {0.3, 0, 0};
+  s.bodies[0].velocity = {0, 0.9, 0};
+  s.joints[0].limits = {-2, 0.4, 0.6};
+  s.joints[0].friction = 0.3;
+  s.joints[0].motor = {2, 1};
+  const auto whole = make_engine(s), part = make_engine(s), next = make_engine(s);
+  whole->advance(1.5);
+  part->advance(0.7);
+  std::stringstream saved;
+  part->save(saved);
+  next->restore(saved);
+  next->advance(1.5);
+  CHECK(next->bodies()[0].position == whole->bodies()[0].position);
+  CHECK(next->bodies()[0].angular_velocity == whole->bodies()[0].angular_velocity);
+}
+
+TEST_CASE("joint laws are read, written, planned, and refused by name where they cannot be") {
+  const std::string text = R"(
+[scene]
+[[body]]
+name = "a"
+shape = "sphere"
+radius = 0.1
+mass = 1
+[[joint]]
+name = "h"
+kind = "hinge"
+bodies = ["a", "world"]
+at = [1, 0, 0]
+axis = [0, 1, 0]
+limits_deg = [-90, 45]
+limit_restitution = 0.5
+motor = { rate_deg = 180, torque = 3 }
+friction = 0.25
+)";
+  const Scene s = parse_scene(text, "laws.toml");
+  const Joint& h = s.joints[0];
+  CHECK(std::abs(h.limits->lower + kPi / 2) < 1e-15);
+  CHECK(std::abs(h.motor->rate - kPi) < 1e-15);
+  CHECK((h.limits->restitution == 0.5 && h.motor->bound == 3 && h.friction == 0.25));
+  CHECK(write_scene(parse_scene(write_scene(s), "again.toml")) == write_scene(s));
+  const Plan plan = make_plan(s);
+  CHECK(plan.engine == EngineKind::stepping);
+  std::ostringstream told;
+  told << plan;
+  for (const char* word : {"joint limits", "motors", "joint friction", "joints have limits"})
+    CHECK(told.str().find(word) != std::string::npos);
+  CHECK(std::string(make_engine(s)->name()) == "stepping");
+
+  Scene wrong = s;
+  wrong.smooth.emplace();
+  CHECK(refusal(wrong).find("smooth engine does not have") != std::string::npos);
+  wrong = s;
+  wrong.engine = EngineChoice::event;
+  CHECK(refusal(wrong).find("event engine does not have") != std::string::npos);
+  wrong = s;
+  wrong.stepping.emplace().law = tether::contact::Law::frictionless;
+  CHECK(refusal(wrong).find("need law = coulomb") != std::string::npos);
+  wrong = s;
+  wrong.joints[0].motion.emplace().rate = 1;
+  CHECK(refusal(wrong).find("joint \"h\"") != std::string::npos);
+  wrong = s;
+  wrong.joints[0].kind = JointKind::ball;
+  CHECK(refusal(wrong).find("hinges and sliders") != std::string::npos);
+  wrong = s;
+  wrong.joints[0].limits->lower = 0.1;
+  CHECK(refusal(wrong).find("between its limits") != std::string::npos);
+
+  const auto reads = [&](const std::string& from, const std::string& to, const std::string& says) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    try {
+      parse_scene(changed, "laws.toml");
+      FAIL("read: " << to);
+    } catch (const SceneError& e) {
+      INFO(e.what());
+      CHECK(std::string(e.what()).find(says) != std::string::npos);
+    }
+  };
+  reads("[-90, 45]", "[10, 45]", "between them");
+  reads("[-90, 45]", "[-200, 170]", "full turn");
+  reads("torque = 3", "force = 3", "torque");
+  reads("friction = 0.25", "friction = -1", "friction");
+  reads("kind = \"hinge\"", "kind = \"ball\"", "limits_deg");
+}
