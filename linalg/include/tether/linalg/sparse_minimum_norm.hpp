@@ -9,8 +9,6 @@
 TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
-class BorderedGram;
-
 /// The same as MinimumNorm, min sum_j (dy_j / D_j)^2 subject to C dy = g, for an m x n matrix C
 /// whose first rows are sparse with a fixed pattern and whose last `full` rows are dense.
 ///
@@ -45,17 +43,17 @@ class SparseMinimumNorm {
   /// Sparse rows in compressed form: columns[starts[i] .. starts[i + 1]), ascending, of row i.
   void resize(int columns, std::vector<int> starts, std::vector<int> column_of, int full_rows);
 
-  int rows() const { return sparse_ + full_; }
-  int columns() const { return n_; }
-  int sparse_rows() const { return sparse_; }
+  int rows() const;
+  int columns() const;
+  int sparse_rows() const;
 
   /// Writable storage for the sparse rows of C, in the order of the pattern; factor() overwrites
   /// it.
-  double* entries() { return A_.data(); }
+  double* entries();
   /// The same for full row k, n entries.
-  double* full_row(int k) { return full_rows_.data() + static_cast<std::size_t>(k) * width(); }
+  double* full_row(int k);
   /// Writable storage for D, n entries >= 0, that the next factor() reads; D_j = 0 keeps dy_j = 0.
-  double* metric() { return metric_.data(); }
+  double* metric();
 
   /// eps = rank_tolerance^2, at least 1e-13, which rounding of A A^T needs. False if C D has an
   /// entry that is not finite; the factors are then unusable.
@@ -70,53 +68,27 @@ class SparseMinimumNorm {
   void multipliers(const double* dy, double* x);
 
   int rank() const { return rows() - dropped(); }
-  int dropped() const { return static_cast<int>(dropped_.size()); }
+  int dropped() const;
   /// k < rank(): kept rows; k >= rank(): dropped ones.
-  int pivot(int k) const { return order_[static_cast<std::size_t>(k)]; }
+  int pivot(int k) const;
   /// |row_i(C D)|; 0 for a row that vanishes.
-  double row_norm(int i) const { return norm_[static_cast<std::size_t>(i)]; }
+  double row_norm(int i) const;
 
   /// After solve(): |b - A du| / |b|, 0 for b = 0. Rows that vanish do not count.
-  double residual() const { return residual_; }
+  double residual() const;
   /// After solve(): (b - A du)_i, a distance in the metric.
-  double residual(int i) const { return left_[static_cast<std::size_t>(i)]; }
+  double residual(int i) const;
   /// M^-1 solves of the last solve().
-  int iterations() const { return iterations_; }
+  int iterations() const;
   /// After solve(): by how much dropped row pivot(k) contradicts the rows that it depends on, a
   /// distance in the metric: |b_i - c . b_kept|, c = dependence(k); |g_i| if the row vanishes.
-  double inconsistency(int k) const { return inconsistency_[static_cast<std::size_t>(k - rank())]; }
+  double inconsistency(int k) const;
   /// Coefficients over the kept rows pivot(0 .. rank()-1) that give dropped row k. Allocates.
   std::vector<double> dependence(int k) const;
 
  private:
-  std::size_t width() const { return static_cast<std::size_t>(n_); }
-  bool scale_sparse();
-  bool scale_full();
-  void couple_full();
-  double row_dot(int i, const double* u) const;
-  void multiply(const double* u, double* z) const;
-  double transposed(const double* z, double* u) const;
-  double find_left();
-  double find_step();
-  void take_back(double share, const std::vector<double>& step, double* left);
-  bool done(double step, double left) const;
-  bool proximal_steps(double* left);
-  void gradient_steps(double* left);
-  void find_inconsistencies(const double* g);
-  void add_multipliers(const double* dy, double* x);
-
-  int n_ = 0, sparse_ = 0, full_ = 0, iterations_ = 0;
-  std::vector<int> starts_{0}, column_;
-  std::vector<double> A_, metric_, norm_, inverse_norm_;
-  std::vector<double> full_rows_;      // unit length
-  std::vector<double> du_, b_, left_;  // left_ = b - A du
-  std::vector<double> z_, step_;       // M^-1 (b - A du), and A^T of it
-  std::vector<double> p_, Ap_, MAp_;   // conjugate gradients: direction, A p, M^-1 A p
-  double size_ = 0.0, tolerance_ = 0.0, residual_ = 0.0;  // size_ = |b|
-  double eps_ = 0.0;
-  std::unique_ptr<BorderedGram> gram_;
-  std::vector<int> dropped_, order_;
-  std::vector<double> inconsistency_;
+  struct TETHER_HIDDEN Parts;
+  std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace tether::linalg

@@ -1,0 +1,150 @@
+// Tether: minimum-norm solutions and multipliers by repeated steps with regularised factors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "least_norm_steps.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::linalg {
+
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kHalving = 0.5;  // a step that leaves more of the residual is the last one
+constexpr int kProximalSteps = 8;
+constexpr int kGradientSteps = 10;
+constexpr int kFilters = 3;
+constexpr double kShort = 1e-14;  // of the multipliers: such a step is the last one
+
+}  // namespace
+
+void LeastNormSteps::resize(const UnitRows& rows) {
+  const auto m = static_cast<std::size_t>(rows.rows());
+  for (std::vector<double>* v : {&du_, &step_, &p_}) v->assign(rows.width(), 0.0);
+  for (std::vector<double>* v : {&b_, &left_, &z_, &Ap_, &MAp_}) v->assign(m, 0.0);
+}
+
+// left_ = b - A du; returns its length.
+double LeastNormSteps::find_left(const System& system) {
+  system.rows.multiply(du_.data(), left_.data());
+  for (std::size_t i = 0; i < left_.size(); ++i) left_[i] = b_[i] - left_[i];
+  return std::sqrt(dot(left_.data(), left_.data(), left_.size()));
+}
+
+// z_ = M^-1 left_, step_ = A^T z_; returns |step_|.
+double LeastNormSteps::find_step(const System& system) {
+  z_ = left_;
+  system.gram.solve(z_.data());
+  ++iterations_;
+  return system.rows.transposed(z_.data(), step_.data());
+}
+
+// Is the residual small enough, or does du no longer change?
+bool LeastNormSteps::done(double step, double left) const {
+  const double length = std::sqrt(dot(du_.data(), du_.data(), du_.size()));
+  return left <= tolerance_ * size_ + 2.0 * kEpsilon * length || step <= tolerance_ * length;
+}
+
+void LeastNormSteps::take_back(const System& system, double share, const std::vector<double>& step,
+                               double* left) {
+  for (std::size_t j = 0; j < du_.size(); ++j) du_[j] -= share * step[j];
+  *left = find_left(system);
+}
+
+// From du = 0. Returns false where more of them would reduce the residual too slowly.
+bool LeastNormSteps::proximal_steps(const System& system, double* left) {
+  for (int k = 0; k < kProximalSteps; ++k) {
+    const double step = find_step(system), before = *left;
+    for (std::size_t j = 0; j < du_.size(); ++j) du_[j] += step_[j];
+    *left = find_left(system);
+    if (*left > before) {  // rounding rules: b has no part that the rows can give
+      take_back(system, 1.0, step_, left);
+      return true;
+    }
+    if (done(step, *left)) return true;
+    if (k > 0 && *left > kHalving * before) return false;
+  }
+  return false;
+}
+
+// Least squares by conjugate gradients (Golub and Van Loan, section 11.3.9) in the norm of M^-1:
+// what proximal steps do, with the best multiple of each direction.
+void LeastNormSteps::gradient_steps(const System& system, double* left) {
+  double square = std::pow(find_step(system), 2);
+  p_ = step_;
+  for (int k = 0; k < kGradientSteps; ++k) {
+    system.rows.multiply(p_.data(), Ap_.data());
+    MAp_ = Ap_;
+    system.gram.solve(MAp_.data());
+    ++iterations_;
+    const double curvature = dot(Ap_.data(), MAp_.data(), Ap_.size());
+    if (!(curvature > 0.0)) return;
+    const double share = square / curvature, before = *left;
+    for (std::size_t j = 0; j < du_.size(); ++j) du_[j] += share * p_[j];
+    for (std::size_t i = 0; i < z_.size(); ++i) z_[i] -= share * MAp_[i];
+    *left = find_left(system);
+    if (*left > before) return take_back(system, share, p_, left);  // rounding rules
+    const double step = system.rows.transposed(z_.data(), step_.data()), next = step * step;
+    if (done(step, *left)) return;
+    for (std::size_t j = 0; j < du_.size(); ++j) p_[j] = step_[j] + next / square * p_[j];
+    square = next;
+  }
+}
+
+void LeastNormSteps::solve(const UnitRows& rows, BorderedGram& gram, const double* g,
+                           double tolerance) {
+  for (std::size_t i = 0; i < b_.size(); ++i) left_[i] = b_[i] = g[i] * rows.inverse_norm(i);
+  std::fill(du_.begin(), du_.end(), 0.0);
+  iterations_ = 0;
+  tolerance_ = tolerance;
+  size_ = std::sqrt(dot(b_.data(), b_.data(), b_.size()));
+  double left = size_;
+  const System system{rows, gram};
+  if (size_ > 0.0 && !proximal_steps(system, &left)) gradient_steps(system, &left);
+  residual_ = size_ > 0.0 ? left / size_ : 0.0;
+}
+
+void LeastMultipliers::resize(const UnitRows& rows) {
+  step_.assign(rows.width(), 0.0);
+  rest_.assign(rows.width(), 0.0);
+  z_.assign(static_cast<std::size_t>(rows.rows()), 0.0);
+}
+
+// Proximal steps on A A^T x = A u. Rounding of A (u - A^T x), over eps, stays in the null space of
+// A^T; x <- x - eps M^-1 x takes most of that away, and eps / s^2 of the rest, which further steps
+// bring back: they start from so small a residual that their own rounding counts for nothing.
+void LeastMultipliers::find(const UnitRows& rows, BorderedGram& gram, double eps, const double* dy,
+                            double* x) {
+  const std::size_t m = z_.size();
+  std::fill(x, x + m, 0.0);
+  add(rows, gram, dy, x);
+  for (int k = 0; k < kFilters; ++k) {
+    std::copy(x, x + m, z_.begin());
+    gram.solve(z_.data());
+    for (std::size_t i = 0; i < m; ++i) x[i] -= eps * z_[i];
+  }
+  add(rows, gram, dy, x);
+  for (std::size_t i = 0; i < m; ++i) x[i] *= rows.inverse_norm(i);
+}
+
+// x <- x + M^-1 A (u - A^T x), D u = dy, as long as the steps halve.
+void LeastMultipliers::add(const UnitRows& rows, BorderedGram& gram, const double* dy, double* x) {
+  const double* metric = rows.metric();
+  const std::size_t m = z_.size();
+  double before = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kProximalSteps; ++k) {
+    rows.transposed(x, step_.data());
+    for (std::size_t j = 0; j < rest_.size(); ++j)
+      rest_[j] = (metric[j] > 0.0 ? dy[j] / metric[j] : 0.0) - step_[j];
+    rows.multiply(rest_.data(), z_.data());
+    gram.solve(z_.data());
+    const double step = std::sqrt(dot(z_.data(), z_.data(), m));
+    if (!(step < kHalving * before)) return;
+    before = step;
+    for (std::size_t i = 0; i < m; ++i) x[i] += z_[i];
+    if (step <= kShort * std::sqrt(dot(x, x, m))) return;
+  }
+}
+
+}  // namespace tether::linalg
