@@ -36,6 +36,7 @@ class GaussNewtonOn final : public GaussNewton {
  private:
   using Block = typename Rows::Block;
 
+  bool structured_for(const std::vector<bool>& hold, const double* id);
   bool evaluate(double t, const std::vector<double>& y, ConsistencyReport& report);
   Status evaluate_jacobian(double t, const std::vector<double>& y);
   void fill_metric();
@@ -47,7 +48,21 @@ class GaussNewtonOn final : public GaussNewton {
   Rows blocks_;
   int n_;
   std::vector<double> WT_, g_;
+  std::vector<bool> hold_;  // those of the last structure
+  std::vector<double> id_;
 };
+
+// Output points come one after the other: what can move stays, and entries that were zero so far
+// are met by evaluate(). Only rows with variables of both kinds are split by their entries at a
+// point.
+template <class Rows>
+bool GaussNewtonOn<Rows>::structured_for(const std::vector<bool>& hold, const double* id) {
+  const std::vector<double> mask(id, id != nullptr ? id + n_ : id);
+  const bool known = blocks_.structured() && !blocks_.mixed() && hold == hold_ && mask == id_;
+  hold_ = hold;
+  id_ = mask;
+  return known;
+}
 
 template <class Rows>
 bool GaussNewtonOn<Rows>::evaluate(double t, const std::vector<double>& y,
@@ -99,10 +114,12 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
   WT_ = WT;
   evaluator_.forget();
   std::vector<double> y = y0;
-  report.status = blocks_.structure(evaluator_, t, y, WT_, hold, id);
-  if (report.status != Status::success) {
-    report.message = blocks_.message;
-    return;
+  if (!structured_for(hold, id)) {
+    report.status = blocks_.structure(evaluator_, t, y, WT_, hold, id);
+    if (report.status != Status::success) {
+      report.message = blocks_.message;
+      return;
+    }
   }
   fill_metric();
 
