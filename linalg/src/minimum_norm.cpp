@@ -46,7 +46,7 @@ void MinimumNorm::resize(int rows, int columns) {
     if (!small_) small_ = std::make_unique<small::Storage>();
     if (!small_kept_) small_kept_ = std::make_unique<small::KeptRows>();
     small_->clear();
-    solve_small_kept_ = small::solve_kept_for(rows);
+    small_kept_->resize(rows);
     metric_.assign(static_cast<std::size_t>(kernel_->stride), 0.0);
   } else {
     kernel_ = nullptr;
@@ -145,10 +145,16 @@ bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, co
 bool MinimumNorm::factor_kept_small(const small::Gathered& from) {
   small::Storage& s = *small_;
   const double sine = std::max(kLeastSine, kLeastShare * decided_least_);
-  if (!small::factor_kept(*small_kept_, from, s.pivot, m_, n_, sine * sine, s.square, s.ratio))
+  if (!small_kept_->factor(*small_kept_, from, s.pivot, m_, n_, sine * sine, s.square, s.ratio)) {
+    set_rank(0);  // what was known of the rows is overwritten
     return false;
-  std::fill_n(s.scale, m_, 1.0);
-  least_square_ = *std::min_element(s.ratio, s.ratio + m_);
+  }
+  double least = 1.0;
+  for (int k = 0; k < m_; ++k) {
+    s.scale[k] = 1.0;
+    least = s.ratio[k] < least ? s.ratio[k] : least;
+  }
+  least_square_ = least;
   return true;
 }
 
@@ -168,7 +174,7 @@ double MinimumNorm::scaled(const double* g, int i) const {
 
 void MinimumNorm::solve(const double* g, double* dy) {
   if (kernel_ != nullptr && kept_)
-    solve_small_kept_(*small_kept_, small_->pivot, n_, g, metric_.data(), dy);
+    small_kept_->solve(*small_kept_, small_->pivot, n_, g, metric_.data(), dy);
   else
     kernel_ != nullptr ? solve_small(g, dy) : kept_ ? solve_kept(g, dy) : solve_large(g, dy);
 }

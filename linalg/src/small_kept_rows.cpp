@@ -96,18 +96,9 @@ TETHER_FACTOR(4)
 
 }  // namespace
 
-bool factor_kept(KeptRows& s, const Gathered& from, const int* order, int m, int n, double least,
-                 double* square, double* ratio) {
-  switch (KeptRows::stride(m) / 4) {
-    case 1:
-      return factor_1(s, from, order, m, n, least, square, ratio);
-    case 2:
-      return factor_2(s, from, order, m, n, least, square, ratio);
-    case 3:
-      return factor_3(s, from, order, m, n, least, square, ratio);
-    default:
-      return factor_4(s, from, order, m, n, least, square, ratio);
-  }
+KeptRows::Factor KeptRows::factor_for(int m) {
+  static constexpr Factor kFactors[] = {factor_1, factor_2, factor_3, factor_4};
+  return m > 0 && m <= kRows ? kFactors[stride(m) / 4 - 1] : nullptr;
 }
 
 }  // namespace tether::linalg::small

@@ -4,6 +4,14 @@
 
 namespace tether::linalg::small {
 
+/// Where C(i, j) = wide[rows[i] * width + columns[j]] is, and D.
+struct Gathered {
+  const double* wide;
+  int width;
+  const int *rows, *columns;
+  const double* D;
+};
+
 /// A = C D of up to 16 rows in a given order, at most 32 columns. Column j of A and column k of L
 /// are stored one after the other, each with the rows side by side: operations on a column take
 /// four rows at once and need no sum over a vector, and no entry of C is read together with its
@@ -16,26 +24,25 @@ struct KeptRows {
 
   /// Rows take `stride(m)` places in a column.
   static constexpr int stride(int m) { return (m + 3) / 4 * 4; }
+
+  /// A A^T = L diag(d) L^T of the m rows order[0], order[1], ...; square[order[k]] receives
+  /// |a_k|^2, ratio[k] the square of the part of row k that is independent of those before it,
+  /// d_k / |a_k|^2. False: an entry is not finite, a length may overflow, or a ratio is below
+  /// `least`.
+  using Factor = bool (*)(KeptRows& s, const Gathered& from, const int* order, int m, int n,
+                          double least, double* square, double* ratio);
+  /// dy = D A^T (A A^T)^-1 g; g in the caller's order of rows.
+  using Solve = void (*)(const KeptRows& s, const int* order, int n, const double* g,
+                         const double* D, double* dy);
+  Factor factor = nullptr;
+  Solve solve = nullptr;
+  /// The functions for m rows.
+  void resize(int m) {
+    factor = factor_for(m);
+    solve = solve_for(m);
+  }
+  static Factor factor_for(int m);
+  static Solve solve_for(int m);
 };
-
-/// Where C(i, j) = wide[rows[i] * width + columns[j]] is, and D.
-struct Gathered {
-  const double* wide;
-  int width;
-  const int *rows, *columns;
-  const double* D;
-};
-
-/// A A^T = L diag(d) L^T of the m rows order[0], order[1], ...; square[order[k]] receives |a_k|^2,
-/// ratio[k] the square of the part of row k that is independent of those before it, d_k / |a_k|^2.
-/// False: an entry is not finite, a length may overflow, or a ratio is below `least`.
-bool factor_kept(KeptRows& s, const Gathered& from, const int* order, int m, int n, double least,
-                 double* square, double* ratio);
-
-/// dy = D A^T (A A^T)^-1 g; g in the caller's order of rows.
-using SolveKept = void (*)(const KeptRows& s, const int* order, int n, const double* g,
-                           const double* D, double* dy);
-/// The function for m rows.
-SolveKept solve_kept_for(int m);
 
 }  // namespace tether::linalg::small

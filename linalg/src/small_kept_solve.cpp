@@ -61,11 +61,11 @@ TETHER_SOLVE(16)
 
 }  // namespace
 
-SolveKept solve_kept_for(int m) {
-  static constexpr SolveKept kSolves[] = {
-      nullptr, solve_1,  solve_2,  solve_3,  solve_4,  solve_5,  solve_6,  solve_7, solve_8,
-      solve_9, solve_10, solve_11, solve_12, solve_13, solve_14, solve_15, solve_16};
-  return m <= KeptRows::kRows ? kSolves[m] : nullptr;
+KeptRows::Solve KeptRows::solve_for(int m) {
+  static constexpr Solve kSolves[] = {nullptr,  solve_1,  solve_2,  solve_3,  solve_4,  solve_5,
+                                      solve_6,  solve_7,  solve_8,  solve_9,  solve_10, solve_11,
+                                      solve_12, solve_13, solve_14, solve_15, solve_16};
+  return m <= kRows ? kSolves[m] : nullptr;
 }
 
 }  // namespace tether::linalg::small

@@ -109,8 +109,6 @@ class MinimumNorm {
   const small::Kernel* kernel_ = nullptr;  // null: beyond the small sizes
   std::unique_ptr<small::Storage> small_;
   std::unique_ptr<small::KeptRows> small_kept_;  // of factor_kept()
-  void (*solve_small_kept_)(const small::KeptRows&, const int* order, int n, const double* g,
-                            const double* D, double* dy) = nullptr;
   struct TETHER_HIDDEN Large;  // Eigen's types stay inside the library: see eigen.hpp
   std::unique_ptr<Large> large_;
   bool kept_ = false;  // the factors are those of factor_kept()
