@@ -91,6 +91,9 @@ void print_summary(const Scene& scene, const RunResult& r) {
     if (c.accepted + c.halved > 0)
       fmt::print("  accepted     {} contact problems above the tolerance; {} steps halved\n",
                  c.accepted, c.halved);
+    if (const double accuracy = scene.stepping.value_or(SteppingOptions{}).accuracy; accuracy > 0)
+      fmt::print("  accuracy     {:g} of the size of each body: {} parts of steps refused\n",
+                 accuracy, c.error_test_failures);
   } else if (c.residual_evaluations > 0) {
     fmt::print("  drift        {:.2e} (largest violation of a joint or a kept invariant)\n",
                s.drift);

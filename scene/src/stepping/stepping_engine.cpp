@@ -205,6 +205,7 @@ Counts SteppingEngine::counts() const {
   out.unsolved = c.unsolved;
   out.accepted = c.accepted;
   out.halved = c.halved;
+  out.error_test_failures = c.rejected;
   return out;
 }
 
