@@ -148,7 +148,7 @@ double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
   return std::sqrt(square);
 }
 
-// As Stepper::Implementation::shift: the angular velocity turns with the body.
+// As PositionCorrection: the angular velocity turns with the body.
 void StepJoints::turn_back(BodySet& bodies, int body, const Vector3d& turn) const {
   if (turn.isZero(0)) return;
   const linalg::Quaternion by = exponential(turn);

@@ -30,9 +30,6 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
     s.give_joints();
   else if (s.joints->has_laws())
     s.make_solvers();
-  for (std::vector<int>* list : {&s.moving, &s.long_bodies, &s.free, &s.free_round, &s.free_long})
-    list->clear();
-  s.free_spin.clear();
   s.stages.clear();
   s.make_stages();
 }

@@ -12,6 +12,7 @@
 namespace tether::contact {
 
 using detail::PartState;
+using Active = detail::PartControl::Active;
 using Eigen::Vector3d;
 
 namespace {
@@ -36,21 +37,21 @@ void Stepper::Implementation::remember_part(PartState& p) const {
   p.position = bodies.position;
   p.orientation = bodies.orientation;
   p.motion = bodies.motion;
-  p.spin = free_spin;
+  p.spin = motion.spins();
 }
 
 void Stepper::Implementation::restore_part(const PartState& p) {
   bodies.position = p.position;
   bodies.orientation = p.orientation;
   bodies.motion = p.motion;
-  free_spin = p.spin;
+  motion.spins() = p.spin;
 }
 
 // With impulses of the last part as far as they go with its length.
 void Stepper::Implementation::advance_part(double time, double length) {
-  if (solver && control.length > 0)
-    solver->scale_warm_start(std::min(2.0, length / control.length));
-  control.length = length;
+  if (solver && parts.control.length > 0)
+    solver->scale_warm_start(std::min(2.0, length / parts.control.length));
+  parts.control.length = length;
   advance(time, length, options.max_halvings);
 }
 
@@ -121,7 +122,7 @@ double Stepper::Implementation::first_impact(double length, double& at_once) con
   };
   if (joints)
     for (const detail::Strike& s : joints->strikes())
-      take(moment(s.gap, s.came, s.comes, s.body < 0 ? 1 : radius[at(s.body)], length));
+      take(moment(s.gap, s.came, s.comes, s.body < 0 ? 1 : parts.radius[at(s.body)], length));
   if (near)
     for (const detail::Impact& i : impacts->list()) take(moment(i, length));
   return first;
@@ -132,9 +133,9 @@ double Stepper::Implementation::first_impact(double length, double& at_once) con
 double Stepper::Implementation::part_error(const PartState& whole, double length,
                                            bool smooth) const {
   double most = 0;
-  for (const int k : moving) {
+  for (const int k : motion.moving()) {
     const std::size_t i = at(k);
-    const double R = radius[i];
+    const double R = parts.radius[i];
     most = std::max({most, (bodies.position[i] - whole.position[i]).norm() / R,
                      rotation_between(whole.orientation[i], bodies.orientation[i]).norm()});
     if (!smooth) continue;
@@ -147,7 +148,7 @@ double Stepper::Implementation::part_error(const PartState& whole, double length
 
 // 2 halves - whole. A body that no moment acts on keeps its momentum exactly, and its halves.
 void Stepper::Implementation::extrapolate(const PartState& whole) {
-  for (const int k : moving) {
+  for (const int k : motion.moving()) {
     const std::size_t i = at(k);
     bodies.position[i] += bodies.position[i] - whole.position[i];
     bodies.motion[i].velocity += bodies.motion[i].velocity - whole.motion[i].velocity;
@@ -160,27 +161,26 @@ void Stepper::Implementation::extrapolate(const PartState& whole) {
     Vector3d& w = bodies.motion[i].angular_velocity;
     w += w - whole.motion[i].angular_velocity;
   };
+  const std::vector<detail::FreeSpin>& spins = motion.spins();
   std::size_t next = 0;
-  for (const int k : moving) {
-    if (next < free_spin.size() && free_long[next] == k && !free_spin.empty()) {
+  for (const int k : motion.moving()) {
+    if (next < spins.size() && motion.free_long()[next] == k) {
       const std::size_t s = next++;
-      if (free_spin[s].L == whole.spin[s].L) continue;
+      if (spins[s].L == whole.spin[s].L) continue;
     }
     turn(k);
   }
-  turn_inertias();
+  motion.turn_inertias(bodies);
 }
 
 // One part, of at most this length. Returns the length that was taken.
 double Stepper::Implementation::take_part(double time, double length, bool shortened,
                                           double shortest) {
-  const Judgement before = judged();
-  const double deep = deepest;
-  remember_part(part_before);
+  const detail::Judgement before = judged();
+  remember_part(parts.before);
   const auto back = [&] {
-    restore_part(part_before);
+    restore_part(parts.before);
     set_judged(before);
-    deepest = deep;
   };
   bool cut = shortened;
   for (;;) {
@@ -198,36 +198,37 @@ double Stepper::Implementation::take_part(double time, double length, bool short
       advance_part(time, length);
       break;
     }
-    list_active(length, active[0]);
-    remember_part(part_whole);
+    list_active(length, parts.active[0]);
+    remember_part(parts.whole);
     back();
     advance_part(time, length / 2);
-    list_active(length / 2, active[1]);
+    list_active(length / 2, parts.active[1]);
     advance_part(time + length / 2, length / 2);
-    list_active(length / 2, active[2]);
-    const bool smooth = same(active[0], active[1]) && same(active[1], active[2]);
-    const double error = std::max(part_error(part_whole, length, smooth), 1e-4);
+    list_active(length / 2, parts.active[2]);
+    const bool smooth =
+        same(parts.active[0], parts.active[1]) && same(parts.active[1], parts.active[2]);
+    const double error = std::max(part_error(parts.whole, length, smooth), 1e-4);
     if (error > 1) {
       back();
       ++counts.rejected;
       length = std::max(length * std::clamp(0.9 / (smooth ? std::sqrt(error) : error), 0.1, 0.7),
                         shortest);
       cut = false;
-      control.last = 0;
+      parts.control.last = 0;
       continue;
     }
     if (smooth) {
-      extrapolate(part_whole);
+      extrapolate(parts.whole);
       if (joints) joints->begin(bodies, time + length);
     }
     double factor = std::pow(error, -0.125);
-    factor *= control.last > 0
-                  ? std::pow(control.error, -0.125) * std::pow(length / control.last, -0.25)
-                  : factor;
+    factor *= parts.control.last > 0 ? std::pow(parts.control.error, -0.125) *
+                                           std::pow(length / parts.control.last, -0.25)
+                                     : factor;
     const double next = length * std::clamp(factor, 0.3, 2.0);
-    control.next = cut ? std::max(control.next, next) : next;
-    control.last = length;
-    control.error = error;
+    parts.control.next = cut ? std::max(parts.control.next, next) : next;
+    parts.control.last = length;
+    parts.control.error = error;
     break;
   }
   ++counts.parts;
@@ -236,13 +237,13 @@ double Stepper::Implementation::take_part(double time, double length, bool short
 
 void Stepper::Implementation::advance_accurately(double start, double length) {
   double done = 0, shortest = kShortest * length;
-  for (int parts = 0; done < length; ++parts) {
-    if (parts == kManyImpacts) shortest = length / kManyImpacts;
+  for (int taken_parts = 0; done < length; ++taken_parts) {
+    if (taken_parts == kManyImpacts) shortest = length / kManyImpacts;
     const double left = length - done;
-    double part = control.next > 0 ? control.next : left;
-    const bool shortened = part > 0.5 * left;
-    if (shortened) part = part < left ? left / 2 : left;
-    const double taken = take_part(start + done, part, shortened, std::min(shortest, left));
+    double next = parts.control.next > 0 ? parts.control.next : left;
+    const bool shortened = next > 0.5 * left;
+    if (shortened) next = next < left ? left / 2 : left;
+    const double taken = take_part(start + done, next, shortened, std::min(shortest, left));
     done = taken < left ? done + taken : length;
   }
 }

@@ -7,9 +7,7 @@
 namespace tether::contact {
 
 void Stepper::Implementation::step() {
-  status = Status::solved;
-  succeeded = true;
-  residual = deepest = 0;
+  outcome = {};
   const double start = static_cast<double>(counts.steps) * options.step;
   if (options.accuracy > 0)
     advance_accurately(start, options.step);
@@ -19,9 +17,9 @@ void Stepper::Implementation::step() {
 }
 
 void Stepper::Implementation::advance(double time, double length, int halvings) {
-  part_start = time;
-  dt = length;
-  may_halve = halvings > 0;
+  part.start = time;
+  part.dt = length;
+  part.may_halve = halvings > 0;
   if (run_stages(time)) return;
   // Nothing has moved yet.
   bodies.motion = impacts->coming();
@@ -37,16 +35,16 @@ void Stepper::Implementation::advance(double time, double length, int halvings) 
 bool Stepper::Implementation::run_stages(double time) {
   using Clock = std::chrono::steady_clock;
   Clock::time_point start = Clock::now();
-  failed = false;
+  part.failed = false;
   for (Stage& stage : stages) {
     if (stage.method)
       (this->*stage.method)();
     else
-      force[at(stage.force)](bodies, time, dt);
+      force[at(stage.force)](bodies, time, part.dt);
     const Clock::time_point end = Clock::now();
     stage.seconds += std::chrono::duration<double>(end - start).count();
     start = end;
-    if (failed && may_halve) return false;
+    if (part.failed && part.may_halve) return false;
   }
   return true;
 }
@@ -55,17 +53,15 @@ bool Stepper::Implementation::run_stages(double time) {
 // does not hang on the length of the step. Who accepts nothing gets the shorter steps even so.
 bool Stepper::Implementation::shortest() const {
   const bool impact = options.acceptance > 1 && !impacts->list().empty();
-  return options.max_halvings > 0 && (!may_halve || impact);
+  return options.max_halvings > 0 && (!part.may_halve || impact);
 }
 
-Stepper::Implementation::Judgement Stepper::Implementation::judged() const {
-  return {status, succeeded, residual, counts.bounces, counts.accepted, counts.unsolved};
+detail::Judgement Stepper::Implementation::judged() const {
+  return {outcome, counts.bounces, counts.accepted, counts.unsolved};
 }
 
-void Stepper::Implementation::set_judged(const Judgement& b) {
-  status = b.status;
-  succeeded = b.succeeded;
-  residual = b.residual;
+void Stepper::Implementation::set_judged(const detail::Judgement& b) {
+  outcome = b.outcome;
   counts.bounces = b.bounces;
   counts.accepted = b.accepted;
   counts.unsolved = b.unsolved;
@@ -75,13 +71,13 @@ void Stepper::Implementation::set_judged(const Judgement& b) {
 void Stepper::Implementation::judge() {
   const bool solved = solution.status == Status::solved;
   const double most = std::max(accepted_residual(options), shortest() ? detail::kGood : 0.0);
-  failed = !solved && !(solution.error <= most);
-  if (failed && may_halve) return;
-  counts.accepted += !solved && !failed;
-  counts.unsolved += failed;
-  if (!solved) status = solution.status;
-  succeeded = succeeded && !failed;
-  residual = solution.error <= residual ? residual : solution.error;
+  part.failed = !solved && !(solution.error <= most);
+  if (part.failed && part.may_halve) return;
+  counts.accepted += !solved && !part.failed;
+  counts.unsolved += part.failed;
+  if (!solved) outcome.status = solution.status;
+  outcome.succeeded = outcome.succeeded && !part.failed;
+  if (!(solution.error <= outcome.residual)) outcome.residual = solution.error;
 }
 
 }  // namespace tether::contact

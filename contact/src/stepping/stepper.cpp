@@ -28,9 +28,7 @@ void Stepper::Implementation::make_solvers() {
     later->add_restitution(options.restitution_law, o);
   }
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
-    correction = std::make_unique<detail::StepSolver>(detail::correction_options(options));
-    closing = std::make_unique<detail::Closing>(detail::closing_options(options),
-                                                detail::depenetration(options));
+    positions = std::make_unique<detail::PositionCorrection>(options);
   }
   if (joints) give_joints();
 }
@@ -40,10 +38,7 @@ void Stepper::Implementation::give_joints() {
   solver->set_joints(joints->make_islands(o, detail::LawUse::all));
   if (!near) return;
   if (restitution) restitution->set_joints(*joints, o);
-  if (correction)
-    correction->set_joints(
-        joints->make_islands(detail::correction_options(options), detail::LawUse::limits));
-  if (closing) closing->set_joints(*joints, detail::closing_options(options));
+  if (positions) positions->set_joints(*joints, options);
   later->set_joints(*joints, o);
 }
 
@@ -68,7 +63,7 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
   Implementation& s = *implementation_;
   s.bodies = std::move(bodies);
   s.options = options;
-  if (options.accuracy > 0) s.radius = sizes(s.bodies, surfaces);
+  if (options.accuracy > 0) s.parts.radius = sizes(s.bodies, surfaces);
   if (!meetings.empty() && !surfaces.empty()) {
     s.near = std::make_unique<detail::NearContacts>(s.bodies, std::move(surfaces),
                                                     std::move(meetings), options.law,
@@ -97,10 +92,10 @@ double Stepper::time() const {
 const BodySet& Stepper::bodies() const { return implementation_->bodies; }
 BodySet& Stepper::bodies() { return implementation_->bodies; }
 const StepContacts& Stepper::contacts() const { return implementation_->contacts; }
-double Stepper::penetration() const { return implementation_->deepest; }
-double Stepper::residual() const { return implementation_->residual; }
-Status Stepper::status() const { return implementation_->status; }
-bool Stepper::succeeded() const { return implementation_->succeeded; }
+double Stepper::penetration() const { return implementation_->outcome.deepest; }
+double Stepper::residual() const { return implementation_->outcome.residual; }
+Status Stepper::status() const { return implementation_->outcome.status; }
+bool Stepper::succeeded() const { return implementation_->outcome.succeeded; }
 double Stepper::joint_drift() const {
   return implementation_->joints ? implementation_->joints->drift() : 0;
 }
@@ -112,7 +107,7 @@ const std::vector<double>& Stepper::law_impulses() const {
   static const std::vector<double> none;
   return implementation_->joints ? implementation_->joints->law_impulses() : none;
 }
-double Stepper::last_part() const { return implementation_->dt; }
+double Stepper::last_part() const { return implementation_->part.dt; }
 const StepCounts& Stepper::counts() const { return implementation_->counts; }
 const SteppingOptions& Stepper::options() const { return implementation_->options; }
 
@@ -135,46 +130,47 @@ StepperMemory Stepper::memory() const {
   StepperMemory m;
   m.steps = s.counts.steps;
   if (s.solver) m.contacts = s.solver->warm_start();
-  if (s.correction) m.corrections = s.correction->warm_start();
+  if (s.positions) m.corrections = s.positions->warm_start();
   if (s.restitution) m.bounces = s.restitution->warm_start();
-  for (const detail::FreeSpin& each : s.free_spin)
+  for (const detail::FreeSpin& each : s.motion.spins())
     m.spins.push_back({each.L, each.w, {each.q.x(), each.q.y(), each.q.z(), each.q.w()}});
   m.last = s.contacts;
-  m.penetration = s.deepest;
-  m.residual = s.residual;
-  m.status = s.status;
-  m.control = s.control;
+  m.penetration = s.outcome.deepest;
+  m.residual = s.outcome.residual;
+  m.status = s.outcome.status;
+  m.control = s.parts.control;
   return m;
 }
 
 void Stepper::set_memory(const StepperMemory& m) {
   Implementation& s = *implementation_;
-  if (m.spins.size() != s.free_spin.size() || m.steps < 0)
+  if (m.spins.size() != s.motion.spins().size() || m.steps < 0)
     throw std::invalid_argument("stepping: a memory of " + std::to_string(m.steps) + " steps of " +
                                 std::to_string(m.spins.size()) + " turning bodies, but there are " +
-                                std::to_string(s.free_spin.size()));
+                                std::to_string(s.motion.spins().size()));
   s.counts.steps = m.steps;
-  s.turn_inertias();
+  s.motion.turn_inertias(s.bodies);
   if (s.solver) s.solver->set_warm_start(m.contacts);
-  if (s.correction) s.correction->set_warm_start(m.corrections);
+  if (s.positions) s.positions->set_warm_start(m.corrections);
   if (s.restitution) s.restitution->set_warm_start(m.bounces);
   for (std::size_t k = 0; k < m.spins.size(); ++k) {
     const std::array<double, 4>& q = m.spins[k].orientation;
-    s.free_spin[k] = {m.spins[k].momentum, m.spins[k].angular_velocity, {q[3], q[0], q[1], q[2]}};
+    s.motion.spins()[k] = {
+        m.spins[k].momentum, m.spins[k].angular_velocity, {q[3], q[0], q[1], q[2]}};
   }
   s.contacts = m.last;
-  s.deepest = m.penetration;
-  s.residual = m.residual;
-  s.status = m.status;
-  s.control = m.control;
+  s.outcome.deepest = m.penetration;
+  s.outcome.residual = m.residual;
+  s.outcome.status = m.status;
+  s.parts.control = m.control;
 }
 
 void Stepper::start_anew(long steps) {
   Implementation& s = *implementation_;
   s.counts.steps = steps;
-  s.control = {};
-  s.free_spin.assign(s.free_spin.size(), {});
-  s.turn_inertias();
+  s.parts.control = {};
+  s.motion.spins().assign(s.motion.spins().size(), {});
+  s.motion.turn_inertias(s.bodies);
   if (s.solver) s.make_solvers();  // nothing of the past is left
 }
 
