@@ -63,11 +63,26 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)  # and has ldconfig run
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")
 foreach(library IN LISTS tether_libraries)
-  list(APPEND CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS $<TARGET_FILE_DIR:tether_${library}>)
+  get_target_property(folder tether_${library} BINARY_DIR)  # where cpack finds them
+  list(APPEND CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${folder})
 endforeach()
+list(REMOVE_DUPLICATES CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS)
+
+# The soname of each library, for packages that link it, and the trigger of ldconfig that Debian's policy
+# wants; cpack adds a script that runs it, too.
+set(shlibs "")
+foreach(library IN LISTS tether_libraries)
+  get_target_property(soversion tether_${library} SOVERSION)
+  string(APPEND shlibs "libtether_${library} ${soversion} libtether (= ${PROJECT_VERSION})\n")
+endforeach()
+file(CONFIGURE OUTPUT ${tether_package_dir}/libtether/shlibs CONTENT "${shlibs}")
+file(CONFIGURE OUTPUT ${tether_package_dir}/libtether/triggers CONTENT "activate-noawait ldconfig\n")
+set(CPACK_DEBIAN_LIBTETHER_PACKAGE_CONTROL_EXTRA
+  ${tether_package_dir}/libtether/shlibs ${tether_package_dir}/libtether/triggers)
+if(TARGET tether_preload)  # all that lies in a folder of libraries has a soname
+  target_link_options(tether_preload PRIVATE LINKER:-soname,libtether_preload.so)
+endif()
 
 foreach(package IN LISTS tether_packages)
   string(TOUPPER ${package} upper)
@@ -78,10 +93,12 @@ set(CPACK_DEBIAN_LIBTETHER-DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_TETHER_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_LIBTETHER-DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_LIBTETHER-DEV_PACKAGE_DEPENDS "${tether_dev_needs}")
+set(CPACK_DEBIAN_TETHER_PACKAGE_DEPENDS "libtether (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_TETHER_PACKAGE_SUGGESTS "gnuplot-nox, libtether-dev")
 set(summary "motions kept on their constraints")
-set(about "Tether projects the steps of SUNDIALS IDA onto invariants and constraints, solves frictional
-contact problems with the exact friction cone, and moves scenes of rigid bodies.")
+set(about "Tether projects the steps of SUNDIALS IDA onto invariants and
+constraints, solves frictional contact problems with the exact friction
+cone, and moves scenes of rigid bodies.")
 set(CPACK_COMPONENT_LIBTETHER_DESCRIPTION "${summary}: libraries
 ${about}
 This package has the shared libraries.")
@@ -90,6 +107,7 @@ ${about}
 This package has headers, and files for CMake and pkg-config.")
 set(CPACK_COMPONENT_TETHER_DESCRIPTION "${summary}: program
 ${about}
-This package has the program tether, which checks, plans, runs and prices scene files.")
+This package has the program tether, which checks, plans, runs and prices
+scene files.")
 
 include(CPack)
