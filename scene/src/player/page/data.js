@@ -23,9 +23,14 @@ function readFilm() {
   data.moving = data.bodies.filter(b => b.film !== null).length;
   data.firstContact = [0];
   for (const count of data.contacts) data.firstContact.push(data.firstContact[data.firstContact.length - 1] + count);
-  data.largestImpulse = 0;
-  for (let k = 0; k < data.contactNumbers.length; k += 9)
-    data.largestImpulse = Math.max(data.largestImpulse, Math.hypot(...data.contactNumbers.subarray(k + 3, k + 6)));
+  // Nine tenths of the impulses are smaller: beside an impact those of rest would not be seen.
+  const impulses = [];
+  for (let k = 0; k < data.contactNumbers.length; k += 9) {
+    const impulse = Math.hypot(...data.contactNumbers.subarray(k + 3, k + 6));
+    if (impulse > 0) impulses.push(impulse);
+  }
+  impulses.sort((a, b) => a - b);
+  data.largeImpulse = impulses.length > 0 ? impulses[Math.floor(0.9 * (impulses.length - 1))] : 0;
   data.start = data.times[0];
   data.end = data.times[data.times.length - 1];
   return data;

@@ -77,7 +77,7 @@ class Shapes {
     this.solid = new Instances(this.forms);
     this.above = new Instances(this.forms);  // drawn over all bodies
     this.marker = reach > 0 ? Math.max(0.002 * size, Math.min(0.009 * size, 0.12 * reach)) : 0.009 * size;
-    this.reach = 14 * this.marker;  // of the longest arrow
+    this.reach = 14 * this.marker;  // of the arrow of a large impulse
   }
   ballForm() {
     const points = [], faces = [], around = 12, rings = 7;
@@ -161,13 +161,13 @@ class Shapes {
   }
   // The impulse on the first body; a contact without one shows its normal.
   addContacts(frame) {
-    const n = this.data.contactNumbers, largest = this.data.largestImpulse;
+    const n = this.data.contactNumbers, large = this.data.largeImpulse;
     for (let k = this.data.firstContact[frame]; k < this.data.firstContact[frame + 1]; ++k) {
       const at = n.subarray(9 * k, 9 * k + 3), impulse = n.subarray(9 * k + 3, 9 * k + 6);
       this.addBall(this.above, at, 0.5 * this.marker, kForce, -1);
-      if (!(largest > 0)) continue;
+      if (!(large > 0)) continue;
       // Square roots: the small ones of a heap are seen beside the large ones.
-      const length = this.reach * Math.sqrt(lengthOf(impulse) / largest), along = unit(impulse);
+      const length = this.reach * Math.sqrt(Math.min(3, lengthOf(impulse) / large)), along = unit(impulse);
       if (length < this.marker) continue;
       const neck = add(at, scaled(along, Math.max(0, length - 2 * this.marker)));
       this.addRod(this.above, at, neck, 0.35 * this.marker, kForce);
