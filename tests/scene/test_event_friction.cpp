@@ -81,6 +81,45 @@ motion = { rate = 1 }
   }
 }
 
+TEST_CASE("event: a box on a belt slips when it must, however long the steps before were") {
+  // Sticking on the belt it moves at one speed: the step in which it slips is as long as that.
+  const std::string text = R"(
+[[body]]
+name = "belt"
+shape = "box"
+size = [60, 1, 0.2]
+density = 1
+position = [0, 0, -0.1]
+velocity = [1, 0, 0]
+material = "floor"
+[[joint]]
+kind = "slider"
+bodies = ["belt", "world"]
+axis = [1, 0, 0]
+motion = { rate = 1 }
+[[body]]
+name = "box"
+shape = "box"
+size = [0.4, 0.4, 0.2]
+mass = 1
+position = [0, 0, 0.1]
+velocity = [1, 0, 0]
+material = "body"
+[[spring]]
+bodies = ["box", "world"]
+at = [[0, 0, 0.1], [-10, 0, 0.1]]
+stiffness = 1
+)" + mu(0.3);
+  for (const double tolerance : {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
+    CAPTURE(tolerance);
+    const auto engine = run(text, tolerance, 6, kUnitGravity);
+    REQUIRE(!engine->events().empty());
+    CHECK(engine->events()[0].kind == Kind::slip);
+    CHECK(std::abs(engine->events()[0].time - 0.3) < 10 * std::max(tolerance, 1e-8));
+    CHECK(std::abs(engine->bodies()[1].position.x() - (0.3 + std::sin(6 - 0.3))) < 10 * tolerance);
+  }
+}
+
 TEST_CASE("event: a block across a slope turns downhill and stops or slides on") {
   // Gravity is turned by 30 deg; v0 = 1 m/s along y, mu = k tan(30 deg).
   const std::string gravity = "[4.905, 0, " + number(-9.81 * std::cos(M_PI / 6)) + "]";

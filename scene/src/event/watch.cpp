@@ -11,17 +11,23 @@ namespace tether::scene::event {
 namespace {
 
 constexpr int kMostIterations = 80;
-constexpr int kPolish = 3;
+constexpr int kPolish = 3, kPatience = 4;
 // Of accelerations, by the contact library's tolerance and by what stands for a large slip.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
-/// A zero of f between a and b, where it has other signs; Illinois' rule.
+/// A zero of f between a and b, where it has other signs; Illinois' rule, and halving of what is
+/// `kinked` where that is slow: what contacts can bear is flat up to the zero.
 template <class F>
-double zero_between(const F& f, double a, double fa, double b, double fb, double resolution) {
+double zero_between(const F& f, double a, double fa, double b, double fb, double resolution,
+                    bool kinked = false) {
   int side = 0;
+  double width = std::abs(b - a);
   for (int k = 0; k < kMostIterations && std::abs(b - a) > resolution; ++k) {
     double m = (fa * b - fb * a) / (fa - fb);
-    if (!(m > std::min(a, b) && m < std::max(a, b))) m = 0.5 * (a + b);
+    const bool look = kinked && k % kPatience == kPatience - 1;
+    const bool slow = look && std::abs(b - a) > 0.5 * width;
+    if (look) width = std::abs(b - a);
+    if (slow || !(m > std::min(a, b) && m < std::max(a, b))) m = 0.5 * (a + b);
     const double fm = f(m);
     if (fm == 0) return m;
     if ((fm > 0) == (fb > 0)) {
@@ -193,7 +199,7 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
   if (fa <= 0 && f.what == Watch::gap && f.slope_before > 0 && f.slope < 0) fa = turn(phase, f, a);
   Zero zero{f.what, f.contact, a, {}};
   const double resolution = 4e-16 * b;
-  if (fa > 0) zero.time = zero_between(at, a, fa, b, fb, resolution);
+  if (fa > 0) zero.time = zero_between(at, a, fa, b, fb, resolution, f.what == Watch::support);
   // Newton in time, on the constraints: a move in space would not be the motion.
   const double slope = fa > 0 && b > a ? (fb - fa) / (b - a) : 0;
   phase.projected_at(zero.time, zero.y);
@@ -202,8 +208,11 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
   for (int k = 0; k < kPolish; ++k) {
     const double next = std::clamp(last_time - last / local, phase.step_begin(), phase.step_end());
     if (std::abs(next - last_time) <= resolution) break;
-    phase.projected_at(next, zero.y);
-    const double now = value(f, phase.start() + next, zero.y);
+    VectorXd there;
+    phase.projected_at(next, there);
+    const double now = value(f, phase.start() + next, there);
+    if (f.what == Watch::support && !(std::abs(now) < std::abs(last))) break;  // it has a kink
+    zero.y = there;
     if (now != last && next != last_time) local = (now - last) / (next - last_time);
     last = now;
     last_time = zero.time = next;
