@@ -155,7 +155,7 @@ TEST_CASE("event: corners of a slider with clearance hit in turns until they res
   // P. Flores, R. Leine, C. Glocker (2010), by an independent code.
   Scene scene = read_scene(TETHER_SHIPPED_SCENES "/clearance.toml");
   Eigen::VectorXd there;
-  for (const double tolerance : {1e-10, 1e-8, 1e-7, 1e-6}) {
+  for (const double tolerance : {1e-10, 1e-8, 1e-7, 1e-6, 1e-5}) {
     CAPTURE(tolerance);
     scene.event->tolerance = tolerance;
     const auto engine = make_engine(scene);

@@ -7,14 +7,14 @@
 
 namespace tether::scene::event {
 
-/// As those of smooth::units_of where these are not SI; else never above 1 m, 1 s and 1 m/s, and
+/// As those of smooth::units_of where these are not SI; else never above 1 m and 1 s, and
 /// below them natural ones: bands and tolerances of a toy of millimetres are parts of a millimetre.
 inline smooth::Units units_of(const Scene& scene) {
   const smooth::Units usual = smooth::units_of(scene);
   if (usual.length != 1 || usual.time != 1) return usual;
   smooth::Units units = smooth::natural_units(scene);
   units.length = std::min(1.0, units.length);
-  units.time = std::clamp(units.time, units.length, 1.0);
+  units.time = std::min(1.0, units.time);
   return units;
 }
 
