@@ -55,12 +55,12 @@ void check_sparse(const SparseJacobian& sparse, int rows, long unknowns) {
              "; starts must not decrease, nor exceed the number of entries");
     for (int e = begin; e < end; ++e) {
       const int j = sparse.columns[static_cast<std::size_t>(e)];
+      const bool outside = j < 0 || j >= unknowns;
+      if (!outside && (e == begin || j > sparse.columns[static_cast<std::size_t>(e) - 1])) continue;
       const std::string where = "SparseJacobian::columns[" + std::to_string(e) +
                                 "] = " + std::to_string(j) + " in row " + std::to_string(i);
-      if (j < 0 || j >= unknowns)
-        reject(where + "; it must be 0 .. " + std::to_string(unknowns - 1));
-      if (e > begin && j <= sparse.columns[static_cast<std::size_t>(e) - 1])
-        reject(where + "; columns of a row must ascend, each once");
+      if (outside) reject(where + "; it must be 0 .. " + std::to_string(unknowns - 1));
+      reject(where + "; columns of a row must ascend, each once");
     }
   }
 }

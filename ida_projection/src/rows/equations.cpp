@@ -165,14 +165,29 @@ struct Point {
 
 }  // namespace
 
+// Rows given by their entries have no others.
+static bool patterns_leave_out(const Evaluator& rows, const std::vector<char>& algebraic) {
+  for (const Evaluator::Part& part : rows.parts()) {
+    const auto* sparse = std::get_if<SparseJacobian>(&part.set->jacobian);
+    if (sparse == nullptr) return false;
+    for (const int j : sparse->columns)
+      if (algebraic[at(j)]) return false;
+  }
+  return true;
+}
+
 bool contain_algebraic(Evaluator& rows, double t, const std::vector<double>& y,
                        const std::vector<double>& WT, const std::vector<bool>& hold,
                        const double* id) {
   const auto n = static_cast<int>(y.size());
   std::vector<int> algebraic;
+  std::vector<char> is_algebraic(at(n), 0);
   for (int j = 0; j < n; ++j)
-    if (id[j] == 0.0 && (hold.empty() || !hold[at(j)])) algebraic.push_back(j);
-  if (algebraic.empty()) return false;
+    if (id[j] == 0.0 && (hold.empty() || !hold[at(j)])) {
+      algebraic.push_back(j);
+      is_algebraic[at(j)] = 1;
+    }
+  if (algebraic.empty() || patterns_leave_out(rows, is_algebraic)) return false;
   Dense C = Dense::Zero(rows.rows(), n);
   for (const std::vector<double>& point : {y, further_away(y, WT)}) {
     if (rows.jacobian(t, point.data(), n, WT.data(), algebraic, C.data()) != Status::success)
