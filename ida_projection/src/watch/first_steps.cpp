@@ -14,7 +14,7 @@ constexpr long kSettled = 2;             // accepted steps: before, y' is still 
 constexpr double kNoInvariant = 1e-2;    // of the terms of C y'; the corrector knows y' better
 constexpr double kFelt = 1.0;            // tolerances in one step: less may be noise of y'
 constexpr int kDoubts = 5, kLooks = 20;  // steps in a row with a doubt of one sign; looks into them
-constexpr long kSearchLimit = 2000;      // unknowns up to which entries of C are compared
+constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C
 constexpr long kFirstLook = 6, kLastLook = 10;  // accepted steps, at the solution's size
 constexpr double kMoves = 0.05;                 // of y in a step: it is no state of rest
 
@@ -23,6 +23,7 @@ constexpr double kMoves = 0.05;                 // of y in a step: it is no stat
 void FirstSteps::reset() {
   row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), 0);
   looks_ = small_looks_ = 0;
+  searched_ = 0;
 }
 
 std::string FirstSteps::look(const Candidate& candidate, const StepData& step, long steps, double h,
@@ -123,7 +124,8 @@ std::string FirstSteps::false_row(int row, const StepData& step, double h, Corre
     return out.str();
   }
   if (std::abs(tangency_.rate[i] + in_time - along) > kNoInvariant * terms &&
-      size <= kSearchLimit) {
+      searched_ + size <= kSearchLimit) {
+    searched_ += size;  // C at hand may be of an earlier step: mostly nothing is wrong
     const std::string found = wrong_entry(step.t);
     if (!found.empty())
       return "check_jacobian finds at t = " + std::to_string(step.t) + ": " + found;
