@@ -192,8 +192,8 @@ TEST_CASE("cost compares what the scene's law allows, and says why not") {
   CHECK(all.rows[0].method == Method::events);
   CHECK(all.rows[2].method == Method::steps);
   CHECK(all.reference.find("events") != std::string::npos);
-  const CostTable other =
-      cost(parse_scene("[scene]\n" + kHead + "restitution_law = \"poisson\"\n" + ball, "test"), few);
+  const CostTable other = cost(
+      parse_scene("[scene]\n" + kHead + "restitution_law = \"poisson\"\n" + ball, "test"), few);
   CHECK(other.no_events.find("Newton") != std::string::npos);
   CHECK(other.rows.size() == 2);
 }
