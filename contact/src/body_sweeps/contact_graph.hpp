@@ -6,27 +6,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "body_sweeps/graph_parts.hpp"
+
 namespace tether::contact::detail {
-
-// How a contact is solved: alone, or in fours that have no moving body in common. A chunk holds its
-// contacts in this order.
-enum class Kind : std::uint8_t { general4, sphere4, general, sphere, smooth };
-constexpr int kKinds = 5;
-
-// Contacts that one thread sweeps in one go: place .. place of the next chunk. Bodies of a chunk
-// are near each other, so that they stay in the cache.
-struct Chunk {
-  int place;          // among all contacts in the order of sweeping
-  int begin[kKinds];  // the same within the contacts of each kind
-};
-
-// A connected component over bodies that move. Nothing about it depends on other islands.
-struct Island {
-  int contacts, contact_begin;  // places
-  int body_begin, body_end;     // slots
-  int chunk_begin, chunk_end;
-  int colour_begin, colour_end;  // into ContactGraph::colours
-};
 
 // Keeps its storage between calls of build().
 //
@@ -52,32 +34,20 @@ class ContactGraph {
   std::size_t body_bytes() const;
 
  private:
-  int root(int b);
-  void find_islands(int bodies);
   void one_chunk(Island& island);
-  void cluster(Island& island);
-  void colour_chunks(Island& island);
-  void count_coupled();
-  void order_within(const int* begin, const int* end, int place);
-  void group(const int* begin, const int* end);
+  void many_chunks(Island& island);
+  void append_chunk(const int* begin, const int* end, int place);
 
-  const std::vector<int>* first_ = nullptr;
-  const std::vector<int>* second_ = nullptr;
+  ContactPairs pairs_;
   const std::vector<Kind>* kind_ = nullptr;
-  std::vector<int> parent_;                     // body -> union-find parent
-  std::vector<int> island_of_;                  // body (root) -> island
-  std::vector<int> sorted_;                     // contacts by island, later by chunk
-  std::vector<int> adjacent_start_, adjacent_;  // body -> contacts
-  std::vector<int> between_;                    // body -> contacts with the body looked at
-  std::vector<float> count_;                    // contact -> coupled
-  std::vector<char> taken_;                     // contact -> in a cluster
-  std::vector<int> chunk_start_;                // chunk -> contacts
-  std::vector<int> chunk_colour_, by_colour_, sequence_;
-  std::vector<int> mark_;             // body -> last cluster that has seen it
-  std::vector<int> near_, far_;       // queues of bodies
-  std::vector<std::uint64_t> used_;   // body -> colours
-  std::vector<int> by_kind_[kKinds];  // contacts of one chunk
   bool in_fours_ = false;
+  std::vector<int> sorted_;          // contacts by island, later by chunk
+  std::vector<std::uint64_t> used_;  // body -> colours of its chunks, then open fours
+  IslandFinder finder_;
+  Adjacency adjacent_;
+  Clusters clusters_;
+  ChunkColours chunk_colours_;
+  ContactsByKind by_kind_;
 };
 
 }  // namespace tether::contact::detail
