@@ -58,6 +58,7 @@ class JointEffect : public Effect {
       type.write(joint, out);
       if (joint.motion)
         joints::write_motion(*joint.motion, type.motion() == JointType::MotionOf::angle, out);
+      if (!type.is_free()) continue;
       for (const Effect* each : all())
         each->write_joint(joint, type.motion() == JointType::MotionOf::angle, out);
     }
