@@ -11,9 +11,6 @@ namespace tether::scene {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-/// The same for all spellings of a path; links are followed as far as they exist.
 std::string one_name(const std::string& file) {
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(fs::absolute(file, error), error);
@@ -25,8 +22,6 @@ bool is_device(const std::string& file) {
   const fs::file_status there = fs::status(file, error);
   return fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
 }
-
-}  // namespace
 
 std::string event_file(const std::string& csv) {
   return fs::path(csv).replace_extension(".events.csv").string();

@@ -30,18 +30,6 @@ std::vector<std::size_t> moving_bodies(const Scene& scene) {
   return out;
 }
 
-std::string one_name(const std::string& file) {
-  std::error_code error;
-  const fs::path whole = fs::weakly_canonical(fs::absolute(file, error), error);
-  return error ? file : whole.string();
-}
-
-bool is_device(const std::string& file) {
-  std::error_code error;
-  const fs::file_status there = fs::status(file, error);
-  return fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
-}
-
 void check_name(const Scene& scene, const std::string& file) {
   const fs::path name = fs::path(file).filename();
   if (name.empty() || name == "." || name == "..")

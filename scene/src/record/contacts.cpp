@@ -1,24 +1,25 @@
 // Tether: the contacts of a run as a table, with their forces. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "record/long_table.hpp"
 #include "record/number_at.hpp"
-#include "recorder.hpp"
+#include "record/table_recorder.hpp"
 
 namespace tether::scene {
 
 namespace {
 
 /// One row for each contact of each record.
-class ContactRecorder : public Recorder {
+class ContactRecorder : public TableRecorder {
  public:
   ContactRecorder(const Scene& scene, const std::string& file, const Resume& resume)
-      : scene_(scene),
-        table_(file,
-               "time_s,first,second,x_m,y_m,z_m,normal_x,normal_y,normal_z,gap_m,normal_force_N,"
-               "fx_N,fy_N,fz_N,slip_x_m_per_s,slip_y_m_per_s,slip_z_m_per_s\n",
-               resume.restarted,
-               [time = resume.time](const std::string& row) { return number_at(row, 0) <= time; }) {
-  }
+      : TableRecorder(
+            scene,
+            LongTable(
+                file,
+                "time_s,first,second,x_m,y_m,z_m,normal_x,normal_y,normal_z,gap_m,normal_force_N,"
+                "fx_N,fy_N,fz_N,slip_x_m_per_s,slip_y_m_per_s,slip_z_m_per_s\n",
+                resume.restarted, [time = resume.time](const std::string& row) {
+                  return number_at(row, 0) <= time;
+                })) {}
 
   void record(const Engine& engine, const Diagnostics&) override {
     std::string rows;
@@ -34,19 +35,6 @@ class ContactRecorder : public Recorder {
     }
     table_.put(rows);
   }
-  void keep() override { table_.flush(); }
-  void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
-    keep();
-    written.push_back(table_.file());
-  }
-
- private:
-  const std::string& body(int index) const {
-    return scene_.bodies[static_cast<std::size_t>(index)].name;
-  }
-
-  const Scene& scene_;
-  LongTable table_;
 };
 
 }  // namespace

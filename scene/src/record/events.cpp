@@ -1,23 +1,24 @@
 // Tether: the events of a run as a table. SPDX-License-Identifier: BSD-3-Clause
-#include "record/long_table.hpp"
 #include "record/number_at.hpp"
-#include "recorder.hpp"
+#include "record/table_recorder.hpp"
 
 namespace tether::scene {
 
 namespace {
 
-class EventRecorder : public Recorder {
+class EventRecorder : public TableRecorder {
  public:
   // Rows of an earlier run from before its state stay. A `rest` lies ahead of when it was found.
   EventRecorder(const Scene& scene, const std::string& file, const Resume& resume, double now)
-      : scene_(scene),
-        table_(file,
-               "time_s,kind,first,second,normal_speed_before_m_per_s,normal_speed_after_m_per_s,"
-               "energy_lost_J\n",
-               resume.restarted, [now](const std::string& row) {
-                 return !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
-               }) {}
+      : TableRecorder(
+            scene,
+            LongTable(
+                file,
+                "time_s,kind,first,second,normal_speed_before_m_per_s,normal_speed_after_m_per_s,"
+                "energy_lost_J\n",
+                resume.restarted, [now](const std::string& row) {
+                  return !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
+                })) {}
 
   void record(const Engine& engine, const Diagnostics&) override {
     const std::vector<ContactEvent>& all = engine.events();
@@ -27,19 +28,8 @@ class EventRecorder : public Recorder {
                              body(e.second), e.before, e.after, e.lost));
     }
   }
-  void keep() override { table_.flush(); }
-  void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
-    keep();
-    written.push_back(table_.file());
-  }
 
  private:
-  const std::string& body(int index) const {
-    return scene_.bodies[static_cast<std::size_t>(index)].name;
-  }
-
-  const Scene& scene_;
-  LongTable table_;
   std::size_t next_ = 0;
 };
 

@@ -1,0 +1,33 @@
+// Tether: a recorder whose rows go to a table of their own. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "record/long_table.hpp"
+#include "recorder.hpp"
+
+namespace tether::scene {
+
+class TableRecorder : public Recorder {
+ public:
+  void keep() override { table_.flush(); }
+  void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
+    keep();
+    written.push_back(table_.file());
+  }
+
+ protected:
+  TableRecorder(const Scene& scene, LongTable table) : table_(std::move(table)), scene_(scene) {}
+  const std::string& body(int index) const {
+    return scene_.bodies[static_cast<std::size_t>(index)].name;
+  }
+
+  LongTable table_;
+
+ private:
+  const Scene& scene_;
+};
+
+}  // namespace tether::scene
