@@ -14,136 +14,28 @@ struct Assembly {
   Problem problem() const { return delassus(bodies, contacts); }
 };
 
-inline Body box(double mass, const Eigen::Vector3d& half) {
-  Body body;
-  const Eigen::Vector3d s = half.cwiseProduct(half) * (mass / 3);
-  body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 1 / (s[1] + s[2]),
-      1 / (s[0] + s[2]), 1 / (s[0] + s[1]);
-  return body;
-}
+Body box(double mass, const Eigen::Vector3d& half);
 
-inline Body sphere(double mass, double radius) {
-  Body body;
-  const double i = 0.4 * mass * radius * radius;
-  body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 1 / i, 1 / i, 1 / i;
-  return body;
-}
+Body sphere(double mass, double radius);
 
 // n unit cubes on the ground, four contacts a level, the top one `ratio` times heavier; one step of
 // gravity, with a small push so that the data are not symmetric.
-inline Assembly stack(int n, double ratio, double mu = 0.5) {
-  Assembly out;
-  for (int k = 0; k < n; ++k) {
-    Body body = box(k == n - 1 ? ratio : 1, {0.5, 0.5, 0.5});
-    body.velocity << 0.001, 0.002, -0.0981, 0, 0, 0;
-    out.bodies.push_back(body);
-    for (double x : {-0.5, 0.5})
-      for (double y : {-0.5, 0.5})
-        out.contacts.push_back(
-            BodyContact::at_point(k, k - 1, {x, y, -0.5}, {x, y, 0.5}, {0, 0, 1}, mu));
-  }
-  return out;
-}
+Assembly stack(int n, double ratio, double mu = 0.5);
 
 struct RigidAssembly {
   std::vector<RigidBody> bodies;
   std::vector<PointContact> contacts;
   // Another assembly beside this one; ids continue.
-  void add(const RigidAssembly& other) {
-    const int b = static_cast<int>(bodies.size());
-    const std::uint64_t ids = contacts.size();
-    bodies.insert(bodies.end(), other.bodies.begin(), other.bodies.end());
-    for (PointContact c : other.contacts) {
-      c.first += b;
-      if (c.second >= 0) c.second += b;
-      if (c.id != PointContact::kNoId) c.id += ids;
-      contacts.push_back(c);
-    }
-  }
+  void add(const RigidAssembly& other);
 };
 
 // stack() for BodySolver; contacts have ids 0, 1, ...
-inline RigidAssembly rigid_stack(int n, double ratio, double mu = 0.5) {
-  RigidAssembly out;
-  const Assembly from = stack(n, ratio, mu);
-  for (const Body& b : from.bodies) {
-    RigidBody body;
-    body.inverse_mass = b.inverse_mass(0, 0);
-    body.inverse_inertia = b.inverse_mass.bottomRightCorner<3, 3>();
-    body.velocity = b.velocity.head<3>();
-    out.bodies.push_back(body);
-  }
-  for (int k = 0; k < n; ++k)
-    for (double x : {-0.5, 0.5})
-      for (double y : {-0.5, 0.5}) {
-        PointContact c;
-        c.first = k;
-        c.second = k - 1;
-        c.r1 << x, y, -0.5;
-        c.r2 << x, y, 0.5;
-        c.mu = mu;
-        c.id = out.contacts.size();
-        out.contacts.push_back(c);
-      }
-  return out;
-}
+RigidAssembly rigid_stack(int n, double ratio, double mu = 0.5);
 
 // Five bodies with random inertia, twelve random contacts.
-inline Assembly cluster(Generator& g, double mu, int bodies = 5, int contacts = 12) {
-  Assembly out;
-  for (int k = 0; k < bodies; ++k) {
-    Body body =
-        box(std::exp(g.uniform(-1, 1)), {g.uniform(0.2, 1), g.uniform(0.2, 1), g.uniform(0.2, 1)});
-    const Eigen::Matrix3d R = g.rotation();
-    body.inverse_mass.bottomRightCorner<3, 3>() =
-        (R * body.inverse_mass.bottomRightCorner<3, 3>() * R.transpose()).eval();
-    body.velocity << g.vector(), g.vector();
-    out.bodies.push_back(body);
-  }
-  for (int k = 0; k < contacts; ++k) {
-    const int first = static_cast<int>(g.uniform(0, bodies));
-    int second = static_cast<int>(g.uniform(-1, bodies));
-    if (second >= first) second = second == first ? -1 : second;
-    Eigen::Vector3d normal = g.vector().normalized();
-    const Eigen::Vector3d r1(g.uniform(-1, 1), g.uniform(-1, 1), g.uniform(-1, 1));
-    const Eigen::Vector3d r2(g.uniform(-1, 1), g.uniform(-1, 1), g.uniform(-1, 1));
-    out.contacts.push_back(BodyContact::at_point(first, second, r1, r2, normal, mu));
-  }
-  return out;
-}
+Assembly cluster(Generator& g, double mu, int bodies = 5, int contacts = 12);
 
 // Contacts in random order with randomly turned tangents: the same problem to the eye.
-inline Problem shuffled(const Problem& p, Generator& g, std::vector<int>* order = nullptr) {
-  const int n = p.contacts(), d = p.dimension();
-  std::vector<int> to(static_cast<std::size_t>(n));
-  for (int i = 0; i < n; ++i) to[static_cast<std::size_t>(i)] = i;
-  for (int i = n - 1; i > 0; --i)
-    std::swap(to[static_cast<std::size_t>(i)],
-              to[static_cast<std::size_t>(static_cast<int>(g.uniform(0, i + 1)))]);
-  std::vector<Eigen::Matrix3d> R;
-  for (int i = 0; i < n; ++i) {
-    Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
-    const double a = d == 3 ? g.uniform(0, 6.283185307179586) : 0;
-    r.bottomRightCorner<2, 2>() << std::cos(a), -std::sin(a), std::sin(a), std::cos(a);
-    R.push_back(r);
-  }
-  std::vector<MatrixBlock> blocks;
-  Eigen::VectorXd b(d * n), mu(n);
-  for (int i = 0; i < n; ++i) {
-    const std::size_t si = static_cast<std::size_t>(i);
-    for (int k = p.row_start()[si]; k < p.row_start()[si + 1]; ++k) {
-      const std::size_t j = static_cast<std::size_t>(p.columns()[static_cast<std::size_t>(k)]);
-      Eigen::Matrix3d value;
-      for (int c = 0; c < 3; ++c)
-        for (int r = 0; r < 3; ++r)
-          value(r, c) = p.blocks()[static_cast<std::size_t>(k)].column[4 * c + r];
-      blocks.push_back({to[si], to[j], R[si] * value * R[j].transpose()});
-    }
-    b.segment(d * to[si], d) = R[si].topLeftCorner(d, d) * p.b().segment(d * i, d);
-    mu[to[si]] = p.mu(i);
-  }
-  if (order) *order = to;
-  return Problem::sparse(d, std::move(blocks), b, mu);
-}
+Problem shuffled(const Problem& p, Generator& g, std::vector<int>* order = nullptr);
 
 }  // namespace tether::contact::random

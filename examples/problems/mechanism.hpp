@@ -7,6 +7,7 @@
 #include <limits>
 #include <problems/problem.hpp>
 #include <problems/rows.hpp>
+#include <problems/wide_solves.hpp>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -140,7 +141,6 @@ class Mechanism {
   /// gamma.
   static void solve_motion(const System& system, double t, const double* q, const double* v,
                            double* a, double* lam) {
-    using Wide = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
     MatrixN M = MatrixN::Zero();
     MatrixG G = MatrixG::Zero();
     VectorN f;
@@ -150,15 +150,7 @@ class Mechanism {
     system.force(t, q, v, f.data());
     system.gradient(t, q, G.data());
     system.acceleration(t, q, v, none.data(), gamma.data());
-    Wide K = Wide::Zero(n + m, n + m), right(n + m, 1);
-    K.topLeftCorner(n, n) = M.template cast<long double>();
-    K.topRightCorner(n, m) = System::sign * G.transpose().template cast<long double>();
-    K.bottomLeftCorner(m, n) = G.template cast<long double>();
-    right.topRows(n) = f.template cast<long double>();
-    right.bottomRows(m) = -gamma.template cast<long double>();
-    const Wide solution = K.fullPivLu().solve(right);
-    for (int i = 0; i < n; ++i) a[i] = static_cast<double>(solution(i));
-    for (int i = 0; i < m; ++i) lam[i] = static_cast<double>(solution(n + i));
+    solve_motion_wide(n, m, M.data(), G.data(), System::sign, f.data(), gamma.data(), a, lam);
   }
 
   /// The nearest start with g = 0 and dg/dt = 0: least change of q, then of v.
@@ -245,11 +237,7 @@ class Mechanism {
   static void move(const System& system, double t, const double* q, const VectorM& r, double* x) {
     MatrixG G = MatrixG::Zero();
     system.gradient(t, q, G.data());
-    const Eigen::Matrix<long double, n, m> wide = G.transpose().template cast<long double>();
-    const Eigen::Matrix<long double, m, m> normal = wide.transpose() * wide;
-    const Eigen::Matrix<long double, n, 1> step =
-        wide * normal.fullPivLu().solve(r.template cast<long double>());
-    for (int i = 0; i < n; ++i) x[i] -= static_cast<double>(step(i));
+    take_least_step_wide(n, m, G.data(), r.data(), x);
   }
 
   static void kinematics(const double* y, const double* yp, double* r) {
