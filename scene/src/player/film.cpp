@@ -2,13 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "film.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
-#include "json.hpp"
+#include "page_text.hpp"
 
 namespace tether::scene::player {
 
@@ -97,21 +96,16 @@ void Film::finish() {
   last_kept_ = true;
 }
 
-std::string Film::json_entries() const {
-  const auto column = [&](const char* name, auto value) {
-    std::vector<double> values;
-    for (const Frame& each : frames_) values.push_back(value(each));
-    return fmt::format("\"{}\":{}", name, json(values));
-  };
-  return fmt::format("{},{},{},{},{},{},{}", column("times", [](const Frame& f) { return f.time; }),
-                     column("kinetic", [](const Frame& f) { return f.kinetic; }),
-                     column("potential", [](const Frame& f) { return f.potential; }),
-                     column("drift", [](const Frame& f) { return f.drift; }),
-                     column("penetration", [](const Frame& f) { return f.penetration; }),
-                     column("residual", [](const Frame& f) { return f.residual; }),
-                     column("contacts", [](const Frame& f) {
-                       return static_cast<double>(f.contacts.size() / 9);
-                     }));
+void Film::add_to(nlohmann::json& page) const {
+  for (const Frame& each : frames_) {
+    page["times"].push_back(each.time);
+    page["kinetic"].push_back(each.kinetic);
+    page["potential"].push_back(each.potential);
+    page["drift"].push_back(each.drift);
+    page["penetration"].push_back(each.penetration);
+    page["residual"].push_back(each.residual);
+    page["contacts"].push_back(each.contacts.size() / 9);
+  }
 }
 
 template <class T>

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <tether/scene/engine.hpp>
 #include <vector>
@@ -28,8 +29,8 @@ class Film {
   void finish();
 
   std::size_t size() const { return frames_.size(); }
-  /// Entries of the JSON object of the page: times, energies, errors, contacts a frame.
-  std::string json_entries() const;
+  /// Adds times, energies, errors and contacts a frame to the object of the page.
+  void add_to(nlohmann::json& page) const;
   /// In base 64: positions (3 a body, single precision), orientations (w, x, y, z a body, 32767 for
   /// 1), contacts (point in units of the view, impulse on the first body and normal: 9 a contact).
   std::string positions() const, orientations() const, contacts() const;

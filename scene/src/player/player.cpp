@@ -2,16 +2,17 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <tether/scene/player.hpp>
 
 #include "film.hpp"
-#include "json.hpp"
 #include "output/output_lock.hpp"
 #include "output/output_names.hpp"
 #include "output/whole_file.hpp"
 #include "page_parts.hpp"
+#include "page_text.hpp"
 #include "record/gnuplot.hpp"
 #include "scene_data.hpp"
 
@@ -85,13 +86,13 @@ class Player::Implementation {
         "'unsafe-inline'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'\">\n"
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
         "<title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n{}",
-        html(scene_.name.empty() ? "Tether" : scene_.name), kStyle, kBody);
-    out += fmt::format(
-        "<script id=\"film-data\" "
-        "type=\"application/json\">{{\n{},\n\"engine\":{},\"start_energy\":"
-        "{},\n{}}}</script>\n",
-        scene_entries(scene_, moving_, view_), json(engine_), json(start_energy_.value_or(0)),
-        film_.json_entries());
+        html_text(scene_.name.empty() ? "Tether" : scene_.name), kStyle, kBody);
+    nlohmann::json data = scene_data(scene_, moving_, view_);
+    data["engine"] = engine_;
+    data["start_energy"] = start_energy_.value_or(0);
+    film_.add_to(data);
+    out += fmt::format("<script id=\"film-data\" type=\"application/json\">{}</script>\n",
+                       script_text(data));
     const auto numbers = [&](const char* id, const std::string& base64) {
       out += fmt::format("<script id=\"{}\" type=\"text/plain\">{}</script>\n", id, base64);
     };

@@ -2,26 +2,30 @@
 // BSD-3-Clause
 #include "scene_data.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "geometry/mesh.hpp"
 #include "joints/list.hpp"
-#include "json.hpp"
 
 namespace tether::scene::player {
 
 namespace {
 
-using Eigen::Quaterniond;
 using Eigen::Vector3d;
+using Json = nlohmann::json;
 
 constexpr int kAround = 24, kAroundOfMany = 10;  // segments of a circle
 constexpr std::size_t kMany = 300;               // bodies
 constexpr std::size_t kMostDots = 64;            // single points of a shape that are shown
+
+Json list(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+template <class Quaternion>
+Json wxyz(const Quaternion& q) {
+  return {q.w(), q.x(), q.y(), q.z()};
+}
 
 double reach(const Shape& shape) {
   double out = 0;
@@ -34,8 +38,8 @@ class Forms {
  public:
   Forms(int around, const View& view) : around_(around), view_(view) {}
 
-  /// Entries of a part: the number of the form and its scale.
-  std::string part(const Shape& shape) {
+  /// Adds the number of the form and its scale to a part.
+  void add_to(Json& part, const Shape& shape) {
     Shape form;
     form.kind = shape.kind;
     Vector3d scale = Vector3d::Ones();
@@ -43,61 +47,58 @@ class Forms {
       case ShapeKind::sphere:
         form.radius = 1;
         scale.setConstant(shape.radius / view_.length);
-        return entry(form, scale, true, false);
+        return add(part, form, scale, true, false);
       case ShapeKind::box:
         form.size.setOnes();
         scale = shape.size / view_.length;
-        return entry(form, scale, false, false);
+        return add(part, form, scale, false, false);
       case ShapeKind::capsule:
         form.radius = shape.radius;
         form.length = shape.length;
-        return entry(form, scale, true, true);
+        return add(part, form, scale, true, true);
       default:
         form.points = shape.points;
-        return entry(form, scale, false, true);
+        return add(part, form, scale, false, true);
     }
   }
-  const std::string& list() const { return list_; }
+  const Json& list() const { return list_; }
 
  private:
-  std::string entry(const Shape& form, const Vector3d& scale, bool round, bool in_metres) {
-    Mesh m = mesh(form, around_, 0);
-    std::string points, faces;
+  void add(Json& part, const Shape& form, const Vector3d& scale, bool round, bool in_metres) {
+    const Mesh m = mesh(form, around_, 0);
+    Json points = Json::array();
     for (const Vector3d& p : m.points)
-      points += (points.empty() ? "" : ",") + json(in_metres ? Vector3d(p / view_.length) : p);
-    for (const std::vector<std::size_t>& face : m.faces)
-      faces += fmt::format("{}[{}]", faces.empty() ? "" : ",", fmt::join(face, ","));
-    const std::string text =
-        fmt::format("{{\"points\":[{}],\"faces\":[{}],\"round\":{}}}", points, faces, round);
-    const auto [at, fresh] = known_.emplace(text, known_.size());
-    if (fresh) list_ += (list_.empty() ? "" : ",") + text;
-    return fmt::format("\"form\":{},\"scale\":{}", at->second, json(scale));
+      points.push_back(player::list(in_metres ? Vector3d(p / view_.length) : p));
+    const Json entry = {{"points", points}, {"faces", m.faces}, {"round", round}};
+    const auto [at, fresh] = known_.emplace(entry.dump(), known_.size());
+    if (fresh) list_.push_back(entry);
+    part["form"] = at->second;
+    part["scale"] = player::list(scale);
   }
 
   int around_;
   View view_;
   std::map<std::string, std::size_t> known_;
-  std::string list_;
+  Json list_ = Json::array();
 };
 
 /// A point, given in world axes at t = 0, in the axes of its body; body -1: the world.
-std::string anchor(const Scene& scene, int body, const Vector3d& at, const View& view) {
+Json anchor(const Scene& scene, int body, const Vector3d& at, const View& view) {
   Vector3d local = at - view.centre;
   if (body >= 0) {
     const Body& b = scene.bodies[static_cast<std::size_t>(body)];
     local = b.orientation.conjugate() * (at - b.position);
   }
-  return fmt::format("{{\"body\":{},\"at\":{}}}", body, json(Vector3d(local / view.length)));
+  return {{"body", body}, {"at", list(local / view.length)}};
 }
 
-std::string turned(const Scene& scene, int body, const Vector3d& axis) {
+Json turned(const Scene& scene, int body, const Vector3d& axis) {
   const Vector3d along = axis.stableNormalized();
-  if (body < 0) return json(along);
-  return json(
-      Vector3d(scene.bodies[static_cast<std::size_t>(body)].orientation.conjugate() * along));
+  if (body < 0) return list(along);
+  return list(scene.bodies[static_cast<std::size_t>(body)].orientation.conjugate() * along);
 }
 
-std::string joint_entry(const Scene& scene, const Joint& joint, const View& view) {
+Json joint_entry(const Scene& scene, const Joint& joint, const View& view) {
   std::string_view kind;
   for (const auto& [word, each] : kJointWords)
     if (each == joint.kind) kind = word;
@@ -106,35 +107,36 @@ std::string joint_entry(const Scene& scene, const Joint& joint, const View& view
   const int shown = joint.first >= 0 ? joint.first : joint.second;
   const Vector3d at =
       slider && shown >= 0 ? scene.bodies[static_cast<std::size_t>(shown)].position : joint.at;
-  const std::string first = anchor(scene, slider ? shown : joint.first, at, view);
-  const std::string second =
+  const Json first = anchor(scene, slider ? shown : joint.first, at, view);
+  const Json second =
       slider ? first
              : anchor(scene, joint.second, joints::type(joint.kind).point_on_second(joint), view);
-  return fmt::format(
-      "{{\"name\":{},\"kind\":{},\"first\":{},\"second\":{},\"axis\":{},\"axis_body\":{}}}",
-      json(joint.name), json(kind), first, second, turned(scene, joint.second, joint.axis),
-      joint.second);
+  return {{"name", joint.name},
+          {"kind", kind},
+          {"first", first},
+          {"second", second},
+          {"axis", turned(scene, joint.second, joint.axis)},
+          {"axis_body", joint.second}};
 }
 
-std::string spring_entry(const Scene& scene, const Spring& spring, const View& view) {
-  return fmt::format("{{\"name\":{},\"first\":{},\"second\":{}}}", json(spring.name),
-                     anchor(scene, spring.first, spring.at, view),
-                     anchor(scene, spring.second, spring.at_second, view));
+Json spring_entry(const Scene& scene, const Spring& spring, const View& view) {
+  return {{"name", spring.name},
+          {"first", anchor(scene, spring.first, spring.at, view)},
+          {"second", anchor(scene, spring.second, spring.at_second, view)}};
 }
 
-std::string part_entry(const Shape& shape, const View& view, Forms& forms) {
-  const std::string place = fmt::format("\"position\":{},\"orientation\":{}",
-                                        json(Vector3d(shape.position / view.length)),
-                                        json(Quaterniond(shape.orientation)));
-  if (shape.kind == ShapeKind::plane)
-    return fmt::format("{{\"normal\":{},{}}}", json(Vector3d(shape.normal.stableNormalized())),
-                       place);
-  std::string dots;
-  if (const Mesh m = mesh(shape, 8, 0); !m.single.empty())
-    for (std::size_t k = 0; k < std::min(kMostDots, m.single.size()); ++k)
-      dots += (k == 0 ? "" : ",") + json(Vector3d(m.points[m.single[k]] / view.length));
-  if (!dots.empty()) return fmt::format("{{\"dots\":[{}],{}}}", dots, place);
-  return fmt::format("{{{},{}}}", forms.part(shape), place);
+Json part_entry(const Shape& shape, const View& view, Forms& forms) {
+  Json part = {{"position", list(shape.position / view.length)},
+               {"orientation", wxyz(shape.orientation)}};
+  if (shape.kind == ShapeKind::plane) {
+    part["normal"] = list(shape.normal.stableNormalized());
+    return part;
+  }
+  const Mesh m = mesh(shape, 8, 0);
+  for (std::size_t k = 0; k < std::min(kMostDots, m.single.size()); ++k)
+    part["dots"].push_back(list(m.points[m.single[k]] / view.length));
+  if (m.single.empty()) forms.add_to(part, shape);
+  return part;
 }
 
 }  // namespace
@@ -164,38 +166,32 @@ View view_of(const Scene& scene) {
   return out;
 }
 
-std::string scene_entries(const Scene& scene, const std::vector<std::size_t>& moving,
-                          const View& view) {
+Json scene_data(const Scene& scene, const std::vector<std::size_t>& moving, const View& view) {
   Forms forms(scene.bodies.size() > kMany ? kAroundOfMany : kAround, view);
   std::map<std::size_t, std::size_t> number;  // of a moving body in the film
   for (std::size_t i = 0; i < moving.size(); ++i) number.emplace(moving[i], i);
-  std::string bodies, joints, springs, centres;
-  const auto add = [](std::string& to, const std::string& entry) {
-    to += (to.empty() ? "" : ",\n") + entry;
-  };
+  Json bodies = Json::array(), joints = Json::array(), springs = Json::array(),
+       centres = Json::array();
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const Body& body = scene.bodies[b];
-    std::string parts;
-    for (const Shape& shape : body.shapes) add(parts, part_entry(shape, view, forms));
+    Json parts = Json::array();
+    for (const Shape& shape : body.shapes) parts.push_back(part_entry(shape, view, forms));
     const auto film = number.find(b);
-    add(bodies,
-        fmt::format("{{\"name\":{},\"film\":{},\"position\":{},\"orientation\":{},\"parts\":[{}]}}",
-                    json(body.name),
-                    film == number.end() ? "null" : fmt::format("{}", film->second),
-                    json(Vector3d((body.position - view.centre) / view.length)),
-                    json(Quaterniond(body.orientation)), parts));
+    bodies.push_back({{"name", body.name},
+                      {"film", film == number.end() ? Json() : Json(film->second)},
+                      {"position", list((body.position - view.centre) / view.length)},
+                      {"orientation", wxyz(body.orientation)},
+                      {"parts", parts}});
   }
-  for (const Joint& joint : scene.joints) add(joints, joint_entry(scene, joint, view));
-  for (const Spring& spring : scene.springs) add(springs, spring_entry(scene, spring, view));
+  for (const Joint& joint : scene.joints) joints.push_back(joint_entry(scene, joint, view));
+  for (const Spring& spring : scene.springs) springs.push_back(spring_entry(scene, spring, view));
   for (const CentralGravity& each : scene.central_gravity)
-    add(centres, json(Vector3d((each.at - view.centre) / view.length)));
+    centres.push_back(list((each.at - view.centre) / view.length));
   const Vector3d down = scene.gravity.value_or(Vector3d::Zero());
-  return fmt::format(
-      "\"name\":{},\"length\":{},\"centre\":{},\"up\":{},\n\"bodies\":[{}],\n\"forms\":[{}],\n"
-      "\"joints\":[{}],\n\"springs\":[{}],\n\"centres\":[{}]",
-      json(scene.name), json(view.length), json(view.centre),
-      json(Vector3d(down.norm() > 0 ? Vector3d(-down.stableNormalized()) : Vector3d::UnitZ())),
-      bodies, forms.list(), joints, springs, centres);
+  const Vector3d up = down.norm() > 0 ? Vector3d(-down.stableNormalized()) : Vector3d::UnitZ();
+  return {{"name", scene.name}, {"length", view.length}, {"centre", list(view.centre)},
+          {"up", list(up)},     {"bodies", bodies},      {"forms", forms.list()},
+          {"joints", joints},   {"springs", springs},    {"centres", centres}};
 }
 
 }  // namespace tether::scene::player

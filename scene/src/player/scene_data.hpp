@@ -2,7 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
-#include <string>
+#include <nlohmann/json_fwd.hpp>
 #include <tether/scene/scene.hpp>
 #include <vector>
 
@@ -13,8 +13,8 @@ namespace tether::scene::player {
 /// Centre and size of the bodies at the start, planes apart.
 View view_of(const Scene& scene);
 
-/// Entries of the JSON object of the page. `moving`: as in Film.
-std::string scene_entries(const Scene& scene, const std::vector<std::size_t>& moving,
+/// The object of the page, without what the film adds. `moving`: as in Film.
+nlohmann::json scene_data(const Scene& scene, const std::vector<std::size_t>& moving,
                           const View& view);
 
 }  // namespace tether::scene::player

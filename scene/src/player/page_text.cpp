@@ -1,0 +1,82 @@
+// Tether: values of a page: JSON that may stand inside HTML, and numbers in base 64.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "page_text.hpp"
+
+#include <cctype>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+namespace tether::scene::player {
+
+namespace {
+
+using Handler = nlohmann::json::error_handler_t;
+
+std::string base64(const std::string& bytes) {
+  constexpr const char* kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t k = i; k < i + 3; ++k)
+      three = three << 8 | (k < bytes.size() ? static_cast<unsigned char>(bytes[k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k)
+      out += i + k <= bytes.size() ? kDigits[three >> (18 - 6 * k) & 0x3f] : '=';
+  }
+  return out;
+}
+
+template <class Bits, class T>
+std::string little_endian(const std::vector<T>& values) {
+  static_assert(sizeof(Bits) == sizeof(T));
+  std::string bytes;
+  bytes.reserve(values.size() * sizeof(T));
+  for (const T value : values) {
+    Bits bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    for (std::size_t k = 0; k < sizeof bits; ++k)
+      bytes += static_cast<char>(bits >> (8 * k) & 0xff);
+  }
+  return bytes;
+}
+
+}  // namespace
+
+std::string html_text(const std::string& text) {
+  const auto valid = nlohmann::json(text).dump(-1, ' ', false, Handler::replace);
+  std::string out;
+  for (const char c : nlohmann::json::parse(valid).get<std::string>()) {
+    if (std::strchr("<>&\"'", c) && c)
+      out += "&#" + std::to_string(int{c}) + ";";
+    else
+      out += std::iscntrl(static_cast<unsigned char>(c)) ? ' ' : c;
+  }
+  return out;
+}
+
+// Outside of strings JSON has none of these characters, and in them each may be written by its
+// code.
+std::string script_text(const nlohmann::json& value) {
+  constexpr std::string_view kHtml = "<>&'";
+  constexpr const char* kCodes[] = {"\\u003c", "\\u003e", "\\u0026", "\\u0027"};
+  std::string out;
+  for (const char c : value.dump(-1, ' ', true, Handler::replace)) {
+    const std::size_t at = kHtml.find(c);
+    if (at == std::string_view::npos)
+      out += c;
+    else
+      out += kCodes[at];
+  }
+  return out;
+}
+
+std::string base64(const std::vector<float>& values) {
+  return base64(little_endian<std::uint32_t>(values));
+}
+std::string base64(const std::vector<std::int16_t>& values) {
+  return base64(little_endian<std::uint16_t>(values));
+}
+
+}  // namespace tether::scene::player

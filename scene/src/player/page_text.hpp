@@ -1,0 +1,23 @@
+// Tether: values of a page: JSON that may stand inside HTML, and numbers in base 64.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace tether::scene::player {
+
+/// In ASCII without a character that means something to HTML. Bytes that are not UTF-8 become
+/// U+FFFD, numbers that JSON lacks null.
+std::string script_text(const nlohmann::json& value);
+
+/// Text of an HTML element, in UTF-8.
+std::string html_text(const std::string& text);
+
+/// Little-endian, in base 64.
+std::string base64(const std::vector<float>& values);
+std::string base64(const std::vector<std::int16_t>& values);
+
+}  // namespace tether::scene::player
