@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <tether/scene/engine.hpp>
 #include <tether/scene/files.hpp>
@@ -44,6 +45,31 @@ inline std::vector<ContactEvent> of_kind(const Engine& engine, Kind kind) {
   for (const ContactEvent& each : engine.events())
     if (each.kind == kind) out.push_back(each);
   return out;
+}
+
+/// A state saved at `cut` and restored moves to `end` with the bits of the engine that saved it,
+/// and tells no event twice.
+inline void goes_on_with_its_bits(const Scene& scene, double cut, double end) {
+  CAPTURE(cut);
+  const auto first = make_engine(scene), second = make_engine(scene);
+  first->advance(cut);
+  std::stringstream state;
+  first->save(state);
+  second->restore(state);
+  CHECK(second->time() == first->time());
+  first->advance(end);
+  second->advance(end);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const BodyState &p = first->bodies()[b], &q = second->bodies()[b];
+    CHECK(q.position == p.position);
+    CHECK(q.velocity == p.velocity);
+    CHECK(q.orientation.coeffs() == p.orientation.coeffs());
+    CHECK(q.angular_velocity == p.angular_velocity);
+  }
+  REQUIRE(second->events().size() <= first->events().size());
+  const std::size_t before = first->events().size() - second->events().size();
+  for (std::size_t k = 0; k < second->events().size(); ++k)
+    CHECK(second->events()[k].time == first->events()[before + k].time);
 }
 
 /// What energy is left less what impacts took and what the start had, where friction does no work.

@@ -111,16 +111,24 @@ TEST_CASE("reported errors of steps bound the true ones: sliding to rest") {
                });
 }
 
-TEST_CASE("reported errors of steps bound the true ones: from sliding to rolling") {
+namespace {
+
+const std::string kRolling =
+    "[[body]]\nshape = \"sphere\"\nradius = 0.5\nmass = 1\nposition = [0, 0, 0.5]\n"
+    "velocity = [7, 0, 0]\nmaterial = \"a\"\n";
+
+/// Slides with the friction 0.3 until it rolls.
+Truth rolls(double t) {
   const double a = 0.3 * 9.81, roll = 2 * 7 / (7 * a), radius = 0.5;
-  check_bounds("[scene]\nname = \"rolling\"\n" + kHead + kFloor +
-                   "[[body]]\nshape = \"sphere\"\nradius = 0.5\nmass = 1\nposition = [0, 0, "
-                   "0.5]\nvelocity = [7, 0, 0]\nmaterial = \"a\"\n",
-               [=](double t) {
-                 const double s = std::min(t, roll), w = 2.5 * a / radius;
-                 return Truth{Vector3d(7 * s - 0.5 * a * s * s + 5 * (t - s), 0, radius),
-                              Vector3d(0, 0.5 * w * s * s + 5 / radius * (t - s), 0)};
-               });
+  const double s = std::min(t, roll), w = 2.5 * a / radius;
+  return {Vector3d(7 * s - 0.5 * a * s * s + 5 * (t - s), 0, radius),
+          Vector3d(0, 0.5 * w * s * s + 5 / radius * (t - s), 0)};
+}
+
+}  // namespace
+
+TEST_CASE("reported errors of steps bound the true ones: from sliding to rolling") {
+  check_bounds("[scene]\nname = \"rolling\"\n" + kHead + kFloor + kRolling, rolls);
 }
 
 TEST_CASE("what cost names keeps the wanted error: sliding to rest") {
@@ -137,19 +145,11 @@ TEST_CASE("what cost names keeps the wanted error: sliding to rest") {
 }
 
 TEST_CASE("what cost names keeps the wanted error: from sliding to rolling, by its events") {
-  const double a = 0.3 * 9.81, roll = 2 * 7 / (7 * a), radius = 0.5;
   check_wanted(
       "[scene]\nname = \"rolling\"\nengine = \"event\"\nend = 2\n"
       "gravity = [0, 0, -9.81]\n" +
-          kFloor +
-          "[[body]]\nshape = \"sphere\"\nradius = 0.5\nmass = 1\nposition = [0, 0, "
-          "0.5]\nvelocity = [7, 0, 0]\nmaterial = \"a\"\n",
-      [=](double t) {
-        const double s = std::min(t, roll), w = 2.5 * a / radius;
-        return Truth{Vector3d(7 * s - 0.5 * a * s * s + 5 * (t - s), 0, radius),
-                     Vector3d(0, 0.5 * w * s * s + 5 / radius * (t - s), 0)};
-      },
-      5);
+          kFloor + kRolling,
+      rolls, 5);
 }
 
 TEST_CASE("what cost names keeps the wanted error: a ball that bounces to rest") {

@@ -201,15 +201,5 @@ TEST_CASE("event: a run that is cut while corners rattle goes on with its bits")
       "[scene]\nengine = \"event\"\nend = 2\ngravity = [0, 0, -9.81]\n[event]\ntolerance = 1e-8\n" +
           tumbling_box({0.6, 0.2, "[0.3, 0.2, 0.1]", "[0, 0.5, 1]", "[0.5, 0.3, 0]"}),
       "test");
-  for (const double cut : {0.3, 0.45, 0.459, 0.46, 0.4600465}) {
-    CAPTURE(cut);
-    const auto first = make_engine(scene), second = make_engine(scene);
-    first->advance(cut);
-    std::stringstream state;
-    first->save(state);
-    second->restore(state);
-    first->advance(2);
-    second->advance(2);
-    CHECK(state_of(*second) == state_of(*first));
-  }
+  for (const double cut : {0.3, 0.45, 0.459, 0.46, 0.4600465}) goes_on_with_its_bits(scene, cut, 2);
 }
