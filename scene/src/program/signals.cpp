@@ -2,6 +2,7 @@
 #include "signals.hpp"
 
 #include <csignal>
+#include <ctime>
 #include <initializer_list>
 
 namespace tether::scene {
@@ -9,21 +10,39 @@ namespace tether::scene {
 namespace {
 
 volatile std::sig_atomic_t caught = 0;
+std::timespec first{};
 
-extern "C" void note(int signal) { caught = signal; }
+// timeout(1), shells and supervisors signal a process and then its group: what comes within a
+// second is the same wish. A later one is of somebody who does not want to wait. All calls here are
+// safe in a handler (POSIX).
+extern "C" void note(int signal) {
+  std::timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  if (caught == 0) {
+    first = now;
+    caught = signal;
+    return;
+  }
+  const double seconds = std::difftime(now.tv_sec, first.tv_sec) +
+                         1e-9 * static_cast<double>(now.tv_nsec - first.tv_nsec);
+  if (seconds < 1) return;
+  std::signal(signal, SIG_DFL);
+  raise(signal);
+}
 
 }  // namespace
 
 void catch_signals() {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  const auto signals = {SIGINT, SIGTERM, SIGHUP};
+  struct sigaction action {};
+  action.sa_handler = note;
+  action.sa_flags = SA_RESTART;  // calls of the system go on, so that no file is cut
+  sigemptyset(&action.sa_mask);
+  for (const int signal : signals) sigaddset(&action.sa_mask, signal);
+  for (const int signal : signals) {
     struct sigaction before {};
     if (sigaction(signal, nullptr, &before) != 0) continue;
     if (signal == SIGHUP && before.sa_handler == SIG_IGN) continue;
-    struct sigaction action {};
-    action.sa_handler = note;
-    // Calls of the system go on, so that no file is cut; a second signal finds no handler.
-    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-    sigemptyset(&action.sa_mask);
     sigaction(signal, &action, nullptr);
   }
 }

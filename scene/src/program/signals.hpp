@@ -3,8 +3,8 @@
 
 namespace tether::scene {
 
-/// From now on the first SIGINT, SIGTERM or SIGHUP is only noted; the second one ends the program.
-/// SIGHUP stays ignored where it is (nohup).
+/// From now on the first SIGINT, SIGTERM or SIGHUP is only noted; one that comes a second later or
+/// more ends the program. SIGHUP stays ignored where it is (nohup).
 void catch_signals();
 
 /// 0: none yet.
