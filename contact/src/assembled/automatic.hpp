@@ -4,7 +4,7 @@
 #include "assembled/local_solves.hpp"
 #include "assembled/stages/accelerated_sweeps.hpp"
 #include "assembled/stages/admm.hpp"
-#include "assembled/stages/interior_point.hpp"
+#include "assembled/stages/interior/interior_point.hpp"
 #include "assembled/stages/proximal_newton.hpp"
 
 namespace tether::contact::detail {

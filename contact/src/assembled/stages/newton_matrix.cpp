@@ -3,6 +3,7 @@
 #include "assembled/stages/newton_matrix.hpp"
 
 #include <algorithm>
+#include <vector>
 
 namespace tether::contact::detail {
 namespace {
@@ -19,6 +20,38 @@ double NewtonMatrix::cost(const Search& search) const {
       ordered_ ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
   return 4 * operations + sweeps_ * search.sweep_cost + 25 * blocks +
          per_contact_ * search.system.size();
+}
+
+// Breadth-first levels, whose ends separate the graph: a front of a nested elimination is as wide
+// as a level, and the widest front takes most of the work.
+double NewtonMatrix::cost_by_width(const Search& search) const {
+  constexpr double kOfBand =
+      0.1;  // of the work of eliminating level by level, as measured on packings
+  const linalg::BlockPattern p = pattern(search.system.problem());
+  const int n = p.size;
+  std::vector<int> reached;
+  std::vector<char> seen(at(n), 0);
+  reached.reserve(at(n));
+  double operations = 0;
+  for (int seed = 0; seed < n; ++seed) {
+    if (seen[at(seed)]) continue;
+    seen[at(seed)] = 1;
+    reached.push_back(seed);
+    std::size_t begin = reached.size() - 1;
+    while (begin < reached.size()) {
+      const std::size_t end = reached.size();
+      const double width = static_cast<double>(end - begin);
+      operations += width * width * width;
+      for (; begin < end; ++begin)
+        for (int k = p.starts[reached[begin]]; k < p.starts[reached[begin] + 1]; ++k) {
+          const int j = p.columns[k];
+          if (seen[at(j)]) continue;
+          seen[at(j)] = 1;
+          reached.push_back(j);
+        }
+    }
+  }
+  return 4 * kOfBand * operations;
 }
 
 bool NewtonMatrix::order_by_bodies(Search& search) {

@@ -1,6 +1,6 @@
 // Tether: proximal point iteration by Newton steps and interior points. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "assembled/stages/interior_point.hpp"
+#include "assembled/stages/interior/interior_point.hpp"
 
 namespace tether::contact::detail {
 
@@ -12,7 +12,8 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
   constexpr double kLeast = 1e-9, kMost = 1;  // tau
   System& system = search.system;
   Packed rate(at(n_)), point(at(n_));  // rate: tau (x_k+1 - x_k)
-  std::copy(x, x + n_, anchor_.begin());
+  equations_.set_anchor(x);
+  const Packed& anchor = equations_.anchor();
   double tau = 1e-2, near = 1e-4;
   double reference = search.best_error;
   int gain = 0;
@@ -21,26 +22,23 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
     int corrections = 0;
     if (drifting) {
       for (int i = 0; i < n_; ++i)
-        for (int c = 0; c < 3; ++c)
-          point[at(i)].v[c] = anchor_[at(i)].v[c] + rate[at(i)].v[c] / tau;
-      corrections = newton.correct(search, tau, anchor_.data(), point, kCorrections);
+        for (int c = 0; c < 3; ++c) point[at(i)].v[c] = anchor[at(i)].v[c] + rate[at(i)].v[c] / tau;
+      corrections = newton.correct(search, tau, anchor.data(), point, kCorrections);
     }
     bool found = corrections > 0;
     if (!found) {
       // Half the natural map of the problem itself at the anchor is enough: with more accuracy the
       // iteration is no better, with more steps each.
-      tau_ = 0;
-      std::copy(anchor_.begin(), anchor_.end(), z_.begin());
-      velocities(system);
-      const double before = natural_map(system);
+      equations_.set_tau(0);
+      const double before = equations_.natural_map(system, anchor.data());
       if (!start_proximal(search, tau, near)) break;
       found = follow(search, kSteps, 0.5 * before) <= 0.8 * before;
-      tau_ = 0;
-      search.test(z_.data(), Method::interior_point);
+      equations_.set_tau(0);
+      search.test(equations_.impulses().data(), Method::interior_point);
       if (search.solved()) break;
       if (found) {
-        std::copy(z_.begin(), z_.end(), point.begin());
-        newton.correct(search, tau, anchor_.data(), point, kCorrections);
+        point = equations_.impulses();
+        newton.correct(search, tau, anchor.data(), point, kCorrections);
       } else {
         near = near < 5e-5 ? 1e-3 : near > 5e-4 ? 1e-4 : 1e-5;  // another way to the same point
       }
@@ -55,13 +53,12 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       continue;
     }
     for (int i = 0; i < n_; ++i)
-      for (int c = 0; c < 3; ++c)
-        rate[at(i)].v[c] = tau * (point[at(i)].v[c] - anchor_[at(i)].v[c]);
+      for (int c = 0; c < 3; ++c) rate[at(i)].v[c] = tau * (point[at(i)].v[c] - anchor[at(i)].v[c]);
     drifting = true;
-    std::copy(point.begin(), point.end(), anchor_.begin());
-    search.test(anchor_.data(), Method::interior_point);
+    equations_.set_anchor(point.data());
+    search.test(anchor.data(), Method::interior_point);
     // Sweeps remove errors of single contacts.
-    std::copy(anchor_.begin(), anchor_.end(), swept_.begin());
+    swept_ = anchor;
     for (int k = 0; k < kSweeps && !search.solved(); ++k) {
       system.sweep(swept_.data());
       search.count_sweep();
@@ -70,7 +67,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
     if (search.solved()) break;
     tau = std::max(kLeast, (corrections == 1 ? 0.4 : 0.5) * tau);
   }
-  tau_ = 0;
+  equations_.set_tau(0);
 }
 
 }  // namespace tether::contact::detail

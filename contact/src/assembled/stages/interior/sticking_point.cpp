@@ -1,5 +1,5 @@
 // Tether: the point where every contact sticks. SPDX-License-Identifier: BSD-3-Clause
-#include "assembled/stages/sticking_point.hpp"
+#include "assembled/stages/interior/sticking_point.hpp"
 
 #include <algorithm>
 #include <cmath>

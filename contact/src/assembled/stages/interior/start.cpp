@@ -2,63 +2,28 @@
 #include <cmath>
 #include <limits>
 
-#include "assembled/stages/interior_point.hpp"
+#include "assembled/stages/interior/interior_point.hpp"
 
 namespace tether::contact::detail {
 
 bool InteriorPoint::order_bodies(Search& search) {
-  if (matrix_.ordered()) return matrix_.by_bodies();
-  if (!matrix_.order_by_bodies(search)) return false;
-  find_flat(search.system);
+  if (newton_.matrix().ordered()) return newton_.matrix().by_bodies();
+  if (!newton_.matrix().order_by_bodies(search)) return false;
+  equations_.find_flat(search.system);
   return true;
 }
 
-// Breadth-first levels, whose ends separate the graph: a front of a nested elimination is as wide
-// as a level, and the widest front takes most of the work.
-double InteriorPoint::cost_by_width(const Search& search) const {
-  constexpr double kOfBand =
-      0.1;  // of the work of eliminating level by level, as measured on packings
-  const linalg::BlockPattern p = pattern(search.system.problem());
-  std::vector<int> reached;
-  std::vector<char> seen(at(n_), 0);
-  reached.reserve(at(n_));
-  double operations = 0;
-  for (int seed = 0; seed < n_; ++seed) {
-    if (seen[at(seed)]) continue;
-    seen[at(seed)] = 1;
-    reached.push_back(seed);
-    std::size_t begin = reached.size() - 1;
-    while (begin < reached.size()) {
-      const std::size_t end = reached.size();
-      const double width = static_cast<double>(end - begin);
-      operations += width * width * width;
-      for (; begin < end; ++begin)
-        for (int k = p.starts[reached[begin]]; k < p.starts[reached[begin] + 1]; ++k) {
-          const int j = p.columns[k];
-          if (seen[at(j)]) continue;
-          seen[at(j)] = 1;
-          reached.push_back(j);
-        }
-    }
-  }
-  return 4 * kOfBand * operations;
-}
-
 void InteriorPoint::order(Search& search) {
-  if (matrix_.ordered()) return;
-  matrix_.order(search);
-  find_flat(search.system);
-}
-
-void InteriorPoint::find_flat(const System& system) {
-  for (int i = 0; i < n_; ++i) flat_[at(i)] = !(system.friction(i) > 0);
+  if (newton_.matrix().ordered()) return;
+  newton_.matrix().order(search);
+  equations_.find_flat(search.system);
 }
 
 void InteriorPoint::stick(Search& search) {
   if (sticking_.tried()) return;
   order(search);
-  sticking_.find(search, matrix_, flat_);
-  if (sticking_.found() && sticking_.outside() <= 0) exact_ = search.near_round_off();
+  sticking_.find(search, newton_.matrix(), equations_.flat());
+  if (sticking_.found() && sticking_.outside() <= 0) equations_.set_exact(search.near_round_off());
 }
 
 // The point where everything sticks, shifted into the cone; false if it is the solution or cannot
@@ -79,25 +44,24 @@ bool InteriorPoint::start(Search& search) {
     u[0] = u[3] = speed;
     u[1] = u[2] = 0;
   }
-  residual(system);
+  equations_.evaluate(system, point_);
   return true;
 }
 
 // x and the u that belongs to its velocity, both kept off the cone as far as x.u = nu asks for,
 // nu = near * (mean size of x) * (mean size of u).
-bool InteriorPoint::start_near(Search& search, const PackedVector* start, double near) {
+bool InteriorPoint::place_near(Search& search, const PackedVector* start, double near) {
   System& system = search.system;
   const Problem& p = system.problem();
   order(search);
-  system.velocities(start, w_.data());
+  system.velocities(start, swept_.data());
   double x_size = 0, u_size = 0;
   for (int i = 0; i < n_; ++i) {
     const double mu = p.local(i).mu;
-    const double* w = w_[at(i)].v;
+    const double* w = swept_[at(i)].v;
     double* x = point_.x[at(i)].v;
     double* u = point_.u[at(i)].v;
-    flat_[at(i)] = !(system.friction(i) > 0);
-    if (flat_[at(i)]) {
+    if (equations_.flat(i)) {
       x[0] = std::max(start[i].v[0], 0.0);
       u[0] = std::max(w[0], 0.0);
       x[1] = x[2] = u[1] = u[2] = 0;
@@ -128,16 +92,20 @@ bool InteriorPoint::start_near(Search& search, const PackedVector* start, double
     x[0] = x[3] + tangent(x);
     u[0] = u[3] + tangent(u);
   }
-  residual(system);
+  return true;
+}
+
+bool InteriorPoint::start_near(Search& search, const PackedVector* start, double near) {
+  if (!place_near(search, start, near)) return false;
+  equations_.evaluate(search.system, point_);
   return true;
 }
 
 // Near the anchor, in the proximal problem around it.
 bool InteriorPoint::start_proximal(Search& search, double tau, double near) {
-  tau_ = 0;
-  if (!start_near(search, anchor_.data(), near)) return false;
-  tau_ = tau;
-  residual(search.system);
+  if (!place_near(search, equations_.anchor().data(), near)) return false;
+  equations_.set_tau(tau);
+  equations_.evaluate(search.system, point_);
   return true;
 }
 

@@ -1,0 +1,96 @@
+// Tether: the equations that interior points solve. SPDX-License-Identifier: BSD-3-Clause
+#include "assembled/stages/interior/equations.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tether/linalg/cone_scaling.hpp>
+
+namespace tether::contact::detail {
+
+void InteriorEquations::reset(int contacts) {
+  n_ = contacts;
+  for (Packed* p : {&anchor_, &r_, &z_, &w_}) p->resize(at(n_));
+  flat_.resize(at(n_));
+  tau_ = 0;
+  exact_ = false;
+}
+
+void InteriorEquations::find_flat(const System& system) {
+  for (int i = 0; i < n_; ++i) flat_[at(i)] = !(system.friction(i) > 0);
+}
+
+// w_: velocities at z_, of the proximal problem if there is one
+void InteriorEquations::velocities(const System& system) {
+  if (exact_)
+    system.exact_velocities(z_.data(), w_.data());
+  else
+    system.velocities(z_.data(), w_.data());
+  if (!(tau_ > 0)) return;
+  for (int i = 0; i < n_; ++i) {
+    const double* z = z_[at(i)].v;
+    const double* a = anchor_[at(i)].v;
+    const double d[3] = {z[0] - a[0], z[1] - a[1], z[2] - a[2]};
+    add_block(system.problem().local(i), tau_, d, w_[at(i)].v);
+  }
+}
+
+// r = P^-1 (A x - b) - (u - s (1, gamma)), P = diag(mu, 1, 1)
+void InteriorEquations::evaluate(const System& system, const ConePair& point) {
+  const Problem& p = system.problem();
+  for (int i = 0; i < n_; ++i) {
+    const double* x = point.x[at(i)].v;
+    z_[at(i)] = {{flat_[at(i)] ? x[0] : x[0] / p.local(i).mu, x[1], x[2], 0}};
+  }
+  velocities(system);
+  for (int i = 0; i < n_; ++i) {
+    const double* u = point.u[at(i)].v;
+    const double* w = w_[at(i)].v;
+    double* r = r_[at(i)].v;
+    if (flat_[at(i)]) {
+      r[0] = w[0] - u[0];
+      r[1] = r[2] = 0;
+      continue;
+    }
+    double gamma[2];
+    system.gamma(i, gamma);
+    const double s = slip_of(u);
+    r[0] = w[0] / p.local(i).mu - (u[0] - s);
+    r[1] = w[1] - (u[1] - s * gamma[0]);
+    r[2] = w[2] - (u[2] - s * gamma[1]);
+  }
+}
+
+double InteriorEquations::natural_map(const System& system) const {
+  double sum = 0;
+  for (int i = 0; i < n_; ++i) {
+    const double* z = z_[at(i)].v;
+    const double* w = w_[at(i)].v;
+    double v[3] = {std::max(z[0] - w[0], 0.0), 0, 0};
+    if (!flat_[at(i)]) {
+      double gamma[2];
+      system.gamma(i, gamma);
+      const double mu = system.problem().local(i).mu, s = slip(w[1], w[2], gamma[0], gamma[1]);
+      v[0] = z[0] - w[0] - mu * s;
+      for (int c = 1; c < 3; ++c) v[c] = z[c] - w[c] - s * gamma[c - 1];
+      project_cone(mu, v);
+    }
+    for (int c = 0; c < 3; ++c) sum += (z[c] - v[c]) * (z[c] - v[c]);
+  }
+  return std::sqrt(sum);
+}
+
+double InteriorEquations::natural_map(const System& system, const PackedVector* impulses) {
+  std::copy(impulses, impulses + n_, z_.begin());
+  velocities(system);
+  return natural_map(system);
+}
+
+double InteriorEquations::complementarity(const ConePair& point) const {
+  double sum = 0;
+  for (int i = 0; i < n_; ++i)
+    sum += flat_[at(i)] ? point.x[at(i)].v[0] * point.u[at(i)].v[0]
+                        : product(point.x[at(i)].v, point.u[at(i)].v);
+  return sum / n_;
+}
+
+}  // namespace tether::contact::detail

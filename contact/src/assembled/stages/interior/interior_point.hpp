@@ -1,0 +1,59 @@
+// Tether: interior points for the exact cones. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "assembled/stages/interior/newton_step.hpp"
+#include "assembled/stages/interior/sticking_point.hpp"
+#include "assembled/stages/proximal_newton.hpp"
+
+namespace tether::contact::detail {
+
+// Follows x o u = nu e, nu -> 0, for x in K and u = w + s (mu, gamma) in K*, w = A x - b. With
+// s = s(u) the velocity w is an explicit function of u, so that one Newton matrix holds the law as
+// well; it is regular for every rank of A (README, section 9).
+class InteriorPoint {
+ public:
+  void reset(int contacts);
+  // Tests the point where everything sticks, which run() starts from: one factorisation.
+  void stick(Search& search);
+  // From the point where everything sticks; at most `most` steps. The result is search.best.
+  void run(Search& search, int most);
+  // From near x.
+  void run_near(Search& search, const PackedVector* x, int most);
+  // Proximal point iteration from x, at most `most` problems A + tau D, b + tau D x, which a small
+  // tau D makes solvable where the path of the problem itself ends. Each is solved by a few steps
+  // of `newton` from the point to which the last step leads or, where that fails, along its own
+  // path.
+  void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton);
+  // Orders the matrix, so that cost() knows its fill.
+  void order(Search& search);
+  // Estimated ns of one step; by a guess of the fill before order().
+  double cost(const Search& search) const { return newton_.matrix().cost(search); }
+  // Estimated ns of order().
+  double order_cost(const Search& search) const { return newton_.matrix().order_cost(search); }
+  // A guess of cost() that no order is needed for, from the width of the graph.
+  double cost_by_width(const Search& search) const {
+    return newton_.matrix().cost_by_width(search);
+  }
+  // True, and ordered, where bodies have so many contacts that equations of bodies take the place
+  // of those of contacts.
+  bool order_bodies(Search& search);
+
+ private:
+  bool start(Search& search);
+  bool start_near(Search& search, const PackedVector* start, double near);
+  bool start_proximal(Search& search, double tau, double near);
+  // Puts point_ near an answer; false: there is nothing to scale it by.
+  bool place_near(Search& search, const PackedVector* start, double near);
+  // Steps until nothing is gained or, for a proximal problem, until its natural map is <= target;
+  // returns that map.
+  double follow(Search& search, int most, double target);
+
+  int n_ = 0;
+  InteriorEquations equations_;
+  InteriorNewton newton_;
+  StickingPoint sticking_;
+  ConePair point_;
+  Packed swept_;
+};
+
+}  // namespace tether::contact::detail
