@@ -29,10 +29,10 @@ void GramFactor::analyse(int n, const std::vector<int>& starts, const std::vecto
   place_.resize(at(m_));
   for (int k = 0; k < m_; ++k) place_[at(row_at_[at(k)])] = k;
   list_columns(starts, columns);
-  find_fill(gram, row_at_, place_, column_starts_, column_rows_);
-  transpose(m_, column_starts_, column_rows_, row_starts_, row_columns_);
-  filled_.assign(at(m_), 0);
-  L_.assign(column_rows_.size(), 0.0);
+  find_fill(gram, row_at_, place_, L_.column_starts, L_.column_rows);
+  transpose(m_, L_.column_starts, L_.column_rows, L_.row_starts, L_.row_columns);
+  L_.filled.assign(at(m_), 0);
+  L_.value.assign(L_.column_rows.size(), 0.0);
   find_supernodes();
   work_.assign(at(m_), 0.0);  // zero between calls of factor()
   solution_.assign(at(m_), 0.0);
@@ -74,39 +74,41 @@ void GramFactor::find_gram(const std::vector<int>& starts, const std::vector<int
 }
 
 void GramFactor::list_columns(const std::vector<int>& starts, const std::vector<int>& columns) {
-  entry_starts_.assign(1, 0);
-  entry_.clear();
-  entry_column_.clear();
+  PA_.starts.assign(1, 0);
+  PA_.entry.clear();
+  PA_.column.clear();
   for (const int i : row_at_) {
     for (int e = starts[at(i)]; e < starts[at(i) + 1]; ++e) {
-      entry_.push_back(e);
-      entry_column_.push_back(columns[at(e)]);
+      PA_.entry.push_back(e);
+      PA_.column.push_back(columns[at(e)]);
     }
-    entry_starts_.push_back(static_cast<int>(entry_.size()));
+    PA_.starts.push_back(static_cast<int>(PA_.entry.size()));
   }
-  transpose(n_, entry_starts_, entry_column_, member_starts_, member_);
-  met_.assign(at(n_), 0);
-  member_value_.assign(entry_.size(), 0.0);
+  transpose(n_, PA_.starts, PA_.column, PA_.member_starts, PA_.member);
+  PA_.met.assign(at(n_), 0);
+  PA_.value.assign(PA_.entry.size(), 0.0);
 }
 
 // Column j + 1 has the rows of column j without its own.
 void GramFactor::find_supernodes() {
-  alike_.assign(at(m_), 1);
-  const auto length = [this](int j) { return column_starts_[at(j) + 1] - column_starts_[at(j)]; };
+  L_.alike.assign(at(m_), 1);
+  const auto length = [this](int j) {
+    return L_.column_starts[at(j) + 1] - L_.column_starts[at(j)];
+  };
   for (int j = m_ - 2; j >= 0; --j)
-    if (length(j) == length(j + 1) + 1 && column_rows_[at(column_starts_[at(j)])] == j + 1)
-      alike_[at(j)] = alike_[at(j + 1)] + 1;
+    if (length(j) == length(j + 1) + 1 && L_.column_rows[at(L_.column_starts[at(j)])] == j + 1)
+      L_.alike[at(j)] = L_.alike[at(j + 1)] + 1;
 }
 
 // Row k of A times the rows before it, into work_.
 void GramFactor::scatter_products(int k, const double* A) {
   double* __restrict y = work_.data();
-  double* __restrict value = member_value_.data();
-  const int *member = member_.data(), *starts = member_starts_.data();
-  for (int p = entry_starts_[at(k)]; p < entry_starts_[at(k) + 1]; ++p) {
-    const int j = entry_column_[at(p)];
-    const double a = A[entry_[at(p)]];
-    const int here = starts[j] + met_[at(j)]++;
+  double* __restrict value = PA_.value.data();
+  const int *member = PA_.member.data(), *starts = PA_.member_starts.data();
+  for (int p = PA_.starts[at(k)]; p < PA_.starts[at(k) + 1]; ++p) {
+    const int j = PA_.column[at(p)];
+    const double a = A[PA_.entry[at(p)]];
+    const int here = starts[j] + PA_.met[at(j)]++;
     for (int q = starts[j]; q < here; ++q) y[member[q]] += a * value[q];
     value[here] = a;
   }
@@ -115,12 +117,12 @@ void GramFactor::scatter_products(int k, const double* A) {
 // Row k of L from row k of A A^T in work_, which becomes zero again; returns d_k.
 double GramFactor::eliminate(int k, double d) {
   double* __restrict y = work_.data();
-  double* __restrict L = L_.data();
+  double* __restrict L = L_.value.data();
   const double* __restrict inverse_d = inverse_d_.data();
-  int* __restrict filled = filled_.data();
-  const int *rows = column_rows_.data(), *starts = column_starts_.data();
-  const int* column = row_columns_.data() + row_starts_[at(k)];
-  const int* end = row_columns_.data() + row_starts_[at(k) + 1];
+  int* __restrict filled = L_.filled.data();
+  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data();
+  const int* column = L_.row_columns.data() + L_.row_starts[at(k)];
+  const int* end = L_.row_columns.data() + L_.row_starts[at(k) + 1];
   const auto finish = [&](int j, double yj) {
     const double entry = yj * inverse_d[j];
     d -= entry * yj;
@@ -129,7 +131,7 @@ double GramFactor::eliminate(int k, double d) {
   };
   while (column < end) {
     const int j = *column;
-    if (alike_[at(j)] >= kTogether && end - column >= kTogether) {
+    if (L_.alike[at(j)] >= kTogether && end - column >= kTogether) {
       const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
                    *L3 = L + starts[j + 3];
       const double y0 = y[j];
@@ -159,18 +161,18 @@ double GramFactor::eliminate(int k, double d) {
 // |c|^2, c the coefficients of row k over the rows before it: L_before^T c = row k of L.
 double GramFactor::coefficients_square(int k) {
   double* __restrict x = work_.data();
-  const double* __restrict L = L_.data();
-  const int *rows = column_rows_.data(), *starts = column_starts_.data();
-  const int* first = row_columns_.data() + row_starts_[at(k)];
-  const int* column = row_columns_.data() + row_starts_[at(k) + 1];
+  const double* __restrict L = L_.value.data();
+  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data();
+  const int* first = L_.row_columns.data() + L_.row_starts[at(k)];
+  const int* column = L_.row_columns.data() + L_.row_starts[at(k) + 1];
   double square = 0.0;
   while (column > first) {
     const int j = column[-1] - (kTogether - 1);  // of four columns, if they are alike
-    if (column - first >= kTogether && column[-kTogether] == j && alike_[at(j)] >= kTogether) {
+    if (column - first >= kTogether && column[-kTogether] == j && L_.alike[at(j)] >= kTogether) {
       const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
                    *L3 = L + starts[j + 3];
       const int* row = rows + starts[j + 3];
-      const int count = filled_[at(j + 3)] - 1;  // the last entry is that of row k
+      const int count = L_.filled[at(j + 3)] - 1;  // the last entry is that of row k
       double x0 = L0[count + 3], x1 = L1[count + 2], x2 = L2[count + 1], x3 = L3[count];
       for (int q = 0; q < count; ++q) {
         const double xq = x[row[q]];
@@ -189,21 +191,21 @@ double GramFactor::coefficients_square(int k) {
       square += x0 * x0 + x1 * x1 + x2 * x2 + x3 * x3;
       column -= kTogether;
     } else {
-      const int last = starts[column[-1]] + filled_[at(column[-1])] - 1;
+      const int last = starts[column[-1]] + L_.filled[at(column[-1])] - 1;
       double xj = L[last];
       for (int q = starts[column[-1]]; q < last; ++q) xj -= L[q] * x[rows[q]];
       x[*--column] = xj;
       square += xj * xj;
     }
   }
-  for (const int* end = row_columns_.data() + row_starts_[at(k) + 1]; column < end; ++column)
+  for (const int* end = L_.row_columns.data() + L_.row_starts[at(k) + 1]; column < end; ++column)
     x[*column] = 0.0;
   return square;
 }
 
 int GramFactor::factor(const double* A, const double* norm, double eps) {
-  std::fill(filled_.begin(), filled_.end(), 0);
-  std::fill(met_.begin(), met_.end(), 0);
+  std::fill(L_.filled.begin(), L_.filled.end(), 0);
+  std::fill(PA_.met.begin(), PA_.met.end(), 0);
   int count = 0;
   for (int k = 0; k < m_; ++k) {
     scatter_products(k, A);
@@ -221,8 +223,8 @@ int GramFactor::factor(const double* A, const double* norm, double eps) {
 
 void GramFactor::forward_in_place() {
   double* __restrict x = solution_.data();
-  const double* __restrict L = L_.data();
-  const int *rows = column_rows_.data(), *starts = column_starts_.data();
+  const double* __restrict L = L_.value.data();
+  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data();
   for (int j = 0; j < m_; ++j) {
     const double xj = x[j];
     for (int q = starts[j]; q < starts[j + 1]; ++q) x[rows[q]] -= L[q] * xj;
@@ -237,9 +239,10 @@ void GramFactor::forward(double* z) {
 
 void GramFactor::solve(double* z) {
   double* __restrict x = solution_.data();
-  const double* __restrict L = L_.data();
+  const double* __restrict L = L_.value.data();
   const double* __restrict inverse_d = inverse_d_.data();
-  const int *rows = column_rows_.data(), *starts = column_starts_.data(), *place = place_.data();
+  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data(),
+            *place = place_.data();
   for (int i = 0; i < m_; ++i) x[place[i]] = z[i];
   forward_in_place();
   for (int j = m_ - 1; j >= 0; --j) {
@@ -257,14 +260,14 @@ void GramFactor::depend(double* z, int last) const {
   std::vector<double> x(at(m_), 0.0);
   for (int k = 0; k < count; ++k) x[at(k)] = z[row_at_[at(k)]];
   for (int j = 0; j < count; ++j)
-    for (int q = column_starts_[at(j)];
-         q < column_starts_[at(j) + 1] && column_rows_[at(q)] < count; ++q)
-      x[at(column_rows_[at(q)])] -= L_[at(q)] * x[at(j)];
+    for (int q = L_.column_starts[at(j)];
+         q < L_.column_starts[at(j) + 1] && L_.column_rows[at(q)] < count; ++q)
+      x[at(L_.column_rows[at(q)])] -= L_.value[at(q)] * x[at(j)];
   for (int j = count - 1; j >= 0; --j) {
     double xj = x[at(j)] * inverse_d_[at(j)];
-    for (int q = column_starts_[at(j)];
-         q < column_starts_[at(j) + 1] && column_rows_[at(q)] < count; ++q)
-      xj -= L_[at(q)] * x[at(column_rows_[at(q)])];
+    for (int q = L_.column_starts[at(j)];
+         q < L_.column_starts[at(j) + 1] && L_.column_rows[at(q)] < count; ++q)
+      xj -= L_.value[at(q)] * x[at(L_.column_rows[at(q)])];
     x[at(j)] = dependent_[at(j)] ? 0.0 : xj;
   }
   for (int i = 0; i < m_; ++i) z[i] = x[at(place_of(i))];

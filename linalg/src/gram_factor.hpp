@@ -31,7 +31,7 @@ class GramFactor {
 
   bool dependent(int i) const { return dependent_[static_cast<std::size_t>(place_of(i))] != 0; }
   int rows() const { return m_; }
-  long entries_of_factor() const { return static_cast<long>(L_.size()); }
+  long entries_of_factor() const { return static_cast<long>(L_.value.size()); }
 
  private:
   int place_of(int i) const { return place_[static_cast<std::size_t>(i)]; }
@@ -44,17 +44,25 @@ class GramFactor {
   void scatter_products(int k, const double* A);
   void forward_in_place();
 
-  int m_ = 0, n_ = 0;
-  std::vector<int> place_, row_at_;  // row i of A is row place_[i] of P A, and back
   // P A by rows (where each entry is in A, and its column) and by columns (rows of P A, ascending,
   // and the values of those that factor() has met).
-  std::vector<int> entry_starts_, entry_, entry_column_;
-  std::vector<int> member_starts_, member_, met_;
-  std::vector<double> member_value_;
+  struct PermutedRows {
+    std::vector<int> starts, entry, column;
+    std::vector<int> member_starts, member, met;
+    std::vector<double> value;
+  };
   // L by rows (which columns, ascending) and by columns (which rows, ascending, and the values).
-  std::vector<int> row_starts_, row_columns_, column_starts_, column_rows_, filled_;
-  std::vector<int> alike_;  // columns from j on that have the rows of column j below them
-  std::vector<double> L_, inverse_d_, work_, solution_;
+  struct Triangle {
+    std::vector<int> row_starts, row_columns, column_starts, column_rows, filled;
+    std::vector<int> alike;  // columns from j on that have the rows of column j below them
+    std::vector<double> value;
+  };
+
+  int m_ = 0, n_ = 0;
+  std::vector<int> place_, row_at_;  // row i of A is row place_[i] of P A, and back
+  PermutedRows PA_;
+  Triangle L_;
+  std::vector<double> inverse_d_, work_, solution_;
   std::vector<char> dependent_;
 };
 

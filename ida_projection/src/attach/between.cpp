@@ -12,12 +12,12 @@ bool Projection::Impl::needs_projection(const Candidate& candidate, const StepDa
       frequency_.need(attempts_.steps, attempts_.repeated, std::abs(ida_.step_size()));
   if (need == FrequencyPolicy::Need::projection) return true;
   if (need == FrequencyPolicy::Need::nothing) {
-    if (engaged_ && !leave_alone(candidate, step, tolerance)) return true;
+    if (run_.engaged && !leave_alone(candidate, step, tolerance)) return true;
     frequency_.left_alone();
     ++statistics_.left_alone;
     return false;
   }
-  return !(engaged_ && mover_->may_follow() && follow(candidate, step, tolerance));
+  return !(run_.engaged && movers_.used->may_follow() && follow(candidate, step, tolerance));
 }
 
 // Only the iteration that removes noise. False: old factors misled the corrector, which a projected
@@ -36,11 +36,11 @@ bool Projection::Impl::leave_alone(const Candidate& candidate, const StepData& s
 // iteration, or with one before the move, stiff components do not answer to the move and oscillate.
 bool Projection::Impl::follow(const Candidate& candidate, const StepData& step, double tolerance) {
   polish_.keep(candidate);
-  const Move move = mover_->follow(candidate, false);
+  const Move move = movers_.used->follow(candidate, false);
   bool done = move.status == Status::success;
   if (done && wants_polish(move.length) && polish_.add_newton_step(candidate, step.cj, tolerance))
-    done =
-        polish_.corrector_was_right() && mover_->follow(candidate, true).status == Status::success;
+    done = polish_.corrector_was_right() &&
+           movers_.used->follow(candidate, true).status == Status::success;
   if (!done) {
     polish_.restore(candidate);
     return false;

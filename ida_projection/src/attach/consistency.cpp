@@ -42,14 +42,14 @@ struct Projection::Impl::JointStart {
 
 // Such rows are solved together with the equations of F, while IDA's residual callback is at hand.
 void Projection::Impl::project_jointly(const Candidate& candidate) {
-  if (joint_start_ == nullptr) return;
-  joined_.join(candidate, ida_.step().cj);
-  if (joined_.mover() != nullptr) {
-    PointProjection point(joined_.constraints(), options_);
-    point.project(joint_start_->t, joint_start_->y, joint_start_->hold, joined_.moved_id(),
-                  weights_, joint_start_->report);
+  if (inquiry_.joint_start == nullptr) return;
+  movers_.joined.join(candidate, ida_.step().cj);
+  if (movers_.joined.mover() != nullptr) {
+    PointProjection point(movers_.joined.constraints(), options_);
+    point.project(inquiry_.joint_start->t, inquiry_.joint_start->y, inquiry_.joint_start->hold,
+                  movers_.joined.moved_id(), unknowns_.weights, inquiry_.joint_start->report);
   }
-  joined_.forget();
+  movers_.joined.forget();
 }
 
 // One step of IDA that goes nowhere: the decorated solver answers "no correction" and, on the way,
@@ -58,11 +58,11 @@ bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
   OwnedVector y(yy), ydot(yp);
   N_VScale(1.0, yy, y);
   N_VScale(1.0, yp, ydot);
-  probe_ = Probe::asked;
+  inquiry_.probe = Probe::asked;
   sunrealtype reached = t0;
   const double tiny = 1e-8 * std::max(1.0, std::abs(t0));
   IDASolve(ida_.mem(), t0 + tiny, &reached, y, ydot, IDA_ONE_STEP);
-  return std::exchange(probe_, Probe::none) == Probe::answered;
+  return std::exchange(inquiry_.probe, Probe::none) == Probe::answered;
 }
 
 // y' and the algebraic variables consistent with F; the reason of a failure, or nothing.
@@ -82,10 +82,11 @@ std::string Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector yd
       found = flag == 0 && IDAGetConsistentIC(ida_.mem(), y, ydot) == 0;
     }
   }
-  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr && contiguous_) {
+  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr &&
+      unknowns_.contiguous) {
     const Status solved =
         consistent_derivative(how.residual, how.user_data, t0, y, ydot, variables_.vector(),
-                              weights_, how.maximum_iterations);
+                              unknowns_.weights, how.maximum_iterations);
     if (solved == Status::callback_fatal) return kResidualEnded;
     found = solved == Status::success;
   }
@@ -100,14 +101,14 @@ std::string Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector yd
 bool Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
                                      ConsistencyReport* report) {
   JointStart joint{t0, y, how.hold, {}};
-  joint_start_ = &joint;
+  inquiry_.joint_start = &joint;
   const bool answered = IDAReInit(ida_.mem(), t0, y, ydot) == 0 && probe(t0, y, ydot);
-  joint_start_ = nullptr;
+  inquiry_.joint_start = nullptr;
   if (!answered) return false;
   if (joint.report.status == Status::success)
     *report = joint.report;
   else if (!corrector_.stopped())
-    point_.project(t0, y, how.hold, variables_.id(), weights_, *report);
+    point_.project(t0, y, how.hold, variables_.id(), unknowns_.weights, *report);
   return true;
 }
 
@@ -127,7 +128,7 @@ bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const 
     N_VScale(1.0, y, before);
     ConsistencyReport again;
     if (!project_start(t0, y, ydot, how, &again)) {
-      if (broken_) return fail(report_.status, std::string(report_.message));
+      if (run_.broken) return fail(report_.status, std::string(report_.message));
       return fail(Status::internal_error,
                   "IDA could not be started at the given values; set tolerances and the linear "
                   "solver before make_consistent, and look at IDA's own message");
@@ -140,7 +141,7 @@ bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const 
       report->drift_after = again.drift_after;
     if (again.status != Status::success) return fail(again.status, again.message);
     N_VLinearSum(1.0, y, -1.0, before, before);
-    if (round > 0 && N_VWrmsNorm(before, weights_) <= kSettled) return true;
+    if (round > 0 && N_VWrmsNorm(before, unknowns_.weights) <= kSettled) return true;
     Status failure = Status::success;
     const std::string reason = find_derivative(t0, y, ydot, how, &failure);
     if (!reason.empty()) return fail(failure, reason);
@@ -161,10 +162,10 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
     return report;
   };
   if (yy == nullptr || yp == nullptr) reject("make_consistent: yy and yp must not be null");
-  if (!how.hold.empty() && static_cast<int>(how.hold.size()) != size_)
+  if (!how.hold.empty() && static_cast<int>(how.hold.size()) != unknowns_.count)
     reject("make_consistent: hold has " + std::to_string(how.hold.size()) + " entries for " +
-           std::to_string(size_) + " unknowns");
-  if (!mover_) return report.status = report_.status = Status::success, report;
+           std::to_string(unknowns_.count) + " unknowns");
+  if (!movers_.used) return report.status = report_.status = Status::success, report;
 
   int flag = 0;
   corrector_.forget_stop();
@@ -179,12 +180,12 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
 
   OwnedVector change(yy);
   N_VLinearSum(1.0, y, -1.0, yy, change);
-  report.move = N_VWrmsNorm(change, weights_);
-  if (contiguous_) {
-    report.largest_change = largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy), size_,
-                                               &report.changed_component);
-    report.derivative_change =
-        largest_difference(N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp), size_, nullptr);
+  report.move = N_VWrmsNorm(change, unknowns_.weights);
+  if (unknowns_.contiguous) {
+    report.largest_change = largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy),
+                                               unknowns_.count, &report.changed_component);
+    report.derivative_change = largest_difference(N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp),
+                                                  unknowns_.count, nullptr);
   } else if (static_cast<N_Vector>(change)->ops->nvmaxnorm != nullptr) {
     report.largest_change = N_VMaxNorm(change);
     N_VLinearSum(1.0, ydot, -1.0, yp, change);
@@ -204,30 +205,30 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
 ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) {
   if (yy == nullptr) reject("project: yy must not be null");
   ConsistencyReport report;
-  if (!mover_) {
+  if (!movers_.used) {
     report.status = report_.status = Status::success;
     return report;
   }
   current_weights(yy);
   OwnedVector y(yy);
   N_VScale(1.0, yy, y);
-  point_.project(t, y, {}, variables_.id(), weights_, report);
+  point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);
   if (report.status == Status::success && yp != nullptr) {
     OwnedVector ydot(yp);
     N_VScale(1.0, yp, ydot);
     if (point_.tangent(t, y, ydot, report)) {
-      report.derivative_change =
-          largest_difference(N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp), size_, nullptr);
+      report.derivative_change = largest_difference(
+          N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp), unknowns_.count, nullptr);
       N_VScale(1.0, ydot, yp);
     }
   }
   if (report.status == Status::success) {
     OwnedVector change(yy);
     N_VLinearSum(1.0, y, -1.0, yy, change);
-    report.move = N_VWrmsNorm(change, weights_);
-    if (contiguous_)
+    report.move = N_VWrmsNorm(change, unknowns_.weights);
+    if (unknowns_.contiguous)
       report.largest_change = largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy),
-                                                 size_, &report.changed_component);
+                                                 unknowns_.count, &report.changed_component);
     N_VScale(1.0, y, yy);
   }
   report_.status = report.status;
@@ -237,22 +238,22 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
 
 // IDA's present error weights once it has some; before that, weights of relative size.
 void Projection::Impl::current_weights(N_Vector y) {
-  if (initialized_ && IDAGetErrWeights(ida_.mem(), weights_) == 0) {
-    N_VScale(1.0 / control_.weights_factor(), weights_, weights_);
+  if (run_.initialized && IDAGetErrWeights(ida_.mem(), unknowns_.weights) == 0) {
+    N_VScale(1.0 / control_.weights_factor(), unknowns_.weights, unknowns_.weights);
     return;
   }
-  N_VAbs(y, weights_);
-  N_VAddConst(weights_, 1.0, weights_);
-  N_VInv(weights_, weights_);
-  N_VScale(1e6, weights_, weights_);
+  N_VAbs(y, unknowns_.weights);
+  N_VAddConst(unknowns_.weights, 1.0, unknowns_.weights);
+  N_VInv(unknowns_.weights, unknowns_.weights);
+  N_VScale(1e6, unknowns_.weights, unknowns_.weights);
 }
 
 int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret,
                                         int itask) {
   const int flag = IDASolve(ida_.mem(), tout, tret, yret, ypret, itask);
-  if (flag < 0 || !mover_) return flag;
+  if (flag < 0 || !movers_.used) return flag;
   look_for_bypass();
-  if (bypass_.steps() > 0) return flag;
+  if (watch_.bypass.steps() > 0) return flag;
   // A step that IDA returns as it is has been projected; what it interpolates has not.
   const Status of_step = report_.status;
   const std::string text = report_.message;

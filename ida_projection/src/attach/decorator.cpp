@@ -24,29 +24,29 @@ constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not wo
 
 // Called by IDA once tolerances, linear solver and sensitivities are known.
 int Projection::Impl::initialize() {
-  initialized_ = broken_ = false;
+  run_.initialized = run_.broken = false;
   // IDASetMaxNonlinIters reaches the state's solver unless IDAS solves states and sensitivities
   // together; there is no getter for that. Ask, and see whether the question arrives here.
   // Without constraints nothing would be lost.
-  if (mover_ != nullptr && !corrector_.is_reached_by(ida_)) {
+  if (movers_.used != nullptr && !corrector_.is_reached_by(ida_)) {
     finish(Status::simultaneous_sensitivities,
            "IDAS with IDA_SIMULTANEOUS does not use the state's nonlinear solver, so nothing would "
            "be projected; use IDA_STAGGERED in IDASensInit");
     return kFatal;
   }
-  initialized_ = true;
-  engaged_ = false;
-  linear_solver_ = LinearSolverKind();
+  run_.initialized = true;
+  run_.engaged = false;
+  run_.linear_solver = LinearSolverKind();
   options_.metric = wanted_metric_;
   attempts_ = Attempts();
   attempts_.left_before = std::numeric_limits<double>::infinity();
   report_.reset();
-  rejections_.reset();
-  first_steps_.reset();
+  watch_.rejections.reset();
+  watch_.first_steps.reset();
   variables_.forget_index();
-  joined_.forget();
-  mover_ = own_mover_.get();
-  if (mover_ != nullptr) mover_->reset();
+  movers_.joined.forget();
+  movers_.used = movers_.own.get();
+  if (movers_.used != nullptr) movers_.used->reset();
   control_.reset();
   frequency_.reset();
   return corrector_.initialize();
@@ -62,7 +62,7 @@ class Projection::Impl::Stopwatch {
   }
   ~Stopwatch() {
     if (!running_) return;
-    owner_.timed_.add(std::chrono::duration<double>(Clock::now() - begin_).count());
+    owner_.tally_.timed.add(std::chrono::duration<double>(Clock::now() - begin_).count());
   }
   bool running() const { return running_; }
   Stopwatch(const Stopwatch&) = delete;
@@ -79,76 +79,76 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
                             bool call_setup, void* mem) {
   ++statistics_.solver_calls;
   polish_.begin();
-  if (!initialized_)
+  if (!run_.initialized)
     return finish(
         Status::late_attach,
         "the Projection was made after IDA had been initialised, so IDA never handed its linear "
         "solver over; make it before IDACalcIC and the first IDASolve, or call IDAReInit");
 
-  if (broken_) return kFatal;  // status and message are those of the exception
+  if (run_.broken) return kFatal;  // status and message are those of the exception
 
   Candidate candidate{0.0, y_predicted, ycor, weights};
-  if (contiguous_) candidate.with_entries();
-  joined_.begin(candidate);
+  if (unknowns_.contiguous) candidate.with_entries();
+  movers_.joined.begin(candidate);
   corrector_.begin(mem);
-  if (mover_ != nullptr) mover_->forget_failure();
+  if (movers_.used != nullptr) movers_.used->forget_failure();
   control_.restore_weights(weights, attempts_.steps);
   int flag = attempt(candidate, tolerance, call_setup);
   // Evaluations that only look around may fail, but what asks for the end of the run ends it.
-  const bool ended = corrector_.stopped() || (mover_ != nullptr && mover_->fatal());
-  if (flag >= 0 && ended) flag = finish(Status::callback_fatal, mover_->message());
+  const bool ended = corrector_.stopped() || (movers_.used != nullptr && movers_.used->fatal());
+  if (flag >= 0 && ended) flag = finish(Status::callback_fatal, movers_.used->message());
   return corrector_.stopped() ? corrector_.stop_flag() : flag;
 }
 
 int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_setup) {
-  if (probe_ != Probe::none) {  // make_consistent wants to look around, not to step
-    N_VScale(1.0, candidate.weights, weights_);
+  if (inquiry_.probe != Probe::none) {  // make_consistent wants to look around, not to step
+    N_VScale(1.0, candidate.weights, unknowns_.weights);
     if (!variables_.known()) derive_id(candidate);
     candidate.t = ida_.step().t;
     project_jointly(candidate);
-    probe_ = Probe::answered;
+    inquiry_.probe = Probe::answered;
     return 0;
   }
   const int flag = correct_and_move(candidate, tolerance, call_setup);
   if (flag != 0) return flag;
-  const bool suppressed = engaged_ && options_.suppress_algebraic;
-  control_.control(candidate, engaged_, suppressed ? variables_.id() : nullptr);
+  const bool suppressed = run_.engaged && options_.suppress_algebraic;
+  control_.control(candidate, run_.engaged, suppressed ? variables_.id() : nullptr);
   return 0;
 }
 
 int Projection::Impl::caught(Status outcome, const char* text) noexcept {
-  broken_ = true;
-  probe_ = Probe::none;
+  run_.broken = true;
+  inquiry_.probe = Probe::none;
   return report_.caught(outcome, text);
 }
 
 int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup) {
   static const std::vector<int> none;
-  const bool may_leave_out = engaged_ && options_.suppress_algebraic;
+  const bool may_leave_out = run_.engaged && options_.suppress_algebraic;
   return corrector_.correct(candidate, tolerance, call_setup,
                             may_leave_out ? variables_.undetermined() : none);
 }
 
 int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup) {
-  if (mover_ != nullptr && !engaged_ && !variables_.index_known() &&
+  if (movers_.used != nullptr && !run_.engaged && !variables_.index_known() &&
       control_.in_trouble(attempts_.steps)) {
     const Status engaged = engage_if_index_is_high(candidate);
-    if (engaged != Status::success) return finish(engaged, mover_->message());
+    if (engaged != Status::success) return finish(engaged, movers_.used->message());
   }
   int flag = correct(candidate, tolerance, call_setup);
-  if (mover_ == nullptr) return flag;
+  if (movers_.used == nullptr) return flag;
   if (flag != 0) return corrector_failed(flag);
-  if (!linear_solver_.known()) look_at_linear_solver();
+  if (!run_.linear_solver.known()) look_at_linear_solver();
 
   const StepData step = ida_.step();
   account_for_previous_attempt(step);
   candidate.t = step.t;
   const Candidate& at = candidate;
-  if (rejections_.collapsed() && report_.warning() != Status::collapsed)
-    report_.warn(Status::collapsed, rejections_.cause(at, step, variables_, corrector_));
+  if (watch_.rejections.collapsed() && report_.warning() != Status::collapsed)
+    report_.warn(Status::collapsed, watch_.rejections.cause(at, step, variables_, corrector_));
   if (frequency_.on() && !needs_projection(at, step, tolerance)) return finish(Status::success, "");
   const Stopwatch stopwatch(*this);
-  if (!engaged_) {
+  if (!run_.engaged) {
     bool done = false;
     const int outcome = look_before_moving(at, done);
     if (done) return outcome;
@@ -165,18 +165,19 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     polish_.note_setup(step.cj);
     move = move_and_polish(at, step.cj, tolerance);
   }
-  if (stopwatch.running()) move.drift_after = mover_->remaining_drift(at);
+  if (stopwatch.running()) move.drift_after = movers_.used->remaining_drift(at);
   account(move, step, stopwatch.running());
   if (move.status == Status::success) look_for_doubts(at, step);
-  return finish(move.status, move.capped ? capped_message_ : mover_->message());
+  return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
 void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {
   if (attempts_.steps > FirstSteps::kSteps || attempts_.repeated ||
       report_.warning() != Status::success)
     return;
-  const std::string doubt = first_steps_.look(candidate, step, attempts_.steps, ida_.step_size(),
-                                              polish_.corrected(), variables_, *mover_, corrector_);
+  const std::string doubt =
+      watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
+                              polish_.corrected(), variables_, *movers_.used, corrector_);
   if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
 }
 
@@ -192,11 +193,11 @@ int Projection::Impl::corrector_failed(int flag) {
 
 // Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
 int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done) {
-  const Move first = mover_->measure(candidate);
+  const Move first = movers_.used->measure(candidate);
   if (frequency_.on()) frequency_.looked(first.length, ida_.step_size());
   done = true;
   if (first.status != Status::success) {
-    const int code = finish(first.status, mover_->message());
+    const int code = finish(first.status, movers_.used->message());
     // Before the first step a smaller step cannot cure rows that contradict each other.
     return attempts_.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
   }
@@ -208,21 +209,21 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done)
     return finish(Status::success, "");
   }
   const Status engaged = engage(candidate);
-  if (engaged != Status::success) return finish(engaged, mover_->message());
+  if (engaged != Status::success) return finish(engaged, movers_.used->message());
   done = false;
   return 0;
 }
 
 Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance) {
   polish_.keep(candidate);
-  Move move = mover_->move(candidate);
+  Move move = movers_.used->move(candidate);
   if (move.capped) {
     judge_capped(move);
     return move;  // the steps below would make the whole move
   }
   if (move.status == Status::success)
-    move.status =
-        wants_polish(move.length) ? polish(candidate, cj, tolerance) : mover_->finish(candidate);
+    move.status = wants_polish(move.length) ? polish(candidate, cj, tolerance)
+                                            : movers_.used->finish(candidate);
   return move;
 }
 
@@ -230,8 +231,8 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
   // A refinement: where F or the linear solver fails here, the move itself stands, unless the
   // failure is to end the run; then the corrector has kept it.
   return polish_.add_newton_step(candidate, cj, tolerance)
-             ? mover_->settle(candidate, polish_.delta())
-             : mover_->finish(candidate);
+             ? movers_.used->settle(candidate, polish_.delta())
+             : movers_.used->finish(candidate);
 }
 
 // A cap is meant for a start off the constraints, which is approached step by step. A step that
@@ -239,25 +240,26 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
 void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, attempts_.left_before)) return;
   move.status = Status::move_too_long;
-  capped_message_ = "the move onto the constraints, capped at " + std::to_string(move.length) +
-                    " tolerances (Options::largest_move), leaves " + std::to_string(move.left) +
-                    ", which the error test does not allow; use a larger largest_move";
+  attempts_.capped_message =
+      "the move onto the constraints, capped at " + std::to_string(move.length) +
+      " tolerances (Options::largest_move), leaves " + std::to_string(move.left) +
+      ", which the error test does not allow; use a larger largest_move";
 }
 
 // A few invariants of many unknowns, as on grids; rows of mechanisms are many and local.
 bool Projection::Impl::rows_of_field() const {
   const bool gradients = std::holds_alternative<Gradients>(constraints_.jacobian);
-  return gradients || kFew * constraints_.total_count() <= N_VGetLength(weights_);
+  return gradients || kFew * constraints_.total_count() <= N_VGetLength(unknowns_.weights);
 }
 
 void Projection::Impl::look_at_linear_solver() {
-  linear_solver_.look(ida_, attempts_.steps);
-  const bool iterative = linear_solver_.iterative();
+  run_.linear_solver.look(ida_, attempts_.steps);
+  const bool iterative = run_.linear_solver.iterative();
   if (wanted_metric_ == Metric::automatic)
     options_.metric =
         iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;
   polish_.note_linear_solver(iterative);
-  mover_->expect_no_settle(iterative);
+  movers_.used->expect_no_settle(iterative);
 }
 
 // IDA does not tell whether it accepted an attempt; the count of steps does, at the next one.
@@ -266,15 +268,15 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (setups != attempts_.setups) polish_.note_setup(step.cj);
   attempts_.setups = setups;
   attempts_.repeated = steps == attempts_.steps;
-  rejections_.count(attempts_.repeated, attempts_.steps);
-  if (!attempts_.repeated) control_.look_for_refusals(engaged_);
+  watch_.rejections.count(attempts_.repeated, attempts_.steps);
+  if (!attempts_.repeated) control_.look_for_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {
     attempts_.left_before = attempts_.left;
-    mover_->accept();
-    if (options_.progress && ++progress_count_ % options_.progress_interval == 0) {
-      progress_.steps = steps;
+    movers_.used->accept();
+    if (options_.progress && ++tally_.progress_count % options_.progress_interval == 0) {
+      tally_.progress.steps = steps;
       std::string ignored;
-      guarded([&] { return options_.progress(progress_), 0; }, ignored);
+      guarded([&] { return options_.progress(tally_.progress), 0; }, ignored);
     }
   }
   attempts_.steps = steps;
@@ -311,11 +313,11 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   else
     variables_.note_index_as_low();
   if (variables_.high_index()) control_.begin_smoothing(kAsideFromTest);
-  joined_.join(candidate, cj);
-  mover_ = joined_.mover() != nullptr ? joined_.mover() : own_mover_.get();
+  movers_.joined.join(candidate, cj);
+  movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;
-  const Status structured = mover_->set_algebraic(candidate, joined_.moved_id());
-  engaged_ = structured == Status::success;  // else the next attempt looks again
+  const Status structured = movers_.used->set_algebraic(candidate, movers_.joined.moved_id());
+  run_.engaged = structured == Status::success;  // else the next attempt looks again
   return structured;
 }
 
@@ -333,12 +335,12 @@ void Projection::Impl::note(const Move& move, const StepData& step) {
   Statistics& s = statistics_;
   s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
   s.largest_move = std::max(s.largest_move, move.length);
-  move_sum_ += move.length;
+  tally_.move_sum += move.length;
   if (frequency_.on()) frequency_.looked(move.length, ida_.step_size());
   attempts_.pending = true;
   attempts_.left = move.left;
   if (options_.progress) {
-    progress_ = {step.t, ida_.step_size(), ida_.order(), move.drift_before, move.length, 0};
+    tally_.progress = {step.t, ida_.step_size(), ida_.order(), move.drift_before, move.length, 0};
   }
 }
 

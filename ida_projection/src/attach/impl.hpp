@@ -75,10 +75,11 @@ class Projection::Impl {
     bool pending = false;          // a projected one that is not yet judged
     // What capped moves lacked, in tolerances: in the last accepted step, and in this attempt.
     double left_before = 0.0, left = 0.0;
+    std::string capped_message;
   };
 
   void attach();
-  void look_for_bypass() { bypass_.look(attempts_.steps, initialized_, report_); }
+  void look_for_bypass() { watch_.bypass.look(attempts_.steps, run_.initialized, report_); }
 
   // decorator.cpp: the stages of a projected step
   int attempt(Candidate& candidate, double tolerance, bool call_setup);
@@ -118,6 +119,41 @@ class Projection::Impl {
                     ConsistencyReport* report);
   void current_weights(N_Vector y);
 
+  // Who moves the rows: the caller's alone (null: there are none), or joined with equations of F.
+  struct Movers {
+    JoinedRows joined;
+    std::unique_ptr<Mover> own;
+    Mover* used = nullptr;
+  };
+  // Vectors of the host's problem.
+  struct Unknowns {
+    bool contiguous = false;
+    int count = 0;
+    OwnedVector weights;  // for points between steps and initial values
+  };
+  struct Watches {
+    RejectionWatch rejections;
+    FirstSteps first_steps;
+    BypassWatch bypass;
+  };
+  struct Run {
+    bool initialized = false;
+    bool broken = false;   // an exception left things half done: the run cannot go on
+    bool engaged = false;  // the policy acts from the first move that was needed
+    LinearSolverKind linear_solver;
+  };
+  struct Inquiry {  // make_consistent() looks around
+    Probe probe = Probe::none;
+    JointStart* joint_start = nullptr;
+  };
+  // What the caller is told of the moves.
+  struct Tally {
+    double move_sum = 0.0;
+    SampledTime timed;
+    Progress progress;
+    long progress_count = 0;
+  };
+
   Constraints constraints_;
   Options options_;
   Statistics statistics_;
@@ -128,33 +164,16 @@ class Projection::Impl {
   Polish polish_;
   StepControl control_;
   FrequencyPolicy frequency_;
-  JoinedRows joined_;
+  Movers movers_;
   PointProjection point_;
-  RejectionWatch rejections_;
-  FirstSteps first_steps_;
-  BypassWatch bypass_;
+  Watches watch_;
   std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeSolver> solver_;  // IDA sees it
-
-  std::unique_ptr<Mover> own_mover_;  // of the caller's rows; null: there are none
-  Mover* mover_ = nullptr;            // that one, or the one of joined_
-  bool contiguous_ = false;
-  int size_ = 0;
-  OwnedVector weights_;  // for points between steps and initial values
-
-  LinearSolverKind linear_solver_;
+  Unknowns unknowns_;
   Metric wanted_metric_;
-  bool initialized_ = false;
-  bool broken_ = false;   // an exception left things half done: the run cannot go on
-  bool engaged_ = false;  // the policy acts from the first move that was needed
-  Probe probe_ = Probe::none;
-  JointStart* joint_start_ = nullptr;  // while make_consistent looks around
+  Run run_;
+  Inquiry inquiry_;
   Attempts attempts_;
-  std::string capped_message_;
-
-  double move_sum_ = 0.0;
-  SampledTime timed_;
-  Progress progress_;
-  long progress_count_ = 0;
+  Tally tally_;
 };
 
 }  // namespace tether::ida_projection

@@ -77,29 +77,28 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       polish_(options_, statistics_, corrector_, variables_),
       control_(ida_, options_, statistics_),
       frequency_(options_.frequency),
-      joined_(constraints_, options_, statistics_, corrector_, variables_),
+      movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),
-      rejections_(constraints_),
-      first_steps_(constraints_, statistics_),
-      bypass_(ida_),
+      watch_{RejectionWatch(constraints_), FirstSteps(constraints_, statistics_),
+             BypassWatch(ida_)},
       wanted_metric_(options_.metric) {
   N_Vector like = vector_of(ida_mem);
   validate(constraints_, options_, like);
 
-  contiguous_ = is_contiguous(like);
-  size_ = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
-  own_mover_ = make_mover(constraints_, options_, statistics_, like, size_);
-  mover_ = own_mover_.get();
-  if (mover_ != nullptr) {
-    polish_.allocate(like, contiguous_);
-    weights_ = OwnedVector(like);
+  unknowns_.contiguous = is_contiguous(like);
+  unknowns_.count = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
+  movers_.own = make_mover(constraints_, options_, statistics_, like, unknowns_.count);
+  movers_.used = movers_.own.get();
+  if (movers_.used != nullptr) {
+    polish_.allocate(like, unknowns_.contiguous);
+    unknowns_.weights = OwnedVector(like);
     if (options_.id != nullptr) {
       variables_.set(options_.id);
       options_.id = variables_.vector();  // the caller's vector may go
     }
-    if (contiguous_ && options_.hold_vector != nullptr && options_.hold.empty()) {
+    if (unknowns_.contiguous && options_.hold_vector != nullptr && options_.hold.empty()) {
       const double* free = N_VGetArrayPointer(options_.hold_vector);
-      for (int j = 0; j < size_; ++j) options_.hold.push_back(free[j] == 0.0);
+      for (int j = 0; j < unknowns_.count; ++j) options_.hold.push_back(free[j] == 0.0);
     }
   }
   if (corrector_.inner() != nullptr)
@@ -123,8 +122,8 @@ void Projection::Impl::attach() {
   require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
   require(SUNNonlinSolSetMaxIters(solver_.get(), corrector_.maximum_iterations()),
           "a number of iterations");
-  if (mover_ != nullptr)
-    bypass_.begin([this] {
+  if (movers_.used != nullptr)
+    watch_.bypass.begin([this] {
       std::string ignored;
       guarded([this] { return look_for_bypass(), 0; }, ignored);
     });
@@ -146,17 +145,17 @@ const Report& Projection::Impl::report() {
 Statistics Projection::Impl::statistics() {
   look_for_bypass();
   Statistics s = statistics_;
-  s.steps_without_plugin = bypass_.steps();
+  s.steps_without_plugin = watch_.bypass.steps();
   const long moved = s.projections + s.chord_projections - s.failures();
-  s.mean_move = moved > 0 ? move_sum_ / static_cast<double>(moved) : 0.0;
-  s.seconds = timed_.total(s.projections);
+  s.mean_move = moved > 0 ? tally_.move_sum / static_cast<double>(moved) : 0.0;
+  s.seconds = tally_.timed.total(s.projections);
   return s;
 }
 
 void Projection::Impl::reset_statistics() {
   statistics_ = Statistics{};
-  move_sum_ = 0.0;
-  timed_ = SampledTime();
+  tally_.move_sum = 0.0;
+  tally_.timed = SampledTime();
 }
 
 Projection::Projection(void* ida_mem, Constraints constraints, Options options,

@@ -6,16 +6,16 @@ namespace tether::ida_projection {
 
 template <class Rows>
 Move ContiguousMover<Rows>::follow(const Candidate& candidate, bool again) {
-  at_.load(candidate);
+  rows_.at.load(candidate);
   if (!again) {
-    set_metric(false);
-    ++age_;
-    decided_ = false;
+    rows_.set_metric(false);
+    ++kept_.age;
+    rows_.factors.decided = false;
   }
   return move_with_old_factors(
-      wear_, [&] { return value(candidate.t); }, [&] { return solve(); },
-      [&] { apply(1.0, candidate.correction_entries); }, [&] { return drift(); },
-      1e2 * kEpsilon * at_.size(), options_.largest_move, kMayFollowLeave);
+      wear_, [&] { return rows_.value(candidate.t); }, [&] { return rows_.solve(); },
+      [&] { rows_.apply(1.0, candidate.correction_entries); }, [&] { return rows_.drift(); },
+      1e2 * kEpsilon * rows_.at.size(), options_.largest_move, kMayFollowLeave);
 }
 
 template Move ContiguousMover<RowBlocks>::follow(const Candidate&, bool);

@@ -1,7 +1,5 @@
 // Tether: Newton's method onto the constraints, on contiguous vectors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cstdint>
-
 #include "movers/contiguous_mover.hpp"
 
 namespace tether::ida_projection {
@@ -11,211 +9,47 @@ namespace {
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
 constexpr double kForLater = 0.1;
 constexpr int kQuick = 3;  // moves with a whole C
-constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
 
 }  // namespace
 
 template <class Rows>
-Status ContiguousMover<Rows>::structure(const Candidate& candidate, const double* id) {
-  reusable_ = false;
-  const Status status =
-      blocks_.structure(evaluator_, candidate.t, at_.y, at_.WT(), options_.hold, id);
-  if (status != Status::success) message_ = blocks_.message;
-  return status;
-}
-
-template <class Rows>
 Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector id) {
-  at_.load(candidate);
+  rows_.at.load(candidate);
   const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
-  return structure(candidate, mask);
-}
-
-// C at the present y, and g if wanted.
-template <class Rows>
-Status ContiguousMover<Rows>::rows(double t, double* g) {
-  // Only differences and mixed rows need to know how large a tolerance is.
-  const double* WT = evaluator_.uses_differences() || blocks_.mixed() ? at_.WT().data() : nullptr;
-  Status status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT, g);
-  if (status == Status::success && blocks_.outgrown()) {
-    blocks_.rearrange();
-    reusable_ = lasting_ = false;
-    set_metric(true);
-    status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT);
-  }
-  if (status != Status::success) message_ = evaluator_.message();
-  return status;
-}
-
-// g where C will be wanted, too.
-template <class Rows>
-Status ContiguousMover<Rows>::value_with_rows(double t) {
-  if (!evaluator_.gives_both()) return value(t);
-  const Status status = rows(t, g_.data());
-  rows_known_ = status == Status::success;
-  return status;
-}
-
-template <class Rows>
-Status ContiguousMover<Rows>::factor(double t) {
-  if (!rows_known_) {
-    const Status status = rows(t, nullptr);
-    if (status != Status::success) return status;
-  }
-  rows_known_ = false;
-  const bool known = Rows::kKeepsRank && lasting_ && reusable_;
-  reusable_ = false;
-  weighed_ = false;
-  if (known && blocks_.factor_kept()) {
-    thin_ = false;
-    ++(Rows::many(m_) ? statistics_.refactorizations : statistics_.factorizations);
-  } else if (!decide()) {
-    message_ =
-        "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
-    return Status::not_finite;
-  }
-  reusable_ = true;
-  slope_ = kUnknownSlope;
-  age_ = 0;
-  wear_.renewed();
-  return Status::success;
-}
-
-// Factors from which it can be seen which rows are independent. False: an entry is not finite.
-template <class Rows>
-bool ContiguousMover<Rows>::decide() {
-  ++statistics_.factorizations;
-  if (!blocks_.factor()) return false;
-  if (blocks_.dropped_rows()) ++statistics_.rank_drops;
-  if constexpr (Rows::kThinRows) thin_ = RowTrust::has_thin_rows(blocks_.counted().solver);
-  lasting_ = !thin_;
-  decided_ = true;
-  return true;
-}
-
-// The first solve() after factor(): decides which of the thin rows take part until the next one.
-template <class Rows>
-double ContiguousMover<Rows>::first_solve() {
-  const double length = solve();
-  if constexpr (Rows::kThinRows) {
-    if (!thin_) return length;
-    linalg::MinimumNorm& solver = blocks_.counted().solver;
-    const int all = solver.rank();
-    if (!firm_only_ && blocks_.trust.trusted_rows(solver, length) == all) return length;
-    const bool whole = !blocks_.dropped_rows();
-    // Nothing magnifies the right-hand side of the firm rows.
-    const int firm = RowTrust::firm_rows(solver);
-    solver.use_rank(firm);
-    const double firm_length = solve();
-    --statistics_.iterations;
-    if (!firm_only_) {
-      solver.use_rank(all);
-      const int trusted = blocks_.trust.trusted_rows(solver, firm_length);
-      solver.use_rank(trusted);
-      lasting_ = RowTrust::lasting(solver, firm, trusted);
-      if (trusted > firm) {
-        --statistics_.iterations;
-        if (whole && trusted < all) ++statistics_.rank_drops;
-        return solve();
-      }
-    }
-    if (whole) ++statistics_.rank_drops;
-    return firm_length;
-  }
-  return length;
+  return rows_.structure(candidate, mask);
 }
 
 template <class Rows>
 bool ContiguousMover<Rows>::must_learn(double length) const {
-  if constexpr (Rows::kThinRows) return thin_ && start_known_ && blocks_.trust.must_learn(length);
+  if constexpr (Rows::kThinRows)
+    return rows_.factors.thin && start_known_ && rows_.blocks.trust.must_learn(length);
   return false;
-}
-
-// After the first move: by how much has C turned?
-template <class Rows>
-Status ContiguousMover<Rows>::learn_trust(double t, double length) {
-  if constexpr (Rows::kThinRows) {
-    if (!thin_) return Status::success;
-    const double* WT = evaluator_.uses_differences() ? at_.WT().data() : nullptr;
-    const Status status = blocks_.learn_trust(evaluator_, t, at_.y.data(), WT, length);
-    if (status != Status::success) message_ = evaluator_.message();
-    return status;
-  }
-  return Status::success;
 }
 
 template <class Rows>
 bool ContiguousMover<Rows>::contradicts() {
-  if (!blocks_.dropped_rows()) return false;
-  if (weighed_ && blocks_.left_of_dropped() <= kContradiction) return false;
-  if (!blocks_.contradict(at_.WT())) return false;
-  message_ = blocks_.contradiction.message;
-  contradicting_rows_ = blocks_.contradiction.rows;
+  if (!rows_.contradicts()) return false;
+  contradicting_rows_ = rows_.blocks.contradiction.rows;
   return true;
-}
-
-// Does the rounding of its own terms explain every g_i? Then there is nothing to enforce, however
-// short the tolerances are that the metric would make of it.
-template <class Rows>
-bool ContiguousMover<Rows>::rounding_only() const {
-  for (int i = 0; i < m_; ++i) {
-    const double terms = blocks_.terms(i, at_.y.data());
-    if (!(std::abs(g_[static_cast<std::size_t>(i)]) <= 64.0 * kEpsilon * terms)) return false;
-  }
-  return true;
-}
-
-// Length of the move that the rounding of g asks for in the worst case, with the present factors:
-// at most sum_i |dy_i|, dy_i the move for row i alone. Where that would take many solves it is
-// bounded by sqrt(m sum_i |dy_i|^2), the sum of squares by moves for all rows with random signs.
-template <class Rows>
-double ContiguousMover<Rows>::rounding_length() {
-  const std::vector<double> g = g_;
-  std::vector<double> rounding(g.size());
-  for (int i = 0; i < m_; ++i)
-    rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks_.terms(i, at_.y.data());
-  double total = 0.0;
-  const auto add = [&](auto&& length) {
-    total += length(solve());
-    --statistics_.iterations;
-  };
-  if (m_ <= kRoundedOneByOne) {
-    for (std::size_t i = 0; i < g.size(); ++i) {
-      std::fill(g_.begin(), g_.end(), 0.0);
-      g_[i] = rounding[i];
-      add([](double length) { return length; });
-    }
-  } else {
-    std::uint32_t random = 1;
-    for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
-      for (std::size_t i = 0; i < g.size(); ++i) {
-        random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
-        g_[i] = random >> 31 != 0 ? rounding[i] : -rounding[i];
-      }
-      add([](double length) { return length * length; });
-    }
-    total = std::sqrt(total / kSignPatterns * m_);
-  }
-  g_ = g;
-  return total;
 }
 
 template <class Rows>
 Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   Move result;
-  at_.load(candidate);
-  if (!blocks_.structured() && (result.status = structure(candidate, nullptr)) != Status::success)
+  rows_.at.load(candidate);
+  if (!rows_.blocks.structured() &&
+      (result.status = rows_.structure(candidate, nullptr)) != Status::success)
     return result;
-  if ((result.status = value_with_rows(candidate.t)) != Status::success) return result;
-  result.drift_before = result.drift_after = drift();
+  if ((result.status = rows_.value_with_rows(candidate.t)) != Status::success) return result;
+  result.drift_before = result.drift_after = rows_.drift();
   if (result.drift_before == 0.0) return result;
-  set_metric(true);
-  lasting_ = false;
+  rows_.set_metric(true);
+  rows_.factors.lasting = false;
   if ((result.status = factor(candidate.t)) != Status::success) return result;
-  if (rounding_only()) return result;
+  if (rows_.rounding_only()) return result;
   firm_only_ = false;
   result.length = first_solve();
-  result.floor = 4.0 * kEpsilon * at_.size();
+  result.floor = 4.0 * kEpsilon * rows_.at.size();
   if (contradicts()) result.status = Status::inconsistent;
   return result;
 }
@@ -225,30 +59,30 @@ template <class Rows>
 bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
   if (length <= options_.largest_move) return false;
   double sum = 0.0;
-  for (int j : blocks_.d.columns) {
-    const double change = at_.ycor[j] * at_.w[j];
+  for (int j : rows_.blocks.d.columns) {
+    const double change = rows_.at.ycor[j] * rows_.at.w[j];
     sum += change * change;
   }
-  limit = options_.largest_move * std::max(1.0, std::sqrt(sum * inverse_n_));
+  limit = options_.largest_move * std::max(1.0, rows_.wrms(sum));
   return !(length <= limit);
 }
 
 template <class Rows>
 Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
-  at_.load(candidate);
-  reused_ = may_reuse();
-  ++age_;
-  decided_ = false;
-  set_metric(!reused_);
-  result.status = reused_ ? value(candidate.t) : value_with_rows(candidate.t);
+  rows_.at.load(candidate);
+  reused_ = keeps_factors() && rows_.factors.there;
+  ++kept_.age;
+  rows_.factors.decided = false;
+  rows_.set_metric(!reused_);
+  result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;
   firm_only_ = start_known_ = false;
-  result = newton(candidate, drift());
+  result = newton(candidate, rows_.drift());
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
   if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
-  if (broken || result.moves > kQuick) blocks_.look_again_soon();
+  if (broken || result.moves > kQuick) rows_.blocks.look_again_soon();
   // Kept factors are in use only while dropped rows ask for less than that.
   if (result.status == Status::success && !result.capped && !reused_ && contradicts())
     result.status = Status::inconsistent;
@@ -259,7 +93,7 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
 template <class Rows>
 void ContiguousMover<Rows>::restart(const Candidate& candidate) {
   for (std::size_t i = 0; i < start_.size(); ++i) candidate.correction_entries[i] = start_[i];
-  at_.restart(candidate);
+  rows_.at.restart(candidate);
 }
 
 // Where rows are nearly parallel they magnify the rounding of g beyond any tolerance. Such a row
@@ -270,19 +104,19 @@ Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, co
   const std::string reason = message_;
   restart(candidate);
   Move result = failed;
-  if ((result.status = value_with_rows(candidate.t)) != Status::success) return result;
+  if ((result.status = rows_.value_with_rows(candidate.t)) != Status::success) return result;
   firm_only_ = true;
   result = newton(candidate, failed.drift_before);
   if (result.status == Status::success && !result.capped) {
-    if ((result.status = value(candidate.t)) != Status::success) return result;
-    result.drift_after = drift();
-    if (rounding_only()) return result;
+    if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
+    result.drift_after = rows_.drift();
+    if (rows_.rounding_only()) return result;
   }
   message_ = reason;
   return failed;
 }
 
-// Newton's method from at_.y, with g_ known there.
+// Newton's method from rows_.at.y, with g_ known there.
 template <class Rows>
 Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_before) {
   Move result;
@@ -293,35 +127,38 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   bool fresh = false;  // factors belong to the present y
   bool have_factors = reused_;
   const bool was_reused = reused_;
-  if (Rows::kThinRows && was_reused) std::copy(correction, correction + n_, start_.begin());
+  if (Rows::kThinRows && was_reused)
+    std::copy(correction, correction + start_.size(), start_.begin());
   bool tried = firm_only_;
   for (;;) {
     if (!have_factors) {
       if ((result.status = factor(candidate.t)) != Status::success) return result;
       have_factors = fresh = true;
       if (!firm_only_ && (result.moves == 0 || was_reused)) {
-        start_known_ = thin_;
-        if (thin_ && !was_reused) std::copy(correction, correction + n_, start_.begin());
+        start_known_ = rows_.factors.thin;
+        if (rows_.factors.thin && !was_reused)
+          std::copy(correction, correction + start_.size(), start_.begin());
       }
     }
-    const double length = fresh ? first_solve() : solve();
+    const double length = fresh ? first_solve() : rows_.solve();
     if (result.moves == 0 && !tried && must_learn(length)) {
       // The firm rows' move shows how C turns; then all rows are judged, from the start.
       tried = true;
-      apply(1.0, correction);
-      if ((result.status = learn_trust(candidate.t, length)) != Status::success) return result;
+      rows_.apply(1.0, correction);
+      if ((result.status = rows_.learn_trust(candidate.t, length)) != Status::success)
+        return result;
       restart(candidate);
       have_factors = false;
       continue;
     }
-    const bool follow = dropped_follow();
+    const bool follow = rows_.dropped_follow();
     if (reused_ && !(length <= kLong && follow)) {
-      set_metric(true);
+      rows_.set_metric(true);
       reused_ = have_factors = false;
       continue;
     }
     if (!follow && Rows::kKeepsRank) {
-      lasting_ = have_factors = false;
+      rows_.factors.lasting = have_factors = false;
       continue;
     }
     ++result.moves;
@@ -338,7 +175,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
                      "smaller step";
           return result;
         }
-        apply(limit / length, correction);
+        rows_.apply(limit / length, correction);
         result.left = length - limit;
         result.length = limit;
         result.capped = true;
@@ -346,25 +183,26 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
         return result;
       }
     }
-    apply(1.0, correction);
+    rows_.apply(1.0, correction);
     if (reused_) {
-      if (2.0 * rate() * length <= kForLater) break;
-      if ((result.status = value(candidate.t)) != Status::success) return result;
-      set_metric(true);
+      if (2.0 * kept_.rate() * length <= kForLater) break;
+      if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
+      rows_.set_metric(true);
       reused_ = have_factors = false;
       continue;
     }
-    if (result.moves == 1 && (result.status = learn_trust(candidate.t, length)) != Status::success)
+    if (result.moves == 1 &&
+        (result.status = rows_.learn_trust(candidate.t, length)) != Status::success)
       return result;
 
     // A first move longer than the largest floor need not know it.
     const double floor = result.moves == 1 && length > kLargestFloor
                              ? 0.0
-                             : std::min(kLargestFloor, 1e3 * kEpsilon * at_.size());
+                             : std::min(kLargestFloor, 1e3 * kEpsilon * rows_.at.size());
     Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
     // Almost parallel rows magnify rounding: a move that it explains has converged.
     if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
-        length <= std::min(kLargestFloor, rounding_length()))
+        length <= std::min(kLargestFloor, rows_.rounding_length()))
       verdict = Monitor::Verdict::done;
     if (verdict == Monitor::Verdict::done) break;
     if (verdict == Monitor::Verdict::failed) {
@@ -377,8 +215,8 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
           "roots, and rows with |.| or max no derivative: neither lets Newton's moves shrink";
       return result;
     }
-    if ((result.status = value(candidate.t)) != Status::success) return result;
-    result.drift_after = drift();
+    if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
+    result.drift_after = rows_.drift();
     fresh = false;
     have_factors = verdict != Monitor::Verdict::refactor;
   }
@@ -386,11 +224,6 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   result.status = Status::success;
   return result;
 }
-
-template double ContiguousMover<RowBlocks>::first_solve();
-template double ContiguousMover<SparseRows>::first_solve();
-template double ContiguousMover<RowBlocks>::rounding_length();
-template double ContiguousMover<SparseRows>::rounding_length();
 
 std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
                                         Statistics& statistics, int size, int reported) {

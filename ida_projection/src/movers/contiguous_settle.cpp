@@ -17,11 +17,11 @@ constexpr double kWorn = 0.06, kSlow = 0.1;
 template <class Rows>
 Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
   const double* e = N_VGetArrayPointer(change);
-  for (std::size_t i = 0; i < at_.y.size(); ++i) at_.y[i] += e[i];
+  for (std::size_t i = 0; i < rows_.at.y.size(); ++i) rows_.at.y[i] += e[i];
   if (keeps_factors()) return take_back(candidate);
   double sum = 0.0;
-  for (int j : blocks_.d.columns) sum += (e[j] * at_.w[j]) * (e[j] * at_.w[j]);
-  return take_rest(candidate, move_length_ + std::sqrt(sum * inverse_n_));
+  for (int j : rows_.blocks.d.columns) sum += (e[j] * rows_.at.w[j]) * (e[j] * rows_.at.w[j]);
+  return take_rest(candidate, move_length_ + rows_.wrms(sum));
 }
 
 // With factors that belong to a point `reach` tolerances away.
@@ -31,17 +31,17 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
   const double enough = (takes_rest_ ? kCheapRest : 1.0) * options_.tolerance;
   double previous = 0.0;
   for (int k = 0; k < options_.maximum_iterations; ++k) {
-    const Status status = value(candidate.t);
+    const Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
-    double length = solve();
-    if (takes_rest_ && !dropped_follow()) {
-      lasting_ = false;
+    double length = rows_.solve();
+    if (takes_rest_ && !rows_.dropped_follow()) {
+      rows_.factors.lasting = false;
       const Status made = factor(candidate.t);
       if (made != Status::success) return made;
       length = first_solve();
     }
-    apply(1.0, candidate.correction_entries);
-    const double floor = 1e2 * kEpsilon * at_.size();
+    rows_.apply(1.0, candidate.correction_entries);
+    const double floor = 1e2 * kEpsilon * rows_.at.size();
     const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
     if (k > 0) staleness_.measured(reach, previous, rounding ? 0.0 : length);
     if (rounding) break;
@@ -60,33 +60,33 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
 // others. Where too much is left, also of dropped rows, or a move is long, factors are made anew.
 template <class Rows>
 Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
-  const double floor = 1e2 * kEpsilon * at_.size();
+  const double floor = 1e2 * kEpsilon * rows_.at.size();
   double previous = -1.0;  // length of the move before, by the same factors
   for (int k = 0; k <= options_.maximum_iterations; ++k) {
-    Status status = value(candidate.t);
+    Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
-    double length = solve();
+    double length = rows_.solve();
     double part = previous > 0.0 && length > floor ? length / previous : 0.0;
-    if (part > 0.0) slope_ = part / age_;
-    bool follow = dropped_follow();
-    if (age_ > 0 && (part > kSlow || length > kLong || (k > 0 && !follow))) {
-      set_metric(true);
+    if (part > 0.0) kept_.slope = part / kept_.age;
+    bool follow = rows_.dropped_follow();
+    if (kept_.age > 0 && (part > kSlow || length > kLong || (k > 0 && !follow))) {
+      rows_.set_metric(true);
       if ((status = factor(candidate.t)) != Status::success) return status;
       length = first_solve();
-      follow = dropped_follow();
+      follow = rows_.dropped_follow();
       part = 0.0;
       previous = -1.0;
     }
-    apply(1.0, candidate.correction_entries);
+    rows_.apply(1.0, candidate.correction_entries);
     const bool small = length <= std::max(floor, kSafe * options_.tolerance);
     if (follow && (small || (part > 0.0 && part * length <= kSafe * options_.tolerance))) {
-      if (part > kWorn) reusable_ = false;
+      if (part > kWorn) rows_.factors.there = false;
       return Status::success;
     }
     previous = length;
   }
-  reusable_ = false;
-  if (previous <= std::min(kLargestFloor, rounding_length())) return Status::success;
+  rows_.factors.there = false;
+  if (previous <= std::min(kLargestFloor, rows_.rounding_length())) return Status::success;
   message_ = "after " + std::to_string(options_.maximum_iterations) +
              " moves with kept factors the next one still is " + std::to_string(previous) +
              " tolerances long (Options::maximum_iterations)";

@@ -7,16 +7,16 @@ namespace tether::ida_projection {
 template <class Rows>
 bool ContiguousMover<Rows>::tangency(const std::vector<double>& yp, const double* id,
                                      Tangency& out) {
-  if (!blocks_.structured() || !reusable_) return false;
-  const auto rows = static_cast<std::size_t>(reported_);
-  const std::vector<double>& WT = at_.WT();
+  if (!rows_.blocks.structured() || !rows_.factors.there) return false;
+  const auto rows = static_cast<std::size_t>(rows_.reported());
+  const std::vector<double>& WT = rows_.at.WT();
   out.rate.assign(rows, 0.0);
   out.terms.assign(rows, 0.0);
   out.tolerance.assign(rows, 0.0);
   for (std::size_t i = 0; i < rows; ++i) {
     double rate = 0.0, terms = 0.0, square = 0.0;
     bool algebraic = false;
-    blocks_.visit_row(static_cast<int>(i), [&](int j, double c) {
+    rows_.blocks.visit_row(static_cast<int>(i), [&](int j, double c) {
       const auto k = static_cast<std::size_t>(j);
       algebraic = algebraic || (c != 0.0 && id != nullptr && id[j] == 0.0);
       rate += c * yp[k];

@@ -5,6 +5,7 @@
 
 #include "host/owned_vector.hpp"
 #include "movers/factor_wear.hpp"
+#include "movers/vector_metric.hpp"
 #include "rows/gradient_rows.hpp"
 
 namespace tether::ida_projection {
@@ -23,13 +24,9 @@ class GradientMover final : public Mover {
         constraints_(constraints),
         monitor_(options),
         y_(like),
-        scale_(like),
-        trial_(like),
-        D_(like),
-        WT_(like),
-        free_(like),
         dy_(like),
         work_(like),
+        metric_(options, like),
         rows_(constraints.total_count(), like),
         g_(static_cast<std::size_t>(rows_.rows()), 0.0),
         terms_(g_) {
@@ -39,10 +36,9 @@ class GradientMover final : public Mover {
   }
 
   void expect_no_settle(bool none) override { no_settle_ = none; }
-  void accept() override { std::swap(scale_, trial_); }
+  void accept() override { metric_.accept(); }
   void reset() override {
-    N_VConst(0.0, scale_);
-    N_VConst(0.0, trial_);
+    metric_.reset();
     monitor_.reset();
     wear_ = FactorWear();
     factored_ = false;
@@ -57,7 +53,7 @@ class GradientMover final : public Mover {
     const Status status = fill(candidate.t);
     if (status != Status::success) return status;
     holds_algebraic_ = !contains_algebraic();
-    if (holds_algebraic_) N_VProd(free_, id, free_);
+    if (holds_algebraic_) metric_.hold_all_but(id);
     return Status::success;
   }
 
@@ -88,7 +84,7 @@ class GradientMover final : public Mover {
         return result;
       }
     }
-    set_metric(candidate);
+    metric_.set(candidate, dy_);
     sums_terms_ = static_cast<N_Vector>(y_)->ops->nvl1norm != nullptr;
     result.status = factor(candidate);
     sums_terms_ = false;
@@ -135,7 +131,7 @@ class GradientMover final : public Mover {
   // Error weights change slowly, and so do factors in their metric. What follows a polish is taken
   // back with the factors of the step alone.
   bool factors_last() const {
-    return no_settle_ && !local() && factored_ && rows_.rank() == rows_.rows();
+    return no_settle_ && !metric_.local() && factored_ && rows_.rank() == rows_.rows();
   }
 
   // After load(): moves with the factors at hand.
@@ -154,7 +150,7 @@ class GradientMover final : public Mover {
   Move newton(const Candidate& candidate) {
     Move result;
     load(candidate);
-    set_metric(candidate);
+    metric_.set(candidate, dy_);
     if ((result.status = value(candidate.t)) != Status::success) return result;
     result.drift_before = result.drift_after = drift();
     monitor_.start();
@@ -209,8 +205,7 @@ class GradientMover final : public Mover {
 
   void free_all() {
     holds_algebraic_ = false;
-    N_VConst(1.0, free_);
-    if (options_.hold_vector != nullptr) N_VScale(1.0, options_.hold_vector, free_);
+    metric_.free_all();
   }
 
   // After fill().
@@ -234,30 +229,7 @@ class GradientMover final : public Mover {
   // y = base + correction, s <- max(0.8 s, |correction|).
   void load(const Candidate& candidate) {
     N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
-    if (!local()) return;
-    N_VAbs(candidate.correction, work_);
-    larger(0.8, scale_, work_, trial_);
-  }
-  // z = max(a x, y) elementwise, for x, y >= 0: (a x + y + |a x - y|) / 2. z may be x.
-  void larger(double a, const OwnedVector& x, const OwnedVector& y, OwnedVector& z) {
-    N_VLinearSum(a, x, -1.0, y, dy_);
-    N_VAbs(dy_, dy_);
-    N_VLinearSum(0.5 * a, x, 0.5, y, z);
-    N_VLinearSum(1.0, z, 0.5, dy_, z);
-  }
-  bool local() const { return options_.metric == Metric::local_correction; }
-  // WT = 1/w (0 where w = 0), D.
-  void set_metric(const Candidate& candidate) {
-    N_VConst(0.0, WT_);
-    if (static_cast<N_Vector>(WT_)->ops->nvinvtest != nullptr)
-      (void)N_VInvTest(candidate.weights, WT_);
-    else
-      N_VInv(candidate.weights, WT_);
-    if (local())
-      larger(1e-3, WT_, trial_, D_);
-    else
-      N_VScale(1.0, WT_, D_);
-    N_VProd(D_, free_, D_);
+    metric_.look(candidate, work_, dy_);
   }
 
   Status failed(int flag, const char* what, const std::string& thrown) {
@@ -303,7 +275,7 @@ class GradientMover final : public Mover {
     if (status != Status::success) return status;
     if (holds_algebraic_ && contains_algebraic()) {
       free_all();
-      set_metric(candidate);
+      metric_.set(candidate, dy_);
     }
     ++statistics_.factorizations;
     if (sums_terms_)
@@ -311,7 +283,7 @@ class GradientMover final : public Mover {
         N_VProd(rows_.gradients()[i], y_, work_);
         terms_[i] = N_VL1Norm(work_);
       }
-    const int bad = rows_.factor(D_, WT_);
+    const int bad = rows_.factor(metric_.D(), metric_.WT());
     if (bad >= 0) {
       message_ = "the gradient of " + constraints_.name(bad) + " is not finite";
       return Status::not_finite;
@@ -325,7 +297,7 @@ class GradientMover final : public Mover {
   // Returns the WRMS length of dy in the error norm.
   double solve(N_Vector weights) {
     ++statistics_.iterations;
-    rows_.solve(g_, D_, dy_);
+    rows_.solve(g_, metric_.D(), dy_);
     return N_VWrmsNorm(dy_, weights);
   }
 
@@ -358,7 +330,8 @@ class GradientMover final : public Mover {
   const Constraints& constraints_;
   Monitor monitor_;
   std::vector<Part> parts_;
-  OwnedVector y_, scale_, trial_, D_, WT_, free_, dy_, work_;
+  OwnedVector y_, dy_, work_;
+  VectorMetric metric_;
   GradientRows rows_;
   std::vector<double> g_;
   std::vector<double> terms_;  // sum_j |C_ij y_j|

@@ -110,7 +110,7 @@ const char* to_string(Request request) {
   return "unknown";
 }
 
-/// IDA and its data, and the fiber in which it runs. A call sets `command_`, enters the fiber, and
+/// IDA and its data, and the fiber in which it runs. A call sets the command, enters the fiber, and
 /// returns when a function that IDA has called leaves it with a question, or the command is done.
 class ReverseIda::Implementation {
  public:
@@ -158,10 +158,10 @@ class ReverseIda::Implementation {
     const int task = one_step ? IDA_ONE_STEP : IDA_NORMAL;
     return start([this, tout, task] {
       double reached = t_;
-      flag_ = projection_ ? projection_->solve(tout, &reached, y_.get(), yp_.get(), task)
-                          : IDASolve(mem_.get(), tout, &reached, y_.get(), yp_.get(), task);
+      task_.flag = projection_ ? projection_->solve(tout, &reached, y_.get(), yp_.get(), task)
+                               : IDASolve(mem_.get(), tout, &reached, y_.get(), yp_.get(), task);
       t_ = reached;
-      if (flag_ < 0) fail();
+      if (task_.flag < 0) fail();
     });
   }
 
@@ -171,29 +171,29 @@ class ReverseIda::Implementation {
       const tp::ConsistencyReport report =
           projection_->make_consistent(equations_.t0, y_.get(), yp_.get());
       t_ = equations_.t0;
-      flag_ = report ? 0 : -1;
-      if (!report) message_ = report.message.empty() ? "no consistent values" : report.message;
+      task_.flag = report ? 0 : -1;
+      if (!report) task_.message = report.message.empty() ? "no consistent values" : report.message;
     });
   }
 
   Request go_on(int answer) {
-    if (request_ == Request::reached || request_ == Request::failed)
+    if (asked_.request == Request::reached || asked_.request == Request::failed)
       throw std::logic_error("ReverseIda: go_on() without a request");
-    answer_ = answer;
+    asked_.answer = answer;
     return resume();
   }
 
   const Equations& equations() const { return equations_; }
-  Request request() const { return request_; }
+  Request request() const { return asked_.request; }
   double t() const { return t_; }
-  double cj() const { return cj_; }
-  const double* y() const { return at_y_; }
-  const double* yp() const { return at_yp_; }
-  const double* rhs() const { return rhs_; }
-  double* result() const { return result_; }
-  std::size_t result_size() const { return result_size_; }
-  int flag() const { return flag_; }
-  const std::string& message() const { return message_; }
+  double cj() const { return asked_.cj; }
+  const double* y() const { return asked_.y; }
+  const double* yp() const { return asked_.yp; }
+  const double* rhs() const { return asked_.rhs; }
+  double* result() const { return asked_.result; }
+  std::size_t result_size() const { return asked_.result_size; }
+  int flag() const { return task_.flag; }
+  const std::string& message() const { return task_.message; }
   void* mem() const { return mem_.get(); }
   const tp::Projection* projection() const { return projection_ ? &*projection_ : nullptr; }
 
@@ -273,7 +273,7 @@ class ReverseIda::Implementation {
                     void* data, N_Vector, N_Vector, N_Vector) {
     auto& self = *static_cast<Implementation*>(data);
     self.set_point(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp));
-    self.cj_ = cj;
+    self.asked_.cj = cj;
     if (self.equations_.linear == Linear::own) return self.ask(Request::setup, nullptr, 0);
     const std::size_t n = self.equations_.y.size();
     return self.ask(Request::jacobian, SUNDenseMatrix_Data(J), n * n);
@@ -281,81 +281,81 @@ class ReverseIda::Implementation {
 
   static int linear_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
     auto& self = *static_cast<Implementation*>(solver->content);
-    self.rhs_ = N_VGetArrayPointer(b);
-    self.at_yp_ = nullptr;
+    self.asked_.rhs = N_VGetArrayPointer(b);
+    self.asked_.yp = nullptr;
     return self.ask(Request::solve, N_VGetArrayPointer(x), self.equations_.y.size());
   }
 
   void set_point(double t, const double* y, const double* yp) {
-    asked_t_ = t;
-    at_y_ = y;
-    at_yp_ = yp;
-    rhs_ = nullptr;
+    asked_.t = t;
+    asked_.y = y;
+    asked_.yp = yp;
+    asked_.rhs = nullptr;
   }
 
   /// In the fiber: the caller's answer to a request.
   int ask(Request request, double* result, std::size_t size) {
     if (abandoned_) return -1;
-    request_ = request;
-    result_ = result;
-    result_size_ = size;
+    asked_.request = request;
+    asked_.result = result;
+    asked_.result_size = size;
     const double reached = t_;
-    t_ = asked_t_;
+    t_ = asked_.t;
     fiber_.leave();
     t_ = reached;
-    return abandoned_ ? -1 : answer_;
+    return abandoned_ ? -1 : asked_.answer;
   }
 
   template <class Command>
   Request start(Command command) {
-    if (request_ != Request::reached && request_ != Request::failed)
-      throw std::logic_error(std::string("ReverseIda: the request \"") + to_string(request_) +
+    if (asked_.request != Request::reached && asked_.request != Request::failed)
+      throw std::logic_error(std::string("ReverseIda: the request \"") + to_string(asked_.request) +
                              "\" is open: answer it by go_on() first");
-    message_.clear();
-    flag_ = 0;
-    thrown_ = nullptr;
-    command_ = std::move(command);
+    task_.message.clear();
+    task_.flag = 0;
+    task_.thrown = nullptr;
+    task_.command = std::move(command);
     return resume();
   }
 
   Request resume() {
-    waiting_ = false;
+    task_.waiting = false;
     started_ = true;
     fiber_.enter();
-    if (!waiting_) return request_;  // a request
-    command_ = nullptr;
-    at_rest(flag_ < 0 || thrown_ ? Request::failed : Request::reached);
-    if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
-    return request_;
+    if (!task_.waiting) return asked_.request;  // a request
+    task_.command = nullptr;
+    at_rest(task_.flag < 0 || task_.thrown ? Request::failed : Request::reached);
+    if (task_.thrown) std::rethrow_exception(std::exchange(task_.thrown, nullptr));
+    return asked_.request;
   }
 
   void at_rest(Request request) {
-    request_ = request;
-    at_y_ = N_VGetArrayPointer(y_.get());
-    at_yp_ = N_VGetArrayPointer(yp_.get());
-    rhs_ = nullptr;
-    result_ = nullptr;
-    result_size_ = 0;
+    asked_.request = request;
+    asked_.y = N_VGetArrayPointer(y_.get());
+    asked_.yp = N_VGetArrayPointer(yp_.get());
+    asked_.rhs = nullptr;
+    asked_.result = nullptr;
+    asked_.result_size = 0;
   }
 
   /// The body of the fiber; nothing is thrown out of it.
   void run_commands() noexcept {
     while (!abandoned_) {
       try {
-        command_();
+        task_.command();
       } catch (...) {
-        thrown_ = std::current_exception();
+        task_.thrown = std::current_exception();
       }
-      waiting_ = true;
+      task_.waiting = true;
       if (!abandoned_) fiber_.leave();
     }
   }
 
   void fail() {
-    if (projection_) message_ = projection_->message();
-    if (!message_.empty()) return;
-    char* const name = IDAGetReturnFlagName(flag_);
-    message_ = std::string("IDASolve: ") + (name != nullptr ? name : "unknown flag");
+    if (projection_) task_.message = projection_->message();
+    if (!task_.message.empty()) return;
+    char* const name = IDAGetReturnFlagName(task_.flag);
+    task_.message = std::string("IDASolve: ") + (name != nullptr ? name : "unknown flag");
     std::free(name);
   }
 
@@ -367,20 +367,28 @@ class ReverseIda::Implementation {
   std::unique_ptr<void, FreeIda> mem_;
   std::optional<tp::Projection> projection_;
 
-  // The open request.
-  Request request_ = Request::reached;
-  double t_ = 0.0, asked_t_ = 0.0, cj_ = 0.0;
-  const double *at_y_ = nullptr, *at_yp_ = nullptr, *rhs_ = nullptr;
-  double* result_ = nullptr;
-  std::size_t result_size_ = 0;
-  int answer_ = 0;
+  // What the caller is asked, where, and what he answers; or that nothing is open.
+  struct Question {
+    Request request = Request::reached;
+    double t = 0.0, cj = 0.0;
+    const double *y = nullptr, *yp = nullptr, *rhs = nullptr;
+    double* result = nullptr;
+    std::size_t result_size = 0;
+    int answer = 0;
+  };
+  // The command that runs in the fiber, and its outcome.
+  struct Task {
+    std::function<void()> command;
+    int flag = 0;
+    std::string message;
+    std::exception_ptr thrown;
+    bool waiting = false;  // it is done
+  };
 
-  // The command that runs, and its outcome.
-  std::function<void()> command_;
-  int flag_ = 0;
-  std::string message_;
-  std::exception_ptr thrown_;
-  bool waiting_ = false, abandoned_ = false, started_ = false;
+  double t_ = 0.0;
+  Question asked_;
+  Task task_;
+  bool abandoned_ = false, started_ = false;
   Fiber fiber_;  // destroyed first
 };
 

@@ -63,14 +63,11 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
   }
   evaluator.sensitive(t, y0.data(), n_, WT.data(), [this](int i, int j) { notice(i, j); });
 
-  held_.assign(n, 0);
-  for (std::size_t j = 0; j < hold.size(); ++j) held_[j] = hold[j] ? 1 : 0;
-  id_.assign(id, id != nullptr ? id + n : id);
-  without_.assign(static_cast<std::size_t>(m_), 0);
+  kinds_.begin(n_, m_, hold, id);
   for (int i = 0; i < m_; ++i) {
     bool held = false, free = false;
     for (int j = 0; j < n_; ++j)
-      if (fills(i, j)) (held_[static_cast<std::size_t>(j)] ? held : free) = true;
+      if (fills(i, j)) (kinds_.held[static_cast<std::size_t>(j)] ? held : free) = true;
     if (!held || free) continue;
     message = constraints_.name(i) + " depends on no component that is free to move";
     return Status::inconsistent;
@@ -87,15 +84,15 @@ void RowBlocks::rearrange() {
   for (int i = 0; i < m_; ++i) {
     bool empty = true;
     for (int j = 0; j < n_; ++j) {
-      if (!fills(i, j) || held_[static_cast<std::size_t>(j)]) continue;
+      if (!fills(i, j) || kinds_.held[static_cast<std::size_t>(j)]) continue;
       empty = false;
       used[static_cast<std::size_t>(j)] = 1;
-      if (is_algebraic(j) && !without_[static_cast<std::size_t>(i)])
+      if (kinds_.algebraic(j) && !kinds_.without[static_cast<std::size_t>(i)])
         row_is_algebraic[static_cast<std::size_t>(i)] = 1;
     }
     // A row that vanishes here may come to hang on any of them.
     for (int j = 0; empty && j < n_; ++j)
-      if (!held_[static_cast<std::size_t>(j)] && !is_algebraic(j))
+      if (!kinds_.held[static_cast<std::size_t>(j)] && !kinds_.algebraic(j))
         used[static_cast<std::size_t>(j)] = 1;
   }
   for (Block* block : {&d, &a}) {
@@ -105,7 +102,7 @@ void RowBlocks::rearrange() {
   for (int i = 0; i < m_; ++i)
     (row_is_algebraic[static_cast<std::size_t>(i)] ? a : d).rows.push_back(i);
   for (int j = 0; j < n_; ++j)
-    if (used[static_cast<std::size_t>(j)]) (is_algebraic(j) ? a : d).columns.push_back(j);
+    if (used[static_cast<std::size_t>(j)]) (kinds_.algebraic(j) ? a : d).columns.push_back(j);
   // More rows than algebraic columns to satisfy them with: all rows over all columns together.
   if (a.rows.size() > a.columns.size()) {
     for (int i : a.rows) d.rows.push_back(i);
@@ -134,45 +131,36 @@ void RowBlocks::watch() {
   for (int j : columns_) used[static_cast<std::size_t>(j)] = 1;
   const auto row_watches = [this](int i, const auto& wanted) {
     for (int j = 0; j < n_; ++j)
-      if (!held_[static_cast<std::size_t>(j)] && !fills(i, j) && wanted(j))
+      if (!kinds_.held[static_cast<std::size_t>(j)] && !fills(i, j) && wanted(j))
         watched_.push_back(static_cast<std::size_t>(i) * static_cast<std::size_t>(n_) +
                            static_cast<std::size_t>(j));
   };
   const bool split = !a.rows.empty() || std::none_of(d.columns.begin(), d.columns.end(),
-                                                     [this](int j) { return is_algebraic(j); });
+                                                     [this](int j) { return kinds_.algebraic(j); });
   for (int i : d.rows)
-    row_watches(
-        i, [&](int j) { return !used[static_cast<std::size_t>(j)] || (split && is_algebraic(j)); });
+    row_watches(i, [&](int j) {
+      return !used[static_cast<std::size_t>(j)] || (split && kinds_.algebraic(j));
+    });
   for (int i : a.rows) row_watches(i, [&](int j) { return !used[static_cast<std::size_t>(j)]; });
-  mixed_.clear();
+  kinds_.mixed.clear();
   for (int i = 0; split && i < m_; ++i)
     for (int j : columns_)
-      if (fills(i, j) && is_algebraic(j)) {
-        mixed_.push_back(i);
+      if (fills(i, j) && kinds_.algebraic(j)) {
+        kinds_.mixed.push_back(i);
         break;
       }
-}
-
-bool RowBlocks::loses_algebraic_part(int i, const double* WT) const {
-  double part[2] = {0.0, 0.0};  // algebraic, differential
-  for (int j : columns_) {
-    const double entry = row(i)[j] * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
-    part[is_algebraic(j) ? 0 : 1] += entry * entry;
-  }
-  return ida_projection::loses_algebraic_part(part[0], part[1],
-                                              without_[static_cast<std::size_t>(i)] != 0);
 }
 
 Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
                            double* g) {
   const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_.data(), g);
   if (status != Status::success || !structured_) return status;
-  for (int i : mixed_) {
-    char& without = without_[static_cast<std::size_t>(i)];
-    const char now = loses_algebraic_part(i, WT) ? 1 : 0;
-    outgrown_ |= now != without;
-    without = now;
-  }
+  outgrown_ |= kinds_.changed([&](int i, double* squares) {
+    for (int j : columns_) {
+      const double entry = row(i)[j] * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
+      squares[kinds_.algebraic(j) ? 0 : 1] += entry * entry;
+    }
+  });
   if (watched_.empty()) return status;
   const bool look = evaluator.uses_differences() && look_.due();
   if (look) look_beyond(evaluator, t, y, WT);

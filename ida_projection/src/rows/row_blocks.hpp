@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "constraints/evaluator.hpp"
+#include "rows/kinds_of_unknowns.hpp"
 #include "rows/row_trust.hpp"
 
 namespace tether::ida_projection {
@@ -124,15 +125,6 @@ double left_of_dropped(const BlockOf<Solver>& block) {
   return largest;
 }
 
-/// Is a row one for the differential variables although it contains algebraic ones? Where their
-/// part (in tolerances, squared) is nothing beside the rest, solving for them would divide by
-/// nothing; what it leaves is then as small. `already`: it was so before.
-inline bool loses_algebraic_part(double algebraic, double differential, bool already) {
-  constexpr double kLost = 1e-3, kBack = 1e-2;
-  const double share = already ? kBack : kLost;
-  return algebraic <= share * share * differential;
-}
-
 /// When to look again which entries of C differences have to visit, that is, which ones g can fill
 /// by now: at the C evaluations number 16, 32, 64, ..., and with the next one after a failure.
 class LookAgain {
@@ -180,7 +172,7 @@ class RowBlocks {
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
   /// Do rows contain variables of both kinds?
-  bool mixed() const { return !mixed_.empty(); }
+  bool mixed() const { return !kinds_.mixed.empty(); }
 
   /// C at y; WT: only differences and mixed rows need it. The text of a failure is the evaluator's.
   /// g: null, or receives the values, too.
@@ -229,7 +221,6 @@ class RowBlocks {
  private:
   double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   const double* row(int i) const { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
-  bool is_algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
   bool fills(int i, int j) const {
     return filled_[static_cast<std::size_t>(i) * static_cast<std::size_t>(n_) +
                    static_cast<std::size_t>(j)] != 0;
@@ -240,22 +231,16 @@ class RowBlocks {
   }
   void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
   void watch();
-  bool loses_algebraic_part(int i, const double* WT) const;
 
   const Constraints& constraints_;
   int m_, n_;
   double rank_tolerance_;
-  std::vector<double> C_;             // m x n, row-major
-  std::vector<double> C_after_;       // work space of learn_trust()
-  std::vector<int> columns_;          // every column that C can fill and that is free
-  std::vector<char> filled_;          // m x n: entries seen not to be zero, or not constant
-  std::vector<char> held_;            // of each column
-  std::vector<double> id_;            // empty: none algebraic
+  std::vector<double> C_;        // m x n, row-major
+  std::vector<double> C_after_;  // work space of learn_trust()
+  std::vector<int> columns_;     // every column that C can fill and that is free
+  std::vector<char> filled_;     // m x n: entries seen not to be zero, or not constant
+  KindsOfUnknowns kinds_;
   std::vector<std::size_t> watched_;  // entries of C that would change the blocks, zero so far
-  // Rows whose algebraic part can be filled: of these the ones where it is next to nothing at
-  // present.
-  std::vector<int> mixed_;
-  std::vector<char> without_;  // of each row
   LookAgain look_;
   bool outgrown_ = false;
   bool structured_ = false;

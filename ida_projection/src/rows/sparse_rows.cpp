@@ -17,36 +17,30 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-SparseRows::SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n)
-    : constraints_(constraints), m_(evaluator.rows()), n_(n) {
+StoredRows::StoredRows(const Evaluator& evaluator, int n) : n_(n) {
+  int full = 0;
   for (const Evaluator::Part& part : evaluator.parts()) {
     const SparseJacobian* sparse = part.sparse();
-    const int first = static_cast<int>(columns_of_.size());
+    const int first = static_cast<int>(columns.size());
     for (int i = 0; i < part.set->count; ++i)
-      rows_.push_back(sparse != nullptr ? Row{first + sparse->starts[at(i)],
-                                              first + sparse->starts[at(i) + 1], -1}
-                                        : Row{0, 0, full_++});
+      rows.push_back(sparse != nullptr
+                         ? Row{first + sparse->starts[at(i)], first + sparse->starts[at(i) + 1], -1}
+                         : Row{0, 0, full++});
     if (sparse != nullptr)
-      columns_of_.insert(columns_of_.end(), sparse->columns.begin(), sparse->columns.end());
+      columns.insert(columns.end(), sparse->columns.begin(), sparse->columns.end());
   }
-  entries_.assign(columns_of_.size(), 0.0);
-  full_rows_.assign(at(full_) * at(n_), 0.0);
+  entries.assign(columns.size(), 0.0);
+  full_entries.assign(place(full, 0), 0.0);
 }
 
-template <class Visit>
-void SparseRows::visit(int i, Visit f) const {
-  const Row& row = rows_[at(i)];
-  for (int e = row.begin; e < row.end; ++e) f(columns_of_[at(e)], entries_[at(e)]);
-  if (row.full < 0) return;
-  const double* full = full_rows_.data() + at(row.full) * at(n_);
-  for (int j = 0; j < n_; ++j) f(j, full[j]);
-}
+SparseRows::SparseRows(const Constraints& constraints, const Evaluator& evaluator, int n)
+    : constraints_(constraints), m_(evaluator.rows()), n_(n), C_(evaluator, n) {}
 
 // Entries not zero at y or at a point some tolerances away.
 Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y0,
                                      const std::vector<double>& WT) {
-  full_fills_.assign(full_rows_.size(), 0);
-  entry_fills_.assign(entries_.size(), 0);
+  C_.full_fills.assign(C_.full_entries.size(), 0);
+  C_.entry_fills.assign(C_.entries.size(), 0);
   columns_.resize(at(n_));
   for (int j = 0; j < n_; ++j) columns_[at(j)] = j;
   std::vector<double> y = y0;
@@ -54,8 +48,8 @@ Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::
     if (pass == 1) y = some_tolerances_away(std::move(y), WT);
     Status status = evaluate(evaluator, t, y.data(), WT.data());
     const bool evaluated = status == Status::success;
-    if (evaluated && !(all_finite(entries_.data(), entries_.size()) &&
-                       all_finite(full_rows_.data(), full_rows_.size())))
+    if (evaluated && !(all_finite(C_.entries.data(), C_.entries.size()) &&
+                       all_finite(C_.full_entries.data(), C_.full_entries.size())))
       status = Status::not_finite;
     if (status != Status::success && pass == 0) {
       message = evaluated ? "the constraint Jacobian C has an entry that is not finite"
@@ -63,21 +57,17 @@ Status SparseRows::find_full_columns(Evaluator& evaluator, double t, const std::
       return status;
     }
     if (status != Status::success) continue;
-    for (std::size_t e = 0; e < full_fills_.size(); ++e) full_fills_[e] |= full_rows_[e] != 0.0;
-    for (std::size_t e = 0; e < entry_fills_.size(); ++e) entry_fills_[e] |= entries_[e] != 0.0;
+    for (std::size_t e = 0; e < C_.full_fills.size(); ++e)
+      C_.full_fills[e] |= C_.full_entries[e] != 0.0;
+    for (std::size_t e = 0; e < C_.entry_fills.size(); ++e)
+      C_.entry_fills[e] |= C_.entries[e] != 0.0;
   }
   if (evaluator.uses_differences()) look_beyond(evaluator, t, y0.data(), WT.data());
   return Status::success;
 }
 
 void SparseRows::look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT) {
-  evaluator.sensitive(t, y, n_, WT, [this](int i, int j) {
-    full_fills_[at(rows_[at(i)].full) * at(n_) + at(j)] = 1;
-  });
-}
-
-bool SparseRows::fills(const Row& row, int j) const {
-  return row.full < 0 || full_fills_[at(row.full) * at(n_) + at(j)] != 0;
+  evaluator.sensitive(t, y, n_, WT, [this](int i, int j) { C_.notice(i, j); });
 }
 
 Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<double>& y,
@@ -87,16 +77,13 @@ Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<d
   outgrown_ = false;
   const Status status = find_full_columns(evaluator, t, y, WT);
   if (status != Status::success) return status;
-  held_.assign(at(n_), 0);
-  for (std::size_t j = 0; j < hold.size(); ++j) held_[j] = hold[j] ? 1 : 0;
-  id_.assign(id, id != nullptr ? id + n_ : id);
-  without_.assign(at(m_), 0);
+  kinds_.begin(n_, m_, hold, id);
   for (int i = 0; i < m_; ++i) {
     bool held = false, free = false;
-    visit(i, [&](int j, double) {
-      if (fills(rows_[at(i)], j)) (held_[at(j)] ? held : free) = true;
+    C_.visit(i, [&](int j, double) {
+      if (C_.fills(C_.rows[at(i)], j)) (kinds_.held[at(j)] ? held : free) = true;
     });
-    if (free || (!held && rows_[at(i)].full >= 0)) continue;
+    if (free || (!held && C_.rows[at(i)].full >= 0)) continue;
     message = constraints_.name(i) + " depends on no component that is free to move";
     return Status::inconsistent;
   }
@@ -120,17 +107,18 @@ void SparseRows::split() {
   std::vector<char> used(at(n_), 0), algebraic_row(at(m_), 0);
   // An entry of the pattern that is zero wherever it was looked at makes no row algebraic.
   for (int i = 0; i < m_; ++i) {
-    int entry = rows_[at(i)].begin;
-    bool empty = rows_[at(i)].full >= 0;
-    visit(i, [&](int j, double) {
-      const bool is_zero = rows_[at(i)].full < 0 && entry_fills_[at(entry++)] == 0;
-      if (!fills(rows_[at(i)], j) || held_[at(j)]) return;
+    int entry = C_.rows[at(i)].begin;
+    bool empty = C_.rows[at(i)].full >= 0;
+    C_.visit(i, [&](int j, double) {
+      const bool is_zero = C_.rows[at(i)].full < 0 && C_.entry_fills[at(entry++)] == 0;
+      if (!C_.fills(C_.rows[at(i)], j) || kinds_.held[at(j)]) return;
       empty = false;
-      used[at(j)] |= !(is_algebraic(j) && is_zero);
-      algebraic_row[at(i)] |= is_algebraic(j) && !is_zero && !without_[at(i)];
+      used[at(j)] |= !(kinds_.algebraic(j) && is_zero);
+      algebraic_row[at(i)] |= kinds_.algebraic(j) && !is_zero && !kinds_.without[at(i)];
     });
     // A row that vanishes here may come to hang on any of them.
-    for (int j = 0; empty && j < n_; ++j) used[at(j)] |= !held_[at(j)] && !is_algebraic(j);
+    for (int j = 0; empty && j < n_; ++j)
+      used[at(j)] |= !kinds_.held[at(j)] && !kinds_.algebraic(j);
   }
   for (Block* block : {&d, &a}) {
     block->rows.clear();
@@ -138,16 +126,16 @@ void SparseRows::split() {
   }
   for (const bool full : {false, true})
     for (int i = 0; i < m_; ++i)
-      if ((rows_[at(i)].full >= 0) == full) (algebraic_row[at(i)] ? a : d).rows.push_back(i);
+      if ((C_.rows[at(i)].full >= 0) == full) (algebraic_row[at(i)] ? a : d).rows.push_back(i);
   for (int j = 0; j < n_; ++j)
-    if (used[at(j)]) (is_algebraic(j) ? a : d).columns.push_back(j);
+    if (used[at(j)]) (kinds_.algebraic(j) ? a : d).columns.push_back(j);
   if (a.rows.size() <= a.columns.size()) return;
   // More rows than algebraic columns to satisfy them with: all rows over all columns together.
   d.rows.insert(d.rows.end(), a.rows.begin(), a.rows.end());
   d.columns.insert(d.columns.end(), a.columns.begin(), a.columns.end());
   std::sort(d.columns.begin(), d.columns.end());
   std::stable_sort(d.rows.begin(), d.rows.end(), [this](int i, int j) {
-    return (rows_[at(i)].full >= 0) < (rows_[at(j)].full >= 0);
+    return (C_.rows[at(i)].full >= 0) < (C_.rows[at(j)].full >= 0);
   });
   a.rows.clear();
   a.columns.clear();
@@ -161,38 +149,29 @@ void SparseRows::watch() {
   std::vector<char> used(at(n_), 0), whole(at(m_), 0);
   for (int j : columns_) used[at(j)] = 1;
   const bool split = !a.rows.empty() || std::none_of(d.columns.begin(), d.columns.end(),
-                                                     [this](int j) { return is_algebraic(j); });
+                                                     [this](int j) { return kinds_.algebraic(j); });
   for (int i : d.rows) whole[at(i)] = split;
   for (int i = 0; i < m_; ++i) {
-    const Row& row = rows_[at(i)];
+    const StoredRows::Row& row = C_.rows[at(i)];
     const auto matters = [&](int j) {
-      return !held_[at(j)] && (!used[at(j)] || (whole[at(i)] != 0 && is_algebraic(j)));
+      return !kinds_.held[at(j)] && (!used[at(j)] || (whole[at(i)] != 0 && kinds_.algebraic(j)));
     };
     for (int e = row.begin; e < row.end; ++e)
-      if (!entry_fills_[at(e)] && matters(columns_of_[at(e)])) watched_entries_.push_back(at(e));
+      if (!C_.entry_fills[at(e)] && matters(C_.columns[at(e)])) watched_entries_.push_back(at(e));
     for (int j = 0; row.full >= 0 && j < n_; ++j)
-      if (!fills(row, j) && matters(j)) watched_full_.push_back(at(row.full) * at(n_) + at(j));
+      if (!C_.fills(row, j) && matters(j)) watched_full_.push_back(C_.place(row.full, j));
   }
-  mixed_.clear();
-  for (int i = 0; split && !id_.empty() && i < m_; ++i) {
+  kinds_.mixed.clear();
+  for (int i = 0; split && kinds_.any_algebraic() && i < m_; ++i) {
     bool mixed = false;
-    int entry = rows_[at(i)].begin;
-    visit(i, [&](int j, double) {
-      const bool seen = rows_[at(i)].full >= 0 || entry_fills_[at(entry++)] != 0;
-      mixed = mixed || (seen && fills(rows_[at(i)], j) && is_algebraic(j) && !held_[at(j)]);
+    int entry = C_.rows[at(i)].begin;
+    C_.visit(i, [&](int j, double) {
+      const bool seen = C_.rows[at(i)].full >= 0 || C_.entry_fills[at(entry++)] != 0;
+      mixed = mixed ||
+              (seen && C_.fills(C_.rows[at(i)], j) && kinds_.algebraic(j) && !kinds_.held[at(j)]);
     });
-    if (mixed) mixed_.push_back(i);
+    if (mixed) kinds_.mixed.push_back(i);
   }
-}
-
-bool SparseRows::loses_algebraic_part(int i, const double* WT) const {
-  double part[2] = {0.0, 0.0};  // algebraic, differential
-  visit(i, [&](int j, double c) {
-    if (held_[at(j)]) return;
-    const double entry = c * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
-    part[is_algebraic(j) ? 0 : 1] += entry * entry;
-  });
-  return ida_projection::loses_algebraic_part(part[0], part[1], without_[at(i)] != 0);
 }
 
 void SparseRows::set_up(Block& block, std::vector<int>* gather) {
@@ -202,14 +181,14 @@ void SparseRows::set_up(Block& block, std::vector<int>* gather) {
   gather->clear();
   int full = 0;
   for (const int i : block.rows) {
-    const Row& row = rows_[at(i)];
+    const StoredRows::Row& row = C_.rows[at(i)];
     if (row.full >= 0) {
       ++full;
       continue;
     }
     for (int e = row.begin; e < row.end; ++e)
-      if (local[at(columns_of_[at(e)])] >= 0) {
-        columns.push_back(local[at(columns_of_[at(e)])]);
+      if (local[at(C_.columns[at(e)])] >= 0) {
+        columns.push_back(local[at(C_.columns[at(e)])]);
         gather->push_back(e);
       }
     starts.push_back(static_cast<int>(columns.size()));
@@ -222,32 +201,34 @@ void SparseRows::set_up(Block& block, std::vector<int>* gather) {
 Status SparseRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
                             double* g) {
   const Status status =
-      evaluator.entries(t, y, n_, WT, columns_, entries_.data(), full_rows_.data(), g);
+      evaluator.entries(t, y, n_, WT, columns_, C_.entries.data(), C_.full_entries.data(), g);
   if (status != Status::success || !structured_) return status;
-  for (int i : mixed_) {
-    const char now = loses_algebraic_part(i, WT) ? 1 : 0;
-    outgrown_ |= now != without_[at(i)];
-    without_[at(i)] = now;
-  }
+  outgrown_ |= kinds_.changed([&](int i, double* squares) {
+    C_.visit(i, [&](int j, double c) {
+      if (kinds_.held[at(j)]) return;
+      const double entry = c * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
+      squares[kinds_.algebraic(j) ? 0 : 1] += entry * entry;
+    });
+  });
   if (!watched_full_.empty() && evaluator.uses_differences() && look_.due())
     look_beyond(evaluator, t, y, WT);
   for (const std::size_t e : watched_entries_) {
-    if (entries_[e] != 0.0) entry_fills_[e] = 1;
-    outgrown_ |= entry_fills_[e] != 0;
+    if (C_.entries[e] != 0.0) C_.entry_fills[e] = 1;
+    outgrown_ |= C_.entry_fills[e] != 0;
   }
   for (const std::size_t e : watched_full_) {
-    if (full_rows_[e] != 0.0) full_fills_[e] = 1;
-    outgrown_ |= full_fills_[e] != 0;
+    if (C_.full_entries[e] != 0.0) C_.full_fills[e] = 1;
+    outgrown_ |= C_.full_fills[e] != 0;
   }
   return status;
 }
 
 void SparseRows::load(Block& block, const std::vector<int>& gather) {
   double* to = block.solver.entries();
-  for (std::size_t k = 0; k < gather.size(); ++k) to[k] = entries_[at(gather[k])];
+  for (std::size_t k = 0; k < gather.size(); ++k) to[k] = C_.entries[at(gather[k])];
   const int sparse = block.solver.sparse_rows();
   for (int k = sparse; k < block.solver.rows(); ++k) {
-    const double* from = full_rows_.data() + at(rows_[at(block.rows[at(k)])].full) * at(n_);
+    const double* from = C_.full_row(C_.rows[at(block.rows[at(k)])].full);
     double* row = block.solver.full_row(k - sparse);
     block.for_columns([=](int c, int j) { row[c] = from[j]; });
   }
@@ -275,20 +256,20 @@ void SparseRows::solve(const std::vector<double>& g) {
 
 double SparseRows::terms(int i, const double* y) const {
   double sum = 0.0;
-  visit(i, [&](int j, double c) { sum += std::abs(c * y[j]); });
+  C_.visit(i, [&](int j, double c) { sum += std::abs(c * y[j]); });
   return sum;
 }
 
 double SparseRows::times(int i, const double* y) const {
   double sum = 0.0;
-  visit(i, [&](int j, double c) { sum += c * y[j]; });
+  C_.visit(i, [&](int j, double c) { sum += c * y[j]; });
   return sum;
 }
 
 // |row_i(C WT)| over the block's columns.
 double SparseRows::in_tolerances(const Block& block, int i, const std::vector<double>& WT) const {
   double sum = 0.0;
-  visit(i, [&](int j, double c) {
+  C_.visit(i, [&](int j, double c) {
     if (std::binary_search(block.columns.begin(), block.columns.end(), j))
       sum += c * WT[at(j)] * (c * WT[at(j)]);
   });

@@ -9,6 +9,45 @@
 
 namespace tether::ida_projection {
 
+/// C with rows that keep a sparse pattern and rows of n entries.
+struct StoredRows {
+  /// Where row i of C is: entries begin .. end - 1, or full row `full` >= 0.
+  struct Row {
+    int begin = 0, end = 0, full = -1;
+  };
+
+  StoredRows(const Evaluator& evaluator, int n);
+
+  /// f(column, entry) for the entries of row i.
+  template <class Visit>
+  void visit(int i, Visit f) const {
+    const Row& row = rows[static_cast<std::size_t>(i)];
+    for (int e = row.begin; e < row.end; ++e)
+      f(columns[static_cast<std::size_t>(e)], entries[static_cast<std::size_t>(e)]);
+    if (row.full < 0) return;
+    const double* from = full_row(row.full);
+    for (int j = 0; j < n_; ++j) f(j, from[j]);
+  }
+  /// Can column j of the row differ from zero, as far as seen?
+  bool fills(const Row& row, int j) const {
+    return row.full < 0 || full_fills[place(row.full, j)] != 0;
+  }
+  void notice(int i, int j) { full_fills[place(rows[static_cast<std::size_t>(i)].full, j)] = 1; }
+  std::size_t place(int full, int j) const {
+    return static_cast<std::size_t>(full) * static_cast<std::size_t>(n_) +
+           static_cast<std::size_t>(j);
+  }
+  const double* full_row(int full) const { return full_entries.data() + place(full, 0); }
+
+  std::vector<Row> rows;
+  std::vector<int> columns;                   ///< of every sparse entry
+  std::vector<double> entries, full_entries;  ///< C
+  std::vector<char> entry_fills, full_fills;  ///< which of these can differ from zero
+
+ private:
+  int n_;
+};
+
 /// The two stages of RowBlocks with sparse factors. Rows with a SparseJacobian keep their pattern;
 /// all others are full rows. A block's rows are the sparse ones first. Members as in RowBlocks.
 class SparseRows {
@@ -28,7 +67,7 @@ class SparseRows {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
-  bool mixed() const { return !mixed_.empty(); }
+  bool mixed() const { return !kinds_.mixed.empty(); }
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
                   double* g = nullptr);
   bool outgrown() const { return outgrown_; }
@@ -49,52 +88,31 @@ class SparseRows {
   /// f(column, entry) for the entries of row i.
   template <class Visit>
   void visit_row(int i, Visit f) const {
-    const Row& row = rows_[static_cast<std::size_t>(i)];
-    for (int e = row.begin; e < row.end; ++e)
-      f(columns_of_[static_cast<std::size_t>(e)], entries_[static_cast<std::size_t>(e)]);
-    for (int j = 0; row.full >= 0 && j < n_; ++j)
-      f(j, full_rows_[static_cast<std::size_t>(row.full) * static_cast<std::size_t>(n_) +
-                      static_cast<std::size_t>(j)]);
+    C_.visit(i, f);
   }
 
   Contradiction contradiction;
   std::string message;
 
  private:
-  /// Where row i of C is: entries begin .. end - 1, or full row `full` >= 0.
-  struct Row {
-    int begin = 0, end = 0, full = -1;
-  };
-  template <class Visit>
-  void visit(int i, Visit f) const;  // f(column, entry) of row i
   double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   Status find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y,
                            const std::vector<double>& WT);
-  bool fills(const Row& row, int j) const;
   void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
   void split();
   void watch();
-  bool loses_algebraic_part(int i, const double* WT) const;
-  bool is_algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
   void set_up(Block& block, std::vector<int>* gather);
   void load(Block& block, const std::vector<int>& gather);
 
   const Constraints& constraints_;
-  int m_, n_, full_ = 0;
-  std::vector<Row> rows_;
-  std::vector<int> columns_of_;              // of every sparse entry
-  std::vector<double> entries_, full_rows_;  // C
-  std::vector<char> full_fills_;             // which entries of the full rows can differ from zero
-  std::vector<char> entry_fills_;            // the same for the sparse entries, as far as seen
-  std::vector<int> columns_;                 // every column that differences must visit
-  std::vector<int> gather_d_, gather_a_;     // entry of C of each entry of a block
-  std::vector<double> moved_;                // d.dy at its columns, 0 elsewhere; where B exists
-  std::vector<char> held_;                   // of each column
-  std::vector<double> id_;                   // empty: none algebraic
+  int m_, n_;
+  StoredRows C_;
+  std::vector<int> columns_;              // every column that differences must visit
+  std::vector<int> gather_d_, gather_a_;  // entry of C of each entry of a block
+  std::vector<double> moved_;             // d.dy at its columns, 0 elsewhere; where B exists
+  KindsOfUnknowns kinds_;
   // Entries, zero so far, that would change the blocks: of the sparse rows and of the full ones.
   std::vector<std::size_t> watched_entries_, watched_full_;
-  std::vector<int> mixed_;     // as in RowBlocks
-  std::vector<char> without_;  // of each row
   LookAgain look_;
   bool outgrown_ = false;
   bool structured_ = false;

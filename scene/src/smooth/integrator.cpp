@@ -3,24 +3,14 @@
 #include "integrator.hpp"
 
 #include <nvector/nvector_serial.h>
-#include <sunlinsol/sunlinsol_dense.h>
-#include <sunmatrix/sunmatrix_dense.h>
-#ifdef TETHER_SCENE_KLU
-#include <sunlinsol/sunlinsol_klu.h>
-#include <sunmatrix/sunmatrix_sparse.h>
-#endif
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
 namespace tether::scene::smooth {
 
 namespace {
-
-// Unknowns from which KLU is faster than the dense solver.
-constexpr int kSparseFrom = 80;
 
 // IDA bounds the error of each step; a run's error grows with the number of steps, which is about
 // tolerance^(-1/6). With this, and a tenth of the wanted error at 1e-4, slider-crank and four-bar
@@ -56,17 +46,26 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-#ifdef TETHER_SCENE_KLU
-// SUNDIALS calls KLU's singular matrix unrecoverable, and its next setups want the factors that
-// were not made. A predictor may meet a dead point exactly; another step passes by.
-int factor_or_try_smaller_step(SUNLinearSolver solver, SUNMatrix matrix) {
-  if (SUNLinSolSetup_KLU(solver, matrix) == 0) return 0;
-  SUNLinSol_KLUReInit(solver, matrix, 0, SUNKLU_REINIT_PARTIAL);
-  return 1;
-}
-#endif
-
 }  // namespace
+
+Integrator::Vectors::Vectors(const System& system, const Eigen::VectorXd& start,
+                             const Eigen::VectorXd& rate, double tolerance, SUNContext context) {
+  const int N = system.size();
+  y = ida_projection::fast_vector(N_VNew_Serial(N, context));
+  yp = N_VClone(y);
+  id = N_VClone(y);
+  atol = N_VClone(y);
+  for (int i = 0; i < N; ++i) {
+    N_VGetArrayPointer(y)[i] = start[i];
+    N_VGetArrayPointer(yp)[i] = rate[i];
+    N_VGetArrayPointer(id)[i] = system.id(i);
+    N_VGetArrayPointer(atol)[i] = system.absolute_tolerance(i, tolerance);
+  }
+}
+
+Integrator::Vectors::~Vectors() {
+  for (N_Vector v : {y, yp, id, atol}) N_VDestroy(v);
+}
 
 Integrator::Integrator(System& system, const SmoothOptions& options, double t,
                        const Eigen::VectorXd& y, const Eigen::VectorXd& yp)
@@ -74,31 +73,21 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
       options_(options),
       t_(t),
       tolerance_(local_tolerance(options)),
-      watch_(system.effect_names().size()) {
-  const int N = system.size();
-  y_ = ida_projection::fast_vector(N_VNew_Serial(N, context_));
-  yp_ = N_VClone(y_);
-  id_ = N_VClone(y_);
-  atol_ = N_VClone(y_);
-  for (int i = 0; i < N; ++i) {
-    N_VGetArrayPointer(y_)[i] = y[i];
-    N_VGetArrayPointer(yp_)[i] = yp[i];
-    N_VGetArrayPointer(id_)[i] = system.id(i);
-    N_VGetArrayPointer(atol_)[i] = system.absolute_tolerance(i, tolerance_);
-  }
+      vectors_(system, y, yp, tolerance_, context_),
+      spent_(system.effect_names().size()) {
   ida_ = IDACreate(context_);
   context_.keep_messages_of(ida_);
-  IDAInit(ida_, residual, t, y_, yp_);
+  IDAInit(ida_, residual, t, vectors_.y, vectors_.yp);
   IDASetUserData(ida_, this);
   system.choose_rows(t, y.data(), tolerance_);
   IDAWFtolerances(ida_, weights);
   IDASetMaxNumSteps(ida_, -1);  // counted in step_past
   if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
   IDASetInitStep(ida_, first_step(t, y, yp));
-  prepare_matrix();
-  IDASetLinearSolver(ida_, solver_, matrix_);
+  matrix_.emplace(system, t, vectors_.y, vectors_.yp, context_);
+  IDASetLinearSolver(ida_, matrix_->solver(), matrix_->matrix());
   IDASetJacFn(ida_, jacobian);
-  IDASetId(ida_, id_);
+  IDASetId(ida_, vectors_.id);
   // Multipliers are derived quantities in every form: IDA judges the motion.
   IDASetSuppressAlg(ida_, 1);
   const bool index2 = options.formulation == Formulation::stabilised_index2;
@@ -106,7 +95,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
                        index2 ? std::max(kNewtonIndex2, kNewtonRounding / tolerance_) : kNewton);
   if (options.projection) {
     ida_projection::Options projection;
-    projection.id = id_;
+    projection.id = vectors_.id;
     projection.print_fatal = false;
     projection.print_warnings = false;
     // Behind a dead point rows come back, and weights narrow, with errors of earlier steps: no
@@ -128,9 +117,6 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
 Integrator::~Integrator() {
   IDAFree(&ida_);
   projection_.reset();
-  SUNLinSolFree(solver_);
-  SUNMatDestroy(matrix_);
-  for (N_Vector v : {y_, yp_, id_, atol_}) N_VDestroy(v);
 }
 
 // IDA begins with half a tolerance / |y'|, at tight tolerances 1e-12 s. There the multipliers of
@@ -157,53 +143,13 @@ double Integrator::first_step(double t, const Eigen::VectorXd& y, const Eigen::V
   return curvature > 0 ? std::min(longest, std::sqrt(4.0 * kFirstError / curvature)) : longest;
 }
 
-void Integrator::prepare_matrix() {
-  const int N = system_.size();
-  entries_.record();
-  system_.jacobian(t_, 1.0, N_VGetArrayPointer(y_), N_VGetArrayPointer(yp_), entries_);
-  const auto& places = entries_.places;
-  std::vector<int> slots(places.size());
-#ifdef TETHER_SCENE_KLU
-  if (N >= kSparseFrom) {
-    std::vector<std::size_t> order(places.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    const auto column_first = [&](std::size_t a, std::size_t b) {
-      return std::pair(places[a].second, places[a].first) <
-             std::pair(places[b].second, places[b].first);
-    };
-    std::sort(order.begin(), order.end(), column_first);
-    column_starts_.assign(static_cast<std::size_t>(N) + 1, 0);
-    for (std::size_t k = 0; k < order.size(); ++k) {
-      const auto [row, column] = places[order[k]];
-      if (k == 0 || places[order[k - 1]] != places[order[k]]) {
-        row_indices_.push_back(row);
-        ++column_starts_[static_cast<std::size_t>(column) + 1];
-      }
-      slots[order[k]] = static_cast<int>(row_indices_.size()) - 1;
-    }
-    std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
-    matrix_ =
-        SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context_);
-    solver_ = SUNLinSol_KLU(y_, matrix_, context_);
-    solver_->ops->setup = factor_or_try_smaller_step;
-    entries_.finish(std::move(slots));
-    return;
-  }
-#endif
-  for (std::size_t k = 0; k < places.size(); ++k) slots[k] = places[k].first + N * places[k].second;
-  matrix_ = SUNDenseMatrix(N, N, context_);
-  solver_ = N <= ida_projection::kLargestFastDense ? ida_projection::fast_dense_solver(y_, matrix_)
-                                                   : SUNLinSol_Dense(y_, matrix_, context_);
-  entries_.finish(std::move(slots));
-}
-
 int Integrator::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
   Integrator& me = *static_cast<Integrator*>(self);
   // Reading clocks costs as much as a small effect, so few evaluations are timed.
-  const bool timed = (me.residuals_++ & 31) == 0;
-  me.timed_ += timed;
+  const bool timed = (me.spent_.residuals++ & 31) == 0;
+  me.spent_.timed += timed;
   me.system_.residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), N_VGetArrayPointer(r),
-                      timed ? &me.watch_ : nullptr);
+                      timed ? &me.spent_.effects : nullptr);
   const double* out = N_VGetArrayPointer(r);
   double sum = 0;
   for (int i = 0; i < me.system_.size(); ++i) sum += out[i];
@@ -219,7 +165,7 @@ int Integrator::weights(N_Vector y, N_Vector weights, void* self) {
   const double smallest = index2 ? kSmallestPivotIndex2 : kSmallestPivot;
   const double pivot = std::max(me.system_.weakest_pivot(), smallest);
   const double widen = std::max(1.0, kNoise / (pivot * pivot * me.tolerance_));
-  const double *values = N_VGetArrayPointer(y), *atol = N_VGetArrayPointer(me.atol_);
+  const double *values = N_VGetArrayPointer(y), *atol = N_VGetArrayPointer(me.vectors_.atol);
   double* out = N_VGetArrayPointer(weights);
   for (int i = 0; i < me.system_.size(); ++i)
     out[i] = 1.0 / (widen * (me.tolerance_ * std::abs(values[i]) + atol[i]));
@@ -230,33 +176,15 @@ int Integrator::jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector,
                          void* self, N_Vector, N_Vector, N_Vector) {
   Integrator& me = *static_cast<Integrator*>(self);
   const double begin = now();
-  double* values = nullptr;
-#ifdef TETHER_SCENE_KLU
-  if (!me.row_indices_.empty()) {
-    std::copy(me.column_starts_.begin(), me.column_starts_.end(), SUNSparseMatrix_IndexPointers(J));
-    std::copy(me.row_indices_.begin(), me.row_indices_.end(), SUNSparseMatrix_IndexValues(J));
-    values = SUNSparseMatrix_Data(J);
-    std::fill(values, values + me.row_indices_.size(), 0.0);
-    if (me.multiplier_choices_ != me.system_.multiplier_choices()) {
-      me.multiplier_choices_ = me.system_.multiplier_choices();
-      SUNLinSol_KLUReInit(me.solver_, J, 0, SUNKLU_REINIT_PARTIAL);  // other pivots
-    }
-  }
-#endif
-  if (!values) {
-    SUNMatZero(J);
-    values = SUNDenseMatrix_Data(J);
-  }
-  me.entries_.begin(values);
-  me.system_.jacobian(t, cj, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), me.entries_);
-  me.jacobian_seconds_ += now() - begin;
+  me.matrix_->fill(t, cj, y, yp, J);
+  me.spent_.jacobian += now() - begin;
   return 0;
 }
 
 ida_projection::ConsistencyReport Integrator::make_consistent(double t) {
   ida_projection::Consistency how;
   how.derivative = ida_projection::Consistency::Derivative::keep;  // System::complete knows it
-  return projection_->make_consistent(t, y_, yp_, how);
+  return projection_->make_consistent(t, vectors_.y, vectors_.yp, how);
 }
 
 // Step by step up to t. IDA's own way to an output time takes the same steps.
@@ -268,7 +196,7 @@ int Integrator::step_past(double t, long& steps_left, const std::function<bool()
       return IDA_TOO_MUCH_WORK;
     }
     const long before = steps();
-    const int flag = IDASolve(ida_, t, &t_, y_, yp_, IDA_ONE_STEP);
+    const int flag = IDASolve(ida_, t, &t_, vectors_.y, vectors_.yp, IDA_ONE_STEP);
     if (flag < 0) return flag;
     steps_left -= steps() - before;
   }
@@ -284,9 +212,9 @@ bool Integrator::advance(double t, long& steps_left, const std::function<bool()>
   const double to = std::min(t, step_end());
   // Also where a step ended there: whoever arrives in other pieces has the same bits.
   if (flag == IDA_SUCCESS && to > from)
-    flag = projection_ ? projection_->solve(to, &t_, y_, yp_, IDA_NORMAL)
-                       : IDASolve(ida_, to, &t_, y_, yp_, IDA_NORMAL);
-  total_seconds_ += now() - begin;
+    flag = projection_ ? projection_->solve(to, &t_, vectors_.y, vectors_.yp, IDA_NORMAL)
+                       : IDASolve(ida_, to, &t_, vectors_.y, vectors_.yp, IDA_NORMAL);
+  spent_.total += now() - begin;
   if (flag < 0) throw SimulationError(failure(flag));
   return t_ >= t;
 }
@@ -338,7 +266,7 @@ std::string Integrator::failure(int flag) const {
 }
 
 Eigen::Map<const Eigen::VectorXd> Integrator::y() const {
-  return {N_VGetArrayPointer(y_), system_.size()};
+  return {N_VGetArrayPointer(vectors_.y), system_.size()};
 }
 
 Counts Integrator::counts() const {
@@ -353,13 +281,13 @@ Counts Integrator::counts() const {
 
 Integrator::Seconds Integrator::seconds() const {
   Seconds s;
-  s.effects = watch_.seconds;
-  if (timed_ > 0)
+  s.effects = spent_.effects.seconds;
+  if (spent_.timed > 0)
     for (double& each : s.effects)
-      each *= static_cast<double>(residuals_) / static_cast<double>(timed_);
-  s.jacobian = jacobian_seconds_;
+      each *= static_cast<double>(spent_.residuals) / static_cast<double>(spent_.timed);
+  s.jacobian = spent_.jacobian;
   if (projection_) s.projection = projection_->statistics().seconds;
-  s.total = total_seconds_;
+  s.total = spent_.total;
   return s;
 }
 

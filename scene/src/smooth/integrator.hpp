@@ -7,10 +7,9 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <sundials/sundials_linearsolver.h>
-#include <sundials/sundials_matrix.h>
 #include <tether/ida_projection.hpp>
 
+#include "newton_matrix.hpp"
 #include "sundials/quiet_context.hpp"
 #include "system.hpp"
 
@@ -54,27 +53,34 @@ class Integrator {
                       void* self, N_Vector, N_Vector, N_Vector);
   static int weights(N_Vector y, N_Vector weights, void* self);
   double first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const;
-  void prepare_matrix();
   int step_past(double t, long& steps_left, const std::function<bool()>& interrupted);
   std::string failure(int flag) const;
+
+  struct Vectors {
+    Vectors(const System& system, const Eigen::VectorXd& start, const Eigen::VectorXd& rate,
+            double tolerance, SUNContext context);
+    ~Vectors();
+    Vectors(const Vectors&) = delete;
+    Vectors& operator=(const Vectors&) = delete;
+    N_Vector y = nullptr, yp = nullptr, id = nullptr, atol = nullptr;
+  };
+  struct Spent {  // seconds on the clock; of the effects in `timed` of all residuals
+    explicit Spent(std::size_t parts) : effects(parts) {}
+    Stopwatch effects;
+    double jacobian = 0, total = 0;
+    long residuals = 0, timed = 0;
+  };
 
   System& system_;
   SmoothOptions options_;
   double t_;
   double tolerance_;  // of a step
   QuietContext context_;
-  N_Vector y_ = nullptr, yp_ = nullptr, id_ = nullptr, atol_ = nullptr;
-  SUNMatrix matrix_ = nullptr;
-  SUNLinearSolver solver_ = nullptr;
+  Vectors vectors_;
+  std::optional<NewtonMatrix> matrix_;
   void* ida_ = nullptr;
   std::optional<ida_projection::Projection> projection_;
-  Entries entries_;
-  std::vector<sunindextype> column_starts_, row_indices_;  // sparse: the pattern
-  int multiplier_choices_ = 0;                             // those that KLU's pivots are for
-
-  Stopwatch watch_;
-  double jacobian_seconds_ = 0, total_seconds_ = 0;  // wall clock
-  long residuals_ = 0, timed_ = 0;
+  Spent spent_;
 };
 
 }  // namespace tether::scene::smooth

@@ -1,0 +1,178 @@
+// Tether: g, C and its factors at a candidate. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "constraints/evaluator.hpp"
+#include "movers/loaded_candidate.hpp"
+#include "movers/local_metric.hpp"
+#include "rows/row_blocks.hpp"
+#include "rows/sparse_rows.hpp"
+
+namespace tether::ida_projection {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
+
+/// What the factors at hand are good for.
+struct FactorState {
+  bool there = false;    ///< of this candidate or of an earlier one
+  bool thin = false;     ///< the last factor() found rows that need RowTrust
+  bool lasting = false;  ///< which rows it has kept is right for the next steps, too
+  bool decided = false;  ///< it found that out for this candidate
+};
+
+/// A candidate and the rows there: evaluates them, factors C in the metric and solves. It decides
+/// nothing about the sequence of moves. `Rows` keeps C and its factors: RowBlocks or SparseRows.
+template <class Rows>
+class FactoredRows {
+ public:
+  /// Drift is that of the first `reported` rows (-1: of all). What failed is told in `message`.
+  FactoredRows(const Constraints& constraints, const Options& options, Statistics& statistics,
+               int size, int reported, std::string& message)
+      : evaluator(constraints, statistics),
+        blocks(constraints, evaluator, size),
+        at(size),
+        metric(options, size),
+        options_(options),
+        statistics_(statistics),
+        message_(message),
+        reported_(reported >= 0 ? reported : evaluator.rows()),
+        inverse_n_(1.0 / size) {
+    g_.assign(static_cast<std::size_t>(evaluator.rows()), 0.0);
+  }
+
+  Evaluator evaluator;
+  Rows blocks;
+  LoadedCandidate at;
+  LocalMetric metric;
+  FactorState factors;
+
+  int count() const { return static_cast<int>(g_.size()); }
+  int reported() const { return reported_; }
+  /// Of a sum of squares over some of the N columns.
+  double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
+  void set_metric(bool for_factors) {
+    if (for_factors)
+      metric.fill(at, blocks.d, blocks.a);
+    else
+      metric.look(at);
+  }
+  /// At the candidate, whose variables are algebraic where `id` is 0.
+  Status structure(const Candidate& candidate, const double* id);
+  /// g at the present y.
+  Status value(double t) {
+    rows_known_ = false;
+    const Status status = evaluator.value(t, at.y.data(), unknowns(), g_.data());
+    if (status != Status::success) message_ = evaluator.message();
+    return status;
+  }
+  /// The same where C will be wanted, too.
+  Status value_with_rows(double t);
+  /// C at the present y, and its factors.
+  Status factor(double t);
+  /// The move for g by the factors at hand; returns its WRMS length in the error norm. Algebraic
+  /// columns do not count there: they follow the others.
+  double solve();
+  /// The first solve() after factor(): decides which of the thin rows take part until the next one,
+  /// none of them if `firm_only`.
+  double first_solve(bool firm_only);
+  /// y and the correction move by -factor dy.
+  void apply(double factor, double* correction);
+  /// After the first move, of this length: by how much has C turned?
+  Status learn_trust(double t, double length);
+
+  /// After solve(): do the rows that were dropped follow from the others? Rows that an earlier step
+  /// has dropped are satisfied only while they depend on the others; where they ask for more than
+  /// they did then, one may have become independent.
+  bool dropped_follow();
+  bool contradicts();
+  double drift() const;
+  bool rounding_only() const;
+  double rounding_length();
+  void reset() {
+    factors.there = false;
+    metric.reset();
+    if constexpr (Rows::kThinRows) blocks.trust.reset();
+    usual_ = 0.0;
+  }
+
+ private:
+  using Block = typename Rows::Block;
+
+  int unknowns() const { return static_cast<int>(at.y.size()); }
+  Status rows(double t, double* g);
+  bool decide();
+  double left_of_dropped();
+
+  const Options& options_;
+  Statistics& statistics_;
+  std::string& message_;
+  int reported_;  // the others are equations of F
+  double inverse_n_;
+  std::vector<double> g_;
+  bool rows_known_ = false;  // C belongs to the present y
+  double usual_ = 0.0;       // left_of_dropped() after the moves, with factors.decided
+  bool weighed_ = false;     // the blocks know what a tolerance is for their dropped rows
+};
+
+template <class Rows>
+double FactoredRows<Rows>::solve() {
+  ++statistics_.iterations;
+  blocks.solve(g_);
+  const Block& counted = blocks.d.rows.empty() ? blocks.a : blocks.d;
+  double sum = 0.0;
+  const double* dy = counted.dy.data();
+  counted.for_columns([&sum, dy, w = at.w](int k, int i) {
+    const double move = dy[k] * w[i];
+    sum += move * move;
+  });
+  return wrms(sum);
+}
+
+// After solve(): the largest distance, in tolerances, that the dropped rows ask for beyond the
+// others.
+template <class Rows>
+double FactoredRows<Rows>::left_of_dropped() {
+  if (!blocks.dropped_rows()) return 0.0;
+  if (!weighed_) blocks.weigh_dropped(at.WT());
+  weighed_ = true;
+  const double left = blocks.left_of_dropped();
+  if (factors.decided) usual_ = left;
+  return left;
+}
+
+template <class Rows>
+bool FactoredRows<Rows>::dropped_follow() {
+  const double left = left_of_dropped();
+  if (factors.decided || left <= std::max(kSafe * options_.tolerance, 2.0 * usual_)) return true;
+  return left <= 1e2 * kEpsilon * at.size();
+}
+
+template <class Rows>
+void FactoredRows<Rows>::apply(double factor, double* correction) {
+  for (const Block* block : {&blocks.d, &blocks.a}) {
+    if (block->rows.empty()) continue;
+    double* __restrict y = at.y.data();
+    double* __restrict ycor = correction;
+    const double* __restrict dy = block->dy.data();
+    block->for_columns([=](int k, int i) {
+      const double move = factor * dy[k];
+      ycor[i] -= move;
+      y[i] -= move;
+    });
+  }
+}
+
+template <class Rows>
+double FactoredRows<Rows>::drift() const {
+  double largest = 0.0;
+  for (int i = 0; i < reported_; ++i)
+    largest = std::max(largest, std::abs(g_[static_cast<std::size_t>(i)]));
+  return largest;
+}
+
+}  // namespace tether::ida_projection

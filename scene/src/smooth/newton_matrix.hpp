@@ -1,0 +1,38 @@
+// Tether: IDA's matrix of a smooth system and its solver. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+#include <sundials/sundials_nvector.h>
+
+#include "system.hpp"
+
+namespace tether::scene::smooth {
+
+/// dF/dy + cj dF/dy' of a system: dense, or sparse with KLU where there are many unknowns.
+class NewtonMatrix {
+ public:
+  /// Its entries are those of the Jacobian at t, y and y'.
+  NewtonMatrix(System& system, double t, N_Vector y, N_Vector yp, SUNContext context);
+  ~NewtonMatrix();
+  NewtonMatrix(const NewtonMatrix&) = delete;
+  NewtonMatrix& operator=(const NewtonMatrix&) = delete;
+
+  SUNMatrix matrix() const { return matrix_; }
+  SUNLinearSolver solver() const { return solver_; }
+  /// The values at this point into J, a matrix like matrix().
+  void fill(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J);
+
+ private:
+  void make_dense(N_Vector y, SUNContext context);
+  void make_sparse(N_Vector y, SUNContext context);
+
+  System& system_;
+  SUNMatrix matrix_ = nullptr;
+  SUNLinearSolver solver_ = nullptr;
+  Entries entries_;
+  std::vector<sunindextype> column_starts_, row_indices_;  // sparse: the pattern
+  int multiplier_choices_ = 0;                             // those that KLU's pivots are for
+};
+
+}  // namespace tether::scene::smooth
