@@ -32,21 +32,38 @@ class Automatic {
   ProximalNewton newton;
   InteriorPoint interior;
 
- private:
   struct Rotation;
+  struct Turn;
+
+ private:
+  static const Turn kRotation[], kFewBodies[];
   Status rotate(Search& search, bool last);
-  bool infeasible(Search& search);
-  bool at_round_off(Search& search);
-  bool mostly_sticks(Search& search);
-  // unsolved: other stages may.
-  Status few_bodies(Search& search);
+  template <int N>
+  Status take_turns(Search& search, Rotation& r, const Turn (&turns)[N]);
   bool replace_contacts(Search& search, double eccentricity, bool only_unconverged);
+
+  // Rows of the tables, with their budgets.
+  Status sweep_while_cheap(Search& search, Rotation& r, int factorisations);
+  Status sweep_few_bodies(Search& search, Rotation& r, int factorisations);
+  Status sticking_point(Search& search, Rotation& r, int);
+  Status interior_points(Search& search, Rotation& r, int steps);
+  Status interior_points_near(Search& search, Rotation& r, int steps);
+  Status interior_points_at_best(Search& search, Rotation& r, int steps);
+  Status directions(Search& search, Rotation& r, int iterations);
+  Status proximal_newton(Search& search, Rotation& r, int problems);
+  Status proximal_path(Search& search, Rotation& r, int problems);
+  Status rescue(Search& search, Rotation& r, int problems);
+  Status round_off(Search& search, Rotation& r, int steps);
+  Status no_solution(Search& search, Rotation& r, int);
+  Status end_of_work(Search& search, Rotation& r, int);
+  Status end_of_round(Search& search, Rotation& r, int);
+  Status patience(Search& search, Rotation& r, int);
+
   bool sweep_first(Search& search, const Rotation& r);
-  bool sweep_while_cheap(Search& search, Rotation& r);
   bool sweep_and_solve_parts(Search& search, double until);
-  bool near_the_best(Search& search);
-  bool interior_points(Search& search, const Rotation& r, double before);
-  bool rescue(Search& search, Rotation& r);
+  bool mostly_sticks(Search& search);
+  bool infeasible(Search& search);
+  bool at_round_off(Search& search, int steps);
 
   Options options_;
   LocalSolves parts_;

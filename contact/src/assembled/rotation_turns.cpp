@@ -1,0 +1,156 @@
+// Tether: the turns of Method::automatic besides sweeps. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "assembled/infeasible.hpp"
+#include "assembled/rotation.hpp"
+
+namespace tether::contact::detail {
+
+// Looked for once in a solve, where the quick stages have failed.
+bool Automatic::infeasible(Search& search) {
+  if (proofs_ && !looked_for_proof_) {
+    looked_for_proof_ = true;
+    if (!proves_infeasible(search, pressed_)) pressed_.clear();
+  }
+  return !pressed_.empty();
+}
+
+// Whether what is left is what round-off makes of A x - b: its bound explains the error, and steps
+// with long sums gain nothing any more. They end within 1 to 3 units of it on stacks of 100 to 2000
+// boxes of masses 1 : 1e6 to 1 : 1e12.
+bool Automatic::at_round_off(Search& search, int steps) {
+  constexpr double kGain = 0.7;
+  while (search.explained_by_round_off() && !search.solved()) {
+    const double before = search.best_error;
+    prepare(search);
+    interior.run_near(search, search.best.data(), steps);
+    if (search.best_error > kGain * before) return true;
+    if (search.exhausted()) return false;
+  }
+  return false;
+}
+
+// Plain sweeps from the best point that keep moving are a cycle (or a wander), those that come to
+// rest above the tolerance are a stall.
+Status Automatic::give_up(Search& search) {
+  if (infeasible(search)) return Status::infeasible;
+  if (at_round_off(search, kRoundOffSteps)) return Status::round_off;
+  if (search.solved()) return Status::solved;
+  if (search.exhausted()) return Status::work_limit;
+  x_ = search.best;
+  double change = 0, size = 0;
+  for (int k = 0; k < 100; ++k) {
+    z_ = x_;
+    search.system.sweep(x_.data());
+    search.count_sweep();
+  }
+  for (std::size_t i = 0; i < x_.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      change += (x_[i].v[c] - z_[i].v[c]) * (x_[i].v[c] - z_[i].v[c]);
+      size += x_[i].v[c] * x_[i].v[c];
+    }
+  return change > 1e-8 * size ? Status::cycling : Status::stalled;
+}
+
+Status Automatic::end_of_work(Search& search, Rotation&, int) {
+  return search.exhausted() ? Status::work_limit : Status::unsolved;
+}
+
+Status Automatic::no_solution(Search& search, Rotation&, int) {
+  return infeasible(search) ? Status::infeasible : Status::unsolved;
+}
+
+Status Automatic::round_off(Search& search, Rotation&, int steps) {
+  if (!at_round_off(search, steps)) return Status::unsolved;
+  return infeasible(search) ? Status::infeasible : Status::round_off;
+}
+
+// Near an answer interior points need ten steps or so, after a few alternating directions.
+Status Automatic::interior_points_near(Search& search, Rotation& r, int steps) {
+  constexpr int kDirections = 15;
+  admm.start(search, search.best.data());
+  admm.run(search, kDirections, true, true);
+  if (search.solved()) return Status::solved;
+  return interior_points_at_best(search, r, steps);
+}
+
+Status Automatic::interior_points_at_best(Search& search, Rotation&, int steps) {
+  interior.run_near(search, search.best.data(), steps);
+  return Status::unsolved;
+}
+
+Status Automatic::interior_points(Search& search, Rotation&, int steps) {
+  interior.run(search, steps);
+  return Status::unsolved;
+}
+
+Status Automatic::directions(Search& search, Rotation&, int iterations) {
+  admm.start(search, search.best.data());
+  admm.run(search, iterations, true, true);
+  return Status::unsolved;
+}
+
+Status Automatic::proximal_newton(Search& search, Rotation&, int problems) {
+  newton.run(search, search.best.data(), problems);
+  return Status::unsolved;
+}
+
+// Sweeps start anew where the others have gained; they stay twice as long in each round until the
+// error has fallen by ten.
+Status Automatic::end_of_round(Search& search, Rotation& r, int) {
+  if (search.best_error < 0.9 * r.swept) sweeps.start(search.best.data());
+  r.kappa = std::min(64.0, 2 * r.kappa);
+  if (search.best_error < 0.1 * r.tenth) {
+    r.tenth = search.best_error;
+    r.kappa = 1;
+  }
+  ++r.rounds;
+  return Status::unsolved;
+}
+
+// Long plain alternating directions identify the active set, Newton finishes.
+Status Automatic::rescue(Search& search, Rotation& r, int problems) {
+  for (int k = 0; k < r.bursts && !search.exhausted(); ++k) {
+    if (!admm.started()) admm.start(search, search.best.data());
+    if (!admm.started()) break;
+    admm.run(search, r.burst, false, false);
+    if (search.solved()) return Status::solved;
+    newton.run(search, admm.point(), r.outers);
+    if (search.solved()) return Status::solved;
+    if (r.regular) interior.run_proximal(search, admm.point(), problems, newton);
+    if (search.solved()) return Status::solved;
+    r.burst = std::min(20000, r.burst + r.burst / 2);
+    r.outers = std::min(60, r.outers + 12);
+  }
+  r.bursts = std::min(16, r.bursts + 2);
+  return Status::unsolved;
+}
+
+// Gives up after rescues that have not halved the error.
+Status Automatic::patience(Search& search, Rotation& r, int) {
+  r.rounds = 0;
+  sweeps.start(search.best.data());
+  if (search.best_error > 0.5 * r.halved)
+    return ++r.patience >= r.most_patience ? give_up(search) : Status::unsolved;
+  r.patience = 0;
+  r.halved = search.best_error;
+  return Status::unsolved;
+}
+
+// The interior points that follow get a quarter of the work that is left at most.
+Status Automatic::sticking_point(Search& search, Rotation& r, int) {
+  constexpr double kRun = 40, kShare = 0.25;
+  interior.stick(search);
+  // Where the path of interior points ends is no better start than where the sweeps were.
+  x_ = search.best;
+  r.small = kRun * interior.cost(search) < kShare * (search.work_end - search.counts.work);
+  return Status::unsolved;
+}
+
+Status Automatic::proximal_path(Search& search, Rotation&, int problems) {
+  interior.run_proximal(search, x_.data(), problems, newton);
+  return Status::unsolved;
+}
+
+}  // namespace tether::contact::detail
