@@ -1,7 +1,7 @@
 // Tether: the predicted cost of an island as a Problem. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "body_sweeps/contact_graph.hpp"
+#include "graph/contact_graph.hpp"
 
 namespace tether::contact::detail {
 

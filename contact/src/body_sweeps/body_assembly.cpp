@@ -1,7 +1,7 @@
 // Tether: a stiff island as a Problem. SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 
-#include "body_sweeps/body_parts.hpp"
+#include "body_sweeps/implementation.hpp"
 #include "body_sweeps/wide_velocities.hpp"
 #include "problem/contact_side.hpp"
 
@@ -10,37 +10,9 @@ namespace tether::contact {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The island as a Problem, for the stages of Solver; from the present impulses.
-void BodySolver::Implementation::assemble(int k, Worker& worker) {
-  const Island& island = graph.islands[at(k)];
-  IslandResult& r = results[at(k)];
-  r.assembled = true;
-  worker.bodies.resize(at(island.body_end - island.body_begin));
-  for (int s = island.body_begin; s < island.body_end; ++s) {
-    const RigidBody& b = (*bodies)[at(graph.body[at(s)])];
-    Body& body = worker.bodies[at(s - island.body_begin)];
-    body.inverse_mass.setZero();
-    body.inverse_mass.topLeftCorner<3, 3>() = b.inverse_mass * Matrix3d::Identity();
-    body.inverse_mass.bottomRightCorner<3, 3>() = b.inverse_inertia;
-    body.velocity << b.velocity, b.angular_velocity;
-  }
-  worker.contacts.clear();
-  Eigen::VectorXd x(3 * island.contacts);
-  for (int chunk = island.chunk_begin; chunk < island.chunk_end; ++chunk) {
-    visit(chunk, [&](int contact, Kind kind_, int place) {
-      const PointContact& c = (*contacts)[at(contact)];
-      const detail::Side s = detail::side(*bodies, c, turned[at(contact)] != 0);
-      const auto local = [&](int b) { return b < 0 ? -1 : graph.slot[at(b)] - island.body_begin; };
-      const Matrix3d F = tangent_frame(s.n);
-      x.segment<3>(3 * static_cast<Eigen::Index>(worker.contacts.size())) =
-          F * impulse(kind_, place);
-      worker.contacts.push_back(BodyContact::at_point(
-          local(first[at(contact)]), local(second[at(contact)]), s.r1, s.r2, s.n, c.mu));
-      worker.contacts.back().bias = F * (c.bias * s.n - s.fixed);
-    });
-  }
-  if (!x.allFinite()) x.setZero();  // sweeps have overflowed
-  const Problem problem = delassus(worker.bodies, worker.contacts);
+namespace {
+
+Options solver_options(const BodyOptions& options) {
   Options o;
   o.law = options.law;
   o.measure = Measure::fixed_point;
@@ -48,32 +20,69 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
   o.strict = options.strict;
   o.max_work = options.max_work;
   o.enough = options.enough;
-  worker.solver = std::make_unique<Solver>(o);
+  return o;
+}
+
+}  // namespace
+
+// The island as a Problem, for the stages of Solver; x: its present impulses.
+Problem BodySolver::Implementation::assembled(const Island& island, Worker& worker,
+                                              Eigen::VectorXd& x) const {
+  worker.bodies.resize(at(island.body_end - island.body_begin));
+  for (int s = island.body_begin; s < island.body_end; ++s) {
+    const RigidBody& b = given.bodies()[at(graph.body[at(s)])];
+    Body& body = worker.bodies[at(s - island.body_begin)];
+    body.inverse_mass.setZero();
+    body.inverse_mass.topLeftCorner<3, 3>() = b.inverse_mass * Matrix3d::Identity();
+    body.inverse_mass.bottomRightCorner<3, 3>() = b.inverse_inertia;
+    body.velocity << b.velocity, b.angular_velocity;
+  }
+  worker.contacts.clear();
+  x.resize(3 * island.contacts);
+  const auto local = [&](int b) { return b < 0 ? -1 : graph.slot[at(b)] - island.body_begin; };
+  sweeps.for_contacts(island, [&](int contact, Kind kind, int place) {
+    const PointContact& c = given.contact(contact);
+    const detail::Side s = given.side(contact);
+    const Matrix3d F = tangent_frame(s.n);
+    x.segment<3>(3 * static_cast<Eigen::Index>(worker.contacts.size())) =
+        F * sweeps.impulse(kind, place);
+    worker.contacts.push_back(BodyContact::at_point(local(given.first()[at(contact)]),
+                                                    local(given.second()[at(contact)]), s.r1, s.r2,
+                                                    s.n, c.mu));
+    worker.contacts.back().bias = F * (c.bias * s.n - s.fixed);
+  });
+  if (!x.allFinite()) x.setZero();  // sweeps have overflowed
+  return delassus(worker.bodies, worker.contacts);
+}
+
+// The worker's solution, back to the bodies.
+void BodySolver::Implementation::take(const Island& island, Worker& worker) {
+  Team one{0, 1, nullptr, &worker.scratch};
+  sweeps.load(island, one);
+  int i = 0;
+  sweeps.for_contacts(island, [&](int contact, Kind kind, int place) {
+    const Matrix3d F = tangent_frame(given.normal(contact));
+    const Vector3d p = F.transpose() * worker.solution.impulses.segment<3>(3 * i++);
+    sweeps.add_impulse(contact, kind, place, p);
+  });
+  for (int replaced : worker.solution.replaced)
+    worker.replaced.push_back(graph.order[at(island.contact_begin + replaced)]);
+}
+
+void BodySolver::Implementation::assemble(int k, Worker& worker) {
+  const Island& island = graph.islands[at(k)];
+  IslandResult& r = results[at(k)];
+  r.assembled = true;
+  Eigen::VectorXd x;
+  const Problem problem = assembled(island, worker, x);
+  worker.solver = std::make_unique<Solver>(solver_options(options));
   worker.solution = worker.solver->solve(problem, x);
   r.status = worker.solution.status;
   r.error = worker.solution.error;
-
-  // Back to the bodies.
-  for (int s = island.body_begin; s < island.body_end; ++s) load_body(s);
-  int i = 0;
-  PassResult residual;
-  for (int chunk = island.chunk_begin; chunk < island.chunk_end; ++chunk) {
-    visit(chunk, [&](int contact, Kind kind_, int place) {
-      const Vector3d n = turned[at(contact)] ? Vector3d(-(*contacts)[at(contact)].normal)
-                                             : (*contacts)[at(contact)].normal;
-      const Vector3d p =
-          tangent_frame(n).transpose() * worker.solution.impulses.segment<3>(3 * i++);
-      set_impulse(kind_, place, p);
-      apply(contact, p);
-    });
-  }
-  for (int replaced : worker.solution.replaced) {
-    worker.replaced.push_back(graph.order[at(island.contact_begin + replaced)]);
-  }
+  take(island, worker);
   if (!worker.solution.replaced.empty()) return;  // the sweeps do not know the other rule
-  const Team one{0, 1, nullptr, &worker};
-  for (int c = island.chunk_begin; c < island.chunk_end; ++c) residual.add(test(c, one));
-  r.error = r.relative(residual.most);
+  Team one{0, 1, nullptr, &worker.scratch};
+  r.error = r.relative(sweeps.test(island, one).most);
   if (r.error <= options.tolerance)
     r.status = Status::solved;
   else if (r.status == Status::solved)
@@ -87,21 +96,17 @@ void BodySolver::Implementation::judge_with_long_sums(int k) {
   IslandResult& r = results[at(k)];
   std::vector<PointContact> here;
   std::vector<Vector3d> impulses;
-  detail::WideVelocities velocities(*bodies);
-  for (int chunk = island.chunk_begin; chunk < island.chunk_end; ++chunk) {
-    visit(chunk, [&](int contact, Kind kind_, int place) {
-      here.push_back((*contacts)[at(contact)]);
-      const Vector3d p = impulse(kind_, place);
-      impulses.push_back(turned[at(contact)] ? Vector3d(-p) : p);
-      velocities.push(here.back(), impulses.back());
-    });
-  }
-  r.error = evaluate(*bodies, here, options.law, impulses).fixed_point;
+  detail::WideVelocities velocities(given.bodies());
+  sweeps.for_contacts(island, [&](int contact, Kind kind, int place) {
+    here.push_back(given.contact(contact));
+    impulses.push_back(given.with_sign(contact, sweeps.impulse(kind, place)));
+    velocities.push(here.back(), impulses.back());
+  });
+  r.error = evaluate(given.bodies(), here, options.law, impulses).fixed_point;
   r.status = r.error <= options.tolerance ? Status::solved : Status::stalled;
   for (int s = island.body_begin; s < island.body_end; ++s) {
     const int body = graph.body[at(s)];
-    detail::store(velocities.linear(body), state[at(s)].v);
-    detail::store(velocities.angular(body), state[at(s)].w);
+    sweeps.set_velocity(s, velocities.linear(body), velocities.angular(body));
   }
 }
 

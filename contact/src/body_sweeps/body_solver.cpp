@@ -6,8 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "body_sweeps/body_parts.hpp"
-#include "problem/contact_side.hpp"
+#include "body_passes/body_kernels.hpp"
+#include "body_sweeps/implementation.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
@@ -49,124 +49,95 @@ void check(const BodyOptions& o) {
 
 }  // namespace
 
-void BodySolver::Implementation::unpack(const Island& island, const Team& team) {
-  int turn = 0;
-  pass(island, team, turn, [&](int chunk) { return unpack(chunk), PassResult(); });
-  const int begin = island.body_begin, end = island.body_end;
-  for (int s = team.from(begin, end); s < team.to(begin, end); ++s) {
-    const int b = graph.body[at(s)];
-    out->velocities[at(b)] = detail::load(state[at(s)].v);
-    out->angular_velocities[at(b)] = detail::load(state[at(s)].w);
-  }
-}
-
 // A large island by all threads; islands to be assembled are left to alone().
-void BodySolver::Implementation::together(int k, const Team& team) {
+void BodySolver::Implementation::together(int k, Team& team) {
   const Island& island = graph.islands[at(k)];
-  const int begin = island.body_begin, end = island.body_end;
-  team.worker->nowhere = {};
-  for (int s = team.from(begin, end); s < team.to(begin, end); ++s) load_body(s);
+  sweeps.load(island, team);
   team.meet();
   iterate(k, team);
   team.meet();
-  if (!assemblable(k) && !results[at(k)].saved) unpack(island, team);
+  const IslandResult& r = results[at(k)];
+  if (!r.assemblable && !r.saved) sweeps.unpack(island, team, *out);
 }
 
 void BodySolver::Implementation::alone(int k, Worker& worker) {
   const Island& island = graph.islands[at(k)];
-  const Team team{0, 1, nullptr, &worker};
-  worker.nowhere = {};
-  if (results[at(k)].sweeps == 0) {
-    for (int s = island.body_begin; s < island.body_end; ++s) load_body(s);
+  Team team{0, 1, nullptr, &worker.scratch};
+  const IslandResult& r = results[at(k)];
+  if (r.sweeps == 0) {
+    sweeps.load(island, team);
     iterate(k, team);
   }
-  if (assemblable(k)) assemble(k, worker);
-  if (!results[at(k)].saved) unpack(island, team);
+  if (r.assemblable) assemble(k, worker);
+  if (!r.saved) sweeps.unpack(island, team, *out);
 }
 
 void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
                                        const std::vector<PointContact>& c, BodySolution& o) {
-  bodies = &b;
-  contacts = &c;
   out = &o;
-  read_bodies();
-  read_contacts();
+  given.read(b, c, options.law);
   find_starts();
-  graph.build(static_cast<int>(b.size()), first, second, kind, detail::groups_are_served());
-
-  const Chunk& end = graph.chunks.back();
-  const auto total = [&](Kind k) { return at(end.begin[static_cast<int>(k)]); };
-  general4.resize(total(Kind::general4) / 4);
-  spheres4.resize(total(Kind::sphere4) / 4);
-  general.resize(total(Kind::general));
-  spheres.resize(total(Kind::sphere));
-  smooth.resize(total(Kind::smooth));
-  state.resize(graph.body.size());
-  inertia.resize(graph.body.size());
-  for (std::vector<PassResult>& sums : chunk_sum) sums.resize(graph.chunks.size());
+  graph.build(static_cast<int>(b.size()), given.first(), given.second(), given.kinds(),
+              detail::groups_are_served());
+  sweeps.start(given, graph, options.law);
   results.resize(graph.islands.size());  // assign() would grow without reserve
   std::fill(results.begin(), results.end(), IslandResult{});
-  previous_impulse.resize(3 * c.size());
-  previous_velocity.resize(6 * graph.body.size());
   o.impulses.resize(c.size());
   o.regimes.resize(c.size());
   o.velocities.resize(b.size());
   o.angular_velocities.resize(b.size());
-
   // Few contacts are not worth waking a thread; the bits are the same.
-  const int threads = c.size() < at(kTogether) ? 1 : options.threads;
-  while (static_cast<int>(workers.size()) < threads) workers.push_back(std::make_unique<Worker>());
-  for (auto& worker : workers) {
-    worker->replaced.clear();
-    worker->failure = nullptr;
-    worker->bad_contact = std::numeric_limits<int>::max();
+  solve_islands(c.size() < at(kTogether) ? 1 : options.threads);
+  report();
+  if (options.warm_start) memory.keep(c, o.impulses);
+  o.bytes = graph.contact_bytes() + memory.bytes() + given.contact_bytes() +
+            starts.capacity() * sizeof(starts[0]) + sweeps.contact_bytes() +
+            results.capacity() * sizeof(results[0]);
+  o.body_bytes = graph.body_bytes() + given.body_bytes() + sweeps.body_bytes();
+}
+
+void BodySolver::Implementation::find_starts() {
+  out->warm_started = 0;
+  if (!options.warm_start || memory.empty()) return starts.clear();
+  starts.resize(given.contacts().size());  // cleared before, it would grow without reserve
+  memory.rewind();
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    starts[i] = memory.find(given.contacts()[i].id);
+    out->warm_started += starts[i] != nullptr;
   }
+}
+
+// Large islands by all threads, the others one by one by whoever is free.
+void BodySolver::Implementation::solve_islands(int threads) {
   const int islands = static_cast<int>(graph.islands.size());
   const auto large = [&](int k) {
     return threads > 1 && graph.islands[at(k)].contacts >= kTogether;
   };
   std::atomic<int> next{0};
-  auto work = [&](int thread) {
-    Worker& worker = *workers[at(thread)];
-    const Team all{thread, threads, &threads_.barrier, &worker};
+  workers.run(threads, [&](Worker& worker, Team& all) {
     for (int k = 0; k < islands; ++k) {
       if (large(k)) together(k, all);
     }
     all.meet();
-    // The others one by one, whoever is free.
     constexpr int kBatch = 16;
     try {
       for (int k = next.fetch_add(kBatch); k < islands; k = next.fetch_add(kBatch)) {
         for (int i = k; i < std::min(k + kBatch, islands); ++i) {
-          if (!large(i) || assemblable(i)) alone(i, worker);
+          if (!large(i) || results[at(i)].assemblable) alone(i, worker);
         }
       }
     } catch (...) {
       worker.failure = std::current_exception();
     }
-  };
-  threads_.run(threads, work);
-  finish();
+  });
 }
 
 // Everything that is about more than one island.
-void BodySolver::Implementation::finish() {
-  int bad = std::numeric_limits<int>::max();
-  const Worker* by = nullptr;
-  for (const auto& worker : workers) {
-    if (worker->bad_contact >= bad) continue;
-    bad = worker->bad_contact;
-    by = worker.get();
-  }
-  if (by) throw std::invalid_argument("contact " + std::to_string(bad) + ": " + by->bad_reason);
-  for (const auto& worker : workers) {
-    if (worker->failure) std::rethrow_exception(worker->failure);
-  }
-
-  for (std::size_t k = 0; k < bodies->size(); ++k) {
+void BodySolver::Implementation::report() {
+  for (std::size_t k = 0; k < given.bodies().size(); ++k) {
     if (graph.slot[k] >= 0) continue;
-    out->velocities[k] = (*bodies)[k].velocity;
-    out->angular_velocities[k] = (*bodies)[k].angular_velocity;
+    out->velocities[k] = given.bodies()[k].velocity;
+    out->angular_velocities[k] = given.bodies()[k].angular_velocity;
   }
   out->status = Status::solved;
   out->error = 0;
@@ -183,27 +154,8 @@ void BodySolver::Implementation::finish() {
     ++out->failed_islands;
     if (severity(r.status) > severity(out->status)) out->status = r.status;
   }
-  out->replaced.clear();
-  for (const auto& worker : workers) {
-    out->replaced.insert(out->replaced.end(), worker->replaced.begin(), worker->replaced.end());
-  }
-  std::sort(out->replaced.begin(), out->replaced.end());
-  out->spheres = general.empty() && general4.empty();
-
-  if (options.warm_start) {
-    std::swap(memory, memory_before);
-    memory.clear();
-    for (std::size_t i = 0; i < contacts->size(); ++i)
-      memory.add((*contacts)[i].id, out->impulses[i]);
-  }
-  const auto bytes = [](const auto&... list) {
-    return (... + (list.capacity() * sizeof(list[0])));
-  };
-  out->bytes = graph.contact_bytes() + memory.bytes() +
-               bytes(first, second, kind, turned, start, general4, spheres4, general, spheres,
-                     smooth, chunk_sum[0], chunk_sum[1], results, previous_impulse);
-  out->body_bytes =
-      graph.body_bytes() + bytes(body_kind, state, inertia, fixed_slot, fixed, previous_velocity);
+  workers.replaced(out->replaced);
+  out->spheres = !sweeps.has_general();
 }
 
 BodySolver::BodySolver(const BodyOptions& options) : implementation_(new Implementation) {
@@ -224,18 +176,18 @@ void BodySolver::scale_warm_start(double factor) {
   }
   implementation_->memory.scale(factor);
 }
-void BodySolver::take_back() { std::swap(implementation_->memory, implementation_->memory_before); }
-void BodySolver::forget() { implementation_->memory.clear(); }
+void BodySolver::take_back() { implementation_->memory.take_back(); }
+void BodySolver::forget() { implementation_->memory.forget(); }
 WarmStart BodySolver::warm_start() const {
-  return {implementation_->memory.ids(), implementation_->memory.impulses()};
+  WarmStart start;
+  implementation_->memory.get(start);
+  return start;
 }
 void BodySolver::set_warm_start(const WarmStart& start) {
   if (start.ids.size() != start.impulses.size())
     throw std::invalid_argument("warm start: " + std::to_string(start.ids.size()) + " ids, but " +
                                 std::to_string(start.impulses.size()) + " impulses");
-  detail::ImpulseMemory& memory = implementation_->memory;
-  memory.clear();
-  for (std::size_t i = 0; i < start.ids.size(); ++i) memory.add(start.ids[i], start.impulses[i]);
+  implementation_->memory.set(start);
 }
 
 BodySolution BodySolver::solve(const std::vector<RigidBody>& bodies,

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "assembled/system.hpp"
-#include "body_sweeps/contact_graph.hpp"
 #include "body_sweeps/wide_velocities.hpp"
+#include "graph/contact_graph.hpp"
 #include "law/exact_error.hpp"
 #include "problem/contact_side.hpp"
 #include "problem/criterion.hpp"

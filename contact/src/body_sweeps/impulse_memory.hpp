@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <tether/contact/body_solver.hpp>
+#include <utility>
 #include <vector>
 
 namespace tether::contact::detail {
@@ -84,6 +86,38 @@ class ImpulseMemory {
   std::vector<std::uint32_t> table_;
   std::size_t next_ = 0, mask_ = 0;
   bool indexed_ = false;
+};
+
+// The impulses of the last solve, and of the one before it, so that the last one can be taken back.
+class ImpulseHistory {
+ public:
+  bool empty() const { return last_.empty(); }
+  // find() in the order of the contacts of this solve, after rewind().
+  void rewind() { last_.rewind(); }
+  const Eigen::Vector3d* find(std::uint64_t id) { return last_.find(id); }
+  // After a solve: its impulses.
+  void keep(const std::vector<PointContact>& contacts, const std::vector<Eigen::Vector3d>& p) {
+    std::swap(last_, before_);
+    last_.clear();
+    for (std::size_t i = 0; i < contacts.size(); ++i) last_.add(contacts[i].id, p[i]);
+  }
+  void add(std::uint64_t id, const Eigen::Vector3d& impulse) { last_.add(id, impulse); }
+
+  void take_back() { std::swap(last_, before_); }
+  void scale(double factor) { last_.scale(factor); }
+  void forget() { last_.clear(); }
+  void get(WarmStart& out) const {
+    out.ids = last_.ids();
+    out.impulses = last_.impulses();
+  }
+  void set(const WarmStart& start) {
+    last_.clear();
+    for (std::size_t i = 0; i < start.ids.size(); ++i) last_.add(start.ids[i], start.impulses[i]);
+  }
+  std::size_t bytes() const { return last_.bytes(); }
+
+ private:
+  ImpulseMemory last_, before_;
 };
 
 }  // namespace tether::contact::detail

@@ -38,11 +38,6 @@ void StepJointIslands::set_options(const BodyOptions& options) {
   solver_.set_options(solver_options(options));
 }
 
-void StepJointIslands::set_warm_start(const WarmStart& start) {
-  memory_.clear();
-  for (std::size_t k = 0; k < start.ids.size(); ++k) memory_.add(start.ids[k], start.impulses[k]);
-}
-
 // Islands of moving bodies, connected by contacts and mechanisms.
 void StepJointIslands::find_islands(const std::vector<PointContact>& contacts) {
   const int n = mechanisms_.bodies();
@@ -163,8 +158,7 @@ void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& b
   solve_jointed(bodies, contacts);
   merge(bodies, contacts, out);
   remember(contacts, out);
-  start_.ids = memory_.ids();
-  start_.impulses = memory_.impulses();
+  memory_.get(start_);
   others.set_warm_start(start_);
 }
 
@@ -172,9 +166,7 @@ void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& b
 // kind, and a run that goes on from a saved state finds the same.
 void StepJointIslands::remember(const std::vector<PointContact>& contacts,
                                 const BodySolution& out) {
-  std::swap(memory_, before_);
-  memory_.clear();
-  for (std::size_t k = 0; k < contacts.size(); ++k) memory_.add(contacts[k].id, out.impulses[k]);
+  memory_.keep(contacts, out.impulses);
   for (std::size_t l = 0; l < law_of_.size(); ++l)
     memory_.add(laws_.id(law_of_[l]), law_impulse(l));
 }

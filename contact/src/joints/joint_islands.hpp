@@ -21,9 +21,9 @@ class StepJointIslands final : public JointIslands {
              const std::vector<PointContact>& contacts, BodySolution& out) override;
   void set_options(const BodyOptions& options) override;
   void scale_warm_start(double factor) override { memory_.scale(factor); }
-  void take_back() override { std::swap(memory_, before_); }
-  void forget() override { memory_.clear(); }
-  void set_warm_start(const WarmStart& start) override;
+  void take_back() override { memory_.take_back(); }
+  void forget() override { memory_.forget(); }
+  void set_warm_start(const WarmStart& start) override { memory_.set(start); }
 
  private:
   void find_islands(const std::vector<PointContact>& contacts);
@@ -56,7 +56,7 @@ class StepJointIslands final : public JointIslands {
   std::vector<Eigen::Vector3d> own_;   // mobilities of contacts_; empty: none has any
   std::vector<Vector6d> v_;
   linalg::VectorX x_;
-  ImpulseMemory memory_, before_;  // of the last solve, and of the one before it
+  ImpulseHistory memory_;
   WarmStart start_;
 };
 

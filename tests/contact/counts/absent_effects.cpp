@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "body_sweeps/body_kernels.hpp"
+#include "body_passes/body_kernels.hpp"
 #include "stepping/restitution.hpp"
 #include "stepping/rotation.hpp"
 

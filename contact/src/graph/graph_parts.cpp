@@ -1,5 +1,5 @@
 // Tether: the parts of which a graph of contacts is built. SPDX-License-Identifier: BSD-3-Clause
-#include "body_sweeps/graph_parts.hpp"
+#include "graph/graph_parts.hpp"
 
 #include <algorithm>
 

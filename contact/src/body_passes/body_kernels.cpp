@@ -1,5 +1,5 @@
 // Tether: one pass over contacts between bodies. SPDX-License-Identifier: BSD-3-Clause
-#include "body_sweeps/body_kernels.hpp"
+#include "body_passes/body_kernels.hpp"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 // Tether: one pass over contacts between bodies, four at a time. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "body_sweeps/body_kernels.hpp"
+#include "body_passes/body_kernels.hpp"
 
 #if TETHER_GROUPS
 #include <cmath>

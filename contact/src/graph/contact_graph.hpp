@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "body_sweeps/graph_parts.hpp"
+#include "graph/graph_parts.hpp"
 
 namespace tether::contact::detail {
 

@@ -1,6 +1,6 @@
 // Tether: islands of bodies in contact, and the order in which their contacts are swept.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "body_sweeps/contact_graph.hpp"
+#include "graph/contact_graph.hpp"
 
 #include <algorithm>
 

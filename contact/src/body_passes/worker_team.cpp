@@ -1,5 +1,5 @@
 // Tether: threads that wait for work and meet inside it. SPDX-License-Identifier: BSD-3-Clause
-#include "body_sweeps/worker_team.hpp"
+#include "body_passes/worker_team.hpp"
 
 namespace tether::contact::detail {
 

@@ -1,0 +1,39 @@
+// Tether: the threads that work on one island. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+#include <string>
+
+#include "body_passes/worker_team.hpp"
+#include "kernels/body_contacts.hpp"
+
+namespace tether::contact::detail {
+
+// What a thread needs of its own to pass over contacts.
+struct PassScratch {
+  alignas(64) BodyState nowhere = {};  // see BodyArrays
+  // The first contact that was refused, and why: other threads wait at the next barrier, so that it
+  // is reported after the run.
+  int refused = std::numeric_limits<int>::max();
+  std::string reason;
+};
+
+// All threads, or one; each has a Team of its own that says which of them it is.
+struct Team {
+  int thread, threads;
+  Barrier* barrier;
+  PassScratch* scratch;
+  int passes = 0;  // so far: the same number for each thread of a team
+
+  void meet() const {
+    if (threads > 1) barrier->wait();
+  }
+  // This thread's part of begin .. end.
+  int from(int begin, int end) const { return part(begin, end, thread); }
+  int to(int begin, int end) const { return part(begin, end, thread + 1); }
+  int part(int begin, int end, int k) const {
+    return begin + static_cast<int>(static_cast<long long>(end - begin) * k / threads);
+  }
+};
+
+}  // namespace tether::contact::detail

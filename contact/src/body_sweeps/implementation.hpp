@@ -1,0 +1,75 @@
+// Tether: the parts of BodySolver, and what they do together. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <tether/contact/body_solver.hpp>
+#include <vector>
+
+#include "body_passes/given_problem.hpp"
+#include "body_passes/island_sweeps.hpp"
+#include "body_sweeps/impulse_memory.hpp"
+#include "body_sweeps/workers.hpp"
+#include "graph/contact_graph.hpp"
+
+namespace tether::contact::detail {
+
+struct IslandResult {
+  Status status = Status::unsolved;
+  int sweeps = 0;
+  double error = 0;
+  double inverse_scale = 0;  // 1 / velocity scale
+  double floor = 0;          // squares of errors up to here are round-off of the bodies' velocities
+  double relative(double square) const {
+    return square <= floor ? 0 : std::sqrt(square) * inverse_scale;
+  }
+  bool assemblable = false;  // unsolved, and a Problem of it is allowed and affordable
+  bool assembled = false;
+  bool saved = false;  // an earlier point was the best and is unpacked already
+};
+
+}  // namespace tether::contact::detail
+
+namespace tether::contact {
+
+struct BodySolver::Implementation {
+  using Island = detail::Island;
+  using IslandResult = detail::IslandResult;
+  using Kind = detail::Kind;
+  using PassResult = detail::PassResult;
+  using Team = detail::Team;
+  using Vector3d = Eigen::Vector3d;
+  using Worker = detail::Worker;
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  BodyOptions options;
+  detail::GivenProblem given;           // the caller's bodies and contacts
+  detail::ContactGraph graph;           // their islands
+  detail::ImpulseHistory memory;        // impulses of earlier solves
+  std::vector<const Vector3d*> starts;  // of each contact, in the memory; empty: none
+  detail::IslandSweeps sweeps;          // impulses and velocities of this solve
+  std::vector<IslandResult> results;    // of each island
+  detail::Workers workers;              // threads
+  BodySolution* out = nullptr;          // the caller's
+
+  // A solve, from body_solver.cpp on.
+  void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
+  void find_starts();
+  void solve_islands(int threads);
+  void together(int k, Team& team);
+  void alone(int k, Worker& worker);
+  void report();
+
+  // block_gauss_seidel.cpp
+  void iterate(int k, Team& team);
+  IslandResult start(const Island& island, Team& team);
+  void save(const Island& island, Team& team);
+
+  // body_assembly.cpp
+  void assemble(int k, Worker& worker);
+  Problem assembled(const Island& island, Worker& worker, Eigen::VectorXd& x) const;
+  void take(const Island& island, Worker& worker);
+  void judge_with_long_sums(int k);
+};
+
+}  // namespace tether::contact

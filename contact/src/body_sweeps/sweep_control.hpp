@@ -1,0 +1,122 @@
+// Tether: what the progress of sweeps tells to do next. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::contact::detail {
+
+// Nesterov's momentum on the sweeps. A sweep is no gradient step, but the same rule serves: where a
+// sweep changes more than the one before, the momentum is dropped and its growth set back by half.
+// Where contacts toggle between stick and slip that happens all the time: as long as it does not
+// get on, a little more change is allowed in every other window.
+class Momentum {
+ public:
+  void start() { on_ = true; }
+  bool on() const { return on_; }
+  // beta, given the sum of squares that the last sweep changed.
+  double next(double change) {
+    best_ = std::min(best_, change);
+    if (++count_ == window_end_) look_back();
+    const double grown = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
+    double beta = (t_ - 1) / grown;
+    if (change > allowed_ * last_) {
+      t_ = std::max(1.0, 0.5 * t_);
+      beta = 0;
+    } else {
+      t_ = grown;
+    }
+    last_ = change;
+    return beta;
+  }
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+
+  void look_back() {
+    if (best_ > 0.25 * best_before_) {  // of squares: not halved
+      allowed_ = allowed_ > 1 ? 1 : 1.2;
+      t_ = 1;
+      last_ = kNone;
+    }
+    best_before_ = best_;
+    window_ += window_ / 2;
+    window_end_ = count_ + window_;
+  }
+
+  bool on_ = false;
+  double t_ = 1, last_ = kNone, allowed_ = 1, best_ = kNone, best_before_ = kNone;
+  int count_ = 0, window_ = 100, window_end_ = 100;
+};
+
+// The best point of an island that may never be solved. Residuals of earlier points cost a pass
+// each: they are looked at where a sweep changes clearly less than at the last look or that is long
+// ago, and only where the forecast passes max_sweeps, half of them are gone, or changes begin to
+// rise in a long run.
+class BestPoint {
+ public:
+  static constexpr int kFirst = 64;  // sweeps before the first look
+
+  explicit BestPoint(int max_sweeps) : max_sweeps_(max_sweeps) {}
+  void want() { wanted_ = true; }
+  void forecast(double sweeps) { slow_ = !(sweeps <= max_sweeps_); }
+  // change: sum of squares that the last sweep changed.
+  bool look(int sweeps, double change) {
+    const bool rises = change > last_ && sweeps >= kLong;
+    last_ = change;
+    if (!wanted_ || sweeps < next_) return false;
+    if (!(change < kLess * change_) && sweeps < next_ + kOld) return false;
+    if (!rises && !slow_ && sweeps <= max_sweeps_ / 2) return false;
+    change_ = change;
+    next_ = sweeps + kApart;
+    return true;
+  }
+  // residual: a sum of squares too. True: the point is to be saved.
+  bool improved(double residual) {
+    if (!(residual < residual_)) return false;
+    residual_ = residual;
+    return true;
+  }
+  // False where the residual of the last point is not a number, unless nothing was saved.
+  bool last_is_best(double residual) const { return !(residual_ < kNone) || residual <= residual_; }
+  double residual() const { return residual_; }
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  static constexpr int kApart = 8, kLong = 256, kOld = 120;
+  static constexpr double kLess = 0.64;
+
+  bool wanted_ = false, slow_ = false;
+  int max_sweeps_, next_ = kFirst;
+  double change_ = kNone, last_ = kNone, residual_ = kNone;
+};
+
+// The sweeps that are still needed, forecast after 5, 10, 20, 40, ... sweeps from the convergence
+// since half as many.
+class Forecast {
+ public:
+  static constexpr int kFirst = 5;
+
+  bool due(int sweeps) const { return sweeps == next_; }
+  // sum, most: squares that the last sweep changed; bound: of the largest one when solved.
+  double more(int sweeps, double sum, double most, double bound) const {
+    const bool known = sum > 0 && std::isfinite(earlier_);
+    const double rate = known ? std::log(sum / earlier_) / (0.5 * sweeps) : 0;
+    return !known     ? 0
+           : rate < 0 ? std::log(bound / most) / rate
+                      : std::numeric_limits<double>::infinity();
+  }
+  void made(double sum) {
+    earlier_ = sum;
+    next_ *= 2;
+  }
+  // Sweeps no longer change less than at the last forecast.
+  bool no_progress(double sum) const { return sum > 0.998 * earlier_; }
+
+ private:
+  double earlier_ = std::numeric_limits<double>::infinity();
+  int next_ = kFirst;
+};
+
+}  // namespace tether::contact::detail
