@@ -5,6 +5,9 @@ that should notice. SPDX-License-Identifier: BSD-3-Clause
     python3 tests/mutations/run.py --check             every mutation still has its place
     python3 tests/mutations/run.py                     all, in build/mutations
     python3 tests/mutations/run.py contact Nesterov    of one file, or with a word in the title
+    python3 tests/mutations/run.py --log FILE          goes on: those with a verdict in FILE are done
+
+Two at once need two trees: run.py contact --tree /tmp/a, run.py scene --tree /tmp/b.
 
 A mutation in linalg.txt, ida_projection.txt, contact.txt or scene.txt:
 
@@ -12,6 +15,7 @@ A mutation in linalg.txt, ida_projection.txt, contact.txt or scene.txt:
     file contact/src/law/coulomb.cpp
     near void f(              (optional) the text stands behind this one
     kill test_contact | stepping: incline*,spheres*    program | its tests, or its arguments
+    kill tether | sh tests/x.sh {tether}               programs, libraries | a script
     equivalent ...            (instead of a kill that succeeds) why no test can notice
     - the text, found once; any white space fits any other; \\n is a new line
     + what replaces it
@@ -31,6 +35,7 @@ import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
+BUILD = os.path.join("build", "release")  # as deep as that of the presets: one ccache serves both
 PARTS = ["linalg", "ida_projection", "contact", "scene"]
 
 
@@ -60,7 +65,7 @@ def read_list(part):
             m.equivalent = rest
         elif word == "kill":
             program, _, tests = rest.partition("|")
-            m.kill.append((program.strip(), tests.strip()))
+            m.kill.append((tuple(program.split()), tests.strip()))
         elif word == "-":
             m.old.append(rest)
         elif word == "+":
@@ -120,22 +125,25 @@ def copy_tree(to):
 
 
 def build(tree, targets):
-    return subprocess.run(["cmake", "--build", "build", "--parallel", str(args.jobs), "--target", *targets], cwd=tree,
+    return subprocess.run(["cmake", "--build", BUILD, "--parallel", str(args.jobs), "--target", *targets], cwd=tree,
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
-def program_path(tree, name):
-    for folder, _, files in os.walk(os.path.join(tree, "build")):
-        if name in files and os.access(os.path.join(folder, name), os.X_OK) and "CMakeFiles" not in folder:
-            return os.path.join(folder, name)
-    return None
+def program_path(tree, target):
+    for folder, folders, files in os.walk(os.path.join(tree, BUILD)):
+        folders[:] = [f for f in folders if f != "CMakeFiles"]
+        for name in (target, target + ".so", f"lib{target}.so"):
+            if name in files and os.access(os.path.join(folder, name), os.X_OK):
+                return os.path.join(folder, name)
+    sys.exit(f"{target} is not built")
 
 
-def run(tree, program, tests, limit):
+def run(tree, programs, tests, limit):
     """True: the tests passed."""
-    path = program_path(tree, program)
+    path = program_path(tree, programs[0])
     if tests.startswith("sh "):
-        command = [word.replace("{program}", path) for word in tests.split()]
+        places = {"{" + name + "}": program_path(tree, name) for name in programs}
+        command = [places.get(word, word) for word in tests.split()]
         folder = tree
     else:
         command = [path]
@@ -151,12 +159,12 @@ def run(tree, program, tests, limit):
     except subprocess.TimeoutExpired:
         return False
     if b"No test cases matched" in done.stdout or b"No tests ran" in done.stdout:
-        sys.exit(f"{program}: no test is called {tests}")
+        sys.exit(f"{programs[0]}: no test is called {tests}")
     return done.returncode == 0
 
 
-def target_of(program):
-    return "tether_program" if program == "tether" else program
+def targets_of(programs):
+    return ["tether_program" if name == "tether" else name for name in programs]
 
 
 parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
@@ -165,6 +173,7 @@ parser.add_argument("--check", action="store_true", help="only whether each has 
 parser.add_argument("--tree", default=os.path.join(ROOT, "build", "mutations"), help="where the copy is")
 parser.add_argument("--jobs", type=int, default=os.cpu_count())
 parser.add_argument("--seconds", type=float, default=0, help="begin no other one after this time")
+parser.add_argument("--log", default="", help="verdicts are added here; those with one are not run again")
 parser.add_argument("--cmake", default="", help="further arguments of cmake")
 args = parser.parse_args()
 
@@ -184,10 +193,13 @@ if args.check:
     sys.exit(2 if misplaced else 0)
 
 copy_tree(args.tree)
+known = set()
+if args.log and os.path.isfile(args.log):
+    known = {line.rstrip("\n").partition("\t")[2] for line in open(args.log, encoding="utf-8")}
 generator = ["-G", "Ninja"] if shutil.which("ninja") else []
 launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
-subprocess.check_call(["cmake", "-S", ".", "-B", "build", *generator, *launcher, "-DCMAKE_BUILD_TYPE=Release",
-                       "-DTETHER_BUILD_BENCHMARKS=OFF", "-DTETHER_BUILD_EXAMPLES=OFF", *args.cmake.split()],
+subprocess.check_call(["cmake", "-S", ".", "-B", BUILD, *generator, *launcher, "-DCMAKE_BUILD_TYPE=Release",
+                       "-DTETHER_BUILD_BENCHMARKS=OFF", "-DTETHER_BUILD_PYTHON=OFF", *args.cmake.split()],
                       cwd=args.tree, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 usual = {}  # seconds of tests on sources as they are
@@ -195,35 +207,34 @@ count = {"killed": 0, "does not compile": 0, "SURVIVED": 0, "equivalent": 0, "EQ
 begin = time.time()
 left_out = 0
 for m in chosen:
-    if m in misplaced:
+    if m in misplaced or f"{m.part}: {m.title}" in known:
         continue
     if args.seconds and time.time() - begin > args.seconds:
         left_out += 1
         continue
     file = os.path.join(args.tree, m.file)
     source = open(file, encoding="utf-8").read()
-    targets = sorted({target_of(program) for program, _ in m.kill})
-    verdict, by = "SURVIVED", ""
     missing = [k for k in m.kill if k not in usual]
     if missing:
-        done = build(args.tree, targets)
+        done = build(args.tree, sorted({t for programs, _ in missing for t in targets_of(programs)}))
         if done.returncode != 0:
             sys.exit("the sources as they are do not build:\n" + done.stdout[-3000:])
         for each in missing:
             start = time.time()
             if not run(args.tree, *each, 3600):
-                sys.exit(f"{each[0]} | {each[1]}: fails on the sources as they are")
+                sys.exit(f"{each[0][0]} | {each[1]}: fails on the sources as they are")
             usual[each] = time.time() - start
+    verdict, by = "SURVIVED", ""
     try:
         with open(file, "w", encoding="utf-8") as out:
             out.write(mutated(m, source)[0])
-        if build(args.tree, targets).returncode != 0:
-            verdict = "does not compile"
-        else:
-            for each in m.kill:
-                if not run(args.tree, *each, max(60.0, 10 * usual[each])):
-                    verdict, by = "killed", f" by {each[0]}"
-                    break
+        for each in m.kill:
+            if build(args.tree, targets_of(each[0])).returncode != 0:
+                verdict = "does not compile"
+                break
+            if not run(args.tree, *each, max(60.0, 10 * usual[each])):
+                verdict, by = "killed", f" by {each[0][0]}"
+                break
     finally:
         with open(file, "w", encoding="utf-8") as out:
             out.write(source)
@@ -231,6 +242,9 @@ for m in chosen:
         verdict = "equivalent" if verdict == "SURVIVED" else "EQUIVALENT, KILLED" if verdict == "killed" else verdict
     count[verdict] += 1
     print(f"{verdict:18} {m.part}: {m.title}{by}", flush=True)
+    if args.log:
+        with open(args.log, "a", encoding="utf-8") as out:
+            out.write(f"{verdict}\t{m.part}: {m.title}\n")
 
 print(", ".join(f"{n} {what}" for what, n in count.items() if n) + (f", {left_out} not begun" if left_out else ""))
 if misplaced or count["EQUIVALENT, KILLED"]:

@@ -46,9 +46,11 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt) {
     const double came = -speed(k, coming_), comes = -speed(k, v);
     const bool hits = comes * dt > law.gap && came > std::max(0.0, comes - came);
     if (hits) strikes.push_back({law.gap, came, comes, moving_along(k)});
-    bias_[at(k)] = hits           ? -law.restitution * came
+    // A body that turns throws what is at its limit beyond it, and against it, in every step.
+    const double beyond = kTakenBack * std::min(law.gap, 0.0) / dt;
+    bias_[at(k)] = hits           ? std::min(-law.restitution * came, beyond)
                    : law.gap >= 0 ? law.gap / dt
-                                  : kTakenBack * law.gap / dt;
+                                  : beyond;
   }
 }
 

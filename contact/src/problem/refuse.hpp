@@ -24,9 +24,10 @@ void require_finite(const char* argument, const Eigen::Ref<const Eigen::MatrixXd
 
 // Symmetric to 1e-8 and without eigenvalues below -1e-8 of the trace; names the entry or the
 // eigenvalue that is not. where() comes before the argument.
-template <int n, class Where>
-void require_semidefinite(const char* argument, const Eigen::Matrix<double, n, n>& A,
+template <class Derived, class Where>
+void require_semidefinite(const char* argument, const Eigen::MatrixBase<Derived>& A,
                           const Where& where) {
+  constexpr int n = Derived::RowsAtCompileTime;
   constexpr double kSmall = 1e-8;
   const double trace = A.diagonal().cwiseAbs().sum(), most = kSmall * trace;
   for (int c = 0; c < n; ++c) {
