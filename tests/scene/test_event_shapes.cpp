@@ -1,5 +1,8 @@
 // Polyhedra and round bodies on each other in the event engine. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <Eigen/Geometry>
+#include <array>
+
 #include "event_runs.hpp"
 
 using namespace event_runs;
@@ -19,6 +22,37 @@ std::string law(double friction, double restitution) {
   return "[[pair]]\nbetween = [\"body\", \"body\"]\nfriction = " + number(friction) +
          "\nrestitution = " + number(restitution) + "\n";
 }
+
+/// A box whose bottom slides over a parallel edge, in the plane across it: `beyond` the edge is its
+/// centre, `height` above its bottom; N(I / m + beyond (beyond + mu height)) = I (g cos - ...).
+struct Tipping {
+  double friction, height, inertia;  // by its mass, m^2
+  double beyond = 0, speed = 0, angle = 0, spin = 0;
+
+  std::array<double, 4> rate(const std::array<double, 4>& y) const {
+    const double x = y[0], v = y[1], w = y[3];
+    const double lever = x + friction * height;
+    const double normal =
+        (9.81 * std::cos(y[2]) - height * w * w - 2 * v * w) / (1 + x * lever / inertia);
+    const double turn = normal * lever / inertia;
+    return {v, 9.81 * std::sin(y[2]) - friction * normal + x * w * w - height * turn, w, turn};
+  }
+  void step(double h) {
+    const std::array<double, 4> y = {beyond, speed, angle, spin};
+    const auto ahead = [&](const std::array<double, 4>& k, double part) {
+      std::array<double, 4> out = y;
+      for (std::size_t i = 0; i < 4; ++i) out[i] += part * h * k[i];
+      return out;
+    };
+    const auto a = rate(y), b = rate(ahead(a, 0.5)), c = rate(ahead(b, 0.5)), d = rate(ahead(c, 1));
+    std::array<double, 4> out = y;
+    for (std::size_t i = 0; i < 4; ++i) out[i] += h / 6 * (a[i] + 2 * b[i] + 2 * c[i] + d[i]);
+    beyond = out[0];
+    speed = out[1];
+    angle = out[2];
+    spin = out[3];
+  }
+};
 
 const std::string kBar = "shape = \"capsule\"\nradius = 0.1\nlength = 1";
 
@@ -41,6 +75,73 @@ TEST_CASE("event: a box slides off a table and tips when its centre has passed t
     CHECK(std::abs(of_kind(*engine, Kind::border)[0].time - 0.25) < 10 * tolerance);
     CHECK(std::abs(ledger(*engine, 0.72 + 0.981)) < 10 * tolerance);
     CHECK(engine->bodies()[1].angular_velocity.y() > 0);
+  }
+}
+
+TEST_CASE("event: a box slides wholly off a table, at any size, as the plane's equations say") {
+  struct Case {
+    double size, friction, speed, turn;  // of the scene; at size 1; about the vertical
+  };
+  const Case c = GENERATE(Case{1, 0.3, 2.5, 0}, Case{1, 0, 1.2, 0}, Case{1, 0.3, 2.5, 0.7},
+                          Case{1e-3, 0.2, 2, 0.3}, Case{1e3, 0.4, 3, 0});
+  const double s = c.size, width = 0.4 * s, h = 0.1 * s, start = 0.3 * s, g = 9.81;
+  const double v0 = c.speed * std::sqrt(s), slow = c.friction * g;
+  // It tips where the force at the edge, friction included, points through its centre.
+  const double way_to_tip = start - c.friction * h;
+  const double v1 = std::sqrt(v0 * v0 - 2 * slow * way_to_tip), t1 = 2 * way_to_tip / (v0 + v1);
+  Tipping box{c.friction, h, (width * width + 4 * h * h) / 12};
+  box.beyond = -c.friction * h;
+  box.speed = v1;
+  const double dt = 2e-5 * std::sqrt(s);
+  double t = t1;
+  for (; box.beyond + dt * box.speed < 0.5 * width; t += dt) box.step(dt);
+  for (int k = 0; k < 6; ++k) {
+    const double rest = (0.5 * width - box.beyond) / box.speed;
+    box.step(rest);
+    t += rest;
+  }
+  const double end = t + 0.02 * std::sqrt(s), flight = end - t;
+  // (x beyond the edge, z) of the centre, then in flight.
+  const double sin = std::sin(box.angle), cos = std::cos(box.angle);
+  const double x0 = box.beyond * cos + h * sin, z0 = h * cos - box.beyond * sin;
+  const double along = box.speed + h * box.spin, up = -box.beyond * box.spin;
+  const double vx = along * cos + up * sin, vz = up * cos - along * sin - g * flight;
+  const double x1 = x0 + vx * flight, z1 = z0 + (vz + 0.5 * g * flight) * flight;
+  const Eigen::AngleAxisd turned(c.turn, Vector3d::UnitZ());
+  const auto vector = [&](const Vector3d& local) {
+    const Vector3d v = turned * local;
+    return "[" + number(v.x()) + ", " + number(v.y()) + ", " + number(v.z()) + "]";
+  };
+  const auto sized = [&](double x, double y, double z) {
+    return "shape = \"box\"\nsize = [" + number(x * s) + ", " + number(y * s) + ", " +
+           number(z * s) + "]";
+  };
+  const std::string way = "orientation = { axis = [0, 0, 1], rad = " + number(c.turn) + " }\n";
+  const std::string text =
+      body("table", sized(1, 1, 0.2), vector({-0.5 * s, 0, -0.1 * s}), "fixed = true\n" + way) +
+      body("box", sized(0.4, 0.3, 0.2), vector({-start, 0.05 * s, h}),
+           "mass = 1\nvelocity = " + vector({v0, 0, 0}) + "\n" + way) +
+      law(c.friction, 0);
+  for (const double tolerance : kLadder) {
+    CAPTURE(s, c.friction, c.turn, tolerance);
+    const auto engine = run(text, tolerance, end);
+    const double time = 10 * tolerance * std::sqrt(s), speed = 10 * tolerance * std::sqrt(s);
+    const auto lifts = of_kind(*engine, Kind::lift);
+    REQUIRE(lifts.size() == 2);
+    for (const ContactEvent& each : lifts) CHECK(std::abs(each.time - t1) < time);
+    const auto borders = of_kind(*engine, Kind::border);
+    REQUIRE(!borders.empty());
+    CHECK(std::abs(borders.back().time - t) < time);
+    CHECK(of_kind(*engine, Kind::impact).empty());
+    CHECK(engine->counts().events <= 6);
+    const BodyState& b = engine->bodies()[1];
+    const Vector3d x = turned.inverse() * b.position, v = turned.inverse() * b.velocity;
+    CHECK(std::abs(x.x() - x1) < 10 * tolerance * s);
+    CHECK(std::abs(x.y() - 0.05 * s) < 10 * tolerance * s);
+    CHECK(std::abs(x.z() - z1) < 10 * tolerance * s);
+    CHECK(std::abs(v.x() - vx) < speed);
+    CHECK(std::abs(v.z() - vz) < speed);
+    CHECK(std::abs(b.angular_velocity.norm() - box.spin) < 10 * tolerance / std::sqrt(s));
   }
 }
 

@@ -22,6 +22,10 @@ struct Bands {
 /// Of approach, in the units of the model: bounces of slower contacts are as high as rounding.
 constexpr double kLeastSpeed = 1e-7;
 
+/// Of the band of a gap: how far from the border of a face a contact may be by errors of the motion
+/// that is on it.
+constexpr double kBesideBorder = 30;
+
 /// At most 1; a power of 2, so that rounding does not show in it.
 inline double part_of(double length) {
   return length > 0 ? std::min(1.0, std::exp2(std::round(std::log2(length)))) : 1.0;

@@ -8,6 +8,11 @@
 // the second body, and counts where it leads out of both of each edge's faces (their arcs on the
 // Gauss sphere cross); of round bars it points from the second to the first. Lines that are
 // parallel have no such contact: their ends do.
+//
+// Of an edge that lies flush with a face of the other body n is at the end of an arc, on either
+// side of it by rounding. Beyond the end the gap still bounds one of the true ones from above, as
+// long as its line goes on over the face: so arcs are longer by kFlush. (A face that turns about
+// the other edge is left by its own border: its corners and other edges touch by then.)
 #pragma once
 
 #include <array>
@@ -41,6 +46,7 @@ struct CrossingFeature {
     return c.dot(B.R * (second.inward[0] + second.inward[1])) > 0 ? -1 : 1;
   }
   static constexpr double kParallel = 1e-9;  // squared sine
+  static constexpr double kFlush = 0.1;      // sine
 };
 
 inline Touch CrossingFeature::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
@@ -54,7 +60,7 @@ inline Touch CrossingFeature::look(const Frame<double>& A, const Frame<double>& 
   Touch t;
   const double square = c.squaredNorm();
   if (square < kParallel) {
-    t.gap = first.length + second.length;
+    t.gap = kNowhere;
     t.point = a.x;
     return t;
   }
@@ -86,9 +92,9 @@ inline double CrossingFeature::margin(const Frame<double>& A, const Frame<double
   double least = std::min(std::min(s, first.length - s), std::min(t, second.length - t));
   const Vector3d n = sign(B, second, c, d) * c / std::sqrt(square);
   for (const Vector3d& inward : second.inward)
-    if (second.is_sharp()) least = std::min(least, -second.length * n.dot(B.R * inward));
+    if (second.is_sharp()) least = std::min(least, second.length * (kFlush - n.dot(B.R * inward)));
   for (const Vector3d& inward : first.inward)
-    if (first.is_sharp()) least = std::min(least, first.length * n.dot(A.R * inward));
+    if (first.is_sharp()) least = std::min(least, first.length * (kFlush + n.dot(A.R * inward)));
   return least;
 }
 

@@ -90,14 +90,14 @@ void Driver::check_start() const {
   }
 }
 
-// Contacts with no gap, closed ones among them.
+// Contacts with no gap, closed ones among them, and those that come in over a border.
 std::vector<int> Driver::touching(int always) const {
   std::vector<int> out;
   for (int i = 0; i < model_.contacts(); ++i) {
     double rate = 0;
     const bool closed = motion_.modes()[at(i)].mode != Mode::open;
-    const bool near =
-        std::abs(model_.gap(i, rate)) <= bands().gap(i) && model_.margin(i) >= -bands().gap(i);
+    const bool near = std::abs(model_.gap(i, rate)) <= bands().gap(i) &&
+                      model_.margin(i) >= -kBesideBorder * bands().gap(i);
     if (i == always || closed || near) out.push_back(i);
   }
   return out;
@@ -264,6 +264,8 @@ void Driver::record(EventKind kind, int contact, double before, double after, do
 void Driver::handle(const Zero& zero) {
   const double now = phase_->start() + zero.time;
   at_one_time_ = now > event_time_ ? 0 : at_one_time_ + 1;
+  if (at_one_time_ == 0) lifted_.clear();
+  if (zero.what == Watch::normal_force) lifted_.push_back(zero.contact);
   if (at_one_time_ > kMostAtOneTime)
     fail(fmt::format("more than {} events at one time", kMostAtOneTime));
   if (++counts_.events > options_.max_events)

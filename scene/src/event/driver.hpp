@@ -113,7 +113,8 @@ class Driver {
   double lost_ = 0, first_energy_ = 0;
   DriverCounts counts_;
   long at_one_time_ = 0;
-  bool jammed_ = false;  // at this event
+  std::vector<int> lifted_;  // at this time
+  bool jammed_ = false;      // at this event
 };
 
 /// An impact of contacts that touch: the right hand side of its problem w = A x - b.

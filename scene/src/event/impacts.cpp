@@ -29,8 +29,10 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
     double rate = 0;
     const double gap = model_.gap(i, rate), band = bands().approach(i);
     const bool now = i == first || gap <= -rate * options_.tolerance;
-    const bool hits = rate < -band && now;
-    const bool rests = motion_.modes()[at(i)].mode != Mode::open && std::abs(rate) <= band;
+    const bool open = motion_.modes()[at(i)].mode == Mode::open;
+    const bool hits =
+        rate < -band && now && !(open && i != first && motion_.passes_border(event_time_, y_, i));
+    const bool rests = !open && std::abs(rate) <= band;
     if (hits || rests) out.push_back(i);
     any = any || hits;
   }

@@ -59,6 +59,12 @@ class Model {
   /// How far the contact is inside the border of its features, m; infinite: they have none.
   virtual double margin(int /*contact*/) { return std::numeric_limits<double>::infinity(); }
 
+  /// Whether both contacts are of one point of the same two bodies, with other normals: on the edge
+  /// or at the corner of a face, within `distance`, m.
+  virtual bool are_at_one_edge(int /*contact*/, int /*other*/, double /*distance*/) {
+    return false;
+  }
+
   /// The gradient by the coordinates of what has the velocity gradient `row`.
   virtual void to_coordinates(const double* row, double* gradient) const = 0;
   /// Rows that the coordinates obey by themselves, such as the length of a quaternion.

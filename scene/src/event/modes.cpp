@@ -1,6 +1,7 @@
 // Tether: which contacts stay closed, stick and slide. SPDX-License-Identifier: BSD-3-Clause
 //
 // By Coulomb's law for accelerations, see solve_accelerations.
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -10,11 +11,34 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kStill = 3e-9;           // of the accelerations
-constexpr double kAhead = 1e-5;           // s in the units of the model
-constexpr double kLeastApproach = 1e-12;  // of the slip
+constexpr double kStill = 3e-9;    // of the accelerations
+constexpr double kNoForce = 1e-9;  // of the largest; a contact that had lifted needs more
+constexpr double kRank = 1e-11, kImplied = 1e-9;  // of A_nn
+constexpr double kLeastApproach = 1e-12;          // of the slip
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// Whether the gap of contact k stays where those of the contacts with a force stay: which of them
+/// has none is the solver's choice, and no reason to leave it open.
+bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int k) {
+  const int block = rows.size();
+  std::vector<int> others;
+  for (int i = 0; i < static_cast<int>(answer.regimes.size()); ++i)
+    if (i != k && answer.regimes[at(i)] != contact::Regime::separating) others.push_back(block * i);
+  if (others.empty()) return false;
+  const int n = static_cast<int>(others.size());
+  MatrixXd A(n, n);
+  VectorXd a(n);
+  for (int i = 0; i < n; ++i) {
+    a[i] = rows.A()(others[at(i)], block * k);
+    for (int j = 0; j < n; ++j) A(i, j) = rows.A()(others[at(i)], others[at(j)]);
+  }
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
+  factor.setThreshold(kRank);
+  factor.compute(A);
+  const double own = rows.A()(block * k, block * k);
+  return own - a.dot(factor.solve(a)) <= kImplied * own;
+}
 
 }  // namespace
 
@@ -69,7 +93,12 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     const int i = candidates[at(k)];
     ContactMode& mode = modes[at(i)];
     const contact::Regime regime = answer.regimes[at(k)];
-    if (regime == contact::Regime::separating) continue;
+    if (regime == contact::Regime::separating &&
+        !(std::abs(answer.w[block * k]) <= kStill * solved.scale &&
+          rests_on_others(rows, answer, k)))
+      continue;
+    const bool lifted = std::find(lifted_.begin(), lifted_.end(), i) != lifted_.end();
+    if (lifted && answer.x[block * k] <= kNoForce * answer.x.cwiseAbs().maxCoeff()) continue;
     const VectorXd& d = slides[at(k)];
     if (d.size() > 0) {
       mode.mode = Mode::slide;
@@ -94,16 +123,9 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
 
 // It is at the border of its face or edge, and on its way out; another contact takes its place.
 bool Driver::leaves_its_feature(int contact) {
-  const double here = model_.margin(contact);
-  if (!(here <= bands().gap(contact))) return false;
-  const int nq = motion_.coordinates();
-  VectorXd ahead = y_, rate(nq);
-  model_.rates(rate.data());
-  ahead.head(nq) += kAhead * rate;
-  model_.set(event_time_, ahead.data(), ahead.data() + nq);
-  const double there = model_.margin(contact);
-  model_.set(event_time_, y_.data(), y_.data() + nq);
-  return there - here < -kAhead * bands().approach(contact);
+  const double band = bands().gap(contact);
+  return model_.margin(contact) <= band &&
+         motion_.margin_rate(event_time_, y_, contact) < -bands().approach(contact);
 }
 
 // Forces without bound stop the slip in no time: the impulses that keep the contacts from closing

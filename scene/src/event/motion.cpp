@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kRank = 1e-10;  // of rows of unit length
 constexpr double kIndependent = 1e-6;
+constexpr double kAhead = 1e-5;  // s in the units of the model
 constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
 
 /// Rows that the earlier ones do not imply, in the metric of the masses; Gram and Schmidt, twice.
@@ -109,6 +110,32 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   rate(t, y.data(), y_rate.data());
   // Of what stands still energy is known to rounding only, and says nothing of the state.
   keeps_energy_ = rank < nu_ && a_.norm() + u_.norm() > kStill;
+}
+
+double Motion::margin_rate(double t, const VectorXd& y, int contact) {
+  VectorXd ahead = y, rate(nq_);
+  set(t, y.data());
+  model_.rates(rate.data());
+  ahead.head(nq_) += kAhead * rate;
+  const double here = model_.margin(contact);
+  set(t, ahead.data());
+  const double there = model_.margin(contact);
+  set(t, y.data());
+  return (there - here) / kAhead;
+}
+
+// A corner that slid over an edge until its end comes to the plane of the face where the face ends:
+// which of them is first is rounding. One that slides from an edge onto one of its faces closes the
+// gap of the other.
+bool Motion::passes_border(double t, const VectorXd& y, int contact) {
+  const double margin = model_.margin(contact), band = bands_.gap(contact);
+  if (margin < -band) return true;
+  if (margin > kBesideBorder * band) return false;
+  const double inward = margin_rate(t, y, contact), least = bands_.approach(contact);
+  if (inward < -least) return true;
+  return inward <= least && std::any_of(closed_.begin(), closed_.end(), [&](int other) {
+           return model_.are_at_one_edge(contact, other, kBesideBorder * band);
+         });
 }
 
 // Redundant hinges, or ten copies of one, need no forces of their own.

@@ -57,6 +57,11 @@ class Motion {
     modes_[index(contact)].direction = direction;
   }
 
+  /// An open contact whose gap closes at the border of its features, at (t, y), which is set, but
+  /// that touches nothing: on its way out, or on its way along the border with a closed contact.
+  bool passes_border(double t, const VectorXd& y, int contact);
+  /// How fast the contact moves into its features at (t, y), which is set, m/s.
+  double margin_rate(double t, const VectorXd& y, int contact);
   /// y' at (t, y); afterwards acceleration() and force() are those there.
   void rate(double t, const double* y, double* y_rate);
   const VectorXd& acceleration() const { return a_; }

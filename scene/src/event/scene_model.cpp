@@ -13,6 +13,7 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
+constexpr double kOtherNormal = 1e-4;   // squared sine
 constexpr double kFarFromNormal = 0.1;  // squared sine: an axis that the tangents keep to
 
 /// Adds the velocity gradient of a force at a point, times the sign.
@@ -154,6 +155,14 @@ void SceneModel::look(int contact, ContactLook& out) {
     out.tangents.row(k) = row;
     out.slip_rest[k] = tangent[k].dot(rest);
   }
+}
+
+bool SceneModel::are_at_one_edge(int contact, int other, double distance) {
+  const FeaturePair &p = pair(contact), &q = pair(other);
+  if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return false;
+  const Touch a = p.look(bodies_.all()), b = q.look(bodies_.all());
+  return (a.point - b.point).norm() <= distance &&
+         a.normal.cross(b.normal).squaredNorm() > kOtherNormal;
 }
 
 void SceneModel::to_coordinates(const double* row, double* gradient) const {

@@ -46,6 +46,8 @@ class SceneModel final : public Model {
 
   double margin(int contact) override { return pair(contact).margin(bodies_.all()); }
 
+  bool are_at_one_edge(int contact, int other, double distance) override;
+
   void to_coordinates(const double* row, double* gradient) const override;
   int own_rows() const override { return bodies_.count(); }
   void own_values(double* values) const override;

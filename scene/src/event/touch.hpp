@@ -13,6 +13,8 @@ namespace tether::scene::event {
 using namespace mechanics;
 
 constexpr double kNoBorder = std::numeric_limits<double>::infinity();
+/// The gap of features that do not face each other.
+constexpr double kNowhere = -std::numeric_limits<double>::infinity();
 
 struct Touch {
   double gap = 0, rate = 0, second = 0;

@@ -2,6 +2,7 @@
 #include "watch.hpp"
 
 #include "friction_solve.hpp"
+#include "touch.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,23 +12,19 @@ namespace tether::scene::event {
 namespace {
 
 constexpr int kMostIterations = 80;
-constexpr int kPolish = 3, kPatience = 4;
+constexpr int kPolish = 3;
+constexpr double kApart = 1e4;  // of the resolution of times
+constexpr double kFewOfBand = 0.02;
 // Of accelerations, by the contact library's tolerance and by what stands for a large slip.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
-/// A zero of f between a and b, where it has other signs; Illinois' rule, and halving of what is
-/// `kinked` where that is slow: what contacts can bear is flat up to the zero.
+/// A zero of f between a and b, where it has other signs; Illinois' rule.
 template <class F>
-double zero_between(const F& f, double a, double fa, double b, double fb, double resolution,
-                    bool kinked = false) {
+double zero_between(const F& f, double a, double fa, double b, double fb, double resolution) {
   int side = 0;
-  double width = std::abs(b - a);
   for (int k = 0; k < kMostIterations && std::abs(b - a) > resolution; ++k) {
     double m = (fa * b - fb * a) / (fa - fb);
-    const bool look = kinked && k % kPatience == kPatience - 1;
-    const bool slow = look && std::abs(b - a) > 0.5 * width;
-    if (look) width = std::abs(b - a);
-    if (slow || !(m > std::min(a, b) && m < std::max(a, b))) m = 0.5 * (a + b);
+    if (!(m > std::min(a, b) && m < std::max(a, b))) m = 0.5 * (a + b);
     const double fm = f(m);
     if (fm == 0) return m;
     if ((fm > 0) == (fb > 0)) {
@@ -43,6 +40,27 @@ double zero_between(const F& f, double a, double fa, double b, double fb, double
     }
   }
   return std::abs(fa) < std::abs(fb) ? a : b;
+}
+
+/// The first time from which on f is negative, between a and b where it is; up to there it is flat,
+/// as what contacts can bear is. Straight lines of its negative side aim at a value of -`near`.
+template <class F>
+double kink_between(const F& f, double a, double b, double fb, double near, double resolution) {
+  double m = 0.5 * (a + b);
+  for (int k = 0; k < kMostIterations && b - a > resolution && fb < -2 * near; ++k) {
+    const double fm = f(m);
+    if (fm >= 0) {
+      a = m;
+      m = 0.5 * (a + b);
+      continue;
+    }
+    const double slope = (fb - fm) / (b - m);
+    b = m;
+    fb = fm;
+    m = b - (fb + near) / slope;
+    if (!(slope < 0 && m > a)) m = 0.5 * (a + b);
+  }
+  return b;
 }
 
 }  // namespace
@@ -72,6 +90,10 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
     const bool gap = f.what == Watch::gap;
     f.dormant = gap && f.value < -bands().gap(f.contact);
     if (gap && f.value < 0 && !f.dormant) {
+      f.level = f.value;
+      f.value = 0;
+    }
+    if (f.what == Watch::border && f.value < 0) {  // it comes in over it
       f.level = f.value;
       f.value = 0;
     }
@@ -105,7 +127,7 @@ double Watcher::of_state(Function& f) {
       return motion_.model().law(f.contact).friction * motion_.normal_force(f.closed) -
              motion_.friction_force(f.closed).norm();
     case Watch::border:
-      return motion_.model().margin(f.contact);
+      return motion_.model().margin(f.contact) - f.level;
     case Watch::support:
       return support();
     case Watch::slip:
@@ -199,7 +221,12 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
   if (fa <= 0 && f.what == Watch::gap && f.slope_before > 0 && f.slope < 0) fa = turn(phase, f, a);
   Zero zero{f.what, f.contact, a, {}};
   const double resolution = 4e-16 * b;
-  if (fa > 0) zero.time = zero_between(at, a, fa, b, fb, resolution, f.what == Watch::support);
+  if (f.what == Watch::support) {
+    zero.time = fa > 0 ? kink_between(at, a, b, fb, kFewOfBand * support_band_, resolution) : a;
+    phase.projected_at(zero.time, zero.y);
+    return zero;
+  }
+  if (fa > 0) zero.time = zero_between(at, a, fa, b, fb, resolution);
   // Newton in time, on the constraints: a move in space would not be the motion.
   const double slope = fa > 0 && b > a ? (fb - fa) / (b - a) : 0;
   phase.projected_at(zero.time, zero.y);
@@ -211,9 +238,10 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
     VectorXd there;
     phase.projected_at(next, there);
     const double now = value(f, phase.start() + next, there);
-    if (f.what == Watch::support && !(std::abs(now) < std::abs(last))) break;  // it has a kink
     zero.y = there;
-    if (now != last && next != last_time) local = (now - last) / (next - last_time);
+    // The slope of two values that differ by rounding would lead anywhere.
+    if (now != last && std::abs(next - last_time) > kApart * resolution)
+      local = (now - last) / (next - last_time);
     last = now;
     last_time = zero.time = next;
     if (local == 0) break;
@@ -231,7 +259,7 @@ double Watcher::lag(Phase& phase, const Function& f, double time) {
   const double here = value(f, phase.start() + time, y);
   phase.projected_at(later, y);
   const double growth = (here - value(f, phase.start() + later, y)) / (later - time);
-  return growth > 0 ? std::min(support_band_ / growth, phase.start() + time) : 0;
+  return growth > 0 ? std::min((support_band_ - here) / growth, phase.start() + time) : 0;
 }
 
 std::optional<Zero> Watcher::look(Phase& phase) {
@@ -241,6 +269,10 @@ std::optional<Zero> Watcher::look(Phase& phase) {
   std::optional<Zero> first;
   for (Function& f : functions_) {
     const double edge = band(f);
+    if (f.value == kNowhere) {
+      f.dormant = true;
+      f.armed = false;
+    }
     if (f.dormant) continue;
     bool hit = f.value < (f.armed ? 0 : -edge);
     // Else it is on its way out; its first gaps are lost in rounding.
@@ -253,8 +285,9 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     if (!hit) continue;
     Zero zero = locate(phase, f);
     if (f.what == Watch::support) zero.lag = lag(phase, f, zero.time);
-    if (f.what == Watch::gap && motion_.model().margin(f.contact) < -bands().gap(f.contact)) {
-      f.dormant = true;  // it passes beside the face
+    if (f.what == Watch::gap &&
+        motion_.passes_border(phase.start() + zero.time, zero.y, f.contact)) {
+      f.dormant = true;
       f.armed = false;
       continue;
     }

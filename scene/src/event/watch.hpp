@@ -47,7 +47,7 @@ class Watcher {
     bool dormant;  // a gap that is negative beside its feature: no contact
     double value, before;
     double slope, slope_before;  // of a gap, m/s
-    double level;                // from which a gap counts, m
+    double level;                // from which a gap or a border counts, m
   };
   void evaluate(double t, const VectorXd& y);
   double value(Function f, double t, const VectorXd& y);
