@@ -5,6 +5,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "small_orthogonal.hpp"
@@ -25,21 +27,46 @@ void KeptRows::resize(int rows, int columns) {
   spread_.resize(columns, most);
 }
 
+namespace {
+
+/// visit(j, c_j) for the entries of a row that are not zero; four zeros in a row are passed at
+/// once.
+template <class Visit>
+void visit_filled(const double* c, int n, Visit visit) {
+  int j = 0;
+  for (; j + 4 <= n; j += 4) {
+    std::uint64_t bits[4];
+    std::memcpy(bits, c + j, sizeof bits);
+    if (((bits[0] | bits[1] | bits[2] | bits[3]) << 1) == 0) continue;  // but for the sign
+    for (int k = j; k < j + 4; ++k)
+      if (c[k] != 0.0) visit(k, c[k]);
+  }
+  for (; j < n; ++j)
+    if (c[j] != 0.0) visit(j, c[j]);
+}
+
+}  // namespace
+
 bool KeptRows::load(const double* wide, int width, const int* rows, const int* columns,
                     const double* D, double* row_norm) {
   const int m = static_cast<int>(starts_.size()) - 1;
+  const bool adjacent = n_ > 0 && columns[n_ - 1] - columns[0] + 1 == n_;
   int count = 0;
   for (int i = 0; i < m; ++i) {
     const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
     const int first = count;
     double square = 0.0;
-    for (int j = 0; j < n_; ++j) {
-      const double entry = c[columns[j]];
-      if (entry == 0.0) continue;
+    const auto add = [&](int j, double entry) {
       const double scaled = entry * D[j];
       square += scaled * scaled;
       columns_[static_cast<std::size_t>(count)] = j;
       entries_[static_cast<std::size_t>(count++)] = scaled;
+    };
+    if (adjacent) {
+      visit_filled(c + columns[0], n_, add);
+    } else {
+      for (int j = 0; j < n_; ++j)
+        if (c[columns[j]] != 0.0) add(j, c[columns[j]]);
     }
     double* a = entries_.data() + first;
     const double length = square > 1e-280 && square < 1e280 ? std::sqrt(square)

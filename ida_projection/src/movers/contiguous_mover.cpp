@@ -8,7 +8,8 @@ namespace {
 
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
 constexpr double kForLater = 0.1;
-constexpr int kQuick = 3;  // moves with a whole C
+constexpr double kNothing = 1e-8;  // tolerances: as good as no move
+constexpr int kQuick = 3;          // moves with a whole C
 
 }  // namespace
 
@@ -44,11 +45,19 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   result.drift_before = result.drift_after = rows_.drift();
   if (result.drift_before == 0.0) return result;
   rows_.set_metric(true);
-  rows_.factors.lasting = false;
+  rows_.factors.decided = false;
+  if (!takes_rest_) rows_.factors.lasting = false;
   if ((result.status = factor(candidate.t)) != Status::success) return result;
   if (rows_.rounding_only()) return result;
   firm_only_ = false;
   result.length = first_solve();
+  // That there is nothing to do the rows that an earlier look has kept tell as well.
+  const bool nothing = result.length <= kNothing && rows_.dropped_follow();
+  if (!rows_.factors.decided && !nothing) {
+    rows_.factors.lasting = false;
+    if ((result.status = factor(candidate.t)) != Status::success) return result;
+    result.length = first_solve();
+  }
   result.floor = 4.0 * kEpsilon * rows_.at.size();
   if (contradicts()) result.status = Status::inconsistent;
   return result;

@@ -7,7 +7,8 @@ namespace tether::ida_projection {
 template <class Rows>
 bool ContiguousMover<Rows>::tangency(const std::vector<double>& yp, const double* id,
                                      Tangency& out) {
-  if (!rows_.blocks.structured() || !rows_.factors.there) return false;
+  // C of an earlier candidate says nothing about y' here.
+  if (!rows_.blocks.structured() || !rows_.factors.there || kept_.age > 0) return false;
   const auto rows = static_cast<std::size_t>(rows_.reported());
   const std::vector<double>& WT = rows_.at.WT();
   out.rate.assign(rows, 0.0);
