@@ -38,6 +38,7 @@ bool Automatic::sweep_first(Search& search, const Rotation& r) {
   const double begin = search.counts.work;
   for (int look = 0; look < 2; ++look) {
     AcceleratedSweeps::Leave leave;
+    leave.partly = true;
     const double price = interior.cost(search);
     leave.price = kWorth * price;
     leave.least_work = kLookAround * price - (search.counts.work - begin);
@@ -62,6 +63,7 @@ bool Automatic::sweep_and_solve_parts(Search& search, double until) {
   double in_parts = 0, halved = search.best_error, between = kBetween;
   while (!search.solved() && !search.exhausted() && search.counts.work < until) {
     AcceleratedSweeps::Leave leave;
+    leave.partly = true;
     leave.price = search.counts.work;
     leave.least_work = between * search.sweep_cost;
     leave.most_work = until - search.counts.work;
@@ -104,6 +106,7 @@ Status Automatic::sweep_while_cheap(Search& search, Rotation& r, int factorisati
     } else {
       constexpr double kShortStay = 11;
       AcceleratedSweeps::Leave leave;
+      leave.partly = true;
       leave.price = factorisations * price;
       leave.least_work =
           std::max(share, r.kappa * price * (1 + kShortStay * ratio / (ratio + kDear))) -
@@ -121,6 +124,7 @@ Status Automatic::sweep_while_cheap(Search& search, Rotation& r, int factorisati
 Status Automatic::sweep_few_bodies(Search& search, Rotation&, int factorisations) {
   constexpr double kStay = 5;  // factorisations
   AcceleratedSweeps::Leave leave;
+  leave.partly = true;
   leave.price = factorisations * interior.cost(search);
   leave.least_work = kStay * interior.cost(search);
   sweeps.run(search, leave);

@@ -146,6 +146,11 @@ void System::sweep(PackedVector* x, const Proximal& proximal) {
   kernels().sweep(s, x);
 }
 
+void System::sweep(PackedVector* x, const std::vector<int>& list) {
+  const View s = view(*problem_, rule_.data(), lambda_.data(), weight_.data());
+  kernels().sweep_some(s, list.data(), static_cast<int>(list.size()), x);
+}
+
 double System::blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal,
                       Regime* regimes, LocalDerivative* derivatives) {
   const View s = view(*problem_, rule_.data(), lambda_.data(), weight_.data(), proximal);

@@ -54,6 +54,8 @@ class System {
 
   // One Gauss-Seidel sweep on x in place, contacts in the given order.
   void sweep(PackedVector* x, const Proximal& proximal = {});
+  // Of the contacts of a list alone, in its order.
+  void sweep(PackedVector* x, const std::vector<int>& list);
   // out_i = block solution of contact i with all others as in x (Jacobi). Regimes and, if asked
   // for, derivatives dx/db of each block; returns (sum weight^2 |out - x|^2)^1/2.
   double blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal = {},

@@ -81,6 +81,20 @@ TETHER_INLINE void sweep(const View& s, PackedVector* x) {
   }
 }
 
+// The contacts of a list alone.
+template <class Rule>
+TETHER_INLINE void sweep_some(const View& s, const int* list, int size, PackedVector* x) {
+  int count = 0;
+  alignas(32) double w[4];
+  for (int k = 0; k < size; ++k) {
+    const int i = list[k];
+    double r[3];
+    row(s, x, i, w);
+    block_rhs(s, x, i, w, r);
+    Rule::solve(s.rule, i, s.local[i], r[0], r[1], r[2], x[i].v, s.lambda[i], count);
+  }
+}
+
 template <class Rule>
 TETHER_INLINE double blocks(const View& s, const PackedVector* x, PackedVector* out,
                             Regime* regimes, LocalDerivative* derivatives) {
@@ -168,6 +182,10 @@ TETHER_INLINE double worst_error(const View& s, const PackedVector* x) {
 #define TETHER_ASSEMBLED_KERNELS(name, ...)                                                     \
   using name##_rule = __VA_ARGS__;                                                              \
   TETHER_CLONES void name##_sweep(const View& s, PackedVector* x) { sweep<name##_rule>(s, x); } \
+  TETHER_CLONES void name##_sweep_some(const View& s, const int* list, int size,                \
+                                       PackedVector* x) {                                       \
+    sweep_some<name##_rule>(s, list, size, x);                                                  \
+  }                                                                                             \
   TETHER_CLONES double name##_blocks(const View& s, const PackedVector* x, PackedVector* out,   \
                                      Regime* regimes, LocalDerivative* derivatives) {           \
     return blocks<name##_rule>(s, x, out, regimes, derivatives);                                \
@@ -181,5 +199,5 @@ TETHER_INLINE double worst_error(const View& s, const PackedVector* x) {
   double name##_exact_error(const View& s, const PackedVector* x) {                             \
     return exact_error<name##_rule>(s, x);                                                      \
   }                                                                                             \
-  constexpr AssembledKernels name = {name##_sweep, name##_blocks, name##_natural, name##_error, \
-                                     name##_exact_error};
+  constexpr AssembledKernels name = {name##_sweep,   name##_sweep_some, name##_blocks,          \
+                                     name##_natural, name##_error,      name##_exact_error};

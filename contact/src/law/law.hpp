@@ -48,6 +48,7 @@ struct Test {
 
 struct AssembledKernels {
   void (*sweep)(const View&, PackedVector* x);
+  void (*sweep_some)(const View&, const int* list, int size, PackedVector* x);
   double (*blocks)(const View&, const PackedVector* x, PackedVector* out, Regime*,
                    LocalDerivative*);
   Test (*natural_map)(const View&, const PackedVector* x, PackedVector* w);

@@ -16,6 +16,7 @@ void AcceleratedSweeps::reset(int contacts, int depth) {
   f_.resize(at(n_));
   regime_.assign(at(n_), -1);
   anderson_.reset(n_, depth);
+  partial_.reset(n_);
 }
 
 void AcceleratedSweeps::start(const PackedVector* x) {
@@ -23,6 +24,7 @@ void AcceleratedSweeps::start(const PackedVector* x) {
   anderson_.clear();
   sweeps_ = quiet_ = slow_ = 0;
   quiet_asked_ = kLeastQuiet;
+  partial_.start();
   accelerate_ = n_ <= kFew;
   eager_ = accelerate_;
   earlier_ = {};
@@ -170,6 +172,17 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
     if (sweep >= 2 * later_.sweep) {
       earlier_ = later_;
       later_ = {sweep, f};
+    }
+    if (leave.partly && n_ > kFew) {
+      const PartialSweeps::Outcome outcome = partial_.run(search, sweep, g_, f_);
+      if (outcome != PartialSweeps::Outcome::none) {
+        if (partial_.to_tolerance()) search.test(g_.data(), Method::anderson);
+        if (search.solved() || search.exhausted()) return;
+        if (outcome == PartialSweeps::Outcome::gained) replace(g_.data());
+        x_ = g_;
+        anderson_.clear();
+        continue;
+      }
     }
     if (!extrapolates(sweep, f, toggles(system))) {
       std::copy(g_.begin(), g_.end(), x_.begin());

@@ -2,7 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
-#include "assembled/search.hpp"
+#include "assembled/stages/partial_sweeps.hpp"
 #include <tether/linalg/anderson.hpp>
 
 namespace tether::contact::detail {
@@ -19,6 +19,7 @@ class AcceleratedSweeps {
     double least_work = 0;  // spent here before leaving is considered
     double most_work = 0;   // > 0: leave after so much
     int most_sweeps = 0;    // > 0: leave after so many
+    bool partly = false;    // contacts that have not settled may be swept alone
   };
   // Until solved, exhausted, or the conditions hold.
   void run(Search& search, const Leave& leave);
@@ -34,6 +35,7 @@ class AcceleratedSweeps {
 
   int n_ = 0, depth_ = 10;
   Anderson anderson_;
+  PartialSweeps partial_;
   std::vector<char> regime_;  // of each contact after the last sweep
   // f: weighted change of a sweep.
   bool accelerate_ = false, eager_ = false;
