@@ -98,6 +98,10 @@ TEST_CASE("damaged .dat files are refused") {
     spill(file.path, "3\n2\n0\n9 9\n9 9\n");
     CHECK_THROWS_WITH(read_dat(file.path), Catch::Contains("2 contacts of dimension 3 need 6"));
   }
+  // The word is shown, and nothing behind it, and nothing that a terminal obeys.
+  Temporary file("test_contact_terminal.dat");
+  spill(file.path, "3\n\x1b[31mtwo\xc2\x9b three\n");
+  CHECK_THROWS_WITH(read_dat(file.path), Catch::Contains("'?[31mtwo??'"));
   CHECK_THROWS_WITH(read_dat("no/such/file.dat"), Catch::Contains("cannot be opened"));
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include <tether/ida_projection.h>
+#include <tether/ida_projection/c_options.hpp>
 #include <vector>
 
 #include "host.hpp"
@@ -174,6 +175,61 @@ TEST_CASE("C interface: the defaults are those of Options, and what is set is us
   CHECK(same_bits(host.state(), same.state()));
 }
 
+TEST_CASE("C interface: every field of the options is handed on") {
+  tether_options o;
+  REQUIRE(tether_options_init(&o, sizeof o) == 0);
+  const tp::Options defaults;
+  Host host(circle(1), 1e-6);
+  const int hold[] = {0, 1, 0}, group[] = {2, -1, 0};
+  o.metric = TETHER_METRIC_LOCAL_CORRECTION;
+  o.tolerance = 0.125;
+  o.maximum_iterations = defaults.maximum_iterations + 1;
+  o.frequency = defaults.frequency + 2;
+  o.largest_move = 0.375;
+  o.long_move = TETHER_LONG_MOVE_CAP;
+  o.id = host.y;
+  o.derive_id_limit = defaults.derive_id_limit + 3;
+  o.suppress_algebraic = !defaults.suppress_algebraic;
+  o.refresh_algebraic = !defaults.refresh_algebraic;
+  o.extra_iterations = defaults.extra_iterations + 4;
+  o.step_smoothing = !defaults.step_smoothing;
+  o.smooth_where_needed = !defaults.smooth_where_needed;
+  o.smoothing_setpoint = 0.625;
+  o.maximum_step = 0.875;
+  o.maximum_order = 3;
+  o.limit_order = !defaults.limit_order;
+  o.hold = hold;
+  o.hold_vector = host.yp;
+  o.group = group;
+  o.print_fatal = !defaults.print_fatal;
+  o.print_warnings = !defaults.print_warnings;
+  o.progress_interval = defaults.progress_interval + 5;
+  const tp::Options cpp = tp::options_of(&o, 3);
+  CHECK(cpp.metric == tp::Metric::local_correction);
+  CHECK(cpp.tolerance == 0.125);
+  CHECK(cpp.maximum_iterations == o.maximum_iterations);
+  CHECK(cpp.frequency == o.frequency);
+  CHECK(cpp.largest_move == 0.375);
+  CHECK(cpp.long_move == tp::LongMove::cap);
+  CHECK(cpp.id == host.y);
+  CHECK(cpp.derive_id_limit == o.derive_id_limit);
+  CHECK(cpp.suppress_algebraic != defaults.suppress_algebraic);
+  CHECK(cpp.refresh_algebraic != defaults.refresh_algebraic);
+  CHECK(cpp.extra_iterations == o.extra_iterations);
+  CHECK(cpp.step_smoothing != defaults.step_smoothing);
+  CHECK(cpp.smooth_where_needed != defaults.smooth_where_needed);
+  CHECK(cpp.smoothing_setpoint == 0.625);
+  CHECK(cpp.maximum_step == 0.875);
+  CHECK(cpp.maximum_order == 3);
+  CHECK(cpp.limit_order != defaults.limit_order);
+  CHECK(cpp.hold == std::vector<bool>{false, true, false});
+  CHECK(cpp.hold_vector == host.yp);
+  CHECK(cpp.group == std::vector<int>{2, -1, 0});
+  CHECK(cpp.print_fatal != defaults.print_fatal);
+  CHECK(cpp.print_warnings != defaults.print_warnings);
+  CHECK(cpp.progress_interval == o.progress_interval);
+}
+
 TEST_CASE("C interface: a structure of an older header keeps the defaults of what it lacks") {
   tether_options options;
   std::memset(&options, 0x55, sizeof options);
@@ -319,8 +375,10 @@ TEST_CASE("C interface: wrong arguments are refused by name and change nothing")
   options.tolerance = -1;
   refused(options, "tolerance");
   REQUIRE(tether_options_init(&options, sizeof options) == 0);
-  options.size = 0;
-  refused(options, "tether_options_init");
+  for (const std::size_t wrong : {std::size_t{0}, sizeof options + 1}) {
+    options.size = wrong;
+    refused(options, "tether_options_init");
+  }
   REQUIRE(tether_options_init(&options, sizeof options) == 0);
   const int hold[] = {0, 1};
   options.hold = hold;

@@ -146,6 +146,21 @@ TEST_CASE("g and C by one function: beside rows without, and rows by their entri
   CHECK(together.y == alone.y);
   CHECK(calls == together.statistics.joint_evaluations);
   CHECK(calls >= together.statistics.projections);
+
+  // Behind another row: g begins at their own.
+  const tp::Constraints thrice = row(
+      "thrice", [](double, const double* y) { return 1.5 * (y[0] * y[0] + y[1] * y[1] - 1.0); },
+      [](double, const double* y, double* c) {
+        c[0] = 3.0 * y[0];
+        c[1] = 3.0 * y[1];
+      });
+  const Run behind = integrate(problem, 1e-6, thrice + sparse, {}, false);
+  entries.fill_with_value = nullptr;
+  sparse.jacobian = entries;
+  const Run behind_alone = integrate(problem, 1e-6, thrice + sparse, {}, false);
+  REQUIRE(behind.flag >= 0);
+  CHECK(behind.y == behind_alone.y);
+  CHECK(behind.statistics.joint_evaluations > 0);
 }
 
 TEST_CASE("g and C by one function: a failure shortens the step or ends the run, by name") {
@@ -171,6 +186,27 @@ TEST_CASE("g and C by one function: a failure shortens the step or ends the run,
   CHECK(thrown == IDA_NLS_FAIL);
   CHECK(reason == tp::Status::callback_fatal);
   CHECK(contains(words, "the table ends here"));
+  // g that is no number: once, or from the 30th call on.
+  const auto without_number = [](int last) {
+    tp::Constraints set = on_circle();
+    auto& dense = std::get<tp::DenseJacobian>(set.jacobian);
+    dense.fill_with_value = [n = 0, last](double, tp::ConstVector y, tp::Vector g,
+                                          tp::Matrix C) mutable {
+      const bool wrong = ++n >= 30 && n <= last;
+      g[0] = wrong ? std::nan("") : (y.squaredNorm() - 1.0) / 2.0;
+      C(0, 0) = y[0];
+      C(0, 1) = y[1];
+      return 0;
+    };
+    return set;
+  };
+  const auto [once, fine, none, v] = end(without_number(30));
+  CHECK(once >= 0);
+  CHECK(v.not_finite == 1);
+  const auto [always, cause, told, w] = end(without_number(1 << 30));
+  CHECK(always < 0);
+  CHECK(cause == tp::Status::not_finite);
+  CHECK(contains(told, "g of circle is not finite"));
 }
 
 TEST_CASE("check_jacobian: a function for both that differs from value or fill is named") {

@@ -1,5 +1,6 @@
 // Tether: IDA by reverse communication gives the bits of IDA with callbacks.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -198,7 +199,29 @@ TEST_CASE("reverse communication: answers > 0 shorten a step, answers < 0 end th
         CHECK_FALSE(ida.message().empty());
         CHECK(ida.result() == nullptr);
       }
+      if (said > 0 || which != Request::residual) continue;
+      CHECK(program.finish(ida, ida.solve(0.2)) == Request::reached);
+      CHECK(ida.message().empty());  // that was of the run before
     }
+}
+
+TEST_CASE("reverse communication: a request has the time at which it is asked") {
+  tr::Equations e;
+  e.y = {0.0};
+  e.yp = {1.0};
+  e.rtol = 1e-7;
+  e.atol = {1e-7};
+  tr::ReverseIda ida(e);
+  double latest = 0;
+  Request request = ida.solve(2);
+  while (request != Request::reached && request != Request::failed) {
+    latest = std::max(latest, ida.t());
+    if (request == Request::residual) ida.result()[0] = ida.yp()[0] - std::cos(ida.t());
+    request = ida.go_on(0);
+  }
+  REQUIRE(request == Request::reached);
+  CHECK(latest >= 2);
+  CHECK(std::abs(ida.y()[0] - std::sin(2.0)) < 1e-5);
 }
 
 TEST_CASE("reverse communication: calls out of turn and wrong arguments are refused") {

@@ -60,6 +60,34 @@ TEST_CASE("depth without end is refused before it is parsed, with its place") {
                   "flat.toml"));
 }
 
+TEST_CASE("messages about a file hold nothing that a terminal obeys") {
+  // Escape sequences of ASCII and of Unicode, and marks that write from right to left.
+  for (const std::string bad :
+       {"\\u001b]0;x\\u0007", "\\u009b31m", "\\u007f", "\\u202e", "\\u2066"})
+    for (const std::string& text :
+         {"\"" + bad + "\" = 1\n", "[scene]\n\"a" + bad + "\" = 1\n", "[\"" + bad + "\"]\n",
+          body("name = \"" + bad + "\"\n"), "[[body]]\nshape = \"" + bad + "\"\n",
+          body("material = \"" + bad + "\"\n"), "[scene]\nend = [\"" + bad + "\"]\n",
+          "[scene]\nend = { \"" + bad + "\" = 1 }\n",
+          body("[[expect]]\nquantity = \"" + bad + "\"\n"),
+          body("[[pair]]\nbetween = [\"" + bad + "\", \"b\"]\n"),
+          body("[[load]]\nbody = \"" + bad + "\"\n")}) {
+      INFO(text);
+      try {
+        parse_scene(text, "terminal.toml");
+        FAIL("it is taken");
+      } catch (const SceneError& e) {
+        const std::string said = e.what();
+        for (const std::string part :
+             {"\x1b", "\x07", "\x7f", "\xc2\x9b", "\xe2\x80\xae", "\xe2\x81\xa6"})
+          CHECK(said.find(part) == std::string::npos);
+        CHECK(said.find('?') != std::string::npos);
+      }
+    }
+  CHECK(parse_scene(body("name = \"K\u00f6rper \u2192 \u4e00\"\n"), "names.toml").bodies[0].name ==
+        "K\u00f6rper \u2192 \u4e00");
+}
+
 TEST_CASE("wrong names and missing pairs in thousands cost no more than the file") {
   // Quadratic work over 30 000 lines would be a thousand million comparisons of texts: minutes.
   std::string references, materials = "[stepping]\n", fixed = body("material = \"m\"\n");

@@ -226,6 +226,7 @@ TEST_CASE("motor and friction on one joint, and a limit beyond half a turn") {
   const auto engine = make_engine(s);
   engine->advance(0.5);
   CHECK(std::abs(engine->bodies()[0].angular_velocity.z() - 3 / 0.4 * 0.5) < 1e-8);
+  CHECK(std::abs(engine->forces().joints[0].drive - 3) < 1e-7);  // motor less friction
   engine->advance(2);
   const BodyState& b = engine->bodies()[0];
   CHECK((b.orientation * Vector3d::UnitX() - Vector3d(0, -1, 0)).norm() < 1e-8);

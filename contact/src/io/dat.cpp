@@ -92,8 +92,12 @@ class Tokens {
   static bool separates(char c) {
     return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\0';
   }
+  // Without what a terminal would obey: of ASCII, and a question mark for the rest.
   std::string word(const char* begin) const {
-    return std::string(begin, std::min<std::size_t>(20, static_cast<std::size_t>(end_ - begin)));
+    std::string out;
+    for (const char* c = begin; c != end_ && out.size() < 20 && !separates(*c); ++c)
+      out += *c > ' ' && *c < 0x7f ? *c : '?';
+    return out;
   }
 
   std::string path_, text_;

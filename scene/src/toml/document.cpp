@@ -66,12 +66,7 @@ Value plain(const toml::node& node) {
 constexpr std::size_t kShownText = 60, kShownItems = 8;
 
 std::string quoted(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text.substr(0, kShownText)) {
-    const bool printable = static_cast<unsigned char>(c) >= 0x20 && c != 0x7f;
-    out += printable ? c : '?';
-  }
-  return out + (text.size() > kShownText ? "...\"" : "\"");
+  return fmt::format("\"{}{}\"", text.substr(0, kShownText), text.size() > kShownText ? "..." : "");
 }
 
 }  // namespace

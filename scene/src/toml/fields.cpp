@@ -116,12 +116,12 @@ std::string Fields::text(std::string_view key, const std::string& otherwise) {
     return otherwise;
   }
   // Names end up in CSV headers, XML and messages.
-  for (const char c : found->value.text)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '"' || c == ',') {
-      wrong(*found, found->value, "must hold no comma, quote or control character");
-      return otherwise;
-    }
-  return found->value.text;
+  const std::string& text = found->value.text;
+  if (text.find_first_of("\",") != std::string::npos || printable(text) != text) {
+    wrong(*found, found->value, "must hold no comma, quote or control character");
+    return otherwise;
+  }
+  return text;
 }
 
 // A scene from an untrusted source must not write elsewhere: no way out of the folder, no pipe of

@@ -21,6 +21,10 @@ class Report {
   std::vector<Problem> problems_;
 };
 
+/// `text` with a question mark for all that a terminal obeys instead of showing it: control
+/// characters of ASCII and Unicode, and marks that turn the direction of what follows.
+std::string printable(std::string_view text);
+
 /// Throws a SceneError of one problem.
 [[noreturn]] void refuse(const Place& place, std::string why);
 
