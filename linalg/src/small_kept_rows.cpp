@@ -68,6 +68,41 @@ TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m,
   return true;
 }
 
+// Up to four rows: A A^T is summed while the columns are gathered, and no entry of it or of L is
+// taken out of memory where it has just been put.
+template <int Rows>
+TETHER_INLINE bool factor_few(KeptRows& s, const Gathered& from, const int* order, int n,
+                              double least, double* square, double* ratio) {
+  const double* c[4];
+  for (int k = 0; k < 4; ++k)
+    c[k] = from.wide + static_cast<std::ptrdiff_t>(from.rows[order[k < Rows ? k : 0]]) * from.width;
+  v4 U[Rows] = {}, L[Rows];  // U begins as A A^T
+  v4* A = reinterpret_cast<v4*>(s.A);
+  for (int j = 0; j < n; ++j) {
+    const int column = from.columns[j];
+    const v4 four = v4{c[0][column], c[1][column], c[2][column], c[3][column]} * from.D[j];
+    A[j] = four;
+#pragma GCC unroll 4
+    for (int a = 0; a < Rows; ++a) U[a] += four * four[a];
+  }
+  bool good = true;
+#pragma GCC unroll 4
+  for (int a = 0; a < Rows; ++a) {
+    const double whole = U[a][a];
+#pragma GCC unroll 4
+    for (int k = 0; k < a; ++k) U[a] -= L[k] * U[k][a];
+    const double d = U[a][a], inverse = 1.0 / d;
+    L[a] = U[a] * inverse;
+    reinterpret_cast<v4*>(s.L)[a] = L[a];
+    s.inverse[a] = inverse;
+    square[order[a]] = whole;
+    ratio[a] = d / whole;
+    // One comparison for what is not a number, too.
+    good &= whole > kSmallestSquare && whole < kLargestSquare && d >= least * whole;
+  }
+  return good;
+}
+
 template <int Lanes>
 TETHER_INLINE bool factor(KeptRows& s, const Gathered& from, const int* order, int m, int n,
                           double least, double* square, double* ratio) {
@@ -88,17 +123,29 @@ TETHER_INLINE bool factor(KeptRows& s, const Gathered& from, const int* order, i
                                     int n, double least, double* square, double* ratio) {       \
     return factor<Lanes>(s, from, order, m, n, least, square, ratio);                           \
   }
-TETHER_FACTOR(1)
 TETHER_FACTOR(2)
 TETHER_FACTOR(3)
 TETHER_FACTOR(4)
 #undef TETHER_FACTOR
 
+#define TETHER_FACTOR_FEW(Rows)                                                                  \
+  TETHER_CLONES bool factor_few_##Rows(KeptRows& s, const Gathered& from, const int* order, int, \
+                                       int n, double least, double* square, double* ratio) {     \
+    return factor_few<Rows>(s, from, order, n, least, square, ratio);                            \
+  }
+TETHER_FACTOR_FEW(1)
+TETHER_FACTOR_FEW(2)
+TETHER_FACTOR_FEW(3)
+TETHER_FACTOR_FEW(4)
+#undef TETHER_FACTOR_FEW
+
 }  // namespace
 
 KeptRows::Factor KeptRows::factor_for(int m) {
-  static constexpr Factor kFactors[] = {factor_1, factor_2, factor_3, factor_4};
-  return m > 0 && m <= kRows ? kFactors[stride(m) / 4 - 1] : nullptr;
+  static constexpr Factor kFew[] = {factor_few_1, factor_few_2, factor_few_3, factor_few_4};
+  static constexpr Factor kFactors[] = {factor_2, factor_3, factor_4};
+  if (m <= 0 || m > kRows) return nullptr;
+  return m <= 4 ? kFew[m - 1] : kFactors[stride(m) / 4 - 2];
 }
 
 }  // namespace tether::linalg::small

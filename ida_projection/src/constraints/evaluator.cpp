@@ -92,7 +92,7 @@ void Evaluator::count(bool with_value) {
   if (gives_both_) ++statistics_.joint_evaluations;
 }
 
-Status Evaluator::finite(double t, const double* g) {
+Status Evaluator::not_finite(double t, const double* g) {
   const long bad = first_not_finite(g, rows_);
   if (bad < 0) return Status::success;
   message_ = "g of " + constraints_.name(static_cast<int>(bad)) +
@@ -103,7 +103,7 @@ Status Evaluator::finite(double t, const double* g) {
 // Entries that are not finite are found by the factors, which scan them anyway.
 Status Evaluator::dense(const Part& part, double t, const double* y, int n, const double* scale,
                         const std::vector<int>& columns, double* C, double* g) {
-  const auto* given = std::get_if<DenseJacobian>(&part.set->jacobian);
+  const DenseJacobian* given = part.dense;
   const int count = part.set->count;
   if (g != nullptr && given != nullptr && given->fill_with_value) {
     const int flag = guarded(
@@ -126,7 +126,7 @@ Status Evaluator::dense(const Part& part, double t, const double* y, int n, cons
 
 Status Evaluator::sparse(const Part& part, double t, const double* y, int n, double* entries,
                          double* g) {
-  const SparseJacobian& given = *part.sparse();
+  const SparseJacobian& given = *part.sparse;
   const auto count = static_cast<Eigen::Index>(given.columns.size());
   if (g != nullptr && given.fill_with_value) {
     const int flag = guarded(
@@ -154,18 +154,27 @@ Status Evaluator::jacobian(double t, const double* y, int n, const double* scale
   std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
   for (const Part& part : parts_) {
     double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
-    const SparseJacobian* given = part.sparse();
-    if (given != nullptr) entries_.assign(given->columns.size(), 0.0);
-    const Status status = given != nullptr ? sparse(part, t, y, n, entries_.data(), value)
-                                           : dense(part, t, y, n, scale, columns, block, value);
+    const Status status = part.sparse != nullptr
+                              ? spread(part, t, y, n, block, value)
+                              : dense(part, t, y, n, scale, columns, block, value);
     if (status != Status::success) return status;
-    for (int i = 0; given != nullptr && i < part.set->count; ++i)
-      for (int e = given->starts[static_cast<std::size_t>(i)];
-           e < given->starts[static_cast<std::size_t>(i) + 1]; ++e)
-        block[static_cast<std::ptrdiff_t>(i) * n + given->columns[static_cast<std::size_t>(e)]] =
-            entries_[static_cast<std::size_t>(e)];
   }
   return value == nullptr ? Status::success : finite(t, value);
+}
+
+// Sparse rows as full ones.
+Status Evaluator::spread(const Part& part, double t, const double* y, int n, double* block,
+                         double* g) {
+  const SparseJacobian& given = *part.sparse;
+  entries_.assign(given.columns.size(), 0.0);
+  const Status status = sparse(part, t, y, n, entries_.data(), g);
+  if (status != Status::success) return status;
+  for (int i = 0; i < part.set->count; ++i)
+    for (int e = given.starts[static_cast<std::size_t>(i)];
+         e < given.starts[static_cast<std::size_t>(i) + 1]; ++e)
+      block[static_cast<std::ptrdiff_t>(i) * n + given.columns[static_cast<std::size_t>(e)]] =
+          entries_[static_cast<std::size_t>(e)];
+  return status;
 }
 
 Status Evaluator::entries(double t, const double* y, int n, const double* scale,
@@ -174,7 +183,7 @@ Status Evaluator::entries(double t, const double* y, int n, const double* scale,
   if (fatal_) return Status::callback_fatal;
   count(value != nullptr);
   for (const Part& part : parts_) {
-    const SparseJacobian* given = part.sparse();
+    const SparseJacobian* given = part.sparse;
     double*& at = given != nullptr ? entries : full;
     const std::ptrdiff_t size = given != nullptr
                                     ? static_cast<std::ptrdiff_t>(given->columns.size())

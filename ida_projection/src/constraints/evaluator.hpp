@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <tether/ida_projection/constraints.hpp>
@@ -67,7 +68,8 @@ class Evaluator {
   struct Part {
     const Constraints* set;
     int first_row;
-    const SparseJacobian* sparse() const { return std::get_if<SparseJacobian>(&set->jacobian); }
+    const DenseJacobian* dense = std::get_if<DenseJacobian>(&set->jacobian);
+    const SparseJacobian* sparse = std::get_if<SparseJacobian>(&set->jacobian);
   };
   const std::vector<Part>& parts() const { return parts_; }
 
@@ -87,12 +89,18 @@ class Evaluator {
  private:
   void flatten(const Constraints& set);
   Status checked(int flag, const char* what, const Part& part);
-  Status finite(double t, const double* g);
+  Status finite(double t, const double* g) {
+    double sum = 0.0;
+    for (int i = 0; i < rows_; ++i) sum += g[i];
+    return std::isfinite(sum) ? Status::success : not_finite(t, g);
+  }
+  Status not_finite(double t, const double* g);
   Status value_of(const Part& part, double t, const double* y, int n, double* g);
   void count(bool with_value);
   Status dense(const Part& part, double t, const double* y, int n, const double* scale,
                const std::vector<int>& columns, double* C, double* g);
   Status sparse(const Part& part, double t, const double* y, int n, double* entries, double* g);
+  Status spread(const Part& part, double t, const double* y, int n, double* block, double* g);
   Status differences(const Part& part, double t, const double* y, int n, const double* scale,
                      const std::vector<int>& columns, double* C);
 

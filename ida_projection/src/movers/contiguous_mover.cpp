@@ -93,7 +93,8 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
   if (broken || result.moves > kQuick) rows_.blocks.look_again_soon();
   // Kept factors are in use only while dropped rows ask for less than that.
-  if (result.status == Status::success && !result.capped && !reused_ && contradicts())
+  if (rows_.blocks.dropped_rows() && result.status == Status::success && !result.capped &&
+      !reused_ && contradicts())
     result.status = Status::inconsistent;
   return result;
 }
@@ -160,7 +161,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       have_factors = false;
       continue;
     }
-    const bool follow = rows_.dropped_follow();
+    const bool follow = !rows_.blocks.dropped_rows() || rows_.dropped_follow();
     if (reused_ && !(length <= kLong && follow)) {
       rows_.set_metric(true);
       reused_ = have_factors = false;
@@ -200,10 +201,11 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       reused_ = have_factors = false;
       continue;
     }
-    if (result.moves == 1 &&
+    if (result.moves == 1 && rows_.factors.thin &&
         (result.status = rows_.learn_trust(candidate.t, length)) != Status::success)
       return result;
 
+    if (result.moves == 1 && monitor_.plainly_done(length)) break;
     // A first move longer than the largest floor need not know it.
     const double floor = result.moves == 1 && length > kLargestFloor
                              ? 0.0

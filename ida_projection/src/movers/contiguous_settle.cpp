@@ -41,14 +41,15 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
       length = first_solve();
     }
     rows_.apply(1.0, candidate.correction_entries);
-    const double floor = 1e2 * kEpsilon * rows_.at.size();
-    const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
-    if (k > 0) staleness_.measured(reach, previous, rounding ? 0.0 : length);
-    if (rounding) break;
     // Where moves are cheap only what is seen on this candidate counts.
     const double expected = takes_rest_ ? length * (k > 0 ? length / previous : kUnknownSlope)
                                         : staleness_.left(reach, length);
-    if ((k > 0 || takes_rest_ || !measure) && expected <= enough) break;
+    const bool enough_done = (k > 0 || takes_rest_ || !measure) && expected <= enough;
+    if (k == 0 && enough_done) break;
+    const double floor = 1e2 * kEpsilon * rows_.at.size();
+    const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
+    if (k > 0) staleness_.measured(reach, previous, rounding ? 0.0 : length);
+    if (rounding || enough_done) break;
     previous = length;
   }
   return Status::success;

@@ -103,6 +103,14 @@ class FactoredRows {
  private:
   using Block = typename Rows::Block;
 
+  static void take(double factor, const double* __restrict dy, int n, double* __restrict ycor,
+                   double* __restrict y) {
+    for (int k = 0; k < n; ++k) {
+      const double move = factor * dy[k];
+      ycor[k] -= move;
+      y[k] -= move;
+    }
+  }
   int unknowns() const { return static_cast<int>(at.y.size()); }
   Status rows(double t, double* g);
   bool decide();
@@ -156,14 +164,14 @@ template <class Rows>
 void FactoredRows<Rows>::apply(double factor, double* correction) {
   for (const Block* block : {&blocks.d, &blocks.a}) {
     if (block->rows.empty()) continue;
-    double* __restrict y = at.y.data();
-    double* __restrict ycor = correction;
-    const double* __restrict dy = block->dy.data();
-    block->for_columns([=](int k, int i) {
-      const double move = factor * dy[k];
-      ycor[i] -= move;
-      y[i] -= move;
-    });
+    if (block->first >= 0)
+      take(factor, block->dy.data(), static_cast<int>(block->columns.size()),
+           correction + block->first, at.y.data() + block->first);
+    else
+      block->for_columns([=, y = at.y.data(), dy = block->dy.data()](int k, int i) {
+        correction[i] -= factor * dy[k];
+        y[i] -= factor * dy[k];
+      });
   }
 }
 

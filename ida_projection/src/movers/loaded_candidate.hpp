@@ -23,10 +23,7 @@ class LoadedCandidate {
   }
   /// y for the correction as it is now.
   void restart(const Candidate& candidate) {
-    const double* base = candidate.base_entries;
-    const int n = static_cast<int>(y.size());
-    double* to = y.data();
-    for (int i = 0; i < n; ++i) to[i] = base[i] + candidate.correction_entries[i];
+    add(candidate.base_entries, candidate.correction_entries, static_cast<int>(y.size()), y.data());
   }
   /// 1/w. A weight of zero means that the error of this component does not count at all.
   const std::vector<double>& WT() {
@@ -46,6 +43,11 @@ class LoadedCandidate {
   const double *w = nullptr, *ycor = nullptr;  ///< error weights; the corrector's change
 
  private:
+  static void add(const double* __restrict a, const double* __restrict b, int n,
+                  double* __restrict sum) {
+    for (int i = 0; i < n; ++i) sum[i] = a[i] + b[i];
+  }
+
   std::vector<double> WT_;
   bool WT_known_ = false;
 };

@@ -14,12 +14,9 @@ Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
 
   if (moves_ == 1) {
     previous_ = length;
-    // Newton's second move is about theta d^2. Ask for it only when it could matter; the factor 4
-    // pays for theta being measured now and then, not at every step.
-    const bool measure =
-        theta_ < 0.0 || length > 4.0 * measured_ || candidates_ % kMeasureEvery == 0;
     if (length <= floor) return Verdict::done;
-    if (!measure && 4.0 * theta_ * length * length <= options_->tolerance) return Verdict::done;
+    if (!measures(length) && 4.0 * theta_ * length * length <= options_->tolerance)
+      return Verdict::done;
     if (last) return length <= options_->tolerance ? Verdict::done : Verdict::failed;
     return Verdict::go_on;
   }

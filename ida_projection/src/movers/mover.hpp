@@ -117,11 +117,26 @@ class Monitor {
     ++candidates_;
   }
 
+  /// After a first move of this length: is it plain, whatever `floor` is, that judge() will call it
+  /// done? Then judge() need not be asked.
+  bool plainly_done(double length) {
+    const bool done =
+        moves_ == 0 && !measures(length) && 4.0 * theta_ * length * length <= options_->tolerance;
+    if (done) moves_ = 1;
+    return done;
+  }
+
   /// After a move of this length; `fresh`: the factors belong to the point that was left;
   /// `floor`: length below which rounding of y rules.
   Verdict judge(double length, bool fresh, double floor);
 
  private:
+  // Newton's second move is about theta d^2. It is asked for only when it could matter; the factor
+  // 4 pays for theta being measured now and then, not at every step.
+  bool measures(double length) const {
+    return theta_ < 0.0 || !(length <= 4.0 * measured_) || candidates_ % kMeasureEvery == 0;
+  }
+
   const Options* options_;
   double theta_ = -1.0;    // largest d_2 / d_1^2 seen; < 0: not measured yet
   double measured_ = 0.0;  // longest first move at which theta was looked for: no rounding there

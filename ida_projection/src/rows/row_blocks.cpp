@@ -196,19 +196,7 @@ bool RowBlocks::factor() {
   return true;
 }
 
-bool RowBlocks::factor_kept() {
-  for (Block* block : {&d, &a})
-    if (!block->rows.empty() &&
-        !block->solver.factor_kept(C_.data(), n_, block->rows.data(), block->columns.data()))
-      return false;
-  return true;
-}
-
-void RowBlocks::solve(const std::vector<double>& g) {
-  if (a.rows.empty()) {  // then d has every row, in order
-    d.solver.solve(g.data(), d.dy.data());
-    return;
-  }
+void RowBlocks::solve_both(const std::vector<double>& g) {
   for (std::size_t i = 0; i < d.rows.size(); ++i) d.g[i] = g[static_cast<std::size_t>(d.rows[i])];
   d.solve();
   for (std::size_t i = 0; i < a.rows.size(); ++i) {

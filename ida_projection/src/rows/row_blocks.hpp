@@ -187,9 +187,14 @@ class RowBlocks {
   /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
   bool factor();
   /// The same with the rows that the last factor() has kept. False: factor() is due.
-  bool factor_kept();
+  bool factor_kept() { return keep(d) && (a.rows.empty() || keep(a)); }
   /// d.dy and a.dy for the values g, with the C that was factored.
-  void solve(const std::vector<double>& g);
+  void solve(const std::vector<double>& g) {
+    if (a.rows.empty())
+      d.solver.solve(g.data(), d.dy.data());  // then d has every row, in order
+    else
+      solve_both(g);
+  }
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   /// The rows whose move is measured in tolerances.
   Block& counted() { return d.rows.empty() ? a : d; }
@@ -219,6 +224,11 @@ class RowBlocks {
   std::string message;
 
  private:
+  bool keep(Block& block) {
+    return block.rows.empty() ||
+           block.solver.factor_kept(C_.data(), n_, block.rows.data(), block.columns.data());
+  }
+  void solve_both(const std::vector<double>& g);
   double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   const double* row(int i) const { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
   bool fills(int i, int j) const {

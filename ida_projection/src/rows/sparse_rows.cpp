@@ -20,7 +20,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 StoredRows::StoredRows(const Evaluator& evaluator, int n) : n_(n) {
   int full = 0;
   for (const Evaluator::Part& part : evaluator.parts()) {
-    const SparseJacobian* sparse = part.sparse();
+    const SparseJacobian* sparse = part.sparse;
     const int first = static_cast<int>(columns.size());
     for (int i = 0; i < part.set->count; ++i)
       rows.push_back(sparse != nullptr
