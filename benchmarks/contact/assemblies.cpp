@@ -6,31 +6,31 @@
 
 namespace tether::contact::random {
 
-Body box(double mass, const Eigen::Vector3d& half) {
-  Body body;
+RigidBody box(double mass, const Eigen::Vector3d& half) {
+  RigidBody body;
   const Eigen::Vector3d s = half.cwiseProduct(half) * (mass / 3);
-  body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 1 / (s[1] + s[2]),
-      1 / (s[0] + s[2]), 1 / (s[0] + s[1]);
+  body.inverse_mass = 1 / mass;
+  body.inverse_inertia.diagonal() << 1 / (s[1] + s[2]), 1 / (s[0] + s[2]), 1 / (s[0] + s[1]);
   return body;
 }
 
-Body sphere(double mass, double radius) {
-  Body body;
-  const double i = 0.4 * mass * radius * radius;
-  body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 1 / i, 1 / i, 1 / i;
+RigidBody sphere(double mass, double radius) {
+  RigidBody body;
+  body.inverse_mass = 1 / mass;
+  body.inverse_inertia.diagonal().setConstant(1 / (0.4 * mass * radius * radius));
   return body;
 }
 
 Assembly stack(int n, double ratio, double mu) {
   Assembly out;
   for (int k = 0; k < n; ++k) {
-    Body body = box(k == n - 1 ? ratio : 1, {0.5, 0.5, 0.5});
-    body.velocity << 0.001, 0.002, -0.0981, 0, 0, 0;
+    RigidBody body = box(k == n - 1 ? ratio : 1, {0.5, 0.5, 0.5});
+    body.velocity << 0.001, 0.002, -0.0981;
     out.bodies.push_back(body);
     for (double x : {-0.5, 0.5})
       for (double y : {-0.5, 0.5})
         out.contacts.push_back(
-            BodyContact::at_point(k, k - 1, {x, y, -0.5}, {x, y, 0.5}, {0, 0, 1}, mu));
+            ContactRows::at_point(k, k - 1, {x, y, -0.5}, {x, y, 0.5}, {0, 0, 1}, mu));
   }
   return out;
 }
@@ -49,14 +49,7 @@ void RigidAssembly::add(const RigidAssembly& other) {
 
 RigidAssembly rigid_stack(int n, double ratio, double mu) {
   RigidAssembly out;
-  const Assembly from = stack(n, ratio, mu);
-  for (const Body& b : from.bodies) {
-    RigidBody body;
-    body.inverse_mass = b.inverse_mass(0, 0);
-    body.inverse_inertia = b.inverse_mass.bottomRightCorner<3, 3>();
-    body.velocity = b.velocity.head<3>();
-    out.bodies.push_back(body);
-  }
+  out.bodies = stack(n, ratio, mu).bodies;
   for (int k = 0; k < n; ++k)
     for (double x : {-0.5, 0.5})
       for (double y : {-0.5, 0.5}) {
@@ -75,12 +68,13 @@ RigidAssembly rigid_stack(int n, double ratio, double mu) {
 Assembly cluster(Generator& g, double mu, int bodies, int contacts) {
   Assembly out;
   for (int k = 0; k < bodies; ++k) {
-    Body body =
+    RigidBody body =
         box(std::exp(g.uniform(-1, 1)), {g.uniform(0.2, 1), g.uniform(0.2, 1), g.uniform(0.2, 1)});
     const Eigen::Matrix3d R = g.rotation();
-    body.inverse_mass.bottomRightCorner<3, 3>() =
-        (R * body.inverse_mass.bottomRightCorner<3, 3>() * R.transpose()).eval();
-    body.velocity << g.vector(), g.vector();
+    body.inverse_inertia = (R * body.inverse_inertia * R.transpose()).eval();
+    Vector6d v;
+    v << g.vector(), g.vector();
+    body.set_velocities(v);
     out.bodies.push_back(body);
   }
   for (int k = 0; k < contacts; ++k) {
@@ -90,7 +84,7 @@ Assembly cluster(Generator& g, double mu, int bodies, int contacts) {
     Eigen::Vector3d normal = g.vector().normalized();
     const Eigen::Vector3d r1(g.uniform(-1, 1), g.uniform(-1, 1), g.uniform(-1, 1));
     const Eigen::Vector3d r2(g.uniform(-1, 1), g.uniform(-1, 1), g.uniform(-1, 1));
-    out.contacts.push_back(BodyContact::at_point(first, second, r1, r2, normal, mu));
+    out.contacts.push_back(ContactRows::at_point(first, second, r1, r2, normal, mu));
   }
   return out;
 }

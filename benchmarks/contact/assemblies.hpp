@@ -9,14 +9,14 @@
 namespace tether::contact::random {
 
 struct Assembly {
-  std::vector<Body> bodies;
-  std::vector<BodyContact> contacts;
+  std::vector<RigidBody> bodies;
+  std::vector<ContactRows> contacts;
   Problem problem() const { return delassus(bodies, contacts); }
 };
 
-Body box(double mass, const Eigen::Vector3d& half);
+RigidBody box(double mass, const Eigen::Vector3d& half);
 
-Body sphere(double mass, double radius);
+RigidBody sphere(double mass, double radius);
 
 // n unit cubes on the ground, four contacts a level, the top one `ratio` times heavier; one step of
 // gravity, with a small push so that the data are not symmetric.

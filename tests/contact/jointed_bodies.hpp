@@ -21,16 +21,16 @@ inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 /// Bodies, rows and contacts in world axes. Each joint gets the next number.
 struct Mechanism {
-  std::vector<tc::Body> bodies;
+  std::vector<tc::RigidBody> bodies;
   std::vector<Vector3d> centre;
   tc::JointRows rows;
-  std::vector<tc::BodyContact> contacts;
+  std::vector<tc::ContactRows> contacts;
   int joints = 0;
 
   int body(double mass, const Matrix3d& inertia, const Vector3d& where) {
-    tc::Body b;
-    b.inverse_mass.topLeftCorner<3, 3>() = Matrix3d::Identity() / mass;
-    b.inverse_mass.bottomRightCorner<3, 3>() = inertia.inverse();
+    tc::RigidBody b;
+    b.inverse_mass = 1 / mass;
+    b.inverse_inertia = inertia.inverse();
     bodies.push_back(b);
     centre.push_back(where);
     return static_cast<int>(bodies.size()) - 1;
@@ -45,7 +45,7 @@ struct Mechanism {
   }
   int fixed(const Vector3d& velocity) {
     bodies.emplace_back();
-    bodies.back().velocity.head<3>() = velocity;
+    bodies.back().velocity = velocity;
     centre.push_back(Vector3d::Zero());
     return static_cast<int>(bodies.size()) - 1;
   }
@@ -90,12 +90,12 @@ struct Mechanism {
              double bias = 0) {
     const Vector3d r2 = second >= 0 ? Vector3d(p - centre[at(second)]) : p;
     contacts.push_back(
-        tc::BodyContact::at_point(first, second, p - centre[at(first)], r2, normal, mu));
+        tc::ContactRows::at_point(first, second, p - centre[at(first)], r2, normal, mu));
     contacts.back().bias[0] = bias;
   }
   void fall(double dt, const Vector3d& gravity = Vector3d(0, 0, -kGravity)) {
-    for (tc::Body& b : bodies)
-      if (!b.inverse_mass.isZero(0)) b.velocity.head<3>() += dt * gravity;
+    for (tc::RigidBody& b : bodies)
+      if (b.moves()) b.velocity += dt * gravity;
   }
   tc::JointSolution solve(tc::Options options = coulomb()) const {
     return tc::JointSolver(options).solve(bodies, rows, contacts);
@@ -109,9 +109,9 @@ struct Mechanism {
   double energy(const std::vector<Vector6d>& v) const {
     double sum = 0;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (bodies[i].inverse_mass.isZero(0)) continue;
+      if (!bodies[i].moves()) continue;
       const Eigen::Matrix<double, 6, 6> M =
-          Eigen::Matrix<double, 6, 6>(bodies[i].inverse_mass).inverse();
+          Eigen::Matrix<double, 6, 6>(bodies[i].inverse_mass_matrix()).inverse();
       sum += 0.5 * v[i].dot(M * v[i]);
     }
     return sum;

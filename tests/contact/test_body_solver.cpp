@@ -14,7 +14,7 @@ using namespace tether::contact;
 TEST_CASE("body form and Delassus form judge alike") {
   for (bool spheres : {true, false}) {
     const random::Packing p = random::packing(3, spheres);
-    const Problem problem = delassus(to_bodies(p.bodies), to_contacts(p.contacts));
+    const Problem problem = delassus(p.bodies, to_contacts(p.contacts));
     for (Law law : {Law::coulomb, Law::maximum_dissipation, Law::frictionless}) {
       const BodySolution s = run(p, law, 1);
       REQUIRE(s.status == Status::solved);
@@ -27,7 +27,7 @@ TEST_CASE("body form and Delassus form judge alike") {
       const Residuals r = evaluate(problem, law, x);
       CHECK(r.fixed_point <= 2e-10);
       CHECK(r.dissipation <= 1e-8);
-      const auto v = velocities_after(to_bodies(p.bodies), to_contacts(p.contacts), x);
+      const auto v = velocities_after(p.bodies, to_contacts(p.contacts), x);
       for (std::size_t k = 0; k < v.size(); ++k) {
         CHECK((v[k].head<3>() - s.velocities[k]).norm() < 1e-9);
         CHECK((v[k].tail<3>() - s.angular_velocities[k]).norm() < 1e-9);
@@ -44,7 +44,7 @@ TEST_CASE("evaluate of bodies is evaluate of the Delassus problem") {
       c.bias = g.uniform(-0.1, 0.1);
       c.mu = g.uniform(0, 1) < 0.3 ? 0 : g.uniform(0, 1);
     }
-    const Problem problem = delassus(to_bodies(p.bodies), to_contacts(p.contacts));
+    const Problem problem = delassus(p.bodies, to_contacts(p.contacts));
     for (Law law : {Law::coulomb, Law::maximum_dissipation, Law::frictionless}) {
       const BodySolution s = run(p, law, 1, 1e-3);
       Eigen::VectorXd x(problem.b().size());
@@ -95,15 +95,8 @@ TEST_CASE("replaced laws are reported, strict never replaces") {
   for (int k = 0; k < 40; ++k) {
     random::RigidAssembly a;
     const random::Assembly from = random::cluster(g, 2);
-    for (const Body& b : from.bodies) {
-      RigidBody body;
-      body.inverse_mass = b.inverse_mass(0, 0);
-      body.inverse_inertia = b.inverse_mass.bottomRightCorner<3, 3>();
-      body.velocity = b.velocity.head<3>();
-      body.angular_velocity = b.velocity.tail<3>();
-      a.bodies.push_back(body);
-    }
-    for (const BodyContact& c : from.contacts) {
+    a.bodies = from.bodies;
+    for (const ContactRows& c : from.contacts) {
       PointContact p;
       p.first = c.first;
       p.second = c.second;

@@ -64,7 +64,10 @@ Problem repeated(const Problem& p, int times) {
 // Five boxes of `mass` on each other after one step of gravity.
 Problem boxes(double mass, double mu) {
   random::Assembly a = random::stack(5, 1, mu);
-  for (Body& body : a.bodies) body.inverse_mass /= mass;
+  for (RigidBody& body : a.bodies) {
+    body.inverse_mass /= mass;
+    body.inverse_inertia /= mass;
+  }
   return a.problem();
 }
 
@@ -194,11 +197,12 @@ TEST_CASE("criterion: impulses outside of the range of doubles are no solution")
 
 // Between walls impulses grow until they overflow.
 TEST_CASE("criterion: a body between closing walls at any scale has finite impulses") {
-  Body body;
-  body.inverse_mass.setIdentity();
-  std::vector<BodyContact> walls;
+  RigidBody body;
+  body.inverse_mass = 1;
+  body.inverse_inertia.setIdentity();
+  std::vector<ContactRows> walls;
   for (double side : {1.0, -1.0}) {
-    walls.push_back(BodyContact::at_point(0, -1, {0, 0, 0}, {0, 0, 0}, {side, 0, 0}, 5));
+    walls.push_back(ContactRows::at_point(0, -1, {0, 0, 0}, {0, 0, 0}, {side, 0, 0}, 5));
     walls.back().bias[0] = -1;
   }
   for (int of_A : {-480, 0, 480})
@@ -226,7 +230,7 @@ TEST_CASE("criterion: no friction makes zero impulses a solution of an approach"
 TEST_CASE("criterion: a slip that friction cannot stop says nothing about the approach") {
   // A box at 1000 m/s, one step of gravity.
   random::Assembly a = random::stack(1, 1, 0.3);
-  a.bodies[0].velocity << 1000, 0, -0.0098, 0, 0, 0;
+  a.bodies[0].velocity << 1000, 0, -0.0098;
   const Problem p = a.problem();
   CHECK(evaluate(p, Law::coulomb, VectorXd::Zero(12)).fixed_point > 0.5);
   const Solution s = Solver(with(Law::coulomb, 1e-6)).solve(p);
@@ -299,12 +303,12 @@ TEST_CASE("criterion: a body between closing walls is infeasible, with the proof
       const Vector3d n = Vector3d(1, 2, -0.5).normalized();
       for (double side : {1.0, -1.0}) {
         a.contacts.push_back(
-            BodyContact::at_point(0, -1, -0.5 * side * n, Vector3d::Zero(), side * n, mu));
+            ContactRows::at_point(0, -1, -0.5 * side * n, Vector3d::Zero(), side * n, mu));
         a.contacts.back().bias[0] = -0.1;  // the wall comes
       }
       a.bodies.push_back(random::box(2, {0.5, 0.5, 0.5}));  // and something that can be solved
-      a.bodies[1].velocity << 0, 0, -1, 0, 0, 0;
-      a.contacts.push_back(BodyContact::at_point(1, -1, {0, 0, -0.5}, {0, 0, 0}, {0, 0, 1}, mu));
+      a.bodies[1].velocity << 0, 0, -1;
+      a.contacts.push_back(ContactRows::at_point(1, -1, {0, 0, -0.5}, {0, 0, 0}, {0, 0, 1}, mu));
       const Problem p = a.problem();
       for (Law law : kLaws) {
         for (Method method : {Method::automatic, Method::gauss_seidel, Method::anderson,
@@ -355,14 +359,18 @@ TEST_CASE(
                                          1 + static_cast<int>(g.uniform(0, 8)));
     const int kind = k % 4;
     if (kind == 1) {  // grazing: normal velocities from 1e-1 to 1e-300
-      for (BodyContact& c : a.contacts) {
-        Eigen::Vector3d u = c.J1 * a.bodies[static_cast<std::size_t>(c.first)].velocity;
-        if (c.second >= 0) u += c.J2 * a.bodies[static_cast<std::size_t>(c.second)].velocity;
+      for (ContactRows& c : a.contacts) {
+        Eigen::Vector3d u = c.J1 * a.bodies[static_cast<std::size_t>(c.first)].velocities();
+        if (c.second >= 0) u += c.J2 * a.bodies[static_cast<std::size_t>(c.second)].velocities();
         c.bias[0] = -u[0];
       }
     }
     if (kind == 2)
-      for (Body& body : a.bodies) body.inverse_mass *= std::pow(10, g.uniform(-4, 4));
+      for (RigidBody& body : a.bodies) {
+        const double factor = std::pow(10, g.uniform(-4, 4));
+        body.inverse_mass *= factor;
+        body.inverse_inertia *= factor;
+      }
     Problem p = a.problem();
     VectorXd b = p.b();
     if (kind == 1)

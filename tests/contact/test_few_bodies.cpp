@@ -13,8 +13,8 @@ using namespace tether::contact;
 using Eigen::Vector3d;
 
 struct Pile {
-  std::vector<Body> bodies;
-  std::vector<BodyContact> contacts;
+  std::vector<RigidBody> bodies;
+  std::vector<ContactRows> contacts;
 };
 
 // Round plates on each other and on the ground, each touching the next at `points` of its rim, with
@@ -24,16 +24,17 @@ Pile pile(int plates, int points, double mu, unsigned seed) {
   std::uniform_real_distribution<double> any(-1, 1);
   Pile out;
   for (int k = 0; k < plates; ++k) {
-    Body body;
+    RigidBody body;
     const double mass = 1 + 0.3 * any(random);
-    body.inverse_mass.diagonal() << 1 / mass, 1 / mass, 1 / mass, 4 / mass, 4 / mass, 2 / mass;
-    body.velocity << 0.5 * any(random), 0.5 * any(random), -1 + 0.2 * any(random), any(random),
-        any(random), any(random);
+    body.inverse_mass = 1 / mass;
+    body.inverse_inertia.diagonal() << 4 / mass, 4 / mass, 2 / mass;
+    body.velocity << 0.5 * any(random), 0.5 * any(random), -1 + 0.2 * any(random);
+    body.angular_velocity << any(random), any(random), any(random);
     out.bodies.push_back(body);
     for (int p = 0; p < points; ++p) {
       const double angle = 2 * 3.141592653589793 * (p + 0.3 * k) / points;
       const Vector3d rim(std::cos(angle), std::sin(angle), 0);
-      out.contacts.push_back(BodyContact::at_point(
+      out.contacts.push_back(ContactRows::at_point(
           k, k - 1, rim - Vector3d(0, 0, 0.2), rim + Vector3d(0, 0, 0.2), Vector3d::UnitZ(), mu));
     }
   }
@@ -103,9 +104,8 @@ TEST_CASE("few bodies: where interior points end, proximal problems go on") {
 
 TEST_CASE("few bodies: an inverse mass that is singular or zero serves, too") {
   Pile p = pile(5, 40, 0.4, 3);
-  p.bodies[2].inverse_mass.setZero();  // fixed
-  p.bodies[4].inverse_mass(5, 5) = 0;  // never turns about the vertical
-  p.bodies[2].velocity.setZero();
+  p.bodies[2] = RigidBody();              // fixed
+  p.bodies[4].inverse_inertia(2, 2) = 0;  // never turns about the vertical
   const Problem problem = delassus(p.bodies, p.contacts);
   Options options;
   options.law = Law::coulomb;

@@ -36,11 +36,12 @@ struct Parallelogram : Mechanism {
     const double a = radians(degrees);
     const Vector3d arm(std::sin(a), 0, -std::cos(a)), along_rod(-arm.z(), 0, arm.x());
     const int coupler = body(2, 0.2 * Matrix3d::Identity(), Vector3d(1, 0, 0) + arm);
-    bodies.back().velocity.head<3>() = -along_rod;
+    bodies.back().velocity = -along_rod;
     for (int k = 0; k < 3; ++k) {
       const Vector3d pivot(k, 0, 0);
       const int crank = rod(1, pivot, pivot + arm);
-      bodies.back().velocity << -along_rod / 2, 0, 1, 0;
+      bodies.back().velocity = -along_rod / 2;
+      bodies.back().angular_velocity = Vector3d::UnitY();
       for (int c = 0; c < copies; ++c) {
         hinge(crank, kWorld, pivot);
         hinge(coupler, crank, pivot + arm);
@@ -133,7 +134,7 @@ TEST_CASE("joints: an elastic impact takes (1 - e^2) w_n^2 / (2 J P J') through 
       // One degree of freedom: reduced mass 2 + 3/3 kg at the coupler.
       const double before = m.energy(s.velocities) + (1 - e * e) * 3.0 / 2;
       std::vector<Vector6d> came;
-      for (const tc::Body& b : m.bodies) came.push_back(b.velocity);
+      for (const tc::RigidBody& b : m.bodies) came.push_back(b.velocities());
       CHECK(m.energy(came) == Approx(1.5).epsilon(1e-13));
       CHECK(before == Approx(1.5).epsilon(1e-12));
       CHECK(s.impulses[0] == Approx(3 * (1 + e)).epsilon(1e-12));
@@ -239,7 +240,8 @@ TEST_CASE("joints: random mechanisms, against dense elimination") {
     for (int i = 0; i < n; ++i) {
       const Vector3d s = (random().cwiseAbs() + Vector3d::Ones()) * units;
       m.body(units * (1 + i), s.asDiagonal(), random() * 2);
-      m.bodies.back().velocity << random(), random();
+      m.bodies.back().velocity = random();
+      m.bodies.back().angular_velocity = random();
     }
     for (int i = 1; i < n; ++i) m.ball(i, i - 1 - (i % 3 == 2), m.centre[at(i)] + random());
     m.ball(0, n - 1, m.centre[0] + random());
@@ -255,14 +257,14 @@ TEST_CASE("joints: random mechanisms, against dense elimination") {
     Eigen::MatrixXd W = Eigen::MatrixXd::Zero(6 * n, 6 * n);
     Eigen::VectorXd v(6 * n), mu(contacts);
     for (int i = 0; i < n; ++i) {
-      W.block<6, 6>(6 * i, 6 * i) = m.bodies[at(i)].inverse_mass;
-      v.segment<6>(6 * i) = m.bodies[at(i)].velocity;
+      W.block<6, 6>(6 * i, 6 * i) = m.bodies[at(i)].inverse_mass_matrix();
+      v.segment<6>(6 * i) = m.bodies[at(i)].velocities();
     }
     for (int r = 0; r < rows; ++r)
       for (const tc::JointRows::Term* t = m.rows.begin(r); t != m.rows.end(r); ++t)
         G.block<1, 6>(r, 6 * t->body) += t->G.transpose();
     for (int c = 0; c < contacts; ++c) {
-      const tc::BodyContact& contact = m.contacts[at(c)];
+      const tc::ContactRows& contact = m.contacts[at(c)];
       mu[c] = contact.mu;
       J.block<3, 6>(3 * c, 6 * contact.first) += contact.J1;
       if (contact.second >= 0) J.block<3, 6>(3 * c, 6 * contact.second) += contact.J2;

@@ -13,7 +13,7 @@ namespace {
 struct Stack {
   std::vector<RigidBody> bodies;
   std::vector<PointContact> contacts;
-  Problem problem() const { return delassus(to_bodies(bodies), to_contacts(contacts)); }
+  Problem problem() const { return delassus(bodies, to_contacts(contacts)); }
 };
 
 // Unit cubes on each other, touching with their corners; one millisecond of gravity. `lean`: the

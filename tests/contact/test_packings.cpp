@@ -71,7 +71,7 @@ TEST_CASE(
     for (double mu : {0.4, 0.7}) {
       for (std::uint64_t seed : {1, 2}) {
         const random::Packing packing = close_packing(5, spheres, mu, seed);
-        const Problem p = delassus(to_bodies(packing.bodies), to_contacts(packing.contacts));
+        const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
         Options o;
         o.law = Law::coulomb;
         o.measure = Measure::fixed_point;
@@ -139,7 +139,7 @@ TEST_CASE("packings: the few contacts that toggle are solved as problems of thei
   for (bool spheres : {true, false}) {
     for (std::uint64_t seed : {3, 4}) {
       const random::Packing packing = close_packing(5, spheres, 1, seed);
-      const Problem p = delassus(to_bodies(packing.bodies), to_contacts(packing.contacts));
+      const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
       Options o;
       o.law = Law::coulomb;
       o.tolerance = 1e-6;
@@ -162,7 +162,7 @@ TEST_CASE("packings: the few contacts that toggle are solved as problems of thei
 TEST_CASE("packings: four contacts a body are factorised by bodies, to the same answer") {
   for (bool spheres : {true, false}) {
     const random::Packing packing = close_packing(4, spheres, 0.2, 31, 0.05, 1.08);
-    const Problem p = delassus(to_bodies(packing.bodies), to_contacts(packing.contacts));
+    const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
     REQUIRE(p.contacts() >= 4 * static_cast<int>(packing.bodies.size()));
     Problem contacts_only = p;
     contacts_only.set_body_form(nullptr);

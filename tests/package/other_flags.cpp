@@ -76,13 +76,14 @@ void problem_and_solution() {
 }
 
 void bodies() {
-  std::vector<tc::Body> bodies(3);
-  for (tc::Body& body : bodies) {
-    body.inverse_mass.setIdentity();
-    body.velocity << 0, 0, -1, 0, 0, 0;
+  std::vector<tc::RigidBody> bodies(3);
+  for (tc::RigidBody& body : bodies) {
+    body.inverse_mass = 1;
+    body.inverse_inertia.setIdentity();
+    body.velocity << 0, 0, -1;
   }
-  const std::vector<tc::BodyContact> contacts(
-      3, tc::BodyContact::at_point(1, -1, {0, 0, -1}, {0, 0, 0}, {0, 0, 1}, 0.3));
+  const std::vector<tc::ContactRows> contacts(
+      3, tc::ContactRows::at_point(1, -1, {0, 0, -1}, {0, 0, 0}, {0, 0, 1}, 0.3));
   const tc::Solution s = tc::Solver().solve(tc::delassus(bodies, contacts));
   const std::vector<tc::Vector6d> v = tc::velocities_after(bodies, contacts, s.impulses);
   expect(std::abs(v[1][2]) < 1e-8 && v[0][2] == -1, "velocities after");

@@ -32,7 +32,7 @@ void GivenProblem::read_bodies() {
   for (std::size_t k = 0; k < bodies_->size(); ++k) {
     const RigidBody& b = (*bodies_)[k];
     check(k, b);
-    const bool moving = moves(b);
+    const bool moving = b.moves();
     if (!moving && !(b.velocity.isZero(0) && b.angular_velocity.isZero(0))) {
       fixed_slot_[k] = static_cast<int>(fixed_.size());
       fixed_.push_back({});

@@ -28,15 +28,9 @@ Options solver_options(const BodyOptions& options) {
 // The island as a Problem, for the stages of Solver; x: its present impulses.
 Problem BodySolver::Implementation::assembled(const Island& island, Worker& worker,
                                               Eigen::VectorXd& x) const {
-  worker.bodies.resize(at(island.body_end - island.body_begin));
-  for (int s = island.body_begin; s < island.body_end; ++s) {
-    const RigidBody& b = given.bodies()[at(graph.body[at(s)])];
-    Body& body = worker.bodies[at(s - island.body_begin)];
-    body.inverse_mass.setZero();
-    body.inverse_mass.topLeftCorner<3, 3>() = b.inverse_mass * Matrix3d::Identity();
-    body.inverse_mass.bottomRightCorner<3, 3>() = b.inverse_inertia;
-    body.velocity << b.velocity, b.angular_velocity;
-  }
+  worker.bodies.clear();
+  for (int s = island.body_begin; s < island.body_end; ++s)
+    worker.bodies.push_back(given.bodies()[at(graph.body[at(s)])]);
   worker.contacts.clear();
   x.resize(3 * island.contacts);
   const auto local = [&](int b) { return b < 0 ? -1 : graph.slot[at(b)] - island.body_begin; };
@@ -46,7 +40,7 @@ Problem BodySolver::Implementation::assembled(const Island& island, Worker& work
     const Matrix3d F = tangent_frame(s.n);
     x.segment<3>(3 * static_cast<Eigen::Index>(worker.contacts.size())) =
         F * sweeps.impulse(kind, place);
-    worker.contacts.push_back(BodyContact::at_point(local(given.first()[at(contact)]),
+    worker.contacts.push_back(ContactRows::at_point(local(given.first()[at(contact)]),
                                                     local(given.second()[at(contact)]), s.r1, s.r2,
                                                     s.n, c.mu));
     worker.contacts.back().bias = F * (c.bias * s.n - s.fixed);

@@ -202,21 +202,10 @@ void BodySolver::solve(const std::vector<RigidBody>& bodies,
   implementation_->solve(bodies, contacts, solution);
 }
 
-std::vector<Body> to_bodies(const std::vector<RigidBody>& bodies) {
-  std::vector<Body> out(bodies.size());
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    out[k].inverse_mass.topLeftCorner<3, 3>() =
-        bodies[k].inverse_mass * Eigen::Matrix3d::Identity();
-    out[k].inverse_mass.bottomRightCorner<3, 3>() = bodies[k].inverse_inertia;
-    out[k].velocity << bodies[k].velocity, bodies[k].angular_velocity;
-  }
-  return out;
-}
-
-std::vector<BodyContact> to_contacts(const std::vector<PointContact>& contacts) {
-  std::vector<BodyContact> out;
+std::vector<ContactRows> to_contacts(const std::vector<PointContact>& contacts) {
+  std::vector<ContactRows> out;
   for (const PointContact& c : contacts) {
-    out.push_back(BodyContact::at_point(c.first, c.second, c.r1, c.r2, c.normal, c.mu));
+    out.push_back(ContactRows::at_point(c.first, c.second, c.r1, c.r2, c.normal, c.mu));
     out.back().bias[0] = c.bias;
   }
   return out;

@@ -31,7 +31,7 @@ class Scales {
     std::vector<detail::Side> sides;
     for (std::size_t i = 0; i < n; ++i) {
       const PointContact& c = contacts[i];
-      const bool turned = !detail::moves(bodies[at(c.first)]);
+      const bool turned = !bodies[at(c.first)].moves();
       sides.push_back(detail::side(bodies, c, turned));
       first[i] = turned ? c.second : c.first;
       second[i] = sides[i].second ? (turned ? c.first : c.second) : -1;
@@ -98,11 +98,10 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
   std::vector<LocalBlock> blocks;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const PointContact& c = contacts[i];
-    if (!detail::moves(bodies[at(c.first)]) &&
-        (c.second < 0 || !detail::moves(bodies[at(c.second)])))
+    if (!bodies[at(c.first)].moves() && (c.second < 0 || !bodies[at(c.second)].moves()))
       detail::refuse_fixed(i);
     const Eigen::Matrix3d F = tangent_frame(c.normal);
-    const detail::Side side = detail::side(bodies, c, !detail::moves(bodies[at(c.first)]));
+    const detail::Side side = detail::side(bodies, c, !bodies[at(c.first)].moves());
     blocks.emplace_back(F * detail::diagonal_block(side) * F.transpose(), c.mu);
   }
   const detail::LawKernels& rule = detail::kernels(law);

@@ -19,8 +19,8 @@ struct Worker {
   // Of an assembled island.
   std::unique_ptr<Solver> solver;
   Solution solution;
-  std::vector<Body> bodies;
-  std::vector<BodyContact> contacts;
+  std::vector<RigidBody> bodies;
+  std::vector<ContactRows> contacts;
   std::vector<int> replaced;  // contacts, of all islands
   std::exception_ptr failure;
 };

@@ -77,7 +77,7 @@ void StepJointIslands::solve_jointed(const std::vector<RigidBody>& bodies,
     const PointContact& p = contacts[at(k)];
     const double mu = law_ == Law::frictionless ? 0 : p.mu;
     const auto row = 3 * static_cast<Eigen::Index>(contacts_.size());
-    contacts_.push_back(BodyContact::at_point(p.first, p.second, p.r1, p.r2, p.normal, mu));
+    contacts_.push_back(ContactRows::at_point(p.first, p.second, p.r1, p.r2, p.normal, mu));
     contacts_.back().bias[0] = p.bias;
     if (const Vector3d* last = warm_ ? memory_.find(p.id) : nullptr)
       x_.segment<3>(row) = tangent_frame(p.normal) * *last;

@@ -51,7 +51,7 @@ class StepJointIslands final : public JointIslands {
   std::vector<int> jointed_, rest_;  // contacts
   std::vector<PointContact> points_;
   BodySolution solution_;              // of rest_
-  std::vector<BodyContact> contacts_;  // jointed_, then laws
+  std::vector<ContactRows> contacts_;  // jointed_, then laws
   std::vector<int> law_of_;            // of the latter
   std::vector<Eigen::Vector3d> own_;   // mobilities of contacts_; empty: none has any
   std::vector<Vector6d> v_;

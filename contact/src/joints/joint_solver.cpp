@@ -42,11 +42,11 @@ std::string advice(const JointSolution& s) {
 
 }  // namespace
 
-JointSolution JointSolver::solve(const std::vector<Body>& bodies, const JointRows& joints,
-                                 const std::vector<BodyContact>& contacts) {
+JointSolution JointSolver::solve(const std::vector<RigidBody>& bodies, const JointRows& joints,
+                                 const std::vector<ContactRows>& contacts) {
   detail::check(bodies, contacts);
   const auto moves = [&](int body) {
-    return body >= 0 && !bodies[static_cast<std::size_t>(body)].inverse_mass.isZero(0);
+    return body >= 0 && bodies[static_cast<std::size_t>(body)].moves();
   };
   for (std::size_t i = 0; i < contacts.size(); ++i)
     if (!moves(contacts[i].first) && !moves(contacts[i].second)) detail::refuse_fixed(i);
@@ -55,7 +55,7 @@ JointSolution JointSolver::solve(const std::vector<Body>& bodies, const JointRow
   mechanisms.clear_pulls();
   JointSolution out;
   out.velocities.reserve(bodies.size());
-  for (const Body& body : bodies) out.velocities.push_back(body.velocity);
+  for (const RigidBody& body : bodies) out.velocities.push_back(body.velocities());
   mechanisms.satisfy(joints, out.velocities);
   out.contradicting = mechanisms.contradicting();
 

@@ -19,14 +19,14 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-double normal_speed(const BodyContact& c, const std::vector<Vector6d>& v) {
+double normal_speed(const ContactRows& c, const std::vector<Vector6d>& v) {
   double w = c.bias[0] + c.J1.row(0).dot(v[at(c.first)]);
   if (c.second >= 0) w += c.J2.row(0).dot(v[at(c.second)]);
   return w;
 }
 
 // Upper bound of the sum of its terms, row by row.
-Eigen::Vector3d largest_speeds(const BodyContact& c, const std::vector<Vector6d>& v) {
+Eigen::Vector3d largest_speeds(const ContactRows& c, const std::vector<Vector6d>& v) {
   Eigen::Vector3d w = c.bias.cwiseAbs() + c.J1.cwiseAbs() * v[at(c.first)].cwiseAbs();
   if (c.second >= 0) w += c.J2.cwiseAbs() * v[at(c.second)].cwiseAbs();
   return w;
@@ -43,7 +43,7 @@ int JointedContacts::node_of(const Mechanisms& mechanisms, int body) const {
 }
 
 void JointedContacts::find_islands(const Mechanisms& mechanisms,
-                                   const std::vector<BodyContact>& contacts) {
+                                   const std::vector<ContactRows>& contacts) {
   const int n = static_cast<int>(contacts.size());
   std::vector<int>& parent = parent_;
   parent.resize(at(mechanisms.count() + mechanisms.bodies()));
@@ -53,10 +53,10 @@ void JointedContacts::find_islands(const Mechanisms& mechanisms,
     return i;
   };
   const auto moving = [&](int body) { return body >= 0 && mechanisms.moves(body); };
-  const auto any = [&](const BodyContact& c) {
+  const auto any = [&](const ContactRows& c) {
     return node_of(mechanisms, moving(c.first) ? c.first : c.second);
   };
-  for (const BodyContact& c : contacts)
+  for (const ContactRows& c : contacts)
     if (moving(c.first) && moving(c.second))
       parent[at(root(node_of(mechanisms, c.first)))] = root(node_of(mechanisms, c.second));
   order_.resize(contacts.size());
@@ -76,10 +76,10 @@ void JointedContacts::find_islands(const Mechanisms& mechanisms,
 
 // By node, then by contact.
 void JointedContacts::collect_sides(const Mechanisms& mechanisms,
-                                    const std::vector<BodyContact>& contacts) {
+                                    const std::vector<ContactRows>& contacts) {
   sides_.clear();
   for (std::size_t l = 0; l < members_.size(); ++l) {
-    const BodyContact& c = contacts[at(members_[l])];
+    const ContactRows& c = contacts[at(members_[l])];
     const int body[2] = {c.first, c.second};
     for (int s = 0; s < 2; ++s) {
       if (body[s] < 0 || !mechanisms.moves(body[s])) continue;
@@ -153,7 +153,7 @@ void JointedContacts::clear_held_slips() {
 }
 
 // Leaves the contacts in kept_ whose normal velocity an impulse can change.
-void JointedContacts::drop_held(const std::vector<BodyContact>& contacts,
+void JointedContacts::drop_held(const std::vector<ContactRows>& contacts,
                                 const std::vector<Vector6d>& v) {
   kept_.clear();
   for (std::size_t l = 0; l < members_.size(); ++l) {
@@ -162,7 +162,7 @@ void JointedContacts::drop_held(const std::vector<BodyContact>& contacts,
       kept_.push_back(i);
       continue;
     }
-    const BodyContact& c = contacts[at(members_[l])];
+    const ContactRows& c = contacts[at(members_[l])];
     const double w = normal_speed(c, v), scale = largest_speeds(c, v)[0];
     if (w >= -solver_.options().tolerance * scale) continue;
     result_.blocked.push_back(members_[l]);
@@ -172,7 +172,7 @@ void JointedContacts::drop_held(const std::vector<BodyContact>& contacts,
 }
 
 // b of a contact; where joints hold a direction of slip, what rounding leaves there is no slip.
-Eigen::Vector3d JointedContacts::approach(int place, const BodyContact& c,
+Eigen::Vector3d JointedContacts::approach(int place, const ContactRows& c,
                                           const std::vector<Vector6d>& v) const {
   Eigen::Vector3d w = c.bias + c.J1 * v[at(c.first)];
   if (c.second >= 0) w += c.J2 * v[at(c.second)];
@@ -186,7 +186,7 @@ Eigen::Vector3d JointedContacts::approach(int place, const BodyContact& c,
 }
 
 // From and to x of all contacts.
-void JointedContacts::solve_kept(const std::vector<BodyContact>& contacts,
+void JointedContacts::solve_kept(const std::vector<ContactRows>& contacts,
                                  const std::vector<Vector6d>& v, linalg::VectorX& x) {
   const auto n = static_cast<Eigen::Index>(kept_.size());
   if (n == 0) return;
@@ -199,7 +199,7 @@ void JointedContacts::solve_kept(const std::vector<BodyContact>& contacts,
                                            .eval();
   for (Eigen::Index i = 0; i < n; ++i) {
     const int contact = members_[at(kept_[static_cast<std::size_t>(i)])];
-    const BodyContact& c = contacts[at(contact)];
+    const ContactRows& c = contacts[at(contact)];
     b.segment<3>(3 * i) = approach(kept_[static_cast<std::size_t>(i)], c, v);
     mu[i] = c.mu;
     start.segment<3>(3 * i) = x.segment<3>(3 * contact);
@@ -245,7 +245,7 @@ void JointedContacts::apply(Mechanisms& mechanisms, const linalg::VectorX& x,
 }
 
 const JointedContacts::Result& JointedContacts::solve(Mechanisms& mechanisms,
-                                                      const std::vector<BodyContact>& contacts,
+                                                      const std::vector<ContactRows>& contacts,
                                                       const std::vector<Eigen::Vector3d>& own,
                                                       std::vector<Vector6d>& v,
                                                       linalg::VectorX& x) {

@@ -26,7 +26,7 @@ class JointedContacts {
   /// what the joints do to the pulls. x (3 each, contact frame): where to start from, and the
   /// impulses found. own: what an impulse moves a contact by besides the bodies, in each direction,
   /// on the diagonal of A; empty: nothing.
-  const Result& solve(Mechanisms& mechanisms, const std::vector<BodyContact>& contacts,
+  const Result& solve(Mechanisms& mechanisms, const std::vector<ContactRows>& contacts,
                       const std::vector<Eigen::Vector3d>& own, std::vector<Vector6d>& v,
                       linalg::VectorX& x);
 
@@ -42,15 +42,15 @@ class JointedContacts {
     Eigen::Vector2d direction;
   };
   int node_of(const Mechanisms& mechanisms, int body) const;
-  void find_islands(const Mechanisms& mechanisms, const std::vector<BodyContact>& contacts);
-  void collect_sides(const Mechanisms& mechanisms, const std::vector<BodyContact>& contacts);
+  void find_islands(const Mechanisms& mechanisms, const std::vector<ContactRows>& contacts);
+  void collect_sides(const Mechanisms& mechanisms, const std::vector<ContactRows>& contacts);
   void assemble(Mechanisms& mechanisms, const std::vector<Eigen::Vector3d>& own);
   void add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end);
   void clear_held_slips();
-  void drop_held(const std::vector<BodyContact>& contacts, const std::vector<Vector6d>& v);
-  Eigen::Vector3d approach(int place, const BodyContact& contact,
+  void drop_held(const std::vector<ContactRows>& contacts, const std::vector<Vector6d>& v);
+  Eigen::Vector3d approach(int place, const ContactRows& contact,
                            const std::vector<Vector6d>& v) const;
-  void solve_kept(const std::vector<BodyContact>& contacts, const std::vector<Vector6d>& v,
+  void solve_kept(const std::vector<ContactRows>& contacts, const std::vector<Vector6d>& v,
                   linalg::VectorX& x);
   void apply(Mechanisms& mechanisms, const linalg::VectorX& x, std::vector<Vector6d>& v);
 

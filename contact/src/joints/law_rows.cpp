@@ -54,11 +54,11 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt) {
   }
 }
 
-BodyContact LawRows::contact(int law, bool place, const std::vector<Vector6d>& v,
+ContactRows LawRows::contact(int law, bool place, const std::vector<Vector6d>& v,
                              const Mechanisms& mechanisms, Eigen::Vector3d& own) const {
   const JointLaws::Law& each = laws[law];
   const int row = each.limit ? 0 : 1;
-  BodyContact out;
+  ContactRows out;
   double mobility = 0;
   for (const JointRows::Term* t = laws.rows().begin(law); t != laws.rows().end(law); ++t) {
     (t == laws.rows().begin(law) ? out.first : out.second) = t->body;

@@ -32,7 +32,7 @@ class LawRows {
   std::uint64_t id(int law) const { return kFirstId + static_cast<std::uint64_t>(law); }
   /// The contact of a law, and its own mobility in the directions that no body moves in. `place`:
   /// the problem moves positions, from rest.
-  BodyContact contact(int law, bool place, const std::vector<Vector6d>& v,
+  ContactRows contact(int law, bool place, const std::vector<Vector6d>& v,
                       const Mechanisms& mechanisms, Eigen::Vector3d& own) const;
   /// Its impulse in the contact frame, and back.
   Eigen::Vector3d start(int law, const Eigen::Vector3d* last) const;

@@ -26,10 +26,10 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 // Bodies and kinds of the rows, as numbers.
-bool Mechanisms::is_same(const std::vector<Body>& bodies, const JointRows& joints) const {
+bool Mechanisms::is_same(const std::vector<RigidBody>& bodies, const JointRows& joints) const {
   if (moves_.size() != bodies.size()) return false;
   for (std::size_t i = 0; i < bodies.size(); ++i)
-    if ((moves_[i] != 0) == bodies[i].inverse_mass.isZero(0)) return false;
+    if ((moves_[i] != 0) != bodies[i].moves()) return false;
   std::size_t k = 0;
   for (int row = 0; row < joints.count(); ++row) {
     const auto terms = joints.end(row) - joints.begin(row);
@@ -41,10 +41,10 @@ bool Mechanisms::is_same(const std::vector<Body>& bodies, const JointRows& joint
   return k == pattern_.size();
 }
 
-void Mechanisms::analyse(const std::vector<Body>& bodies, const JointRows& joints) {
+void Mechanisms::analyse(const std::vector<RigidBody>& bodies, const JointRows& joints) {
   const int n = static_cast<int>(bodies.size());
   moves_.resize(bodies.size());
-  for (std::size_t i = 0; i < bodies.size(); ++i) moves_[i] = !bodies[i].inverse_mass.isZero(0);
+  for (std::size_t i = 0; i < bodies.size(); ++i) moves_[i] = bodies[i].moves();
   pattern_.clear();
   std::vector<int> parent(bodies.size());
   std::iota(parent.begin(), parent.end(), 0);
@@ -100,16 +100,18 @@ void Mechanisms::analyse(const std::vector<Body>& bodies, const JointRows& joint
   x_.resize(at(joints.count()));
 }
 
-void Mechanisms::update(const std::vector<Body>& bodies, const JointRows& joints) {
+void Mechanisms::update(const std::vector<RigidBody>& bodies, const JointRows& joints) {
   if (!is_same(bodies, joints)) {
     analyse(bodies, joints);
     root_.assign(bodies.size(), Matrix6d::Zero());
     inverse_mass_.assign(bodies.size(), Matrix6d::Zero());
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    if (!moves_[i] || inverse_mass_[i] == bodies[i].inverse_mass) continue;
-    inverse_mass_[i] = bodies[i].inverse_mass;
-    root_[i] = inverse_mass_root(bodies[i].inverse_mass);
+    if (!moves_[i]) continue;
+    const Matrix6d inverse_mass = bodies[i].inverse_mass_matrix();
+    if (inverse_mass_[i] == inverse_mass) continue;
+    inverse_mass_[i] = inverse_mass;
+    root_[i] = inverse_mass_root(inverse_mass);
   }
   for (const auto& each : list_)
     if (!each->factor(joints, root_))

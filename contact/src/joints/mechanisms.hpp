@@ -15,7 +15,7 @@ class Mechanisms {
  public:
   /// Factors of the rows, for bodies of these inverse masses. Throws std::invalid_argument on rows
   /// that name bodies that do not exist, and on values that are not finite.
-  void update(const std::vector<Body>& bodies, const JointRows& joints);
+  void update(const std::vector<RigidBody>& bodies, const JointRows& joints);
 
   int count() const { return static_cast<int>(list_.size()); }
   Mechanism& operator[](int m) { return *list_[static_cast<std::size_t>(m)]; }
@@ -44,8 +44,8 @@ class Mechanisms {
   void add(int m, const double* u, std::vector<Vector6d>& v) const;
 
  private:
-  bool is_same(const std::vector<Body>& bodies, const JointRows& joints) const;
-  void analyse(const std::vector<Body>& bodies, const JointRows& joints);
+  bool is_same(const std::vector<RigidBody>& bodies, const JointRows& joints) const;
+  void analyse(const std::vector<RigidBody>& bodies, const JointRows& joints);
   double defect(int m, const JointRows& joints, const std::vector<Vector6d>& v);
   void find_contradicting(int m, const JointRows& joints, double scale);
 

@@ -37,7 +37,6 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
     : equations_(std::move(equations)),
       gyroscopic_(gyroscopic),
       has_laws_(equations_->has_laws()),
-      bodies_(bodies.motion.size()),
       v_(bodies.motion.size(), Vector6d::Zero()),
       g_(at(equations_->rows())),
       b_(g_.size()),
@@ -87,12 +86,7 @@ void StepJoints::list_laws(std::vector<int>& out) const {
 void StepJoints::factor(const BodySet& bodies, double t) {
   rows_.clear();
   equations_->add_rows(bodies, t, rows_);
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    bodies_[i].inverse_mass.topLeftCorner<3, 3>() =
-        bodies.motion[i].inverse_mass * Eigen::Matrix3d::Identity();
-    bodies_[i].inverse_mass.bottomRightCorner<3, 3>() = bodies.motion[i].inverse_inertia;
-  }
-  mechanisms_.update(bodies_, rows_);
+  mechanisms_.update(bodies.motion, rows_);
   position_.assign(bodies.position.begin(), bodies.position.end());
   orientation_.assign(bodies.orientation.begin(), bodies.orientation.end());
   time_ = t;

@@ -78,9 +78,8 @@ class StepJoints final : public JointPart {
   bool has_laws_;
   LawRows laws_;
   JointRows rows_;
-  std::vector<Body> bodies_;  // inverse masses
-  std::vector<int> held_;     // bodies of mechanisms
-  std::vector<char> round_;   // of them: of inertia 1
+  std::vector<int> held_;    // bodies of mechanisms
+  std::vector<char> round_;  // of them: of inertia 1
   std::vector<std::pair<int, int>> links_, joined_;
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
   std::vector<double> g_, b_, u_, x_, impulses_;

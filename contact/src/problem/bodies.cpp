@@ -16,18 +16,29 @@ namespace {
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
-void detail::check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    const auto where = [k] { return "body " + std::to_string(k) + ": "; };
-    if (!bodies[k].inverse_mass.allFinite())
-      require_finite("inverse_mass", bodies[k].inverse_mass, where());
-    if (!bodies[k].inverse_mass.isZero(0))
-      require_semidefinite("inverse_mass", bodies[k].inverse_mass, where);
-    if (!bodies[k].velocity.allFinite()) require_finite("velocity", bodies[k].velocity, where());
-  }
+Matrix6d RigidBody::inverse_mass_matrix() const {
+  Matrix6d out = Matrix6d::Zero();
+  out.diagonal().head<3>().setConstant(inverse_mass);
+  out.bottomRightCorner<3, 3>() = inverse_inertia;
+  return out;
+}
+
+Vector6d RigidBody::velocities() const {
+  Vector6d out;
+  out << velocity, angular_velocity;
+  return out;
+}
+
+void RigidBody::set_velocities(const Vector6d& v) {
+  velocity = v.head<3>();
+  angular_velocity = v.tail<3>();
+}
+
+void detail::check(const std::vector<RigidBody>& bodies, const std::vector<ContactRows>& contacts) {
+  for (std::size_t k = 0; k < bodies.size(); ++k) check(k, bodies[k]);
   const int n = static_cast<int>(bodies.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {
-    const BodyContact& c = contacts[k];
+    const ContactRows& c = contacts[k];
     if (c.first < 0 || c.first >= n || c.second < -1 || c.second >= n || c.first == c.second) {
       throw std::invalid_argument("contact " + std::to_string(k) + " names bodies " +
                                   std::to_string(c.first) + " and " + std::to_string(c.second) +
@@ -51,14 +62,14 @@ Eigen::Matrix3d tangent_frame(const Eigen::Vector3d& n) {
   return F;
 }
 
-BodyContact BodyContact::at_point(int first, int second, const Eigen::Vector3d& r1,
+ContactRows ContactRows::at_point(int first, int second, const Eigen::Vector3d& r1,
                                   const Eigen::Vector3d& r2, const Eigen::Vector3d& normal,
                                   double mu) {
   detail::require(std::abs(normal.norm() - 1) < 1e-6, "length of normal", normal.norm(),
                   "must be 1 (to 1e-6)");
   detail::require_finite("r1", r1);
   detail::require_finite("r2", r2);
-  BodyContact c;
+  ContactRows c;
   c.first = first;
   c.second = second;
   c.mu = mu;
@@ -75,19 +86,20 @@ BodyContact BodyContact::at_point(int first, int second, const Eigen::Vector3d& 
 
 namespace {
 
-std::shared_ptr<const detail::BodyForm> body_form(const std::vector<Body>& bodies,
-                                                  const std::vector<BodyContact>& contacts) {
+std::shared_ptr<const detail::BodyForm> body_form(const std::vector<RigidBody>& bodies,
+                                                  const std::vector<ContactRows>& contacts) {
   auto form = std::make_shared<detail::BodyForm>();
   form->bodies = static_cast<int>(bodies.size());
   std::vector<Matrix6d> C;
-  for (const Body& body : bodies) C.push_back(detail::inverse_mass_root(body.inverse_mass));
+  for (const RigidBody& body : bodies)
+    C.push_back(detail::inverse_mass_root(body.inverse_mass_matrix()));
   form->contacts.resize(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const BodyContact& c = contacts[i];
+    const ContactRows& c = contacts[i];
     detail::BodyForm::Contact& to = form->contacts[i];
     const int body[2] = {c.first, c.second};
     for (int s = 0; s < 2; ++s) {
-      const bool moves = body[s] >= 0 && !bodies[at(body[s])].inverse_mass.isZero(0);
+      const bool moves = body[s] >= 0 && bodies[at(body[s])].moves();
       to.body[s] = moves ? body[s] : -1;
       if (!moves) continue;
       const Matrix36d H = (s == 0 ? c.J1 : c.J2) * C[at(body[s])];
@@ -102,7 +114,7 @@ std::shared_ptr<const detail::BodyForm> body_form(const std::vector<Body>& bodie
 
 }  // namespace
 
-Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts) {
+Problem delassus(const std::vector<RigidBody>& bodies, const std::vector<ContactRows>& contacts) {
   detail::check(bodies, contacts);
   const int n = static_cast<int>(contacts.size());
   struct Side {
@@ -112,11 +124,11 @@ Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>
   std::vector<std::vector<Side>> sides(bodies.size());
   Eigen::VectorXd b(3 * n), mu(n);
   for (int i = 0; i < n; ++i) {
-    const BodyContact& c = contacts[at(i)];
-    Eigen::Vector3d u = c.bias + c.J1 * bodies[at(c.first)].velocity;
+    const ContactRows& c = contacts[at(i)];
+    Eigen::Vector3d u = c.bias + c.J1 * bodies[at(c.first)].velocities();
     sides[at(c.first)].push_back({i, &c.J1});
     if (c.second >= 0) {
-      u += c.J2 * bodies[at(c.second)].velocity;
+      u += c.J2 * bodies[at(c.second)].velocities();
       sides[at(c.second)].push_back({i, &c.J2});
     }
     b.segment<3>(3 * i) = -u;
@@ -124,9 +136,10 @@ Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>
   }
   std::vector<MatrixBlock> blocks;
   for (std::size_t k = 0; k < bodies.size(); ++k) {
-    if (bodies[k].inverse_mass.isZero(0)) continue;
+    if (!bodies[k].moves()) continue;
+    const Matrix6d inverse_mass = bodies[k].inverse_mass_matrix();
     for (const Side& p : sides[k]) {
-      const Matrix36d JM = *p.J * bodies[k].inverse_mass;
+      const Matrix36d JM = *p.J * inverse_mass;
       for (const Side& q : sides[k])
         blocks.push_back({p.contact, q.contact, JM * q.J->transpose()});
     }
@@ -137,8 +150,8 @@ Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>
   return problem;
 }
 
-std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
-                                       const std::vector<BodyContact>& contacts,
+std::vector<Vector6d> velocities_after(const std::vector<RigidBody>& bodies,
+                                       const std::vector<ContactRows>& contacts,
                                        const linalg::VectorView& impulses) {
   detail::check(bodies, contacts);
   if (impulses.size() != 3 * static_cast<Eigen::Index>(contacts.size())) {
@@ -147,13 +160,13 @@ std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
   }
   detail::require_finite("impulses", impulses);
   std::vector<Vector6d> v;
-  for (const Body& body : bodies) v.push_back(body.velocity);
+  for (const RigidBody& body : bodies) v.push_back(body.velocities());
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const BodyContact& c = contacts[i];
+    const ContactRows& c = contacts[i];
     const Eigen::Vector3d x = impulses.segment<3>(3 * static_cast<Eigen::Index>(i));
-    v[at(c.first)] += bodies[at(c.first)].inverse_mass * (c.J1.transpose() * x);
+    v[at(c.first)] += bodies[at(c.first)].inverse_mass_matrix() * (c.J1.transpose() * x);
     if (c.second >= 0)
-      v[at(c.second)] += bodies[at(c.second)].inverse_mass * (c.J2.transpose() * x);
+      v[at(c.second)] += bodies[at(c.second)].inverse_mass_matrix() * (c.J2.transpose() * x);
   }
   return v;
 }

@@ -13,8 +13,6 @@ namespace tether::contact::detail {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-inline bool moves(const RigidBody& b) { return b.inverse_mass > 0 || !b.inverse_inertia.isZero(0); }
-
 inline Matrix3d skew(const Vector3d& r) {
   Matrix3d X;
   X << 0, -r[2], r[1], r[2], 0, -r[0], -r[1], r[0], 0;
@@ -45,7 +43,7 @@ inline Side side(const std::vector<RigidBody>& bodies, const PointContact& c, bo
     s.n = -s.n;
     s.sign = -1;
   }
-  if (other && moves(*other)) {
+  if (other && other->moves()) {
     s.second = other;
   } else if (other) {
     s.fixed = other->velocity + other->angular_velocity.cross(s.r2);

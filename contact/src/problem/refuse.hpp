@@ -51,8 +51,8 @@ void require_semidefinite(const char* argument, const Eigen::MatrixBase<Derived>
 }
 
 // For delassus(): also refuses contacts between bodies that do not exist, or of one body.
-void check(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts);
-// Body k of BodySolver, and contact i between `count` bodies.
+void check(const std::vector<RigidBody>& bodies, const std::vector<ContactRows>& contacts);
+// Body k, and contact i between `count` bodies.
 void check(std::size_t k, const RigidBody& body);
 void check(std::size_t i, const PointContact& contact, int count);
 [[noreturn]] void refuse_fixed(std::size_t i);  // neither body of contact i moves

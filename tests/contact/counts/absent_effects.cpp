@@ -20,7 +20,7 @@ struct Solver::Implementation {};
 Solver::Solver(const Options&) { absent("assembled islands"); }
 Solver::~Solver() = default;
 Solution Solver::solve(const Problem&, const linalg::VectorView&) { absent("assembled islands"); }
-Problem delassus(const std::vector<Body>&, const std::vector<BodyContact>&) {
+Problem delassus(const std::vector<RigidBody>&, const std::vector<ContactRows>&) {
   absent("assembled islands");
 }
 Residuals evaluate(const std::vector<RigidBody>&, const std::vector<PointContact>&, Law,

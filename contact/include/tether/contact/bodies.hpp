@@ -13,16 +13,28 @@ using Matrix6d = linalg::Matrix<6, 6>;
 using Vector6d = linalg::Matrix<6, 1>;
 using Matrix36d = linalg::Matrix<3, 6>;
 
-/// Inverse mass matrix (symmetric, positive semidefinite) and velocity (linear, angular) before the
-/// impulses. Zero inverse: fixed.
-struct Body {
-  Matrix6d inverse_mass = Matrix6d::Zero();
-  Vector6d velocity = Vector6d::Zero();
+/// Rigid body at one instant: mass and inertia about its centre of mass, in world axes, and the
+/// velocity before the impulses. Zero inverse mass and inertia: fixed (its velocity may be
+/// prescribed and is not changed).
+struct RigidBody {
+  double inverse_mass = 0;                                     ///< 1/kg
+  Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();   ///< 1/(kg m^2)
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< of the centre, m/s
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s
+
+  bool moves() const { return inverse_mass > 0 || !inverse_inertia.isZero(0); }
+  /// M^-1 of the six velocities (linear, angular).
+  Matrix6d inverse_mass_matrix() const;
+  /// Linear, then angular.
+  Vector6d velocities() const;
+  void set_velocities(const Vector6d& v);
 };
 
-/// Relative velocity J1 v1 + J2 v2 in the contact frame (normal, tangent, tangent), positive
-/// normal: the bodies separate. `bias` is added to it before the solve: w = J v + bias.
-struct BodyContact {
+/// The rows of one contact: relative velocity J1 v1 + J2 v2 in the contact frame (normal, tangent,
+/// tangent), positive normal: the bodies separate. `bias` is added to it before the solve: w = J v
+/// + bias. Where a contact is of rigid bodies that touch at a point, PointContact says the same by
+/// geometry; rows are for any Jacobian.
+struct ContactRows {
   int first = 0, second = -1;  ///< indices of bodies; -1: the fixed world
   Matrix36d J1 = Matrix36d::Zero(), J2 = Matrix36d::Zero();
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();
@@ -30,20 +42,21 @@ struct BodyContact {
 
   /// Touching at r1 from the centre of `first` and r2 from that of `second`; the unit normal
   /// points from `second` to `first`. The first tangent is chosen; see tangent_frame.
-  static BodyContact at_point(int first, int second, const Eigen::Vector3d& r1,
+  static ContactRows at_point(int first, int second, const Eigen::Vector3d& r1,
                               const Eigen::Vector3d& r2, const Eigen::Vector3d& normal, double mu);
 };
+using BodyContact [[deprecated("is called ContactRows")]] = ContactRows;
 
 /// Rows: normal, tangent, tangent (right-handed).
 Eigen::Matrix3d tangent_frame(const Eigen::Vector3d& normal);
 
 /// Forms A = J M^-1 J' and b = -(J v + bias). Throws std::invalid_argument on indices that do not
 /// exist, values that are not finite, and contacts between fixed bodies.
-Problem delassus(const std::vector<Body>& bodies, const std::vector<BodyContact>& contacts);
+Problem delassus(const std::vector<RigidBody>& bodies, const std::vector<ContactRows>& contacts);
 
 /// Velocities after the impulses: v + M^-1 J' x.
-std::vector<Vector6d> velocities_after(const std::vector<Body>& bodies,
-                                       const std::vector<BodyContact>& contacts,
+std::vector<Vector6d> velocities_after(const std::vector<RigidBody>& bodies,
+                                       const std::vector<ContactRows>& contacts,
                                        const linalg::VectorView& impulses);
 
 }  // namespace tether::contact

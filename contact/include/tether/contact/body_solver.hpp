@@ -12,15 +12,6 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// Rigid body: mass and inertia about its centre, in world axes. Zero inverse mass and inertia:
-/// fixed (its velocity may be prescribed and is not changed).
-struct RigidBody {
-  double inverse_mass = 0;  // 1/kg
-  Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          // of the centre, m/s
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  // rad/s
-};
-
 /// Contact at r1 from the centre of `first`, r2 from that of `second` (-1: the fixed world); the
 /// unit normal points from `second` to `first`. One of the two bodies must be able to move.
 struct PointContact {
@@ -129,9 +120,8 @@ class BodySolver {
 Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
                    Law law, const std::vector<Eigen::Vector3d>& impulses);
 
-/// The same assembly for delassus() and Solver.
-std::vector<Body> to_bodies(const std::vector<RigidBody>& bodies);
-std::vector<BodyContact> to_contacts(const std::vector<PointContact>& contacts);
+/// The same contacts for delassus() and Solver.
+std::vector<ContactRows> to_contacts(const std::vector<PointContact>& contacts);
 
 }  // namespace tether::contact
 TETHER_EXPORT_END

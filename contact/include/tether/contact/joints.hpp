@@ -90,8 +90,8 @@ class JointSolver {
 
   /// From the velocities of the bodies before the impulses. Throws std::invalid_argument on indices
   /// that do not exist and values that are not finite.
-  JointSolution solve(const std::vector<Body>& bodies, const JointRows& joints,
-                      const std::vector<BodyContact>& contacts);
+  JointSolution solve(const std::vector<RigidBody>& bodies, const JointRows& joints,
+                      const std::vector<ContactRows>& contacts);
 
  private:
   struct TETHER_HIDDEN Implementation;
