@@ -13,10 +13,9 @@
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
+using linalg::at;
 
 namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // Newell's normal of a closed loop: twice its area long.
 Vector3d newell(const std::vector<Vector3d>& vertices, const std::vector<int>& loop) {

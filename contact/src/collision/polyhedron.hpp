@@ -3,9 +3,14 @@
 
 #include <Eigen/Core>
 #include <tether/contact/shapes.hpp>
+#include <tether/linalg/block3.hpp>
 #include <vector>
 
 namespace tether::contact::detail {
+
+// Part of the smaller thickness: numbers that differ by rounding only, of which the first is taken
+// in every attitude.
+constexpr double kRounding = 1e-12;
 
 struct Polyhedron {
   struct Face {

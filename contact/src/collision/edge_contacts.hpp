@@ -1,0 +1,19 @@
+// Tether: edges of polyhedra that touch. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "collision/separating_axes.hpp"
+
+namespace tether::contact::detail {
+
+// Nearest points of two segments from p along u and from q along v.
+void nearest(const Eigen::Vector3d& p, const Eigen::Vector3d& u, const Eigen::Vector3d& q,
+             const Eigen::Vector3d& v, Eigen::Vector3d& on_first, Eigen::Vector3d& on_second);
+
+// Of the edges of an axis. tie: points nearer to the axis than this are on it.
+void crossing_edges(const Placed& a, const Placed& b, const EdgeAxis& axis, double tie,
+                    double margin, NearPoints& out);
+// Of the edges (or corners) farthest in the unit direction m, which points from `a` to `b`.
+void edge_along_edge(const Placed& a, const Placed& b, const Eigen::Vector3d& m, double rounding,
+                     double margin, NearPoints& out);
+
+}  // namespace tether::contact::detail

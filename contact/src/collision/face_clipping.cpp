@@ -1,0 +1,102 @@
+// Tether: points of a polyhedron over a face of another. SPDX-License-Identifier: BSD-3-Clause
+#include "collision/face_clipping.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+using linalg::at;
+
+namespace {
+
+constexpr double kSame = 1e-7;  // of the smaller thickness: corners this near are one
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+// Among the faces farthest along -n, the one most nearly perpendicular to n. A face that lies
+// more against n may still end above the lowest corner.
+int FaceClipper::lowest_face(const Placed& other, const Vector3d& n, double same) {
+  double lowest = kInfinity;
+  height_.clear();
+  for (const Vector3d& v : other.now.vertices) {
+    height_.push_back(n.dot(v));
+    lowest = std::min(lowest, height_.back());
+  }
+  int best = -1;
+  double cosine = 0;
+  for (int f = 0; f < static_cast<int>(other.now.faces.size()); ++f) {
+    const std::vector<int>& loop = other.loop(f);
+    if (std::none_of(loop.begin(), loop.end(),
+                     [&](int v) { return height_[at(v)] < lowest + same; }))
+      continue;
+    const double c = other.face(f).normal.dot(n);
+    if (best >= 0 && !(c < cosine - kRounding)) continue;
+    best = f;
+    cosine = c;
+  }
+  return best;
+}
+
+void FaceClipper::clip(const Placed& reference, int face, const Placed& other, double least,
+                       double margin, double size, int mark, NearPoints& out) {
+  const Vector3d& n = reference.face(face).normal;
+  const double offset = reference.face(face).offset;
+  const double same = kSame * size;
+  const int opposite = lowest_face(other, n, same);
+  polygon_.clear();
+  // Loops run the other way round seen from the reference face; either way serves.
+  for (int k = 0; k < other.loop_size(opposite); ++k) {
+    const int v = other.loop(opposite)[at(k)];
+    polygon_.push_back({other.vertex(v), v & 0x7ff, k});
+  }
+  for (int k = 0; k < reference.loop_size(face) && !polygon_.empty(); ++k)
+    clip_to(reference.inward(face, k), reference.corner(face, k), k, same);
+  merge(same);
+  for (const Corner& c : polygon_) {
+    const double gap = n.dot(c.point) - offset;
+    if (gap > least && gap < margin) out.add(c.point, c.point - gap * n, n, gap, mark | c.feature);
+  }
+}
+
+// Keeps inward . (x - on_plane) >= 0. Signs and cut parameters are of the same two numbers, so
+// that a cut lies between the ends of its edge however flat the edge lies in the plane. A cut
+// within `same` of a corner takes over its feature: faces of equal size do not flicker.
+void FaceClipper::clip_to(const Vector3d& inward, const Vector3d& on_plane, int plane,
+                          double same) {
+  clipped_.clear();
+  const std::size_t n = polygon_.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    const Corner &c = polygon_[k], &next = polygon_[k + 1 == n ? 0 : k + 1];
+    const double d = inward.dot(c.point - on_plane), e = inward.dot(next.point - on_plane);
+    const bool in = d >= 0, next_in = e >= 0;
+    if (in) clipped_.push_back(c);
+    if (in == next_in) continue;
+    const Vector3d point = c.point + d / (d - e) * (next.point - c.point);
+    int feature = 2048 + (c.edge * 181 + plane) % 30000;
+    if ((point - c.point).squaredNorm() < same * same) feature = c.feature;
+    if ((point - next.point).squaredNorm() < same * same) feature = next.feature;
+    // Going out, the side plane follows; coming in, the rest of the edge.
+    clipped_.push_back({point, feature, in ? 128 + plane : c.edge});
+  }
+  polygon_.swap(clipped_);
+}
+
+// Leaves out corners within `same` of another one or of the line between their neighbours: what
+// is left spans the polygon up to that, and no point is moved.
+void FaceClipper::merge(double same) {
+  const auto spare = [&](std::size_t k) {
+    const std::size_t n = polygon_.size();
+    const Vector3d p = polygon_[k == 0 ? n - 1 : k - 1].point - polygon_[k].point;
+    const Vector3d q = polygon_[k + 1 == n ? 0 : k + 1].point - polygon_[k].point;
+    const double pp = p.squaredNorm(), qq = q.squaredNorm(), s2 = same * same;
+    if (pp < s2 || qq < s2) return true;
+    return p.dot(q) < 0 && p.cross(q).squaredNorm() < s2 * (p - q).squaredNorm();
+  };
+  for (std::size_t k = polygon_.size(); k-- > 0 && polygon_.size() > 1;)
+    if (spare(k)) polygon_.erase(polygon_.begin() + static_cast<std::ptrdiff_t>(k));
+}
+
+}  // namespace tether::contact::detail

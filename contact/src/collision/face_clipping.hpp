@@ -1,0 +1,35 @@
+// Tether: points of a polyhedron over a face of another. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "collision/separating_axes.hpp"
+
+namespace tether::contact::detail {
+
+// Keeps its storage between pairs of bodies.
+class FaceClipper {
+ public:
+  // Points on faces of `other` over the reference face, with gaps between `least` and `margin`;
+  // on_first of a result is on `other`, its normal is that of the reference face. size: the smaller
+  // thickness of both, mark: is put to the features.
+  void clip(const Placed& reference, int face, const Placed& other, double least, double margin,
+            double size, int mark, NearPoints& out);
+
+ private:
+  // A corner of the polygon that is being clipped; `edge` follows it.
+  struct Corner {
+    Eigen::Vector3d point;
+    int feature, edge;
+  };
+
+  int lowest_face(const Placed& other, const Eigen::Vector3d& n, double same);
+  void clip_to(const Eigen::Vector3d& inward, const Eigen::Vector3d& on_plane, int plane,
+               double same);
+  void merge(double same);
+
+  std::vector<Corner> polygon_, clipped_;
+  std::vector<double> height_;
+};
+
+}  // namespace tether::contact::detail

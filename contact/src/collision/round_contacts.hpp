@@ -1,0 +1,19 @@
+// Tether: balls and capsules on polyhedra. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "collision/separating_axes.hpp"
+
+namespace tether::contact::detail {
+
+// A ball, or a capsule with its axis from middle - half to middle + half.
+struct Round {
+  Eigen::Vector3d middle, half;
+  double radius;
+  bool capsule;
+};
+
+// Both ends of a capsule as balls, and where its axis passes an edge between them.
+void round_on_polyhedron(const Round& round, const Placed& polyhedron, double margin,
+                         NearPoints& out);
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,49 @@
+// Tether: the axes along which two polyhedra lie farthest apart. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "collision/separating_axes.hpp"
+
+#include <algorithm>
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+using linalg::at;
+
+FaceAxis best_face(const Placed& a, const Placed& b, double rounding) {
+  FaceAxis best;
+  for (int f = 0; f < static_cast<int>(a.now.faces.size()); ++f) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Vector3d& v : b.now.vertices) least = std::min(least, a.face(f).normal.dot(v));
+    const double separation = least - a.face(f).offset;
+    if (separation > best.separation + rounding) best = {separation, f};
+  }
+  return best;
+}
+
+// Only edges whose arcs of normals cross can touch (Gregorius, The Separating Axis Test between
+// Convex Polyhedra, 2013).
+EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
+  EdgeAxis best;
+  for (int i = 0; i < static_cast<int>(a.shape->edges.size()); ++i) {
+    const Polyhedron::Edge& e = a.shape->edges[at(i)];
+    const Vector3d &n1 = a.face(e.left).normal, &n2 = a.face(e.right).normal;
+    const Vector3d u = a.vertex(e.to) - a.vertex(e.from);
+    for (int j = 0; j < static_cast<int>(b.shape->edges.size()); ++j) {
+      const Polyhedron::Edge& g = b.shape->edges[at(j)];
+      const Vector3d m1 = -b.face(g.left).normal, m2 = -b.face(g.right).normal;
+      const Vector3d v = b.vertex(g.to) - b.vertex(g.from);
+      const double s1 = m1.dot(u), s2 = m2.dot(u), t1 = n1.dot(v), t2 = n2.dot(v);
+      if (s1 * s2 >= 0 || t1 * t2 >= 0 || s1 * t2 <= 0) continue;
+      Vector3d n = u.cross(v);
+      const double length = n.norm();
+      if (!(length > 1e-6 * u.norm() * v.norm())) continue;
+      n /= length;
+      if (n.dot(n1) + n.dot(n2) < 0) n = -n;
+      const double separation = n.dot(b.vertex(g.from) - a.vertex(e.from));
+      if (separation > best.separation + rounding) best = {separation, i, j, n};
+    }
+  }
+  return best;
+}
+
+}  // namespace tether::contact::detail
