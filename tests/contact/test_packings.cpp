@@ -108,7 +108,7 @@ TEST_CASE("packings: contacts that have settled are not swept to the end, 5300 c
   for (bool spheres : {true, false}) {
     for (double mu : {0.4, 0.7}) {
       const random::Packing packing = close_packing(8, spheres, mu, spheres ? 42 : 43);
-      const Problem p = delassus(to_bodies(packing.bodies), to_contacts(packing.contacts));
+      const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
       REQUIRE(p.contacts() > 5000);
       Options o;
       o.law = Law::coulomb;
