@@ -119,7 +119,7 @@ void PackedContacts::resize(const Chunk& end, std::size_t contacts) {
 double PackedContacts::pack(Kind k, int place, const Side& side, double mu, double bias, int a,
                             int b) {
   double slip = 0;
-  const auto between = [&](auto p) {
+  const auto between = [&](auto&& p) -> auto& {
     p.first = a;
     p.second = b;
     p.bias = bias;

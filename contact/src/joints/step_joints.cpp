@@ -38,10 +38,8 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
       gyroscopic_(gyroscopic),
       has_laws_(equations_->has_laws()),
       v_(bodies.motion.size(), Vector6d::Zero()),
-      g_(at(equations_->rows())),
-      b_(g_.size()),
-      x_(g_.size()),
-      impulses_(g_.size()) {
+      row_(at(equations_->rows())),
+      impulses_(row_.g.size()) {
   factor(bodies, 0);
   if (rows_.count() != equations_->rows())
     throw std::invalid_argument("joints: " + std::to_string(rows_.count()) + " rows instead of " +
@@ -65,7 +63,7 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
   }
   for (auto p = pairs.begin(); p != pairs.end(); p = pairs.upper_bound(*p))
     if (pairs.count(*p) >= kRowsOfJoint) joined_.push_back(*p);
-  position_.clear();  // begin() looks at the positions
+  factored_.clear();  // begin() looks at the positions
 }
 
 bool StepJoints::are_joined(int first, int second) const {
@@ -87,18 +85,22 @@ void StepJoints::factor(const BodySet& bodies, double t) {
   rows_.clear();
   equations_->add_rows(bodies, t, rows_);
   mechanisms_.update(bodies.motion, rows_);
+  factored_.set(bodies, t);
+}
+
+void StepJoints::FactoredAt::set(const BodySet& bodies, double t) {
   position_.assign(bodies.position.begin(), bodies.position.end());
   orientation_.assign(bodies.orientation.begin(), bodies.orientation.end());
   time_ = t;
 }
 
-bool StepJoints::moved_since(const BodySet& bodies, double t) const {
-  if (position_.empty() || std::abs(t - time_) > 1e-9 * std::abs(t)) return true;
+bool StepJoints::FactoredAt::is(const BodySet& bodies, double t) const {
+  if (position_.empty() || std::abs(t - time_) > 1e-9 * std::abs(t)) return false;
   for (std::size_t i = 0; i < position_.size(); ++i)
     if (position_[i] != bodies.position[i] ||
         orientation_[i].coeffs() != bodies.orientation[i].coeffs())
-      return true;
-  return false;
+      return false;
+  return true;
 }
 
 void StepJoints::take_velocities(const BodySet& bodies) {
@@ -124,18 +126,18 @@ double StepJoints::size(const BodySet& bodies) const {
 // change_ becomes the least change of positions, over `dt`, that takes back g at time t; returns
 // its length in the metric of the masses.
 double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
-  equations_->values(bodies, t, g_.data());
+  equations_->values(bodies, t, row_.g.data());
   change_.assign(v_.size(), Vector6d::Zero());
   double square = 0;
   left_ = 0;
   for (int m = 0; m < mechanisms_.count(); ++m) {
     Mechanism& mechanism = mechanisms_[m];
     for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
-      b_[k] = -g_[at(mechanism.rows()[k])] / dt;
-    u_.resize(at(mechanism.entries()));
-    mechanism.least(b_.data(), u_.data());
-    mechanisms_.add(m, u_.data(), change_);
-    square += std::pow(norm(u_) * dt, 2);
+      row_.b[k] = -row_.g[at(mechanism.rows()[k])] / dt;
+    row_.u.resize(at(mechanism.entries()));
+    mechanism.least(row_.b.data(), row_.u.data());
+    mechanisms_.add(m, row_.u.data(), change_);
+    square += std::pow(norm(row_.u) * dt, 2);
     for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
       left_ = std::max(left_, std::abs(mechanism.left(static_cast<int>(k))) * dt);
   }
@@ -157,7 +159,7 @@ bool StepJoints::project_positions(BodySet& bodies, double t) {
   const double whole = size(bodies);
   double before = INFINITY;
   for (int k = 0; k < kMoves; ++k) {
-    if (k > 0 || position_.empty()) factor(bodies, t);
+    if (k > 0 || factored_.none()) factor(bodies, t);
     const double move = least_move(bodies, t, 1);
     if (!std::isfinite(move)) return false;
     if (move <= kNoMove * whole) break;
@@ -179,7 +181,7 @@ void StepJoints::begin(BodySet& bodies, double t) {
 }
 
 void StepJoints::put_onto(BodySet& bodies, double t) {
-  if (!moved_since(bodies, t)) return;
+  if (factored_.is(bodies, t)) return;
   factor(bodies, t);
   // The result of a step stays the same to the last bit, also in a continued run.
   if (!(least_move(bodies, t, 1) + left_ <= kMet * size(bodies))) {
@@ -195,12 +197,12 @@ void StepJoints::put_onto(BodySet& bodies, double t) {
 
 // The rows that least squares leave the most of.
 void StepJoints::refuse(const BodySet& bodies, double t) {
-  equations_->values(bodies, t, g_.data());
+  equations_->values(bodies, t, row_.g.data());
   double most = 0;
-  for (const double g : g_) most = std::max(most, std::abs(g));
+  for (const double g : row_.g) most = std::max(most, std::abs(g));
   std::set<std::string> names;
   for (int row = 0; row < rows_.count(); ++row)
-    if (!(std::abs(g_[at(row)]) < 0.1 * most)) names.insert(equations_->name(rows_.joint(row)));
+    if (!(std::abs(row_.g[at(row)]) < 0.1 * most)) names.insert(equations_->name(rows_.joint(row)));
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   throw std::invalid_argument("joints contradict each other at t = " + std::to_string(t) +
@@ -274,7 +276,7 @@ void StepJoints::predict(BodySet& bodies, double t, double dt) {
 }
 
 void StepJoints::put_back(BodySet& bodies, double t) {
-  if (!moved_since(bodies, t)) return;
+  if (factored_.is(bodies, t)) return;
   const double whole = size(bodies);
   double before = INFINITY;
   for (int k = 0; k < kMoves; ++k) {
@@ -340,11 +342,11 @@ bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& 
   mechanisms_.satisfy(rows_, v_);
   met = met && mechanisms_.contradicting().empty();
   give_velocities(bodies);
-  mechanisms_.impulses(x_.data());
-  for (std::size_t row = 0; row < impulses_.size(); ++row) impulses_[row] += x_[row];
-  equations_->values(bodies, t + dt, g_.data());
+  mechanisms_.impulses(row_.x.data());
+  for (std::size_t row = 0; row < impulses_.size(); ++row) impulses_[row] += row_.x[row];
+  equations_->values(bodies, t + dt, row_.g.data());
   drift_ = 0;
-  for (const double g : g_) drift_ = std::max(drift_, std::abs(g));
+  for (const double g : row_.g) drift_ = std::max(drift_, std::abs(g));
   return met;
 }
 

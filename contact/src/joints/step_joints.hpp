@@ -55,9 +55,28 @@ class StepJoints final : public JointPart {
     Eigen::Vector3d position;
     linalg::Quaternion orientation;
   };
+  // Positions of all bodies and the time for which the factors were made.
+  class FactoredAt {
+   public:
+    void set(const BodySet& bodies, double t);
+    void clear() { position_.clear(); }
+    bool none() const { return position_.empty(); }
+    // False where a body has moved, or the time is another one.
+    bool is(const BodySet& bodies, double t) const;
+
+   private:
+    std::vector<Eigen::Vector3d> position_;
+    std::vector<linalg::Quaternion> orientation_;
+    double time_ = 0;
+  };
+  // Newton's iteration for the joints at the end of a step, a number for each row.
+  struct RowVectors {
+    explicit RowVectors(std::size_t rows) : g(rows), b(rows), x(rows) {}
+    std::vector<double> g, b, x;
+    std::vector<double> u;  // the entries of a mechanism
+  };
   void put_onto(BodySet& bodies, double t);
   void factor(const BodySet& bodies, double t);
-  bool moved_since(const BodySet& bodies, double t) const;
   void take_velocities(const BodySet& bodies);
   void give_velocities(BodySet& bodies) const;
   double size(const BodySet& bodies) const;
@@ -82,12 +101,11 @@ class StepJoints final : public JointPart {
   std::vector<char> round_;  // of them: of inertia 1
   std::vector<std::pair<int, int>> links_, joined_;
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
-  std::vector<double> g_, b_, u_, x_, impulses_;
+  RowVectors row_;
+  std::vector<double> impulses_;
   std::vector<Place> place_;  // of held_, at the start of the step
-  // Positions of all bodies and the time for which the factors were made.
-  std::vector<Eigen::Vector3d> position_;
-  std::vector<linalg::Quaternion> orientation_;
-  double time_ = 0, drift_ = 0;
+  FactoredAt factored_;
+  double drift_ = 0;
   double left_ = 0;  // of the last least_move(): what no move takes back, in its metric
 };
 

@@ -12,6 +12,9 @@ namespace tether::contact::detail::avx2 {
 namespace {
 
 using v4 = __m256d;
+// The words of law/real.hpp.
+using Real = v4;
+using Mask = v4;
 
 TETHER_AVX2 v4 all(double x) { return _mm256_set1_pd(x); }
 TETHER_AVX2 v4 load(const double* p) { return _mm256_load_pd(p); }

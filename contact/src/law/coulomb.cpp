@@ -6,8 +6,17 @@
 
 #include "law/coulomb_lanes.hpp"
 #include "law/define_law.hpp"
+#include "law/real.hpp"
 
 namespace tether::contact::detail {
+
+namespace scalar {
+namespace {
+#define TETHER_TEXT TETHER_INLINE
+#include "law/coulomb_slip.hpp"
+#undef TETHER_TEXT
+}  // namespace
+}  // namespace scalar
 
 // Not inlined into kernels that are built for several machines: its bits are the same on all.
 __attribute__((noinline)) void Coulomb::derivative(const LocalBlock& L, double bn, double b0,
@@ -97,25 +106,17 @@ bool Coulomb::safeguarded(const LocalBlock& L, const LocalRhs& r, double warm, d
   const double h = std::sqrt(r.h0 * r.h0 + r.h1 * r.h1), ik = 1 / r.k;
   const double gh = L.g[0] * r.h0 + L.g[1] * r.h1;
   if (!(h * ik < 1e60 * beta_max)) return false;
-  // s lies between (1 - e) and (1 + e) times |y|; at e > 1 it may start lower.
-  double lo = std::max((1 - L.e) * h * ik - beta_max, 0.0);
-  double hi = std::max((1 + L.e) * h * ik - beta_min, lo);
+  auto [lo, hi] = scalar::slip_bracket(L.e, h, ik, beta_min, beta_max);
   if (!(l > lo && l < hi)) l = warm > lo && warm < hi ? warm : lo;
   // A Newton step of 3e-8 leaves round-off unless the two beta are far apart.
   const double stop = beta_max < 1e3 * beta_min ? 3e-8 : 1e-12;
   for (int n = 0; n < kMaxEvaluations; ++n) {
     ++evaluations;
-    const double e0 = L.beta[0] + l, e1 = L.beta[1] + l, p = e0 * e1;
-    const double z0 = r.h0 * e1, z1 = r.h1 * e0;
-    const double z = std::sqrt(z0 * z0 + z1 * z1);
-    const double q = z + L.g[0] * z0 + L.g[1] * z1;
-    const double excess = q - r.k * p;
-    // d(p/q) z q^2 = (p' q - p q') z with q' z = z.h + z g.h
-    const double zh = z0 * r.h0 + z1 * r.h1;
-    double slope = (e0 + e1) * q * z - p * (zh + z * gh);
+    auto [excess, q, z, zh, slope] =
+        scalar::slip_equation(l, r.k, L.beta[0], L.beta[1], L.g[0], L.g[1], r.h0, r.h1, gh);
     double step = excess * q * z / (r.k * slope);
     if (!(slope > 0 && q > 0.1 * z) || n > 8) {  // near the pole of p / q, e > 1: Newton for f
-      slope = (r.k * (e0 + e1) - gh) * z - zh;
+      slope = (r.k * (L.beta[0] + l + (L.beta[1] + l)) - gh) * z - zh;
       step = excess * z / slope;
     }
     if (excess > 0) {

@@ -9,6 +9,10 @@
 namespace tether::contact::detail::avx2 {
 namespace {
 
+#define TETHER_TEXT TETHER_AVX2
+#include "law/coulomb_slip.hpp"
+#undef TETHER_TEXT
+
 struct CoulombLanes {
   // Several solutions are possible: also a stick or a jam at b_n <= 0.
   TETHER_AVX2 v4 rare(const LaneBlocks& L, v4 h0, v4 h1, v4 touching) {
@@ -30,8 +34,7 @@ struct CoulombLanes {
     const v4 ik = all(1) / k;
     rare = either(rare, grazing);
     wanted = without(wanted, rare);
-    v4 lo = most((all(1) - e) * h * ik - beta_max, zero);
-    v4 hi = most((all(1) + e) * h * ik - beta_min, lo);
+    auto [lo, hi] = slip_bracket(e, h, ik, beta_min, beta_max);
     const v4 gh = L.g0 * h0 + L.g1 * h1;
     const v4 mean = (L.beta0 * h0 * h0 + L.beta1 * h1 * h1) / most(h * h, all(1e-300));
     const v4 guess = least(most((h + gh) * ik - mean, lo), hi);
@@ -39,13 +42,9 @@ struct CoulombLanes {
     const v4 stop = choose(less(beta_max, all(1e3) * beta_min), all(3e-8), all(1e-12));
     v4 active = wanted;
     for (int n = 0; n < Coulomb::kMaxEvaluations; ++n) {
-      const v4 e0 = L.beta0 + l, e1 = L.beta1 + l, p = e0 * e1;
-      const v4 z0 = h0 * e1, z1 = h1 * e0, z = root(z0 * z0 + z1 * z1);
-      const v4 q = z + L.g0 * z0 + L.g1 * z1;
-      const v4 excess = q - k * p;
-      const v4 slope = (e0 + e1) * q * z - p * (z0 * h0 + z1 * h1 + z * gh);
-      const v4 above = less(zero, excess), rising = less(zero, k * slope);
-      const v4 step = excess * q * z / or_one(rising, k * slope);
+      const SlipEquation f = slip_equation(l, k, L.beta0, L.beta1, L.g0, L.g1, h0, h1, gh);
+      const v4 above = less(zero, f.excess), rising = less(zero, k * f.slope);
+      const v4 step = f.excess * f.q * f.z / or_one(rising, k * f.slope);
       lo = choose(above, l, lo);
       hi = choose(above, hi, l);
       v4 next = l + step;

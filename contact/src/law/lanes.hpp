@@ -7,7 +7,8 @@
 #if TETHER_GROUPS
 #include "kernels/body_lanes_avx2.hpp"
 
-// The laws are those of the scalar files, with choices instead of branches: in a packing the
+// The laws are those of the scalar files, with choices instead of branches; what both share is a
+// text in the words of law/real.hpp. In a packing the
 // regimes of neighbours are hard to predict, and a wrong guess costs more than the arithmetic that
 // it saves. Lanes that need the rare parts of a law are solved one by one afterwards.
 

@@ -4,9 +4,18 @@
 #include <limits>
 
 #include "law/local_geometry.hpp"
+#include "law/real.hpp"
 #include <tether/linalg/friction_cone.hpp>
 
 namespace tether::contact::detail {
+
+namespace scalar {
+namespace {
+#define TETHER_TEXT TETHER_INLINE
+#include "law/maximum_dissipation_arc.hpp"
+#undef TETHER_TEXT
+}  // namespace
+}  // namespace scalar
 
 struct LawKernels;
 
@@ -37,75 +46,12 @@ struct MaximumDissipation {
 
     if (!((length > 1e-140) & (length < 1e140)))
       return in_other_units(L, bn, b0, b1, x, evaluations);
-    const double il = 1 / length, u0 = s0 * il, u1 = s1 * il;
-    // Cosine of half the visible arc, from the conic's tangents through y*.
-    const double kappa = (r.k * L.beta[0] * L.beta[1] - L.g[0] * s0 - L.g[1] * s1) * il;
-    // Frame (u0, R90 u0): h, g and M = k B - h g'.
-    const double h1 = u0 * r.h0 + u1 * r.h1, h2 = u0 * r.h1 - u1 * r.h0;
-    const double g1 = u0 * L.g[0] + u1 * L.g[1];
-    double g2 = u0 * L.g[1] - u1 * L.g[0];
-    const double kb0 = r.k * L.beta[0], kb1 = r.k * L.beta[1];
-    const double B12 = u0 * u1 * (kb1 - kb0);
-    const double M11 = kb0 * u0 * u0 + kb1 * u1 * u1 - h1 * g1, M12 = B12 - h1 * g2;
-    const double M21 = B12 - h2 * g1, M22 = kb0 * u1 * u1 + kb1 * u0 * u0 - h2 * g2;
-    const double S = h1 + M22 * g1 - M12 * g2, C = M21 * g1 - M11 * g2 - h2;
-    const double K = h1 * g2 - h2 * g1, dM = M22 - M11;
-    double q0 = M21 + C + K, q1 = 2 * (S + dM), q2 = 2 * (K - M21) - 4 * M12, q3 = 2 * (S - dM);
-    double q4 = M21 - C + K;
-    double side = 1;
-    if (q0 > 0) {  // the root lies at phi < 0: reflect
-      side = -1;
-      q0 = -q0;
-      q2 = -q2;
-      q4 = -q4;
-      g2 = -g2;
-    }
-    // Far end of the arc: T^2 = (1 - kappa) / (1 + kappa), and before the asymptote for e >= 1.
-    // kappa is above 1 by rounding only.
-    double far = kappa > -1 ? (kappa < 1 ? std::sqrt((1 - kappa) / (1 + kappa)) : 0.0) : 1e150;
-    if (L.e >= 1) {
-      // (1 - g1) t^2 + 2 g2 t + (1 + g1) > 0, positive at t = 0
-      const double A = 1 - g1, D = g2 * g2 - A * (1 + g1);
-      if (D >= 0) {
-        const double root = std::sqrt(D);
-        double cut = -1;
-        if (g2 < 0) {
-          cut = (1 + g1) / (-g2 + root);
-        } else if (A < 0) {
-          cut = (-g2 - root) / A;
-        }
-        if (cut > 0 && cut < far) far = cut;
-      }
-    }
-    // Warm start: the direction of the present tangential impulse.
-    double t = 0;
-    {
-      const double w0 = L.cosine * x[1] + L.sine * x[2], w1 = L.cosine * x[2] - L.sine * x[1];
-      const double w = std::sqrt(w0 * w0 + w1 * w1);
-      const double down = w + u0 * w0 + u1 * w1;
-      if (down > 1e-12 * w) t = side * (u0 * w1 - u1 * w0) / down;
-    }
-    bool inverted = false;
-    double lo = 0, hi = far;
-    if (far > 1) {
-      ++evaluations;
-      if (q0 + q1 + q2 + q3 + q4 < 0) {
-        inverted = true;
-        const double p0 = q0, p1 = q1;
-        q0 = -q4;
-        q1 = -q3;
-        q2 = -q2;
-        q3 = -p1;
-        q4 = -p0;
-        lo = 1 / far;
-        hi = 1;
-        t = t > 1e-300 ? 1 / t : (t > 0 ? 1e300 : 1);
-      } else {
-        hi = 1;
-      }
-    }
-    if (!(t > lo)) t = lo;
-    if (t > hi) t = hi;
+    const double w0 = L.cosine * x[1] + L.sine * x[2], w1 = L.cosine * x[2] - L.sine * x[1];
+    const scalar::Arc arc = scalar::visible_arc(r.k, L.beta[0], L.beta[1], L.g[0], L.g[1], r.h0,
+                                                r.h1, s0, s1, length, L.e >= 1, w0, w1, true);
+    if (arc.wide) ++evaluations;
+    const double q0 = arc.q0, q1 = arc.q1, q2 = arc.q2, q3 = arc.q3, q4 = arc.q4;
+    double lo = arc.lo, hi = arc.hi, t = arc.t;
     for (int n = 0; n < kMaxEvaluations; ++n) {
       ++evaluations;
       const double f = (((q4 * t + q3) * t + q2) * t + q1) * t + q0;
@@ -132,12 +78,7 @@ struct MaximumDissipation {
       if (next == t || hi - lo <= 4e-17) break;
       t = next;
     }
-    double co = 1 - t * t, si = 2 * t * side;
-    if (inverted) co = -co;
-    const double in = 1 / (1 + t * t);
-    co *= in;
-    si *= in;
-    const double v0 = co * u0 - si * u1, v1 = co * u1 + si * u0;
+    const auto [v0, v1] = scalar::direction(arc, t);
     double denominator = 1 + L.g[0] * v0 + L.g[1] * v1;
     const double floor = 1e-16 * (1 + L.e);
     if (denominator < floor) denominator = floor;
