@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "law/local_geometry.hpp"
+#include "problem/block_units.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
