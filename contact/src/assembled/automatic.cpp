@@ -33,6 +33,10 @@ bool unless_first_and_dear(const Search&, const Rotation& r) {
   return !(r.first && r.regular && r.dear);
 }
 bool every_second_round(const Search&, const Rotation& r) { return r.rounds == 2; }
+bool first_and_dear(const Search&, const Rotation& r) { return r.first && r.regular && r.dear; }
+bool second_round_once(const Search&, const Rotation& r) {
+  return r.rounds == 2 && r.regular && !r.coupled;
+}
 bool at_a_small_price(const Search&, const Rotation& r) { return r.small; }
 
 }  // namespace
@@ -46,6 +50,7 @@ const Automatic::Turn Automatic::kRotation[] = {
     {&Automatic::interior_points_near, first_and_near, 30},     // steps
     {&Automatic::interior_points, first_and_far_or_cheap, 40},  // steps, from sticking
     {&Automatic::round_off, always, kRoundOffSteps},            // steps
+    {&Automatic::coupling_path, first_and_dear, 150},           // factorisations
     {&Automatic::directions, unless_first_and_dear, 200},       // iterations
     {&Automatic::interior_points_at_best, first_that_came_near, 30},  // steps
     {&Automatic::proximal_newton, unless_first_and_dear, 12},         // proximal problems
@@ -53,6 +58,8 @@ const Automatic::Turn Automatic::kRotation[] = {
     {&Automatic::round_off, unless_first_and_dear, kRoundOffSteps},   // steps
     {&Automatic::end_of_work, unless_first_and_dear, 0},              //
     {&Automatic::end_of_round, unless_first_and_dear, 0},             //
+    {&Automatic::coupling_path, second_round_once, 150},              // factorisations
+    {&Automatic::round_off, every_second_round, kRoundOffSteps},      // steps
     {&Automatic::rescue, every_second_round, 4000},                   // proximal problems a burst
     {&Automatic::end_of_work, every_second_round, 0},                 //
     {&Automatic::patience, every_second_round, 0},                    // rounds that do not halve

@@ -52,6 +52,7 @@ class Automatic {
   Status directions(Search& search, Rotation& r, int iterations);
   Status proximal_newton(Search& search, Rotation& r, int problems);
   Status proximal_path(Search& search, Rotation& r, int problems);
+  Status coupling_path(Search& search, Rotation& r, int factorisations);
   Status rescue(Search& search, Rotation& r, int problems);
   Status round_off(Search& search, Rotation& r, int steps);
   Status no_solution(Search& search, Rotation& r, int);

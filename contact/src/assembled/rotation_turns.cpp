@@ -109,6 +109,13 @@ Status Automatic::end_of_round(Search& search, Rotation& r, int) {
   return Status::unsolved;
 }
 
+// From the convex problem, which needs no start.
+Status Automatic::coupling_path(Search& search, Rotation& r, int factorisations) {
+  r.coupled = true;
+  interior.run_coupling(search, factorisations);
+  return Status::unsolved;
+}
+
 // Long plain alternating directions identify the active set, Newton finishes.
 Status Automatic::rescue(Search& search, Rotation& r, int problems) {
   for (int k = 0; k < r.bursts && !search.exhausted(); ++k) {

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tether/linalg/cone_scaling.hpp>
+#include <utility>
 
 namespace tether::contact::detail {
 
@@ -12,6 +14,7 @@ void InteriorEquations::reset(int contacts) {
   for (Packed* p : {&anchor_, &r_, &z_, &w_}) p->resize(at(n_));
   flat_.resize(at(n_));
   tau_ = 0;
+  coupling_ = 1;
   exact_ = false;
 }
 
@@ -53,10 +56,23 @@ void InteriorEquations::evaluate(const System& system, const ConePair& point) {
     }
     double gamma[2];
     system.gamma(i, gamma);
-    const double s = slip_of(u);
+    const double s = coupling_ * slip_of(u);
     r[0] = w[0] / p.local(i).mu - (u[0] - s);
     r[1] = w[1] - (u[1] - s * gamma[0]);
     r[2] = w[2] - (u[2] - s * gamma[1]);
+  }
+}
+
+void InteriorEquations::add_coupling_rate(const System& system, const ConePair& point) {
+  for (int i = 0; i < n_; ++i) {
+    if (flat_[at(i)]) continue;
+    double gamma[2];
+    system.gamma(i, gamma);
+    const double s = slip_of(point.u[at(i)].v);
+    double* r = r_[at(i)].v;
+    r[0] += s;
+    r[1] += s * gamma[0];
+    r[2] += s * gamma[1];
   }
 }
 
@@ -91,6 +107,36 @@ double InteriorEquations::complementarity(const ConePair& point) const {
     sum += flat_[at(i)] ? point.x[at(i)].v[0] * point.u[at(i)].v[0]
                         : product(point.x[at(i)].v, point.u[at(i)].v);
   return sum / n_;
+}
+
+void advance(ConePair& to, const ConePair& along, double step) {
+  for (auto [point, change] : {std::pair(&to.x, &along.x), std::pair(&to.u, &along.u)}) {
+    for (std::size_t i = 0; i < point->size(); ++i) {
+      double* x = (*point)[i].v;
+      const double* c = (*change)[i].v;
+      const double d[3] = {step * c[0], step * c[1], step * c[2]};
+      const double before = tangent(x);
+      const double square = 2 * (x[1] * d[1] + x[2] * d[2]) + d[1] * d[1] + d[2] * d[2];
+      for (int k = 0; k < 3; ++k) x[k] += d[k];
+      const double after = tangent(x);
+      // |x_t| after - before = (|x_t|^2 after - before) / (after + before)
+      x[3] += d[0] - (after + before > 0 ? square / (after + before) : 0);
+      x[0] = after + x[3];
+    }
+  }
+}
+
+double InteriorEquations::longest_step(const ConePair& point, const ConePair& along) const {
+  double t = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < n_; ++i)
+    for (auto [x, d] : {std::pair(point.x[at(i)].v, along.x[at(i)].v),
+                        std::pair(point.u[at(i)].v, along.u[at(i)].v)}) {
+      if (!flat_[at(i)])
+        t = std::min(t, longest(x, determinant(x), d));
+      else if (d[0] < 0)
+        t = std::min(t, -x[0] / d[0]);
+    }
+  return t;
 }
 
 }  // namespace tether::contact::detail

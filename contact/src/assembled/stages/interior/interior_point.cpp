@@ -10,23 +10,6 @@ namespace {
 
 constexpr double kLeastCentre = 1e-3, kCentreAfterBlocked = 0.2;
 
-void advance(ConePair& to, const ConePair& along, double step) {
-  for (auto [point, change] : {std::pair(&to.x, &along.x), std::pair(&to.u, &along.u)}) {
-    for (std::size_t i = 0; i < point->size(); ++i) {
-      double* x = (*point)[i].v;
-      const double* c = (*change)[i].v;
-      const double d[3] = {step * c[0], step * c[1], step * c[2]};
-      const double before = tangent(x);
-      const double square = 2 * (x[1] * d[1] + x[2] * d[2]) + d[1] * d[1] + d[2] * d[2];
-      for (int k = 0; k < 3; ++k) x[k] += d[k];
-      const double after = tangent(x);
-      // |x_t| after - before = (|x_t|^2 after - before) / (after + before)
-      x[3] += d[0] - (after + before > 0 ? square / (after + before) : 0);
-      x[0] = after + x[3];
-    }
-  }
-}
-
 }  // namespace
 
 void InteriorPoint::reset(int contacts) {

@@ -24,6 +24,9 @@ class InteriorPoint {
   // of `newton` from the point to which the last step leads or, where that fails, along its own
   // path.
   void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton);
+  // From the convex problem to the law, at most `most` factorisations: in theta s(u) the path of
+  // theta from 0 to 1 at constant x.u, then run().
+  void run_coupling(Search& search, int most);
   // Orders the matrix, so that cost() knows its fill.
   void order(Search& search);
   // Estimated ns of one step; by a guess of the fill before order().
@@ -39,6 +42,7 @@ class InteriorPoint {
   bool order_bodies(Search& search);
 
  private:
+  struct CouplingPath;
   bool start(Search& search);
   bool start_near(Search& search, const PackedVector* start, double near);
   bool start_proximal(Search& search, double tau, double near);
@@ -47,6 +51,8 @@ class InteriorPoint {
   // Steps until nothing is gained or, for a proximal problem, until its natural map is <= target;
   // returns that map.
   double follow(Search& search, int most, double target);
+  bool centred(const System& system, double nu) const;
+  bool centre(Search& search, double nu);
 
   int n_ = 0;
   InteriorEquations equations_;

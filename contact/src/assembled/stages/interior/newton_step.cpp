@@ -63,8 +63,9 @@ bool InteriorNewton::scale(const System& system, const InteriorEquations& equati
     if (!s.set(point.x[at(i)].v, u)) return false;
     double gamma[2];
     system.gamma(i, gamma);
-    const double slip = slip_of(u), c = kSmooth;
-    const double gradient[3] = {c * u[0] / slip, (1 - c) * u[1] / slip, (1 - c) * u[2] / slip};
+    const double slip = slip_of(u), theta = equations.coupling();
+    const double c = theta * kSmooth, d = theta * (1 - kSmooth);
+    const double gradient[3] = {c * u[0] / slip, d * u[1] / slip, d * u[2] / slip};
     const double column[3] = {1, gamma[0], gamma[1]};
     const double f = 1 / (1 - dot3(gradient, column));
     const double inverse_mu = 1 / system.problem().local(i).mu;
