@@ -42,4 +42,23 @@ for case in INT:130 TERM:143 INT:130 TERM:143; do
     code=$?
   [ "$code" -le 1 ] || die "the restart exits with $code"
 done
+# A run that waits for a reader of its table, and cannot end by itself: two signals at once leave it alone, one
+# more than a second later ends it.
+mkfifo "$work/never_read"
+signal=INT
+"$program" run "$scene" --quiet --csv "$work/never_read" >"$work/said" 2>&1 &
+child=$!
+sleep 1
+kill -s INT "$child" && kill -s INT "$child"
+sleep 1.3
+kill -0 "$child" 2>/dev/null || die "two signals at once ended a run that waits"
+left=20  # the first ones may have come before the program listened
+while kill -s INT "$child" 2>/dev/null; do
+  left=$((left - 1))
+  [ $left -gt 0 ] || { kill -s KILL "$child"; die "later signals are not heard"; }
+  sleep 1.1
+done
+code=0
+wait "$child" || code=$?
+[ "$code" -eq 130 ] || die "the later signal: exit code $code"
 echo "interrupted runs leave whole files"
