@@ -192,6 +192,25 @@ TEST_CASE("event: two bars that cross hit where the closed form says, and share 
   }
 }
 
+TEST_CASE("event: a ball passes both ends of a bar, and hits them where their spheres are") {
+  const std::string bar = body("bar", kBar, "[0, 0, 0]", "fixed = true");
+  const auto ball = [](double z) {
+    return body("ball", "shape = \"sphere\"\nradius = 0.1", "[-1, 0, " + number(z) + "]",
+                "mass = 1\nvelocity = [1, 0, 0]");
+  };
+  for (const double end : {-1.0, 1.0}) {
+    CAPTURE(end);
+    CHECK(run(bar + ball(0.71 * end) + law(0, 1), 1e-8, 2, "")->events().empty());
+    // Centres 0.15 m apart along the bar and 0.2 m altogether.
+    const double before = std::sqrt(0.04 - 0.0225), n = before / 0.2;
+    const auto engine = run(bar + ball(0.65 * end) + law(0, 1), 1e-8, 1.2, "");
+    const auto impacts = of_kind(*engine, Kind::impact);
+    REQUIRE(impacts.size() == 1);
+    CHECK(std::abs(impacts[0].time - (1 - before)) < 1e-7);
+    CHECK(std::abs(engine->bodies()[1].velocity.x() - (1 - 2 * n * n)) < 1e-7);
+  }
+}
+
 TEST_CASE("event: edges of two boxes hit each other crosswise") {
   const std::string text = body("low", "shape = \"box\"\nsize = [0.2, 2, 0.2]", "[0, 0, 0]",
                                 "fixed = true\norientation = { axis = [0, 1, 0], deg = 45 }") +
