@@ -347,14 +347,90 @@ TEST_CASE("asking for forces leaves the bits of a motion as they are") {
   }
 }
 
-TEST_CASE("the event engine is not asked for forces that it does not tell") {
+TEST_CASE("the event engine tells the forces of blocks on a slope, and their slips") {
+  const double c = std::sqrt(0.75), N = 2 * 9.81 * c, pull = 9.81 * (0.5 - 0.3 * c);
   Scene s = parse_scene(kSlope, "slope.toml");
   s.stepping.reset();
   s.engine = EngineChoice::event;
-  try {
-    make_plan(s);
-    FAIL("planned");
-  } catch (const std::invalid_argument& e) {
-    CHECK(std::string(e.what()).find("does not tell forces") != std::string::npos);
+  for (const double tolerance : {1e-4, 1e-7, 1e-10}) {
+    CAPTURE(tolerance);
+    s.event.emplace().tolerance = tolerance;
+    const auto engine = make_engine(s);
+    engine->advance(0.4);
+    const Forces f = total_forces(*engine);
+    const Vector3d normal(0.5, 0, c), up(-c, 0, 0.5);
+    const double near = 30 * tolerance + 1e-9;
+    CHECK((f.contact[1] - Vector3d(0, 0, 2 * 9.81)).norm() < near);
+    CHECK((f.contact[2] - (N * normal + 0.3 * N * up)).norm() < near);
+    CHECK((f.contact[0] + f.contact[1] + f.contact[2]).norm() < 1e-12);
+    CHECK(f.contact_moment[1].norm() < near);
+    CHECK(f.contact_moment[2].norm() < near);
+    CHECK(engine->contacts().size() == 8);
+    for (const ContactState& each : engine->contacts()) {
+      const bool slides = each.first == 2 || each.second == 2;
+      const Vector3d slip = slides ? Vector3d(-0.4 * pull * up) : Vector3d::Zero();
+      CHECK(((each.first == 0 ? -1 : 1) * each.slip - slip).norm() < near);
+      CHECK(each.force.dot(each.normal) >= 0);
+      // In the cone, on its border where it slides.
+      const double along = each.force.dot(each.normal);
+      const double across = (each.force - along * each.normal).norm();
+      CHECK(across < (slides ? 0.3 : 0.7) * along + near);
+      if (slides) CHECK(across > 0.3 * along - near);
+    }
   }
+}
+
+TEST_CASE("the event engine tells what pivots pull with, and redundant ones equal parts") {
+  const double angle = 1.5, expected = force_at_bottom(angle, 1, 2, 0.1);
+  for (const int pins : {1, 2}) {
+    Scene s = pendulum_of(JointKind::hinge, angle, 1, 2, 0.1);
+    s.joints.resize(static_cast<std::size_t>(pins), s.joints[0]);
+    s.engine = EngineChoice::event;
+    for (const double tolerance : {1e-6, 1e-9}) {
+      s.event.emplace().tolerance = tolerance;
+      const auto engine = make_engine(s);
+      engine->advance(quarter_period(angle, 2.1 / 2));
+      const Forces f = engine->forces();
+      for (const JointForce& each : f.joints)
+        CHECK((pins * each.force - Vector3d(0, 0, expected)).norm() < 30 * tolerance * expected);
+    }
+  }
+}
+
+TEST_CASE("the event engine tells the impulse of an impact") {
+  // Slipping all along: the friction's is mu of the normal one, against the slip.
+  const double tolerance = 1e-9, speed = std::sqrt(2 * 9.81 * 0.4), mu = 0.2, e = 0.5, mass = 3;
+  const Scene s = parse_scene(R"(
+[scene]
+end = 0.3
+gravity = [0, 0, -9.81]
+engine = "event"
+[event]
+tolerance = 1e-9
+[[body]]
+name = "floor"
+shape = "plane"
+fixed = true
+material = "floor"
+[[body]]
+name = "ball"
+shape = "sphere"
+radius = 0.1
+mass = 3
+position = [0, 0, 0.5]
+velocity = [0, 20, 0]
+material = "ball"
+[[pair]]
+between = ["floor", "ball"]
+friction = 0.2
+restitution = 0.5
+)",
+                              "ball.toml");
+  const auto engine = make_engine(s);
+  engine->advance(0.3);
+  REQUIRE(engine->events().size() == 1);
+  const ContactEvent& hit = engine->events()[0];
+  const double sign = hit.first == 1 ? 1 : -1, normal = mass * (1 + e) * speed;
+  CHECK((sign * hit.impulse - Vector3d(0, -mu * normal, normal)).norm() < 100 * tolerance);
+  CHECK(std::abs(engine->bodies()[1].velocity.y() - 20 + mu * normal / mass) < 100 * tolerance);
 }

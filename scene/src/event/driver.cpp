@@ -240,6 +240,13 @@ VectorXd Driver::state() {
   return y;
 }
 
+VectorXd Driver::state_with_forces() {
+  const VectorXd y = state();
+  VectorXd rate(motion_.size());
+  motion_.rate(time_, y.data(), rate.data());
+  return y;
+}
+
 // The direction in which a contact slides, for the moment when its slip vanishes.
 void Driver::turn_slips() {
   for (std::size_t k = 0; k < motion_.closed().size(); ++k) {

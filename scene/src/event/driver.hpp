@@ -57,6 +57,8 @@ class Driver {
   double time() const { return time_; }
   /// The state there: q, u, work of forces without potential.
   VectorXd state();
+  /// The same, and the motion has the accelerations and forces there.
+  VectorXd state_with_forces();
   const std::vector<EventRecord>& events() const { return events_; }
   DriverCounts counts() const;
   const Motion& motion() const { return motion_; }

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "driver.hpp"
+#include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
 #include "scaled_scene.hpp"
 #include "scene_model.hpp"
@@ -38,7 +39,8 @@ class EventEngine : public Engine {
         scene_(scaled(scene, units_)),
         options_(driver_options(scene_)),
         model_(scene_),
-        driver_(std::make_unique<Driver>(model_, options_, 0.0, model_.start())) {
+        driver_(std::make_unique<Driver>(model_, options_, 0.0, model_.start())),
+        reactions_(scene_, mechanics::placed_bodies(scene_)) {
     bodies_.resize(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
       bodies_[b].position = scene.bodies[b].position;
@@ -62,7 +64,11 @@ class EventEngine : public Engine {
 
   const std::vector<BodyState>& bodies() const override { return bodies_; }
   Diagnostics diagnostics() const override { return diagnostics_; }
-  const std::vector<ContactState>& contacts() const override { return contacts_; }
+  const std::vector<ContactState>& contacts() const override {
+    if (!contacts_known_) look_at_contacts();
+    return contacts_;
+  }
+  Forces forces() const override;
   const std::vector<ContactEvent>& events() const override { return events_; }
 
   Counts counts() const override {
@@ -85,17 +91,19 @@ class EventEngine : public Engine {
 
  private:
   void look();
-  void look_at_contacts();
+  void look_at_contacts() const;
   void look_at_events();
 
   smooth::Units units_;
   Scene scene_;  // in these units, as everything here but the results
   DriverOptions options_;
-  SceneModel model_;
+  mutable SceneModel model_;  // forces are found at the state that it is set to
   std::unique_ptr<Driver> driver_;
+  joints::Reactions reactions_;
   VectorXd now_;
   std::vector<BodyState> bodies_;
-  std::vector<ContactState> contacts_;
+  mutable std::vector<ContactState> contacts_;
+  mutable bool contacts_known_ = false;
   std::vector<ContactEvent> events_;
   Diagnostics diagnostics_;
 };
@@ -111,8 +119,8 @@ void EventEngine::look() {
   d.kinetic_energy = bodies.kinetic_energy();
   d.momentum = bodies.momentum();
   d.angular_momentum = bodies.angular_momentum();
-  look_at_contacts();
-  d.contacts = static_cast<int>(contacts_.size());
+  contacts_known_ = false;
+  d.contacts = static_cast<int>(driver_->motion().closed().size());
   // A point behind a face that has a border is not always in the body.
   const std::vector<ContactMode>& modes = driver_->motion().modes();
   for (int i = 0; i < model_.contacts(); ++i) {
@@ -130,12 +138,16 @@ void EventEngine::look() {
   look_at_events();
 }
 
-// Impulses: the present forces times one second.
-void EventEngine::look_at_contacts() {
+void EventEngine::look_at_contacts() const {
   contacts_.clear();
-  const event::Motion& motion = driver_->motion();
-  for (const int i : motion.closed()) {
-    const FeaturePair& pair = model_.pair(i);
+  contacts_known_ = true;
+  event::Motion& motion = driver_->motion();
+  if (motion.closed().empty()) return;
+  driver_->state_with_forces();
+  const std::vector<VectorXd> forces = motion.contact_forces();
+  for (std::size_t k = 0; k < forces.size(); ++k) {
+    const int contact = motion.closed()[k];
+    const FeaturePair& pair = model_.pair(contact);
     const Touch touch = pair.look(model_.bodies().all());
     ContactState c;
     c.first = pair.first;
@@ -143,8 +155,19 @@ void EventEngine::look_at_contacts() {
     c.point = units_.length * touch.point;
     c.normal = touch.normal;
     c.gap = units_.length * touch.gap;
+    c.force = units_.force() * model_.in_space(contact, forces[k]);
+    VectorXd slip(3);
+    slip << 0, motion.slip(static_cast<int>(k));
+    c.slip = units_.speed() * model_.in_space(contact, slip);
     contacts_.push_back(c);
   }
+}
+
+Forces EventEngine::forces() const {
+  driver_->state_with_forces();
+  Forces out = model_.forces_of(reactions_, driver_->motion().joint_forces());
+  smooth::to_si(units_, scene_, out);
+  return out;
 }
 
 void EventEngine::look_at_events() {
@@ -159,6 +182,7 @@ void EventEngine::look_at_events() {
     e.before = units_.speed() * from.before;
     e.after = units_.speed() * from.after;
     e.lost = units_.energy() * from.lost;
+    e.impulse = units_.mass * units_.speed() * from.impulse;
     events_.push_back(e);
   }
 }

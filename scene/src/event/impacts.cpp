@@ -121,6 +121,7 @@ void Driver::tell_impacts(const std::vector<int>& touching, const Impact& impact
     const bool over = impact.rest[k] > 0;
     record(over ? EventKind::rest : EventKind::impact, touching[at(k)], before[block * k],
            after[block * k], first ? lost : 0);
+    events_.back().impulse = model_.in_space(touching[at(k)], x.segment(block * k, block));
     if (over) events_.back().time = event_time_ + impact.rest[k];
     first = false;
   }

@@ -65,6 +65,11 @@ class Model {
     return false;
   }
 
+  /// A vector of a contact by its normal and tangents, in world axes.
+  virtual Eigen::Vector3d in_space(int /*contact*/, const VectorXd& /*parts*/) {
+    return Eigen::Vector3d::Zero();
+  }
+
   /// The gradient by the coordinates of what has the velocity gradient `row`.
   virtual void to_coordinates(const double* row, double* gradient) const = 0;
   /// Rows that the coordinates obey by themselves, such as the length of a quaternion.

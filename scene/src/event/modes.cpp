@@ -145,6 +145,8 @@ void Driver::jam(const ContactRows& rows, const VectorXd& velocities, const Vect
     record(EventKind::jam, rows.contacts()[at(k)], velocities[block * k],
            rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()))[block * k],
            first ? lost : 0);
+    events_.back().impulse =
+        model_.in_space(rows.contacts()[at(k)], answer.x.segment(block * k, block));
     first = false;
   }
 }

@@ -6,14 +6,17 @@
 #include <cmath>
 #include <limits>
 
+#include "friction_solve.hpp"
+
 namespace tether::scene::event {
 
 namespace {
 
 constexpr double kRank = 1e-10;  // of rows of unit length
 constexpr double kIndependent = 1e-6;
-constexpr double kAhead = 1e-5;  // s in the units of the model
-constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
+constexpr double kAhead = 1e-5;   // s in the units of the model
+constexpr double kLawful = 1e-9;  // of the largest force
+constexpr double kStill = 1e-3;   // speeds and accelerations in the units of the model
 
 /// Rows that the earlier ones do not imply, in the metric of the masses; Gram and Schmidt, twice.
 class IndependentRows {
@@ -261,6 +264,55 @@ void Motion::rate(double t, const double* y, double* y_rate) {
     if (modes_[index(closed_[k])].mode == Mode::slide)
       power += friction_force(static_cast<int>(k)).dot(slip_of(looks_[k]));
   y_rate[work()] = power;
+}
+
+VectorXd Motion::joint_forces() {
+  const int rows = model_.joint_rows();
+  if (joints_ == rows) return lambda_.head(joints_);
+  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  VectorXd load = VectorXd::Zero(nu_);
+  for (int k = 0; k < joints_; ++k)
+    load += lambda_[k] * joint_W_.row(joints_in_use_[index(k)]).transpose();
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
+  factor.setThreshold(kRank);
+  factor.compute(joint_W_.transpose());
+  return factor.solve(load);
+}
+
+std::vector<VectorXd> Motion::slides() const {
+  std::vector<VectorXd> out(closed_.size());
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const ContactMode& mode = modes_[index(closed_[k])];
+    if (mode.mode != Mode::slide) continue;
+    const VectorXd s = slip_of(looks_[k]);
+    const bool fast = s.dot(mode.direction) > bands_.slip(closed_[k]);
+    out[k] = fast ? VectorXd(s.normalized()) : mode.direction;
+  }
+  return out;
+}
+
+std::vector<VectorXd> Motion::contact_forces() {
+  std::vector<VectorXd> out;
+  double largest = 0;
+  bool lawful = true;
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const int contact = static_cast<int>(k);
+    VectorXd& force = out.emplace_back(1 + tangents_);
+    force << normal_force(contact), friction_force(contact);
+    largest = std::max(largest, force.norm());
+  }
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const double least = -kLawful * largest, mu = model_.law(closed_[k]).friction;
+    lawful =
+        lawful && out[k][0] >= least && mu * out[k][0] - out[k].tail(tangents_).norm() >= least;
+  }
+  if (lawful || !hyperstatic_) return out;
+  ContactRows rows(model_, closed_);
+  const AccelerationAnswer answer = solve_accelerations(model_, rows, slides());
+  if (!answer.contacts.solved) return out;
+  for (std::size_t k = 0; k < closed_.size(); ++k)
+    out[k] = answer.contacts.x.segment(rows.size() * static_cast<int>(k), rows.size());
+  return out;
 }
 
 VectorXd Motion::friction_force(int closed) const {

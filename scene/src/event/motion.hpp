@@ -67,6 +67,13 @@ class Motion {
   const VectorXd& acceleration() const { return a_; }
   double normal_force(int closed) const { return lambda_[row_of_[index(closed)]]; }
   VectorXd friction_force(int closed) const;  ///< by tangents
+  /// Of all rows of joints: redundant ones share.
+  VectorXd joint_forces();
+  /// Of each closed contact (n, tangents). Those that share their forces have such as Coulomb's law
+  /// allows, which the shortest ones may not be.
+  std::vector<VectorXd> contact_forces();
+  /// Directions of the closed contacts that slide; empty where they stick.
+  std::vector<VectorXd> slides() const;
   const ContactLook& look(int closed) const { return looks_[index(closed)]; }
   VectorXd slip(int closed) const { return slip_of(looks_[index(closed)]); }
   long evaluations() const { return evaluations_; }

@@ -143,18 +143,36 @@ void SceneModel::look(int contact, ContactLook& out) {
   out.normal_rate = 0;
   out.normal_rest = touch.second;
   // Where the point sticks, the tangents' own turning does not count.
-  const Vector3d t1 = touch.normal.cross(axes_[at(contact)]).normalized();
   out.tangents.setZero(2, velocities());
   out.slip_rate.setZero(2);
   out.slip_rest.resize(2);
-  const Vector3d tangent[2] = {t1, touch.normal.cross(t1)};
+  const std::array<Vector3d, 2> tangent = tangents_of(contact, touch.normal);
   for (int k = 0; k < 2; ++k) {
     Row row = Row::Zero(velocities());
-    add_force(bodies, p.first, touch.point, tangent[k], 1, row);
-    add_force(bodies, p.second, touch.point, tangent[k], -1, row);
+    add_force(bodies, p.first, touch.point, tangent[at(k)], 1, row);
+    add_force(bodies, p.second, touch.point, tangent[at(k)], -1, row);
     out.tangents.row(k) = row;
-    out.slip_rest[k] = tangent[k].dot(rest);
+    out.slip_rest[k] = tangent[at(k)].dot(rest);
   }
+}
+
+std::array<Vector3d, 2> SceneModel::tangents_of(int contact, const Vector3d& normal) const {
+  const Vector3d t1 = normal.cross(axes_[at(contact)]).normalized();
+  return {t1, normal.cross(t1)};
+}
+
+Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
+  const Vector3d normal = pair(contact).look(bodies_.all()).normal;
+  const std::array<Vector3d, 2> tangent = tangents_of(contact, normal);
+  return parts[0] * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
+}
+
+Forces SceneModel::forces_of(const joints::Reactions& reactions,
+                             const VectorXd& multipliers) const {
+  Forces out;
+  out.joints = reactions.find(rows_, bodies_.all(), multipliers.data());
+  for (const auto& force : forces_) force->report(bodies_.all(), out);
+  return out;
 }
 
 bool SceneModel::are_at_one_edge(int contact, int other, double distance) {

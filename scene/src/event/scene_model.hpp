@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tether/scene/scene.hpp>
+#include <array>
+#include <tether/scene/engine.hpp>
 #include <vector>
 
 #include "features.hpp"
 #include "joints/joint_rows.hpp"
+#include "joints/reactions.hpp"
 #include "mechanics/force.hpp"
 #include "model.hpp"
 #include "smooth/moving_bodies.hpp"
@@ -48,6 +50,8 @@ class SceneModel final : public Model {
 
   bool are_at_one_edge(int contact, int other, double distance) override;
 
+  Vector3d in_space(int contact, const VectorXd& parts) override;
+
   void to_coordinates(const double* row, double* gradient) const override;
   int own_rows() const override { return bodies_.count(); }
   void own_values(double* values) const override;
@@ -64,8 +68,12 @@ class SceneModel final : public Model {
   const smooth::MovingBodies& bodies() const { return bodies_; }
   const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
   double potential() const;
+  /// Of joints, by the multipliers of their rows, and of springs, at the state that is set.
+  Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
 
  private:
+  std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
+
   smooth::MovingBodies bodies_;
   joints::JointRows rows_;
   std::vector<std::unique_ptr<Force>> forces_;

@@ -141,17 +141,9 @@ double Watcher::of_state(Function& f) {
 double Watcher::support() {
   ContactRows rows(motion_.model(), motion_.closed());
   const int block = rows.size();
-  std::vector<VectorXd> slides(motion_.closed().size());
-  bool sliding = false;
-  for (std::size_t k = 0; k < slides.size(); ++k) {
-    const int contact = motion_.closed()[k];
-    const ContactMode& mode = motion_.modes()[static_cast<std::size_t>(contact)];
-    if (mode.mode != Mode::slide) continue;
-    const VectorXd s = motion_.slip(static_cast<int>(k));
-    const bool fast = s.dot(mode.direction) > bands().slip(contact);
-    slides[k] = fast ? VectorXd(s.normalized()) : mode.direction;
-    sliding = true;
-  }
+  const std::vector<VectorXd> slides = motion_.slides();
+  const bool sliding = std::any_of(slides.begin(), slides.end(),
+                                   [](const VectorXd& each) { return each.size() > 0; });
   const AccelerationAnswer answer = solve_accelerations(motion_.model(), rows, slides);
   if (!answer.contacts.solved) return -answer.scale;
   double largest = 0;

@@ -85,9 +85,6 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
              : contact || event ? event_engine_refusal(s)
                                 : std::string("nothing touches");
   refuse(event && !no_event.empty(), no_event);
-  refuse(event && asks_for_forces(s),
-         "the event engine does not tell forces ([output] forces, [[expect]] of forces and slips): "
-         "use [stepping], or, without contacts, [smooth]");
   if (!refusal.empty()) throw std::invalid_argument(refusal);
 
   if (event) {

@@ -78,6 +78,7 @@ struct ContactEvent {
   int first = -1, second = -1;   ///< bodies
   double before = 0, after = 0;  ///< normal velocities of an impact, m/s
   double lost = 0;               ///< energy of all contacts of the instant, in its first event, J
+  Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< on `first`, world axes, N s
 };
 const char* name(ContactEvent::Kind kind);
 
