@@ -8,6 +8,7 @@
 #include "driver.hpp"
 #include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
+#include "output/saved_bodies.hpp"
 #include "scaled_scene.hpp"
 #include "scene_model.hpp"
 
@@ -18,7 +19,7 @@ namespace {
 using namespace event;
 using mechanics::at;
 
-constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '2'};
+constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '3'};
 
 DriverOptions driver_options(const Scene& scene) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -189,6 +190,7 @@ void EventEngine::look_at_events() {
 
 void EventEngine::save(std::ostream& out) const {
   const Driver::Memory m = driver_->memory();
+  put_bodies(out, time(), bodies_);
   out.write(kMagic, sizeof kMagic);
   binary::put(out, static_cast<std::uint64_t>(m.y.size()),
               static_cast<std::uint64_t>(m.modes.size()), units_.length, units_.time, units_.mass,
@@ -210,6 +212,11 @@ void EventEngine::save(std::ostream& out) const {
 void EventEngine::restore(std::istream& in, Restore how) {
   char magic[sizeof kMagic];
   in.read(magic, sizeof magic);
+  if (in && std::equal(magic, magic + sizeof magic, kBodiesFirst)) {
+    std::vector<BodyState> bodies(bodies_.size());
+    get_bodies(in, bodies);
+    in.read(magic, sizeof magic);
+  }
   if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
     throw std::runtime_error("this is not a state of the event engine");
   std::uint64_t size = 0, contacts = 0;

@@ -99,12 +99,24 @@ class Run {
       }
     } catch (const SimulationError& e) {
       result_.failure = e.what();
+      hand_over();
     }
     finish();
     return std::move(result_);
   }
 
  private:
+  // Where events cannot go on, steps can.
+  void hand_over() {
+    if (make_plan(scene_).engine != EngineKind::event || scene_.output.state.empty()) return;
+    save(scene_.output.state);
+    result_.remarks.push_back(
+        fmt::format("{} has the state at {:g} s: with engine = \"stepping\" the scene goes on from "
+                    "its positions "
+                    "and velocities (--restart {} --force)",
+                    scene_.output.state, engine_->time(), scene_.output.state));
+  }
+
   Summary& summary() { return result_.summary; }
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
 

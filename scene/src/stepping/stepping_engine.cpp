@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <istream>
+#include <limits>
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "output/binary.hpp"
+#include "output/saved_bodies.hpp"
 #include "saved_memory.hpp"
 
 #if defined(TETHER_HAVE_COLLISION)
@@ -226,9 +228,35 @@ void SteppingEngine::save(std::ostream& out) const {
   if (!out) throw std::runtime_error("the state could not be written");
 }
 
+void SteppingEngine::set_bodies(const std::vector<BodyState>& states) {
+  contact::BodySet& b = stepper_.bodies();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    b.position[i] = states[i].position;
+    b.orientation[i] = states[i].orientation;
+    b.motion[i].velocity = states[i].velocity;
+    b.motion[i].angular_velocity = states[i].angular_velocity;
+  }
+}
+
+// What another engine saved, from the next step boundary on.
+void SteppingEngine::take_over(std::istream& in) {
+  std::vector<BodyState> states(bodies_.size());
+  const double steps = std::ceil(get_bodies(in, states) / stepper_.options().step * (1 - 1e-12));
+  if (!(steps >= 0 && steps <= kMostSteps))
+    throw std::runtime_error("the saved state is damaged: it has no time");
+  in.ignore(std::numeric_limits<std::streamsize>::max());
+  set_bodies(states);
+  stepper_.start_anew(std::lround(steps));
+  contacts_of_ = -1;
+  read_bodies();
+}
+
 void SteppingEngine::restore(std::istream& in, Restore how) {
   char magic[sizeof kMagic];
-  if (!in.read(magic, sizeof magic) || std::memcmp(magic, kMagic, sizeof magic - 1) != 0)
+  in.read(magic, sizeof magic);
+  if (in && how == Restore::near && std::memcmp(magic, kBodiesFirst, sizeof magic) == 0)
+    return take_over(in);
+  if (!in || std::memcmp(magic, kMagic, sizeof magic - 1) != 0)
     throw std::runtime_error("this is no saved state of the stepping engine");
   const char format = magic[sizeof magic - 1];
   if (format != kMagic[sizeof magic - 1] && format != kWithClosings && format != kWithoutControl)
@@ -253,13 +281,7 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
                                              : MemoryFormat::now);
   if (!(std::abs(time) <= kMostSteps * stepper_.options().step))
     throw std::runtime_error("the saved state is damaged: it has no time");
-  contact::BodySet& b = stepper_.bodies();
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    b.position[i] = states[i].position;
-    b.orientation[i] = states[i].orientation;
-    b.motion[i].velocity = states[i].velocity;
-    b.motion[i].angular_velocity = states[i].angular_velocity;
-  }
+  set_bodies(states);
   try {
     if (same)
       stepper_.set_memory(memory);

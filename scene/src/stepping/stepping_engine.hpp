@@ -32,6 +32,8 @@ class SteppingEngine final : public Engine {
   void step();
   void report_failure() const;
   void read_bodies();
+  void set_bodies(const std::vector<BodyState>& states);
+  void take_over(std::istream& in);
 
   void add_forces(const Scene& scene);
 
