@@ -51,8 +51,13 @@ function(tether_library name)
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   # Installed shared libraries find each other in their own folder.
   set_target_properties(tether_${name} PROPERTIES
-    INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>)
+    INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>
+    UNITY_BUILD ${TETHER_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 12)
   tether_warnings(tether_${name})
+  if(TETHER_UNITY_BUILD)
+    # A source that another one includes is no header: its unnamed namespace may be in its classes.
+    target_compile_options(tether_${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  endif()
   tether_keep_private(tether_${name})
   set_property(GLOBAL APPEND PROPERTY TETHER_LIBRARIES ${name})
 endfunction()

@@ -1,6 +1,6 @@
 #!/bin/sh
 # All tests: installs what is missing, builds all but the programs of benchmarks/ (a tenth of the time) in
-# build/release and runs ctest.
+# build/release, the sources of libraries by the dozen, and runs ctest.
 # Arguments go to ctest, e.g. -R projection. SPDX-License-Identifier: BSD-3-Clause
 set -eu
 
@@ -8,6 +8,6 @@ root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
 cd "$root"
 
 sh cmake/install_packages.sh
-cmake --preset release -DTETHER_BUILD_BENCHMARKS=OFF
+cmake --preset release -DTETHER_BUILD_BENCHMARKS=OFF -DTETHER_UNITY_BUILD=ON
 cmake --build --preset release --parallel "$(nproc)"
 exec ctest --preset release --parallel "$(nproc)" "$@"

@@ -9,7 +9,7 @@ namespace tether::linalg {
 
 namespace {
 
-constexpr double kDependent = 10.0;  // eps, as in GramFactor
+constexpr double kDependentBorder = 10.0;  // eps, as in GramFactor
 
 }  // namespace
 
@@ -42,7 +42,7 @@ int BorderedGram::factor(const double* A, const double* norm, double eps) {
     }
     const bool vanished = !(norm[m_ + f] > 0.0);
     d_[at(f)] = vanished ? 1.0 : std::max(d, eps);
-    dependent_[at(f)] = vanished || !(d > kDependent * eps);
+    dependent_[at(f)] = vanished || !(d > kDependentBorder * eps);
     count += dependent_[at(f)];
   }
   return count;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <tether/contact/joints.hpp>
+#include <tether/linalg/index.hpp>
 #include <vector>
 
 namespace jointed_bodies {
@@ -17,7 +18,7 @@ constexpr double kGravity = 9.81;
 constexpr int kWorld = -1;
 
 inline double radians(double degrees) { return degrees * 3.14159265358979323846 / 180; }
-inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 /// Bodies, rows and contacts in world axes. Each joint gets the next number.
 struct Mechanism {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <tether/contact/joints.hpp>
+#include <tether/linalg/index.hpp>
 #include <vector>
 
 #include "stepping_scenes.hpp"
@@ -15,7 +16,7 @@ namespace {
 using namespace stepping_scenes;
 using tc::Vector6d;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 // Glocker's woodpecker (C. Glocker, Set-valued force laws, 2001; parameters as in Siconos'
 // tutorials): linear in y, phi_M, phi_S. Each generalised coordinate, the bird's height and the two

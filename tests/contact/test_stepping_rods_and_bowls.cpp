@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <tether/linalg/index.hpp>
 
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
@@ -11,7 +12,7 @@ namespace {
 
 using namespace stepping_scenes;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 // A slender rod (m = 1, L = 1) whose lower end touches the ground at the origin, leaning towards +x
 // by `angle` from the ground. Sliding that end towards +x digs it in, towards -x lifts it.

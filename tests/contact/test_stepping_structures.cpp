@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <tether/contact/polyhedra.hpp>
+#include <tether/linalg/index.hpp>
 
 #include "stepping_stacks.hpp"
 #include "support/catch.hpp"
@@ -11,7 +12,7 @@ namespace {
 
 using namespace stepping_scenes;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 // Dominoes with frictionless, inelastic sides on a floor without slip, the first one pushed. Speed
 // of the wave between two of them, over sqrt(g h).

@@ -1,7 +1,7 @@
 // Scene files damaged in every way: no crash, no hang, each error names its place.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <chrono>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -76,6 +76,11 @@ std::string joined(const std::vector<std::string>& parts) {
   std::string out;
   for (const std::string& part : parts) out += part;
   return out;
+}
+
+// Of a machine that others use, too: what waits is no hang.
+double processor_seconds(std::clock_t start) {
+  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
 /// One damage.
@@ -177,10 +182,9 @@ TEST_CASE("ten thousand damaged scene files are refused with a place, or are sce
     std::string text = originals[static_cast<std::size_t>(i) % originals.size()];
     const std::string& other = originals[below(random, originals.size())];
     for (std::size_t n = 1 + below(random, 3); n > 0; --n) text = damaged(text, other, random);
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t start = std::clock();
     accepted += judge(text);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    slowest = std::max(slowest, took.count());
+    slowest = std::max(slowest, processor_seconds(start));
   }
   WARN(accepted << " of " << kFiles << " damaged files are scenes still; the slowest took "
                 << slowest * 1e3 << " ms");
@@ -189,7 +193,7 @@ TEST_CASE("ten thousand damaged scene files are refused with a place, or are sce
 }
 
 TEST_CASE("scenes of unusual size are read or refused in bounded time") {
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   std::string many;
   for (int i = 0; i < 20000; ++i)
     many += "[[body]]\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nmaterial = \"m\"\n";
@@ -209,6 +213,5 @@ TEST_CASE("scenes of unusual size are read or refused in bounded time") {
   CHECK_FALSE(judge("x = \"" + std::string(5000000, 'a') + "\"\n"));
   CHECK_FALSE(judge("[a." + std::string(100000, 'b') + "]\n"));
 
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  CHECK(took.count() < 30);
+  CHECK(processor_seconds(start) < 30);
 }

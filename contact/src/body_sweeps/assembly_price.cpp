@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <tether/linalg/block_lu.hpp>
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 namespace {
@@ -15,7 +16,7 @@ constexpr double kMostSteps = 20;     // of a run of interior points
 constexpr double kLeastSweeps = 500;  // on the Problem, after which packings begin to end
 constexpr int kMany = 4;              // contacts a body, from which on equations are by bodies
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 // Rows of a pattern with sorted columns from lists with repetitions.
 struct Pattern {

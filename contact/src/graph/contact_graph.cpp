@@ -3,11 +3,12 @@
 #include "graph/contact_graph.hpp"
 
 #include <algorithm>
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 constexpr int kOneChunk = 256;  // up to this an island is one chunk
 

@@ -2,11 +2,12 @@
 #include "graph/graph_parts.hpp"
 
 #include <algorithm>
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 // A chunk has about 1/128 of its island, so that a colour holds several for each thread, within
 // limits: call overhead below, first-level cache above.

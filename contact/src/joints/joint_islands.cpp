@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 
@@ -10,7 +11,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 Options solver_options(const BodyOptions& o) {
   Options out;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 
@@ -15,7 +16,7 @@ namespace {
 constexpr double kHeld = 1e-14;
 constexpr double kSlip = 1e-12;  // of the speeds that a slip is the difference of
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 
@@ -14,7 +15,7 @@ namespace {
 constexpr double kTakenBack = 0.2;
 constexpr double kHeldByBound = 1 - 1e-9;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 }  // namespace
 

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/index.hpp>
 #include <utility>
 
 namespace tether::contact::detail {
 
 namespace {
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 }  // namespace
 
 Mechanism::Mechanism(std::vector<int> bodies, std::vector<int> rows, const JointRows& joints,

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/index.hpp>
 
 #include "problem/inverse_mass_root.hpp"
 
@@ -19,9 +20,9 @@ namespace {
 constexpr double kContradiction = 1e-7;
 // The squares of smaller speeds vanish, and nothing relative is left: what comes to rest passes
 // there.
-constexpr double kLeast = 1e-150;
+constexpr double kLeastScale = 1e-150;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 }  // namespace
 
@@ -175,9 +176,9 @@ void Mechanisms::find_contradicting(int m, const JointRows& joints, double scale
   for (std::size_t k = 0; k < mechanism.rows().size(); ++k) {
     const int i = static_cast<int>(k);
     const double norm = mechanism.row_norm(i);
-    const bool holds = norm > 0
-                           ? std::abs(mechanism.left(i)) <= std::max(kContradiction * scale, kLeast)
-                           : b_[k] == 0;  // a row of zeros
+    const bool holds =
+        norm > 0 ? std::abs(mechanism.left(i)) <= std::max(kContradiction * scale, kLeastScale)
+                 : b_[k] == 0;  // a row of zeros
     if (!holds) contradicting_.push_back(joints.joint(mechanism.rows()[k]));
   }
 }

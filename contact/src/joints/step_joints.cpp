@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 #include <stdexcept>
+#include <tether/linalg/index.hpp>
 
 #include "joints/joint_islands.hpp"
 #include "stepping/rotation.hpp"
@@ -22,7 +23,7 @@ constexpr double kHalving = 0.5;
 constexpr int kMoves = 30;
 constexpr int kRowsOfJoint = 3;  // bodies that fewer rows connect may touch
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 double norm(const std::vector<double>& u) {
   double sum = 0;

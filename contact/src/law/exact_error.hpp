@@ -41,9 +41,9 @@ inline void wide_block(const LocalBlock& L, const Wide* v, Wide* out) {
 // left as it is where that is not a small correction.
 inline void refine_sliding(const LocalBlock& L, const double* gamma, const Wide* w, const Wide* x,
                            Wide* z) {
-  constexpr int kSteps = 2;
+  constexpr int kRefinements = 2;
   constexpr Wide kSmall = 1e-20L;  // of |z|^2
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kRefinements; ++step) {
     const Wide d[3] = {z[0] - x[0], z[1] - x[1], z[2] - x[2]};
     Wide v[3];
     wide_block(L, d, v);

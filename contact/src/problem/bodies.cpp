@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/index.hpp>
 
 #include "problem/body_form.hpp"
 #include "problem/inverse_mass_root.hpp"
@@ -13,7 +14,7 @@
 
 namespace tether::contact {
 namespace {
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 }  // namespace
 
 Matrix6d RigidBody::inverse_mass_matrix() const {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/index.hpp>
 
 #include "problem/block_units.hpp"
 #include "problem/refuse.hpp"
@@ -13,7 +14,7 @@
 namespace tether::contact {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 int dimension_of(const linalg::VectorView& b, const linalg::VectorView& mu) {
   for (int d : {3, 2}) {

@@ -2,11 +2,12 @@
 #include "stepping/closing.hpp"
 
 #include <algorithm>
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 
 namespace {
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 }  // namespace
 
 bool Closing::find(const Impacts& impacts, const BodySet& bodies, double dt,

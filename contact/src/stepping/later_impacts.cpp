@@ -3,19 +3,16 @@
 
 #include <algorithm>
 #include <limits>
+#include <tether/linalg/index.hpp>
 
 #include "stepping/step_energy.hpp"
+#include "stepping/step_settings.hpp"
 
 namespace tether::contact::detail {
 
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-BodyOptions cold(BodyOptions options) {
-  options.warm_start = false;
-  return options;
-}
+using linalg::at;
 
 double bias(double gap, double dt) { return gap > 0 ? gap / dt : 0; }
 

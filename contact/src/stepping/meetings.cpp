@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <tether/linalg/index.hpp>
 #include <tuple>
 #include <utility>
 
 namespace tether::contact::detail {
 
 namespace {
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 }  // namespace
 
 Meetings::Meetings(std::vector<Meeting> meetings) : list_(std::move(meetings)) {

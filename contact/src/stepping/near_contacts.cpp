@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/index.hpp>
 #include <utility>
 
 #include "stepping/collide.hpp"
@@ -15,7 +16,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; }
 

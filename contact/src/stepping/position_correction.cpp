@@ -3,6 +3,7 @@
 
 #include "stepping/rotation.hpp"
 #include "stepping/step_settings.hpp"
+#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 
@@ -10,7 +11,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 // By velocities that are not kept. The angular velocity turns with the body: so its energy stays.
 void shift(BodySet& bodies, int body, double dt, const Vector3d& v, const Vector3d& w) {

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/index.hpp>
 
 #include "stepping/rotation.hpp"
 #include "stepping/step_energy.hpp"
+#include "stepping/step_settings.hpp"
 
 namespace tether::contact::detail {
 
@@ -13,16 +15,11 @@ using Eigen::Vector3d;
 
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 void push(RigidBody& body, const Vector3d& r, const Vector3d& p) {
   body.velocity += body.inverse_mass * p;
   body.angular_velocity += body.inverse_inertia * r.cross(p);
-}
-
-BodyOptions cold(BodyOptions options) {
-  options.warm_start = false;
-  return options;
 }
 
 }  // namespace

@@ -84,6 +84,11 @@ BodyOptions closing_options(const SteppingOptions& o) {
   return b;
 }
 
+BodyOptions cold(BodyOptions options) {
+  options.warm_start = false;
+  return options;
+}
+
 }  // namespace detail
 
 const char* name(Gyroscopic gyroscopic) {

@@ -9,12 +9,12 @@
 #include "constraints/evaluator.hpp"
 #include "movers/loaded_candidate.hpp"
 #include "movers/local_metric.hpp"
+#include "rows/rounding.hpp"
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
 
 namespace tether::ida_projection {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
 
 /// What the factors at hand are good for.

@@ -7,13 +7,13 @@
 #include "movers/factor_wear.hpp"
 #include "movers/vector_metric.hpp"
 #include "rows/gradient_rows.hpp"
+#include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kNothing = 1e-9;  // tolerances: no move at all
+constexpr double kNoMove = 1e-9;  // tolerances: no move at all
 
 class GradientMover final : public Mover {
  public:
@@ -79,7 +79,7 @@ class GradientMover final : public Mover {
     if (result.drift_before == 0.0) return result;
     if (factors_last() && wear_.usable()) {
       const double length = solve(candidate.weights);
-      if (length <= kNothing) {
+      if (length <= kNoMove) {
         result.length = length;
         return result;
       }

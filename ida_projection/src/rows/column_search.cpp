@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tether/linalg/index.hpp>
 #include <utility>
 
 namespace tether::ida_projection {
@@ -12,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostAnswers = 20000000;  // rows of all groups: 80 MB
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 }  // namespace
 

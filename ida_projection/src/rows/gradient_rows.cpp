@@ -1,21 +1,22 @@
 // Tether: few rows given by their gradients, on any N_Vector. SPDX-License-Identifier: BSD-3-Clause
 #include "rows/gradient_rows.hpp"
+#include "rows/rounding.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/linalg/index.hpp>
 
 namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kTiny = std::numeric_limits<double>::min();
 constexpr double kDependent = 1e-12;      // of a unit row, for each row
 constexpr double kInvolved = 1e-3;        // share of a kept row in a dropped one
 constexpr double kReorthogonalise = 0.1;  // of a unit row: where less is left, digits are lost
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 double norm(N_Vector v) { return std::sqrt(N_VDotProd(v, v)); }
 

@@ -11,6 +11,7 @@
 
 #include "constraints/evaluator.hpp"
 #include "rows/kinds_of_unknowns.hpp"
+#include "rows/rounding.hpp"
 #include "rows/row_trust.hpp"
 
 namespace tether::ida_projection {
@@ -65,7 +66,6 @@ constexpr double kContradiction = 0.5;
 template <class Solver, class Norm>
 bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, int n,
                  Norm in_tolerances, Contradiction* found) {
-  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   const Solver& solver = block.solver;
   for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
     const int row = block.rows[static_cast<std::size_t>(solver.pivot(k))];

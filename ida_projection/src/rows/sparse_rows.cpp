@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/index.hpp>
 #include <utility>
 
 namespace tether::ida_projection {
@@ -13,7 +14,7 @@ namespace {
 constexpr double kRankTolerance = 1e-6;
 constexpr double kSolved = 1e-8;  // of g: Newton's next move takes the rest
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 }  // namespace
 

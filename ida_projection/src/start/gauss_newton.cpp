@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "rows/rounding.hpp"
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
 
@@ -12,7 +13,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr int kMaximumIterations = 60;
 constexpr double kSmallestDamping = 1.0 / 1024.0;
 constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off

@@ -12,7 +12,8 @@ namespace {
 // Unknowns. Beyond the first size the look would be felt, except where each Jacobian of IDA takes
 // as many evaluations as there are unknowns, and dense factors: it costs two of these.
 constexpr int kLargestSize = 200, kLargestDense = 2000;
-constexpr double kDependent = 1e-6;  // of the largest pivot; difference quotients are this good
+constexpr double kDependentPivot =
+    1e-6;                            // of the largest pivot; difference quotients are this good
 constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
 
 // Columns that the matrix does not determine: those with an entry in a null vector. Rows and
@@ -30,7 +31,7 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
     }
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
-  qr.setThreshold(kDependent);
+  qr.setThreshold(kDependentPivot);
   const Eigen::Index n = a.cols(), rank = qr.rank();
   if (rank == n) return {};
   // R11 z1 + R12 z2 = 0, in the order of the pivots.
@@ -42,7 +43,7 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
   null = qr.colsPermutation() * null;
   std::vector<char> found(static_cast<std::size_t>(n));
   for (Eigen::Index j = 0; j < n; ++j)
-    found[static_cast<std::size_t>(j)] = null.row(j).lpNorm<Eigen::Infinity>() > kDependent;
+    found[static_cast<std::size_t>(j)] = null.row(j).lpNorm<Eigen::Infinity>() > kDependentPivot;
   return found;
 }
 

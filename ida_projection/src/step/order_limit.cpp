@@ -5,6 +5,8 @@
 #include <cmath>
 #include <ida/ida.h>
 
+#include "step/step_smoothing.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
@@ -17,7 +19,6 @@ constexpr long kFirstWait = 100;                 // steps, after a limit that di
 constexpr int kTries = 8;
 constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
 constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
-constexpr double kAnyRatio = 1e30;
 
 }  // namespace
 

@@ -20,8 +20,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kFilter = 4.0;     // b
-constexpr double kAnyRatio = 1e30;  // eta_max_fx that is never reached: keep h
+constexpr double kFilter = 4.0;  // b
 
 // IDA's defaults.
 constexpr double kLowestFixed = 1.0, kHighestFixed = 2.0, kLargest = 2.0, kLow = 0.9, kMin = 0.5;

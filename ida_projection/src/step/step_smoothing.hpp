@@ -6,6 +6,9 @@
 
 namespace tether::ida_projection {
 
+/// Of steps, as a bound of IDASetEtaFixedStepBounds that is never reached: keep h.
+constexpr double kAnyRatio = 1e30;
+
 /// Soederlind's filter H211b (ACM TOMS 29 (2003) 1-26), p = k + 1, k the order:
 ///
 ///     r_n = (c_n c_{n-1})^(1 / (b p)) rho_{n-1}^(-1/b),   c = 1 / (s err + 1e-4),

@@ -7,13 +7,14 @@
 #include <sstream>
 #include <vector>
 
+#include "watch/first_steps.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
 
-constexpr long kWindow = 200;          // accepted steps
-constexpr int kLargestSearch = 2000;   // unknowns up to which columns are looked at one by one
-constexpr double kNoInvariant = 1e-2;  // of the terms of C y'; the corrector knows y' better
+constexpr long kWindow = 200;         // accepted steps
+constexpr int kLargestSearch = 2000;  // unknowns up to which columns are looked at one by one
 
 const char* const kKink =
     "; its slopes to both sides differ there: a row with |.| or max has no derivative on the set, "

@@ -11,7 +11,6 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kSettled = 2;             // accepted steps: before, y' is still that of the start
-constexpr double kNoInvariant = 1e-2;    // of the terms of C y'; the corrector knows y' better
 constexpr double kFelt = 1.0;            // tolerances in one step: less may be noise of y'
 constexpr int kDoubts = 5, kLooks = 20;  // steps in a row with a doubt of one sign; looks into them
 constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C

@@ -12,6 +12,9 @@
 
 namespace tether::ida_projection {
 
+/// Of the terms of C y': what their sum may be at an invariant; the corrector knows y' better.
+constexpr double kNoInvariant = 1e-2;
+
 /// Rows that F does not keep, wrong entries of C, tolerances above the solution.
 class FirstSteps {
  public:

@@ -7,6 +7,7 @@
 #include <tether/linalg/block_lu.hpp>
 #include <tether/linalg/cone_scaling.hpp>
 #include <tether/linalg/friction_cone.hpp>
+#include <tether/linalg/index.hpp>
 #include <tether/linalg/minimum_norm.hpp>
 #include <tether/linalg/small_lu.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>

@@ -10,6 +10,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/index.hpp>
 
 #include "driver.hpp"
 
@@ -20,7 +21,7 @@ namespace {
 constexpr double kAgree = 0.05;       // of ratios
 constexpr double kUnresolved = 1e-5;  // m/s in the units of the model: heights near round-off
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 }  // namespace
 

@@ -12,7 +12,7 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kRank = 1e-10;  // of rows of unit length
+constexpr double kDependentRows = 1e-10;  // of rows of unit length
 
 }  // namespace
 
@@ -53,7 +53,7 @@ void Motion::settle_velocities(double t, VectorXd& y) {
   const MatrixXd rows = columns.transpose();
   model_.divide_by_mass(columns);
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(kRank);
+  factor.setThreshold(kDependentRows);
   factor.compute(rows * columns);
   y.segment(nq_, nu_) -= columns * factor.solve(row_scale_.cwiseProduct(rates));
   set(t, y.data());

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <tether/linalg/index.hpp>
 #include <tether/scene/engine.hpp>
 
 namespace tether::scene::event {
@@ -25,7 +26,7 @@ constexpr long kMostAtOneTime = 300;
 constexpr double kStartTolerance = 1e-4;
 constexpr long kAnchor = 5000;  // steps
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 /// Until a gap that falls with the acceleration `back` is zero, s; 0: never.
 double flight_time(double gap, double rate, double back) {

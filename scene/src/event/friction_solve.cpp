@@ -12,15 +12,15 @@ using contact::Regime;
 
 namespace {
 
-constexpr double kRank = 1e-11;
+constexpr double kDependent = 1e-11;
 constexpr double kLocked = 1e-12;  // A_nn of the largest
-constexpr double kAgree = 1e-7;    // of the answer's size: the exact one against the library's
+constexpr double kSame = 1e-7;     // of the answer's size: the exact one against the library's
 constexpr double kSolve = 1e-12;
 constexpr double kFarAbove = 1e5;
 
 MatrixXd pseudo_solve(const MatrixXd& S, const MatrixXd& right) {
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(kRank);
+  factor.setThreshold(kDependent);
   factor.compute(S);
   return factor.solve(right);
 }
@@ -97,10 +97,10 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
   const double force = answer.x.cwiseAbs().maxCoeff(), speed = b.cwiseAbs().maxCoeff();
   for (int i = 0; i < n; ++i) {
     const double xn = x[block * i], wn = w[block * i];
-    if (xn < -kAgree * force || wn < -kAgree * speed) return;
-    if (x.segment(block * i + 1, block - 1).norm() > mu[i] * xn + kAgree * force) return;
+    if (xn < -kSame * force || wn < -kAgree * speed) return;
+    if (x.segment(block * i + 1, block - 1).norm() > mu[i] * xn + kSame * force) return;
   }
-  if ((w - answer.w).cwiseAbs().maxCoeff() > kAgree * (speed + 1e-300)) return;
+  if ((w - answer.w).cwiseAbs().maxCoeff() > kSame * (speed + 1e-300)) return;
   answer.x = x;
   answer.w = w;
 }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/index.hpp>
 
 #include "driver.hpp"
 
@@ -16,7 +17,7 @@ namespace {
 constexpr double kNoImpulse = 1e-9;  // of the largest of an impact
 constexpr int kMostRounds = 2000;    // of one instant
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 }  // namespace
 

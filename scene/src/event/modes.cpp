@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/index.hpp>
 
 #include "driver.hpp"
 
@@ -13,10 +14,10 @@ namespace {
 
 constexpr double kStill = 3e-9;    // of the accelerations
 constexpr double kNoForce = 1e-9;  // of the largest; a contact that had lifted needs more
-constexpr double kRank = 1e-11, kImplied = 1e-9;  // of A_nn
-constexpr double kLeastApproach = 1e-12;          // of the slip
+constexpr double kDependentForces = 1e-11, kImplied = 1e-9;  // of A_nn
+constexpr double kLeastApproach = 1e-12;                     // of the slip
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+using linalg::at;
 
 /// Whether the gap of contact k stays where those of the contacts with a force stay: which of them
 /// has none is the solver's choice, and no reason to leave it open.
@@ -34,7 +35,7 @@ bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int 
     for (int j = 0; j < n; ++j) A(i, j) = rows.A()(others[at(i)], others[at(j)]);
   }
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(kRank);
+  factor.setThreshold(kDependentForces);
   factor.compute(A);
   const double own = rows.A()(block * k, block * k);
   return own - a.dot(factor.solve(a)) <= kImplied * own;

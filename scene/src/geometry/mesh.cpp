@@ -13,9 +13,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kHalfTurn = 3.14159265358979323846;
 
-Mesh box(const Vector3d& size) {
+Mesh box_mesh(const Vector3d& size) {
   Mesh m;
   for (int corner = 0; corner < 8; ++corner)
     m.points.emplace_back(
@@ -26,7 +26,7 @@ Mesh box(const Vector3d& size) {
 }
 
 // Two half spheres, `length` apart along z; a sphere at length 0.
-Mesh capsule(double radius, double length, int around) {
+Mesh capsule_mesh(double radius, double length, int around) {
   const int rings = std::max(2, around / 4);  // of each half, pole excluded
   const auto n = static_cast<std::size_t>(around);
   Mesh m;
@@ -34,9 +34,9 @@ Mesh capsule(double radius, double length, int around) {
   for (int ring = 0; ring < 2 * rings; ++ring) {
     const bool upper = ring >= rings;
     const double latitude =
-        upper ? kPi / 2 * (ring - rings) / rings : kPi / 2 * (ring + 1 - rings) / rings;
+        upper ? kHalfTurn / 2 * (ring - rings) / rings : kHalfTurn / 2 * (ring + 1 - rings) / rings;
     for (int k = 0; k < around; ++k) {
-      const double longitude = 2 * kPi * k / around;
+      const double longitude = 2 * kHalfTurn * k / around;
       m.points.emplace_back(radius * std::cos(latitude) * std::cos(longitude),
                             radius * std::cos(latitude) * std::sin(longitude),
                             radius * std::sin(latitude) + (upper ? length / 2 : -length / 2));
@@ -75,11 +75,11 @@ Mesh points(const std::vector<Vector3d>& all) {
 Mesh in_own_axes(const Shape& shape, int around, double half_plane) {
   switch (shape.kind) {
     case ShapeKind::sphere:
-      return capsule(shape.radius, 0, around);
+      return capsule_mesh(shape.radius, 0, around);
     case ShapeKind::capsule:
-      return capsule(shape.radius, shape.length, around);
+      return capsule_mesh(shape.radius, shape.length, around);
     case ShapeKind::box:
-      return box(shape.size);
+      return box_mesh(shape.size);
     case ShapeKind::plane:
       return plane(shape.normal, half_plane);
     case ShapeKind::convex:

@@ -2,11 +2,10 @@
 // BSD-3-Clause
 #pragma once
 
-#include <cstddef>
+#include <tether/linalg/index.hpp>
 
 namespace tether::scene::mechanics {
 
-/// `index` >= 0.
-constexpr std::size_t at(int index) { return static_cast<std::size_t>(index); }
+using linalg::at;
 
 }  // namespace tether::scene::mechanics

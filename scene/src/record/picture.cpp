@@ -26,7 +26,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr std::size_t kMostBodies = 300;    // drawn; of more, only the first
+constexpr std::size_t kMostDrawn = 300;     // drawn; of more, only the first
 constexpr std::size_t kMostRecords = 1024;  // kept; then every second one goes
 constexpr std::size_t kMostPaths = 30;
 
@@ -93,7 +93,7 @@ class PictureRecorder : public Recorder {
       : scene_(scene), file_(file), start_energy_(start_energy) {
     make_folder_of(file);
     check_writable(file);
-    bodies_ = std::min(scene.bodies.size(), kMostBodies);
+    bodies_ = std::min(scene.bodies.size(), kMostDrawn);
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {

@@ -65,7 +65,7 @@ Value plain(const toml::node& node) {
 
 constexpr std::size_t kShownText = 60, kShownItems = 8;
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   return fmt::format("\"{}{}\"", text.substr(0, kShownText), text.size() > kShownText ? "..." : "");
 }
 
@@ -78,7 +78,7 @@ std::string shown(const Value& value) {
     case Value::Kind::number:
       return fmt::format("{}", value.number);
     case Value::Kind::text:
-      return quoted(value.text);
+      return in_quotes(value.text);
     case Value::Kind::array: {
       std::string out = "[";
       for (std::size_t i = 0; i < value.items.size(); ++i) {

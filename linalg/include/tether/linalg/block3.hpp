@@ -2,8 +2,8 @@
 // BSD-3-Clause
 #pragma once
 
-#include <cstddef>
 #include <tether/export.hpp>
+#include <tether/linalg/index.hpp>
 #include <vector>
 
 TETHER_EXPORT_BEGIN
@@ -26,8 +26,6 @@ struct BlockPattern {
   const int* starts;
   const int* columns;
 };
-
-inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 /// p.q, and q += a p, over arrays of whole PackedVectors: n is a multiple of 4, storage is aligned
 /// to 32 bytes.

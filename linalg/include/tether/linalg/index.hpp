@@ -1,0 +1,12 @@
+// Tether: indices that are int in formulas, as containers take them. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+
+namespace tether::linalg {
+
+/// `index` >= 0.
+constexpr std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+}  // namespace tether::linalg
