@@ -40,6 +40,18 @@ function(tether_executable target)
   tether_warnings(${target})
 endfunction()
 
+# The sources of a folder compile as one: names in unnamed namespaces differ within a folder.
+function(tether_group_by_folder target)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE OUTPUT_VARIABLE folder)
+    cmake_path(RELATIVE_PATH folder BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+    cmake_path(GET folder PARENT_PATH folder)
+    string(MAKE_C_IDENTIFIER "${folder}" group)
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
+  endforeach()
+endfunction()
+
 function(tether_library name)
   add_library(tether_${name})
   add_library(tether::${name} ALIAS tether_${name})
@@ -52,9 +64,10 @@ function(tether_library name)
   # Installed shared libraries find each other in their own folder.
   set_target_properties(tether_${name} PROPERTIES
     INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>
-    UNITY_BUILD ${TETHER_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 12)
+    UNITY_BUILD ${TETHER_UNITY_BUILD} UNITY_BUILD_MODE GROUP)
   tether_warnings(tether_${name})
   if(TETHER_UNITY_BUILD)
+    cmake_language(EVAL CODE "cmake_language(DEFER CALL tether_group_by_folder tether_${name})")
     # A source that another one includes is no header: its unnamed namespace may be in its classes.
     target_compile_options(tether_${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   endif()

@@ -1,6 +1,6 @@
 #!/bin/sh
 # All tests: installs what is missing, builds all but the programs of benchmarks/ (a tenth of the time) in
-# build/release, the sources of libraries by the dozen, and runs ctest.
+# build/release, the sources of libraries by folders, and runs ctest.
 # Arguments go to ctest, e.g. -R projection. SPDX-License-Identifier: BSD-3-Clause
 set -eu
 

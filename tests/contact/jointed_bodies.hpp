@@ -18,7 +18,7 @@ constexpr double kGravity = 9.81;
 constexpr int kWorld = -1;
 
 inline double radians(double degrees) { return degrees * 3.14159265358979323846 / 180; }
-using linalg::at;
+using tether::linalg::at;
 
 /// Bodies, rows and contacts in world axes. Each joint gets the next number.
 struct Mechanism {

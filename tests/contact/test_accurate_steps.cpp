@@ -16,7 +16,7 @@ namespace {
 using namespace stepping_scenes;
 using tc::Vector6d;
 
-using linalg::at;
+using tether::linalg::at;
 
 // Glocker's woodpecker (C. Glocker, Set-valued force laws, 2001; parameters as in Siconos'
 // tutorials): linear in y, phi_M, phi_S. Each generalised coordinate, the bird's height and the two

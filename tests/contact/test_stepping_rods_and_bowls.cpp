@@ -12,7 +12,7 @@ namespace {
 
 using namespace stepping_scenes;
 
-using linalg::at;
+using tether::linalg::at;
 
 // A slender rod (m = 1, L = 1) whose lower end touches the ground at the origin, leaning towards +x
 // by `angle` from the ground. Sliding that end towards +x digs it in, towards -x lifts it.

@@ -12,7 +12,7 @@ namespace {
 
 using namespace stepping_scenes;
 
-using linalg::at;
+using tether::linalg::at;
 
 // Dominoes with frictionless, inelastic sides on a floor without slip, the first one pushed. Speed
 // of the wave between two of them, over sqrt(g h).

@@ -72,10 +72,11 @@ tp::Constraints one(const Row& row, Kind kind) {
     set.jacobian = tp::DenseJacobian{
         [row](double t, tp::ConstVector y, tp::Matrix c) { row.gradient(t, y.data(), c.data()); }};
   if (kind == Kind::sparse)
-    set.jacobian =
-        tp::SparseJacobian{{0, 3}, {0, 1, 2}, [row](double t, tp::ConstVector y, tp::Vector c) {
-                             row.gradient(t, y.data(), c.data());
-                           }};
+    set.jacobian = tp::SparseJacobian{
+        {0, 3},
+        {0, 1, 2},
+        [row](double t, tp::ConstVector y, tp::Vector c) { row.gradient(t, y.data(), c.data()); },
+        nullptr};
   if (kind == Kind::gradients) {
     set.value = nullptr;
     set.jacobian = tp::Gradients{

@@ -8,7 +8,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "event/model.hpp"
+#include "event/model/model.hpp"
 
 namespace woodpecker {
 

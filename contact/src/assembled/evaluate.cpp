@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "assembled/system.hpp"
+#include "assembled/search/system.hpp"
 
 namespace tether::contact {
 

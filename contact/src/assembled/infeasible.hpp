@@ -1,7 +1,7 @@
 // Tether: the proof that a contact problem has no solution. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "assembled/search.hpp"
+#include "assembled/search/search.hpp"
 
 namespace tether::contact::detail {
 

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "assembled/search.hpp"
+#include "assembled/search/search.hpp"
 
 namespace tether::contact::detail {
 

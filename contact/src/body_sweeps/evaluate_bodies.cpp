@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "assembled/system.hpp"
+#include "assembled/search/system.hpp"
 #include "body_sweeps/wide_velocities.hpp"
 #include "graph/contact_graph.hpp"
 #include "law/exact_error.hpp"

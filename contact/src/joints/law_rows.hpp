@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "joints/mechanisms.hpp"
-#include "stepping/joint_part.hpp"
+#include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
 

@@ -8,7 +8,7 @@
 #include <tether/linalg/index.hpp>
 
 #include "joints/joint_islands.hpp"
-#include "stepping/rotation.hpp"
+#include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {
 

@@ -9,7 +9,7 @@
 
 #include "joints/law_rows.hpp"
 #include "joints/mechanisms.hpp"
-#include "stepping/joint_part.hpp"
+#include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
 

@@ -1,7 +1,7 @@
 // Tether: moves of a step that are no velocities. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping/position_correction.hpp"
 
-#include "stepping/rotation.hpp"
+#include "stepping/motion/rotation.hpp"
 #include "stepping/step_settings.hpp"
 #include <tether/linalg/index.hpp>
 

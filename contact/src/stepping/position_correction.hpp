@@ -4,8 +4,8 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "stepping/closing.hpp"
-#include "stepping/joint_part.hpp"
+#include "stepping/impacts/closing.hpp"
+#include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
 

@@ -84,11 +84,6 @@ BodyOptions closing_options(const SteppingOptions& o) {
   return b;
 }
 
-BodyOptions cold(BodyOptions options) {
-  options.warm_start = false;
-  return options;
-}
-
 }  // namespace detail
 
 const char* name(Gyroscopic gyroscopic) {

@@ -3,7 +3,7 @@
 
 #include <tether/contact/stepping.hpp>
 
-#include "stepping/closing.hpp"
+#include "stepping/impacts/closing.hpp"
 
 namespace tether::contact::detail {
 
@@ -25,8 +25,6 @@ Depenetration depenetration(const SteppingOptions& o);
 double negligible_depth(const SteppingOptions& o, double dt);
 /// Options of the problem that finds the gaps closed by inelastic impacts.
 BodyOptions closing_options(const SteppingOptions& o);
-/// The same without the impulses of the problem before.
-BodyOptions cold(BodyOptions options);
 /// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
 double threshold_speed(double threshold, const SteppingOptions& o);
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "stepping/collide.hpp"
+#include "stepping/detection/collide.hpp"
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {

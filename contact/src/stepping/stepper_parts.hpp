@@ -7,14 +7,14 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "stepping/free_motion.hpp"
-#include "stepping/impacts.hpp"
-#include "stepping/joint_part.hpp"
-#include "stepping/later_impacts.hpp"
-#include "stepping/near_contacts.hpp"
+#include "stepping/detection/near_contacts.hpp"
+#include "stepping/impacts/impacts.hpp"
+#include "stepping/impacts/later_impacts.hpp"
+#include "stepping/impacts/restitution.hpp"
+#include "stepping/motion/free_motion.hpp"
+#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/rotation.hpp"
 #include "stepping/position_correction.hpp"
-#include "stepping/restitution.hpp"
-#include "stepping/rotation.hpp"
 #include "stepping/step_settings.hpp"
 
 namespace tether::contact {

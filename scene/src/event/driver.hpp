@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "event.hpp"
-#include "friction_solve.hpp"
-#include "motion.hpp"
-#include "phase.hpp"
-#include "watch.hpp"
+#include "event/phase/friction_solve.hpp"
+#include "event/phase/motion.hpp"
+#include "event/phase/phase.hpp"
+#include "event/phase/watch.hpp"
 
 namespace tether::scene::event {
 

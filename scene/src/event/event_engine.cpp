@@ -6,11 +6,11 @@
 #include <stdexcept>
 
 #include "driver.hpp"
+#include "event/model/scaled_scene.hpp"
+#include "event/model/scene_model.hpp"
 #include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
 #include "output/saved_bodies.hpp"
-#include "scaled_scene.hpp"
-#include "scene_model.hpp"
 
 namespace tether::scene {
 

@@ -12,8 +12,8 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kStill = 3e-9;    // of the accelerations
-constexpr double kNoForce = 1e-9;  // of the largest; a contact that had lifted needs more
+constexpr double kNegligible = 3e-9;  // of the accelerations
+constexpr double kNoForce = 1e-9;     // of the largest; a contact that had lifted needs more
 constexpr double kDependentForces = 1e-11, kImplied = 1e-9;  // of A_nn
 constexpr double kLeastApproach = 1e-12;                     // of the slip
 
@@ -95,7 +95,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     ContactMode& mode = modes[at(i)];
     const contact::Regime regime = answer.regimes[at(k)];
     if (regime == contact::Regime::separating &&
-        !(std::abs(answer.w[block * k]) <= kStill * solved.scale &&
+        !(std::abs(answer.w[block * k]) <= kNegligible * solved.scale &&
           rests_on_others(rows, answer, k)))
       continue;
     const bool lifted = std::find(lifted_.begin(), lifted_.end(), i) != lifted_.end();
@@ -108,7 +108,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     }
     // On the border of its cone a contact may be said to slide though nothing moves it.
     const VectorXd a = answer.w.segment(block * k + 1, block - 1);
-    const bool still = a.norm() <= kStill * solved.scale;
+    const bool still = a.norm() <= kNegligible * solved.scale;
     if ((regime == contact::Regime::sticking || still) && mu[k] > 0) {
       mode.mode = Mode::stick;
       continue;

@@ -27,7 +27,7 @@ std::vector<std::string> words_of(const std::string& path) {
   throw std::invalid_argument(fmt::format("\"{}\": {}", path, why));
 }
 
-Value* entry(Value& table, const std::string& key) {
+Value* wanted_entry(Value& table, const std::string& key) {
   for (Entry& each : table.entries)
     if (each.key == key) return &each.value;
   return nullptr;
@@ -72,7 +72,7 @@ class Path {
     }
     if (value.kind != Value::Kind::table)
       refuse_path(path_, fmt::format("nothing is inside of \"{}\"", words_[at - 1]));
-    if (Value* found = entry(value, word)) return walk(*found, at + 1, number);
+    if (Value* found = wanted_entry(value, word)) return walk(*found, at + 1, number);
     const bool options = word == "smooth" || word == "stepping" || word == "event";
     if (at + 1 < words_.size() && !(at == 0 && options))
       refuse_path(path_, fmt::format("the scene has no \"{}\"", word));
@@ -92,7 +92,7 @@ class Path {
       return;
     }
     for (Value& each : all.items) {
-      const Value* name = entry(each, "name");
+      const Value* name = wanted_entry(each, "name");
       if (name != nullptr && name->kind == Value::Kind::text && name->text == word)
         return walk(each, at + 1, number);
     }

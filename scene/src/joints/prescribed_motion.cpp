@@ -13,12 +13,12 @@ namespace joints {
 
 namespace {
 
-constexpr double kFullTurn = 6.283185307179586;
+constexpr double kTwoPi = 6.283185307179586;
 
 }  // namespace
 
 Now evaluate(const Motion& motion, double t) {
-  const double speed = kFullTurn * motion.frequency, angle = speed * t + motion.phase;
+  const double speed = kTwoPi * motion.frequency, angle = speed * t + motion.phase;
   Now now;
   now.s = motion.rate * t + motion.amplitude * (std::sin(angle) - std::sin(motion.phase));
   now.s1 = motion.rate + motion.amplitude * speed * std::cos(angle);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::vector<double> list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+std::vector<double> three(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 /// The larger one; NaN counts as infinity.
 double larger(double a, double b) {
@@ -80,15 +80,15 @@ std::vector<double> measure(const Scene& scene, const Expect& expect, const Engi
   const auto joint = [&] { return engine.forces().joints[static_cast<std::size_t>(expect.joint)]; };
   switch (expect.quantity) {
     case Quantity::position:
-      return list(state().position);
+      return three(state().position);
     case Quantity::velocity:
-      return list(state().velocity);
+      return three(state().velocity);
     case Quantity::orientation: {
       const Eigen::Quaterniond& q = state().orientation;
       return {q.w(), q.x(), q.y(), q.z()};
     }
     case Quantity::angular_velocity:
-      return list(state().angular_velocity);
+      return three(state().angular_velocity);
     case Quantity::distance_moved:
       return {(state().position - scene.bodies[index].position).norm()};
     case Quantity::speed:
@@ -102,9 +102,9 @@ std::vector<double> measure(const Scene& scene, const Expect& expect, const Engi
     case Quantity::energy_change:
       return {energy() - start_energy};
     case Quantity::momentum:
-      return list(diagnostics().momentum);
+      return three(diagnostics().momentum);
     case Quantity::angular_momentum:
-      return list(diagnostics().angular_momentum);
+      return three(diagnostics().angular_momentum);
     case Quantity::drift:
       return {diagnostics().drift};
     case Quantity::contacts:
@@ -114,13 +114,13 @@ std::vector<double> measure(const Scene& scene, const Expect& expect, const Engi
     case Quantity::residual:
       return {diagnostics().residual};
     case Quantity::contact_force:
-      return list(contact_force(expect, engine));
+      return three(contact_force(expect, engine));
     case Quantity::contact_slip:
       return {contact_slip(expect, engine)};
     case Quantity::joint_force:
-      return list(joint().force);
+      return three(joint().force);
     case Quantity::joint_moment:
-      return list(joint().moment);
+      return three(joint().moment);
     case Quantity::joint_drive:
       return {joint().drive};
     case Quantity::spring_force:

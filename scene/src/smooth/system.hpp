@@ -23,12 +23,12 @@
 #include <tether/scene/scene.hpp>
 #include <vector>
 
-#include "acceleration_jacobian.hpp"
-#include "forward_dynamics.hpp"
-#include "jacobian_terms.hpp"
 #include "joints/reactions.hpp"
-#include "kept_invariants.hpp"
-#include "rows_in_use.hpp"
+#include "smooth/terms/acceleration_jacobian.hpp"
+#include "smooth/terms/forward_dynamics.hpp"
+#include "smooth/terms/jacobian_terms.hpp"
+#include "smooth/terms/kept_invariants.hpp"
+#include "smooth/terms/rows_in_use.hpp"
 #include "stopwatch.hpp"
 
 namespace tether::scene::smooth {

@@ -5,8 +5,8 @@
 #include <cstdlib>
 
 #include "body_passes/body_kernels.hpp"
-#include "stepping/restitution.hpp"
-#include "stepping/rotation.hpp"
+#include "stepping/impacts/restitution.hpp"
+#include "stepping/motion/rotation.hpp"
 
 namespace tether::contact {
 namespace {

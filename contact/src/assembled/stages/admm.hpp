@@ -1,7 +1,7 @@
 // Tether: alternating directions with one factorisation. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "assembled/search.hpp"
+#include "assembled/search/search.hpp"
 #include <tether/linalg/anderson.hpp>
 #include <tether/linalg/block_lu.hpp>
 

@@ -5,7 +5,7 @@
 #include <tether/linalg/block_lu.hpp>
 #include <vector>
 
-#include "assembled/system.hpp"
+#include "assembled/search/system.hpp"
 #include "problem/body_form.hpp"
 
 namespace tether::contact::detail {

@@ -1,7 +1,7 @@
 // Tether: the convex relaxation of a contact problem. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "assembled/search.hpp"
+#include "assembled/search/search.hpp"
 
 namespace tether::contact::detail {
 

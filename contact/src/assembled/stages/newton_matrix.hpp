@@ -4,7 +4,7 @@
 
 #include <tether/linalg/block_lu.hpp>
 
-#include "assembled/search.hpp"
+#include "assembled/search/search.hpp"
 #include "assembled/stages/body_newton.hpp"
 
 namespace tether::contact::detail {

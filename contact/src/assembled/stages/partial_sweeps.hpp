@@ -1,7 +1,7 @@
 // Tether: sweeps of the contacts that have not settled. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "assembled/search.hpp"
+#include "assembled/search/search.hpp"
 
 namespace tether::contact::detail {
 

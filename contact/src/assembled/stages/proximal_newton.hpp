@@ -2,7 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
-#include "assembled/search.hpp"
+#include "assembled/search/search.hpp"
 #include "assembled/stages/newton_matrix.hpp"
 #include <tether/linalg/anderson.hpp>
 

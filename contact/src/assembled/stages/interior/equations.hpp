@@ -1,7 +1,7 @@
 // Tether: the equations that interior points solve. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "assembled/system.hpp"
+#include "assembled/search/system.hpp"
 
 namespace tether::contact::detail {
 

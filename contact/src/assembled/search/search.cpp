@@ -1,0 +1,84 @@
+// Tether: the best point so far and the work spent on it. SPDX-License-Identifier: BSD-3-Clause
+#include "assembled/search/search.hpp"
+
+#include <algorithm>
+
+namespace tether::contact::detail {
+namespace {
+
+constexpr double kExactCost = 5;  // tests
+
+}  // namespace
+
+void Search::reset(const Problem& problem, const Options& o, Measure m) {
+  options = o;
+  measure = m;
+  system.reset(problem, o.law);
+  counts = Counts();
+  work_end = o.max_work;
+  history.clear();
+  best_error = std::numeric_limits<double>::infinity();
+  hidden_ = 0;
+  const std::size_t n = at(problem.contacts());
+  best.resize(n);
+  scratch_.resize(n);
+  sweep_cost = 2.2 * static_cast<double>(problem.blocks().size()) + 30.0 * problem.contacts();
+  test_cost = m == Measure::fixed_point ? 1.2 * sweep_cost : 0.8 * sweep_cost;
+}
+
+// Never below what round-off of x makes of it: impulses that swallow b leave a small residual by
+// chance. Long sums are taken where those of doubles may decide. Sweeps do not ask for them first:
+// what is to be solved down to round-off between light and heavy bodies they do not solve.
+double Search::fixed_point_error(const PackedVector* x, Method stage) {
+  constexpr double kLook = 1e3;  // tolerances
+  const double fast = system.fixed_point(x).fixed, tolerance = options.tolerance;
+  const bool factorised = stage == Method::interior_point || stage == Method::proximal_newton;
+  double rounding = 0;
+  if (fast <= tolerance || (factorised && fast <= kLook * tolerance)) {
+    rounding = system.rounding(x);
+    hidden_ = kSumUnits * rounding;
+  }
+  if (fast > std::max(tolerance, hidden_)) return fast;
+  if (hidden_ <= tolerance) return std::max(fast, rounding);
+  counts.work += kExactCost * test_cost;
+  if (!(rounding > 0)) rounding = system.rounding(x);
+  return std::max(system.exact_fixed_point(x), rounding);
+}
+
+bool Search::explained_by_round_off() {
+  const double rounding = system.rounding(best.data());
+  hidden_ = kSumUnits * rounding;
+  if (!(best_error <= hidden_)) return false;
+  if (measure == Measure::fixed_point) {
+    counts.work += kExactCost * test_cost;
+    best_error = std::min(best_error, std::max(system.exact_fixed_point(best.data()), rounding));
+  }
+  return true;
+}
+
+double Search::test(const PackedVector* x, Method stage) {
+  ++counts.tests;
+  counts.work += test_cost;
+  double error;
+  if (measure == Measure::fixed_point) {
+    error = fixed_point_error(x, stage);
+  } else {
+    error = system.measure(system.natural_map(x, scratch_.data()), measure);
+    // Impulses that swallow b leave a small residual by round-off.
+    if (error <= options.tolerance) error = std::max(error, system.rounding(x));
+  }
+  if (error < best_error) {
+    best_error = error;
+    std::copy(x, x + best.size(), best.begin());
+  }
+  if (options.history) {
+    const int iteration = stage == Method::admm ? counts.admm_iterations
+                          : stage == Method::proximal_newton || stage == Method::interior_point
+                              ? counts.factorisations
+                              : counts.sweeps;
+    history.push_back({stage, iteration, best_error});
+  }
+  return error;
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,48 @@
+// Tether: the best point so far and the work spent on it. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+
+#include "assembled/search/system.hpp"
+
+namespace tether::contact::detail {
+
+// Stages improve the same best point; none may overwrite it by a worse one (README, section 6).
+// All decisions use residuals and operation counts, never the clock.
+struct Search {
+  System system;
+  Options options;
+  Measure measure = Measure::natural_map;
+  Counts counts;
+  std::vector<HistoryEntry> history;
+  Packed best;
+  double best_error = std::numeric_limits<double>::infinity();
+  double work_end = 0;                   // of the present attempt
+  double sweep_cost = 0, test_cost = 0;  // estimated ns
+
+  void reset(const Problem& problem, const Options& o, Measure m);
+  // Measures x, keeps it if it is the best.
+  double test(const PackedVector* x, Method stage);
+  // Whether errors near the tolerance are found with long sums, those of doubles being round-off.
+  bool near_round_off() const { return hidden_ > options.tolerance; }
+  // Whether round-off may be what is left of the best point, whose error is then found with long
+  // sums.
+  bool explained_by_round_off();
+  bool solved() const { return best_error <= options.tolerance; }
+  bool exhausted() const {
+    return counts.work > work_end ||
+           (best_error <= options.enough && counts.work > 0.25 * options.max_work);
+  }
+  void count_sweep(double factor = 1) {
+    ++counts.sweeps;
+    counts.work += factor * sweep_cost;
+  }
+
+ private:
+  double fixed_point_error(const PackedVector* x, Method stage);
+
+  Packed scratch_;
+  double hidden_ = 0;  // errors that round-off of double sums may make; 0: not near the tolerance
+};
+
+}  // namespace tether::contact::detail

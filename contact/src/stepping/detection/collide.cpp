@@ -1,0 +1,300 @@
+// Tether: where two shapes are near each other. SPDX-License-Identifier: BSD-3-Clause
+#include "stepping/detection/collide.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace tether::contact {
+
+using Eigen::Vector3d;
+
+const char* name(ShapeKind kind) {
+  switch (kind) {
+    case ShapeKind::sphere:
+      return "sphere";
+    case ShapeKind::plane:
+      return "plane";
+    case ShapeKind::box:
+      return "box";
+    case ShapeKind::capsule:
+      return "capsule";
+    case ShapeKind::convex:
+      return "convex";
+    case ShapeKind::points:
+      return "points";
+  }
+  return "?";
+}
+
+Shape Shape::sphere(double radius) {
+  Shape s;
+  s.kind = ShapeKind::sphere;
+  s.radius = radius;
+  return s;
+}
+
+Shape Shape::plane(const Vector3d& normal) {
+  Shape s;
+  s.kind = ShapeKind::plane;
+  s.normal = normal.normalized();
+  return s;
+}
+
+Shape Shape::box(const Vector3d& size) {
+  Shape s;
+  s.kind = ShapeKind::box;
+  s.size = size;
+  return s;
+}
+
+Shape Shape::capsule(double radius, double length) {
+  Shape s;
+  s.kind = ShapeKind::capsule;
+  s.radius = radius;
+  s.length = length;
+  return s;
+}
+
+Shape Shape::convex(std::vector<Vector3d> vertices) {
+  Shape s;
+  s.kind = ShapeKind::convex;
+  s.points = std::move(vertices);
+  return s;
+}
+
+Shape Shape::touching_points(std::vector<Vector3d> points) {
+  Shape s;
+  s.kind = ShapeKind::points;
+  s.points = std::move(points);
+  return s;
+}
+
+namespace detail {
+namespace {
+
+// A point and a plane. `to_plane` is the plane's normal, from the plane to the point.
+void point_plane(const Vector3d& p, const Pose& plane, const Vector3d& to_point, double margin,
+                 int feature, NearPoints& out) {
+  const double gap = to_point.dot(p - plane.position);
+  if (gap < margin) out.add(p, p - gap * to_point, to_point, gap, feature);
+}
+
+void ball_plane(const Vector3d& centre, double radius, const Pose& plane, const Vector3d& n,
+                double margin, int feature, NearPoints& out) {
+  const double distance = n.dot(centre - plane.position);
+  if (distance - radius < margin)
+    out.add(centre - radius * n, centre - distance * n, n, distance - radius, feature);
+}
+
+void with_plane(const Shape& a, const Pose& A, const Shape& plane, const Pose& P, double margin,
+                NearPoints& out) {
+  const Vector3d n = P.rotation * plane.normal;
+  switch (a.kind) {
+    case ShapeKind::sphere:
+      ball_plane(A.position, a.radius, P, n, margin, 0, out);
+      break;
+    case ShapeKind::capsule:
+      for (int end = 0; end < 2; ++end)
+        ball_plane(A.position + (end == 0 ? -0.5 : 0.5) * a.length * A.rotation.col(2), a.radius, P,
+                   n, margin, end, out);
+      break;
+    case ShapeKind::box:
+      for (int k = 0; k < 8; ++k) {
+        const Vector3d corner((k & 1) != 0 ? 0.5 : -0.5, (k & 2) != 0 ? 0.5 : -0.5,
+                              (k & 4) != 0 ? 0.5 : -0.5);
+        point_plane(A.position + A.rotation * corner.cwiseProduct(a.size), P, n, margin, k, out);
+      }
+      break;
+    case ShapeKind::convex:
+    case ShapeKind::points:
+      for (std::size_t k = 0; k < a.points.size(); ++k)
+        point_plane(A.position + A.rotation * a.points[k], P, n, margin, static_cast<int>(k), out);
+      break;
+    case ShapeKind::plane:
+      break;
+  }
+}
+
+// Spheres of radii r1, r2 about the nearest points of two shapes.
+void ball_ball(const Vector3d& c1, double r1, const Vector3d& c2, double r2, double margin,
+               int feature, NearPoints& out) {
+  const Vector3d d = c1 - c2;
+  const double distance2 = d.squaredNorm(), sum = r1 + r2 + margin;
+  if (!(distance2 < sum * sum)) return;
+  const double distance = std::sqrt(distance2);
+  const Vector3d n = distance > 0 ? Vector3d(d / distance) : Vector3d(Vector3d::UnitZ());
+  out.add(c1 - r1 * n, c2 + r2 * n, n, distance - r1 - r2, feature);
+}
+
+void sphere_box(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
+                NearPoints& out) {
+  const Vector3d p = B.rotation.transpose() * (A.position - B.position), half = 0.5 * b.size;
+  const Vector3d inside = p.cwiseMax(-half).cwiseMin(half);
+  // In the axes of the box: differences of world positions have no direction on its surface.
+  const Vector3d d = p - inside;
+  const double distance = d.norm();
+  if (distance > 0) {
+    if (!(distance - a.radius < margin)) return;
+    const Vector3d n = B.rotation * (d / distance);
+    out.add(A.position - a.radius * n, B.position + B.rotation * inside, n, distance - a.radius, 0);
+    return;
+  }
+  // The centre is in the box: out through the nearest face.
+  int axis = 0;
+  const double depth = (half - p.cwiseAbs()).minCoeff(&axis);
+  Vector3d face = p;
+  face[axis] = p[axis] < 0 ? -half[axis] : half[axis];
+  const Vector3d n = (p[axis] < 0 ? -1 : 1) * B.rotation.col(axis);
+  out.add(A.position - a.radius * n, B.position + B.rotation * face, n, -depth - a.radius, 0);
+}
+
+Vector3d nearest_on_segment(const Vector3d& p, const Vector3d& from, const Vector3d& to) {
+  const Vector3d d = to - from;
+  const double length2 = d.squaredNorm();
+  return length2 > 0 ? Vector3d(from + std::clamp((p - from).dot(d) / length2, 0.0, 1.0) * d)
+                     : from;
+}
+
+struct Segment {
+  Vector3d from, to;
+};
+Segment axis_of(const Shape& s, const Pose& P) {
+  const Vector3d half = 0.5 * s.length * P.rotation.col(2);
+  return {P.position - half, P.position + half};
+}
+
+// Near-parallel axes touch at two points: the ends of the part that they share.
+void capsule_capsule(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
+                     NearPoints& out) {
+  const Segment s = axis_of(a, A), t = axis_of(b, B);
+  const Vector3d u = s.to - s.from, v = t.to - t.from;
+  const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v);
+  const double square = uu * vv - uv * uv;
+  if (square > 1e-4 * uu * vv) {
+    const Vector3d w = s.from - t.from;
+    double x = std::clamp((uv * v.dot(w) - vv * u.dot(w)) / square, 0.0, 1.0);
+    const Vector3d q = nearest_on_segment(s.from + x * u, t.from, t.to);
+    const Vector3d p = nearest_on_segment(q, s.from, s.to);
+    ball_ball(p, a.radius, nearest_on_segment(p, t.from, t.to), b.radius, margin, 0, out);
+    return;
+  }
+  for (int end = 0; end < 2; ++end) {
+    const Vector3d q = nearest_on_segment(end == 0 ? s.from : s.to, t.from, t.to);
+    const Vector3d p = nearest_on_segment(q, s.from, s.to);
+    ball_ball(p, a.radius, q, b.radius, margin, 1 + end, out);
+  }
+}
+
+int rank(ShapeKind kind) {
+  switch (kind) {
+    case ShapeKind::sphere:
+      return 0;
+    case ShapeKind::capsule:
+      return 1;
+    case ShapeKind::box:
+      return 2;
+    case ShapeKind::convex:
+      return 3;
+    case ShapeKind::points:
+      return 4;
+    case ShapeKind::plane:
+      return 5;
+  }
+  return 6;
+}
+
+// a of lower rank than b.
+void collide_ordered(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
+                     NearPoints& out) {
+  if (b.kind == ShapeKind::plane) return with_plane(a, A, b, B, margin, out);
+  if (a.kind == ShapeKind::sphere) {
+    if (b.kind == ShapeKind::sphere)
+      return ball_ball(A.position, a.radius, B.position, b.radius, margin, 0, out);
+    if (b.kind == ShapeKind::box) return sphere_box(a, A, b, B, margin, out);
+    const Segment t = axis_of(b, B);
+    return ball_ball(A.position, a.radius, nearest_on_segment(A.position, t.from, t.to), b.radius,
+                     margin, 0, out);
+  }
+  capsule_capsule(a, A, b, B, margin, out);
+}
+
+}  // namespace
+
+bool has_own_collision(ShapeKind a, ShapeKind b) {
+  if (rank(a) > rank(b)) std::swap(a, b);
+  if (b == ShapeKind::plane) return a != ShapeKind::plane;
+  if (a == ShapeKind::sphere) return rank(b) <= rank(ShapeKind::box);
+  return a == ShapeKind::capsule && b == ShapeKind::capsule;
+}
+
+void collide(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
+             NearPoints& out) {
+  if (rank(a.kind) <= rank(b.kind)) return collide_ordered(a, A, b, B, margin, out);
+  const int from = out.count;
+  collide_ordered(b, B, a, A, margin, out);
+  for (int k = from; k < out.count; ++k) {
+    std::swap(out.point[k].on_first, out.point[k].on_second);
+    out.point[k].normal = -out.point[k].normal;
+  }
+}
+
+double reach(const Shape& s) {
+  double most = 0;
+  switch (s.kind) {
+    case ShapeKind::sphere:
+      return s.radius;
+    case ShapeKind::capsule:
+      return s.radius + 0.5 * s.length;
+    case ShapeKind::box:
+      return 0.5 * s.size.norm();
+    case ShapeKind::convex:
+    case ShapeKind::points:
+      for (const Vector3d& p : s.points) most = std::max(most, p.norm());
+      return most;
+    case ShapeKind::plane:
+      break;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+void check(const Shape& s) {
+  const auto positive = [&](double x, const char* what) {
+    if (!(x > 0) || !std::isfinite(x))
+      throw std::invalid_argument(std::string(name(s.kind)) + ": " + what +
+                                  " must be > 0 and finite");
+  };
+  if (!s.position.allFinite() || !(std::abs(s.orientation.norm() - 1) < 1e-6))
+    throw std::invalid_argument(std::string(name(s.kind)) +
+                                ": position must be finite, orientation a unit quaternion");
+  switch (s.kind) {
+    case ShapeKind::sphere:
+      return positive(s.radius, "radius");
+    case ShapeKind::capsule:
+      positive(s.radius, "radius");
+      if (s.length != 0) positive(s.length, "length");
+      return;
+    case ShapeKind::box:
+      return positive(s.size.minCoeff(), "size");
+    case ShapeKind::plane:
+      if (!(std::abs(s.normal.norm() - 1) < 1e-6))
+        throw std::invalid_argument("plane: normal must be a unit vector");
+      return;
+    case ShapeKind::convex:
+    case ShapeKind::points:
+      if (s.points.size() < (s.kind == ShapeKind::convex ? 4u : 1u) || s.points.size() > 65536)
+        throw std::invalid_argument(std::string(name(s.kind)) +
+                                    ": needs 4 (points: 1) to 65536 points");
+      for (const Vector3d& p : s.points)
+        if (!p.allFinite())
+          throw std::invalid_argument(std::string(name(s.kind)) + ": points must be finite");
+      positive(reach(s), "extent");
+      return;
+  }
+}
+
+}  // namespace detail
+}  // namespace tether::contact

@@ -1,0 +1,242 @@
+// Tether: contacts of a set of bodies. SPDX-License-Identifier: BSD-3-Clause
+#include "stepping/detection/near_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <tether/linalg/index.hpp>
+#include <utility>
+
+#include "stepping/detection/collide.hpp"
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+
+namespace {
+
+using linalg::at;
+
+bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; }
+
+}  // namespace
+
+double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& c) {
+  const RigidBody &a = motion[at(c.first)], &b = motion[at(c.second)];
+  return c.normal.dot(a.velocity + a.angular_velocity.cross(c.r1) - b.velocity -
+                      b.angular_velocity.cross(c.r2));
+}
+
+NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
+                           std::vector<Meeting> meetings, Law law, double near_part,
+                           std::unique_ptr<PairCollision> polyhedra)
+    : surfaces_(std::move(surfaces)),
+      meetings_(std::move(meetings)),
+      law_(law),
+      near_part_(near_part),
+      polyhedra_(std::move(polyhedra)) {
+  if (surfaces_.size() >= (1u << 24))
+    throw std::invalid_argument("more than 16777215 surfaces");  // contact_id has 24 bits
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+    const Surface& s = surfaces_[k];
+    const std::string where = "surface " + std::to_string(k) + ": ";
+    if (s.body < 0 || s.body >= bodies.size())
+      throw std::invalid_argument(where + "names a body that does not exist");
+    if (s.material < 0) throw std::invalid_argument(where + "material must be >= 0");
+    check(s.shape);
+    const bool plane = s.shape.kind == ShapeKind::plane;
+    if (plane && moves(bodies, s.body))
+      throw std::invalid_argument(where + "a plane belongs to a fixed body");
+    (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
+    material_.push_back(meetings_.row(s.material));
+  }
+  find_foreign(bodies);
+
+  pose_.resize(surfaces_.size());
+  for (const Surface& s : surfaces_) {
+    centred_.push_back(s.shape.kind == ShapeKind::sphere && s.shape.position.isZero(0));
+    size_.push_back(reach(s.shape));
+  }
+  reach_.resize(bounded_.size());
+  centre_.resize(bounded_.size());
+  ball_.resize(bounded_.size());
+  still_.resize(bounded_.size());
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    const Surface& s = surface(bounded_[k]);
+    reach_[k] = reach(s.shape);
+    still_[k] = !moves(bodies, s.body);
+  }
+}
+
+// Who meets whom by material and kind: refuses pairs that nobody serves, and hands the surfaces of
+// those to `polyhedra` that are not served here.
+void NearContacts::find_foreign(const BodySet& bodies) {
+  struct Kind {
+    ShapeKind kind;
+    bool moves, foreign;
+    std::vector<int> surfaces;
+  };
+  std::vector<std::vector<Kind>> kinds(at(meetings_.rows()));
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+    if (material_[k] < 0) continue;
+    std::vector<Kind>& list = kinds[at(material_[k])];
+    const Surface& s = surfaces_[k];
+    auto found = std::find_if(list.begin(), list.end(),
+                              [&](const Kind& a) { return a.kind == s.shape.kind; });
+    if (found == list.end()) found = list.insert(found, {s.shape.kind, false, false, {}});
+    found->moves = found->moves || moves(bodies, s.body);
+    found->surfaces.push_back(static_cast<int>(k));
+  }
+  const auto meet = [&](Kind& a, Kind& b) {
+    if (!(a.moves || b.moves) || has_own_collision(a.kind, b.kind)) return;
+    if (&a == &b && a.surfaces.size() < 2) return;  // one body alone meets nobody of its own kind
+    if (!polyhedra_ || !polyhedra_->serves(a.kind, b.kind))
+      throw std::invalid_argument(
+          std::string("contact of ") + name(a.kind) + " and " + name(b.kind) +
+          (polyhedra_ ? " is not supported"
+                      : " needs the collision of polyhedra (target tether_contact_collision, "
+                        "built where Bullet is installed: Debian libbullet-dev)"));
+    a.foreign = b.foreign = true;
+  };
+  for (const Meeting& m : meetings_.list())
+    for (Kind& a : kinds[at(meetings_.row(m.first))])
+      for (Kind& b : kinds[at(meetings_.row(m.second))]) a.moves ? meet(a, b) : meet(b, a);
+  for (const std::vector<Kind>& list : kinds)
+    for (const Kind& each : list)
+      if (each.foreign)
+        for (const int k : each.surfaces) polyhedra_->add(k, surface(k).shape);
+}
+
+int NearContacts::meeting_of(int a, int b) const {
+  return meetings_.find(material_[at(a)], material_[at(b)]);
+}
+
+const Meeting& NearContacts::meeting(const PointContact& c) const {
+  const int a = static_cast<int>(c.id >> 40), b = static_cast<int>(c.id >> 16 & 0xffffff);
+  return meetings_[meeting_of(a, b)];
+}
+
+double NearContacts::size(const PointContact& c) const {
+  return std::min(size_[at(static_cast<int>(c.id >> 40))],
+                  size_[at(static_cast<int>(c.id >> 16 & 0xffffff))]);
+}
+
+bool NearContacts::any_restitution() const {
+  return std::any_of(meetings_.list().begin(), meetings_.list().end(),
+                     [](const Meeting& m) { return m.restitution > 0; });
+}
+
+void NearContacts::place(const BodySet& bodies, double dt) {
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+    const Surface& s = surfaces_[k];
+    const linalg::Quaternion& q = bodies.orientation[at(s.body)];
+    pose_[k].position = bodies.position[at(s.body)];
+    if (!s.shape.position.isZero(0)) pose_[k].position += q * s.shape.position;
+    if (s.shape.kind != ShapeKind::sphere)
+      pose_[k].rotation = (q * s.shape.orientation).toRotationMatrix();
+  }
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    centre_[k] = pose_[at(bounded_[k])].position;
+    ball_[k] = reach_[k] + near_part_ * reach_[k] + way(bodies, k, dt);
+  }
+}
+
+// That the bounded surface k covers at most.
+double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const {
+  const Surface& s = surface(bounded_[k]);
+  const RigidBody& b = bodies.motion[at(s.body)];
+  const double arm = reach_[k] + s.shape.position.norm();
+  return dt * (b.velocity.norm() + arm * b.angular_velocity.norm());
+}
+
+void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) {
+  const int i = bounded_[at(a)];
+  // b < 0: plane ~b.
+  const int j = b < 0 ? planes_[at(~b)] : bounded_[at(b)];
+  const Surface &s = surface(i), &t = surface(j);
+  if (s.body == t.body) return;
+  const int m = meeting_of(i, j);
+  if (m < 0) return;
+  double margin = ball_[at(a)] - reach_[at(a)];
+  if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
+  near_.count = 0;
+  if (has_own_collision(s.shape.kind, t.shape.kind))
+    collide(s.shape, pose_[at(i)], t.shape, pose_[at(j)], margin, near_);
+  else
+    polyhedra_->collide(i, pose_[at(i)], j, pose_[at(j)], margin, near_);
+  // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
+  // would change their common angular momentum.
+  const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;
+  for (int k = 0; k < near_.count; ++k) {
+    const NearPoint& p = near_.point[k];
+    const Vector3d half = part * (p.on_second - p.on_first);
+    PointContact c;
+    c.first = s.body;
+    c.second = t.body;
+    // Centred spheres: along the normal to the last bit, however far from the origin.
+    c.r1 = centred_[at(i)] ? Vector3d(-(s.shape.radius + part * p.gap) * p.normal)
+                           : Vector3d(p.on_first + half - bodies.position[at(s.body)]);
+    c.r2 = centred_[at(j)] ? Vector3d((t.shape.radius + part * p.gap) * p.normal)
+                           : Vector3d(p.on_second - half - bodies.position[at(t.body)]);
+    c.normal = p.normal;
+    c.mu = law_ == Law::frictionless ? 0 : meetings_[m].friction;
+    c.id = contact_id(i, j, p.feature);
+    out.points.push_back(c);
+    out.gaps.push_back(p.gap);
+  }
+}
+
+// Pairs of bounded surfaces, or of one and a plane, that `use(first, second)` wants.
+template <class Use>
+void NearContacts::pairs(const BodySet& bodies, StepContacts& out, const Use& use) {
+  for (int p = 0; p < static_cast<int>(planes_.size()); ++p) {
+    const Pose& plane = pose_[at(planes_[at(p)])];
+    const Vector3d n = plane.rotation * surface(planes_[at(p)]).shape.normal;
+    for (int k = 0; k < static_cast<int>(bounded_.size()); ++k)
+      if (!still_[at(k)] && use(k, k) && n.dot(centre_[at(k)] - plane.position) < ball_[at(k)])
+        pair(bodies, k, ~p, out);
+  }
+  broadphase_.pairs(centre_, ball_, still_, [&](int a, int b) {
+    if (use(a, b)) pair(bodies, a, b, out);
+  });
+}
+
+void NearContacts::find(const BodySet& bodies, double dt, StepContacts& out) {
+  out.points.clear();
+  out.gaps.clear();
+  place(bodies, dt);
+  pairs(bodies, out, [](int, int) { return true; });
+}
+
+bool NearContacts::find_more(const BodySet& bodies, double dt, StepContacts& out) {
+  faster_.assign(bounded_.size(), 0);
+  bool any = false;
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    if (still_[k]) continue;
+    const double now = way(bodies, k, dt);
+    if (!(reach_[k] + now > ball_[k])) continue;
+    faster_[k] = 1;
+    any = true;
+    ball_[k] = reach_[k] + near_part_ * reach_[k] + now;
+  }
+  if (!any) return false;
+  more_.points.clear();
+  more_.gaps.clear();
+  pairs(bodies, more_, [&](int a, int b) { return faster_[at(a)] || faster_[at(b)]; });
+  known_.clear();
+  for (const PointContact& c : out.points) known_.push_back(c.id);
+  std::sort(known_.begin(), known_.end());
+  const std::size_t before = out.points.size();
+  for (std::size_t k = 0; k < more_.points.size(); ++k) {
+    const PointContact& c = more_.points[k];
+    if (more_.gaps[k] + dt * normal_velocity(bodies.motion, c) > -near_part_ * size(c) ||
+        std::binary_search(known_.begin(), known_.end(), c.id))
+      continue;
+    out.points.push_back(c);
+    out.gaps.push_back(more_.gaps[k]);
+  }
+  return out.points.size() > before;
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,67 @@
+// Tether: contacts of a set of bodies. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "stepping/detection/broadphase.hpp"
+#include "stepping/detection/meetings.hpp"
+
+namespace tether::contact::detail {
+
+/// Normal velocity of separation.
+double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& contact);
+
+/// Finds the points at which bodies are or, by their velocities, may come into contact in a step.
+class NearContacts {
+ public:
+  /// Throws std::invalid_argument; see Stepper.
+  NearContacts(const BodySet& bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
+               Law law, double near_part, std::unique_ptr<PairCollision> polyhedra);
+
+  /// Fills points and gaps.
+  void find(const BodySet& bodies, double dt, StepContacts& out);
+
+  /// After find(), with other velocities at the same places: adds points whose bodies were too slow
+  /// to reach each other and are no longer, if they would end the step deeper in each other than
+  /// near_part of their size. False: none.
+  bool find_more(const BodySet& bodies, double dt, StepContacts& out);
+
+  const Surface& surface(int k) const { return surfaces_[static_cast<std::size_t>(k)]; }
+  const Meeting& meeting(const PointContact& c) const;
+  /// Distance of the farthest point of its smaller shape from that shape's origin, m.
+  double size(const PointContact& c) const;
+  bool any_restitution() const;
+
+ private:
+  void find_foreign(const BodySet& bodies);
+  int meeting_of(int a, int b) const;
+  void place(const BodySet& bodies, double dt);
+  double way(const BodySet& bodies, std::size_t k, double dt) const;
+  template <class Use>
+  void pairs(const BodySet& bodies, StepContacts& out, const Use& use);
+  void pair(const BodySet& bodies, int a, int b, StepContacts& out);
+
+  std::vector<Surface> surfaces_;
+  Meetings meetings_;
+  std::vector<int> material_;  // of each surface: its row in meetings_
+  Law law_;
+  double near_part_;
+  std::unique_ptr<PairCollision> polyhedra_;
+  Broadphase broadphase_;
+  std::vector<int> planes_, bounded_;  // surfaces
+  // For each surface: its pose; for each bounded one: reach with and without what it may move.
+  std::vector<Pose> pose_;
+  std::vector<char> centred_;  // a sphere about the centre of its body
+  std::vector<double> size_;   // of each surface: its reach, infinite for planes
+  std::vector<double> reach_;
+  std::vector<Eigen::Vector3d> centre_;
+  std::vector<double> ball_;
+  std::vector<char> still_, faster_;
+  StepContacts more_;
+  std::vector<std::uint64_t> known_;  // identities of contacts
+  NearPoints near_;
+};
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,32 @@
+// Tether: contacts that close within a step. SPDX-License-Identifier: BSD-3-Clause
+#include "stepping/impacts/impacts.hpp"
+
+#include <cmath>
+
+namespace tether::contact::detail {
+
+namespace {}  // namespace
+
+void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
+                     StepContacts& contacts) {
+  list_.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    PointContact& c = contacts.points[k];
+    const double came = -normal_velocity(coming_, c);
+    if (!(came > 0)) continue;
+    const double size = std::sqrt(near.size(c));
+    const double epsilon = came > restitution_threshold_ * size ? near.meeting(c).restitution : 0;
+    if (!(came > threshold_ * size || epsilon > 0)) continue;
+    const double comes = -normal_velocity(bodies.motion, c);
+    if (!(comes > 0) || !(comes * dt > contacts.gaps[k])) continue;
+    c.bias = 0;
+    list_.push_back({static_cast<int>(k), came, comes, epsilon});
+  }
+  if (!list_.empty()) free_ = bodies.motion;
+}
+
+double Impacts::least_speed(const NearContacts& near, const PointContact& c) const {
+  return threshold_ * std::sqrt(near.size(c));
+}
+
+}  // namespace tether::contact::detail

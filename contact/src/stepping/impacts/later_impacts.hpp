@@ -1,0 +1,91 @@
+// Tether: impacts that impacts cause. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "stepping/detection/near_contacts.hpp"
+#include "stepping/impacts/impacts.hpp"
+#include "stepping/impacts/restitution.hpp"
+#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
+
+namespace tether::contact::detail {
+
+/// README, section 13. A contact that begins to close because of an impact, and is closed before
+/// the end of the step, strikes within it: a ball that the first of a row sends on, the other end
+/// of a rod. One solve with bias gap / dt would leave a part of that impact to the next step. So
+/// the island is solved again from the velocities before the impulses, in passes, each with the
+/// contacts that touch or that close by its velocities. Where an impact does not bounce the way to
+/// it counts for the others; where it bounces the velocities after it move bodies for the whole
+/// step. What still closes after kPasses has bias gap / dt in the last one. Islands of more than
+/// kMostContacts keep the one solve: their impacts do not end one by one.
+class LaterImpacts {
+ public:
+  static constexpr int kPasses = 16, kMostContacts = 16;
+  struct Counts {
+    int problems = 0, sweeps = 0, bounces = 0;
+  };
+
+  /// Thresholds: see Impacts.
+  LaterImpacts(double threshold, double restitution_threshold, const BodyOptions& options);
+  /// Where anything bounces.
+  void add_restitution(RestitutionLaw law, const BodyOptions& options);
+
+  /// After the above.
+  void set_joints(JointPart& joints, const BodyOptions& options) {
+    solver_.set_joints(joints.make_islands(options, LawUse::none));
+    if (restitution_) restitution_->set_joints(joints, options);
+    islands_.set_links(joints.links());
+  }
+
+  /// After the solve and what bounces in it. Changes velocities and impulses, and adds to
+  /// `impacts`, where there are later ones whose problems are all solved.
+  Counts take(const NearContacts& near, Impacts& impacts, double dt, BodySet& bodies,
+              StepContacts& contacts);
+
+ private:
+  struct Member {
+    int contact, root;
+    double least;     // approach that counts, m/s
+    double left;      // gap at the time of the pass, m
+    double approach;  // before the pass, m/s
+    bool touches;     // at the start, or closed by an impact that does not bounce
+  };
+
+  bool find_islands(const NearContacts& near, const Impacts& impacts, const BodySet& bodies,
+                    double dt, const StepContacts& contacts);
+  void start(const NearContacts& near, const Impacts& impacts, double dt, BodySet& bodies,
+             StepContacts& contacts);
+  double remaining(const Member& m, double dt) const { return dt - time_[root(m)]; }
+  static std::size_t root(const Member& m) { return static_cast<std::size_t>(m.root); }
+  bool gather(const BodySet& bodies, double dt, const StepContacts& contacts, bool all);
+  void pass_time(const StepContacts& contacts);
+  bool solve_pass(const NearContacts& near, const Impacts& impacts, double dt, BodySet& bodies,
+                  StepContacts& contacts, Counts& counts);
+  bool run_passes(const NearContacts& near, const Impacts& impacts, double dt, BodySet& bodies,
+                  StepContacts& contacts, Counts& counts);
+
+  void keep_energy(const Impacts& impacts, BodySet& bodies, StepContacts& contacts);
+
+  MovingIslands islands_;
+  std::vector<char> marked_;     // islands, by their root
+  std::vector<int> size_;        // of each island, contacts
+  std::vector<Member> members_;  // contacts of the marked islands
+  std::vector<double> time_,
+      way_;                  // of islands: since the start of the step, to the impacts of a pass
+  std::vector<int> member_;  // of each contact of a pass
+  StepContacts part_;        // of a pass
+  Impacts pass_impacts_;
+  std::vector<Impact> taken_;
+  std::vector<RigidBody> first_, force_;
+  std::vector<double> gain_, kinetic_;  // of islands, J
+  std::vector<Eigen::Vector3d> first_impulses_;
+  std::unique_ptr<Restitution> restitution_;
+  StepSolver solver_;
+  BodySolution solution_;
+  int bounces_ = 0;  // of the last pass
+};
+
+}  // namespace tether::contact::detail

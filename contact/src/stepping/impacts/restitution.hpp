@@ -1,0 +1,68 @@
+// Tether: restitution that cannot create energy. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "stepping/impacts/impacts.hpp"
+#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
+
+namespace tether::contact::detail {
+
+/// The same without the impulses of the problem before.
+BodyOptions cold(BodyOptions options);
+
+/// README, section 14. `newton`: contacts that bounce leave with epsilon times the speed they came
+/// with, in the one solve that friction takes part in. `poisson`: the contact problem without
+/// restitution, impulses x; then epsilon x at the contacts that bounce; then the contact problem
+/// once more, for contacts which that pressed together. In both, what restitution adds to the
+/// solution without it is scaled down where an island of bodies would end the step with more energy
+/// than it began it with and the forces of the step add on the way that the new velocities go.
+class Restitution {
+ public:
+  Restitution(RestitutionLaw law, const BodyOptions& options);
+
+  void set_joints(JointPart& joints, const BodyOptions& options) {
+    solver_.set_joints(joints.make_islands(options, LawUse::none));
+    islands_.set_links(joints.links());
+  }
+
+  /// After the impacts are chosen: those that bounce. `chosen` has the velocities that bodies came
+  /// with; `forces` those before and after the forces of the step.
+  void choose(const Impacts& chosen, const Impacts& forces, const BodySet& bodies,
+              StepContacts& contacts);
+  /// After the solve. Changes velocities and impulses; returns the number of bounces.
+  int apply(BodySet& bodies, StepContacts& contacts);
+
+  /// Warm start of its second solve.
+  WarmStart warm_start() const { return solver_.warm_start(); }
+  void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
+
+ private:
+  struct Bounce {
+    int contact;
+    double speed;  // given back, m/s
+    double part;   // of the impulse
+  };
+  void sum_energies(const BodySet& bodies, const std::vector<RigidBody>& now);
+  bool gains_energy(const BodySet& bodies);
+  void add_impulses_again(BodySet& bodies, StepContacts& contacts);
+  void solve_without(BodySet& bodies, StepContacts& contacts);
+  void limit_energy(const BodySet& bodies);
+  void add_change(BodySet& bodies, StepContacts& contacts);
+
+  RestitutionLaw law_;
+  std::vector<Bounce> bounces_;  // those that press, once the problem is solved
+  std::vector<int> biased_;      // contacts
+  // Velocities before the impulses, those that energy is compared with, what the forces of the step
+  // add; what restitution adds to velocities without it, and to impulses.
+  std::vector<RigidBody> before_, came_, force_, change_;
+  std::vector<Eigen::Vector3d> added_;
+  MovingIslands islands_;
+  std::vector<double> constant_, linear_, square_, scale_;  // of each island; see limit_energy
+  StepSolver solver_;
+  BodySolution solution_;
+};
+
+}  // namespace tether::contact::detail

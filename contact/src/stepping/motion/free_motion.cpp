@@ -1,0 +1,83 @@
+// Tether: the motion of bodies in a step, without contacts and joints. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "stepping/motion/free_motion.hpp"
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+
+void FreeMotion::list(const BodySet& bodies, const JointPart* joints, Gyroscopic gyroscopic) {
+  for (std::vector<int>* list : {&moving_, &long_, &free_, &free_round_, &free_long_})
+    list->clear();
+  spins_.clear();
+  for (int i = 0; i < bodies.size(); ++i) {
+    if (bodies.mass[at(i)] == 0) continue;
+    moving_.push_back(i);
+    const bool round = is_isotropic(bodies.inertia[at(i)]);
+    if (!round) long_.push_back(i);
+    if (joints && joints->holds(i)) continue;
+    free_.push_back(i);
+    (round ? free_round_ : free_long_).push_back(i);
+  }
+  if (gyroscopic == Gyroscopic::momentum) spins_.resize(free_long_.size());
+}
+
+void FreeMotion::accelerate(const Vector3d& dv, BodySet& bodies) const {
+  for (const int i : moving_) bodies.motion[at(i)].velocity += dv;
+}
+
+void FreeMotion::gyrate_explicit(double dt, BodySet& bodies) const {
+  for (const int i : long_) {
+    Vector3d& w = bodies.motion[at(i)].angular_velocity;
+    w += gyroscopic_explicit(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)],
+                             bodies.orientation[at(i)], w, dt);
+  }
+}
+
+void FreeMotion::gyrate_implicit(double dt, BodySet& bodies) const {
+  for (const int i : long_) {
+    Vector3d& w = bodies.motion[at(i)].angular_velocity;
+    w += gyroscopic_implicit(bodies.inertia[at(i)], bodies.orientation[at(i)], w, dt);
+  }
+}
+
+void FreeMotion::move(double dt, BodySet& bodies) const {
+  for (const int i : free_) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
+}
+
+void FreeMotion::turn_inertias(BodySet& bodies) const {
+  for (const int i : long_)
+    bodies.motion[at(i)].inverse_inertia =
+        turned(bodies.inverse_inertia[at(i)], bodies.orientation[at(i)]);
+}
+
+void FreeMotion::turn_round(double dt, BodySet& bodies) const {
+  for (const int i : free_round_) {
+    const Vector3d& w = bodies.motion[at(i)].angular_velocity;
+    if (w.isZero(0)) continue;
+    linalg::Quaternion& q = bodies.orientation[at(i)];
+    q = (exponential(dt * w) * q).normalized();
+  }
+}
+
+void FreeMotion::turn_plain(double dt, BodySet& bodies) const {
+  for (const int i : free_long_) {
+    RigidBody& b = bodies.motion[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
+    q = (exponential(dt * b.angular_velocity) * q).normalized();
+    b.inverse_inertia = turned(bodies.inverse_inertia[at(i)], q);
+  }
+}
+
+void FreeMotion::turn_keeping_momentum(double dt, BodySet& bodies) {
+  for (std::size_t k = 0; k < free_long_.size(); ++k) {
+    const int i = free_long_[k];
+    RigidBody& b = bodies.motion[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
+    turn_with_momentum(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)], dt, q,
+                       b.angular_velocity, spins_[k]);
+    b.inverse_inertia = turned(bodies.inverse_inertia[at(i)], q);
+  }
+}
+
+}  // namespace tether::contact::detail

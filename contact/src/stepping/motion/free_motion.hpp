@@ -1,0 +1,49 @@
+// Tether: the motion of bodies in a step, without contacts and joints. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/rotation.hpp"
+
+namespace tether::contact::detail {
+
+/// Which bodies move, and how each of them does: gravity, the gyroscopic term, the places that
+/// velocities take them to. Joints move the bodies that they hold themselves.
+class FreeMotion {
+ public:
+  /// Lists the bodies anew; joints may be null.
+  void list(const BodySet& bodies, const JointPart* joints, Gyroscopic gyroscopic);
+
+  const std::vector<int>& moving() const { return moving_; }
+  bool any_long() const { return !long_.empty(); }  ///< of inertia other than 1
+  bool any_free_round() const { return !free_round_.empty(); }
+  bool any_free_long() const { return !free_long_.empty(); }
+
+  void accelerate(const Eigen::Vector3d& dv, BodySet& bodies) const;
+  void gyrate_explicit(double dt, BodySet& bodies) const;
+  void gyrate_implicit(double dt, BodySet& bodies) const;
+
+  void move(double dt, BodySet& bodies) const;
+  void turn_round(double dt, BodySet& bodies) const;
+  void turn_plain(double dt, BodySet& bodies) const;
+  void turn_keeping_momentum(double dt, BodySet& bodies);
+  /// To world axes, after orientations were set from outside.
+  void turn_inertias(BodySet& bodies) const;
+
+  /// Of the bodies that keep their momentum, in the order of free_long().
+  std::vector<FreeSpin>& spins() { return spins_; }
+  const std::vector<FreeSpin>& spins() const { return spins_; }
+  const std::vector<int>& free_long() const { return free_long_; }
+
+ private:
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  std::vector<int> moving_, long_;
+  std::vector<int> free_, free_round_, free_long_;  // those that no joint moves
+  std::vector<FreeSpin> spins_;
+};
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,90 @@
+// Tether: the bodies, joints, forces and contacts of a scene as a model of the event engine.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <tether/scene/engine.hpp>
+#include <vector>
+
+#include "features.hpp"
+#include "joints/joint_rows.hpp"
+#include "joints/reactions.hpp"
+#include "mechanics/force.hpp"
+#include "model.hpp"
+#include "smooth/terms/moving_bodies.hpp"
+
+namespace tether::scene::event {
+
+/// Coordinates: x and q (wxyz) of each moving body, by slot. Velocities: v in world axes and w in
+/// body axes.
+class SceneModel final : public Model {
+ public:
+  /// Throws std::invalid_argument, naming what the engine does not have; see potential_contacts.
+  explicit SceneModel(const Scene& scene);
+  ~SceneModel() override;
+
+  int coordinates() const override { return 7 * bodies_.count(); }
+  int velocities() const override { return 6 * bodies_.count(); }
+  int joint_rows() const override { return rows_.count(); }
+  int contacts() const override { return static_cast<int>(pairs_.size()); }
+  int tangents() const override { return 2; }
+  ContactLaw law(int contact) const override {
+    return {pair(contact).friction, pair(contact).restitution};
+  }
+
+  void set(double t, const double* q, const double* u) override;
+  void settle() override;
+  void rates(double* q_rate) const override;
+  void divide_by_mass(Eigen::Ref<MatrixXd> X) const override;
+  void forces(VectorXd& h) override;
+  void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) override;
+  std::string joint_name(int row) const override { return "joint \"" + rows_.joint_of(row) + "\""; }
+  void look(int contact, ContactLook& out) override;
+  double gap(int contact, double& rate) override {
+    const Touch touch = pair(contact).look(bodies_.all());
+    rate = touch.rate;
+    return touch.gap;
+  }
+
+  double margin(int contact) override { return pair(contact).margin(bodies_.all()); }
+
+  bool are_at_one_edge(int contact, int other, double distance) override;
+
+  Vector3d in_space(int contact, const VectorXd& parts) override;
+
+  void to_coordinates(const double* row, double* gradient) const override;
+  int own_rows() const override { return bodies_.count(); }
+  void own_values(double* values) const override;
+  void own_gradient(int row, double* gradient) const override;
+
+  double energy() const override;
+  void energy_gradient(double* by_q, double* by_u) const override;
+  bool does_work() const override;
+  double power() const override;
+
+  /// q, then u, at t = 0.
+  VectorXd start() const;
+  const FeaturePair& pair(int contact) const { return pairs_[at(contact)]; }
+  const smooth::MovingBodies& bodies() const { return bodies_; }
+  const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
+  double potential() const;
+  /// Of joints, by the multipliers of their rows, and of springs, at the state that is set.
+  Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
+
+ private:
+  std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
+
+  smooth::MovingBodies bodies_;
+  joints::JointRows rows_;
+  std::vector<std::unique_ptr<Force>> forces_;
+  std::vector<FeaturePair> pairs_;
+  std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen
+  std::vector<double> y_;       // of MovingBodies
+  std::vector<Load6> loads_;
+};
+
+/// The pairs of features of a scene that may touch. Throws std::invalid_argument, naming shapes
+/// whose contact the engine does not have.
+std::vector<FeaturePair> potential_contacts(const Scene& scene);
+
+}  // namespace tether::scene::event

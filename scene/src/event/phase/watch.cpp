@@ -1,0 +1,296 @@
+// Tether: the functions of the state whose zeros are events. SPDX-License-Identifier: BSD-3-Clause
+#include "watch.hpp"
+
+#include "event/model/touch.hpp"
+#include "friction_solve.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tether::scene::event {
+
+namespace {
+
+constexpr int kMostIterations = 80;
+constexpr int kPolish = 3;
+constexpr double kApart = 1e4;  // of the resolution of times
+constexpr double kFewOfBand = 0.02;
+// Of accelerations, by the contact library's tolerance and by what stands for a large slip.
+constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
+
+/// A zero of f between a and b, where it has other signs; Illinois' rule.
+template <class F>
+double zero_between(const F& f, double a, double fa, double b, double fb, double resolution) {
+  int side = 0;
+  for (int k = 0; k < kMostIterations && std::abs(b - a) > resolution; ++k) {
+    double m = (fa * b - fb * a) / (fa - fb);
+    if (!(m > std::min(a, b) && m < std::max(a, b))) m = 0.5 * (a + b);
+    const double fm = f(m);
+    if (fm == 0) return m;
+    if ((fm > 0) == (fb > 0)) {
+      b = m;
+      fb = fm;
+      if (side == -1) fa *= 0.5;
+      side = -1;
+    } else {
+      a = m;
+      fa = fm;
+      if (side == 1) fb *= 0.5;
+      side = 1;
+    }
+  }
+  return std::abs(fa) < std::abs(fb) ? a : b;
+}
+
+/// The first time from which on f is negative, between a and b where it is; up to there it is flat,
+/// as what contacts can bear is. Straight lines of its negative side aim at a value of -`near`.
+template <class F>
+double kink_between(const F& f, double a, double b, double fb, double near, double resolution) {
+  double m = 0.5 * (a + b);
+  for (int k = 0; k < kMostIterations && b - a > resolution && fb < -2 * near; ++k) {
+    const double fm = f(m);
+    if (fm >= 0) {
+      a = m;
+      m = 0.5 * (a + b);
+      continue;
+    }
+    const double slope = (fb - fm) / (b - m);
+    b = m;
+    fb = fm;
+    m = b - (fb + near) / slope;
+    if (!(slope < 0 && m > a)) m = 0.5 * (a + b);
+  }
+  return b;
+}
+
+}  // namespace
+
+void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leaving) {
+  functions_.clear();
+  force_ = 0;
+  const auto add = [&](Watch what, int contact, int closed, bool leaves) {
+    functions_.push_back({what, contact, closed, false, leaves, false, 0, 0, 0, 0, 0});
+  };
+  const std::vector<int>& closed = motion_.closed();
+  for (int i = 0; i < motion_.model().contacts(); ++i)
+    if (motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::open)
+      add(Watch::gap, i, -1, leaving[static_cast<std::size_t>(i)]);
+  for (std::size_t k = 0; k < closed.size(); ++k) {
+    const int i = closed[k], place = static_cast<int>(k);
+    const bool single = !motion_.is_hyperstatic();
+    if (single) add(Watch::normal_force, i, place, false);
+    const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
+    if (stuck && single) add(Watch::cone, i, place, false);
+    if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place, false);
+    if (!stuck && motion_.model().law(i).friction > 0) add(Watch::slip, i, place, false);
+  }
+  if (motion_.is_hyperstatic()) add(Watch::support, -1, -1, false);
+  evaluate(t, y);
+  for (Function& f : functions_) {
+    const bool gap = f.what == Watch::gap;
+    f.dormant = gap && f.value < -bands().gap(f.contact);
+    if (gap && f.value < 0 && !f.dormant) {
+      f.level = f.value;
+      f.value = 0;
+    }
+    if (f.what == Watch::border && f.value < 0) {  // it comes in over it
+      f.level = f.value;
+      f.value = 0;
+    }
+    const bool closing = gap && f.value > 0 && f.slope < -bands().approach(f.contact);
+    f.armed = closing || f.value > band(f);
+  }
+}
+
+double Watcher::band(const Function& f) const {
+  switch (f.what) {
+    case Watch::gap:
+      return f.leaving ? 0 : bands().gap(f.contact);
+    case Watch::border:
+      return bands().gap(f.contact);
+    case Watch::support:
+      return 0;
+    case Watch::slip:
+      return bands().slip(f.contact);
+    default:
+      return bands().part * force_;
+  }
+}
+
+double Watcher::of_state(Function& f) {
+  switch (f.what) {
+    case Watch::gap:
+      return motion_.model().gap(f.contact, f.slope) - f.level;
+    case Watch::normal_force:
+      return motion_.normal_force(f.closed);
+    case Watch::cone:
+      return motion_.model().law(f.contact).friction * motion_.normal_force(f.closed) -
+             motion_.friction_force(f.closed).norm();
+    case Watch::border:
+      return motion_.model().margin(f.contact) - f.level;
+    case Watch::support:
+      return support();
+    case Watch::slip:
+      return motion_.slip(f.closed).dot(
+          motion_.modes()[static_cast<std::size_t>(f.contact)].direction);
+  }
+  return 0;
+}
+
+// What is left of a band, of the accelerations, by those of contacts that are to have none.
+double Watcher::support() {
+  ContactRows rows(motion_.model(), motion_.closed());
+  const int block = rows.size();
+  const std::vector<VectorXd> slides = motion_.slides();
+  const bool sliding = std::any_of(slides.begin(), slides.end(),
+                                   [](const VectorXd& each) { return each.size() > 0; });
+  const AccelerationAnswer answer = solve_accelerations(motion_.model(), rows, slides);
+  if (!answer.contacts.solved) return -answer.scale;
+  double largest = 0;
+  for (std::size_t k = 0; k < slides.size(); ++k) {
+    const int row = block * static_cast<int>(k);
+    largest = std::max(largest, std::abs(answer.contacts.w[row]));
+    if (slides[k].size() == 0)
+      largest = std::max(largest, answer.contacts.w.segment(row + 1, block - 1).norm());
+  }
+  const double noise = std::max(sliding ? kSlidingNoise : kNoise, 100 * answer.contacts.error);
+  support_band_ = std::max(0.1 * bands().part, noise) * answer.scale;
+  return support_band_ - largest;
+}
+
+void Watcher::evaluate(double t, const VectorXd& y) {
+  rate_.resize(motion_.size());
+  if (motion_.closed().empty())
+    motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
+  else
+    motion_.rate(t, y.data(), rate_.data());
+  for (std::size_t k = 0; k < motion_.closed().size(); ++k)
+    force_ = std::max(force_, std::abs(motion_.normal_force(static_cast<int>(k))));
+  for (Function& f : functions_) {
+    f.before = f.value;
+    f.slope_before = f.slope;
+    f.value = of_state(f);
+  }
+}
+
+double Watcher::value(Function f, double t, const VectorXd& y) {
+  if (f.what == Watch::gap)
+    motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
+  else
+    motion_.rate(t, y.data(), rate_.data());
+  return of_state(f);
+}
+
+// Whether a gap that is positive at both ends of a step, and falls, then rises, can reach zero.
+bool Watcher::may_dip(const Function& f, double step) const {
+  return f.what == Watch::gap && f.armed && f.slope_before < 0 && f.slope > 0 && f.before > 0 &&
+         std::min(f.before, f.value) < step * std::max(-f.slope_before, f.slope);
+}
+
+// The least or largest value of a gap that turns in the last step.
+double Watcher::turn(Phase& phase, const Function& f, double& when) {
+  const double a = phase.step_begin(), b = phase.step_end();
+  const auto slope = [&](double time) {
+    phase.at(time, y_);
+    motion_.model().set(phase.start() + time, y_.data(), y_.data() + motion_.coordinates());
+    double rate = 0;
+    motion_.model().gap(f.contact, rate);
+    return rate;
+  };
+  when = zero_between(slope, a, f.slope_before, b, f.slope, 1e-9 * (b - a));
+  phase.at(when, y_);
+  return value(f, phase.start() + when, y_);
+}
+
+Zero Watcher::locate(Phase& phase, const Function& f) {
+  double a = phase.step_begin(), b = phase.step_end();
+  double fa = f.before, fb = f.value;
+  const auto at = [&](double time) {
+    phase.at(time, y_);
+    return value(f, phase.start() + time, y_);
+  };
+  if (fb >= 0) fb = turn(phase, f, b);
+  if (fa <= 0 && f.what == Watch::gap && f.slope_before > 0 && f.slope < 0) fa = turn(phase, f, a);
+  Zero zero{f.what, f.contact, a, {}};
+  const double resolution = 4e-16 * b;
+  if (f.what == Watch::support) {
+    zero.time = fa > 0 ? kink_between(at, a, b, fb, kFewOfBand * support_band_, resolution) : a;
+    phase.projected_at(zero.time, zero.y);
+    return zero;
+  }
+  if (fa > 0) zero.time = zero_between(at, a, fa, b, fb, resolution);
+  // Newton in time, on the constraints: a move in space would not be the motion.
+  const double slope = fa > 0 && b > a ? (fb - fa) / (b - a) : 0;
+  phase.projected_at(zero.time, zero.y);
+  if (slope == 0) return zero;
+  double local = slope, last = value(f, phase.start() + zero.time, zero.y), last_time = zero.time;
+  for (int k = 0; k < kPolish; ++k) {
+    const double next = std::clamp(last_time - last / local, phase.step_begin(), phase.step_end());
+    if (std::abs(next - last_time) <= resolution) break;
+    VectorXd there;
+    phase.projected_at(next, there);
+    const double now = value(f, phase.start() + next, there);
+    zero.y = there;
+    // The slope of two values that differ by rounding would lead anywhere.
+    if (now != last && std::abs(next - last_time) > kApart * resolution)
+      local = (now - last) / (next - last_time);
+    last = now;
+    last_time = zero.time = next;
+    if (local == 0) break;
+  }
+  return zero;
+}
+
+// Accelerations of contacts that can no longer rest begin at zero and grow; by their rate where
+// they leave the band.
+double Watcher::lag(Phase& phase, const Function& f, double time) {
+  const double later = time + 0.01 * (phase.step_end() - time);
+  if (!(later > time)) return 0;
+  VectorXd y;
+  phase.projected_at(time, y);
+  const double here = value(f, phase.start() + time, y);
+  phase.projected_at(later, y);
+  const double growth = (here - value(f, phase.start() + later, y)) / (later - time);
+  return growth > 0 ? std::min((support_band_ - here) / growth, phase.start() + time) : 0;
+}
+
+std::optional<Zero> Watcher::look(Phase& phase) {
+  phase.at(phase.step_end(), y_);
+  const VectorXd at_end = y_;
+  evaluate(phase.start() + phase.step_end(), at_end);
+  std::optional<Zero> first;
+  for (Function& f : functions_) {
+    const double edge = band(f);
+    if (f.value == kNowhere) {
+      f.dormant = true;
+      f.armed = false;
+    }
+    if (f.dormant) continue;
+    bool hit = f.value < (f.armed ? 0 : -edge);
+    // Else it is on its way out; its first gaps are lost in rounding.
+    const bool from_zero = !f.armed || (f.leaving && f.value > -bands().gap(f.contact));
+    if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
+    if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
+      double when = 0;
+      hit = turn(phase, f, when) < -bands().gap(f.contact);  // else it only touches
+    }
+    if (!hit) continue;
+    Zero zero = locate(phase, f);
+    if (f.what == Watch::support) zero.lag = lag(phase, f, zero.time);
+    if (f.what == Watch::gap &&
+        motion_.passes_border(phase.start() + zero.time, zero.y, f.contact)) {
+      f.dormant = true;
+      f.armed = false;
+      continue;
+    }
+    if (!first || zero.time < first->time) first = std::move(zero);
+  }
+  if (!first)
+    for (Function& f : functions_) {
+      f.armed = f.armed || f.value > band(f);
+      f.dormant = f.dormant && !f.armed;
+    }
+  return first;
+}
+
+}  // namespace tether::scene::event

@@ -1,0 +1,63 @@
+// Tether: `tether check`: is a scene file right? SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/core.h>
+
+#include <memory>
+#include <tether/scene/files.hpp>
+#include <tether/scene/plan.hpp>
+
+#include "program/commands.hpp"
+#include "program/scene_text.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+struct Arguments {
+  std::vector<std::string> files;
+  bool print = false;
+};
+
+/// The options that the run will have, spelt out.
+Scene with_options(Scene scene, EngineKind engine) {
+  if (engine == EngineKind::smooth && !scene.smooth) scene.smooth.emplace();
+  if (engine == EngineKind::stepping && !scene.stepping) scene.stepping.emplace();
+  if (engine == EngineKind::event && !scene.event) scene.event.emplace();
+  return scene;
+}
+
+int check(const Arguments& arguments) {
+  int status = kGood;
+  for (const std::string& file : arguments.files) {
+    try {
+      const Scene scene = read_scene_argument(file);
+      const Plan plan = make_plan(scene);
+      if (arguments.print)
+        fmt::print("{}", write_scene(with_options(scene, plan.engine)));
+      else
+        fmt::print("{}: right (bodies: {}, effects: {}, expectations: {})\n", file, plan.bodies,
+                   plan.effects.size(), scene.expect.size());
+    } catch (const SceneError& e) {
+      fmt::print(stderr, "{}\n", e.what());
+      status = kWrong;
+    } catch (const std::exception& e) {
+      fmt::print(stderr, "{}: {}\n", file, e.what());
+      status = kWrong;
+    }
+  }
+  return status;
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, int* status) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "check", "Reads scene files and names what is wrong, with line, field and what is allowed");
+  command->add_option("scenes", arguments->files, "Scene files (TOML); - is the standard input")
+      ->required();
+  command->add_flag("--print", arguments->print, "Print the scene with every default spelt out");
+  command->footer("Exit code: 0 right, 2 wrong. The format: scene/README.md.");
+  command->callback([arguments, status] { *status = check(*arguments); });
+}
+
+}  // namespace tether::scene

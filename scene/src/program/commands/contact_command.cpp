@@ -1,0 +1,126 @@
+// Tether: `tether contact`: solves contact problems in files. SPDX-License-Identifier: BSD-3-Clause
+#include "program/contact_command.hpp"
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+#include <tether/contact.hpp>
+#include <tether/contact/files.hpp>
+#include <vector>
+
+namespace tether::scene {
+namespace {
+
+using namespace tether::contact;
+
+struct Arguments {
+  std::vector<std::string> files;
+  Options options;
+  bool csv = false;
+};
+
+const std::map<std::string, Law> kLaws = {{"maximum_dissipation", Law::maximum_dissipation},
+                                          {"coulomb", Law::coulomb},
+                                          {"frictionless", Law::frictionless}};
+const std::map<std::string, Measure> kMeasures = {{"automatic", Measure::automatic},
+                                                  {"natural_map", Measure::natural_map},
+                                                  {"natural_map_data", Measure::natural_map_data},
+                                                  {"fixed_point", Measure::fixed_point}};
+
+std::map<std::string, Method> methods() {
+  std::map<std::string, Method> out;
+  for (int k = 0; k <= static_cast<int>(Method::convex_relaxation); ++k) {
+    out[name(static_cast<Method>(k))] = static_cast<Method>(k);
+  }
+  return out;
+}
+
+// Words, not values: CLI11 would print those of an enumeration of bytes as characters. `value` has
+// to outlive the parsing.
+template <class E>
+void add_choice(CLI::App& command, const char* option, const char* what,
+                const std::map<std::string, E>& words, E& value) {
+  std::vector<std::string> names;
+  std::string now;
+  for (const auto& [word, each] : words) {
+    names.push_back(word);
+    if (each == value) now = word;
+  }
+  command
+      .add_option_function<std::string>(
+          option, [words, &value](const std::string& word) { value = words.at(word); }, what)
+      ->check(CLI::IsMember(names))
+      ->default_str(now);
+}
+
+// 0: all solved, 1: some not solved, 2: some file or option is wrong.
+int run(const Arguments& arguments) {
+  int status = 0;
+  if (arguments.csv) {
+    std::printf(
+        "file,contacts,law,method,tolerance,status,error,sweeps,admm,factorisations,replaced,"
+        "signorini,cone,"
+        "alignment,dissipation,energy_change,fixed_point,natural_map,natural_map_data\n");
+  }
+  for (const std::string& file : arguments.files) {
+    try {
+      const Problem problem = read_problem(file);
+      const Options& o = arguments.options;
+      const Solution s = Solver(o).solve(problem);
+      const Residuals r = evaluate(problem, o.law, s.impulses);
+      if (s.status != Status::solved && status == 0) status = 1;
+      if (arguments.csv) {
+        std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e\n",
+                    file.c_str(), problem.contacts(), name(o.law), name(o.method), o.tolerance,
+                    name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
+                    s.counts.factorisations, s.replaced.size(), r.signorini, r.cone, r.alignment,
+                    r.dissipation, r.energy_change, r.fixed_point, r.natural_map,
+                    r.natural_map_data);
+        continue;
+      }
+      int count[3] = {0, 0, 0};
+      for (Regime regime : s.regimes) ++count[static_cast<int>(regime)];
+      std::printf("%s: %d contacts, %s\n", file.c_str(), problem.contacts(), name(o.law));
+      std::printf("  %s, error %.3e; %d sweeps, %d ADMM iterations, %d factorisations\n",
+                  name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
+                  s.counts.factorisations);
+      std::printf("  separating %d, sticking %d, sliding %d\n", count[0], count[1], count[2]);
+      std::printf(
+          "  fixed point %.3e, natural map %.3e, over data %.3e, Signorini %.3e, cone %.3e, "
+          "alignment %.3e\n",
+          r.fixed_point, r.natural_map, r.natural_map_data, r.signorini, r.cone, r.alignment);
+      std::printf("  energy change %.9e\n", r.energy_change);
+      if (!s.replaced.empty()) {
+        std::printf("  the Coulomb rule replaces the law at %zu contacts:", s.replaced.size());
+        for (int i : s.replaced) std::printf(" %d", i);
+        std::printf("\n");
+      }
+      if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
+    } catch (const std::exception& e) {
+      std::fprintf(stderr, "tether contact: %s\n", e.what());
+      status = 2;
+    }
+  }
+  return status;
+}
+
+}  // namespace
+
+void add_contact_command(CLI::App& app, int* status) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("contact", "Solves frictional contact problems (.dat, fclib .hdf5)");
+  command->add_option("files", arguments->files, "Problem files")->required();
+  add_choice(*command, "--law", "Friction law", kLaws, arguments->options.law);
+  command->add_option("--tolerance", arguments->options.tolerance, "The measure ends below it")
+      ->capture_default_str();
+  add_choice(*command, "--method", "Solution method", methods(), arguments->options.method);
+  add_choice(*command, "--measure", "What is compared with the tolerance", kMeasures,
+             arguments->options.measure);
+  command->add_flag("--strict", arguments->options.strict, "Never replace the law");
+  command->add_flag("--csv", arguments->csv, "One line a file");
+  command->callback([arguments, status] { *status = run(*arguments); });
+}
+
+}  // namespace tether::scene

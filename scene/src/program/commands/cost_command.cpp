@@ -1,0 +1,187 @@
+// Tether: `tether cost`: what accuracy costs in time. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/core.h>
+#include <fmt/os.h>
+
+#include <memory>
+#include <optional>
+#include <progress.hpp>
+#include <tether/scene/cost.hpp>
+#include <tether/scene/files.hpp>
+#include <tether/scene/plan.hpp>
+
+#include "program/commands.hpp"
+#include "program/settings.hpp"
+#include "record/gnuplot.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+struct Arguments {
+  std::string file, csv, svg;
+  std::vector<std::string> tolerances, steps, accuracies;
+  std::optional<double> reference, wanted;
+};
+
+void print_row(const Scene& scene, const CostTable& table, const CostRow& row) {
+  if (!row.failure.empty()) {
+    fmt::print("  {:<8}  {:>9.3g}  fails: {}\n", name(row.method), row.setting,
+               row.failure.substr(0, row.failure.find(". ")));
+    return;
+  }
+  fmt::print("  {:<8}  {:>9.3g}  {:>10.2e}  {:>10.4g}  {:>9}  {:>9.1e}  {:>11.3g}{}\n",
+             name(row.method), row.setting, row.error, 1e3 * row.seconds, row.steps,
+             table.smooth ? row.drift : row.penetration,
+             1e6 * row.seconds / static_cast<double>(std::max(row.steps, 1L)),
+             scene.expect.empty() ? "" : fmt::format("  {} of {}", row.met, scene.expect.size()));
+}
+
+void print(const Scene& scene, const CostTable& table) {
+  fmt::print("{}: errors against {}\n", scene.name.empty() ? scene.file : scene.name,
+             table.reference);
+  fmt::print("  (which may be off by {:.1e}; the errors include that)\n", table.reference_error);
+  if (!table.no_events.empty()) fmt::print("  events are not compared: {}\n", table.no_events);
+  fmt::print("  {:<8}  {:>9}  {:>10}  {:>10}  {:>9}  {:>9}  {:>11}{}\n", "method", "setting",
+             "error", "time / ms", "steps", table.smooth ? "drift" : "depth / m", "us per step",
+             scene.expect.empty() ? "" : "  expectations met");
+  for (const CostRow& row : table.rows) print_row(scene, table, row);
+}
+
+void write_csv(const std::string& file, const CostTable& table) {
+  fmt::ostream out = fmt::output_file(file);
+  out.print(
+      "method,setting,error,seconds,steps,contact_problems,drift,penetration_m,expectations_met,"
+      "status\n");
+  for (const CostRow& row : table.rows)
+    out.print("{},{:g},{:.4e},{:.4e},{},{},{:.3e},{:.3e},{},{}\n", name(row.method), row.setting,
+              row.error, row.seconds, row.steps, row.contact_problems, row.drift, row.penetration,
+              row.met, row.failure.empty() ? "ok" : "failed");
+}
+
+/// The data and the plot command of one method's curve; nothing where none of its runs got through.
+std::string curve_of(const CostTable& table, Method method, std::string& plot) {
+  static const char* const kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
+  std::string points;
+  for (const CostRow& row : table.rows)
+    if (row.method == method && row.failure.empty())
+      points += fmt::format("{:.4e} {:.4e} {:g}\n", 1e3 * row.seconds, std::max(row.error, 1e-17),
+                            row.setting);
+  if (points.empty()) return {};
+  plot += fmt::format(
+      "{}${} using 1:2 with linespoints lc rgb '{}' lw 1.5 pt 7 ps 0.6 title '{}: {}', ${} using "
+      "1:2:3 with labels offset 3.2,0.6 font ',11' tc rgb '#404040' notitle",
+      plot.empty() ? "plot " : ", ", name(method), kColours[static_cast<int>(method)], name(method),
+      setting_name(method), name(method));
+  return fmt::format("${} << EOD\n{}EOD\n", name(method), points);
+}
+
+/// Error against time, each point with its setting.
+std::string draw(const std::string& file, const Scene& scene, const CostTable& table) {
+  std::string script = picture_head(560, 460), plot;
+  for (const Method each : {Method::smooth, Method::events, Method::steps, Method::accuracy})
+    script += curve_of(table, each, plot);
+  if (plot.empty()) return "no run got through";
+  std::string title;
+  for (const char c : scene.name) title += c == '\'' ? ' ' : c;
+  script += fmt::format(
+      "set logscale xy\nset format xy '10^{{%T}}'\nset xlabel 'processor time / ms'\nset ylabel "
+      "'largest error / m, rad'\nset title '{}: what accuracy costs' noenhanced\nset offsets graph "
+      "0.1, graph 0.2, graph 0.1, graph 0.05\nset key below\n",
+      title);
+  script += plot;
+  if (table.reference_error > 1e-16)
+    script +=
+        fmt::format(", {:.3e} with lines lc rgb '#999999' dt 2 title 'trust in the reference'",
+                    table.reference_error);
+  return gnuplot(script + "\n", file);
+}
+
+// Settings of engines that the scene does not have are refused by name.
+void check_settings(const Scene& scene, const Arguments& arguments) {
+  const Plan plan = make_plan(scene);
+  const bool of_steps = !arguments.steps.empty() || !arguments.accuracies.empty();
+  if (plan.engine == EngineKind::smooth && of_steps)
+    throw std::invalid_argument("the scene runs on the smooth engine: use --tolerances");
+  if (plan.engine == EngineKind::stepping && !arguments.tolerances.empty() &&
+      !plan.no_event.empty())
+    throw std::invalid_argument("the scene runs on the stepping engine (" + plan.no_event +
+                                "): use --time-steps");
+}
+
+int run_cost(const Arguments& arguments) {
+  const Scene scene = read_scene(arguments.file);
+  check_settings(scene, arguments);
+  CostOptions options;
+  options.tolerances = read_settings("--tolerances", arguments.tolerances, 10);
+  options.steps = read_settings("--time-steps", arguments.steps, 2);
+  options.accuracies = read_settings("--accuracies", arguments.accuracies, 10);
+  options.reference = arguments.reference;
+  std::optional<tether::Progress> bar;
+  options.progress = [&](const std::string& what, int done, int all) {
+    if (done == 0)
+      bar.emplace(all);
+    else
+      bar->finish();
+    bar->start(what, 1, 1);
+  };
+  const CostTable table = cost(scene, options);
+  bar.reset();
+  print(scene, table);
+  if (!arguments.csv.empty()) write_csv(arguments.csv, table);
+  if (!arguments.svg.empty()) {
+    const std::string why = draw(arguments.svg, scene, table);
+    if (!why.empty()) fmt::print(stderr, "no picture: {}\n", why);
+  }
+  if (!arguments.wanted) return kGood;
+  const CostRow* best = table.cheapest(*arguments.wanted);
+  if (best == nullptr) {
+    fmt::print("no setting reaches an error of {:g}\n", *arguments.wanted);
+    return kNotMet;
+  }
+  fmt::print("cheapest with an error of at most {:g}: {}, {} {:g}, {:.4g} ms\n", *arguments.wanted,
+             name(best->method), setting_name(best->method), best->setting, 1e3 * best->seconds);
+  return kGood;
+}
+
+}  // namespace
+
+void add_cost_command(CLI::App& app, int* status) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "cost", "What accuracy costs in time: runs a scene over a range of tolerances or time steps");
+  command->add_option("scene", a->file, "Scene file (TOML)")->required();
+  command
+      ->add_option("--tolerances", a->tolerances,
+                   "Tolerances of the smooth or the event engine, each or "
+                   "as a range [1e-4:1e-9, or 1e-3:1e-8 with contacts]")
+      ->delimiter(',');
+  command
+      ->add_option("--time-steps", a->steps,
+                   "Steps of the stepping engine, s, each or as a range such as 8e-3:1e-3 (halved) "
+                   "[8 to 1/4 times that of the scene]")
+      ->delimiter(',');
+  command
+      ->add_option("--accuracies", a->accuracies,
+                   "Accuracies of steps in parts, each or as a range [1e-2:1e-5]")
+      ->delimiter(',');
+  command
+      ->add_option("--reference", a->reference,
+                   "Tolerance or time step of the reference [1e-12, of events 1e-11 where they "
+                   "move the scene, "
+                   "else a quarter of the finest step]")
+      ->check(positive_number());
+  command->add_option("--wanted", a->wanted, "Name the cheapest setting with at most this error")
+      ->check(positive_number());
+  command->add_option("--csv", a->csv, "Write the table");
+  command->add_option("--svg", a->svg, "Draw error against time (needs gnuplot)");
+  command->footer(
+      "The error is the largest distance (m) or angle (rad) of a body from the reference at 400 "
+      "equal\n"
+      "times, and what the reference may be off. Exit code: 0, 1 no setting meets --wanted, 2 the "
+      "scene or an option is wrong, or "
+      "there\n"
+      "is no reference.");
+  command->callback([a, status] { *status = run_cost(*a); });
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,80 @@
+// Tether: `tether new`: writes a scene to start from. SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+
+#include "output/whole_file.hpp"
+#include "program/commands.hpp"
+#include "program/kinds.hpp"
+#include "program/standard_streams.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+struct Arguments {
+  std::string kind, file;
+  bool force = false, list = false;
+};
+
+/// The first line of a scene's comment says what it is.
+std::string summary(std::string_view text) {
+  const std::string_view line = text.substr(0, text.find('\n'));
+  return std::string(line.substr(std::min<std::size_t>(2, line.size())));
+}
+
+/// Makes the file; nobody else's in between.
+void reserve(const std::string& file) {
+  make_folder_of(file);
+  const int descriptor = open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+  if (descriptor < 0)
+    throw std::invalid_argument(errno == EEXIST
+                                    ? file + " is there already; --force replaces it"
+                                    : "cannot write " + file + ": " + std::strerror(errno));
+  close(descriptor);
+}
+
+int write_new(const Arguments& arguments) {
+  if (arguments.list) {
+    for (const Kind& each : kinds()) fmt::print("{:<24} {}\n", each.name, summary(each.text));
+    return kGood;
+  }
+  const auto& all = kinds();
+  const auto kind = std::find_if(all.begin(), all.end(),
+                                 [&](const Kind& each) { return each.name == arguments.kind; });
+  if (kind == all.end()) throw std::invalid_argument("new: name a KIND; --list shows them");
+  const std::string file =
+      arguments.file.empty() ? std::string(kind->name) + ".toml" : arguments.file;
+  const std::string text(kind->text);
+  if (file == "-") {
+    StandardOutput(file).write(text);
+    return kGood;
+  }
+  if (!arguments.force) reserve(file);
+  write_whole(file, text);
+  fmt::print("written: {0}\nnext: tether run {0}\n", file);
+  return kGood;
+}
+
+}  // namespace
+
+void add_new_command(CLI::App& app, int* status) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("new", "Writes a scene to start from, with comments on its fields");
+  std::vector<std::string> names;
+  for (const Kind& each : kinds()) names.emplace_back(each.name);
+  command->add_option("kind", a->kind, "What it is to be")->check(CLI::IsMember(names));
+  command->add_option("file", a->file, "Its name [KIND.toml]; - is the standard output");
+  command->add_flag("--force", a->force, "Replace a file that is there");
+  command->add_flag("--list", a->list, "Name the kinds");
+  command->footer("Exit code: 0, 2 no such kind, or the file is there or cannot be written.");
+  command->callback([a, status] { *status = write_new(*a); });
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,49 @@
+// Tether: `tether plan`: what a scene asks for. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/core.h>
+
+#include <iostream>
+#include <memory>
+#include <tether/scene/files.hpp>
+#include <tether/scene/plan.hpp>
+#include <tether/scene/run.hpp>
+
+#include "program/commands.hpp"
+#include "program/report_run.hpp"
+#include "program/scene_text.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+struct Arguments {
+  std::string file;
+  bool run = false;
+};
+
+int plan(const Arguments& arguments) {
+  const Scene scene = read_scene_argument(arguments.file);
+  std::cout << make_plan(scene) << std::flush;
+  if (!arguments.run) return kGood;
+  Scene silent = scene;
+  silent.output = Output{};
+  const RunResult result = run(silent);
+  print_costs(result);
+  if (!result.failure.empty()) fmt::print("stopped at {:g} s: {}\n", result.time, result.failure);
+  return result.failure.empty() ? kGood : kFailed;
+}
+
+}  // namespace
+
+void add_plan_command(CLI::App& app, int* status) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "plan", "Tells which effects a scene asks for, which engine moves it, and how large it is");
+  command->add_option("scene", arguments->file, "Scene file (TOML); - is the standard input")
+      ->required();
+  command->add_flag("--run", arguments->run, "Run it, and tell what each effect cost");
+  command->footer(
+      "Exit code: 0, 2 the scene is wrong or no engine has it, 3 --run could not go on.");
+  command->callback([arguments, status] { *status = plan(*arguments); });
+}
+
+}  // namespace tether::scene

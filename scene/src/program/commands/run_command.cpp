@@ -1,0 +1,149 @@
+// Tether: `tether run`: moves a scene. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/core.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <progress.hpp>
+#include <tether/scene/files.hpp>
+#include <tether/scene/player.hpp>
+#include <tether/scene/run.hpp>
+
+#include "program/commands.hpp"
+#include "program/report_run.hpp"
+#include "program/scene_text.hpp"
+#include "program/settings.hpp"
+#include "program/signals.hpp"
+#include "program/standard_output_file.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+struct Arguments {
+  std::string file, restart, folder, html;
+  std::optional<std::string> csv, vtk, svg, state;
+  std::optional<double> end, every;
+  bool force = false, quiet = false;
+};
+
+/// File names given in a scene stay inside the output folder, links resolved: only the command line
+/// may choose to overwrite files elsewhere.
+void stay_inside(const std::string& folder, const Output& o) {
+  namespace fs = std::filesystem;
+  const fs::path inside = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder));
+  for (const std::string& file : {o.csv, o.vtk, o.svg, o.state}) {
+    if (file.empty()) continue;
+    const fs::path whole = fs::weakly_canonical(inside / file),
+                   way = whole.lexically_relative(inside);
+    std::error_code error;
+    const fs::file_status there = fs::status(whole, error);
+    if (way.empty() || *way.begin() == ".." ||
+        (fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there)))
+      throw std::invalid_argument(fmt::format(
+          "output: \"{}\" leads to {}: names in a scene stay in the folder of its output, {}, and "
+          "name files; options of the command line may name any place",
+          file, whole.string(), inside.string()));
+  }
+}
+
+/// Settings of the command line override those of the scene.
+void overlay(const Arguments& arguments, Scene& scene) {
+  Output& o = scene.output;
+  Output by_scene = o;
+  if (arguments.csv) by_scene.csv.clear();
+  if (arguments.vtk) by_scene.vtk.clear();
+  if (arguments.svg) by_scene.svg.clear();
+  if (arguments.state) by_scene.state.clear();
+  stay_inside(arguments.folder, by_scene);
+  if (arguments.csv) o.csv = *arguments.csv;
+  if (arguments.vtk) o.vtk = *arguments.vtk;
+  if (arguments.svg) o.svg = *arguments.svg;
+  if (arguments.state) o.state = *arguments.state;
+  if (arguments.every) o.every = *arguments.every;
+  if (!arguments.folder.empty())
+    for (std::string* file : {&o.csv, &o.vtk, &o.svg, &o.state})
+      if (!file->empty() && *file != "-")
+        *file = (std::filesystem::path(arguments.folder) / *file).string();
+  if (!arguments.end) return;
+  // Records stay where they were, so that runs in parts make one table.
+  if (o.every == 0) o.every = scene.end / 1000;
+  scene.end = *arguments.end;
+}
+
+int run_scene(const Arguments& arguments) {
+  const auto begin = std::chrono::steady_clock::now();
+  Scene scene = read_scene_argument(arguments.file);
+  overlay(arguments, scene);
+  std::string html = arguments.html;
+  if (!html.empty() && html != "-" && !arguments.folder.empty())
+    html = (std::filesystem::path(arguments.folder) / html).string();
+  StandardOutputFile standard_output(scene.output, html);
+  std::optional<Player> player;
+  if (!html.empty()) player.emplace(scene, html);
+  tether::Progress bar(1);
+  RunOptions options;
+  options.restart = arguments.restart;
+  options.force = arguments.force;
+  options.interrupted = [] { return caught_signal() != 0; };
+  catch_signals();
+  bar.start(scene.name, scene.end, 1);
+  if (!arguments.quiet) options.progress = [&](double t) { bar.at(t); };
+  if (player) options.record = [&](const Engine& engine) { player->record(engine); };
+  RunResult result = run(scene, options);
+  if (player) {
+    player->write();
+    result.written.push_back(html);
+    if (!arguments.restart.empty())
+      result.remarks.push_back(html + " shows the motion from the restart on");
+  }
+  bar.hide();
+  standard_output.copy();
+  print_summary(scene, result);
+  print_times(result,
+              std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  print_judgements(scene, result);
+  print_files(result);
+  if (result.interrupted)
+    fmt::print("interrupted at {:.9g} s of {:g} s{}\n", result.time, scene.end,
+               scene.output.state.empty()
+                   ? ""
+                   : fmt::format("; to go on: --restart {}", scene.output.state));
+  std::fflush(stdout);
+  return result.interrupted ? kSignal + caught_signal() : exit_code(result);
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app, int* status) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "run", "Moves a scene, records what its [output] names, and judges it by its [[expect]]");
+  command->add_option("scene", a->file, "Scene file (TOML); - is the standard input")->required();
+  command->add_option("--restart", a->restart,
+                      "Go on from a saved state; the bits are those of a run in one piece");
+  command->add_option("--output", a->folder, "Folder of all files written");
+  command->add_option("--csv", a->csv, "Table: energies, momenta, errors, states of the bodies");
+  command->add_option("--vtk", a->vtk, "Film for ParaView (.pvd, with a folder of .vtp)");
+  command->add_option("--svg", a->svg, "Picture (needs gnuplot)");
+  command->add_option("--html", a->html, "Page that plays the run in a browser, on its own");
+  command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
+  command->add_option("--every", a->every, "Time between records, s")->check(positive_number());
+  command->add_option("--end", a->end, "End of the run, s")->check(positive_number());
+  command->add_flag("--force", a->force,
+                    "With --restart: the state may be of another scene; positions and velocities "
+                    "are taken over, bits are not the same");
+  command->add_flag("--quiet", a->quiet, "No progress bar");
+  command->footer(
+      "Exit code: 0 every expectation is met, 1 one is not, 2 the scene, a file or an option is\n"
+      "wrong, 3 the run could not go on, 130 (143) ended by Ctrl-C (SIGTERM), with all files "
+      "whole\n"
+      "and the state saved. Options go before what the scene says in [output]. One of --csv, "
+      "--svg, --html and "
+      "--state may\nbe -, the standard output; what the run says goes to the standard error then.");
+  command->callback([a, status] { *status = run_scene(*a); });
+}
+
+}  // namespace tether::scene

@@ -1,0 +1,212 @@
+// Tether: `tether sweep`: runs a scene over ranges of its numbers. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <fmt/core.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <progress.hpp>
+#include <tether/scene/plan.hpp>
+#include <tether/scene/run.hpp>
+#include <tether/scene/vary.hpp>
+#include <tether/scene/words.hpp>
+#include <thread>
+
+#include "output/whole_file.hpp"
+#include "program/commands.hpp"
+#include "program/scene_text.hpp"
+#include "program/settings.hpp"
+#include "program/signals.hpp"
+#include "program/standard_streams.hpp"
+#include "program/worker_processes.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+constexpr std::size_t kMostRuns = 100000;
+
+struct Arguments {
+  std::string file, out = "-";
+  std::vector<std::string> vary;
+  int jobs = 0;
+  bool quiet = false;
+};
+
+/// A field of CSV: quoted where it has to be; control characters become blanks.
+std::string field(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+    out += control ? ' ' : c;
+    if (c == '"') out += '"';
+  }
+  return out.find_first_of(",\"") == std::string::npos ? out : '"' + out + '"';
+}
+
+/// All combinations, the last range being the fastest.
+std::vector<std::vector<Setting>> combinations(const std::vector<VariedNumber>& varied) {
+  std::vector<std::vector<Setting>> all(1);
+  for (const VariedNumber& each : varied) {
+    if (all.size() * each.values.size() > kMostRuns)
+      throw std::invalid_argument(
+          fmt::format("--vary: more than {} combinations of values", kMostRuns));
+    std::vector<std::vector<Setting>> longer;
+    for (const std::vector<Setting>& before : all)
+      for (const double value : each.values) {
+        longer.push_back(before);
+        longer.back().push_back({each.path, value});
+      }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+std::string header(const Scene& scene, const std::vector<VariedNumber>& varied) {
+  std::string text;
+  for (const VariedNumber& each : varied) text += field(each.path) + ',';
+  text +=
+      "status,met,expectations,time_s,start_energy_J,end_energy_J,lowest_change_J,largest_change_J,"
+      "drift,penetration_m,residual,contacts,steps,contact_problems,unsolved,seconds";
+  for (std::size_t k = 0; k < scene.expect.size(); ++k) {
+    const Expect& e = scene.expect[k];
+    const std::string of =
+        e.body >= 0 ? scene.bodies[static_cast<std::size_t>(e.body)].name + '.' : std::string();
+    for (int i = 0; i < components(e.quantity); ++i)
+      text += ',' + field(fmt::format("{}{}{}@{:g}", of, word(e.quantity),
+                                      components(e.quantity) > 1 ? fmt::format("[{}]", i + 1) : "",
+                                      e.time));
+  }
+  return text + ",failure\n";
+}
+
+const char* status_of(const RunResult& r) {
+  if (r.interrupted) return "interrupted";
+  if (!r.failure.empty()) return "failed";
+  return r.met() ? "ok" : "not met";
+}
+
+std::string row_of(const Scene& scene, const RunResult& r) {
+  const Summary& s = r.summary;
+  const Counts& c = r.counts;
+  const auto met = std::count_if(r.judgements.begin(), r.judgements.end(),
+                                 [](const Judgement& j) { return j.judged && j.met; });
+  std::string row = fmt::format(
+      "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.3g}", status_of(r), met, scene.expect.size(),
+      r.time, s.start_energy, s.end_energy, s.lowest_change, s.largest_change, s.drift,
+      s.penetration, s.residual, s.contacts, c.steps, c.contact_problems, c.unsolved, r.seconds);
+  for (std::size_t k = 0; k < scene.expect.size(); ++k)
+    for (int i = 0; i < components(scene.expect[k].quantity); ++i) {
+      const std::vector<double>& value = r.judgements[k].value;
+      const auto at = static_cast<std::size_t>(i);
+      row += at < value.size() ? fmt::format(",{}", value[at]) : ",";
+    }
+  return row + ',' + field(r.failure);
+}
+
+/// A row without its settings: of a run, or with what is wrong and empty fields between.
+std::string row_of(const std::string& text, const std::string& name,
+                   const std::vector<Setting>& settings, std::size_t fields) {
+  try {
+    Scene scene = parse_scene_with(text, name, settings);
+    const double every = scene.output.every;
+    scene.output = Output{};
+    scene.output.every = every;
+    RunOptions options;
+    options.interrupted = [] { return caught_signal() != 0; };
+    return row_of(scene, run(scene, options));
+  } catch (const std::exception& e) {
+    return "wrong" + std::string(fields, ',') + field(e.what());
+  }
+}
+
+bool begins(const std::string& row, const char* status) { return row.rfind(status, 0) == 0; }
+
+int exit_code(const std::vector<std::string>& rows) {
+  const auto any = [&](const char* status) {
+    return std::any_of(rows.begin(), rows.end(),
+                       [&](const std::string& row) { return begins(row, status); });
+  };
+  if (std::all_of(rows.begin(), rows.end(), [](const auto& row) { return begins(row, "wrong"); }))
+    return kWrong;
+  if (any("wrong") || any("failed")) return kFailed;
+  return any("not met") ? kNotMet : kGood;
+}
+
+int sweep(const Arguments& arguments) {
+  const SceneText scene_text = read_scene_text(arguments.file);
+  std::vector<VariedNumber> varied;
+  for (const std::string& each : arguments.vary) varied.push_back(read_varied(each));
+  const std::vector<std::vector<Setting>> all = combinations(varied);
+  const Scene plain = parse_scene(scene_text.text, scene_text.name);
+  parse_paths(scene_text, all.front());
+  const std::string first = header(plain, varied);
+  const auto fields =
+      static_cast<std::size_t>(std::count(first.begin(), first.end(), ',')) - varied.size();
+
+  StandardOutput output(arguments.out);
+  catch_signals();
+  tether::Progress bar(1);
+  bar.start(plain.name.empty() ? plain.file : plain.name, 1, 1);
+  WorkerProcesses workers(arguments.jobs > 0 ? static_cast<unsigned>(arguments.jobs)
+                                             : std::max(1u, std::thread::hardware_concurrency()));
+  workers.work = [&](std::size_t k) {
+    return row_of(scene_text.text, scene_text.name, all[k], fields);
+  };
+  workers.lost = [&](const std::string& why) {
+    return "failed" + std::string(fields, ',') + field(why);
+  };
+  workers.stopped = [] { return caught_signal() != 0; };
+  if (!arguments.quiet)
+    workers.progress = [&](std::size_t done) {
+      bar.at(static_cast<double>(done) / static_cast<double>(all.size()));
+    };
+  const std::vector<std::string> rows = workers.run(all.size());
+  bar.hide();
+  std::string table = first;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (rows[k].empty()) continue;  // not begun
+    for (const Setting& each : all[k]) table += fmt::format("{},", each.value);
+    table += rows[k] + '\n';
+  }
+  output.write(table);
+  const auto count = [&](const char* status) {
+    return std::count_if(rows.begin(), rows.end(),
+                         [&](const std::string& row) { return begins(row, status); });
+  };
+  fmt::print("{} runs: {} ok, {} not met, {} failed, {} wrong{}\n", rows.size(), count("ok"),
+             count("not met"), count("failed"), count("wrong"),
+             caught_signal() != 0 ? ", the others interrupted" : "");
+  if (arguments.out != "-") fmt::print("written: {}\n", arguments.out);
+  return caught_signal() != 0 ? kSignal + caught_signal() : exit_code(rows);
+}
+
+}  // namespace
+
+void add_sweep_command(CLI::App& app, int* status) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("sweep", "Runs a scene over ranges of its numbers: one row of CSV a run");
+  command->add_option("scene", a->file, "Scene file (TOML); - is the standard input")->required();
+  command
+      ->add_option("--vary", a->vary,
+                   "PATH=FROM:TO:COUNT, equally spaced, PATH=FROM:TO:COUNT:log, or "
+                   "PATH=VALUE,VALUE,...; more than one: all combinations. PATH: "
+                   "pair.friction, body.NAME.velocity.x, spring.2.stiffness, stepping.step; * is "
+                   "every element")
+      ->required()
+      ->delimiter(' ');
+  command->add_option("--out", a->out, "The table; - is the standard output")
+      ->capture_default_str();
+  command->add_option("--jobs", a->jobs, "Runs at a time [as many as there are processors]")
+      ->check(CLI::Range(1, 1024));
+  command->add_flag("--quiet", a->quiet, "No progress bar");
+  command->footer(
+      "Rows are in the order of the values, whichever run ends first. A run that fails, or whose "
+      "value\nis wrong, is a row that says so. Exit code: 0 all met, 1 an expectation is not met, "
+      "2 the scene,\na path or every value is wrong, 3 a run failed or a value is wrong, 130 "
+      "(143) ended by Ctrl-C\n(SIGTERM), with the rows that were done.");
+  command->callback([a, status] { *status = sweep(*a); });
+}
+
+}  // namespace tether::scene
