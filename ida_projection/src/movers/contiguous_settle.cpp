@@ -70,9 +70,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
     double part = previous > 0.0 && length > floor ? length / previous : 0.0;
     if (part > 0.0) kept_.slope = part / kept_.age;
     bool follow = rows_.dropped_follow();
-    // Factors of this candidate belong to another point, too, once it has moved.
-    const bool slow = part > kSlow && (kept_.age > 0 || part * length > kSafe * options_.tolerance);
-    if (slow || (kept_.age > 0 && (length > kLong || (k > 0 && !follow)))) {
+    if (kept_.age > 0 && (part > kSlow || length > kLong || (k > 0 && !follow))) {
       rows_.set_metric(true);
       if ((status = factor(candidate.t)) != Status::success) return status;
       length = first_solve();

@@ -33,11 +33,7 @@ Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
   // What is left is at most about length * ratio, and no more than length while ratio <= 1/2.
   if (ratio <= 0.5) {
     if (length * ratio <= options_->tolerance) return Verdict::done;
-    if (last) return Verdict::failed;
-    // At this rate the moves that may be made lead nowhere.
-    const int more = options_->maximum_iterations - moves_;
-    const bool slow = length * std::pow(ratio, more + 1) > options_->tolerance;
-    return slow && !fresh ? Verdict::refactor : Verdict::go_on;
+    return last ? Verdict::failed : Verdict::go_on;
   }
   // No longer halving: rounding (then nothing can be gained) or a broken iteration.
   if (length <= std::max({floor, 1e-5, 0.1 * std::min(1.0, options_->tolerance)}))
