@@ -51,6 +51,20 @@ struct PlaneFeature {
   }
 };
 
+/// Gap, rates and normal of two round features whose middles are d = (d, d', d'') apart; `n1` gets
+/// the rate of the normal. The point of contact is left to the caller.
+inline Touch apart(const Vector3d& d, const Vector3d& d1, const Vector3d& d2, double radius_first,
+                   double radius, Vector3d& n1) {
+  const double D = d.norm();
+  Touch t;
+  t.normal = d / D;
+  t.gap = D - radius_first - radius;
+  t.rate = t.normal.dot(d1);
+  t.second = t.normal.dot(d2) + (d1.squaredNorm() - t.rate * t.rate) / D;
+  n1 = (d1 - t.normal * t.rate) / D;
+  return t;
+}
+
 /// A point of the second body with a radius.
 struct PointFeature {
   Vector3d at = Vector3d::Zero();
@@ -60,13 +74,8 @@ struct PointFeature {
              double radius_first) const {
     const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
     const Vector3d d = c.x - b.x, d1 = c.x1 - b.x1, d2 = c.x2 - b.x2;
-    const double D = d.norm();
-    Touch t;
-    t.normal = d / D;
-    t.gap = D - radius_first - radius;
-    t.rate = t.normal.dot(d1);
-    t.second = t.normal.dot(d2) + (d1.squaredNorm() - t.rate * t.rate) / D;
-    const Vector3d n1 = (d1 - t.normal * t.rate) / D;
+    Vector3d n1;
+    Touch t = apart(d, d1, d2, radius_first, radius, n1);
     // Between the surfaces, by their radii: at a gap of 0 it is the point of contact.
     t.point = b.x + radius * t.normal;
     t.point_velocity = b.x1 + radius * n1;
@@ -93,13 +102,8 @@ struct LineFeature {
                  k2 = s2.dot(e.x) + 2 * s1.dot(e.x1) + s.dot(e.x2);
     const Vector3d d = s - k * e.x, d1 = s1 - k1 * e.x - k * e.x1,
                    d2 = s2 - k2 * e.x - 2 * k1 * e.x1 - k * e.x2;
-    const double D = d.norm();
-    Touch t;
-    t.normal = d / D;
-    t.gap = D - radius_first - radius;
-    t.rate = t.normal.dot(d1);
-    t.second = t.normal.dot(d2) + (d1.squaredNorm() - t.rate * t.rate) / D;
-    const Vector3d n1 = (d1 - t.normal * t.rate) / D;
+    Vector3d n1;
+    Touch t = apart(d, d1, d2, radius_first, radius, n1);
     t.point = c.x - radius_first * t.normal;
     t.point_velocity = c.x1 - radius_first * n1;
     return t;
