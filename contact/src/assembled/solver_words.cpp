@@ -1,7 +1,7 @@
 // Tether: names and advice of the solver. SPDX-License-Identifier: BSD-3-Clause
 #include "assembled/solver_words.hpp"
 
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 
 namespace tether::contact {
 

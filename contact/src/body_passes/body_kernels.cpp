@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "kernels/body_pass.hpp"
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 
 namespace tether::contact::detail {
 namespace {

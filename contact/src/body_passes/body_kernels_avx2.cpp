@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "kernels/body_lanes_avx2.hpp"
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 
 namespace tether::contact::detail {
 namespace avx2 {

@@ -2,7 +2,7 @@
 // BSD-3-Clause
 #include "body_passes/given_problem.hpp"
 
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact::detail {

@@ -10,7 +10,7 @@
 #include "assembled/search/system.hpp"
 #include "body_sweeps/wide_velocities.hpp"
 #include "graph/contact_graph.hpp"
-#include "law/exact_error.hpp"
+#include "law/kernels/exact_error.hpp"
 #include "problem/contact_side.hpp"
 #include "problem/criterion.hpp"
 #include "problem/refuse.hpp"

@@ -12,7 +12,7 @@ namespace tether::contact::detail::avx2 {
 namespace {
 
 using v4 = __m256d;
-// The words of law/real.hpp.
+// The words of law/interface/real.hpp.
 using Real = v4;
 using Mask = v4;
 

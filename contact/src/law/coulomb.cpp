@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "law/coulomb_lanes.hpp"
-#include "law/define_law.hpp"
-#include "law/real.hpp"
+#include "law/interface/real.hpp"
+#include "law/kernels/define_law.hpp"
 
 namespace tether::contact::detail {
 

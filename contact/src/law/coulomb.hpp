@@ -1,7 +1,7 @@
 // Tether: the classical Coulomb law for one contact. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "law/local_geometry.hpp"
+#include "law/interface/local_geometry.hpp"
 #include <tether/linalg/friction_cone.hpp>
 
 namespace tether::contact::detail {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "law/coulomb.hpp"
-#include "law/lanes.hpp"
+#include "law/interface/lanes.hpp"
 
 #if TETHER_GROUPS
 

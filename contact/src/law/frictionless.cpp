@@ -1,7 +1,7 @@
 // Tether: contact without friction: kernels. SPDX-License-Identifier: BSD-3-Clause
 #include "law/frictionless.hpp"
 
-#include "law/define_law.hpp"
+#include "law/kernels/define_law.hpp"
 
 namespace tether::contact::detail {
 

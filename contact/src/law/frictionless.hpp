@@ -1,7 +1,7 @@
 // Tether: contact without friction. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "law/local_geometry.hpp"
+#include "law/interface/local_geometry.hpp"
 
 namespace tether::contact::detail {
 

@@ -4,7 +4,7 @@
 
 #include "law/coulomb.hpp"
 #include "law/frictionless.hpp"
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 #include "law/maximum_dissipation.hpp"
 
 namespace tether::contact {

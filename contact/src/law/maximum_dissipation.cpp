@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "law/coulomb.hpp"
-#include "law/define_law.hpp"
+#include "law/kernels/define_law.hpp"
 #include "law/maximum_dissipation_lanes.hpp"
 
 namespace tether::contact::detail {

@@ -3,8 +3,8 @@
 
 #include <limits>
 
-#include "law/local_geometry.hpp"
-#include "law/real.hpp"
+#include "law/interface/local_geometry.hpp"
+#include "law/interface/real.hpp"
 #include <tether/linalg/friction_cone.hpp>
 
 namespace tether::contact::detail {

@@ -1,7 +1,7 @@
 // Tether: maximum dissipation for four contacts at a time. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "law/lanes.hpp"
+#include "law/interface/lanes.hpp"
 #include "law/maximum_dissipation.hpp"
 
 #if TETHER_GROUPS

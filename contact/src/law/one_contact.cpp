@@ -6,8 +6,9 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/pi.hpp>
 
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
@@ -136,7 +137,7 @@ OneContact solve_one_golden_section(const LocalBlock& L, const Eigen::Vector3d& 
     out.impulse << x[0], x[1], x[2];
     return out;
   }
-  const double pi = 3.14159265358979323846;
+  const double pi = linalg::kPi;
   const double center = std::atan2(s1, s0);
   const double kappa = (r.k * L.beta[0] * L.beta[1] - L.g[0] * s0 - L.g[1] * s1) / length;
   const double reach = kappa <= -1 ? pi : std::acos(std::min(1.0, kappa));

@@ -9,5 +9,6 @@
 #include <tether/linalg/friction_cone.hpp>
 #include <tether/linalg/index.hpp>
 #include <tether/linalg/minimum_norm.hpp>
+#include <tether/linalg/pi.hpp>
 #include <tether/linalg/small_lu.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>

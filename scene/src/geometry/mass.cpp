@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/pi.hpp>
 
 #include "hull.hpp"
 
@@ -13,8 +14,7 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
+using linalg::kPi;
 
 // |d|^2 1 - d d^T: the inertia of a unit point mass at d (parallel axes).
 Matrix3d point_inertia(const Vector3d& d) {

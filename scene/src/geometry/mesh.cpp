@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numeric>
+#include <tether/linalg/pi.hpp>
 
 #include "hull.hpp"
 
@@ -12,8 +13,6 @@ namespace tether::scene {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kHalfTurn = 3.14159265358979323846;
 
 Mesh box_mesh(const Vector3d& size) {
   Mesh m;
@@ -33,10 +32,10 @@ Mesh capsule_mesh(double radius, double length, int around) {
   m.points.emplace_back(0, 0, -length / 2 - radius);
   for (int ring = 0; ring < 2 * rings; ++ring) {
     const bool upper = ring >= rings;
-    const double latitude =
-        upper ? kHalfTurn / 2 * (ring - rings) / rings : kHalfTurn / 2 * (ring + 1 - rings) / rings;
+    const double latitude = upper ? linalg::kPi / 2 * (ring - rings) / rings
+                                  : linalg::kPi / 2 * (ring + 1 - rings) / rings;
     for (int k = 0; k < around; ++k) {
-      const double longitude = 2 * kHalfTurn * k / around;
+      const double longitude = 2 * linalg::kPi * k / around;
       m.points.emplace_back(radius * std::cos(latitude) * std::cos(longitude),
                             radius * std::cos(latitude) * std::sin(longitude),
                             radius * std::sin(latitude) + (upper ? length / 2 : -length / 2));

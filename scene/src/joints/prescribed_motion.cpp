@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/pi.hpp>
 
 #include "list.hpp"
 #include "mechanics/effect.hpp"
@@ -11,14 +12,8 @@ namespace tether::scene {
 
 namespace joints {
 
-namespace {
-
-constexpr double kTwoPi = 6.283185307179586;
-
-}  // namespace
-
 Now evaluate(const Motion& motion, double t) {
-  const double speed = kTwoPi * motion.frequency, angle = speed * t + motion.phase;
+  const double speed = 2 * linalg::kPi * motion.frequency, angle = speed * t + motion.phase;
   Now now;
   now.s = motion.rate * t + motion.amplitude * (std::sin(angle) - std::sin(motion.phase));
   now.s1 = motion.rate + motion.amplitude * speed * std::cos(angle);

@@ -5,7 +5,7 @@
 
 #include "commands.hpp"
 #include "contact_command.hpp"
-#include "standard_streams.hpp"
+#include "program/process/standard_streams.hpp"
 
 namespace {
 

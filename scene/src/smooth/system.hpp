@@ -23,7 +23,7 @@
 #include <tether/scene/scene.hpp>
 #include <vector>
 
-#include "joints/reactions.hpp"
+#include "joints/laws/reactions.hpp"
 #include "smooth/terms/acceleration_jacobian.hpp"
 #include "smooth/terms/forward_dynamics.hpp"
 #include "smooth/terms/jacobian_terms.hpp"

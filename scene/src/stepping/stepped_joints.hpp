@@ -8,9 +8,9 @@
 #include <tether/scene/scene.hpp>
 #include <vector>
 
-#include "joints/joint_laws.hpp"
 #include "joints/joint_rows.hpp"
-#include "joints/reactions.hpp"
+#include "joints/laws/joint_laws.hpp"
+#include "joints/laws/reactions.hpp"
 #include "mechanics/stepped_bodies.hpp"
 
 namespace tether::scene::stepping {

@@ -7,13 +7,14 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <tether/linalg/pi.hpp>
 
 namespace tether::scene::files {
 
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kDegree = linalg::kPi / 180;
 // A unit vector may be off by its rounding; beyond it is normalised.
 constexpr double kUnitError = 1e-15;
 

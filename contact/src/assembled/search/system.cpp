@@ -6,8 +6,8 @@
 #include <array>
 #include <utility>
 
-#include "law/exact_error.hpp"
-#include "law/rows.hpp"
+#include "law/kernels/exact_error.hpp"
+#include "law/kernels/rows.hpp"
 #include "problem/criterion.hpp"
 
 namespace tether::contact::detail {

@@ -7,7 +7,7 @@
 #include <tether/contact/solver.hpp>
 #include <tether/linalg/friction_cone.hpp>
 
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 #include "problem/criterion.hpp"
 
 namespace tether::contact::detail {

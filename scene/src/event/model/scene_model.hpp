@@ -8,7 +8,7 @@
 
 #include "features.hpp"
 #include "joints/joint_rows.hpp"
-#include "joints/reactions.hpp"
+#include "joints/laws/reactions.hpp"
 #include "mechanics/force.hpp"
 #include "model.hpp"
 #include "smooth/terms/moving_bodies.hpp"

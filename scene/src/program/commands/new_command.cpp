@@ -11,7 +11,7 @@
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/kinds.hpp"
-#include "program/standard_streams.hpp"
+#include "program/process/standard_streams.hpp"
 
 namespace tether::scene {
 

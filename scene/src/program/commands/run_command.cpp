@@ -12,11 +12,11 @@
 #include <tether/scene/run.hpp>
 
 #include "program/commands.hpp"
+#include "program/process/signals.hpp"
+#include "program/process/standard_output_file.hpp"
 #include "program/report_run.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
-#include "program/signals.hpp"
-#include "program/standard_output_file.hpp"
 
 namespace tether::scene {
 

@@ -14,11 +14,11 @@
 
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
+#include "program/process/signals.hpp"
+#include "program/process/standard_streams.hpp"
+#include "program/process/worker_processes.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
-#include "program/signals.hpp"
-#include "program/standard_streams.hpp"
-#include "program/worker_processes.hpp"
 
 namespace tether::scene {
 

@@ -1,0 +1,354 @@
+// Tether: joints in a step. SPDX-License-Identifier: BSD-3-Clause
+#include "step_joints.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+#include <tether/linalg/index.hpp>
+
+#include "joints/joint_islands.hpp"
+#include "stepping/motion/rotation.hpp"
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+
+namespace {
+
+// Moves in parts of the size of the mechanism, root of mass times square of the distance from the
+// origin: what ends an iteration, and what may be left where it does not go on.
+constexpr double kNoMove = 1e-14, kMet = 1e-11;
+constexpr double kHalving = 0.5;
+constexpr int kMoves = 30;
+constexpr int kRowsOfJoint = 3;  // bodies that fewer rows connect may touch
+
+using linalg::at;
+
+double norm(const std::vector<double>& u) {
+  double sum = 0;
+  for (const double x : u) sum += x * x;
+  return std::sqrt(sum);
+}
+
+}  // namespace
+
+StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet& bodies,
+                       Gyroscopic gyroscopic)
+    : equations_(std::move(equations)),
+      gyroscopic_(gyroscopic),
+      has_laws_(equations_->has_laws()),
+      v_(bodies.motion.size(), Vector6d::Zero()),
+      row_(at(equations_->rows())),
+      impulses_(row_.g.size()) {
+  factor(bodies, 0);
+  if (rows_.count() != equations_->rows())
+    throw std::invalid_argument("joints: " + std::to_string(rows_.count()) + " rows instead of " +
+                                std::to_string(equations_->rows()));
+  for (int i = 0; i < bodies.size(); ++i)
+    if (holds(i)) held_.push_back(i);
+  for (const int i : held_) round_.push_back(is_isotropic(bodies.inertia[at(i)]));
+  place_.resize(held_.size());
+  for (int m = 0; m < mechanisms_.count(); ++m) {
+    const std::vector<int>& list = mechanisms_[m].bodies();
+    for (std::size_t k = 1; k < list.size(); ++k) links_.emplace_back(list[k - 1], list[k]);
+  }
+  std::multiset<std::pair<int, int>> pairs;
+  for (int row = 0; row < rows_.count(); ++row) {
+    if (rows_.compliance(row) > 0)
+      throw std::invalid_argument(equations_->name(rows_.joint(row)) +
+                                  ": rows with compliance are for JointSolver; in steps it is a "
+                                  "spring's force");
+    if (rows_.end(row) - rows_.begin(row) != 2) continue;
+    pairs.insert(std::minmax(rows_.begin(row)->body, rows_.begin(row)[1].body));
+  }
+  for (auto p = pairs.begin(); p != pairs.end(); p = pairs.upper_bound(*p))
+    if (pairs.count(*p) >= kRowsOfJoint) joined_.push_back(*p);
+  factored_.clear();  // begin() looks at the positions
+}
+
+bool StepJoints::are_joined(int first, int second) const {
+  return std::binary_search(joined_.begin(), joined_.end(),
+                            std::pair<int, int>(std::minmax(first, second)));
+}
+
+std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& options, LawUse laws) {
+  return std::make_unique<StepJointIslands>(mechanisms_, laws_, laws, options);
+}
+
+void StepJoints::list_laws(std::vector<int>& out) const {
+  for (int k = 0; k < laws_.laws.count(); ++k)
+    out.push_back(laws_.impulses[at(k)] == 0 ? 0 : laws_.at_bound(k) != 0 ? laws_.at_bound(k) : 2);
+}
+
+// Equations of the positions at time t.
+void StepJoints::factor(const BodySet& bodies, double t) {
+  rows_.clear();
+  equations_->add_rows(bodies, t, rows_);
+  mechanisms_.update(bodies.motion, rows_);
+  factored_.set(bodies, t);
+}
+
+void StepJoints::FactoredAt::set(const BodySet& bodies, double t) {
+  position_.assign(bodies.position.begin(), bodies.position.end());
+  orientation_.assign(bodies.orientation.begin(), bodies.orientation.end());
+  time_ = t;
+}
+
+bool StepJoints::FactoredAt::is(const BodySet& bodies, double t) const {
+  if (position_.empty() || std::abs(t - time_) > 1e-9 * std::abs(t)) return false;
+  for (std::size_t i = 0; i < position_.size(); ++i)
+    if (position_[i] != bodies.position[i] ||
+        orientation_[i].coeffs() != bodies.orientation[i].coeffs())
+      return false;
+  return true;
+}
+
+void StepJoints::take_velocities(const BodySet& bodies) {
+  for (std::size_t i = 0; i < v_.size(); ++i)
+    v_[i] << bodies.motion[i].velocity, bodies.motion[i].angular_velocity;
+}
+
+void StepJoints::give_velocities(BodySet& bodies) const {
+  for (const int i : held_) {
+    bodies.motion[at(i)].velocity = v_[at(i)].head<3>();
+    bodies.motion[at(i)].angular_velocity = v_[at(i)].tail<3>();
+  }
+}
+
+double StepJoints::size(const BodySet& bodies) const {
+  double sum = 0;
+  for (const int i : held_)
+    sum +=
+        bodies.mass[at(i)] * bodies.position[at(i)].squaredNorm() + bodies.inertia[at(i)].trace();
+  return std::sqrt(sum);
+}
+
+// change_ becomes the least change of positions, over `dt`, that takes back g at time t; returns
+// its length in the metric of the masses.
+double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
+  equations_->values(bodies, t, row_.g.data());
+  change_.assign(v_.size(), Vector6d::Zero());
+  double square = 0;
+  left_ = 0;
+  for (int m = 0; m < mechanisms_.count(); ++m) {
+    Mechanism& mechanism = mechanisms_[m];
+    for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
+      row_.b[k] = -row_.g[at(mechanism.rows()[k])] / dt;
+    row_.u.resize(at(mechanism.entries()));
+    mechanism.least(row_.b.data(), row_.u.data());
+    mechanisms_.add(m, row_.u.data(), change_);
+    square += std::pow(norm(row_.u) * dt, 2);
+    for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
+      left_ = std::max(left_, std::abs(mechanism.left(static_cast<int>(k))) * dt);
+  }
+  return std::sqrt(square);
+}
+
+// As PositionCorrection: the angular velocity turns with the body.
+void StepJoints::turn_back(BodySet& bodies, int body, const Vector3d& turn) const {
+  if (turn.isZero(0)) return;
+  const linalg::Quaternion by = exponential(turn);
+  linalg::Quaternion& q = bodies.orientation[at(body)];
+  q = (by * q).normalized();
+  Vector3d& w = bodies.motion[at(body)].angular_velocity;
+  w = by * w;
+  bodies.motion[at(body)].inverse_inertia = turned(bodies.inverse_inertia[at(body)], q);
+}
+
+bool StepJoints::project_positions(BodySet& bodies, double t) {
+  const double whole = size(bodies);
+  double before = INFINITY;
+  for (int k = 0; k < kMoves; ++k) {
+    if (k > 0 || factored_.none()) factor(bodies, t);
+    const double move = least_move(bodies, t, 1);
+    if (!std::isfinite(move)) return false;
+    if (move <= kNoMove * whole) break;
+    if (k > 3 && move > kHalving * before) return move + left_ <= kMet * whole;
+    before = move;
+    for (const int i : held_) {
+      bodies.position[at(i)] += change_[at(i)].head<3>();
+      turn_back(bodies, i, change_[at(i)].tail<3>());
+    }
+  }
+  return left_ <= kMet * whole;
+}
+
+void StepJoints::begin(BodySet& bodies, double t) {
+  put_onto(bodies, t);
+  if (!has_laws_) return;
+  take_velocities(bodies);
+  laws_.remember(v_);
+}
+
+void StepJoints::put_onto(BodySet& bodies, double t) {
+  if (factored_.is(bodies, t)) return;
+  factor(bodies, t);
+  // The result of a step stays the same to the last bit, also in a continued run.
+  if (!(least_move(bodies, t, 1) + left_ <= kMet * size(bodies))) {
+    if (!project_positions(bodies, t)) refuse(bodies, t);
+    factor(bodies, t);
+  }
+  take_velocities(bodies);
+  if (mechanisms_.error(rows_, v_) <= kMet) return;
+  mechanisms_.satisfy(rows_, v_);
+  if (!mechanisms_.contradicting().empty()) refuse_rates();
+  give_velocities(bodies);
+}
+
+// The rows that least squares leave the most of.
+void StepJoints::refuse(const BodySet& bodies, double t) {
+  equations_->values(bodies, t, row_.g.data());
+  double most = 0;
+  for (const double g : row_.g) most = std::max(most, std::abs(g));
+  std::set<std::string> names;
+  for (int row = 0; row < rows_.count(); ++row)
+    if (!(std::abs(row_.g[at(row)]) < 0.1 * most)) names.insert(equations_->name(rows_.joint(row)));
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  throw std::invalid_argument("joints contradict each other at t = " + std::to_string(t) +
+                              " s: no positions near these satisfy " + text + " (off by up to " +
+                              std::to_string(most) + " m or rad)");
+}
+
+void StepJoints::refuse_rates() {
+  std::string text;
+  for (const int joint : mechanisms_.contradicting())
+    text += (text.empty() ? "" : ", ") + equations_->name(joint);
+  throw std::invalid_argument("joints contradict each other: no velocities satisfy " + text);
+}
+
+void StepJoints::store(const BodySet& bodies) {
+  for (std::size_t k = 0; k < held_.size(); ++k)
+    place_[k] = {bodies.position[at(held_[k])], bodies.orientation[at(held_[k])]};
+}
+
+void StepJoints::restore(BodySet& bodies) const {
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    bodies.position[at(held_[k])] = place_[k].position;
+    bodies.orientation[at(held_[k])] = place_[k].orientation;
+  }
+}
+
+// From the stored places by v_ over dt; angular velocities as they are then.
+void StepJoints::advance_bodies(BodySet& bodies, double dt) const {
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    const std::size_t i = at(held_[k]);
+    bodies.position[i] = place_[k].position + dt * v_[i].head<3>();
+    linalg::Quaternion q = place_[k].orientation;
+    Vector3d w = v_[i].tail<3>();
+    if (!round_[k] && gyroscopic_ == Gyroscopic::momentum) {
+      FreeSpin spin;
+      turn_with_momentum(bodies.inertia[i], bodies.inverse_inertia[i], dt, q, w, spin);
+    } else if (!w.isZero(0)) {
+      q = (exponential(dt * w) * q).normalized();
+    }
+    bodies.orientation[i] = q;
+    bodies.motion[i].angular_velocity = w;
+  }
+}
+
+// Impulses along the rows of the start, until the end meets g = 0. Leaves the bodies at the end.
+bool StepJoints::meet(BodySet& bodies, double t, double dt) {
+  const double whole = size(bodies);
+  double before = INFINITY;
+  for (int k = 0;; ++k) {
+    advance_bodies(bodies, dt);
+    const double move = least_move(bodies, t + dt, dt);
+    if (move <= kNoMove * whole) return left_ <= kMet * whole;
+    if (k == kMoves || !(move <= kHalving * before)) return move + left_ <= kMet * whole;
+    before = move;
+    for (const int i : held_) v_[at(i)] += change_[at(i)];
+  }
+}
+
+void StepJoints::predict(BodySet& bodies, double t, double dt) {
+  take_velocities(bodies);
+  start_ = v_;
+  mechanisms_.satisfy(rows_, v_);
+  store(bodies);
+  meet(bodies, t, dt);
+  restore(bodies);
+  give_velocities(bodies);
+  if (!has_laws_) return;
+  laws_.laws.clear();
+  equations_->add_laws(bodies, t, laws_.laws);
+  laws_.prepare(v_, dt);
+}
+
+void StepJoints::put_back(BodySet& bodies, double t) {
+  if (factored_.is(bodies, t)) return;
+  const double whole = size(bodies);
+  double before = INFINITY;
+  for (int k = 0; k < kMoves; ++k) {
+    const double move = least_move(bodies, t, 1);
+    if (move <= kNoMove * whole || !(move <= kHalving * before)) return;
+    before = move;
+    for (const int i : held_) {
+      bodies.position[at(i)] += change_[at(i)].head<3>();
+      turn_back(bodies, i, change_[at(i)].tail<3>());
+    }
+  }
+}
+
+// Changes of the momenta since predict(), other than by contacts.
+void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contacts) {
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    const std::size_t i = at(held_[k]);
+    const Vector6d dv = v_[i] - start_[i];
+    change_[i] << bodies.mass[i] * dv.head<3>(),
+        spin(bodies.inertia[i], place_[k].orientation, dv.tail<3>());
+  }
+  for (std::size_t c = 0; c < contacts.impulses.size(); ++c) {
+    const PointContact& p = contacts.points[c];
+    const Vector3d& x = contacts.impulses[c];
+    if (holds(p.first)) {
+      change_[at(p.first)].head<3>() -= x;
+      change_[at(p.first)].tail<3>() -= p.r1.cross(x);
+    }
+    if (p.second >= 0 && holds(p.second)) {
+      change_[at(p.second)].head<3>() += x;
+      change_[at(p.second)].tail<3>() += p.r2.cross(x);
+    }
+  }
+  const JointRows& laws = laws_.laws.rows();
+  for (int k = 0; k < laws.count(); ++k)
+    for (const JointRows::Term* t = laws.begin(k); t != laws.end(k); ++t)
+      change_[at(t->body)] -= laws_.impulses[at(k)] * t->G;
+  for (int m = 0; m < mechanisms_.count(); ++m) {
+    std::vector<double>& u = mechanisms_.pull(m);
+    const std::vector<int>& list = mechanisms_[m].bodies();
+    for (std::size_t k = 0; k < list.size(); ++k)
+      Eigen::Map<Eigen::Matrix<double, 6, 1>>(u.data() + 6 * k) =
+          mechanisms_.root(list[k]).transpose() * change_[at(list[k])];
+  }
+  mechanisms_.impulses(impulses_.data());
+}
+
+bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& contacts) {
+  take_velocities(bodies);
+  store(bodies);
+  bool met = meet(bodies, t, dt);
+  find_impulses(bodies, contacts);
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    const std::size_t i = at(held_[k]);
+    bodies.motion[i].velocity = v_[i].head<3>();
+    if (!round_[k])
+      bodies.motion[i].inverse_inertia = turned(bodies.inverse_inertia[i], bodies.orientation[i]);
+  }
+  if (!met) met = project_positions(bodies, t + dt);
+  factor(bodies, t + dt);
+  take_velocities(bodies);
+  mechanisms_.clear_pulls();
+  mechanisms_.satisfy(rows_, v_);
+  met = met && mechanisms_.contradicting().empty();
+  give_velocities(bodies);
+  mechanisms_.impulses(row_.x.data());
+  for (std::size_t row = 0; row < impulses_.size(); ++row) impulses_[row] += row_.x[row];
+  equations_->values(bodies, t + dt, row_.g.data());
+  drift_ = 0;
+  for (const double g : row_.g) drift_ = std::max(drift_, std::abs(g));
+  return met;
+}
+
+}  // namespace tether::contact::detail

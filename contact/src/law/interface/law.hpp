@@ -1,0 +1,93 @@
+// Tether: the interface of a friction law, and the list of laws. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <tether/contact/problem.hpp>
+
+#include "kernels/body_contacts.hpp"
+#include "law/interface/local_geometry.hpp"
+
+// A law is a struct of static members in a file of this folder:
+//
+//   kLaw, kName, kFriction       its enumerator, its name in files, whether mu counts at all
+//   kKernels                     its kernels, defined in its .cpp file
+//   solve(L, bn, b0, b1, x, lambda, evaluations)   one contact, warm-started from x and lambda
+//   solve_singular(L, bn, b0, b1, x, regime, evaluations)   the same for a singular block, or false
+//   derivative(L, bn, b0, b1, x, regime, out)      dx/db of that solution
+//   gamma(L, out)                slip is opposite to x_t/|x_t| + gamma
+//   natural_point(L, x, w, v)    the nearest admissible impulse to x - w under the law, whose
+//                                distance from x is the residual `natural_map`
+//
+// and for four contacts at a time a struct of the members `rare` and `slide` (lanes.hpp). The .cpp
+// file of the law instantiates its kernels (define_law.hpp); what is missing does
+// not compile. A new law: its file, and a line in `Law` (one_contact.hpp) and in laws.cpp.
+
+namespace tether::contact::detail {
+
+// Arguments of the sweeps over an assembled problem.
+struct View {
+  int n;
+  const int* start;
+  const int* columns;
+  const PackedBlock* blocks;
+  const LocalBlock* local;
+  const PackedVector* b;
+  const char* rule;  // marks of contacts with another law; only read by rules that have one
+  double* lambda;
+  const double* weight;
+  double tau;
+  const PackedVector* anchor;
+  const double* share;
+  const double* inverse_scale;
+};
+
+// Results of a test: norms, and the largest error of a contact relative to its island.
+struct Test {
+  double natural = 0, fixed = 0, x = 0, w = 0;
+};
+
+struct AssembledKernels {
+  void (*sweep)(const View&, PackedVector* x);
+  void (*sweep_some)(const View&, const int* list, int size, PackedVector* x);
+  double (*blocks)(const View&, const PackedVector* x, PackedVector* out, Regime*,
+                   LocalDerivative*);
+  Test (*natural_map)(const View&, const PackedVector* x, PackedVector* w);
+  double (*error)(const View&, const PackedVector* x);
+  double (*exact_error)(const View&, const PackedVector* x);  // exact_error.hpp
+};
+struct BodyKernels {
+  Squares (*sweep)(const BodyArrays&, GeneralContact* begin, GeneralContact* end);
+  Squares (*test)(const BodyArrays&, GeneralContact* begin, GeneralContact* end, Coupled);
+};
+struct GroupKernels {
+  Squares (*pass)(const BodyArrays&, GeneralGroup* begin, GeneralGroup* end,
+                  Coupled);  // null: sweep
+};
+
+// Programs that need no kernels need not link them: traits and kernels are apart.
+struct LawTraits {
+  Law law;
+  const char* name;
+  bool friction;
+};
+
+struct LawKernels {
+  Law law;
+  const char* name;
+  bool friction;
+  Regime (*solve)(const LocalBlock&, const double* b, double* x, double& lambda, int& evaluations);
+  void (*gamma)(const LocalBlock&, double* out);
+  void (*natural_point)(const LocalBlock&, const double* x, const double* w, double* v);
+  AssembledKernels assembled;
+  BodyKernels bodies;
+  GroupKernels groups;
+  // The law that takes over at single contacts where this one has no fixed point, and the kernels
+  // of both together; null: none.
+  const LawKernels* replacement;
+  const AssembledKernels* mixed;
+};
+
+const LawTraits& traits(Law law);
+const LawKernels& kernels(Law law);
+
+}  // namespace tether::contact::detail

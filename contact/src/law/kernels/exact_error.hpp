@@ -1,0 +1,132 @@
+// Tether: errors of contacts below the round-off of double sums. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "law/interface/law.hpp"
+
+// Between light and heavy bodies the terms of A x - b are 1e6 times larger than what they leave.
+// Their double sum is off by up to as many units u |A| |x| as it has terms, D x_i - w_i and the
+// block solution by as many again, times the contacts of the row. x itself costs one unit. These
+// sums are long doubles, and x_i - z_i is found as such, not as a difference of rounded points.
+
+namespace tether::contact::detail {
+namespace {
+
+using Wide = long double;
+
+// w = (A x - b)_i
+inline void wide_row(const View& s, const PackedVector* x, int i, Wide* w) {
+  for (int r = 0; r < 3; ++r) w[r] = -static_cast<Wide>(s.b[i].v[r]);
+  for (int k = s.start[i]; k < s.start[i + 1]; ++k) {
+    const double* A = s.blocks[k].column;
+    const double* v = x[s.columns[k]].v;
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r) w[r] += static_cast<Wide>(A[4 * c + r]) * v[c];
+  }
+}
+
+// out = D v, D the diagonal block
+inline void wide_block(const LocalBlock& L, const Wide* v, Wide* out) {
+  out[0] = L.a * v[0] + L.c[0] * v[1] + L.c[1] * v[2];
+  out[1] = L.c[0] * v[0] + L.T[0] * v[1] + L.T[1] * v[2];
+  out[2] = L.c[1] * v[0] + L.T[1] * v[1] + L.T[2] * v[2];
+}
+
+// A rounded sliding solution z made exact by Newton's method for
+//   (w + D d)_n = 0,  |z_t| = mu z_n,  (w + D d)_t parallel to z_t/|z_t| + gamma,  d = z - x;
+// left as it is where that is not a small correction.
+inline void refine_sliding(const LocalBlock& L, const double* gamma, const Wide* w, const Wide* x,
+                           Wide* z) {
+  constexpr int kRefinements = 2;
+  constexpr Wide kSmall = 1e-20L;  // of |z|^2
+  for (int step = 0; step < kRefinements; ++step) {
+    const Wide d[3] = {z[0] - x[0], z[1] - x[1], z[2] - x[2]};
+    Wide v[3];
+    wide_block(L, d, v);
+    for (int c = 0; c < 3; ++c) v[c] += w[c];
+    const Wide t = std::sqrt(z[1] * z[1] + z[2] * z[2]);
+    if (!(t > 0)) return;
+    const Wide u[2] = {z[1] / t, z[2] / t}, q[2] = {u[0] + gamma[0], u[1] + gamma[1]};
+    const Wide F[3] = {v[0], t - L.mu * z[0], v[1] * q[1] - v[2] * q[0]};
+    const Wide along = (v[1] * u[0] + v[2] * u[1]) / t;  // -d/dz_t of v x z_t/|z_t|, across z_t
+    const Wide J[3][3] = {
+        {L.a, L.c[0], L.c[1]},
+        {-static_cast<Wide>(L.mu), u[0], u[1]},
+        {L.c[0] * q[1] - L.c[1] * q[0], L.T[0] * q[1] - L.T[1] * q[0] - along * u[1],
+         L.T[1] * q[1] - L.T[2] * q[0] + along * u[0]}};
+    Wide minor[3][3];  // transposed cofactors
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) {
+        const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+        minor[c][r] = J[r1][c1] * J[r2][c2] - J[r1][c2] * J[r2][c1];
+      }
+    const Wide det = J[0][0] * minor[0][0] + J[0][1] * minor[1][0] + J[0][2] * minor[2][0];
+    Wide move[3], moved = 0, size = 0;
+    for (int c = 0; c < 3; ++c) {
+      move[c] = -(minor[c][0] * F[0] + minor[c][1] * F[1] + minor[c][2] * F[2]) / det;
+      moved += move[c] * move[c];
+      size += z[c] * z[c];
+    }
+    if (!(moved <= kSmall * size)) return;
+    for (int c = 0; c < 3; ++c) z[c] += move[c];
+  }
+}
+
+// b of the block problem, D x - w. w: times the share of the contact.
+inline void wide_rhs(const LocalBlock& L, const Wide* x, const Wide* w, double* b) {
+  Wide f[3];
+  wide_block(L, x, f);
+  for (int c = 0; c < 3; ++c) b[c] = static_cast<double>(f[c] - w[c]);
+}
+
+// |D (x - z)|, or A_nn times what x is outside of its cone; z: block solution in doubles, mu: 0
+// where the law has no friction.
+inline Wide wide_error(const LocalBlock& L, double mu, const double* gamma, const Wide* x,
+                       const Wide* w, const double* z, Regime regime) {
+  Wide f[3] = {w[0], w[1], w[2]};
+  if (regime != Regime::sticking) {
+    Wide end[3] = {z[0], z[1], z[2]};
+    if (regime == Regime::sliding && mu > 0) {
+      refine_sliding(L, gamma, w, x, end);
+    } else if (regime == Regime::sliding) {  // z_t = 0, (w + D (z - x))_n = 0
+      end[0] = x[0] + (L.c[0] * x[1] + L.c[1] * x[2] - w[0]) / L.a;
+    }
+    const Wide d[3] = {x[0] - end[0], x[1] - end[1], x[2] - end[2]};
+    wide_block(L, d, f);
+  }
+  const Wide t = std::sqrt(x[1] * x[1] + x[2] * x[2]);
+  const Wide outside = L.a * std::max(t - mu * x[0], -x[0]);
+  return std::max(std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]), outside);
+}
+
+// worst_error() (assembled_kernels.hpp) with that.
+template <class Rule>
+double exact_error(const View& s, const PackedVector* x) {
+  int count = 0;
+  Wide most = 0;
+  for (int i = 0; i < s.n; ++i) {
+    const LocalBlock& L = s.local[i];
+    const Wide point[3] = {x[i].v[0], x[i].v[1], x[i].v[2]};
+    Wide w[3];
+    wide_row(s, x, i, w);
+    for (Wide& v : w) v *= s.share[i];
+    double b[3], z[3] = {x[i].v[0], x[i].v[1], x[i].v[2]}, gamma[2];
+    wide_rhs(L, point, w, b);
+    double lambda = s.lambda[i] * s.share[i];
+    const Regime regime = Rule::solve(s.rule, i, L, b[0], b[1], b[2], z, lambda, count);
+    Rule::gamma(s.rule, i, L, gamma);
+    const Wide error = wide_error(L, Rule::kFriction ? L.mu : 0, gamma, point, w, z, regime) *
+                       s.inverse_scale[i] / s.share[i];
+    if (!(error < std::numeric_limits<double>::infinity()))
+      return std::numeric_limits<double>::infinity();
+    most = std::max(most, error);
+  }
+  return static_cast<double>(most);
+}
+
+}  // namespace
+}  // namespace tether::contact::detail

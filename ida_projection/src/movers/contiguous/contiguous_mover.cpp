@@ -1,0 +1,251 @@
+// Tether: Newton's method onto the constraints, on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "contiguous_mover.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+// Factors of an earlier step leave at most so much for settle(), in tolerances.
+constexpr double kForLater = 0.1;
+constexpr double kNothing = 1e-8;  // tolerances: as good as no move
+constexpr int kQuick = 3;          // moves with a whole C
+
+}  // namespace
+
+template <class Rows>
+Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector id) {
+  rows_.at.load(candidate);
+  const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
+  return rows_.structure(candidate, mask);
+}
+
+template <class Rows>
+bool ContiguousMover<Rows>::must_learn(double length) const {
+  if constexpr (Rows::kThinRows)
+    return rows_.factors.thin && start_known_ && rows_.blocks.trust.must_learn(length);
+  return false;
+}
+
+template <class Rows>
+bool ContiguousMover<Rows>::contradicts() {
+  if (!rows_.contradicts()) return false;
+  contradicting_rows_ = rows_.blocks.contradiction.rows;
+  return true;
+}
+
+template <class Rows>
+Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
+  Move result;
+  rows_.at.load(candidate);
+  if (!rows_.blocks.structured() &&
+      (result.status = rows_.structure(candidate, nullptr)) != Status::success)
+    return result;
+  if ((result.status = rows_.value_with_rows(candidate.t)) != Status::success) return result;
+  result.drift_before = result.drift_after = rows_.drift();
+  if (result.drift_before == 0.0) return result;
+  rows_.set_metric(true);
+  rows_.factors.decided = false;
+  if (!takes_rest_) rows_.factors.lasting = false;
+  if ((result.status = factor(candidate.t)) != Status::success) return result;
+  if (rows_.rounding_only()) return result;
+  firm_only_ = false;
+  result.length = first_solve();
+  // That there is nothing to do the rows that an earlier look has kept tell as well.
+  const bool nothing = result.length <= kNothing && rows_.dropped_follow();
+  if (!rows_.factors.decided && !nothing) {
+    rows_.factors.lasting = false;
+    if ((result.status = factor(candidate.t)) != Status::success) return result;
+    result.length = first_solve();
+  }
+  result.floor = 4.0 * kEpsilon * rows_.at.size();
+  if (contradicts()) result.status = Status::inconsistent;
+  return result;
+}
+
+// Only a long move can be too long: the limit is at least largest_move.
+template <class Rows>
+bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
+  if (length <= options_.largest_move) return false;
+  double sum = 0.0;
+  for (int j : rows_.blocks.d.columns) {
+    const double change = rows_.at.ycor[j] * rows_.at.w[j];
+    sum += change * change;
+  }
+  limit = options_.largest_move * std::max(1.0, rows_.wrms(sum));
+  return !(length <= limit);
+}
+
+template <class Rows>
+Move ContiguousMover<Rows>::move(const Candidate& candidate) {
+  Move result;
+  rows_.at.load(candidate);
+  reused_ = keeps_factors() && rows_.factors.there;
+  ++kept_.age;
+  rows_.factors.decided = false;
+  rows_.set_metric(!reused_);
+  result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
+  if (result.status != Status::success) return result;
+  firm_only_ = start_known_ = false;
+  result = newton(candidate, rows_.drift());
+  const bool broken =
+      result.status == Status::not_converged || result.status == Status::move_too_long;
+  if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
+  if (broken || result.moves > kQuick) rows_.blocks.look_again_soon();
+  // Kept factors are in use only while dropped rows ask for less than that.
+  if (rows_.blocks.dropped_rows() && result.status == Status::success && !result.capped &&
+      !reused_ && contradicts())
+    result.status = Status::inconsistent;
+  return result;
+}
+
+// Back to the correction before the move.
+template <class Rows>
+void ContiguousMover<Rows>::restart(const Candidate& candidate) {
+  for (std::size_t i = 0; i < start_.size(); ++i) candidate.correction_entries[i] = start_[i];
+  rows_.at.restart(candidate);
+}
+
+// Where rows are nearly parallel they magnify the rounding of g beyond any tolerance. Such a row
+// cannot be followed, nor need it be, if without it the others lead to a point where rounding
+// explains every g: only then does this count.
+template <class Rows>
+Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, const Move& failed) {
+  const std::string reason = message_;
+  restart(candidate);
+  Move result = failed;
+  if ((result.status = rows_.value_with_rows(candidate.t)) != Status::success) return result;
+  firm_only_ = true;
+  result = newton(candidate, failed.drift_before);
+  if (result.status == Status::success && !result.capped) {
+    if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
+    result.drift_after = rows_.drift();
+    if (rows_.rounding_only()) return result;
+  }
+  message_ = reason;
+  return failed;
+}
+
+// Newton's method from rows_.at.y, with g_ known there.
+template <class Rows>
+Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_before) {
+  Move result;
+  double* correction = candidate.correction_entries;
+  result.drift_before = result.drift_after = drift_before;
+
+  monitor_.start();
+  bool fresh = false;  // factors belong to the present y
+  bool have_factors = reused_;
+  const bool was_reused = reused_;
+  if (Rows::kThinRows && was_reused)
+    std::copy(correction, correction + start_.size(), start_.begin());
+  bool tried = firm_only_;
+  for (;;) {
+    if (!have_factors) {
+      if ((result.status = factor(candidate.t)) != Status::success) return result;
+      have_factors = fresh = true;
+      if (!firm_only_ && (result.moves == 0 || was_reused)) {
+        start_known_ = rows_.factors.thin;
+        if (rows_.factors.thin && !was_reused)
+          std::copy(correction, correction + start_.size(), start_.begin());
+      }
+    }
+    const double length = fresh ? first_solve() : rows_.solve();
+    if (result.moves == 0 && !tried && must_learn(length)) {
+      // The firm rows' move shows how C turns; then all rows are judged, from the start.
+      tried = true;
+      rows_.apply(1.0, correction);
+      if ((result.status = rows_.learn_trust(candidate.t, length)) != Status::success)
+        return result;
+      restart(candidate);
+      have_factors = false;
+      continue;
+    }
+    const bool follow = !rows_.blocks.dropped_rows() || rows_.dropped_follow();
+    if (reused_ && !(length <= kLong && follow)) {
+      rows_.set_metric(true);
+      reused_ = have_factors = false;
+      continue;
+    }
+    if (!follow && Rows::kKeepsRank) {
+      rows_.factors.lasting = have_factors = false;
+      continue;
+    }
+    ++result.moves;
+
+    if (result.moves == 1) {
+      result.length = move_length_ = length;
+      double limit = 0.0;
+      if (!std::isfinite(length) || too_long(length, limit)) {
+        if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
+          result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
+          message_ = "the move onto the constraints is " + std::to_string(length) +
+                     " tolerances long, the limit is " + std::to_string(limit) +
+                     " (Options::largest_move); start closer with make_consistent, or use a "
+                     "smaller step";
+          return result;
+        }
+        rows_.apply(limit / length, correction);
+        result.left = length - limit;
+        result.length = limit;
+        result.capped = true;
+        result.status = Status::success;
+        return result;
+      }
+    }
+    rows_.apply(1.0, correction);
+    if (reused_) {
+      if (2.0 * kept_.rate() * length <= kForLater) break;
+      if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
+      rows_.set_metric(true);
+      reused_ = have_factors = false;
+      continue;
+    }
+    if (result.moves == 1 && rows_.factors.thin &&
+        (result.status = rows_.learn_trust(candidate.t, length)) != Status::success)
+      return result;
+
+    if (result.moves == 1 && monitor_.plainly_done(length)) break;
+    // A first move longer than the largest floor need not know it.
+    const double floor = result.moves == 1 && length > kLargestFloor
+                             ? 0.0
+                             : std::min(kLargestFloor, 1e3 * kEpsilon * rows_.at.size());
+    Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
+    // Almost parallel rows magnify rounding: a move that it explains has converged.
+    if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
+        length <= std::min(kLargestFloor, rows_.rounding_length()))
+      verdict = Monitor::Verdict::done;
+    if (verdict == Monitor::Verdict::done) break;
+    if (verdict == Monitor::Verdict::failed) {
+      result.status = Status::not_converged;
+      message_ =
+          "move " + std::to_string(result.moves) + " onto the constraints still is " +
+          std::to_string(length) +
+          " tolerances long; check the constraint Jacobian with check_jacobian, or whether "
+          "the rows have a common solution here; rows written as squares have none but double "
+          "roots, and rows with |.| or max no derivative: neither lets Newton's moves shrink";
+      return result;
+    }
+    if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
+    result.drift_after = rows_.drift();
+    fresh = false;
+    have_factors = verdict != Monitor::Verdict::refactor;
+  }
+
+  result.status = Status::success;
+  return result;
+}
+
+std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
+                                        Statistics& statistics, int size, int reported) {
+  return std::make_unique<ContiguousMover<RowBlocks>>(constraints, options, statistics, size,
+                                                      reported);
+}
+
+std::unique_ptr<Mover> make_sparse_mover(const Constraints& constraints, const Options& options,
+                                         Statistics& statistics, int size, int reported) {
+  return std::make_unique<ContiguousMover<SparseRows>>(constraints, options, statistics, size,
+                                                       reported);
+}
+
+}  // namespace tether::ida_projection

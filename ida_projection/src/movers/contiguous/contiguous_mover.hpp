@@ -1,0 +1,106 @@
+// Tether: the move onto the constraints on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Notation as in ida_projection/README.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w
+// the error weights, s the size of the corrector's changes. The move itself is in
+// contiguous_mover.cpp, its metric in local_metric.hpp, what follows the polish in
+// contiguous_settle.cpp; their common data is here.
+#pragma once
+
+#include "factored_rows.hpp"
+#include "movers/factor_wear.hpp"
+#include "movers/mover.hpp"
+
+namespace tether::ida_projection {
+
+constexpr double kLargestFloor = 0.1;  // tolerances
+// What a move leaves where nothing is known yet.
+constexpr double kUnknownSlope = 0.03;
+constexpr double kLong = 1.0;  // tolerances: such a move is made with fresh factors
+
+/// Factors of an earlier step leave the part slope * age of a move, age in candidates.
+struct SlopeOfFactors {
+  double slope = 0.0;
+  int age = 0;
+  double rate() const { return slope * age; }
+};
+
+/// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
+template <class Rows>
+class ContiguousMover final : public Mover {
+ public:
+  ContiguousMover(const Constraints& constraints, const Options& options, Statistics& statistics,
+                  int size, int reported)
+      : options_(options),
+        monitor_(options),
+        rows_(constraints, options, statistics, size, reported, message_),
+        keeps_factors_(Rows::keeps_factors(rows_.count())),
+        takes_rest_(Rows::many(rows_.count())),
+        start_(static_cast<std::size_t>(size), 0.0) {}
+
+  Move measure(const Candidate& candidate) override;
+  Move move(const Candidate& candidate) override;
+  // Which of the thin rows count was judged at another point.
+  bool may_follow() override {
+    return rows_.factors.there && !rows_.factors.thin && wear_.usable();
+  }
+  Move follow(const Candidate& candidate, bool again) override;
+  Status set_algebraic(const Candidate& candidate, N_Vector id) override;
+  Status settle(const Candidate& candidate, N_Vector change) override;
+  double remaining_drift(const Candidate& candidate) override {
+    rows_.at.restart(candidate);
+    return rows_.value(candidate.t) == Status::success ? rows_.drift() : -1.0;
+  }
+  bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
+  void accept() override { rows_.metric.accept(); }
+  bool fatal() const override { return rows_.evaluator.fatal(); }
+  void forget_failure() override { rows_.evaluator.forget(); }
+  Status finish(const Candidate& candidate) override {
+    // Where a move costs little beside the step, what Newton's method left is taken, too.
+    if (takes_rest_) return take_rest(candidate, move_length_);
+    if (!keeps_factors()) return Status::success;
+    const bool unseen = move_length_ > kSafe * options_.tolerance || !rows_.dropped_follow();
+    return unseen ? take_back(candidate) : Status::success;
+  }
+  void reset() override {
+    rows_.reset();
+    monitor_.reset();
+    staleness_.reset();
+    wear_ = FactorWear();
+  }
+
+ private:
+  bool keeps_factors() const { return keeps_factors_ && rows_.factors.lasting; }
+  Status take_back(const Candidate& candidate);
+  Status take_rest(const Candidate& candidate, double reach);
+  Status factor(double t) {
+    const Status status = rows_.factor(t);
+    if (status != Status::success) return status;
+    kept_ = {kUnknownSlope, 0};
+    wear_.renewed();
+    return status;
+  }
+  double first_solve() { return rows_.first_solve(firm_only_); }
+  bool contradicts();
+  bool must_learn(double length) const;
+  void restart(const Candidate& candidate);
+  Move newton(const Candidate& candidate, double drift_before);
+  Move newton_with_firm_rows(const Candidate& candidate, const Move& failed);
+  bool too_long(double length, double& limit) const;
+
+  const Options& options_;
+  Monitor monitor_;
+  FactoredRows<Rows> rows_;
+  bool keeps_factors_;         // over several steps
+  bool takes_rest_;            // what Newton's method leaves
+  bool firm_only_ = false;     // this attempt does without thin rows
+  std::vector<double> start_;  // the correction before the move, kept where there are thin rows
+  bool start_known_ = false;
+  double move_length_ = 0.0;  // of the last first move, in tolerances
+  bool reused_ = false;       // factors of an earlier step are in use for this one
+  SlopeOfFactors kept_;       // these
+  Staleness staleness_;
+  FactorWear wear_;  // for follow()
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,102 @@
+// Tether: moves a polished candidate back onto the constraints, on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "contiguous_mover.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+// Where a move costs little beside the factors so much of Options::tolerance is left.
+constexpr double kCheapRest = 1e-4;
+// Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
+// moves would not be enough.
+constexpr double kWorn = 0.06, kSlow = 0.1;
+
+}  // namespace
+
+template <class Rows>
+Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
+  const double* e = N_VGetArrayPointer(change);
+  for (std::size_t i = 0; i < rows_.at.y.size(); ++i) rows_.at.y[i] += e[i];
+  if (keeps_factors()) return take_back(candidate);
+  double sum = 0.0;
+  for (int j : rows_.blocks.d.columns) sum += (e[j] * rows_.at.w[j]) * (e[j] * rows_.at.w[j]);
+  return take_rest(candidate, move_length_ + rows_.wrms(sum));
+}
+
+// With factors that belong to a point `reach` tolerances away.
+template <class Rows>
+Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach) {
+  const bool measure = staleness_.due(reach);
+  const double enough = (takes_rest_ ? kCheapRest : 1.0) * options_.tolerance;
+  double previous = 0.0;
+  for (int k = 0; k < options_.maximum_iterations; ++k) {
+    const Status status = rows_.value(candidate.t);
+    if (status != Status::success) return status;
+    double length = rows_.solve();
+    if (takes_rest_ && !rows_.dropped_follow()) {
+      rows_.factors.lasting = false;
+      const Status made = factor(candidate.t);
+      if (made != Status::success) return made;
+      length = first_solve();
+    }
+    rows_.apply(1.0, candidate.correction_entries);
+    // Where moves are cheap only what is seen on this candidate counts.
+    const double expected = takes_rest_ ? length * (k > 0 ? length / previous : kUnknownSlope)
+                                        : staleness_.left(reach, length);
+    const bool enough_done = (k > 0 || takes_rest_ || !measure) && expected <= enough;
+    if (k == 0 && enough_done) break;
+    const double floor = 1e2 * kEpsilon * rows_.at.size();
+    const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
+    if (k > 0) staleness_.measured(reach, previous, rounding ? 0.0 : length);
+    if (rounding || enough_done) break;
+    previous = length;
+  }
+  return Status::success;
+}
+
+// The same with kept factors, which leave a part of each move that grows with their age. Only what
+// is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
+// two moves with the same factors, that makes the next one so; and dropped rows that follow the
+// others. Where too much is left, also of dropped rows, or a move is long, factors are made anew.
+template <class Rows>
+Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
+  const double floor = 1e2 * kEpsilon * rows_.at.size();
+  double previous = -1.0;  // length of the move before, by the same factors
+  for (int k = 0; k <= options_.maximum_iterations; ++k) {
+    Status status = rows_.value(candidate.t);
+    if (status != Status::success) return status;
+    double length = rows_.solve();
+    double part = previous > 0.0 && length > floor ? length / previous : 0.0;
+    if (part > 0.0) kept_.slope = part / kept_.age;
+    bool follow = rows_.dropped_follow();
+    if (kept_.age > 0 && (part > kSlow || length > kLong || (k > 0 && !follow))) {
+      rows_.set_metric(true);
+      if ((status = factor(candidate.t)) != Status::success) return status;
+      length = first_solve();
+      follow = rows_.dropped_follow();
+      part = 0.0;
+      previous = -1.0;
+    }
+    rows_.apply(1.0, candidate.correction_entries);
+    const bool small = length <= std::max(floor, kSafe * options_.tolerance);
+    if (follow && (small || (part > 0.0 && part * length <= kSafe * options_.tolerance))) {
+      if (part > kWorn) rows_.factors.there = false;
+      return Status::success;
+    }
+    previous = length;
+  }
+  rows_.factors.there = false;
+  if (previous <= std::min(kLargestFloor, rows_.rounding_length())) return Status::success;
+  message_ = "after " + std::to_string(options_.maximum_iterations) +
+             " moves with kept factors the next one still is " + std::to_string(previous) +
+             " tolerances long (Options::maximum_iterations)";
+  return Status::not_converged;
+}
+
+template Status ContiguousMover<RowBlocks>::settle(const Candidate&, N_Vector);
+template Status ContiguousMover<SparseRows>::settle(const Candidate&, N_Vector);
+template Status ContiguousMover<RowBlocks>::take_back(const Candidate&);
+template Status ContiguousMover<SparseRows>::take_back(const Candidate&);
+
+}  // namespace tether::ida_projection

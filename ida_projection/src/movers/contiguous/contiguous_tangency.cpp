@@ -1,0 +1,38 @@
+// Tether: how far y' points out of the constraints, on contiguous vectors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "contiguous_mover.hpp"
+
+namespace tether::ida_projection {
+
+template <class Rows>
+bool ContiguousMover<Rows>::tangency(const std::vector<double>& yp, const double* id,
+                                     Tangency& out) {
+  // C of an earlier candidate says nothing about y' here.
+  if (!rows_.blocks.structured() || !rows_.factors.there || kept_.age > 0) return false;
+  const auto rows = static_cast<std::size_t>(rows_.reported());
+  const std::vector<double>& WT = rows_.at.WT();
+  out.rate.assign(rows, 0.0);
+  out.terms.assign(rows, 0.0);
+  out.tolerance.assign(rows, 0.0);
+  for (std::size_t i = 0; i < rows; ++i) {
+    double rate = 0.0, terms = 0.0, square = 0.0;
+    bool algebraic = false;
+    rows_.blocks.visit_row(static_cast<int>(i), [&](int j, double c) {
+      const auto k = static_cast<std::size_t>(j);
+      algebraic = algebraic || (c != 0.0 && id != nullptr && id[j] == 0.0);
+      rate += c * yp[k];
+      terms += std::abs(c * yp[k]);
+      square += (c * WT[k]) * (c * WT[k]);
+    });
+    out.rate[i] = rate;
+    out.terms[i] = algebraic ? -1.0 : terms;
+    out.tolerance[i] = std::sqrt(square);
+  }
+  return true;
+}
+
+template bool ContiguousMover<RowBlocks>::tangency(const std::vector<double>&, const double*,
+                                                   Tangency&);
+template bool ContiguousMover<SparseRows>::tangency(const std::vector<double>&, const double*,
+                                                    Tangency&);
+}  // namespace tether::ida_projection

@@ -1,0 +1,181 @@
+// Tether: g, C and its factors at a candidate. SPDX-License-Identifier: BSD-3-Clause
+#include "factored_rows.hpp"
+
+#include <cstdint>
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
+
+}  // namespace
+
+template <class Rows>
+Status FactoredRows<Rows>::structure(const Candidate& candidate, const double* id) {
+  factors.there = false;
+  const Status status = blocks.structure(evaluator, candidate.t, at.y, at.WT(), options_.hold, id);
+  if (status != Status::success) message_ = blocks.message;
+  return status;
+}
+
+// C at the present y, and g if wanted.
+template <class Rows>
+Status FactoredRows<Rows>::rows(double t, double* g) {
+  // Only differences and mixed rows need to know how large a tolerance is.
+  const double* WT = evaluator.uses_differences() || blocks.mixed() ? at.WT().data() : nullptr;
+  Status status = blocks.evaluate(evaluator, t, at.y.data(), WT, g);
+  if (status == Status::success && blocks.outgrown()) {
+    blocks.rearrange();
+    factors.there = factors.lasting = false;
+    set_metric(true);
+    status = blocks.evaluate(evaluator, t, at.y.data(), WT);
+  }
+  if (status != Status::success) message_ = evaluator.message();
+  return status;
+}
+
+template <class Rows>
+Status FactoredRows<Rows>::value_with_rows(double t) {
+  if (!evaluator.gives_both()) return value(t);
+  const Status status = rows(t, g_.data());
+  rows_known_ = status == Status::success;
+  return status;
+}
+
+template <class Rows>
+Status FactoredRows<Rows>::factor(double t) {
+  if (!rows_known_) {
+    const Status status = rows(t, nullptr);
+    if (status != Status::success) return status;
+  }
+  rows_known_ = false;
+  const bool known = Rows::kKeepsRank && factors.lasting && factors.there;
+  factors.there = false;
+  weighed_ = false;
+  if (known && blocks.factor_kept()) {
+    factors.thin = false;
+    ++(Rows::many(count()) ? statistics_.refactorizations : statistics_.factorizations);
+  } else if (!decide()) {
+    message_ =
+        "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
+    return Status::not_finite;
+  }
+  factors.there = true;
+  return Status::success;
+}
+
+// Factors from which it can be seen which rows are independent. False: an entry is not finite.
+template <class Rows>
+bool FactoredRows<Rows>::decide() {
+  ++statistics_.factorizations;
+  if (!blocks.factor()) return false;
+  if (blocks.dropped_rows()) ++statistics_.rank_drops;
+  if constexpr (Rows::kThinRows) factors.thin = RowTrust::has_thin_rows(blocks.counted().solver);
+  factors.lasting = !factors.thin;
+  factors.decided = true;
+  return true;
+}
+
+template <class Rows>
+double FactoredRows<Rows>::first_solve([[maybe_unused]] bool firm_only) {
+  const double length = solve();
+  if constexpr (Rows::kThinRows) {
+    if (!factors.thin) return length;
+    linalg::MinimumNorm& solver = blocks.counted().solver;
+    const int all = solver.rank();
+    if (!firm_only && blocks.trust.trusted_rows(solver, length) == all) return length;
+    const bool whole = !blocks.dropped_rows();
+    // Nothing magnifies the right-hand side of the firm rows.
+    const int firm = RowTrust::firm_rows(solver);
+    solver.use_rank(firm);
+    const double firm_length = solve();
+    --statistics_.iterations;
+    if (!firm_only) {
+      solver.use_rank(all);
+      const int trusted = blocks.trust.trusted_rows(solver, firm_length);
+      solver.use_rank(trusted);
+      factors.lasting = RowTrust::lasting(solver, firm, trusted);
+      if (trusted > firm) {
+        --statistics_.iterations;
+        if (whole && trusted < all) ++statistics_.rank_drops;
+        return solve();
+      }
+    }
+    if (whole) ++statistics_.rank_drops;
+    return firm_length;
+  }
+  return length;
+}
+
+template <class Rows>
+Status FactoredRows<Rows>::learn_trust(double t, double length) {
+  if constexpr (Rows::kThinRows) {
+    if (!factors.thin) return Status::success;
+    const double* WT = evaluator.uses_differences() ? at.WT().data() : nullptr;
+    const Status status = blocks.learn_trust(evaluator, t, at.y.data(), WT, length);
+    if (status != Status::success) message_ = evaluator.message();
+    return status;
+  }
+  return Status::success;
+}
+
+template <class Rows>
+bool FactoredRows<Rows>::contradicts() {
+  if (!blocks.dropped_rows()) return false;
+  if (weighed_ && blocks.left_of_dropped() <= kContradiction) return false;
+  if (!blocks.contradict(at.WT())) return false;
+  message_ = blocks.contradiction.message;
+  return true;
+}
+
+// Does the rounding of its own terms explain every g_i? Then there is nothing to enforce, however
+// short the tolerances are that the metric would make of it.
+template <class Rows>
+bool FactoredRows<Rows>::rounding_only() const {
+  for (int i = 0; i < count(); ++i) {
+    const double terms = blocks.terms(i, at.y.data());
+    if (!(std::abs(g_[static_cast<std::size_t>(i)]) <= 64.0 * kEpsilon * terms)) return false;
+  }
+  return true;
+}
+
+// Length of the move that the rounding of g asks for in the worst case, with the present factors:
+// at most sum_i |dy_i|, dy_i the move for row i alone. Where that would take many solves it is
+// bounded by sqrt(m sum_i |dy_i|^2), the sum of squares by moves for all rows with random signs.
+template <class Rows>
+double FactoredRows<Rows>::rounding_length() {
+  const std::vector<double> g = g_;
+  std::vector<double> rounding(g.size());
+  for (int i = 0; i < count(); ++i)
+    rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks.terms(i, at.y.data());
+  double total = 0.0;
+  const auto add = [&](auto&& length) {
+    total += length(solve());
+    --statistics_.iterations;
+  };
+  if (count() <= kRoundedOneByOne) {
+    for (std::size_t i = 0; i < g.size(); ++i) {
+      std::fill(g_.begin(), g_.end(), 0.0);
+      g_[i] = rounding[i];
+      add([](double length) { return length; });
+    }
+  } else {
+    std::uint32_t random = 1;
+    for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
+      for (std::size_t i = 0; i < g.size(); ++i) {
+        random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
+        g_[i] = random >> 31 != 0 ? rounding[i] : -rounding[i];
+      }
+      add([](double length) { return length * length; });
+    }
+    total = std::sqrt(total / kSignPatterns * count());
+  }
+  g_ = g;
+  return total;
+}
+
+template class FactoredRows<RowBlocks>;
+template class FactoredRows<SparseRows>;
+
+}  // namespace tether::ida_projection

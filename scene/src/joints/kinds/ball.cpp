@@ -1,0 +1,27 @@
+// Tether: the ball joint. SPDX-License-Identifier: BSD-3-Clause
+//
+// A point in common; 3 rows.
+#include "joints/joint_type.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+class Ball : public JointType {
+ public:
+  JointKind kind() const override { return JointKind::ball; }
+  void add_rows(RowBuilder& rows) const override { rows.coincide(); }
+  // A force through the point.
+  void limit_axes(const Joint& joint, Momenta& momenta, const std::string& because) const override {
+    momenta.force_through(joint.at, kOrigin, because);
+  }
+};
+
+}  // namespace
+
+const JointType& ball_joint() {
+  static const Ball joint;
+  return joint;
+}
+
+}  // namespace tether::scene::joints

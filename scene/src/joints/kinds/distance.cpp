@@ -1,0 +1,58 @@
+// Tether: the distance joint. SPDX-License-Identifier: BSD-3-Clause
+//
+// Two points at a distance, which a motion changes; 1 row.
+#include <stdexcept>
+
+#include "joints/joint_type.hpp"
+#include "toml/reader.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+class DistanceJoint : public JointType {
+ public:
+  JointKind kind() const override { return JointKind::distance; }
+  MotionOf motion() const override { return MotionOf::length; }
+  void read(files::Fields& in, Joint& joint) const override {
+    files::read_two_points(in, joint.at, joint.at_second);
+    if (in.has("length")) joint.length = in.number("length", 1, files::kPositive, "m");
+    const bool apart = (joint.at - joint.at_second).norm() > 0;
+    if (in.has("at") && !apart) in.wrong("at", "the two points must be apart");
+  }
+  void write(const Joint& joint, files::Writer& out) const override {
+    out.raw("at", files::toml(std::vector<Vector3d>{joint.at, joint.at_second}), "m");
+    if (joint.length) out.field("length", *joint.length, "m");
+  }
+  void check(const Joint& joint, const std::string& name) const override {
+    if (!(length(joint) > 0))
+      throw std::invalid_argument("joint \"" + name +
+                                  "\": a distance must be > 0; two points in one place are a "
+                                  "ball joint");
+  }
+  void add_rows(RowBuilder& rows) const override { rows.distance(length(rows.joint())); }
+  const Vector3d& point_on_second(const Joint& joint) const override { return joint.at_second; }
+  void take_lengths(const Joint& joint, Largest& longest) const override {
+    if (joint.length) longest.take(*joint.length);
+    longest.take((joint.at - joint.at_second).norm());
+  }
+  // A force along the line through the point that is outside.
+  void limit_axes(const Joint& joint, Momenta& momenta, const std::string& because) const override {
+    const bool second = momenta.is_outside(joint.second);
+    momenta.force_through(second ? joint.at_second : joint.at, kOrigin, because);
+  }
+
+ private:
+  static double length(const Joint& joint) {
+    return joint.length ? *joint.length : (joint.at_second - joint.at).norm();
+  }
+};
+
+}  // namespace
+
+const JointType& distance_joint() {
+  static const DistanceJoint joint;
+  return joint;
+}
+
+}  // namespace tether::scene::joints

@@ -1,0 +1,26 @@
+// Tether: the fixed joint. SPDX-License-Identifier: BSD-3-Clause
+//
+// A point and the attitude in common; 6 rows.
+#include "joints/joint_type.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+class Fixed : public JointType {
+ public:
+  JointKind kind() const override { return JointKind::fixed; }
+  void add_rows(RowBuilder& rows) const override {
+    rows.coincide();
+    rows.same_attitude();
+  }
+};
+
+}  // namespace
+
+const JointType& fixed_joint() {
+  static const Fixed joint;
+  return joint;
+}
+
+}  // namespace tether::scene::joints

@@ -1,0 +1,48 @@
+// Tether: the hinge joint. SPDX-License-Identifier: BSD-3-Clause
+//
+// A point and an axis in common; 5 rows, and 1 for the prescribed angle.
+#include "joints/joint_type.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+class Hinge : public JointType {
+ public:
+  JointKind kind() const override { return JointKind::hinge; }
+  MotionOf motion() const override { return MotionOf::angle; }
+  bool is_free() const override { return true; }
+  void read(files::Fields& in, Joint& joint) const override {
+    read_point(in, joint);
+    read_axis(in, joint);
+  }
+  void write(const Joint& joint, files::Writer& out) const override {
+    out.field("at", joint.at, "m");
+    out.field("axis", joint.axis);
+  }
+  void check(const Joint& joint, const std::string& name) const override {
+    check_axis(joint.axis, name);
+  }
+  void add_rows(RowBuilder& rows) const override {
+    rows.coincide();
+    rows.right_angle(rows.z(), rows.x());
+    rows.right_angle(rows.z(), rows.y());
+    if (rows.now()) rows.prescribed_angle();
+  }
+  // No torque about its axis, if that passes through the origin.
+  void limit_axes(const Joint& joint, Momenta& momenta, const std::string& because) const override {
+    if (!joint.motion && joint.at.cross(joint.axis).norm() < kOrigin * joint.axis.norm())
+      momenta.axes.only(joint.axis.normalized(), because);
+    else
+      momenta.axes.none(because);
+  }
+};
+
+}  // namespace
+
+const JointType& hinge_joint() {
+  static const Hinge joint;
+  return joint;
+}
+
+}  // namespace tether::scene::joints

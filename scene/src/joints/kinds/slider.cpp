@@ -1,0 +1,41 @@
+// Tether: the slider joint. SPDX-License-Identifier: BSD-3-Clause
+//
+// The attitude and a line along the axis in common; 5 rows, and 1 for the prescribed displacement.
+#include "joints/joint_type.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+class Slider : public JointType {
+ public:
+  JointKind kind() const override { return JointKind::slider; }
+  MotionOf motion() const override { return MotionOf::length; }
+  bool is_free() const override { return true; }
+  void read(files::Fields& in, Joint& joint) const override {
+    joint.at = in.vector("at", joint.at, files::kAny, "m");
+    read_axis(in, joint);
+  }
+  void write(const Joint& joint, files::Writer& out) const override {
+    out.field("at", joint.at, "m");
+    out.field("axis", joint.axis);
+  }
+  void check(const Joint& joint, const std::string& name) const override {
+    check_axis(joint.axis, name);
+  }
+  void add_rows(RowBuilder& rows) const override {
+    rows.same_attitude();
+    rows.plane(rows.x(), nullptr);
+    rows.plane(rows.y(), nullptr);
+    if (rows.now()) rows.plane(rows.z(), rows.now());
+  }
+};
+
+}  // namespace
+
+const JointType& slider_joint() {
+  static const Slider joint;
+  return joint;
+}
+
+}  // namespace tether::scene::joints

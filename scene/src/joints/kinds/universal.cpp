@@ -1,0 +1,60 @@
+// Tether: the universal joint. SPDX-License-Identifier: BSD-3-Clause
+//
+// A cross joins the bodies: they have its centre in common, and its arms, one fixed in each body,
+// stay at right angles; 4 rows.
+#include <cmath>
+#include <stdexcept>
+
+#include "joints/joint_type.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+class Universal : public JointType {
+ public:
+  JointKind kind() const override { return JointKind::universal; }
+  void read(files::Fields& in, Joint& joint) const override {
+    read_point(in, joint);
+    constexpr const char* kAllowed =
+        "the arms of the cross [[x, y, z], [x, y, z]] on the first and on the second body, world, "
+        "at "
+        "right angles";
+    if (!in.has("axis")) in.missing("axis", kAllowed);
+    const std::vector<Vector3d> axes = in.points("axis", 2, 2);
+    if (axes.empty()) return;
+    if (!(axes[0].norm() > 0 && axes[1].norm() > 0 && is_right(axes[0], axes[1])))
+      return in.wrong("axis", std::string("must be ") + kAllowed);
+    joint.axis = axes[0];
+    joint.axis_second = axes[1];
+  }
+  void write(const Joint& joint, files::Writer& out) const override {
+    out.field("at", joint.at, "m");
+    out.raw("axis", files::toml(std::vector<Vector3d>{joint.axis, joint.axis_second}));
+  }
+  void check(const Joint& joint, const std::string& name) const override {
+    check_axis(joint.axis, name);
+    check_axis(joint.axis_second, name);
+    if (!is_right(joint.axis, joint.axis_second))
+      throw std::invalid_argument("joint \"" + name + "\": its two axes are not at right angles");
+  }
+  void add_rows(RowBuilder& rows) const override {
+    rows.coincide();
+    rows.right_angle(rows.joint().axis.normalized(), rows.joint().axis_second.normalized());
+  }
+
+ private:
+  // Digits of a file are rounded; the start is moved onto the joint.
+  static bool is_right(const Vector3d& u, const Vector3d& v) {
+    return std::abs(u.normalized().dot(v.normalized())) < 1e-6;
+  }
+};
+
+}  // namespace
+
+const JointType& universal_joint() {
+  static const Universal joint;
+  return joint;
+}
+
+}  // namespace tether::scene::joints

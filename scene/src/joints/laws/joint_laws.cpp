@@ -1,0 +1,83 @@
+// Tether: laws along the free coordinates of joints. SPDX-License-Identifier: BSD-3-Clause
+#include "joint_laws.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <tether/linalg/pi.hpp>
+
+#include "effects/list.hpp"
+#include "joints/list.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+constexpr double kBeyond = 1e-9;  // m or rad: a start this far beyond a limit is on it
+
+bool has_laws(const Joint& joint) { return joint.limits || joint.motor || joint.friction != 0; }
+
+}  // namespace
+
+JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
+  for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+    const Joint& joint = scene.joints[j];
+    if (!has_laws(joint)) continue;
+    const std::string name = "joint \"" + name_of(joint, j) + "\": ";
+    if (!type(joint.kind).is_free() || joint.motion)
+      throw std::invalid_argument(name +
+                                  "limits, a motor and friction act on hinges and sliders that no "
+                                  "motion drives");
+    joints_.push_back({static_cast<int>(j), joint, Coordinate(joint, bodies)});
+    if (joint.limits && (joint.limits->lower > kBeyond || joint.limits->upper < -kBeyond))
+      throw std::invalid_argument(name + "it is at 0 at t = 0, which must be between its limits");
+  }
+}
+
+// The turn of a hinge whose angle is nearest to the middle between its limits.
+double JointLaws::value(const Item& item, const Bodies& bodies) const {
+  const double value = item.coordinate.value(bodies);
+  if (!item.law.limits || item.coordinate.what() != JointType::MotionOf::angle) return value;
+  const double middle = 0.5 * (item.law.limits->lower + item.law.limits->upper);
+  const double turn = 2 * linalg::kPi;
+  return value + turn * std::round((middle - value) / turn);
+}
+
+void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
+  signs_.clear();
+  joint_of_.clear();
+  mechanics::JointLawList list{out, signs_, nullptr};
+  for (std::size_t k = 0; k < joints_.size(); ++k) {
+    const Item& item = joints_[k];
+    const double at_now = value(item, bodies);
+    Wrench<double> on[2];
+    item.coordinate.gradient(bodies, on[0], on[1]);
+    const int body[2] = {item.coordinate.first(), item.coordinate.second()};
+    // One law after the other: a term goes to the law added last.
+    list.on = [&](double sign) {
+      joint_of_.push_back(static_cast<int>(k));
+      for (int side = 0; side < 2; ++side) {
+        if (!bodies.moves(body[side])) continue;
+        contact::Vector6d G;
+        G << sign * on[side].force, sign * on[side].torque;
+        out.on(body[side], G);
+      }
+    };
+    for (const effects::Effect* each : effects::all())
+      each->add_laws(item.law, item.joint, at_now, list);
+  }
+}
+
+void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
+                           std::vector<JointForce>& forces) const {
+  if (!(dt > 0)) return;
+  for (std::size_t i = 0; i < impulses.size() && i < signs_.size(); ++i) {
+    const Item& item = joints_[at(joint_of_[i])];
+    const double x = signs_[i] * impulses[i] / dt;
+    JointForce& force = forces[at(item.joint)];
+    const bool angle = item.coordinate.what() == JointType::MotionOf::angle;
+    (angle ? force.moment : force.force) += x * item.coordinate.direction(bodies);
+    force.drive += x;
+  }
+}
+
+}  // namespace tether::scene::joints

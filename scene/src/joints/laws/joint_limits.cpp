@@ -1,0 +1,77 @@
+// Tether: limits of joints. SPDX-License-Identifier: BSD-3-Clause
+//
+// s >= lower, upper >= s, of the angle of a hinge or the way of a slider: impulses that only push
+// away from the limit, s'+ = -e s'- where it is struck.
+#include <algorithm>
+#include <cmath>
+#include <tether/linalg/pi.hpp>
+
+#include "joints/list.hpp"
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+constexpr double kFullTurn = 2 * linalg::kPi;
+
+bool has_limits(const Joint& joint) { return joint.limits.has_value(); }
+
+class JointLimitEffect : public Effect {
+ public:
+  void read_joint(files::Fields& in, files::Reader&, bool angle, Joint& joint) const override {
+    const bool degrees = angle && in.has("limits_deg");
+    const char* const key = degrees ? "limits_deg" : angle ? "limits_rad" : "limits";
+    if (degrees && in.has("limits_rad"))
+      return in.wrong("limits_deg", "give limits_deg or limits_rad, not both");
+    if (!in.has(key)) {
+      if (in.has("limit_restitution"))
+        in.wrong("limit_restitution", "is of limits, and there are none");
+      return;
+    }
+    const std::vector<double> list = in.numbers(key, {2},
+                                                degrees ? "degrees"
+                                                : angle ? "rad"
+                                                        : "m");
+    if (list.size() != 2) return;
+    const double unit = degrees ? kFullTurn / 360 : 1;
+    JointLimits& limits = joint.limits.emplace();
+    limits.lower = unit * list[0];
+    limits.upper = unit * list[1];
+    limits.restitution = in.number("limit_restitution", 0, files::kPart, "");
+    if (!(limits.lower <= 0 && limits.upper >= 0 && limits.lower < limits.upper))
+      in.wrong(key, "must be [least, largest] with 0, where the joint starts, between them");
+    if (angle && !(limits.upper - limits.lower < kFullTurn))
+      in.wrong(key, "must be less than a full turn apart");
+  }
+  void write_joint(const Joint& joint, bool angle, files::Writer& out) const override {
+    if (!joint.limits) return;
+    out.field(angle ? "limits_rad" : "limits",
+              std::vector<double>{joint.limits->lower, joint.limits->upper});
+    out.field("limit_restitution", joint.limits->restitution);
+  }
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), has_limits);
+    if (count > 0)
+      lines.push_back({"joint limits", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
+  }
+  void add_laws(const Joint& joint, int number, double value, JointLawList& out) const override {
+    if (!joint.limits) return;
+    out.limit(number, value - joint.limits->lower, joint.limits->restitution, 1);
+    out.limit(number, joint.limits->upper - value, joint.limits->restitution, -1);
+  }
+  bool has_joint_laws(const Scene& scene) const override {
+    return std::any_of(scene.joints.begin(), scene.joints.end(), has_limits);
+  }
+};
+
+}  // namespace
+
+const Effect& joint_limits_effect() {
+  static const JointLimitEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects
