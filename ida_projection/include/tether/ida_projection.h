@@ -10,6 +10,7 @@
 #include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
 #include <sundials/sundials_types.h>
+#include <tether/ida_projection/idas_functions.h>
 #include <tether/ida_projection/sundials_build.h>
 
 #ifdef __cplusplus
@@ -196,6 +197,45 @@ int tether_project(tether_projection* projection, sunrealtype t, N_Vector yy, N_
 /* IDASolve, then tether_project of what it returns. Returns IDASolve's flag. */
 int tether_solve(tether_projection* projection, sunrealtype tout, sunrealtype* tret, N_Vector yret,
                  N_Vector ypret, int itask);
+
+/* ---- sensitivities of IDAS ---- */
+
+/* dg/dp_k for parameter k, as many values as there are rows; zero on entry. The second one for
+ * gradients. */
+typedef int (*tether_parameter_fn)(sunrealtype t, const sunrealtype* y, int k, sunrealtype* g_p,
+                                   void* user_data);
+typedef int (*tether_vector_parameter_fn)(sunrealtype t, N_Vector y, int k, sunrealtype* g_p,
+                                          void* user_data);
+
+/* As tether::ida_projection::Sensitivities: a function, or parameters for differences of g, or
+ * neither, where g does not depend on p. Set what is not used to 0. */
+typedef struct {
+  size_t size; /* sizeof(tether_sensitivities) */
+  int count;   /* Ns of IDASensInit */
+  tether_parameter_fn derivative;
+  tether_vector_parameter_fn vector_derivative;
+  void* user_data;
+  sunrealtype* parameters;   /* p, which g reads */
+  const sunrealtype* scales; /* pbar, count entries, or null; copied */
+  const int* list;           /* plist, count entries, or null; copied */
+  SUNNonlinearSolver nonlinear_solver;
+} tether_sensitivities;
+
+/* After IDASensInit with IDA_STAGGERED: from now on the sensitivities of each step are moved onto
+ * C s + dg/dp = 0. */
+int tether_project_sensitivities_with(tether_projection* projection,
+                                      const tether_sensitivities* sensitivities,
+                                      const tether_idas_functions* idas);
+static inline int tether_project_sensitivities(tether_projection* projection,
+                                               const tether_sensitivities* sensitivities) {
+  const tether_idas_functions idas = tether_idas_of_host();
+  return tether_project_sensitivities_with(projection, sensitivities, &idas);
+}
+/* Initial sensitivities onto C s + dg/dp = 0, sp (may be null) onto its derivative; hand them to
+ * IDASensReInit. On failure s and sp are unchanged. */
+int tether_make_sensitivities_consistent(tether_projection* projection, sunrealtype t0, N_Vector yy,
+                                         N_Vector yp, N_Vector* s, N_Vector* sp,
+                                         tether_report* report);
 
 /* Of the last step or call; TETHER_MEM_NULL for a null pointer. */
 int tether_get_status(const tether_projection* projection);

@@ -47,6 +47,7 @@ int Projection::Impl::initialize() {
   movers_.joined.forget();
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) movers_.used->reset();
+  if (sensitivities_) sensitivities_->forget_run();
   control_.reset();
   frequency_.reset();
   return corrector_.initialize();

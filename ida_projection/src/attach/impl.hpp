@@ -13,6 +13,7 @@
 #include "host/owned_vector.hpp"
 #include "host/sampled_time.hpp"
 #include "movers/mover.hpp"
+#include "sensitivity/corrector.hpp"
 #include "start/algebraic.hpp"
 #include "start/joined_rows.hpp"
 #include "start/point.hpp"
@@ -28,9 +29,6 @@ namespace tether::ida_projection {
 
 /// Throws std::invalid_argument("Projection: " + text).
 [[noreturn]] void reject(const std::string& text);
-/// The nonlinear solver that IDA sees; its operations call `implementation`.
-SUNNonlinearSolver make_solver(Projection::Impl& implementation, SUNNonlinearSolver inner,
-                               SUNContext context);
 /// Rejects values that cannot work, naming the option, its value and the allowed ones.
 void validate(const Constraints& constraints, const Options& options, N_Vector like);
 
@@ -46,6 +44,11 @@ class Projection::Impl {
   ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp, const Consistency& how);
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp);
   int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
+
+  // sensitivities.cpp
+  void project_sensitivities(Sensitivities given, const tether_idas_functions& idas);
+  ConsistencyReport make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp, N_Vector* s,
+                                                  N_Vector* sp);
 
   const Constraints& constraints() const { return constraints_; }
   const Report& report();  ///< with what has gone by without the plugin
@@ -168,6 +171,7 @@ class Projection::Impl {
   PointProjection point_;
   Watches watch_;
   std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeSolver> solver_;  // IDA sees it
+  std::unique_ptr<SensitivityCorrector> sensitivities_;
   Unknowns unknowns_;
   Metric wanted_metric_;
   Run run_;

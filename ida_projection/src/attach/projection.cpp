@@ -3,6 +3,7 @@
 #include <tether/ida_projection/projection.hpp>
 
 #include "attach/impl.hpp"
+#include "host/operations.hpp"
 
 namespace tether::ida_projection {
 
@@ -102,7 +103,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
     }
   }
   if (corrector_.inner() != nullptr)
-    solver_.reset(make_solver(*this, corrector_.inner(), like->sunctx));
+    solver_.reset(Operations<Impl>::make(*this, corrector_.inner(), like->sunctx));
   if (!solver_) throw std::bad_alloc();
   attach();
 }
@@ -176,6 +177,14 @@ ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
 }
 int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask) {
   return impl_->solve_and_project(tout, tret, yret, ypret, itask);
+}
+void Projection::project_sensitivities(Sensitivities sensitivities,
+                                       const tether_idas_functions& idas) {
+  impl_->project_sensitivities(std::move(sensitivities), idas);
+}
+ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp,
+                                                            N_Vector* s, N_Vector* sp) {
+  return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp);
 }
 Statistics Projection::statistics() const { return impl_->statistics(); }
 void Projection::reset_statistics() { impl_->reset_statistics(); }

@@ -8,6 +8,7 @@
 #include <tether/ida_projection.h>
 #include <tether/ida_projection.hpp>
 #include <tether/ida_projection/c_options.hpp>
+#include <tether/ida_projection/sensitivities.hpp>
 #include <utility>
 #include <vector>
 
@@ -381,6 +382,49 @@ int tether_solve(tether_projection* projection, sunrealtype tout, sunrealtype* t
   return guarded([&] {
     if (projection == nullptr) return null("tether_solve", "projection");
     return projection->projection.solve(tout, tret, yret, ypret, itask);
+  });
+}
+
+int tether_project_sensitivities_with(tether_projection* projection,
+                                      const tether_sensitivities* sensitivities,
+                                      const tether_idas_functions* idas) {
+  return guarded([&] {
+    const char* const function = "tether_project_sensitivities";
+    if (projection == nullptr) return null(function, "projection");
+    if (sensitivities == nullptr) return null(function, "sensitivities");
+    if (idas == nullptr) return null(function, "idas");
+    if (sensitivities->size != sizeof *sensitivities)
+      return ill(std::string(function) + ": sensitivities->size = " +
+                 std::to_string(sensitivities->size) + ", must be sizeof(tether_sensitivities)");
+    const tether_sensitivities given = *sensitivities;
+    ip::Sensitivities chosen;
+    chosen.count = given.count;
+    if (given.derivative != nullptr)
+      chosen.derivative = [given](double t, ip::ConstVector y, int k, ip::Vector g_p) {
+        return given.derivative(t, y.data(), k, g_p.data(), given.user_data);
+      };
+    if (given.vector_derivative != nullptr)
+      chosen.vector_derivative = [given](double t, N_Vector y, int k, double* g_p) {
+        return given.vector_derivative(t, y, k, g_p, given.user_data);
+      };
+    chosen.parameters = given.parameters;
+    const int count = given.count > 0 ? given.count : 0;
+    if (given.scales != nullptr) chosen.scales.assign(given.scales, given.scales + count);
+    if (given.list != nullptr) chosen.list.assign(given.list, given.list + count);
+    chosen.nonlinear_solver = given.nonlinear_solver;
+    projection->projection.project_sensitivities(std::move(chosen), *idas);
+    return 0;
+  });
+}
+
+int tether_make_sensitivities_consistent(tether_projection* projection, sunrealtype t0, N_Vector yy,
+                                         N_Vector yp, N_Vector* s, N_Vector* sp,
+                                         tether_report* report) {
+  return guarded([&] {
+    const char* const function = "tether_make_sensitivities_consistent";
+    if (projection == nullptr) return null(function, "projection");
+    if (bad_size(function, report)) return int{TETHER_ILL_INPUT};
+    return finish(projection->projection.make_sensitivities_consistent(t0, yy, yp, s, sp), report);
   });
 }
 

@@ -37,6 +37,10 @@ class GradientMover final : public Mover {
 
   void expect_no_settle(bool none) override { no_settle_ = none; }
   void accept() override { metric_.accept(); }
+  bool metric(N_Vector D) const override {
+    N_VScale(1.0, metric_.D(), D);
+    return factored_;
+  }
   void reset() override {
     metric_.reset();
     monitor_.reset();

@@ -59,6 +59,14 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
   }
 }
 
+void LocalMetric::current(const LoadedCandidate& at, double* D) const {
+  const bool local = options_.metric == Metric::local_correction;
+  for (std::size_t i = 0; i < scale_.size(); ++i) {
+    const double s = trial_scale_[i], weight = at.w[i] > 0.0 ? 1.0 / at.w[i] : s;
+    D[i] = local ? std::max(s, kMetricFloor * weight) : weight;
+  }
+}
+
 // One scale for each group: rms of |correction| in tolerances over its members.
 void LocalMetric::find_group_scales(LoadedCandidate& at) {
   const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());

@@ -22,6 +22,8 @@ class LocalMetric {
   /// The same, and D of both blocks of rows: s or, where the error weights are asked for, WT.
   template <class Block>
   void fill(LoadedCandidate& at, Block& d, Block& a);
+  /// D of every component, by the candidate that look() or fill() saw last.
+  void current(const LoadedCandidate& at, double* D) const;
   void accept() { std::swap(scale_, trial_scale_); }
   void reset();
 

@@ -66,6 +66,9 @@ class Mover {
   /// constraints, with the factors at hand.
   virtual Status settle(const Candidate& candidate, N_Vector change) = 0;
 
+  /// D as the last candidate had it, of every component; false: there is none.
+  virtual bool metric(N_Vector /*D*/) const { return false; }
+
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 

@@ -84,6 +84,10 @@ void GradientRows::orthogonalise() {
   }
 }
 
+void GradientRows::keep_firm(double least) {
+  while (rank_ > 0 && L(pivot_[at(rank_ - 1)], rank_ - 1) < least) --rank_;
+}
+
 void GradientRows::solve(const std::vector<double>& g, N_Vector D, N_Vector dy) {
   if (rank_ == 0) N_VConst(0.0, dy);
   for (int k = 0; k < m_; ++k) {

@@ -22,6 +22,8 @@ class GradientRows {
 
   /// `WT`: tolerances. Returns the first row that is not finite; -1: none.
   int factor(N_Vector D, N_Vector WT);
+  /// Until the next factor() only rows that are independent by so much take part.
+  void keep_firm(double least);
   /// dy <- the shortest D^-1 dy with C dy = g, as far as the rows that are kept say.
   void solve(const std::vector<double>& g, N_Vector D, N_Vector dy);
   /// After solve(): a dropped row that asks for more than half a tolerance beyond the kept ones,

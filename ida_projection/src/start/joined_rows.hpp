@@ -27,6 +27,8 @@ class JoinedRows {
   /// Looks for such equations at the candidate.
   void join(const Candidate& candidate, double cj);
   void forget();
+  /// IDA's y and y' as the present attempt has left them: rows at hand evaluate F elsewhere.
+  void restore_ida() { (void)corrector_.residual(present_.correction, f_); }
   /// Moves the rows and the equations; null: the caller's rows move alone.
   Mover* mover() const { return mover_.get(); }
   /// What that one moves.

@@ -21,6 +21,7 @@ class Polish {
   /// A new solve().
   void begin() { iterations_ = 0; }
   void note_setup(double cj) { cj_at_setup_ = cj; }
+  double cj_at_setup() const { return cj_at_setup_; }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
 
   /// Is an iteration worth its price after a move of this length? `smoothing`: steps are smoothed.

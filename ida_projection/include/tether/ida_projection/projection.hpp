@@ -6,6 +6,7 @@
 #include <string>
 #include <tether/export.hpp>
 #include <tether/ida_projection/constraints.hpp>
+#include <tether/ida_projection/idas_functions.h>
 #include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/statistics.hpp>
 #include <tether/ida_projection/sundials_build.hpp>
@@ -14,6 +15,8 @@
 
 TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
+
+struct Sensitivities;  // <tether/ida_projection/sensitivities.hpp>
 
 /// Outcome of the last action of the plugin. Negative values end the run.
 enum class Status {
@@ -112,6 +115,16 @@ class Projection {
   /// IDASolve, then project() of what it returns. Returns IDASolve's flag; a failed projection of
   /// the returned point leaves that point as IDA gave it and shows in status().
   int solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
+
+  /// See <tether/ida_projection/sensitivities.hpp>, whose function of this name is to be called.
+  void project_sensitivities(Sensitivities sensitivities, const tether_idas_functions& idas);
+
+  /// Initial sensitivities (as many as Sensitivities::count, after project_sensitivities) onto
+  /// C s_k + dg/dp_k = 0, sp (may be null) onto the derivative of that along (y, y'), each by its
+  /// shortest change in the error weights. Hand the result to IDASensReInit; IDACalcIC may follow.
+  /// y, y' on the constraints. On failure s and sp are unchanged.
+  ConsistencyReport make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp, N_Vector* s,
+                                                  N_Vector* sp);
 
   Statistics statistics() const;
   void reset_statistics();

@@ -53,6 +53,11 @@ class ContiguousMover final : public Mover {
   }
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
   void accept() override { rows_.metric.accept(); }
+  bool metric(N_Vector D) const override {
+    if (rows_.at.w == nullptr) return false;
+    rows_.metric.current(rows_.at, N_VGetArrayPointer(D));
+    return true;
+  }
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
   Status finish(const Candidate& candidate) override {

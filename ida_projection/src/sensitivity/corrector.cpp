@@ -1,0 +1,318 @@
+// Tether: the decorator of IDAS' staggered corrector. SPDX-License-Identifier: BSD-3-Clause
+#include "sensitivity/corrector.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+
+#include "host/operations.hpp"
+#include "rows/rounding.hpp"
+#include "sensitivity/wrapped.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr double kOnTangent = 1e-8;  // tolerances; a shorter move is not worth making
+constexpr int kFewRows = 16;         // factors for each sensitivity
+
+[[noreturn]] void refuse(const std::string& text) {
+  throw std::invalid_argument("project_sensitivities: " + text);
+}
+
+void check(const Sensitivities& given, const Constraints& constraints) {
+  const auto count = static_cast<std::size_t>(given.count);
+  if (given.count < 1)
+    refuse("Sensitivities::count = " + std::to_string(given.count) +
+           ", must be the number of sensitivities given to IDASensInit");
+  if (std::holds_alternative<UserProjection>(constraints.jacobian))
+    refuse("a UserProjection tells no C, so sensitivities cannot be projected; give the rows");
+  const bool gradients = std::holds_alternative<Gradients>(constraints.jacobian);
+  if (gradients && given.derivative)
+    refuse("rows that are Gradients need Sensitivities::vector_derivative, not derivative");
+  if (!gradients && given.vector_derivative)
+    refuse("Sensitivities::vector_derivative is for rows that are Gradients; give derivative");
+  const bool function = given.derivative || given.vector_derivative;
+  if (given.parameters == nullptr && !function && !(given.scales.empty() && given.list.empty()))
+    refuse("Sensitivities::scales and list belong to parameters, which is null");
+  const auto whole = [&](std::size_t size, const char* name) {
+    if (size != 0 && size != count)
+      refuse("Sensitivities::" + std::string(name) + " has " + std::to_string(size) +
+             " entries for " + std::to_string(count) + " sensitivities");
+  };
+  whole(given.scales.size(), "scales");
+  whole(given.list.size(), "list");
+  for (const double scale : given.scales)
+    if (!(std::abs(scale) > 0.0) || !std::isfinite(scale))
+      refuse("Sensitivities::scales has an entry " + std::to_string(scale) +
+             ", all must be finite and not 0");
+  for (const int index : given.list)
+    if (index < 0) refuse("Sensitivities::list has an entry " + std::to_string(index) + " < 0");
+}
+
+}  // namespace
+
+SensitivityCorrector::SensitivityCorrector(const State& state, Sensitivities given,
+                                           const tether_idas_functions& idas, N_Vector like,
+                                           bool contiguous)
+    : state_(state), idas_(idas), g_p_(std::move(given)), contiguous_(contiguous) {
+  check(g_p_.given(), state_.constraints);
+  if (idas_.set_solver == nullptr || idas_.system_data == nullptr || idas_.setups == nullptr)
+    refuse("the functions of IDAS are null; call it through project_sensitivities()");
+  SUNNonlinearSolver inner = g_p_.given().nonlinear_solver;
+  if (inner == nullptr) {
+    own_.reset(SUNNonlinSol_NewtonSens(count(), like, like->sunctx));
+    inner = own_.get();
+    if (inner == nullptr) throw std::bad_alloc();
+  }
+  corrector_ = std::make_unique<Corrector>(inner, like);
+  D_ = OwnedVector(like);
+  weights_ = OwnedVector(like);
+  s_ = OwnedVector(like);
+  work_ = OwnedVector(like);
+  spare_ = OwnedVector(like);
+  for (int k = 0; k < count(); ++k) ds_.emplace_back(like);
+  if (like->ops->nvabs != nullptr && like->ops->nvprod != nullptr && like->ops->nvinv != nullptr &&
+      state_.constraints.total_count() <= kFewRows)
+    for (int k = 0; k < count(); ++k) metrics_.emplace_back(state_.options, like);
+  solver_.reset(Operations<SensitivityCorrector>::make(*this, inner, like->sunctx));
+  if (!solver_) throw std::bad_alloc();
+  const int flag = idas_.set_solver(state_.ida.mem(), solver_.get());
+  if (flag != 0)
+    refuse("IDASetNonlinearSolverSensStg returned " + std::to_string(flag) +
+           "; call IDASensInit with IDA_STAGGERED before. IDA_SIMULTANEOUS corrects states and "
+           "sensitivities together, past the projection of the state, and IDAS has no "
+           "STAGGERED1");
+}
+
+void SensitivityCorrector::forget_run() {
+  engaged_ = false;
+  moved_ = nullptr;
+  setups_ = 0;
+  steps_ = -1;
+  for (VectorMetric& metric : metrics_) {
+    metric.reset();
+    metric.free_all();
+  }
+}
+
+// IDA's count of steps tells at the next attempt whether this one was accepted.
+void SensitivityCorrector::accept() {
+  const long steps = state_.ida.steps();
+  if (steps == steps_ + 1)
+    for (VectorMetric& metric : metrics_) metric.accept();
+  steps_ = steps;
+}
+
+// Empty, or why IDAS' vectors cannot be used.
+std::string SensitivityCorrector::set_up(N_Vector predicted) {
+  if (checked_) return "";
+  sunrealtype t, cj;
+  N_Vector *s = nullptr, *sp, *sn, *spn;
+  void* data;
+  idas_.system_data(state_.ida.mem(), &t, &s, &sp, &sn, &spn, &cj, &data);
+  const std::string reason = why_not_wrapped(predicted, s, count());
+  if (!reason.empty()) return reason;
+  variables_ = std::make_unique<AlgebraicVariables>(state_.options, uncounted_);
+  polish_ = std::make_unique<Polish>(state_.options, uncounted_, *corrector_, *variables_);
+  polish_->allocate(predicted, false);
+  checked_ = true;
+  return "";
+}
+
+int SensitivityCorrector::finish(Status status, const std::string& text) {
+  // The state's outcome stands unless this one is worse.
+  if (status == Status::success) return 0;
+  return state_.report.finish(status, text, state_.ida.steps());
+}
+
+int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vector weights,
+                                double tolerance, bool call_setup, void* mem) {
+  const std::string reason = set_up(predicted);
+  if (!reason.empty()) return finish(Status::internal_error, reason);
+  polish_->begin();
+  corrector_->begin(mem);
+  static const std::vector<int> none;
+  const Candidate candidate{0.0, predicted, correction, weights};
+  int flag = corrector_->correct(candidate, tolerance, call_setup, none);
+  const StepData step = state_.ida.step();
+  note_setups(step.cj);
+  if (flag != 0) return flag;
+
+  use_rows_of_state();
+  rows_->forget_failure();
+  accept();
+  Status status = evaluate(step);
+  if (status == Status::success) status = move_and_polish(candidate, step, tolerance);
+  if (status == Status::success && engaged_ && !polish_->corrector_was_right() && !call_setup &&
+      corrector_->has_setup()) {
+    // As for the state: old factors fooled IDAS' convergence test.
+    N_VConst(0.0, correction);
+    flag = corrector_->correct(candidate, tolerance, true, none);
+    note_setups(step.cj);
+    if (flag != 0) return flag;
+    status = move_and_polish(candidate, step, tolerance);
+  }
+  if (corrector_->stopped()) return corrector_->stop_flag();
+  return finish(status, message_);
+}
+
+// The rows, the variables and the metric that move the state.
+void SensitivityCorrector::use_rows_of_state() {
+  const Constraints* rows =
+      state_.joined.mover() != nullptr ? &state_.joined.constraints() : &state_.constraints;
+  if (moved_ != rows || !rows_) {
+    moved_ = rows;
+    rows_ = std::holds_alternative<Gradients>(rows->jacobian)
+                ? make_gradient_tangent(*rows, state_.statistics, s_)
+                : make_contiguous_tangent(*rows, state_.options, state_.statistics,
+                                          static_cast<int>(N_VGetLength(s_)));
+    const auto m = static_cast<std::size_t>(rows_->rows());
+    r_.assign(m, 0.0);
+    row_terms_.assign(static_cast<std::size_t>(count()), r_);
+  }
+  if (!variables_->any() && state_.variables.any()) {
+    id_ = OwnedVector(polish_->delta());
+    for (int k = 0; k < count(); ++k) N_VScale(1.0, state_.variables.id(), vectors_of(id_)[k]);
+    variables_->set(id_);
+  }
+}
+
+// IDAS may make new factors for sensitivities, too; both iterations divide by what they belong to.
+void SensitivityCorrector::note_setups(double cj) {
+  long setups = 0;
+  idas_.setups(state_.ida.mem(), &setups);
+  if (setups != setups_) state_.polish.note_setup(cj);
+  setups_ = setups;
+  polish_->note_setup(state_.polish.cj_at_setup());
+}
+
+// C at the accepted candidate, and its factors where one metric serves all.
+Status SensitivityCorrector::evaluate(const StepData& step) {
+  y_ = step.y;
+  IDAGetErrWeights(state_.ida.mem(), weights_);
+  N_Vector id = state_.engaged ? state_.joined.moved_id() : nullptr;
+  Status status = rows_->evaluate(step.t, y_, weights_, id);
+  if (status == Status::success && metrics_.empty()) {
+    Mover* mover = state_.joined.mover() != nullptr ? state_.joined.mover() : state_.own.get();
+    if (!mover->metric(D_)) N_VInv(weights_, D_);
+    status = rows_->factor(D_);
+  }
+  if (status != Status::success) message_ = rows_->message();
+  return status;
+}
+
+// In the metric of sensitivity k; `first`: its correction is that of IDAS.
+Status SensitivityCorrector::factor(const Candidate& candidate, int k, bool first) {
+  if (metrics_.empty()) return Status::success;
+  VectorMetric& metric = metrics_[static_cast<std::size_t>(k)];
+  if (first) {
+    const Candidate own{candidate.t, vectors_of(candidate.base)[k],
+                        vectors_of(candidate.correction)[k], vectors_of(candidate.weights)[k]};
+    metric.look(own, work_, spare_);
+    metric.set(own, spare_);
+  }
+  const Status status = rows_->factor(metric.D());
+  if (status != Status::success) message_ = rows_->message();
+  return status;
+}
+
+// dg/dp_k for the rows of the caller. Equations of F that are moved with them hold for what IDAS'
+// corrector has found: their right-hand side is what keeps them there.
+Status SensitivityCorrector::derivative(int k, double t, N_Vector y) {
+  std::vector<double>& terms = row_terms_[static_cast<std::size_t>(k)];
+  const auto own = static_cast<std::size_t>(state_.constraints.total_count());
+  const Status status = g_p_.evaluate(
+      t, y, k, own, [this](double at, N_Vector v, double* g) { return rows_->value(at, v, g); },
+      terms);
+  if (status != Status::success)
+    message_ = g_p_.message().empty() ? rows_->message() : g_p_.message();
+  if (own == terms.size()) return status;
+  if (status != Status::success) return status;
+  const Status known = product(s_);
+  for (std::size_t i = own; i < terms.size(); ++i) terms[i] = -r_[i];
+  return known;
+}
+
+// r_ = C s.
+Status SensitivityCorrector::product(N_Vector s) {
+  const Status status = rows_->product(s, r_.data());
+  if (status != Status::success) message_ = rows_->message();
+  return status;
+}
+
+// ds_k for the candidate; `longest`: in tolerances of s_k. The second move has the rows of the
+// first.
+Status SensitivityCorrector::find_moves(const Candidate& candidate, double t, bool first,
+                                        double* longest) {
+  *longest = 0.0;
+  for (int k = 0; k < count(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    N_VLinearSum(1.0, vectors_of(candidate.base)[k], 1.0, vectors_of(candidate.correction)[k], s_);
+    if (first) {
+      const Status known = derivative(k, t, y_);
+      if (known != Status::success) return known;
+    }
+    Status status = factor(candidate, k, first);
+    if (status == Status::success) status = product(s_);
+    if (status != Status::success) return status;
+    for (std::size_t row = 0; row < r_.size(); ++row) r_[row] += row_terms_[i][row];
+    rows_->solve(r_, ds_[i]);
+    const double length = N_VWrmsNorm(ds_[i], vectors_of(candidate.weights)[k]);
+    if (!std::isfinite(length)) {
+      message_ = "the move of sensitivity " + std::to_string(k) + " is not finite";
+      return Status::not_finite;
+    }
+    *longest = std::max(*longest, length);
+  }
+  return Status::success;
+}
+
+// As for the state. Sensitivities that take no part in IDAS' error test change by any length.
+Status SensitivityCorrector::too_long(const Candidate& candidate, int k, double length) {
+  const double change =
+      N_VWrmsNorm(vectors_of(candidate.correction)[k], vectors_of(candidate.weights)[k]);
+  const double limit = state_.options.largest_move * std::max(1.0, change);
+  if (length <= limit) return Status::success;
+  message_ = "the move of sensitivity " + std::to_string(k) + " onto C s + dg/dp = 0 is " +
+             std::to_string(length) + " tolerances long, the limit is " + std::to_string(limit) +
+             " (Options::largest_move); start with make_sensitivities_consistent, and check dg/dp";
+  return Status::move_too_long;
+}
+
+void SensitivityCorrector::apply(const Candidate& candidate) {
+  for (int k = 0; k < count(); ++k) {
+    N_Vector e = vectors_of(candidate.correction)[k];
+    N_VLinearSum(1.0, e, -1.0, ds_[static_cast<std::size_t>(k)], e);
+  }
+}
+
+Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const StepData& step,
+                                             double tolerance) {
+  double length = 0.0;
+  Status status = find_moves(candidate, step.t, true, &length);
+  if (moved_ != &state_.constraints) state_.joined.restore_ida();
+  if (status != Status::success) return status;
+  if (!engaged_) {
+    const double floor = 4.0 * kEpsilon * N_VWrmsNorm(candidate.base, candidate.weights);
+    if (length <= std::max(kOnTangent, floor)) return Status::success;
+    engaged_ = true;
+  }
+  if (length > state_.options.largest_move)
+    for (int k = 0; k < count(); ++k) {
+      N_Vector w = vectors_of(candidate.weights)[k];
+      status = too_long(candidate, k, N_VWrmsNorm(ds_[static_cast<std::size_t>(k)], w));
+      if (status != Status::success) return status;
+    }
+  polish_->keep(candidate);
+  apply(candidate);
+  ++state_.statistics.sensitivity_projections;
+  if (!polish_->wanted(length, false)) return Status::success;
+  if (!polish_->add_newton_step(candidate, step.cj, tolerance)) return Status::success;
+  status = find_moves(candidate, step.t, false, &length);
+  if (status == Status::success) apply(candidate);
+  return status;
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,45 @@
+// Tether: moves of sensitivities onto the tangent of the constraints.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tether/ida_projection/options.hpp>
+#include <tether/ida_projection/projection.hpp>
+#include <tether/ida_projection/statistics.hpp>
+#include <vector>
+
+namespace tether::ida_projection {
+
+/// C at one state, and the shortest ds with C ds = r there. The rows are linear in s: what a move
+/// leaves is rounding. Rows that depend on each other on the set only have derivatives that do so
+/// too, up to the distance from the set over their independence, which means nothing: rows that are
+/// independent by less than a thousandth take no part.
+class TangentRows {
+ public:
+  virtual ~TangentRows() = default;
+
+  virtual int rows() const = 0;
+  /// g(t, y) itself, for differences in parameters.
+  virtual Status value(double t, N_Vector y, double* g) = 0;
+  /// C(t, y); `weights`: reciprocal tolerances of y; `id` as in Mover::set_algebraic().
+  virtual Status evaluate(double t, N_Vector y, N_Vector weights, N_Vector id) = 0;
+  /// Its factors in the metric D, one entry for each component.
+  virtual Status factor(N_Vector D) = 0;
+  /// r = C s, with the accuracy that g allows, whatever C is good for.
+  virtual Status product(N_Vector s, double* r) = 0;
+  virtual void solve(const std::vector<double>& r, N_Vector ds) = 0;
+  virtual void forget_failure() {}
+
+  const std::string& message() const { return message_; }
+
+ protected:
+  std::string message_;
+};
+
+/// As make_..._mover() in movers/mover.hpp.
+std::unique_ptr<TangentRows> make_contiguous_tangent(const Constraints&, const Options&,
+                                                     Statistics&, int size);
+std::unique_ptr<TangentRows> make_gradient_tangent(const Constraints&, Statistics&, N_Vector like);
+
+}  // namespace tether::ida_projection
