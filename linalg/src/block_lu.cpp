@@ -81,6 +81,24 @@ TETHER_INLINE void solve_pivot(const BlockPivot& d, double* y) {
   y[3] = 0;
 }
 
+// y <- D'^-1 y
+TETHER_INLINE void solve_pivot_transposed(const BlockPivot& d, double* y) {
+  const double f0 = y[0] * d.reciprocal[0];
+  const double f1 = (y[1] - d.u01 * f0) * d.reciprocal[1];
+  const double f2 = (y[2] - d.u02 * f0 - d.u12 * f1) * d.reciprocal[2];
+  const double g1 = f1 - d.l21 * f2;
+  const double g0 = f0 - d.l10 * g1 - d.l20 * f2;
+  y[d.order[0]] = g0;
+  y[d.order[1]] = g1;
+  y[d.order[2]] = f2;
+  y[3] = 0;
+}
+
+// y -= A' x
+TETHER_INLINE void subtract_transposed(const double* A, const double* x, double* y) {
+  for (int c = 0; c < 3; ++c) y[c] -= A[4 * c] * x[0] + A[4 * c + 1] * x[1] + A[4 * c + 2] * x[2];
+}
+
 struct Rows {
   const int* lower;
   int lower_count;
@@ -204,6 +222,19 @@ void BlockLu::solve(PackedVector* x) {
   for (int r = 0; r < n_; ++r) rhs_[at(r)] = x[block_row_[at(r)]];
   substitute(n_, lower_start_.data(), lower_.data(), L_.data(), upper_start_.data(), upper_.data(),
              U_.data(), pivot_.data(), rhs_.data());
+  for (int r = 0; r < n_; ++r) x[block_row_[at(r)]] = rhs_[at(r)];
+}
+
+void BlockLu::solve_transposed(PackedVector* x) {
+  for (int r = 0; r < n_; ++r) rhs_[at(r)] = x[block_row_[at(r)]];
+  for (int r = 0; r < n_; ++r) {
+    solve_pivot_transposed(pivot_[at(r)], rhs_[at(r)].v);
+    for (int m = upper_start_[at(r)]; m < upper_start_[at(r + 1)]; ++m)
+      subtract_transposed(U_[at(m)].column, rhs_[at(r)].v, rhs_[at(upper_[at(m)])].v);
+  }
+  for (int r = n_; r-- > 0;)
+    for (int m = lower_start_[at(r)]; m < lower_start_[at(r + 1)]; ++m)
+      subtract_transposed(L_[at(m)].column, rhs_[at(r)].v, rhs_[at(lower_[at(m)])].v);
   for (int r = 0; r < n_; ++r) x[block_row_[at(r)]] = rhs_[at(r)];
 }
 

@@ -1,12 +1,15 @@
 // Tether: contact problems in files: those that ship with the tests, and those of other projects.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <iostream>
 #include <set>
 #include <tether/contact.hpp>
 #include <tether/contact/files.hpp>
 
 #include "assemblies.hpp"
+#include "contact_differences.hpp"
 #include "support/catch.hpp"
 #include "support/skip.hpp"
 
@@ -97,12 +100,38 @@ void solve_in_other_orders(const Paths& paths) {
   }
 }
 
+// How many problems had a derivative to compare, and how many of these one of impulses.
+std::array<int, 2> compare_derivatives(const Paths& paths) {
+  std::array<int, 2> out = {0, 0};
+  for (const std::string& path : paths) {
+    if (hard(path)) continue;  // A of 1389 rows: differences cost too much
+    const Problem p = read_problem(path);
+    for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
+      const differences::Comparison found = differences::compare(p, law, 7);
+      INFO(path << ", " << name(law) << ": " << found.words);
+      CHECK(found.transposed < 1e-12);
+      if (!found.regular) continue;
+      ++out[0];
+      out[1] += found.unique;
+      CHECK(found.residual < 1e-8);
+      CHECK(found.error < 1e-6);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE("own collection: every problem is solved under coulomb") { solve_under_coulomb(own()); }
 
 TEST_CASE("own collection: every problem is solved under maximum dissipation") {
   solve_under_maximum_dissipation(own());
+}
+
+TEST_CASE("own collection: derivatives against differences, wherever strictly regular") {
+  const auto [all, unique] = compare_derivatives(own());
+  CHECK(all >= 13);  // under one law a contact of stack.dat is at a kink
+  CHECK(unique >= 10);
 }
 
 TEST_CASE("own collection: other orders and tangents") { solve_in_other_orders(own()); }
@@ -126,6 +155,15 @@ TEST_CASE("the collection under coulomb") {
   const Paths all = others();
   NEEDS(all);
   solve_under_coulomb(all);
+}
+
+TEST_CASE("the collection: derivatives against differences, wherever strictly regular") {
+  const Paths all = others();
+  NEEDS(all);
+  const auto [compared, unique] = compare_derivatives(all);
+  std::cout << "derivatives compared: " << compared << ", of impulses: " << unique << "\n";
+  CHECK(compared >= 16);
+  CHECK(unique >= 12);
 }
 
 TEST_CASE("the collection under maximum dissipation") {

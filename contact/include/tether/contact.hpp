@@ -2,7 +2,9 @@
 #pragma once
 
 #include <tether/contact/bodies.hpp>
+#include <tether/contact/body_derivative.hpp>
 #include <tether/contact/body_solver.hpp>
+#include <tether/contact/derivative.hpp>
 #include <tether/contact/evaluate.hpp>
 #include <tether/contact/joints.hpp>
 #include <tether/contact/one_contact.hpp>

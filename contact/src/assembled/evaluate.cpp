@@ -17,10 +17,7 @@ Residuals evaluate(const Problem& problem, Law law, const linalg::VectorView& im
   system.to_own_units(own.data());
   detail::velocities(problem, x.data(), w.data());
   detail::Test test = system.natural_map(own.data(), scratch.data());
-  const double rounding = system.rounding(own.data());
-  test.fixed = system.fixed_point(own.data()).fixed;
-  if (test.fixed <= detail::kSumUnits * rounding) test.fixed = system.exact_fixed_point(own.data());
-  test.fixed = std::max(test.fixed, rounding);
+  test.fixed = system.judged_fixed_point(own.data());
   Residuals r;
   r.fixed_point = system.measure(test, Measure::fixed_point);
   r.natural_map = system.measure(test, Measure::natural_map);

@@ -1,6 +1,7 @@
 // Tether: the classical Coulomb law for one contact. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 #include <tether/linalg/friction_cone.hpp>
 
@@ -63,6 +64,9 @@ struct Coulomb {
   static TETHER_INLINE void natural_point(const LocalBlock& L, const double* x, const double* w,
                                           double* v) {
     cone_natural_point(L.mu, 0, 0, x, w, v);
+  }
+  static void tangent(const LocalBlock& L, const double* x, const double* w, LawTangent& out) {
+    cone_tangent(L, nullptr, x, w, out);
   }
   static void derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
                          Regime regime, LocalDerivative& out);

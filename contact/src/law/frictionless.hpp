@@ -1,6 +1,7 @@
 // Tether: contact without friction. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 
 namespace tether::contact::detail {
@@ -29,6 +30,12 @@ struct Frictionless {
                                           double* v) {
     v[0] = x[0] - w[0] > 0 ? x[0] - w[0] : 0;
     v[1] = v[2] = 0;
+  }
+  // mu does not count.
+  static void tangent(const LocalBlock& L, const double* x, const double* w, LawTangent& out) {
+    if (parting_tangent(L, x, w, out)) return;
+    out.regime = Regime::sliding;
+    out.P[1][1] = out.P[2][2] = 1;
   }
   static void derivative(const LocalBlock& L, double, double, double, const double*, Regime regime,
                          LocalDerivative& out) {

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 #include "law/interface/real.hpp"
 #include <tether/linalg/friction_cone.hpp>
@@ -115,6 +116,14 @@ struct MaximumDissipation {
     double g[2];
     gamma(L, g);
     cone_natural_point(L.mu, g[0], g[1], x, w, v);
+  }
+  // At (D x)_n = 0, D the contact's own block, the solution jumps where e > 1.
+  static void tangent(const LocalBlock& L, const double* x, const double* w, LawTangent& out) {
+    double g[2];
+    gamma(L, g);
+    cone_tangent(L, g, x, w, out);
+    if (out.regime != Regime::separating)
+      out.nearer(L.a * x[0] + L.c[0] * x[1] + L.c[1] * x[2], Regime::separating);
   }
   static void derivative(const LocalBlock& L, double bn, double b0, double b1, const double* x,
                          Regime regime, LocalDerivative& out);

@@ -187,6 +187,10 @@ Test System::fixed_point(const PackedVector* x) {
   out.fixed = kernels().error(error_view(), x);
   return out;
 }
+double System::judged_fixed_point(const PackedVector* x) {
+  const double round_off = rounding(x), fast = fixed_point(x).fixed;
+  return std::max(fast <= kSumUnits * round_off ? exact_fixed_point(x) : fast, round_off);
+}
 double System::exact_fixed_point(const PackedVector* x) {
   return kernels().exact_error(error_view(), x);
 }

@@ -39,6 +39,14 @@ class System {
   // Impulses of the given problem in these units, and back. Exact within the range of doubles.
   void to_own_units(PackedVector* x) const;
   void to_given_units(PackedVector* x) const;
+  // Of impulses and velocities in these units: contact i's times these powers of 2 are those of
+  // the given problem.
+  int impulse_unit(int i) const {
+    return in_other_units() ? mass_[at(problem_->islands()[at(i)])] + velocity_unit(i) : 0;
+  }
+  int velocity_unit(int i) const {
+    return in_other_units() ? -speed_[at(problem_->islands()[at(i)])] : 0;
+  }
   const LawKernels& law() const { return *law_; }
   // The friction coefficient of contact i that counts: 0 under a law without friction.
   double friction(int i) const { return law_->friction ? problem_->local(i).mu : 0; }
@@ -69,6 +77,8 @@ class System {
   // Both with long sums (law/exact_error.hpp): where rounding() is not far below what counts.
   void exact_velocities(const PackedVector* x, PackedVector* w) const;
   double exact_fixed_point(const PackedVector* x);
+  // The larger one of error and round-off, with long sums where it needs them: what is reported.
+  double judged_fixed_point(const PackedVector* x);
   // What round-off makes of w = A x - b, relative to the velocity scale of the island: the largest
   // component of u |A| |x|. A residual below it says nothing.
   double rounding(const PackedVector* x) const;
@@ -79,6 +89,10 @@ class System {
 
   // gamma of contact i in its own frame: slip is opposite to x_t / |x_t| + gamma.
   void gamma(int i, double* out) const { law_of(i).gamma(problem_->local(i), out); }
+  // At the solution x, w of this problem.
+  void tangent(int i, const PackedVector& x, const PackedVector& w, LawTangent& out) const {
+    law_of(i).tangent(problem_->local(i), x.v, w.v, out);
+  }
 
   int sweeps = 0;
 

@@ -5,6 +5,7 @@
 #include <tether/contact/problem.hpp>
 
 #include "kernels/body_contacts.hpp"
+#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 
 // A law is a struct of static members in a file of this folder:
@@ -15,6 +16,7 @@
 //   solve_singular(L, bn, b0, b1, x, regime, evaluations)   the same for a singular block, or false
 //   derivative(L, bn, b0, b1, x, regime, out)      dx/db of that solution
 //   gamma(L, out)                slip is opposite to x_t/|x_t| + gamma
+//   tangent(L, x, w, out)        the relation between changes of x and w (law_tangent.hpp)
 //   natural_point(L, x, w, v)    the nearest admissible impulse to x - w under the law, whose
 //                                distance from x is the residual `natural_map`
 //
@@ -78,6 +80,7 @@ struct LawKernels {
   Regime (*solve)(const LocalBlock&, const double* b, double* x, double& lambda, int& evaluations);
   void (*gamma)(const LocalBlock&, double* out);
   void (*natural_point)(const LocalBlock&, const double* x, const double* w, double* v);
+  void (*tangent)(const LocalBlock&, const double* x, const double* w, LawTangent& out);
   AssembledKernels assembled;
   BodyKernels bodies;
   GroupKernels groups;

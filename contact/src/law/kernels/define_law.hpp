@@ -52,7 +52,8 @@ TETHER_INLINE Regime solve_block(const LocalBlock& block, const double* b, doubl
   TETHER_GROUP_KERNELS(L, Lanes)                                                                   \
   TETHER_ASSEMBLED_KERNELS(plain, Plain<L>)                                                        \
   constexpr LawKernels all_kernels(const LawKernels* replacement, const AssembledKernels* mixed) { \
-    return {L::kLaw,      L::kName,         L::kFriction, solve,                                   \
-            L::gamma,     L::natural_point, plain,        {body_sweep, body_test},                 \
-            {group_pass}, replacement,      mixed};                                                \
+    return {L::kLaw,      L::kName,    L::kFriction,                                               \
+            solve,        L::gamma,    L::natural_point,                                           \
+            L::tangent,   plain,       {body_sweep, body_test},                                    \
+            {group_pass}, replacement, mixed};                                                     \
   }

@@ -36,6 +36,8 @@ class BlockLu {
 
   /// Solves in place; vector indexed by block row, inactive entries untouched.
   void solve(PackedVector* x);
+  /// The same with the transposed matrix.
+  void solve_transposed(PackedVector* x);
 
  private:
   int n_ = 0, row_ = 0;

@@ -1,0 +1,298 @@
+// Tether: implicit differentiation of a solution: its equations. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "derivative/solution_derivative.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "problem/refuse.hpp"
+
+namespace tether::contact::detail {
+
+SolutionDerivative::SolutionDerivative(const Problem& problem, Law law,
+                                       const linalg::VectorView& impulses,
+                                       const DerivativeOptions& options)
+    : problem_(problem), impulses_(impulses) {
+  require(options.tolerance > 0 && std::isfinite(options.tolerance), "tolerance", options.tolerance,
+          "must be finite and > 0");
+  require(options.kink >= 0 && std::isfinite(options.kink), "kink", options.kink,
+          "must be finite and >= 0");
+  require(options.rank_tolerance > 0 && options.rank_tolerance < 1, "rank_tolerance",
+          options.rank_tolerance, "must lie between 0 and 1");
+  x_ = problem_.pack(impulses);
+  require_finite("impulses", impulses);
+  system_.reset(problem_, law);
+  for (int i : options.replaced) {
+    require(i >= 0 && i < problem_.contacts(), "replaced contact", i, "must be one of the problem");
+    if (system_.law().replacement == nullptr)
+      refuse("replaced contact", i,
+             (std::string("the law ") + name(law) + " has no replacement").c_str());
+    system_.replace(i);
+  }
+  own_x_ = x_;
+  system_.to_own_units(own_x_.data());
+  accept(options);
+  own_w_.resize(own_x_.size());
+  system_.exact_velocities(own_x_.data(), own_w_.data());
+  linearise(options);
+  collect_islands();
+  for (auto& island : islands_) {
+    assemble(*island);
+    island->factor(std::max(options.rank_tolerance, slides(*island) ? report_.error : 0.0));
+  }
+  judge_rank();
+  advise();
+}
+
+void SolutionDerivative::accept(const DerivativeOptions& options) {
+  report_.error =
+      system_.measure({0, system_.judged_fixed_point(own_x_.data()), 0, 0}, Measure::fixed_point);
+  if (report_.error <= options.tolerance) return;
+  char wanted[96];
+  std::snprintf(wanted, sizeof wanted, "must be at most DerivativeOptions::tolerance = %g",
+                options.tolerance);
+  refuse(std::string("error of the impulses (Residuals::fixed_point) under the law ") +
+             system_.law().name,
+         report_.error, wanted);
+}
+
+void SolutionDerivative::linearise(const DerivativeOptions& options) {
+  const int n = problem_.contacts();
+  const double kink = std::max(options.kink, 10 * report_.error);
+  place_.assign(at(n), -1);
+  for (int i = 0; i < n; ++i) {
+    LawTangent t;
+    system_.tangent(i, own_x_[at(i)], own_w_[at(i)], t);
+    report_.regimes.push_back(t.regime);
+    const double margin = t.margin * system_.inverse_scale(i);
+    if (!(margin > kink)) report_.kinks.push_back({i, t.regime, t.other, margin});
+    if (t.regime == Regime::separating) continue;
+    place_[at(i)] = static_cast<int>(relations_.size());
+    Relation& to = relations_.emplace_back();
+    const double weight = system_.weight(i);
+    for (int r = 0; r < 3; ++r) {
+      double square = 0;
+      for (int c = 0; c < 3; ++c) {
+        to.P[r][c] = t.P[r][c] / weight;
+        to.Q[r][c] = t.Q[r][c] * weight;
+        square += to.P[r][c] * to.P[r][c] + to.Q[r][c] * to.Q[r][c];
+      }
+      const double f = square > 0 ? 1 / std::sqrt(square) : 0;
+      for (int c = 0; c < 3; ++c) {
+        to.P[r][c] *= f;
+        to.Q[r][c] *= f;
+      }
+      to.friction[r] = t.friction[r] * f;
+      for (int c = 0; c < 2; ++c) to.coupling[r][c] = t.coupling[r][c] * f;
+    }
+  }
+  report_.strictly_regular = report_.kinks.empty();
+}
+
+// Touching contacts that blocks of A connect.
+void SolutionDerivative::collect_islands() {
+  const Problem& p = system_.problem();
+  std::vector<int> local(at(p.contacts()), -1);
+  for (int seed = 0; seed < p.contacts(); ++seed) {
+    if (place_[at(seed)] < 0 || local[at(seed)] >= 0) continue;
+    auto island = std::make_unique<IslandEquations>();
+    const auto reach = [&](int i) {
+      if (place_[at(i)] < 0 || local[at(i)] >= 0) return;
+      local[at(i)] = 0;
+      island->contacts.push_back(i);
+    };
+    reach(seed);
+    for (std::size_t next = 0; next < island->contacts.size(); ++next) {
+      const int i = island->contacts[next];
+      for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k)
+        reach(p.columns()[at(k)]);
+    }
+    std::sort(island->contacts.begin(), island->contacts.end());
+    for (int i = 0; i < island->size(); ++i) local[at(island->contacts[at(i)])] = i;
+    for (int i : island->contacts) {
+      for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+        const int j = p.columns()[at(k)];
+        if (place_[at(j)] >= 0) island->columns.push_back(local[at(j)]);
+      }
+      island->starts.push_back(static_cast<int>(island->columns.size()));
+    }
+    islands_.push_back(std::move(island));
+  }
+}
+
+// M_ij = P_i delta_ij + Q_i A_ij, A scaled to unit traces.
+void SolutionDerivative::assemble(IslandEquations& island) const {
+  const Problem& p = system_.problem();
+  island.blocks.assign(island.columns.size(), PackedBlock());
+  for (int row = 0; row < island.size(); ++row) {
+    const int i = island.contacts[at(row)];
+    const Relation& R = relations_[at(place_[at(i)])];
+    int from = p.row_start()[at(i)];
+    for (int k = island.starts[at(row)]; k < island.starts[at(row + 1)]; ++k) {
+      const int j = island.contacts[at(island.columns[at(k)])];
+      while (p.columns()[at(from)] != j) ++from;
+      const double* A = p.blocks()[at(from)].column;
+      const double scale = 1 / (system_.weight(i) * system_.weight(j));
+      double* M = island.blocks[at(k)].column;
+      for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) {
+          double sum = i == j ? R.P[r][c] : 0;
+          for (int m = 0; m < 3; ++m) sum += R.Q[r][m] * (scale * A[4 * c + m]);
+          M[4 * c + r] = sum;
+        }
+    }
+  }
+}
+
+// The equations of contacts that slide are as exact as the impulses are.
+bool SolutionDerivative::slides(const IslandEquations& island) const {
+  return std::any_of(island.contacts.begin(), island.contacts.end(), [&](int i) {
+    return report_.regimes[at(i)] == Regime::sliding && system_.friction(i) > 0;
+  });
+}
+
+// A direction that the equations do not see says which impulses are not determined, and by A of it
+// whether velocities are.
+void SolutionDerivative::judge_rank() {
+  constexpr double kSeen = 1e-6;
+  const int d = problem_.dimension(), n = problem_.contacts();
+  Packed y(at(n)), moved(at(n));
+  double largest = 0;
+  report_.unknowns = d * static_cast<int>(relations_.size());
+  report_.rank = report_.unknowns;
+  for (const auto& island : islands_) {
+    report_.rank -= island->deficiency;
+    if (island->free.empty()) continue;
+    double most = 0;
+    for (const PackedVector& v : island->free)
+      for (double c : v.v) most = std::max(most, std::abs(c));
+    for (int k = 0; k < island->size(); ++k) {
+      const int i = island->contacts[at(k)];
+      for (int c = 0; c < 3; ++c) {
+        const double part = most > 0 ? island->free[at(k)].v[c] / most : 0;
+        y[at(i)].v[c] = part / system_.weight(i);
+        if (std::abs(part) > kSeen &&
+            (report_.not_unique.empty() || report_.not_unique.back() != i))
+          report_.not_unique.push_back(i);
+      }
+    }
+  }
+  if (report_.rank == report_.unknowns) return;
+  std::sort(report_.not_unique.begin(), report_.not_unique.end());
+  report_.status = DerivativeStatus::minimum_norm;
+  const Problem& p = system_.problem();
+  for (int i = 0; i < n; ++i)
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      const double *A = p.blocks()[at(k)].column, *v = y[at(p.columns()[at(k)])].v;
+      for (int r = 0; r < 3; ++r)
+        moved[at(i)].v[r] += A[r] * v[0] + A[4 + r] * v[1] + A[8 + r] * v[2];
+    }
+  for (int i = 0; i < n; ++i)
+    for (double v : moved[at(i)].v) largest = std::max(largest, std::abs(v) / system_.weight(i));
+  report_.velocities_unique = largest <= kSeen;
+}
+
+void SolutionDerivative::advise() {
+  const auto add = [&](const std::string& sentence) {
+    report_.advice += (report_.advice.empty() ? "" : " ") + sentence;
+  };
+  if (!report_.strictly_regular)
+    add(std::to_string(report_.kinks.size()) +
+        " contacts lie at kinks: the derivative is that of the branch in `regimes`; beyond, "
+        "another "
+        "one holds.");
+  if (report_.status == DerivativeStatus::minimum_norm)
+    add("Impulses are not unique (" + std::to_string(report_.unknowns - report_.rank) +
+        " free directions): the least change is given; " +
+        (report_.velocities_unique ? "velocities are determined."
+                                   : "velocities are not determined either."));
+}
+
+SolutionChange SolutionDerivative::forward(const DataChange& change) const {
+  const Problem& p = system_.problem();
+  const int n = problem_.contacts();
+  SolutionChange out{Packed(at(n)), Packed(at(n)), 0};
+  Packed shift(at(n));  // in the units of system_
+  for (int i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c)
+      shift[at(i)].v[c] = std::ldexp(change.shift[at(i)].v[c], -system_.velocity_unit(i));
+  double left = 0, whole = 0;
+  for (const auto& island : islands_) {
+    Packed y(island->contacts.size()), product(y.size());
+    for (int k = 0; k < island->size(); ++k) {
+      const int i = island->contacts[at(k)];
+      const Relation& R = relations_[at(place_[at(i)])];
+      for (int r = 0; r < 3; ++r) {
+        double sum = R.friction[r] * change.mu[at(i)];
+        for (int c = 0; c < 2; ++c) sum += R.coupling[r][c] * change.gamma[at(i)][at(c)];
+        for (int c = 0; c < 3; ++c) sum += R.Q[r][c] * shift[at(i)].v[c] / system_.weight(i);
+        y[at(k)].v[r] = -sum;
+      }
+    }
+    const Packed right = y;
+    island->factors->solve(y.data());
+    island->multiply(y.data(), product.data());
+    for (int k = 0; k < island->size(); ++k) {
+      const int i = island->contacts[at(k)];
+      for (int c = 0; c < 3; ++c) {
+        const double r = right[at(k)].v[c], d = product[at(k)].v[c] - r;
+        left += d * d;
+        whole += r * r;
+        out.x[at(i)].v[c] = y[at(k)].v[c] / system_.weight(i);
+      }
+    }
+  }
+  out.residual = whole > 0 ? std::sqrt(left / whole) : 0;
+  for (int i = 0; i < n; ++i) {
+    PackedVector w = shift[at(i)];
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      const double *A = p.blocks()[at(k)].column, *v = out.x[at(p.columns()[at(k)])].v;
+      for (int r = 0; r < 3; ++r) w.v[r] += A[r] * v[0] + A[4 + r] * v[1] + A[8 + r] * v[2];
+    }
+    for (int c = 0; c < 3; ++c) out.w[at(i)].v[c] = std::ldexp(w.v[c], system_.velocity_unit(i));
+  }
+  system_.to_given_units(out.x.data());
+  return out;
+}
+
+DataChange SolutionDerivative::adjoint(const SolutionChange& rows) const {
+  const Problem& p = system_.problem();
+  const int n = problem_.contacts();
+  DataChange out(at(n));
+  Packed x(at(n));  // gradient with respect to x, the part by way of w included
+  for (int i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c) {
+      x[at(i)].v[c] = std::ldexp(rows.x[at(i)].v[c], system_.impulse_unit(i));
+      out.shift[at(i)].v[c] = std::ldexp(rows.w[at(i)].v[c], system_.velocity_unit(i));
+    }
+  for (int i = 0; i < n; ++i)
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      const double *A = p.blocks()[at(k)].column, *w = out.shift[at(i)].v;
+      double* to = x[at(p.columns()[at(k)])].v;
+      for (int c = 0; c < 3; ++c)
+        to[c] += A[4 * c] * w[0] + A[4 * c + 1] * w[1] + A[4 * c + 2] * w[2];
+    }
+  for (const auto& island : islands_) {
+    Packed y(island->contacts.size());
+    for (int k = 0; k < island->size(); ++k) {
+      const int i = island->contacts[at(k)];
+      for (int c = 0; c < 3; ++c) y[at(k)].v[c] = x[at(i)].v[c] / system_.weight(i);
+    }
+    island->factors->solve_transposed(y.data());
+    for (int k = 0; k < island->size(); ++k) {
+      const int i = island->contacts[at(k)];
+      const Relation& R = relations_[at(place_[at(i)])];
+      for (int r = 0; r < 3; ++r) {
+        const double v = y[at(k)].v[r];
+        out.mu[at(i)] -= R.friction[r] * v;
+        for (int c = 0; c < 2; ++c) out.gamma[at(i)][at(c)] -= R.coupling[r][c] * v;
+        for (int c = 0; c < 3; ++c) out.shift[at(i)].v[c] -= R.Q[r][c] * v / system_.weight(i);
+      }
+    }
+  }
+  for (int i = 0; i < n; ++i)
+    for (double& v : out.shift[at(i)].v) v = std::ldexp(v, -system_.velocity_unit(i));
+  return out;
+}
+
+}  // namespace tether::contact::detail
