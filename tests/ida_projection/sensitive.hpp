@@ -64,11 +64,11 @@ class Sensitive {
     }
   }
 
-  /// IDASensInit, staggered.
-  void begin(bool error_control) {
+  /// IDASensInit, staggered; null: IDAS' residuals by differences.
+  void begin(bool error_control, IDASensResFn residuals_of_s = residuals) {
     current() = this;
     const int count = static_cast<int>(p.size());
-    if (IDASensInit(host_.ida, count, IDA_STAGGERED, residuals, s.data(), sp.data()) != 0)
+    if (IDASensInit(host_.ida, count, IDA_STAGGERED, residuals_of_s, s.data(), sp.data()) != 0)
       throw std::runtime_error("IDASensInit");
     scales = p;
     IDASetSensParams(host_.ida, p.data(), scales.data(), nullptr);

@@ -534,3 +534,182 @@ TEST_CASE("projected sensitivities: what cannot be is refused by name") {
   CHECK(run.run() < 0);
   CHECK(contains(run.host().projection().message(), "count = 3, but IDASensInit was given 2"));
 }
+
+namespace {
+
+/// n point masses on massless rods, released straight and level, index 1; p = (length of each rod,
+/// gravity, mass of the last one; the others have mass 1). `unit`: of lengths.
+Parametric chain_of(int n, double unit = 1.0) {
+  Parametric made;
+  const auto N = static_cast<std::size_t>(n);
+  made.size = 5 * n;
+  made.rows = 2 * n + 1;
+  made.p = {unit, 9.8 * unit, 1.7};
+  made.y0.assign(5 * N, 0.0);
+  made.yp0 = made.id = made.y0;
+  made.s0.assign(3, made.y0);
+  made.sp0 = made.s0;
+  for (std::size_t i = 0; i < N; ++i) {
+    made.y0[2 * i] = static_cast<double>(i + 1) * unit;
+    made.s0[0][2 * i] = static_cast<double>(i + 1);
+    made.yp0[2 * N + 2 * i + 1] = -made.p[1];
+    made.sp0[1][2 * N + 2 * i + 1] = -1.0;
+  }
+  std::fill(made.id.begin(), made.id.end() - n, 1.0);
+  const auto accelerations = [n](const Complex* y, const Complex* p, Complex* a) {
+    const Complex* l = y + 4 * n;
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < 2; ++c) {
+        const Complex rod = y[2 * i + c] - (i > 0 ? y[2 * i - 2 + c] : 0.0);
+        Complex force = -l[i] * rod;
+        if (i + 1 < n) force += l[i + 1] * (y[2 * i + 2 + c] - y[2 * i + c]);
+        a[2 * i + c] = force / (i + 1 < n ? 1.0 : p[2]) - (c == 1 ? p[1] : 0.0);
+      }
+  };
+  made.F = [n, accelerations](const Complex* y, const Complex* yp, const Complex* p, Complex* r) {
+    std::vector<Complex> a(static_cast<std::size_t>(2 * n));
+    accelerations(y, p, a.data());
+    const Complex* v = y + 2 * n;
+    for (int j = 0; j < 2 * n; ++j) {
+      r[j] = yp[j] - v[j];
+      r[2 * n + j] = yp[2 * n + j] - a[static_cast<std::size_t>(j)];
+    }
+    for (int i = 0; i < n; ++i) {
+      r[4 * n + i] = 0.0;
+      for (int c = 0; c < 2; ++c) {
+        const int j = 2 * i + c;
+        const auto before = [&](const Complex* x) { return i > 0 ? x[j - 2] : Complex(0.0); };
+        r[4 * n + i] += (v[j] - before(v)) * (v[j] - before(v)) +
+                        (y[j] - before(y)) * (a[static_cast<std::size_t>(j)] - before(a.data()));
+      }
+    }
+  };
+  made.g = [n](const Complex* y, const Complex* p, Complex* g) {
+    const Complex* v = y + 2 * n;
+    g[2 * n] = 0.0;
+    for (int i = 0; i < n; ++i) {
+      g[i] = -0.5 * p[0] * p[0];
+      g[n + i] = 0.0;
+      for (int c = 0; c < 2; ++c) {
+        const int j = 2 * i + c;
+        const Complex rod = y[j] - (i > 0 ? y[j - 2] : 0.0), rate = v[j] - (i > 0 ? v[j - 2] : 0.0);
+        g[i] += 0.5 * rod * rod;
+        g[n + i] += rod * rate;
+        g[2 * n] += 0.5 * (i + 1 < n ? 1.0 : p[2]) * v[j] * v[j];
+      }
+      g[2 * n] += (i + 1 < n ? 1.0 : p[2]) * p[1] * y[2 * i + 1];
+    }
+  };
+  return made;
+}
+
+/// dy/dp by central differences of tight projected runs, extrapolated once.
+template <class Make>
+std::vector<std::vector<double>> differences(Make make, double t, double tol) {
+  const auto end = [&](std::size_t k, double factor) {
+    Parametric model = make();
+    const double change = model.p[k] * factor;
+    for (std::size_t j = 0; j < model.y0.size(); ++j) {
+      model.y0[j] += change * model.s0[k][j];
+      model.yp0[j] += change * model.sp0[k][j];
+    }
+    model.p[k] += change;
+    Sensitive run(model, tol, t);
+    run.attach();
+    if (run.host().finish() < 0) throw std::runtime_error("reference");
+    return run.host().state();
+  };
+  const Parametric model = make();
+  std::vector<std::vector<double>> s(model.p.size());
+  for (std::size_t k = 0; k < s.size(); ++k) {
+    const double d = 2e-3;
+    const std::vector<double> a = end(k, d), b = end(k, -d), c = end(k, 2 * d), e = end(k, -2 * d);
+    for (std::size_t j = 0; j < a.size(); ++j)
+      s[k].push_back((8.0 * (a[j] - b[j]) - (c[j] - e[j])) / (12.0 * d * model.p[k]));
+  }
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("projected sensitivities: a double pendulum against differences of tight runs") {
+  for (const double unit : {1.0, 1e-3}) {
+    const auto make = [unit] { return chain_of(2, unit); };
+    const auto exact = differences(make, 1.2, 1e-12 * std::min(1.0, unit));
+    const Outcome run =
+        outcome(make(), Part::both, 1e-10 * std::min(1.0, unit), 1.2, true, exact, 8);
+    CHECK(run.error < 1e-6);
+    CHECK(run.drift < 1e-10 * unit);
+  }
+}
+
+TEST_CASE("projected sensitivities: a chain of 20 rods, dense and sparse rows") {
+  const auto make = [] { return chain_of(20); };
+  const auto exact = differences(make, 0.5, 1e-10);
+  const Outcome plain = outcome(make(), Part::plain, 1e-6, 0.5, true, exact, 80);
+  for (const auto kind : {Sensitive::Rows::dense, Sensitive::Rows::sparse}) {
+    const Outcome both = outcome(make(), Part::both, 1e-6, 0.5, true, exact, 80, kind);
+    REQUIRE(both.flag >= 0);
+    CHECK(both.drift < 1e-11);
+    CHECK(plain.drift > 1e-5);
+    CHECK(both.error < 4e-6);
+    CHECK(both.steps < 0.6 * plain.steps);
+  }
+}
+
+TEST_CASE("projected sensitivities: rows on algebraic variables that F determines") {
+  // x' = -w y, y' = w x from (R, 0), u = x^2, and the row u + y^2 = R^2.
+  const double w = 1.4, R = 0.8, t = 12.0;
+  Parametric model;
+  model.size = 3;
+  model.rows = 1;
+  model.p = {w, R};
+  model.y0 = {R, 0.0, R * R};
+  model.yp0 = {0.0, w * R, 0.0};
+  model.id = {1.0, 1.0, 0.0};
+  model.s0 = {{0.0, 0.0, 0.0}, {1.0, 0.0, 2.0 * R}};
+  model.sp0 = {{0.0, R, 0.0}, {0.0, w, 0.0}};
+  model.F = [](const Complex* y, const Complex* yp, const Complex* p, Complex* r) {
+    r[0] = yp[0] + p[0] * y[1];
+    r[1] = yp[1] - p[0] * y[0];
+    r[2] = y[2] - y[0] * y[0];
+  };
+  model.g = [](const Complex* y, const Complex* p, Complex* g) {
+    g[0] = y[2] + y[1] * y[1] - p[1] * p[1];
+  };
+  const double c = std::cos(w * t), s = std::sin(w * t);
+  const std::vector<std::vector<double>> exact = {{-R * t * s, R * t * c, -2.0 * R * R * t * s * c},
+                                                  {c, s, 2.0 * R * c * c}};
+  const Outcome plain = outcome(model, Part::plain, 1e-7, t, true, exact, 3);
+  for (const bool by_differences : {false, true}) {
+    Sensitive run(model, 1e-7, t);
+    run.attach();
+    run.begin(true);
+    if (by_differences)
+      tp::project_sensitivities(run.host().projection(), run.by_differences());
+    else
+      run.project();
+    REQUIRE(run.run() >= 0);
+    CHECK(run.host().projection().statistics().sensitivity_projections > 100);
+    CHECK(run.drift < 1e-12);
+    CHECK(run.error(exact, 3) < 1e-6);
+    CHECK(run.host().steps() < 0.7 * plain.steps);
+  }
+}
+
+TEST_CASE("projected sensitivities: IDAS' own residuals by differences") {
+  const auto exact = pendulum_derivatives(1.3, 9.8, 5.0);
+  double errors[2], drifts[2];
+  for (const bool projected : {false, true}) {
+    Sensitive run(pendulum_of(1), 1e-6, 5.0);
+    // Its residual reads p where IDAS changes it.
+    if (projected) run.attach();
+    run.begin(true, nullptr);
+    if (projected) run.project();
+    REQUIRE(run.run() >= 0);
+    errors[projected] = run.error(exact, 4);
+    drifts[projected] = run.drift;
+  }
+  CHECK(errors[1] < 0.1 * errors[0]);
+  CHECK(drifts[1] < 1e-11);
+}

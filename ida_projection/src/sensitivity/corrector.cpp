@@ -15,7 +15,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kOnTangent = 1e-8;  // tolerances; a shorter move is not worth making
-constexpr int kFewRows = 16;         // factors for each sensitivity
+constexpr int kFewRows = 64;         // factors for each sensitivity
 
 [[noreturn]] void refuse(const std::string& text) {
   throw std::invalid_argument("project_sensitivities: " + text);
@@ -218,8 +218,7 @@ Status SensitivityCorrector::factor(const Candidate& candidate, int k, bool firs
   return status;
 }
 
-// dg/dp_k for the rows of the caller. Equations of F that are moved with them hold for what IDAS'
-// corrector has found: their right-hand side is what keeps them there.
+// dg/dp_k for the rows of the caller.
 Status SensitivityCorrector::derivative(int k, double t, N_Vector y) {
   std::vector<double>& terms = row_terms_[static_cast<std::size_t>(k)];
   const auto own = static_cast<std::size_t>(state_.constraints.total_count());
@@ -228,11 +227,15 @@ Status SensitivityCorrector::derivative(int k, double t, N_Vector y) {
       terms);
   if (status != Status::success)
     message_ = g_p_.message().empty() ? rows_->message() : g_p_.message();
-  if (own == terms.size()) return status;
-  if (status != Status::success) return status;
-  const Status known = product(s_);
-  for (std::size_t i = own; i < terms.size(); ++i) terms[i] = -r_[i];
-  return known;
+  return status;
+}
+
+// Equations of F that are moved with the rows hold, as far as they are solved, for what Newton's
+// iteration has just found: r_ = 0 there.
+void SensitivityCorrector::add_terms(int k) {
+  const std::vector<double>& terms = row_terms_[static_cast<std::size_t>(k)];
+  const auto own = static_cast<std::size_t>(state_.constraints.total_count());
+  for (std::size_t i = 0; i < r_.size(); ++i) r_[i] = i < own ? r_[i] + terms[i] : 0.0;
 }
 
 // r_ = C s.
@@ -257,7 +260,7 @@ Status SensitivityCorrector::find_moves(const Candidate& candidate, double t, bo
     Status status = factor(candidate, k, first);
     if (status == Status::success) status = product(s_);
     if (status != Status::success) return status;
-    for (std::size_t row = 0; row < r_.size(); ++row) r_[row] += row_terms_[i][row];
+    add_terms(k);
     rows_->solve(r_, ds_[i]);
     const double length = N_VWrmsNorm(ds_[i], vectors_of(candidate.weights)[k]);
     if (!std::isfinite(length)) {

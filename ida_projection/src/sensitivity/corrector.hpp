@@ -86,6 +86,7 @@ class SensitivityCorrector {
   void apply(const Candidate& candidate);
   Status product(N_Vector s);
   Status derivative(int k, double t, N_Vector y);
+  void add_terms(int k);
   int finish(Status status, const std::string& text);
 
   State state_;
