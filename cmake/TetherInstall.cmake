@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # Components: linalg (with the package files that all need), ida_projection, reverse_ida (on it),
-# contact, contact_io and contact_collision (on contact), scene (on all of these but reverse_ida and
-# contact_io). Each library builds alone
+# contact, contact_io, contact_collision and contact_mpi (on contact), scene (on all of these but
+# reverse_ida, contact_io and contact_mpi). Each library builds alone
 # (TETHER_BUILD_*) and installs alone on top of those that it stands on:
 #
 #   cmake --install build --component linalg
@@ -53,7 +53,7 @@ set(tether_has_hdf5 FALSE)
 if(TARGET tether::hdf5)
   set(tether_has_hdf5 TRUE)
 endif()
-foreach(library IN ITEMS contact_io contact_collision)
+foreach(library IN ITEMS contact_io contact_collision contact_mpi)
   if(TARGET tether_${library})
     tether_components(${library})
     install(FILES ${CMAKE_CURRENT_LIST_DIR}/TetherExternal.cmake
@@ -152,6 +152,18 @@ tether_pkg_config(contact_io "Contact problems in files" "tether-contact = ${PRO
   LIBS ${hdf5_libs})
 tether_pkg_config(contact_collision "Collision of polyhedra" "tether-contact = ${PROJECT_VERSION}"
   LIBS ${bullet_libs})
+if(TARGET tether_contact_mpi)
+  get_target_property(mpi_include MPI::MPI_CXX INTERFACE_INCLUDE_DIRECTORIES)
+  get_target_property(mpi_libs MPI::MPI_CXX INTERFACE_LINK_LIBRARIES)
+  list(TRANSFORM mpi_include PREPEND "-I")
+  set(zoltan_libs "")
+  if(NOT BUILD_SHARED_LIBS)
+    get_target_property(zoltan_libs tether::zoltan INTERFACE_LINK_LIBRARIES)
+    list(FILTER zoltan_libs EXCLUDE REGEX "::")
+  endif()
+  tether_pkg_config(contact_mpi "Contacts of bodies over MPI ranks" "tether-contact = ${PROJECT_VERSION}"
+    CFLAGS ${mpi_include} LIBS ${zoltan_libs} ${mpi_libs})
+endif()
 set(scene_requires "tether-ida-projection = ${PROJECT_VERSION}, tether-contact = ${PROJECT_VERSION}")
 if(TARGET tether_contact_collision)
   string(APPEND scene_requires ", tether-contact-collision = ${PROJECT_VERSION}")

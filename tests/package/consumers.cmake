@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 enable_testing()
 
-foreach(library IN ITEMS linalg contact contact_io contact_collision scene)
+foreach(library IN ITEMS linalg contact contact_io contact_collision contact_mpi scene)
   if(TARGET tether::${library})
     add_executable(use_${library} ${CMAKE_CURRENT_LIST_DIR}/${library}.cpp)
     target_link_libraries(use_${library} PRIVATE tether::${library})

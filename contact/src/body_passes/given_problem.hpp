@@ -1,6 +1,7 @@
 // Tether: bodies and contacts as the caller gives them. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <tether/contact/body_solver.hpp>
 #include <vector>
 
@@ -9,6 +10,21 @@
 #include "problem/contact_side.hpp"
 
 namespace tether::contact::detail {
+
+// What the kind of its contacts asks of a body: a sum of these.
+constexpr std::uint8_t kMoves = 1, kIsotropic = 2, kNeverTurns = 4;
+std::uint8_t body_traits(const RigidBody& body);
+
+// The bodies of a contact that move, the first one always, `second` is -1 if the other one does
+// not; exchanged: the caller's second body is `first`. traits: of each body.
+struct MovingPair {
+  int first, second;
+  bool exchanged;
+  Kind kind;  // general, sphere or smooth
+};
+// `first` is -1 if both bodies are fixed. friction: the law has any.
+MovingPair moving_pair(const PointContact& contact, const std::vector<std::uint8_t>& traits,
+                       bool friction);
 
 // The caller's lists, checked, each contact seen from a body that moves, and sorted by how much of
 // a friction problem it is. Keeps its storage between solves.
@@ -51,15 +67,14 @@ class GivenProblem {
  private:
   void read_bodies();
   void read_contacts(Law law);
-  bool arm_is_normal(int body, const Vector3d& r, const Vector3d& normal) const;
 
   const std::vector<RigidBody>* bodies_ = nullptr;
   const std::vector<PointContact>* contacts_ = nullptr;
   std::vector<int> first_, second_;
   std::vector<Kind> kind_;
   std::vector<char> exchanged_;
-  std::vector<char> body_kind_;  // bits kMoves, kIsotropic
-  std::vector<int> fixed_slot_;  // body -> place in fixed_; 0: at rest, as the world
+  std::vector<std::uint8_t> traits_;  // of each body
+  std::vector<int> fixed_slot_;       // body -> place in fixed_; 0: at rest, as the world
   std::vector<BodyState> fixed_;
 };
 

@@ -49,16 +49,26 @@ int IslandSweeps::cut(int begin, int end, int k, int parts) const {
 }
 
 // operation(chunk) for all chunks of the island, colour by colour; what it returns together, in
-// an order that no thread count changes.
+// an order that no number of threads or processes changes.
 template <class Operation>
-PassResult IslandSweeps::pass(const Island& island, Team& team, const Operation& operation) {
+PassResult IslandSweeps::pass(const Island& island, Team& team, Pass kind,
+                              const Operation& operation) {
   std::vector<PassResult>& sums = sums_[++team.passes & 1];
+  SweepPartners* partners = kind == Pass::local ? nullptr : team.partners;
+  if (partners && kind == Pass::reads_bodies && !partners->relaxed())
+    team.once([&] { partners->share(bodies_); });
   for (int k = island.colour_begin; k < island.colour_end; ++k) {
     const int first = graph_->colours[at(k)], last = graph_->colours[at(k + 1)];
     const int begin = cut(first, last, team.thread, team.threads);
     const int end = cut(first, last, team.thread + 1, team.threads);
     for (int c = begin; c < end; ++c) sums[at(c)] = operation(c);
     team.meet();
+    if (partners && kind == Pass::moves_bodies)
+      team.once([&] { partners->after_colour(k, bodies_); });
+  }
+  if (partners) {
+    team.once([&] { total_ = partners->total(sums); });
+    return total_;
   }
   PassResult sum;
   for (int c = island.chunk_begin; c < island.chunk_end; ++c) sum.add(sums[at(c)]);
@@ -80,7 +90,7 @@ PassResult IslandSweeps::over_kinds(int chunk, const Team& team, const Operation
 }
 
 PassResult IslandSweeps::sweep(const Island& island, Team& team) {
-  return pass(island, team, [&](int chunk) {
+  return pass(island, team, Pass::moves_bodies, [&](int chunk) {
     return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end, Coupled) {
       return detail::sweep(s, law_, begin, end);
     });
@@ -88,7 +98,7 @@ PassResult IslandSweeps::sweep(const Island& island, Team& team) {
 }
 
 PassResult IslandSweeps::test(const Island& island, Team& team) {
-  return pass(island, team, [&](int chunk) {
+  return pass(island, team, Pass::reads_bodies, [&](int chunk) {
     return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end, Coupled c) {
       return detail::test(s, law_, begin, end, c);
     });
@@ -100,6 +110,8 @@ void IslandSweeps::load(const Island& island, const Team& team) {
   const int begin = island.body_begin, end = island.body_end;
   for (int s = team.from(begin, end); s < team.to(begin, end); ++s)
     bodies_.load(s, given_->bodies()[at(graph_->body[at(s)])]);
+  if (team.partners && team.partners->relaxed())
+    bodies_.keep(team.from(begin, end), team.to(begin, end));
 }
 
 // Returns |b|^2, the needed change and the speeds of which b is the difference.
@@ -127,7 +139,7 @@ PassResult IslandSweeps::pack_contact(int contact, Kind k, int place, const Vect
 
 PassResult IslandSweeps::pack(const Island& island, Team& team,
                               const std::vector<const Vector3d*>& start) {
-  return pass(island, team, [&](int chunk) {
+  return pass(island, team, Pass::moves_bodies, [&](int chunk) {
     PassResult sum;
     in_chunk(chunk, [&](int contact, Kind k, int place) {
       try {
@@ -162,8 +174,23 @@ void IslandSweeps::extrapolate(const Island& island, const Team& team, double be
   team.meet();
 }
 
+void IslandSweeps::combine(const Island& island, const Team& team, bool start) {
+  const double part = start ? 1 : team.partners->relaxation();
+  const int begin = team.from(island.body_begin, island.body_end);
+  const int end = team.to(island.body_begin, island.body_end);
+  team.once([&] { team.partners->collect(bodies_); });
+  const int last = team.to(island.chunk_begin, island.chunk_end);
+  for (int chunk = team.from(island.chunk_begin, island.chunk_end); chunk < last; ++chunk)
+    contacts_.relax(graph_->chunks[at(chunk)], graph_->chunks[at(chunk + 1)], start ? 0 : part);
+  if (!start) bodies_.relax(begin, end, part);
+  team.meet();
+  team.once([&] { team.partners->share(bodies_); });
+  bodies_.keep(begin, end);
+  team.meet();
+}
+
 void IslandSweeps::rest(const Island& island, Team& team) {
-  pass(island, team, [&](int chunk) {
+  pass(island, team, Pass::local, [&](int chunk) {
     in_chunk(chunk,
              [&](int, Kind k, int place) { contacts_.set_impulse(k, place, Vector3d::Zero()); });
     return PassResult();
@@ -184,7 +211,7 @@ void IslandSweeps::unpack_contact(int contact, Kind k, int place, BodySolution& 
 }
 
 void IslandSweeps::unpack(const Island& island, Team& team, BodySolution& out) {
-  pass(island, team, [&](int chunk) {
+  pass(island, team, Pass::local, [&](int chunk) {
     in_chunk(chunk,
              [&](int contact, Kind k, int place) { unpack_contact(contact, k, place, out); });
     return PassResult();

@@ -7,6 +7,7 @@
 #include "body_passes/given_problem.hpp"
 #include "body_passes/moving_bodies.hpp"
 #include "body_passes/packed_contacts.hpp"
+#include "body_passes/sweep_partners.hpp"
 #include "body_passes/team.hpp"
 #include "graph/contact_graph.hpp"
 
@@ -45,6 +46,9 @@ class IslandSweeps {
   // x <- x + beta (x - previous x), and the same for the velocities, which follow x linearly.
   // Previous: at the last call.
   void extrapolate(const Island& island, const Team& team, double beta);
+  // Where partners sweep at once: what these and others have changed since the last call, relaxed.
+  // start: nothing has, but the impulses to start from.
+  void combine(const Island& island, const Team& team, bool start);
   // No impulses.
   void rest(const Island& island, Team& team);
   // Impulses, regimes and velocities to the caller.
@@ -57,6 +61,9 @@ class IslandSweeps {
   }
   // World axes, on the first moving body.
   Vector3d impulse(Kind k, int place) const { return contacts_.impulse(k, place); }
+  // As PackedContacts has it, without moving the bodies.
+  Eigen::Vector4d state(Kind k, int place) const { return contacts_.state(k, place); }
+  void set_state(Kind k, int place, const Eigen::Vector4d& s) { contacts_.set_state(k, place, s); }
   // In place of a zero impulse: moves the bodies.
   void add_impulse(int contact, Kind k, int place, const Vector3d& p);
   void set_velocity(int slot, const Vector3d& v, const Vector3d& w) {
@@ -70,8 +77,10 @@ class IslandSweeps {
  private:
   template <class Visit>
   void in_chunk(int chunk, const Visit& visit) const;
+  // What a pass does beside its sums.
+  enum class Pass { moves_bodies, reads_bodies, local };
   template <class Operation>
-  PassResult pass(const Island& island, Team& team, const Operation& operation);
+  PassResult pass(const Island& island, Team& team, Pass kind, const Operation& operation);
   template <class Operation>
   PassResult over_kinds(int chunk, const Team& team, const Operation& operation);
   int cut(int begin, int end, int k, int parts) const;
@@ -84,6 +93,7 @@ class IslandSweeps {
   PackedContacts contacts_;
   MovingBodies bodies_;
   std::vector<PassResult> sums_[2];  // of chunks, in turns: a thread may still read the last ones
+  PassResult total_;                 // of all processes
 };
 
 template <class Visit>

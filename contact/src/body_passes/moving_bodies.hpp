@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <tether/contact/body_solver.hpp>
 #include <vector>
 
@@ -46,6 +47,40 @@ class MovingBodies {
   void set_velocity(int slot, const Vector3d& v, const Vector3d& w) {
     store(v, state_[linalg::at(slot)].v);
     store(w, state_[linalg::at(slot)].w);
+  }
+  // Six numbers: velocity, angular velocity.
+  void get(int slot, double* six) const {
+    const BodyState& s = state_[linalg::at(slot)];
+    std::copy(s.v, s.v + 3, six);
+    std::copy(s.w, s.w + 3, six + 3);
+  }
+  void set(int slot, const double* six) {
+    BodyState& s = state_[linalg::at(slot)];
+    std::copy(six, six + 3, s.v);
+    std::copy(six + 3, six + 6, s.w);
+  }
+  // What has been added since keep().
+  void change(int slot, double* six) const {
+    get(slot, six);
+    for (int k = 0; k < 6; ++k) six[k] -= previous_[6 * linalg::at(slot) + linalg::at(k)];
+  }
+  void add(int slot, const double* six) {
+    double sum[6];
+    get(slot, sum);
+    for (int k = 0; k < 6; ++k) sum[k] += six[k];
+    set(slot, sum);
+  }
+  void keep(int begin, int end) {
+    for (int i = begin; i < end; ++i) get(i, previous_.data() + 6 * linalg::at(i));
+  }
+  // Of what has been added since keep(), this part.
+  void relax(int begin, int end, double part) {
+    for (int i = begin; i < end; ++i) {
+      double six[6], *previous = previous_.data() + 6 * linalg::at(i);
+      change(i, six);
+      for (int k = 0; k < 6; ++k) six[k] = previous[k] + part * six[k];
+      set(i, six);
+    }
   }
   void extrapolate(int begin, int end, double beta) {
     for (int i = begin; i < end; ++i) {

@@ -187,12 +187,49 @@ void PackedContacts::set_impulse(Kind k, int place, const Vector3d& p) {
   }
 }
 
+Eigen::Vector4d PackedContacts::state(Kind k, int place) const {
+  if (k == Kind::smooth) return {smooth_[at(place)].x, 0, 0, 0};
+  if (k == Kind::sphere || k == Kind::sphere4) return load(sphere(k, place).p).homogeneous();
+  const GeneralContact c = general(k, place);
+  return {c.x[0], c.x[1], c.x[2], c.lambda};
+}
+
+void PackedContacts::set_state(Kind k, int place, const Eigen::Vector4d& s) {
+  if (k == Kind::smooth) {
+    smooth_[at(place)].x = s[0];
+  } else if (k == Kind::sphere || k == Kind::sphere4) {
+    SphereContact c = sphere(k, place);
+    store(s.head<3>(), c.p);
+    put(c, k, place);
+  } else {
+    GeneralContact c = general(k, place);
+    store(s.head<3>(), c.x);
+    c.lambda = s[3];
+    put(c, k, place);
+  }
+}
+
 void PackedContacts::extrapolate(const Chunk& from, const Chunk& to, double beta) {
   double* previous = previous_.data() + 3 * at(from.place);
   for_kinds(from, to, [&](auto* begin, auto* end, int) {
     for (auto* entry = begin; entry < end; ++entry) {
       constexpr int n = kImpulses<std::remove_reference_t<decltype(*entry)>>;
       detail::extrapolate<n>(beta, impulses(*entry), previous);
+      previous += n;
+    }
+  });
+}
+
+void PackedContacts::relax(const Chunk& from, const Chunk& to, double part) {
+  double* previous = previous_.data() + 3 * at(from.place);
+  for_kinds(from, to, [&](auto* begin, auto* end, int) {
+    for (auto* entry = begin; entry < end; ++entry) {
+      double* x = impulses(*entry);
+      constexpr int n = kImpulses<std::remove_reference_t<decltype(*entry)>>;
+      for (int k = 0; k < n; ++k) {
+        if (part > 0) x[k] = previous[k] + part * (x[k] - previous[k]);
+        previous[k] = x[k];
+      }
       previous += n;
     }
   });

@@ -18,15 +18,24 @@ struct PassScratch {
   std::string reason;
 };
 
+class SweepPartners;
+
 // All threads, or one; each has a Team of its own that says which of them it is.
 struct Team {
   int thread, threads;
   Barrier* barrier;
   PassScratch* scratch;
-  int passes = 0;  // so far: the same number for each thread of a team
+  int passes = 0;                     // so far: the same number for each thread of a team
+  SweepPartners* partners = nullptr;  // other processes that sweep the same island
 
   void meet() const {
     if (threads > 1) barrier->wait();
+  }
+  // What the first thread does for all.
+  template <class Work>
+  void once(const Work& work) const {
+    if (thread == 0) work();
+    meet();
   }
   // This thread's part of begin .. end.
   int from(int begin, int end) const { return part(begin, end, thread); }

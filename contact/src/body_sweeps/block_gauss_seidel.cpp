@@ -30,10 +30,15 @@ void BodySolver::Implementation::save(const Island& island, Team& team) {
 detail::IslandResult BodySolver::Implementation::start(const Island& island, Team& team) {
   IslandResult r;
   const PassResult b = sweeps.pack(island, team, starts);
+  const bool at_once = team.partners && team.partners->relaxed();
+  if (at_once) sweeps.combine(island, team, true);
   r.inverse_scale = detail::inverse_scale(b.most, b.sum);
   r.floor = detail::round_off(b.speed);
   // b = 0: no impulses; those of the last solve are dropped.
-  if (b.sum == 0 && b.most == 0) sweeps.rest(island, team);
+  if (b.sum == 0 && b.most == 0) {
+    sweeps.rest(island, team);
+    if (at_once) sweeps.combine(island, team, true);
+  }
   return r;
 }
 
@@ -41,7 +46,10 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
 void BodySolver::Implementation::iterate(int k, Team& team) {
   const Island& island = graph.islands[at(k)];
   const bool permitted = island.contacts <= options.max_assembled;
-  detail::AssemblyPrice price(graph, island, given.first(), given.second());
+  const detail::WholeGraph whole =
+      team.partners ? partners->whole() : detail::WholeGraph{graph, given.first(), given.second()};
+  detail::AssemblyPrice price(whole.graph, whole.graph.islands[at(k)], whole.first, whole.second);
+  const bool at_once = team.partners && partners->relaxed();
   IslandResult r = start(island, team);
   const double allowed = options.tolerance / r.inverse_scale;
   const double bound = std::max(allowed * allowed, r.floor);
@@ -58,6 +66,7 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
   };
   for (;;) {
     const PassResult change = sweeps.sweep(island, team);
+    if (at_once) sweeps.combine(island, team, false);
     ++r.sweeps;
     if (r.sweeps == detail::BestPoint::kFirst && !(permitted && price.within(options.max_work)))
       best.want();
@@ -83,7 +92,7 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
     if (forecast.due(r.sweeps)) {
       const double more = forecast.more(r.sweeps, change.sum, change.most, bound);
       if (assembly_is_cheaper(more)) break;
-      if (more > kSlow && r.sweeps > detail::Forecast::kFirst) momentum.start();
+      if (more > kSlow && r.sweeps > detail::Forecast::kFirst && !at_once) momentum.start();
       best.forecast(r.sweeps + more);
       forecast.made(change.sum);
     }

@@ -1,5 +1,6 @@
 // Tether: sweeps on the velocities of bodies. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/body_solver.hpp>
+#include <tether/contact/ranks.hpp>
 
 #include <algorithm>
 #include <atomic>
@@ -13,8 +14,7 @@
 namespace tether::contact {
 namespace {
 
-// Islands from this size on are swept by all threads together, others by one thread each.
-constexpr int kTogether = 1500;
+using detail::kTogether;
 
 // The status of all is that of the worst island.
 int severity(Status s) {
@@ -49,12 +49,21 @@ void check(const BodyOptions& o) {
 
 }  // namespace
 
-// A large island by all threads; islands to be assembled are left to alone().
+Status worse(Status a, Status b) { return severity(b) > severity(a) ? b : a; }
+
+// A large island by all threads, or by all processes; islands to be assembled are left to alone().
 void BodySolver::Implementation::together(int k, Team& team) {
   const Island& island = graph.islands[at(k)];
+  team.partners = shared(k) ? partners : nullptr;
+  if (team.partners) team.once([&] { partners->begin(k); });
   sweeps.load(island, team);
   team.meet();
-  iterate(k, team);
+  try {
+    iterate(k, team);
+  } catch (const std::exception& e) {
+    if (team.partners) team.partners->give_up(e.what());
+    throw;
+  }
   team.meet();
   const IslandResult& r = results[at(k)];
   if (!r.assemblable && !r.saved) sweeps.unpack(island, team, *out);
@@ -79,17 +88,30 @@ void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
   find_starts();
   graph.build(static_cast<int>(b.size()), given.first(), given.second(), given.kinds(),
               detail::groups_are_served());
+  solve_graph();
+  if (options.warm_start) memory.keep(c, o.impulses);
+}
+
+void BodySolver::Implementation::solve_graph() {
+  const std::size_t contacts = given.contacts().size(), bodies = given.bodies().size();
+  BodySolution& o = *out;
   sweeps.start(given, graph, options.law);
   results.resize(graph.islands.size());  // assign() would grow without reserve
   std::fill(results.begin(), results.end(), IslandResult{});
-  o.impulses.resize(c.size());
-  o.regimes.resize(c.size());
-  o.velocities.resize(b.size());
-  o.angular_velocities.resize(b.size());
+  o.impulses.resize(contacts);
+  o.regimes.resize(contacts);
+  o.velocities.resize(bodies);
+  o.angular_velocities.resize(bodies);
   // Few contacts are not worth waking a thread; the bits are the same.
-  solve_islands(c.size() < at(kTogether) ? 1 : options.threads);
+  std::exception_ptr failure;
+  try {
+    solve_islands(contacts < at(kTogether) ? 1 : options.threads);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  if (partners) partners->finish(failure != nullptr);
+  if (failure) std::rethrow_exception(failure);
   report();
-  if (options.warm_start) memory.keep(c, o.impulses);
   o.bytes = graph.contact_bytes() + memory.bytes() + given.contact_bytes() +
             starts.capacity() * sizeof(starts[0]) + sweeps.contact_bytes() +
             results.capacity() * sizeof(results[0]);
@@ -111,7 +133,7 @@ void BodySolver::Implementation::find_starts() {
 void BodySolver::Implementation::solve_islands(int threads) {
   const int islands = static_cast<int>(graph.islands.size());
   const auto large = [&](int k) {
-    return threads > 1 && graph.islands[at(k)].contacts >= kTogether;
+    return shared(k) || (threads > 1 && here(k) && graph.islands[at(k)].contacts >= kTogether);
   };
   std::atomic<int> next{0};
   workers.run(threads, [&](Worker& worker, Team& all) {
@@ -123,7 +145,7 @@ void BodySolver::Implementation::solve_islands(int threads) {
     try {
       for (int k = next.fetch_add(kBatch); k < islands; k = next.fetch_add(kBatch)) {
         for (int i = k; i < std::min(k + kBatch, islands); ++i) {
-          if (!large(i) || results[at(i)].assemblable) alone(i, worker);
+          if (here(i) && !shared(i) && (!large(i) || results[at(i)].assemblable)) alone(i, worker);
         }
       }
     } catch (...) {
@@ -145,6 +167,7 @@ void BodySolver::Implementation::report() {
   out->islands = static_cast<int>(results.size());
   for (std::size_t k = 0; k < results.size(); ++k) {
     const IslandResult& r = results[k];
+    if (!here(static_cast<int>(k)) && !shared(static_cast<int>(k))) continue;
     out->error = std::max(out->error, r.error);
     out->sweeps = std::max(out->sweeps, r.sweeps);
     out->colours =
@@ -152,7 +175,7 @@ void BodySolver::Implementation::report() {
     out->assembled_islands += r.assembled;
     if (r.status == Status::solved) continue;
     ++out->failed_islands;
-    if (severity(r.status) > severity(out->status)) out->status = r.status;
+    out->status = worse(out->status, r.status);
   }
   workers.replaced(out->replaced);
   out->spheres = !sweeps.has_general();

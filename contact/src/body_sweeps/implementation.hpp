@@ -14,6 +14,9 @@
 
 namespace tether::contact::detail {
 
+// Islands from this size on are swept by all threads together, others by one thread each.
+constexpr int kTogether = 1500;
+
 struct IslandResult {
   Status status = Status::unsolved;
   int sweeps = 0;
@@ -43,19 +46,23 @@ struct BodySolver::Implementation {
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
   BodyOptions options;
-  detail::GivenProblem given;           // the caller's bodies and contacts
-  detail::ContactGraph graph;           // their islands
-  detail::ImpulseHistory memory;        // impulses of earlier solves
-  std::vector<const Vector3d*> starts;  // of each contact, in the memory; empty: none
-  detail::IslandSweeps sweeps;          // impulses and velocities of this solve
-  std::vector<IslandResult> results;    // of each island
-  detail::Workers workers;              // threads
-  BodySolution* out = nullptr;          // the caller's
+  detail::GivenProblem given;                 // the caller's bodies and contacts
+  detail::ContactGraph graph;                 // their islands
+  detail::ImpulseHistory memory;              // impulses of earlier solves
+  std::vector<const Vector3d*> starts;        // of each contact, in the memory; empty: none
+  detail::IslandSweeps sweeps;                // impulses and velocities of this solve
+  std::vector<IslandResult> results;          // of each island
+  detail::Workers workers;                    // threads
+  BodySolution* out = nullptr;                // the caller's
+  detail::SweepPartners* partners = nullptr;  // other processes: RankedSolver
 
   // A solve, from body_solver.cpp on.
   void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
   void find_starts();
+  void solve_graph();  // given, starts and graph are known
   void solve_islands(int threads);
+  bool here(int k) const { return !partners || partners->here(k); }
+  bool shared(int k) const { return partners && partners->shared(k); }
   void together(int k, Team& team);
   void alone(int k, Worker& worker);
   void report();

@@ -76,6 +76,8 @@ struct BodySolution {
   std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
 };
 
+class RankSolver;
+
 /// Solves each island of bodies in contact by itself: Gauss-Seidel on the velocities of the bodies,
 /// and Solver where that converges slowly. The result of an island depends neither on the other
 /// islands nor on the number of threads.
@@ -83,6 +85,8 @@ struct BodySolution {
 /// Keep one for a run of time steps: it holds the workspace, the threads and the impulses by id.
 /// Not for use by two threads at once.
 class BodySolver {
+  friend class RankSolver;
+
  public:
   explicit BodySolver(const BodyOptions& options = {});  ///< throws std::invalid_argument
   ~BodySolver();

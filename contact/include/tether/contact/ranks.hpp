@@ -1,0 +1,124 @@
+// Tether: contacts that several processes solve together, without their messages.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <tether/contact/body_solver.hpp>
+#include <tether/export.hpp>
+#include <vector>
+
+TETHER_EXPORT_BEGIN
+namespace tether::contact {
+
+/// What the kinds of contacts depend on, of a body: some bits, which all processes know. Throws
+/// std::invalid_argument, with the number, for what BodySolver refuses.
+std::uint8_t rank_traits(std::size_t number, const RigidBody& body);
+
+/// A contact as all processes know it: what the order of sweeping depends on. Bodies by number.
+struct RankContact {
+  int first = 0, second = -1;  ///< those that move; second -1: there is one
+  int fixed = -1;              ///< the one that does not move, -1: none
+  std::uint8_t kind = 0;
+};
+/// traits: of each body. Throws std::invalid_argument as rank_traits, and where both bodies are
+/// fixed.
+RankContact rank_contact(std::size_t number, const PointContact& contact,
+                         const std::vector<std::uint8_t>& traits, Law law);
+
+/// How processes ("ranks", 0 .. size - 1) talk to each other; tether::contact_mpi has it on MPI.
+/// All of them call the same functions in the same order.
+class RankMessages {
+ public:
+  struct With {
+    int rank;
+    std::vector<double> out, in;  ///< of fixed length, which both sides know
+  };
+  virtual ~RankMessages() = default;
+  virtual int size() const = 0;
+  virtual int rank() const = 0;
+  /// Sends `out` to and fills `in` from each of these; an empty one is no message.
+  virtual void exchange(std::vector<With>& with) = 0;
+  /// The sum over all ranks, which is exact: at most one gives anything but 0.
+  virtual void sum(std::vector<double>& values) = 0;
+  /// What each rank gives, counts[rank] numbers, one after the other, for `root`.
+  virtual void gather(int root, const std::vector<double>& mine, const std::vector<int>& counts,
+                      std::vector<double>& all) = 0;
+  virtual void broadcast(int root, std::vector<double>& values) = 0;
+  /// Ends all processes: this one cannot go on while others wait for it.
+  [[noreturn]] virtual void give_up(const char* why) = 0;
+};
+
+/// exact: colour by colour, in the order of BodySolver and with its bits, for any number of ranks.
+/// relaxed: all ranks sweep at once; their changes of a body's velocity are added, and the sum (and
+/// that of the impulses) taken times `relaxation`. Fewer messages; the bits, and how many sweeps
+/// are needed, depend on the partition.
+enum class RankMode { exact, relaxed };
+
+struct RankOptions {
+  BodyOptions bodies;  ///< warm_start is not used: `starts` says it
+  RankMode mode = RankMode::exact;
+  double relaxation = 0.8;  ///< of RankMode::relaxed, in (0, 1]
+};
+
+/// What one sweep over all islands that ranks share, and one look at their residuals, send from
+/// this rank, by the plan; 48 bytes a velocity. exact: bodies go to the rank that sweeps them next,
+/// after each colour. relaxed: once to the rank where their changes are added, and back; looks send
+/// nothing.
+struct RankTraffic {
+  long long messages = 0, velocities = 0;
+  long long look_messages = 0, look_velocities = 0;
+  long long sums = 0;  ///< numbers in the sum over all ranks that ends both, 3 a chunk
+};
+
+/// Islands of a solve: of all ranks together `all` and `shared`; `assembled` and `failed` add up
+/// over ranks.
+struct RankIslands {
+  int all = 0, shared = 0, assembled = 0, failed = 0;
+};
+
+/// Of two parts of a solve, the status of both.
+Status worse(Status a, Status b);
+
+/// The part of one rank of BodySolver. All ranks plan the whole graph of contacts alike, so that it
+/// needs no messages; bodies and contacts themselves are where they are used.
+class RankSolver {
+ public:
+  explicit RankSolver(const RankOptions& options);  ///< throws std::invalid_argument
+  ~RankSolver();
+  RankSolver(RankSolver&&) noexcept;
+  RankSolver& operator=(RankSolver&&) noexcept;
+
+  const RankOptions& options() const;
+  void set_options(const RankOptions& options);  ///< throws std::invalid_argument
+
+  /// The order of sweeping, and who sweeps what. owner: rank of each body. The contacts are the
+  /// same on all ranks, in an order which the result depends on.
+  void plan(const std::vector<RankContact>& contacts, const std::vector<int>& owner, int ranks,
+            int rank);
+  /// What solve() wants: numbers of contacts, in its order.
+  const std::vector<int>& contacts() const;
+  /// Numbers of bodies, in its order.
+  const std::vector<int>& bodies() const;
+  /// The rank that sweeps each contact, and the one that knows the velocity of each body after a
+  /// solve (its owner, where no contact moves it).
+  const std::vector<int>& contact_ranks() const;
+  const std::vector<int>& body_ranks() const;
+  RankTraffic traffic() const;
+  RankIslands islands() const;  ///< after a solve
+
+  /// Bodies and contacts as bodies() and contacts() say, the bodies of contacts by their place in
+  /// bodies() (-1: the world); starts: impulses to start from, world axes, on `first`, empty: none.
+  /// Velocities in `solution` are those of all contacts for bodies with body_ranks() here only;
+  /// status, error and counts are of the islands that this rank has a part of.
+  void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+             const std::vector<Eigen::Vector3d>& starts, RankMessages& messages,
+             BodySolution& solution);
+
+ private:
+  struct TETHER_HIDDEN Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace tether::contact
+TETHER_EXPORT_END

@@ -1,0 +1,50 @@
+// Tether: other processes that sweep the same islands. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "body_passes/moving_bodies.hpp"
+#include "graph/contact_graph.hpp"
+
+namespace tether::contact::detail {
+
+struct PassResult;
+
+// The whole graph, of which this process has a part; first, second as ContactGraph::build has them.
+struct WholeGraph {
+  const ContactGraph& graph;
+  const std::vector<int>&first, &second;
+};
+
+// What a process does for those that it shares islands with. Called by its first thread, by all
+// processes in the same order.
+class SweepPartners {
+ public:
+  virtual ~SweepPartners() = default;
+
+  // Islands have the same numbers here and in the whole graph.
+  virtual bool here(int island) const = 0;    // some contact of it
+  virtual bool shared(int island) const = 0;  // several processes sweep it
+  virtual WholeGraph whole() const = 0;
+  // The calls below are about this island.
+  virtual void begin(int island) = 0;
+
+  // Velocities that the chunks of a colour have changed, to who sweeps these bodies next.
+  virtual void after_colour(int colour, MovingBodies& bodies) = 0;
+  // Velocities as they are after a sweep, to all that have the body.
+  virtual void share(MovingBodies& bodies) = 0;
+  // What all processes have added up; sums: of each chunk here.
+  virtual PassResult total(const std::vector<PassResult>& sums) = 0;
+
+  // All sweep at once, and what they change is taken times this factor; else colour by colour.
+  virtual bool relaxed() const = 0;
+  virtual double relaxation() const = 0;
+  // The changes of velocities since MovingBodies::keep by others, added at one place for each body.
+  virtual void collect(MovingBodies& bodies) = 0;
+
+  // After all islands: those to be assembled are brought together and solved. failed: this process
+  // is about to throw.
+  virtual void finish(bool failed) = 0;
+  // The others wait for this process, which cannot go on: ends all of them.
+  virtual void give_up(const char* why) = 0;
+};
+
+}  // namespace tether::contact::detail
