@@ -4,7 +4,7 @@
 #include <tether/contact/ranks.hpp>
 
 #include "body_passes/given_problem.hpp"
-#include "law/law.hpp"
+#include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
