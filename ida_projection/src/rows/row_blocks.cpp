@@ -225,10 +225,15 @@ double RowBlocks::times(int i, const double* y) const {
 // |row_i(C WT)| over the block's columns.
 double RowBlocks::in_tolerances(const Block& block, int i, const std::vector<double>& WT) const {
   double sum = 0.0;
-  for (int j : block.columns) {
-    const double c = row(i)[j] * WT[static_cast<std::size_t>(j)];
+  const auto add = [&](int j, double entry) {
+    const double c = entry * WT[static_cast<std::size_t>(j)];
     sum += c * c;
-  }
+  };
+  if (block.first >= 0)
+    linalg::visit_filled(row(i) + block.first, static_cast<int>(block.columns.size()),
+                         [&](int k, double entry) { add(block.first + k, entry); });
+  else
+    for (int j : block.columns) add(j, row(i)[j]);
   return std::sqrt(sum);
 }
 

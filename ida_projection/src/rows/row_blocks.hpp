@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <tether/linalg/filled.hpp>
 #include <tether/linalg/minimum_norm.hpp>
 #include <vector>
 
@@ -207,10 +208,10 @@ class RowBlocks {
   /// sum_j |C_ij y_j| and sum_j C_ij y_j.
   double terms(int i, const double* y) const;
   double times(int i, const double* y) const;
-  /// f(column, entry) for the entries of row i.
+  /// f(column, entry) for the entries of row i that are not zero.
   template <class Visit>
   void visit_row(int i, Visit f) const {
-    for (int j = 0; j < n_; ++j) f(j, row(i)[j]);
+    linalg::visit_filled(row(i), n_, f);
   }
 
   /// After solve(): as contradicts() above, for both blocks.

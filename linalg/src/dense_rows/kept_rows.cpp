@@ -5,9 +5,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <limits>
+#include <tether/linalg/filled.hpp>
 
 #include "small_orthogonal.hpp"
 
@@ -26,26 +25,6 @@ void KeptRows::resize(int rows, int columns) {
   L_.resize(most, most);
   spread_.resize(columns, most);
 }
-
-namespace {
-
-/// visit(j, c_j) for the entries of a row that are not zero; four zeros in a row are passed at
-/// once.
-template <class Visit>
-void visit_filled(const double* c, int n, Visit visit) {
-  int j = 0;
-  for (; j + 4 <= n; j += 4) {
-    std::uint64_t bits[4];
-    std::memcpy(bits, c + j, sizeof bits);
-    if (((bits[0] | bits[1] | bits[2] | bits[3]) << 1) == 0) continue;  // but for the sign
-    for (int k = j; k < j + 4; ++k)
-      if (c[k] != 0.0) visit(k, c[k]);
-  }
-  for (; j < n; ++j)
-    if (c[j] != 0.0) visit(j, c[j]);
-}
-
-}  // namespace
 
 bool KeptRows::load(const double* wide, int width, const int* rows, const int* columns,
                     const double* D, double* row_norm) {
