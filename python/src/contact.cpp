@@ -107,11 +107,125 @@ tc::Solution solve(const tc::Problem& problem, const std::string& law, double to
   return solver.solve(problem, x);
 }
 
-std::vector<std::string> regimes(const tc::Solution& s) {
+std::vector<std::string> words_of(const std::vector<tc::Regime>& regimes) {
   std::vector<std::string> words;
-  words.reserve(s.regimes.size());
-  for (const tc::Regime regime : s.regimes) words.emplace_back(name(regime));
+  words.reserve(regimes.size());
+  for (const tc::Regime regime : regimes) words.emplace_back(name(regime));
   return words;
+}
+
+/// An argument that may be None: no change.
+Eigen::VectorXd entries(const char* argument, const py::object& value) {
+  if (value.is_none()) return {};
+  return vector(argument, value.cast<Array>());
+}
+
+tc::Derivative derivative(const tc::Problem& problem, const tc::Solution& solution,
+                          const std::string& law, double tolerance, double kink) {
+  tc::DerivativeOptions options;
+  options.tolerance = tolerance;
+  options.kink = kink;
+  const tc::Law known = named<tc::Law>("law", law, tc::laws());
+  const py::gil_scoped_release others_run;
+  return tc::derivative(problem, known, solution, options);
+}
+
+py::tuple forward(const tc::Derivative& d, const py::object& A, const py::object& b,
+                  const py::object& mu) {
+  tc::ProblemDirection v;
+  v.b = entries("b", b);
+  v.mu = entries("mu", mu);
+  if (!A.is_none()) {
+    const auto dense = py::array_t<double, py::array::f_style | py::array::forcecast>::ensure(
+        py::hasattr(A, "toarray") ? A.attr("toarray")() : A);
+    if (!dense) throw py::error_already_set();
+    const py::ssize_t size = d.impulses().size();
+    if (dense.ndim() != 2 || dense.shape(0) != size || dense.shape(1) != size)
+      refuse("A must be a change of the matrix, " + std::to_string(size) + " x " +
+             std::to_string(size));
+    const Eigen::Map<const Eigen::MatrixXd> whole(dense.data(), size, size);
+    const int n = static_cast<int>(d.report().regimes.size());
+    const Eigen::Index w = n > 0 ? size / n : 3;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const auto part = whole.block(w * i, w * j, w, w);
+        if ((part.array() == 0).all()) continue;
+        v.A.push_back({i, j, Eigen::Matrix3d::Zero()});
+        v.A.back().value.topLeftCorner(w, w) = part;
+      }
+  }
+  const tc::SolutionDirection found = d.forward(v);
+  return py::make_tuple(Eigen::VectorXd(found.impulses), Eigen::VectorXd(found.velocities),
+                        found.residual);
+}
+
+py::dict adjoint(const tc::Derivative& d, const py::object& impulses,
+                 const py::object& velocities) {
+  using namespace py::literals;
+  const tc::ProblemDirection g =
+      d.adjoint(entries("impulses", impulses), entries("velocities", velocities));
+  const Eigen::Index n = g.mu.size(), w = n > 0 ? g.b.size() / n : 3;
+  const auto count = static_cast<py::ssize_t>(g.A.size());
+  py::array_t<int> rows(count), columns(count);
+  py::array_t<double> blocks({count, static_cast<py::ssize_t>(w), static_cast<py::ssize_t>(w)});
+  auto to = blocks.mutable_unchecked<3>();
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const tc::MatrixBlock& block = g.A[static_cast<std::size_t>(k)];
+    rows.mutable_at(k) = block.row;
+    columns.mutable_at(k) = block.column;
+    for (py::ssize_t r = 0; r < w; ++r)
+      for (py::ssize_t c = 0; c < w; ++c) to(k, r, c) = block.value(r, c);
+  }
+  return py::dict("b"_a = Eigen::VectorXd(g.b), "mu"_a = Eigen::VectorXd(g.mu), "rows"_a = rows,
+                  "columns"_a = columns, "blocks"_a = blocks);
+}
+
+void bind_derivative(py::module_& module) {
+  using namespace py::literals;
+  py::class_<tc::Derivative>(module, "Derivative", R"(Derivative of the solution x(A, b, mu).
+
+By implicit differentiation on the branch of the present regimes; factors are kept. Made by
+Problem.derivative.)")
+      .def("forward", &forward, py::kw_only(), "A"_a = py::none(), "b"_a = py::none(),
+           "mu"_a = py::none(),
+           R"(J v: (dx, dw, residual) for changes of the data.
+
+A: (d n, d n) array or scipy.sparse matrix, b: (d n,), mu: (n,); None: no change. dx: of the
+impulses, dw: of the velocities. residual is not small where the direction leaves the range of a
+hyperstatic problem: the solution then jumps.)")
+      .def("adjoint", &adjoint, "impulses"_a = py::none(), "velocities"_a = py::none(),
+           R"(J' v: the gradient of impulses.x + velocities.w, a dict.
+
+impulses, velocities: (d n,) rows; None: 0. Result: b (d n,), mu (n,), and of A the blocks of the
+problem: blocks[k] (d, d) at block row rows[k] and block column columns[k].)")
+      .def_property_readonly(
+          "status", [](const tc::Derivative& d) { return std::string(name(d.report().status)); },
+          "unique, or minimum_norm: impulses are not unique, the least change is given")
+      .def_property_readonly(
+          "strictly_regular",
+          [](const tc::Derivative& d) { return d.report().strictly_regular; },
+          "every contact is strictly open, sticking or sliding")
+      .def_property_readonly("regimes",
+                             [](const tc::Derivative& d) { return words_of(d.report().regimes); })
+      .def_property_readonly(
+          "kinks",
+          [](const tc::Derivative& d) {
+            py::list out;
+            for (const tc::Kink& k : d.report().kinks)
+              out.append(py::make_tuple(k.contact, name(k.branch), name(k.other), k.margin));
+            return out;
+          },
+          "(contact, branch whose derivative is given, other regime, relative margin)")
+      .def_property_readonly("rank", [](const tc::Derivative& d) { return d.report().rank; })
+      .def_property_readonly("unknowns",
+                             [](const tc::Derivative& d) { return d.report().unknowns; })
+      .def_property_readonly("not_unique",
+                             [](const tc::Derivative& d) { return d.report().not_unique; },
+                             "contacts whose impulses are not determined")
+      .def_property_readonly("velocities_unique",
+                             [](const tc::Derivative& d) { return d.report().velocities_unique; })
+      .def_property_readonly("error", [](const tc::Derivative& d) { return d.report().error; })
+      .def_property_readonly("advice", [](const tc::Derivative& d) { return d.report().advice; });
 }
 
 }  // namespace
@@ -145,6 +259,12 @@ w = A x - b. Raises ValueError on sizes that do not match and values that are no
           },
           "impulses"_a, "law"_a = "maximum_dissipation",
           "How far any impulses are from a solution: velocities in m/s; fixed_point has no unit.")
+      .def("derivative", &derivative, "solution"_a, "law"_a = "maximum_dissipation", py::kw_only(),
+           "tolerance"_a = 1e-5, "kink"_a = 1e-6,
+           R"(The derivative of a Solution of this problem under `law`: a Derivative.
+
+tolerance: largest error of a solution that is taken; kink: contacts nearer to another regime than
+this (relative) are listed. Raises ValueError where the impulses are no solution.)")
       .def("solve", &solve, "law"_a = "maximum_dissipation", py::kw_only(), "tolerance"_a = 1e-9,
            "method"_a = "automatic", "start"_a = py::none(), "max_work"_a = 1e10,
            "strict"_a = false,
@@ -163,7 +283,9 @@ replace the law at single contacts. What cannot be solved is a status, with advi
                              [](const tc::Solution& s) { return Eigen::VectorXd(s.impulses); })
       .def_property_readonly("velocities",
                              [](const tc::Solution& s) { return Eigen::VectorXd(s.velocities); })
-      .def_property_readonly("regimes", &regimes, "separating, sticking or sliding")
+      .def_property_readonly(
+          "regimes", [](const tc::Solution& s) { return words_of(s.regimes); },
+          "separating, sticking or sliding")
       .def_readonly("error", &tc::Solution::error)
       .def_readonly("advice", &tc::Solution::advice)
       .def_readonly("replaced", &tc::Solution::replaced)
@@ -181,6 +303,8 @@ replace the law at single contacts. What cannot be solved is a status, with advi
         return "<Solution: " + std::string(name(s.status)) + ", error " + std::to_string(s.error) +
                ">";
       });
+
+  bind_derivative(module);
 
   module.def("read", &tc::read_problem, "path"_a,
              "A problem from a Siconos .dat or fclib .hdf5 file.");

@@ -82,6 +82,65 @@ class ManyContacts(unittest.TestCase):
         self.assertFalse(s.solved)
 
 
+class Derivatives(unittest.TestCase):
+    def test_forward_is_what_differences_say(self):
+        A, b, mu = chain(6, 0.4, 1)
+        for law in ("coulomb", "maximum_dissipation"):
+            p = contact.Problem(A, b, mu)
+            s = p.solve(law, tolerance=1e-13)
+            d = p.derivative(s, law)
+            self.assertEqual((d.status, d.strictly_regular, d.kinks), ("unique", True, []))
+            self.assertEqual(d.regimes, s.regimes)
+            db, h = np.linspace(-1, 1, b.size), 1e-5
+            dx, dw, residual = d.forward(b=db, mu=mu, A=0.1 * A)
+            ends = [
+                contact.Problem(A * (1 + 0.1 * e), b + e * db, mu * (1 + e)).solve(
+                    law, tolerance=1e-13
+                )
+                for e in (h, -h)
+            ]
+            np.testing.assert_allclose(
+                dx, (ends[0].impulses - ends[1].impulses) / (2 * h), atol=1e-6 * abs(dx).max()
+            )
+            np.testing.assert_allclose(
+                dw, (ends[0].velocities - ends[1].velocities) / (2 * h), atol=1e-6 * abs(dw).max()
+            )
+            self.assertLess(residual, 1e-12)
+            # The transpose: the same number from the gradient.
+            row = np.cos(np.arange(b.size))
+            g = d.adjoint(row, velocities=row)
+            of_A = sum(
+                (g["blocks"][k] * 0.1 * A[3 * i : 3 * i + 3, 3 * j : 3 * j + 3]).sum()
+                for k, (i, j) in enumerate(zip(g["rows"], g["columns"]))
+            )
+            self.assertAlmostEqual(
+                row @ dx + row @ dw, g["b"] @ db + g["mu"] @ mu + of_A, delta=1e-10
+            )
+
+    def test_equal_contacts_are_hyperstatic(self):
+        A = np.kron(np.ones((2, 2)), np.diag([1.0, 1, 1]))
+        p = contact.Problem(A, [1, 0.1, 0] * 2, [0.5, 0.5])
+        # Half on each; sweeps from zero load the first one only, and the other is at a kink.
+        d = p.derivative(p.solve("coulomb", start=[0.5, 0.05, 0] * 2), "coulomb")
+        self.assertEqual(p.derivative(p.solve("coulomb"), "coulomb").kinks[0][0], 1)
+        self.assertEqual((d.status, d.rank, d.unknowns), ("minimum_norm", 3, 6))
+        self.assertEqual((d.not_unique, d.velocities_unique), ([0, 1], True))
+        np.testing.assert_allclose(d.forward(b=[1, 0, 0] * 2)[0], [0.5, 0, 0] * 2, atol=1e-14)
+        self.assertIn("not unique", d.advice)
+
+    def test_kinks_and_refusals_are_named(self):
+        p = contact.Problem(np.diag([2.0, 4, 4]), [0, 1, 0], [0.5])
+        s = p.solve("coulomb")
+        self.assertEqual(p.derivative(s, "coulomb").kinks[0][:3], (0, "separating", "sliding"))
+        other = contact.Problem(np.diag([2.0, 4, 4]), [1, 1, 0], [0.5])
+        with self.assertRaisesRegex(ValueError, "error of the impulses"):
+            other.derivative(s, "coulomb")
+        with self.assertRaisesRegex(ValueError, "b has 2"):
+            p.derivative(s, "coulomb").forward(b=[1, 2])
+        with self.assertRaisesRegex(ValueError, "3 x 3"):
+            p.derivative(s, "coulomb").forward(A=np.eye(2))
+
+
 class Files(unittest.TestCase):
     def test_a_shipped_problem_is_read(self):
         folder = os.path.join(os.environ["TETHER_SOURCE"], "tests", "contact", "collection")

@@ -1,5 +1,6 @@
 // Tether: derivatives of solutions against closed forms and differences of tight solutions.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <tether/contact.hpp>
@@ -503,6 +504,40 @@ TEST_CASE("derivative: kinks are named with the branch and the other regime") {
       CHECK(d.report().regimes[0] == found.branch);
       CHECK_THAT(d.report().advice, Contains("1 contacts lie at kinks"));
     }
+}
+
+TEST_CASE(
+    "derivative: contacts with the Coulomb rule under maximum dissipation have its derivative") {
+  const Data data = random_problem(4, 16, 0.5, 11);
+  const Problem p = data.problem();
+  DerivativeOptions all;
+  all.replaced = {0, 1, 2, 3};
+  const Solution s = tight(p, Law::coulomb);
+  REQUIRE(s.error < 1e-11);
+  REQUIRE(std::count(s.regimes.begin(), s.regimes.end(), Regime::sliding) > 0);
+  ProblemDirection v;
+  v.b = VectorXd::LinSpaced(12, -1, 1);
+  v.mu = VectorXd::Ones(4);
+  v.A = {{0, 0, Eigen::Matrix3d::Ones()}, {1, 1, Eigen::Matrix3d::Ones()}};
+  const SolutionDirection own = derivative(p, Law::coulomb, s).forward(v);
+  const SolutionDirection other =
+      derivative(p, Law::maximum_dissipation, s.impulses, all).forward(v);
+  CHECK(own.impulses == other.impulses);
+  // The law itself has another solution.
+  CHECK_THROWS_AS(derivative(p, Law::maximum_dissipation, s), std::invalid_argument);
+}
+
+TEST_CASE("derivative: blocks that are not symmetric count as given") {
+  Data data = random_problem(3, 16, 0.3, 4);
+  data.A(0, 1) += 0.05 * data.A(0, 0);
+  data.A(4, 7) -= 0.05 * data.A(4, 4);
+  for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
+    const auto found = differences::compare(data, law, 2);
+    INFO(name(law) << ": " << found.words);
+    REQUIRE(found.regular);
+    CHECK(found.error < 1e-6);
+    CHECK(found.transposed < 1e-12);
+  }
 }
 
 TEST_CASE("derivative: what is refused is named") {
