@@ -301,6 +301,24 @@ void bad_input_is_refused_by_all() {
                  "rank " + std::to_string(last) + ": std::bad_alloc"));
 }
 
+void items_go_to_their_ranks() {
+  // Each rank sends its number and the receiver's to all, the highest rank first.
+  std::vector<double> items;
+  std::vector<int> to;
+  for (int r = ranks; r-- > 0;) {
+    items.insert(items.end(), {static_cast<double>(rank), static_cast<double>(r)});
+    to.push_back(r);
+  }
+  const std::vector<double> come = send(MPI_COMM_WORLD, 2, items, to);
+  CHECK(come.size() == 2 * at(ranks));
+  for (int r = 0; r < ranks; ++r) CHECK(come[2 * at(r)] == r && come[2 * at(r) + 1] == rank);
+  CHECK(send(MPI_COMM_WORLD, 3, {}, {}).empty());
+  if (rank == ranks - 1) to[0] = ranks;
+  CHECK(contains(
+      thrown<std::invalid_argument>([&] { send(MPI_COMM_WORLD, 2, items, to); }),
+      "to[0] = " + std::to_string(ranks) + ": must lie in 0 .. " + std::to_string(ranks - 1)));
+}
+
 // Half of the weight in a corner: each rank has its part of it.
 void bodies_are_spread_by_weight() {
   std::vector<int> numbers;
@@ -345,6 +363,7 @@ int main(int argc, char** argv) {
     few_bodies();
     bad_input_is_refused_by_all();
     bodies_are_spread_by_weight();
+    items_go_to_their_ranks();
   } catch (const std::exception& e) {
     check_failed(__FILE__, __LINE__, e.what());
   }

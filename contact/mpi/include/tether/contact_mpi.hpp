@@ -83,6 +83,12 @@ std::vector<int> partition(MPI_Comm comm, const std::vector<int>& numbers,
                            const std::vector<Eigen::Vector3d>& centres,
                            const std::vector<double>& weights);
 
+/// Items of `size` numbers each, one after the other in `items`, to ranks: item k to to[k]. Returns
+/// those that have come, from the lowest rank on, each in its order. For bodies that change their
+/// rank, and for copies of those near others. Called by all ranks; throws std::invalid_argument.
+std::vector<double> send(MPI_Comm comm, int size, const std::vector<double>& items,
+                         const std::vector<int>& to);
+
 /// All ranks throw where one has a failure: that of the first such rank, std::invalid_argument if
 /// it is one, else std::runtime_error. Called by all ranks.
 void agree(MPI_Comm comm, const std::exception_ptr& failure);
