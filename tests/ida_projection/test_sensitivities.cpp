@@ -713,3 +713,37 @@ TEST_CASE("projected sensitivities: IDAS' own residuals by differences") {
   CHECK(errors[1] < 0.1 * errors[0]);
   CHECK(drifts[1] < 1e-11);
 }
+
+TEST_CASE("gradients of functions on the constraints: what points across them is left out") {
+  double y[5];
+  pendulum_exact(1.3, 9.8, 0.4, y);
+  for (const auto kind : {Sensitive::Rows::dense, Sensitive::Rows::sparse,
+                          Sensitive::Rows::differences, Sensitive::Rows::gradients}) {
+    Sensitive run(pendulum_of(0), 1e-8, 1.0);
+    tp::Projection& projection = run.attach(kind);
+    std::copy(y, y + 5, run.host().data());
+    // Here C itself counts, and one by differences is what it is.
+    const double accuracy = kind == Sensitive::Rows::differences ? 1e-3 : 1e-8;
+    // x, and x with multiples of the rows: the same function on the set.
+    std::vector<std::vector<double>> found;
+    for (const double factor : {0.0, 3.0}) {
+      N_Vector v = run.host().vector({1.0, 0.0, 0.0, 0.0, 0.0});
+      double* entries = N_VGetArrayPointer(v);
+      const Eigen::MatrixXd C = jacobian(run.constraints(Sensitive::Rows::dense), 0.0, y, 5);
+      for (int j = 0; j < 5; ++j) entries[j] += factor * (C(0, j) - 2.0 * C(2, j) + C(3, j));
+      REQUIRE(projection.project_gradient(0.0, run.host().y, v));
+      for (int i = 0; i < 4; ++i) {
+        double along = 0.0;
+        for (int j = 0; j < 5; ++j) along += C(i, j) * entries[j];
+        CHECK(std::abs(along) < accuracy);
+      }
+      found.emplace_back(entries, entries + 5);
+    }
+    double size = 0.0;
+    for (std::size_t j = 0; j < 5; ++j) {
+      CHECK(std::abs(found[0][j] - found[1][j]) < accuracy);
+      size = std::max(size, std::abs(found[0][j]));
+    }
+    CHECK(size > 0.01);
+  }
+}

@@ -237,6 +237,10 @@ int tether_make_sensitivities_consistent(tether_projection* projection, sunrealt
                                          N_Vector yp, N_Vector* s, N_Vector* sp,
                                          tether_report* report);
 
+/* For adjoint problems: v <- v - C^T (C C^T)^+ C v, the gradient of a function of y without its
+ * part across the constraints. */
+int tether_project_gradient(tether_projection* projection, sunrealtype t, N_Vector yy, N_Vector v);
+
 /* Of the last step or call; TETHER_MEM_NULL for a null pointer. */
 int tether_get_status(const tether_projection* projection);
 /* What to do about it; "" when all is well. Valid until the next call with this projection. */

@@ -49,6 +49,7 @@ class Projection::Impl {
   void project_sensitivities(Sensitivities given, const tether_idas_functions& idas);
   ConsistencyReport make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp, N_Vector* s,
                                                   N_Vector* sp);
+  ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);
 
   const Constraints& constraints() const { return constraints_; }
   const Report& report();  ///< with what has gone by without the plugin
@@ -172,6 +173,7 @@ class Projection::Impl {
   Watches watch_;
   std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeSolver> solver_;  // IDA sees it
   std::unique_ptr<SensitivityCorrector> sensitivities_;
+  std::unique_ptr<TangentRows> tangent_;  // of project_gradient()
   Unknowns unknowns_;
   Metric wanted_metric_;
   Run run_;

@@ -186,6 +186,9 @@ ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector 
                                                             N_Vector* s, N_Vector* sp) {
   return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp);
 }
+ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v) {
+  return impl_->project_gradient(t, yy, v);
+}
 Statistics Projection::statistics() const { return impl_->statistics(); }
 void Projection::reset_statistics() { impl_->reset_statistics(); }
 Status Projection::status() const { return impl_->report().told(); }

@@ -1,4 +1,7 @@
 // Tether: sensitivities of IDAS beside the state. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
 #include "attach/impl.hpp"
 #include "sensitivity/corrector.hpp"
 
@@ -25,6 +28,35 @@ ConsistencyReport Projection::Impl::make_sensitivities_consistent(double t0, N_V
     reject("make_sensitivities_consistent: yy, yp and s must not be null");
   current_weights(yy);
   sensitivities_->make_consistent(t0, yy, yp, unknowns_.weights, s, sp, report);
+  report_.status = report.status;
+  report_.message = report.message;
+  return report;
+}
+
+ConsistencyReport Projection::Impl::project_gradient(double t, N_Vector yy, N_Vector v) {
+  ConsistencyReport report;
+  report.status = Status::success;
+  if (yy == nullptr || v == nullptr) reject("project_gradient: yy and v must not be null");
+  if (movers_.used == nullptr) return report;
+  if (std::holds_alternative<UserProjection>(constraints_.jacobian))
+    reject("project_gradient: a UserProjection tells no C; give the rows");
+  current_weights(yy);
+  if (!tangent_)
+    tangent_ = make_tangent_rows(constraints_, options_, statistics_, unknowns_.weights);
+  OwnedVector unit(yy), across(yy);
+  N_VConst(1.0, unit);
+  std::vector<double> r(static_cast<std::size_t>(tangent_->rows()), 0.0);
+  tangent_->forget_failure();
+  report.status = tangent_->evaluate(t, yy, unknowns_.weights, nullptr);
+  if (report.status == Status::success) report.status = tangent_->factor(unit);
+  if (report.status == Status::success) report.status = tangent_->product(v, r.data());
+  if (report.status == Status::success) {
+    tangent_->solve(r, across);
+    N_VLinearSum(1.0, v, -1.0, across, v);
+    for (const double rate : r) report.drift_before = std::max(report.drift_before, std::abs(rate));
+  } else {
+    report.message = tangent_->message();
+  }
   report_.status = report.status;
   report_.message = report.message;
   return report;

@@ -428,6 +428,13 @@ int tether_make_sensitivities_consistent(tether_projection* projection, sunrealt
   });
 }
 
+int tether_project_gradient(tether_projection* projection, sunrealtype t, N_Vector yy, N_Vector v) {
+  return guarded([&] {
+    if (projection == nullptr) return null("tether_project_gradient", "projection");
+    return finish(projection->projection.project_gradient(t, yy, v), nullptr);
+  });
+}
+
 int tether_get_status(const tether_projection* projection) {
   return guarded([&] {
     if (projection == nullptr) return null("tether_get_status", "projection");

@@ -22,10 +22,7 @@ void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_
                                            N_Vector* s, N_Vector* sp, ConsistencyReport& report) {
   moved_ = nullptr;
   const Constraints& rows = state_.constraints;
-  rows_ = std::holds_alternative<Gradients>(rows.jacobian)
-              ? make_gradient_tangent(rows, state_.statistics, s_)
-              : make_contiguous_tangent(rows, state_.options, state_.statistics,
-                                        static_cast<int>(N_VGetLength(s_)));
+  rows_ = make_tangent_rows(rows, state_.options, state_.statistics, s_);
   row_terms_.assign(static_cast<std::size_t>(count()),
                     std::vector<double>(static_cast<std::size_t>(rows_->rows()), 0.0));
   r_ = row_terms_.front();

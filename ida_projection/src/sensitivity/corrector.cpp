@@ -164,10 +164,7 @@ void SensitivityCorrector::use_rows_of_state() {
       state_.joined.mover() != nullptr ? &state_.joined.constraints() : &state_.constraints;
   if (moved_ != rows || !rows_) {
     moved_ = rows;
-    rows_ = std::holds_alternative<Gradients>(rows->jacobian)
-                ? make_gradient_tangent(*rows, state_.statistics, s_)
-                : make_contiguous_tangent(*rows, state_.options, state_.statistics,
-                                          static_cast<int>(N_VGetLength(s_)));
+    rows_ = make_tangent_rows(*rows, state_.options, state_.statistics, s_);
     const auto m = static_cast<std::size_t>(rows_->rows());
     r_.assign(m, 0.0);
     row_terms_.assign(static_cast<std::size_t>(count()), r_);

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <sundials/sundials_nvector.h>
 #include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/projection.hpp>
 #include <tether/ida_projection/statistics.hpp>
@@ -41,5 +42,14 @@ class TangentRows {
 std::unique_ptr<TangentRows> make_contiguous_tangent(const Constraints&, const Options&,
                                                      Statistics&, int size);
 std::unique_ptr<TangentRows> make_gradient_tangent(const Constraints&, Statistics&, N_Vector like);
+
+/// The one of them that suits the rows.
+inline std::unique_ptr<TangentRows> make_tangent_rows(const Constraints& rows,
+                                                      const Options& options,
+                                                      Statistics& statistics, N_Vector like) {
+  if (std::holds_alternative<Gradients>(rows.jacobian))
+    return make_gradient_tangent(rows, statistics, like);
+  return make_contiguous_tangent(rows, options, statistics, static_cast<int>(N_VGetLength(like)));
+}
 
 }  // namespace tether::ida_projection

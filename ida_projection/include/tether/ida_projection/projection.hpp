@@ -126,6 +126,11 @@ class Projection {
   ConsistencyReport make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp, N_Vector* s,
                                                   N_Vector* sp);
 
+  /// For adjoint problems: the gradient of a function of y, of which only its part along the
+  /// constraints matters, without that across them: v <- v - C^T (C C^T)^+ C v with C at (t, y). On
+  /// failure v is unchanged. Needs no sensitivities; std::invalid_argument for a UserProjection.
+  ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);
+
   Statistics statistics() const;
   void reset_statistics();
   Status status() const;               ///< of the last call by IDA, or of the last call above
