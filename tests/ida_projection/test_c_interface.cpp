@@ -443,3 +443,36 @@ TEST_CASE("C interface: no exception passes where memory ends, and IDA is as it 
   CHECK(done);
   CHECK(n > 10);
 }
+
+TEST_CASE("C interface: sensitivities and gradients report what is wrong with their arguments") {
+  Host host(circle(1.0), 1e-6);
+  const Set set = new_set();
+  REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr) == 0);
+  const Attached projection = attach(host, set);
+  REQUIRE(projection);
+  const tether_idas_functions none = {nullptr, nullptr, nullptr};
+  tether_sensitivities given = {};
+  given.size = sizeof given;
+  const auto refused = [&](int flag, int expected, const char* text) {
+    CHECK(flag == expected);
+    CHECK(contains(tether_last_error(), text));
+  };
+  tether_projection* p = projection.get();
+  refused(tether_project_sensitivities_with(nullptr, &given, &none), TETHER_MEM_NULL, "projection");
+  refused(tether_project_sensitivities_with(p, nullptr, &none), TETHER_MEM_NULL, "sensitivities");
+  refused(tether_project_sensitivities_with(p, &given, nullptr), TETHER_MEM_NULL, "idas");
+  refused(tether_project_sensitivities_with(p, &given, &none), TETHER_ILL_INPUT, "count = 0");
+  given.count = 1;
+  refused(tether_project_sensitivities_with(p, &given, &none), TETHER_ILL_INPUT, "are null");
+  given.size = 4;
+  refused(tether_project_sensitivities_with(p, &given, &none), TETHER_ILL_INPUT, "size = 4");
+  refused(tether_make_sensitivities_consistent(p, 0.0, host.y, host.yp, nullptr, nullptr, nullptr),
+          TETHER_ILL_INPUT, "project_sensitivities before");
+  refused(tether_project_gradient(nullptr, 0.0, host.y, host.y), TETHER_MEM_NULL, "projection");
+  refused(tether_project_gradient(p, 0.0, host.y, nullptr), TETHER_ILL_INPUT, "must not be null");
+  // x on the unit circle at (1, 0) points across it.
+  N_Vector x = host.vector({1.0, 2.0});
+  CHECK(tether_project_gradient(p, 0.0, host.y, x) == 0);
+  CHECK(std::abs(N_VGetArrayPointer(x)[0]) < 1e-12);
+  CHECK(std::abs(N_VGetArrayPointer(x)[1] - 2.0) < 1e-12);
+}
