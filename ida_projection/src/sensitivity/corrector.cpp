@@ -182,7 +182,7 @@ void SensitivityCorrector::note_setups(double cj) {
   idas_.setups(state_.ida.mem(), &setups);
   if (setups != setups_) state_.polish.note_setup(cj);
   setups_ = setups;
-  polish_->note_setup(state_.polish.cj_at_setup());
+  polish_->follow(state_.polish);
 }
 
 // C at the accepted candidate, and its factors where one metric serves all.

@@ -21,8 +21,12 @@ class Polish {
   /// A new solve().
   void begin() { iterations_ = 0; }
   void note_setup(double cj) { cj_at_setup_ = cj; }
-  double cj_at_setup() const { return cj_at_setup_; }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
+  /// For the iteration of sensitivities, which has the same linear solver.
+  void follow(const Polish& other) {
+    cj_at_setup_ = other.cj_at_setup_;
+    iterative_ = other.iterative_;
+  }
 
   /// Is an iteration worth its price after a move of this length? `smoothing`: steps are smoothed.
   bool wanted(double length, bool smoothing) const;
