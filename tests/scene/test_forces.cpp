@@ -1,5 +1,7 @@
 // Forces that scenes tell: of joints, contacts and springs. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <sstream>
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
@@ -433,4 +435,119 @@ restitution = 0.5
   const double sign = hit.first == 1 ? 1 : -1, normal = mass * (1 + e) * speed;
   CHECK((sign * hit.impulse - Vector3d(0, -mu * normal, normal)).norm() < 100 * tolerance);
   CHECK(std::abs(engine->bodies()[1].velocity.y() - 20 + mu * normal / mass) < 100 * tolerance);
+}
+
+namespace {
+
+// Floats of an array of a .vtp file.
+std::vector<float> array_of(const std::filesystem::path& file, const std::string& name) {
+  const std::string text = tether::test::content(file);
+  const std::size_t entry = text.find("Name=\"" + name + "\"");
+  const std::size_t data = text.find("<AppendedData encoding=\"raw\">\n_");
+  REQUIRE(entry != std::string::npos);
+  REQUIRE(data != std::string::npos);
+  const std::size_t offset = std::stoul(text.substr(text.find("offset=\"", entry) + 8));
+  const char* at = text.data() + text.find('_', data) + 1 + offset;
+  std::uint64_t length = 0;
+  std::memcpy(&length, at, sizeof length);
+  std::vector<float> out(length / sizeof(float));
+  std::memcpy(out.data(), at + sizeof length, length);
+  return out;
+}
+
+double sum_of(const std::vector<float>& vectors, std::size_t component) {
+  double sum = 0;
+  for (std::size_t k = component; k < vectors.size(); k += 3) sum += vectors[k];
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("the event engine's forces are in films, tables and expectations: closed forms") {
+  // Blocks on a slope, a bob below its pin, and a mass that hangs at rest from a spring.
+  const double c = std::sqrt(0.75), N = 2 * 9.81 * c, pull = 9.81 * (0.5 - 0.3 * c);
+  std::string text = kSlope;
+  text.replace(text.find("[stepping]\nstep = 1e-3"), 22, "[event]\ntolerance = 1e-9");
+  text += R"(
+[[body]]
+name = "bob"
+mass = 3
+inertia = [1, 1, 1]
+position = [20, 0, -1]
+[[joint]]
+name = "pin"
+kind = "hinge"
+bodies = ["bob", "world"]
+at = [20, 0, 0]
+axis = [0, 1, 0]
+[[body]]
+name = "weight"
+mass = 4
+inertia = [1, 1, 1]
+position = [30, 0, -2]
+[[spring]]
+name = "spring"
+bodies = ["weight", "world"]
+at = [[30, 0, -2], [30, 0, 0]]
+stiffness = 100
+rest = 1.6076
+)";
+  const auto expect = [&](const std::string& what, const std::string& value) {
+    text += "[[expect]]\nthroughout = true\n" + what + "\nvalue = " + value + "\nwithin = 1e-6\n";
+  };
+  const auto three = [](const Vector3d& v) {
+    std::ostringstream out;
+    out.precision(17);
+    out << "[" << v.x() << ", " << v.y() << ", " << v.z() << "]";
+    return out.str();
+  };
+  const Vector3d normal(0.5, 0, c), up(-c, 0, 0.5);
+  expect("quantity = \"joint_force\"\njoint = \"pin\"", "[0, 0, 29.43]");
+  expect("quantity = \"joint_moment\"\njoint = \"pin\"", "[0, 0, 0]");
+  expect("quantity = \"spring_force\"\nspring = \"spring\"", "39.24");
+  expect("quantity = \"contact_force\"\nbody = \"stays\"", "[0, 0, 19.62]");
+  expect("quantity = \"contact_force\"\nbody = \"slides\"", three(N * normal + 0.3 * N * up));
+  text += "[[expect]]\nquantity = \"contact_slip\"\nbody = \"slides\"\nvalue = " +
+          std::to_string(0.4 * pull) + "\nwithin = 1e-5\n";
+  Scene s = parse_scene(text, "forces.toml");
+  const std::filesystem::path folder = tether::test::folder("event_forces");
+  s.output.csv = (folder / "a.csv").string();
+  s.output.vtk = (folder / "a.pvd").string();
+  const RunResult result = run(s);
+  CHECK(result.engine == "event");
+  CHECK(result.failure.empty());
+  for (const Judgement& each : result.judgements) CHECK(each.met);
+  // At the start, and at the end.
+  for (const char* frame : {"000000", "000004"}) {
+    CAPTURE(frame);
+    const std::filesystem::path film = folder / "a";
+    const std::vector<float> force =
+        array_of(film / ("contacts_" + std::string(frame) + ".vtp"), "force");
+    const std::vector<float> slip =
+        array_of(film / ("contacts_" + std::string(frame) + ".vtp"), "slip");
+    REQUIRE(force.size() == 8 * 3);
+    REQUIRE(slip.size() == 8 * 3);
+    // On the first body of each, the slope: it carries both blocks.
+    const Vector3d on_slope = -Vector3d(0, 0, 19.62) - (N * normal + 0.3 * N * up);
+    for (int k = 0; k < 3; ++k)
+      CHECK(std::abs(std::abs(sum_of(force, static_cast<std::size_t>(k))) - std::abs(on_slope[k])) <
+            1e-4);
+    double fastest = 0;
+    for (std::size_t k = 0; k < slip.size(); k += 3)
+      fastest = std::max(fastest, Eigen::Vector3f(slip.data() + k).cast<double>().norm());
+    CHECK(std::abs(fastest - (frame[5] == '4' ? 0.4 * pull : 0)) < 1e-5);
+    const std::vector<float> pin =
+        array_of(film / ("joints_" + std::string(frame) + ".vtp"), "force");
+    REQUIRE(pin.size() == 3);
+    CHECK(std::abs(pin[2] - 29.43) < 1e-4);
+    const std::vector<float> tension =
+        array_of(film / ("springs_" + std::string(frame) + ".vtp"), "tension");
+    REQUIRE(tension.size() == 1);
+    CHECK(std::abs(tension[0] - 39.24) < 1e-4);
+  }
+  const std::string table = tether::test::content(folder / "a.csv");
+  CHECK(table.find("pin.fz_N") != std::string::npos);
+  CHECK(table.find("in_steps") == std::string::npos);
+  const std::string contacts = tether::test::content(folder / "a.contacts.csv");
+  CHECK(std::count(contacts.begin(), contacts.end(), '\n') == 1 + 5 * 8);
 }

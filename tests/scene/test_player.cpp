@@ -129,6 +129,20 @@ TEST_CASE("a page is one document with the data of its run, and asks the network
   CHECK(!decoded(element(page, "film-contacts")).empty());
 }
 
+TEST_CASE("the page of an event run has its forces") {
+  Scene scene = parse_scene(kBall, "events.toml");
+  scene.engine = EngineChoice::event;
+  scene.bodies[1].velocity.setZero();
+  const std::string page = page_of(scene);
+  const std::vector<float> x = floats(decoded(element(page, "film-contacts")));
+  REQUIRE(x.size() % 9 == 0);
+  REQUIRE(x.size() >= 9 * 100);
+  for (std::size_t k = 0; k < x.size(); k += 9) {
+    CHECK(std::abs(std::abs(x[k + 5]) - 9.81) < 1e-4);
+    CHECK(std::abs(x[k + 3]) + std::abs(x[k + 4]) < 1e-4);
+  }
+}
+
 TEST_CASE("texts of a scene stay texts on its page") {
   Scene scene = parse_scene(kBall, "hostile.toml");
   const std::string evil =

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "page_text.hpp"
 
@@ -53,9 +54,10 @@ Film::Frame Film::frame(const Engine& engine, const Diagnostics& d) const {
       out.orientations.push_back(
           static_cast<std::int16_t>(std::lround(32767 * std::clamp(x, -1.0, 1.0))));
   }
+  const bool events = std::string_view(engine.name()) == "event";
   for (const ContactState& contact : engine.contacts()) {
     add(in_view(contact.point), out.contacts);
-    add(contact.impulse, out.contacts);
+    add(events ? contact.force : contact.impulse, out.contacts);
     add(contact.normal, out.contacts);
   }
   return out;

@@ -32,7 +32,8 @@ class Film {
   /// Adds times, energies, errors and contacts a frame to the object of the page.
   void add_to(nlohmann::json& page) const;
   /// In base 64: positions (3 a body, single precision), orientations (w, x, y, z a body, 32767 for
-  /// 1), contacts (point in units of the view, impulse on the first body and normal: 9 a contact).
+  /// 1), contacts (point in units of the view, impulse on the first body and normal: 9 a contact;
+  /// of the event engine, whose closed contacts have no impulses, the force).
   std::string positions() const, orientations() const, contacts() const;
 
   static constexpr std::size_t kMostFrames = 2000;

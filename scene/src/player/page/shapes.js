@@ -159,7 +159,7 @@ class Shapes {
     const half = scaled(axis, (joint.kind === 'slider' ? 8 : 3) * this.marker);
     this.addRod(this.above, subtract(ends[0], half), add(ends[0], half), 0.4 * this.marker, kJoint);
   }
-  // The impulse on the first body; a contact without one shows its normal.
+  // The impulse, or force, on the first body; a contact without one shows its normal.
   addContacts(frame) {
     const n = this.data.contactNumbers, large = this.data.largeImpulse;
     for (let k = this.data.firstContact[frame]; k < this.data.firstContact[frame + 1]; ++k) {
