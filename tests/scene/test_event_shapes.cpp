@@ -268,3 +268,100 @@ TEST_CASE("event: boxes, bars and balls on each other are where the limit of ste
   CHECK(errors[0] < 5e-3);
   CHECK(errors[1] < 0.4 * errors[0]);
 }
+
+namespace {
+
+const std::string kCube = "shape = \"box\"\nsize = [1, 1, 1]";
+const std::string kGround = body("ground", "shape = \"plane\"", "[0, 0, 0]", "fixed = true");
+
+}  // namespace
+
+TEST_CASE("event: equal boxes on each other stand still, and carry the weights above") {
+  for (const int boxes : {2, 3})
+    for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+      CAPTURE(boxes, tolerance);
+      std::string text = kGround;
+      for (int k = 0; k < boxes; ++k)
+        text += body("box " + number(k), kCube, "[0, 0, " + number(0.5 + k) + "]",
+                     "mass = " + number(k + 1));
+      const auto engine = run(text + law(0.5, 0.3), tolerance, 0.5);
+      CHECK(engine->events().empty());
+      CHECK(engine->diagnostics().kinetic_energy < 1e-20);
+      CHECK(engine->diagnostics().contacts == 4 * boxes);
+      double weight = 0;
+      for (int k = boxes; k > 0; --k) {
+        weight += 9.81 * k;
+        Vector3d below = Vector3d::Zero();  // on body k by the one below it
+        for (const ContactState& c : engine->contacts()) {
+          if (c.first == k && c.second == k - 1) below += c.force;
+          if (c.first == k - 1 && c.second == k) below -= c.force;
+        }
+        CHECK((below - Vector3d(0, 0, weight)).norm() < 1e-7);
+      }
+    }
+}
+
+TEST_CASE("event: equal boxes that fall on each other come to rest at once without restitution") {
+  const std::string text = kGround + body("low", kCube, "[0, 0, 0.55]", "mass = 1") +
+                           body("up", kCube, "[0, 0, 1.6]", "mass = 1") + law(0.5, 0);
+  for (const double tolerance : {1e-5, 1e-8}) {
+    const auto engine = run(text, tolerance, 0.3);
+    // 0.05 m, and 0.1 m: the upper one falls by 0.05 m more than the lower one.
+    CHECK(std::abs(engine->events().front().time - std::sqrt(0.1 / 9.81)) < 10 * tolerance);
+    CHECK(std::abs(engine->events().back().time - std::sqrt(0.2 / 9.81)) < 10 * tolerance);
+    CHECK(std::abs(engine->bodies()[2].position.z() - 1.5) < 10 * tolerance);
+    CHECK(engine->diagnostics().kinetic_energy < 1e-18);
+  }
+}
+
+TEST_CASE("event: a box slides on one of its width, which lies still or moves, as on a plane") {
+  const double a = 0.3 * 9.81;
+  for (const double tolerance : kLadder) {
+    CAPTURE(tolerance);
+    const auto fixed =
+        run(body("low", "shape = \"box\"\nsize = [4, 1, 1]", "[0, 0, 0.5]", "fixed = true") +
+                body("up", kCube, "[-1, 0, 1.5]", "mass = 1\nvelocity = [2, 0, 0]") + law(0.3, 0),
+            tolerance, 0.8);
+    CHECK(std::abs(fixed->bodies()[1].position.x() + 1 - 2 / a) < 10 * tolerance);
+    CHECK(std::abs(fixed->bodies()[1].position.y()) < tolerance);
+    REQUIRE(!fixed->events().empty());
+    for (const ContactEvent& each : fixed->events()) {
+      CHECK(each.kind == Kind::stop);
+      CHECK(std::abs(each.time - 2 / a) < 10 * tolerance);
+    }
+    // Both slide: the lower one is dragged along on smooth ground until they go together.
+    const std::string smooth = body("low", kCube, "[0, 0, 0.5]", "mass = 3") +
+                               body("up", kCube, "[0, 0, 1.5]", "mass = 1\nvelocity = [1, 0, 0]") +
+                               law(0.3, 0);
+    const auto both = run(kFloor + smooth + pair(""), tolerance, 0.4);
+    const double together = 1 / (a + a / 3), v = a / 3 * together;
+    const double way = v * v / (2 * a / 3) + v * (0.4 - together);
+    CHECK(std::abs(both->bodies()[1].position.x() - way) < 10 * tolerance);
+    CHECK(std::abs(both->bodies()[2].position.x() - (way + 0.5 * together)) < 10 * tolerance);
+    CHECK(std::abs(both->bodies()[2].velocity.x() - 0.25) < 10 * tolerance);
+  }
+}
+
+TEST_CASE("event: a box that stands askew tips over the edge that it shares with the one below") {
+  // 50 degrees about the common edge, from rest, held by friction: the energy of the turn about it.
+  const double tilt = 50 * M_PI / 180, r = std::sqrt(0.5), at = tilt + M_PI / 4;
+  const Vector3d centre(0.5 - r * std::cos(at), 0, 1 + r * std::sin(at));
+  const std::string text =
+      body("low", kCube, "[0, 0, 0.5]", "fixed = true") +
+      body("up", kCube, "[" + number(centre.x()) + ", 0, " + number(centre.z()) + "]",
+           "mass = 2\norientation = { axis = [0, 1, 0], deg = 50 }") +
+      law(3, 0);
+  for (const double tolerance : {1e-5, 1e-7, 1e-9}) {
+    CAPTURE(tolerance);
+    const auto engine = run(text, tolerance, 0.6);
+    CHECK(engine->events().empty());
+    const BodyState& up = engine->bodies()[1];
+    const double angle = 2 * std::atan2(up.orientation.y(), up.orientation.w());
+    const Vector3d edge = up.position + up.orientation * Vector3d(0.5, 0, -0.5);
+    CHECK((edge - Vector3d(0.5, 0, 1)).norm() < 10 * tolerance);
+    const double fallen = r * (std::sin(at) - std::sin(angle + M_PI / 4));
+    CHECK(std::abs(fallen) > 0.01);
+    CHECK(std::abs(up.angular_velocity.y() - std::sqrt(2 * 9.81 * std::abs(fallen) / (2.0 / 3))) <
+          10 * tolerance);
+  }
+}

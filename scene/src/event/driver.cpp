@@ -104,6 +104,24 @@ std::vector<int> Driver::touching(int always) const {
   return out;
 }
 
+bool Driver::are_one(int contact, int other) const {
+  return model_.are_one(contact, other, kBesideBorder * bands().gap(contact));
+}
+
+// Features of faces, edges and corners that lie on each other: one of those that are one contact,
+// the closed one, which so changes only where it ends.
+std::vector<int> Driver::without_doubles(const std::vector<int>& contacts) const {
+  std::vector<int> out;
+  for (const int i : contacts) {
+    const auto twin = std::find_if(out.begin(), out.end(), [&](int k) { return are_one(k, i); });
+    if (twin == out.end())
+      out.push_back(i);
+    else if (motion_.modes()[at(*twin)].mode == Mode::open)
+      *twin = motion_.modes()[at(i)].mode == Mode::open ? *twin : i;
+  }
+  return out;
+}
+
 void Driver::begin_phase() {
   settle_velocities();
   motion_.keep_energy_of(event_time_, y_);
@@ -234,7 +252,8 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
 
 VectorXd Driver::state() {
   VectorXd y = y_;
-  const double since = time_ - phase_->start();
+  // A run that gives up within an event has no phase there yet.
+  const double since = time_ - event_time_;
   if (since > 0 && phase_->step_end() > 0)
     phase_->projected_at(std::min(std::max(since, phase_->step_begin()), phase_->step_end()), y);
   model_.set(time_, y.data(), y.data() + motion_.coordinates());

@@ -93,6 +93,8 @@ class Driver {
   bool leaves_its_feature(int contact);
   void jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu);
   std::vector<int> touching(int always) const;
+  bool are_one(int contact, int other) const;
+  std::vector<int> without_doubles(const std::vector<int>& contacts) const;
   double longest_first_step(const std::vector<bool>& leaving);
   void turn_slips();
   void record(EventKind kind, int contact, double before, double after, double lost);

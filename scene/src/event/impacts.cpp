@@ -38,7 +38,7 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
     any = any || hits;
   }
   if (!any) out.clear();
-  return out;
+  return without_doubles(out);
 }
 
 // One impact may strike others that are near. With corners in turns there are infinitely many in no

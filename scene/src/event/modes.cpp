@@ -51,11 +51,13 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   std::vector<int> candidates;
   double rate = 0;
   for (const int i : touching) {
-    if (i == left_contact && (left == Watch::normal_force || left == Watch::border)) continue;
+    if (i == left_contact && left == Watch::border) continue;
+    if (left == Watch::normal_force && are_one(i, left_contact)) continue;
     model_.gap(i, rate);
     if (std::abs(rate) <= bands().approach(i) && !leaves_its_feature(i)) candidates.push_back(i);
   }
   if (candidates.empty()) return modes;
+  candidates = without_doubles(candidates);
   ContactRows rows(model_, candidates);
   const int block = rows.size(), n = static_cast<int>(candidates.size());
   const VectorXd velocities = rows.velocities(u);
@@ -98,7 +100,8 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
         !(std::abs(answer.w[block * k]) <= kNegligible * solved.scale &&
           rests_on_others(rows, answer, k)))
       continue;
-    const bool lifted = std::find(lifted_.begin(), lifted_.end(), i) != lifted_.end();
+    const bool lifted =
+        std::any_of(lifted_.begin(), lifted_.end(), [&](int each) { return are_one(i, each); });
     if (lifted && answer.x[block * k] <= kNoForce * answer.x.cwiseAbs().maxCoeff()) continue;
     const VectorXd& d = slides[at(k)];
     if (d.size() > 0) {

@@ -46,7 +46,6 @@ struct CrossingFeature {
     return c.dot(B.R * (second.inward[0] + second.inward[1])) > 0 ? -1 : 1;
   }
   static constexpr double kParallel = 1e-9;  // squared sine
-  static constexpr double kFlush = 0.1;      // sine
 };
 
 inline Touch CrossingFeature::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,

@@ -119,7 +119,8 @@ struct LineFeature {
 struct FeaturePair {
   int first = 0, second = 0;  ///< bodies, as in Bodies
   Vector3d centre = Vector3d::Zero();
-  double radius = 0;  ///< of the first feature, a point
+  double radius = 0;            ///< of the first feature, a point
+  std::vector<Vector3d> edges;  ///< of the first feature, a vertex: the ways to its neighbours
   std::variant<PlaneFeature, PointFeature, LineFeature, CrossingFeature> on_second;
   double friction = 0, restitution = 0;
 
@@ -131,11 +132,22 @@ struct FeaturePair {
         on_second);
   }
   double margin(const Bodies& bodies) const {
-    return std::visit(
-        [&](const auto& feature) {
-          return feature.margin(bodies.frames[at(first)], bodies.frames[at(second)], centre);
-        },
-        on_second);
+    const Frame<double>&A = bodies.frames[at(first)], &B = bodies.frames[at(second)];
+    const double margin =
+        std::visit([&](const auto& feature) { return feature.margin(A, B, centre); }, on_second);
+    const auto* face = std::get_if<PlaneFeature>(&on_second);
+    if (face == nullptr || face->border.empty()) return margin;
+    return std::min(margin, out_of_face(B.R * face->normal, A));
+  }
+
+ private:
+  /// A vertex touches a face whose normal no edge of it goes against. (That of a box which stands
+  /// flush on another one is on the border of the other's side faces, too: its edges go into them.)
+  double out_of_face(const Vector3d& normal, const Frame<double>& A) const {
+    double least = kNoBorder;
+    for (const Vector3d& way : edges)
+      least = std::min(least, kFlush * way.norm() + normal.dot(A.R * way));
+    return least;
   }
 };
 

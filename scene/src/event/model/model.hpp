@@ -65,6 +65,10 @@ class Model {
     return false;
   }
 
+  /// Whether both are the same contact by two pairs of features: of one point, within `distance`,
+  /// m, of the same two bodies, with one normal. (Corners of equal boxes that stand on each other.)
+  virtual bool are_one(int contact, int other, double /*distance*/) { return contact == other; }
+
   /// A vector of a contact by its normal and tangents, in world axes.
   virtual Eigen::Vector3d in_space(int /*contact*/, const VectorXd& /*parts*/) {
     return Eigen::Vector3d::Zero();

@@ -40,6 +40,7 @@ PlaneFeature face_between(const std::vector<Vector3d>& corners) {
 }
 
 void add_polyhedron(const std::vector<Vector3d>& points, Outline& out) {
+  const std::size_t first_knob = out.knobs.size() - points.size();
   std::map<std::pair<std::size_t, std::size_t>, Segment> edges;
   for (const std::vector<std::size_t>& face : hull_faces(points)) {
     std::vector<Vector3d> corners;
@@ -57,7 +58,12 @@ void add_polyhedron(const std::vector<Vector3d>& points, Outline& out) {
       edge.inward[known ? 1 : 0] = -out.faces.back().border[k].first;
     }
   }
-  for (const auto& [ends, edge] : edges) out.segments.push_back(edge);
+  for (const auto& [ends, edge] : edges) {
+    out.segments.push_back(edge);
+    const Vector3d way = edge.length * edge.along;
+    out.knobs[first_knob + ends.first].edges.push_back(way);
+    out.knobs[first_knob + ends.second].edges.push_back(-way);
+  }
 }
 
 }  // namespace
@@ -67,11 +73,11 @@ Outline outline_of(const Shape& shape) {
   std::vector<Vector3d> points;
   switch (shape.kind) {
     case ShapeKind::sphere:
-      out.knobs.push_back({shape.position, shape.radius});
+      out.knobs.push_back({shape.position, shape.radius, {}});
       break;
     case ShapeKind::capsule: {
       for (const double end : {-0.5, 0.5})
-        out.knobs.push_back({placed(shape, {0, 0, end * shape.length}), shape.radius});
+        out.knobs.push_back({placed(shape, {0, 0, end * shape.length}), shape.radius, {}});
       Segment axis;
       axis.at = out.knobs[0].at;
       axis.along = shape.orientation * Vector3d(0, 0, 1);
@@ -92,7 +98,7 @@ Outline outline_of(const Shape& shape) {
   }
   for (Vector3d& p : points) {
     p = placed(shape, p);
-    out.knobs.push_back({p, 0});
+    out.knobs.push_back({p, 0, {}});
   }
   if (shape.kind == ShapeKind::box || shape.kind == ShapeKind::convex) add_polyhedron(points, out);
   return out;

@@ -9,10 +9,11 @@
 
 namespace tether::scene::event {
 
-/// A point of a body with a radius.
+/// A point of a body with a radius. Of a vertex, the edges that leave it.
 struct Knob {
   Vector3d at = Vector3d::Zero();
   double radius = 0;
+  std::vector<Vector3d> edges = {};
 };
 
 /// In the axes of the body. Points with a radius (spheres, ends of capsules) and vertices; edges

@@ -41,6 +41,7 @@ class Contacts {
     out_.push_back(bodies_);
     out_.back().centre = knob.at;
     out_.back().radius = knob.radius;
+    out_.back().edges = knob.edges;
     out_.back().on_second.emplace<Feature>(std::move(feature));
   }
 

@@ -176,11 +176,22 @@ Forces SceneModel::forces_of(const joints::Reactions& reactions,
 }
 
 bool SceneModel::are_at_one_edge(int contact, int other, double distance) {
+  return square_between(contact, other, distance) > kOtherNormal;
+}
+
+bool SceneModel::are_one(int contact, int other, double distance) {
+  if (contact == other) return true;
+  const double square = square_between(contact, other, distance);
+  return square >= 0 && square <= kOtherNormal;
+}
+
+// Of the sine between the normals of contacts of one point; -1: they are of two.
+double SceneModel::square_between(int contact, int other, double distance) {
   const FeaturePair &p = pair(contact), &q = pair(other);
-  if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return false;
+  if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return -1;
   const Touch a = p.look(bodies_.all()), b = q.look(bodies_.all());
-  return (a.point - b.point).norm() <= distance &&
-         a.normal.cross(b.normal).squaredNorm() > kOtherNormal;
+  if ((a.point - b.point).norm() > distance) return -1;
+  return a.normal.cross(b.normal).squaredNorm();
 }
 
 void SceneModel::to_coordinates(const double* row, double* gradient) const {

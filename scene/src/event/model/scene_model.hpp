@@ -49,6 +49,7 @@ class SceneModel final : public Model {
   double margin(int contact) override { return pair(contact).margin(bodies_.all()); }
 
   bool are_at_one_edge(int contact, int other, double distance) override;
+  bool are_one(int contact, int other, double distance) override;
 
   Vector3d in_space(int contact, const VectorXd& parts) override;
 
@@ -72,6 +73,7 @@ class SceneModel final : public Model {
   Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
 
  private:
+  double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
 
   smooth::MovingBodies bodies_;

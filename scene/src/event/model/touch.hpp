@@ -16,6 +16,9 @@ constexpr double kNoBorder = std::numeric_limits<double>::infinity();
 /// The gap of features that do not face each other.
 constexpr double kNowhere = -std::numeric_limits<double>::infinity();
 
+/// Sine by which features that lie flush in a face may be turned beyond it by rounding.
+constexpr double kFlush = 0.1;
+
 struct Touch {
   double gap = 0, rate = 0, second = 0;
   Vector3d normal = Vector3d::UnitZ(), point = Vector3d::Zero();
