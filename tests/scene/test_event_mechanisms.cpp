@@ -301,3 +301,114 @@ TEST_CASE("event: where the engine gives up its state is saved, and steps take i
   const double since = 1.05 - 2 * first, up = e * e * speed;
   CHECK(std::abs(height - 0.1 - (up * since - 4.905 * since * since)) < 5e-3);
 }
+
+namespace {
+
+/// A ball dropped from 1 m with a restitution of 1/2, whose events end at the second impact.
+Scene handed_over(const std::string& more = "") {
+  return parse_scene(
+      "[scene]\nend = 1.05\ngravity = [0, 0, -9.81]\n[event]\ntolerance = 1e-8\nmax_events = 1\n"
+      "otherwise = \"stepping\"\n[stepping]\nstep = 1e-4\n[output]\nevery = 0.05\n" +
+          more + kFloor +
+          "[[body]]\nname = \"ball\"\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nposition = [0, "
+          "0, "
+          "1.1]\nmaterial = \"body\"\n" +
+          pair("restitution = 0.5"),
+      "test");
+}
+
+}  // namespace
+
+TEST_CASE("event: with otherwise = \"stepping\" a run goes on in steps, and says so") {
+  const double e = 0.5, first = std::sqrt(2 / 9.81), up = e * e * 9.81 * first;
+  const std::filesystem::path folder = tether::test::folder("otherwise");
+  Scene scene = handed_over();
+  CHECK(write_scene(parse_scene(write_scene(scene), "again")) == write_scene(scene));
+  scene.output.csv = (folder / "a.csv").string();
+  const Plan plan = make_plan(scene);
+  CHECK(plan.engine == EngineKind::event);
+  CHECK(plan.then_steps == 1e-4);
+  std::ostringstream said;
+  said << plan;
+  CHECK(said.str().find("[stepping] takes over, at steps of 0.0001 s") != std::string::npos);
+
+  double height = 0;
+  RunOptions options;
+  options.record = [&](const Engine& engine) { height = engine.bodies()[1].position.z(); };
+  const RunResult result = tether::scene::run(scene, options);
+  CHECK(result.failure.empty());
+  CHECK(result.engine == "event");
+  REQUIRE(result.hand_over);
+  CHECK(std::abs(result.hand_over->time - 2 * first) < 1e-7);
+  CHECK(result.hand_over->why.find("max_events = 1") != std::string::npos);
+  CHECK(result.hand_over->why.find("t = 0.90304728") == 0);
+  CHECK(result.hand_over->before.impacts == 1);
+  const double since = 1.05 - 2 * first;
+  CHECK(std::abs(height - 0.1 - (up * since - 4.905 * since * since)) < 1e-3);
+  CHECK(std::abs(static_cast<double>(result.counts.steps) - (1.05 - 2 * first) / 1e-4) <= 2);
+  // Table of events and of states.
+  const std::string events = tether::test::content(folder / "a.events.csv");
+  CHECK(events.find(",hand_over,,,") != std::string::npos);
+  std::istringstream table(tether::test::content(folder / "a.csv"));
+  std::string line;
+  std::getline(table, line);
+  CHECK(line.find(",drift,in_steps,") != std::string::npos);
+  const auto column = static_cast<int>(
+      std::count(line.begin(), line.begin() + static_cast<long>(line.find("in_steps")), ','));
+  while (std::getline(table, line)) {
+    std::size_t at = 0;
+    for (int k = 0; k < column; ++k) at = line.find(',', at) + 1;
+    CHECK(line.substr(at, 2) == (std::stod(line) < 2 * first ? "0," : "1,"));
+  }
+}
+
+TEST_CASE("event: hand-overs at any phase of a step keep the time") {
+  // The shorter first step: heights are those of the closed form at every step, to its order.
+  const double first = std::sqrt(2 / 9.81), up = 0.25 * 9.81 * first;
+  for (const double step : {1e-2, 1.1e-2, 1.27e-2, 1e-3}) {
+    Scene scene = handed_over();
+    scene.stepping->step = step;
+    const auto engine = make_engine(scene);
+    engine->advance(0.95);
+    REQUIRE(engine->hand_over());
+    const double since = engine->time() - 2 * first;
+    CAPTURE(step, since);
+    CHECK(std::abs(std::remainder(engine->time(), step)) < 1e-12);
+    // Steps add g dt t / 2 to the height.
+    CHECK(std::abs(engine->bodies()[1].position.z() - 0.1 - (up * since - 4.905 * since * since)) <
+          4.905 * step * since + 1e-6);
+  }
+}
+
+TEST_CASE("event: a run that has been handed over is saved and goes on with its bits") {
+  Scene scene = handed_over();
+  goes_on_with_its_bits(scene, 0.5, 1.0);
+  goes_on_with_its_bits(scene, 0.95, 1.0);
+  // For a scene of steps alone, too: its bodies come first.
+  const auto engine = make_engine(scene);
+  engine->advance(0.95);
+  std::stringstream state;
+  engine->save(state);
+  Scene steps = scene;
+  steps.event.reset();
+  const auto other = make_engine(steps);
+  other->restore(state, Engine::Restore::near);
+  CHECK(other->time() == engine->time());
+  CHECK(other->bodies()[1].position == engine->bodies()[1].position);
+}
+
+TEST_CASE("event: what the event engine does not have is stepped where the scene allows it") {
+  const std::string turns =
+      "[[body]]\nname = \"arm\"\nmass = 1\ninertia = [1, 1, 1]\nposition = [5, 0, 5]\n"
+      "[[joint]]\nkind = \"hinge\"\nbodies = [\"arm\", \"world\"]\nat = [5, 0, 5]\naxis = [0, 1, "
+      "0]\n"
+      "limits_deg = [-10, 10]\n";
+  const Plan plan = make_plan(handed_over(turns));
+  CHECK(plan.engine == EngineKind::stepping);
+  CHECK(plan.why.find("limits, motors or friction") != std::string::npos);
+  Scene refused = handed_over(turns);
+  refused.event->otherwise = Otherwise::stop;
+  refused.stepping.reset();
+  CHECK_THROWS_AS(make_plan(refused), std::invalid_argument);
+  CHECK_THROWS_AS(parse_scene("[event]\n[stepping]\n", "two"), SceneError);
+}

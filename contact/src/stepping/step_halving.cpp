@@ -8,11 +8,13 @@ namespace tether::contact {
 
 void Stepper::Implementation::step() {
   outcome = {};
-  const double start = static_cast<double>(counts.steps) * options.step;
+  const double start = static_cast<double>(counts.steps) * options.step + late;
+  const double length = options.step - late;
   if (options.accuracy > 0)
-    advance_accurately(start, options.step);
+    advance_accurately(start, length);
   else
-    advance(start, options.step, options.max_halvings);
+    advance(start, length, options.max_halvings);
+  late = 0;
   ++counts.steps;
 }
 

@@ -87,7 +87,8 @@ void Stepper::add_force(const char* effect, Force force) {
 void Stepper::step() { implementation_->step(); }
 
 double Stepper::time() const {
-  return static_cast<double>(implementation_->counts.steps) * implementation_->options.step;
+  const Implementation& s = *implementation_;
+  return static_cast<double>(s.counts.steps) * s.options.step + s.late;
 }
 const BodySet& Stepper::bodies() const { return implementation_->bodies; }
 BodySet& Stepper::bodies() { return implementation_->bodies; }
@@ -149,6 +150,7 @@ void Stepper::set_memory(const StepperMemory& m) {
                                 std::to_string(m.spins.size()) + " turning bodies, but there are " +
                                 std::to_string(s.motion.spins().size()));
   s.counts.steps = m.steps;
+  s.late = 0;
   s.motion.turn_inertias(s.bodies);
   if (s.solver) s.solver->set_warm_start(m.contacts);
   if (s.positions) s.positions->set_warm_start(m.corrections);
@@ -165,9 +167,13 @@ void Stepper::set_memory(const StepperMemory& m) {
   s.parts.control = m.control;
 }
 
-void Stepper::start_anew(long steps) {
+void Stepper::start_anew(long steps, double late) {
   Implementation& s = *implementation_;
+  if (!(late >= 0 && late < s.options.step))
+    throw std::invalid_argument("stepping: a start that is " + std::to_string(late) +
+                                " s late, but a step has " + std::to_string(s.options.step) + " s");
   s.counts.steps = steps;
+  s.late = late;
   s.parts.control = {};
   s.motion.spins().assign(s.motion.spins().size(), {});
   s.motion.turn_inertias(s.bodies);

@@ -95,6 +95,7 @@ struct Stepper::Implementation {
   detail::Outcome outcome;
   detail::PartControl parts;  // only with an accuracy
   StepCounts counts;
+  double late = 0;  // how much later than its boundary the next step begins, s
 
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
 

@@ -70,6 +70,7 @@ Scene with_setting(const Scene& scene, Method method, double setting) {
   out.stepping.reset();
   if (method == Method::events) {
     out.event = scene.event.value_or(EventOptions{});
+    out.event->otherwise = Otherwise::stop;
     out.event->tolerance = setting;
     out.event->max_events = std::min(out.event->max_events, kMostEvents);
     out.event->max_steps = std::min(out.event->max_steps, kMostEventSteps);

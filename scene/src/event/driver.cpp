@@ -334,8 +334,9 @@ void Driver::record_changes(const std::vector<ContactMode>& before,
 }
 
 void Driver::fail(const std::string& what) const {
-  throw SimulationError(fmt::format(
-      "t = {:.12g} s: {}. Try another [event] tolerance, or the stepping engine", time_, what));
+  throw SimulationError(
+      fmt::format("t = {:.12g} s: {}. Try another [event] tolerance, or the stepping engine",
+                  model_.time_unit() * time_, what));
 }
 
 DriverCounts Driver::counts() const {

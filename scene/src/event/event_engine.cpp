@@ -39,7 +39,7 @@ class EventEngine : public Engine {
       : units_(event::units_of(scene)),
         scene_(scaled(scene, units_)),
         options_(driver_options(scene_)),
-        model_(scene_),
+        model_(scene_, units_.time),
         driver_(std::make_unique<Driver>(model_, options_, 0.0, model_.start())),
         reactions_(scene_, mechanics::placed_bodies(scene_)) {
     bodies_.resize(scene.bodies.size());
@@ -292,6 +292,8 @@ const char* name(ContactEvent::Kind kind) {
       return "jam";
     case ContactEvent::Kind::border:
       return "border";
+    case ContactEvent::Kind::hand_over:
+      return "hand_over";
   }
   return "?";
 }

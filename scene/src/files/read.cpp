@@ -35,10 +35,13 @@ void read_event(Fields& root, Reader& r) {
   o.max_step = in.number("max_step", o.max_step, kNotNegative, "s; 0: free");
   o.max_events = in.count("max_events", o.max_events, 1, 2000000000);
   o.max_steps = in.count("max_steps", o.max_steps, 1, 2000000000);
+  o.otherwise = in.word("otherwise", o.otherwise);
   in.finish();
   r.scene.event = o;
-  if (r.scene.smooth || r.scene.stepping)
-    root.wrong("event", "a scene has one of [smooth], [stepping] and [event]");
+  if (r.scene.smooth || (r.scene.stepping && o.otherwise != Otherwise::stepping))
+    root.wrong("event",
+               "a scene has one of [smooth], [stepping] and [event]; [stepping] beside [event] is "
+               "for otherwise = \"stepping\"");
 }
 
 void read_engine(Fields& root, Reader& r) {

@@ -117,6 +117,7 @@ void write_event(const EventOptions& o, Writer& out) {
   out.field("max_step", o.max_step, "s; 0: free");
   out.field("max_events", o.max_events);
   out.field("max_steps", o.max_steps);
+  out.raw("otherwise", toml_word(o.otherwise));
 }
 
 void write_output(const Output& o, Writer& out) {

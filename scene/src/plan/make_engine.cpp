@@ -3,6 +3,10 @@
 
 namespace tether::scene {
 
+bool goes_on_in_steps(const Scene& scene) {
+  return scene.event.value_or(EventOptions{}).otherwise == Otherwise::stepping;
+}
+
 std::unique_ptr<Engine> make_engine(const Scene& scene) {
   switch (make_plan(scene).engine) {
     case EngineKind::smooth:
@@ -10,7 +14,8 @@ std::unique_ptr<Engine> make_engine(const Scene& scene) {
     case EngineKind::stepping:
       return make_stepping_engine(scene);
     case EngineKind::event:
-      return make_event_engine(scene);
+      return goes_on_in_steps(scene) ? make_event_engine_with_steps(scene)
+                                     : make_event_engine(scene);
   }
   return nullptr;
 }

@@ -65,8 +65,9 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
                                      [](const Invariant& each) { return each.project; });
   const auto asks = [&](EngineChoice which, bool options) { return s.engine == which || options; };
   const bool smooth = asks(EngineChoice::smooth, s.smooth.has_value());
-  const bool stepping = asks(EngineChoice::stepping, s.stepping.has_value());
   const bool event = asks(EngineChoice::event, s.event.has_value());
+  const bool then_steps = event && goes_on_in_steps(s);
+  const bool stepping = asks(EngineChoice::stepping, s.stepping.has_value() && !then_steps);
   refuse(
       smooth + stepping + event > 1,
       smooth && stepping && !event
@@ -84,9 +85,16 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   no_event = laws               ? has_laws + "event engine does not have"
              : contact || event ? event_engine_refusal(s)
                                 : std::string("nothing touches");
-  refuse(event && !no_event.empty(), no_event);
+  refuse(event && !then_steps && !no_event.empty(), no_event);
+  refuse(then_steps && projected,
+         "[event] otherwise = \"stepping\": the stepping engine projects no invariants: give them "
+         "project = false");
   if (!refusal.empty()) throw std::invalid_argument(refusal);
 
+  if (then_steps && !no_event.empty()) {
+    why = "[event] otherwise: " + no_event;
+    return EngineKind::stepping;
+  }
   if (event) {
     why = contact ? "bodies touch, and the scene asks for it" : "the scene asks for it";
     return EngineKind::event;
@@ -114,6 +122,10 @@ std::string with_accuracy(const Scene& scene) {
 // Which engines could move the scene, too, or why not.
 std::string others(const Plan& plan) {
   const bool free = plan.invariants == 0;  // only the smooth engine keeps some
+  if (plan.engine == EngineKind::event && plan.then_steps > 0)
+    return fmt::format(
+        "          where it cannot go on, [stepping] takes over, at steps of {:g} s\n",
+        plan.then_steps);
   if (plan.engine == EngineKind::event)
     return "          [stepping] could move it, too, at fixed steps or within an accuracy\n";
   if (plan.engine == EngineKind::smooth)
@@ -131,6 +143,8 @@ Plan make_plan(const Scene& scene) {
   Plan plan;
   plan.engine = choose(scene, plan.why, plan.no_event);
   if (plan.engine == EngineKind::stepping) plan.why += with_accuracy(scene);
+  if (plan.engine == EngineKind::event && goes_on_in_steps(scene))
+    plan.then_steps = scene.stepping.value_or(SteppingOptions{}).step;
   for (const effects::Effect* each : effects::all()) each->plan(scene, plan.engine, plan.effects);
   for (const Body& body : scene.bodies) {
     ++plan.bodies;

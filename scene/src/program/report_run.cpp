@@ -69,21 +69,18 @@ std::string subject(const Scene& scene, const Expect& e) {
 
 }  // namespace
 
-void print_summary(const Scene& scene, const RunResult& r) {
-  const Summary& s = r.summary;
-  const Counts& c = r.counts;
-  fmt::print("{}: {} engine, {:g} s\n", scene.name.empty() ? scene.file : scene.name, r.engine,
-             r.time);
-  fmt::print(
-      "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
-      s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
-  if (r.engine == "event") {
-    fmt::print("  events       {}, {} of them impacts; {} contact problems\n", c.events, c.impacts,
-               c.contact_problems);
-    fmt::print("  drift        {:.2e} m; penetration {:.2e} m\n", s.drift, s.penetration);
-    fmt::print("  work         {} steps, {} residuals, {} Jacobians, {} failed error tests\n",
-               c.steps, c.residual_evaluations, c.jacobian_evaluations, c.error_test_failures);
-  } else if (c.contact_problems > 0) {
+namespace {
+
+void print_events(const Summary& s, const Counts& c) {
+  fmt::print("  events       {}, {} of them impacts; {} contact problems\n", c.events, c.impacts,
+             c.contact_problems);
+  fmt::print("  drift        {:.2e} m; penetration {:.2e} m\n", s.drift, s.penetration);
+  fmt::print("  work         {} steps, {} residuals, {} Jacobians, {} failed error tests\n",
+             c.steps, c.residual_evaluations, c.jacobian_evaluations, c.error_test_failures);
+}
+
+void print_work(const Scene& scene, const Summary& s, const Counts& c) {
+  if (c.contact_problems > 0) {
     fmt::print("  contacts     at most {}; penetration {:.2e} m; residual {:.2e}\n", s.contacts,
                s.penetration, s.residual);
     fmt::print("  work         {} steps, {} contact problems, {} sweeps, {} unsolved\n", c.steps,
@@ -105,6 +102,24 @@ void print_summary(const Scene& scene, const RunResult& r) {
   } else {
     fmt::print("  work         {} steps\n", c.steps);
   }
+}
+
+}  // namespace
+
+void print_summary(const Scene& scene, const RunResult& r) {
+  const Summary& s = r.summary;
+  const Counts& c = r.counts;
+  fmt::print("{}: {} engine, {:g} s\n", scene.name.empty() ? scene.file : scene.name, r.engine,
+             r.time);
+  fmt::print(
+      "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
+      s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
+  if (r.engine == "event") print_events(s, r.hand_over ? r.hand_over->before : c);
+  if (r.hand_over)
+    fmt::print("  HANDED OVER  at {:.9g} s events could not go on; steps of {:g} s did: {}\n",
+               r.hand_over->time, scene.stepping.value_or(SteppingOptions{}).step,
+               r.hand_over->why);
+  if (r.engine != "event" || r.hand_over) print_work(scene, s, c);
   if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, r.failure);
 }
 

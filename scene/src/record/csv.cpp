@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <tether/scene/plan.hpp>
 
 #include "effects/list.hpp"
 #include "output/whole_file.hpp"
@@ -28,6 +29,7 @@ class CsvRecorder : public Recorder {
   CsvRecorder(const Scene& scene, const std::string& file, double start_energy,
               const Resume& resume)
       : file_(file), start_energy_(start_energy), forces_(scene.output.forces) {
+    tells_steps_ = make_plan(scene).then_steps > 0;
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       if (!scene.bodies[i].fixed) moving_.push_back(i);
     bodies_ = moving_.size();
@@ -56,6 +58,7 @@ class CsvRecorder : public Recorder {
     add(d.kinetic_energy), add(d.potential_energy), add(energy), add(energy - start_energy_);
     add3(d.momentum), add3(d.angular_momentum);
     add(d.drift);
+    if (tells_steps_) add(engine.hand_over() ? 1 : 0);
     const Forces forces = forces_ ? total_forces(engine) : Forces();
     for (const mechanics::Column& column : columns_) add(column.value(d, forces));
     for (const std::size_t i : moving_) {
@@ -90,6 +93,7 @@ class CsvRecorder : public Recorder {
     std::string text =
         "time_s,kinetic_energy_J,potential_energy_J,energy_J,energy_change_J,momentum_x,momentum_y,"
         "momentum_z,angular_momentum_x,angular_momentum_y,angular_momentum_z,drift";
+    if (tells_steps_) text += ",in_steps";
     for (const mechanics::Column& column : columns_) text += "," + column.name;
     for (const std::size_t i : moving_)
       for (const char* column :
@@ -125,7 +129,7 @@ class CsvRecorder : public Recorder {
 
   std::string file_, line_;
   double start_energy_;
-  bool forces_;
+  bool forces_, tells_steps_ = false;
   std::vector<std::size_t> moving_;  // those in the table
   std::size_t bodies_ = 0;           // that move
   std::vector<mechanics::Column> columns_;

@@ -20,8 +20,9 @@ class TableRecorder : public Recorder {
 
  protected:
   TableRecorder(const Scene& scene, LongTable table) : table_(std::move(table)), scene_(scene) {}
-  const std::string& body(int index) const {
-    return scene_.bodies[static_cast<std::size_t>(index)].name;
+  /// Its name; empty: none.
+  std::string body(int index) const {
+    return index < 0 ? std::string() : scene_.bodies[static_cast<std::size_t>(index)].name;
   }
 
   LongTable table_;

@@ -47,7 +47,8 @@ const Scene& checked(const Scene& scene) {
        {std::pair("every", scene.output.every), std::pair("checkpoint", scene.output.checkpoint)})
     demand(value == 0 || (value > 0 && scene.end / value <= kMostRecords), what, value,
            fmt::format("must be > 0, s, and end / it at most {:g}", kMostRecords));
-  if (make_plan(scene).engine != EngineKind::stepping) return scene;
+  const Plan plan = make_plan(scene);
+  if (plan.engine != EngineKind::stepping && !(plan.then_steps > 0)) return scene;
   const double step = scene.stepping.value_or(SteppingOptions{}).step;
   demand(scene.end / step <= kMostSteps, "step", step,
          fmt::format("end / step must be at most {:g}", kMostSteps));
@@ -108,7 +109,13 @@ class Run {
  private:
   // Where events cannot go on, steps can.
   void hand_over() {
-    if (make_plan(scene_).engine != EngineKind::event || scene_.output.state.empty()) return;
+    if (make_plan(scene_).engine != EngineKind::event || engine_->hand_over()) return;
+    if (scene_.output.state.empty()) {
+      result_.remarks.emplace_back(
+          "with [event] otherwise = \"stepping\" (--otherwise stepping) the run goes on in steps "
+          "where events cannot go on");
+      return;
+    }
     save(scene_.output.state);
     result_.remarks.push_back(
         fmt::format("{} has the state at {:g} s: with engine = \"stepping\" the scene goes on from "
@@ -134,6 +141,7 @@ class Run {
   void move(double time) {
     const Stopwatch watch;
     engine_->advance(time);
+    if (!step_ && engine_->hand_over()) step_ = scene_.stepping.value_or(SteppingOptions{}).step;
     result_.seconds += watch.processor();
     result_.wall += watch.wall();
   }
@@ -201,6 +209,7 @@ class Run {
   void finish() {
     result_.time = engine_->time();
     result_.counts = engine_->counts();
+    result_.hand_over = engine_->hand_over();
     result_.costs = engine_->costs();
     result_.judgements = judge_.judgements();
     for (const auto& recorder : recorders_) recorder->finish(result_.written, result_.remarks);

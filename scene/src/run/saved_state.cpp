@@ -65,6 +65,8 @@ std::uint64_t hash_of_motion(const Scene& scene) {
     if (!moving.event) moving.event.emplace();
     moving.event->max_steps = EventOptions{}.max_steps;
     moving.event->max_events = EventOptions{}.max_events;
+    moving.event->otherwise = Otherwise::stop;
+    if (moving.stepping) moving.stepping->threads = 1;
   } else if (engine == EngineKind::smooth) {
     if (!moving.smooth) moving.smooth.emplace();
     moving.smooth->max_steps = SmoothOptions{}.max_steps;

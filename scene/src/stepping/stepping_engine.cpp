@@ -65,6 +65,8 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 
 // The last letter is the format, see MemoryFormat.
 constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '4'};
+// Of the step, and of the time: that of a boundary up to rounding.
+constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
 constexpr char kWithClosings = '2', kWithoutControl = '3';
 
 }  // namespace
@@ -103,17 +105,19 @@ void SteppingEngine::add_forces(const Scene& scene) {
 }
 
 void SteppingEngine::advance(double t) {
-  // A time that is a multiple of the step up to round-off is that step.
-  const double slack = 1e-9 * stepper_.options().step;
+  const double slack = kSameBoundary * stepper_.options().step;
   while (time() < t - slack) {
     if (interrupted()) break;
-    step();
-    if (on_failure_ == OnFailure::stop && !stepper_.succeeded()) {
-      read_bodies();
-      report_failure();
-    }
+    take_step();
   }
   read_bodies();
+}
+
+void SteppingEngine::take_step() {
+  step();
+  if (on_failure_ != OnFailure::stop || stepper_.succeeded()) return;
+  read_bodies();
+  report_failure();
 }
 
 void SteppingEngine::step() {
@@ -238,16 +242,25 @@ void SteppingEngine::set_bodies(const std::vector<BodyState>& states) {
   }
 }
 
-// What another engine saved, from the next step boundary on.
+// What another engine saved.
 void SteppingEngine::take_over(std::istream& in) {
   std::vector<BodyState> states(bodies_.size());
-  const double steps = std::ceil(get_bodies(in, states) / stepper_.options().step * (1 - 1e-12));
-  if (!(steps >= 0 && steps <= kMostSteps))
+  const double time = get_bodies(in, states);
+  if (!(time >= 0 && time <= kMostSteps * stepper_.options().step))
     throw std::runtime_error("the saved state is damaged: it has no time");
   in.ignore(std::numeric_limits<std::streamsize>::max());
+  begin_at(time, states);
+}
+
+// The first step is shorter. It is taken at once: states that are saved are those of boundaries.
+void SteppingEngine::begin_at(double time, const std::vector<BodyState>& states) {
+  const double step = stepper_.options().step, nearest = std::round(time / step);
+  const bool boundary = std::abs(time - nearest * step) <= kSameBoundary * step + kRounding * time;
+  const double steps = boundary ? nearest : std::floor(time / step);
   set_bodies(states);
-  stepper_.start_anew(std::lround(steps));
+  stepper_.start_anew(std::lround(steps), boundary ? 0 : time - steps * step);
   contacts_of_ = -1;
+  if (!boundary) take_step();
   read_bodies();
 }
 

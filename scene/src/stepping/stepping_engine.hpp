@@ -15,6 +15,10 @@ class SteppingEngine final : public Engine {
  public:
   explicit SteppingEngine(const Scene& scene);
 
+  /// Goes on from states of any time, s: to the next boundary at once, where it is not one. Throws
+  /// SimulationError.
+  void begin_at(double time, const std::vector<BodyState>& states);
+
   const char* name() const override { return "stepping"; }
   double time() const override { return stepper_.time(); }
   void advance(double t) override;
@@ -30,6 +34,7 @@ class SteppingEngine final : public Engine {
  private:
   SteppingEngine(const Scene& scene, Mapped mapped);
   void step();
+  void take_step();
   void report_failure() const;
   void read_bodies();
   void set_bodies(const std::vector<BodyState>& states);

@@ -212,7 +212,7 @@ class Stepper {
 
   void step();
 
-  double time() const;  ///< steps * dt
+  double time() const;  ///< steps * dt; where a start was late, that until its step is taken
   const BodySet& bodies() const;
   BodySet& bodies();  ///< to set positions and velocities between steps
   const StepContacts& contacts() const;
@@ -240,8 +240,9 @@ class Stepper {
   /// set_memory() throws std::invalid_argument if the memory belongs to other bodies.
   StepperMemory memory() const;
   void set_memory(const StepperMemory& memory);
-  /// Drops all warm starts and sets the number of steps.
-  void start_anew(long steps);
+  /// Drops all warm starts and sets the number of steps. The next step begins `late` after its
+  /// boundary, in 0 <= late < dt, s, and ends at its own: bodies() are those of that time.
+  void start_anew(long steps, double late = 0);
 
  private:
   struct TETHER_HIDDEN Implementation;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <iosfwd>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tether/export.hpp>
@@ -64,18 +65,19 @@ struct Forces {
 /// What happened to one contact at an instant of the event engine. An instant may have several.
 struct ContactEvent {
   enum class Kind : std::uint8_t {
-    impact,  ///< a gap closes with speed
-    touch,   ///< a gap closes without
-    lift,    ///< a normal force vanishes
-    slip,    ///< a stuck contact begins to slide
-    stop,    ///< a slip vanishes
-    rest,    ///< impacts accumulate: `time` is when the last one is over
-    jam,     ///< sliding has no forces any more: an impact without collision
-    border   ///< a contact leaves its face
+    impact,    ///< a gap closes with speed
+    touch,     ///< a gap closes without
+    lift,      ///< a normal force vanishes
+    slip,      ///< a stuck contact begins to slide
+    stop,      ///< a slip vanishes
+    rest,      ///< impacts accumulate: `time` is when the last one is over
+    jam,       ///< sliding has no forces any more: an impact without collision
+    border,    ///< a contact leaves its face
+    hand_over  ///< steps take over from here on; of no contact
   };
   double time = 0;  ///< s
   Kind kind = Kind::impact;
-  int first = -1, second = -1;   ///< bodies
+  int first = -1, second = -1;   ///< bodies; -1: none
   double before = 0, after = 0;  ///< normal velocities of an impact, m/s
   double lost = 0;               ///< energy of all contacts of the instant, in its first event, J
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< on `first`, world axes, N s
@@ -97,6 +99,13 @@ struct Counts {
   long accepted = 0;             ///< contact problems above the tolerance, within what is accepted
   long halved = 0;               ///< steps, or parts of them, taken in two halves
   long events = 0, impacts = 0;  ///< of the event engine
+};
+
+/// Where a run of events went on in steps.
+struct HandOver {
+  double time = 0;  ///< s
+  std::string why;
+  Counts before;  ///< of the event engine
 };
 
 /// Wall time spent on one effect since the start, s.
@@ -129,6 +138,9 @@ class Engine {
   /// Since the start, or the state that was restored.
   virtual const std::vector<ContactEvent>& events() const;
   virtual Counts counts() const = 0;
+  /// Whether steps have taken over (EventOptions::otherwise); counts() has their work then, and the
+  /// events before.
+  virtual std::optional<HandOver> hand_over() const { return {}; }
   virtual std::vector<EffectCost> costs() const = 0;
   /// Writes the state without changing it. An engine of the same scene that restores it continues
   /// bit by bit.
@@ -155,6 +167,8 @@ Forces total_forces(const Engine& engine);
 std::unique_ptr<Engine> make_smooth_engine(const Scene& scene);
 std::unique_ptr<Engine> make_stepping_engine(const Scene& scene);
 std::unique_ptr<Engine> make_event_engine(const Scene& scene);
+/// Events, and steps from where these cannot go on. Its time then is that of a boundary of steps.
+std::unique_ptr<Engine> make_event_engine_with_steps(const Scene& scene);
 /// Why the event engine cannot move the scene; empty: it can.
 std::string event_engine_refusal(const Scene& scene);
 

@@ -24,8 +24,9 @@ struct Effect {
 /// Exactly what the scene names is on. Sizes that do not apply are zero.
 struct Plan {
   EngineKind engine = EngineKind::smooth;
-  std::string why;       ///< the engine
-  std::string no_event;  ///< why the event engine is not to be had; empty: it is
+  std::string why;        ///< the engine
+  std::string no_event;   ///< why the event engine is not to be had; empty: it is
+  double then_steps = 0;  ///< s; > 0: of the steps that take over where events cannot go on
   std::vector<Effect> effects;
 
   int bodies = 0, moving = 0, shapes = 0;

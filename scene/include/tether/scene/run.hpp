@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <tether/export.hpp>
 #include <tether/scene/engine.hpp>
@@ -48,6 +49,7 @@ struct RunResult {
   double whole_wall = 0, whole_seconds = 0;  ///< of the whole run, with what it records
   std::string failure;                       ///< why the run could not go on; empty: it could
   bool interrupted = false;                  ///< RunOptions::interrupted ended it
+  std::optional<HandOver> hand_over;  ///< from events to steps; counts has those of the steps
   Summary summary;
   Counts counts;
   std::vector<EffectCost> costs;

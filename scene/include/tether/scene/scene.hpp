@@ -109,6 +109,12 @@ struct SteppingOptions : contact::SteppingOptions {
   }
 };
 
+/// Where the event engine cannot go on, or cannot move the scene at all.
+enum class Otherwise : std::uint8_t {
+  stop,     ///< the run ends, or is refused
+  stepping  ///< the stepping engine takes over there, and says so
+};
+
 /// Scenes with contact whose impacts, slips and stops are found to a tolerance: IDA with projection
 /// between them.
 struct EventOptions {
@@ -116,6 +122,7 @@ struct EventOptions {
   double max_step = 0;        ///< s; 0: free
   int max_events = 1000000;   ///< then the run is given up
   int max_steps = 100000000;  ///< of IDA
+  Otherwise otherwise = Otherwise::stop;
 };
 
 /// What a scene asks for: `automatic` leaves it to the plan.
@@ -213,12 +220,16 @@ struct Scene {
   std::vector<CentralGravity> central_gravity;
   std::vector<Invariant> invariants;
   EngineChoice engine = EngineChoice::automatic;
-  std::optional<SmoothOptions> smooth;      ///< at most one of the three is given;
-  std::optional<SteppingOptions> stepping;  ///< none: the plan chooses with defaults
-  std::optional<EventOptions> event;
+  std::optional<SmoothOptions> smooth;  ///< at most one of the three is given, but steps may
+  std::optional<SteppingOptions>
+      stepping;                       ///< be what events go on with (EventOptions::otherwise);
+  std::optional<EventOptions> event;  ///< none: the plan chooses with defaults
   Output output;
   std::vector<Expect> expect;
 };
+
+/// Whether steps take over where events cannot go on.
+bool goes_on_in_steps(const Scene& scene);
 
 /// Whether the output or an expectation of a scene is of forces.
 bool asks_for_forces(const Scene& scene);

@@ -86,6 +86,14 @@ struct Words<OnFailure> {
 };
 
 template <>
+struct Words<Otherwise> {
+  static constexpr std::array<std::pair<std::string_view, Otherwise>, 2> list{{
+      {"stop", Otherwise::stop},
+      {"stepping", Otherwise::stepping},
+  }};
+};
+
+template <>
 struct Words<Quantity> {
   static constexpr std::array<std::pair<std::string_view, Quantity>, 22> list{{
       {"position", Quantity::position},

@@ -42,6 +42,8 @@ class Model {
   /// and of the energy. 1 in units in which these are near 1.
   virtual VectorXd sizes() const { return VectorXd::Ones(coordinates() + velocities() + 1); }
 
+  virtual double time_unit() const { return 1; }  ///< s, for what users read
+
   virtual void set(double t, const double* q, const double* u) = 0;
   /// A smooth phase begins at the state that is set: tangents turn smoothly from here on.
   virtual void settle() {}

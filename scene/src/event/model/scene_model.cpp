@@ -37,8 +37,9 @@ struct Material {
 
 }  // namespace
 
-SceneModel::SceneModel(const Scene& scene)
-    : bodies_(scene),
+SceneModel::SceneModel(const Scene& scene, double time_unit)
+    : time_unit_(time_unit),
+      bodies_(scene),
       rows_(scene, bodies_.all()),
       forces_(effects::make_forces(scene, bodies_.all())),
       pairs_(potential_contacts(scene)),

@@ -20,9 +20,11 @@ namespace tether::scene::event {
 class SceneModel final : public Model {
  public:
   /// Throws std::invalid_argument, naming what the engine does not have; see potential_contacts.
-  explicit SceneModel(const Scene& scene);
+  /// `time_unit`: of the scene, s.
+  explicit SceneModel(const Scene& scene, double time_unit = 1);
   ~SceneModel() override;
 
+  double time_unit() const override { return time_unit_; }
   int coordinates() const override { return 7 * bodies_.count(); }
   int velocities() const override { return 6 * bodies_.count(); }
   int joint_rows() const override { return rows_.count(); }
@@ -76,6 +78,7 @@ class SceneModel final : public Model {
   double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
 
+  double time_unit_;
   smooth::MovingBodies bodies_;
   joints::JointRows rows_;
   std::vector<std::unique_ptr<Force>> forces_;

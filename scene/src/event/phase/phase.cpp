@@ -188,10 +188,11 @@ void Phase::step() {
   const int flag = IDASolve(ida_->memory, end_ + 1, &t, ida_->y, ida_->yp, IDA_ONE_STEP);
   if (flag < 0) {
     char* name = IDAGetReturnFlagName(flag);
+    const double unit = motion_.model().time_unit();
     std::string text = fmt::format(
         "the event engine's smooth phase that began at t = {:.9g} s stopped {:.3g} s "
         "later: {}. {}",
-        start_, end_, name, ida_->context.message());
+        unit * start_, unit * end_, name, ida_->context.message());
     std::free(name);
     if (ida_->projection && !ida_->projection->message().empty())
       text += " Projection: " + ida_->projection->message();

@@ -24,7 +24,7 @@ namespace {
 
 struct Arguments {
   std::string file, restart, folder, html;
-  std::optional<std::string> csv, vtk, svg, state;
+  std::optional<std::string> csv, vtk, svg, state, otherwise;
   std::optional<double> end, every;
   bool force = false, quiet = false;
 };
@@ -67,6 +67,14 @@ void overlay(const Arguments& arguments, Scene& scene) {
     for (std::string* file : {&o.csv, &o.vtk, &o.svg, &o.state})
       if (!file->empty() && *file != "-")
         *file = (std::filesystem::path(arguments.folder) / *file).string();
+  if (arguments.otherwise) {
+    if (scene.engine != EngineChoice::event && !scene.event)
+      throw std::invalid_argument(
+          "--otherwise is for scenes of the event engine: engine = \"event\", or [event]");
+    if (!scene.event) scene.event.emplace();
+    scene.event->otherwise =
+        *arguments.otherwise == "stepping" ? Otherwise::stepping : Otherwise::stop;
+  }
   if (!arguments.end) return;
   // Records stay where they were, so that runs in parts make one table.
   if (o.every == 0) o.every = scene.end / 1000;
@@ -132,6 +140,12 @@ void add_run_command(CLI::App& app, int* status) {
   command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
   command->add_option("--every", a->every, "Time between records, s")->check(positive_number());
   command->add_option("--end", a->end, "End of the run, s")->check(positive_number());
+  command
+      ->add_option(
+          "--otherwise", a->otherwise,
+          "Where the event engine cannot go on: stop (exit code 3), or stepping from there "
+          "(said in the summary; exit code as of a run of steps)")
+      ->check(CLI::IsMember({"stop", "stepping"}));
   command->add_flag("--force", a->force,
                     "With --restart: the state may be of another scene; positions and velocities "
                     "are taken over, bits are not the same");
