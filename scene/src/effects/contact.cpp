@@ -34,13 +34,18 @@ class ContactEffect : public Effect {
       if (r.materials.count(name) == 0)
         return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,
                                                r.hint_of(name, r.materials)));
+    pair.touch = in.flag("touch", pair.touch);
+    for (const char* key : {"friction", "restitution"})
+      if (!pair.touch && in.has(key)) in.wrong(key, "is of a contact, and touch = false has none");
   }
   void write_pair(const Pair& pair, files::Writer& out) const override {
     out.raw("between", fmt::format("[{}, {}]", files::toml(pair.first), files::toml(pair.second)));
+    if (!pair.touch) out.field("touch", pair.touch);
   }
   void check(const Scene& scene, files::Report& report) const override;
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const std::size_t count = scene.pairs.size();
+    const auto count = std::count_if(scene.pairs.begin(), scene.pairs.end(),
+                                     [](const Pair& pair) { return pair.touch; });
     if (count > 0)
       lines.push_back(
           {"contact", fmt::format("{} pair{} of materials", count, count == 1 ? "" : "s")});

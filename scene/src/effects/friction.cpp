@@ -19,7 +19,7 @@ class FrictionEffect : public Effect {
     pair.friction = in.number("friction", pair.friction, files::kNotNegative, "");
   }
   void write_pair(const Pair& pair, files::Writer& out) const override {
-    out.field("friction", pair.friction);
+    if (pair.touch) out.field("friction", pair.friction);
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const contact::Law law = scene.stepping.value_or(SteppingOptions{}).law;

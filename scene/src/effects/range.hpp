@@ -4,16 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <tether/scene/scene.hpp>
 #include <vector>
 
 namespace tether::scene::effects {
 
-/// "0.3", or "0.1 to 0.5" where the pairs differ; there must be one.
+/// "0.3", or "0.1 to 0.5" where the pairs that touch differ; there must be one.
 inline std::string range(const std::vector<Pair>& pairs, double Pair::*value) {
-  double low = pairs.front().*value, high = low;
+  double low = HUGE_VAL, high = -HUGE_VAL;
   for (const Pair& pair : pairs) {
+    if (!pair.touch) continue;
     low = std::min(low, pair.*value);
     high = std::max(high, pair.*value);
   }

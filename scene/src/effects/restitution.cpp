@@ -19,7 +19,7 @@ class RestitutionEffect : public Effect {
     pair.restitution = in.number("restitution", pair.restitution, files::kPart, "");
   }
   void write_pair(const Pair& pair, files::Writer& out) const override {
-    out.field("restitution", pair.restitution);
+    if (pair.touch) out.field("restitution", pair.restitution);
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     if (std::any_of(scene.pairs.begin(), scene.pairs.end(),

@@ -31,6 +31,7 @@ long contact_pairs(const Scene& scene) {
   }
   long sum = 0;
   for (const Pair& pair : scene.pairs) {
+    if (!pair.touch) continue;
     const Bodies a = of[pair.first], b = of[pair.second];
     const auto fixed = [](const Bodies& x) { return x.all - x.moving; };
     if (pair.first == pair.second)

@@ -19,6 +19,7 @@ enum ExitCode : int {
 
 void add_check_command(CLI::App& app, int* status);
 void add_cost_command(CLI::App& app, int* status);
+void add_import_command(CLI::App& app, int* status);
 void add_new_command(CLI::App& app, int* status);
 void add_plan_command(CLI::App& app, int* status);
 void add_run_command(CLI::App& app, int* status);

@@ -72,6 +72,14 @@ std::vector<double> range(const std::string& word, const std::vector<std::string
 
 }  // namespace
 
+SceneText read_text(const std::string& file) {
+  if (file == "-") return {all_of(std::cin), "standard input"};
+  std::ifstream in(file, std::ios::binary);
+  std::string text = in ? all_of(in) : "";
+  if (!in.eof()) throw std::invalid_argument(file + ": cannot be read, or is beyond 256 MiB");
+  return {std::move(text), file};
+}
+
 SceneText read_scene_text(const std::string& file) {
   if (file == "-") return {all_of(std::cin), "standard input"};
   std::ifstream in(file, std::ios::binary);

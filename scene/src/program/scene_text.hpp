@@ -13,6 +13,10 @@ struct SceneText {
   std::string text, name;
 };
 
+/// The text of any file of at most 256 MiB; "-" is the standard input. std::invalid_argument where
+/// it cannot be read.
+SceneText read_text(const std::string& file);
+
 /// "-" is the standard input. Throws SceneError where there is nothing to read.
 SceneText read_scene_text(const std::string& file);
 

@@ -24,6 +24,7 @@ void refuse(const Scene& scene) {
 std::map<std::string, int> materials(const Scene& scene) {
   std::map<std::string, int> index;
   for (const Pair& pair : scene.pairs) {
+    if (!pair.touch) continue;
     index.emplace(pair.first, static_cast<int>(index.size()));
     index.emplace(pair.second, static_cast<int>(index.size()));
   }
@@ -51,6 +52,7 @@ Mapped map_scene(const Scene& scene) {
     for (const Shape& shape : body.shapes) out.surfaces.push_back({index, shape, found->second});
   }
   for (const Pair& pair : scene.pairs) {
+    if (!pair.touch) continue;
     contact::Meeting meeting;
     meeting.first = material.at(pair.first);
     meeting.second = material.at(pair.second);

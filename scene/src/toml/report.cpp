@@ -45,7 +45,8 @@ std::string files::printable(std::string_view text) {
 // Keys and values are those of the file, and the message goes to a terminal.
 std::string Problem::message() const {
   std::string text = place.file;
-  if (place.line > 0) text += fmt::format(":{}:{}", place.line, place.column);
+  if (place.line > 0) text += fmt::format(":{}", place.line);
+  if (place.column > 0) text += fmt::format(":{}", place.column);
   text += ": ";
   if (!field.empty()) text += value.empty() ? field + ": " : fmt::format("{} = {}: ", field, value);
   return files::printable(text + allowed);

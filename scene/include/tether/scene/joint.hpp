@@ -29,16 +29,17 @@ struct JointMotor {
   double rate = 0, bound = 0;  ///< rad/s, N m; m/s, N
 };
 
-enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal };
+enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal, planar };
 
 /// The words of files for them.
-inline constexpr std::array<std::pair<std::string_view, JointKind>, 6> kJointWords{{
+inline constexpr std::array<std::pair<std::string_view, JointKind>, 7> kJointWords{{
     {"distance", JointKind::distance},
     {"ball", JointKind::ball},
     {"hinge", JointKind::hinge},
     {"slider", JointKind::slider},
     {"fixed", JointKind::fixed},
     {"universal", JointKind::universal},
+    {"planar", JointKind::planar},
 }};
 
 /// `first` and `second` are indices of bodies, -1 the world. Points and axes in world coordinates
@@ -50,8 +51,8 @@ struct Joint {
   int first = -1, second = -1;
   Eigen::Vector3d at = Eigen::Vector3d::Zero();
   Eigen::Vector3d at_second = Eigen::Vector3d::Zero();  ///< distance only: the point on `second`
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();      ///< hinge, slider, universal
-  std::optional<double> length;                         ///< distance: default the one at t = 0
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< hinge, slider, universal; planar: normal
+  std::optional<double> length;                     ///< distance: default the one at t = 0
   std::optional<Motion> motion;
   std::optional<JointLimits> limits;
   std::optional<JointMotor> motor;

@@ -51,6 +51,7 @@ struct Pair {
   double friction = 0;
   double restitution = 0;  ///< 0 .. 1
   Place place;
+  bool touch = true;  ///< false: they pass through each other
 };
 
 /// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points; torsional: about

@@ -105,7 +105,8 @@ std::vector<FeaturePair> potential_contacts(const Scene& scene) {
         fmt::format("the event engine is for at most {} moving bodies, here are {}: use [stepping]",
                     kMostMoving, moving));
   std::map<std::pair<std::string, std::string>, const Pair*> meet;
-  for (const Pair& pair : scene.pairs) meet[std::minmax(pair.first, pair.second)] = &pair;
+  for (const Pair& pair : scene.pairs)
+    if (pair.touch) meet[std::minmax(pair.first, pair.second)] = &pair;
   const std::set<std::pair<int, int>> apart = jointed(scene);
   std::vector<FeaturePair> out;
   const int count = static_cast<int>(scene.bodies.size());

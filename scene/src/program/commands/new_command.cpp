@@ -1,16 +1,13 @@
 // Tether: `tether new`: writes a scene to start from. SPDX-License-Identifier: BSD-3-Clause
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <memory>
 
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/kinds.hpp"
+#include "program/new_file.hpp"
 #include "program/process/standard_streams.hpp"
 
 namespace tether::scene {
@@ -26,17 +23,6 @@ struct Arguments {
 std::string summary(std::string_view text) {
   const std::string_view line = text.substr(0, text.find('\n'));
   return std::string(line.substr(std::min<std::size_t>(2, line.size())));
-}
-
-/// Makes the file; nobody else's in between.
-void reserve(const std::string& file) {
-  make_folder_of(file);
-  const int descriptor = open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
-  if (descriptor < 0)
-    throw std::invalid_argument(errno == EEXIST
-                                    ? file + " is there already; --force replaces it"
-                                    : "cannot write " + file + ": " + std::strerror(errno));
-  close(descriptor);
 }
 
 int write_new(const Arguments& arguments) {

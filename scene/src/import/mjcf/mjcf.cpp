@@ -1,0 +1,256 @@
+// Tether: reads MJCF. SPDX-License-Identifier: BSD-3-Clause
+//
+// Bodies stand inside each other; a body without joints is welded to the one around it, one with
+// several moves by them in turn. Things of the world that touch become links of their own.
+#include "mjcf.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "geoms.hpp"
+#include "import/robot/geometry.hpp"
+
+namespace tether::scene::import {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using mjcf::Geom;
+using mjcf::InertiaFrom;
+using mjcf::Settings;
+
+class Reader {
+ public:
+  Reader(Model& model, const Settings& settings, Problems& problems)
+      : model_(model), settings_(settings), problems_(problems) {}
+
+  void world(const Node& node) {
+    Tag tag(node, problems_);
+    children(node, -1, tag.text("childclass"));
+    tag.finish(model_.remarks, {"name"});
+  }
+
+ private:
+  void children(const Node& node, int link, const std::string& class_name);
+  void body(const Node& node, int parent, const std::string& around);
+  void joint(const Node& node, int link, const std::string& class_name);
+  void geom(const Node& node, int link, const std::string& class_name);
+  void inertial(const Node& node, int link);
+  void take_name(int line, const std::string& name, const char* kind, std::set<std::string>& names);
+  Link& link(int k) { return model_.links[static_cast<std::size_t>(k)]; }
+
+  Model& model_;
+  const Settings& settings_;
+  Problems& problems_;
+  std::set<std::string> bodies_, joints_;
+  std::set<int> weighed_;  // links that <inertial> gives mass
+};
+
+void Reader::take_name(int line, const std::string& name, const char* kind,
+                       std::set<std::string>& names) {
+  if (!names.insert(name).second)
+    problems_.add(line, fmt::format("{} \"{}\": name", kind, name), "",
+                  fmt::format("another {} has it already", kind));
+}
+
+void Reader::children(const Node& node, int of, const std::string& class_name) {
+  // Geoms last: whether they give mass is known then.
+  for (const Node* each = node.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement()) {
+    if (of >= 0 && (is(*each, "joint") || is(*each, "freejoint")))
+      joint(*each, of, class_name);
+    else if (of >= 0 && is(*each, "inertial"))
+      inertial(*each, of);
+  }
+  for (const Node* each = node.FirstChildElement("geom"); each != nullptr;
+       each = each->NextSiblingElement("geom"))
+    geom(*each, of, class_name);
+  for (const Node* each = node.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement()) {
+    if (is(*each, "body")) {
+      body(*each, of, class_name);
+    } else if (is(*each, "light") || is(*each, "camera") || is(*each, "site")) {
+      model_.remarks.add(fmt::format("<{}>", each->Name()));
+    } else if (is(*each, "frame") || is(*each, "replicate") || is(*each, "composite") ||
+               is(*each, "flexcomp") || is(*each, "attach") || is(*each, "include")) {
+      problems_.add(each->GetLineNum(), path(*each), "",
+                    "is not read; MuJoCo writes the model without it (mj_saveLastXML, or save in "
+                    "its viewer)");
+    } else if (!is(*each, "geom") && !(of >= 0 && (is(*each, "joint") || is(*each, "freejoint") ||
+                                                   is(*each, "inertial")))) {
+      model_.remarks.add(fmt::format("<{}> in <{}>", each->Name(), node.Name()),
+                         name_or_line(*each));
+    }
+  }
+}
+
+void Reader::body(const Node& node, int parent, const std::string& around) {
+  Tag tag(node, problems_);
+  Link out;
+  out.line = tag.line();
+  out.parent = parent;
+  out.name = tag.has("name") ? tag.name("name", "") : fmt::format("body {}", bodies_.size() + 1);
+  take_name(out.line, out.name, "body", bodies_);
+  const Vector3d at = tag.vector("pos", Vector3d::Zero());
+  out.pose = placed(mjcf::read_orientation(tag, settings_), at);
+  const std::string class_name = tag.text("childclass", around);
+  tag.finish(model_.remarks, {"user"});
+  const int index = static_cast<int>(model_.links.size());
+  model_.links.push_back(std::move(out));
+  children(node, index, class_name);
+}
+
+void Reader::joint(const Node& node, int of, const std::string& class_name) {
+  const bool is_freejoint = is(node, "freejoint");
+  Tag own(node, problems_);
+  Tag tag(
+      node, problems_,
+      is_freejoint ? nullptr : settings_.defaults(node, own.text("class", class_name), problems_));
+  LinkJoint out;
+  out.line = tag.line();
+  out.name = tag.has("name")
+                 ? tag.name("name", "")
+                 : fmt::format("joint {} of {}", link(of).joints.size() + 1, link(of).name);
+  take_name(out.line, out.name, "joint", joints_);
+  const std::string type = is_freejoint ? "free" : tag.text("type", "hinge");
+  out.kind = type == "slide"  ? MotionKind::slide
+             : type == "ball" ? MotionKind::ball
+             : type == "free" ? MotionKind::free
+                              : MotionKind::hinge;
+  if (out.kind == MotionKind::hinge && type != "hinge")
+    tag.wrong("type", "must be hinge, slide, ball or free");
+  if (out.kind == MotionKind::free && link(of).parent >= 0)
+    problems_.add(out.line, path(node), "", "a free joint is of bodies in the world only");
+  const bool turns = out.kind == MotionKind::hinge;
+  const auto value = [&](double x) { return turns ? settings_.angle(x) : x; };
+  out.axis = tag.direction("axis", Vector3d::UnitZ());
+  out.at = tag.vector("pos", Vector3d::Zero());
+  out.reference = value(tag.number("ref", 0));
+  out.rest = value(tag.number("springref", 0));
+  out.stiffness = tag.not_negative("stiffness", 0);
+  out.damping = tag.not_negative("damping", 0);
+  out.friction = tag.not_negative("frictionloss", 0);
+  if (tag.not_negative("armature", 0) > 0)
+    model_.remarks.add("armature (inertia of rotors)", out.name);
+  const std::string limited = tag.text("limited", "auto");
+  if (limited != "auto" && limited != "true" && limited != "false")
+    tag.wrong("limited", "must be true, false or auto");
+  const std::vector<double> range = tag.numbers("range", 2, 2);
+  const bool is_limited = limited == "true" || (limited == "auto" && settings_.autolimits);
+  if (is_limited && !range.empty() && out.kind != MotionKind::free) {
+    if (out.kind == MotionKind::ball)
+      model_.remarks.add("limits of ball joints", out.name);
+    else if (!(range[0] < range[1]))
+      tag.wrong("range", "must be two numbers, the smaller one first");
+    else
+      out.limits = {value(range[0]), value(range[1])};
+  }
+  tag.finish(model_.remarks, {"class", "group", "user"});
+  link(of).joints.push_back(std::move(out));
+}
+
+void Reader::inertial(const Node& node, int of) {
+  if (settings_.inertia == InertiaFrom::geoms) return;
+  Tag tag(node, problems_);
+  Link& out = link(of);
+  if (!weighed_.insert(of).second) return problems_.add(tag.line(), path(node), "", "stands twice");
+  if (!tag.has("mass")) tag.missing("mass", "kg");
+  out.mass = tag.not_negative("mass", 0);
+  out.centre = tag.vector("pos", Vector3d::Zero());
+  const Matrix3d R = mjcf::read_orientation(tag, settings_).toRotationMatrix();
+  Matrix3d inertia = Matrix3d::Zero();
+  if (const auto full = tag.numbers("fullinertia", 6, 6); !full.empty())
+    inertia << full[0], full[3], full[4], full[3], full[1], full[5], full[4], full[5], full[2];
+  else
+    inertia = tag.vector("diaginertia", Vector3d::Zero()).asDiagonal();
+  const Matrix3d turned = R * inertia * R.transpose();
+  out.inertia = R == Matrix3d::Identity() ? inertia : Matrix3d((turned + turned.transpose()) / 2);
+  tag.finish(model_.remarks);
+}
+
+void Reader::geom(const Node& node, int of, const std::string& class_name) {
+  Geom geom = mjcf::read_geom(node, class_name, settings_, problems_, model_.remarks);
+  const bool plane = geom.shape && geom.shape->kind == ShapeKind::plane;
+  if (of < 0) {  // of the world
+    if (!geom.shape) return;
+    Link out;
+    out.line = node.GetLineNum();
+    out.name = geom.name.empty() ? fmt::format("geom of line {}", out.line) : geom.name;
+    out.scenery = true;
+    out.shapes.push_back(std::move(*geom.shape));
+    if (geom.touches) out.touch = geom.touch;
+    model_.links.push_back(std::move(out));
+    return;
+  }
+  Link& out = link(of);
+  if (plane)
+    return problems_.add(node.GetLineNum(), path(node), "", "a plane stands in the world only");
+  const bool weighs = settings_.inertia == InertiaFrom::geoms ||
+                      (settings_.inertia == InertiaFrom::as_said && weighed_.count(of) == 0);
+  if (weighs && geom.has_mass && geom.mass < 0)
+    problems_.add(node.GetLineNum(), path(node) + ": type", "",
+                  "the mass of a mesh is not known here: give the body an <inertial>, or the geom "
+                  "mass=\"0\"");
+  if (weighs && geom.has_mass)
+    add_mass(geom.mass, geom.centre, geom.inertia, out.mass, out.centre, out.inertia);
+  if (!geom.shape) return;
+  if (!geom.touches)
+    return model_.remarks.add("geoms that touch nothing by their contype and conaffinity",
+                              geom.name.empty() ? name_or_line(node) : geom.name);
+  out.shapes.push_back(std::move(*geom.shape));
+  if (!out.touch) {
+    out.touch = geom.touch;
+    return;
+  }
+  if (out.touch->friction != geom.touch.friction || out.touch->tangential != geom.touch.tangential)
+    model_.remarks.add("bodies whose geoms differ in friction have the largest of it", out.name);
+  out.touch->friction = std::max(out.touch->friction, geom.touch.friction);
+  out.touch->tangential = out.touch->tangential || geom.touch.tangential;
+  out.touch->type |= geom.touch.type;
+  out.touch->affinity |= geom.touch.affinity;
+}
+
+void set_total_mass(double total, Model& model) {
+  double sum = 0;
+  for (const Link& link : model.links) sum += link.mass;
+  if (!(total > 0) || !(sum > 0)) return;
+  for (Link& link : model.links) {
+    link.mass *= total / sum;
+    link.inertia *= total / sum;
+  }
+}
+
+}  // namespace
+
+Model read_mjcf(const Node& root, Problems& problems) {
+  Model model;
+  Tag tag(root, problems);
+  model.format = "MJCF";
+  model.name = tag.text("model");
+  const Settings settings = mjcf::read_settings(root, model, problems);
+  Reader reader(model, settings, problems);
+  bool has_world = false;
+  for (const Node* each = root.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement()) {
+    if (is(*each, "worldbody")) {
+      has_world = true;
+      reader.world(*each);
+    } else if (is(*each, "include")) {
+      problems.add(each->GetLineNum(), "include", "",
+                   "other files are not read; MuJoCo writes the model in one file");
+    } else if (!is(*each, "compiler") && !is(*each, "option") && !is(*each, "default")) {
+      for (const Node* part = each->FirstChildElement(); part != nullptr;
+           part = part->NextSiblingElement())
+        model.remarks.add(fmt::format("<{}> in <{}>", part->Name(), each->Name()),
+                          part->Attribute("name") != nullptr ? name_or_line(*part) : "");
+    }
+  }
+  if (!has_world) problems.add(root.GetLineNum(), "mujoco: worldbody", "", "is missing");
+  set_total_mass(settings.total_mass, model);
+  return model;
+}
+
+}  // namespace tether::scene::import

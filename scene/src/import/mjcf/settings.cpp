@@ -1,0 +1,146 @@
+// Tether: what holds for a whole MJCF. SPDX-License-Identifier: BSD-3-Clause
+#include "settings.hpp"
+
+#include <fmt/format.h>
+
+namespace tether::scene::import::mjcf {
+
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+void read_compiler(const Node& node, Settings& out, Problems& problems, Remarks& remarks) {
+  Tag tag(node, problems);
+  const std::string angle = tag.text("angle", out.degrees ? "degree" : "radian");
+  if (angle != "degree" && angle != "radian") tag.wrong("angle", "must be degree or radian");
+  out.degrees = angle == "degree";
+  out.autolimits = tag.flag("autolimits", out.autolimits);
+  if (tag.text("coordinate", "local") != "local")
+    tag.wrong("coordinate", "must be local; global ones were dropped by MuJoCo 2.3.4");
+  out.euler = tag.text("eulerseq", out.euler);
+  if (out.euler.size() != 3 || out.euler.find_first_not_of("xyzXYZ") != std::string::npos)
+    tag.wrong("eulerseq", "must be three of the letters x, y, z, X, Y, Z");
+  const std::string from = tag.text("inertiafromgeom", "auto");
+  if (from != "auto" && from != "true" && from != "false")
+    tag.wrong("inertiafromgeom", "must be true, false or auto");
+  out.inertia = from == "true"    ? InertiaFrom::geoms
+                : from == "false" ? InertiaFrom::inertial
+                                  : InertiaFrom::as_said;
+  out.total_mass = tag.number("settotalmass", 0);
+  if (const auto range = tag.numbers("inertiagrouprange", 2, 2); !range.empty()) {
+    out.least_group = static_cast<int>(std::min(std::max(range[0], -1e9), 1e9));
+    out.most_group = static_cast<int>(std::min(std::max(range[1], -1e9), 1e9));
+  }
+  for (const char* key : {"boundmass", "boundinertia"})
+    if (tag.number(key, 0) > 0) remarks.add(fmt::format("compiler {}", key));
+  if (tag.flag("balanceinertia", false)) remarks.add("compiler balanceinertia (--mend does it)");
+  tag.finish(remarks, {"meshdir", "texturedir", "assetdir", "convexhull", "discardvisual",
+                       "usethread", "strippath", "alignfree", "fusestatic"});
+}
+
+void read_option(const Node& node, Model& model, Problems& problems) {
+  Tag tag(node, problems);
+  model.gravity = tag.vector("gravity", model.gravity.value_or(Vector3d::Zero()));
+  if (tag.has("timestep")) model.step = tag.positive("timestep", 0.002);
+  tag.finish(model.remarks);
+  if (const Node* const flags = node.FirstChildElement("flag")) {
+    Tag flag(*flags, problems);
+    if (flag.text("gravity", "enable") == "disable") model.gravity.reset();
+    flag.finish(model.remarks);
+  }
+}
+
+/// A class has what it says, and what it does not say of the one around it.
+void read_class(const Node& node, const std::string& around, Settings& out, Problems& problems,
+                Remarks& remarks) {
+  Tag tag(node, problems);
+  const bool outermost = around.empty();
+  const std::string name = tag.text("class", outermost ? "main" : "");
+  if (name.empty()) tag.missing("class", "a class inside another one has a name");
+  tag.finish(remarks);
+  auto& own = out.classes[name];
+  if (!outermost && name != around) own = out.classes[around];
+  for (const Node* each = node.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement()) {
+    if (is(*each, "default")) continue;
+    Attributes& of = own[each->Name()];
+    for (const auto* a = each->FirstAttribute(); a != nullptr; a = a->Next())
+      of[a->Name()] = a->Value();
+  }
+  for (const Node* each = node.FirstChildElement("default"); each != nullptr;
+       each = each->NextSiblingElement("default"))
+    read_class(*each, name, out, problems, remarks);
+}
+
+Quaterniond from_euler(const Vector3d& angles, const std::string& sequence) {
+  Quaterniond out = Quaterniond::Identity();
+  for (int k = 0; k < 3; ++k) {
+    const char letter = sequence[static_cast<std::size_t>(k)];
+    const bool fixed = letter < 'a';
+    const Vector3d axis = Vector3d::Unit(letter - (fixed ? 'X' : 'x'));
+    const Quaterniond turn(AngleAxisd(angles[k], axis));
+    out = fixed ? turn * out : out * turn;
+  }
+  return out;
+}
+
+}  // namespace
+
+const Attributes* Settings::defaults(const Node& node, const std::string& name,
+                                     Problems& problems) const {
+  const auto found = classes.find(name.empty() ? "main" : name);
+  if (found == classes.end()) {
+    if (!name.empty())
+      problems.add(node.GetLineNum(), path(node) + ": class", "\"" + name + "\"",
+                   "no <default> has this class");
+    return nullptr;
+  }
+  const auto of = found->second.find(node.Name());
+  return of == found->second.end() ? nullptr : &of->second;
+}
+
+Settings read_settings(const Node& root, Model& model, Problems& problems) {
+  Settings out;
+  model.gravity = Vector3d(0, 0, -9.81);
+  for (const Node* each = root.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement()) {
+    if (is(*each, "compiler")) read_compiler(*each, out, problems, model.remarks);
+    if (is(*each, "option")) read_option(*each, model, problems);
+    if (is(*each, "default")) read_class(*each, "", out, problems, model.remarks);
+  }
+  return out;
+}
+
+Quaterniond read_orientation(Tag& tag, const Settings& settings) {
+  if (const auto q = tag.numbers("quat", 4, 4); !q.empty()) {
+    const Quaterniond read(q[0], q[1], q[2], q[3]);
+    if (read.coeffs().stableNorm() > 0) return Quaterniond(read.coeffs().stableNormalized());
+    tag.wrong("quat", "must not be zero");
+  } else if (const auto a = tag.numbers("axisangle", 4, 4); !a.empty()) {
+    const Vector3d axis(a[0], a[1], a[2]);
+    if (axis.stableNorm() > 0)
+      return Quaterniond(AngleAxisd(settings.angle(a[3]), axis.stableNormalized()));
+    tag.wrong("axisangle", "must have an axis that is not zero");
+  } else if (const auto e = tag.numbers("euler", 3, 3); !e.empty()) {
+    return from_euler({settings.angle(e[0]), settings.angle(e[1]), settings.angle(e[2])},
+                      settings.euler);
+  } else if (const auto v = tag.numbers("xyaxes", 6, 6); !v.empty()) {
+    const Vector3d x = Vector3d(v[0], v[1], v[2]).stableNormalized();
+    const Vector3d y = Vector3d(v[3], v[4], v[5]).stableNormalized();
+    const Vector3d z = x.cross(y);
+    if (z.norm() > 1e-9) {
+      Eigen::Matrix3d R;
+      R << x, z.normalized().cross(x), z.normalized();
+      return Quaterniond(R);
+    }
+    tag.wrong("xyaxes", "must be two directions that are not parallel");
+  } else if (tag.has("zaxis")) {
+    return Quaterniond::FromTwoVectors(Vector3d::UnitZ(),
+                                       tag.direction("zaxis", Vector3d::UnitZ()));
+  }
+  return Quaterniond::Identity();
+}
+
+}  // namespace tether::scene::import::mjcf

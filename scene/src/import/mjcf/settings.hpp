@@ -1,0 +1,36 @@
+// Tether: what holds for a whole MJCF. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <tether/linalg/pi.hpp>
+
+#include "import/robot/model.hpp"
+#include "import/robot/xml.hpp"
+
+namespace tether::scene::import::mjcf {
+
+enum class InertiaFrom { as_said, geoms, inertial };
+
+struct Settings {
+  // <compiler>
+  bool degrees = true, autolimits = true;
+  std::string euler = "xyz";  ///< lower case: about turned axes, upper case: about fixed ones
+  InertiaFrom inertia = InertiaFrom::as_said;
+  double total_mass = 0;                ///< kg; 0: as it comes
+  int least_group = 0, most_group = 5;  ///< of geoms that have mass
+  // <default>
+  std::map<std::string, std::map<std::string, Attributes>, std::less<>> classes;  ///< by element
+
+  double angle(double x) const { return degrees ? x * (linalg::kPi / 180) : x; }
+  /// Attributes of `element` in a class ("": main). Reports a class that is not there.
+  const Attributes* defaults(const Node& node, const std::string& name, Problems& problems) const;
+};
+
+/// Reads <compiler>, <option> and <default> below the root; gravity and step go to the model.
+Settings read_settings(const Node& root, Model& model, Problems& problems);
+
+/// One of quat, axisangle, euler, xyaxes, zaxis; none: the identity.
+Eigen::Quaterniond read_orientation(Tag& tag, const Settings& settings);
+
+}  // namespace tether::scene::import::mjcf

@@ -1,0 +1,39 @@
+// Tether: what moves as one. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "import/import.hpp"
+#include "import/robot/model.hpp"
+#include "import/robot/xml.hpp"
+
+namespace tether::scene::import {
+
+/// A joint at the start, in world axes.
+struct PlacedJoint {
+  LinkJoint law;
+  Eigen::Vector3d axis, at;
+  double value = 0;  ///< of its coordinate, as the file counts it
+};
+
+/// Links that are welded to each other, as one body in the frame of the first of them.
+struct Part {
+  std::string name;
+  std::vector<std::string> links;
+  int line = 0, parent = -1;        ///< an earlier part; -1: the world
+  std::vector<PlacedJoint> joints;  ///< none: fixed
+  bool fixed() const { return joints.empty(); }
+  bool gone = false;  ///< folded into another one, or left out
+  bool scenery = false;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< in the world
+  double mass = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< in the frame of the first link
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre
+  std::vector<Shape> shapes;                          ///< in the frame of the first link
+  std::optional<Touch> touch;
+};
+
+/// The parts at the start, parents before children. Parts without mass are folded into what hangs
+/// on them, or left out where nothing does. Reports parts that no scene can have. Throws
+/// std::invalid_argument where an option names a joint that is not there, or asks too much of it.
+std::vector<Part> make_parts(Model& model, const ImportOptions& options, Problems& problems);
+
+}  // namespace tether::scene::import

@@ -1,0 +1,92 @@
+// Tether: what both formats of robots say alike. SPDX-License-Identifier: BSD-3-Clause
+#include "import/robot/geometry.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <tether/linalg/pi.hpp>
+
+namespace tether::scene::import {
+
+namespace {
+
+constexpr int kEdges = 32;  // 64 corners: the most of which scenes find the hull
+constexpr double kTurn = 2 * linalg::kPi;
+
+}  // namespace
+
+Eigen::Quaterniond from_rpy(const Eigen::Vector3d& rpy) {
+  return Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX());
+}
+
+Eigen::Isometry3d placed(const Eigen::Quaterniond& orientation, const Eigen::Vector3d& position) {
+  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
+  out.linear() = orientation.toRotationMatrix();
+  out.translation() = position;
+  return out;
+}
+
+Shape prism(double radius, double length) {
+  Shape out;
+  out.kind = ShapeKind::convex;
+  for (int k = 0; k < kEdges; ++k) {
+    const double angle = kTurn * k / kEdges;
+    for (const double z : {-length / 2, length / 2})
+      out.points.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
+  }
+  return out;
+}
+
+std::string prism_remark() {
+  return fmt::format("cylinders touch as prisms of {} edges inside them ({:.1g} of the radius)",
+                     kEdges, 1 - std::cos(kTurn / 2 / kEdges));
+}
+
+bool is_inertia(const Eigen::Matrix3d& inertia) {
+  if (!inertia.allFinite()) return false;
+  const double scale = inertia.cwiseAbs().maxCoeff();
+  if (!(scale > 1e-300)) return false;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia / scale,
+                                                              Eigen::EigenvaluesOnly);
+  const Eigen::Vector3d moment = solver.eigenvalues();  // ascending
+  // Inside the bounds of scenes, so that rounding on the way there does no harm.
+  return solver.info() == Eigen::Success && moment[0] > 1e-13 &&
+         moment[2] <= (moment[0] + moment[1]) * (1 + 0.5e-9);
+}
+
+Eigen::Matrix3d mended_inertia(const Eigen::Matrix3d& inertia) {
+  const double scale = inertia.cwiseAbs().maxCoeff();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia / scale);
+  Eigen::Vector3d moment = solver.eigenvalues();
+  moment = moment.cwiseMax(1e-6 * moment[2]);
+  const double lacking = std::max(0.0, moment[2] * (1 + 1e-9) - moment[0] - moment[1]);
+  moment[0] += lacking / 2;
+  moment[1] += lacking / 2;
+  const Eigen::Matrix3d out =
+      solver.eigenvectors() * moment.asDiagonal() * solver.eigenvectors().transpose();
+  return scale / 2 * (out + out.transpose());
+}
+
+void add_mass(double mass, const Eigen::Vector3d& centre, const Eigen::Matrix3d& inertia,
+              double& total, Eigen::Vector3d& common, Eigen::Matrix3d& sum) {
+  const auto about = [](double m, const Eigen::Vector3d& d) {
+    return Eigen::Matrix3d(m * (d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose()));
+  };
+  sum += inertia;
+  if (!(mass > 0)) return;
+  if (!(total > 0)) {
+    total = mass;
+    common = centre;
+    return;
+  }
+  const Eigen::Vector3d now = (total * common + mass * centre) / (total + mass);
+  sum += about(total, common - now) + about(mass, centre - now);
+  total += mass;
+  common = now;
+}
+
+}  // namespace tether::scene::import

@@ -1,0 +1,71 @@
+// Tether: a robot as its file has it, before it becomes a scene. SPDX-License-Identifier:
+// BSD-3-Clause
+//
+// Links form a tree. A link's frame at reference is that of its parent times `pose`; its joints
+// move it one after the other, the first one next to the parent.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <tether/scene/scene.hpp>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "import/robot/remarks.hpp"
+
+namespace tether::scene::import {
+
+enum class MotionKind { hinge, slide, ball, free, planar };
+
+/// One joint; its coordinate is the angle (rad) or way (m) that the file means, `reference` where
+/// the link stands at `pose`.
+struct LinkJoint {
+  std::string name;
+  MotionKind kind = MotionKind::hinge;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< length 1, in the frame of the link
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();     ///< in the frame of the link, m
+  std::optional<std::pair<double, double>> limits;
+  double reference = 0;
+  double friction = 0;                ///< N m, N
+  double stiffness = 0, damping = 0;  ///< N/m, N s/m: of slides; N m/rad, N m s: of hinges
+  double rest = 0;                    ///< of the stiffness
+  int line = 0;
+};
+
+/// How the surface of a link meets others: MuJoCo's rules, of which a URDF uses the defaults.
+struct Touch {
+  double friction = 0;
+  bool tangential = true;  ///< false: without friction, unless the other one has it
+  unsigned type = 1, affinity = 1;
+  bool operator<(const Touch& o) const {
+    return std::tie(friction, tangential, type, affinity) <
+           std::tie(o.friction, o.tangential, o.type, o.affinity);
+  }
+};
+
+struct Link {
+  std::string name;
+  int parent = -1;  ///< an earlier link; -1: the world
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::vector<LinkJoint> joints;                      ///< none: welded to its parent
+  double mass = 0;                                    ///< kg
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< m, in the frame of the link
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre, axes of the link
+  std::vector<Shape> shapes;                          ///< that touch, in the frame of the link
+  std::optional<Touch> touch;                         ///< none: its shapes touch nothing
+  bool scenery = false;                               ///< a thing of the world, not of the robot
+  int line = 0;
+};
+
+struct Model {
+  std::string name, format;
+  std::vector<Link> links;  ///< parents before children
+  std::optional<Eigen::Vector3d> gravity;
+  double step = 0;           ///< s; 0: not said
+  bool base_is_said = true;  ///< false: whether the base is fixed is up to who uses the file
+  Remarks remarks;
+};
+
+}  // namespace tether::scene::import

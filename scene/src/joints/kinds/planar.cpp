@@ -1,0 +1,38 @@
+// Tether: the planar joint. SPDX-License-Identifier: BSD-3-Clause
+//
+// The first body moves in a plane of the second and turns about its normal; 3 rows.
+#include "joints/joint_type.hpp"
+
+namespace tether::scene::joints {
+
+namespace {
+
+class Planar : public JointType {
+ public:
+  JointKind kind() const override { return JointKind::planar; }
+  void read(files::Fields& in, Joint& joint) const override {
+    read_point(in, joint);
+    read_axis(in, joint);
+  }
+  void write(const Joint& joint, files::Writer& out) const override {
+    out.field("at", joint.at, "m");
+    out.field("axis", joint.axis);
+  }
+  void check(const Joint& joint, const std::string& name) const override {
+    check_axis(joint.axis, name);
+  }
+  void add_rows(RowBuilder& rows) const override {
+    rows.right_angle(rows.x(), rows.z());
+    rows.right_angle(rows.y(), rows.z());
+    rows.plane(rows.z(), nullptr);
+  }
+};
+
+}  // namespace
+
+const JointType& planar_joint() {
+  static const Planar joint;
+  return joint;
+}
+
+}  // namespace tether::scene::joints

@@ -1,0 +1,112 @@
+// Tether: `tether import`: robots of other programs as scenes. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "import/import.hpp"
+#include "output/whole_file.hpp"
+#include "program/commands.hpp"
+#include "program/new_file.hpp"
+#include "program/process/standard_streams.hpp"
+#include "program/scene_text.hpp"
+#include "program/settings.hpp"
+
+namespace tether::scene {
+
+namespace {
+
+struct Arguments {
+  std::string file, out = "-", base;
+  std::vector<std::string> joints, held;
+  std::optional<double> ground, friction;
+  double height = 0, end = 1;
+  bool no_joint_laws = false, mend = false, strict = false, force = false;
+};
+
+/// NAME=VALUE; a name may have an equals sign, a value has none.
+std::pair<std::string, double> read_position(const std::string& word) {
+  const std::size_t equals = word.rfind('=');
+  double value = 0;
+  if (equals == std::string::npos || equals == 0 ||
+      !CLI::detail::lexical_cast(word.substr(equals + 1), value) || !std::isfinite(value))
+    throw std::invalid_argument(
+        fmt::format("--joint {}: must be NAME=VALUE, a position in rad or m", word));
+  return {word.substr(0, equals), value};
+}
+
+import::ImportOptions options_of(const Arguments& a){import::ImportOptions out;
+out.base = a.base == "fixed"  ? import::Base::fixed
+           : a.base == "free" ? import::Base::free
+                              : import::Base::as_file;
+for (const std::string& word : a.joints) out.positions.push_back(read_position(word));
+out.held.insert(a.held.begin(), a.held.end());
+for (const auto& [name, number] : {std::pair{"--height", a.height},
+                                   {"--ground", a.ground.value_or(0)},
+                                   {"--friction", a.friction.value_or(0)}})
+  if (!std::isfinite(number) || std::abs(number) > 1e9)
+    throw std::invalid_argument(fmt::format("{} {}: must be a finite number", name, number));
+if (a.friction && *a.friction < 0)
+  throw std::invalid_argument(fmt::format("--friction {}: must be >= 0", *a.friction));
+out.height = a.height;
+out.ground = a.ground;
+out.friction = a.friction;
+out.joint_laws = !a.no_joint_laws;
+out.mend = a.mend;
+out.end = a.end;
+return out;
+}  // namespace
+
+/// Said once more on the standard error, since a scene may leave through a pipe.
+int write_import(const Arguments& a) {
+  const import::ImportOptions options = options_of(a);
+  const SceneText robot = read_text(a.file);
+  const import::Imported made = import::import_robot(robot.text, robot.name, options);
+  if (a.out == "-") {
+    StandardOutput(a.out).write(made.toml);
+  } else {
+    if (!a.force) reserve(a.out);
+    write_whole(a.out, made.toml);
+  }
+  for (const std::string& remark : made.remarks)
+    fmt::print(stderr, "left out or changed: {}\n", remark);
+  if (a.out != "-") fmt::print("written: {0}\nnext: tether run {0}\n", a.out);
+  return a.strict && !made.remarks.empty() ? kNotMet : kGood;
+}
+
+}  // namespace tether::scene
+
+void add_import_command(CLI::App& app, int* status) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "import", "Makes a scene of a robot (URDF, or MuJoCo's MJCF), and says what it leaves out");
+  command->add_option("robot", a->file, "Robot file (XML); - is the standard input")->required();
+  command->add_option("--out", a->out, "The scene [-, the standard output]");
+  command->add_option("--base", a->base, "The base: fixed or free [URDF: fixed; MJCF: as it says]")
+      ->check(CLI::IsMember({"fixed", "free"}));
+  command->add_option("--height", a->height, "Raise the robot by this, m");
+  command->add_option("--joint", a->joints, "Start: NAME=VALUE, rad or m; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--hold", a->held, "Fix this joint where it starts; may be repeated")
+      ->allow_extra_args(false);
+  command->add_flag("--no-joint-laws", a->no_joint_laws,
+                    "Leave out limits and friction of joints, which need the stepping engine");
+  command->add_option("--ground", a->ground,
+                      "Add ground at this height, m, that the robot touches");
+  command->add_option("--friction", a->friction, "Of all contacts [MJCF: as it says; URDF: 1]");
+  command->add_flag("--mend", a->mend, "Change inertias that no body has to the nearest ones");
+  command->add_option("--end", a->end, "End of the run, s [1]")->check(positive_number());
+  command->add_flag("--strict", a->strict, "Exit code 1 if anything was left out or changed");
+  command->add_flag("--force", a->force, "Replace a file that is there");
+  command->footer(
+      "Exit code: 0 written (what was left out is on the standard error and in the scene's "
+      "comments),\n1 with --strict: something was left out or changed; 2 the robot or an option is "
+      "wrong, or the\nfile cannot be read or written. What is taken over: scene/README.md.");
+  command->callback([a, status] { *status = write_import(*a); });
+}
+
+}  // namespace tether::scene
