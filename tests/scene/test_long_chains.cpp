@@ -1,4 +1,5 @@
 // Smooth scenes of many bodies. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 
 #include "smooth_runs.hpp"
@@ -25,6 +26,58 @@ Scene chains(int links, int chains, double tolerance) {
   Scene s = scene(tolerance);
   s.gravity = Vector3d(0, 0, -kGravity);
   for (int i = 0; i < chains; ++i) add_chain(s, links, i);
+  return s;
+}
+
+/// n x n balls on a curved surface, on rods along the lattice and, if `braced`, both diagonals of
+/// its cells; two corners hang on the world. Lengths in units of `unit`.
+Scene net(int n, bool braced, double tolerance, double unit = 1) {
+  Scene s = scene(tolerance);
+  s.gravity = Vector3d(0, 0, -kGravity * unit);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      s.bodies.push_back(ball("ball " + std::to_string(n * i + j),
+                              unit * Vector3d(i, j, 0.2 * i * i - 0.1 * j * j + 0.1 * i * j) / n, 1,
+                              0.01 * unit * unit));
+  const auto link = [&](int a, int b) {
+    s.joints.push_back(joint(JointKind::distance, a, b, s.bodies[std::size_t(a)].position,
+                             s.bodies[std::size_t(b)].position));
+  };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const int here = n * i + j;
+      if (i + 1 < n) link(here, here + n);
+      if (j + 1 < n) link(here, here + 1);
+      if (!braced || i + 1 == n || j + 1 == n) continue;
+      link(here, here + n + 1);
+      link(here + 1, here + n);
+    }
+  for (const int corner : {0, n - 1})
+    s.joints.push_back(
+        joint(JointKind::ball, corner, kWorld, s.bodies[std::size_t(corner)].position));
+  return s;
+}
+
+/// The scene turned by Q, its bodies and joints in the opposite order.
+Scene turned_and_reversed(const Scene& from, const Eigen::Quaterniond& Q) {
+  Scene s = from;
+  s.gravity = Q * *s.gravity;
+  const int last = static_cast<int>(s.bodies.size()) - 1;
+  std::reverse(s.bodies.begin(), s.bodies.end());
+  std::reverse(s.joints.begin(), s.joints.end());
+  for (Body& body : s.bodies) {
+    body.position = Q * body.position;
+    body.orientation = Q * body.orientation;
+    body.velocity = Q * body.velocity;
+    body.angular_velocity = Q * body.angular_velocity;
+  }
+  for (Joint& each : s.joints) {
+    if (each.first != kWorld) each.first = last - each.first;
+    if (each.second != kWorld) each.second = last - each.second;
+    each.at = Q * each.at;
+    each.at_second = Q * each.at_second;
+    each.axis = Q * each.axis;
+  }
   return s;
 }
 
@@ -65,4 +118,95 @@ TEST_CASE("a chain of 300 links keeps its joints and its energy", "[smooth]") {
   // The far end falls freely, the first rod turns about its joint.
   CHECK(engine->bodies()[290].position.z() < engine->bodies()[0].position.z());
   CHECK(engine->counts().steps < 400);
+}
+
+TEST_CASE("closed loops by entries move as dense ones do: three rows of four-bars", "[smooth]") {
+  // Alone 35 rows, three times that are chosen by their entries; rank drops at t = 0.714.
+  const double tolerance = 1e-7;
+  const Scene alone = four_bar(2, tolerance);
+  Scene among = alone;
+  const int bodies = static_cast<int>(alone.bodies.size());
+  for (int copy = 1; copy < 3; ++copy) {
+    const Vector3d aside(0, 0, copy);
+    for (Body body : alone.bodies) {
+      body.name += " of copy " + std::to_string(copy);
+      body.position += aside;
+      among.bodies.push_back(body);
+    }
+    for (Joint each : alone.joints) {
+      if (each.first != kWorld) each.first += copy * bodies;
+      if (each.second != kWorld) each.second += copy * bodies;
+      each.name += " of copy " + std::to_string(copy);
+      each.at += aside;
+      among.joints.push_back(each);
+    }
+  }
+  const auto one = make_smooth_engine(alone), many = make_smooth_engine(among);
+  for (const double t : {0.5, 1.0}) {
+    one->advance(t);
+    many->advance(t);
+    for (std::size_t k = 0; k < among.bodies.size(); ++k) {
+      const BodyState &a = one->bodies()[k % std::size_t(bodies)], &b = many->bodies()[k];
+      const Vector3d aside(0, 0, double(k / std::size_t(bodies)));
+      INFO("t = " << t << ", body " << k);
+      CHECK((a.position - b.position + aside).norm() < 1e-6);
+      CHECK((a.velocity - b.velocity).norm() < 1e-5);
+    }
+  }
+  const Vector3d top = end_of(*many, 0);
+  CHECK(in_plane(top, -0.195020301949435, -0.980799205662174) < 1e-6);
+  CHECK(many->diagnostics().drift < 1e-9);
+  CHECK(many->counts().steps < 1.5 * double(one->counts().steps));
+}
+
+TEST_CASE("forty four-bars pass the point where forty rows become dependent", "[smooth]") {
+  const double tolerance = 1e-6;
+  const auto engine = make_smooth_engine(four_bar(40, tolerance));
+  engine->advance(1.0);
+  CHECK(in_plane(end_of(*engine, 0), -0.115356880632110, -0.993324111300450) < 10 * tolerance);
+  CHECK(std::abs(energy(*engine) - 620.338333333333) < 1e-9 * 620);
+  CHECK(engine->diagnostics().drift < 2e-9);
+  CHECK(engine->counts().steps < 400);
+}
+
+TEST_CASE("a net moves the same way turned, renumbered and in other units", "[smooth]") {
+  const double tolerance = 1e-6, end = 0.2;
+  const int n = 6;
+  const auto plain = make_smooth_engine(net(n, false, tolerance));
+  plain->advance(end);
+  CHECK(plain->diagnostics().drift < 1e-10);
+  CHECK(plain->counts().steps < 400);
+  SECTION("turned and renumbered") {
+    const Eigen::Quaterniond Q(Eigen::AngleAxisd(1.0, Vector3d(1, 2, 3).normalized()));
+    const auto other = make_smooth_engine(turned_and_reversed(net(n, false, tolerance), Q));
+    other->advance(end);
+    for (std::size_t k = 0; k < n * n; ++k)
+      CHECK((Q * plain->bodies()[k].position - other->bodies()[n * n - 1 - k].position).norm() <
+            10 * tolerance);
+  }
+  for (const double unit : {1e-6, 1e6}) {
+    SECTION("in units of " + std::to_string(unit)) {
+      const auto other = make_smooth_engine(net(n, false, tolerance, unit));
+      other->advance(end);
+      for (std::size_t k = 0; k < n * n; ++k)
+        CHECK((plain->bodies()[k].position - other->bodies()[k].position / unit).norm() <
+              10 * tolerance);
+    }
+  }
+}
+
+TEST_CASE("a rod too long for its closed net is refused by name", "[smooth]") {
+  Scene s = net(6, true, 1e-6);
+  Joint& rod = s.joints[40];
+  const Vector3d way =
+      s.bodies[std::size_t(rod.first)].position - s.bodies[std::size_t(rod.second)].position;
+  rod.length = way.norm() + 5e-5;
+  try {
+    make_smooth_engine(s);
+    FAIL("taken");
+  } catch (const std::invalid_argument& e) {
+    INFO(e.what());
+    CHECK(std::string(e.what()).find("contradict") != std::string::npos);
+    CHECK(std::string(e.what()).find("joint \"") != std::string::npos);
+  }
 }

@@ -3,6 +3,7 @@
 #include "bordered_gram.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <tether/linalg/block3.hpp>
 
 namespace tether::linalg {
@@ -26,6 +27,7 @@ void BorderedGram::analyse(int n, const std::vector<int>& starts, const std::vec
 }
 
 int BorderedGram::factor(const double* A, const double* norm, double eps) {
+  eps_ = eps;
   int count = sparse_.factor(A, norm, eps);
   for (int f = 0; f < full_; ++f) {
     std::copy(coupling(f), coupling(f) + m_, solved(f));
@@ -46,6 +48,10 @@ int BorderedGram::factor(const double* A, const double* norm, double eps) {
     count += dependent_[at(f)];
   }
   return count;
+}
+
+double BorderedGram::independent_part(int i) const {
+  return i < m_ ? sparse_.independent_part(i) : std::sqrt(std::max(0.0, d_[at(i - m_)] - eps_));
 }
 
 double BorderedGram::dot(const double* y, const double* z) const {

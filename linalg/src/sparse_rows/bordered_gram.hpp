@@ -36,6 +36,7 @@ class BorderedGram {
   bool dependent(int i) const {
     return i < m_ ? sparse_.dependent(i) : dependent_[static_cast<std::size_t>(i - m_)] != 0;
   }
+  double independent_part(int i) const;
 
  private:
   int factor_border(const double* norm, double eps);
@@ -47,6 +48,7 @@ class BorderedGram {
   void subtract(const double* y, double share, double* z) const;
 
   GramFactor sparse_;
+  double eps_ = 0.0;
   int m_ = 0, full_ = 0;
   std::vector<double> B_, Y_;  // A f and (A A^T + eps I)^-1 A f, m entries for each full row
   std::vector<double> S_, d_;  // full x full, row-major: L below the diagonal

@@ -6,6 +6,7 @@
 #include "gram_factor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "elimination.hpp"
 
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double kDependent = 16.0;  // eps (1 + |c|^2)
 constexpr double kThin = 1e6;        // eps
+constexpr double kShort = 1e-3;      // d: behind rows that just count |c|^2 eps may be as much
 constexpr int kTogether = 4;         // columns of L that are applied in one pass
 
 }  // namespace
@@ -206,12 +208,13 @@ double GramFactor::coefficients_square(int k) {
 int GramFactor::factor(const double* A, const double* norm, double eps) {
   std::fill(L_.filled.begin(), L_.filled.end(), 0);
   std::fill(PA_.met.begin(), PA_.met.end(), 0);
+  eps_ = eps;
   int count = 0;
   for (int k = 0; k < m_; ++k) {
     scatter_products(k, A);
     // Without rounding d is at least eps.
     const double d = std::max(eliminate(k, 1.0 + eps), eps);
-    const bool thin = d <= kThin * eps;
+    const bool thin = d <= std::max(kThin * eps, kShort);
     const bool dependent = (thin && d <= kDependent * eps * (1.0 + coefficients_square(k))) ||
                            !(norm[row_at_[at(k)]] > 0.0);
     dependent_[at(k)] = dependent;
@@ -219,6 +222,10 @@ int GramFactor::factor(const double* A, const double* norm, double eps) {
     inverse_d_[at(k)] = 1.0 / d;
   }
   return count;
+}
+
+double GramFactor::independent_part(int i) const {
+  return std::sqrt(std::max(0.0, 1.0 / inverse_d_[at(place_of(i))] - eps_));
 }
 
 void GramFactor::forward_in_place() {

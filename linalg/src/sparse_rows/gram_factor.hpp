@@ -30,6 +30,8 @@ class GramFactor {
   void depend(double* z, int last) const;
 
   bool dependent(int i) const { return dependent_[static_cast<std::size_t>(place_of(i))] != 0; }
+  /// sqrt(d_k - eps) of row i
+  double independent_part(int i) const;
   int rows() const { return m_; }
   long entries_of_factor() const { return static_cast<long>(L_.value.size()); }
 
@@ -62,6 +64,7 @@ class GramFactor {
   std::vector<int> place_, row_at_;  // row i of A is row place_[i] of P A, and back
   PermutedRows PA_;
   Triangle L_;
+  double eps_ = 0.0;
   std::vector<double> inverse_d_, work_, solution_;
   std::vector<char> dependent_;
 };

@@ -103,6 +103,7 @@ double* SparseMinimumNorm::full_row(int k) { return parts_->rows.full_row(k); }
 double* SparseMinimumNorm::metric() { return parts_->rows.metric(); }
 int SparseMinimumNorm::dropped() const { return parts_->dependent.count(); }
 int SparseMinimumNorm::pivot(int k) const { return parts_->dependent.at(k); }
+double SparseMinimumNorm::independent_part(int i) const { return parts_->gram.independent_part(i); }
 double SparseMinimumNorm::row_norm(int i) const {
   return parts_->rows.norm(static_cast<std::size_t>(i));
 }

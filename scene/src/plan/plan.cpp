@@ -9,6 +9,7 @@
 
 #include "effects/list.hpp"
 #include "joints/list.hpp"
+#include "smooth/sizes.hpp"
 
 namespace tether::scene {
 
@@ -54,6 +55,18 @@ int smooth_unknowns(const Scene& s, const Plan& plan) {
   const Formulation form = s.smooth.value_or(SmoothOptions{}).formulation;
   const int multipliers = form == Formulation::index0 ? 0 : form == Formulation::index1 ? 1 : 2;
   return 13 * plan.moving + (keeps_energy && works ? 1 : 0) + multipliers * plan.rows;
+}
+
+// Which of the smooth engine's matrices have entries only where they are not zero.
+std::string smooth_matrices(const Plan& plan) {
+#ifdef TETHER_SCENE_KLU
+  const bool jacobian = plan.unknowns >= smooth::kManyUnknowns;
+#else
+  const bool jacobian = false;
+#endif
+  std::string text = jacobian ? "sparse Jacobian (KLU)" : "dense Jacobian";
+  if (plan.rows == 0) return text;
+  return text + (plan.rows >= smooth::kManyRows ? ", sparse rows" : ", dense rows") + " of joints";
 }
 
 EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
@@ -176,7 +189,8 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan) {
   if (smooth)
     out << fmt::format("unknowns  {}{}, with {} and {}\n", plan.rows > 0 ? "up to " : "",
                        plan.unknowns, number(plan.rows, "row") + " of joints",
-                       number(plan.invariants, "invariant") + " kept");
+                       number(plan.invariants, "invariant") + " kept")
+        << "matrices  " << smooth_matrices(plan) << "\n";
   else
     out << fmt::format("unknowns  {}{}{}; {} of bodies can touch\n", plan.unknowns,
                        event ? "" : " velocities",

@@ -30,8 +30,10 @@ void System::row_values(double t, const double* y, double* g) {
   joint_values(t, y, joint_values_.data());
   const int p = in_use_.count();
   for (int k = 0; k < p; ++k) {
-    g[k] = joint_values_[in_use_.used()[at(k)]];
-    g[p + k] = joint_values_[rows() + in_use_.used()[at(k)]];
+    const int row = in_use_.used()[at(k)];
+    const bool kept = in_use_.keeps(row);
+    g[k] = kept ? joint_values_[row] : 0.0;
+    g[p + k] = kept ? joint_values_[rows() + row] : 0.0;
   }
   double* norms = g + 2 * p;
   for (int k = 0; k < moving(); ++k)
@@ -66,7 +68,7 @@ void System::row_jacobian(double t, const double* y, const Place& entries) {
     row.template rows<1>(A, B, rate);
     for (int i = 0; i < row.count; ++i) {
       const int place = in_use_.place_of(row.row + i);
-      if (place < 0) continue;
+      if (!in_use_.keeps(row.row + i)) continue;
       put(place, ia, ib, g[i].derivatives(), 0);
       put(place, ib, ia, g[i].derivatives(), kBodyDirections);
       put(p + place, ia, ib, rate[i].derivatives(), 0);
@@ -140,7 +142,7 @@ std::vector<std::string> System::constraint_names() const {
 }
 
 ida_projection::Constraints System::constraints() {
-  return in_use_.fixed() ? sparse_constraints() : dense_constraints();
+  return in_use_.in_place() ? sparse_constraints() : dense_constraints();
 }
 
 ida_projection::Constraints System::dense_constraints() {

@@ -12,13 +12,12 @@
 #include <numeric>
 #include <tether/ida_projection.hpp>
 
+#include "sizes.hpp"
+
 namespace tether::scene::smooth {
 
 #ifdef TETHER_SCENE_KLU
 namespace {
-
-// Unknowns from which KLU is faster than the dense solver.
-constexpr int kSparseFrom = 80;
 
 // SUNDIALS calls KLU's singular matrix unrecoverable, and its next setups want the factors that
 // were not made. A predictor may meet a dead point exactly; another step passes by.
@@ -36,7 +35,7 @@ NewtonMatrix::NewtonMatrix(System& system, double t, N_Vector y, N_Vector yp, SU
   entries_.record();
   system_.jacobian(t, 1.0, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), entries_);
 #ifdef TETHER_SCENE_KLU
-  if (system_.size() >= kSparseFrom) {
+  if (system_.size() >= kManyUnknowns) {
     make_sparse(y, context);
     return;
   }

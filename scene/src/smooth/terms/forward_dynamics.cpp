@@ -1,12 +1,13 @@
 // Tether: accelerations and multipliers of a state. SPDX-License-Identifier: BSD-3-Clause
 #include "forward_dynamics.hpp"
 
+#include "smooth/sizes.hpp"
+
 namespace tether::scene::smooth {
 
 namespace {
 
 constexpr double kEpsilon = 1e-11;  // of the diagonal of G M^-1 G^T
-constexpr int kManyRows = 48;
 
 }  // namespace
 

@@ -22,6 +22,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "smooth/sizes.hpp"
+
 namespace tether::scene::smooth {
 
 namespace {
@@ -33,19 +35,22 @@ constexpr double kRounding = 1e-11;    // of g, with room for the next steps
 constexpr double kWeakest = 1e-3, kGood = 0.3;
 constexpr double kMuchWorse = 0.1;
 constexpr int kWait = 4;  // steps between looks while all pivots are good
-// Rows of a tree are independent at every state; looking at them costs the cube of their number.
-constexpr int kTrustStructure = 48;
+// Looking at dense rows costs the cube of their number. Of many, those of a tree are independent at
+// every state; those of closed loops are chosen by their entries.
+constexpr double kGoodByEntries = 0.03;  // in an order that looks at fill only
+constexpr double kLeastWeakByEntries = 1e-5;
 
 }  // namespace
 
 RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
     : rows_(rows), bodies_(bodies), count_(rows.count()) {
-  if (rows.count() >= kTrustStructure && independent_by_structure()) {
-    fixed_ = true;
+  if (rows.count() >= kManyRows) {
+    in_place_ = true;
     used_.resize(at(count_));
     std::iota(used_.begin(), used_.end(), 0);
     place_of_used_ = used_;
     carries_.assign(at(count_), 1);
+    if (!independent_by_structure()) sparse_ = std::make_unique<SparseRowChoice>(rows_, bodies_);
     return;
   }
   if (rows.count() > 0) {
@@ -136,8 +141,15 @@ void RowsInUse::choose(double tolerance) {
   choose();
 }
 
+void RowsInUse::choose_sparse() {
+  multiplier_choices_ += sparse_->choose(std::max(weak_, kLeastWeakByEntries));
+  weakest_ = sparse_->carriers().weakest;
+  wait_ = weakest_ > kGoodByEntries ? kWait : 1;
+}
+
 void RowsInUse::choose() {
-  if (count_ == 0 || fixed_) return;
+  if (sparse_) choose_sparse();
+  if (count_ == 0 || in_place_) return;
   gradient_.form(rows_, bodies_);
   Eigen::MatrixXd& G = gradient_.G;
   for (int i = 0; i < rows_.count(); ++i) G.row(i) /= std::max(G.row(i).norm(), 1e-300);

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/QR>
+#include <memory>
 #include <vector>
 
 #include "joint_gradient.hpp"
+#include "sparse_row_choice.hpp"
 
 namespace tether::scene::smooth {
 
@@ -19,9 +21,12 @@ class RowsInUse {
   int count() const { return count_; }
   const std::vector<int>& used() const { return used_; }
   int place_of(int row) const { return place_of_used_[at(row)]; }  ///< first in used(), or -1
-  bool carries_multiplier(int row) const { return carries_[at(row)] != 0; }
-  /// All rows are used for the whole run, each in its own place.
-  bool fixed() const { return fixed_; }
+  bool carries_multiplier(int row) const {
+    return (sparse_ ? sparse_->carriers().has[at(row)] : carries_[at(row)]) != 0;
+  }
+  /// Many rows, each in its own place for the whole run; one that is not kept now counts as zero.
+  bool in_place() const { return in_place_; }
+  bool keeps(int row) const { return sparse_ ? sparse_->keeps(row) : place_of(row) >= 0; }
   /// Grows when other rows carry multipliers: the matrix has other zeros then.
   int multiplier_choices() const { return multiplier_choices_; }
   /// How far the rows in use are from depending on each other: the length of what the last one adds
@@ -37,12 +42,14 @@ class RowsInUse {
   int count_needed_beyond(Eigen::Index rank, const Eigen::VectorXd& length,
                           const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr);
   void choose();
+  void choose_sparse();
   void choose_multipliers();
 
   JointRows& rows_;
   MovingBodies& bodies_;
   double weak_ = 0;  // pivot below which a row is not used
-  bool fixed_ = false;
+  bool in_place_ = false;
+  std::unique_ptr<SparseRowChoice> sparse_;  // in place, with closed loops
   int count_ = 0;
   std::vector<int> used_, place_of_used_;
   std::vector<char> carries_;

@@ -11,6 +11,8 @@ namespace {
 
 using Row6 = Eigen::Matrix<double, 1, 6>;
 
+constexpr double kRankTolerance = 1e-6;
+
 }  // namespace
 
 // put(row, where its entries of this body begin within the row, body's slot, force, torque)
@@ -48,14 +50,28 @@ SparseJointGradient::SparseJointGradient(const JointRows& rows, const MovingBodi
   least_.setZero(6 * bodies.count());
 }
 
-void SparseJointGradient::factor() {
+void SparseJointGradient::factor() { factor(nullptr, kRankTolerance); }
+
+// A factor of the tolerance that SparseMinimumNorm calls a row dependent at.
+void SparseJointGradient::factor(const std::vector<char>& wanted, double dependent) {
+  factor(wanted.data(), 0.25 * dependent);
+}
+
+int SparseJointGradient::independent(std::vector<char>& rows) const {
+  rows.assign(at(rows_.count()), 1);
+  for (int k = factors_.rank(); k < rows_.count(); ++k) rows[at(factors_.pivot(k))] = 0;
+  return factors_.rank();
+}
+
+void SparseJointGradient::factor(const char* wanted, double rank_tolerance) {
   std::fill_n(factors_.entries(), starts_.back(), 0.0);
   each_entry([&](int row, int offset, int slot, const Vector3d& force, const Vector3d& torque) {
+    if (wanted && !wanted[row]) return;
     Eigen::Map<Row6> to(factors_.entries() + starts_[at(row)] + offset);
     to.head<3>() += force.transpose() / std::sqrt(bodies_.inertia(slot).mass);
     to.tail<3>() += torque.transpose() * roots_[at(slot)];
   });
-  factors_.factor();
+  factors_.factor(rank_tolerance);
 }
 
 void SparseJointGradient::solve(const Eigen::VectorXd& right, Eigen::VectorXd& a,

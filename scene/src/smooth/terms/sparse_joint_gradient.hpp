@@ -16,8 +16,14 @@ class SparseJointGradient {
  public:
   SparseJointGradient(const JointRows& rows, const MovingBodies& bodies);
 
-  /// At the state that is set.
+  /// At the state that is set. Rows that are not wanted count as zero; `dependent`: how short what
+  /// others leave of a row of unit length, in the metric of M, is if it is to depend on them.
   void factor();
+  void factor(const std::vector<char>& wanted, double dependent);
+  /// After factor(): 1 for each row that is wanted and depends on none of the others; their number.
+  int independent(std::vector<char>& rows) const;
+  /// After factor(): what rows before row i in the order of elimination leave of it, 0 to 1.
+  double independent_part(int i) const { return factors_.independent_part(i); }
   /// Of least kinetic energy a^T M a / 2: a with G a = right, and lambda with M a = G^T lambda.
   void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda);
   /// Of G with each moving body's velocities.
@@ -26,6 +32,7 @@ class SparseJointGradient {
   Eigen::VectorXd size_of_rows() const;
 
  private:
+  void factor(const char* wanted, double rank_tolerance);
   template <class Put>
   void each_entry(const Put& put) const;
 
