@@ -32,6 +32,7 @@ class NewtonMatrix {
   SUNLinearSolver solver_ = nullptr;
   Entries entries_;
   std::vector<sunindextype> column_starts_, row_indices_;  // sparse: the pattern
+  std::vector<int> order_;                                 // sparse: of KLU's elimination
   int multiplier_choices_ = 0;                             // those that KLU's pivots are for
 };
 
