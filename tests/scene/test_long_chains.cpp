@@ -195,6 +195,19 @@ TEST_CASE("a net moves the same way turned, renumbered and in other units", "[sm
   }
 }
 
+TEST_CASE("a thousand free bodies take no room for rows without entries", "[smooth]") {
+  Scene s = scene(1e-6);
+  s.gravity = Vector3d(0, 0, -kGravity);
+  for (int i = 0; i < 1000; ++i) {
+    s.bodies.push_back(ball("ball " + std::to_string(i), {double(i), 0, 0}));
+    s.bodies.back().angular_velocity = {1, 0.1 * i, 0};
+  }
+  const auto engine = make_smooth_engine(s);
+  engine->advance(0.1);
+  CHECK((engine->bodies()[999].position - Vector3d(999, 0, -0.005 * kGravity)).norm() < 1e-6);
+  CHECK(engine->diagnostics().drift < 1e-12);
+}
+
 TEST_CASE("a rod too long for its closed net is refused by name", "[smooth]") {
   Scene s = net(6, true, 1e-6);
   Joint& rod = s.joints[40];

@@ -66,7 +66,8 @@ std::string smooth_matrices(const Plan& plan) {
 #endif
   std::string text = jacobian ? "sparse Jacobian (KLU)" : "dense Jacobian";
   if (plan.rows == 0) return text;
-  return text + (plan.rows >= smooth::kManyRows ? ", sparse rows" : ", dense rows") + " of joints";
+  return text + (smooth::by_entries(plan.rows, plan.moving) ? ", sparse rows" : ", dense rows") +
+         " of joints";
 }
 
 EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {

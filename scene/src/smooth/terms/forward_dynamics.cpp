@@ -40,7 +40,7 @@ ForwardDynamics::ForwardDynamics(JointRows& rows, MovingBodies& bodies, bool gra
   scratch_.setZero(m);
   a_.setZero(n);
   free_.setZero(n);
-  if (m >= kManyRows && !gradient) {
+  if (m > 0 && by_entries(m, bodies.count()) && !gradient) {
     sparse_.emplace(rows_, bodies_);
     change_.setZero(n);
     sparse_->factor();

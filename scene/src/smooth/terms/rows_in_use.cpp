@@ -44,7 +44,7 @@ constexpr double kLeastWeakByEntries = 1e-5;
 
 RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
     : rows_(rows), bodies_(bodies), count_(rows.count()) {
-  if (rows.count() >= kManyRows) {
+  if (by_entries(rows.count(), bodies.count())) {
     in_place_ = true;
     used_.resize(at(count_));
     std::iota(used_.begin(), used_.end(), 0);
