@@ -193,8 +193,8 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
     }
     report.message.clear();
     y = trial;
-    // Seen with the factors at hand: others would only confirm it.
-    if (left <= std::max(kConverged, floor)) {
+    // Seen with the factors at hand: others would only confirm it, where no row waits to come back.
+    if (!blocks_.dropped_rows() && left <= std::max(kConverged, floor)) {
       ++report.iterations;
       break;
     }
