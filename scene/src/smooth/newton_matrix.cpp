@@ -105,8 +105,10 @@ void NewtonMatrix::make_sparse(N_Vector y, SUNContext context) {
   std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
   matrix_ = SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context);
   solver_ = SUNLinSol_KLU(y, matrix_, context);
-  order_ = elimination_order(N, system_.moving(), kBody, places);
-  use_order(solver_, order_);
+  if (by_entries(system_.rows(), system_.moving())) {
+    order_ = elimination_order(N, system_.moving(), kBody, places);
+    use_order(solver_, order_);
+  }
   solver_->ops->setup = factor_or_try_smaller_step;
   entries_.finish(std::move(slots));
 }
