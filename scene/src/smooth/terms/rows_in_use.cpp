@@ -38,7 +38,7 @@ constexpr int kWait = 4;  // steps between looks while all pivots are good
 // Looking at dense rows costs the cube of their number. Of many, those of a tree are independent at
 // every state; those of closed loops are chosen by their entries.
 constexpr double kGoodByEntries = 0.03;  // in an order that looks at fill only
-constexpr double kLeastWeakByEntries = 1e-5;
+constexpr double kLeastWeakByEntries = 1.2e-4;
 
 }  // namespace
 

@@ -16,8 +16,9 @@ namespace tether::scene::smooth {
 
 namespace {
 
-constexpr double kDependent = 4e-6;  // rounding of G M^-1 G^T is some 1e-15
-constexpr double kWay = 1e-3;        // of the free move, of a link's length and in rad
+// GramFactor weighs the coefficients of rows up to d = 1e6 eps: then of all that are this short.
+constexpr double kDependent = 1.2e-4;
+constexpr double kWay = 1e-3;  // of the free move, of a link's length and in rad
 constexpr int kCloseMoves = 3;
 constexpr double kClosed = 1e-12;  // of a link's length
 constexpr double kStandsOut = 0.1, kGood = 0.03;
