@@ -9,7 +9,7 @@
 
 #include "effects/list.hpp"
 #include "joints/list.hpp"
-#include "smooth/sizes.hpp"
+#include "smooth/rows/sizes.hpp"
 
 namespace tether::scene {
 

@@ -12,8 +12,8 @@
 #include <numeric>
 #include <tether/ida_projection.hpp>
 
-#include "elimination_order.hpp"
-#include "sizes.hpp"
+#include "smooth/rows/elimination_order.hpp"
+#include "smooth/rows/sizes.hpp"
 
 namespace tether::scene::smooth {
 

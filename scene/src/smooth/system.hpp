@@ -24,11 +24,11 @@
 #include <vector>
 
 #include "joints/laws/reactions.hpp"
+#include "smooth/rows/rows_in_use.hpp"
 #include "smooth/terms/acceleration_jacobian.hpp"
 #include "smooth/terms/forward_dynamics.hpp"
 #include "smooth/terms/jacobian_terms.hpp"
 #include "smooth/terms/kept_invariants.hpp"
-#include "smooth/terms/rows_in_use.hpp"
 #include "stopwatch.hpp"
 
 namespace tether::scene::smooth {

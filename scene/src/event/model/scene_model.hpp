@@ -11,7 +11,7 @@
 #include "joints/laws/reactions.hpp"
 #include "mechanics/force.hpp"
 #include "model.hpp"
-#include "smooth/terms/moving_bodies.hpp"
+#include "smooth/rows/moving_bodies.hpp"
 
 namespace tether::scene::event {
 

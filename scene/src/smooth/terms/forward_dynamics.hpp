@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "joint_gradient.hpp"
-#include "sparse_joint_gradient.hpp"
+#include "smooth/rows/joint_gradient.hpp"
+#include "smooth/rows/sparse_joint_gradient.hpp"
 
 namespace tether::scene::smooth {
 

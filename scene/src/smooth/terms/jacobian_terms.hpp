@@ -3,8 +3,8 @@
 
 #include "joints/joint_rows.hpp"
 #include "kept_invariants.hpp"
-#include "moving_bodies.hpp"
-#include "rows_in_use.hpp"
+#include "smooth/rows/moving_bodies.hpp"
+#include "smooth/rows/rows_in_use.hpp"
 
 namespace tether::scene::smooth {
 

@@ -8,7 +8,7 @@
 
 #include "mechanics/force.hpp"
 #include "mechanics/units.hpp"
-#include "moving_bodies.hpp"
+#include "smooth/rows/moving_bodies.hpp"
 
 namespace tether::scene::smooth {
 

@@ -22,7 +22,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "smooth/sizes.hpp"
+#include "sizes.hpp"
 
 namespace tether::scene::smooth {
 

@@ -17,12 +17,12 @@ namespace tether::scene::smooth {
 namespace {
 
 // GramFactor weighs the coefficients of rows up to d = 1e6 eps: then of all that are this short.
-constexpr double kDependent = 1.2e-4;
+constexpr double kDependentByEntries = 1.2e-4;
 constexpr double kWay = 1e-3;  // of the free move, of a link's length and in rad
 constexpr int kCloseMoves = 3;
 constexpr double kClosed = 1e-12;  // of a link's length
-constexpr double kStandsOut = 0.1, kGood = 0.03;
-constexpr double kMuchWorse = 0.1;
+constexpr double kStandsOut = 0.1, kGoodChoice = 0.03;
+constexpr double kMuchWorseChoice = 0.1;
 constexpr int kLooks = 16;  // from one search to the next
 
 }  // namespace
@@ -32,15 +32,15 @@ SparseRowChoice::SparseRowChoice(JointRows& rows, MovingBodies& bodies)
   rows_.set_time(0.0);
   std::vector<double> y = bodies_.start();
   bodies_.set_state(y.data());
-  gradient_.factor(all_, kDependent);
+  gradient_.factor(all_, kDependentByEntries);
   if (gradient_.independent(kept_.has) < rows_.count()) {
     move_freely(y);
     close(y);
   }
-  const int count = independent_among(all_, kDependent).count;
-  carriers_ = best(count, kDependent);
+  const int count = independent_among(all_, kDependentByEntries).count;
+  carriers_ = best(count, kDependentByEntries);
   bodies_.set_state(bodies_.start().data());
-  kept_ = independent_among(all_, kDependent);
+  kept_ = independent_among(all_, kDependentByEntries);
 }
 
 RowSet SparseRowChoice::independent_among(const std::vector<char>& wanted, double dependent) {
@@ -104,7 +104,7 @@ void SparseRowChoice::close(std::vector<double>& y) {
                            g.data() + row.row);
     });
     if (k == kCloseMoves || g.cwiseAbs().maxCoeff() <= closed) return;
-    gradient_.factor(all_, kDependent);
+    gradient_.factor(all_, kDependentByEntries);
     gradient_.solve(g, v, multipliers);
     move(y, -v);
   }
@@ -123,18 +123,18 @@ RowSet SparseRowChoice::best(int count, double weak) {
 // There are never more independent rows than a little way off the start: at loose tolerances bodies
 // are off the joints by more than rounding, and rows that are implied seem independent.
 bool SparseRowChoice::choose(double weak) {
-  RowSet carried = independent_among(carriers_.has, kDependent);
+  RowSet carried = independent_among(carriers_.has, kDependentByEntries);
   if (carried.count < carriers_.count) carried.weakest = 0;
   carriers_.weakest = carried.weakest;
-  const bool as_it_was = carried.weakest > kMuchWorse * weakest_found_ && --looks_left_ > 0;
-  if (carried.weakest > kGood || (as_it_was && carried.weakest > weak)) {
+  const bool as_it_was = carried.weakest > kMuchWorseChoice * weakest_found_ && --looks_left_ > 0;
+  if (carried.weakest > kGoodChoice || (as_it_was && carried.weakest > weak)) {
     kept_ = std::move(carried);
     return false;
   }
   looks_left_ = kLooks;
   kept_ = best(carriers_.count, weak);
   weakest_found_ = kept_.weakest;
-  if (kept_.count != carriers_.count || carried.weakest > kMuchWorse * kept_.weakest) {
+  if (kept_.count != carriers_.count || carried.weakest > kMuchWorseChoice * kept_.weakest) {
     weakest_found_ = carried.weakest;
     if (carried.weakest > weak) kept_ = std::move(carried);
     return false;
