@@ -37,6 +37,13 @@ foreach(library IN LISTS tether_libraries)
     DESTINATION ${tether_cmake_dir} COMPONENT ${tether_dev})
 endforeach()
 
+# Needs deal.II, so it is in no set of headers that are compiled one by one.
+if(TARGET tether_ida_projection)
+  tether_components(ida_projection)
+  install(FILES ${PROJECT_SOURCE_DIR}/ida_projection/include/tether/ida_projection/deal_ii.hpp
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tether/ida_projection COMPONENT ${tether_dev})
+endif()
+
 if(TARGET tether_preload)
   tether_components(ida_projection)
   install(TARGETS tether_preload LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${tether_run})
