@@ -68,7 +68,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
     if (status != Status::success) return status;
     double length = rows_.solve();
     double part = previous > 0.0 && length > floor ? length / previous : 0.0;
-    if (part > 0.0) kept_.slope = part / kept_.age;
+    if (part > 0.0 && kept_.age > 0) kept_.slope = part / kept_.age;
     bool follow = rows_.dropped_follow();
     if (kept_.age > 0 && (part > kSlow || length > kLong || (k > 0 && !follow))) {
       rows_.set_metric(true);
