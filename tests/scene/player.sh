@@ -21,7 +21,7 @@ page() {
 for scene in "$@"; do
   "$program" run "$scene" --end 0.1 --quiet --html "$work/page.html" >"$work/said" 2>&1 ||
     [ $? -eq 1 ] || { echo "$scene: $(cat "$work/said")"; exit 1; }
-  page "$work/page.html"
+  page "$work/page.html#through=1"
   if [ ! -s "$work/dom" ]; then echo "chromium does not start here: $(tail -1 "$work/log")"; exit 77; fi
   if ! grep -q 'data-tether="drawn"' "$work/dom"; then echo "$scene: not drawn"; wrong=1; fi
   if grep -iE 'CONSOLE.*(error|warn|uncaught|refused|invalid)' "$work/log"; then echo "$scene: errors"; wrong=1; fi

@@ -11,7 +11,7 @@ class Player {
     this.time = data.start;
     this.playing = false;
     this.poses = new Float32Array(7 * data.bodies.length);
-    this.show = { joints: true, contacts: true, names: data.moving <= 8, selected: -1 };
+    this.show = { joints: true, contacts: true, names: data.moving <= 8, through: false, selected: -1 };
     this.quality = { pixels: 1, shadows: true, slow: 0 };
     this.findSize();
     this.camera = new Camera(data.up);
@@ -154,8 +154,9 @@ class Player {
     });
     on('follow', 'change', () => this.follow(Number(element('follow').value)));
     on('view', 'change', () => { if (element('view').value) this.home(element('view').value); element('view').value = ''; });
-    const has = { joints: data.joints.length > 0, contacts: data.contactNumbers.length > 0, names: true };
-    for (const what of ['joints', 'contacts', 'names']) {
+    const has = { joints: data.joints.length > 0, contacts: data.contactNumbers.length > 0, names: true,
+      through: data.bodies.some(body => body.film === null && body.parts.some(part => !part.normal)) };
+    for (const what of Object.keys(has)) {
       element(what).checked = this.show[what];
       element(what).parentElement.hidden = !has[what];
       on(what, 'change', () => { this.show[what] = element(what).checked; this.dirty = true; });
@@ -243,6 +244,8 @@ class Player {
   }
   readHash() {
     const hash = new URLSearchParams(window.location.hash.slice(1));
+    for (const what of ['joints', 'contacts', 'names', 'through'])
+      if (hash.has(what)) this.element(what).checked = this.show[what] = hash.get(what) !== '0';
     if (hash.has('view')) this.home(hash.get('view'));
     this.element('fps').hidden = !hash.has('fps');
     this.play(!window.matchMedia('(prefers-reduced-motion: reduce)').matches);

@@ -19,11 +19,13 @@ in vec3 across, local, tint; in float pattern;
 uniform vec3 light, towards; uniform int mode;
 out vec4 pixel;
 void main() {
+  // Bodies to be seen through have one pixel in four, and none where a body is looked for.
+  if (pattern < 0.0 && (mode == 2 || mod(gl_FragCoord.x, 2.0) > 1.0 || mod(gl_FragCoord.y, 2.0) > 1.0)) discard;
   if (mode == 1) { pixel = vec4(0.0, 0.0, 0.0, 0.16); return; }
   if (mode == 2) { pixel = vec4(tint, 1.0); return; }
   vec3 n = normalize(across);
   float lit = 0.58 + 0.3 * max(dot(n, light), 0.0) + 0.28 * max(dot(n, towards), 0.0);
-  float dark = local.x * local.y * local.z < 0.0 ? pattern : 1.0;  // turning spheres are seen to turn
+  float dark = local.x * local.y * local.z < 0.0 ? abs(pattern) : 1.0;  // turning spheres are seen to turn
   pixel = vec4(tint * lit * dark + 0.06, 1.0);
 }`;
 const kGroundVertex = `#version 300 es

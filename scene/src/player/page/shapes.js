@@ -97,7 +97,7 @@ class Shapes {
     this.poses = poses;
     this.solid.clear();
     this.above.clear();
-    this.data.bodies.forEach((body, b) => this.addBody(body, b, show.selected === b));
+    this.data.bodies.forEach((body, b) => this.addBody(body, b, show));
     for (const spring of this.data.springs) this.addSpring(spring);
     for (const at of this.data.centres) this.addBall(this.solid, at, 2 * this.marker, kFixed, -1);
     for (const joint of this.data.joints) {
@@ -115,7 +115,8 @@ class Shapes {
     const { position, q } = this.pose(anchor.body);
     return add(position, rotated(q, anchor.at));
   }
-  addBody(body, b, selected) {
+  addBody(body, b, show) {
+    const selected = show.selected === b, through = show.through && body.film === null;
     const { position, q } = this.pose(b);
     const colour = selected ? this.colour(b).map(x => 0.35 + 0.65 * x) : this.colour(b);
     const pattern = selected ? 1 : 0.72;
@@ -129,7 +130,7 @@ class Shapes {
         continue;
       }
       this.solid.add(part.form, at, product(q, part.orientation), part.scale, colour,
-        this.forms[part.form].round ? pattern : 1, b);
+        through ? -1 : this.forms[part.form].round ? pattern : 1, b);
     }
   }
   addBall(to, at, radius, colour, b) { to.add(this.ball, at, kNone, [radius, radius, radius], colour, 1, b); }
