@@ -286,6 +286,23 @@ TEST_CASE("sparse rows of a thousand rods: plain IDA's steps, smaller errors, li
   CHECK(std::exp(mean) <= 1.1);
 }
 
+TEST_CASE("a thousand rods, GMRES: a step size at which it failed is not tried again at once") {
+  const RodChain chain(1000, 0.1);
+  const Problem problem = chain.problem(0.5);
+  const tp::Constraints rows = chain.sparse_rows();
+  double mean = 0.0;
+  long failures = 0;
+  for (const double tolerance : {1.1e-3, 1e-3, 9e-4, 8e-4}) {
+    const Run run = integrate_without_matrix(problem, tolerance, &rows);
+    const Run plain = integrate_without_matrix(problem, tolerance, nullptr);
+    REQUIRE(run.flag >= 0);
+    mean += std::log(static_cast<double>(run.steps) / static_cast<double>(plain.steps)) / 4.0;
+    failures += run.statistics.corrector_failures;
+  }
+  CHECK(failures <= 100);  // tried again after two steps: 197
+  CHECK(std::exp(mean) <= 1.3);
+}
+
 TEST_CASE("sparse rows of lower rank: the steps and the motion of dense rows") {
   for (const double tolerance : {1e-4, 1e-6, 1e-9}) {
     INFO("tolerance " << tolerance);

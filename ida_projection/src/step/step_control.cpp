@@ -1,6 +1,8 @@
 // Tether: control of IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
 #include "step/step_control.hpp"
 
+#include <cmath>
+
 namespace tether::ida_projection {
 
 namespace {
@@ -21,6 +23,7 @@ void StepControl::reset() {
   weights_factor_ = 1.0;
   smoother_.reset();
   order_limit_.reset();
+  refused_size_.reset();
   refused_in_row_ = 0;
   last_error_failures_ = 0;
 }
@@ -41,14 +44,24 @@ void StepControl::control(const Candidate& candidate, bool engaged, N_Vector dif
   };
   if (smoother_.on()) {
     order_limit_.end();
+    refused_size_.forget();
     weights_factor_ = smoother_.control(steps, norm());
   } else {
     compare_slopes(candidate, steps, differential);
     weights_factor_ =
         order_limit_.control(steps, ida_.step().t, order_limit_.lowering() ? norm() : 0.0);
     statistics_.order_limited = order_limit_.begun();
+    // Both set the same bounds.
+    if (order_limit_.lowering())
+      refused_size_.forget();
+    else
+      refused_size_.control(steps, std::abs(ida_.step_size()), ida_.order());
   }
   if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
+}
+
+void StepControl::corrector_failed() {
+  if (!smoother_.on() && !order_limit_.lowering()) refused_size_.refuse(std::abs(ida_.step_size()));
 }
 
 // y' of two steps in a row, now and then, for the order.

@@ -5,6 +5,7 @@
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "step/order_limit.hpp"
+#include "step/refused_size.hpp"
 #include "step/step_smoothing.hpp"
 
 namespace tether::ida_projection {
@@ -17,7 +18,8 @@ class StepControl {
         options_(options),
         statistics_(statistics),
         smoother_(ida.mem(), options),
-        order_limit_(ida.mem(), options) {}
+        order_limit_(ida.mem(), options),
+        refused_size_(ida.mem()) {}
 
   void reset();  ///< a new run starts
 
@@ -27,6 +29,8 @@ class StepControl {
   /// of IDA's error test (null: all).
   void control(const Candidate& candidate, bool engaged, N_Vector differential);
   double weights_factor() const { return weights_factor_; }
+  /// The corrector failed in a way that a smaller step may cure.
+  void corrector_failed();
 
   bool smoothing() const { return smoother_.on(); }
   /// Errors are steered to a `care`-th of what smoothing asks for.
@@ -47,6 +51,7 @@ class StepControl {
   Statistics& statistics_;
   StepSmoother smoother_;
   OrderLimit order_limit_;
+  RefusedSize refused_size_;
   OwnedVector kept_slope_, slope_;  // y' of a step and of the next one, for the order
   double weights_factor_ = 1.0;     // by which IDA's weights were multiplied in the last solve
   int refused_in_row_ = 0;          // accepted steps that needed more than one attempt
