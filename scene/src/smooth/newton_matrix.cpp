@@ -106,7 +106,7 @@ void NewtonMatrix::make_sparse(N_Vector y, SUNContext context) {
   matrix_ = SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context);
   solver_ = SUNLinSol_KLU(y, matrix_, context);
   if (by_entries(system_.rows(), system_.moving())) {
-    order_ = elimination_order(N, system_.moving(), kBody, places);
+    order_ = elimination_order(N, system_.moving(), kBody, kVelocity, places);
     use_order(solver_, order_);
   }
   solver_->ops->setup = factor_or_try_smaller_step;

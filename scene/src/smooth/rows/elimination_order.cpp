@@ -34,7 +34,7 @@ std::vector<int> times_of_bodies(int bodies, std::vector<Eigen::Triplet<char>>& 
 
 }  // namespace
 
-std::vector<int> elimination_order(int unknowns, int bodies, int width,
+std::vector<int> elimination_order(int unknowns, int bodies, int width, int coordinates,
                                    const std::vector<std::pair<int, int>>& places) {
   const int first = width * bodies;
   Ends ends(at(unknowns - first), {-1, -1});
@@ -58,11 +58,14 @@ std::vector<int> elimination_order(int unknowns, int bodies, int width,
   for (int body = 0; body < bodies; ++body) edges.emplace_back(body, body, char(1));
   const std::vector<int> time = times_of_bodies(bodies, edges);
 
-  // Of each unknown the time of its body; multipliers come behind the later one's unknowns.
+  // Coordinates first; of each other unknown the time of its body; multipliers come behind the
+  // later one's unknowns.
   std::vector<std::pair<int, int>> when(at(unknowns));
   for (int i = 0; i < unknowns; ++i) {
     int moment = std::numeric_limits<int>::max();
-    if (i < first) {
+    if (i < first && i % width < coordinates) {
+      moment = -1;
+    } else if (i < first) {
       moment = time[at(i / width)];
     } else if (const auto [a, b] = ends[at(i - first)]; a >= 0) {
       moment = std::max(time[at(a)], b >= 0 ? time[at(b)] : 0);
