@@ -27,9 +27,26 @@ std::string slide(double x, double b, double phase) {
          number(b / (2 * M_PI)) + ", phase_deg = " + number(phase * 180 / M_PI) + " }\n";
 }
 
+/// A box of 1 kg on the belt, at its speed, held by a spring that is at rest at x = 0.
+std::string box_on_spring(double x) {
+  return "[[body]]\nname = \"mass\"\nshape = \"box\"\nsize = [0.4, 0.4, 0.2]\nmass = 1\n"
+         "material = \"body\"\nvelocity = [1, 0, 0]\nposition = [" +
+         number(x) + ", 0, 0.1]\n[[spring]]\nbodies = [\"mass\", \"world\"]\nat = [[" + number(x) +
+         ", 0, 0.1], [-10, 0, 0.1]]\nstiffness = 1\nrest = 10\n";
+}
+
 std::string mu(double value) { return pair("friction = " + number(value)); }
 
 const std::string kUnitGravity = "[0, 0, -1]";
+
+/// A belt that runs at 1 m/s, of this height, with its upper side at z = 0.
+std::string belt(double height) {
+  return "[[body]]\nname = \"belt\"\nshape = \"box\"\nsize = [60, 1, " + number(height) +
+         "]\nposition = [0, 0, " + number(-height / 2) +
+         "]\nvelocity = [1, 0, 0]\ndensity = 1\nmaterial = \"floor\"\n"
+         "[[joint]]\nkind = \"slider\"\nbodies = [\"belt\", \"world\"]\naxis = [1, 0, 0]\n"
+         "motion = { rate = 1 }\n";
+}
 
 }  // namespace
 
@@ -51,22 +68,8 @@ TEST_CASE("event: a mass on a spring with friction turns at multiples of pi and 
 }
 
 TEST_CASE("event: a mass on a belt slips once, then touches the belt's speed without sticking") {
-  const std::string text = R"(
-[[body]]
-name = "belt"
-shape = "box"
-size = [60, 1, 1]
-position = [0, 0, -0.5]
-velocity = [1, 0, 0]
-mass = 1
-material = "floor"
-[[joint]]
-kind = "slider"
-bodies = ["belt", "world"]
-axis = [1, 0, 0]
-motion = { rate = 1 }
-)" + point_mass("[0, 0, 0]", "[1, 0, 0]") +
-                           spring(0, "world", -10) + mu(0.3);
+  const std::string text =
+      belt(1) + point_mass("[0, 0, 0]", "[1, 0, 0]") + spring(0, "world", -10) + mu(0.3);
   for (const double tolerance : kLadder) {
     CAPTURE(tolerance);
     const auto engine = run(text, tolerance, 12, kUnitGravity);
@@ -83,33 +86,7 @@ motion = { rate = 1 }
 
 TEST_CASE("event: a box on a belt slips when it must, however long the steps before were") {
   // Sticking on the belt it moves at one speed: the step in which it slips is as long as that.
-  const std::string text = R"(
-[[body]]
-name = "belt"
-shape = "box"
-size = [60, 1, 0.2]
-density = 1
-position = [0, 0, -0.1]
-velocity = [1, 0, 0]
-material = "floor"
-[[joint]]
-kind = "slider"
-bodies = ["belt", "world"]
-axis = [1, 0, 0]
-motion = { rate = 1 }
-[[body]]
-name = "box"
-shape = "box"
-size = [0.4, 0.4, 0.2]
-mass = 1
-position = [0, 0, 0.1]
-velocity = [1, 0, 0]
-material = "body"
-[[spring]]
-bodies = ["box", "world"]
-at = [[0, 0, 0.1], [-10, 0, 0.1]]
-stiffness = 1
-)" + mu(0.3);
+  const std::string text = belt(0.2) + box_on_spring(0) + mu(0.3);
   for (const double tolerance : {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
     CAPTURE(tolerance);
     const auto engine = run(text, tolerance, 6, kUnitGravity);
@@ -117,6 +94,35 @@ stiffness = 1
     CHECK(engine->events()[0].kind == Kind::slip);
     CHECK(std::abs(engine->events()[0].time - 0.3) < 10 * std::max(tolerance, 1e-8));
     CHECK(std::abs(engine->bodies()[1].position.x() - (0.3 + std::sin(6 - 0.3))) < 10 * tolerance);
+  }
+}
+
+TEST_CASE("event: a box whose slip grew from nothing is as right as its tolerance") {
+  // Once 129 tolerances off: Newton's matrix was that of a slip of 1e-8 m/s.
+  const double x0 = 0.1790752702687855, tolerance = 4.2807784005917262e-09;
+  const auto engine = run(belt(0.2) + box_on_spring(x0) + mu(0.3), tolerance, 12, kUnitGravity);
+  const double slips = 12 - (0.3 - x0);
+  CHECK(std::abs(engine->bodies()[1].position.x() - (0.3 + std::sin(slips))) < 10 * tolerance);
+  CHECK(std::abs(engine->bodies()[1].velocity.x() - std::cos(slips)) < 10 * tolerance);
+}
+
+TEST_CASE("event: a slip that vanishes and would return within one step ends") {
+  // From v = 1 at x = -0.3 - a it slips forward, from -0.3 + a backward, and sticks for b = a - 0.6
+  // seconds, which one step of IDA passes over.
+  const double a = 0.61168565307143012, b = a - 0.6;
+  const std::string text = belt(1) + point_mass("[" + number(-0.3 - a) + ", 0, 0]", "[1, 0, 0]") +
+                           spring(-0.3 - a, "world", -10) + mu(0.3);
+  const double times[] = {2 * std::atan(a), 2 * std::atan(a) + 2 * M_PI - 2 * std::atan(b),
+                          2 * std::atan(a) + 2 * M_PI - 2 * std::atan(b) + b};
+  for (const double tolerance : {1e-5, 1e-6, 9.1835669653438504e-08, 1e-8, 1e-9}) {
+    CAPTURE(tolerance);
+    const auto engine = run(text, tolerance, 12, kUnitGravity);
+    REQUIRE(engine->events().size() == 3);
+    for (std::size_t k = 0; k < 3; ++k)
+      CHECK(std::abs(engine->events()[k].time - times[k]) < 100 * tolerance);
+    const double slips = 12 - times[2];
+    CHECK(std::abs(engine->bodies()[1].position.x() - (0.3 + std::sin(slips))) < 10 * tolerance);
+    CHECK(std::abs(engine->bodies()[1].velocity.x() - std::cos(slips)) < 10 * tolerance);
   }
 }
 

@@ -72,6 +72,11 @@ VectorXd Motion::slip_of(const ContactLook& look) const {
   return look.tangents * u_ + look.slip_rate;
 }
 
+VectorXd Motion::slip_rate(int closed) const {
+  const ContactLook& look = looks_[index(closed)];
+  return look.tangents * a_ + look.slip_rest;
+}
+
 // Slip that ends passes through zero within a step: its direction stays.
 VectorXd Motion::held_slip(int closed) const {
   const int contact = closed_[index(closed)];
@@ -80,6 +85,20 @@ VectorXd Motion::held_slip(int closed) const {
   const double along = s.dot(direction), least = bands_.slip(contact);
   if (along < least) s += (least - along) * direction;
   return s;
+}
+
+void Motion::slips_with_friction(double t, const double* y, VectorXd& slips) {
+  set(t, y);
+  slips.resize(tangents_ * static_cast<Eigen::Index>(closed_.size()));
+  Eigen::Index size = 0;
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const int contact = closed_[k];
+    if (modes_[index(contact)].mode != Mode::slide || model_.law(contact).friction == 0) continue;
+    model_.look(contact, looks_[k]);
+    slips.segment(size, tangents_) = held_slip(static_cast<int>(k));
+    size += tangents_;
+  }
+  slips.conservativeResize(size);
 }
 
 void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes) {

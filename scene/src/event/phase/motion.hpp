@@ -76,7 +76,10 @@ class Motion {
   std::vector<VectorXd> slides() const;
   const ContactLook& look(int closed) const { return looks_[index(closed)]; }
   VectorXd slip(int closed) const { return slip_of(looks_[index(closed)]); }
+  VectorXd slip_rate(int closed) const;  ///< at the state of the last rate()
   long evaluations() const { return evaluations_; }
+  /// Of the contacts that slide with friction at (t, y), one after the other.
+  void slips_with_friction(double t, const double* y, VectorXd& slips);
   /// Of contacts that slide with friction, at the last state: forces turn within such a change.
   double smallest_slip() const { return smallest_slip_; }
 

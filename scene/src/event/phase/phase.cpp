@@ -7,6 +7,7 @@
 #include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #include <cmath>
 #include <optional>
@@ -25,6 +26,13 @@ constexpr double kFirstError = 0.125, kFirstMove = 1e-2, kFirstAtRest = 1e-3, kF
 constexpr double kLook = 1e-5;   // the part of a move over which y'' is looked at
 constexpr double kNewton = 0.1;  // Newton's test, of the tolerance
 constexpr double kDifference = 1e-7, kOfSlip = 1e-3;
+constexpr double kTurned = 0.5;  // of a slip, since Newton's matrix was made
+
+#if SUNDIALS_VERSION_MAJOR >= 7
+using Flag = sunbooleantype;
+#else
+using Flag = booleantype;
+#endif
 
 }  // namespace
 
@@ -38,6 +46,9 @@ struct Phase::Ida {
   static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
   static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
                       void* self, N_Vector, N_Vector, N_Vector);
+  static int newton(SUNNonlinearSolver solver, N_Vector predicted, N_Vector correction,
+                    N_Vector weights, double tolerance, Flag renew, void* memory);
+  bool has_turned(double t, N_Vector predicted);
   double first_step(const VectorXd& y0, const VectorXd& rate0) const;
 
   Motion& motion;
@@ -46,9 +57,12 @@ struct Phase::Ida {
   N_Vector y = nullptr, yp = nullptr, id = nullptr;
   SUNMatrix matrix = nullptr;
   SUNLinearSolver solver = nullptr;
+  SUNNonlinearSolver corrector = nullptr;
+  decltype(SUNNonlinearSolver {} -> ops->solve) iterate = nullptr;  // SUNDIALS' Newton
   void* memory = nullptr;
   std::optional<ida_projection::Projection> projection;
   VectorXd rate, near, near_rate, sizes;
+  VectorXd slips, slips_of_matrix;
 };
 
 Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
@@ -88,9 +102,15 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
   IDASetJacFn(memory, jacobian);
   IDASetId(memory, id);
   IDASetNonlinConvCoef(memory, kNewton);
+  corrector = SUNNonlinSol_Newton(y, context);
+  iterate = corrector->ops->solve;
+  corrector->ops->solve = newton;
   ida_projection::Constraints constraints;
   constraints.count = motion.constraint_count();
-  if (constraints.count == 0) return;
+  if (constraints.count == 0) {
+    IDASetNonlinearSolver(memory, corrector);
+    return;
+  }
   constraints.value = [this](double t, ida_projection::ConstVector at, ida_projection::Vector g) {
     motion.constraints(start + t, at.data(), g.data());
   };
@@ -100,6 +120,7 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
       });
   ida_projection::Options options;
   options.id = id;
+  options.nonlinear_solver = corrector;
   options.print_fatal = false;
   options.print_warnings = false;
   options.long_move = ida_projection::LongMove::cap;
@@ -110,6 +131,7 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
 Phase::Ida::~Ida() {
   IDAFree(&memory);
   projection.reset();
+  SUNNonlinSolFree(corrector);
   SUNLinSolFree(solver);
   SUNMatDestroy(matrix);
   for (N_Vector v : {y, yp, id}) N_VDestroy(v);
@@ -125,11 +147,35 @@ int Phase::Ida::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* se
   return std::isfinite(sum) ? 0 : 1;
 }
 
+// The force of a slip s turns with 1 / |s|. A matrix of a slip that was far shorter takes errors
+// across it for small ones: Newton's test lets them pass.
+bool Phase::Ida::has_turned(double t, N_Vector predicted) {
+  motion.slips_with_friction(start + t, N_VGetArrayPointer(predicted), slips);
+  const Eigen::Index n = motion.model().tangents();
+  for (Eigen::Index k = 0; k < slips.size(); k += n) {
+    const auto now = slips.segment(k, n), then = slips_of_matrix.segment(k, n);
+    if ((now - then).norm() > kTurned * std::min(now.norm(), then.norm())) return true;
+  }
+  return false;
+}
+
+int Phase::Ida::newton(SUNNonlinearSolver solver, N_Vector predicted, N_Vector correction,
+                       N_Vector weights, double tolerance, Flag renew, void* memory) {
+  double t = 0, cj = 0;
+  N_Vector yy, yp, at, rate, r;
+  void* self = nullptr;
+  IDAGetNonlinearSystemData(memory, &t, &yy, &yp, &at, &rate, &r, &cj, &self);
+  Ida& me = *static_cast<Ida*>(self);
+  if (me.slips_of_matrix.size() > 0 && me.has_turned(t, predicted)) renew = SUNTRUE;
+  return me.iterate(solver, predicted, correction, weights, tolerance, renew, memory);
+}
+
 // cj - d(y')/dy by differences: Newton's matrix decides how fast it converges, not where to.
 int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SUNMatrix J,
                          void* self, N_Vector, N_Vector, N_Vector) {
   Ida& me = *static_cast<Ida*>(self);
   const int N = me.motion.size();
+  me.motion.slips_with_friction(me.start + t, N_VGetArrayPointer(y), me.slips_of_matrix);
   me.near = Eigen::Map<const VectorXd>(N_VGetArrayPointer(y), N);
   me.motion.rate(me.start + t, me.near.data(), me.rate.data());
   // Friction turns with the slip: differences are short against it.

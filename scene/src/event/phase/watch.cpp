@@ -130,9 +130,11 @@ double Watcher::of_state(Function& f) {
       return motion_.model().margin(f.contact) - f.level;
     case Watch::support:
       return support();
-    case Watch::slip:
-      return motion_.slip(f.closed).dot(
-          motion_.modes()[static_cast<std::size_t>(f.contact)].direction);
+    case Watch::slip: {
+      const VectorXd& d = motion_.modes()[static_cast<std::size_t>(f.contact)].direction;
+      f.slope = motion_.slip_rate(f.closed).dot(d);
+      return motion_.slip(f.closed).dot(d);
+    }
   }
   return 0;
 }
@@ -173,7 +175,9 @@ void Watcher::evaluate(double t, const VectorXd& y) {
   }
 }
 
-double Watcher::value(Function f, double t, const VectorXd& y) {
+double Watcher::value(Function f, double t, const VectorXd& y) { return value_of(f, t, y); }
+
+double Watcher::value_of(Function& f, double t, const VectorXd& y) {
   if (f.what == Watch::gap)
     motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
   else
@@ -181,23 +185,27 @@ double Watcher::value(Function f, double t, const VectorXd& y) {
   return of_state(f);
 }
 
-// Whether a gap that is positive at both ends of a step, and falls, then rises, can reach zero.
+double Watcher::slope(Function f, double t, const VectorXd& y) {
+  value_of(f, t, y);
+  return f.slope;
+}
+
+// Whether a gap or slip that is positive at both ends of a step, and falls, then rises, can reach
+// zero.
 bool Watcher::may_dip(const Function& f, double step) const {
-  return f.what == Watch::gap && f.armed && f.slope_before < 0 && f.slope > 0 && f.before > 0 &&
+  return (f.what == Watch::gap || f.what == Watch::slip) && f.armed && f.slope_before < 0 &&
+         f.slope > 0 && f.before > 0 &&
          std::min(f.before, f.value) < step * std::max(-f.slope_before, f.slope);
 }
 
-// The least or largest value of a gap that turns in the last step.
+// The least or largest value of a gap or slip that turns in the last step.
 double Watcher::turn(Phase& phase, const Function& f, double& when) {
   const double a = phase.step_begin(), b = phase.step_end();
-  const auto slope = [&](double time) {
+  const auto slope_at = [&](double time) {
     phase.at(time, y_);
-    motion_.model().set(phase.start() + time, y_.data(), y_.data() + motion_.coordinates());
-    double rate = 0;
-    motion_.model().gap(f.contact, rate);
-    return rate;
+    return slope(f, phase.start() + time, y_);
   };
-  when = zero_between(slope, a, f.slope_before, b, f.slope, 1e-9 * (b - a));
+  when = zero_between(slope_at, a, f.slope_before, b, f.slope, 1e-9 * (b - a));
   phase.at(when, y_);
   return value(f, phase.start() + when, y_);
 }
@@ -272,7 +280,8 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
     if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
       double when = 0;
-      hit = turn(phase, f, when) < -bands().gap(f.contact);  // else it only touches
+      const double least = f.what == Watch::gap ? bands().gap(f.contact) : band(f);
+      hit = turn(phase, f, when) < -least;  // else it only touches
     }
     if (!hit) continue;
     Zero zero = locate(phase, f);

@@ -46,11 +46,13 @@ class Watcher {
     bool armed, leaving;
     bool dormant;  // a gap that is negative beside its feature: no contact
     double value, before;
-    double slope, slope_before;  // of a gap, m/s
+    double slope, slope_before;  // of a gap, m/s, or of a slip, m/s^2
     double level;                // from which a gap or a border counts, m
   };
   void evaluate(double t, const VectorXd& y);
   double value(Function f, double t, const VectorXd& y);
+  double slope(Function f, double t, const VectorXd& y);
+  double value_of(Function& f, double t, const VectorXd& y);
   double of_state(Function& f);
   double support();
   double band(const Function& f) const;
