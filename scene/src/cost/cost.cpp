@@ -88,24 +88,25 @@ std::vector<Setting> settings_of(const Scene& scene, const Plan& plan, bool even
 Reference reference_of(const Scene& scene, const Plan& plan, bool events, double finest_step,
                        const CostOptions& options) {
   if (plan.engine == EngineKind::smooth)
-    return smooth_reference(scene, options.reference.value_or(1e-12), options.samples);
+    return smooth_reference(scene, options.reference.value_or(1e-12), options);
   const bool own = plan.engine == EngineKind::event;
   if (own || (events && !options.reference)) {
     const double tolerance = options.reference.value_or(1e-11);
-    const auto found = event_reference(scene, tolerance, options.samples);
+    const auto found = event_reference(scene, tolerance, options);
     if (found) return *found;
     if (own && options.reference)
       throw std::runtime_error("no reference: the event engine does not get to the end");
   }
   return stepping_reference(
-      scene, own ? finest_step / 4 : options.reference.value_or(finest_step / 4), options.samples);
+      scene, own ? finest_step / 4 : options.reference.value_or(finest_step / 4), options);
 }
 
-CostRow measure_row(const Scene& scene, Setting setting, int samples, const Reference& reference) {
+CostRow measure_row(const Scene& scene, Setting setting, const CostOptions& options,
+                    const Reference& reference) {
   CostRow row;
   row.method = setting.method;
   row.setting = setting.value;
-  const Measured m = measure_once(scene, samples);
+  const Measured m = measure_once(scene, options);
   const RunResult& r = m.result;
   row.failure = r.failure;
   // On the safe side: the error of the reference may add to the difference found.
@@ -120,7 +121,11 @@ CostRow measure_row(const Scene& scene, Setting setting, int samples, const Refe
   // Without the looks in between; the least of several: everything else on the machine only adds.
   double spent = 0;
   for (int repeat = 0; repeat < 5 && spent < 0.3 && row.failure.empty(); ++repeat) {
-    const double seconds = run(scene).seconds;
+    RunOptions plain;
+    plain.interrupted = options.interrupted;
+    const RunResult again = run(scene, plain);
+    if (again.interrupted) throw Interrupted{};
+    const double seconds = again.seconds;
     spent += seconds;
     row.seconds = repeat == 0 ? seconds : std::min(row.seconds, seconds);
   }
@@ -175,13 +180,17 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
   };
 
   tell("reference");
-  const Reference reference = reference_of(scene, plan, events, finest_step, options);
-  table.reference = reference.what;
-  table.reference_error = reference.error;
-  for (const Setting& each : settings) {
-    tell(fmt::format("{} {:g}", name(each.method), each.value));
-    table.rows.push_back(measure_row(with_setting(scene, each.method, each.value), each,
-                                     options.samples, reference));
+  try {
+    const Reference reference = reference_of(scene, plan, events, finest_step, options);
+    table.reference = reference.what;
+    table.reference_error = reference.error;
+    for (const Setting& each : settings) {
+      tell(fmt::format("{} {:g}", name(each.method), each.value));
+      table.rows.push_back(
+          measure_row(with_setting(scene, each.method, each.value), each, options, reference));
+    }
+  } catch (const Interrupted&) {
+    table.interrupted = true;
   }
   return table;
 }

@@ -19,10 +19,11 @@ Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q
 
 }  // namespace
 
-Measured measure_once(const Scene& scene, int samples) {
+Measured measure_once(const Scene& scene, const CostOptions& cost) {
   Measured out;
   RunOptions options;
-  for (int k = 1; k <= samples; ++k) options.stops.push_back(scene.end * k / samples);
+  options.interrupted = cost.interrupted;
+  for (int k = 1; k <= cost.samples; ++k) options.stops.push_back(scene.end * k / cost.samples);
   // Records and expectations stop the run at other times, too.
   std::size_t next = 0;
   options.record = [&](const Engine& engine) {
@@ -40,6 +41,7 @@ Measured measure_once(const Scene& scene, int samples) {
     }
   };
   out.result = run(scene, options);
+  if (out.result.interrupted) throw Interrupted{};
   return out;
 }
 

@@ -18,8 +18,11 @@ struct Measured {
   Samples samples;
 };
 
-/// Runs the scene, with poses at equal times.
-Measured measure_once(const Scene& scene, int samples);
+/// Thrown where somebody does not want to wait.
+struct Interrupted {};
+
+/// Runs the scene, with poses at `options.samples` equal times. Throws Interrupted.
+Measured measure_once(const Scene& scene, const CostOptions& options);
 
 /// The largest distance (m) and angle (rad).
 double distance(const Samples& a, const Samples& b);

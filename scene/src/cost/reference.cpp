@@ -30,12 +30,12 @@ Scene projected(const Scene& scene, double tolerance) {
 
 /// The tightest run that gets through, and by how much the next looser one differs from it.
 std::optional<Reference> tightest(Scene (*make)(const Scene&, double), const Scene& scene,
-                                  const char* name, double tolerance, int samples) {
+                                  const char* name, double tolerance, const CostOptions& options) {
   // Each ten times as loose; a mechanism at a dead point may get through from 1e-8 on only.
   constexpr int kTries = 8;
   std::optional<Reference> best;
   for (int k = 0; k < kTries && tolerance < 0.1; ++k, tolerance *= 10) {
-    const Measured m = measure_once(make(scene, tolerance), samples);
+    const Measured m = measure_once(make(scene, tolerance), options);
     if (!m.result.failure.empty()) continue;
     if (best) {
       best->error = distance(best->samples, m.samples);
@@ -63,9 +63,9 @@ Samples extrapolated(const Samples& fine, const Samples& coarse) {
 
 // Plain IDA, unless the scene's own run settles ten times as well: then that, and what plain IDA
 // says of it. Where the two agree they are right, having little in common.
-Reference smooth_reference(const Scene& scene, double tolerance, int samples) {
-  const auto own = tightest(projected, scene, "the scene", tolerance, samples);
-  const auto other = tightest(plain, scene, "plain IDA, index 0", tolerance, samples);
+Reference smooth_reference(const Scene& scene, double tolerance, const CostOptions& options) {
+  const auto own = tightest(projected, scene, "the scene", tolerance, options);
+  const auto other = tightest(plain, scene, "plain IDA, index 0", tolerance, options);
   if (!own && !other)
     throw std::runtime_error(fmt::format(
         "no reference: neither plain IDA nor the scene itself gets to the end at tolerances from "
@@ -91,14 +91,14 @@ Reference smooth_reference(const Scene& scene, double tolerance, int samples) {
 // by what it must be there, at coarser ones: one of them may be small by chance. Where impacts or
 // chaos leave no order in the errors, the extrapolated points differ more than the runs themselves,
 // which are the reference then.
-Reference stepping_reference(const Scene& scene, double step, int samples) {
+Reference stepping_reference(const Scene& scene, double step, const CostOptions& options) {
   constexpr int kRuns = 4;
   std::vector<Samples> runs;
   for (int k = 0; k < kRuns; ++k) {
     const double h = step * (1 << k);
     Scene each = with_setting(scene, Method::steps, h);
     if (k > 0) each.stepping->on_failure = OnFailure::warn;
-    const Measured m = measure_once(each, samples);
+    const Measured m = measure_once(each, options);
     if (!m.result.failure.empty())
       throw std::runtime_error(
           fmt::format("no reference: at a step of {:g} s {}", h, m.result.failure));
@@ -125,12 +125,13 @@ Reference stepping_reference(const Scene& scene, double step, int samples) {
 }
 
 /// The event engine at a tight tolerance, and how far a looser one is from it.
-std::optional<Reference> event_reference(const Scene& scene, double tolerance, int samples) {
+std::optional<Reference> event_reference(const Scene& scene, double tolerance,
+                                         const CostOptions& options) {
   constexpr int kTries = 3;
   for (int k = 0; k < kTries; ++k, tolerance *= 10) {
-    const Measured tight = measure_once(with_setting(scene, Method::events, tolerance), samples);
+    const Measured tight = measure_once(with_setting(scene, Method::events, tolerance), options);
     const Measured loose =
-        measure_once(with_setting(scene, Method::events, 10 * tolerance), samples);
+        measure_once(with_setting(scene, Method::events, 10 * tolerance), options);
     if (!tight.result.failure.empty() || !loose.result.failure.empty()) continue;
     Reference out;
     out.samples = tight.samples;

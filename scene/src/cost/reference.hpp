@@ -16,9 +16,10 @@ struct Reference {
 };
 
 /// Each throws std::runtime_error where there is none.
-Reference smooth_reference(const Scene& scene, double tolerance, int samples);
-Reference stepping_reference(const Scene& scene, double step, int samples);
+Reference smooth_reference(const Scene& scene, double tolerance, const CostOptions& options);
+Reference stepping_reference(const Scene& scene, double step, const CostOptions& options);
 /// None: the event engine does not get to the end.
-std::optional<Reference> event_reference(const Scene& scene, double tolerance, int samples);
+std::optional<Reference> event_reference(const Scene& scene, double tolerance,
+                                         const CostOptions& options);
 
 }  // namespace tether::scene::costs

@@ -66,8 +66,13 @@ void write_whole_regular(const std::string& file, std::string_view content) {
   if (fs::exists(there) && !fs::is_regular_file(there))
     throw std::runtime_error("cannot write " + file + ": it is there and is no file");
   const std::string fresh = file + ".new";
-  write_all(fresh, O_CREAT | O_TRUNC, content, true);
-  if (std::rename(fresh.c_str(), file.c_str()) != 0) fail(file);
+  try {
+    write_all(fresh, O_CREAT | O_TRUNC, content, true);
+    if (std::rename(fresh.c_str(), file.c_str()) != 0) fail(file);
+  } catch (...) {  // a full disk gets its room back
+    fs::remove(fresh, error);
+    throw;
+  }
   sync_folder_of(file);
 }
 
@@ -78,6 +83,29 @@ void write_whole(const std::string& file, std::string_view content) {
     write_all(file, 0, content, false);
   else
     write_whole_regular(file, content);
+}
+
+void write_fresh(const std::string& file, std::string_view content) {
+  try {
+    write_all(file, O_CREAT | O_TRUNC, content, false);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(file, ignored);
+    throw;
+  }
+}
+
+void check_writable(const std::string& file) {
+  std::error_code error;
+  const fs::file_status there = fs::status(file, error);
+  if (fs::exists(there) && !fs::is_regular_file(there)) return;  // a device
+  make_folder_of(file);
+  const std::string trial = file + ".new";
+  {
+    const Open out{open(trial.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666)};
+    if (out.descriptor < 0) fail(file);
+  }
+  fs::remove(trial, error);
 }
 
 }  // namespace tether::scene

@@ -17,4 +17,11 @@ void write_whole(const std::string& file, std::string_view content);
 /// The same, but an existing target must be a regular file.
 void write_whole_regular(const std::string& file, std::string_view content);
 
+/// A file that nobody reads before the run has named it elsewhere: gone again where it could not be
+/// written. Throws std::runtime_error.
+void write_fresh(const std::string& file, std::string_view content);
+
+/// The error of `write_whole` before the work is done; makes the folder.
+void check_writable(const std::string& file);
+
 }  // namespace tether::scene

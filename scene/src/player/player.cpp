@@ -13,7 +13,6 @@
 #include "output/whole_file.hpp"
 #include "page_parts.hpp"
 #include "page_text.hpp"
-#include "record/gnuplot.hpp"
 #include "scene_data.hpp"
 
 namespace tether::scene {
@@ -59,7 +58,7 @@ class Player::Implementation {
     check_name(scene, file);
     make_folder_of(file);
     lock_.take(file);
-    if (!is_device(file)) check_writable(file);
+    check_writable(file);
   }
 
   // Steps may be longer than the time between records: no state is shown twice.

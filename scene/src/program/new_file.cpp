@@ -1,25 +1,32 @@
 // Tether: files that are not there yet. SPDX-License-Identifier: BSD-3-Clause
 #include "new_file.hpp"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 #include "output/whole_file.hpp"
 
 namespace tether::scene {
 
-void reserve(const std::string& file) {
+void make_new(const std::string& file, std::string_view content) {
+  namespace fs = std::filesystem;
+  const std::invalid_argument there(file + " is there already; --force replaces it");
+  std::error_code error;
+  if (fs::exists(fs::symlink_status(file, error))) throw there;
   make_folder_of(file);
-  const int descriptor = open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
-  if (descriptor < 0)
-    throw std::invalid_argument(errno == EEXIST
-                                    ? file + " is there already; --force replaces it"
-                                    : "cannot write " + file + ": " + std::strerror(errno));
-  close(descriptor);
+  const std::string fresh = file + ".new";
+  write_fresh(fresh, content);
+  // The whole file gets its name only where nobody else took it in between.
+  const int linked = link(fresh.c_str(), file.c_str());
+  const int reason = errno;
+  if (linked != 0 && reason != EEXIST)  // some file systems have no second names
+    return fs::rename(fresh, file);
+  fs::remove(fresh, error);
+  if (linked != 0) throw there;
 }
 
 }  // namespace tether::scene

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 namespace tether::scene {
 
-/// Makes the file; nobody else's in between. std::invalid_argument where it is there already.
-void reserve(const std::string& file);
+/// Writes a file that is not there, whole or not at all. std::invalid_argument where it is there
+/// already, std::runtime_error where it cannot be written.
+void make_new(const std::string& file, std::string_view content);
 
 }  // namespace tether::scene

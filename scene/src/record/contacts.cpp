@@ -1,5 +1,7 @@
 // Tether: the contacts of a run as a table, with their forces. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <fmt/format.h>
+
 #include "record/number_at.hpp"
 #include "record/table_recorder.hpp"
 

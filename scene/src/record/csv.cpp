@@ -1,19 +1,14 @@
 // Tether: a run as a table. SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <tether/scene/plan.hpp>
 
 #include "effects/list.hpp"
-#include "output/whole_file.hpp"
+#include "output/row_file.hpp"
 #include "record/number_at.hpp"
 #include "recorder.hpp"
 
@@ -35,18 +30,10 @@ class CsvRecorder : public Recorder {
     bodies_ = moving_.size();
     moving_.resize(std::min(bodies_, kMostBodies));
     for (const effects::Effect* each : effects::all()) each->add_columns(scene, columns_);
-    make_folder_of(file);
     const std::string first = header(scene);
-    const long kept = resume.restarted ? length_up_to(resume.time, first) : 0;
-    // Truncated where the run continues, never emptied: the kept rows are safe at every moment.
-    out_.reset(std::fopen(file.c_str(), kept > 0 ? "r+b" : "wb"));
-    if (!out_) fail();
-    if (kept == 0) {
-      put(first);
-      return;
-    }
-    if (ftruncate(fileno(out_.get()), kept) != 0 || std::fseek(out_.get(), kept, SEEK_SET) != 0)
-      fail();
+    const std::size_t kept = resume.restarted ? length_up_to(resume.time, first) : 0;
+    out_.emplace(file, kept);
+    if (kept == 0) out_->put(first);
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {
@@ -68,16 +55,13 @@ class CsvRecorder : public Recorder {
       add3(b.velocity), add3(b.angular_velocity);
     }
     line_ += '\n';
-    put(line_);
+    out_->put(line_);
   }
 
-  void keep() override {
-    if (std::fflush(out_.get()) != 0) fail();
-    fsync(fileno(out_.get()));  // devices have none
-  }
+  void keep() override { out_->keep(); }
 
   void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) override {
-    if (std::fflush(out_.get()) != 0) fail();
+    out_->flush();
     written.push_back(file_);
     if (bodies_ > moving_.size())
       remarks.push_back(
@@ -105,26 +89,19 @@ class CsvRecorder : public Recorder {
 
   /// Bytes of the rows of an earlier run that are kept, so that a run in two parts leaves the table
   /// of one; 0: there is no such table.
-  long length_up_to(double time, const std::string& first) {
+  std::size_t length_up_to(double time, const std::string& first) {
     std::ifstream in(file_, std::ios::binary);
     std::string line;
     lacks_rows_ = true;
     if (!std::getline(in, line) || line + '\n' != first) return 0;
-    auto length = static_cast<long>(first.size());
+    std::size_t length = first.size();
     while (std::getline(in, line) && !in.eof()) {  // a row without its end is cut
       const double at = number_at(line, 0);
       if (!(at <= time)) break;
       lacks_rows_ = at != time;
-      length += static_cast<long>(line.size()) + 1;
+      length += line.size() + 1;
     }
     return length;
-  }
-
-  void put(const std::string& text) {
-    if (std::fwrite(text.data(), 1, text.size(), out_.get()) != text.size()) fail();
-  }
-  [[noreturn]] void fail() const {
-    throw std::runtime_error(fmt::format("cannot write {}: {}", file_, std::strerror(errno)));
   }
 
   std::string file_, line_;
@@ -134,10 +111,7 @@ class CsvRecorder : public Recorder {
   std::size_t bodies_ = 0;           // that move
   std::vector<mechanics::Column> columns_;
   bool lacks_rows_ = false;
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  std::unique_ptr<std::FILE, Close> out_;
+  std::optional<RowFile> out_;
 };
 
 }  // namespace

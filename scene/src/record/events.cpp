@@ -1,4 +1,6 @@
 // Tether: the events of a run as a table. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
 #include "record/number_at.hpp"
 #include "record/table_recorder.hpp"
 

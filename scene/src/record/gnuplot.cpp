@@ -10,8 +10,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <vector>
@@ -68,8 +66,13 @@ Outcome execute(const std::string& script) {
   posix_spawn_file_actions_adddup2(&actions, to.number(), STDOUT_FILENO);
   // Its remarks on empty ranges would only worry; a failure shows in the exit code.
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  // In a group of its own: Ctrl-C ends the run with its picture, not gnuplot.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   pid_t child = 0;
-  const int spawned = posix_spawnp(&child, "gnuplot", &actions, nullptr, argv, environ);
+  const int spawned = posix_spawnp(&child, "gnuplot", &actions, &attributes, argv, environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (spawned != 0) return {127, ""};
   to.shut();
@@ -98,14 +101,6 @@ std::string picture_head(int width, int height) {
       "set border 3 lc rgb '#404040'\nset tics nomirror out tc rgb '#202020'\n"
       "set grid xtics ytics lc rgb '#e4e4e4' lt 1 lw 0.6\n",
       width, height);
-}
-
-void check_writable(const std::string& file) {
-  const std::string name = file + ".new";
-  if (!std::ofstream(name, std::ios::binary | std::ios::app))
-    throw std::runtime_error("cannot write " + name);
-  std::error_code ignored;
-  std::filesystem::remove(name, ignored);
 }
 
 std::string gnuplot(const std::string& script, const std::string& file) {

@@ -10,9 +10,6 @@ namespace tether::scene {
 /// written.
 std::string gnuplot(const std::string& script, const std::string& file);
 
-/// The same error before the work is done.
-void check_writable(const std::string& file);
-
 /// Settings common to all pictures: terminal, axes, colours.
 std::string picture_head(int width, int height);
 

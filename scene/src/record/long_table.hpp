@@ -1,15 +1,11 @@
 // Tether: a table with any number of rows at a time. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <fmt/format.h>
-
-#include <cerrno>
-#include <cstring>
 #include <fstream>
-#include <stdexcept>
+#include <memory>
 #include <string>
 
-#include "output/whole_file.hpp"
+#include "output/row_file.hpp"
 
 namespace tether::scene {
 
@@ -19,38 +15,26 @@ class LongTable {
   /// `keep(row)`: whether a row of an earlier run of the same head stays; the first one that does
   /// not ends them.
   template <class Keep>
-  LongTable(std::string file, const std::string& head, bool restarted, const Keep& keep)
-      : file_(std::move(file)) {
-    std::string rows;
-    if (restarted) {
-      std::ifstream in(file_, std::ios::binary);
-      std::string line;
-      std::getline(in, line);
-      while (std::getline(in, line) && !in.eof() && keep(line)) rows += line + '\n';
+  LongTable(const std::string& file, const std::string& head, bool restarted, const Keep& keep) {
+    std::size_t kept = 0;
+    std::string line;
+    std::ifstream in;
+    if (restarted) in.open(file, std::ios::binary);
+    if (restarted && std::getline(in, line) && line + '\n' == head) {
+      kept = head.size();
+      while (std::getline(in, line) && !in.eof() && keep(line)) kept += line.size() + 1;
     }
-    make_folder_of(file_);
-    out_.open(file_, std::ios::binary | std::ios::trunc);
-    put(head);
-    put(rows);
+    rows_ = std::make_unique<RowFile>(file, kept);
+    if (kept == 0) put(head);
   }
 
-  void put(const std::string& text) {
-    out_ << text;
-    demand_good();
-  }
-  void flush() {
-    out_.flush();
-    demand_good();
-  }
-  const std::string& file() const { return file_; }
+  void put(const std::string& rows) { rows_->put(rows); }
+  void flush() { rows_->flush(); }
+  void keep() { rows_->keep(); }
+  const std::string& file() const { return rows_->name(); }
 
  private:
-  void demand_good() const {
-    if (!out_)
-      throw std::runtime_error(fmt::format("cannot write {}: {}", file_, std::strerror(errno)));
-  }
-  std::string file_;
-  std::ofstream out_;
+  std::unique_ptr<RowFile> rows_;
 };
 
 }  // namespace tether::scene

@@ -91,7 +91,6 @@ class PictureRecorder : public Recorder {
  public:
   PictureRecorder(const Scene& scene, const std::string& file, double start_energy)
       : scene_(scene), file_(file), start_energy_(start_energy) {
-    make_folder_of(file);
     check_writable(file);
     bodies_ = std::min(scene.bodies.size(), kMostDrawn);
   }

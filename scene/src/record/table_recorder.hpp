@@ -12,9 +12,9 @@ namespace tether::scene {
 
 class TableRecorder : public Recorder {
  public:
-  void keep() override { table_.flush(); }
+  void keep() override { table_.keep(); }
   void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
-    keep();
+    table_.flush();
     written.push_back(table_.file());
   }
 

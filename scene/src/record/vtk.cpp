@@ -69,9 +69,7 @@ class PolyData {
            array("Int32", "connectivity", 1, appended_.add(polygons)) +
            array("Int32", "offsets", 1, appended_.add(ends)) +
            "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_";
-    std::ofstream out(file, std::ios::binary);
-    out << xml << appended_.bytes() << "\n</AppendedData>\n</VTKFile>\n";
-    if (!out.flush()) throw std::runtime_error("cannot write " + file);
+    write_fresh(file, xml + appended_.bytes() + "\n</AppendedData>\n</VTKFile>\n");
   }
 
  private:
@@ -98,6 +96,7 @@ class VtkRecorder : public Recorder {
       : file_(film_file(file)), folder_(film_folder(file)), forces_(scene.output.forces) {
     if (resume.restarted) keep_up_to(resume.time);
     make_folder_of(folder_ + "/x");
+    check_writable(file_);
     std::size_t surfaces = 0;
     for (const Body& body : scene.bodies) surfaces += body.shapes.size();
     const double half_plane = 2 * extent(scene);

@@ -13,6 +13,7 @@
 #include "output/binary.hpp"
 #include "output/output_lock.hpp"
 #include "output/output_names.hpp"
+#include "output/whole_file.hpp"
 #include "record/recorder.hpp"
 #include "saved_state.hpp"
 #include "schedule.hpp"
@@ -63,6 +64,7 @@ class Run {
     const Output& o = scene.output;
     check_names(o, {scene.file, o.state == options.restart ? "" : options.restart});
     for (const std::string& each : names(o)) lock_.take(each);
+    if (!o.state.empty()) check_writable(o.state);
     if (!o.state.empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene);
     result_.engine = engine_->name();
     if (make_plan(scene).engine == EngineKind::stepping)

@@ -47,6 +47,8 @@ struct CostOptions {
   int samples = 400;
   /// Before each part of the work: its name, and how many of all parts are done.
   std::function<void(const std::string& what, int done, int all)> progress;
+  /// Asked as `RunOptions::interrupted` is: true ends the comparison with the rows that are done.
+  std::function<bool()> interrupted;
 };
 
 struct CostTable {
@@ -57,6 +59,7 @@ struct CostTable {
   /// Estimated error of the reference: its change from the next looser setting (smooth, events), or
   /// the distance between the limits extrapolated from pairs of steps (stepping).
   double reference_error = 0;
+  bool interrupted = false;
   std::vector<CostRow> rows;  ///< by method, in the order of the settings, loosest first
   /// The cheapest row with an error of at most `wanted`; null: there is none.
   const CostRow* cheapest(double wanted) const;

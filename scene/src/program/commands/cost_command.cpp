@@ -1,6 +1,6 @@
 // Tether: `tether cost`: what accuracy costs in time. SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/core.h>
-#include <fmt/os.h>
+#include <fmt/format.h>
 
 #include <memory>
 #include <optional>
@@ -9,7 +9,10 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "output/output_names.hpp"
+#include "output/whole_file.hpp"
 #include "program/commands.hpp"
+#include "program/process/signals.hpp"
 #include "program/settings.hpp"
 #include "record/gnuplot.hpp"
 
@@ -47,15 +50,15 @@ void print(const Scene& scene, const CostTable& table) {
   for (const CostRow& row : table.rows) print_row(scene, table, row);
 }
 
-void write_csv(const std::string& file, const CostTable& table) {
-  fmt::ostream out = fmt::output_file(file);
-  out.print(
+std::string table_text(const CostTable& table) {
+  std::string out =
       "method,setting,error,seconds,steps,contact_problems,drift,penetration_m,expectations_met,"
-      "status\n");
+      "status\n";
   for (const CostRow& row : table.rows)
-    out.print("{},{:g},{:.4e},{:.4e},{},{},{:.3e},{:.3e},{},{}\n", name(row.method), row.setting,
-              row.error, row.seconds, row.steps, row.contact_problems, row.drift, row.penetration,
-              row.met, row.failure.empty() ? "ok" : "failed");
+    out += fmt::format("{},{:g},{:.4e},{:.4e},{},{},{:.3e},{:.3e},{},{}\n", name(row.method),
+                       row.setting, row.error, row.seconds, row.steps, row.contact_problems,
+                       row.drift, row.penetration, row.met, row.failure.empty() ? "ok" : "failed");
+  return out;
 }
 
 /// The data and the plot command of one method's curve; nothing where none of its runs got through.
@@ -108,6 +111,16 @@ void check_settings(const Scene& scene, const Arguments& arguments) {
                                 "): use --time-steps");
 }
 
+// What would be lost is told before the work.
+void check_files(const Arguments& arguments) {
+  Output files;
+  files.csv = arguments.csv;
+  files.svg = arguments.svg;
+  check_names(files, {arguments.file});
+  for (const std::string& file : {arguments.csv, arguments.svg})
+    if (!file.empty()) check_writable(file);
+}
+
 int run_cost(const Arguments& arguments) {
   const Scene scene = read_scene(arguments.file);
   check_settings(scene, arguments);
@@ -116,6 +129,9 @@ int run_cost(const Arguments& arguments) {
   options.steps = read_settings("--time-steps", arguments.steps, 2);
   options.accuracies = read_settings("--accuracies", arguments.accuracies, 10);
   options.reference = arguments.reference;
+  options.interrupted = [] { return caught_signal() != 0; };
+  catch_signals();
+  check_files(arguments);
   std::optional<tether::Progress> bar;
   options.progress = [&](const std::string& what, int done, int all) {
     if (done == 0)
@@ -126,11 +142,19 @@ int run_cost(const Arguments& arguments) {
   };
   const CostTable table = cost(scene, options);
   bar.reset();
+  if (table.rows.empty()) {
+    fmt::print(stderr, "tether: interrupted before the first setting: nothing is written\n");
+    return kSignal + caught_signal();
+  }
   print(scene, table);
-  if (!arguments.csv.empty()) write_csv(arguments.csv, table);
+  if (!arguments.csv.empty()) write_whole(arguments.csv, table_text(table));
   if (!arguments.svg.empty()) {
     const std::string why = draw(arguments.svg, scene, table);
     if (!why.empty()) fmt::print(stderr, "no picture: {}\n", why);
+  }
+  if (table.interrupted) {
+    fmt::print("interrupted: the other settings are missing\n");
+    return kSignal + caught_signal();
   }
   if (!arguments.wanted) return kGood;
   const CostRow* best = table.cheapest(*arguments.wanted);
@@ -178,9 +202,8 @@ void add_cost_command(CLI::App& app, int* status) {
       "The error is the largest distance (m) or angle (rad) of a body from the reference at 400 "
       "equal\n"
       "times, and what the reference may be off. Exit code: 0, 1 no setting meets --wanted, 2 the "
-      "scene or an option is wrong, or "
-      "there\n"
-      "is no reference.");
+      "scene,\na file or an option is wrong, or there is no reference, 130 (143) ended by Ctrl-C "
+      "(SIGTERM), with\nthe settings that were done.");
   command->callback([a, status] { *status = run_cost(*a); });
 }
 

@@ -12,6 +12,7 @@
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/new_file.hpp"
+#include "program/process/signals.hpp"
 #include "program/process/standard_streams.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
@@ -66,11 +67,13 @@ int write_import(const Arguments& a) {
   const import::ImportOptions options = options_of(a);
   const SceneText robot = read_text(a.file);
   const import::Imported made = import::import_robot(robot.text, robot.name, options);
+  catch_signals();  // the file is whole before they count
   if (a.out == "-") {
     StandardOutput(a.out).write(made.toml);
-  } else {
-    if (!a.force) reserve(a.out);
+  } else if (a.force) {
     write_whole(a.out, made.toml);
+  } else {
+    make_new(a.out, made.toml);
   }
   for (const std::string& remark : made.remarks)
     fmt::print(stderr, "left out or changed: {}\n", remark);

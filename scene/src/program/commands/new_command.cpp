@@ -8,6 +8,7 @@
 #include "program/commands.hpp"
 #include "program/kinds.hpp"
 #include "program/new_file.hpp"
+#include "program/process/signals.hpp"
 #include "program/process/standard_streams.hpp"
 
 namespace tether::scene {
@@ -41,8 +42,11 @@ int write_new(const Arguments& arguments) {
     StandardOutput(file).write(text);
     return kGood;
   }
-  if (!arguments.force) reserve(file);
-  write_whole(file, text);
+  catch_signals();  // the file is whole before they count
+  if (arguments.force)
+    write_whole(file, text);
+  else
+    make_new(file, text);
   fmt::print("written: {0}\nnext: tether run {0}\n", file);
   return kGood;
 }

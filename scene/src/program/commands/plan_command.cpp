@@ -8,6 +8,7 @@
 #include <tether/scene/run.hpp>
 
 #include "program/commands.hpp"
+#include "program/process/signals.hpp"
 #include "program/report_run.hpp"
 #include "program/scene_text.hpp"
 
@@ -26,8 +27,15 @@ int plan(const Arguments& arguments) {
   if (!arguments.run) return kGood;
   Scene silent = scene;
   silent.output = Output{};
-  const RunResult result = run(silent);
+  catch_signals();
+  RunOptions options;
+  options.interrupted = [] { return caught_signal() != 0; };
+  const RunResult result = run(silent, options);
   print_costs(result);
+  if (result.interrupted) {
+    fmt::print("interrupted at {:.9g} s of {:g} s\n", result.time, scene.end);
+    return kSignal + caught_signal();
+  }
   if (!result.failure.empty()) fmt::print("stopped at {:g} s: {}\n", result.time, result.failure);
   return result.failure.empty() ? kGood : kFailed;
 }
@@ -42,7 +50,8 @@ void add_plan_command(CLI::App& app, int* status) {
       ->required();
   command->add_flag("--run", arguments->run, "Run it, and tell what each effect cost");
   command->footer(
-      "Exit code: 0, 2 the scene is wrong or no engine has it, 3 --run could not go on.");
+      "Exit code: 0, 2 the scene is wrong or no engine has it, 3 --run could not go on, 130 (143) "
+      "--run\nended by Ctrl-C (SIGTERM).");
   command->callback([arguments, status] { *status = plan(*arguments); });
 }
 

@@ -88,6 +88,7 @@ int run_scene(const Arguments& arguments) {
   std::string html = arguments.html;
   if (!html.empty() && html != "-" && !arguments.folder.empty())
     html = (std::filesystem::path(arguments.folder) / html).string();
+  catch_signals();
   StandardOutputFile standard_output(scene.output, html);
   std::optional<Player> player;
   if (!html.empty()) player.emplace(scene, html);
@@ -96,7 +97,6 @@ int run_scene(const Arguments& arguments) {
   options.restart = arguments.restart;
   options.force = arguments.force;
   options.interrupted = [] { return caught_signal() != 0; };
-  catch_signals();
   bar.start(scene.name, scene.end, 1);
   if (!arguments.quiet) options.progress = [&](double t) { bar.at(t); };
   if (player) options.record = [&](const Engine& engine) { player->record(engine); };

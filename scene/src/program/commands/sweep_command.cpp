@@ -12,6 +12,7 @@
 #include <tether/scene/words.hpp>
 #include <thread>
 
+#include "output/output_names.hpp"
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
@@ -144,8 +145,12 @@ int sweep(const Arguments& arguments) {
   const auto fields =
       static_cast<std::size_t>(std::count(first.begin(), first.end(), ',')) - varied.size();
 
-  StandardOutput output(arguments.out);
   catch_signals();
+  if (arguments.out != "-") check_writable(arguments.out);
+  if (arguments.out != "-" && !is_device(arguments.out) &&
+      one_name(arguments.out) == one_name(arguments.file))
+    throw std::invalid_argument("--out " + arguments.out + ": this file is the scene");
+  StandardOutput output(arguments.out);
   tether::Progress bar(1);
   bar.start(plain.name.empty() ? plain.file : plain.name, 1, 1);
   WorkerProcesses workers(arguments.jobs > 0 ? static_cast<unsigned>(arguments.jobs)
