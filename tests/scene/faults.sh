@@ -26,7 +26,8 @@ arguments() {
     run) line="run $work/pendulum.toml --end 0.2 --every 0.02 --quiet --output $2 --csv a.csv --vtk f.pvd
       --svg a.svg --html a.html --state a.state" ;;
     events) line="run $work/bounce.toml --end 0.5 --every 0.001 --quiet --output $2 --csv a.csv" ;;
-    cost) line="cost $work/pendulum.toml --tolerances 1e-3,1e-4 --reference 1e-5 --csv $2/a.csv --svg $2/a.svg" ;;
+    cost) line="cost $work/pendulum.toml --tolerances 1e-3,1e-4 --reference 1e-5 --csv $2/a.csv --svg $2/a.svg
+      --html $2/a.html" ;;
     sweep) line="sweep $work/pendulum.toml --vary smooth.tolerance=1e-3,1e-4 --quiet --out $2/a.csv" ;;
     import) line="import $work/robot --out $2/a.toml" ;;
     new) line="new pendulum $2/a.toml" ;;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <tether/scene/cost.hpp>
 #include <tether/scene/files.hpp>
 #include <tether/scene/player.hpp>
 #include <tether/scene/run.hpp>
@@ -313,4 +314,42 @@ TEST_CASE(
   CHECK_THROWS_AS(play(scene, path.string() + "/"), std::invalid_argument);
   const Player first(scene, page);
   CHECK_THROWS_WITH(play(scene, page), Catch::Contains("lock") || Catch::Contains("another run"));
+}
+
+TEST_CASE("a page of costs has every point of the table and the command that repeats it") {
+  Scene scene = parse_scene(kBall, "it's a ball.toml");
+  scene.name = "a < b & \"c\" </script><img src=x>";
+  CostOptions options;
+  options.steps = {4e-3, 2e-3};
+  options.accuracies = {1e-3};
+  options.reference = 1e-3;
+  CostTable table = cost(scene, options);
+  REQUIRE(table.rows.size() == 3);
+  table.rows[1].failure = "stuck <b>";
+  const std::string page = cost_page(scene, table, 1e-2);
+  CHECK(page.find("<img") == std::string::npos);
+  CHECK(page.find("<b>") == std::string::npos);
+  CHECK(page.find("http:") == page.find("http://www.w3.org/2000/svg"));  // a name, not a link
+  const std::string begin = "<script id=\"cost-data\" type=\"application/json\">";
+  const std::size_t at = page.find(begin) + begin.size();
+  const Json data = Json::parse(page.substr(at, page.find("</script>", at) - at));
+  CHECK(data["wanted"] == 1e-2);
+  CHECK(data["methods"] == Json({"steps", "accuracy"}));
+  REQUIRE(data["rows"].size() == 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(data["rows"][i]["error"] == table.rows[i].error);
+    CHECK(data["rows"][i]["setting"] == table.rows[i].setting);
+  }
+  CHECK(data["rows"][1]["failure"] == "stuck <b>");
+  CHECK(data["rows"][2]["command"] ==
+        "tether cost 'it'\\''s a ball.toml' --accuracies 0.001 --reference 0.001");
+  // Alone it has the same reference, and so the same error.
+  CostOptions alone;
+  alone.steps = {4e-3};
+  alone.reference = table.reference_setting;
+  CHECK(cost(scene, alone).rows.at(0).error == table.rows[0].error);
+  options.reference.reset();
+  table = cost(scene, options);
+  alone.reference = table.reference_setting;
+  CHECK(cost(scene, alone).rows.at(0).error == table.rows[0].error);
 }

@@ -184,6 +184,9 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
     const Reference reference = reference_of(scene, plan, events, finest_step, options);
     table.reference = reference.what;
     table.reference_error = reference.error;
+    table.reference_setting = options.reference;
+    if (plan.engine == EngineKind::stepping && !(events && reference.of_events))
+      table.reference_setting = options.reference.value_or(finest_step / 4);
     for (const Setting& each : settings) {
       tell(fmt::format("{} {:g}", name(each.method), each.value));
       table.rows.push_back(

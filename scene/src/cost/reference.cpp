@@ -136,6 +136,7 @@ std::optional<Reference> event_reference(const Scene& scene, double tolerance,
     Reference out;
     out.samples = tight.samples;
     out.error = distance(tight.samples, loose.samples);
+    out.of_events = true;
     out.what = fmt::format("the scene's events at a tolerance of {:g}", tolerance);
     return out;
   }

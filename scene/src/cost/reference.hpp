@@ -13,6 +13,7 @@ struct Reference {
   std::string what;
   double error = 0;  // what it may be off
   double drift = 0;  // how far it left the joints
+  bool of_events = false;
 };
 
 /// Each throws std::runtime_error where there is none.

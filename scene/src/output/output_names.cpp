@@ -76,6 +76,19 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
   }
 }
 
+void check_page_name(const std::string& html, const std::vector<std::string>& others) {
+  const fs::path name = fs::path(html).filename();
+  if (name.empty() || name == "." || name == "..")
+    throw std::invalid_argument(fmt::format("html = \"{}\": must name a file", html));
+  if (is_device(html)) return;
+  for (const std::string& each : others)
+    for (const char* with : {"", ".new", ".lock"})
+      if (!each.empty() &&
+          (one_name(each + with) == one_name(html) || one_name(html + with) == one_name(each)))
+        throw std::invalid_argument(
+            fmt::format("html = \"{}\": this file is an input or another output", html));
+}
+
 std::vector<std::string> names(const Output& o) {
   std::vector<std::string> all;
   for (const std::string& each :

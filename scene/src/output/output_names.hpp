@@ -22,6 +22,10 @@ bool is_device(const std::string& file);
 /// Throws std::invalid_argument if two outputs have a name in common, or one that of an input.
 void check_names(const Output& output, const std::vector<std::string>& inputs);
 
+/// Throws std::invalid_argument if a page is to be written over one of the others, which may be
+/// empty.
+void check_page_name(const std::string& html, const std::vector<std::string>& others);
+
 /// One name for each requested output; its lock covers all files of that output.
 std::vector<std::string> names(const Output& output);
 

@@ -8,4 +8,8 @@ namespace tether::scene::player {
 /// Made at configuration from the files in `page`.
 extern const std::string_view kStyle, kBody, kScript;
 
+// The page of `tether cost`.
+extern const std::string_view kCostStyle;
+extern const std::string_view kCostScript;
+
 }  // namespace tether::scene::player

@@ -72,6 +72,28 @@ std::string script_text(const nlohmann::json& value) {
   return out;
 }
 
+std::string page_head(const std::string& title, std::string_view style) {
+  std::string out =
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src "
+      "'unsafe-inline'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+      html_text(title) + "</title>\n<style>\n";
+  out += style;
+  return out + "</style>\n</head>\n<body>\n";
+}
+
+std::string page_end(std::string_view script) {
+  std::string out = "<script>\n";
+  out += script;
+  return out + "</script>\n</body>\n</html>\n";
+}
+
+std::string data_script(const std::string& id, const nlohmann::json& value) {
+  return "<script id=\"" + id + "\" type=\"application/json\">" + script_text(value) +
+         "</script>\n";
+}
+
 std::string base64(const std::vector<float>& values) {
   return base64(little_endian<std::uint32_t>(values));
 }

@@ -59,6 +59,8 @@ struct CostTable {
   /// Estimated error of the reference: its change from the next looser setting (smooth, events), or
   /// the distance between the limits extrapolated from pairs of steps (stepping).
   double reference_error = 0;
+  /// `CostOptions::reference` with which one row alone has the same reference; none: its default.
+  std::optional<double> reference_setting;
   bool interrupted = false;
   std::vector<CostRow> rows;  ///< by method, in the order of the settings, loosest first
   /// The cheapest row with an error of at most `wanted`; null: there is none.
@@ -68,6 +70,11 @@ struct CostTable {
 /// Runs the scene at each setting. Throws std::invalid_argument for a scene that no engine has, and
 /// std::runtime_error if there is no reference.
 CostTable cost(const Scene& scene, const CostOptions& options = {});
+
+/// A page of HTML that needs nothing but a browser: error against time, and for each point the
+/// command that repeats it. `wanted`: an error that is drawn as a line.
+std::string cost_page(const Scene& scene, const CostTable& table,
+                      std::optional<double> wanted = {});
 
 }  // namespace tether::scene
 TETHER_EXPORT_END

@@ -21,7 +21,7 @@ namespace tether::scene {
 namespace {
 
 struct Arguments {
-  std::string file, csv, svg;
+  std::string file, csv, svg, html;
   std::vector<std::string> tolerances, steps, accuracies;
   std::optional<double> reference, wanted;
 };
@@ -117,7 +117,9 @@ void check_files(const Arguments& arguments) {
   files.csv = arguments.csv;
   files.svg = arguments.svg;
   check_names(files, {arguments.file});
-  for (const std::string& file : {arguments.csv, arguments.svg})
+  if (!arguments.html.empty())
+    check_page_name(arguments.html, {arguments.file, arguments.csv, arguments.svg});
+  for (const std::string& file : {arguments.csv, arguments.svg, arguments.html})
     if (!file.empty()) check_writable(file);
 }
 
@@ -148,6 +150,8 @@ int run_cost(const Arguments& arguments) {
   }
   print(scene, table);
   if (!arguments.csv.empty()) write_whole(arguments.csv, table_text(table));
+  if (!arguments.html.empty())
+    write_whole(arguments.html, cost_page(scene, table, arguments.wanted));
   if (!arguments.svg.empty()) {
     const std::string why = draw(arguments.svg, scene, table);
     if (!why.empty()) fmt::print(stderr, "no picture: {}\n", why);
@@ -197,6 +201,8 @@ void add_cost_command(CLI::App& app, int* status) {
   command->add_option("--wanted", a->wanted, "Name the cheapest setting with at most this error")
       ->check(positive_number());
   command->add_option("--csv", a->csv, "Write the table");
+  command->add_option("--html", a->html,
+                      "Page of error against time whose points tell the command that repeats them");
   command->add_option("--svg", a->svg, "Draw error against time (needs gnuplot)");
   command->footer(
       "The error is the largest distance (m) or angle (rad) of a body from the reference at 400 "
