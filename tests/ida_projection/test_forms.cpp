@@ -81,7 +81,7 @@ struct Mean {
 /// of the error test, which may fail where the projection must not.
 void compare(const Problem& problem, double tolerance, Mean* mean) {
   INFO(problem.name << ", " << problem.form << ", tolerance " << tolerance);
-  const tp::Constraints rows = problem.recommended_constraints();
+  const tp::Constraints rows = problem.select(problem.recommended);  // dense ones
   const Run dense = integrate(problem, tolerance, rows, {}, false);
   const Run sparse = integrate(
       problem, tolerance,
@@ -92,9 +92,14 @@ void compare(const Problem& problem, double tolerance, Mean* mean) {
   double apart = 0.0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(problem.error_components); ++i)
     apart = std::max(apart, std::abs(dense.y[i] - sparse.y[i]) / (1.0 + std::abs(dense.y[i])));
-  // Where rounding has changed no decision of IDA's, and within what such changes do.
-  if (tolerance >= 1e-3 && problem.index < 2) CHECK(apart <= 1e-2 * tolerance);
-  CHECK(apart <= 60.0 * tolerance);
+  if (problem.sparse_constraints) {
+    CHECK(apart <=
+          2.0 * tolerance);  // above 64 sparse rows factors and their D serve several steps
+  } else {
+    // Where rounding has changed no decision of IDA's, and within what such changes do.
+    if (tolerance >= 1e-3 && problem.index < 2) CHECK(apart <= 1e-2 * tolerance);
+    CHECK(apart <= 60.0 * tolerance);
+  }
   Run plain = integrate_suppressed(problem, tolerance);
   if (problem.index == 1) {
     const Run tested = integrate_plain(problem, tolerance);

@@ -326,6 +326,53 @@ TEST_CASE("rows of few entries known to be independent: the same") {
   compare_kept_with_new_factors(true);
 }
 
+TEST_CASE(
+    "rows of few entries in groups: each part of L in the order of the pivots, late entries too") {
+  const int m = 24, n = 60, groups = 3, width = 2 * n + 1;
+  for (const bool adjacent : {true, false}) {
+    INFO((adjacent ? "adjacent columns" : "columns with gaps"));
+    std::mt19937 random(17);
+    Case c{RowMajor::Zero(m, n), random_vector(n, random, 0.5, 2.0), random_vector(m, random)};
+    for (int i = 0; i < m; ++i)  // of its group's 20 columns, in which groups take turns
+      for (int e = 0; e < 5; ++e)
+        c.C(i, groups * ((i / groups + 3 * e * e) % 20) + i % groups) = std::cos(1.0 + 5 * i + e);
+    std::vector<int> rows, columns;
+    for (int i = 0; i < m; ++i) rows.push_back(i);
+    for (int j = 0; j < n; ++j) columns.push_back(adjacent ? 1 + j : 1 + 2 * j);
+    RowMajor wide(m, width);
+    MinimumNorm solver(m, n);
+    std::copy_n(c.D.data(), n, solver.metric());
+    const auto spread = [&] {
+      wide.setConstant(std::numeric_limits<double>::quiet_NaN());
+      for (int i = 0; i < m; ++i)
+        for (int j = 0; j < n; ++j) wide(i, columns[static_cast<std::size_t>(j)]) = c.C(i, j);
+    };
+    spread();
+    REQUIRE(solver.factor(wide.data(), width, rows.data(), columns.data(), 1e-12));
+    REQUIRE(solver.rank() == m);
+    const auto check = [&] {
+      spread();
+      REQUIRE(solver.factor_kept(wide.data(), width, rows.data(), columns.data()));
+      RowMajor A = c.C * c.D.asDiagonal();
+      for (int k = 0; k < m; ++k) {
+        A.row(k) = c.C.row(solver.pivot(k)).cwiseProduct(c.D.transpose());
+        A.row(k) /= A.row(k).norm();
+      }
+      const Eigen::MatrixXd L = Eigen::MatrixXd(A * A.transpose()).llt().matrixL();
+      for (int k = 0; k < m; ++k)
+        CHECK(solver.independent_part(k) == Approx(L(k, k)).epsilon(1e-11));
+      CHECK(distance(solve(solver, c.g), oracle(c), c.D) <= 1e-10 * length(oracle(c), c.D));
+    };
+    check();
+    c.C(5, 0) = 0.7;  // its group has no such column
+    check();
+    c.C(5, 0) = 0.0;
+    check();
+    for (int j = 0; j < n; ++j) c.C.row(4)[j] += 0.01 * std::sin(1.0 + j);
+    check();
+  }
+}
+
 TEST_CASE("rows known to be independent: lengths whose squares are no numbers") {
   const int m = 20, n = 60;
   Case c = random_case(m, n, 5);

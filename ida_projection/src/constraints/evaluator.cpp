@@ -149,9 +149,14 @@ Status Evaluator::sparse(const Part& part, double t, const double* y, int n, dou
 
 Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
                            const std::vector<int>& columns, double* C, double* value) {
+  std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
+  return jacobian_into_zeros(t, y, n, scale, columns, C, value);
+}
+
+Status Evaluator::jacobian_into_zeros(double t, const double* y, int n, const double* scale,
+                                      const std::vector<int>& columns, double* C, double* value) {
   if (fatal_) return Status::callback_fatal;
   count(value != nullptr);
-  std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
   for (const Part& part : parts_) {
     double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
     const Status status = part.sparse != nullptr

@@ -57,6 +57,9 @@ class Evaluator {
   /// null, or receives g(t, y) as value() does, in one call of the rows that give both.
   Status jacobian(double t, const double* y, int n, const double* scale,
                   const std::vector<int>& columns, double* C, double* value = nullptr);
+  /// The same where C is zero throughout.
+  Status jacobian_into_zeros(double t, const double* y, int n, const double* scale,
+                             const std::vector<int>& columns, double* C, double* value = nullptr);
 
   /// The same with the sparse sets' entries one after the other in `entries`, and the rows of all
   /// other sets one after the other in `full` (n entries each).

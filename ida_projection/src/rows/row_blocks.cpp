@@ -12,6 +12,8 @@ namespace tether::ida_projection {
 
 namespace {
 
+constexpr double kFewPlaces = 4.0;  // times as many entries as places are worth their lists
+
 // Of C's entries; without a branch for each, as next to always none is.
 bool any_not_zero(const double* C, const std::vector<std::size_t>& entries) {
   std::uint64_t bits = 0;
@@ -37,12 +39,32 @@ RowBlocks::RowBlocks(const Constraints& constraints, const Evaluator& evaluator,
       m_(evaluator.rows()),
       n_(n),
       rank_tolerance_(evaluator.uses_differences() ? 1e-6 : std::max(m_, n) * 1e-13),
-      C_(static_cast<std::size_t>(m_) * static_cast<std::size_t>(n), 0.0) {}
+      C_(static_cast<std::size_t>(m_) * static_cast<std::size_t>(n), 0.0),
+      by_places_(m_ > linalg::MinimumNorm::kSmallRows) {
+  if (by_places_) places_.resize(m_, n);
+}
+
+// Many rows are mostly zero: only what was ever filled is made zero again. What a callback that
+// failed has left is not known.
+Status RowBlocks::fill(Evaluator& evaluator, double t, const double* y, const double* WT,
+                       double* g) {
+  if (by_places_ && zero_elsewhere_)
+    for (int i = 0; i < m_; ++i) places_.clear(i, row(i));
+  else
+    std::fill(C_.begin(), C_.end(), 0.0);
+  zero_elsewhere_ = false;
+  const Status status = evaluator.jacobian_into_zeros(t, y, n_, WT, columns_, C_.data(), g);
+  if (!by_places_ || status != Status::success) return status;
+  for (int i = 0; i < m_; ++i) places_.look(i, row(i));
+  zero_elsewhere_ = by_places_ =
+      kFewPlaces * static_cast<double>(places_.known()) <= static_cast<double>(C_.size());
+  return status;
+}
 
 Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<double>& y0,
                             const std::vector<double>& WT, const std::vector<bool>& hold,
                             const double* id) {
-  structured_ = false;
+  structured_ = zero_elsewhere_ = false;
   const auto n = static_cast<std::size_t>(n_);
   filled_.assign(static_cast<std::size_t>(m_) * n, 0);
   std::vector<double> y = y0;
@@ -153,7 +175,7 @@ void RowBlocks::watch() {
 
 Status RowBlocks::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
                            double* g) {
-  const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_.data(), g);
+  const Status status = fill(evaluator, t, y, WT, g);
   if (status != Status::success || !structured_) return status;
   outgrown_ |= kinds_.changed([&](int i, double* squares) {
     for (int j : columns_) {
@@ -209,16 +231,14 @@ void RowBlocks::solve_both(const std::vector<double>& g) {
 }
 
 double RowBlocks::terms(int i, const double* y) const {
-  const double* c = row(i);
   double sum = 0.0;
-  for (int j = 0; j < n_; ++j) sum += std::abs(c[j] * y[j]);
+  visit_row(i, [&](int j, double c) { sum += std::abs(c * y[j]); });
   return sum;
 }
 
 double RowBlocks::times(int i, const double* y) const {
-  const double* c = row(i);
   double sum = 0.0;
-  for (int j = 0; j < n_; ++j) sum += c[j] * y[j];
+  visit_row(i, [&](int j, double c) { sum += c * y[j]; });
   return sum;
 }
 
@@ -229,9 +249,11 @@ double RowBlocks::in_tolerances(const Block& block, int i, const std::vector<dou
     const double c = entry * WT[static_cast<std::size_t>(j)];
     sum += c * c;
   };
+  const int last = block.first + static_cast<int>(block.columns.size());
   if (block.first >= 0)
-    linalg::visit_filled(row(i) + block.first, static_cast<int>(block.columns.size()),
-                         [&](int k, double entry) { add(block.first + k, entry); });
+    visit_row(i, [&](int j, double entry) {
+      if (j >= block.first && j < last) add(j, entry);
+    });
   else
     for (int j : block.columns) add(j, row(i)[j]);
   return std::sqrt(sum);

@@ -211,7 +211,10 @@ class RowBlocks {
   /// f(column, entry) for the entries of row i that are not zero.
   template <class Visit>
   void visit_row(int i, Visit f) const {
-    linalg::visit_filled(row(i), n_, f);
+    if (!zero_elsewhere_) return linalg::visit_filled(row(i), n_, f);
+    const double* c = row(i);
+    for (const int *j = places_.begin(i), *last = places_.end(i); j != last; ++j)
+      if (c[*j] != 0.0) f(*j, c[*j]);
   }
 
   /// After solve(): as contradicts() above, for both blocks.
@@ -229,9 +232,11 @@ class RowBlocks {
     return block.rows.empty() ||
            block.solver.factor_kept(C_.data(), n_, block.rows.data(), block.columns.data());
   }
+  Status fill(Evaluator& evaluator, double t, const double* y, const double* WT, double* g);
   void solve_both(const std::vector<double>& g);
   double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   const double* row(int i) const { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
+  double* row(int i) { return C_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
   bool fills(int i, int j) const {
     return filled_[static_cast<std::size_t>(i) * static_cast<std::size_t>(n_) +
                    static_cast<std::size_t>(j)] != 0;
@@ -246,7 +251,9 @@ class RowBlocks {
   const Constraints& constraints_;
   int m_, n_;
   double rank_tolerance_;
-  std::vector<double> C_;        // m x n, row-major
+  std::vector<double> C_;                    // m x n, row-major
+  bool by_places_, zero_elsewhere_ = false;  // of C: the known places are all that is not zero
+  linalg::FilledPlaces places_;
   std::vector<double> C_after_;  // work space of learn_trust()
   std::vector<int> columns_;     // every column that C can fill and that is free
   std::vector<char> filled_;     // m x n: entries seen not to be zero, or not constant

@@ -3,12 +3,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <tether/linalg/filled.hpp>
 #include <vector>
+
+#include "envelope.hpp"
 
 namespace tether::linalg {
 
-/// Unit rows A = S C D, S = diag(1 / |row_i(C D)|), as lists of the entries that are not zero: rows
-/// of mechanisms have few. `order` lists the independent ones first; of these A A^T is factored.
+/// Unit rows A = S C D, S = diag(1 / |row_i(C D)|), by the places that have ever been filled: rows
+/// of mechanisms have few. `order` lists the independent ones first; of these A A^T is factored,
+/// by its envelope where places are few. Rows that no chain of shared columns joins come one group
+/// after the other there; inside a group they keep the order, so that L_kk is the same.
 /// resize() allocates, nothing else does.
 class KeptRows {
  public:
@@ -21,8 +26,10 @@ class KeptRows {
   /// A A^T = L L^T of the first `rank` rows of the order. False: not positive definite.
   bool factor(const int* order, int rank);
   /// L_kk: how much of row k of the order is independent of those before it.
-  double independent_part(int k) const { return L_(k, k); }
-  double least_part(int rank) const { return L_.diagonal().head(rank).minCoeff(); }
+  double independent_part(int k) const {
+    return dense_ ? L_(k, k) : envelope_.diagonal(place_[static_cast<std::size_t>(k)]);
+  }
+  double least_part(int rank) const;
 
   /// du = A^T (A A^T)^-1 z over the first `rank` of these rows; z is overwritten.
   void solve(int rank, double* z, double* du) const;
@@ -37,21 +44,22 @@ class KeptRows {
 
   template <class Visit>
   void visit(int i, Visit f) const {
-    const auto row = static_cast<std::size_t>(i);
-    for (int e = starts_[row]; e < starts_[row + 1]; ++e)
-      f(columns_[static_cast<std::size_t>(e)], entries_[static_cast<std::size_t>(e)]);
+    const double* a = A_.data() + static_cast<std::ptrdiff_t>(i) * n_;
+    for (const int *j = places_.begin(i), *last = places_.end(i); j != last; ++j) f(*j, *a++);
   }
   void spread(int i) const;
   void clear(int i) const;
   void solve_factored(int rank, double* z) const;
-  void multiply_sparse(int rank);
+  bool planned(const int* order, int rank) const;
+  void plan(const int* order, int rank);
+  int group_of(int j);
+  void multiply_by_columns(int rank);
   void multiply_dense(int rank);
-  bool factor_sparse(int rank);
 
   int n_ = 0;
-  const int* order_ = nullptr;  // the caller's
-  std::vector<int> starts_, columns_;
-  std::vector<double> entries_;
+  FilledPlaces places_;    // columns of each row
+  std::vector<double> A_;  // the entries there, of row i from i n_ on
+  std::vector<double> gathered_;
   struct Link {
     int next, row;
     double entry;
@@ -59,7 +67,18 @@ class KeptRows {
   std::vector<int> heads_;  // of each column: its last entry so far in links_
   std::vector<Link> links_;
   mutable std::vector<double> work_;  // one row, spread out
-  Eigen::MatrixXd L_, spread_;        // the lower triangle; the rows as columns
+
+  // for the places and the order that plan() has seen
+  long planned_places_ = -1;
+  bool dense_ = true;
+  std::vector<int> order_;   // as given
+  std::vector<int> place_;   // of row k of the order in the envelope
+  std::vector<int> sorted_;  // rows as the envelope has them
+  std::vector<int> groups_;  // of columns: a tree for each, to its root
+  std::vector<int> firsts_;
+  Envelope envelope_;
+  mutable std::vector<double> permuted_;
+  Eigen::MatrixXd L_, spread_;  // the lower triangle; the rows as columns
 };
 
 }  // namespace tether::linalg

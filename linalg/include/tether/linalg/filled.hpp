@@ -1,9 +1,14 @@
 // Tether: the entries of a row that are not zero. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <vector>
 
+#include <tether/export.hpp>
+
+TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
 /// visit(j, c[j]) for the entries j of c[0 .. n-1] that are not zero, ascending: four zeros in a
@@ -22,4 +27,36 @@ void visit_filled(const double* c, int n, Visit visit) {
     if (c[j] != 0.0) visit(j, c[j]);
 }
 
+/// The columns of each row of an array in which anything but a zero was ever seen: arrays that are
+/// handed over whole mostly hold few entries, in the same places each time. resize() allocates,
+/// nothing else does.
+class FilledPlaces {
+ public:
+  /// No place is known.
+  void resize(int rows, int columns);
+  /// Takes up what is not zero in row i, c[0 .. columns - 1], outside its known places; next to
+  /// nothing is done where all of that is zero.
+  void look(int i, const double* c) {
+    if (others(i, c)) learn(i, c);
+  }
+  /// Zeros in the known places of row i.
+  void clear(int i, double* c) const {
+    for (const int *j = begin(i), *last = end(i); j != last; ++j) c[*j] = 0.0;
+  }
+  /// Of the known places of row i, ascending.
+  const int* begin(int i) const { return places_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
+  const int* end(int i) const { return begin(i) + counts_[static_cast<std::size_t>(i)]; }
+  /// Grows with the places.
+  long known() const { return known_; }
+
+ private:
+  bool others(int i, const double* c) const;
+  void learn(int i, const double* c);
+
+  int n_ = 0;
+  long known_ = 0;
+  std::vector<int> places_, counts_;
+};
+
 }  // namespace tether::linalg
+TETHER_EXPORT_END
