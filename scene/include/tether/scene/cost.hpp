@@ -76,5 +76,9 @@ CostTable cost(const Scene& scene, const CostOptions& options = {});
 std::string cost_page(const Scene& scene, const CostTable& table,
                       std::optional<double> wanted = {});
 
+/// The same as a picture (SVG).
+std::string cost_picture(const Scene& scene, const CostTable& table,
+                         std::optional<double> wanted = {});
+
 }  // namespace tether::scene
 TETHER_EXPORT_END

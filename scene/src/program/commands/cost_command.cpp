@@ -14,7 +14,6 @@
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
 #include "program/settings.hpp"
-#include "record/gnuplot.hpp"
 
 namespace tether::scene {
 
@@ -59,44 +58,6 @@ std::string table_text(const CostTable& table) {
                        row.setting, row.error, row.seconds, row.steps, row.contact_problems,
                        row.drift, row.penetration, row.met, row.failure.empty() ? "ok" : "failed");
   return out;
-}
-
-/// The data and the plot command of one method's curve; nothing where none of its runs got through.
-std::string curve_of(const CostTable& table, Method method, std::string& plot) {
-  static const char* const kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
-  std::string points;
-  for (const CostRow& row : table.rows)
-    if (row.method == method && row.failure.empty())
-      points += fmt::format("{:.4e} {:.4e} {:g}\n", 1e3 * row.seconds, std::max(row.error, 1e-17),
-                            row.setting);
-  if (points.empty()) return {};
-  plot += fmt::format(
-      "{}${} using 1:2 with linespoints lc rgb '{}' lw 1.5 pt 7 ps 0.6 title '{}: {}', ${} using "
-      "1:2:3 with labels offset 3.2,0.6 font ',11' tc rgb '#404040' notitle",
-      plot.empty() ? "plot " : ", ", name(method), kColours[static_cast<int>(method)], name(method),
-      setting_name(method), name(method));
-  return fmt::format("${} << EOD\n{}EOD\n", name(method), points);
-}
-
-/// Error against time, each point with its setting.
-std::string draw(const std::string& file, const Scene& scene, const CostTable& table) {
-  std::string script = picture_head(560, 460), plot;
-  for (const Method each : {Method::smooth, Method::events, Method::steps, Method::accuracy})
-    script += curve_of(table, each, plot);
-  if (plot.empty()) return "no run got through";
-  std::string title;
-  for (const char c : scene.name) title += c == '\'' ? ' ' : c;
-  script += fmt::format(
-      "set logscale xy\nset format xy '10^{{%T}}'\nset xlabel 'processor time / ms'\nset ylabel "
-      "'largest error / m, rad'\nset title '{}: what accuracy costs' noenhanced\nset offsets graph "
-      "0.1, graph 0.2, graph 0.1, graph 0.05\nset key below\n",
-      title);
-  script += plot;
-  if (table.reference_error > 1e-16)
-    script +=
-        fmt::format(", {:.3e} with lines lc rgb '#999999' dt 2 title 'trust in the reference'",
-                    table.reference_error);
-  return gnuplot(script + "\n", file);
 }
 
 // Settings of engines that the scene does not have are refused by name.
@@ -152,10 +113,8 @@ int run_cost(const Arguments& arguments) {
   if (!arguments.csv.empty()) write_whole(arguments.csv, table_text(table));
   if (!arguments.html.empty())
     write_whole(arguments.html, cost_page(scene, table, arguments.wanted));
-  if (!arguments.svg.empty()) {
-    const std::string why = draw(arguments.svg, scene, table);
-    if (!why.empty()) fmt::print(stderr, "no picture: {}\n", why);
-  }
+  if (!arguments.svg.empty())
+    write_whole(arguments.svg, cost_picture(scene, table, arguments.wanted));
   if (table.interrupted) {
     fmt::print("interrupted: the other settings are missing\n");
     return kSignal + caught_signal();
@@ -203,7 +162,7 @@ void add_cost_command(CLI::App& app, int* status) {
   command->add_option("--csv", a->csv, "Write the table");
   command->add_option("--html", a->html,
                       "Page of error against time whose points tell the command that repeats them");
-  command->add_option("--svg", a->svg, "Draw error against time (needs gnuplot)");
+  command->add_option("--svg", a->svg, "Picture of error against time");
   command->footer(
       "The error is the largest distance (m) or angle (rad) of a body from the reference at 400 "
       "equal\n"

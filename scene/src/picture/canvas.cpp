@@ -1,0 +1,169 @@
+// Tether: a picture in SVG. SPDX-License-Identifier: BSD-3-Clause
+#include "canvas.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+namespace tether::scene::picture {
+
+namespace {
+
+constexpr double kCharacter = 0.6;                 // em
+constexpr double kAscent = 0.85, kDescent = 0.25;  // em
+
+/// Bytes of the character of UTF-8 that begins here; 0: there is none.
+std::size_t character_at(std::string_view text) {
+  const auto byte = [&](std::size_t k) {
+    return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u;
+  };
+  const unsigned first = byte(0);
+  const std::size_t count = first < 0x80                    ? 1
+                            : first >= 0xc2 && first < 0xe0 ? 2
+                            : first >= 0xe0 && first < 0xf0 ? 3
+                            : first >= 0xf0 && first < 0xf5 ? 4
+                                                            : 0;
+  for (std::size_t k = 1; k < count; ++k)
+    if ((byte(k) & 0xc0u) != 0x80) return 0;
+  // Longer than needed, half of a pair, beyond the last one, or no character of XML.
+  if ((first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) >= 0xa0) ||
+      (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) >= 0x90) ||
+      (first == 0xef && byte(1) == 0xbf && byte(2) >= 0xbe))
+    return 0;
+  return count;
+}
+
+/// Its characters; what is none becomes the sign for that.
+std::vector<std::string> characters(std::string_view text) {
+  std::vector<std::string> out;
+  while (!text.empty()) {
+    const std::size_t count = character_at(text);
+    out.emplace_back(count > 0 ? std::string(text.substr(0, count)) : "\xef\xbf\xbd");
+    text.remove_prefix(std::max<std::size_t>(count, 1));
+  }
+  return out;
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const std::string& c : characters(text)) {
+    const auto first = static_cast<unsigned char>(c.front());
+    if (c == "<" || c == ">" || c == "&" || c == "\"" || c == "'")
+      out += fmt::format("&#{};", first);
+    else
+      out += first < 0x20 || first == 0x7f ? std::string(" ") : c;
+  }
+  return out;
+}
+
+std::string stroke(const Pen& pen) {
+  return fmt::format(" stroke=\"{}\" stroke-width=\"{:.3g}\"{}", pen.colour, pen.width,
+                     pen.dashes.empty() ? "" : fmt::format(" stroke-dasharray=\"{}\"", pen.dashes));
+}
+
+std::string corners(const std::vector<Vector2d>& points) {
+  std::string out;
+  for (const Vector2d& p : points)
+    out += fmt::format("{}{:.1f},{:.1f}", out.empty() ? "" : " ", p.x(), p.y());
+  return out;
+}
+
+bool is_free(const Box& box, const std::vector<Box>& of) {
+  return std::none_of(of.begin(), of.end(), [&](const Box& each) { return each.meets(box); });
+}
+
+}  // namespace
+
+double width_of(const std::string& text, double size) {
+  return kCharacter * size * static_cast<double>(characters(text).size());
+}
+
+std::string fitted(const std::string& text, double size, double width) {
+  if (width_of(text, size) <= width) return text;
+  const std::vector<std::string> all = characters(text);
+  const double room = width / (kCharacter * size) - 1;
+  std::string out;
+  for (std::size_t k = 0; k < all.size() && static_cast<double>(k + 1) <= room; ++k) out += all[k];
+  return out + "\xe2\x80\xa6";
+}
+
+void Canvas::line(const Vector2d& from, const Vector2d& to, const Pen& pen) {
+  drawn_ += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"{}/>\n",
+                        from.x(), from.y(), to.x(), to.y(), stroke(pen));
+}
+
+void Canvas::path(const std::vector<Vector2d>& points, const Pen& pen) {
+  if (points.size() < 2) return;
+  drawn_ += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke-linejoin=\"round\"{}/>\n",
+                        corners(points), stroke(pen));
+}
+
+void Canvas::polygon(const std::vector<Vector2d>& points, const std::string& fill, const Pen& pen) {
+  if (points.size() < 2) return;
+  drawn_ += fmt::format("<polygon points=\"{}\" fill=\"{}\" stroke-linejoin=\"round\"{}/>\n",
+                        corners(points), fill.empty() ? "none" : fill, stroke(pen));
+}
+
+void Canvas::circle(const Vector2d& centre, double radius, const std::string& fill,
+                    const Pen& pen) {
+  drawn_ += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\"{}/>\n",
+                        centre.x(), centre.y(), radius, fill.empty() ? "none" : fill, stroke(pen));
+}
+
+void Canvas::begin_clip(const Box& box) {
+  drawn_ += fmt::format(
+      "<clipPath id=\"clip{0}\"><rect x=\"{1:.1f}\" y=\"{2:.1f}\" width=\"{3:.1f}\" "
+      "height=\"{4:.1f}\"/></clipPath>\n<g clip-path=\"url(#clip{0})\">\n",
+      clips_++, box.left, box.top, box.right - box.left, box.bottom - box.top);
+}
+
+void Canvas::end_clip() { drawn_ += "</g>\n"; }
+
+void Canvas::avoid(const Vector2d& from, const Vector2d& to) {
+  constexpr double kPart = 4;
+  const int parts = std::max(1, static_cast<int>(std::min((to - from).norm() / kPart, 1000.0)));
+  for (int k = 0; k <= parts; ++k) {
+    const Vector2d p = from + (to - from) * k / parts;
+    avoided_.push_back({p.x() - 1.5, p.y() - 1.5, p.x() + 1.5, p.y() + 1.5});
+  }
+}
+
+bool Canvas::text(const std::string& text, const std::vector<Spot>& places, const Box& inside,
+                  const Font& font) {
+  constexpr const char* kAnchors[] = {"start", "middle", "end"};
+  const double width = width_of(text, font.size);
+  for (const bool crossing : {false, true})
+    for (const Spot& place : places) {
+      const double left = place.at.x() - 0.5 * width * static_cast<int>(place.anchor);
+      const Box box{left, place.at.y() - kAscent * font.size, left + width,
+                    place.at.y() + kDescent * font.size};
+      if (!inside.holds(box) || !is_free(box, taken_)) continue;
+      if (!crossing && !is_free(box, avoided_)) continue;
+      taken_.push_back(box);
+      texts_ += fmt::format(
+          "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:.4g}\" text-anchor=\"{}\" "
+          "fill=\"{}\">{}</text>\n",
+          place.at.x(), place.at.y(), font.size, kAnchors[static_cast<int>(place.anchor)],
+          font.colour, escaped(text));
+      return true;
+    }
+  return false;
+}
+
+std::string Canvas::svg(const std::string& title) const {
+  return fmt::format(
+             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg "
+             "xmlns=\"http://www.w3.org/2000/svg\" "
+             "width=\"{0:g}\" height=\"{1:g}\" viewBox=\"0 0 {0:g} {1:g}\" "
+             "font-family=\"Helvetica, Arial, sans-serif\">\n<title>{2}</title>\n"
+             "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"#ffffff\"/>\n",
+             whole_.right, whole_.bottom, escaped(title)) +
+         drawn_ +
+         "<g stroke=\"#ffffff\" stroke-width=\"3\" stroke-linejoin=\"round\" "
+         "paint-order=\"stroke\">\n" +
+         texts_ + "</g>\n</svg>\n";
+}
+
+}  // namespace tether::scene::picture

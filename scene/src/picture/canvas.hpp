@@ -1,0 +1,82 @@
+// Tether: a picture in SVG. SPDX-License-Identifier: BSD-3-Clause
+//
+// Units are pixels, y goes down. Texts are laid out by boxes of .6 em a character, which the
+// letters of common fonts do not fill: two texts whose boxes are apart are apart in every viewer.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace tether::scene::picture {
+
+using Eigen::Vector2d;
+
+struct Box {
+  double left = 0, top = 0, right = 0, bottom = 0;
+  bool meets(const Box& o) const {
+    return left < o.right && right > o.left && top < o.bottom && bottom > o.top;
+  }
+  bool holds(const Box& o) const {
+    return o.left >= left && o.right <= right && o.top >= top && o.bottom <= bottom;
+  }
+};
+
+enum class Anchor : std::uint8_t { begin, middle, end };
+
+/// A point of the baseline of a text.
+struct Spot {
+  Vector2d at;
+  Anchor anchor = Anchor::begin;
+};
+
+struct Pen {
+  std::string colour = "#202020";
+  double width = 1;
+  std::string dashes;  // as SVG has them; empty: none
+};
+
+struct Font {
+  double size = 13;
+  std::string colour = "#202020";
+};
+
+/// Width of the box of a text.
+double width_of(const std::string& text, double size);
+/// At most that wide: what does not fit becomes three dots.
+std::string fitted(const std::string& text, double size, double width);
+
+class Canvas {
+ public:
+  Canvas(double width, double height) : whole_{0, 0, width, height} {}
+  const Box& whole() const { return whole_; }
+
+  void line(const Vector2d& from, const Vector2d& to, const Pen& pen);
+  void path(const std::vector<Vector2d>& points, const Pen& pen);
+  /// An empty colour: not filled.
+  void polygon(const std::vector<Vector2d>& points, const std::string& fill, const Pen& pen);
+  void circle(const Vector2d& centre, double radius, const std::string& fill, const Pen& pen);
+  /// What is drawn between the two is seen inside of the box only.
+  void begin_clip(const Box& box);
+  void end_clip();
+
+  /// Texts keep off the box.
+  void block(const Box& box) { taken_.push_back(box); }
+  /// Texts cross the line only where they find no other place.
+  void avoid(const Vector2d& from, const Vector2d& to);
+  /// Puts the text at the first place inside of the box where nothing is; false: there is none.
+  bool text(const std::string& text, const std::vector<Spot>& places, const Box& inside,
+            const Font& font = {});
+
+  /// The file.
+  std::string svg(const std::string& title) const;
+
+ private:
+  Box whole_;
+  std::string drawn_, texts_;  // texts lie over all else
+  std::vector<Box> taken_, avoided_;
+  int clips_ = 0;
+};
+
+}  // namespace tether::scene::picture
