@@ -365,3 +365,20 @@ TEST_CASE("event: a box that stands askew tips over the edge that it shares with
           10 * tolerance);
   }
 }
+
+TEST_CASE("events: ellipsoids and cylinders are refused by name, and steps take the scene") {
+  for (const std::string& shape : {std::string("shape = \"ellipsoid\"\nhalf_axes = [1, 2, 3]"),
+                                   std::string("shape = \"cylinder\"\nradius = 1\nlength = 2")}) {
+    const std::string text = "[scene]\nend = 1\ngravity = [0, 0, -9.81]\n" + kTable +
+                             body("stone", shape, "[0, 0, 3]", "density = 1") + law(0.5, 0);
+    Scene scene = parse_scene(text, "curved.toml");
+    CHECK(make_plan(scene).engine == EngineKind::stepping);
+    const Shape again = parse_scene(write_scene(scene), "again.toml").bodies[1].shapes[0];
+    CHECK(again.kind == scene.bodies[1].shapes[0].kind);
+    CHECK(again.size == scene.bodies[1].shapes[0].size);
+    CHECK(again.length == scene.bodies[1].shapes[0].length);
+    scene.engine = EngineChoice::event;
+    CHECK_THROWS_WITH(make_plan(scene),
+                      Catch::Contains(shape.substr(0, 17)) && Catch::Contains("[stepping]"));
+  }
+}

@@ -142,6 +142,16 @@ TEST_CASE("mass and inertia come from the shapes") {
       body("shape = \"capsule\"\nradius = 0.3\nlength = 1e-9\nmass = 2\n").bodies[0];
   CHECK(capsule.inertia.isApprox(0.4 * 2 * 0.09 * Eigen::Matrix3d::Identity(), 1e-8));
 
+  // Unequal numbers: each moment has its own.
+  const Body ellipsoid =
+      body("shape = \"ellipsoid\"\nhalf_axes = [1, 2, 3]\ndensity = 5\n").bodies[0];
+  CHECK(ellipsoid.mass == Approx(5 * 4.0 / 3 * pi * 6).epsilon(1e-14));
+  CHECK(ellipsoid.inertia.diagonal().isApprox(ellipsoid.mass / 5 * Vector3d(13, 10, 5), 1e-14));
+  const Body cylinder =
+      body("shape = \"cylinder\"\nradius = 2\nlength = 3\ndensity = 5\n").bodies[0];
+  CHECK(cylinder.mass == Approx(60 * pi).epsilon(1e-14));
+  CHECK(cylinder.inertia.diagonal().isApprox(cylinder.mass * Vector3d(1.75, 1.75, 2), 1e-14));
+
   // A cube as a hull, with points inside its faces and its volume, in any order.
   const std::string corners =
       "points = [[1,1,1], [0,0,0.5], [1,1,-1], [0,0,1], [1,-1,1], [1,0,0], [1,-1,-1], [-1,1,1], "

@@ -55,10 +55,11 @@ Eigen::Quaterniond read_orientation(Fields& in, const Reader& r) {
 // The fields of a shape; `in` is the body itself for a body's only shape.
 Shape read_shape(Fields& in) {
   Shape shape;
-  required(in, "shape", "it is a sphere, plane, box, capsule, convex or points");
+  required(in, "shape",
+           "it is a sphere, plane, box, capsule, ellipsoid, cylinder, convex or points");
   const std::optional<ShapeKind> kind = in.word_of<ShapeKind>("shape");
   if (!kind) {
-    in.pass_over({"radius", "length", "size", "normal", "points"});
+    in.pass_over({"radius", "length", "size", "half_axes", "normal", "points"});
     shape.radius = 1;
     return shape;
   }
@@ -66,7 +67,10 @@ Shape read_shape(Fields& in) {
   // Keys of other kinds stay unknown: a box with a radius is a mistake.
   switch (shape.kind) {
     case ShapeKind::capsule:
-      required(in, "length", "between the centres of the caps, m, > 0");
+    case ShapeKind::cylinder:
+      required(in, "length",
+               shape.kind == ShapeKind::capsule ? "between the centres of the caps, m, > 0"
+                                                : "of the whole cylinder, m, > 0");
       shape.length = in.number("length", 1, kPositive, "m");
       [[fallthrough]];
     case ShapeKind::sphere:
@@ -79,6 +83,10 @@ Shape read_shape(Fields& in) {
     case ShapeKind::box:
       required(in, "size", "the full edges [x, y, z], m, > 0");
       shape.size = in.vector("size", Vector3d::Ones(), kPositive, "m (full edges)");
+      break;
+    case ShapeKind::ellipsoid:
+      required(in, "half_axes", "[x, y, z], m, > 0");
+      shape.size = in.vector("half_axes", Vector3d::Ones(), kPositive, "m");
       break;
     case ShapeKind::convex:
       required(in, "points", "its corners [[x, y, z], ...], m");

@@ -25,7 +25,11 @@ Keys shape_keys(const Shape& shape) {
     case ShapeKind::sphere:
       keys.emplace_back("radius", toml(shape.radius));
       break;
+    case ShapeKind::ellipsoid:
+      keys.emplace_back("half_axes", toml(shape.size));
+      break;
     case ShapeKind::capsule:
+    case ShapeKind::cylinder:
       keys.emplace_back("radius", toml(shape.radius));
       keys.emplace_back("length", toml(shape.length));
       break;

@@ -33,6 +33,19 @@ MassProperties box(const Vector3d& a) {
           volume * Vector3d(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal()};
 }
 
+MassProperties ellipsoid(const Vector3d& half_axes) {
+  const double volume = 4.0 / 3.0 * kPi * half_axes.prod();
+  const Vector3d s = half_axes.cwiseProduct(half_axes) / 5;
+  return {volume, Vector3d::Zero(),
+          volume * Vector3d(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal()};
+}
+
+// Axis z.
+MassProperties cylinder(double r, double L) {
+  const double volume = kPi * r * r * L, across = volume * (r * r / 4 + L * L / 12);
+  return {volume, Vector3d::Zero(), Vector3d(across, across, volume * r * r / 2).asDiagonal()};
+}
+
 // Cylinder of length L and two half spheres, axis z.
 MassProperties capsule(double r, double L) {
   const double cylinder = kPi * r * r * L, caps = 4.0 / 3.0 * kPi * r * r * r;
@@ -99,6 +112,12 @@ MassProperties mass_properties(const Shape& shape) {
       break;
     case ShapeKind::capsule:
       out = capsule(shape.radius, shape.length);
+      break;
+    case ShapeKind::ellipsoid:
+      out = ellipsoid(shape.size);
+      break;
+    case ShapeKind::cylinder:
+      out = cylinder(shape.radius, shape.length);
       break;
     case ShapeKind::convex:
       out = convex(shape.points);

@@ -57,6 +57,29 @@ Mesh capsule_mesh(double radius, double length, int around) {
   return m;
 }
 
+Mesh ellipsoid_mesh(const Vector3d& half_axes, int around) {
+  Mesh m = capsule_mesh(1, 0, around);
+  for (Vector3d& p : m.points) p = p.cwiseProduct(half_axes);
+  return m;
+}
+
+Mesh cylinder_mesh(double radius, double length, int around) {
+  const auto n = static_cast<std::size_t>(around);
+  Mesh m;
+  m.faces.resize(2);  // lower and upper end
+  for (const double z : {-length / 2, length / 2})
+    for (int k = 0; k < around; ++k) {
+      const double angle = 2 * linalg::kPi * k / around;
+      m.points.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
+    }
+  for (std::size_t k = 0; k < n; ++k) {
+    m.faces[0].push_back(n - 1 - k);
+    m.faces[1].push_back(n + k);
+    m.faces.push_back({k, (k + 1) % n, n + (k + 1) % n, n + k});
+  }
+  return m;
+}
+
 Mesh plane(const Vector3d& normal, double half) {
   const Vector3d other = std::abs(normal.x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
   const Vector3d v = normal.cross(other).normalized() * half, u = v.cross(normal);
@@ -77,6 +100,10 @@ Mesh in_own_axes(const Shape& shape, int around, double half_plane) {
       return capsule_mesh(shape.radius, 0, around);
     case ShapeKind::capsule:
       return capsule_mesh(shape.radius, shape.length, around);
+    case ShapeKind::ellipsoid:
+      return ellipsoid_mesh(shape.size, around);
+    case ShapeKind::cylinder:
+      return cylinder_mesh(shape.radius, shape.length, around);
     case ShapeKind::box:
       return box_mesh(shape.size);
     case ShapeKind::plane:

@@ -56,6 +56,13 @@ class Forms {
         form.radius = shape.radius;
         form.length = shape.length;
         return add(part, form, scale, true, true);
+      case ShapeKind::ellipsoid:
+        form.size = shape.size;
+        return add(part, form, scale, true, true);
+      case ShapeKind::cylinder:
+        form.radius = shape.radius;
+        form.length = shape.length;
+        return add(part, form, scale, false, true);
       default:
         form.points = shape.points;
         return add(part, form, scale, false, true);

@@ -196,8 +196,10 @@ class PictureRecorder : public Recorder {
         draw_plane(shape, pose, text);
         continue;
       }
-      const bool round = shape.kind == ShapeKind::sphere || shape.kind == ShapeKind::capsule;
-      const Mesh m = mesh(shape, round ? 20 : 8, half_plane_);
+      const bool round = shape.kind == ShapeKind::sphere || shape.kind == ShapeKind::capsule ||
+                         shape.kind == ShapeKind::ellipsoid;
+      const bool curved = round || shape.kind == ShapeKind::cylinder;
+      const Mesh m = mesh(shape, curved ? 20 : 8, half_plane_);
       std::vector<Vector2d> points;
       for (const Vector3d& p : m.points) points.push_back(flat(eye_, pose.position + R * p));
       if (round || !filled) {

@@ -61,6 +61,10 @@ TEST_CASE("MJCF: masses and inertias of geoms are those of their solids") {
   CHECK(scene.bodies[1].position.z() == Approx(2).epsilon(1e-14));
   CHECK(scene.bodies[1].inertia(2, 2) == Approx(cylinder * 0.125).epsilon(1e-13));
   CHECK(scene.bodies[1].inertia(0, 0) == Approx(cylinder * (0.0625 + 4.0 / 12)).epsilon(1e-13));
+  CHECK(scene.bodies[0].shapes[1].kind == ShapeKind::ellipsoid);
+  CHECK(scene.bodies[0].shapes[1].size == Eigen::Vector3d(0.1, 0.2, 0.3));
+  CHECK(scene.bodies[1].shapes[0].kind == ShapeKind::cylinder);
+  CHECK(scene.bodies[1].shapes[0].length == Approx(2).epsilon(1e-14));
   CHECK(scene.bodies[2].mass == 2);
   CHECK(scene.bodies[2].inertia(1, 2) == 0.3);
 }

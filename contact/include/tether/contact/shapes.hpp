@@ -10,20 +10,29 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-enum class ShapeKind : std::uint8_t { sphere, plane, box, capsule, convex, points };
+enum class ShapeKind : std::uint8_t {
+  sphere,
+  plane,
+  box,
+  capsule,
+  convex,
+  points,
+  ellipsoid,
+  cylinder
+};
 
-inline constexpr std::array<ShapeKind, 6> kShapeKinds{ShapeKind::sphere, ShapeKind::plane,
-                                                      ShapeKind::box,    ShapeKind::capsule,
-                                                      ShapeKind::convex, ShapeKind::points};
+inline constexpr std::array<ShapeKind, 8> kShapeKinds{
+    ShapeKind::sphere, ShapeKind::plane,  ShapeKind::box,       ShapeKind::capsule,
+    ShapeKind::convex, ShapeKind::points, ShapeKind::ellipsoid, ShapeKind::cylinder};
 
 const char* name(ShapeKind kind);
 
 /// Given in the axes of its body; `position` and `orientation` place it on the body.
 struct Shape {
   ShapeKind kind = ShapeKind::sphere;
-  double radius = 0;  ///< sphere, capsule: m
-  double length = 0;  ///< capsule: between the centres of its caps (axis z), m
-  Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box: full edges, m
+  double radius = 0;  ///< sphere, capsule, cylinder: m
+  double length = 0;  ///< axis z; capsule: between the centres of its caps, cylinder: whole, m
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box: full edges, ellipsoid: half axes, m
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the half-space
   std::vector<Eigen::Vector3d> points;                ///< convex: vertices; points: touching points
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -34,6 +43,10 @@ struct Shape {
   static Shape box(const Eigen::Vector3d& size);
   static Shape capsule(double radius, double length);
   static Shape convex(std::vector<Eigen::Vector3d> vertices);
+  /// Half axes along x, y and z.
+  static Shape ellipsoid(const Eigen::Vector3d& half_axes);
+  /// Solid, with flat ends.
+  static Shape cylinder(double radius, double length);
   static Shape touching_points(std::vector<Eigen::Vector3d> points);
 };
 

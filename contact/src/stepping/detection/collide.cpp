@@ -8,6 +8,8 @@
 #include <string>
 #include <utility>
 
+#include "stepping/detection/convex_pair.hpp"
+
 namespace tether::contact {
 
 using Eigen::Vector3d;
@@ -26,6 +28,10 @@ const char* name(ShapeKind kind) {
       return "convex";
     case ShapeKind::points:
       return "points";
+    case ShapeKind::ellipsoid:
+      return "ellipsoid";
+    case ShapeKind::cylinder:
+      return "cylinder";
   }
   return "?";
 }
@@ -63,6 +69,21 @@ Shape Shape::convex(std::vector<Vector3d> vertices) {
   Shape s;
   s.kind = ShapeKind::convex;
   s.points = std::move(vertices);
+  return s;
+}
+
+Shape Shape::ellipsoid(const Vector3d& half_axes) {
+  Shape s;
+  s.kind = ShapeKind::ellipsoid;
+  s.size = half_axes;
+  return s;
+}
+
+Shape Shape::cylinder(double radius, double length) {
+  Shape s;
+  s.kind = ShapeKind::cylinder;
+  s.radius = radius;
+  s.length = length;
   return s;
 }
 
@@ -114,6 +135,10 @@ void with_plane(const Shape& a, const Pose& A, const Shape& plane, const Pose& P
       for (std::size_t k = 0; k < a.points.size(); ++k)
         point_plane(A.position + A.rotation * a.points[k], P, n, margin, static_cast<int>(k), out);
       break;
+    case ShapeKind::ellipsoid:
+      return ellipsoid_plane(a, A, P, n, margin, out);
+    case ShapeKind::cylinder:
+      return cylinder_plane(a, A, P, n, margin, out);
     case ShapeKind::plane:
       break;
   }
@@ -197,20 +222,25 @@ int rank(ShapeKind kind) {
       return 1;
     case ShapeKind::box:
       return 2;
-    case ShapeKind::convex:
+    case ShapeKind::ellipsoid:
       return 3;
-    case ShapeKind::points:
+    case ShapeKind::cylinder:
       return 4;
-    case ShapeKind::plane:
+    case ShapeKind::convex:
       return 5;
+    case ShapeKind::points:
+      return 6;
+    case ShapeKind::plane:
+      return 7;
   }
-  return 6;
+  return 8;
 }
 
 // a of lower rank than b.
 void collide_ordered(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
                      NearPoints& out) {
   if (b.kind == ShapeKind::plane) return with_plane(a, A, b, B, margin, out);
+  if (is_convex_pair(a.kind, b.kind)) return collide_convex(a, A, b, B, margin, out);
   if (a.kind == ShapeKind::sphere) {
     if (b.kind == ShapeKind::sphere)
       return ball_ball(A.position, a.radius, B.position, b.radius, margin, 0, out);
@@ -227,6 +257,7 @@ void collide_ordered(const Shape& a, const Pose& A, const Shape& b, const Pose& 
 bool has_own_collision(ShapeKind a, ShapeKind b) {
   if (rank(a) > rank(b)) std::swap(a, b);
   if (b == ShapeKind::plane) return a != ShapeKind::plane;
+  if (is_convex_pair(a, b)) return true;
   if (a == ShapeKind::sphere) return rank(b) <= rank(ShapeKind::box);
   return a == ShapeKind::capsule && b == ShapeKind::capsule;
 }
@@ -251,6 +282,10 @@ double reach(const Shape& s) {
       return s.radius + 0.5 * s.length;
     case ShapeKind::box:
       return 0.5 * s.size.norm();
+    case ShapeKind::ellipsoid:
+      return s.size.maxCoeff();
+    case ShapeKind::cylinder:
+      return std::hypot(s.radius, 0.5 * s.length);
     case ShapeKind::convex:
     case ShapeKind::points:
       for (const Vector3d& p : s.points) most = std::max(most, p.norm());
@@ -279,6 +314,12 @@ void check(const Shape& s) {
       return;
     case ShapeKind::box:
       return positive(s.size.minCoeff(), "size");
+    case ShapeKind::ellipsoid:
+      positive(s.size.maxCoeff(), "half_axes");
+      return positive(s.size.minCoeff(), "half_axes");
+    case ShapeKind::cylinder:
+      positive(s.radius, "radius");
+      return positive(s.length, "length");
     case ShapeKind::plane:
       if (!(std::abs(s.normal.norm() - 1) < 1e-6))
         throw std::invalid_argument("plane: normal must be a unit vector");

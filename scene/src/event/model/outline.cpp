@@ -94,6 +94,8 @@ Outline outline_of(const Shape& shape) {
       points = shape.points;
       break;
     case ShapeKind::plane:
+    case ShapeKind::ellipsoid:  // refused before
+    case ShapeKind::cylinder:
       break;
   }
   for (Vector3d& p : points) {

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <tether/linalg/pi.hpp>
 
 #include "geometry/mass.hpp"
 #include "import/robot/geometry.hpp"
@@ -18,7 +17,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using linalg::kPi;
 
 /// Volume and inertia of density 1 in the axes of the geom, and the shape that touches.
 struct Solid {
@@ -32,17 +30,6 @@ Solid of_shape(const Shape& shape) {
   return {properties.volume, properties.inertia, shape};
 }
 
-Solid cylinder(double r, double half) {
-  const double volume = kPi * r * r * 2 * half, across = volume * (r * r / 4 + half * half / 3);
-  return {volume, Vector3d(across, across, volume * r * r / 2).asDiagonal(), prism(r, 2 * half)};
-}
-
-Solid ellipsoid(const Vector3d& a) {
-  const Vector3d s = a.cwiseProduct(a) / 5;
-  const double volume = 4.0 / 3.0 * kPi * a.prod();
-  return {volume, volume * Vector3d(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal(), {}};
-}
-
 /// The numbers of `size` from `from` on, which must be there and > 0.
 bool sizes(Tag& tag, const std::vector<double>& size, std::size_t count) {
   bool good = size.size() >= count;
@@ -53,8 +40,7 @@ bool sizes(Tag& tag, const std::vector<double>& size, std::size_t count) {
   return good;
 }
 
-Solid read_solid(Tag& tag, const std::string& type, const std::vector<double>& size,
-                 Remarks& remarks) {
+Solid read_solid(Tag& tag, const std::string& type, const std::vector<double>& size) {
   Shape shape;
   if (type == "sphere" && sizes(tag, size, 1)) {
     shape.radius = size[0];
@@ -72,12 +58,15 @@ Solid read_solid(Tag& tag, const std::string& type, const std::vector<double>& s
     return of_shape(shape);
   }
   if (type == "cylinder" && sizes(tag, size, 2)) {
-    remarks.add(prism_remark());
-    return cylinder(size[0], size[1]);
+    shape.kind = ShapeKind::cylinder;
+    shape.radius = size[0];
+    shape.length = 2 * size[1];
+    return of_shape(shape);
   }
   if (type == "ellipsoid" && sizes(tag, size, 3)) {
-    remarks.add("ellipsoids, which have mass here and touch nothing", name_or_line(tag.node()));
-    return ellipsoid({size[0], size[1], size[2]});
+    shape.kind = ShapeKind::ellipsoid;
+    shape.size = Vector3d(size[0], size[1], size[2]);
+    return of_shape(shape);
   }
   return {};
 }
@@ -149,7 +138,7 @@ Geom read_geom(const Node& node, const std::string& class_name, const Settings& 
              type != "ellipsoid") {
     tag.wrong("type", "must be plane, sphere, capsule, cylinder, box, ellipsoid, mesh or hfield");
   } else {
-    solid = read_solid(tag, type, size, remarks);
+    solid = read_solid(tag, type, size);
   }
   const double mass = tag.has("mass") ? tag.not_negative("mass", 0) : density * solid.volume;
   if (solid.volume > 0) {

@@ -1,21 +1,11 @@
 // Tether: what both formats of robots say alike. SPDX-License-Identifier: BSD-3-Clause
 #include "import/robot/geometry.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <tether/linalg/pi.hpp>
 
 namespace tether::scene::import {
-
-namespace {
-
-constexpr int kEdges = 32;  // 64 corners: the most of which scenes find the hull
-constexpr double kTurn = 2 * linalg::kPi;
-
-}  // namespace
 
 Eigen::Quaterniond from_rpy(const Eigen::Vector3d& rpy) {
   return Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
@@ -28,22 +18,6 @@ Eigen::Isometry3d placed(const Eigen::Quaterniond& orientation, const Eigen::Vec
   out.linear() = orientation.toRotationMatrix();
   out.translation() = position;
   return out;
-}
-
-Shape prism(double radius, double length) {
-  Shape out;
-  out.kind = ShapeKind::convex;
-  for (int k = 0; k < kEdges; ++k) {
-    const double angle = kTurn * k / kEdges;
-    for (const double z : {-length / 2, length / 2})
-      out.points.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
-  }
-  return out;
-}
-
-std::string prism_remark() {
-  return fmt::format("cylinders touch as prisms of {} edges inside them ({:.1g} of the radius)",
-                     kEdges, 1 - std::cos(kTurn / 2 / kEdges));
 }
 
 bool is_inertia(const Eigen::Matrix3d& inertia) {

@@ -12,10 +12,6 @@ Eigen::Quaterniond from_rpy(const Eigen::Vector3d& rpy);
 
 Eigen::Isometry3d placed(const Eigen::Quaterniond& orientation, const Eigen::Vector3d& position);
 
-/// A prism of 32 edges in a cylinder along z, `length` its whole height: scenes have no cylinder.
-Shape prism(double radius, double length);
-std::string prism_remark();
-
 /// Shapes must have no larger or smaller numbers: m.
 constexpr double kLargestLength = 1e9;
 

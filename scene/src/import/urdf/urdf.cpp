@@ -101,10 +101,10 @@ std::optional<Shape> read_geometry(const Node& node, Problems& problems, Remarks
     least = shape.size.minCoeff();
     if (!(least >= 0)) tag.wrong("size", "must be three numbers > 0");
   } else if (is(node, "cylinder")) {
-    const double radius = size_of("radius"), length = size_of("length");
-    least = std::min(radius, length);
-    shape = prism(radius, length);
-    remarks.add(prism_remark());
+    shape.kind = ShapeKind::cylinder;
+    shape.radius = size_of("radius");
+    shape.length = size_of("length");
+    least = std::min(shape.radius, shape.length);
   } else if (is(node, "capsule")) {
     shape.kind = ShapeKind::capsule;
     shape.radius = size_of("radius");
