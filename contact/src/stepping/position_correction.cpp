@@ -31,7 +31,7 @@ PositionCorrection::PositionCorrection(const SteppingOptions& options)
       closing_(closing_options(options), depenetration_),
       solver_(correction_options(options)) {}
 
-void PositionCorrection::set_joints(JointPart& joints, const SteppingOptions& options) {
+void PositionCorrection::set_joints(IslandMaker& joints, const SteppingOptions& options) {
   solver_.set_joints(joints.make_islands(correction_options(options), LawUse::limits));
   closing_.set_joints(joints, closing_options(options));
 }

@@ -14,7 +14,7 @@ class PositionCorrection {
  public:
   PositionCorrection(const SteppingOptions& options);
 
-  void set_joints(JointPart& joints, const SteppingOptions& options);
+  void set_joints(IslandMaker& joints, const SteppingOptions& options);
 
   /// After the solve of velocities.
   void close_gaps(const Impacts& impacts, double dt, const StepContacts& contacts,

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "rolling/rolling_part.hpp"
 #include "stepping/detection/collide.hpp"
 #include "stepping/stepper_parts.hpp"
 
@@ -19,7 +20,7 @@ void Stepper::Implementation::make_solvers() {
     impacts = std::make_unique<detail::Impacts>(
         detail::threshold_speed(options.impact_threshold, options),
         detail::threshold_speed(options.restitution_threshold, options));
-  if (!near) return give_joints();
+  if (!near) return give_islands(*joints);
   later = std::make_unique<detail::LaterImpacts>(
       detail::threshold_speed(options.impact_threshold, options),
       detail::threshold_speed(options.restitution_threshold, options), o);
@@ -30,16 +31,31 @@ void Stepper::Implementation::make_solvers() {
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
     positions = std::make_unique<detail::PositionCorrection>(options);
   }
-  if (joints) give_joints();
+  if (joints) give_islands(*joints);
+  if (near->any_rolling()) {
+    rolling = std::make_unique<detail::RollingPart>(*near);
+    give_islands(*rolling);
+  }
 }
 
-void Stepper::Implementation::give_joints() {
+void Stepper::Implementation::give_islands(detail::IslandMaker& maker) {
   const BodyOptions o = detail::contact_options(options);
-  solver->set_joints(joints->make_islands(o, detail::LawUse::all));
+  solver->set_joints(maker.make_islands(o, detail::LawUse::all));
   if (!near) return;
-  if (restitution) restitution->set_joints(*joints, o);
-  if (positions) positions->set_joints(*joints, options);
-  later->set_joints(*joints, o);
+  if (restitution) restitution->set_joints(maker, o);
+  if (positions) positions->set_joints(maker, options);
+  later->set_joints(maker, o);
+}
+
+// Refuses by name what it does not go with.
+static void check_rolling(const SteppingOptions& options) {
+  if (options.law != Law::coulomb)
+    throw std::invalid_argument(
+        std::string("rolling and torsional friction need law = coulomb, not ") + name(options.law));
+  if (options.restitution_law != RestitutionLaw::newton)
+    throw std::invalid_argument("rolling and torsional friction need restitution_law = newton");
+  if (options.accuracy > 0)
+    throw std::invalid_argument("rolling and torsional friction need accuracy = 0");
 }
 
 // Of bodies, m: the reach of their surfaces, or the radius of gyration.
@@ -68,6 +84,7 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
     s.near = std::make_unique<detail::NearContacts>(s.bodies, std::move(surfaces),
                                                     std::move(meetings), options.law,
                                                     options.near_part, std::move(polyhedra));
+    if (s.near->any_rolling()) check_rolling(options);
     s.make_solvers();
   }
   s.make_stages();
@@ -93,6 +110,10 @@ double Stepper::time() const {
 const BodySet& Stepper::bodies() const { return implementation_->bodies; }
 BodySet& Stepper::bodies() { return implementation_->bodies; }
 const StepContacts& Stepper::contacts() const { return implementation_->contacts; }
+const std::vector<Eigen::Vector3d>& Stepper::contact_moments() const {
+  static const std::vector<Eigen::Vector3d> none;
+  return implementation_->rolling ? implementation_->rolling->moments() : none;
+}
 double Stepper::penetration() const { return implementation_->outcome.deepest; }
 double Stepper::residual() const { return implementation_->outcome.residual; }
 Status Stepper::status() const { return implementation_->outcome.status; }

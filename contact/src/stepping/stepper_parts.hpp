@@ -21,6 +21,8 @@ namespace tether::contact {
 
 namespace detail {
 
+class RollingPart;
+
 /// Bodies, at the start of a part of a step or at its end.
 struct PartState {
   std::vector<Eigen::Vector3d> position;
@@ -83,7 +85,8 @@ struct Stepper::Implementation {
   std::unique_ptr<detail::PositionCorrection> positions;  // only with error reduction
   StepContacts contacts;
   BodySolution solution;
-  std::unique_ptr<detail::JointPart> joints;  // only where they have been added
+  std::unique_ptr<detail::JointPart> joints;     // only where they have been added
+  std::unique_ptr<detail::RollingPart> rolling;  // only where a meeting names it
 
   // The part of the step that is taken, from its start over dt.
   struct Part {
@@ -103,7 +106,7 @@ struct Stepper::Implementation {
   void make_stages();
 
   void make_solvers();
-  void give_joints();
+  void give_islands(detail::IslandMaker& maker);
   void step();
   void advance(double time, double length, int halvings);
   bool run_stages(double time);

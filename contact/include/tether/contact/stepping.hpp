@@ -76,6 +76,10 @@ struct Meeting {
   int first = 0, second = 0;
   double friction = 0;
   double restitution = 0;  ///< 0 .. 1
+  /// Moments that a contact holds, over its normal force: about axes in the surface and about the
+  /// normal, m (README, section 19). Only with law = coulomb and restitution_law = newton, without
+  /// joints.
+  double rolling = 0, torsional = 0;
 };
 
 /// Velocities changed by forces during a step of length dt that starts at `time`.
@@ -216,6 +220,9 @@ class Stepper {
   const BodySet& bodies() const;
   BodySet& bodies();  ///< to set positions and velocities between steps
   const StepContacts& contacts() const;
+  /// Moments of impulse on `first` that rolling and torsional friction add, of contacts(): world
+  /// axes, N m s. Empty unless a meeting names either.
+  const std::vector<Eigen::Vector3d>& contact_moments() const;
   double penetration() const;  ///< deepest at the start of the last step, m
   double residual() const;     ///< of its contact problem, the largest of its parts
   /// Status of the last step's contact problem, the worst of its parts; solved without contacts.

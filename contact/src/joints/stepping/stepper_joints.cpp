@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rolling/rolling_part.hpp"
 #include "step_joints.hpp"
 #include "stepping/stepper_parts.hpp"
 
@@ -14,6 +15,9 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   if (s.joints || !s.force.empty())
     throw std::invalid_argument("Stepper::add_joints: once, and before add_force");
   if (!joints || joints->rows() == 0) return;
+  if (s.rolling)
+    throw std::invalid_argument(
+        "Stepper::add_joints: joints do not go with rolling and torsional friction (Meeting)");
   if (joints->has_laws() && s.options.law != Law::coulomb)
     throw std::invalid_argument(
         std::string(
@@ -27,7 +31,7 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
       std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
   s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
   if (s.solver)
-    s.give_joints();
+    s.give_islands(*s.joints);
   else if (s.joints->has_laws())
     s.make_solvers();
   s.stages.clear();

@@ -20,6 +20,8 @@ Meetings::Meetings(std::vector<Meeting> meetings) : list_(std::move(meetings)) {
         !(m.restitution >= 0 && m.restitution <= 1))
       throw std::invalid_argument(
           "meeting: materials must be >= 0, friction >= 0 and finite, restitution 0 .. 1");
+    if (!(m.rolling >= 0 && m.torsional >= 0) || !std::isfinite(m.rolling + m.torsional))
+      throw std::invalid_argument("meeting: rolling and torsional must be >= 0 and finite");
     materials_.insert(materials_.end(), {m.first, m.second});
   }
   std::sort(materials_.begin(), materials_.end());

@@ -127,6 +127,11 @@ bool NearContacts::any_restitution() const {
                      [](const Meeting& m) { return m.restitution > 0; });
 }
 
+bool NearContacts::any_rolling() const {
+  return std::any_of(meetings_.list().begin(), meetings_.list().end(),
+                     [](const Meeting& m) { return m.rolling > 0 || m.torsional > 0; });
+}
+
 void NearContacts::place(const BodySet& bodies, double dt) {
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
     const Surface& s = surfaces_[k];

@@ -33,6 +33,7 @@ class NearContacts {
   /// Distance of the farthest point of its smaller shape from that shape's origin, m.
   double size(const PointContact& c) const;
   bool any_restitution() const;
+  bool any_rolling() const;
 
  private:
   void find_foreign(const BodySet& bodies);

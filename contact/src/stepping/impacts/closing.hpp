@@ -30,7 +30,7 @@ class Closing {
   Closing(const BodyOptions& options, const Depenetration& depenetration)
       : depenetration_(depenetration), solver_(options) {}
 
-  void set_joints(JointPart& joints, const BodyOptions& options) {
+  void set_joints(IslandMaker& joints, const BodyOptions& options) {
     solver_.set_joints(joints.make_islands(options, LawUse::all));
     islands_.set_links(joints.links());
   }

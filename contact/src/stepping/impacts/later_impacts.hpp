@@ -34,7 +34,7 @@ class LaterImpacts {
   void add_restitution(RestitutionLaw law, const BodyOptions& options);
 
   /// After the above.
-  void set_joints(JointPart& joints, const BodyOptions& options) {
+  void set_joints(IslandMaker& joints, const BodyOptions& options) {
     solver_.set_joints(joints.make_islands(options, LawUse::none));
     if (restitution_) restitution_->set_joints(joints, options);
     islands_.set_links(joints.links());

@@ -23,7 +23,7 @@ class Restitution {
  public:
   Restitution(RestitutionLaw law, const BodyOptions& options);
 
-  void set_joints(JointPart& joints, const BodyOptions& options) {
+  void set_joints(IslandMaker& joints, const BodyOptions& options) {
     solver_.set_joints(joints.make_islands(options, LawUse::none));
     islands_.set_links(joints.links());
   }

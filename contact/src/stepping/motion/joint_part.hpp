@@ -35,15 +35,21 @@ class JointIslands {
   virtual void set_warm_start(const WarmStart& start) = 0;
 };
 
-class JointPart {
+/// Who has contact problems of its own, and bodies that it connects.
+class IslandMaker {
  public:
-  virtual ~JointPart() = default;
-  virtual bool holds(int body) const = 0;
+  virtual ~IslandMaker() = default;
   /// Pairs that connect the bodies of each mechanism.
   virtual const std::vector<std::pair<int, int>>& links() const = 0;
+  /// Null: none of its own for this use.
+  virtual std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) = 0;
+};
+
+class JointPart : public IslandMaker {
+ public:
+  virtual bool holds(int body) const = 0;
   /// Bodies that a joint of three rows or more connects pass through each other.
   virtual bool are_joined(int first, int second) const = 0;
-  virtual std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) = 0;
 
   virtual void begin(BodySet& bodies, double t) = 0;
   virtual void predict(BodySet& bodies, double t, double dt) = 0;
