@@ -16,6 +16,7 @@ constexpr double kRank = 1e-10;  // of rows of unit length
 constexpr double kIndependent = 1e-6;
 constexpr double kAhead = 1e-5;   // s in the units of the model
 constexpr double kLawful = 1e-9;  // of the largest force
+constexpr double kHeld = 1e-9;    // of the accelerations
 constexpr double kStill = 1e-3;   // speeds and accelerations in the units of the model
 
 /// Rows that the earlier ones do not imply, in the metric of the masses; Gram and Schmidt, twice.
@@ -308,6 +309,18 @@ std::vector<VectorXd> Motion::slides() const {
     out[k] = fast ? VectorXd(s.normalized()) : mode.direction;
   }
   return out;
+}
+
+bool Motion::forces_are_lawful() const {
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const int contact = static_cast<int>(k);
+    const double normal = normal_force(contact), mu = model_.law(closed_[k]).friction;
+    if (!(normal >= 0 && friction_force(contact).norm() <= mu * normal * (1 + kLawful)))
+      return false;
+  }
+  const VectorXd left = row_scale_.cwiseProduct(R_ * a_ + r_);
+  const double scale = row_scale_.cwiseProduct(r_).norm() + a_.norm();
+  return left.size() == 0 || left.cwiseAbs().maxCoeff() <= kHeld * scale;
 }
 
 std::vector<VectorXd> Motion::contact_forces() {

@@ -72,6 +72,8 @@ class Motion {
   /// Of each closed contact (n, tangents). Those that share their forces have such as Coulomb's law
   /// allows, which the shortest ones may not be.
   std::vector<VectorXd> contact_forces();
+  /// Whether the forces of the last rate() hold all rows, and Coulomb's law allows them.
+  bool forces_are_lawful() const;
   /// Directions of the closed contacts that slide; empty where they stick.
   std::vector<VectorXd> slides() const;
   const ContactLook& look(int closed) const { return looks_[index(closed)]; }

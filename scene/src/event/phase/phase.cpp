@@ -27,6 +27,7 @@ constexpr double kLook = 1e-5;   // the part of a move over which y'' is looked 
 constexpr double kNewton = 0.1;  // Newton's test, of the tolerance
 constexpr double kDifference = 1e-7, kOfSlip = 1e-3;
 constexpr double kTurned = 0.5;  // of a slip, since Newton's matrix was made
+constexpr double kMoved = 1e-5;  // of the state, since d(y')/dy was found
 
 #if SUNDIALS_VERSION_MAJOR >= 7
 using Flag = sunbooleantype;
@@ -47,8 +48,10 @@ struct Phase::Ida {
   static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
                       void* self, N_Vector, N_Vector, N_Vector);
   static int newton(SUNNonlinearSolver solver, N_Vector predicted, N_Vector correction,
-                    N_Vector weights, double tolerance, Flag renew, void* memory);
+                    N_Vector weights, double tolerance, Flag renew, void* ida);
   bool has_turned(double t, N_Vector predicted);
+  bool may_reuse(double t, N_Vector at);
+  void differentiate(double t, const double* from);
   double first_step(const VectorXd& y0, const VectorXd& rate0) const;
 
   Motion& motion;
@@ -63,6 +66,9 @@ struct Phase::Ida {
   std::optional<ida_projection::Projection> projection;
   VectorXd rate, near, near_rate, sizes;
   VectorXd slips, slips_of_matrix;
+  MatrixXd slope;  // d(y')/dy at
+  VectorXd slope_at;
+  double asked_time = -1;
 };
 
 Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
@@ -160,14 +166,47 @@ bool Phase::Ida::has_turned(double t, N_Vector predicted) {
 }
 
 int Phase::Ida::newton(SUNNonlinearSolver solver, N_Vector predicted, N_Vector correction,
-                       N_Vector weights, double tolerance, Flag renew, void* memory) {
+                       N_Vector weights, double tolerance, Flag renew, void* ida) {
   double t = 0, cj = 0;
   N_Vector yy, yp, at, rate, r;
   void* self = nullptr;
-  IDAGetNonlinearSystemData(memory, &t, &yy, &yp, &at, &rate, &r, &cj, &self);
+  IDAGetNonlinearSystemData(ida, &t, &yy, &yp, &at, &rate, &r, &cj, &self);
   Ida& me = *static_cast<Ida*>(self);
   if (me.slips_of_matrix.size() > 0 && me.has_turned(t, predicted)) renew = SUNTRUE;
-  return me.iterate(solver, predicted, correction, weights, tolerance, renew, memory);
+  return me.iterate(solver, predicted, correction, weights, tolerance, renew, ida);
+}
+
+// The first steps of a phase move the state by nothing: what changes is cj. Where IDA asks twice at
+// one time its corrector has failed.
+bool Phase::Ida::may_reuse(double t, N_Vector at) {
+  const bool failed = t == asked_time;
+  asked_time = t;
+  if (failed || slope_at.size() == 0) return false;
+  for (Eigen::Index i = 0; i < slope_at.size(); ++i) {
+    const double there = N_VGetArrayPointer(at)[i];
+    if (!(std::abs(there - slope_at[i]) <= kMoved * (sizes[i] + std::abs(there)))) return false;
+  }
+  return !has_turned(t, at);
+}
+
+void Phase::Ida::differentiate(double t, const double* from) {
+  const int N = motion.size();
+  motion.slips_with_friction(start + t, from, slips_of_matrix);
+  near = slope_at = Eigen::Map<const VectorXd>(from, N);
+  motion.rate(start + t, near.data(), rate.data());
+  // Friction turns with the slip: differences are short against it.
+  const double longest = kOfSlip * motion.smallest_slip();
+  slope.setZero(N, N);
+  for (int j = 0; j < N; ++j) {
+    if (j == motion.work()) continue;
+    const double kept = near[j];
+    double step = kDifference * std::max(sizes[j], std::abs(kept));
+    if (j >= motion.coordinates()) step = std::min(step, longest);
+    near[j] = kept + step;
+    motion.rate(start + t, near.data(), near_rate.data());
+    near[j] = kept;
+    slope.col(j) = (near_rate - rate) / step;
+  }
 }
 
 // cj - d(y')/dy by differences: Newton's matrix decides how fast it converges, not where to.
@@ -175,26 +214,10 @@ int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SU
                          void* self, N_Vector, N_Vector, N_Vector) {
   Ida& me = *static_cast<Ida*>(self);
   const int N = me.motion.size();
-  me.motion.slips_with_friction(me.start + t, N_VGetArrayPointer(y), me.slips_of_matrix);
-  me.near = Eigen::Map<const VectorXd>(N_VGetArrayPointer(y), N);
-  me.motion.rate(me.start + t, me.near.data(), me.rate.data());
-  // Friction turns with the slip: differences are short against it.
-  const double longest = kOfSlip * me.motion.smallest_slip();
+  if (!me.may_reuse(t, y)) me.differentiate(t, N_VGetArrayPointer(y));
   for (int j = 0; j < N; ++j) {
-    double* column = SM_COLUMN_D(J, j);
-    if (j == me.motion.work()) {
-      std::fill(column, column + N, 0.0);
-      column[j] = cj;
-      continue;
-    }
-    const double kept = me.near[j];
-    double step = kDifference * std::max(me.sizes[j], std::abs(kept));
-    if (j >= me.motion.coordinates()) step = std::min(step, longest);
-    me.near[j] = kept + step;
-    me.motion.rate(me.start + t, me.near.data(), me.near_rate.data());
-    me.near[j] = kept;
-    for (int i = 0; i < N; ++i) column[i] = -(me.near_rate[i] - me.rate[i]) / step;
-    column[j] += cj;
+    Eigen::Map<VectorXd>(SM_COLUMN_D(J, j), N) = -me.slope.col(j);
+    SM_ELEMENT_D(J, j, j) += cj;
   }
   return 0;
 }

@@ -141,6 +141,7 @@ double Watcher::of_state(Function& f) {
 
 // What is left of a band, of the accelerations, by those of contacts that are to have none.
 double Watcher::support() {
+  if (motion_.forces_are_lawful()) return support_band_ > 0 ? support_band_ : kNoise;
   ContactRows rows(motion_.model(), motion_.closed());
   const int block = rows.size();
   const std::vector<VectorXd> slides = motion_.slides();
