@@ -86,9 +86,11 @@ void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
   out = &o;
   given.read(b, c, options.law);
   find_starts();
-  graph.build(static_cast<int>(b.size()), given.first(), given.second(), given.kinds(),
-              detail::groups_are_served());
-  solve_graph();
+  if (!options.team || !options.team->solve(b, c, starts, options, o)) {
+    graph.build(static_cast<int>(b.size()), given.first(), given.second(), given.kinds(),
+                detail::groups_are_served());
+    solve_graph();
+  }
   if (options.warm_start) memory.keep(c, o.impulses);
 }
 

@@ -39,6 +39,7 @@ BodyOptions contact_options(const SteppingOptions& o) {
     b.enough = std::min(accepted_residual(o), std::max(kGood, o.tolerance));
   }
   b.threads = o.threads;
+  b.team = o.team;
   return b;
 }
 

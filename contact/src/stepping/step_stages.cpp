@@ -48,6 +48,7 @@ void Stepper::Implementation::make_stages() {
 }
 
 void Stepper::Implementation::find_contacts() {
+  if (options.team) options.team->place(bodies.position);
   near->find(bodies, part.dt, contacts);
   if (joints) leave_out_joined();
   set_gaps();

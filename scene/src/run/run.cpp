@@ -17,6 +17,7 @@
 #include "record/recorder.hpp"
 #include "saved_state.hpp"
 #include "schedule.hpp"
+#include "stepping/stepping_engine.hpp"
 
 namespace tether::scene {
 
@@ -56,11 +57,25 @@ const Scene& checked(const Scene& scene) {
   return scene;
 }
 
+std::unique_ptr<Engine> engine_of(const Scene& scene, contact::SolverTeam* team) {
+  if (!team) return make_engine(scene);
+  const Plan plan = make_plan(scene);
+  if (plan.engine == EngineKind::stepping)
+    return std::make_unique<stepping::SteppingEngine>(scene, team);
+  throw std::invalid_argument(fmt::format(
+      "several processes share steps with impulses; this scene is moved by the engine \"{}\", in "
+      "one process ({})",
+      plan.engine == EngineKind::smooth ? "smooth" : "event", plan.why));
+}
+
 /// One run from its start, or from a saved state, to the end.
 class Run {
  public:
   Run(const Scene& scene, const RunOptions& options)
-      : scene_(checked(scene)), options_(options), judge_(scene), engine_(make_engine(scene)) {
+      : scene_(checked(scene)),
+        options_(options),
+        judge_(scene),
+        engine_(engine_of(scene, options.team)) {
     const Output& o = scene.output;
     check_names(o, {scene.file, o.state == options.restart ? "" : options.restart});
     for (const std::string& each : names(o)) lock_.take(each);

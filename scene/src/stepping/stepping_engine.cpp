@@ -69,9 +69,16 @@ constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '4'};
 constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
 constexpr char kWithClosings = '2', kWithoutControl = '3';
 
+Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
+  Mapped out = map_scene(scene);
+  out.options.team = team;
+  return out;
+}
+
 }  // namespace
 
-SteppingEngine::SteppingEngine(const Scene& scene) : SteppingEngine(scene, map_scene(scene)) {}
+SteppingEngine::SteppingEngine(const Scene& scene, contact::SolverTeam* team)
+    : SteppingEngine(scene, mapped_for(team, scene)) {}
 
 SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
     : stepped_(scene),

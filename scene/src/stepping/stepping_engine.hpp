@@ -13,7 +13,7 @@ namespace tether::scene::stepping {
 
 class SteppingEngine final : public Engine {
  public:
-  explicit SteppingEngine(const Scene& scene);
+  explicit SteppingEngine(const Scene& scene, contact::SolverTeam* team = nullptr);
 
   /// Goes on from states of any time, s: to the next boundary at once, where it is not one. Throws
   /// SimulationError.

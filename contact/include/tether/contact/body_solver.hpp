@@ -29,6 +29,8 @@ struct PointContact {
   std::uint64_t id = kNoId;
 };
 
+class SolverTeam;
+
 struct BodyOptions {
   Law law = Law::maximum_dissipation;
   /// Wanted Residuals::fixed_point of each contact: the error of its velocity over the largest
@@ -53,6 +55,9 @@ struct BodyOptions {
   bool strict = false;    ///< as Options::strict, for assembled islands
   double max_work = 1e9;  ///< as Options::max_work, for each assembled island
   double enough = 0;      ///< as Options::enough, for each assembled island
+  /// Processes that share the work of each solve, all with the same bodies, contacts and options;
+  /// null: none. Outlives the solver. See RankTeam.
+  SolverTeam* team = nullptr;
 };
 
 /// Start of the next solve: the impulses of the last one and the ids of their contacts, in the
@@ -74,6 +79,20 @@ struct BodySolution {
   std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`
   std::vector<Regime> regimes;            ///< of each contact
   std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
+};
+
+/// What BodySolver asks of those that it shares its work with; RankTeam has it on RankMessages.
+class SolverTeam {
+ public:
+  virtual ~SolverTeam() = default;
+  /// Where bodies are, by index: those near each other are swept by the same process. Optional.
+  virtual void place(const std::vector<Eigen::Vector3d>& positions) = 0;
+  /// As BodySolver::solve. starts: impulse to start from of each contact, null: zero; empty: none.
+  /// False: not worth messages, each process solves it by itself.
+  virtual bool solve(const std::vector<RigidBody>& bodies,
+                     const std::vector<PointContact>& contacts,
+                     const std::vector<const Eigen::Vector3d*>& starts, const BodyOptions& options,
+                     BodySolution& solution) = 0;
 };
 
 class RankSolver;

@@ -120,5 +120,28 @@ class RankSolver {
   std::unique_ptr<Implementation> implementation_;
 };
 
+/// Processes that all have the same bodies and contacts, as a team for BodyOptions::team and
+/// SteppingOptions::team: each sweeps the contacts of its part of the bodies (RankMode::exact), and
+/// all know the whole result then. Bits are those of one process. Every process makes the same
+/// calls; what one cannot do all throw.
+class RankTeam final : public SolverTeam {
+ public:
+  /// Fewer contacts than `smallest` are solved by each process itself. `messages` outlives this.
+  explicit RankTeam(RankMessages& messages, int smallest = 200);
+  ~RankTeam() override;
+
+  void place(const std::vector<Eigen::Vector3d>& positions) override;
+  bool solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+             const std::vector<const Eigen::Vector3d*>& starts, const BodyOptions& options,
+             BodySolution& solution) override;
+  /// Problems that were shared, and contacts of them that this process swept.
+  long problems() const;
+  long swept_contacts() const;
+
+ private:
+  struct TETHER_HIDDEN Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
 }  // namespace tether::contact
 TETHER_EXPORT_END

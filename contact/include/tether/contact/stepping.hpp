@@ -130,6 +130,9 @@ struct SteppingOptions {
   /// See BodyOptions: bounds the time of a step. With acceptance > 1 a fifth of it comes first.
   double max_work = 2e8;
   int threads = 1;
+  /// Processes that take the same steps and share the work of their contact problems; see
+  /// BodyOptions. Bits are those of one process.
+  SolverTeam* team = nullptr;
 };
 
 /// Largest residual of a contact problem that is used: see SteppingOptions::acceptance.

@@ -11,6 +11,9 @@
 #include <vector>
 
 TETHER_EXPORT_BEGIN
+namespace tether::contact {
+class SolverTeam;
+}
 namespace tether::scene {
 
 /// Result of an [[expect]]; for one that holds `throughout`, at its worst moment.
@@ -39,6 +42,9 @@ struct RunOptions {
   std::function<void(const Engine&)> record;  ///< called at each record and stop
   /// Called after every step; if it returns true, the run ends there, with all its files complete.
   std::function<bool()> interrupted;
+  /// Processes that make the same run, of the stepping engine, and share its contact problems; all
+  /// but one without names in Scene::output, and `interrupted` says the same to each.
+  contact::SolverTeam* team = nullptr;
 };
 
 struct RunResult {

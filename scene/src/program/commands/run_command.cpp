@@ -14,6 +14,7 @@
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
 #include "program/process/standard_output_file.hpp"
+#include "program/ranks/ranks.hpp"
 #include "program/report_run.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
@@ -81,11 +82,21 @@ void overlay(const Arguments& arguments, Scene& scene) {
   scene.end = *arguments.end;
 }
 
-int run_scene(const Arguments& arguments) {
+/// Of several processes the first writes.
+void write_nothing(Output& o, std::string& html) {
+  for (std::string* file : {&o.csv, &o.vtk, &o.svg, &o.state, &html}) file->clear();
+}
+
+/// ranks: processes that make the same run, null: there is one.
+int run_scene(const Arguments& arguments, Ranks* ranks) {
   const auto begin = std::chrono::steady_clock::now();
+  const bool first = !ranks || ranks->messages().rank() == 0;
+  if (ranks && arguments.file == "-")
+    throw std::invalid_argument("several processes have no standard input: give the scene's file");
   Scene scene = read_scene_argument(arguments.file);
   overlay(arguments, scene);
   std::string html = arguments.html;
+  if (!first) write_nothing(scene.output, html);
   if (!html.empty() && html != "-" && !arguments.folder.empty())
     html = (std::filesystem::path(arguments.folder) / html).string();
   catch_signals();
@@ -96,9 +107,15 @@ int run_scene(const Arguments& arguments) {
   RunOptions options;
   options.restart = arguments.restart;
   options.force = arguments.force;
-  options.interrupted = [] { return caught_signal() != 0; };
-  bar.start(scene.name, scene.end, 1);
-  if (!arguments.quiet) options.progress = [&](double t) { bar.at(t); };
+  int signal = 0;
+  options.interrupted = [&] {
+    signal = ranks ? ranks->largest(caught_signal()) : caught_signal();
+    return signal != 0;
+  };
+  std::optional<contact::RankTeam> team;
+  if (ranks) options.team = &team.emplace(ranks->messages());
+  if (first) bar.start(scene.name, scene.end, 1);
+  if (!arguments.quiet && first) options.progress = [&](double t) { bar.at(t); };
   if (player) options.record = [&](const Engine& engine) { player->record(engine); };
   RunResult result = run(scene, options);
   if (player) {
@@ -107,9 +124,14 @@ int run_scene(const Arguments& arguments) {
     if (!arguments.restart.empty())
       result.remarks.push_back(html + " shows the motion from the restart on");
   }
+  const int code = result.interrupted ? kSignal + signal : exit_code(result);
+  if (!first) return code;
   bar.hide();
   standard_output.copy();
   print_summary(scene, result);
+  if (ranks)
+    fmt::print("  ranks        {} processes, which shared {} contact problems\n",
+               ranks->messages().size(), team->problems());
   print_times(result,
               std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   print_judgements(scene, result);
@@ -120,7 +142,22 @@ int run_scene(const Arguments& arguments) {
                    ? ""
                    : fmt::format("; to go on: --restart {}", scene.output.state));
   std::fflush(stdout);
-  return result.interrupted ? kSignal + caught_signal() : exit_code(result);
+  return code;
+}
+
+/// By all processes that mpirun has started, by the one that there is otherwise.
+int run_together(const Arguments& arguments) {
+  const std::unique_ptr<Ranks> ranks = join_ranks();
+  if (!ranks) return run_scene(arguments, nullptr);
+  int status = kWrong;
+  std::string why;
+  try {
+    status = run_scene(arguments, ranks.get());
+  } catch (const std::exception& e) {
+    why = e.what();
+  }
+  std::fflush(stdout);
+  return ranks->finish(status, why);
 }
 
 }  // namespace
@@ -156,8 +193,10 @@ void add_run_command(CLI::App& app, int* status) {
       "whole\n"
       "and the state saved. Options go before what the scene says in [output]. One of --csv, "
       "--svg, --html and "
-      "--state may\nbe -, the standard output; what the run says goes to the standard error then.");
-  command->callback([a, status] { *status = run_scene(*a); });
+      "--state may\nbe -, the standard output; what the run says goes to the standard error then.\n"
+      "mpirun -n N tether run SCENE: N processes share the contact problems of a scene that steps "
+      "with\nimpulses; the bits are those of one.");
+  command->callback([a, status] { *status = run_together(*a); });
 }
 
 }  // namespace tether::scene
