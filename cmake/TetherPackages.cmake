@@ -94,7 +94,7 @@ set(CPACK_DEBIAN_TETHER_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_LIBTETHER-DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_LIBTETHER-DEV_PACKAGE_DEPENDS "${tether_dev_needs}")
 set(CPACK_DEBIAN_TETHER_PACKAGE_DEPENDS "libtether (= ${PROJECT_VERSION})")
-set(CPACK_DEBIAN_TETHER_PACKAGE_SUGGESTS "gnuplot-nox, libtether-dev")
+set(CPACK_DEBIAN_TETHER_PACKAGE_SUGGESTS "libtether-dev")
 set(summary "motions kept on their constraints")
 set(about "Tether projects the steps of SUNDIALS IDA onto invariants and
 constraints, solves frictional contact problems with the exact friction

@@ -67,7 +67,6 @@ whole() {
           >"$work/restart_said" 2>&1 || code=$?
         [ $code -eq 130 ] || complain "$2: $file does not go on: $(cat "$work/restart_said")" ;;
       *.toml) "$program" check "$file" >"$work/said" 2>&1 || complain "$2: $file is cut" ;;
-      *.gp) ;;  # a picture that gnuplot could not draw, or no gnuplot
       *) complain "$2: left behind: $file" ;;
     esac
   done

@@ -2,15 +2,21 @@
 #include <tinyxml2.h>
 
 #include <cmath>
+#include <filesystem>
 #include <string>
 #include <tether/scene/cost.hpp>
 #include <tether/scene/files.hpp>
+#include <tether/scene/run.hpp>
 #include <vector>
 
 #include "picture/canvas.hpp"
+#include "run_files.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
+using tether::test::content;
+using tether::test::folder;
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -113,4 +119,117 @@ TEST_CASE("a picture of costs takes any name and any table") {
   CHECK(texts.front().words.find("\xc3\xa9: what") != std::string::npos);
   scene.name = std::string(300, 'W');
   texts_of(cost_picture(scene, table));
+}
+
+TEST_CASE("texts of the pictures of all shipped scenes are apart") {
+  std::size_t scenes = 0;
+  for (const auto& entry : fs::directory_iterator(TETHER_SHIPPED_SCENES)) {
+    if (entry.path().extension() != ".toml") continue;
+    Scene scene = read_scene(entry.path().string());
+    if (scene.bodies.size() > 100) continue;  // slow, and without names
+    INFO(entry.path());
+    // Their beginning; the pictures in the repository are of all of them.
+    scene.end *= 0.003;
+    scene.expect.clear();
+    scene.output = Output{};
+    scene.output.svg = (folder("pictures") / "a.svg").string();
+    try {
+      run(scene);
+    } catch (const std::invalid_argument&) {  // contact without Bullet's collision
+      continue;
+    }
+    const std::vector<Text> texts = texts_of(content(scene.output.svg));
+    CHECK(has(texts, "t / s"));
+    CHECK(has(texts, "energy / J"));
+    CHECK(has(texts, "kinetic"));
+    ++scenes;
+  }
+  CHECK(scenes > 10);
+}
+
+TEST_CASE("texts of the pictures in the repository are apart") {
+  std::size_t pictures = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(TETHER_SHIPPED_SCENES) / "figures")) {
+    if (entry.path().extension() != ".svg") continue;
+    INFO(entry.path());
+    texts_of(content(entry.path()));
+    ++pictures;
+  }
+  CHECK(pictures > 10);
+}
+
+namespace {
+
+constexpr const char* kMechanism = R"(
+[scene]
+name = "a < b & c"
+end = 0.2
+gravity = [0, 0, -9.81]
+[[body]]
+name = "bob < & >"
+mass = 1
+inertia = [1, 1, 1]
+position = [1, 0, 0]
+[[body]]
+name = "bob 2"
+mass = 1
+inertia = [1, 1, 1]
+position = [1, 0, 0.01]
+[[body]]
+name = "wall"
+shape = "plane"
+fixed = true
+[[joint]]
+kind = "distance"
+bodies = ["bob < & >", "world"]
+at = [[1, 0, 0], [0, 0, 0]]
+[[spring]]
+bodies = ["bob 2", "world"]
+at = [[1, 0, 0.01], [0, 0, 1]]
+stiffness = 10
+)";
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t found = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++found;
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("texts of a scene stay texts in its picture") {
+  Scene scene = parse_scene(kMechanism, "picture.toml");
+  scene.output.svg = (folder("pictures") / "a.svg").string();
+  run(scene);
+  const std::vector<Text> texts = texts_of(content(scene.output.svg));
+  CHECK(has(texts, "a < b & c"));
+  CHECK(has(texts, "bob < & >"));
+  CHECK(has(texts, "bob 2"));
+  CHECK(has(texts, "0.2 m"));
+  CHECK(has(texts, "t = 0 (outline) to 0.2 s"));
+}
+
+TEST_CASE("ground is hatched where it is, and what the world holds has a bearing") {
+  Scene scene = parse_scene(kMechanism, "picture.toml");
+  scene.output.svg = (folder("pictures") / "a.svg").string();
+  run(scene);
+  // The ground, the bearing of the rod, the end of the spring.
+  CHECK(count(content(scene.output.svg), "url(#hatch)") == 3);
+  scene.bodies.pop_back();
+  scene.springs.clear();
+  run(scene);
+  CHECK(count(content(scene.output.svg), "url(#hatch)") == 1);
+  scene.joints.clear();
+  run(scene);
+  CHECK(count(content(scene.output.svg), "hatch") == 0);
+}
+
+TEST_CASE("a picture of a run that ends at its start is one") {
+  Scene scene = parse_scene(kMechanism, "picture.toml");
+  scene.output.svg = (folder("pictures") / "a.svg").string();
+  RunOptions options;
+  options.interrupted = [] { return true; };
+  run(scene, options);
+  texts_of(content(scene.output.svg));
 }

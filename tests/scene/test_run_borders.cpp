@@ -194,7 +194,7 @@ TEST_CASE("outputs that collide with each other or with an input are refused") {
   refused([](Output& o) { o.csv = "a.pvd", o.vtk = "a.vtu"; });
   refused([](Output& o) { o.csv = "a", o.vtk = "a.pvd"; });
   refused([](Output& o) { o.csv = "s.new", o.state = "s"; });
-  refused([](Output& o) { o.svg = "s", o.state = "s.gp"; });
+  refused([](Output& o) { o.svg = "s", o.state = "s.new"; });
   refused([](Output& o) { o.vtk = "a", o.csv = "a/bodies_000001.vtp"; });
   refused([](Output& o) { o.csv = "x/.."; });
 
@@ -210,16 +210,15 @@ TEST_CASE("outputs that collide with each other or with an input are refused") {
   CHECK(content(scene.file) == "precious");
 }
 
-TEST_CASE("gnuplot never sees a name from a scene") {
+TEST_CASE("a picture has the name that is asked for, whatever shells make of it") {
   Scene scene = parse_scene(falling(""), "picture.toml");
   const fs::path path = folder("picture");
   const fs::path before = fs::current_path();
   fs::current_path(path);
   scene.output.svg = "| touch pwned; cat > x";
-  const RunResult result = run(scene);
+  run(scene);
   fs::current_path(before);
   CHECK_FALSE(fs::exists(path / "pwned"));
   CHECK_FALSE(fs::exists(path / "x"));
-  if (result.remarks.empty())
-    CHECK(content(path / scene.output.svg).find("<svg") != std::string::npos);
+  CHECK(content(path / scene.output.svg).find("<svg") != std::string::npos);
 }

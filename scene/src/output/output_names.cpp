@@ -62,7 +62,7 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
   take_all("csv", o.csv, {".lock"});
   if (!o.csv.empty() && !is_device(o.csv)) take("csv", event_file(o.csv));
   if (!o.csv.empty() && o.forces && !is_device(o.csv)) take("csv", contact_file(o.csv));
-  take_all("svg", o.svg, {".lock", ".new", ".gp"});
+  take_all("svg", o.svg, {".lock", ".new"});
   take_all("state", o.state, {".lock", ".new"});
   if (o.vtk.empty()) return;
   take_all("vtk", film_file(o.vtk), {".lock", ".new"});

@@ -45,13 +45,13 @@ std::vector<Tick> linear_ticks(const Range& range, double least) {
 std::vector<Tick> logarithmic_ticks(const Range& range, double least) {
   const double low = std::log10(range.low), high = std::log10(range.high);
   const int stride = std::max(1, static_cast<int>(std::ceil(least * (high - low))));
-  const bool between = least * (high - low) < 0.25 && high - low < 2;
   std::vector<Tick> out;
-  for (int power = static_cast<int>(std::floor(low)); power <= high; ++power) {
-    if (power % stride != 0) continue;
-    for (const int factor : {1, 2, 5}) {
+  // The powers come first: 2 and 5 take the room that they leave.
+  for (const int factor : {1, 2, 5}) {
+    if (factor > 1 && high - low >= 2) break;
+    for (int power = static_cast<int>(std::floor(low)); power <= high; ++power) {
       const double value = factor * std::pow(10, power);
-      if ((factor == 1 || between) && value >= 0.999 * range.low && value <= 1.001 * range.high)
+      if (power % stride == 0 && value >= 0.999 * range.low && value <= 1.001 * range.high)
         out.push_back({value, short_number(value)});
     }
   }

@@ -14,6 +14,11 @@ namespace {
 constexpr double kCharacter = 0.6;                 // em
 constexpr double kAscent = 0.85, kDescent = 0.25;  // em
 
+constexpr const char* kHatch =
+    "<defs><pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" "
+    "patternTransform=\"rotate(45)\"><line x1=\"0\" y1=\"0\" x2=\"0\" y2=\"6\" "
+    "stroke=\"#909090\" stroke-width=\"1.6\"/></pattern></defs>\n";
+
 /// Bytes of the character of UTF-8 that begins here; 0: there is none.
 std::size_t character_at(std::string_view text) {
   const auto byte = [&](std::size_t k) {
@@ -70,6 +75,13 @@ std::string corners(const std::vector<Vector2d>& points) {
   return out;
 }
 
+/// Viewers reckon in 32 bits: what is far outside is left out.
+bool drawable(const std::vector<Vector2d>& points) {
+  return std::all_of(points.begin(), points.end(), [](const Vector2d& p) {
+    return p.allFinite() && p.cwiseAbs().maxCoeff() < 1e6;
+  });
+}
+
 bool is_free(const Box& box, const std::vector<Box>& of) {
   return std::none_of(of.begin(), of.end(), [&](const Box& each) { return each.meets(box); });
 }
@@ -90,26 +102,34 @@ std::string fitted(const std::string& text, double size, double width) {
 }
 
 void Canvas::line(const Vector2d& from, const Vector2d& to, const Pen& pen) {
+  if (!drawable({from, to})) return;
   drawn_ += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"{}/>\n",
                         from.x(), from.y(), to.x(), to.y(), stroke(pen));
 }
 
 void Canvas::path(const std::vector<Vector2d>& points, const Pen& pen) {
-  if (points.size() < 2) return;
+  if (points.size() < 2 || !drawable(points)) return;
   drawn_ += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke-linejoin=\"round\"{}/>\n",
                         corners(points), stroke(pen));
 }
 
 void Canvas::polygon(const std::vector<Vector2d>& points, const std::string& fill, const Pen& pen) {
-  if (points.size() < 2) return;
+  if (points.size() < 2 || !drawable(points)) return;
   drawn_ += fmt::format("<polygon points=\"{}\" fill=\"{}\" stroke-linejoin=\"round\"{}/>\n",
                         corners(points), fill.empty() ? "none" : fill, stroke(pen));
 }
 
 void Canvas::circle(const Vector2d& centre, double radius, const std::string& fill,
                     const Pen& pen) {
+  if (!drawable({centre})) return;
   drawn_ += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\"{}/>\n",
                         centre.x(), centre.y(), radius, fill.empty() ? "none" : fill, stroke(pen));
+}
+
+void Canvas::hatch(const std::vector<Vector2d>& points) {
+  if (points.size() < 3 || !drawable(points)) return;
+  hatched_ = true;
+  drawn_ += fmt::format("<polygon points=\"{}\" fill=\"url(#hatch)\"/>\n", corners(points));
 }
 
 void Canvas::begin_clip(const Box& box) {
@@ -123,6 +143,7 @@ void Canvas::end_clip() { drawn_ += "</g>\n"; }
 
 void Canvas::avoid(const Vector2d& from, const Vector2d& to) {
   constexpr double kPart = 4;
+  if (!drawable({from, to})) return;
   const int parts = std::max(1, static_cast<int>(std::min((to - from).norm() / kPart, 1000.0)));
   for (int k = 0; k <= parts; ++k) {
     const Vector2d p = from + (to - from) * k / parts;
@@ -160,7 +181,7 @@ std::string Canvas::svg(const std::string& title) const {
              "font-family=\"Helvetica, Arial, sans-serif\">\n<title>{2}</title>\n"
              "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"#ffffff\"/>\n",
              whole_.right, whole_.bottom, escaped(title)) +
-         drawn_ +
+         (hatched_ ? kHatch : "") + drawn_ +
          "<g stroke=\"#ffffff\" stroke-width=\"3\" stroke-linejoin=\"round\" "
          "paint-order=\"stroke\">\n" +
          texts_ + "</g>\n</svg>\n";

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -42,6 +43,10 @@ struct Font {
   std::string colour = "#202020";
 };
 
+/// Okabe and Ito: safe for colour-blind readers.
+inline constexpr std::array<const char*, 7> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                        "#e69f00", "#56b4e9", "#999999"};
+
 /// Width of the box of a text.
 double width_of(const std::string& text, double size);
 /// At most that wide: what does not fit becomes three dots.
@@ -57,6 +62,8 @@ class Canvas {
   /// An empty colour: not filled.
   void polygon(const std::vector<Vector2d>& points, const std::string& fill, const Pen& pen);
   void circle(const Vector2d& centre, double radius, const std::string& fill, const Pen& pen);
+  /// Lines over a polygon: what is held fast.
+  void hatch(const std::vector<Vector2d>& points);
   /// What is drawn between the two is seen inside of the box only.
   void begin_clip(const Box& box);
   void end_clip();
@@ -77,6 +84,7 @@ class Canvas {
   std::string drawn_, texts_;  // texts lie over all else
   std::vector<Box> taken_, avoided_;
   int clips_ = 0;
+  bool hatched_ = false;
 };
 
 }  // namespace tether::scene::picture

@@ -37,7 +37,6 @@ class Tether(CMakePackage):
         depends_on("nlohmann-json")
         depends_on("cli11")
         depends_on("tinyxml2")
-        depends_on("gnuplot", type="run")
 
     def cmake_args(self):
         return [

@@ -172,7 +172,7 @@ void add_run_command(CLI::App& app, int* status) {
   command->add_option("--output", a->folder, "Folder of all files written");
   command->add_option("--csv", a->csv, "Table: energies, momenta, errors, states of the bodies");
   command->add_option("--vtk", a->vtk, "Film for ParaView (.pvd, with a folder of .vtp)");
-  command->add_option("--svg", a->svg, "Picture (needs gnuplot)");
+  command->add_option("--svg", a->svg, "Picture: the scene, its energies and errors");
   command->add_option("--html", a->html, "Page that plays the run in a browser, on its own");
   command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
   command->add_option("--every", a->every, "Time between records, s")->check(positive_number());

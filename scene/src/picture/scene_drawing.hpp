@@ -1,0 +1,15 @@
+// Tether: a scene as it would be drawn by hand. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "view.hpp"
+
+namespace tether::scene::picture {
+
+/// The scene at the end of a motion, with outlines and paths of the way there: ground hatched,
+/// joints, rods, springs, names, a scale. `motion`: at least one; times in s.
+void draw_scene(Canvas& canvas, const Scene& scene, const std::vector<const Poses*>& motion,
+                double end, const Box& panel);
+
+}  // namespace tether::scene::picture
