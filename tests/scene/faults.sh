@@ -20,7 +20,7 @@ chmod 755 "$work"
 
 # arguments NAME FOLDER: the command line, in $line; `long_` ones go on for minutes.
 commands="run events cost sweep import new check plan contact"
-long_commands="long_run long_cost long_sweep long_plan"
+long_commands="long_run long_last long_cost long_sweep long_plan"
 arguments() {
   case $1 in
     run) line="run $work/pendulum.toml --end 0.2 --every 0.02 --quiet --output $2 --csv a.csv --vtk f.pvd
@@ -36,6 +36,7 @@ arguments() {
     contact) line="contact $work/problem.dat" ;;
     long_run) line="run $work/pendulum.toml --end 99999 --every 0.5 --quiet --output $2 --csv a.csv --vtk f.pvd
       --html a.html --state a.state" ;;
+    long_last) line="run $work/pendulum.toml --end 99999 --every 99999 --quiet --output $2 --state a.state" ;;
     long_cost) line="cost $work/long.toml --tolerances 1e-3:1e-9 --csv $2/a.csv --svg $2/a.svg" ;;
     long_sweep) line="sweep $work/long.toml --vary smooth.tolerance=1e-3,1e-4,1e-5 --jobs 2 --quiet --out $2/a.csv" ;;
     long_plan) line="plan $work/long.toml --run" ;;

@@ -106,8 +106,9 @@ class Run {
       for (const Event& event : schedule(scene_, options_.stops)) {
         if (event.time <= done_ || same_time(event.time, done_)) continue;
         move(event.time);
-        if (engine_->time() >= event.time || !interrupted()) stop(event);
-        if (!interrupted() || event.end) continue;
+        const bool there = engine_->time() >= event.time || !interrupted();
+        if (there) stop(event);
+        if (!interrupted() || (event.end && there)) continue;
         result_.interrupted = true;
         Event here;
         here.time = engine_->time();
