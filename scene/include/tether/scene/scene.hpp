@@ -51,7 +51,8 @@ struct Pair {
   double friction = 0;
   double restitution = 0;  ///< 0 .. 1
   Place place;
-  bool touch = true;  ///< false: they pass through each other
+  bool touch = true;                  ///< false: they pass through each other
+  double rolling = 0, torsional = 0;  ///< m: moments over the normal force
 };
 
 /// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points; torsional: about

@@ -1,0 +1,49 @@
+// Tether: rolling and torsional friction of contacts. SPDX-License-Identifier: BSD-3-Clause
+//
+// |moment across the normal| <= rolling * normal impulse, |moment about it| <= torsional * normal
+// impulse.
+#include <algorithm>
+
+#include "mechanics/effect.hpp"
+#include "range.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+class RollingFrictionEffect : public Effect {
+ public:
+  void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
+    pair.rolling = in.number("rolling", pair.rolling, files::kNotNegative, "m");
+    pair.torsional = in.number("torsional", pair.torsional, files::kNotNegative, "m");
+  }
+  void write_pair(const Pair& pair, files::Writer& out) const override {
+    if (pair.rolling > 0) out.field("rolling", pair.rolling, "m");
+    if (pair.torsional > 0) out.field("torsional", pair.torsional, "m");
+  }
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    const auto any = [&](double Pair::*value) {
+      return std::any_of(scene.pairs.begin(), scene.pairs.end(),
+                         [&](const Pair& pair) { return pair.*value > 0; });
+    };
+    if (any(&Pair::rolling))
+      lines.push_back({"rolling friction", range(scene.pairs, &Pair::rolling) + " m"});
+    if (any(&Pair::torsional))
+      lines.push_back({"torsional friction", range(scene.pairs, &Pair::torsional) + " m"});
+  }
+  void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {
+    meeting.rolling = pair.rolling;
+    meeting.torsional = pair.torsional;
+  }
+};
+
+}  // namespace
+
+const Effect& rolling_friction_effect() {
+  static const RollingFrictionEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects
