@@ -1,10 +1,12 @@
 // Takes the place of what a frictionless scene of spheres does not name: friction (all kernels but
-// the frictionless one, and the stages for assembled islands, which contain the laws), restitution,
-// gyroscopic terms. Whoever calls one of them fails. SPDX-License-Identifier: BSD-3-Clause
+// the frictionless one, and the stages for assembled islands, which contain the laws), rolling
+// friction, restitution, gyroscopic terms. Whoever calls one of them fails.
+// SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
 #include <cstdlib>
 
 #include "body_passes/body_kernels.hpp"
+#include "rolling/rolling_sweeps.hpp"
 #include "stepping/impacts/restitution.hpp"
 #include "stepping/motion/rotation.hpp"
 
@@ -38,6 +40,18 @@ Squares sweep(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
 Squares test(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction"); }
 Squares sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
 Squares test(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
+
+void RollingSweeps::begin(const std::vector<RigidBody>&, const std::vector<RollingContact>&) {
+  absent("rolling friction");
+}
+void RollingSweeps::solve(double, int, int) { absent("rolling friction"); }
+void RollingSweeps::set(int, const Eigen::Vector3d&, const Eigen::Vector3d&) {
+  absent("rolling friction");
+}
+double RollingSweeps::residual() const { absent("rolling friction"); }
+Eigen::Vector3d RollingSweeps::impulse(int) const { absent("rolling friction"); }
+Eigen::Vector3d RollingSweeps::moment(int) const { absent("rolling friction"); }
+Regime RollingSweeps::regime(int) const { absent("rolling friction"); }
 
 Restitution::Restitution(RestitutionLaw, const BodyOptions&) { absent("restitution"); }
 void Restitution::choose(const Impacts&, const Impacts&, const BodySet&, StepContacts&) {
