@@ -306,6 +306,28 @@ TEST_CASE("a saved run with a number that is not finite is refused, or does not 
   CHECK(refused > 13);
 }
 
+// A run looks at times within a step and ends at the end of that step; the steps of a restored one
+// are asked for that end alone.
+TEST_CASE("a run that ends with the step that it has just looked into is restored with its bits",
+          "[smooth]") {
+  for (const Formulation form : kForms) {
+    Scene s = four_bar(1, 1e-6);
+    s.smooth->formulation = form;
+    for (int k = 1; k <= 8; ++k) {
+      const auto a = make_smooth_engine(s);
+      a->advance(0.1 * k);
+      a->stop_when([] { return true; });
+      a->advance(1);  // to the end of the step
+      CHECK(a->time() < 1);
+      std::stringstream state;
+      a->save(state);
+      const auto b = make_smooth_engine(s);
+      CHECK_NOTHROW(b->restore(state));
+      CHECK(b->time() == a->time());
+    }
+  }
+}
+
 TEST_CASE("a saved run and a restored one go on with the same bits", "[smooth]") {
   for (const Formulation form : kForms) {
     Scene s = four_bar(1, 1e-6);

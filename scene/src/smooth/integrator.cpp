@@ -210,9 +210,11 @@ bool Integrator::advance(double t, long& steps_left, const std::function<bool()>
   const double from = t_;
   int flag = step_past(t, steps_left, interrupted);
   const double to = std::min(t, step_end());
-  // Also where a step ended there: whoever arrives in other pieces has the same bits.
   if (flag == IDA_SUCCESS && to > from) {
     flag = IDASolve(ida_, to, &t_, vectors_.y, vectors_.yp, IDA_NORMAL);
+    // IDA has nothing to do where its last step has just ended and leaves y as the corrector summed
+    // it; who comes from a time within that step reads it from the history, by other roundings.
+    if (flag >= 0 && to == step_end()) IDAGetDky(ida_, to, 0, vectors_.y);
     // Nobody looks at y' between steps.
     if (projection_ && flag >= 0) projection_->project(t_, vectors_.y, nullptr);
   }
