@@ -55,6 +55,10 @@ TEST_CASE("the plan lists exactly the effects that the scene names") {
   CHECK(effects(kSphere + kFloor + kPair + "friction = 0.1\n") == Names{"contact", "friction"});
   CHECK(effects(kSphere + kFloor + kPair + "restitution = 0.1\n") ==
         Names{"contact", "restitution"});
+  CHECK(effects(kSphere + kFloor + kPair + "rolling = 1e-3\n") ==
+        Names{"contact", "rolling friction"});
+  CHECK(effects(kSphere + kFloor + kPair + "torsional = 1e-3\n") ==
+        Names{"contact", "torsional friction"});
   CHECK(effects("[stepping]\nlaw = \"frictionless\"\n" + kSphere + kFloor + kPair +
                 "friction = 0.1\n") == Names{"contact"});
   CHECK(effects(with(kSphere, "mass = 1", "mass = 1\ninertia = [1, 2, 2]")) ==
