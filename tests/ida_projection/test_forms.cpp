@@ -93,8 +93,8 @@ void compare(const Problem& problem, double tolerance, Mean* mean) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(problem.error_components); ++i)
     apart = std::max(apart, std::abs(dense.y[i] - sparse.y[i]) / (1.0 + std::abs(dense.y[i])));
   if (problem.sparse_constraints) {
-    CHECK(apart <=
-          2.0 * tolerance);  // above 64 sparse rows factors and their D serve several steps
+    // Above 64 sparse rows factors and their D serve several steps.
+    CHECK(apart <= 2.0 * tolerance);
   } else {
     // Where rounding has changed no decision of IDA's, and within what such changes do.
     if (tolerance >= 1e-3 && problem.index < 2) CHECK(apart <= 1e-2 * tolerance);
