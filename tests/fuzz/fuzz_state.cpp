@@ -21,21 +21,184 @@ namespace {
 
 constexpr double kSaved = 0.03, kEnd = 0.05;
 
+// One for each engine, and for what a state of it holds: joints, laws, moments, parts of steps.
 const char* const kScenes[] = {
-    "[scene]\ngravity = [0, 0, -9.81]\n[smooth]\ntolerance = 1e-3\n[[body]]\nname = \"rod\"\nshape "
-    "= "
-    "\"capsule\"\nradius = 0.1\nlength = 1\nmass = 1\nposition = [0.5, 0, 0]\n[[joint]]\nkind = "
-    "\"ball\"\nbodies = [\"rod\", \"world\"]\nat = [0, 0, 0]\n[[expect]]\nquantity = "
-    "\"energy_change\"\nthroughout = true\nat_most = 1\n",
-    "[scene]\ngravity = [0.1, 0, -9.81]\n[stepping]\nstep = 5e-3\non_failure = "
-    "\"warn\"\n[[body]]\nname = "
-    "\"floor\"\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n[[pair]]\nbetween = [\"a\", "
-    "\"a\"]\nfriction = 0.4\nrestitution = 0.3\n[[body]]\nname = \"one\"\nshape = "
-    "\"sphere\"\nradius = "
-    "0.1\nmass = 1\nposition = [0, 0, 0.1]\nmaterial = \"a\"\n[[body]]\nname = \"two\"\nshape = "
-    "\"sphere\"\nradius = 0.1\nmass = 2\nposition = [0.02, 0.01, 0.3]\nmaterial = "
-    "\"a\"\n[[expect]]\n"
-    "quantity = \"position\"\nbody = \"one\"\nvalue = [0, 0, 0.1]\nwithin = 1\n"};
+    R"([scene]
+gravity = [0, 0, -9.81]
+[smooth]
+tolerance = 1e-3
+[[body]]
+name = "rod"
+shape = "capsule"
+radius = 0.1
+length = 1
+mass = 1
+position = [0.5, 0, 0]
+[[joint]]
+kind = "ball"
+bodies = ["rod", "world"]
+at = [0, 0, 0]
+[[expect]]
+quantity = "energy_change"
+throughout = true
+at_most = 1
+)",
+    R"([scene]
+gravity = [0.1, 0, -9.81]
+[stepping]
+step = 5e-3
+on_failure = "warn"
+[[body]]
+name = "floor"
+shape = "plane"
+fixed = true
+material = "a"
+[[pair]]
+between = ["a", "a"]
+friction = 0.4
+restitution = 0.3
+[[body]]
+name = "one"
+shape = "sphere"
+radius = 0.1
+mass = 1
+position = [0, 0, 0.1]
+material = "a"
+[[body]]
+name = "two"
+shape = "sphere"
+radius = 0.1
+mass = 2
+position = [0.02, 0.01, 0.3]
+material = "a"
+[[expect]]
+quantity = "position"
+body = "one"
+value = [0, 0, 0.1]
+within = 1
+)",
+    R"([scene]
+gravity = [0, 0, -9.81]
+[event]
+tolerance = 1e-4
+[[body]]
+name = "floor"
+shape = "plane"
+fixed = true
+material = "a"
+[[pair]]
+between = ["a", "a"]
+friction = 0.3
+restitution = 0.5
+[[body]]
+name = "ball"
+shape = "sphere"
+radius = 0.1
+mass = 1
+position = [0, 0, 0.103]
+velocity = [1, 0, -1]
+material = "a"
+[[body]]
+name = "slides"
+shape = "box"
+size = [0.2, 0.2, 0.1]
+mass = 1
+position = [1, 0, 0.05]
+velocity = [0.1, 0, 0]
+material = "a"
+[[expect]]
+quantity = "speed"
+body = "ball"
+at_most = 10
+)",
+    R"([scene]
+gravity = [0, 0, -9.81]
+[stepping]
+step = 1e-2
+accuracy = 1e-3
+gyroscopic = "momentum"
+[[body]]
+name = "floor"
+shape = "plane"
+fixed = true
+material = "a"
+[[body]]
+name = "lift"
+shape = "box"
+size = [0.1, 0.2, 0.1]
+mass = 1
+position = [0, 0, 0.3]
+[[body]]
+name = "hangs"
+shape = "cylinder"
+radius = 0.1
+length = 0.3
+mass = 1
+position = [0.3, 0, 0.3]
+angular_velocity = [0, 1, 2]
+material = "a"
+[[body]]
+name = "free"
+shape = "ellipsoid"
+half_axes = [0.1, 0.2, 0.3]
+mass = 1
+position = [3, 0, 0.29]
+angular_velocity = [3, 0.1, 0]
+material = "a"
+[[joint]]
+kind = "slider"
+bodies = ["lift", "world"]
+axis = [0, 0, 1]
+limits = [-0.01, 0.001]
+limit_restitution = 0.5
+motor = { rate = 1, force = 20 }
+friction = 0.1
+[[joint]]
+kind = "hinge"
+bodies = ["hangs", "lift"]
+at = [0.1, 0, 0.3]
+axis = [0, 1, 0]
+[[pair]]
+between = ["a", "a"]
+friction = 0.3
+[[expect]]
+quantity = "joint_drive"
+joint = "joint 1"
+at_most = 1e3
+)",
+    R"([scene]
+gravity = [0, 0, -9.81]
+[stepping]
+step = 5e-3
+[output]
+forces = true
+[[body]]
+name = "felt"
+shape = "plane"
+fixed = true
+material = "felt"
+[[body]]
+name = "rolls"
+shape = "sphere"
+radius = 0.1
+mass = 1
+position = [0, 0, 0.1]
+velocity = [0.5, 0, 0]
+angular_velocity = [0, 5, 1]
+material = "ball"
+[[pair]]
+between = ["ball", "felt"]
+friction = 0.5
+rolling = 0.002
+torsional = 0.001
+[[pair]]
+between = ["ball", "ball"]
+[[expect]]
+quantity = "contact_force"
+body = "rolls"
+against = "felt"
+at_most = 1e3
+)"};
 
 Scene scene_of(std::size_t k) {
   Scene scene = parse_scene(kScenes[k], "fuzz.toml");

@@ -5,6 +5,7 @@ that should notice. SPDX-License-Identifier: BSD-3-Clause
     python3 tests/mutations/run.py --check             every mutation still has its place
     python3 tests/mutations/run.py                     all, in build/mutations
     python3 tests/mutations/run.py contact Nesterov    of one file, or with a word in the title
+    python3 tests/mutations/run.py --every 2           the first, the third, ... of each part
     python3 tests/mutations/run.py --log FILE          goes on: those with a verdict in FILE are done
 
 Two at once need two trees: run.py contact --tree /tmp/a, run.py scene --tree /tmp/b.
@@ -21,13 +22,16 @@ A mutation in linalg.txt, ida_projection.txt, contact.txt or scene.txt:
     + what replaces it
 
 A mutation is killed if a program fails to build, fails, or takes ten times as long as before and more
-than a minute. Killed by what does not compile is said: such a mutation says nothing about the tests.
-Exit code: 0 all killed or equivalent, 1 survivors, 2 a mutation without a place or an equivalent one
-that was killed after all.
+than a minute, of the processor: a machine with other work judges alike. Killed by what does not compile
+is said: such a mutation says nothing about the tests. Neither does one whose tests fail on the sources as
+they are: NO VERDICT.
+Exit code: 0 all killed or equivalent, 1 survivors, 2 a mutation without a place or a verdict or an
+equivalent one that was killed after all.
 """
 import argparse
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -139,7 +143,7 @@ def program_path(tree, target):
 
 
 def run(tree, programs, tests, limit):
-    """True: the tests passed."""
+    """True: the tests passed, in `limit` seconds of the processor (a program that waits: twenty times that)."""
     path = program_path(tree, programs[0])
     if tests.startswith("sh "):
         places = {"{" + name + "}": program_path(tree, name) for name in programs}
@@ -154,13 +158,22 @@ def run(tree, programs, tests, limit):
             command += [tests, "--abort"]
         else:
             command += ["--abort"]
+    def bound():
+        resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit)))
+
     try:
-        done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=limit)
+        done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=20 * limit,
+                              preexec_fn=bound)
     except subprocess.TimeoutExpired:
         return False
     if b"No test cases matched" in done.stdout or b"No tests ran" in done.stdout:
         sys.exit(f"{programs[0]}: no test is called {tests}")
     return done.returncode == 0
+
+
+def seconds_of_children():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def targets_of(programs):
@@ -173,6 +186,7 @@ parser.add_argument("--check", action="store_true", help="only whether each has 
 parser.add_argument("--tree", default=os.path.join(ROOT, "build", "mutations"), help="where the copy is")
 parser.add_argument("--jobs", type=int, default=os.cpu_count())
 parser.add_argument("--seconds", type=float, default=0, help="begin no other one after this time")
+parser.add_argument("--every", type=int, default=1, help="this part of each list")
 parser.add_argument("--log", default="", help="verdicts are added here; those with one are not run again")
 parser.add_argument("--cmake", default="", help="further arguments of cmake")
 args = parser.parse_args()
@@ -181,6 +195,7 @@ all_mutations = [m for part in PARTS for m in read_list(part)]
 chosen = [m for m in all_mutations
           if not args.words or m.part in args.words or
           any(w not in PARTS and w.lower() in m.title.lower() for w in args.words)]
+chosen = [m for part in PARTS for m in [m for m in chosen if m.part == part][::max(1, args.every)]]
 misplaced = []
 for m in all_mutations:
     name = os.path.join(ROOT, m.file or "-")
@@ -202,8 +217,8 @@ subprocess.check_call(["cmake", "-S", ".", "-B", BUILD, *generator, *launcher, "
                        "-DTETHER_BUILD_BENCHMARKS=OFF", "-DTETHER_BUILD_PYTHON=OFF", *args.cmake.split()],
                       cwd=args.tree, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
-usual = {}  # seconds of tests on sources as they are
-count = {"killed": 0, "does not compile": 0, "SURVIVED": 0, "equivalent": 0, "EQUIVALENT, KILLED": 0}
+usual = {}  # seconds of tests on sources as they are; None: they fail
+count = {"killed": 0, "does not compile": 0, "SURVIVED": 0, "equivalent": 0, "EQUIVALENT, KILLED": 0, "NO VERDICT": 0}
 begin = time.time()
 left_out = 0
 for m in chosen:
@@ -220,15 +235,19 @@ for m in chosen:
         if done.returncode != 0:
             sys.exit("the sources as they are do not build:\n" + done.stdout[-3000:])
         for each in missing:
-            start = time.time()
-            if not run(args.tree, *each, 3600):
-                sys.exit(f"{each[0][0]} | {each[1]}: fails on the sources as they are")
-            usual[each] = time.time() - start
+            start = seconds_of_children()
+            passes = run(args.tree, *each, 3600)
+            usual[each] = seconds_of_children() - start if passes else None
+            if not passes:
+                print(f"{each[0][0]} | {each[1]}: fails on the sources as they are", flush=True)
     verdict, by = "SURVIVED", ""
     try:
         with open(file, "w", encoding="utf-8") as out:
             out.write(mutated(m, source)[0])
         for each in m.kill:
+            if usual[each] is None:
+                verdict = "NO VERDICT"
+                continue
             if build(args.tree, targets_of(each[0])).returncode != 0:
                 verdict = "does not compile"
                 break
@@ -242,11 +261,11 @@ for m in chosen:
         verdict = "equivalent" if verdict == "SURVIVED" else "EQUIVALENT, KILLED" if verdict == "killed" else verdict
     count[verdict] += 1
     print(f"{verdict:18} {m.part}: {m.title}{by}", flush=True)
-    if args.log:
+    if args.log and verdict != "NO VERDICT":
         with open(args.log, "a", encoding="utf-8") as out:
             out.write(f"{verdict}\t{m.part}: {m.title}\n")
 
 print(", ".join(f"{n} {what}" for what, n in count.items() if n) + (f", {left_out} not begun" if left_out else ""))
-if misplaced or count["EQUIVALENT, KILLED"]:
+if misplaced or count["EQUIVALENT, KILLED"] or count["NO VERDICT"]:
     sys.exit(2)
 sys.exit(1 if count["SURVIVED"] or count["does not compile"] else 0)

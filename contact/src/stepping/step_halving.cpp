@@ -14,8 +14,21 @@ void Stepper::Implementation::step() {
     advance_accurately(start, length);
   else
     advance(start, length, options.max_halvings);
+  if (!is_finite()) {
+    outcome.succeeded = false;
+    outcome.status = Status::unsolved;
+  }
   late = 0;
   ++counts.steps;
+}
+
+// Velocities near the largest number leave none to the next operation.
+bool Stepper::Implementation::is_finite() const {
+  for (std::size_t i = 0; i < bodies.position.size(); ++i)
+    if (!bodies.position[i].allFinite() || !bodies.orientation[i].coeffs().allFinite() ||
+        !bodies.motion[i].velocity.allFinite() || !bodies.motion[i].angular_velocity.allFinite())
+      return false;
+  return true;
 }
 
 void Stepper::Implementation::advance(double time, double length, int halvings) {

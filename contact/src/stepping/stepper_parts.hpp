@@ -108,6 +108,7 @@ struct Stepper::Implementation {
   void make_solvers();
   void give_islands(detail::IslandMaker& maker);
   void step();
+  bool is_finite() const;
   void advance(double time, double length, int halvings);
   bool run_stages(double time);
   void solve_problem();

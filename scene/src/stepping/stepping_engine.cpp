@@ -139,6 +139,13 @@ void SteppingEngine::step() {
 
 void SteppingEngine::report_failure() const {
   std::ostringstream text;
+  for (const BodyState& b : bodies_)
+    if (!b.position.allFinite() || !b.orientation.coeffs().allFinite() || !b.velocity.allFinite() ||
+        !b.angular_velocity.allFinite()) {
+      text << "t = " << time() << " s: the motion has left the range of numbers, about 1e-150 to "
+           << "1e150 in SI units, or a step is far too long for it";
+      throw SimulationError(text.str());
+    }
   text << "t = " << time() << " s: the contact problem (" << stepper_.contacts().points.size()
        << " contacts) was not solved: " << contact::name(stepper_.status()) << " at a residual of "
        << stepper_.residual() << ", wanted " << stepper_.options().tolerance

@@ -163,5 +163,9 @@ TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with
   refused(world("<include file='x'/>"), "is not read");
   refused(world("", "<compiler coordinate='global'/>"), "must be local");
   refused(world("<body><joint/><geom size='1' quat='0 0 0 0'/></body>"), "quat");
+  for (const char* sequence : {"pyZ", "x", "", "xyzx"})
+    refused(world("<body><joint/><geom size='1' euler='1 2 3'/></body>",
+                  std::string("<compiler eulerseq='") + sequence + "'/>"),
+            "must be three of the letters");
   refused(world("<body><joint/><body><freejoint/><geom size='1'/></body></body>"), "free joint");
 }

@@ -42,9 +42,6 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
       row_(at(equations_->rows())),
       impulses_(row_.g.size()) {
   factor(bodies, 0);
-  if (rows_.count() != equations_->rows())
-    throw std::invalid_argument("joints: " + std::to_string(rows_.count()) + " rows instead of " +
-                                std::to_string(equations_->rows()));
   for (int i = 0; i < bodies.size(); ++i)
     if (holds(i)) held_.push_back(i);
   for (const int i : held_) round_.push_back(is_isotropic(bodies.inertia[at(i)]));
@@ -81,12 +78,54 @@ void StepJoints::list_laws(std::vector<int>& out) const {
     out.push_back(laws_.impulses[at(k)] == 0 ? 0 : laws_.at_bound(k) != 0 ? laws_.at_bound(k) : 2);
 }
 
-// Equations of the positions at time t.
+// Equations of the positions at time t. Factors are of no place while they are made: the caller's
+// equations may throw.
 void StepJoints::factor(const BodySet& bodies, double t) {
+  factored_.clear();
   rows_.clear();
   equations_->add_rows(bodies, t, rows_);
+  check_rows(t);
   mechanisms_.update(bodies.motion, rows_);
   factored_.set(bodies, t);
+}
+
+// All storage is as long as the first rows, and on their bodies.
+void StepJoints::check_rows(double t) {
+  const auto refuse_other = [t](const std::string& what) {
+    throw std::invalid_argument(what + " (JointEquations::add_rows at t = " + std::to_string(t) +
+                                " s): rows and their bodies do not change");
+  };
+  if (at(rows_.count()) != row_.g.size())
+    refuse_other("joints: " + std::to_string(rows_.count()) + " rows instead of " +
+                 std::to_string(row_.g.size()));
+  const bool first = bodies_of_rows_.empty();
+  std::size_t k = 0;
+  for (int row = 0; row < rows_.count(); ++row) {
+    for (const JointRows::Term* term = rows_.begin(row); term <= rows_.end(row); ++term) {
+      const int body = term < rows_.end(row) ? term->body : -1;
+      if (first)
+        bodies_of_rows_.push_back(body);
+      else if (k >= bodies_of_rows_.size() || bodies_of_rows_[k++] != body)
+        refuse_other(equations_->name(rows_.joint(row)) + ": row " + std::to_string(row) +
+                     " is on other bodies than at first");
+    }
+  }
+}
+
+void StepJoints::check_laws(const BodySet& bodies) {
+  const JointRows& rows = laws_.laws.rows();
+  if (laws_in_step_ < 0) laws_in_step_ = rows.count();
+  if (rows.count() != laws_in_step_)
+    throw std::invalid_argument("joints: " + std::to_string(rows.count()) + " laws instead of " +
+                                std::to_string(laws_in_step_) +
+                                " (JointEquations::add_laws): always as many");
+  for (int law = 0; law < rows.count(); ++law)
+    for (const JointRows::Term* term = rows.begin(law); term != rows.end(law); ++term)
+      if (term->body >= bodies.size() ||
+          (bodies.motion[at(term->body)].moves() && !holds(term->body)))
+        throw std::invalid_argument(equations_->name(rows.joint(law)) + ": law " +
+                                    std::to_string(law) + " is on body " +
+                                    std::to_string(term->body) + ", which no joint holds");
 }
 
 void StepJoints::FactoredAt::set(const BodySet& bodies, double t) {
@@ -273,6 +312,7 @@ void StepJoints::predict(BodySet& bodies, double t, double dt) {
   if (!has_laws_) return;
   laws_.laws.clear();
   equations_->add_laws(bodies, t, laws_.laws);
+  check_laws(bodies);
   laws_.prepare(v_, dt);
 }
 
@@ -347,8 +387,9 @@ bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& 
   for (std::size_t row = 0; row < impulses_.size(); ++row) impulses_[row] += row_.x[row];
   equations_->values(bodies, t + dt, row_.g.data());
   drift_ = 0;
-  for (const double g : row_.g) drift_ = std::max(drift_, std::abs(g));
-  return met;
+  for (const double g : row_.g)
+    if (!(std::abs(g) <= drift_)) drift_ = std::isnan(drift_) ? drift_ : std::abs(g);
+  return met && std::isfinite(drift_);
 }
 
 }  // namespace tether::contact::detail

@@ -77,6 +77,8 @@ class StepJoints final : public JointPart {
   };
   void put_onto(BodySet& bodies, double t);
   void factor(const BodySet& bodies, double t);
+  void check_rows(double t);
+  void check_laws(const BodySet& bodies);
   void take_velocities(const BodySet& bodies);
   void give_velocities(BodySet& bodies) const;
   double size(const BodySet& bodies) const;
@@ -97,8 +99,10 @@ class StepJoints final : public JointPart {
   bool has_laws_;
   LawRows laws_;
   JointRows rows_;
-  std::vector<int> held_;    // bodies of mechanisms
-  std::vector<char> round_;  // of them: of inertia 1
+  std::vector<int> bodies_of_rows_;  // of the first rows; -1 behind each
+  int laws_in_step_ = -1;            // of the first step
+  std::vector<int> held_;            // bodies of mechanisms
+  std::vector<char> round_;          // of them: of inertia 1
   std::vector<std::pair<int, int>> links_, joined_;
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
   RowVectors row_;

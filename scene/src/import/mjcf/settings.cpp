@@ -20,8 +20,10 @@ void read_compiler(const Node& node, Settings& out, Problems& problems, Remarks&
   if (tag.text("coordinate", "local") != "local")
     tag.wrong("coordinate", "must be local; global ones were dropped by MuJoCo 2.3.4");
   out.euler = tag.text("eulerseq", out.euler);
-  if (out.euler.size() != 3 || out.euler.find_first_not_of("xyzXYZ") != std::string::npos)
+  if (out.euler.size() != 3 || out.euler.find_first_not_of("xyzXYZ") != std::string::npos) {
     tag.wrong("eulerseq", "must be three of the letters x, y, z, X, Y, Z");
+    out.euler = "xyz";  // orientations are read on, for further errors
+  }
   const std::string from = tag.text("inertiafromgeom", "auto");
   if (from != "auto" && from != "true" && from != "false")
     tag.wrong("inertiafromgeom", "must be true, false or auto");
