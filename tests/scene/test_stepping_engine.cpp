@@ -126,17 +126,20 @@ TEST_CASE("stepping engine: states of the format before are read, others refused
   std::stringstream saved;
   a->save(saved);
   std::string state = saved.str();
-  REQUIRE(state[7] == '4');
-  // Format 3 lacked the four lengths at the end that control the parts of a step; format 2 had a
-  // fourth warm start behind steps and the other three, too. All are empty at the start.
+  REQUIRE(state[7] == '5');
+  // Format 4 lacked the joints' drift at the end. Format 3 lacked the four lengths at the end that
+  // control the parts of a step; format 2 had a fourth warm start behind steps and the other three,
+  // too. All are empty at the start.
   const std::size_t head = 8 + 3 * 8 + scene.bodies.size() * 13 * 8;
-  std::string third = state.substr(0, state.size() - 4 * 8);
+  std::string fourth = state.substr(0, state.size() - 8);
+  fourth[7] = '4';
+  std::string third = fourth.substr(0, fourth.size() - 4 * 8);
   third[7] = '3';
   std::string second = third;
   second[7] = '2';
   second.insert(head + 4 * 8, 8, '\0');
   a->advance(0.3);
-  for (const std::string& before : {third, second}) {
+  for (const std::string& before : {fourth, third, second}) {
     const auto c = make_stepping_engine(scene);
     std::istringstream old(before);
     c->restore(old);

@@ -161,6 +161,7 @@ StepperMemory Stepper::memory() const {
   m.residual = s.outcome.residual;
   m.status = s.outcome.status;
   m.control = s.parts.control;
+  m.drift = joint_drift();
   return m;
 }
 
@@ -186,6 +187,7 @@ void Stepper::set_memory(const StepperMemory& m) {
   s.outcome.residual = m.residual;
   s.outcome.status = m.status;
   s.parts.control = m.control;
+  if (s.joints) s.joints->set_drift(m.drift);
 }
 
 void Stepper::start_anew(long steps, double late) {

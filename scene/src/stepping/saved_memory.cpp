@@ -74,7 +74,7 @@ void put_memory(std::ostream& out, const StepperMemory& m) {
     binary::put_array(out, m.last.impulses[k]);
   }
   binary::put(out, m.penetration, m.residual, static_cast<std::int32_t>(m.status));
-  binary::put(out, m.control.next, m.control.last, m.control.error, m.control.length);
+  binary::put(out, m.control.next, m.control.last, m.control.error, m.control.length, m.drift);
 }
 
 StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
@@ -103,11 +103,15 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
   m.status = static_cast<contact::Status>(status);
   if (contact::name(m.status) == std::string_view("?"))
     throw std::runtime_error("the saved state is damaged: no contact problem ends so");
-  if (format != MemoryFormat::now) return m;
+  if (format < MemoryFormat::without_drift) return m;
   binary::get(in, m.control.next, m.control.last, m.control.error, m.control.length);
   for (const double x : {m.control.next, m.control.last, m.control.error, m.control.length})
     if (!(x >= 0) || !std::isfinite(x))
       throw std::runtime_error("the saved state is damaged: no part of a step is so long");
+  if (format == MemoryFormat::without_drift) return m;
+  binary::get(in, m.drift);
+  if (!(m.drift >= 0))
+    throw std::runtime_error("the saved state is damaged: joints are off by less than nothing");
   return m;
 }
 

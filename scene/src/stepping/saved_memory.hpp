@@ -8,8 +8,9 @@
 
 namespace tether::scene::stepping {
 
-/// With a fourth warm start, of which nothing hung; without the control of parts of steps; as now.
-enum class MemoryFormat : std::uint8_t { with_closings, without_control, now };
+/// With a fourth warm start, of which nothing hung; without the control of parts of steps; without
+/// the joints' drift; as now.
+enum class MemoryFormat : std::uint8_t { with_closings, without_control, without_drift, now };
 
 void put_memory(std::ostream& out, const contact::StepperMemory& memory);
 /// Throws std::runtime_error on a memory that no stepper of so many bodies has written.

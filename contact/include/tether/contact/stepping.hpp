@@ -180,6 +180,7 @@ struct StepperMemory {
   struct Control {
     double next = 0, last = 0, error = 0, length = 0;
   } control;
+  double drift = 0;  ///< of the joints, m or rad
 };
 
 struct StageCost {

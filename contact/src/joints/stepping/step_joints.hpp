@@ -47,6 +47,7 @@ class StepJoints final : public JointPart {
 
   /// Largest |g| at the end of the last step, m or rad.
   double drift() const override { return drift_; }
+  void set_drift(double drift) override { drift_ = drift; }
   /// Impulses of the last step, by row.
   const std::vector<double>& impulses() const override { return impulses_; }
 

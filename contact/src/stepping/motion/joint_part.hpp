@@ -63,6 +63,7 @@ class JointPart : public IslandMaker {
   virtual const std::vector<Strike>& strikes() const = 0;
   virtual const std::vector<double>& law_impulses() const = 0;
   virtual double drift() const = 0;
+  virtual void set_drift(double drift) = 0;
   virtual const std::vector<double>& impulses() const = 0;
 };
 
