@@ -62,8 +62,9 @@ std::unique_ptr<Mover> make_mover(const Constraints& constraints, const Options&
   if (constraints.total_count() == 0) return nullptr;
   if (std::holds_alternative<Gradients>(constraints.jacobian))
     return make_gradient_mover(constraints, options, statistics, like);
-  return has_sparse_rows(constraints) ? make_sparse_mover(constraints, options, statistics, size)
-                                      : make_dense_mover(constraints, options, statistics, size);
+  return wants_sparse_factors(constraints, size)
+             ? make_sparse_mover(constraints, options, statistics, size)
+             : make_dense_mover(constraints, options, statistics, size);
 }
 
 }  // namespace

@@ -21,15 +21,34 @@ long first_not_finite(const double* a, long n) {
   return -1;
 }
 
+// Beyond that C as a whole, of which next to nothing is filled, costs more than its entries.
+constexpr int kSmallCount = 128;
+constexpr double kSmallMatrix = 65536.0;
+
+bool has_sparse_rows(const Constraints& set) {
+  return std::holds_alternative<SparseJacobian>(set.jacobian) ||
+         std::any_of(set.joined.begin(), set.joined.end(), has_sparse_rows);
+}
+
+// A row whose pattern is empty can never move anything, which a row of zeros may yet do.
+bool has_rows_without_entries(const Constraints& set) {
+  const auto* given = std::get_if<SparseJacobian>(&set.jacobian);
+  return (given != nullptr &&
+          std::adjacent_find(given->starts.begin(), given->starts.end()) != given->starts.end()) ||
+         std::any_of(set.joined.begin(), set.joined.end(), has_rows_without_entries);
+}
+
 }  // namespace
 
 bool all_finite(const double* a, std::size_t n) {
   return first_not_finite(a, static_cast<long>(n)) < 0;
 }
 
-bool has_sparse_rows(const Constraints& set) {
-  return std::holds_alternative<SparseJacobian>(set.jacobian) ||
-         std::any_of(set.joined.begin(), set.joined.end(), has_sparse_rows);
+bool wants_sparse_factors(const Constraints& set, int n) {
+  const int rows = set.total_count();
+  return has_sparse_rows(set) &&
+         (rows > kSmallCount || static_cast<double>(rows) * n > kSmallMatrix ||
+          has_rows_without_entries(set));
 }
 
 bool has_values(const Constraints& set) {

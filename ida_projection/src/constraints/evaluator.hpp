@@ -29,8 +29,10 @@ int guarded(Call&& call, std::string& message) noexcept {
   }
 }
 
-/// Are there rows with a SparseJacobian in the set or in the sets joined to it?
-bool has_sparse_rows(const Constraints& set);
+/// Do the rows on n unknowns get sparse factors? Those of a set with a SparseJacobian in it that is
+/// large. A small one gets the factors of dense rows, however it is given: the same rows then make
+/// the same run, bit for bit, and factors with pivots find their rank.
+bool wants_sparse_factors(const Constraints& set, int n);
 /// Is g given by Constraints::value, and C by entries or differences?
 bool has_values(const Constraints& set);
 

@@ -162,7 +162,7 @@ class ContiguousTangent final : public TangentRows {
 std::unique_ptr<TangentRows> make_contiguous_tangent(const Constraints& constraints,
                                                      const Options& options, Statistics& statistics,
                                                      int size) {
-  if (has_sparse_rows(constraints))
+  if (wants_sparse_factors(constraints, size))
     return std::make_unique<ContiguousTangent<SparseRows>>(constraints, options, statistics, size);
   return std::make_unique<ContiguousTangent<RowBlocks>>(constraints, options, statistics, size);
 }

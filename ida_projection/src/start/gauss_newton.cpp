@@ -247,7 +247,7 @@ bool GaussNewtonOn<Rows>::tangent(double t, const std::vector<double>& y, double
 }  // namespace
 
 std::unique_ptr<GaussNewton> make_gauss_newton(const Constraints& constraints, int size) {
-  if (has_sparse_rows(constraints))
+  if (wants_sparse_factors(constraints, size))
     return std::make_unique<GaussNewtonOn<SparseRows>>(constraints, size);
   return std::make_unique<GaussNewtonOn<RowBlocks>>(constraints, size);
 }

@@ -59,7 +59,7 @@ void JoinedRows::join(const Candidate& candidate, double cj) {
   if (found.equations.empty()) return;
   joined_ = constraints_ + as_constraints(
                                found, residual, [this] { return present_.weight_entries; }, size);
-  mover_ = has_sparse_rows(constraints_)
+  mover_ = wants_sparse_factors(joined_, size)
                ? make_sparse_mover(joined_, options_, statistics_, size, rows.rows())
                : make_dense_mover(joined_, options_, statistics_, size, rows.rows());
   mover_->reset();
