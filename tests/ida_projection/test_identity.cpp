@@ -98,6 +98,54 @@ TEST_CASE("a linear invariant that BDF keeps by itself") {
   }
 }
 
+TEST_CASE("a look at rows that are kept costs g, and C now and then") {
+  const Problem problem = robertson(40.0, "index 0");
+  for (const double tolerance : {1e-4, 1e-6, 3e-8}) {
+    INFO("tolerance " << tolerance);
+    Host host(problem, tolerance);
+    host.attach(problem.recommended_constraints());
+    REQUIRE(host.finish() >= 0);
+    const tp::Statistics s = host.projection().statistics();
+    CHECK(s.skipped >= host.steps());
+    CHECK(s.value_evaluations <= s.skipped + 10);
+    CHECK(10 * s.jacobian_evaluations <= s.skipped);
+    CHECK(10 * s.factorizations <= s.skipped);
+    CHECK(s.iterations == 0);
+  }
+}
+
+TEST_CASE("rows that are kept up to some time are moved onto as soon as they are not") {
+  // A mass that rounds, and a rotation that begins smoothly at t = 2.
+  const Problem late = ode({1.0, 0.0, 0.7, 0.3}, 10.0, [](double t, const double* y, double* f) {
+    const double speed = t > 2.0 ? 0.3 * (t - 2.0) * (t - 2.0) : 0.0;
+    f[0] = -speed * y[1];
+    f[1] = speed * y[0];
+    f[2] = -y[2] * (1.0 + 0.5 * std::sin(3.0 * t));
+    f[3] = -f[2];
+  });
+  const tp::Constraints rows =
+      tp::linear_invariant({0.0, 0.0, 1.0, 1.0}, 1.0) +
+      tp::invariant([](tp::ConstVector y) { return (y[0] * y[0] + y[1] * y[1]) / 2.0; },
+                    [](tp::ConstVector y, tp::Vector gradient) {
+                      gradient[0] = y[0];
+                      gradient[1] = y[1];
+                    },
+                    0.5);
+  for (const double tolerance : {1e-4, 1e-6, 1e-9}) {
+    INFO("tolerance " << tolerance);
+    Host host(late, tolerance);
+    host.attach(rows);
+    double drift = 0.0;
+    while (host.t < late.t_end) {
+      REQUIRE(host.step() >= 0);
+      const auto y = host.state();
+      drift = std::max(drift, std::abs((y[0] * y[0] + y[1] * y[1] - 1.0) / 2.0));
+    }
+    CHECK(drift <= 1e-4 * tolerance + 1e-15);  // Options::tolerance
+    CHECK(host.projection().statistics().projections > 0);
+  }
+}
+
 TEST_CASE("at rest where every row has its zero: nothing moves, ever") {
   // Pendulum hanging still: the energy row is parallel to the length row, g is exactly 0.
   Problem rest = pendulum(1.0, 9.80665, 50.0, "index 1");

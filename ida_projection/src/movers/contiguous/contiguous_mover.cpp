@@ -9,6 +9,8 @@ namespace {
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
 constexpr double kForLater = 0.1;
 constexpr double kNothing = 1e-8;  // tolerances: as good as no move
+constexpr double kTurned = 4.0;    // by so much C of an earlier look may mislead
+constexpr int kLooks = 16;         // looks with the factors of one
 constexpr int kQuick = 3;          // moves with a whole C
 
 }  // namespace
@@ -34,6 +36,19 @@ bool ContiguousMover<Rows>::contradicts() {
   return true;
 }
 
+// Do C and the factors of an earlier look show that there is nothing to do? A run whose constraints
+// IDA keeps by itself looks at every step and finds rounding: g alone tells, while what its factors
+// make of it is far below the length at which moves begin.
+template <class Rows>
+bool ContiguousMover<Rows>::plainly_nothing() {
+  const FactorState& factors = rows_.factors;
+  if (!factors.there || factors.thin || rows_.blocks.dropped_rows() || looks_ >= kLooks)
+    return false;
+  ++looks_;
+  ++kept_.age;
+  return rows_.rounding_only() || kTurned * rows_.look() <= kNothing;
+}
+
 template <class Rows>
 Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   Move result;
@@ -41,9 +56,12 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   if (!rows_.blocks.structured() &&
       (result.status = rows_.structure(candidate, nullptr)) != Status::success)
     return result;
-  if ((result.status = rows_.value_with_rows(candidate.t)) != Status::success) return result;
+  const bool may_do = rows_.factors.there && looks_ < kLooks;  // with g alone
+  result.status = may_do ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
+  if (result.status != Status::success) return result;
   result.drift_before = result.drift_after = rows_.drift();
-  if (result.drift_before == 0.0) return result;
+  if (result.drift_before == 0.0 || plainly_nothing()) return result;
+  looks_ = 0;
   rows_.set_metric(true);
   rows_.factors.decided = false;
   if (!takes_rest_) rows_.factors.lasting = false;

@@ -87,6 +87,7 @@ class ContiguousMover final : public Mover {
   }
   double first_solve() { return rows_.first_solve(firm_only_); }
   bool contradicts();
+  bool plainly_nothing();
   bool must_learn(double length) const;
   void restart(const Candidate& candidate);
   Move newton(const Candidate& candidate, double drift_before);
@@ -104,6 +105,7 @@ class ContiguousMover final : public Mover {
   double move_length_ = 0.0;  // of the last first move, in tolerances
   bool reused_ = false;       // factors of an earlier step are in use for this one
   SlopeOfFactors kept_;       // these
+  int looks_ = 0;             // of measure() with the factors of an earlier one
   Staleness staleness_;
   FactorWear wear_;  // for follow()
 };

@@ -77,6 +77,11 @@ class FactoredRows {
   /// The move for g by the factors at hand; returns its WRMS length in the error norm. Algebraic
   /// columns do not count there: they follow the others.
   double solve();
+  /// The same where no move follows.
+  double look() {
+    --statistics_.iterations;
+    return solve();
+  }
   /// The first solve() after factor(): decides which of the thin rows take part until the next one,
   /// none of them if `firm_only`.
   double first_solve(bool firm_only);
