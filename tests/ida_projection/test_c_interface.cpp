@@ -3,8 +3,10 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <problems/pendulum.hpp>
+#include <stdexcept>
 #include <string>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include <tether/ida_projection.h>
@@ -327,6 +329,18 @@ TEST_CASE("C interface: wrong arguments are refused by name and change nothing")
   CHECK(tether_add_rows(nullptr, 1, circle_value, nullptr, nullptr) == TETHER_MEM_NULL);
   CHECK(tether_add_rows(set.get(), 0, circle_value, nullptr, nullptr) == TETHER_ILL_INPUT);
   CHECK(last_error_has("count = 0"));
+  {
+    const Set many = new_set();
+    const int most = std::numeric_limits<int>::max();
+    CHECK(tether_add_rows(many.get(), most, circle_value, nullptr, nullptr) == TETHER_ILL_INPUT);
+    REQUIRE(tether_add_rows(many.get(), most - 2, circle_value, nullptr, nullptr) == 0);
+    CHECK(tether_add_rows(many.get(), 2, circle_value, nullptr, nullptr) == TETHER_ILL_INPUT);
+    CHECK(last_error_has("count = 2 after 2147483645 rows, must be at most 1"));
+    CHECK(tether_count_rows(many.get()) == most - 2);
+    tether::ida_projection::Constraints half, other;
+    half.count = other.count = most / 2 + 1;
+    CHECK_THROWS_AS(half + other, std::invalid_argument);
+  }
   CHECK(tether_add_rows(set.get(), 1, nullptr, nullptr, nullptr) == TETHER_MEM_NULL);
   CHECK(last_error_has("value is null"));
   CHECK(tether_add_sparse_rows(set.get(), 2, starts, columns, circle_value, circle_jacobian,

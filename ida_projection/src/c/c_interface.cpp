@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -111,6 +112,11 @@ int check_rows(const char* function, const tether_constraints* set, int count, b
   if (count < 1)
     return ill(std::string(function) + ": count = " + std::to_string(count) +
                ", must be at least 1");
+  constexpr int kMost = std::numeric_limits<int>::max() - 1;  // starts has an entry more
+  const int there = set->rows.total_count();
+  if (count > kMost - there)
+    return ill(std::string(function) + ": count = " + std::to_string(count) + " after " +
+               std::to_string(there) + " rows, must be at most " + std::to_string(kMost - there));
   if (!value) return null(function, "value");
   return 0;
 }

@@ -68,6 +68,10 @@ Constraints operator+(Constraints a, const Constraints& b) {
     throw std::invalid_argument(
         "Constraints +: rows given as Gradients join only rows given as Gradients; give both sets "
         "the same kind of Jacobian");
+  if (static_cast<long>(a.total_count()) + b.total_count() > std::numeric_limits<int>::max())
+    throw std::invalid_argument("Constraints +: " + std::to_string(a.total_count()) + " and " +
+                                std::to_string(b.total_count()) +
+                                " rows are more than an int counts");
   a.joined.push_back(b);
   return a;
 }

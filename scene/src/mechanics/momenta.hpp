@@ -14,11 +14,14 @@ class FreeAxes {
  public:
   /// Only the direction u is left, if it was there.
   void only(const Vector3d& u, const std::string& because) {
-    const Vector3d inside = basis_ * (basis_.transpose() * u);
-    if (basis_.cols() > 0 && (inside - u).norm() < 1e-9 * u.norm())
-      basis_ = u.normalized();
-    else
-      none(because);
+    // A product with no columns at all reads from a null pointer, by an offset.
+    if (basis_.cols() > 0) {
+      const Vector3d inside = basis_ * (basis_.transpose() * u);
+      if ((inside - u).norm() < 1e-9 * u.norm())
+        basis_ = u.normalized();
+      else
+        none(because);
+    }
     if (reason_.empty()) reason_ = because;
   }
   void none(const std::string& because) {
