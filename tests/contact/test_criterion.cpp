@@ -328,6 +328,8 @@ TEST_CASE("criterion: a body between closing walls is infeasible, with the proof
             CHECK(p.b().dot(d) >= 0.19);
             CHECK_FALSE(s.advice.empty());
             CHECK(s.counts.work < 1e8);
+            // The other island is as well off as alone.
+            if (method == Method::automatic) CHECK(std::abs(s.velocities[6]) <= tolerance);
           }
         }
       }

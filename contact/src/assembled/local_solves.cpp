@@ -31,21 +31,11 @@ void LocalSolves::reset(int contacts) {
 // False: there are none small enough.
 bool LocalSolves::find_parts(Search& search, const Packed& x) {
   constexpr int kLargest = 300;  // contacts of a part
-  const System& system = search.system;
-  const Problem& p = system.problem();
-  search.system.blocks(x.data(), z_.data());
+  const Problem& p = search.system.problem();
+  search.system.changes(x.data(), z_.data(), error_.data());
   search.counts.work += search.sweep_cost;
   most_ = 0;
-  for (int i = 0; i < n_; ++i) {
-    double d2 = 0;
-    for (int c = 0; c < 3; ++c) {
-      const double d = z_[at(i)].v[c] - x[at(i)].v[c];
-      d2 += d * d;
-    }
-    const double weight = system.weight(i);
-    error_[at(i)] = weight * weight * std::sqrt(d2) * system.inverse_scale(i);
-    most_ = std::max(most_, error_[at(i)]);
-  }
+  for (double error : error_) most_ = std::max(most_, error);
   if (!(most_ > 0) || !std::isfinite(most_)) return false;
   // Where many contacts have errors of one size there is no part to solve: solving some of them
   // only disturbs the others.

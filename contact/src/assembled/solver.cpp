@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "assembled/automatic.hpp"
+#include "assembled/island_solves.hpp"
 #include "assembled/solver_words.hpp"
 #include "assembled/stages/convex_relaxation.hpp"
 #include "problem/refuse.hpp"
@@ -40,6 +40,7 @@ struct Solver::Implementation {
   Options options;
   detail::Search search;
   detail::Automatic stages;
+  detail::IslandSolves islands;
   Packed x, z;
   std::unordered_map<std::uint64_t, PackedVector> memory;
 
@@ -81,7 +82,7 @@ Status Solver::Implementation::automatic() {
   search.count_sweep();
   search.test(x.data(), Method::gauss_seidel);
   if (search.solved()) return Status::solved;
-  return stages.run(search);
+  return detail::IslandSolves::serve(search) ? islands.run(search, stages) : stages.run(search);
 }
 
 // gauss_seidel, sor, jacobi
@@ -147,7 +148,7 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
     detail::velocities(problem, search.best.data(), x.data());
   problem.unpack(x, out.velocities);
   out.infeasible_direction.clear();
-  for (const PackedVector& d : stages.proof())
+  for (const PackedVector& d : islands.proof().empty() ? stages.proof() : islands.proof())
     out.infeasible_direction.insert(out.infeasible_direction.end(), d.v, d.v + problem.dimension());
   out.regimes.resize(n);
   out.replaced.clear();
@@ -171,6 +172,7 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
   search.reset(problem, options,
                options.measure == Measure::automatic ? Measure::fixed_point : options.measure);
   stages.reset(problem.contacts(), options);
+  islands.reset();
   if (start) {
     if (start->size() != problem.b().size())
       detail::refuse_size("start", start->size(), problem.b().size(), "as many as b has");

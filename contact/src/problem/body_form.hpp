@@ -2,7 +2,10 @@
 // BSD-3-Clause
 #pragma once
 
+#include <map>
+#include <memory>
 #include <tether/linalg/block3.hpp>
+#include <tether/linalg/index.hpp>
 #include <vector>
 
 namespace tether::contact::detail {
@@ -18,5 +21,19 @@ struct BodyForm {
   int bodies = 0;
   std::vector<Contact> contacts;
 };
+
+/// Of some contacts, with the bodies that they have.
+inline std::shared_ptr<const BodyForm> part_of(const BodyForm& whole,
+                                               const std::vector<int>& contacts) {
+  auto out = std::make_shared<BodyForm>();
+  std::map<int, int> number;
+  for (int i : contacts) {
+    out->contacts.push_back(whole.contacts[linalg::at(i)]);
+    for (int& body : out->contacts.back().body)
+      if (body >= 0) body = number.emplace(body, static_cast<int>(number.size())).first->second;
+  }
+  out->bodies = static_cast<int>(number.size());
+  return out;
+}
 
 }  // namespace tether::contact::detail

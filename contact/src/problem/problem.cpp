@@ -9,6 +9,7 @@
 #include <tether/linalg/index.hpp>
 
 #include "problem/block_units.hpp"
+#include "problem/body_form.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
@@ -167,6 +168,31 @@ Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& 
     for (double& v : out.packed_b_[at(i)].v) v = std::ldexp(v, speed[island]);
   }
   out.unpack(out.packed_b_, out.b_);
+  return out;
+}
+
+Problem Problem::part(const std::vector<int>& contacts) const {
+  Problem out;
+  out.dimension_ = dimension_;
+  std::vector<int> place(local_.size(), -1);
+  for (std::size_t r = 0; r < contacts.size(); ++r) place[at(contacts[r])] = static_cast<int>(r);
+  out.row_start_.push_back(0);
+  for (int i : contacts) {
+    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k) {
+      const int column = place[at(columns_[at(k)])];
+      if (column < 0) continue;
+      out.columns_.push_back(column);
+      out.blocks_.push_back(blocks_[at(k)]);
+    }
+    out.row_start_.push_back(static_cast<int>(out.columns_.size()));
+    out.local_.push_back(local_[at(i)]);
+    out.packed_b_.push_back(packed_b_[at(i)]);
+    if (!ids_.empty()) out.ids_.push_back(ids_[at(i)]);
+  }
+  out.islands_ =
+      find_islands(static_cast<int>(contacts.size()), out.row_start_, out.columns_, out.blocks_);
+  out.unpack(out.packed_b_, out.b_);
+  if (body_form_) out.body_form_ = detail::part_of(*body_form_, contacts);
   return out;
 }
 

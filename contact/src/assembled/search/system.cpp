@@ -134,6 +134,10 @@ void System::belong_to(const System& whole, const int* contacts) {
   }
 }
 
+void System::share_as(const System& whole, const int* contacts) {
+  for (int i = 0; i < n_; ++i) share_[at(i)] = whole.share_[at(contacts[i])];
+}
+
 void System::replace(int i) {
   if (!any_replaced_) rule_.assign(at(n_), 0);
   any_replaced_ = true;
@@ -155,6 +159,19 @@ double System::blocks(const PackedVector* x, PackedVector* out, const Proximal& 
                       Regime* regimes, LocalDerivative* derivatives) {
   const View s = view(*problem_, rule_.data(), lambda_.data(), weight_.data(), proximal);
   return kernels().blocks(s, x, out, regimes, derivatives);
+}
+
+void System::changes(const PackedVector* x, PackedVector* z, double* change) {
+  blocks(x, z);
+  for (int i = 0; i < n_; ++i) {
+    double d2 = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double d = z[i].v[c] - x[i].v[c];
+      d2 += d * d;
+    }
+    const double weight = weight_[at(i)];
+    change[i] = weight * weight * std::sqrt(d2) * inverse_scale_[at(i)];
+  }
 }
 
 void velocities(const Problem& problem, const PackedVector* x, PackedVector* w) {

@@ -32,6 +32,8 @@ class System {
 
   // After reset() with the problem of some contacts of `whole`: the same rules and velocity scales.
   void belong_to(const System& whole, const int* contacts);
+  // And the same parts of bodies: `whole` may have blocks of zeros beside those of an island.
+  void share_as(const System& whole, const int* contacts);
 
   // The problem that the stages see: the given one, or in units in which nothing leaves the range.
   const Problem& problem() const { return *problem_; }
@@ -68,6 +70,8 @@ class System {
   // for, derivatives dx/db of each block; returns (sum weight^2 |out - x|^2)^1/2.
   double blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal = {},
                 Regime* regimes = nullptr, LocalDerivative* derivatives = nullptr);
+  // Of each contact, as a velocity over the scale of its island: what a block solution, z, changes.
+  void changes(const PackedVector* x, PackedVector* z, double* change);
   // w = A x - b
   void velocities(const PackedVector* x, PackedVector* w) const;
   // Natural map with the norms of x and w (scratch is overwritten), or the block fixed point alone.
@@ -84,6 +88,7 @@ class System {
   double rounding(const PackedVector* x) const;
   // 1 / velocity scale of the island of contact i.
   double inverse_scale(int i) const { return inverse_scale_[at(i)]; }
+  int islands() const { return static_cast<int>(needed_.size()); }
   // b = 0 in the island of contact i: the solution is x = 0, and nothing else is judged as one.
   bool at_rest(int i) const { return inverse_scale_[at(i)] == kAtRest; }
 

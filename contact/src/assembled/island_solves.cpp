@@ -1,0 +1,127 @@
+// Tether: the islands of a problem, one by one. SPDX-License-Identifier: BSD-3-Clause
+#include "assembled/island_solves.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::contact::detail {
+namespace {
+
+constexpr double kBlock = 20;  // ns that it takes to take a block out of the problem
+
+}  // namespace
+
+bool IslandSolves::serve(const Search& search) {
+  constexpr double kNearlyAll = 0.9;
+  if (search.measure != Measure::fixed_point || search.system.islands() < 2) return false;
+  std::vector<int> size(at(search.system.islands()));
+  for (int k : search.system.problem().islands()) ++size[at(k)];
+  return *std::max_element(size.begin(), size.end()) <= kNearlyAll * search.system.size();
+}
+
+// Numbers of islands follow their first contacts.
+void IslandSolves::find_islands(const Search& search) {
+  const std::vector<int>& island = search.system.problem().islands();
+  islands_.assign(at(search.system.islands()), {0, 0, Status::unsolved});
+  for (int k : island) ++islands_[at(k)].size;
+  int first = 0;
+  for (Island& k : islands_) {
+    k.first = first;
+    first += k.size;
+    k.size = 0;
+  }
+  contacts_.resize(island.size());
+  for (std::size_t i = 0; i < island.size(); ++i) {
+    Island& k = islands_[at(island[i])];
+    contacts_[at(k.first + k.size++)] = static_cast<int>(i);
+  }
+}
+
+// By changes of a sweep, which are not the measure but never far from it.
+bool IslandSolves::looks_solved(const Search& search, const Island& island) const {
+  constexpr double kFar = 1e-2;
+  for (int k = island.first; k < island.first + island.size; ++k)
+    if (!(error_[at(contacts_[at(k)])] <= kFar * search.options.tolerance)) return false;
+  return true;
+}
+
+void IslandSolves::solve(Search& search, Island& island, double budget) {
+  const int* contacts = contacts_.data() + island.first;
+  const Problem problem =
+      search.system.problem().part(std::vector<int>(contacts, contacts + island.size));
+  search.counts.work += kBlock * static_cast<double>(problem.blocks().size());
+  Options options = search.options;
+  options.history = false;
+  options.max_work = budget;
+  search_.reset(problem, options, search.measure);
+  search_.system.belong_to(search.system, contacts);
+  search_.system.share_as(search.system, contacts);
+  Packed start(at(island.size));
+  for (int r = 0; r < island.size; ++r) start[at(r)] = x_[at(contacts[r])];
+  search_.system.to_own_units(start.data());
+  automatic_.reset(island.size, options);
+  search_.test(start.data(), Method::interior_point);
+  island.status = search_.solved() ? Status::solved : automatic_.run(search_);
+  search.counts.add(search_.counts);
+  search_.system.to_given_units(search_.best.data());
+  for (int r = 0; r < island.size; ++r) {
+    x_[at(contacts[r])] = search_.best[at(r)];
+    if (search_.system.replaced(r)) search.system.replace(contacts[r]);
+  }
+  if (island.status != Status::infeasible || !proof_.empty()) return;
+  proof_.assign(x_.size(), PackedVector());
+  for (int r = 0; r < island.size; ++r) proof_[at(contacts[r])] = automatic_.proof()[at(r)];
+}
+
+Status IslandSolves::run(Search& search, Automatic& stages) {
+  AcceleratedSweeps::Leave leave;
+  leave.partly = true;
+  leave.most_work = kBlock * static_cast<double>(search.system.problem().blocks().size());
+  stages.prepare(search);
+  stages.sweeps.start(search.best.data());
+  stages.sweeps.run(search, leave);
+  if (search.solved()) return Status::solved;
+  if (search.exhausted()) return Status::work_limit;
+  find_islands(search);
+  x_ = search.best;
+  z_.resize(x_.size());
+  error_.resize(x_.size());
+  search.system.changes(x_.data(), z_.data(), error_.data());
+  search.count_sweep();
+  // The small ones first, each with an equal part of the work that is left: what they leave of it
+  // is for the larger ones.
+  std::vector<Island*> order;
+  for (Island& island : islands_) {
+    island.status = Status::solved;
+    if (!looks_solved(search, island)) order.push_back(&island);
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [](const Island* p, const Island* q) { return p->size < q->size; });
+  // What its part did not do for may be done by what all have left.
+  for (int pass = 0; pass < 2 && !order.empty(); ++pass) {
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      const double left = search.options.max_work - search.counts.work;
+      if (left > 0)
+        solve(search, *order[k], left / static_cast<double>(order.size() - k));
+      else
+        order[k]->status = Status::work_limit;
+    }
+    order.erase(std::remove_if(order.begin(), order.end(),
+                               [](const Island* k) { return k->status != Status::work_limit; }),
+                order.end());
+  }
+  // Each island is at its best, also beside one that cannot be solved.
+  search.best_error = std::numeric_limits<double>::infinity();
+  search.test(x_.data(), Method::interior_point);
+  if (search.solved()) return Status::solved;
+  // Of several the one that says most.
+  Status out = Status::unsolved;
+  for (Status s : {Status::stalled, Status::cycling, Status::round_off, Status::work_limit,
+                   Status::infeasible})
+    for (const Island& island : islands_)
+      if (island.status == s) out = s;
+  return out;
+}
+
+}  // namespace tether::contact::detail
