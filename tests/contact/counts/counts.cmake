@@ -60,11 +60,11 @@ if(NOT zero_said STREQUAL most_said)
   message(SEND_ERROR "an effect without strength changes the result: ${zero_said} ${most_said}")
 endif()
 
-# No contacts: only the loop over the stages, gravity, and motion.
+# No contacts: only the loop over the stages, gravity, motion, and the look whether all of it is finite.
 count(COMMAND ${EVERYTHING} free TOGGLE ${step} TOTAL free FUNCTIONS functions)
 list(FILTER functions INCLUDE REGEX "tether::")
 list(FILTER functions EXCLUDE REGEX
-  "Stepper::(step|Implementation::(step|run_stages|apply_gravity|move|turn_round))|FreeMotion::(accelerate|move|turn_round)|detail::exponential")
+  "Stepper::(step|Implementation::(step|run_stages|apply_gravity|move|turn_round|is_finite))|FreeMotion::(accelerate|move|turn_round)|detail::exponential")
 message("free: ${free} instructions")
 if(functions)
   message(SEND_ERROR "without contacts these run: ${functions}")
