@@ -52,12 +52,15 @@ cp "$work/state/a.state" "$work/before"
 [ $? -eq 0 ] && { echo "a state that could not be written: exit code 0"; wrong=1; }
 cmp "$work/before" "$work/state/a.state" || { echo "a full disk harmed the state before"; wrong=1; }
 
-# A reader that leaves: the files are whole.
+# A reader that has left, whatever the load: the files are whole, and an error keeps its code.
 mkdir "$work/pipe"
-{ run --output "$work/pipe" --csv a.csv --state a.state; echo $? >"$work/code"; } 2>"$work/said" | true
-wanted 141 "$(cat "$work/code")" "a pipe that is closed"
-{ "$program" run "$scene" --end 0.5 --output "$work/pipe" --csv b.csv 2>&1 >/dev/null; echo $? >"$work/code"; } | true
-wanted 0 "$(cat "$work/code")" "a closed pipe for the progress"
+mkfifo "$work/fifo"
+exec 3<>"$work/fifo" 4>"$work/fifo" 3<&-
+run --output "$work/pipe" --csv a.csv --state a.state >&4 2>"$work/said"; wanted 141 $? "a pipe that is closed"
+"$program" run "$scene" --end 0.5 --output "$work/pipe" --csv b.csv >/dev/null 2>&4
+wanted 0 $? "a closed pipe for the progress"
+"$program" check "$work/none.toml" >/dev/null 2>&4; wanted 2 $? "a closed pipe for an error"
+exec 4>&-
 run --output "$work/pipe" --csv c.csv >/dev/null 2>&1
 for table in a.csv b.csv; do
   cmp "$work/pipe/$table" "$work/pipe/c.csv" || { echo "a closed pipe changed a table"; wrong=1; }
