@@ -116,12 +116,13 @@ Status IslandSolves::run(Search& search, Automatic& stages) {
   search.test(x_.data(), Method::interior_point);
   if (search.solved()) return Status::solved;
   // Of several the one that says most.
-  Status out = Status::unsolved;
-  for (Status s : {Status::stalled, Status::cycling, Status::round_off, Status::work_limit,
-                   Status::infeasible})
+  Status out = Status::solved;
+  for (Status s : {Status::unsolved, Status::stalled, Status::cycling, Status::round_off,
+                   Status::work_limit, Status::infeasible})
     for (const Island& island : islands_)
       if (island.status == s) out = s;
-  return out;
+  // Each is solved by itself, and not beside the others: what rounding left is for all stages.
+  return out == Status::solved ? stages.run(search) : out;
 }
 
 }  // namespace tether::contact::detail

@@ -172,16 +172,21 @@ Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& 
 }
 
 Problem Problem::part(const std::vector<int>& contacts) const {
+  for (std::size_t r = 0; r < contacts.size(); ++r)
+    if (contacts[r] <= (r > 0 ? contacts[r - 1] : -1) || at(contacts[r]) >= local_.size())
+      throw std::invalid_argument("Problem::part: contacts[" + std::to_string(r) +
+                                  "] = " + std::to_string(contacts[r]) +
+                                  ", must ascend from 0 to below " + std::to_string(local_.size()));
   Problem out;
   out.dimension_ = dimension_;
-  std::vector<int> place(local_.size(), -1);
-  for (std::size_t r = 0; r < contacts.size(); ++r) place[at(contacts[r])] = static_cast<int>(r);
   out.row_start_.push_back(0);
   for (int i : contacts) {
     for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k) {
-      const int column = place[at(columns_[at(k)])];
-      if (column < 0) continue;
-      out.columns_.push_back(column);
+      // Searched for: a table of all contacts would cost many small parts the square of their
+      // number.
+      const auto column = std::lower_bound(contacts.begin(), contacts.end(), columns_[at(k)]);
+      if (column == contacts.end() || *column != columns_[at(k)]) continue;
+      out.columns_.push_back(static_cast<int>(column - contacts.begin()));
       out.blocks_.push_back(blocks_[at(k)]);
     }
     out.row_start_.push_back(static_cast<int>(out.columns_.size()));

@@ -110,8 +110,8 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
       throw std::runtime_error("the saved state is damaged: no part of a step is so long");
   if (format == MemoryFormat::without_drift) return m;
   binary::get(in, m.drift);
-  if (!(m.drift >= 0))
-    throw std::runtime_error("the saved state is damaged: joints are off by less than nothing");
+  if (!(m.drift >= 0) || !std::isfinite(m.drift))
+    throw std::runtime_error("the saved state is damaged: joints are off by no length");
   return m;
 }
 

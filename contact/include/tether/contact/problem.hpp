@@ -65,7 +65,7 @@ class Problem {
   const std::vector<PackedVector>& packed_b() const { return packed_b_; }
   /// The same in other units, exactly: in island k, A times 2^mass[k] and b times 2^speed[k].
   Problem rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const;
-  /// Some of its contacts, ascending, without the blocks between them and others.
+  /// Some contacts alone. std::invalid_argument where they do not ascend within the problem.
   Problem part(const std::vector<int>& contacts) const;
   /// Island of each contact: contacts with a block that is not zero between them share one.
   /// Numbered from 0 in the order of their first contacts.
