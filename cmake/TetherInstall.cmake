@@ -37,10 +37,11 @@ foreach(library IN LISTS tether_libraries)
     DESTINATION ${tether_cmake_dir} COMPONENT ${tether_dev})
 endforeach()
 
-# Needs deal.II, so it is in no set of headers that are compiled one by one.
+# Need deal.II or MPI, so they are in no set of headers that are compiled one by one.
 if(TARGET tether_ida_projection)
   tether_components(ida_projection)
-  install(FILES ${PROJECT_SOURCE_DIR}/ida_projection/include/tether/ida_projection/deal_ii.hpp
+  set(tether_ida_headers ${PROJECT_SOURCE_DIR}/ida_projection/include/tether/ida_projection)
+  install(FILES ${tether_ida_headers}/deal_ii.hpp ${tether_ida_headers}/mpi_rows.hpp
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tether/ida_projection COMPONENT ${tether_dev})
 endif()
 

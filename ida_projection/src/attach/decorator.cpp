@@ -250,6 +250,7 @@ void Projection::Impl::judge_capped(Move& move) {
 
 // A few invariants of many unknowns, as on grids; rows of mechanisms are many and local.
 bool Projection::Impl::rows_of_field() const {
+  if (std::holds_alternative<DistributedRows>(constraints_.jacobian)) return false;
   const bool gradients = std::holds_alternative<Gradients>(constraints_.jacobian);
   return gradients || kFew * constraints_.total_count() <= N_VGetLength(unknowns_.weights);
 }

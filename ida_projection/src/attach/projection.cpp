@@ -57,11 +57,8 @@ N_Vector vector_of(void* ida_mem) {
 
 std::unique_ptr<Mover> make_mover(const Constraints& constraints, const Options& options,
                                   Statistics& statistics, N_Vector like, int size) {
-  if (std::holds_alternative<UserProjection>(constraints.jacobian))
-    return make_user_mover(constraints, options, statistics, like);
-  if (constraints.total_count() == 0) return nullptr;
-  if (std::holds_alternative<Gradients>(constraints.jacobian))
-    return make_gradient_mover(constraints, options, statistics, like);
+  if (!has_rows(constraints)) return nullptr;
+  if (!has_values(constraints)) return make_vector_mover(constraints, options, statistics, like);
   return wants_sparse_factors(constraints, size)
              ? make_sparse_mover(constraints, options, statistics, size)
              : make_dense_mover(constraints, options, statistics, size);

@@ -40,6 +40,8 @@ ConsistencyReport Projection::Impl::project_gradient(double t, N_Vector yy, N_Ve
   if (movers_.used == nullptr) return report;
   if (std::holds_alternative<UserProjection>(constraints_.jacobian))
     reject("project_gradient: a UserProjection tells no C; give the rows");
+  if (std::holds_alternative<DistributedRows>(constraints_.jacobian))
+    reject("project_gradient: DistributedRows are not taken");
   current_weights(yy);
   if (!tangent_)
     tangent_ = make_tangent_rows(constraints_, options_, statistics_, unknowns_.weights);

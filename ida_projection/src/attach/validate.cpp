@@ -1,7 +1,10 @@
 // Tether: checks of the constraints and options that a caller attaches. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <algorithm>
 #include <stdexcept>
 #include <sundials/sundials_config.h>
+#include <utility>
+#include <vector>
 
 #include "attach/impl.hpp"
 #include "constraints/evaluator.hpp"
@@ -37,53 +40,90 @@ const char* missing_gradient_operation(N_Vector v) {
 }
 
 // The pattern of rows given by their entries.
-void check_sparse(const SparseJacobian& sparse, int rows, long unknowns) {
+template <class Rows>
+void check_pattern(const std::string& kind, const Rows& sparse, int rows, long unknowns,
+                   bool ascending) {
   const auto count = static_cast<int>(sparse.columns.size());
-  if (!sparse.fill) reject("SparseJacobian::fill is empty; give the entries of C(t, y)");
+  if (!sparse.fill) reject(kind + "::fill is empty; give the entries of C(t, y)");
   if (static_cast<int>(sparse.starts.size()) != rows + 1)
-    reject("SparseJacobian::starts has " + std::to_string(sparse.starts.size()) + " entries for " +
+    reject(kind + "::starts has " + std::to_string(sparse.starts.size()) + " entries for " +
            std::to_string(rows) + " rows; it must have one more than there are rows");
   if (sparse.starts.front() != 0 || sparse.starts.back() != count)
-    reject("SparseJacobian::starts goes from " + std::to_string(sparse.starts.front()) + " to " +
+    reject(kind + "::starts goes from " + std::to_string(sparse.starts.front()) + " to " +
            std::to_string(sparse.starts.back()) + "; it must go from 0 to the number of entries, " +
            std::to_string(count));
+  std::vector<int> seen(ascending ? 0 : static_cast<std::size_t>(unknowns), -1);
   for (int i = 0; i < rows; ++i) {
     const int begin = sparse.starts[static_cast<std::size_t>(i)];
     const int end = sparse.starts[static_cast<std::size_t>(i) + 1];
     if (end < begin || end > count)
-      reject("SparseJacobian::starts[" + std::to_string(i + 1) + "] = " + std::to_string(end) +
+      reject(kind + "::starts[" + std::to_string(i + 1) + "] = " + std::to_string(end) +
              "; starts must not decrease, nor exceed the number of entries");
     for (int e = begin; e < end; ++e) {
       const int j = sparse.columns[static_cast<std::size_t>(e)];
       const bool outside = j < 0 || j >= unknowns;
-      if (!outside && (e == begin || j > sparse.columns[static_cast<std::size_t>(e) - 1])) continue;
-      const std::string where = "SparseJacobian::columns[" + std::to_string(e) +
+      const auto orderly = [&] {
+        if (ascending) return e == begin || j > sparse.columns[static_cast<std::size_t>(e) - 1];
+        return std::exchange(seen[static_cast<std::size_t>(j)], i) != i;
+      };
+      if (!outside && orderly()) continue;
+      const std::string where = kind + "::columns[" + std::to_string(e) +
                                 "] = " + std::to_string(j) + " in row " + std::to_string(i);
       if (outside) reject(where + "; it must be 0 .. " + std::to_string(unknowns - 1));
-      reject(where + "; columns of a row must ascend, each once");
+      reject(where + (ascending ? "; columns of a row must ascend, each once"
+                                : "; a row contains each column once"));
     }
   }
 }
 
-void check_rows(const Constraints& set, long unknowns) {
+// Rows of this process; `like` is the vector of all.
+void check_distributed(const DistributedRows& given, int rows, N_Vector like) {
+  const auto text = [](const char* name, long value) {
+    return std::string("DistributedRows::") + name + " = " + std::to_string(value) + "; ";
+  };
+  if (like->ops->nvgetarraypointer == nullptr)
+    reject("the vector type lacks N_VGetArrayPointer, which DistributedRows need");
+  if (given.unknowns < 0 || given.ghosts < 0)
+    reject(
+        text(given.unknowns < 0 ? "unknowns" : "ghosts", std::min(given.unknowns, given.ghosts)) +
+        "it must be >= 0");
+  const bool whole = is_contiguous(like);  // in one process
+  long here = whole ? static_cast<long>(N_VGetLength(like)) : -1;
+  if (like->ops->nvgetlocallength != nullptr)
+    here = static_cast<long>(like->ops->nvgetlocallength(like));
+  if (here >= 0 && given.unknowns != here)
+    reject(text("unknowns", given.unknowns) + "this process's part of y has " +
+           std::to_string(here));
+  if (given.unknowns == 0 && (rows > 0 || given.ghosts > 0))
+    reject("DistributedRows on a process without unknowns; give its rows to another one");
+  if (given.ghosts > 0 && (!given.update_ghosts || !given.add_ghosts))
+    reject(text("ghosts", given.ghosts) + "update_ghosts and add_ghosts must both be given");
+  if (rows == 0 && given.columns.empty()) return;
+  check_pattern("DistributedRows", given, rows, static_cast<long>(given.unknowns) + given.ghosts,
+                false);
+}
+
+void check_rows(const Constraints& set, long unknowns, N_Vector like) {
   if (set.count < 0)
     reject("constraints.count = " + std::to_string(set.count) + "; it must be >= 0");
   if (!set.names.empty() && static_cast<int>(set.names.size()) != set.count)
     reject("constraints.names has " + std::to_string(set.names.size()) + " entries for " +
            std::to_string(set.count) + " rows; give one for each row, or none");
-  if (set.count > 0 && has_values(set) && !set.value)
+  const auto* distributed = std::get_if<DistributedRows>(&set.jacobian);
+  if (distributed != nullptr) check_distributed(*distributed, set.count, like);
+  if (set.count > 0 && (has_values(set) || distributed != nullptr) && !set.value)
     reject("constraints.value is empty although constraints.count = " + std::to_string(set.count) +
            "; give g(t, y)");
   if (const auto* dense = std::get_if<DenseJacobian>(&set.jacobian))
     if (set.count > 0 && !dense->fill) reject("DenseJacobian is empty; give C(t, y)");
   if (const auto* sparse = std::get_if<SparseJacobian>(&set.jacobian))
-    if (set.count > 0) check_sparse(*sparse, set.count, unknowns);
+    if (set.count > 0) check_pattern("SparseJacobian", *sparse, set.count, unknowns, true);
   if (const auto* gradients = std::get_if<Gradients>(&set.jacobian))
     if (set.count > 0 && (!gradients->value || !gradients->fill))
       reject("Gradients needs both value and fill");
   if (const auto* user = std::get_if<UserProjection>(&set.jacobian))
     if (user->function == nullptr) reject("UserProjection::function is null");
-  for (const Constraints& part : set.joined) check_rows(part, unknowns);
+  for (const Constraints& part : set.joined) check_rows(part, unknowns, like);
 }
 
 void require(bool condition, const char* name, double value, const char* right) {
@@ -117,7 +157,7 @@ bool is_contiguous(N_Vector v) {
 void validate(const Constraints& constraints, const Options& options, N_Vector like) {
   if (const char* missing = missing_operation(like))
     reject(std::string("the vector type lacks ") + missing + ", which the projection needs");
-  check_rows(constraints, like->ops->nvgetlength != nullptr ? N_VGetLength(like) : 0);
+  check_rows(constraints, like->ops->nvgetlength != nullptr ? N_VGetLength(like) : 0, like);
   if (like->ops->nvgetlength != nullptr) {
     const std::string refusal = wrong_length(constraints, static_cast<long>(N_VGetLength(like)));
     if (!refusal.empty()) reject(refusal);
@@ -149,17 +189,18 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
       SUNNonlinSolGetType(options.nonlinear_solver) != SUNNONLINEARSOLVER_ROOTFIND)
     reject("options.nonlinear_solver is not of root-finding type, which IDA needs");
 
-  const int rows = constraints.total_count();
-  if (rows == 0 && !std::holds_alternative<UserProjection>(constraints.jacobian)) return;
+  if (!has_rows(constraints)) return;
 
   const bool contiguous = is_contiguous(like);
   const auto length = like->ops->nvgetlength != nullptr ? N_VGetLength(like) : -1;
   if (has_values(constraints) && !contiguous)
-    reject("the vectors are not contiguous in this process; give the constraints as Gradients");
-  if (std::holds_alternative<Gradients>(constraints.jacobian))
+    reject(
+        "the vectors are not contiguous in this process; give the constraints as Gradients "
+        "or DistributedRows");
+  if (!has_values(constraints) && !std::holds_alternative<UserProjection>(constraints.jacobian))
     if (const char* missing = missing_gradient_operation(like))
       reject(std::string("the vector type lacks ") + missing +
-             ", which constraints given as Gradients need");
+             ", which constraints given as Gradients or DistributedRows need");
   const auto check_size = [&](std::size_t size, const char* name) {
     if (size == 0) return;
     if (!contiguous)

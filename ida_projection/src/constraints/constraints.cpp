@@ -18,6 +18,7 @@ bool empty(const Constraints& set) { return set.count == 0 && set.joined.empty()
 const char* kind(const Constraints& set) {
   if (std::holds_alternative<Gradients>(set.jacobian)) return "Gradients";
   if (std::holds_alternative<UserProjection>(set.jacobian)) return "UserProjection";
+  if (std::holds_alternative<DistributedRows>(set.jacobian)) return "DistributedRows";
   return "";
 }
 
@@ -64,6 +65,9 @@ Constraints operator+(Constraints a, const Constraints& b) {
   if (left == "UserProjection" || right == "UserProjection")
     throw std::invalid_argument(
         "Constraints +: a UserProjection cannot be joined; it must project onto all rows itself");
+  if (left == "DistributedRows" || right == "DistributedRows")
+    throw std::invalid_argument(
+        "Constraints +: DistributedRows cannot be joined; give the rows of all sets as one");
   if (left != right)
     throw std::invalid_argument(
         "Constraints +: rows given as Gradients join only rows given as Gradients; give both sets "

@@ -51,9 +51,15 @@ bool wants_sparse_factors(const Constraints& set, int n) {
           has_rows_without_entries(set));
 }
 
+bool has_rows(const Constraints& set) {
+  return set.total_count() > 0 || std::holds_alternative<UserProjection>(set.jacobian) ||
+         std::holds_alternative<DistributedRows>(set.jacobian);
+}
+
 bool has_values(const Constraints& set) {
   return !std::holds_alternative<Gradients>(set.jacobian) &&
-         !std::holds_alternative<UserProjection>(set.jacobian);
+         !std::holds_alternative<UserProjection>(set.jacobian) &&
+         !std::holds_alternative<DistributedRows>(set.jacobian);
 }
 
 Evaluator::Evaluator(const Constraints& constraints, Statistics& statistics)

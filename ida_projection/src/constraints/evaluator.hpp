@@ -33,7 +33,9 @@ int guarded(Call&& call, std::string& message) noexcept {
 /// large. A small one gets the factors of dense rows, however it is given: the same rows then make
 /// the same run, bit for bit, and factors with pivots find their rank.
 bool wants_sparse_factors(const Constraints& set, int n);
-/// Is g given by Constraints::value, and C by entries or differences?
+/// Is there anything to project onto? Rows of other processes count.
+bool has_rows(const Constraints& set);
+/// Is g given by Constraints::value on the whole y, and C by entries or differences?
 bool has_values(const Constraints& set);
 
 /// Why the set, or one joined to it, cannot be evaluated on so many unknowns; empty if it can.

@@ -99,8 +99,9 @@ std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Stat
                                         int reported = -1);
 std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size,
                                          int reported = -1);
-std::unique_ptr<Mover> make_gradient_mover(const Constraints&, const Options&, Statistics&,
-                                           N_Vector like);
+/// For rows without has_values(), which need no more of a vector than its operations.
+std::unique_ptr<Mover> make_vector_mover(const Constraints&, const Options&, Statistics&,
+                                         N_Vector like);
 std::unique_ptr<Mover> make_user_mover(const Constraints&, const Options&, Statistics&,
                                        N_Vector like);
 

@@ -28,6 +28,8 @@ void check(const Sensitivities& given, const Constraints& constraints) {
            ", must be the number of sensitivities given to IDASensInit");
   if (std::holds_alternative<UserProjection>(constraints.jacobian))
     refuse("a UserProjection tells no C, so sensitivities cannot be projected; give the rows");
+  if (std::holds_alternative<DistributedRows>(constraints.jacobian))
+    refuse("sensitivities are not projected onto DistributedRows");
   const bool gradients = std::holds_alternative<Gradients>(constraints.jacobian);
   if (gradients && given.derivative)
     refuse("rows that are Gradients need Sensitivities::vector_derivative, not derivative");

@@ -11,7 +11,7 @@
 #include "host/ida.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
-#include "movers/vector_metric.hpp"
+#include "movers/vector/vector_metric.hpp"
 #include "sensitivity/parameter_derivative.hpp"
 #include "sensitivity/tangent_rows.hpp"
 #include "start/algebraic.hpp"

@@ -18,9 +18,7 @@ void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hol
     options_.largest_move = 1e300;
     options_.maximum_iterations = 50;
     options_.tolerance = 1e-8;
-    mover_ = std::holds_alternative<Gradients>(constraints_.jacobian)
-                 ? make_gradient_mover(constraints_, options_, statistics_, y)
-                 : make_user_mover(constraints_, options_, statistics_, y);
+    mover_ = make_vector_mover(constraints_, options_, statistics_, y);
   }
   OwnedVector correction(y);
   N_VConst(0.0, correction);

@@ -32,7 +32,7 @@ class PointProjection {
   const Constraints& constraints_;
   const Options& given_;
   std::unique_ptr<GaussNewton> nearest_;
-  std::unique_ptr<Mover> mover_;  // for gradients and user projections
+  std::unique_ptr<Mover> mover_;  // for rows without values
   Options options_;
   Statistics statistics_;
 };

@@ -93,6 +93,27 @@ struct Gradients {
   Callable<double, N_Vector, N_Vector*> fill;
 };
 
+/// Many rows with few entries each on vectors that are spread over processes: a net of rods on MPI
+/// ranks, with N_VectorParallel or any N_Vector whose entries of this process are an array. Each
+/// row belongs to one process, whose Constraints::count, `value`, names and messages are about its
+/// own rows. A row may contain unknowns of other processes, of which this one has copies, the
+/// ghosts: `value` and `fill` get y with this process's unknowns first and its ghosts after them.
+/// Every process calls the functions of its ghosts equally often, and in the same order; a failure
+/// of one is a failure on all. mpi_rows.hpp makes everything but `value` and `fill` from the global
+/// numbers of the columns.
+struct DistributedRows {
+  int unknowns = 0;          ///< of this process; 0: neither rows nor ghosts
+  int ghosts = 0;            ///< copies of unknowns of other processes
+  std::vector<int> starts;   ///< of each row's entries, as in SparseJacobian
+  std::vector<int> columns;  ///< of each entry, once in a row: an unknown, or unknowns + ghost
+  /// The entries, as SparseJacobian::fill, from y of unknowns + ghosts entries.
+  Callable<double, ConstVector, Vector> fill;
+  /// Fills the ghosts from the values of the unknowns that they copy.
+  Callable<ConstVector, Vector> update_ghosts;
+  /// Adds what ghosts hold to the unknowns that they copy (second argument).
+  Callable<ConstVector, Vector> add_ghosts;
+};
+
 /// The projection done by the caller, in the shape of CVODE's CVProjFn: from y at time t compute
 /// corr with y + corr on the constraints, to accuracy eps_proj in the WRMS norm of IDA's error
 /// weights. err holds a copy of the corrector's accumulated correction; IDA uses the projected
@@ -109,7 +130,8 @@ struct UserProjection {
 struct Constraints {
   int count = 0;                                ///< m, rows of this set
   Callable<double, ConstVector, Vector> value;  ///< g(t, y)
-  std::variant<FiniteDifferences, DenseJacobian, SparseJacobian, Gradients, UserProjection>
+  std::variant<FiniteDifferences, DenseJacobian, SparseJacobian, Gradients, UserProjection,
+               DistributedRows>
       jacobian;                     ///< dg/dy
   std::vector<std::string> names;   ///< optional, one for each row; used in messages
   std::vector<Constraints> joined;  ///< sets added with `+`, their rows after those of this one
@@ -127,8 +149,8 @@ struct Constraints {
   std::string name(int row) const;
 };
 
-/// The rows of `a` followed by those of `b`. Gradients join only Gradients, and a UserProjection
-/// joins nothing: std::invalid_argument otherwise.
+/// The rows of `a` followed by those of `b`. Gradients join only Gradients; a UserProjection and
+/// DistributedRows join nothing: std::invalid_argument otherwise.
 Constraints operator+(Constraints a, const Constraints& b);
 
 /// What check_jacobian found.

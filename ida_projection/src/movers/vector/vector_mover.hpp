@@ -1,36 +1,49 @@
-// Tether: the move onto few constraints on any N_Vector. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the move onto constraints through N_Vectors alone. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "host/owned_vector.hpp"
 #include "movers/factor_wear.hpp"
-#include "movers/vector_metric.hpp"
-#include "rows/gradient_rows.hpp"
+#include "movers/mover.hpp"
+#include "movers/vector/vector_metric.hpp"
 #include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
 
-namespace {
-
 constexpr double kNoMove = 1e-9;  // tolerances: no move at all
 
-class GradientMover final : public Mover {
+/// Moves candidates on any N_Vector.
+///
+/// `Rows` keeps g, C and the factors of C D:
+///
+///     Status value(t, y), fill(t, y), factor(metric, terms_at), all counted in the statistics;
+///                                 `terms_at`: y for rounding_only(), or null
+///     double drift()              largest |g_i|
+///     void solve(D, dy)           the shortest D^-1 dy with C dy = g
+///     double left()               what solve() leaves of its solution
+///     bool contains_algebraic(id), whole(), rounding_only()
+///     bool contradict(dy)         after solve()
+///
+/// and `report`: text, rows and whether a callback asked for the end. Vectors may be spread over
+/// processes: all of these have the same outcome on every one.
+template <class Rows>
+class VectorMover final : public Mover {
  public:
-  GradientMover(const Constraints& constraints, const Options& options, Statistics& statistics,
-                N_Vector like)
+  VectorMover(const Constraints& constraints, const Options& options, Statistics& statistics,
+              N_Vector like)
       : options_(options),
         statistics_(statistics),
-        constraints_(constraints),
         monitor_(options),
         y_(like),
         dy_(like),
         work_(like),
         metric_(options, like),
-        rows_(constraints.total_count(), like),
-        g_(static_cast<std::size_t>(rows_.rows()), 0.0),
-        terms_(g_) {
-    flatten(constraints, 0);
+        rows_(constraints, statistics, like) {
     free_all();
     reset();
   }
@@ -54,9 +67,10 @@ class GradientMover final : public Mover {
     free_all();
     if (id == nullptr) return Status::success;
     load(candidate);
-    const Status status = fill(candidate.t);
+    if (fatal_) return Status::callback_fatal;
+    const Status status = told(rows_.fill(candidate.t, y_));
     if (status != Status::success) return status;
-    holds_algebraic_ = !contains_algebraic();
+    holds_algebraic_ = !rows_.contains_algebraic(id);
     if (holds_algebraic_) metric_.hold_all_but(id);
     return Status::success;
   }
@@ -89,11 +103,8 @@ class GradientMover final : public Mover {
       }
     }
     metric_.set(candidate, dy_);
-    sums_terms_ = static_cast<N_Vector>(y_)->ops->nvl1norm != nullptr;
-    result.status = factor(candidate);
-    sums_terms_ = false;
-    if (result.status != Status::success) return result;
-    if (rounding_only()) return result;
+    if ((result.status = factor(candidate, y_)) != Status::success) return result;
+    if (rows_.rounding_only()) return result;
     result.length = solve(candidate.weights);
     result.floor = 4.0 * kEpsilon * N_VWrmsNorm(y_, candidate.weights);
     if (contradicts()) result.status = Status::inconsistent;
@@ -127,16 +138,9 @@ class GradientMover final : public Mover {
   }
 
  private:
-  struct Part {
-    const Gradients* rows;
-    int first;
-  };
-
   // Error weights change slowly, and so do factors in their metric. What follows a polish is taken
   // back with the factors of the step alone.
-  bool factors_last() const {
-    return no_settle_ && !metric_.local() && factored_ && rows_.rank() == rows_.rows();
-  }
+  bool factors_last() const { return no_settle_ && !metric_.local() && factored_ && rows_.whole(); }
 
   // After load(): moves with the factors at hand.
   Move chord_moves(const Candidate& candidate, double floor, double longest, double may_be_left) {
@@ -191,11 +195,12 @@ class GradientMover final : public Mover {
       apply(candidate);
       const double floor = std::min(0.1, 1e3 * kEpsilon * N_VWrmsNorm(y_, candidate.weights));
       const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
-      if (verdict == Monitor::Verdict::done) break;
-      if (verdict == Monitor::Verdict::failed) {
+      const double left = rows_.left() * length;  // by a solution that is not exact
+      if (verdict == Monitor::Verdict::done && left <= options_.tolerance) break;
+      if (verdict == Monitor::Verdict::failed || result.moves >= options_.maximum_iterations) {
         result.status = Status::not_converged;
         message_ = "move " + std::to_string(result.moves) + " onto the constraints still is " +
-                   std::to_string(length) + " tolerances long; check the gradients";
+                   std::to_string(length) + " tolerances long; check C";
         return result;
       }
       if ((result.status = value(candidate.t)) != Status::success) return result;
@@ -212,87 +217,32 @@ class GradientMover final : public Mover {
     metric_.free_all();
   }
 
-  // After fill().
-  bool contains_algebraic() {
-    for (N_Vector row : rows_.gradients()) {
-      N_VProd(id_, row, work_);
-      N_VLinearSum(1.0, row, -1.0, work_, work_);
-      if (N_VMaxNorm(work_) > 0.0) return true;
-    }
-    return false;
-  }
-
-  // Returns the number of the row after those of the set.
-  int flatten(const Constraints& set, int first) {
-    if (set.count > 0) parts_.push_back({&std::get<Gradients>(set.jacobian), first});
-    first += set.count;
-    for (const Constraints& part : set.joined) first = flatten(part, first);
-    return first;
-  }
-
   // y = base + correction, s <- max(0.8 s, |correction|).
   void load(const Candidate& candidate) {
     N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
     metric_.look(candidate, work_, dy_);
   }
 
-  Status failed(int flag, const char* what, const std::string& thrown) {
-    message_ = std::string(what) +
-               (thrown.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown);
-    if (flag < 0) fatal_ = true;
-    return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
+  // What the rows say where they do not succeed.
+  Status told(Status status) {
+    if (status == Status::success) return status;
+    message_ = rows_.report.text;
+    fatal_ |= rows_.report.fatal;
+    return status;
   }
 
-  Status value(double t) {
-    if (fatal_) return Status::callback_fatal;
-    ++statistics_.value_evaluations;
-    std::string thrown;
-    for (const Part& part : parts_) {
-      const int flag =
-          guarded([&] { return part.rows->value(t, y_, g_.data() + part.first); }, thrown);
-      if (flag != 0) return failed(flag, "Gradients::value", thrown);
-    }
-    for (int i = 0; i < rows_.rows(); ++i)
-      if (!std::isfinite(g_[static_cast<std::size_t>(i)])) {
-        message_ = "g of " + constraints_.name(i) + " is not finite";
-        return Status::not_finite;
-      }
-    return Status::success;
-  }
+  Status value(double t) { return fatal_ ? Status::callback_fatal : told(rows_.value(t, y_)); }
 
-  Status fill(double t) {
-    if (fatal_) return Status::callback_fatal;
-    ++statistics_.jacobian_evaluations;
-    std::string thrown;
-    for (N_Vector row : rows_.gradients()) N_VConst(0.0, row);
-    for (const Part& part : parts_) {
-      const int flag = guarded(
-          [&] { return part.rows->fill(t, y_, rows_.gradients().data() + part.first); }, thrown);
-      if (flag != 0) return failed(flag, "Gradients::fill", thrown);
-    }
-    return Status::success;
-  }
-
-  Status factor(const Candidate& candidate) {
+  Status factor(const Candidate& candidate, N_Vector terms_at = nullptr) {
     factored_ = false;
-    const Status status = fill(candidate.t);
+    if (fatal_) return Status::callback_fatal;
+    Status status = told(rows_.fill(candidate.t, y_));
     if (status != Status::success) return status;
-    if (holds_algebraic_ && contains_algebraic()) {
+    if (holds_algebraic_ && rows_.contains_algebraic(id_)) {
       free_all();
       metric_.set(candidate, dy_);
     }
-    ++statistics_.factorizations;
-    if (sums_terms_)
-      for (std::size_t i = 0; i < terms_.size(); ++i) {
-        N_VProd(rows_.gradients()[i], y_, work_);
-        terms_[i] = N_VL1Norm(work_);
-      }
-    const int bad = rows_.factor(metric_.D(), metric_.WT());
-    if (bad >= 0) {
-      message_ = "the gradient of " + constraints_.name(bad) + " is not finite";
-      return Status::not_finite;
-    }
-    if (rows_.rank() < rows_.rows()) ++statistics_.rank_drops;
+    if ((status = told(rows_.factor(metric_, terms_at))) != Status::success) return status;
     factored_ = true;
     wear_.renewed();
     return Status::success;
@@ -301,57 +251,30 @@ class GradientMover final : public Mover {
   // Returns the WRMS length of dy in the error norm.
   double solve(N_Vector weights) {
     ++statistics_.iterations;
-    rows_.solve(g_, metric_.D(), dy_);
+    rows_.solve(metric_.D(), dy_);
     return N_VWrmsNorm(dy_, weights);
   }
 
   bool contradicts() {
-    std::vector<int> found = rows_.contradicting();
-    if (found.empty()) return false;
-    contradicting_rows_ = std::move(found);
-    message_ = "rows contradict each other:";
-    for (const int i : contradicting_rows_)
-      message_ += " " + std::to_string(i) + " (" + constraints_.name(i) + ")";
+    if (!rows_.contradict(dy_)) return false;
+    contradicting_rows_ = rows_.report.rows;
+    message_ = rows_.report.text;
     return true;
   }
 
-  // Does the rounding of its own terms explain every g_i? It grows with the root of their number.
-  bool rounding_only() const {
-    const double unit = 64.0 * kEpsilon;
-    for (std::size_t i = 0; i < g_.size(); ++i)
-      if (!(std::abs(g_[i]) <= unit * terms_[i])) return false;
-    return true;
-  }
-
-  double drift() const {
-    double largest = 0.0;
-    for (double g : g_) largest = std::max(largest, std::abs(g));
-    return largest;
-  }
+  double drift() const { return rows_.drift(); }
 
   const Options& options_;
   Statistics& statistics_;
-  const Constraints& constraints_;
   Monitor monitor_;
-  std::vector<Part> parts_;
   OwnedVector y_, dy_, work_;
   VectorMetric metric_;
-  GradientRows rows_;
-  std::vector<double> g_;
-  std::vector<double> terms_;  // sum_j |C_ij y_j|
-  FactorWear wear_;            // for follow()
+  Rows rows_;
+  FactorWear wear_;  // for follow()
   bool factored_ = false;
   bool no_settle_ = false;
   N_Vector id_ = nullptr;         // the caller's of set_algebraic()
   bool holds_algebraic_ = false;  // no row has contained one so far
-  bool sums_terms_ = false;       // measure() asks for them
 };
-
-}  // namespace
-
-std::unique_ptr<Mover> make_gradient_mover(const Constraints& constraints, const Options& options,
-                                           Statistics& statistics, N_Vector like) {
-  return std::make_unique<GradientMover>(constraints, options, statistics, like);
-}
 
 }  // namespace tether::ida_projection
