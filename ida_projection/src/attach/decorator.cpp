@@ -16,7 +16,8 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kSampleEvery = 16;
-constexpr double kAsideFromTest = 1.5;   // multipliers of index 2: see README, section 9
+// Multipliers of index 2: see README, section 9.
+constexpr double kAsideFromTest = 1.5, kProportional = 1e-4, kMostCare = 5.0, kManyFree = 0.4;
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
@@ -302,6 +303,19 @@ Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
   return variables_.high_index() && variables_.any() ? engage(candidate) : Status::success;
 }
 
+// By how much more than smoothing_setpoint errors are kept below the tolerance. Those at the end
+// follow (tolerance / s)^(k/(k+1)), k the order; s that grows by its (-1/k)-th power, k = 5, makes
+// them follow the tolerance. Rows that leave few directions free take most of the errors with them.
+double Projection::Impl::care_of_high_index(const Candidate& candidate) const {
+  const N_Vector id = variables_.id();
+  if (variables_.undetermined().empty()) return kAsideFromTest;
+  const double differential = N_VDotProd(id, id);
+  if (constraints_.total_count() > (1.0 - kManyFree) * differential) return kAsideFromTest;
+  const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
+  const double tighter = std::pow(kProportional * unknowns, 0.2);
+  return kAsideFromTest * std::clamp(tighter, 1.0, kMostCare);
+}
+
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
 Status Projection::Impl::engage(const Candidate& candidate) {
   if (!variables_.known()) derive_id(candidate);
@@ -315,7 +329,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();
-  if (variables_.high_index()) control_.begin_smoothing(kAsideFromTest);
+  if (variables_.high_index()) control_.begin_smoothing(care_of_high_index(candidate));
   movers_.joined.join(candidate, cj);
   movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;

@@ -76,7 +76,10 @@ struct DenseJacobian {
 /// that can ever differ from zero (a velocity that is zero at the start included), in compressed
 /// rows: entries starts[i] .. starts[i + 1] - 1 belong to row i, in the ascending columns
 /// `columns[..]`. `fill` writes their values in the same order; they are zero on entry. Joined
-/// dense rows (energy) stay full rows, of which there should be few.
+/// dense rows (energy) stay full rows, of which there should be few. Up to 128 rows in all, with
+/// m N <= 65536, take the factors of dense rows: the run is that of the same rows as a
+/// DenseJacobian, bit for bit. More rows take sparse factors, and agree with dense ones to the
+/// tolerance.
 struct SparseJacobian {
   std::vector<int> starts;   ///< count + 1, from 0 to the number of entries
   std::vector<int> columns;  ///< of each entry
