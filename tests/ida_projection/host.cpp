@@ -296,6 +296,24 @@ Run integrate_suppressed(const Problem& problem, double tolerance) {
   return run;
 }
 
+tp::Constraints gradients_of(const tp::Constraints& dense, int n, double* (*entries)(N_Vector)) {
+  tp::Constraints set;
+  set.count = dense.total_count();
+  for (int i = 0; i < set.count; ++i) set.names.push_back(dense.name(i));
+  tp::Gradients gradients;
+  gradients.value = [dense, n, entries](double t, N_Vector y, double* g) {
+    const Eigen::VectorXd values = value(dense, t, entries(y), n);
+    std::copy(values.data(), values.data() + values.size(), g);
+  };
+  gradients.fill = [dense, n, entries](double t, N_Vector y, N_Vector* rows) {
+    const Eigen::MatrixXd C = jacobian(dense, t, entries(y), n);
+    for (Eigen::Index i = 0; i < C.rows(); ++i)
+      for (int j = 0; j < n; ++j) entries(rows[i])[j] = C(i, j);
+  };
+  set.jacobian = gradients;
+  return set;
+}
+
 tp::Constraints as_sparse(const tp::Constraints& rows, int n) {
   tp::Constraints set;
   set.count = rows.total_count();

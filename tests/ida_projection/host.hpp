@@ -115,6 +115,9 @@ Run integrate_plain(const Problem& problem, double tolerance);
 /// The error of a run that failed or took 60000 steps is infinite.
 Run integrate_suppressed(const Problem& problem, double tolerance);
 
+/// Rows as gradients in vectors whose entries `entries` tells.
+tp::Constraints gradients_of(const tp::Constraints& rows, int n,
+                             double* (*entries)(N_Vector) = N_VGetArrayPointer);
 /// Rows as sparse ones with every entry in the pattern.
 tp::Constraints as_sparse(const tp::Constraints& rows, int n);
 

@@ -11,6 +11,7 @@
 #include <sunlinsol/sunlinsol_spgmr.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -181,6 +182,46 @@ tp::Constraints spread_rows(const Share& share, bool contradicting = false) {
                      tp::distributed_rows(share.comm, share.unknowns(), rows.starts, rows.columns));
 }
 
+/// The squared length of the sum of all points, which the other rows imply.
+tp::Constraints sum_row(const Share& share) {
+  const auto sum = [share](N_Vector y) {
+    std::array<double, 2> own{}, all{};
+    for (int k = 0; k < share.unknowns(); ++k)
+      own[static_cast<std::size_t>(k % 2)] += N_VGetArrayPointer(y)[k];
+    MPI_Allreduce(own.data(), all.data(), 2, MPI_DOUBLE, MPI_SUM, share.comm);
+    return all;
+  };
+  double x = 0.0, y = 0.0;
+  for (int p = 0; p < kPoints; ++p) {
+    x += std::cos(angle(p));
+    y += std::sin(angle(p));
+  }
+  const double square = x * x + y * y;
+  tp::Gradients rows;
+  rows.value = [=](double, N_Vector at, double* g) {
+    const std::array<double, 2> now = sum(at);
+    g[0] = now[0] * now[0] + now[1] * now[1] - square;
+  };
+  rows.fill = [=](double, N_Vector at, N_Vector* row) {
+    const std::array<double, 2> now = sum(at);
+    for (int k = 0; k < share.unknowns(); ++k)
+      N_VGetArrayPointer(row[0])[k] = 2.0 * now[static_cast<std::size_t>(k % 2)];
+  };
+  tp::Constraints set;
+  set.count = 1;
+  set.names = {"sum"};
+  set.jacobian = rows;
+  return set;
+}
+
+void with_full_row(const Share& share) {
+  const End end = run(share, spread_rows(share) + sum_row(share));
+  check(end.flag >= 0, "with a full row: " + end.message);
+  check(end.statistics.failures() == 0, "with a full row moves failed");
+  check(end.statistics.largest_drift_after < 1e-9, "with a full row drift is left");
+  check(end.statistics.rank_drops == end.statistics.factorizations, "the full row is no other's");
+}
+
 void same_motion(const Share& share) {
   const Rows all = rows_of(Share{}, false);
   tp::SparseJacobian sparse;
@@ -191,6 +232,7 @@ void same_motion(const Share& share) {
   check(std::abs(alone.steps - spread.steps) <= alone.steps / 20, "the steps differ");
   check(spread.error <= 1.5 * alone.error + 1e-9, "the error is " + std::to_string(spread.error));
   check(spread.statistics.failures() == 0, "moves failed");
+  check(spread.statistics.rank_drops == 0, "rows were dropped");
   check(spread.statistics.largest_drift_after < 1e-9, "the drift is left");
   check(spread.statistics.largest_drift_after > 0.0, "the drift was not looked at");
   if (rank_of_world == 0)
@@ -254,6 +296,7 @@ int main(int argc, char** argv) {
   const int part = std::min(rank_of_world, with_points), next = std::min(part + 1, with_points);
   const Share share{MPI_COMM_WORLD, kPoints * part / with_points, kPoints * next / with_points};
   same_motion(share);
+  with_full_row(share);
   failing(share, 1);
   failing(share, -1);
   contradicting(share);

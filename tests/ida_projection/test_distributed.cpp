@@ -121,6 +121,45 @@ TEST_CASE("distributed rows: the nearest point is that of sparse rows") {
   }
 }
 
+TEST_CASE("distributed rows: an energy joined to them") {
+  const RodChain chain(kMasses, kRod);
+  const Problem problem = chain.problem(1.0);
+  const int n = problem.size;
+  const tp::Constraints energy = gradients_of(chain.energy_row(), n);
+  const tp::Constraints dense = chain.dense_rows() + chain.energy_row();
+  const Run given = integrate(problem, 1e-5, dense, {}, false);
+  for (const auto& copied : {std::vector<int>{}, middle()}) {
+    INFO("ghosts " << copied.size());
+    const tp::Constraints spread = as_distributed(chain.sparse_rows(), n, copied);
+    Host host(problem, 1e-5);
+    host.attach(spread + energy);
+    while (host.t < problem.t_end) REQUIRE(host.step() >= 0);
+    const tp::Statistics statistics = host.projection().statistics();
+    CHECK(statistics.failures() == 0);
+    CHECK(statistics.rank_drops == 0);
+    CHECK(std::abs(host.steps() - given.steps) <= 0.05 * static_cast<double>(given.steps));
+    CHECK(value(dense, 0.0, host.data(), n).cwiseAbs().maxCoeff() < 1e-7);
+
+    // What depends on the rows is moved by them; another value of it contradicts them.
+    tp::Constraints again = gradients_of(chain.dense_rows(), n);
+    again.names.assign(static_cast<std::size_t>(again.count), "copy");
+    const Run twice = integrate(problem, 1e-5, spread + energy + again, {}, false);
+    CHECK(twice.flag >= 0);
+    CHECK(twice.statistics.rank_drops == twice.statistics.factorizations);
+    CHECK(std::abs(twice.steps - given.steps) <= given.steps / 10);
+    tp::Gradients other = std::get<tp::Gradients>(again.jacobian);
+    other.value = [value = other.value](double t, N_Vector y, double* g) {
+      value(t, y, g);
+      g[3] += 0.01;
+    };
+    again.jacobian = other;
+    const Run refused = integrate(problem, 1e-5, spread + again, {}, false);
+    CHECK(refused.flag < 0);
+    CHECK(refused.status == tp::Status::inconsistent);
+    CHECK(contains(refused.message, "copy contradicts"));
+  }
+}
+
 TEST_CASE("distributed rows: redundant ones serve, contradicting ones are named") {
   const tp::Constraints once = as_sparse(on_circle(), 2);
   for (const double square : {1.0, 2.0}) {
@@ -213,6 +252,8 @@ TEST_CASE("distributed rows: what cannot work is refused by name") {
   expect("each column once", [](Rows& rows) { rows.columns[1] = rows.columns[0]; });
   CHECK(contains(refusal([](Rows&, tp::Constraints& set) { set.value = nullptr; }), "value"));
   const tp::Constraints rows = as_distributed(chain.sparse_rows(), n);
-  CHECK(contains(thrown([&] { (void)(rows + chain.energy_row()); }), "cannot be joined"));
-  CHECK(contains(thrown([&] { (void)(chain.energy_row() + rows); }), "cannot be joined"));
+  const tp::Constraints gradients = gradients_of(chain.energy_row(), n);
+  CHECK(contains(thrown([&] { (void)(rows + chain.energy_row()); }), "only Gradients"));
+  CHECK(contains(thrown([&] { (void)(gradients + rows); }), "come first"));
+  CHECK(contains(thrown([&] { (void)(rows + rows); }), "come first"));
 }

@@ -27,23 +27,8 @@ double* entries(N_Vector v) {
   return NV_DATA_S(v);
 }
 
-/// The same rows as `dense`, as gradients.
 tp::Constraints as_gradients(const tp::Constraints& dense, int n) {
-  tp::Constraints set;
-  set.count = dense.total_count();
-  for (int i = 0; i < set.count; ++i) set.names.push_back(dense.name(i));
-  tp::Gradients gradients;
-  gradients.value = [dense, n](double t, N_Vector y, double* g) {
-    const Eigen::VectorXd values = value(dense, t, entries(y), n);
-    std::copy(values.data(), values.data() + values.size(), g);
-  };
-  gradients.fill = [dense, n](double t, N_Vector y, N_Vector* rows) {
-    const Eigen::MatrixXd C = jacobian(dense, t, entries(y), n);
-    for (Eigen::Index i = 0; i < C.rows(); ++i)
-      for (int j = 0; j < n; ++j) entries(rows[i])[j] = C(i, j);
-  };
-  set.jacobian = gradients;
-  return set;
+  return gradients_of(dense, n, entries);
 }
 
 int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {

@@ -13,7 +13,11 @@ namespace tether::ida_projection {
 
 namespace {
 
-bool empty(const Constraints& set) { return set.count == 0 && set.joined.empty(); }
+// Of DistributedRows other processes may have some.
+bool empty(const Constraints& set) {
+  return set.count == 0 && set.joined.empty() &&
+         !std::holds_alternative<DistributedRows>(set.jacobian);
+}
 
 const char* kind(const Constraints& set) {
   if (std::holds_alternative<Gradients>(set.jacobian)) return "Gradients";
@@ -65,10 +69,11 @@ Constraints operator+(Constraints a, const Constraints& b) {
   if (left == "UserProjection" || right == "UserProjection")
     throw std::invalid_argument(
         "Constraints +: a UserProjection cannot be joined; it must project onto all rows itself");
-  if (left == "DistributedRows" || right == "DistributedRows")
+  if (right == "DistributedRows" || (left == "DistributedRows" && right != "Gradients"))
     throw std::invalid_argument(
-        "Constraints +: DistributedRows cannot be joined; give the rows of all sets as one");
-  if (left != right)
+        "Constraints +: to DistributedRows, which come first, only Gradients can be joined; give "
+        "sparse rows of all sets as one");
+  if (left != right && left != "DistributedRows")
     throw std::invalid_argument(
         "Constraints +: rows given as Gradients join only rows given as Gradients; give both sets "
         "the same kind of Jacobian");

@@ -152,8 +152,9 @@ struct Constraints {
   std::string name(int row) const;
 };
 
-/// The rows of `a` followed by those of `b`. Gradients join only Gradients; a UserProjection and
-/// DistributedRows join nothing: std::invalid_argument otherwise.
+/// The rows of `a` followed by those of `b`. Gradients join only Gradients and, as second
+/// ones, DistributedRows, to which nothing else is joined (an energy over all processes beside the
+/// rods of each); a UserProjection joins nothing: std::invalid_argument otherwise.
 Constraints operator+(Constraints a, const Constraints& b);
 
 /// What check_jacobian found.

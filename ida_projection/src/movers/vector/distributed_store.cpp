@@ -19,6 +19,9 @@ using linalg::at;
 constexpr double kRankTolerance = 1e-6;
 constexpr double kLocallySolved = 1e-12;  // or H is not symmetric
 constexpr double kSolved = 1e-6;          // of the move; more is left to the next one
+// Nothing must seem to be left of a full row that depends on the others, however small the
+// eigenvalues of H that take part.
+constexpr double kSolvedForBorder = 1e-11;
 constexpr int kMostSteps = 300, kPatience = 20;
 
 // Outcomes by severity, so that the worst one is the largest.
@@ -36,6 +39,7 @@ DistributedStore::DistributedStore(const Constraints& constraints, Statistics& s
       n_(given_.unknowns),
       ghosts_(given_.ghosts),
       m_(constraints.count),
+      border_(constraints, like),
       place_(given_.columns.size()),
       entries_(given_.columns.size(), 0.0),
       y_(at(n_ + ghosts_), 0.0),
@@ -133,8 +137,17 @@ Status DistributedStore::value(double t, N_Vector y) {
     drift = std::max(drift, std::abs(g_[at(i)]));
   }
   const Status outcome = agree();
-  if (outcome == Status::success) drift_ = largest(drift);
-  return outcome;
+  if (outcome != Status::success) return outcome;
+  drift_ = largest(drift);
+  return border_.empty() ? outcome : of_border(border_.rows().value(t, y));
+}
+
+// The full rows report the same on every process.
+Status DistributedStore::of_border(Status status) {
+  if (status == Status::success) return status;
+  report.text = border_.rows().report.text;
+  report.fatal |= border_.rows().report.fatal;
+  return status;
 }
 
 Status DistributedStore::fill(double t, N_Vector y) {
@@ -150,7 +163,9 @@ Status DistributedStore::fill(double t, N_Vector y) {
              },
              thrown),
          "DistributedRows::fill", thrown);
-  return agree();
+  const Status outcome = agree();
+  if (outcome != Status::success || border_.empty()) return outcome;
+  return of_border(border_.rows().fill(t, y));
 }
 
 bool DistributedStore::contains_algebraic(N_Vector id) {
@@ -158,10 +173,10 @@ bool DistributedStore::contains_algebraic(N_Vector id) {
   bool found = false;
   for (std::size_t e = 0; e < entries_.size(); ++e)
     found |= entries_[e] != 0.0 && v_[at(given_.columns[e])] == 0.0;
-  return largest(found ? 1.0 : 0.0) > 0.0;
+  return largest(found ? 1.0 : 0.0) > 0.0 || border_.rows().contains_algebraic(id);
 }
 
-Status DistributedStore::factor(const VectorMetric& metric, N_Vector) {
+Status DistributedStore::factor(const VectorMetric& metric, N_Vector terms_at) {
   ++statistics_.factorizations;
   if (!coupling_known_) coupled_ = largest(ghosts_) > 0.0;
   coupling_known_ = true;
@@ -191,6 +206,16 @@ Status DistributedStore::factor(const VectorMetric& metric, N_Vector) {
   const Status outcome = agree();
   if (outcome != Status::success) return outcome;
   whole_ = largest(whole ? 0.0 : 1.0) == 0.0;
+  if (!border_.empty()) {
+    if (terms_at != nullptr) border_.rows().sum_terms(terms_at);
+    const Status bordered = of_border(border_.factor(metric, [&](N_Vector v, N_Vector move) {
+      load(v, v_);
+      for (int i = 0; i < m_; ++i) linear_[at(i)] = times(i, v_);
+      solve_linear(metric.D(), move, kSolvedForBorder);
+    }));
+    if (bordered != Status::success) return bordered;
+    whole_ = whole_ && border_.whole();
+  }
   if (!whole_) ++statistics_.rank_drops;
   return Status::success;
 }
@@ -221,6 +246,12 @@ void DistributedStore::project(N_Vector v, N_Vector Hv) {
 
 void DistributedStore::solve(N_Vector D, N_Vector dy) {
   linear_ = g_;
+  solve_linear(D, dy, kSolved);
+  if (!border_.empty()) border_.add(D, dy);
+}
+
+// The shortest dy with C dy = linear_, as far as the rows say.
+void DistributedStore::solve_linear(N_Vector D, N_Vector dy, double solved) {
   left_ = 0.0;
   if (!coupled_) {
     shortest(u_);
@@ -234,7 +265,7 @@ void DistributedStore::solve(N_Vector D, N_Vector dy) {
   const double first = size;
   double least = size;
   int since_least = 0;
-  for (int k = 0; k < kMostSteps && size > kSolved * kSolved * first; ++k) {
+  for (int k = 0; k < kMostSteps && size > solved * solved * first; ++k) {
     project(p_, q_);
     const double curvature = N_VDotProd(p_, q_);
     if (!(curvature > 0.0)) break;
@@ -255,7 +286,7 @@ bool DistributedStore::rounding_only() {
   const double unit = 64.0 * kEpsilon;
   bool more = false;
   for (int i = 0; i < m_; ++i) more |= !(std::abs(g_[at(i)]) <= unit * terms_[at(i)]);
-  return largest(more ? 1.0 : 0.0) == 0.0;
+  return largest(more ? 1.0 : 0.0) == 0.0 && border_.rows().rounding_only();
 }
 
 bool DistributedStore::contradict(N_Vector dy) {
@@ -268,6 +299,10 @@ bool DistributedStore::contradict(N_Vector dy) {
       found.push_back(i);
   }
   const bool any = largest(found.empty() ? 0.0 : 1.0) > 0.0;
+  if (!any && !border_.empty() && border_.contradict()) {
+    report = border_.rows().report;
+    return true;
+  }
   if (!any) return false;
   if (found.empty())
     report.text = "rows of another process contradict each other";

@@ -2,18 +2,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <tether/ida_projection/constraints.hpp>
 #include <tether/ida_projection/statistics.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>
 #include <vector>
 
+#include "movers/vector/border.hpp"
 #include "movers/vector/rows_report.hpp"
 #include "movers/vector/vector_metric.hpp"
 
 namespace tether::ida_projection {
 
-/// Rows that are DistributedRows, and their factors.
+/// Rows that are DistributedRows, with Gradients joined to them, and their factors.
 ///
 /// With A = C D, A_p its rows on process p, u = D^-1 dy, the shortest u with A u = g solves
 ///
@@ -39,7 +41,7 @@ class DistributedStore {
   Status factor(const VectorMetric& metric, N_Vector terms_at);
   void solve(N_Vector D, N_Vector dy);
   double left() const { return left_; }
-  double drift() const { return drift_; }
+  double drift() const { return std::max(drift_, border_.rows().drift()); }
   /// After fill().
   bool contains_algebraic(N_Vector id);
   bool whole() const { return whole_; }
@@ -63,12 +65,15 @@ class DistributedStore {
   double times(int row, const Numbers& v) const;
   void project(N_Vector v, N_Vector Hv);
   void shortest(N_Vector to);
+  void solve_linear(N_Vector D, N_Vector dy, double solved);
+  Status of_border(Status status);
 
   const Constraints& constraints_;
   const DistributedRows& given_;
   Statistics& statistics_;
   int n_, ghosts_, m_;
   linalg::SparseMinimumNorm solver_;
+  Border border_;
   std::vector<int> place_;  // of each entry of the solver: the caller's, whose order is free
   Numbers entries_, y_, D_, v_, dy_;
   Numbers g_, linear_;                  // g, and C v

@@ -72,13 +72,17 @@ bool GradientStore::contains_algebraic(N_Vector id) {
   return false;
 }
 
+void GradientStore::sum_terms(N_Vector y) {
+  if (y->ops->nvl1norm == nullptr) return;
+  for (std::size_t i = 0; i < terms_.size(); ++i) {
+    N_VProd(rows_.gradients()[i], y, work_);
+    terms_[i] = N_VL1Norm(work_);
+  }
+}
+
 Status GradientStore::factor(const VectorMetric& metric, N_Vector terms_at) {
   ++statistics_.factorizations;
-  if (terms_at != nullptr && terms_at->ops->nvl1norm != nullptr)
-    for (std::size_t i = 0; i < terms_.size(); ++i) {
-      N_VProd(rows_.gradients()[i], terms_at, work_);
-      terms_[i] = N_VL1Norm(work_);
-    }
+  if (terms_at != nullptr) sum_terms(terms_at);
   const int bad = rows_.factor(metric.D(), metric.WT());
   if (bad >= 0) {
     report.text = "the gradient of " + constraints_.name(bad) + " is not finite";

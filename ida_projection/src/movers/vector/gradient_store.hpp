@@ -24,12 +24,22 @@ class GradientStore {
   Status fill(double t, N_Vector y);
   Status factor(const VectorMetric& metric, N_Vector terms_at);
   void solve(N_Vector D, N_Vector dy) { rows_.solve(g_, D, dy); }
+  /// For other values than g.
+  void solve(const std::vector<double>& wanted, N_Vector D, N_Vector dy) {
+    rows_.solve(wanted, D, dy);
+  }
   double left() const { return 0.0; }
   double drift() const;
+  const std::vector<double>& g() const { return g_; }
+  /// After fill(), changed by factor().
+  std::vector<N_Vector>& gradients() { return rows_.gradients(); }
+  /// After fill().
+  void sum_terms(N_Vector y);
   /// After fill().
   bool contains_algebraic(N_Vector id);
   bool whole() const { return rows_.rank() == rows_.rows(); }
-  /// Does the rounding of its own terms explain every g_i? It grows with the root of their number.
+  /// After factor() with terms, or sum_terms(): does the rounding of its own terms explain every
+  /// g_i? It grows with the root of their number.
   bool rounding_only() const;
   bool contradict(N_Vector dy);
 
