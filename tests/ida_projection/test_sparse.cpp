@@ -1,12 +1,10 @@
 // Tether: rows given by their entries. SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
-#include <nvector/nvector_serial.h>
 #include <problems/andrews.hpp>
 #include <problems/car_axis.hpp>
 #include <problems/kepler.hpp>
 #include <problems/link_chain.hpp>
 #include <problems/pendulum.hpp>
-#include <sunlinsol/sunlinsol_spgmr.h>
 
 #include "host.hpp"
 #include "linalg/allocations.hpp"
@@ -238,98 +236,6 @@ TEST_CASE("sparse rows of whipping chains: every step on the constraints, as den
     if (rods == 70) CHECK(s.factorizations <= 7 * s.projections / 8);
     if (rods <= 40) CHECK(host.steps() == other.steps());
   }
-}
-
-namespace {
-
-/// With GMRES: a dense matrix of 4000 unknowns takes 128 MB. `rows` null: plain IDA.
-Run integrate_without_matrix(const Problem& given, double tolerance, const tp::Constraints* rows) {
-  Problem problem = given;
-  Context context;
-  N_Vector y = N_VNew_Serial(problem.size, context), yp = N_VClone(y);
-  std::copy(problem.y0.begin(), problem.y0.end(), N_VGetArrayPointer(y));
-  std::copy(problem.yp0.begin(), problem.yp0.end(), N_VGetArrayPointer(yp));
-  void* ida = IDACreate(context);
-  const auto residual = [](sunrealtype t, N_Vector at, N_Vector slope, N_Vector r, void* data) {
-    static_cast<Problem*>(data)->residual(t, N_VGetArrayPointer(at), N_VGetArrayPointer(slope),
-                                          N_VGetArrayPointer(r));
-    return 0;
-  };
-  IDAInit(ida, residual, 0.0, y, yp);
-  IDASetUserData(ida, &problem);
-  IDASStolerances(ida, tolerance, tolerance);
-  SUNLinearSolver solver = SUNLinSol_SPGMR(y, SUN_PREC_NONE, 10, context);
-  IDASetLinearSolver(ida, solver, nullptr);
-  Run run;
-  {
-    std::unique_ptr<tp::Projection> projection;
-    if (rows != nullptr) projection = std::make_unique<tp::Projection>(ida, *rows, tp::Options());
-    sunrealtype t = 0.0;
-    while (t < problem.t_end && run.flag >= 0) {
-      run.flag = IDASolve(ida, problem.t_end, &t, y, yp, IDA_ONE_STEP);
-      if (rows == nullptr || run.flag < 0) continue;
-      const Eigen::VectorXd g = value(*rows, t, N_VGetArrayPointer(y), problem.size);
-      run.drift = std::max(run.drift, g.lpNorm<Eigen::Infinity>());
-    }
-    if (run.flag >= 0) IDAGetDky(ida, problem.t_end, 0, y);
-    IDAGetNumSteps(ida, &run.steps);
-    run.y.assign(N_VGetArrayPointer(y), N_VGetArrayPointer(y) + problem.size);
-    if (projection) run.statistics = projection->statistics();
-    IDAFree(&ida);
-  }
-  SUNLinSolFree(solver);
-  for (N_Vector v : {y, yp}) N_VDestroy(v);
-  return run;
-}
-
-double apart(const Run& a, const Run& b) {
-  double largest = 0.0;
-  for (std::size_t i = 0; i < a.y.size(); ++i)
-    largest = std::max(largest, std::abs(a.y[i] - b.y[i]));
-  return largest;
-}
-
-}  // namespace
-
-TEST_CASE("sparse rows of a thousand rods: plain IDA's steps, smaller errors, little work") {
-  const RodChain chain(1000, 0.1);
-  const Problem problem = chain.problem(0.5);
-  const tp::Constraints rows = chain.sparse_rows();
-  const Run reference = integrate_without_matrix(problem, 1e-9, &rows);
-  double mean = 0.0;
-  for (const double tolerance : {1e-4, 1e-5, 1e-7}) {
-    INFO("tolerance " << tolerance);
-    const Run run = integrate_without_matrix(problem, tolerance, &rows);
-    const Run plain = integrate_without_matrix(problem, tolerance, nullptr);
-    REQUIRE(run.flag >= 0);
-    REQUIRE(plain.flag >= 0);
-    const double ratio = static_cast<double>(run.steps) / static_cast<double>(plain.steps);
-    CHECK(ratio <= 1.4);
-    mean += std::log(ratio) / 3.0;
-    CHECK(apart(run, reference) <= 1.2 * apart(plain, reference) + tolerance);
-    CHECK(run.drift <= tolerance);
-    CHECK(run.statistics.failures() == 0);
-    CHECK(run.statistics.iterations <= 5 * run.statistics.projections);
-    CHECK(run.statistics.jacobian_evaluations <= run.statistics.projections + 20);
-  }
-  CHECK(std::exp(mean) <= 1.1);
-}
-
-TEST_CASE("a thousand rods, GMRES: a step size at which it failed is not tried again at once") {
-  const RodChain chain(1000, 0.1);
-  const Problem problem = chain.problem(0.5);
-  const tp::Constraints rows = chain.sparse_rows();
-  double mean = 0.0;
-  long failures = 0;
-  for (const double tolerance : {1.1e-3, 1e-3, 9e-4, 8e-4}) {
-    const Run run = integrate_without_matrix(problem, tolerance, &rows);
-    const Run plain = integrate_without_matrix(problem, tolerance, nullptr);
-    REQUIRE(run.flag >= 0);
-    mean += std::log(static_cast<double>(run.steps) / static_cast<double>(plain.steps)) / 4.0;
-    failures += run.statistics.corrector_failures;
-  }
-  CHECK(failures <= 100);  // tried again after two steps: 197
-  CHECK(std::exp(mean) <= 1.3);
 }
 
 TEST_CASE("sparse rows of lower rank: the steps and the motion of dense rows") {

@@ -9,7 +9,8 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kAlike = 0.9;  // of the size that was refused: as good as that
+constexpr double kAlike = 0.9;    // of the size that was refused: as good as that
+constexpr int kHighestOrder = 2;  // beyond it orders excite oscillations that failures hold down
 
 }  // namespace
 
@@ -28,7 +29,7 @@ void RefusedSize::control(long steps, double h, int order) {
   order_ = order;
   if (refused_ == 0.0) return;
   if (same_ >= order + 2) return forget();
-  hold(2.0 * h >= kAlike * refused_);
+  hold(order <= kHighestOrder && 2.0 * h >= kAlike * refused_);
 }
 
 void RefusedSize::hold(bool wanted) {

@@ -4,8 +4,8 @@
 namespace tether::ida_projection {
 
 /// IDA quarters h after a failed corrector, and doubles it as soon as the error test allows that:
-/// two steps later it tries the size that has just failed, at the same order. A smaller size is
-/// kept here until IDA may raise its order, which takes k + 2 steps of one size.
+/// two steps later it tries the size that has just failed, at the same order. At orders 1 and 2 a
+/// smaller size is kept here until IDA may raise its order, which takes k + 2 steps of one size.
 class RefusedSize {
  public:
   explicit RefusedSize(void* ida_mem) : ida_mem_(ida_mem) {}
