@@ -17,11 +17,13 @@ void AcceleratedSweeps::reset(int contacts, int depth) {
   regime_.assign(at(n_), -1);
   anderson_.reset(n_, depth);
   partial_.reset(n_);
+  momentum_.reset(n_);
 }
 
 void AcceleratedSweeps::start(const PackedVector* x) {
   std::copy(x, x + n_, x_.begin());
   anderson_.clear();
+  momentum_.rest();
   sweeps_ = quiet_ = slow_ = 0;
   quiet_asked_ = kLeastQuiet;
   partial_.start();
@@ -34,6 +36,7 @@ void AcceleratedSweeps::start(const PackedVector* x) {
 // What was seen of the rate is the past; when the next test is due is not.
 void AcceleratedSweeps::replace(const PackedVector* x) {
   std::copy(x, x + n_, x_.begin());
+  momentum_.rest();
   anderson_.clear();
   slow_ = 0;
   eager_ = false;
@@ -61,7 +64,7 @@ int AcceleratedSweeps::toggles(const System& system) {
 // back, and where they toggle for good it keeps them toggling. So it begins after a few quiet
 // sweeps and ends with the quiet; each failure doubles the quiet that is asked for, a tenth of |f|
 // pays it back.
-bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
+bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled, bool carried) {
   const bool calm = toggled <= std::max(kToggles, static_cast<int>(kToggledShare * n_));
   quiet_ = calm ? quiet_ + 1 : 0;
   if (eager_ && sweep == 1) {
@@ -80,7 +83,7 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
   if (eager_) window_f_ = std::numeric_limits<double>::infinity();
   eager_ = false;
   if (!accelerate_) {
-    if (quiet_ < quiet_asked_) return false;
+    if (quiet_ < (carried ? std::max(kCarriedQuiet, quiet_asked_) : quiet_asked_)) return false;
     accelerate_ = true;
     anderson_.clear();
     least_f_ = begun_f_ = window_f_ = f;
@@ -123,10 +126,22 @@ double AcceleratedSweeps::forecast(int sweep, double f, double log_gain) const {
   return best;
 }
 
+void AcceleratedSweeps::carry_on(Search& search, double f, bool carried) {
+  if (carried) {
+    search.counts.work += Momentum::kCost * n_;
+    momentum_.step(search.system.problem(), f, g_, x_);
+  } else {
+    std::copy(g_.begin(), g_.end(), x_.begin());
+  }
+}
+
 void AcceleratedSweeps::run(Search& search, const Leave& leave) {
   System& system = search.system;
+  const bool carried = leave.partly && n_ > kFew;
   const double accelerated_cost = 0.8 * 4 * n_ * depth_;
   const double begin = search.counts.work;
+  // A test costs more than a sweep: it may be late by one.
+  constexpr double kForeseen = 1.05;
   double last_error = 0, last_f = 0;
   int next_test = sweeps_ + 1;
   const int first = sweeps_;
@@ -145,7 +160,7 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
       }
     }
     const double f = std::sqrt(f2);
-    if (sweep >= next_test || last_error * f < 1.5 * search.options.tolerance * last_f) {
+    if (sweep >= next_test || last_error * f < kForeseen * search.options.tolerance * last_f) {
       last_error = search.test(g_.data(), Method::anderson);
       last_f = f;
       if (search.solved()) return;
@@ -173,21 +188,24 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
       earlier_ = later_;
       later_ = {sweep, f};
     }
-    if (leave.partly && n_ > kFew) {
+    if (carried && partial_.due(sweep)) {
+      swept_ = g_;
       const PartialSweeps::Outcome outcome = partial_.run(search, sweep, g_, f_);
       if (outcome != PartialSweeps::Outcome::none) {
         if (partial_.to_tolerance()) search.test(g_.data(), Method::anderson);
         if (search.solved() || search.exhausted()) return;
         if (outcome == PartialSweeps::Outcome::gained) replace(g_.data());
-        x_ = g_;
         anderson_.clear();
+        momentum_.rest_where_changed(g_, swept_);
+        carry_on(search, f, carried);
         continue;
       }
     }
-    if (!extrapolates(sweep, f, toggles(system))) {
-      std::copy(g_.begin(), g_.end(), x_.begin());
+    if (!extrapolates(sweep, f, toggles(system), carried)) {
+      carry_on(search, f, carried);
       continue;
     }
+    momentum_.rest();
     search.counts.work += accelerated_cost;
     anderson_.step(g_.data(), f_.data(), x_.data());
     for (int i = 0; i < n_; ++i) clip_cone(system.problem().locals()[at(i)].mu, x_[at(i)].v);

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include "assembled/stages/momentum.hpp"
 #include "assembled/stages/partial_sweeps.hpp"
 #include <tether/linalg/anderson.hpp>
 
@@ -19,23 +20,26 @@ class AcceleratedSweeps {
     double least_work = 0;  // spent here before leaving is considered
     double most_work = 0;   // > 0: leave after so much
     int most_sweeps = 0;    // > 0: leave after so many
-    bool partly = false;    // contacts that have not settled may be swept alone
+    bool partly = false;    // of many contacts: those that have not settled may be swept alone, and
+                            // sweeps have momentum until all have been quiet for long
   };
   // Until solved, exhausted, or the conditions hold.
   void run(Search& search, const Leave& leave);
 
  private:
   static constexpr int kToggles = 4, kLeastQuiet = 3, kMostQuiet = 320, kWindow = 60, kRecent = 10,
-                       kPersuaded = 40, kFew = 500;
+                       kPersuaded = 40, kFew = 500, kCarriedQuiet = 120;
   static constexpr double kToggledShare = 0.003;
 
   int toggles(const System& system);
-  bool extrapolates(int sweep, double f, int toggled);
+  bool extrapolates(int sweep, double f, int toggled, bool carried);
+  void carry_on(Search& search, double f, bool carried);
   double forecast(int sweep, double f, double log_gain) const;
 
   int n_ = 0, depth_ = 10;
   Anderson anderson_;
   PartialSweeps partial_;
+  Momentum momentum_;
   std::vector<char> regime_;  // of each contact after the last sweep
   // f: weighted change of a sweep.
   bool accelerate_ = false, eager_ = false;
@@ -47,7 +51,7 @@ class AcceleratedSweeps {
     double f = 0;
   };
   Mark earlier_, later_;
-  Packed x_, g_, f_;
+  Packed x_, g_, f_, swept_;
 };
 
 }  // namespace tether::contact::detail

@@ -90,7 +90,7 @@ PartialSweeps::Outcome PartialSweeps::run(Search& search, int sweep, Packed& x,
                                           const Packed& change) {
   constexpr double kFew = 0.1;  // of the contacts
   constexpr double kGain = 0.5;
-  if (sweep < next_) return Outcome::none;
+  if (!due(sweep)) return Outcome::none;
   next_ = sweep + kLeastBetween;
   const double most = find_unsettled(search, change);
   if (unsettled_.empty() || static_cast<double>(unsettled_.size()) > kFew * n_)

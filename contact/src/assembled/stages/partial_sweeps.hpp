@@ -22,6 +22,7 @@ class PartialSweeps {
   };
   /// After full sweep number `sweep` to x; `change`: what it changed, times the contacts' weights.
   Outcome run(Search& search, int sweep, Packed& x, const Packed& change);
+  bool due(int sweep) const { return sweep >= next_; }
   /// Whether what has settled may be solved.
   bool to_tolerance() const { return to_tolerance_; }
 
