@@ -103,6 +103,42 @@ TEST_CASE("stepping: a step that fails is taken in halves and quarters, forces a
   CHECK(position(free, 6).z() == Approx(z).epsilon(1e-12));
 }
 
+TEST_CASE("stepping: halves start from impulses of their length, and leave those of the step") {
+  const Scene scene = hard(1e-14, 1, 2);
+  tc::Stepper s = scene.stepper();
+  std::vector<tc::WarmStart> starts;  // of each attempt
+  std::vector<double> lengths;
+  s.add_force("watch", [&](tc::BodySet&, double, double dt) {
+    starts.push_back(s.memory().contacts);
+    lengths.push_back(dt);
+  });
+  const double step = s.options().step;
+  int failed = 0;
+  for (int k = 0; k < 5; ++k) {
+    starts.clear();
+    lengths.clear();
+    s.step();
+    // The impulses of the last part, as a step of the whole length would have them.
+    const tc::WarmStart after = s.memory().contacts;
+    REQUIRE(after.impulses.size() == s.contacts().impulses.size());
+    for (std::size_t c = 0; c < after.impulses.size(); ++c) {
+      const auto place = std::find(after.ids.begin(), after.ids.end(), s.contacts().points[c].id);
+      REQUIRE(place != after.ids.end());
+      const Vector3d& left = after.impulses[static_cast<std::size_t>(place - after.ids.begin())];
+      CHECK(left == step / s.last_part() * s.contacts().impulses[c]);
+    }
+    // An attempt that fails is followed by one of half its length, which knows nothing of it.
+    for (std::size_t a = 0; a + 1 < starts.size(); ++a) {
+      if (lengths[a + 1] != lengths[a] / 2 || starts[a].impulses.empty()) continue;
+      ++failed;
+      REQUIRE(starts[a + 1].ids == starts[a].ids);
+      for (std::size_t c = 0; c < starts[a].impulses.size(); ++c)
+        CHECK(starts[a + 1].impulses[c] == 0.5 * starts[a].impulses[c]);
+    }
+  }
+  CHECK(failed >= 8);
+}
+
 TEST_CASE("stepping: solved problems are neither accepted nor halved") {
   Scene scene = hard(1e-9, 1e3, 4);
   scene.options.max_sweeps = 1000;

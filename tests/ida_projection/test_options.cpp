@@ -304,3 +304,33 @@ TEST_CASE("treatment of algebraic variables") {
   REQUIRE(none.flag >= 0);
   CHECK(none.statistics.refreshes == 0);
 }
+
+TEST_CASE("an algebraic variable answers the move: its equation holds where the step ends") {
+  const Problem problem = pendulum(1.0, 1.0, 30.0, "index 1");
+  struct Left {
+    double square = 0.0, largest = 0.0;  // of lam - (v^2 - g y) at the ends of steps
+  };
+  const auto left = [&](bool refresh) {
+    tp::Options options;
+    options.refresh_algebraic = refresh;
+    Host host(problem, 1e-7);
+    host.attach(problem.select({"position", "velocity"}), options);
+    Left out;
+    long steps = 0;
+    for (; host.t < problem.t_end; ++steps) {
+      const long answers = host.projection().statistics().refreshes;
+      REQUIRE(host.step() >= 0);
+      const double* y = host.data();
+      const double each = std::abs(y[4] - (y[2] * y[2] + y[3] * y[3] - y[1]));
+      out.square += each * each;
+      if (host.projection().statistics().refreshes > answers)
+        out.largest = std::max(out.largest, each);
+    }
+    out.square = std::sqrt(out.square / static_cast<double>(steps));
+    return out;
+  };
+  // IDA's own scaling of linear solutions, 2 / (1 + cj / cj_at_setup), would leave a part of it.
+  const Left with = left(true), without = left(false);
+  CHECK(with.square < 0.15 * without.square);
+  CHECK(with.largest < 0.5 * without.square);
+}

@@ -308,6 +308,13 @@ void compare_kept_with_new_factors(bool few) {
   const Eigen::VectorXd same = solve(kept, c.g);
   CHECK(distance(same, solve(anew, c.g), c.D) <= 1e-9 * length(same, c.D));
 
+  // Within 1e-4 of it A A^T is still positive definite, and too few digits of it are left.
+  const RowMajor independent = c.C;
+  c.C.row(kept.pivot(3)) = 2.0 * c.C.row(kept.pivot(1)) + 1e-4 * independent.row(kept.pivot(3));
+  CHECK_FALSE(factor_kept());
+  c.C = independent;
+  REQUIRE(factor(kept));
+  REQUIRE(factor_kept());
   c.C.row(kept.pivot(3)) = 2.0 * c.C.row(kept.pivot(1));
   CHECK_FALSE(factor_kept());
   REQUIRE(factor(kept));

@@ -288,3 +288,26 @@ TEST_CASE("event: sliding without forces ends by an impact without collision (Pa
   CHECK(of_kind(*run(text(1.36, -2), 1e-8, 0.001), Kind::jam).size() == 1);
   CHECK(of_kind(*run(text(1.5, 2), 1e-8, 0.1), Kind::jam).empty());
 }
+
+TEST_CASE("event: a contact whose normal no body can move along leaves others theirs") {
+  // A wheel on a hinge in the world that just touches the ground: nobody can say how much of its
+  // weight each of them carries. A box beside it slides to a stop.
+  const std::string wheel =
+      "[[body]]\nname = \"wheel\"\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nmaterial = "
+      "\"body\"\n"
+      "position = [0, 0, 0.1]\nangular_velocity = [0, 5, 0]\n[[joint]]\nkind = \"hinge\"\n"
+      "bodies = [\"wheel\", \"world\"]\nat = [0, 0, 0.1]\naxis = [0, 1, 0]\n";
+  const std::string box =
+      "[[body]]\nname = \"box\"\nshape = \"box\"\nsize = [0.2, 0.2, 0.1]\nmass = 1\nmaterial = "
+      "\"body\"\nposition = [0, 3, 0.05]\nvelocity = [1, 0, 0]\n[[pair]]\nbetween = [\"body\", "
+      "\"body\"]\n";
+  for (const bool with_box : {false, true}) {
+    const auto engine = run(kFloor + mu(0.3) + wheel + (with_box ? box : ""), 1e-8, 1);
+    CHECK(engine->bodies()[1].angular_velocity.norm() < 5 + 1e-8);
+    for (const ContactState& each : engine->contacts())
+      if (each.first == 1 || each.second == 1) CHECK(each.force.norm() < 2 * 9.81);
+    if (!with_box) continue;
+    CHECK(std::abs(engine->bodies()[2].position.x() - 1 / (2 * 0.3 * 9.81)) < 1e-7);
+    CHECK(of_kind(*engine, Kind::stop).size() >= 1);
+  }
+}

@@ -1,5 +1,6 @@
 // The stepping engine of scenes. SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -118,6 +119,36 @@ TEST_CASE("stepping engine: a state with a number that is not finite is refused"
     std::istringstream in(bad);
     CHECK_THROWS_AS(a->restore(in), std::runtime_error);
   }
+}
+
+TEST_CASE("stepping engine: a state that presses bodies which are not there is refused") {
+  const Scene scene = balls_on_floor();
+  const auto a = make_stepping_engine(scene);
+  a->advance(0.05);
+  REQUIRE(!a->contacts().empty());
+  std::stringstream saved;
+  a->save(saved);
+  const std::string state = saved.str();
+  // The contacts of the last step stand before its outcome: two bodies, friction, bias, number,
+  // three vectors; gap; impulse.
+  const std::size_t outcome = 8 + 8 + 4 + 5 * 8, contact = 2 * 4 + 3 * 8 + 9 * 8 + 8 + 3 * 8;
+  const std::size_t first = state.size() - outcome - contact, second = first + 4;
+  const auto restored_with = [&](std::size_t place, std::int32_t body) {
+    std::string changed = state;
+    changed.replace(place, 4, reinterpret_cast<const char*>(&body), 4);
+    std::istringstream in(changed);
+    a->restore(in);
+  };
+  const auto bodies = static_cast<std::int32_t>(scene.bodies.size());
+  restored_with(first, a->contacts().back().first);  // this is the place
+  restored_with(second, a->contacts().back().second);
+  restored_with(second, -1);  // the world
+  for (const std::int32_t body : {-2, bodies, bodies + 1, 2147483647}) {
+    INFO(body);
+    CHECK_THROWS_WITH(restored_with(first, body), Catch::Contains("contacts of no bodies"));
+    CHECK_THROWS_WITH(restored_with(second, body), Catch::Contains("contacts of no bodies"));
+  }
+  CHECK_THROWS_WITH(restored_with(first, -1), Catch::Contains("contacts of no bodies"));
 }
 
 TEST_CASE("stepping engine: states of the format before are read, others refused by name") {

@@ -144,7 +144,10 @@ class SmoothEngine : public Engine {
     Eigen::VectorXd y(y_.size()), saved(y_.size());
     binary::get_array(in, y, saved);
     for (double& value : kept) binary::get(in, value);
-    if (!y.allFinite() || !saved.allFinite() || !(to >= from))
+    const bool invariants_are_numbers =
+        std::all_of(kept.begin(), kept.end(), [](double value) { return std::isfinite(value); });
+    if (!y.allFinite() || !saved.allFinite() || !invariants_are_numbers || !(from >= 0) ||
+        !(to >= from) || !std::isfinite(to))
       throw std::runtime_error("the saved state is damaged");
     renew(from, y, kept);
     if (how == Restore::exact) repeat(to, saved);
