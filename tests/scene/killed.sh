@@ -13,7 +13,8 @@ shift 3
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Records and checkpoints are frequent, so that many a kill hits the writing of a file.
+# Records and checkpoints are frequent, so that many a kill hits the writing of a file, and mostly apart, so that
+# something lies between them.
 go() {
   folder=$1
   shift
@@ -21,7 +22,7 @@ go() {
 }
 {
   grep -v -E '^(csv|vtk|svg|state|every|checkpoint|\[output\])' "$scene"
-  printf '[output]\nevery = 0.01\ncheckpoint = 0.05\n'
+  printf '[output]\nevery = 0.01\ncheckpoint = 0.047\n'
 } >"$work/scene.toml"
 
 start=$(date +%s%N)

@@ -88,6 +88,15 @@ TEST_CASE("messages about a file hold nothing that a terminal obeys") {
         "K\u00f6rper \u2192 \u4e00");
 }
 
+TEST_CASE("names that a spreadsheet would compute in a table are refused") {
+  for (const std::string name : {"=1+1", "+1", "-1", "@a", "=cmd|' /C calc'!A0"}) {
+    INFO(name);
+    CHECK_THROWS_WITH(parse_scene(body("name = \"" + name + "\"\n"), "sheet.toml"),
+                      Catch::Contains("not begin with = + - @"));
+  }
+  CHECK(parse_scene(body("name = \"a=b+c-d@e\"\n"), "sheet.toml").bodies[0].name == "a=b+c-d@e");
+}
+
 TEST_CASE("wrong names and missing pairs in thousands cost no more than the file") {
   // Quadratic work over 30 000 lines would be a thousand million comparisons of texts: minutes.
   std::string references, materials = "[stepping]\n", fixed = body("material = \"m\"\n");

@@ -9,6 +9,8 @@
 #include <map>
 #include <set>
 
+#include "toml/report.hpp"
+
 namespace tether::scene::import {
 
 namespace {
@@ -17,10 +19,12 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kMostMaterials = 16;
 
-std::string clean_title(std::string name) {
-  for (char& c : name)
-    if (!is_name(std::string_view(&c, 1))) c = ' ';
-  return name;
+std::string clean_title(const std::string& name) {
+  std::string title = files::printable(name);
+  for (char& c : title)
+    if (c == ',' || c == '"' || c == '\'') c = ' ';
+  title.erase(0, title.find_first_not_of("=+-@ "));
+  return title;
 }
 
 class Drafting {

@@ -58,7 +58,7 @@ class CsvRecorder : public Recorder {
     out_->put(line_);
   }
 
-  void keep() override { out_->keep(); }
+  void keep(const Engine&) override { out_->keep(); }
 
   void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) override {
     out_->flush();

@@ -10,7 +10,8 @@ namespace {
 
 class EventRecorder : public TableRecorder {
  public:
-  // Rows of an earlier run from before its state stay. A `rest` lies ahead of when it was found.
+  // Rows of events that were found before the state was saved stay. A `rest` lies ahead of when it
+  // was found.
   EventRecorder(const Scene& scene, const std::string& file, const Resume& resume, double now)
       : TableRecorder(
             scene,
@@ -18,11 +19,20 @@ class EventRecorder : public TableRecorder {
                 file,
                 "time_s,kind,first,second,normal_speed_before_m_per_s,normal_speed_after_m_per_s,"
                 "energy_lost_J,impulse_x_N_s,impulse_y_N_s,impulse_z_N_s\n",
-                resume.restarted, [now](const std::string& row) {
-                  return !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
+                resume.restarted, [now, left = resume.events](const std::string& row) mutable {
+                  const bool before =
+                      !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
+                  return before && left-- > 0;
                 })) {}
 
-  void record(const Engine& engine, const Diagnostics&) override {
+  void record(const Engine& engine, const Diagnostics&) override { put_found(engine); }
+  void keep(const Engine& engine) override {
+    put_found(engine);
+    TableRecorder::keep(engine);
+  }
+
+ private:
+  void put_found(const Engine& engine) {
     const std::vector<ContactEvent>& all = engine.events();
     for (; next_ < all.size(); ++next_) {
       const ContactEvent& e = all[next_];
@@ -32,7 +42,6 @@ class EventRecorder : public TableRecorder {
     }
   }
 
- private:
   std::size_t next_ = 0;
 };
 

@@ -15,7 +15,7 @@ class LongTable {
   /// `keep(row)`: whether a row of an earlier run of the same head stays; the first one that does
   /// not ends them.
   template <class Keep>
-  LongTable(const std::string& file, const std::string& head, bool restarted, const Keep& keep) {
+  LongTable(const std::string& file, const std::string& head, bool restarted, Keep keep) {
     std::size_t kept = 0;
     std::string line;
     std::ifstream in;

@@ -12,7 +12,7 @@ namespace tether::scene {
 
 class TableRecorder : public Recorder {
  public:
-  void keep() override { table_.keep(); }
+  void keep(const Engine&) override { table_.keep(); }
   void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
     table_.flush();
     written.push_back(table_.file());

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -124,15 +124,10 @@ class VtkRecorder : public Recorder {
     ++number_;
   }
 
-  void keep() override {
-    write_whole(file_,
-                "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
-                "byte_order=\"LittleEndian\">\n<Collection>\n" +
-                    sets_ + "</Collection>\n</VTKFile>\n");
-  }
+  void keep(const Engine&) override { write_film(); }
 
   void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
-    keep();
+    write_film();
     written.push_back(file_);
   }
 
@@ -141,6 +136,13 @@ class VtkRecorder : public Recorder {
     Mesh mesh;
     double radius;
   };
+
+  void write_film() {
+    write_whole(file_,
+                "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
+                "byte_order=\"LittleEndian\">\n<Collection>\n" +
+                    sets_ + "</Collection>\n</VTKFile>\n");
+  }
 
   static double extent(const Scene& scene) {
     double half = 1;
@@ -252,9 +254,12 @@ class VtkRecorder : public Recorder {
       if (line.compare(0, start.size(), start) != 0) continue;
       if (!(number_at(line, start.size()) <= time)) break;
       sets_ += line + '\n';
+      // Lines of another hand name no frame that this run could have written.
       const std::size_t number = line.rfind('_');
-      if (number != std::string::npos)
-        number_ = std::strtol(line.c_str() + number + 1, nullptr, 10) + 1;
+      if (number == std::string::npos) continue;
+      long last = 0;
+      std::from_chars(line.data() + number + 1, line.data() + line.size(), last);
+      if (last >= number_ && last < static_cast<long>(kMostRecords)) number_ = last + 1;
     }
   }
 

@@ -243,11 +243,12 @@ class Run {
   }
 
   void save(const std::string& file) {
-    for (const auto& recorder : recorders_) recorder->keep();
+    for (const auto& recorder : recorders_) recorder->keep(*engine_);
     std::ostringstream out;
     const Summary& s = summary();
     binary::put(out, done_, last_record_, s.start_energy, s.end_energy, s.lowest_change,
-                s.largest_change, s.drift, s.penetration, s.residual, s.contacts);
+                s.largest_change, s.drift, s.penetration, s.residual, s.contacts,
+                static_cast<std::uint64_t>(resume_.events + engine_->events().size()));
     judge_.save(out);
     engine_->save(out);
     write_state(file, scene_hash_, out.str());
@@ -270,7 +271,7 @@ class Run {
     std::istringstream in(content);
     Summary& s = summary();
     binary::get(in, done_, last_record_, s.start_energy, s.end_energy, s.lowest_change,
-                s.largest_change, s.drift, s.penetration, s.residual, s.contacts);
+                s.largest_change, s.drift, s.penetration, s.residual, s.contacts, resume_.events);
     judge_.restore(in);
     engine_->restore(in, how);
     if (in.peek() != std::char_traits<char>::eof())
@@ -284,7 +285,8 @@ class Run {
     if (!(done_ >= 0 && last_record_ >= 0 && last_record_ <= time) ||
         !(done_ <= time || same_time(done_, time)))
       throw std::runtime_error("the saved state " + file + " is damaged: it is of no one time");
-    resume_ = {true, last_record_};
+    resume_.restarted = true;
+    resume_.time = last_record_;
     recorded_ = true;
     if (done_ >= scene_.end)
       throw std::runtime_error(fmt::format(

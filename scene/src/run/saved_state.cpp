@@ -17,7 +17,7 @@ namespace tether::scene {
 namespace {
 
 const std::string kFormat = "tether state ";
-const std::string kThis = kFormat + "3 " TETHER_VERSION "\n";
+const std::string kThis = kFormat + "4 " TETHER_VERSION "\n";
 
 // CRC-32 of IEEE 802.3 (polynomial 0x04c11db7, bits reversed): finds every damage of up to 32 bits
 // in a row, and any other but for one in 4e9.

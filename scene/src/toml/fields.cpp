@@ -116,10 +116,9 @@ std::string Fields::text(std::string_view key, const std::string& otherwise) {
     wrong(*found, found->value, "must be a text in quotes");
     return otherwise;
   }
-  // Names end up in CSV headers, XML and messages.
   const std::string& text = found->value.text;
-  if (text.find_first_of("\",") != std::string::npos || printable(text) != text) {
-    wrong(*found, found->value, "must hold no comma, quote or control character");
+  if (!is_plain(text)) {
+    wrong(*found, found->value, kPlain);
     return otherwise;
   }
   return text;

@@ -42,6 +42,11 @@ std::string files::printable(std::string_view text) {
   return out;
 }
 
+bool files::is_plain(std::string_view text) {
+  return text.find_first_of("\",") == std::string_view::npos && printable(text) == text &&
+         (text.empty() || std::string_view("=+-@").find(text[0]) == std::string_view::npos);
+}
+
 // Keys and values are those of the file, and the message goes to a terminal.
 std::string Problem::message() const {
   std::string text = place.file;

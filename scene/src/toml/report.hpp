@@ -24,6 +24,11 @@ class Report {
 /// `text` with a question mark for all that a terminal obeys instead of showing it: control
 /// characters of ASCII and Unicode, and marks that turn the direction of what follows.
 std::string printable(std::string_view text);
+/// What names and words of a scene may be: they end up in tables, XML and messages. No comma, quote
+/// or control character, and no beginning that makes spreadsheets compute: = + - @.
+bool is_plain(std::string_view text);
+constexpr const char* kPlain =
+    "must hold no comma, quote or control character, and not begin with = + - @";
 
 /// Throws a SceneError of one problem.
 [[noreturn]] void refuse(const Place& place, std::string why);

@@ -282,7 +282,8 @@ TEST_CASE("a URDF that is wrong is refused with the line of the element") {
   refused(two_links("revolute", limit,
                     "<collision><geometry><box size='1 1 -1'/></geometry></collision>"),
           "link \"b\": collision: geometry: box: size");
-  refused("<robot><link name='a,b'/></robot>", "without comma");
+  for (const char* name : {"a,b", "=1+1", "@a", "a\xe2\x80\xae", "a\xc2\x9b", "a\x7f"})
+    refused("<robot>\n<link name='" + std::string(name) + "'/></robot>", "robot.urdf:2: link \"");
   refused("<robot>\n<link name='a'/>\n<link name='a'/></robot>",
           "robot.urdf:3: link \"a\": name: another");
   refused("<robot>\n<link name='a'/>\n<link name='b'/></robot>", "one link is the base");

@@ -9,6 +9,8 @@
 #include <optional>
 #include <tuple>
 
+#include "toml/report.hpp"
+
 namespace tether::scene::import {
 
 namespace {
@@ -152,10 +154,7 @@ std::string name_or_line(const Node& node) {
 bool is(const Node& node, std::string_view name) { return node.Name() == name; }
 
 bool is_name(std::string_view name) {
-  return !name.empty() && std::none_of(name.begin(), name.end(), [](char c) {
-    const auto code = static_cast<unsigned char>(c);
-    return c == ',' || c == '"' || c == '\'' || code < 0x20 || code == 0x7f;
-  });
+  return !name.empty() && files::is_plain(name) && name.find('\'') == std::string_view::npos;
 }
 
 std::string shown(const std::string& text) {
@@ -183,7 +182,7 @@ std::string Tag::name(std::string_view key, std::string_view allowed) {
     missing(key, std::string(allowed));
     return "";
   }
-  if (!is_name(found)) wrong(key, "must be a name without comma, quote and control character");
+  if (!is_name(found)) wrong(key, std::string("must be a name without quotes: ") + files::kPlain);
   return found;
 }
 
