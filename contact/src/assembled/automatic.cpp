@@ -34,6 +34,7 @@ bool unless_first_and_dear(const Search&, const Rotation& r) {
 }
 bool every_second_round(const Search&, const Rotation& r) { return r.rounds == 2; }
 bool first_and_dear(const Search&, const Rotation& r) { return r.first && r.regular && r.dear; }
+bool first_and_cheap(const Search&, const Rotation& r) { return r.first && r.regular && !r.dear; }
 bool second_round_once(const Search&, const Rotation& r) {
   return r.rounds == 2 && r.regular && !r.coupled;
 }
@@ -50,6 +51,7 @@ const Automatic::Turn Automatic::kRotation[] = {
     {&Automatic::interior_points_near, first_and_near, 30},     // steps
     {&Automatic::interior_points, first_and_far_or_cheap, 40},  // steps, from sticking
     {&Automatic::round_off, always, kRoundOffSteps},            // steps
+    {&Automatic::shifted_path_at_best, first_and_cheap, 150},   // steps
     {&Automatic::coupling_path, first_and_dear, 150},           // factorisations
     {&Automatic::directions, unless_first_and_dear, 200},       // iterations
     {&Automatic::interior_points_at_best, first_that_came_near, 30},  // steps
@@ -72,9 +74,12 @@ const Automatic::Turn Automatic::kFewBodies[] = {
     {&Automatic::sweep_few_bodies, always, 20},           // factorisations it may forecast
     {&Automatic::end_of_work, always, 0},                 //
     {&Automatic::sticking_point, always, 1},              // factorisation
+    {&Automatic::shifted_path, always, 1000},             // steps, from where the sweeps were
+    {&Automatic::round_off, always, kRoundOffSteps},      // steps
+    {&Automatic::end_of_work, always, 0},                 //
     {&Automatic::interior_points, at_a_small_price, 40},  // steps
     {&Automatic::round_off, always, kRoundOffSteps},      // steps
-    {&Automatic::proximal_path, always, 4000},            // problems, from where the sweeps were
+    {&Automatic::proximal_path, always, 4000},            // problems, from the best point
     {&Automatic::end_of_work, always, 0},                 //
 };
 

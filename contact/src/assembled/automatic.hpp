@@ -51,6 +51,8 @@ class Automatic {
   Status interior_points_at_best(Search& search, Rotation& r, int steps);
   Status directions(Search& search, Rotation& r, int iterations);
   Status proximal_newton(Search& search, Rotation& r, int problems);
+  Status shifted_path(Search& search, Rotation& r, int steps);
+  Status shifted_path_at_best(Search& search, Rotation& r, int steps);
   Status proximal_path(Search& search, Rotation& r, int problems);
   Status coupling_path(Search& search, Rotation& r, int factorisations);
   Status rescue(Search& search, Rotation& r, int problems);

@@ -155,6 +155,19 @@ Status Automatic::sticking_point(Search& search, Rotation& r, int) {
   return Status::unsolved;
 }
 
+Status Automatic::shifted_path_at_best(Search& search, Rotation&, int steps) {
+  x_ = search.best;
+  interior.run_shifted(search, x_.data(), steps);
+  return Status::unsolved;
+}
+
+// From where the sweeps were.
+Status Automatic::shifted_path(Search& search, Rotation&, int steps) {
+  interior.run_shifted(search, x_.data(), steps);
+  x_ = search.best;
+  return Status::unsolved;
+}
+
 Status Automatic::proximal_path(Search& search, Rotation&, int problems) {
   interior.run_proximal(search, x_.data(), problems, newton);
   return Status::unsolved;

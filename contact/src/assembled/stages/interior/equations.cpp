@@ -109,6 +109,15 @@ double InteriorEquations::complementarity(const ConePair& point) const {
   return sum / n_;
 }
 
+double InteriorEquations::left_over(const ConePair& point) const {
+  double sum = 0;
+  for (int i = 0; i < n_; ++i) {
+    const double* r = r_[at(i)].v;
+    sum += std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) * point.x[at(i)].v[0];
+  }
+  return sum / n_;
+}
+
 void advance(ConePair& to, const ConePair& along, double step) {
   for (auto [point, change] : {std::pair(&to.x, &along.x), std::pair(&to.u, &along.u)}) {
     for (std::size_t i = 0; i < point->size(); ++i) {

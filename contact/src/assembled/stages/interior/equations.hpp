@@ -51,6 +51,8 @@ class InteriorEquations {
   void add_coupling_rate(const System& system, const ConePair& point);
   /// x.u / contacts, which falls to 0 on the way.
   double complementarity(const ConePair& point) const;
+  /// |x| |r| / contacts: the part of it that a residual stands for.
+  double left_over(const ConePair& point) const;
   /// The step along a direction at which the point reaches a cone.
   double longest_step(const ConePair& point, const ConePair& along) const;
 

@@ -21,6 +21,28 @@ void InteriorPoint::reset(int contacts) {
   swept_.resize(at(n_));
 }
 
+// Predictor and corrector (Mehrotra) at the point whose matrix is factored, towards x.u >= least;
+// last: the length that the step before could have had. The one that this step can have.
+double InteriorPoint::aim(const System& system, double mean, double last, double least) {
+  newton_.direction(system, equations_, 0, false);
+  const double affine = std::min(1.0, newton_.longest_step(equations_));
+  newton_.keep_predictor();
+  // A blocked step leaves products x.u of different size behind.
+  const double centre = last < 0.5 ? kCentreAfterBlocked : kLeastCentre;
+  const double nu = std::max(centre, std::pow(1 - affine, 3)) * mean;
+  newton_.direction(system, equations_, std::max(nu, least), true);
+  return newton_.longest_step(equations_);
+}
+
+// The impulses of the last evaluation, and what a sweep makes of them.
+double InteriorPoint::test_point(Search& search) {
+  const double error = search.test(equations_.impulses().data(), Method::interior_point);
+  swept_ = equations_.impulses();
+  search.system.sweep(swept_.data());
+  search.count_sweep();
+  return std::min(error, search.test(swept_.data(), Method::interior_point));
+}
+
 double InteriorPoint::follow(Search& search, int most, double target) {
   System& system = search.system;
   const double speed = system.norm_b() / std::sqrt(n_);
@@ -30,13 +52,7 @@ double InteriorPoint::follow(Search& search, int most, double target) {
   for (int iteration = 0; iteration < most; ++iteration) {
     const double mean = equations_.complementarity(point_);
     if (!newton_.factor(search, equations_, point_)) break;
-    newton_.direction(system, equations_, 0, false);
-    const double affine = std::min(1.0, newton_.longest_step(equations_));
-    newton_.keep_predictor();
-    // A blocked step leaves products x.u of different size behind.
-    const double centre = last < 0.5 ? kCentreAfterBlocked : kLeastCentre;
-    newton_.direction(system, equations_, std::max(centre, std::pow(1 - affine, 3)) * mean, true);
-    const double longest = last = newton_.longest_step(equations_);
+    const double longest = last = aim(system, mean, last, 0);
     if (!(longest > 1e-8)) break;
     newton_.adapt_shift(longest);
     // Close to the cone only with nearly full steps: blocked ones would spoil the centring.
@@ -49,11 +65,7 @@ double InteriorPoint::follow(Search& search, int most, double target) {
       error = equations_.natural_map(system);
       if (error <= target) return error;
     } else {
-      error = search.test(equations_.impulses().data(), Method::interior_point);
-      swept_ = equations_.impulses();
-      system.sweep(swept_.data());
-      search.count_sweep();
-      error = std::min(error, search.test(swept_.data(), Method::interior_point));
+      error = test_point(search);
       if (search.solved()) return error;
     }
     if (search.exhausted()) return error;

@@ -24,6 +24,9 @@ class InteriorPoint {
   // of `newton` from the point to which the last step leads or, where that fails, along its own
   // path.
   void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton);
+  // From near x, the matrix shifted as far as steps along its null space ask for: where the path of
+  // the problem ends, without the problems of run_proximal(). At most `most` factorisations.
+  void run_shifted(Search& search, const PackedVector* x, int most);
   // From the convex problem to the law, at most `most` factorisations: in theta s(u) the path of
   // theta from 0 to 1 at constant x.u, then run().
   void run_coupling(Search& search, int most);
@@ -51,6 +54,8 @@ class InteriorPoint {
   // Steps until nothing is gained or, for a proximal problem, until its natural map is <= target;
   // returns that map.
   double follow(Search& search, int most, double target);
+  double aim(const System& system, double mean, double last, double least);
+  double test_point(Search& search);
   bool centred(const System& system, double nu) const;
   bool centre(Search& search, double nu);
 

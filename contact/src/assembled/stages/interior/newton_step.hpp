@@ -32,6 +32,7 @@ class InteriorNewton {
   /// Added to the matrix, relative to A: bounds steps along its null space, more of it where they
   /// are short.
   void reset_shift();
+  void set_shift(double shift) { shift_ = shift; }
   void adapt_shift(double longest_step);
 
  private:
