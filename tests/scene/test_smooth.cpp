@@ -1,10 +1,12 @@
 // Jointed scenes against known motions. SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 
+#include "linalg/thrown.hpp"
 #include "smooth_runs.hpp"
 
 using namespace tether::scene;
 using namespace mechanisms;
+using tether::test::contains;
 
 TEST_CASE("pendulum against the elliptic functions", "[smooth]") {
   // A point mass on a massless rod of 1 m (A01): inertia does not turn with a distance joint.
@@ -239,4 +241,30 @@ TEST_CASE("flyball governor: stiff springs with dampers, energy by their work", 
     CHECK(std::abs(engine->diagnostics().angular_momentum.z() - Lz) < 1e-9);
     CHECK(engine->diagnostics().drift < 1e-9);
   }
+}
+
+TEST_CASE("smooth: a run that ends at a dead point names the joints that depend on each other") {
+  // A ball on two rods in one line, and a third one across it that has nothing to do with that.
+  Scene taut = scene(1e-6);
+  taut.gravity = Vector3d(0, 0, -9.81);
+  taut.bodies.push_back(rod("ball", {0, 0, -0.1}, {0, 0, 0.1}));
+  taut.bodies.push_back(rod("beside", {0, 3, -0.1}, {0, 3, 0.1}));
+  const auto hold = [&](const char* name, int body, const Vector3d& from, const Vector3d& to) {
+    taut.joints.push_back(joint(JointKind::distance, body, kWorld, from, to));
+    taut.joints.back().name = name;
+  };
+  hold("left", 0, {0, 0, 0}, {-1, 0, 0});
+  hold("beside", 1, {0, 3, 0}, {0, 4, 0});
+  hold("right", 0, {0, 0, 0}, {1, 0, 0});
+  std::string text;
+  try {
+    make_smooth_engine(taut)->advance(0.5);
+  } catch (const SimulationError& error) {
+    text = error.what();
+  }
+  INFO(text);
+  CHECK(contains(text, "dead point"));
+  CHECK(contains(text, "\"left\""));
+  CHECK(contains(text, "\"right\""));
+  CHECK_FALSE(contains(text, "\"beside\""));
 }

@@ -260,7 +260,20 @@ std::string Integrator::failure(int flag) const {
   if (!context_.message().empty()) message += "IDA: " + context_.message() + " ";
   if (projection_ && projection_->status() != ida_projection::Status::success &&
       !projection_->message().empty())
-    message += "Projection: " + projection_->message() + " ";
+    message += "Projection: " + projection_->message() + ". ";
+  const std::vector<std::string> joints = system_.dependent_joints(t_, y().data());
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    constexpr std::size_t kNamed = 6;
+    if (k == kNamed) {
+      message += " and " + std::to_string(joints.size() - kNamed) + " more";
+      break;
+    }
+    message += (k == 0 ? "Joints \"" : ", \"") + joints[k] + "\"";
+  }
+  if (!joints.empty())
+    message +=
+        " depend on each other there, a dead point: they hold the bodies fast whatever pulls at "
+        "them, or let them go on in two ways. Move a body out of it a little. ";
   message +=
       "Try a smaller [smooth] tolerance or max_step; look whether the joints let the bodies reach "
       "a position from which they cannot go on, and whether a spring or a motion is too stiff or "

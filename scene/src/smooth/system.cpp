@@ -50,6 +50,22 @@ void System::choose_rows(double t, const double* y, double tolerance) {
   in_use_.choose(tolerance);
 }
 
+std::vector<std::string> System::dependent_joints(double t, const double* y) {
+  constexpr double kNear = 1e-3;  // of rows of unit length
+  std::vector<std::string> names;
+  if (rows() == 0) return names;
+  update(t, y);
+  in_use_.look_now();
+  if (in_use_.weakest_pivot() > kNear) return names;
+  SparseJointGradient gradient(rows_, bodies_);
+  gradient.factor(std::vector<char>(at(rows()), 1), kNear);
+  for (const int row : gradient.dependent()) {
+    const std::string name = rows_.joint_of(row);
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
 void System::keep_invariants_of(double t, const Eigen::VectorXd& y) {
   update(t, y.data());
   invariants_.keep(t, y.data());

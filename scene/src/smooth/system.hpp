@@ -65,6 +65,8 @@ class System {
   void choose_rows(double t, const double* y, double tolerance);
   void look_at_rows() { in_use_.look(); }  ///< after a step
   double weakest_pivot() const { return in_use_.weakest_pivot(); }
+  /// At a state near a dead point: joints whose rows depend on each other there. Empty elsewhere.
+  std::vector<std::string> dependent_joints(double t, const double* y);
   int multiplier_choices() const { return in_use_.multiplier_choices(); }
   int constraint_count() const;
   void constraint_values(double t, const double* y, double* g);

@@ -36,6 +36,7 @@ class RowsInUse {
   /// Chooses at the state that is set, for this local tolerance from now on.
   void choose(double tolerance);
   void look();  ///< after a step, at the state that is set
+  void look_now() { choose(); }
 
  private:
   bool independent_by_structure() const;

@@ -63,6 +63,22 @@ int SparseJointGradient::independent(std::vector<char>& rows) const {
   return factors_.rank();
 }
 
+std::vector<int> SparseJointGradient::dependent() const {
+  constexpr double kMatters = 0.1;  // of the largest share
+  if (factors_.dropped() == 0) return {};
+  const int k = factors_.rank();
+  const std::vector<double> shares = factors_.dependence(k);
+  std::vector<int> rows = {factors_.pivot(k)};
+  double largest = 0;
+  const auto share = [&](int i) {
+    return std::abs(shares[at(i)]) * factors_.row_norm(factors_.pivot(i));
+  };
+  for (int i = 0; i < k; ++i) largest = std::max(largest, share(i));
+  for (int i = 0; i < k; ++i)
+    if (share(i) > kMatters * largest) rows.push_back(factors_.pivot(i));
+  return rows;
+}
+
 void SparseJointGradient::factor(const char* wanted, double rank_tolerance) {
   std::fill_n(factors_.entries(), starts_.back(), 0.0);
   each_entry([&](int row, int offset, int slot, const Vector3d& force, const Vector3d& torque) {

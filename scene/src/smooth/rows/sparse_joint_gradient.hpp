@@ -24,6 +24,8 @@ class SparseJointGradient {
   int independent(std::vector<char>& rows) const;
   /// After factor(): what rows before row i in the order of elimination leave of it, 0 to 1.
   double independent_part(int i) const { return factors_.independent_part(i); }
+  /// After factor(): a row that depends on others, and those that matter in it; none: empty.
+  std::vector<int> dependent() const;
   /// Of least kinetic energy a^T M a / 2: a with G a = right, and lambda with M a = G^T lambda.
   void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda);
   /// Of G with each moving body's velocities.
