@@ -8,8 +8,8 @@ namespace tether::ida_projection {
 // False: this attempt is done, left alone or moved with the factors at hand.
 bool Projection::Impl::needs_projection(const Candidate& candidate, const StepData& step,
                                         double tolerance) {
-  const FrequencyPolicy::Need need =
-      frequency_.need(attempts_.steps, attempts_.repeated, std::abs(ida_.step_size()));
+  const FrequencyPolicy::Need need = frequency_.need(attempts_.steps, attempts_.repeated,
+                                                     std::abs(ida_.step_size()), run_.engaged);
   if (need == FrequencyPolicy::Need::projection) return true;
   if (need == FrequencyPolicy::Need::nothing) {
     if (run_.engaged && !leave_alone(candidate, step, tolerance)) return true;
@@ -46,6 +46,7 @@ bool Projection::Impl::follow(const Candidate& candidate, const StepData& step, 
     return false;
   }
   ++statistics_.chord_projections;
+  frequency_.looked(move.length, std::abs(ida_.step_size()));
   note(move, step);
   return true;
 }

@@ -197,7 +197,7 @@ int Projection::Impl::corrector_failed(int flag) {
 // Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
 int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done) {
   const Move first = movers_.used->measure(candidate);
-  if (frequency_.on()) frequency_.looked(first.length, ida_.step_size());
+  if (frequency_.on()) frequency_.projected(first.length, std::abs(ida_.step_size()));
   done = true;
   if (first.status != Status::success) {
     const int code = finish(first.status, movers_.used->message());
@@ -343,6 +343,7 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
   ++s.projections;
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
+  if (frequency_.on()) frequency_.projected(move.length, std::abs(ida_.step_size()));
   note(move, step);
   if (sampled) s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
 }
@@ -353,7 +354,6 @@ void Projection::Impl::note(const Move& move, const StepData& step) {
   s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
   s.largest_move = std::max(s.largest_move, move.length);
   tally_.move_sum += move.length;
-  if (frequency_.on()) frequency_.looked(move.length, ida_.step_size());
   attempts_.pending = true;
   attempts_.left = move.left;
   if (options_.progress) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "movers/mover.hpp"
 
@@ -71,14 +72,55 @@ class Staleness {
   long settles_ = 0;
 };
 
+/// By how much does a move with old factors miss the shortest one? Second moves do not tell: g
+/// answers to rows that have turned by an angle a with 1 - cos a of the move, while sin a of it
+/// goes astray, along the set or into components whose scale has changed. So full moves are
+/// compared with what the factors before them would have made of the same g.
+///
+/// Lengths are those in the metric D, the rms of dy_i / D_i: where D_i is the size of the
+/// corrector's own changes, they tell by which part of these a move disturbs the history, also
+/// where a stiff component is far below its tolerance.
+class Misdirection {
+ public:
+  /// The candidate is at time t.
+  void look(double t) { elapsed_ = std::abs(t - made_); }
+  /// The factors are made anew; measured() still is about those before.
+  void renewed(double t) { made_ = t; }
+  /// They would have missed the full move, of this length, by `miss`.
+  void measured(double miss, double length) {
+    if (!(length > kUnfelt) || elapsed_ == 0.0) return;
+    turn_ = std::max(miss / (length * elapsed_), kForget * turn_);
+    known_ = true;
+  }
+  /// May the factors at hand make a move of this length?
+  bool allows(double length) const {
+    return length <= kUnfelt || (known_ && turn_ * elapsed_ * length <= kMayMiss);
+  }
+  /// What such a move leaves grows with the square of this angle, not with the age of the factors.
+  bool far() const { return turn_ * elapsed_ > kFar; }
+
+ private:
+  static constexpr double kMayMiss = 0.05;
+  static constexpr double kFar = 0.3;
+  static constexpr double kUnfelt = 1e-4;
+  static constexpr double kForget = 0.9;  // for each measurement
+
+  bool known_ = false;
+  double turn_ = 0.0;  // part of a move that goes astray, for each unit of time
+  double made_ = 0.0, elapsed_ = 0.0;
+};
+
 constexpr double kMayFollowLeave = 0.02;  // tolerances
 
 /// Mover::follow(), y and g being the mover's own: value() evaluates g, solve() returns the length
-/// of the move for it, apply() makes that move, drift() is the largest |g_i|. Lengths in
-/// tolerances. `may_be_left`: of the drift, after success.
-template <class Value, class Solve, class Apply, class Drift>
+/// of the move for it, apply() makes that move, drift() is the largest |g_i|; allows() says
+/// after solve() whether it may be made as the first one, `far` that what it leaves must be looked
+/// at. Lengths in tolerances. `may_be_left`: of
+/// the drift, after success.
+template <class Value, class Solve, class Apply, class Drift, class Allows>
 Move move_with_old_factors(FactorWear& wear, Value value, Solve solve, Apply apply, Drift drift,
-                           double floor, double longest, double may_be_left) {
+                           Allows allows, bool far, double floor, double longest,
+                           double may_be_left) {
   constexpr int kMostMoves = 3;
 
   Move result;
@@ -87,7 +129,7 @@ Move move_with_old_factors(FactorWear& wear, Value value, Solve solve, Apply app
     const Status status = value();
     if (status != Status::success) break;
     const double length = solve();
-    if (!(length <= longest)) break;
+    if (!(length <= longest) || (result.moves == 0 && !allows())) break;
     if (result.moves == 0) {
       result.length = length;
       result.drift_before = drift();
@@ -96,7 +138,7 @@ Move move_with_old_factors(FactorWear& wear, Value value, Solve solve, Apply app
     }
     apply();
     ++result.moves;
-    const bool look = result.moves == 1 && wear.must_look(length, may_be_left);
+    const bool look = result.moves == 1 && (far || wear.must_look(length, may_be_left));
     if (length <= floor || (!look && wear.rate() * length <= may_be_left)) {
       result.status = Status::success;
       break;

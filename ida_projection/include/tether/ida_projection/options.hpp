@@ -56,8 +56,9 @@ struct Options {
   /// n >= 1: accepted steps n, 2n, 3n, ... are projected with C evaluated and factorised anew. Any
   /// other step is not projected while its predicted drift is below 0.003 tolerances, and otherwise
   /// moved with the existing factors, to 0.02 tolerances; it is projected in full if these factors
-  /// no longer converge well and after steps that IDA rejected. Saves up to four fifths of the
-  /// evaluations and factorisations of C; the number of steps stays that of frequency 1.
+  /// no longer converge well or would move it astray, while the step size grows, and after steps
+  /// that IDA rejected. Saves up to two thirds of the evaluations and factorisations of C; the
+  /// number of steps stays that of frequency 1.
   int frequency = 1;
 
   /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in

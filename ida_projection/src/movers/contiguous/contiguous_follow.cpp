@@ -11,14 +11,54 @@ Move ContiguousMover<Rows>::follow(const Candidate& candidate, bool again) {
     rows_.set_metric(false);
     ++kept_.age;
     rows_.factors.decided = false;
+    misdirection_.look(candidate.t);
   }
+  const auto allows = [&] { return again || misdirection_.allows(in_metric(rows_.counted().dy)); };
   return move_with_old_factors(
       wear_, [&] { return rows_.value(candidate.t); }, [&] { return rows_.solve(); },
       [&] { rows_.apply(1.0, candidate.correction_entries); }, [&] { return rows_.drift(); },
-      1e2 * kEpsilon * rows_.at.size(), options_.largest_move, kMayFollowLeave);
+      allows, misdirection_.far(), 1e2 * kEpsilon * rows_.at.size(), options_.largest_move,
+      kMayFollowLeave);
+}
+
+// rms of dy_i / D_i, dy over the columns that count.
+template <class Rows>
+double ContiguousMover<Rows>::in_metric(const std::vector<double>& dy) {
+  const double* D = rows_.counted().D();
+  double sum = 0.0;
+  for (std::size_t k = 0; k < dy.size(); ++k)
+    if (D[k] > 0.0) sum += (dy[k] / D[k]) * (dy[k] / D[k]);
+  return rows_.wrms(sum);
+}
+
+// The move that the factors of an earlier candidate make for g at hand, in their own metric.
+template <class Rows>
+void ContiguousMover<Rows>::keep_old_move(double t) {
+  old_move_.clear();
+  misdirection_.look(t);
+  if (reused_ || !rows_.factors.there || rows_.factors.thin) return;
+  rows_.look();
+  old_move_ = rows_.counted().dy;
+}
+
+// After the first solve() with the factors of this candidate.
+template <class Rows>
+void ContiguousMover<Rows>::compare_with_old_move() {
+  const std::vector<double>& dy = rows_.counted().dy;
+  if (old_move_.size() == dy.size()) {
+    for (std::size_t k = 0; k < dy.size(); ++k) old_move_[k] -= dy[k];
+    misdirection_.measured(in_metric(old_move_), in_metric(dy));
+  }
+  old_move_.clear();
 }
 
 template Move ContiguousMover<RowBlocks>::follow(const Candidate&, bool);
 template Move ContiguousMover<SparseRows>::follow(const Candidate&, bool);
+template double ContiguousMover<RowBlocks>::in_metric(const std::vector<double>&);
+template double ContiguousMover<SparseRows>::in_metric(const std::vector<double>&);
+template void ContiguousMover<RowBlocks>::keep_old_move(double);
+template void ContiguousMover<SparseRows>::keep_old_move(double);
+template void ContiguousMover<RowBlocks>::compare_with_old_move();
+template void ContiguousMover<SparseRows>::compare_with_old_move();
 
 }  // namespace tether::ida_projection

@@ -101,9 +101,10 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   reused_ = keeps_factors() && rows_.factors.there;
   ++kept_.age;
   rows_.factors.decided = false;
-  rows_.set_metric(!reused_);
   result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;
+  if (options_.frequency > 1) keep_old_move(candidate.t);
+  rows_.set_metric(!reused_);
   firm_only_ = start_known_ = false;
   result = newton(candidate, rows_.drift());
   const bool broken =
@@ -193,6 +194,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
 
     if (result.moves == 1) {
       result.length = move_length_ = length;
+      compare_with_old_move();
       double limit = 0.0;
       if (!std::isfinite(length) || too_long(length, limit)) {
         if (options_.long_move == LongMove::reject || !std::isfinite(length)) {

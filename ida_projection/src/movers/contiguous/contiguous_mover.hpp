@@ -72,6 +72,7 @@ class ContiguousMover final : public Mover {
     monitor_.reset();
     staleness_.reset();
     wear_ = FactorWear();
+    misdirection_ = Misdirection();
   }
 
  private:
@@ -83,12 +84,16 @@ class ContiguousMover final : public Mover {
     if (status != Status::success) return status;
     kept_ = {kUnknownSlope, 0};
     wear_.renewed();
+    misdirection_.renewed(t);
     return status;
   }
   double first_solve() { return rows_.first_solve(firm_only_); }
   bool contradicts();
   bool plainly_nothing();
   bool must_learn(double length) const;
+  double in_metric(const std::vector<double>& dy);
+  void keep_old_move(double t);
+  void compare_with_old_move();
   void restart(const Candidate& candidate);
   Move newton(const Candidate& candidate, double drift_before);
   Move newton_with_firm_rows(const Candidate& candidate, const Move& failed);
@@ -107,7 +112,9 @@ class ContiguousMover final : public Mover {
   SlopeOfFactors kept_;       // these
   int looks_ = 0;             // of measure() with the factors of an earlier one
   Staleness staleness_;
-  FactorWear wear_;  // for follow()
+  FactorWear wear_;  // for follow(), as is what comes next
+  Misdirection misdirection_;
+  std::vector<double> old_move_;  // with the factors that move() found; empty: unknown
 };
 
 }  // namespace tether::ida_projection

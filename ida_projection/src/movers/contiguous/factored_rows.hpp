@@ -77,6 +77,8 @@ class FactoredRows {
   /// The move for g by the factors at hand; returns its WRMS length in the error norm. Algebraic
   /// columns do not count there: they follow the others.
   double solve();
+  /// The rows whose move is measured in tolerances.
+  typename Rows::Block& counted() { return blocks.d.rows.empty() ? blocks.a : blocks.d; }
   /// The same where no move follows.
   double look() {
     --statistics_.iterations;
@@ -136,10 +138,9 @@ template <class Rows>
 double FactoredRows<Rows>::solve() {
   ++statistics_.iterations;
   blocks.solve(g_);
-  const Block& counted = blocks.d.rows.empty() ? blocks.a : blocks.d;
   double sum = 0.0;
-  const double* dy = counted.dy.data();
-  counted.for_columns([&sum, dy, w = at.w](int k, int i) {
+  const double* dy = counted().dy.data();
+  counted().for_columns([&sum, dy, w = at.w](int k, int i) {
     const double move = dy[k] * w[i];
     sum += move * move;
   });

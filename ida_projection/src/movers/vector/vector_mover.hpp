@@ -44,6 +44,7 @@ class VectorMover final : public Mover {
         work_(like),
         metric_(options, like),
         rows_(constraints, statistics, like) {
+    if (options.frequency > 1) old_move_ = OwnedVector(like);
     free_all();
     reset();
   }
@@ -58,6 +59,7 @@ class VectorMover final : public Mover {
     metric_.reset();
     monitor_.reset();
     wear_ = FactorWear();
+    misdirection_ = Misdirection();
     factored_ = false;
   }
 
@@ -117,8 +119,11 @@ class VectorMover final : public Mover {
       N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
     else
       load(candidate);
-    return chord_moves(candidate, 1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights),
-                       options_.largest_move, kMayFollowLeave);
+    if (!again) misdirection_.look(candidate.t);
+    const auto allows = [&] { return again || misdirection_.allows(in_metric(dy_, candidate)); };
+    return chord_moves(candidate, allows, misdirection_.far(),
+                       1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights), options_.largest_move,
+                       kMayFollowLeave);
   }
 
   // A short move by factors of an earlier step leaves a part of itself that their age tells; where
@@ -128,7 +133,8 @@ class VectorMover final : public Mover {
     Move result;
     if (factors_last() && wear_.usable()) {
       load(candidate);
-      result = chord_moves(candidate, 0.0, kShort, kSafe * options_.tolerance);
+      const auto any = [] { return true; };
+      result = chord_moves(candidate, any, false, 0.0, kShort, kSafe * options_.tolerance);
       if (result.status == Status::success || fatal_) return result;
     }
     const double moved = result.length;
@@ -143,10 +149,13 @@ class VectorMover final : public Mover {
   bool factors_last() const { return no_settle_ && !metric_.local() && factored_ && rows_.whole(); }
 
   // After load(): moves with the factors at hand.
-  Move chord_moves(const Candidate& candidate, double floor, double longest, double may_be_left) {
+  template <class Allows>
+  Move chord_moves(const Candidate& candidate, Allows allows, bool far, double floor,
+                   double longest, double may_be_left) {
     return move_with_old_factors(
         wear_, [&] { return value(candidate.t); }, [&] { return solve(candidate.weights); },
-        [&] { apply(candidate); }, [&] { return drift(); }, floor, longest, may_be_left);
+        [&] { apply(candidate); }, [&] { return drift(); }, allows, far, floor, longest,
+        may_be_left);
   }
 
   // The whole move dy.
@@ -158,8 +167,9 @@ class VectorMover final : public Mover {
   Move newton(const Candidate& candidate) {
     Move result;
     load(candidate);
-    metric_.set(candidate, dy_);
     if ((result.status = value(candidate.t)) != Status::success) return result;
+    const bool compare = keep_old_move(candidate);
+    metric_.set(candidate, dy_);
     result.drift_before = result.drift_after = drift();
     monitor_.start();
     bool have_factors = false, fresh = false;
@@ -171,6 +181,7 @@ class VectorMover final : public Mover {
       const double length = solve(candidate.weights);
       if (++result.moves == 1) {
         result.length = length;
+        if (compare) compare_with_old_move(candidate);
         const double limit =
             length <= options_.largest_move
                 ? options_.largest_move
@@ -212,6 +223,28 @@ class VectorMover final : public Mover {
     return result;
   }
 
+  // rms of v_i / D_i; in tolerances where vectors cannot tell which D_i are 0.
+  double in_metric(N_Vector v, const Candidate& candidate) {
+    if (v->ops->nvinvtest == nullptr) return N_VWrmsNorm(v, candidate.weights);
+    N_VConst(0.0, work_);
+    (void)N_VInvTest(metric_.D(), work_);
+    return N_VWrmsNorm(v, work_);
+  }
+
+  // With the factors of an earlier candidate, in their metric: how far do they go astray?
+  bool keep_old_move(const Candidate& candidate) {
+    misdirection_.look(candidate.t);
+    if (options_.frequency == 1 || !factored_) return false;
+    solve(candidate.weights);
+    --statistics_.iterations;
+    N_VScale(1.0, dy_, old_move_);
+    return true;
+  }
+  void compare_with_old_move(const Candidate& candidate) {
+    N_VLinearSum(1.0, dy_, -1.0, old_move_, old_move_);
+    misdirection_.measured(in_metric(old_move_, candidate), in_metric(dy_, candidate));
+  }
+
   void free_all() {
     holds_algebraic_ = false;
     metric_.free_all();
@@ -245,6 +278,7 @@ class VectorMover final : public Mover {
     if ((status = told(rows_.factor(metric_, terms_at))) != Status::success) return status;
     factored_ = true;
     wear_.renewed();
+    misdirection_.renewed(candidate.t);
     return Status::success;
   }
 
@@ -270,7 +304,9 @@ class VectorMover final : public Mover {
   OwnedVector y_, dy_, work_;
   VectorMetric metric_;
   Rows rows_;
-  FactorWear wear_;  // for follow()
+  FactorWear wear_;  // for follow(), as is what comes next
+  Misdirection misdirection_;
+  OwnedVector old_move_;
   bool factored_ = false;
   bool no_settle_ = false;
   N_Vector id_ = nullptr;         // the caller's of set_algebraic()
