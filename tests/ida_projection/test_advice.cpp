@@ -104,6 +104,33 @@ TEST_CASE("an entry of C that is wrong by a factor 2 is named") {
   CHECK(count(end.printed, "check_jacobian") >= 1);
 }
 
+TEST_CASE("a long collapse is explained once, restarts and all") {
+  const Problem problem = swing(100.0);
+  Host host(problem, 1e-6);
+  const tp::Constraints wrong = row(
+      "energy", [](double, const double* y) { return y[2] * y[2] + y[3] * y[3] + 6.9 * y[1]; },
+      [](double, const double* y, double* c) {
+        c[1] = 6.9;
+        c[2] = 2.0 * y[2];
+        c[3] = 2.0 * y[3];
+      });
+  Stderr captured;
+  {
+    tp::Projection projection(host.ida, problem.select({"position", "velocity"}) + wrong);
+    for (int restart = 0; restart < 3; ++restart) {
+      int flag = 0;
+      while (host.steps() < 3000 && host.t < problem.t_end && flag >= 0) flag = host.step();
+      REQUIRE(host.restart() == 0);
+    }
+    IDAFree(&host.ida);
+  }
+  const std::string printed = captured.text();
+  INFO(printed);
+  CHECK(count(printed, "IDA rejected") == 1);
+  CHECK(count(printed, "at t = ") == 1);  // what the first steps of the first run have shown
+  CHECK(count(printed, "tether:") == 2);
+}
+
 TEST_CASE("an id vector that calls everything algebraic is named") {
   const Problem problem = swing(100.0);
   Host host(problem, 1e-6);

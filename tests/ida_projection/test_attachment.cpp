@@ -1,9 +1,13 @@
 // Tether: when and to what the projection is attached. SPDX-License-Identifier: BSD-3-Clause
+#include <cstdint>
+#include <cstring>
 #include <memory>
 #include <nvector/nvector_serial.h>
 #include <problems/pendulum.hpp>
+#include <stdexcept>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <type_traits>
 #include <utility>
 
 #include "host.hpp"
@@ -235,6 +239,40 @@ TEST_CASE("ida_mem that cannot be attached to is refused, and says why") {
   void* fresh = IDACreate(context);
   CHECK(contains(thrown([&] { tp::Projection(fresh, on_circle()); }), "IDAInit"));
   IDAFree(&fresh);
+}
+
+TEST_CASE("a SUNDIALS with indices of another size is refused by name") {
+  Host host(swing(), 1e-6);
+  void* ignored = nullptr;
+  sunrealtype t = 0.0, cj = 0.0;
+  N_Vector y = nullptr, others[4];
+  IDAGetNonlinearSystemData(host.ida, &t, &y, &others[0], &others[1], &others[2], &others[3], &cj,
+                            &ignored);
+  using Other = std::conditional_t<sizeof(sunindextype) == 8, std::int32_t, std::int64_t>;
+  const auto space = y->ops->nvspace;
+  y->ops->nvspace = [](N_Vector, sunindextype* reals, sunindextype* integers) {
+    const Other five = 5, one = 1;
+    std::memcpy(reals, &five, sizeof five);
+    std::memcpy(integers, &one, sizeof one);
+  };
+  const auto attached = [&] {
+    try {
+      tp::Projection projection(host.ida, host.problem.recommended_constraints());
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string said = attached();
+  CHECK(contains(said, "-bit indices, but the plugin was compiled for"));
+  CHECK(contains(said, sizeof(sunindextype) == 8 ? "has 32-bit" : "has 64-bit"));
+
+  // One that says nothing of itself passes.
+  y->ops->nvspace = [](N_Vector, sunindextype*, sunindextype*) {};
+  CHECK(attached().empty());
+  y->ops->nvspace = nullptr;
+  CHECK(attached().empty());
+  y->ops->nvspace = space;
 }
 
 TEST_CASE("status and message before the first step") {

@@ -102,3 +102,37 @@ TEST_CASE("atol above the solution is said, at rest it is not") {
   CHECK(contains(said.message, "reduce atol"));
   CHECK(after(12, small, 1e-6, circle_of(1e-6, "small circle")).status == tp::Status::success);
 }
+
+TEST_CASE("atol ten times above the solution is said however IDA starts") {
+  for (const double t_end : {5.0, 10.0, 20.0, 50.0, 100.0, 500.0}) {
+    Problem tiny = tether::test::circle(t_end);
+    for (double& value : tiny.y0) value *= 1e-4;
+    for (double& value : tiny.yp0) value *= 1e-4;
+    const Said said = after(100, tiny, 1e-3, circle_of(1e-8, "tiny circle"));
+    INFO("to " << t_end << ": " << said.message);
+    CHECK(said.status == tp::Status::doubtful);
+    CHECK(contains(said.message, "reduce atol"));
+  }
+}
+
+TEST_CASE("a solution that decays below its tolerance, or grows from there, is no alarm") {
+  for (const double rate : {-1.0, 1.0}) {
+    // The same twice.
+    Problem problem = ode({rate < 0.0 ? 1.0 : 1e-5, 0.0}, rate < 0.0 ? 40.0 : 12.0,
+                          [rate](double, const double* y, double* f) {
+                            f[0] = rate * y[0];
+                            f[1] = rate * y[1];
+                          });
+    problem.y0[1] = problem.y0[0];
+    problem.yp0[1] = rate * problem.y0[1];
+    const tp::Constraints equal = row(
+        "equal", [](double, const double* y) { return y[0] * y[0] - y[1] * y[1]; },
+        [](double, const double* y, double* c) {
+          c[0] = 2.0 * y[0];
+          c[1] = -2.0 * y[1];
+        });
+    const Said said = after(100, problem, 1e-3, equal);
+    INFO("rate " << rate << ": " << said.message);
+    CHECK(!contains(said.message, "reduce atol"));
+  }
+}

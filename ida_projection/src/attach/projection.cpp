@@ -82,6 +82,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
              BypassWatch(ida_)},
       wanted_metric_(options_.metric) {
   N_Vector like = vector_of(ida_mem);
+  check_running_indices(like);
   validate(constraints_, options_, like);
 
   unknowns_.contiguous = is_contiguous(like);

@@ -11,6 +11,7 @@ namespace tether::ida_projection {
 N_Vector fast_vector(N_Vector y) {
   check_running_sundials(TETHER_SUNDIALS_BUILD);
   fast::require_serial(y, "fast_vector: y");
+  check_running_indices(y);
   fast::install_kernels(y->ops, NV_LENGTH_S(y));
   return y;
 }

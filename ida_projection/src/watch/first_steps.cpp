@@ -14,14 +14,16 @@ constexpr long kSettled = 2;             // accepted steps: before, y' is still 
 constexpr double kFelt = 1.0;            // tolerances in one step: less may be noise of y'
 constexpr int kDoubts = 5, kLooks = 20;  // steps in a row with a doubt of one sign; looks into them
 constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C
-constexpr long kFirstLook = 6, kLastLook = 10;  // accepted steps, at the solution's size
-constexpr double kMoves = 0.05;                 // of y in a step: it is no state of rest
+constexpr int kSmallLooks = 3;       // at a solution below its tolerances
+constexpr double kMoves = 0.05;      // of y in a step: it is no state of rest
+constexpr double kGrows = 1.02;      // for each step: a solution from zero may be small at first
 
 }  // namespace
 
 void FirstSteps::reset() {
   row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), 0);
   looks_ = small_looks_ = 0;
+  largest_ = 0.0;
   searched_ = 0;
 }
 
@@ -30,8 +32,7 @@ std::string FirstSteps::look(const Candidate& candidate, const StepData& step, l
                              Corrector& corrector) {
   std::string found;
   if (steps < kSettled) return found;
-  if (steps >= kFirstLook && steps <= kLastLook && steps % 2 == 0)
-    found = look_at_tolerances(candidate, step, h, corrected);
+  if (largest_ < 1.0) found = look_at_tolerances(candidate, step, h, corrected);
   // In forms of index 2 and more y' and multipliers carry the error of derivatives that F lacks.
   if (!found.empty() || variables.high_index() || !variables.index_known()) return found;
   if (candidate.base_entries != nullptr && has_values(constraints_) && looks_ < kLooks)
@@ -39,7 +40,8 @@ std::string FirstSteps::look(const Candidate& candidate, const StepData& step, l
   return found;
 }
 
-// With |y| below a tolerance in the norm of the error test, y = 0 would pass as well.
+// With |y| below a tolerance in the norm of the error test, y = 0 would pass as well. One that has
+// come from above, or still grows, says nothing.
 std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const StepData& step,
                                            double h, N_Vector corrected) {
   if (!work_) work_ = OwnedVector(candidate.base);
@@ -47,8 +49,10 @@ std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const Ste
   const double size = N_VWrmsNorm(work_, candidate.weights);
   N_VLinearSum(1.0, step.yp_predicted, step.cj, corrected, work_);
   const double change = std::abs(h) * N_VWrmsNorm(work_, candidate.weights);
-  if (!(size < 1.0) || !(change > kMoves * size)) return {};
-  if (++small_looks_ < (kLastLook - kFirstLook) / 2 + 1) return {};
+  const bool grows = size > kGrows * largest_;
+  largest_ = std::max(largest_, size);
+  if (!(size < 1.0) || grows || !(change > kMoves * size)) return {};
+  if (++small_looks_ != kSmallLooks) return {};
   std::ostringstream out;
   out << "the whole solution is " << size << " tolerances long at t = " << step.t
       << ", so that IDA's error test cannot see it: reduce atol";

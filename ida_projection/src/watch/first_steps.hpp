@@ -45,6 +45,7 @@ class FirstSteps {
   Tangency tangency_;                  // of the caller's rows
   std::vector<int> row_doubts_;        // steps in a row in which F did not seem to keep a row
   int looks_ = 0, small_looks_ = 0;    // at doubts in rows; at a solution below its tolerances
+  double largest_ = 0.0;               // size of the solution so far, in tolerances
   long searched_ = 0;                  // unknowns compared
   std::vector<double> point_, slope_;  // y and y' as the corrector left them
   OwnedVector work_;

@@ -87,8 +87,9 @@ void Report::count_failure_in_step(const std::string& text, long steps) {
 void Report::warn(Status kind, const std::string& text) {
   warning_ = text;
   warning_status_ = kind;
-  if (said_warning_ != kind) say(text);  // not again after every IDAReInit
-  said_warning_ = kind;
+  const unsigned bit = 1U << static_cast<unsigned>(kind);
+  if ((said_warnings_ & bit) == 0) say(text);  // not again after every IDAReInit
+  said_warnings_ |= bit;
 }
 
 void Report::say(const std::string& text) const {

@@ -48,7 +48,7 @@ class Report {
   Statistics& statistics_;
   std::string warning_;
   Status warning_status_ = Status::success;
-  Status said_warning_ = Status::success;
+  unsigned said_warnings_ = 0;  // a bit for each kind
   bool printed_ = false;
   long failing_step_ = -1;
   int failures_in_step_ = 0;

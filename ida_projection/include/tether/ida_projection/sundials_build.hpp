@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <sundials/sundials_nvector.h>
 #include <tether/export.hpp>
 #include <tether/ida_projection/sundials_build.h>
 
@@ -11,8 +12,12 @@ namespace tether::ida_projection {
 using SundialsBuild = ::tether_sundials_build;
 
 /// Throws std::runtime_error unless the SUNDIALS in this process has the major version of `built`
-/// and no earlier minor one. (Precision and size of indices cannot be asked for at run time.)
+/// and no earlier minor one. (SUNDIALS does not tell its precision and size of indices.)
 void check_running_sundials(const SundialsBuild& built);
+
+/// Throws std::runtime_error where the code of this vector counts with indices of another size than
+/// the plugin was compiled with: N_VSpace writes two of them. Vectors without it are not checked.
+void check_running_indices(N_Vector vector);
 
 }  // namespace tether::ida_projection
 TETHER_EXPORT_END
