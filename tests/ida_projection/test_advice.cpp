@@ -177,6 +177,27 @@ TEST_CASE("a healthy run says nothing while IDA looks for its first step") {
   }
 }
 
+TEST_CASE("a row that holds one side only, max(u, 0), is named in the first steps") {
+  // Moves from the other side are none: the run goes on, up to 1.6 times as long and off by 1.
+  const Problem problem = swing(50.0);
+  const auto u = [](const double* y) { return y[0] * y[0] + y[1] * y[1] - 1.7 * 1.7; };
+  const tp::Constraints one_sided = row(
+      "outside", [u](double, const double* y) { return std::max(u(y), 0.0); },
+      [u](double, const double* y, double* c) {
+        const double slope = u(y) > 0.0 ? 2.0 : 0.0;
+        c[0] = slope * y[0];
+        c[1] = slope * y[1];
+      });
+  for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+    const Ended end =
+        run(problem, tolerance, one_sided + problem.select({"velocity", "energy"}), 150);
+    INFO(tolerance << ": " << end.message);
+    CHECK(end.status == tp::Status::doubtful);
+    CHECK(contains(end.message, "outside"));
+    CHECK(contains(end.message, "|.| or max"));
+  }
+}
+
 TEST_CASE("rows with a kink on the set, |g| and max, are suspected by name") {
   struct Kink {
     std::string name;

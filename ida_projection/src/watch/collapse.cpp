@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "watch/first_steps.hpp"
+#include "watch/kink.hpp"
 
 namespace tether::ida_projection {
 
@@ -15,32 +16,6 @@ namespace {
 
 constexpr long kWindow = 200;         // accepted steps
 constexpr int kLargestSearch = 2000;  // unknowns up to which columns are looked at one by one
-
-const char* const kKink =
-    "; its slopes to both sides differ there: a row with |.| or max has no derivative on the set, "
-    "write it without";
-
-// Is the entry that check_jacobian calls wrong the slope of g to one side only?
-bool has_kink(const Constraints& constraints, const JacobianReport& report, double t,
-              std::vector<double> y) {
-  constexpr double kReach = 1e-4, kDiffer = 0.1;
-  Statistics ignored;
-  Evaluator evaluator(constraints, ignored);
-  const auto n = static_cast<int>(y.size());
-  const auto j = static_cast<std::size_t>(report.column);
-  const double here = y[j], reach = kReach * std::max(1.0, std::abs(here));
-  std::vector<double> g(static_cast<std::size_t>(evaluator.rows()));
-  double at[3];
-  for (int k = 0; k < 3; ++k) {
-    y[j] = here + (k - 1) * reach;
-    if (evaluator.value(t, y.data(), n, g.data()) != Status::success) return false;
-    at[k] = g[static_cast<std::size_t>(report.row)];
-  }
-  const double left = (at[1] - at[0]) / reach, right = (at[2] - at[1]) / reach;
-  const double size = kDiffer * std::max(std::abs(left), std::abs(right));
-  return std::abs(left - right) > size &&
-         std::min(std::abs(report.given - left), std::abs(report.given - right)) <= size;
-}
 
 }  // namespace
 
@@ -144,7 +119,9 @@ std::string RejectionWatch::suspected_row(const Candidate& candidate, const Step
     const JacobianReport report = check_jacobian(constraints_, candidate.t, y, 1e-3);
     if (!report.correct)
       return "check_jacobian finds there: " + report.message +
-             (has_kink(constraints_, report, candidate.t, y) ? kKink : "");
+             (has_kink(constraints_, report.row, report.column, report.given, candidate.t, y)
+                  ? kKink
+                  : "");
   } catch (const std::exception&) {  // g refuses a point nearby: nothing is known
     return {};
   }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "watch/kink.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
@@ -14,6 +16,7 @@ constexpr long kSettled = 2;             // accepted steps: before, y' is still 
 constexpr double kFelt = 1.0;            // tolerances in one step: less may be noise of y'
 constexpr int kDoubts = 5, kLooks = 20;  // steps in a row with a doubt of one sign; looks into them
 constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C
+constexpr int kVanished = 3;         // steps in which a row of C is zero
 constexpr int kSmallLooks = 3;       // at a solution below its tolerances
 constexpr double kMoves = 0.05;      // of y in a step: it is no state of rest
 constexpr double kGrows = 1.02;      // for each step: a solution from zero may be small at first
@@ -22,6 +25,7 @@ constexpr double kGrows = 1.02;      // for each step: a solution from zero may 
 
 void FirstSteps::reset() {
   row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), 0);
+  vanished_.assign(row_doubts_.size(), 0);
   looks_ = small_looks_ = 0;
   largest_ = 0.0;
   searched_ = 0;
@@ -76,6 +80,10 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
   if (!mover.tangency(slope_, id, tangency_)) return {};
   const double felt = kFelt * std::sqrt(static_cast<double>(n));
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
+    if (tangency_.tolerance[i] == 0.0 && ++vanished_[i] == kVanished) {
+      std::string text = one_sided_row(static_cast<int>(i), step.t);
+      if (!text.empty()) return text;
+    }
     const double rate = std::abs(tangency_.rate[i]);
     int& doubts = row_doubts_[i];  // with the sign of the rate: noise changes it
     const bool doubtful = tangency_.terms[i] >= 0.0 && rate > kNoInvariant * tangency_.terms[i] &&
@@ -90,6 +98,16 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
     if (!text.empty()) return text;
     if (++looks_ >= kLooks) return {};
   }
+  return {};
+}
+
+// max(u, 0) keeps one side only: on the other there is nothing to move. point_ is the corrector's.
+std::string FirstSteps::one_sided_row(int row, double t) const {
+  const auto size = static_cast<int>(point_.size());
+  for (int j = 0; size <= kSearchLimit && j < size; ++j)
+    if (has_kink(constraints_, row, j, 0.0, t, point_))
+      return "row " + std::to_string(row) + " (" + constraints_.name(row) +
+             ") and its gradient vanish to one side of the set" + kKink;
   return {};
 }
 

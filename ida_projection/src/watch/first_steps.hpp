@@ -37,6 +37,7 @@ class FirstSteps {
   std::string look_for_false_rows(const Candidate& candidate, const StepData& step, double h,
                                   N_Vector corrected, const double* id, Mover& mover,
                                   Corrector& corrector);
+  std::string one_sided_row(int row, double t) const;
   std::string false_row(int row, const StepData& step, double h, Corrector& corrector);
   std::string wrong_entry(double t) const;
 
@@ -44,6 +45,7 @@ class FirstSteps {
   Statistics& statistics_;
   Tangency tangency_;                  // of the caller's rows
   std::vector<int> row_doubts_;        // steps in a row in which F did not seem to keep a row
+  std::vector<int> vanished_;          // steps in which a row of C was zero
   int looks_ = 0, small_looks_ = 0;    // at doubts in rows; at a solution below its tolerances
   double largest_ = 0.0;               // size of the solution so far, in tolerances
   long searched_ = 0;                  // unknowns compared

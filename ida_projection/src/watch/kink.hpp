@@ -1,0 +1,15 @@
+// Tether: rows that have a kink on their set. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/ida_projection/constraints.hpp>
+#include <vector>
+
+namespace tether::ida_projection {
+
+extern const char* const kKink;  ///< what to say of one
+
+/// Is `given`, the entry of C in that row and column at y, the slope of g to one side only?
+bool has_kink(const Constraints& constraints, int row, int column, double given, double t,
+              std::vector<double> y);
+
+}  // namespace tether::ida_projection
