@@ -140,11 +140,14 @@ std::vector<std::string> scenes() {
   return out;
 }
 
+// Beside the shipped ones, whose files of surfaces it finds.
+const std::string kName = TETHER_SHIPPED_SCENES "/mutant.toml";
+
 /// True if the text is a scene. A scene must be writable and the same again; an error must tell
 /// where it is.
 bool judge(const std::string& text) {
   try {
-    const Scene scene = parse_scene(text, "mutant.toml");
+    const Scene scene = parse_scene(text, kName);
     try {
       make_plan(scene);
     } catch (const std::invalid_argument&) {
@@ -158,7 +161,7 @@ bool judge(const std::string& text) {
   } catch (const SceneError& e) {
     bool placed = !e.problems().empty();
     for (const Problem& problem : e.problems())
-      placed = placed && problem.place.file == "mutant.toml" && problem.place.line > 0 &&
+      placed = placed && problem.place.file == kName && problem.place.line > 0 &&
                problem.place.column > 0 && !problem.allowed.empty();
     if (!placed) {
       UNSCOPED_INFO(text);

@@ -46,9 +46,14 @@ class ContactEffect : public Effect {
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const auto count = std::count_if(scene.pairs.begin(), scene.pairs.end(),
                                      [](const Pair& pair) { return pair.touch; });
-    if (count > 0)
-      lines.push_back(
-          {"contact", fmt::format("{} pair{} of materials", count, count == 1 ? "" : "s")});
+    if (count == 0) return;
+    std::size_t triangles = 0;
+    for (const Body& body : scene.bodies)
+      for (const Shape& shape : body.shapes) triangles += shape.triangles.size();
+    std::string detail = fmt::format("{} pair{} of materials", count, count == 1 ? "" : "s");
+    if (triangles > 0)
+      detail += fmt::format(", {} triangle{}", triangles, triangles == 1 ? "" : "s");
+    lines.push_back({"contact", detail});
   }
   void add_columns(const Scene& scene, std::vector<Column>& columns) const override {
     const auto add = [&](const char* name, auto value) {

@@ -29,6 +29,11 @@ void check_bodies(const Scene& scene, Report& report) {
     if (plane && !body.fixed)
       report.add(body.place, called(body) + ": fixed", "",
                  "must be true: a plane is infinite and cannot move");
+    const bool mesh = std::any_of(body.shapes.begin(), body.shapes.end(),
+                                  [](const Shape& s) { return s.kind == ShapeKind::mesh; });
+    if (mesh && !body.fixed)
+      report.add(body.place, called(body) + ": fixed", "",
+                 "must be true: a mesh is a surface without an inside, for what stands still");
     if (body.fixed && (!body.velocity.isZero(0) || !body.angular_velocity.isZero(0)))
       report.add(body.place, called(body) + ": velocity", "", "must be zero: the body is fixed");
     for (const effects::Effect* each : effects::all()) each->check_body(body, report);

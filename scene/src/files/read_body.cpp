@@ -8,6 +8,7 @@
 #include "geometry/hull.hpp"
 #include "geometry/mass.hpp"
 #include "read.hpp"
+#include "read_surface.hpp"
 
 namespace tether::scene::files {
 
@@ -56,14 +57,24 @@ Eigen::Quaterniond read_orientation(Fields& in, const Reader& r) {
 Shape read_shape(Fields& in) {
   Shape shape;
   required(in, "shape",
-           "it is a sphere, plane, box, capsule, ellipsoid, cylinder, convex or points");
-  const std::optional<ShapeKind> kind = in.word_of<ShapeKind>("shape");
-  if (!kind) {
-    in.pass_over({"radius", "length", "size", "half_axes", "normal", "points"});
+           "it is a sphere, plane, box, capsule, ellipsoid, cylinder, convex, points, mesh or "
+           "height_field");
+  // A height field is a mesh by another description.
+  std::vector<std::string> words;
+  for (const ShapeKind each : contact::kShapeKinds) words.emplace_back(name(each));
+  words.emplace_back("height_field");
+  const int kind = in.choice("shape", words);
+  if (kind < 0) {
+    in.pass_over({"radius", "length", "size", "half_axes", "normal", "points", "triangles", "file",
+                  "heights", "spacing", "scale"});
     shape.radius = 1;
     return shape;
   }
-  shape.kind = *kind;
+  if (words[static_cast<std::size_t>(kind)] == "height_field") {
+    read_height_field(in, shape);
+    return shape;
+  }
+  shape.kind = contact::kShapeKinds[static_cast<std::size_t>(kind)];
   // Keys of other kinds stay unknown: a box with a radius is a mistake.
   switch (shape.kind) {
     case ShapeKind::capsule:
@@ -95,6 +106,9 @@ Shape read_shape(Fields& in) {
     case ShapeKind::points:
       required(in, "points", "the points that touch [[x, y, z], ...], m");
       shape.points = in.points("points", 1, kMostPoints);
+      break;
+    case ShapeKind::mesh:
+      read_mesh(in, shape);
       break;
   }
   return shape;

@@ -43,6 +43,10 @@ Keys shape_keys(const Shape& shape) {
     case ShapeKind::points:
       keys.emplace_back("points", toml(shape.points));
       break;
+    case ShapeKind::mesh:
+      keys.emplace_back("points", toml(shape.points));
+      keys.emplace_back("triangles", toml(shape.triangles));
+      break;
   }
   return keys;
 }

@@ -124,6 +124,7 @@ MassProperties mass_properties(const Shape& shape) {
       break;
     case ShapeKind::plane:
     case ShapeKind::points:
+    case ShapeKind::mesh:
       return {};
   }
   // Turning by the identity would only add rounding.

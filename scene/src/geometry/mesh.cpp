@@ -94,6 +94,14 @@ Mesh points(const std::vector<Vector3d>& all) {
   return m;
 }
 
+Mesh surface(const Shape& shape) {
+  Mesh m{shape.points, {}, {}};
+  for (const std::array<int, 3>& t : shape.triangles)
+    m.faces.push_back({static_cast<std::size_t>(t[0]), static_cast<std::size_t>(t[1]),
+                       static_cast<std::size_t>(t[2])});
+  return m;
+}
+
 Mesh in_own_axes(const Shape& shape, int around, double half_plane) {
   switch (shape.kind) {
     case ShapeKind::sphere:
@@ -111,6 +119,8 @@ Mesh in_own_axes(const Shape& shape, int around, double half_plane) {
     case ShapeKind::convex:
     case ShapeKind::points:
       return points(shape.points);
+    case ShapeKind::mesh:
+      return surface(shape);
   }
   return {};
 }

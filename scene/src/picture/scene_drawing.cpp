@@ -20,7 +20,8 @@ namespace tether::scene::picture {
 namespace {
 
 constexpr std::size_t kMostPaths = 30, kMostNames = 12;
-constexpr double kNames = 11;  // pixels
+constexpr std::size_t kMostTriangles = 20000;  // of one surface that is drawn
+constexpr double kNames = 11;                  // pixels
 const Pen kDark{"#404040", 1.2, ""};
 
 /// A colour between white (0) and itself (1), or towards black beyond.
@@ -105,6 +106,10 @@ class Drawing {
       const Mesh m = mesh(shape, curved ? 24 : 8, view_.half_plane());
       std::vector<Vector2d> points;
       for (const Vector3d& p : m.points) points.push_back(view_.pixel(pose.position + R * p));
+      if (shape.kind == ShapeKind::mesh) {
+        draw_surface(m, points, R, colour);
+        continue;
+      }
       const std::vector<Vector2d> outline = pixels(points, hull_corners(points));
       if (!filled) {
         canvas_.polygon(outline, "", {"#c8c8c8", 0.8, ""});
@@ -123,6 +128,30 @@ class Drawing {
     }
     if (body.shapes.empty() && filled && !planes)
       canvas_.circle(view_.pixel(pose.position), 2.5, colour, {colour, 0, ""});
+  }
+
+  /// Far faces first; those that are seen from their edge are lines.
+  void draw_surface(const Mesh& m, const std::vector<Vector2d>& points, const Matrix3d& R,
+                    const char* colour) {
+    if (m.faces.size() > kMostTriangles)
+      return canvas_.polygon(pixels(points, hull_corners(points)), "", {colour, 0.8, ""});
+    std::vector<std::pair<double, std::size_t>> order;
+    for (std::size_t f = 0; f < m.faces.size(); ++f) {
+      const Vector3d middle =
+          (m.points[m.faces[f][0]] + m.points[m.faces[f][1]] + m.points[m.faces[f][2]]) / 3;
+      order.emplace_back(view_.eye().row(2).dot(R * middle), f);
+    }
+    std::sort(order.begin(), order.end());
+    for (const auto& [depth, f] : order) {
+      const std::vector<std::size_t>& face = m.faces[f];
+      const Vector3d normal =
+          (R * (m.points[face[1]] - m.points[face[0]]).cross(m.points[face[2]] - m.points[face[0]]))
+              .normalized();
+      const double towards = view_.eye().row(2).dot(normal), up = view_.eye().row(1).dot(normal);
+      if (towards > -1e-6)
+        canvas_.polygon(pixels(points, face), shade(colour, 0.55 + 0.2 * towards - 0.15 * up),
+                        {colour, 0.4, ""});
+    }
   }
 
   void draw_faces(const Mesh& m, const std::vector<Vector2d>& points, const Matrix3d& R,

@@ -65,6 +65,7 @@ class Forms {
         return add(part, form, scale, false, true);
       default:
         form.points = shape.points;
+        form.triangles = shape.triangles;
         return add(part, form, scale, false, true);
     }
   }

@@ -126,7 +126,7 @@ std::string Fields::text(std::string_view key, const std::string& otherwise) {
 
 // A scene from an untrusted source must not write elsewhere: no way out of the folder, no pipe of
 // a program that takes names for commands.
-std::string Fields::file_name(std::string_view key) {
+std::string Fields::file_name(std::string_view key, std::string_view what) {
   const std::string name = text(key, "");
   if (name.empty()) return "";
   const std::filesystem::path path(name);
@@ -136,7 +136,7 @@ std::string Fields::file_name(std::string_view key) {
   if (!out && !odd && path.has_filename() && path.filename() != "." && name.size() < 200)
     return name;
   wrong(key,
-        out ? "must stay in the folder of the output: a relative name without \"..\""
+        out ? fmt::format("must stay in the folder of {}: a relative name without \"..\"", what)
             : "must be the name of a file, of less than 200 characters, without | < > \\ * ? : ` "
               "$ ; & ! and not beginning with - or ~ or a blank");
   return "";

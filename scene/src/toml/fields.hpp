@@ -35,8 +35,9 @@ class Fields {
   int count(std::string_view key, int otherwise, int low, int high);
   bool flag(std::string_view key, bool otherwise);
   std::string text(std::string_view key, const std::string& otherwise);
-  /// The name of a file inside the folder of the output; empty if absent or wrong.
-  std::string file_name(std::string_view key);
+  /// The name of a file inside the folder of the output (or of `what` else); empty if absent or
+  /// wrong.
+  std::string file_name(std::string_view key, std::string_view what = "the output");
   Eigen::Vector3d vector(std::string_view key, const Eigen::Vector3d& otherwise, const Range& range,
                          std::string_view unit);
   /// A direction of any length but zero; returned with length one.
@@ -57,6 +58,8 @@ class Fields {
     if (found < 0) return std::nullopt;
     return Words<E>::list[static_cast<std::size_t>(found)].second;
   }
+  /// Which of the words it is; -1 if it is absent or wrong.
+  int choice(std::string_view key, const std::vector<std::string>& words);
   template <class E>
   E word(std::string_view key, E otherwise) {
     return word_of<E>(key).value_or(otherwise);
@@ -86,7 +89,6 @@ class Fields {
   std::string field(std::string_view key) const;
 
  private:
-  int choice(std::string_view key, const std::vector<std::string>& words);
   void wrong(const Entry& entry, const Value& value, std::string allowed);
   const Entry* entry(std::string_view key);
 

@@ -48,6 +48,13 @@ std::string toml(const std::vector<Vector3d>& points) {
   return out + "]";
 }
 
+std::string toml(const std::vector<std::array<int, 3>>& triangles) {
+  std::string out = "[";
+  for (const std::array<int, 3>& t : triangles)
+    out += fmt::format("{}[{}, {}, {}]", out.size() > 1 ? ", " : "", t[0], t[1], t[2]);
+  return out + "]";
+}
+
 void Writer::raw(std::string_view key, const std::string& value, std::string_view comment) {
   text_ += fmt::format("{} = {}", key, value);
   if (!comment.empty()) text_ += fmt::format("  # {}", comment);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <string>
 #include <string_view>
 #include <tether/scene/words.hpp>
@@ -22,6 +23,7 @@ std::string toml(std::string_view text);
 std::string toml(const std::string& text);
 std::string toml(const Eigen::Quaterniond& q);
 std::string toml(const std::vector<Eigen::Vector3d>& points);
+std::string toml(const std::vector<std::array<int, 3>>& triangles);
 template <class E>
 std::string toml_word(E value) {
   return toml(word(value));

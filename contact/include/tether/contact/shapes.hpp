@@ -18,12 +18,14 @@ enum class ShapeKind : std::uint8_t {
   convex,
   points,
   ellipsoid,
-  cylinder
+  cylinder,
+  mesh
 };
 
-inline constexpr std::array<ShapeKind, 8> kShapeKinds{
-    ShapeKind::sphere, ShapeKind::plane,  ShapeKind::box,       ShapeKind::capsule,
-    ShapeKind::convex, ShapeKind::points, ShapeKind::ellipsoid, ShapeKind::cylinder};
+inline constexpr std::array<ShapeKind, 9> kShapeKinds{
+    ShapeKind::sphere,    ShapeKind::plane,    ShapeKind::box,
+    ShapeKind::capsule,   ShapeKind::convex,   ShapeKind::points,
+    ShapeKind::ellipsoid, ShapeKind::cylinder, ShapeKind::mesh};
 
 const char* name(ShapeKind kind);
 
@@ -34,7 +36,9 @@ struct Shape {
   double length = 0;  ///< axis z; capsule: between the centres of its caps, cylinder: whole, m
   Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box: full edges, ellipsoid: half axes, m
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the half-space
-  std::vector<Eigen::Vector3d> points;                ///< convex: vertices; points: touching points
+  std::vector<Eigen::Vector3d> points;  ///< convex, mesh: vertices; points: touching points
+  /// mesh: indices of its points, counterclockwise seen from outside, where the bodies are.
+  std::vector<std::array<int, 3>> triangles;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   linalg::Quaternion orientation = linalg::Quaternion::Identity();
 
@@ -47,6 +51,12 @@ struct Shape {
   static Shape ellipsoid(const Eigen::Vector3d& half_axes);
   /// Solid, with flat ends.
   static Shape cylinder(double radius, double length);
+  /// A surface of triangles, on bodies that are fixed (README, section 20).
+  static Shape mesh(std::vector<Eigen::Vector3d> vertices,
+                    std::vector<std::array<int, 3>> triangles);
+  /// The mesh of heights[k nx + i] above (i dx, k dy): at least two in each direction. Throws
+  /// std::invalid_argument unless nx divides their number.
+  static Shape height_field(const std::vector<double>& heights, int nx, double dx, double dy);
   static Shape touching_points(std::vector<Eigen::Vector3d> points);
 };
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/index.hpp>
 #include <utility>
 
 #include "stepping/detection/convex_pair.hpp"
@@ -32,6 +33,8 @@ const char* name(ShapeKind kind) {
       return "ellipsoid";
     case ShapeKind::cylinder:
       return "cylinder";
+    case ShapeKind::mesh:
+      return "mesh";
   }
   return "?";
 }
@@ -87,6 +90,32 @@ Shape Shape::cylinder(double radius, double length) {
   return s;
 }
 
+Shape Shape::mesh(std::vector<Vector3d> vertices, std::vector<std::array<int, 3>> triangles) {
+  Shape s;
+  s.kind = ShapeKind::mesh;
+  s.points = std::move(vertices);
+  s.triangles = std::move(triangles);
+  return s;
+}
+
+Shape Shape::height_field(const std::vector<double>& heights, int nx, double dx, double dy) {
+  const int ny = nx > 0 ? static_cast<int>(heights.size()) / nx : 0;
+  if (nx < 2 || ny < 2 || heights.size() != linalg::at(nx) * linalg::at(ny))
+    throw std::invalid_argument("height_field: needs at least 2 x 2 heights, rows of nx");
+  Shape s;
+  s.kind = ShapeKind::mesh;
+  for (int k = 0; k < ny; ++k)
+    for (int i = 0; i < nx; ++i)
+      s.points.emplace_back(i * dx, k * dy, heights[linalg::at(k * nx + i)]);
+  for (int k = 0; k + 1 < ny; ++k)
+    for (int i = 0; i + 1 < nx; ++i) {
+      const int p = k * nx + i;
+      s.triangles.push_back({p, p + 1, p + nx + 1});
+      s.triangles.push_back({p, p + nx + 1, p + nx});
+    }
+  return s;
+}
+
 Shape Shape::touching_points(std::vector<Vector3d> points) {
   Shape s;
   s.kind = ShapeKind::points;
@@ -97,51 +126,20 @@ Shape Shape::touching_points(std::vector<Vector3d> points) {
 namespace detail {
 namespace {
 
-// A point and a plane. `to_plane` is the plane's normal, from the plane to the point.
-void point_plane(const Vector3d& p, const Pose& plane, const Vector3d& to_point, double margin,
+constexpr std::size_t kMostTriangles = 2000000;
+
+// A point and a plane, by a point of it. `to_point` is its normal, towards the point.
+void point_plane(const Vector3d& p, const Vector3d& plane, const Vector3d& to_point, double margin,
                  int feature, NearPoints& out) {
-  const double gap = to_point.dot(p - plane.position);
+  const double gap = to_point.dot(p - plane);
   if (gap < margin) out.add(p, p - gap * to_point, to_point, gap, feature);
 }
 
-void ball_plane(const Vector3d& centre, double radius, const Pose& plane, const Vector3d& n,
+void ball_plane(const Vector3d& centre, double radius, const Vector3d& plane, const Vector3d& n,
                 double margin, int feature, NearPoints& out) {
-  const double distance = n.dot(centre - plane.position);
+  const double distance = n.dot(centre - plane);
   if (distance - radius < margin)
     out.add(centre - radius * n, centre - distance * n, n, distance - radius, feature);
-}
-
-void with_plane(const Shape& a, const Pose& A, const Shape& plane, const Pose& P, double margin,
-                NearPoints& out) {
-  const Vector3d n = P.rotation * plane.normal;
-  switch (a.kind) {
-    case ShapeKind::sphere:
-      ball_plane(A.position, a.radius, P, n, margin, 0, out);
-      break;
-    case ShapeKind::capsule:
-      for (int end = 0; end < 2; ++end)
-        ball_plane(A.position + (end == 0 ? -0.5 : 0.5) * a.length * A.rotation.col(2), a.radius, P,
-                   n, margin, end, out);
-      break;
-    case ShapeKind::box:
-      for (int k = 0; k < 8; ++k) {
-        const Vector3d corner((k & 1) != 0 ? 0.5 : -0.5, (k & 2) != 0 ? 0.5 : -0.5,
-                              (k & 4) != 0 ? 0.5 : -0.5);
-        point_plane(A.position + A.rotation * corner.cwiseProduct(a.size), P, n, margin, k, out);
-      }
-      break;
-    case ShapeKind::convex:
-    case ShapeKind::points:
-      for (std::size_t k = 0; k < a.points.size(); ++k)
-        point_plane(A.position + A.rotation * a.points[k], P, n, margin, static_cast<int>(k), out);
-      break;
-    case ShapeKind::ellipsoid:
-      return ellipsoid_plane(a, A, P, n, margin, out);
-    case ShapeKind::cylinder:
-      return cylinder_plane(a, A, P, n, margin, out);
-    case ShapeKind::plane:
-      break;
-  }
 }
 
 // Spheres of radii r1, r2 about the nearest points of two shapes.
@@ -232,14 +230,17 @@ int rank(ShapeKind kind) {
       return 6;
     case ShapeKind::plane:
       return 7;
+    case ShapeKind::mesh:
+      return 8;
   }
-  return 8;
+  return 9;
 }
 
 // a of lower rank than b.
 void collide_ordered(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
                      NearPoints& out) {
-  if (b.kind == ShapeKind::plane) return with_plane(a, A, b, B, margin, out);
+  if (b.kind == ShapeKind::plane)
+    return collide_plane(a, A, B.position, B.rotation * b.normal, margin, out);
   if (is_convex_pair(a.kind, b.kind)) return collide_convex(a, A, b, B, margin, out);
   if (a.kind == ShapeKind::sphere) {
     if (b.kind == ShapeKind::sphere)
@@ -254,8 +255,42 @@ void collide_ordered(const Shape& a, const Pose& A, const Shape& b, const Pose& 
 
 }  // namespace
 
+void collide_plane(const Shape& a, const Pose& A, const Vector3d& P, const Vector3d& n,
+                   double margin, NearPoints& out) {
+  switch (a.kind) {
+    case ShapeKind::sphere:
+      ball_plane(A.position, a.radius, P, n, margin, 0, out);
+      break;
+    case ShapeKind::capsule:
+      for (int end = 0; end < 2; ++end)
+        ball_plane(A.position + (end == 0 ? -0.5 : 0.5) * a.length * A.rotation.col(2), a.radius, P,
+                   n, margin, end, out);
+      break;
+    case ShapeKind::box:
+      for (int k = 0; k < 8; ++k) {
+        const Vector3d corner((k & 1) != 0 ? 0.5 : -0.5, (k & 2) != 0 ? 0.5 : -0.5,
+                              (k & 4) != 0 ? 0.5 : -0.5);
+        point_plane(A.position + A.rotation * corner.cwiseProduct(a.size), P, n, margin, k, out);
+      }
+      break;
+    case ShapeKind::convex:
+    case ShapeKind::points:
+      for (std::size_t k = 0; k < a.points.size(); ++k)
+        point_plane(A.position + A.rotation * a.points[k], P, n, margin, static_cast<int>(k), out);
+      break;
+    case ShapeKind::ellipsoid:
+      return ellipsoid_plane(a, A, P, n, margin, out);
+    case ShapeKind::cylinder:
+      return cylinder_plane(a, A, P, n, margin, out);
+    case ShapeKind::plane:
+    case ShapeKind::mesh:
+      break;
+  }
+}
+
 bool has_own_collision(ShapeKind a, ShapeKind b) {
   if (rank(a) > rank(b)) std::swap(a, b);
+  if (b == ShapeKind::mesh) return rank(a) <= rank(ShapeKind::convex);  // by MeshContacts
   if (b == ShapeKind::plane) return a != ShapeKind::plane;
   if (is_convex_pair(a, b)) return true;
   if (a == ShapeKind::sphere) return rank(b) <= rank(ShapeKind::box);
@@ -267,6 +302,10 @@ void collide(const Shape& a, const Pose& A, const Shape& b, const Pose& B, doubl
   if (rank(a.kind) <= rank(b.kind)) return collide_ordered(a, A, b, B, margin, out);
   const int from = out.count;
   collide_ordered(b, B, a, A, margin, out);
+  turn(out, from);
+}
+
+void turn(NearPoints& out, int from) {
   for (int k = from; k < out.count; ++k) {
     std::swap(out.point[k].on_first, out.point[k].on_second);
     out.point[k].normal = -out.point[k].normal;
@@ -288,6 +327,7 @@ double reach(const Shape& s) {
       return std::hypot(s.radius, 0.5 * s.length);
     case ShapeKind::convex:
     case ShapeKind::points:
+    case ShapeKind::mesh:
       for (const Vector3d& p : s.points) most = std::max(most, p.norm());
       return most;
     case ShapeKind::plane:
@@ -295,6 +335,26 @@ double reach(const Shape& s) {
   }
   return std::numeric_limits<double>::infinity();
 }
+
+namespace {
+
+void check_mesh(const Shape& s) {
+  const int count = static_cast<int>(s.points.size());
+  if (count < 3 || s.triangles.empty() || s.points.size() > kMostTriangles ||
+      s.triangles.size() > kMostTriangles)
+    throw std::invalid_argument("mesh: needs 3 to " + std::to_string(kMostTriangles) +
+                                " points and 1 to as many triangles");
+  for (const Vector3d& p : s.points)
+    if (!p.allFinite() || !(p.cwiseAbs().maxCoeff() < 1e100))
+      throw std::invalid_argument("mesh: points must be finite, below 1e100 m");
+  for (const std::array<int, 3>& t : s.triangles)
+    for (const int k : t)
+      if (k < 0 || k >= count)
+        throw std::invalid_argument("mesh: a triangle names point " + std::to_string(k) + " of " +
+                                    std::to_string(count));
+}
+
+}  // namespace
 
 void check(const Shape& s) {
   const auto positive = [&](double x, const char* what) {
@@ -332,8 +392,9 @@ void check(const Shape& s) {
       for (const Vector3d& p : s.points)
         if (!p.allFinite())
           throw std::invalid_argument(std::string(name(s.kind)) + ": points must be finite");
-      positive(reach(s), "extent");
-      return;
+      return positive(reach(s), "extent");
+    case ShapeKind::mesh:
+      return check_mesh(s);
   }
 }
 

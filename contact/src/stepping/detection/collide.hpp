@@ -12,6 +12,13 @@ bool has_own_collision(ShapeKind a, ShapeKind b);
 void collide(const Shape& a, const Pose& pose_a, const Shape& b, const Pose& pose_b, double margin,
              NearPoints& out);
 
+/// Exchanges the shapes of all points from this one on.
+void turn(NearPoints& out, int from);
+
+/// The points of shape a, no plane and no mesh, against the plane through a point across n.
+void collide_plane(const Shape& a, const Pose& pose_a, const Eigen::Vector3d& on_plane,
+                   const Eigen::Vector3d& n, double margin, NearPoints& out);
+
 /// Farthest point of the shape from its origin (infinite for planes).
 double reach(const Shape& shape);
 

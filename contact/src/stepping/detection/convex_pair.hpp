@@ -12,10 +12,10 @@ bool is_convex_pair(ShapeKind a, ShapeKind b);
 void collide_convex(const Shape& a, const Pose& pose_a, const Shape& b, const Pose& pose_b,
                     double margin, NearPoints& out);
 
-/// The lowest point of an ellipsoid; a cylinder by its rims. n: the plane's normal.
-void ellipsoid_plane(const Shape& a, const Pose& pose, const Pose& plane, const Eigen::Vector3d& n,
-                     double margin, NearPoints& out);
-void cylinder_plane(const Shape& a, const Pose& pose, const Pose& plane, const Eigen::Vector3d& n,
-                    double margin, NearPoints& out);
+/// The lowest point of an ellipsoid; a cylinder by its rims. A point of the plane, and its normal.
+void ellipsoid_plane(const Shape& a, const Pose& pose, const Eigen::Vector3d& plane,
+                     const Eigen::Vector3d& n, double margin, NearPoints& out);
+void cylinder_plane(const Shape& a, const Pose& pose, const Eigen::Vector3d& plane,
+                    const Eigen::Vector3d& n, double margin, NearPoints& out);
 
 }  // namespace tether::contact::detail

@@ -66,6 +66,17 @@ ConvexShape::ConvexShape(const Shape& s, const Pose& pose, const Vector3d& origi
   size_ = std::max(half_.maxCoeff(), round_);
 }
 
+ConvexShape::ConvexShape(const std::vector<Vector3d>& triangle, double thickness)
+    : kind_(ShapeKind::convex),
+      centre_(Vector3d::Zero()),
+      rotation_(Matrix3d::Identity()),
+      points_(&triangle),
+      thickness_(thickness),
+      whole_(true) {
+  for (const Vector3d& p : triangle) middle_ += p / 3;
+  for (const Vector3d& p : triangle) size_ = std::max(size_, (p - middle_).norm());
+}
+
 int ConvexShape::corner_count() const {
   return kind_ == ShapeKind::box ? 8 : static_cast<int>(points_->size());
 }
@@ -106,7 +117,7 @@ Vector3d ConvexShape::farthest(const Vector3d& direction, double less) const {
           most = m.dot(p);
           x = p;
         }
-      x = middle_ + part * (x - middle_);
+      if (!whole_) x = middle_ + part * (x - middle_);
       break;
     }
     default:

@@ -28,6 +28,9 @@ struct Flat {
 class ConvexShape {
  public:
   ConvexShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& origin);
+  /// Three points, which must outlive this: never smaller than they are, however thin; `thickness`
+  /// is that of what they touch.
+  ConvexShape(const std::vector<Eigen::Vector3d>& triangle, double thickness);
 
   /// Farthest point in direction m (any length) of the shape less a part of its thickness.
   Eigen::Vector3d farthest(const Eigen::Vector3d& m, double less = 0) const;
@@ -39,7 +42,7 @@ class ConvexShape {
   /// What lies against m up to an angle, or up to a height.
   void flat(const Eigen::Vector3d& m, double height, Flat& out) const;
 
-  const Eigen::Vector3d& centre() const { return centre_; }
+  const Eigen::Vector3d& centre() const { return whole_ ? middle_ : centre_; }
   Eigen::Vector3d axis(int k) const { return rotation_.col(k); }
   double radius() const { return round_; }
   double thickness() const { return thickness_; }
@@ -55,6 +58,7 @@ class ConvexShape {
   Eigen::Matrix3d rotation_;
   const std::vector<Eigen::Vector3d>* points_ = nullptr;
   double round_ = 0, thickness_ = 0, size_ = 0;
+  bool whole_ = false;  // no part of the thickness is taken off
 };
 
 }  // namespace tether::contact::detail

@@ -46,8 +46,11 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     if (s.material < 0) throw std::invalid_argument(where + "material must be >= 0");
     check(s.shape);
     const bool plane = s.shape.kind == ShapeKind::plane;
-    if (plane && moves(bodies, s.body))
-      throw std::invalid_argument(where + "a plane belongs to a fixed body");
+    const bool mesh = s.shape.kind == ShapeKind::mesh;
+    if ((plane || mesh) && moves(bodies, s.body))
+      throw std::invalid_argument(where + "a " + name(s.shape.kind) + " belongs to a fixed body");
+    mesh_.push_back(mesh ? static_cast<int>(meshes_.size()) : -1);
+    if (mesh) meshes_.emplace_back(s.shape);
     (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
     material_.push_back(meetings_.row(s.material));
   }
@@ -143,7 +146,9 @@ void NearContacts::place(const BodySet& bodies, double dt) {
   }
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
     centre_[k] = pose_[at(bounded_[k])].position;
-    ball_[k] = reach_[k] + near_part_ * reach_[k] + way(bodies, k, dt);
+    // What is near a mesh is a matter of the other shape, as with planes.
+    const double near = mesh_[at(bounded_[k])] < 0 ? near_part_ * reach_[k] : 0;
+    ball_[k] = reach_[k] + near + way(bodies, k, dt);
   }
 }
 
@@ -153,6 +158,20 @@ double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const 
   const RigidBody& b = bodies.motion[at(s.body)];
   const double arm = reach_[k] + s.shape.position.norm();
   return dt * (b.velocity.norm() + arm * b.angular_velocity.norm());
+}
+
+// Of surfaces i and j, into near_.
+void NearContacts::find_points(int i, int j, double margin) {
+  const Shape &s = surface(i).shape, &t = surface(j).shape;
+  const Pose &S = pose_[at(i)], &T = pose_[at(j)];
+  near_.count = 0;
+  if (mesh_[at(j)] >= 0) return meshes_[at(mesh_[at(j)])].collide(s, S, T, margin, near_);
+  if (mesh_[at(i)] >= 0) {
+    meshes_[at(mesh_[at(i)])].collide(t, T, S, margin, near_);
+    return turn(near_, 0);
+  }
+  if (has_own_collision(s.kind, t.kind)) return collide(s, S, t, T, margin, near_);
+  polyhedra_->collide(i, S, j, T, margin, near_);
 }
 
 void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) {
@@ -165,11 +184,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   if (m < 0) return;
   double margin = ball_[at(a)] - reach_[at(a)];
   if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
-  near_.count = 0;
-  if (has_own_collision(s.shape.kind, t.shape.kind))
-    collide(s.shape, pose_[at(i)], t.shape, pose_[at(j)], margin, near_);
-  else
-    polyhedra_->collide(i, pose_[at(i)], j, pose_[at(j)], margin, near_);
+  find_points(i, j, margin);
   // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
   // would change their common angular momentum.
   const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;

@@ -7,6 +7,7 @@
 
 #include "stepping/detection/broadphase.hpp"
 #include "stepping/detection/meetings.hpp"
+#include "stepping/detection/mesh/mesh_contacts.hpp"
 
 namespace tether::contact::detail {
 
@@ -43,6 +44,7 @@ class NearContacts {
   template <class Use>
   void pairs(const BodySet& bodies, StepContacts& out, const Use& use);
   void pair(const BodySet& bodies, int a, int b, StepContacts& out);
+  void find_points(int i, int j, double margin);
 
   std::vector<Surface> surfaces_;
   Meetings meetings_;
@@ -50,6 +52,8 @@ class NearContacts {
   Law law_;
   double near_part_;
   std::unique_ptr<PairCollision> polyhedra_;
+  std::vector<MeshContacts> meshes_;  // and of each surface its index there, or -1
+  std::vector<int> mesh_;
   Broadphase broadphase_;
   std::vector<int> planes_, bounded_;  // surfaces
   // For each surface: its pose; for each bounded one: reach with and without what it may move.

@@ -96,6 +96,7 @@ Outline outline_of(const Shape& shape) {
     case ShapeKind::plane:
     case ShapeKind::ellipsoid:  // refused before
     case ShapeKind::cylinder:
+    case ShapeKind::mesh:
       break;
   }
   for (Vector3d& p : points) {

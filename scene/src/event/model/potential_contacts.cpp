@@ -73,16 +73,17 @@ class Contacts {
   std::vector<FeaturePair>& out_;
 };
 
-void refuse_curved(const Shape& shape) {
-  if (shape.kind == ShapeKind::ellipsoid || shape.kind == ShapeKind::cylinder)
+void refuse_unknown(const Shape& shape) {
+  if (shape.kind == ShapeKind::ellipsoid || shape.kind == ShapeKind::cylinder ||
+      shape.kind == ShapeKind::mesh)
     throw std::invalid_argument(
         fmt::format("the event engine does not know where a shape = \"{}\" touches: use [stepping]",
                     name(shape.kind)));
 }
 
 void add(const Shape& a, const Shape& b, const FeaturePair& bodies, std::vector<FeaturePair>& out) {
-  refuse_curved(a);
-  refuse_curved(b);
+  refuse_unknown(a);
+  refuse_unknown(b);
   const bool points = a.kind == ShapeKind::points && b.kind == ShapeKind::points;
   if (points || (a.kind == ShapeKind::plane && b.kind == ShapeKind::plane)) return;  // never touch
   const Outline of_a = outline_of(a), of_b = outline_of(b);

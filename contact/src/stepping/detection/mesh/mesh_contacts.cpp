@@ -1,0 +1,236 @@
+// Tether: convex shapes on a mesh of triangles. SPDX-License-Identifier: BSD-3-Clause
+#include "stepping/detection/mesh/mesh_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tether/linalg/index.hpp>
+
+#include "stepping/detection/collide.hpp"
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+using linalg::at;
+
+namespace {
+
+constexpr double kBorder = 1e-10;  // of the longest edge: what is on the border is inside
+constexpr double kShallow = 1e-6;  // of the thickness: depths at which a face needs no proof
+constexpr double kLowest = 1e-9;   // of the thickness: heights that are the same
+constexpr double kSame = 1e-6;     // radian: directions that are the same
+constexpr double kHigh = 0.1;      // of the thickness: what may lie against a face
+constexpr std::size_t kMost = 48;  // corners of what is cut
+
+// What a point belongs to; the same from step to step.
+std::uint64_t key_of(std::uint64_t kind, int a, int b) {
+  std::uint64_t x = kind;
+  for (const int each : {a, b}) {
+    x = (x + static_cast<std::uint64_t>(each) + 1) * 0x9e3779b97f4a7c15;
+    x ^= x >> 29;
+  }
+  return x * 0xbf58476d1ce4e5b9;
+}
+enum Kind : std::uint64_t { kOverFace = 1, kOnEdge, kOnCorner, kTopEdge, kTopCorner };
+
+// A corner of what is left of a face or a line over a triangle; `edge`: of the triangle, that it
+// was cut at, or -1.
+struct Cut {
+  Vector3d point;
+  int id, edge;
+};
+struct Cuts {
+  std::array<Cut, kMost> corner;
+  int count = 0;
+  void add(const Cut& c) {
+    if (at(count) < kMost) corner[at(count++)] = c;
+  }
+};
+
+void cut(const Vector3d& from, const Vector3d& inward, int edge, Cuts& all) {
+  Cuts kept;
+  for (int j = 0; j < all.count; ++j) {
+    const Cut &p = all.corner[at(j)], &q = all.corner[at((j + 1) % all.count)];
+    const double d = inward.dot(p.point - from), e = inward.dot(q.point - from);
+    if (d >= 0) kept.add(p);
+    if ((d >= 0) == (e >= 0)) continue;
+    if (all.count == 2 && j == 1) continue;  // the same line, back
+    kept.add({p.point + d / (d - e) * (q.point - p.point), p.id, edge});
+  }
+  all = kept;
+}
+
+}  // namespace
+
+struct MeshContacts::Body {
+  const Shape& shape;
+  Pose pose;
+  ConvexShape convex;
+  double margin;
+};
+
+MeshContacts::MeshContacts(const Shape& mesh) : mesh_(mesh.points, mesh.triangles), tree_(mesh_) {
+  corners_.resize(3);
+}
+
+void MeshContacts::collide(const Shape& a, const Pose& A, const Pose& mesh, double margin,
+                           NearPoints& out) {
+  Pose pose;
+  pose.rotation = mesh.rotation.transpose() * A.rotation;
+  const Vector3d origin = mesh.rotation.transpose() * (A.position - mesh.position);
+  const Body body{a, pose, ConvexShape(a, pose, Vector3d::Zero()), margin};
+  Vector3d low, high;
+  for (int k = 0; k < 3; ++k) {
+    const double round = body.convex.radius() + margin;
+    high[k] = body.convex.farthest(Vector3d::Unit(k))[k] + round;
+    low[k] = body.convex.farthest(-Vector3d::Unit(k))[k] - round;
+  }
+  const int from = out.count;
+  keys_.clear();
+  features_.clear();
+  tree_.near({origin + low, origin + high}, [&](int t) {
+    const TriangleMesh::Triangle& triangle = mesh_[t];
+    Near near{triangle, {}, 0};
+    for (int k = 0; k < 3; ++k) near.corner[at(k)] = mesh_.point(triangle.corner[at(k)]) - origin;
+    for (int k = 0; k < 3; ++k)
+      near.longest =
+          std::max(near.longest, (near.corner[at((k + 1) % 3)] - near.corner[at(k)]).norm());
+    touch(body, near, out);
+  });
+  for (int k = from; k < out.count; ++k) {
+    NearPoint& p = out.point[at(k)];
+    p.on_first = mesh.position + mesh.rotation * (origin + p.on_first);
+    p.on_second = mesh.position + mesh.rotation * (origin + p.on_second);
+    p.normal = mesh.rotation * p.normal;
+  }
+}
+
+// Over the face: the points with which the body would touch its plane. They are right where the
+// body is above, and below where the face is the nearest way out. Edges and corners count where
+// the surface is sharp.
+void MeshContacts::touch(const Body& body, const Near& near, NearPoints& out) {
+  const Vector3d &n = near.triangle.normal, &p = near.corner[0];
+  if (!(n.dot(p) < 0)) return;  // the middle of the body is behind
+  const double thickness = body.convex.thickness();
+  const double low = n.dot(body.convex.farthest(-n) - p) - body.convex.radius();
+  if (!(low < body.margin)) return;
+  plane_.count = 0;
+  collide_plane(body.shape, body.pose, p, n, body.margin, plane_);
+  int over = 0;
+  bool lowest = false;
+  for (int j = 0; j < plane_.count; ++j) {
+    const NearPoint& q = plane_.point[at(j)];
+    bool inside = true;
+    for (int k = 0; k < 3 && inside; ++k) {
+      const Vector3d& c = near.corner[at(k)];
+      const Vector3d along = near.corner[at((k + 1) % 3)] - c;
+      inside = n.cross(along).dot(q.on_second - c) >= -kBorder * near.longest * along.norm();
+    }
+    if (!inside) continue;
+    lowest = lowest || q.gap <= low + kLowest * thickness;
+    plane_.point[at(over++)] = q;
+  }
+  const bool sharp = near.triangle.sharp(), shallow = low >= -kShallow * thickness;
+  bool face = shallow || !sharp;
+  if (sharp && !(lowest && shallow) && !separate(body, near, face, out)) return;
+  for (int j = 0; j < over; ++j) {
+    const NearPoint& q = plane_.point[at(j)];
+    if (q.gap >= 0 || face)
+      add(q.on_first, n, q.gap, key_of(kOverFace, near.triangle.patch, q.feature), out);
+  }
+  if (sharp && face) cut_edges(body, near, low, out);
+}
+
+// Adds contacts with sharp edges and corners; `face`: the nearest way out is that of the face.
+// False: the body is farther than the margin.
+bool MeshContacts::separate(const Body& body, const Near& near, bool& face, NearPoints& out) {
+  std::copy(near.corner.begin(), near.corner.end(), corners_.begin());
+  const ConvexShape triangle(corners_, body.convex.thickness());
+  Separation apart;
+  if (!find_separation(body.convex, triangle, body.margin, apart)) return false;
+  if ((apart.normal - near.triangle.normal).norm() < kSame) {
+    face = true;
+    return true;
+  }
+  Flat s, top;
+  std::uint64_t part = 0;
+  if (!top_of(near, apart.normal, top, part)) return true;
+  edges_.count = 0;
+  const Vector3d origin = Vector3d::Zero();
+  const ConvexPair pair{body.convex, triangle, origin, apart, body.margin, edges_};
+  body.convex.flat(-apart.normal, pair.height(), s);
+  manifold(pair, s, top);
+  for (int k = 0; k < edges_.count; ++k) {
+    const NearPoint& q = edges_.point[at(k)];
+    add(q.on_first, apart.normal, q.gap, part + q.feature, out);
+  }
+  return true;
+}
+
+// What of the triangle lies against n, if it is sharp and the surface stays below it: then no other
+// triangle is nearer.
+bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
+                          std::uint64_t& part) const {
+  const TriangleMesh::Triangle& t = near.triangle;
+  std::array<double, 3> height{};
+  for (int k = 0; k < 3; ++k) height[at(k)] = n.dot(near.corner[at(k)]);
+  const double least = *std::max_element(height.begin(), height.end()) - kSame * near.longest;
+  for (int k = 0; k < 3; ++k)
+    if (height[at(k)] >= least) top.add(near.corner[at(k)], k);
+  if (top.count == 3) return false;
+  if (top.count == 1) {
+    const int k = top.id[0], corner = t.corner[at(k)];
+    part = key_of(kTopCorner, corner, 0);
+    return t.sharp_corner[at(k)] != 0 && mesh_.is_top(corner, n);
+  }
+  const int k = top.id[0] == 0 && top.id[1] == 2 ? 2 : top.id[0];
+  part = key_of(kTopEdge, t.edge[at(k)], 0);
+  if (t.sharp_edge[at(k)] == 0) return false;
+  if (t.apex[at(k)] < 0) return true;
+  const Vector3d way = mesh_.point(t.apex[at(k)]) - mesh_.point(t.corner[at(k)]);
+  return n.dot(way) <= kSame * way.norm();
+}
+
+// Where a face or a line of the body lies over a sharp edge or corner of the triangle; its other
+// cuts are in the middle of what the body lies on.
+void MeshContacts::cut_edges(const Body& body, const Near& near, double low, NearPoints& out) {
+  const TriangleMesh::Triangle& t = near.triangle;
+  const double height = std::min(body.margin - low, kHigh * body.convex.thickness());
+  Flat flat;
+  body.convex.flat(-t.normal, height, flat);
+  if (flat.count < 2) return;
+  Cuts all;
+  for (int j = 0; j < flat.count; ++j) all.add({flat.point[at(j)], flat.id[at(j)], -1});
+  for (int k = 0; k < 3 && all.count > 0; ++k) {
+    const Vector3d& from = near.corner[at(k)];
+    cut(from, t.normal.cross(near.corner[at((k + 1) % 3)] - from), k, all);
+  }
+  for (int j = 0; j < all.count; ++j) {
+    const Cut& c = all.corner[at(j)];
+    if (c.edge < 0) continue;
+    const double above = t.normal.dot(c.point - near.corner[0]);
+    const double gap = above - body.convex.radius();
+    if (!(gap < body.margin)) continue;
+    const Vector3d foot = c.point - above * t.normal;
+    std::uint64_t key = 0;
+    if (t.sharp_edge[at(c.edge)] != 0) key = key_of(kOnEdge, t.edge[at(c.edge)], c.id);
+    for (const int k : {c.edge, (c.edge + 1) % 3})
+      if ((foot - near.corner[at(k)]).norm() <= kLowest * near.longest)
+        key = t.sharp_corner[at(k)] != 0 ? key_of(kOnCorner, t.corner[at(k)], 0) : 0;
+    if (key != 0)
+      add(c.point - body.convex.radius() * t.normal, t.normal, gap,
+          key + 0x9e3779b97f4a7c15 * static_cast<std::uint64_t>(t.patch), out);
+  }
+}
+
+void MeshContacts::add(const Vector3d& on_body, const Vector3d& n, double gap, std::uint64_t key,
+                       NearPoints& out) {
+  if (std::find(keys_.begin(), keys_.end(), key) != keys_.end()) return;
+  keys_.push_back(key);
+  int feature = static_cast<int>(key >> 48);
+  while (std::find(features_.begin(), features_.end(), feature) != features_.end())
+    feature = (feature + 1) & 0xffff;
+  features_.push_back(feature);
+  out.add(on_body, on_body - gap * n, n, gap, feature);
+}
+
+}  // namespace tether::contact::detail

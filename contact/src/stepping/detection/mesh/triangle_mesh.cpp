@@ -1,0 +1,152 @@
+// Tether: a surface of triangles. SPDX-License-Identifier: BSD-3-Clause
+#include "stepping/detection/mesh/triangle_mesh.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <tether/linalg/index.hpp>
+#include <tuple>
+#include <utility>
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+using linalg::at;
+
+namespace {
+
+constexpr double kFlat = 1e-9;     // radian: bends up to here are rounding
+constexpr double kNoArea = 1e-14;  // twice the area of a triangle over its longest edge squared
+constexpr double kBelow = 1e-7;    // radian: of a neighbour that may rise above a top
+
+// Number of each point among those that differ.
+std::vector<int> welded(const std::vector<Vector3d>& points, std::vector<Vector3d>& different) {
+  std::vector<int> order(points.size()), number(points.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&](int k) {
+    const Vector3d& p = points[at(k)];
+    return std::make_tuple(p.x(), p.y(), p.z());
+  };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    if (k == 0 || key(order[k - 1]) != key(order[k])) different.push_back(points[at(order[k])]);
+    number[at(order[k])] = static_cast<int>(different.size()) - 1;
+  }
+  return number;
+}
+
+struct HalfEdge {
+  int low, high;  // corners
+  int triangle, side;
+};
+
+}  // namespace
+
+bool TriangleMesh::Triangle::sharp() const {
+  const auto any = [](const std::array<char, 3>& a) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };
+  return any(sharp_edge) || any(sharp_corner);
+}
+
+TriangleMesh::TriangleMesh(const std::vector<Vector3d>& points,
+                           const std::vector<std::array<int, 3>>& triangles) {
+  add_triangles(points, triangles);
+  join_edges();
+  mark_corners();
+}
+
+void TriangleMesh::add_triangles(const std::vector<Vector3d>& points,
+                                 const std::vector<std::array<int, 3>>& triangles) {
+  const std::vector<int> number = welded(points, points_);
+  for (const std::array<int, 3>& each : triangles) {
+    Triangle t;
+    for (int k = 0; k < 3; ++k) t.corner[at(k)] = number[at(each[at(k)])];
+    const Vector3d &a = point(t.corner[0]), &b = point(t.corner[1]), &c = point(t.corner[2]);
+    const double longest2 =
+        std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+    const Vector3d area = (b - a).cross(c - a);
+    if (!(area.norm() > kNoArea * longest2)) continue;
+    t.normal = area.normalized();
+    t.apex.fill(-1);
+    t.sharp_edge.fill(1);
+    t.sharp_corner.fill(0);
+    triangles_.push_back(t);
+  }
+}
+
+void TriangleMesh::join_edges() {
+  std::vector<HalfEdge> halves;
+  for (int t = 0; t < size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const int from = (*this)[t].corner[at(k)], to = (*this)[t].corner[at((k + 1) % 3)];
+      halves.push_back({std::min(from, to), std::max(from, to), t, k});
+    }
+  std::sort(halves.begin(), halves.end(), [](const HalfEdge& a, const HalfEdge& b) {
+    return std::tie(a.low, a.high, a.triangle, a.side) <
+           std::tie(b.low, b.high, b.triangle, b.side);
+  });
+  std::vector<std::array<int, 2>> flat;
+  int number = 0;
+  for (std::size_t first = 0, end = 0; first < halves.size(); first = end, ++number) {
+    while (end < halves.size() && halves[end].low == halves[first].low &&
+           halves[end].high == halves[first].high)
+      triangles_[at(halves[end].triangle)].edge[at(halves[end].side)] = number, ++end;
+    // More than two, or two of opposite sides: each ends here.
+    const HalfEdge &h = halves[first], &o = halves[end - 1];
+    Triangle &s = triangles_[at(h.triangle)], &t = triangles_[at(o.triangle)];
+    if (end != first + 2 || s.corner[at(h.side)] == t.corner[at(o.side)]) continue;
+    s.apex[at(h.side)] = t.corner[at((o.side + 2) % 3)];
+    t.apex[at(o.side)] = s.corner[at((h.side + 2) % 3)];
+    const Vector3d& from = point(h.low);
+    const Vector3d along = (point(h.high) - from).normalized();
+    const Vector3d way = point(s.apex[at(h.side)]) - from;
+    const double rise = s.normal.dot(way), out = (way - along.dot(way) * along).norm();
+    const bool ahead = s.normal.dot(t.normal) > 0;
+    if (ahead && std::abs(rise) <= kFlat * out) flat.push_back({h.triangle, o.triangle});
+    const bool bends_away = rise < -kFlat * out || (!ahead && rise <= kFlat * out);
+    s.sharp_edge[at(h.side)] = t.sharp_edge[at(o.side)] = bends_away ? 1 : 0;
+  }
+  find_patches(flat);
+}
+
+void TriangleMesh::find_patches(const std::vector<std::array<int, 2>>& flat) {
+  std::vector<int> root(triangles_.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int t) {
+    while (root[at(t)] != t) t = root[at(t)] = root[at(root[at(t)])];
+    return t;
+  };
+  for (const std::array<int, 2>& each : flat) {
+    const int s = find(each[0]), t = find(each[1]);
+    root[at(std::max(s, t))] = std::min(s, t);
+  }
+  for (int t = 0; t < size(); ++t) triangles_[at(t)].patch = find(t);
+}
+
+void TriangleMesh::mark_corners() {
+  std::vector<char> sharp(points_.size(), 0);
+  std::vector<std::array<int, 2>> links;
+  for (const Triangle& t : triangles_)
+    for (int k = 0; k < 3; ++k) {
+      const int a = t.corner[at(k)], b = t.corner[at((k + 1) % 3)];
+      links.push_back({a, b});
+      links.push_back({b, a});
+      if (t.sharp_edge[at(k)] != 0) sharp[at(a)] = sharp[at(b)] = 1;
+    }
+  std::sort(links.begin(), links.end());
+  links.erase(std::unique(links.begin(), links.end()), links.end());
+  start_.assign(points_.size() + 1, 0);
+  for (const std::array<int, 2>& each : links) ++start_[at(each[0]) + 1];
+  std::partial_sum(start_.begin(), start_.end(), start_.begin());
+  for (const std::array<int, 2>& each : links) neighbours_.push_back(each[1]);
+  for (Triangle& t : triangles_)
+    for (int k = 0; k < 3; ++k) t.sharp_corner[at(k)] = sharp[at(t.corner[at(k)])];
+}
+
+bool TriangleMesh::is_top(int corner, const Vector3d& n) const {
+  for (std::size_t k = start_[at(corner)]; k < start_[at(corner) + 1]; ++k) {
+    const Vector3d way = point(neighbours_[k]) - point(corner);
+    if (n.dot(way) > kBelow * way.norm()) return false;
+  }
+  return true;
+}
+
+}  // namespace tether::contact::detail
