@@ -13,10 +13,22 @@ namespace tether::scene::event {
 
 namespace {
 
+constexpr double kLeastLocal = 1e-11, kLeastInFlight = 2e-13;
+
 // IDA bounds the error of a step; as in the smooth engine.
+double wanted_tolerance(double tolerance) {
+  return std::min(1.0, std::pow(tolerance / 1e-4, 1.0 / 6.0)) * 0.1 * tolerance;
+}
+
 double local_tolerance(double tolerance) {
-  const double tighter = std::min(1.0, std::pow(tolerance / 1e-4, 1.0 / 6.0));
-  return std::max(std::max(tighter * 0.1 * tolerance, std::min(0.1 * tolerance, 1e-11)), 1e-13);
+  return std::max({wanted_tolerance(tolerance), std::min(0.1 * tolerance, kLeastLocal), 1e-13});
+}
+
+// From a bounce on: an error of the height is one of the time of the next impact, over its speed.
+double flight_tolerance(double tolerance, double speed) {
+  const double wanted = wanted_tolerance(tolerance), local = local_tolerance(tolerance);
+  if (wanted >= local) return local;
+  return std::min(local, std::max(kLeastInFlight, wanted * std::min(1.0, speed)));
 }
 
 // The first steps of a bounce are of order 1: some ten times (h / T)^2 is their error in its length
@@ -146,16 +158,18 @@ void Driver::start_phase() {
   motion_.choose(event_time_, y_, modes_);
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
   std::vector<bool> leaving(at(model_.contacts()), false);
+  double local = local_;
   for (int i = 0; i < model_.contacts(); ++i) {
     double rate = 0;
     const double gap = model_.gap(i, rate);
     leaving[at(i)] = motion_.modes()[at(i)].mode == Mode::open && std::abs(gap) <= bands().gap(i) &&
                      rate > bands().approach(i);
+    if (leaving[at(i)]) local = std::min(local, flight_tolerance(options_.tolerance, rate));
   }
   if (phase_) counts_.phases.add(phase_->counts());
   phase_.reset();
   const double first = longest_first_step(leaving);
-  phase_ = std::make_unique<Phase>(motion_, local_, options_.max_step, event_time_, y_, first);
+  phase_ = std::make_unique<Phase>(motion_, local, options_.max_step, event_time_, y_, first);
   watcher_.begin(event_time_, y_, leaving);
   next_.reset();
 }
