@@ -1,6 +1,8 @@
 // The event engine's driver by its memory: what one instant may hold. SPDX-License-Identifier:
 // BSD-3-Clause
-#include <tether/linalg/index.hpp>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
 
 #include "event/driver.hpp"
 #include "event/model/scaled_scene.hpp"
@@ -68,4 +70,85 @@ TEST_CASE("event: an instant with events without end is refused by name") {
   before.at_one_time = 299;
   Driver enough(c.model, c.options(), before);
   CHECK_NOTHROW(enough.advance(c.end));
+}
+
+namespace {
+
+template <class T>
+std::string with(std::string state, std::size_t at, T value) {
+  return state.replace(at, sizeof value, reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+std::string saved(const Engine& engine) {
+  std::stringstream out;
+  engine.save(out);
+  return out.str();
+}
+
+// Bodies of a state stand in front, then the letters, sizes and units of the engine.
+std::size_t numbers_of(const Engine& engine) {
+  return 3 * 8 + engine.bodies().size() * 13 * 8 + 8 + 5 * 8;
+}
+
+std::string ball(const std::string& velocity) {
+  return "[scene]\nengine = \"event\"\nend = 2\n" + kFloor + pair("friction = 0.3") +
+         "[[body]]\nname = \"ball\"\nshape = \"sphere\"\nradius = 0.1\nmass = 1\n"
+         "material = \"body\"\nposition = [0, 0, 0.2]\nvelocity = " +
+         velocity + "\n";
+}
+
+}  // namespace
+
+TEST_CASE("event: a state with any number in any place is refused, or moves on") {
+  const Scene scene = parse_scene(ball("[1, 0, -0.5]"), "state.toml");
+  const auto engine = make_engine(scene);
+  engine->advance(0.1);
+  const std::string state = saved(*engine);
+  int refused = 0;
+  const auto tried = [&](const std::string& changed) {
+    std::istringstream in(changed);
+    try {
+      const auto fresh = make_engine(scene);
+      fresh->restore(in);
+      fresh->advance(0.3);  // behind the impact
+    } catch (const std::runtime_error&) {
+      ++refused;
+    }
+  };
+  for (std::size_t at = numbers_of(*engine); at + 8 <= state.size(); at += 4) {
+    INFO(at);
+    for (const double x : {std::nan(""), HUGE_VAL, 1e300, -1.0}) tried(with(state, at, x));
+    for (const std::int32_t x : {1, 2, -1, std::numeric_limits<std::int32_t>::max()})
+      tried(with(state, at, x));
+  }
+  CHECK(refused > 200);
+}
+
+TEST_CASE("event: a contact of a state slides in a direction, or the state is refused") {
+  const Scene scene = parse_scene(ball("[1, 0, -0.5]"), "state.toml");
+  const auto engine = make_engine(scene);
+  engine->advance(0.1);  // the contact is open, and has no direction
+  const std::string state = saved(*engine);
+  const std::size_t contact = state.size() - (2 * 4 + 7 * 8 + 4);
+  for (const std::int32_t mode : {2, 3, -1}) {
+    std::istringstream in(with(state, contact, mode));
+    CHECK_THROWS_WITH(make_engine(scene)->restore(in), Catch::Contains("damaged"));
+  }
+}
+
+TEST_CASE("event: a state that claims a time far ahead is refused after the steps of a phase") {
+  for (const char* velocity : {"[1, 0, 0.5]", "[1, 0, -0.5]"}) {  // nothing happens; an impact
+    const Scene scene = parse_scene(ball(velocity), "state.toml");
+    const auto engine = make_engine(scene);
+    engine->advance(0.05);
+    const std::size_t reached = numbers_of(*engine) + 8;
+    for (const double time : {1.0, 1e9, 1e300}) {
+      if (time == 1.0 && velocity[7] != '-') continue;  // it is arrived at, with other bits
+      std::istringstream in(with(saved(*engine), reached, time));
+      const auto fresh = make_engine(scene);
+      CHECK_THROWS_AS(fresh->restore(in), std::runtime_error);
+      CHECK(fresh->counts().steps <= 5001);
+      CHECK(fresh->counts().events <= 1);
+    }
+  }
 }

@@ -228,6 +228,31 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
   }
 }
 
+// No event lies in between, and no more steps than a phase has: what says otherwise never was a
+// state.
+bool Driver::arrive(double t) {
+  const long events = counts_.events;
+  const auto is_over = [&] { return counts_.events > events || phase_->counts().steps >= kAnchor; };
+  advance(t, is_over);
+  return time_ == t && counts_.events == events;
+}
+
+bool Driver::Memory::is_sound() const {
+  bool sound = y.allFinite() && time >= 0;
+  for (const double x : {time, kept_energy, lost, first_energy}) sound = sound && std::isfinite(x);
+  for (const ContactMode& each : modes) sound = sound && each.direction.allFinite();
+  for (const double level : levels) sound = sound && std::isfinite(level);
+  for (const Bounces& each : bounces) {
+    sound = sound && each.count >= 0 && each.count <= 3;
+    for (int k = 0; k < 3; ++k)
+      sound = sound && std::isfinite(each.time[k]) && std::isfinite(each.speed[k]);
+  }
+  constexpr long kMostCounted = 1L << 40;
+  for (const long count : {at_one_time, events, impacts})
+    sound = sound && count >= 0 && count <= kMostCounted;
+  return sound;
+}
+
 // A phase without events may be long; a saved state is arrived at again from its start.
 void Driver::anchor() {
   event_time_ = phase_->start() + phase_->step_end();

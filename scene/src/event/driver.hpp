@@ -54,6 +54,8 @@ class Driver {
 
   /// To time t; early where `interrupted`. Throws SimulationError.
   void advance(double t, const std::function<bool()>& interrupted = {});
+  /// From the start of the present phase to a time in it; false: it is not in it, or too far.
+  bool arrive(double t);
   double time() const { return time_; }
   /// The state there: q, u, work of forces without potential.
   VectorXd state();
@@ -137,6 +139,9 @@ struct Driver::Memory {
   std::vector<double> levels;  ///< gaps of closed contacts
   std::vector<Bounces> bounces;
   long at_one_time = 0, events = 0, impacts = 0;
+
+  /// Numbers are finite, counts are counts.
+  bool is_sound() const;
 };
 
 }  // namespace tether::scene::event

@@ -1,6 +1,7 @@
 // Tether: the engine of scenes whose events are found to a tolerance. SPDX-License-Identifier:
 // BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <istream>
 #include <ostream>
 #include <stdexcept>
@@ -19,6 +20,7 @@ namespace {
 using namespace event;
 using mechanics::at;
 
+constexpr const char* kDamaged = "the saved state is damaged";
 constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '3'};
 
 DriverOptions driver_options(const Scene& scene) {
@@ -239,10 +241,11 @@ void EventEngine::restore(std::istream& in, Restore how) {
   for (std::uint64_t i = 0; i < contacts; ++i) {
     std::int32_t mode = 0, directions = 0, count = 0;
     binary::get(in, mode, directions);
-    if (mode < 0 || mode > 2 || directions < 0 || directions > 2)
-      throw std::runtime_error("the saved state is damaged");
     ContactMode& each = m.modes.emplace_back();
     each.mode = static_cast<Mode>(mode);
+    const bool slides = each.mode == Mode::slide;
+    if (mode < 0 || mode > 2 || (directions != model_.tangents() && (slides || directions != 0)))
+      throw std::runtime_error(kDamaged);
     each.direction.resize(directions);
     for (double& x : each.direction) binary::get(in, x);
     binary::get(in, m.levels.emplace_back());
@@ -251,8 +254,8 @@ void EventEngine::restore(std::istream& in, Restore how) {
     binary::get(in, count);
     b.count = count;
   }
-  if (!m.y.allFinite() || !saved.allFinite() || !(reached >= m.time))
-    throw std::runtime_error("the saved state is damaged");
+  if (!m.is_sound() || !saved.allFinite() || !(reached >= m.time) || !std::isfinite(reached))
+    throw std::runtime_error(kDamaged);
   events_.clear();
   if (how == Restore::near) {
     driver_ =
@@ -260,14 +263,15 @@ void EventEngine::restore(std::istream& in, Restore how) {
     return look();
   }
   driver_ = std::make_unique<Driver>(model_, options_, m);
+  bool arrives = false;
   try {
-    driver_->advance(reached);
+    arrives = driver_->arrive(reached);
   } catch (const SimulationError& e) {
     throw std::runtime_error(std::string("the saved state cannot be arrived at again: ") +
                              e.what());
   }
   look();
-  if (driver_->time() != reached || now_ != saved)
+  if (!arrives || now_ != saved)
     throw std::runtime_error(
         "the saved state is of another build or machine: the same steps lead to other bits here");
 }

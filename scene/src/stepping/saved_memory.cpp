@@ -96,7 +96,7 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
     m.last.points.push_back(get_contact(in, bodies));
     binary::get(in, m.last.gaps.emplace_back());
     binary::get_array(in, m.last.impulses.emplace_back());
-    demand_finite(m.last.impulses.back());
+    demand_finite(m.last.impulses.back(), Eigen::Matrix<double, 1, 1>(m.last.gaps.back()));
   }
   std::int32_t status = 0;
   binary::get(in, m.penetration, m.residual, status);

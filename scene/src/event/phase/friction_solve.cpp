@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tether::scene::event {
 
@@ -170,6 +171,10 @@ FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const Vector
   out.x.setZero(b.size());
   out.w = -b;
   out.regimes.assign(static_cast<std::size_t>(n), Regime::separating);
+  if (!A.allFinite() || !b.allFinite()) {  // the motion has left the range of numbers
+    out.error = std::numeric_limits<double>::infinity();
+    return out;
+  }
   double largest = 0;
   for (int i = 0; i < n; ++i) largest = std::max(largest, A(block * i, block * i));
   std::vector<int> free;
