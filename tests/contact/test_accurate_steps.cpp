@@ -279,3 +279,21 @@ TEST_CASE("accurate steps: free tops keep momentum and energy; memory goes on wi
       }(),
       std::invalid_argument);
 }
+
+TEST_CASE("accurate steps: the shortest part is that of the step, whatever a memory says") {
+  for (const double next : {1e-300, 1e-15, 1e-11}) {
+    INFO("next part " << next);
+    Scene scene(1e-2);
+    scene.options.accuracy = 1e-4;
+    scene.friction(0.3, 0.5);
+    scene.ground();
+    scene.sphere(0.1, 1, {0, 0, 0.105}, {1, 0, -0.5});
+    tc::Stepper s = scene.stepper();
+    tc::StepperMemory memory = s.memory();
+    memory.control.next = next;
+    s.set_memory(memory);
+    s.step();
+    CHECK(s.time() == Approx(1e-2).epsilon(1e-14));
+    CHECK(s.counts().parts < 2002);
+  }
+}

@@ -21,8 +21,8 @@ go() {
   exec "$program" run "$work/scene.toml" --quiet --output "$folder" --csv a.csv --vtk f.pvd --state a.state "$@"
 }
 {
-  grep -v -E '^(csv|vtk|svg|state|every|checkpoint|\[output\])' "$scene"
-  printf '[output]\nevery = 0.01\ncheckpoint = 0.047\n'
+  awk '/^\[/ { output = /^\[output\]/ } !output' "$scene"
+  printf '[output]\nevery = 0.01\ncheckpoint = 0.047\nforces = true\n'
 } >"$work/scene.toml"
 
 start=$(date +%s%N)

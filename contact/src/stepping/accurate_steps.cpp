@@ -239,11 +239,11 @@ void Stepper::Implementation::advance_accurately(double start, double length) {
   double done = 0, shortest = kShortest * length;
   for (int taken_parts = 0; done < length; ++taken_parts) {
     if (taken_parts == kManyImpacts) shortest = length / kManyImpacts;
-    const double left = length - done;
-    double next = parts.control.next > 0 ? parts.control.next : left;
+    const double left = length - done, least = std::min(shortest, left);
+    double next = parts.control.next > 0 ? std::max(parts.control.next, least) : left;
     const bool shortened = next > 0.5 * left;
     if (shortened) next = next < left ? left / 2 : left;
-    const double taken = take_part(start + done, next, shortened, std::min(shortest, left));
+    const double taken = take_part(start + done, next, shortened, least);
     done = taken < left ? done + taken : length;
   }
 }
