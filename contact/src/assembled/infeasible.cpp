@@ -62,10 +62,17 @@ bool keep_proof(const System& system, double tolerance, Packed& d) {
   return false;
 }
 
+// Whether impulses whose velocities are w rule out every proof: d.w = -b.d for all d with A d = 0.
+bool rule_out_proofs(const System& system, double tolerance, const Packed& w) {
+  for (int i = 0; i < system.size(); ++i)
+    if (!(-w[at(i)].v[0] * system.inverse_scale(i) <= tolerance)) return false;
+  return true;
+}
+
 }  // namespace
 
 // Proximal point iteration for the frictionless problem: where that has no solution its steps
-// converge to such a d, the faster the smaller tau.
+// converge to such a d, the faster the smaller tau; where it has one, soon no w_n is below zero.
 bool proves_infeasible(Search& search, Packed& d) {
   constexpr int kSteps = 40, kSweeps = 20, kCorrections = 12;
   const Problem& problem = search.system.problem();
@@ -80,7 +87,7 @@ bool proves_infeasible(Search& search, Packed& d) {
   smooth.work_end = std::max(40 * search.sweep_cost * kSteps, search.work_end - search.counts.work);
   ProximalNewton newton;
   newton.reset(problem.contacts());
-  Packed anchor(n), point(n);
+  Packed anchor(n), point(n), w(n);
   double tau = 1e-2;
   int sweeps = kSweeps;
   bool found = false;
@@ -101,6 +108,9 @@ bool proves_infeasible(Search& search, Packed& d) {
     for (std::size_t i = 0; i < n; ++i)
       for (int c = 0; c < 4; ++c) d[i].v[c] = point[i].v[c] - anchor[i].v[c];
     found = keep_proof(search.system, search.options.tolerance, d);
+    search.system.velocities(point.data(), w.data());
+    smooth.counts.work += smooth.test_cost;
+    if (rule_out_proofs(search.system, search.options.tolerance, w)) break;
     // The next step from where this one leads.
     for (std::size_t i = 0; i < n; ++i)
       for (int c = 0; c < 4; ++c) {

@@ -20,6 +20,7 @@ LocalSolves::~LocalSolves() = default;
 void LocalSolves::reset(int contacts) {
   n_ = contacts;
   layers_ = 1;
+  refused_ = 0;
   most_ = 0;
   solved_ = false;
   z_.resize(at(n_));
@@ -37,12 +38,15 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
   most_ = 0;
   for (double error : error_) most_ = std::max(most_, error);
   if (!(most_ > 0) || !std::isfinite(most_)) return false;
-  // Where many contacts have errors of one size there is no part to solve: solving some of them
-  // only disturbs the others.
+  // Where many contacts have errors of one size solving some of them only disturbs the others. But
+  // where sweeps do not settle for long, parts of them may hold what is unstable by itself.
   constexpr double kNearLargest = 0.1, kFew = 0.03;
   int many = 0;
   for (double e : error_) many += e > kNearLargest * most_;
-  if (many > kFew * n_) return false;
+  if (many > kFew * (1 + refused_) * n_) {
+    ++refused_;
+    return false;
+  }
   constexpr int kOutside = -1, kReached = -2;
   for (double cut : {0.3, 0.6, 0.9}) {
     std::fill(place_.begin(), place_.end(), kOutside);

@@ -27,6 +27,7 @@ class LocalSolves {
   bool solve_part(Search& search, int part, double budget, Packed& x);
 
   int n_ = 0, layers_ = 1;
+  int refused_ = 0;      // rounds that found too many contacts with errors of one size
   bool solved_ = false;  // a part, in the last round
   double most_ = 0;      // the largest error, as a velocity relative to its island's scale
   std::vector<double> error_;

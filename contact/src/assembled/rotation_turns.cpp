@@ -109,10 +109,11 @@ Status Automatic::end_of_round(Search& search, Rotation& r, int) {
   return Status::unsolved;
 }
 
-// From the convex problem, which needs no start.
+// From the convex problem, which needs no start; for no more work than all before it.
 Status Automatic::coupling_path(Search& search, Rotation& r, int factorisations) {
   r.coupled = true;
-  interior.run_coupling(search, factorisations);
+  const double affordable = search.counts.work / interior.cost(search);
+  interior.run_coupling(search, static_cast<int>(std::min<double>(factorisations, affordable)));
   return Status::unsolved;
 }
 

@@ -117,6 +117,22 @@ struct InteriorPoint::CouplingPath {
   }
 };
 
+// Forecasts by the factorisations of the last steps, which become short near a fold.
+struct InteriorPoint::Progress {
+  int since;  // count of factorisations at the last look
+  double theta = 0;
+
+  bool arrives(double now, int count, int end) {
+    constexpr int kLook = 12;
+    if (now >= 1) return count < end;
+    if (count - since < kLook) return count < end;
+    const bool in_time = (now - theta) * (end - count) > (1 - now) * (count - since);
+    theta = now;
+    since = count;
+    return in_time;
+  }
+};
+
 // Whether every contact's x.u is near nu, and w(u) near A x - b.
 bool InteriorPoint::centred(const System& system, double nu) const {
   constexpr double kOff = 0.3, kResidual = 0.02;
@@ -161,9 +177,11 @@ void InteriorPoint::run_coupling(Search& search, int most) {
     }
     CouplingPath path(*this, search, nu);
     on_path = on_path && path.directions();
+    Progress progress{search.counts.factorisations};
     while (on_path && path.theta < 1) {
       path.set_tangent();
-      on_path = path.step() && search.counts.factorisations < end && !search.exhausted();
+      on_path = path.step() && progress.arrives(path.theta, search.counts.factorisations, end) &&
+                !search.exhausted();
     }
   }
   equations_.set_coupling(1);

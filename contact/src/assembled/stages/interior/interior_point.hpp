@@ -46,6 +46,7 @@ class InteriorPoint {
 
  private:
   struct CouplingPath;
+  struct Progress;
   bool start(Search& search);
   bool start_near(Search& search, const PackedVector* start, double near);
   bool start_proximal(Search& search, double tau, double near);
