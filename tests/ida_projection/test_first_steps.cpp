@@ -1,10 +1,12 @@
 // Tether: wrong rows and tolerances are named in the first steps. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <problems/pendulum.hpp>
 
 #include "host.hpp"
 #include "linalg/thrown.hpp"
+#include "motions.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::test;
@@ -61,6 +63,31 @@ TEST_CASE("an energy row with gravity off by 5 % is named in the first steps") {
       // The host's y' at the start is no evidence.
       const Said started = after(100, problem, tolerance, geometry, 3.0);
       CHECK(started.message.empty());
+    }
+}
+
+TEST_CASE("the same where the terms of C y' cancel each other: a point on a sphere") {
+  for (const char* form : {"index 1", "index 0"})
+    for (const double tolerance : {1e-5, 3e-6, 1e-6, 1e-8}) {
+      INFO(form << ", tolerance " << tolerance);
+      const Problem problem = spherical_pendulum(form, 100.0);
+      const auto energy = [&problem](double gravity) {
+        const double start = 0.5 * 1.5 * 1.5 + gravity * problem.y0[2];
+        return row(
+            "energy",
+            [=](double, const double* y) {
+              return 0.5 * (y[3] * y[3] + y[4] * y[4] + y[5] * y[5]) + gravity * y[2] - start;
+            },
+            [=](double, const double* y, double* c) {
+              c[2] = gravity;
+              std::copy(y + 3, y + 6, c + 3);
+            });
+      };
+      const tp::Constraints geometry = problem.select({"position", "velocity"});
+      const Said wrong = after(100, problem, tolerance, geometry + energy(1.05));
+      CHECK(wrong.status == tp::Status::doubtful);
+      CHECK(contains(wrong.message, "F does not keep row 2 (energy)"));
+      CHECK(after(100, problem, tolerance, geometry + energy(1.0)).message.empty());
     }
 }
 

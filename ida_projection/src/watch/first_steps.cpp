@@ -12,9 +12,10 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr long kSettled = 2;             // accepted steps: before, y' is still that of the start
-constexpr double kFelt = 1.0;            // tolerances in one step: less may be noise of y'
-constexpr int kDoubts = 5, kLooks = 20;  // steps in a row with a doubt of one sign; looks into them
+constexpr long kSettled = 2;  // accepted steps: before, y' is still that of the start
+// The second is for terms that cancel each other, as those of a centripetal acceleration.
+constexpr std::array<RowDoubt, 2> kDoubts{{{kNoInvariant, 1.0, 5}, {0.1 * kNoInvariant, 2.0, 10}}};
+constexpr int kLooks = 20;           // into doubts
 constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C
 constexpr int kVanished = 3;         // steps in which a row of C is zero
 constexpr int kSmallLooks = 3;       // at a solution below its tolerances
@@ -24,7 +25,7 @@ constexpr double kGrows = 1.02;      // for each step: a solution from zero may 
 }  // namespace
 
 void FirstSteps::reset() {
-  row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), 0);
+  row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), {});
   vanished_.assign(row_doubts_.size(), 0);
   looks_ = small_looks_ = 0;
   largest_ = 0.0;
@@ -78,25 +79,28 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
     slope_[j] = predicted[j] + step.cj * ycor[j];
   }
   if (!mover.tangency(slope_, id, tangency_)) return {};
-  const double felt = kFelt * std::sqrt(static_cast<double>(n));
+  const double root = std::sqrt(static_cast<double>(n));
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
     if (tangency_.tolerance[i] == 0.0 && ++vanished_[i] == kVanished) {
       std::string text = one_sided_row(static_cast<int>(i), step.t);
       if (!text.empty()) return text;
     }
-    const double rate = std::abs(tangency_.rate[i]);
-    int& doubts = row_doubts_[i];  // with the sign of the rate: noise changes it
-    const bool doubtful = tangency_.terms[i] >= 0.0 && rate > kNoInvariant * tangency_.terms[i] &&
-                          rate * std::abs(h) > felt * tangency_.tolerance[i];
-    if (!doubtful)
-      doubts = 0;
-    else
-      doubts = tangency_.rate[i] > 0.0 ? std::max(doubts, 0) + 1 : std::min(doubts, 0) - 1;
-    if (std::abs(doubts) < kDoubts) continue;
-    doubts = 0;
-    std::string text = false_row(static_cast<int>(i), step, h, corrector);
-    if (!text.empty()) return text;
-    if (++looks_ >= kLooks) return {};
+    const double rate = tangency_.rate[i], terms = tangency_.terms[i];
+    for (std::size_t kind = 0; kind < kDoubts.size(); ++kind) {
+      const RowDoubt& doubt = kDoubts[kind];
+      int& seen = row_doubts_[i][kind];  // with the sign of the rate
+      if (!(terms >= 0.0) || !(std::abs(rate) > doubt.share * terms) ||
+          !(std::abs(rate * h) > doubt.felt * root * tangency_.tolerance[i])) {
+        seen = 0;
+        continue;
+      }
+      seen = rate > 0.0 ? std::max(seen, 0) + 1 : std::min(seen, 0) - 1;
+      if (std::abs(seen) < doubt.steps) continue;
+      seen = 0;
+      std::string text = false_row(static_cast<int>(i), doubt, step, h, corrector);
+      if (!text.empty()) return text;
+      if (++looks_ >= kLooks) return {};
+    }
   }
   return {};
 }
@@ -112,7 +116,8 @@ std::string FirstSteps::one_sided_row(int row, double t) const {
 }
 
 // What is wrong with the row: dg/dt along y' and g_t by central differences of g, which know no C.
-std::string FirstSteps::false_row(int row, const StepData& step, double h, Corrector& corrector) {
+std::string FirstSteps::false_row(int row, const RowDoubt& doubt, const StepData& step, double h,
+                                  Corrector& corrector) {
   const auto i = static_cast<std::size_t>(row);
   const auto size = static_cast<int>(point_.size());
   Evaluator evaluator(constraints_, statistics_);
@@ -136,15 +141,15 @@ std::string FirstSteps::false_row(int row, const StepData& step, double h, Corre
   if (evaluator.fatal()) corrector.stop(-1, evaluator.message());
   if (!known) return {};
   const double terms = tangency_.terms[i] + std::abs(in_time);
-  const double felt = kFelt * std::sqrt(static_cast<double>(size)) * tangency_.tolerance[i];
+  const double felt = doubt.felt * std::sqrt(static_cast<double>(size)) * tangency_.tolerance[i];
   std::ostringstream out;
-  if (std::abs(along) > kNoInvariant * terms && std::abs(along * h) > felt) {
+  if (std::abs(along) > doubt.share * terms && std::abs(along * h) > felt) {
     out << "F does not keep row " << row << " (" << constraints_.name(row) << "): at t = " << step.t
         << " C y' + g_t = " << along << ", its terms sum up to " << terms
         << " in absolute value; check the row, its constants and F";
     return out.str();
   }
-  if (std::abs(tangency_.rate[i] + in_time - along) > kNoInvariant * terms &&
+  if (std::abs(tangency_.rate[i] + in_time - along) > doubt.share * terms &&
       searched_ + size <= kSearchLimit) {
     searched_ += size;  // C at hand may be of an earlier step: mostly nothing is wrong
     const std::string found = wrong_entry(step.t);

@@ -1,6 +1,7 @@
 // Tether: doubts in rows and tolerances, in the first steps. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,13 @@ namespace tether::ida_projection {
 
 /// Of the terms of C y': what their sum may be at an invariant; the corrector knows y' better.
 constexpr double kNoInvariant = 1e-2;
+
+/// When C y' + g_t is taken for a fault of the row.
+struct RowDoubt {
+  double share;  ///< of its terms
+  double felt;   ///< tolerances in one step: less may be noise of y'
+  int steps;     ///< so many in a row, with one sign: noise changes it
+};
 
 /// Rows that F does not keep, wrong entries of C, tolerances above the solution.
 class FirstSteps {
@@ -38,13 +46,15 @@ class FirstSteps {
                                   N_Vector corrected, const double* id, Mover& mover,
                                   Corrector& corrector);
   std::string one_sided_row(int row, double t) const;
-  std::string false_row(int row, const StepData& step, double h, Corrector& corrector);
+  std::string false_row(int row, const RowDoubt& doubt, const StepData& step, double h,
+                        Corrector& corrector);
   std::string wrong_entry(double t) const;
 
   const Constraints& constraints_;
   Statistics& statistics_;
-  Tangency tangency_;                  // of the caller's rows
-  std::vector<int> row_doubts_;        // steps in a row in which F did not seem to keep a row
+  Tangency tangency_;  // of the caller's rows
+  // of each row, for each kind of doubt: steps in a row in which F did not seem to keep it
+  std::vector<std::array<int, 2>> row_doubts_;
   std::vector<int> vanished_;          // steps in which a row of C was zero
   int looks_ = 0, small_looks_ = 0;    // at doubts in rows; at a solution below its tolerances
   double largest_ = 0.0;               // size of the solution so far, in tolerances
