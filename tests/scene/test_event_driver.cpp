@@ -54,21 +54,32 @@ TEST_CASE("event: of the impacts of one instant a contact remembers the first") 
 
 TEST_CASE("event: an instant with events without end is refused by name") {
   Clearance c;
-  Driver driver(c.model, c.options(), 0, c.model.start());
-  Driver::Memory before = driver.memory();
-  while (driver.time() < c.end) {
-    driver.advance(c.end, always);
-    const Driver::Memory now = driver.memory();
-    if (now.at_one_time > 0) break;
-    before = now;
+  DriverOptions options = c.options();
+  Driver::Memory before;
+  // Which impacts fall into one instant hangs on rounding: with one of these tolerances some do.
+  const auto comes_upon_two = [&] {
+    Driver driver(c.model, options, 0, c.model.start());
+    before = driver.memory();
+    while (driver.time() < c.end) {
+      driver.advance(c.end, always);
+      const Driver::Memory now = driver.memory();
+      if (now.at_one_time > 0) return now.at_one_time == 1;
+      before = now;
+    }
+    return false;
+  };
+  bool found = comes_upon_two();
+  for (int k = 0; k < 8 && !found; ++k) {
+    options.tolerance *= 0.7;
+    found = comes_upon_two();
   }
+  REQUIRE(found);
   // The same event once more, as the 301st of its instant.
-  REQUIRE(driver.memory().at_one_time == 1);
   before.at_one_time = 300;
-  Driver again(c.model, c.options(), before);
+  Driver again(c.model, options, before);
   CHECK_THROWS_WITH(again.advance(c.end), Catch::Contains("more than 300 events at one time"));
   before.at_one_time = 299;
-  Driver enough(c.model, c.options(), before);
+  Driver enough(c.model, options, before);
   CHECK_NOTHROW(enough.advance(c.end));
 }
 
