@@ -65,6 +65,8 @@ bool is_isotropic(const Matrix3d& I) {
 }
 
 Matrix3d turned(const Matrix3d& tensor, const linalg::Quaternion& q) {
+  // Without rounding: a body read from a saved state has the tensor itself.
+  if (tensor == tensor(0, 0) * Matrix3d::Identity()) return tensor;
   const Matrix3d R = q.toRotationMatrix();
   const Matrix3d out = R * tensor * R.transpose();
   return 0.5 * (out + out.transpose());
