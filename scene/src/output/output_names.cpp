@@ -97,4 +97,14 @@ std::vector<std::string> names(const Output& o) {
   return all;
 }
 
+std::vector<std::string> all_names(const Output& o) {
+  std::vector<std::string> all = names(o);
+  if (!o.csv.empty()) {
+    all.push_back(event_file(o.csv));
+    all.push_back(contact_file(o.csv));
+  }
+  if (!o.vtk.empty()) all.push_back(film_folder(o.vtk));
+  return all;
+}
+
 }  // namespace tether::scene

@@ -28,5 +28,7 @@ void check_page_name(const std::string& html, const std::vector<std::string>& ot
 
 /// One name for each requested output; its lock covers all files of that output.
 std::vector<std::string> names(const Output& output);
+/// Those, the other tables and the folder of frames, whether the run will write them or not.
+std::vector<std::string> all_names(const Output& output);
 
 }  // namespace tether::scene

@@ -67,7 +67,7 @@ void write_whole_regular(const std::string& file, std::string_view content) {
     throw std::runtime_error("cannot write " + file + ": it is there and is no file");
   const std::string fresh = file + ".new";
   try {
-    write_all(fresh, O_CREAT | O_TRUNC, content, true);
+    write_all(fresh, O_CREAT | O_TRUNC | O_NOFOLLOW, content, true);
     if (std::rename(fresh.c_str(), file.c_str()) != 0) fail(file);
   } catch (...) {  // a full disk gets its room back
     fs::remove(fresh, error);
@@ -87,7 +87,7 @@ void write_whole(const std::string& file, std::string_view content) {
 
 void write_fresh(const std::string& file, std::string_view content) {
   try {
-    write_all(file, O_CREAT | O_TRUNC, content, false);
+    write_all(file, O_CREAT | O_TRUNC | O_NOFOLLOW, content, false);
   } catch (...) {
     std::error_code ignored;
     fs::remove(file, ignored);
@@ -102,7 +102,7 @@ void check_writable(const std::string& file) {
   make_folder_of(file);
   const std::string trial = file + ".new";
   {
-    const Open out{open(trial.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666)};
+    const Open out{open(trial.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666)};
     if (out.descriptor < 0) fail(file);
   }
   fs::remove(trial, error);

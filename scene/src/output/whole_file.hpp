@@ -18,7 +18,7 @@ void write_whole(const std::string& file, std::string_view content);
 void write_whole_regular(const std::string& file, std::string_view content);
 
 /// A file that nobody reads before the run has named it elsewhere: gone again where it could not be
-/// written. Throws std::runtime_error.
+/// written. Throws std::runtime_error, on a link of this name, too.
 void write_fresh(const std::string& file, std::string_view content);
 
 /// The error of `write_whole` before the work is done; makes the folder.

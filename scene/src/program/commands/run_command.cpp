@@ -11,6 +11,7 @@
 #include <tether/scene/player.hpp>
 #include <tether/scene/run.hpp>
 
+#include "output/output_names.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
 #include "program/process/standard_output_file.hpp"
@@ -30,18 +31,23 @@ struct Arguments {
   bool force = false, quiet = false;
 };
 
-/// File names given in a scene stay inside the output folder, links resolved: only the command line
-/// may choose to overwrite files elsewhere.
+/// A link to what is not there: nobody can tell where it leads.
+bool is_loose_link(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_symlink(path, error) && !std::filesystem::exists(path, error);
+}
+
+/// File names given in a scene, and those made of them, stay inside the output folder, links
+/// resolved: only the command line may choose to overwrite files elsewhere.
 void stay_inside(const std::string& folder, const Output& o) {
   namespace fs = std::filesystem;
   const fs::path inside = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder));
-  for (const std::string& file : {o.csv, o.vtk, o.svg, o.state}) {
-    if (file.empty()) continue;
+  for (const std::string& file : all_names(o)) {
     const fs::path whole = fs::weakly_canonical(inside / file),
                    way = whole.lexically_relative(inside);
     std::error_code error;
     const fs::file_status there = fs::status(whole, error);
-    if (way.empty() || *way.begin() == ".." ||
+    if (way.empty() || *way.begin() == ".." || is_loose_link(inside / file) ||
         (fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there)))
       throw std::invalid_argument(fmt::format(
           "output: \"{}\" leads to {}: names in a scene stay in the folder of its output, {}, and "
