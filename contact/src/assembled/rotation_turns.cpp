@@ -19,12 +19,19 @@ bool Automatic::infeasible(Search& search) {
 // Whether what is left is what round-off makes of A x - b: its bound explains the error, and steps
 // with long sums gain nothing any more. They end within 1 to 3 units of it on stacks of 100 to 2000
 // boxes of masses 1 : 1e6 to 1 : 1e12.
+// Where steps near the point are stuck far above that, others come from further away.
 bool Automatic::at_round_off(Search& search, int steps) {
-  constexpr double kGain = 0.7;
+  constexpr double kGain = 0.7, kUnits = 4;
+  constexpr int kOthers = 60;
   while (search.explained_by_round_off() && !search.solved()) {
     const double before = search.best_error;
     prepare(search);
     interior.run_near(search, search.best.data(), steps);
+    if (search.best_error > kGain * before &&
+        search.best_error > kUnits * search.system.rounding(search.best.data())) {
+      x_ = search.best;
+      interior.run_shifted(search, x_.data(), kOthers);
+    }
     if (search.best_error > kGain * before) return true;
     if (search.exhausted()) return false;
   }
