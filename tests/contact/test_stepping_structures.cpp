@@ -104,6 +104,43 @@ TEST_CASE("stepping: an icy wedge between two walls presses with m g / (2 sin(ha
   CHECK(right / dt == Approx(force).epsilon(1e-8));
 }
 
+namespace {
+
+// Eight rows of eight bricks, half of one off in every other row.
+Scene wall(double dt) {
+  Scene scene(dt);
+  scene.friction(0.6);
+  scene.ground();
+  for (int row = 0; row < 8; ++row)
+    for (int k = 0; k < 8; ++k)
+      scene.box({0.4, 0.2, 0.2}, 32, {0.4 * k + 0.2 * (row % 2), 0, 0.1 + 0.2 * row});
+  scene.options.acceptance = 1e5;
+  scene.options.max_halvings = 2;
+  return scene;
+}
+
+}  // namespace
+
+// 676 contacts. What one step leaves above the tolerance would be gaps and slips in the next ones.
+TEST_CASE("stepping: a wall stands, every problem solved") {
+  tc::Stepper s = with_polyhedra(wall(2e-3));
+  run(s, 0.02);
+  CHECK(s.counts().accepted == 0);
+  CHECK(s.counts().halved == 0);
+  for (int i = 1; i <= 64; ++i) CHECK(velocity(s, i).norm() < 1e-9);
+}
+
+TEST_CASE("stepping: a wall is hit, no problem above what is accepted") {
+  Scene scene = wall(2e-3);
+  const int ball = scene.sphere(0.2, 261, {1.6, -0.31, 0.8}, {0, 8, 0});
+  tc::Stepper s = with_polyhedra(scene);
+  run(s, 0.008);
+  CHECK(velocity(s, ball).y() < 7);
+  CHECK(s.counts().unsolved == 0);
+  CHECK(s.counts().halved <= 1);
+  CHECK(s.residual() <= 1e-4);
+}
+
 TEST_CASE("stepping: dominoes fall as fast as the chain of one freedom says") {
   // A chain of one freedom with plastic impacts. Time steps in units of sqrt(h / 1 m).
   struct Case {

@@ -35,8 +35,7 @@ BodyOptions contact_options(const SteppingOptions& o) {
   b.max_assembled = o.max_assembled;
   b.max_work = o.max_work;
   if (o.acceptance > 1) {
-    b.max_work *= 0.2;
-    b.enough = std::min(accepted_residual(o), std::max(kGood, o.tolerance));
+    b.enough = std::min(accepted_residual(o), std::max(kEnough, o.tolerance));
   }
   b.threads = o.threads;
   b.team = o.team;

@@ -7,11 +7,12 @@
 
 namespace tether::contact::detail {
 
-/// Parts of the largest velocity that a contact needs. A better answer than `kGood` is worth no
-/// more work where the tolerance is not met. Answers within `kUseful` are as good as the step: it
-/// moves bodies by velocities of its end, an error of half of what it changes them by, while one
-/// contact is off by so much in a problem that is not solved.
-constexpr double kGood = 1e-4, kUseful = 1e-2;
+/// Parts of the largest velocity that a contact needs. Where the tolerance is not met a better
+/// answer than `kEnough` is worth no more than a quarter of max_work, and than `kGood` none of what
+/// is added to max_work where a shorter step would not help. Answers within `kUseful` are as good
+/// as the step: it moves bodies by velocities of its end, an error of half of what it changes them
+/// by, while one contact is off by so much in a problem that is not solved.
+constexpr double kEnough = 1e-6, kGood = 1e-4, kUseful = 1e-2;
 
 /// Throws std::invalid_argument.
 void check(const SteppingOptions& o);

@@ -97,8 +97,8 @@ struct SteppingOptions {
   /// BodyOptions::tolerance of the contact problems.
   double tolerance = 1e-9;
   /// A contact problem that ends above the tolerance is used, and counted as `accepted`, if its
-  /// residual is at most min(acceptance * tolerance, 1e-2) (README, section 13). Below 1e-4 the
-  /// solver stops early instead of spending all of max_work. 1: nothing above the tolerance is
+  /// residual is at most min(acceptance * tolerance, 1e-2) (README, section 13). Below 1e-6 the
+  /// solver stops after a quarter of max_work. 1: nothing above the tolerance is
   /// accepted.
   double acceptance = 1;
   /// A step whose problem is not accepted is repeated as two halves, each of these as two quarters,
@@ -127,7 +127,7 @@ struct SteppingOptions {
   int min_sweeps = 8;     ///< see BodyOptions; remove slow creep of bodies at rest
   int max_sweeps = 1000;  ///< see BodyOptions
   int max_assembled = 1000;
-  /// See BodyOptions: bounds the time of a step. With acceptance > 1 a fifth of it comes first.
+  /// See BodyOptions: bounds the time of a step.
   double max_work = 2e8;
   int threads = 1;
   /// Processes that take the same steps and share the work of their contact problems; see

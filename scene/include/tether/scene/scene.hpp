@@ -106,7 +106,7 @@ struct SteppingOptions : contact::SteppingOptions {
   OnFailure on_failure = OnFailure::stop;
 
   SteppingOptions() {
-    acceptance = 1e7;
+    acceptance = 1e5;
     max_halvings = 2;
   }
 };
