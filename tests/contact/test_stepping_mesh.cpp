@@ -282,6 +282,7 @@ TEST_CASE("mesh: what is no mesh is refused by name", "[stepping]") {
   CHECK_THROWS_WITH(make(Shape::mesh(points, {})), Contains("triangles"));
   CHECK_THROWS_WITH(make(Shape::mesh(points, {{0, 1, 3}})), Contains("point 3 of 3"));
   CHECK_THROWS_WITH(make(Shape::mesh(points, {{0, -1, 2}})), Contains("point -1"));
+  CHECK_THROWS_WITH(make(Shape::mesh(points, {{0, 1, 1}, {2, 2, 0}})), Contains("has an area"));
   CHECK_THROWS_WITH(make(Shape::mesh({{0, 0, 0}, {1, 0, 0}, {0, std::nan(""), 0}}, {{0, 1, 2}})),
                     Contains("finite"));
   CHECK_THROWS_WITH(Shape::height_field({0, 0, 0}, 2, 1, 1), Contains("2 x 2"));

@@ -152,6 +152,7 @@ TEST_CASE("surfaces: what is wrong with them is said by line", "[scene]") {
   CHECK_THAT(obj("v 0 0 1e999\n"), Contains("no finite number"));
   CHECK_THAT(obj("v 0 0\n"), Contains("line 1"));
   CHECK_THAT(obj("v 0 0 1e101\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), Contains("1e100"));
+  CHECK_THAT(obj("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), Contains("has an area"));
   std::string fan = three + "f";
   for (int k = 0; k < 200003; ++k) fan += " 1";
   CHECK_THAT(obj(fan + "\n"), Contains("more than 200000 triangles"));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <tether/linalg/index.hpp>
 
 #include "geometry/surface_files.hpp"
 
@@ -155,6 +156,12 @@ void read_mesh(Fields& in, Shape& shape) {
     for (Eigen::Vector3d& p : read.points) p *= scale;
   if (!in_range(read))
     return in.wrong(in.has("file") ? "file" : "points", "reaches beyond 1e100 m");
+  if (std::all_of(read.triangles.begin(), read.triangles.end(), [&](const auto& t) {
+        const auto corner = [&](std::size_t k) { return read.points[linalg::at(t[k])]; };
+        const Eigen::Vector3d a = corner(1) - corner(0), b = corner(2) - corner(0);
+        return !(a.cross(b).stableNorm() > 0);
+      }))
+    return in.wrong(in.has("file") ? "file" : "triangles", "none of the triangles has an area");
   shape = std::move(read);
 }
 

@@ -352,6 +352,13 @@ void check_mesh(const Shape& s) {
       if (k < 0 || k >= count)
         throw std::invalid_argument("mesh: a triangle names point " + std::to_string(k) + " of " +
                                     std::to_string(count));
+  const auto flat = [&](const std::array<int, 3>& t) {
+    const Vector3d& a = s.points[linalg::at(t[0])];
+    return !((s.points[linalg::at(t[1])] - a).cross(s.points[linalg::at(t[2])] - a).stableNorm() >
+             0);
+  };
+  if (std::all_of(s.triangles.begin(), s.triangles.end(), flat))
+    throw std::invalid_argument("mesh: none of the triangles has an area");
 }
 
 }  // namespace
