@@ -387,8 +387,18 @@ int main(int argc, char** argv) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-  const int n = std::max(argc > 1 ? std::atoi(argv[1]) : 8, ranks);
+  const int n = argc > 1 ? std::atoi(argv[1]) : 8;
   const double seconds = argc > 2 ? std::atof(argv[2]) : 0.5;
+  if (argc > 3 || n < std::max(ranks, 2) || n > 1000 || !(seconds > 0.0 && seconds <= 100.0)) {
+    if (rank == 0)
+      std::fprintf(
+          stderr,
+          "usage: example_ranks_net [balls in a row, %d to 1000 on %d ranks [seconds, above "
+          "0, at most 100]]\n",
+          std::max(ranks, 2), ranks);
+    MPI_Finalize();
+    return 2;
+  }
   const End plain = run(MPI_COMM_WORLD, n, seconds, false);
   const End spread = run(MPI_COMM_WORLD, n, seconds, true);
   const End alone = run(MPI_COMM_SELF, n, seconds, true);
