@@ -1,10 +1,8 @@
 // Tether: the projection for programs in C. SPDX-License-Identifier: BSD-3-Clause
-#include <cmath>
 #include <cstring>
 #include <exception>
 #include <limits>
 #include <new>
-#include <stdexcept>
 #include <string>
 #include <tether/ida_projection.h>
 #include <tether/ida_projection.hpp>
@@ -25,64 +23,6 @@ struct tether_projection {
   ip::Projection projection;
   std::string table;
 };
-
-namespace tether::ida_projection {
-
-// A structure of an older header lacks the last fields.
-Options options_of(const tether_options* given, long unknowns) {
-  tether_options o;
-  tether_options_init(&o, sizeof o);
-  if (given != nullptr) {
-    if (given->size < sizeof(size_t) || given->size > sizeof o)
-      throw std::invalid_argument("options->size = " + std::to_string(given->size) +
-                                  ": call tether_options_init(options, sizeof *options) first");
-    std::memcpy(&o, given, given->size);
-  }
-  const auto check = [](bool right, const char* name, long value, const char* allowed) {
-    if (!right)
-      throw std::invalid_argument(std::string(name) + " = " + std::to_string(value) + ", must be " +
-                                  allowed);
-  };
-  check(o.metric >= TETHER_METRIC_LOCAL_CORRECTION && o.metric <= TETHER_METRIC_AUTOMATIC,
-        "options->metric", o.metric, "TETHER_METRIC_...");
-  check(o.long_move == TETHER_LONG_MOVE_REJECT || o.long_move == TETHER_LONG_MOVE_CAP,
-        "options->long_move", o.long_move, "TETHER_LONG_MOVE_...");
-  check((o.hold == nullptr && o.group == nullptr) || unknowns > 0, "unknowns", unknowns,
-        "the length of options->hold and group");
-  Options options;
-  options.metric = static_cast<Metric>(o.metric);
-  options.tolerance = o.tolerance;
-  options.maximum_iterations = o.maximum_iterations;
-  options.frequency = o.frequency;
-  options.largest_move = o.largest_move;
-  options.long_move = static_cast<LongMove>(o.long_move);
-  options.id = o.id;
-  options.derive_id_limit = o.derive_id_limit;
-  options.suppress_algebraic = o.suppress_algebraic != 0;
-  options.refresh_algebraic = o.refresh_algebraic != 0;
-  options.extra_iterations = o.extra_iterations;
-  options.step_smoothing = o.step_smoothing != 0;
-  options.smooth_where_needed = o.smooth_where_needed != 0;
-  options.smoothing_setpoint = o.smoothing_setpoint;
-  options.maximum_step = o.maximum_step;
-  options.maximum_order = o.maximum_order;
-  options.limit_order = o.limit_order != 0;
-  if (o.hold != nullptr)
-    for (long i = 0; i < unknowns; ++i) options.hold.push_back(o.hold[i] != 0);
-  options.hold_vector = o.hold_vector;
-  if (o.group != nullptr) options.group.assign(o.group, o.group + unknowns);
-  options.nonlinear_solver = o.nonlinear_solver;
-  options.print_fatal = o.print_fatal != 0;
-  options.print_warnings = o.print_warnings != 0;
-  if (o.progress != nullptr)
-    options.progress = [call = o.progress, data = o.progress_data](const Progress& p) {
-      call(p.t, p.step, p.order, p.drift, p.move, p.steps, data);
-    };
-  options.progress_interval = o.progress_interval;
-  return options;
-}
-
-}  // namespace tether::ida_projection
 
 namespace {
 
