@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "small_orthogonal.hpp"
 
@@ -28,7 +27,7 @@ void KeptRows::resize(int rows, int columns) {
   order_.reserve(each_row);
   place_.assign(each_row, 0);
   sorted_.assign(each_row, 0);
-  groups_.assign(each_column, 0);
+  row_order_.resize(most, columns);
   firsts_.assign(each_column, 0);
   permuted_.assign(each_row, 0.0);
   envelope_.resize(most);
@@ -68,6 +67,16 @@ bool KeptRows::load(const double* wide, int width, const int* rows, const int* c
   return true;
 }
 
+void KeptRows::load(const double* unit_rows) {
+  const int m = n_ > 0 ? static_cast<int>(A_.size()) / n_ : 0;
+  for (int i = 0; i < m; ++i) {
+    const double* c = unit_rows + static_cast<std::ptrdiff_t>(i) * n_;
+    double* a = A_.data() + static_cast<std::ptrdiff_t>(i) * n_;
+    places_.look(i, c);
+    for (const int *j = places_.begin(i), *last = places_.end(i); j != last; ++j) *a++ = c[*j];
+  }
+}
+
 bool KeptRows::factor(const int* order, int rank) {
   if (!planned(order, rank)) plan(order, rank);
   if (!dense_) {
@@ -84,14 +93,7 @@ bool KeptRows::planned(const int* order, int rank) const {
          std::equal(order_.begin(), order_.end(), order);
 }
 
-int KeptRows::group_of(int j) {
-  int& root = groups_[static_cast<std::size_t>(j)];
-  while (root != groups_[static_cast<std::size_t>(root)])
-    root = groups_[static_cast<std::size_t>(root)];
-  return root;
-}
-
-// Which rows belong together, and the envelope of A A^T, from the places alone.
+// The order of the factors, and the envelope of A A^T, from the places alone.
 void KeptRows::plan(const int* order, int rank) {
   planned_places_ = places_.known();
   order_.assign(order, order + rank);
@@ -100,21 +102,7 @@ void KeptRows::plan(const int* order, int rank) {
   dense_ = entries > kDense * rank * n_;
   if (dense_) return;
 
-  std::iota(groups_.begin(), groups_.end(), 0);
-  for (const int i : order_)
-    for (const int *j = places_.begin(i), *last = places_.end(i); j != last; ++j)
-      groups_[static_cast<std::size_t>(group_of(*j))] = group_of(*places_.begin(i));
-  // A row without a place, as good as none among independent ones, comes first.
-  const auto group = [this](int k) {
-    const int i = order_[static_cast<std::size_t>(k)];
-    return places_.begin(i) == places_.end(i) ? -1 : group_of(*places_.begin(i));
-  };
-  std::vector<int>& by_group = sorted_;
-  std::iota(by_group.begin(), by_group.begin() + rank, 0);
-  std::sort(by_group.begin(), by_group.begin() + rank, [&](int k, int l) {
-    const int a = group(k), b = group(l);
-    return a != b ? a < b : k < l;
-  });
+  row_order_.run(places_, order, rank, sorted_.data());
   envelope_.begin();
   std::fill(firsts_.begin(), firsts_.end(), -1);  // of each column: the first row that has it
   for (int k = 0; k < rank; ++k) {

@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "envelope.hpp"
+#include "row_order.hpp"
 
 namespace tether::linalg {
 
 /// Unit rows A = S C D, S = diag(1 / |row_i(C D)|), by the places that have ever been filled: rows
 /// of mechanisms have few. `order` lists the independent ones first; of these A A^T is factored,
-/// by its envelope where places are few. Rows that no chain of shared columns joins come one group
-/// after the other there; inside a group they keep the order, so that L_kk is the same.
-/// resize() allocates, nothing else does.
+/// by its envelope, in an order of its own, where places are few. resize() allocates, nothing else
+/// does.
 class KeptRows {
  public:
   void resize(int rows, int columns);
@@ -23,9 +23,11 @@ class KeptRows {
   /// False: an entry is not finite.
   bool load(const double* wide, int width, const int* rows, const int* columns, const double* D,
             double* row_norm);
+  /// A itself, row i at unit_rows + i columns.
+  void load(const double* unit_rows);
   /// A A^T = L L^T of the first `rank` rows of the order. False: not positive definite.
   bool factor(const int* order, int rank);
-  /// L_kk: how much of row k of the order is independent of those before it.
+  /// L_kk: how much of row k of the order is independent of those that the factors have before it.
   double independent_part(int k) const {
     return dense_ ? L_(k, k) : envelope_.diagonal(place_[static_cast<std::size_t>(k)]);
   }
@@ -52,7 +54,6 @@ class KeptRows {
   void solve_factored(int rank, double* z) const;
   bool planned(const int* order, int rank) const;
   void plan(const int* order, int rank);
-  int group_of(int j);
   void multiply_by_columns(int rank);
   void multiply_dense(int rank);
 
@@ -74,7 +75,7 @@ class KeptRows {
   std::vector<int> order_;   // as given
   std::vector<int> place_;   // of row k of the order in the envelope
   std::vector<int> sorted_;  // rows as the envelope has them
-  std::vector<int> groups_;  // of columns: a tree for each, to its root
+  RowOrder row_order_;
   std::vector<int> firsts_;
   Envelope envelope_;
   mutable std::vector<double> permuted_;

@@ -123,10 +123,20 @@ bool MinimumNorm::scale_large() {
   return true;
 }
 
+// In the order in which factor_kept() looks at the rows; 0: they are not independent.
+double MinimumNorm::least_of_decided() {
+  const double least = independent_part(rank_ - 1);
+  if (kernel_ != nullptr || least < kLeastSine) return least;
+  KeptRows& kept = large_->kept;
+  kept.load(large_->A.data());
+  return kept.factor(large_->qr.colsPermutation().indices().data(), rank_) ? kept.least_part(rank_)
+                                                                           : 0.0;
+}
+
 bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns) {
   const int r = rank_;
   if (r == 0 || (kernel_ != nullptr && r < m_)) return false;
-  if (!kept_) decided_least_ = independent_part(r - 1);
+  if (!kept_) decided_least_ = least_of_decided();
   if (decided_least_ < kLeastSine) return false;
   kept_ = false;
   if (kernel_ != nullptr)

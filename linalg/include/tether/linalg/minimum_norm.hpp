@@ -99,6 +99,7 @@ class MinimumNorm {
   void gather_large(const double* wide, int width, const int* rows, const int* columns);
   bool scale_large();
   bool factor_large(double rank_tolerance);
+  double least_of_decided();
   bool factor_kept_small(const small::Gathered& from);
   void solve_kept(const double* g, double* dy);
   void solve_large(const double* g, double* dy);
