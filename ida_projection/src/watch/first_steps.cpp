@@ -79,12 +79,10 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
     slope_[j] = predicted[j] + step.cj * ycor[j];
   }
   if (!mover.tangency(slope_, id, tangency_)) return {};
+  std::string text_of_side = one_sided_row(step.t);
+  if (!text_of_side.empty()) return text_of_side;
   const double root = std::sqrt(static_cast<double>(n));
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
-    if (tangency_.tolerance[i] == 0.0 && ++vanished_[i] == kVanished) {
-      std::string text = one_sided_row(static_cast<int>(i), step.t);
-      if (!text.empty()) return text;
-    }
     const double rate = tangency_.rate[i], terms = tangency_.terms[i];
     for (std::size_t kind = 0; kind < kDoubts.size(); ++kind) {
       const RowDoubt& doubt = kDoubts[kind];
@@ -106,12 +104,19 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
 }
 
 // max(u, 0) keeps one side only: on the other there is nothing to move. point_ is the corrector's.
-std::string FirstSteps::one_sided_row(int row, double t) const {
+// Hosts that take rows out have many that vanish: they are looked at together.
+std::string FirstSteps::one_sided_row(double t) {
+  std::vector<int> rows;
+  for (std::size_t i = 0; i < tangency_.tolerance.size(); ++i)
+    if (tangency_.tolerance[i] == 0.0 && ++vanished_[i] == kVanished)
+      rows.push_back(static_cast<int>(i));
+  if (rows.empty()) return {};
   const auto size = static_cast<int>(point_.size());
-  for (int j = 0; size <= kSearchLimit && j < size; ++j)
-    if (has_kink(constraints_, row, j, 0.0, t, point_))
-      return "row " + std::to_string(row) + " (" + constraints_.name(row) +
-             ") and its gradient vanish to one side of the set" + kKink;
+  for (const int row : one_sided(constraints_, rows, t, point_))
+    for (int j = 0; j < size && searched_ < kSearchLimit; ++j, ++searched_)
+      if (has_kink(constraints_, row, j, 0.0, t, point_))
+        return "row " + std::to_string(row) + " (" + constraints_.name(row) +
+               ") and its gradient vanish to one side of the set" + kKink;
   return {};
 }
 

@@ -45,7 +45,7 @@ class FirstSteps {
   std::string look_for_false_rows(const Candidate& candidate, const StepData& step, double h,
                                   N_Vector corrected, const double* id, Mover& mover,
                                   Corrector& corrector);
-  std::string one_sided_row(int row, double t) const;
+  std::string one_sided_row(double t);
   std::string false_row(int row, const RowDoubt& doubt, const StepData& step, double h,
                         Corrector& corrector);
   std::string wrong_entry(double t) const;

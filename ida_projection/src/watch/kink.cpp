@@ -13,9 +13,14 @@ const char* const kKink =
     "; its slopes to both sides differ there: a row with |.| or max has no derivative on the set, "
     "write it without";
 
+namespace {
+
+constexpr double kReach = 1e-4, kDiffer = 0.1;  // of y; of the slopes
+
+}  // namespace
+
 bool has_kink(const Constraints& constraints, int row, int column, double given, double t,
               std::vector<double> y) {
-  constexpr double kReach = 1e-4, kDiffer = 0.1;
   Statistics ignored;
   Evaluator evaluator(constraints, ignored);
   const auto n = static_cast<int>(y.size());
@@ -32,6 +37,35 @@ bool has_kink(const Constraints& constraints, int row, int column, double given,
   const double size = kDiffer * std::max(std::abs(left), std::abs(right));
   return std::abs(left - right) > size &&
          std::min(std::abs(given - left), std::abs(given - right)) <= size;
+}
+
+std::vector<int> one_sided(const Constraints& constraints, const std::vector<int>& rows, double t,
+                           const std::vector<double>& y) {
+  Statistics ignored;
+  Evaluator evaluator(constraints, ignored);
+  const auto m = static_cast<std::size_t>(evaluator.rows());
+  std::vector<double> moved(y), here(m), plus(m), minus(m);
+  const auto g_at = [&](double share, double turn, std::vector<double>& g) {
+    for (std::size_t j = 0; j < y.size(); ++j)
+      moved[j] = y[j] + share * kReach * std::max(1.0, std::abs(y[j])) *
+                            std::sin(1.0 + turn * static_cast<double>(j));
+    return evaluator.value(t, moved.data(), static_cast<int>(y.size()), g.data()) ==
+           Status::success;
+  };
+  if (!g_at(0.0, 0.0, here)) return {};
+  std::vector<int> found;
+  for (const double turn : {3.7, 1.3}) {
+    if (!g_at(1.0, turn, plus) || !g_at(-1.0, turn, minus)) return {};
+    for (const int row : rows) {
+      const auto i = static_cast<std::size_t>(row);
+      const double ahead = std::abs(plus[i] - here[i]), behind = std::abs(minus[i] - here[i]);
+      if (std::min(ahead, behind) <= kDiffer * std::max(ahead, behind) &&
+          std::max(ahead, behind) > 0.0 &&
+          std::find(found.begin(), found.end(), row) == found.end())
+        found.push_back(row);
+    }
+  }
+  return found;
 }
 
 }  // namespace tether::ida_projection
