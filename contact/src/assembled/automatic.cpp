@@ -182,7 +182,39 @@ constexpr Replacement kReplacements[] = {
 
 }  // namespace
 
+// From a start of smaller impulses, where it is not round-off of these that is left; what was
+// reached before stays where it is the better one.
+Status Automatic::rotate_from_soft(Search& search, Status status) {
+  constexpr double kLittle = 1e8, kBudget = 20, kShare = 0.25;  // the latter of the work before
+  if (search.work_end - search.counts.work <= 0) return status;
+  Packed x(search.best.size());
+  const double work = search.counts.work;
+  const double budget = std::min(kBudget * work, std::max(kLittle, kShare * work));
+  if (!soft_.find(search, budget, x)) return status;
+  search.test(x.data(), Method::interior_point);
+  if (search.solved()) return Status::solved;
+  const Packed best = search.best;
+  const double error = search.best_error, end = search.work_end;
+  search.best_error = std::numeric_limits<double>::infinity();
+  search.test(x.data(), Method::interior_point);
+  search.work_end = std::min(end, search.counts.work + budget);
+  ready_ = false;
+  const Status again = rotate(search, true);
+  search.work_end = end;
+  if (again == Status::solved) return again;
+  if (error < search.best_error) {
+    search.best = best;
+    search.best_error = error;
+  }
+  return status;
+}
+
 Status Automatic::run(Search& search) {
+  const Status status = replace_and_rotate(search);
+  return status == Status::round_off ? rotate_from_soft(search, status) : status;
+}
+
+Status Automatic::replace_and_rotate(Search& search) {
   bool replaceable = false;
   if (search.system.law().replacement && !options_.strict) {
     for (int i = 0; i < contacts_; ++i)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "assembled/local_solves.hpp"
+#include "assembled/soft_start.hpp"
 #include "assembled/stages/accelerated_sweeps.hpp"
 #include "assembled/stages/admm.hpp"
 #include "assembled/stages/interior/interior_point.hpp"
@@ -38,6 +39,8 @@ class Automatic {
  private:
   static const Turn kRotation[], kFewBodies[];
   Status rotate(Search& search, bool last);
+  Status replace_and_rotate(Search& search);
+  Status rotate_from_soft(Search& search, Status status);
   template <int N>
   Status take_turns(Search& search, Rotation& r, const Turn (&turns)[N]);
   bool replace_contacts(Search& search, double eccentricity, bool only_unconverged);
@@ -70,6 +73,7 @@ class Automatic {
 
   Options options_;
   LocalSolves parts_;
+  SoftStart soft_;
   Packed x_, z_, pressed_;
   int contacts_ = 0;
   bool ready_ = false, proofs_ = true, looked_for_proof_ = false;
