@@ -129,12 +129,12 @@ namespace {
 
 template <class T>
 void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& values,
-         hsize_t claimed = 0) {
+         hsize_t claimed = 0, hid_t made = H5P_DEFAULT) {
   const hsize_t size = claimed > 0 ? claimed : values.size();
   const hid_t space = H5Screate_simple(1, &size, nullptr), links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
-  const hid_t set = H5Dcreate2(file, ("/fclib_local/" + name).c_str(), type, space, links,
-                               H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t set =
+      H5Dcreate2(file, ("/fclib_local/" + name).c_str(), type, space, links, made, H5P_DEFAULT);
   if (claimed == 0) H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
   H5Dclose(set);
   H5Pclose(links);
@@ -143,7 +143,8 @@ void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& 
 
 // One contact, W the identity in compressed columns with the given pointers. claimed > 0: W/x says
 // that it has so many entries, none of them written.
-void write_columns(const std::string& path, const std::vector<int>& pointers, hsize_t claimed = 0) {
+void write_columns(const std::string& path, const std::vector<int>& pointers, hsize_t claimed = 0,
+                   hid_t made = H5P_DEFAULT) {
   const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   put<int>(file, "spacedim", H5T_NATIVE_INT, {3});
   put<int>(file, "W/m", H5T_NATIVE_INT, {3});
@@ -151,7 +152,7 @@ void write_columns(const std::string& path, const std::vector<int>& pointers, hs
   put<int>(file, "W/nz", H5T_NATIVE_INT, {-1});
   put<int>(file, "W/p", H5T_NATIVE_INT, pointers);
   put<int>(file, "W/i", H5T_NATIVE_INT, {0, 1, 2});
-  put<double>(file, "W/x", H5T_NATIVE_DOUBLE, {1, 1, 1}, claimed);
+  put<double>(file, "W/x", H5T_NATIVE_DOUBLE, {1, 1, 1}, claimed, made);
   put<double>(file, "vectors/q", H5T_NATIVE_DOUBLE, {-1, 0, 0});
   put<double>(file, "vectors/mu", H5T_NATIVE_DOUBLE, {0.5});
   H5Fclose(file);
@@ -178,6 +179,56 @@ TEST_CASE(
   write_columns(file.path, {0, 1, 2, 3}, hsize_t{1} << 30);
   CHECK_THROWS_WITH(read_fclib(file.path),
                     Catch::Contains("1073741824 entries, but the file holds 0 bytes"));
+}
+
+TEST_CASE("fclib: no other file is read, and no filter that HDF5 does not come with") {
+  Temporary file("test_contact_leads.hdf5"), other("test_contact_other.hdf5"),
+      raw("test_contact_raw.bin");
+  write_columns(other.path, {0, 1, 2, 3});
+  spill(raw.path, std::string(24, '\0'));
+  const auto with = [&](auto&& change) {
+    const hid_t made = H5Pcreate(H5P_DATASET_CREATE);
+    change(made);
+    write_columns(file.path, {0, 1, 2, 3}, 0, made);
+    H5Pclose(made);
+  };
+  const auto deflate = [](hid_t made) {
+    const hsize_t size = 3;
+    H5Pset_chunk(made, 1, &size);
+    H5Pset_deflate(made, 9);
+  };
+  with(deflate);
+  CHECK(read_fclib(file.path).contacts() == 1);
+  with([&](hid_t made) {
+    deflate(made);
+    H5Pset_deflate(made, 9);
+  });
+  CHECK_THROWS_WITH(read_fclib(file.path),
+                    Catch::Contains("a filter that HDF5 does not come with"));
+  with([&](hid_t made) {
+    deflate(made);
+    H5Pset_filter(made, 32001, H5Z_FLAG_OPTIONAL, 0, nullptr);
+  });
+  CHECK_THROWS_WITH(read_fclib(file.path),
+                    Catch::Contains("a filter that HDF5 does not come with"));
+  with([&](hid_t made) { H5Pset_external(made, raw.path.c_str(), 0, 24); });
+  CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("lies in another file"));
+  with([&](hid_t made) {
+    const hsize_t size = 3;
+    const hid_t space = H5Screate_simple(1, &size, nullptr);
+    H5Pset_virtual(made, space, other.path.c_str(), "/fclib_local/W/x", space);
+    H5Sclose(space);
+  });
+  CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("lies in another file"));
+  // By links: of the data, and of the group above.
+  for (const char* name : {"/fclib_local/W/x", "/fclib_local/vectors"}) {
+    write_columns(file.path, {0, 1, 2, 3});
+    const hid_t open = H5Fopen(file.path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    H5Ldelete(open, name, H5P_DEFAULT);
+    H5Lcreate_external(other.path.c_str(), name, open, name, H5P_DEFAULT, H5P_DEFAULT);
+    H5Fclose(open);
+    CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("a link to another file"));
+  }
 }
 
 #endif

@@ -114,3 +114,54 @@ TEST_CASE("wrong names and missing pairs in thousands cost no more than the file
       Catch::Contains("can touch"));
   CHECK(parse_scene(fixed, "fixed.toml").pairs.size() == 30000);
 }
+
+TEST_CASE("names in expectations by the thousand cost no more than the file") {
+  std::string text = "[scene]\ngravity = [0, 0, -1]\n" + body("name = \"a\"\n");
+  for (int k = 0; k < 30000; ++k) {
+    const std::string number = std::to_string(k);
+    text += "[[spring]]\nname = \"s" + number +
+            "\"\nbodies = [\"a\", \"world\"]\nat = [[0, 0, 0], [0, 0, 1]]\nstiffness = 1\n"
+            "[[expect]]\nquantity = \"spring_force\"\nspring = \"s" +
+            number + "\"\nat_most = 1\n";
+  }
+  const Scene scene = parse_scene(text, "expect.toml");
+  CHECK(scene.expect.back().spring == 29999);
+  CHECK_THROWS_WITH(
+      parse_scene(text + "[[expect]]\nquantity = \"spring_force\"\nspring = \"t\"\nat_most = 1\n",
+                  "expect.toml"),
+      Catch::Contains("no such spring"));
+}
+
+TEST_CASE("long texts of a repetition count as what they are, and braces end where they begin") {
+  const auto repeated = [](const std::string& name, int count) {
+    return "[[body]]\nname = \"" + name +
+           "\"\nshape = \"sphere\"\nradius = 1\nmass = 1\nrepeat = { count = " +
+           std::to_string(count) + " }\n";
+  };
+  // A hundred thousand times a megabyte.
+  CHECK_THROWS_WITH(parse_scene(repeated(std::string(1 << 20, 'a'), 100000), "long.toml"),
+                    Catch::Contains("numbers and texts"));
+  CHECK_THROWS_WITH(
+      parse_scene("[[body]]\n" + std::string(1 << 20, 'k') + " = 1\nrepeat = { count = 100000 }\n",
+                  "long.toml"),
+      Catch::Contains("numbers and texts"));
+  // Two million openings before one end: each of them looked at all that follows.
+  CHECK_THROWS_WITH(parse_scene(repeated(std::string(2000000, '{') + "}", 1), "braces.toml"),
+                    Catch::Contains("at most 1000 bytes"));
+  CHECK(parse_scene(repeated("{{i}}{i+123456}{i+1234567}{}", 1), "braces.toml").bodies[0].name ==
+        "{1}123457{i+1234567}{}");
+}
+
+TEST_CASE("names have at most a thousand bytes") {
+  const auto named = [](std::size_t size) {
+    return parse_scene(body("name = \"" + std::string(size, 'n') + "\"\n"), "long.toml");
+  };
+  CHECK(named(1000).bodies[0].name.size() == 1000);
+  CHECK_THROWS_WITH(named(1001), Catch::Contains("at most 1000 bytes"));
+}
+
+TEST_CASE("a scene file has at most 256 MiB, from wherever it comes") {
+  const std::string text((std::size_t{256} << 20) + 1, '\n');
+  CHECK_THROWS_WITH(parse_scene(text, "large.toml"), Catch::Contains("at most 256 MiB"));
+  CHECK_THROWS_WITH(read_scene("/dev/zero"), Catch::Contains("at most 256 MiB"));
+}

@@ -134,6 +134,26 @@ TEST_CASE("surfaces: files are those beside the scene, and of a size", "[scene]"
   CHECK_THAT(folder.refusal(mesh_file("large.obj")), Contains("64 MiB"));
 }
 
+TEST_CASE("surfaces: a file that many bodies name is read within a bound for all of them",
+          "[scene]") {
+  const Folder folder;
+  const auto repeated = [&](const std::string& fields, int count) {
+    return folder.refusal(fields + "\nrepeat = { count = " + std::to_string(count) + " }");
+  };
+  folder.write("long.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n#" + std::string(8u << 20, '.'));
+  CHECK(repeated(mesh_file("long.obj"), 10) == "read");
+  CHECK_THAT(repeated(mesh_file("long.obj"), 100000), Contains("256 MiB of surfaces"));
+  std::string rows;
+  for (int k = 0; k < 300; ++k) {
+    for (int l = 0; l < 300; ++l) rows += "1 ";
+    rows += '\n';
+  }
+  folder.write("h.txt", rows);
+  const std::string field = "shape = \"height_field\"\nspacing = [1, 1]\nfile = \"h.txt\"";
+  CHECK(repeated(field, 2) == "read");
+  CHECK_THAT(repeated(field, 2000), Contains("at most 2000000 triangles"));
+}
+
 TEST_CASE("surfaces: what is wrong with them is said by line", "[scene]") {
   const Folder folder;
   const auto obj = [&](const std::string& text) {

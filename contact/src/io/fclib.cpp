@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <stdexcept>
 
 #ifdef TETHER_HAVE_HDF5
@@ -101,11 +102,34 @@ std::size_t believable_count(hid_t file, hid_t set, const std::string& full) {
   return static_cast<std::size_t>(count);
 }
 
+// A file may lead to others by links, by storage that lies outside and by virtual data; and name
+// filters, which HDF5 would load as code, or the same one twice, which may expand without a bound.
+herr_t no_other_file(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) {
+  return -1;
+}
+
+void check_storage(hid_t set, const std::string& full) {
+  Handle made(H5Dget_create_plist(set), H5Pclose);
+  if (H5Pget_external_count(made) != 0 || H5Pget_layout(made) == H5D_VIRTUAL)
+    throw std::runtime_error(full + " lies in another file, which is not read");
+  std::set<H5Z_filter_t> filters;
+  for (int k = 0; k < H5Pget_nfilters(made); ++k) {
+    std::size_t values = 0;
+    const H5Z_filter_t filter = H5Pget_filter2(made, static_cast<unsigned>(k), nullptr, &values,
+                                               nullptr, 0, nullptr, nullptr);
+    if (filter < 0 || filter >= H5Z_FILTER_RESERVED || !filters.insert(filter).second)
+      throw std::runtime_error(full + " has a filter that HDF5 does not come with, or one twice");
+  }
+}
+
 template <class T>
 std::vector<T> read(hid_t file, const std::string& path, const std::string& name) {
   const std::string full = path + ": /fclib_local/" + name;
-  Handle set(H5Dopen2(file, ("/fclib_local/" + name).c_str(), H5P_DEFAULT), H5Dclose);
-  if (set < 0) throw std::runtime_error(full + " is missing or damaged");
+  Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+  H5Pset_elink_cb(access, no_other_file, nullptr);
+  Handle set(H5Dopen2(file, ("/fclib_local/" + name).c_str(), access), H5Dclose);
+  if (set < 0) throw std::runtime_error(full + " is missing, damaged or a link to another file");
+  check_storage(set, full);
   const std::size_t count = believable_count<T>(file, set, full);
   std::vector<T> out(count);
   if (count > 0 && H5Dread(set, Native<T>::type(), H5S_ALL, H5S_ALL, H5P_DEFAULT, out.data()) < 0) {

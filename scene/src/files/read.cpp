@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <map>
 #include <tether/scene/files.hpp>
 
 #include "effects/list.hpp"
@@ -100,24 +101,30 @@ void read_output(Fields& root, Reader& r) {
   in.finish();
 }
 
-/// The index of the element of [[kind]] that the field `kind` names.
+using Names = std::map<std::string, int>;
+
+/// By name; the first of several.
 template <class Named>
-int named(Fields& in, Reader& r, const char* kind, const std::vector<Named>& all) {
+Names index_of(const std::vector<Named>& all) {
+  Names out;
+  int index = 0;
+  for (const Named& each : all) out.emplace(each.name, index++);
+  return out;
+}
+
+/// The index of the element of [[kind]] that the field `kind` names.
+int named(Fields& in, Reader& r, const char* kind, const Names& all) {
   if (!in.has(kind)) {
     in.missing(kind, fmt::format("the name of a {}", kind));
     return -1;
   }
   const std::string name = in.text(kind, "");
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (all[i].name == name) return static_cast<int>(i);
-    names.push_back(all[i].name);
-  }
-  in.wrong(kind, fmt::format("no such {}{}", kind, r.hint_of(name, names)));
+  if (const auto found = all.find(name); found != all.end()) return found->second;
+  in.wrong(kind, fmt::format("no such {}{}", kind, r.hint_of(name, all)));
   return -1;
 }
 
-void read_expect(Fields& in, Reader& r) {
+void read_expect(Fields& in, Reader& r, const Names& joints, const Names& springs) {
   Expect expect;
   expect.place = in.place();
   expect.time = in.number("time", r.scene.end, kNotNegative, "s");
@@ -127,8 +134,8 @@ void read_expect(Fields& in, Reader& r) {
   if (is_of_body(expect.quantity)) expect.body = r.body(in, "body");
   if (is_force(expect.quantity) && is_of_body(expect.quantity) && in.has("against"))
     expect.against = r.body(in, "against");
-  if (is_of_joint(expect.quantity)) expect.joint = named(in, r, "joint", r.scene.joints);
-  if (is_of_spring(expect.quantity)) expect.spring = named(in, r, "spring", r.scene.springs);
+  if (is_of_joint(expect.quantity)) expect.joint = named(in, r, "joint", joints);
+  if (is_of_spring(expect.quantity)) expect.spring = named(in, r, "spring", springs);
 
   const std::size_t size = components(expect.quantity);
   const Value* value = in.find("value");
@@ -172,8 +179,10 @@ Scene read(Value document, const std::string& name) {
   read_engine(root, r);
   read_event(root, r);
   read_output(root, r);
-  r.each(root, "expect", [&](Fields& in) { read_expect(in, r); });
+  const Names joints = index_of(r.scene.joints), springs = index_of(r.scene.springs);
+  r.each(root, "expect", [&](Fields& in) { read_expect(in, r, joints, springs); });
   root.finish();
+  r.scene.surface_files.assign(r.surface_files.begin(), r.surface_files.end());
   // Parts that were wrong stand as defaults, which must not be blamed in turn.
   if (report.clean()) check(r.scene, report);
   report.finish();

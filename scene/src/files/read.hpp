@@ -9,7 +9,7 @@
 namespace tether::scene::files {
 
 /// One [[body]], but for the fields of effects.
-Body read_body(Fields& in, const Reader& r);
+Body read_body(Fields& in, Reader& r);
 /// The scene of a whole document. Throws SceneError.
 Scene read(Value document, const std::string& name);
 /// Checks across fields: names, pairs of materials, bodies that cannot move, times.

@@ -54,7 +54,7 @@ Eigen::Quaterniond read_orientation(Fields& in, const Reader& r) {
 }
 
 // The fields of a shape; `in` is the body itself for a body's only shape.
-Shape read_shape(Fields& in) {
+Shape read_shape(Fields& in, Reader& r) {
   Shape shape;
   required(in, "shape",
            "it is a sphere, plane, box, capsule, ellipsoid, cylinder, convex, points, mesh or "
@@ -71,7 +71,7 @@ Shape read_shape(Fields& in) {
     return shape;
   }
   if (words[static_cast<std::size_t>(kind)] == "height_field") {
-    read_height_field(in, shape);
+    read_height_field(in, r, shape);
     return shape;
   }
   shape.kind = contact::kShapeKinds[static_cast<std::size_t>(kind)];
@@ -108,23 +108,23 @@ Shape read_shape(Fields& in) {
       shape.points = in.points("points", 1, kMostPoints);
       break;
     case ShapeKind::mesh:
-      read_mesh(in, shape);
+      read_mesh(in, r, shape);
       break;
   }
   return shape;
 }
 
-std::vector<Shape> read_shapes(Fields& in, const Reader& r) {
+std::vector<Shape> read_shapes(Fields& in, Reader& r) {
   std::vector<Shape> shapes;
   const bool several = in.has("shapes");
   if (several && in.has("shape")) in.wrong("shape", "give shape or shapes, not both");
   if (!several) {
-    if (in.has("shape")) shapes.push_back(read_shape(in));
+    if (in.has("shape")) shapes.push_back(read_shape(in, r));
     return shapes;
   }
   for (const Value* each : in.tables("shapes")) {
     Fields fields = r.fields(each, fmt::format("{}: shape {}", in.path(), shapes.size() + 1));
-    Shape shape = read_shape(fields);
+    Shape shape = read_shape(fields, r);
     shape.position = fields.vector("position", Vector3d::Zero(), kAny, "m");
     shape.orientation = read_orientation(fields, r);
     fields.finish();
@@ -217,7 +217,7 @@ void read_mass(Fields& in, Body& body) {
 
 }  // namespace
 
-Body read_body(Fields& in, const Reader& r) {
+Body read_body(Fields& in, Reader& r) {
   Body body;
   body.place = in.place();
   body.name = in.text("name", in.path());

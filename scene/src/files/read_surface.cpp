@@ -16,11 +16,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kLargestFile = std::uintmax_t{64} << 20;
+constexpr std::size_t kLargestFile = std::size_t{64} << 20;
+// Of all bodies together: a file may be named by many, and each reads it.
+constexpr std::size_t kMostBytes = 4 * kLargestFile, kMostOfScene = 10 * kMostTriangles;
 
 // A scene from an untrusted source reads nothing but what lies beside it: no way out of its folder,
 // by a link either, and no device.
-bool read_beside(Fields& in, const std::string& name, std::string& text) {
+bool read_beside(Fields& in, Reader& r, const std::string& name, std::string& text) {
   std::error_code error;
   const fs::path folder = fs::path(in.place().file).parent_path();
   const fs::path base = fs::canonical(folder.empty() ? fs::path(".") : folder, error);
@@ -33,12 +35,18 @@ bool read_beside(Fields& in, const std::string& name, std::string& text) {
     in.wrong("file", "must lie in the folder of the scene, or below it");
     return false;
   }
+  if (r.surface_bytes > kMostBytes) {
+    in.wrong("file", "comes after 256 MiB of surfaces that other bodies of the scene have read");
+    return false;
+  }
   std::ifstream stream(file, std::ios::binary);
   std::vector<char> block(std::size_t{1} << 16);
   while (stream && text.size() <= kLargestFile) {
     stream.read(block.data(), static_cast<std::streamsize>(block.size()));
     text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
   }
+  r.surface_bytes += text.size();
+  r.surface_files.insert(file.string());
   if (stream.bad() || !stream.eof() || text.size() > kLargestFile) {
     in.wrong("file", "cannot be read, or is larger than 64 MiB");
     return false;
@@ -48,10 +56,10 @@ bool read_beside(Fields& in, const std::string& name, std::string& text) {
 
 // What `parse(name, text)` makes of the file that is named; false: it is missing or wrong.
 template <class Parse>
-bool from_file(Fields& in, const Parse& parse) {
+bool from_file(Fields& in, Reader& r, const Parse& parse) {
   const std::string name = in.file_name("file", "the scene");
   std::string text;
-  if (name.empty() || !read_beside(in, name, text)) return false;
+  if (name.empty() || !read_beside(in, r, name, text)) return false;
   try {
     parse(fs::path(name).extension().string(), text);
   } catch (const SurfaceError& e) {
@@ -116,6 +124,15 @@ bool in_range(const Shape& shape) {
   });
 }
 
+// All that the bodies of a scene have is bounded, too: few lines repeat a body many times.
+bool is_within(Fields& in, Reader& r, const Shape& shape) {
+  r.surface_triangles += shape.triangles.size();
+  if (r.surface_triangles <= kMostOfScene) return true;
+  in.wrong("shape",
+           fmt::format("all surfaces of a scene together have at most {} triangles", kMostOfScene));
+  return false;
+}
+
 bool one_of(Fields& in, const char* inline_key, const char* allowed) {
   if (in.has("file") == in.has(inline_key)) {
     if (in.has("file"))
@@ -129,7 +146,7 @@ bool one_of(Fields& in, const char* inline_key, const char* allowed) {
 
 }  // namespace
 
-void read_mesh(Fields& in, Shape& shape) {
+void read_mesh(Fields& in, Reader& r, Shape& shape) {
   shape = one_triangle();
   in.pass_over({"points", "triangles"});
   const double scale = in.number("scale", 1, kPositive, "m in one unit of the points");
@@ -143,7 +160,7 @@ void read_mesh(Fields& in, Shape& shape) {
     if (read.points.empty() || read.triangles.empty()) return;
   } else {
     if (in.has("triangles")) return in.wrong("triangles", "are those of the file");
-    const bool right = from_file(in, [&](const std::string& ending, const std::string& text) {
+    const bool right = from_file(in, r, [&](const std::string& ending, const std::string& text) {
       if (ending != ".obj" && ending != ".stl")
         throw SurfaceError("must end in .obj or .stl: no other mesh is read");
       TriangleSurface surface = ending == ".obj" ? parse_obj(text) : parse_stl(text);
@@ -162,10 +179,10 @@ void read_mesh(Fields& in, Shape& shape) {
         return !(a.cross(b).stableNorm() > 0);
       }))
     return in.wrong(in.has("file") ? "file" : "triangles", "none of the triangles has an area");
-  shape = std::move(read);
+  if (is_within(in, r, read)) shape = std::move(read);
 }
 
-void read_height_field(Fields& in, Shape& shape) {
+void read_height_field(Fields& in, Reader& r, Shape& shape) {
   shape = one_triangle();
   in.pass_over({"heights", "file"});
   const double scale = in.number("scale", 1, kPositive, "m in one unit of the heights");
@@ -178,14 +195,14 @@ void read_height_field(Fields& in, Shape& shape) {
   if (in.has("heights")) {
     heights = read_rows(in);
   } else {
-    from_file(in,
+    from_file(in, r,
               [&](const std::string&, const std::string& text) { heights = parse_heights(text); });
   }
   if (heights.columns == 0) return;
   for (double& each : heights.values) each *= scale;
   Shape read = Shape::height_field(heights.values, heights.columns, spacing[0], spacing[1]);
   if (!in_range(read)) return in.wrong("spacing", "the field reaches beyond 1e100 m");
-  shape = std::move(read);
+  if (is_within(in, r, read)) shape = std::move(read);
 }
 
 }  // namespace tether::scene::files

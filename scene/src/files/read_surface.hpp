@@ -1,13 +1,13 @@
 // Tether: meshes and height fields of a scene file. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "toml/fields.hpp"
+#include "toml/reader.hpp"
 
 namespace tether::scene::files {
 
 /// shape = "mesh": points and triangles, or a file.
-void read_mesh(Fields& in, Shape& shape);
+void read_mesh(Fields& in, Reader& r, Shape& shape);
 /// shape = "height_field", a mesh as well: heights, or a file, and their spacing.
-void read_height_field(Fields& in, Shape& shape);
+void read_height_field(Fields& in, Reader& r, Shape& shape);
 
 }  // namespace tether::scene::files

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array<const char*, 4> kRepeated = {"body", "joint", "spring", "load"};
 constexpr std::array<char, 3> kCounters = {'i', 'j', 'k'};
-constexpr long kMostDigits = 6;  // of N in {i+N}
+constexpr std::size_t kMostDigits = 6;  // of N in {i+N}
 
 Entry* entry(Value& table, std::string_view key) {
   for (Entry& each : table.entries)
@@ -21,10 +21,12 @@ Entry* entry(Value& table, std::string_view key) {
   return nullptr;
 }
 
+// In values: a long text, or a long key, is as large as several.
 std::size_t size_of(const Value& value) {
-  std::size_t size = 1;
+  std::size_t size = 1 + value.text.size() / kBytesOfValue;
   for (const Value& each : value.items) size += size_of(each);
-  for (const Entry& each : value.entries) size += size_of(each.value);
+  for (const Entry& each : value.entries)
+    size += each.key.size() / kBytesOfValue + size_of(each.value);
   return size;
 }
 
@@ -139,23 +141,25 @@ class Repetition {
   std::string filled(const std::string& text, const std::array<long, 3>& at) const {
     std::string out;
     for (std::size_t k = 0; k < text.size(); ++k) {
-      const std::size_t end = text[k] == '{' ? text.find('}', k) : std::string::npos;
+      // A word of two letters and digits: the end of a brace is not looked for beyond it.
+      const std::string_view word = std::string_view(text).substr(k + 1, kMostDigits + 3);
+      const std::size_t end = text[k] == '{' ? word.find('}') : std::string_view::npos;
       const auto number =
-          end == std::string::npos ? std::nullopt : counted(text.substr(k + 1, end - k - 1), at);
+          end == std::string_view::npos ? std::nullopt : counted(word.substr(0, end), at);
       if (!number) {
         out += text[k];
         continue;
       }
       out += fmt::format("{}", *number);
-      k = end;
+      k += 1 + end;
     }
     return out;
   }
-  std::optional<long> counted(const std::string& word, const std::array<long, 3>& at) const {
+  std::optional<long> counted(std::string_view word, const std::array<long, 3>& at) const {
     for (std::size_t r = 0; r < rows_.size(); ++r) {
       if (word.empty() || word[0] != kCounters[r]) continue;
       if (word.size() == 1) return at[r] + 1;
-      const std::string digits = word.substr(2);
+      const std::string digits(word.substr(2));
       const bool sign = word[1] == '+' || word[1] == '-';
       if (!sign || digits.empty() || digits.size() > kMostDigits ||
           digits.find_first_not_of("0123456789") != std::string::npos)

@@ -24,7 +24,7 @@ std::string clean_title(const std::string& name) {
   for (char& c : title)
     if (c == ',' || c == '"' || c == '\'') c = ' ';
   title.erase(0, title.find_first_not_of("=+-@ "));
-  return title;
+  return files::is_plain(title) ? title : "";  // too long
 }
 
 class Drafting {
@@ -154,13 +154,13 @@ class Drafting {
       std::set<std::string> names;
       for (const auto& each : all) names.insert(each.name);
       std::set<std::string> used;
+      std::map<std::string, int> last;  // number of each name
       for (auto& each : all) {
+        if (used.insert(each.name).second) continue;
         const std::string stem = each.name;
-        for (int k = 2; !used.insert(each.name).second; ++k) {
-          do each.name = fmt::format("{} ({})", stem, k++);
-          while (names.count(each.name) > 0);
-          --k;
-        }
+        int& k = last.emplace(stem, 1).first->second;
+        do each.name = fmt::format("{} ({})", stem, ++k);
+        while (names.count(each.name) > 0 || !used.insert(each.name).second);
       }
     };
     each_once(draft_.scene.bodies);

@@ -97,34 +97,41 @@ void check_moves(const Model& model, const std::vector<Part>& parts, Problems& p
 
 /// A part without mass has no equations of motion of its own.
 void fold_massless(std::vector<Part>& parts, Remarks& remarks, Problems& problems) {
-  std::vector<std::vector<int>> children(parts.size());
+  // How many children there are, and the sum of their places: that of the child where it is one.
+  std::vector<int> count(parts.size(), 0);
+  std::vector<long> sum(parts.size(), 0);
   for (std::size_t k = 0; k < parts.size(); ++k)
-    if (parts[k].parent >= 0) children[at(parts[k].parent)].push_back(static_cast<int>(k));
+    if (parts[k].parent >= 0) {
+      ++count[at(parts[k].parent)];
+      sum[at(parts[k].parent)] += static_cast<long>(k);
+    }
+  std::vector<std::vector<PlacedJoint>> ahead(parts.size());  // of its own, the nearest one first
   for (std::size_t k = parts.size(); k-- > 0;) {
     Part& part = parts[k];
     if (part.fixed() || part.mass > 0 || !part.inertia.isZero(0)) continue;
-    if (children[k].size() > 1) {
+    if (count[k] > 1) {
       problems.add(part.line, fmt::format("link \"{}\"", part.name), "",
                    fmt::format("moves, has no mass, and {} links hang on it: give it mass and "
                                "inertia",
-                               children[k].size()));
+                               count[k]));
       continue;
     }
     part.gone = true;
     const int above = part.parent;
-    if (children[k].empty()) {
+    if (count[k] == 0) {
       remarks.add("links without mass at the end of their branch, and their joints", part.name);
     } else {
-      Part& child = parts[at(children[k].front())];
-      child.joints.insert(child.joints.begin(), part.joints.begin(), part.joints.end());
-      child.parent = above;
+      const auto child = static_cast<std::size_t>(sum[k]);
+      ahead[child].insert(ahead[child].end(), part.joints.rbegin(), part.joints.rend());
+      parts[child].parent = above;
       if (!part.shapes.empty()) remarks.add("shapes of links without mass", part.name);
     }
     if (above < 0) continue;
-    auto& siblings = children[at(above)];
-    siblings.erase(std::find(siblings.begin(), siblings.end(), static_cast<int>(k)));
-    siblings.insert(siblings.end(), children[k].begin(), children[k].end());
+    count[at(above)] += count[k] - 1;
+    sum[at(above)] += sum[k] - static_cast<long>(k);
   }
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    parts[k].joints.insert(parts[k].joints.begin(), ahead[k].rbegin(), ahead[k].rend());
 }
 
 bool is_small(const Vector3d& v) {

@@ -2,6 +2,7 @@
 #include "output_names.hpp"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <map>
@@ -11,10 +12,21 @@ namespace tether::scene {
 
 namespace fs = std::filesystem;
 
+namespace {
+
 std::string one_name(const std::string& file) {
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(fs::absolute(file, error), error);
   return error ? file : whole.string();
+}
+
+}  // namespace
+
+std::string identity(const std::string& file) {
+  struct stat there {};
+  if (stat(file.c_str(), &there) == 0 && S_ISREG(there.st_mode))
+    return fmt::format("file {} of device {}", there.st_ino, there.st_dev);
+  return one_name(file);
 }
 
 bool is_device(const std::string& file) {
@@ -39,13 +51,19 @@ std::string film_folder(const std::string& vtk) {
   return fs::path(vtk).replace_extension("").string();
 }
 
+std::vector<std::string> inputs_of(const Scene& scene) {
+  std::vector<std::string> out = scene.surface_files;
+  out.push_back(scene.file);
+  return out;
+}
+
 void check_names(const Output& o, const std::vector<std::string>& inputs) {
   std::map<std::string, std::string> taken;  // name: its purpose
   for (const std::string& input : inputs)
-    if (!input.empty()) taken.emplace(one_name(input), "an input of this run: " + input);
+    if (!input.empty()) taken.emplace(identity(input), "an input of this run: " + input);
   const auto take = [&](const char* what, const std::string& file) {
     if (is_device(file)) return;
-    const auto [at, fresh] = taken.emplace(one_name(file), fmt::format("written as {}", what));
+    const auto [at, fresh] = taken.emplace(identity(file), fmt::format("written as {}", what));
     if (!fresh)
       throw std::invalid_argument(
           fmt::format("{} = \"{}\": this file is {}", what, file, at->second));
@@ -59,7 +77,7 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
     take(what, file);
     for (const char* each : with) take(what, file + each);
   };
-  take_all("csv", o.csv, {".lock"});
+  take_all("csv", o.csv, {".lock", ".new"});
   if (!o.csv.empty() && !is_device(o.csv)) take("csv", event_file(o.csv));
   if (!o.csv.empty() && o.forces && !is_device(o.csv)) take("csv", contact_file(o.csv));
   take_all("svg", o.svg, {".lock", ".new"});
@@ -84,7 +102,7 @@ void check_page_name(const std::string& html, const std::vector<std::string>& ot
   for (const std::string& each : others)
     for (const char* with : {"", ".new", ".lock"})
       if (!each.empty() &&
-          (one_name(each + with) == one_name(html) || one_name(html + with) == one_name(each)))
+          (identity(each + with) == identity(html) || identity(html + with) == identity(each)))
         throw std::invalid_argument(
             fmt::format("html = \"{}\": this file is an input or another output", html));
 }

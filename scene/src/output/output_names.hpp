@@ -14,10 +14,14 @@ std::string contact_file(const std::string& csv);
 std::string film_file(const std::string& vtk);
 std::string film_folder(const std::string& vtk);
 
-/// The same for all spellings of a path; links are followed as far as they exist.
-std::string one_name(const std::string& file);
+/// The same for all spellings of a path, and for second names of a file; links are followed as far
+/// as they exist.
+std::string identity(const std::string& file);
 /// Something there that is neither a file nor a folder.
 bool is_device(const std::string& file);
+
+/// The scene and what was read with it.
+std::vector<std::string> inputs_of(const Scene& scene);
 
 /// Throws std::invalid_argument if two outputs have a name in common, or one that of an input.
 void check_names(const Output& output, const std::vector<std::string>& inputs);

@@ -29,8 +29,9 @@ struct Open {
   }
 };
 
-void write_all(const std::string& file, int flags, std::string_view content, bool lasting) {
-  const Open out{open(file.c_str(), flags | O_WRONLY | O_CLOEXEC, 0666)};
+constexpr int kNew = O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC;
+
+void write_all(const Open& out, const std::string& file, std::string_view content, bool lasting) {
   if (out.descriptor < 0) fail(file);
   while (!content.empty()) {
     const ssize_t written = write(out.descriptor, content.data(), content.size());
@@ -39,6 +40,27 @@ void write_all(const std::string& file, int flags, std::string_view content, boo
     content.remove_prefix(static_cast<std::size_t>(written));
   }
   if (lasting && fsync(out.descriptor) != 0 && errno != EINVAL && errno != EROFS) fail(file);
+}
+
+// A full disk gets its room back.
+void write_or_remove(const Open& out, const std::string& file, std::string_view content,
+                     bool lasting) {
+  try {
+    write_all(out, file, content, lasting);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(file, ignored);
+    throw;
+  }
+}
+
+// What has the name is removed, not written into: it may be a link, a pipe or the second name of
+// another file.
+void replace(const std::string& file, std::string_view content, bool lasting) {
+  unlink(file.c_str());
+  const Open out{open(file.c_str(), kNew, 0666)};
+  if (out.descriptor < 0) fail(file);
+  write_or_remove(out, file, content, lasting);
 }
 
 // The name in the folder outlasts a loss of power only with the folder.
@@ -66,12 +88,12 @@ void write_whole_regular(const std::string& file, std::string_view content) {
   if (fs::exists(there) && !fs::is_regular_file(there))
     throw std::runtime_error("cannot write " + file + ": it is there and is no file");
   const std::string fresh = file + ".new";
-  try {
-    write_all(fresh, O_CREAT | O_TRUNC | O_NOFOLLOW, content, true);
-    if (std::rename(fresh.c_str(), file.c_str()) != 0) fail(file);
-  } catch (...) {  // a full disk gets its room back
+  replace(fresh, content, true);
+  if (std::rename(fresh.c_str(), file.c_str()) != 0) {
+    const int reason = errno;
     fs::remove(fresh, error);
-    throw;
+    errno = reason;
+    fail(file);
   }
   sync_folder_of(file);
 }
@@ -80,19 +102,19 @@ void write_whole(const std::string& file, std::string_view content) {
   std::error_code error;
   const fs::file_status there = fs::status(file, error);
   if (fs::exists(there) && !fs::is_regular_file(there))
-    write_all(file, 0, content, false);
+    write_all(Open{open(file.c_str(), O_WRONLY | O_CLOEXEC)}, file, content, false);
   else
     write_whole_regular(file, content);
 }
 
 void write_fresh(const std::string& file, std::string_view content) {
-  try {
-    write_all(file, O_CREAT | O_TRUNC | O_NOFOLLOW, content, false);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove(file, ignored);
-    throw;
-  }
+  replace(file, content, false);
+}
+
+void write_new(const std::string& file, std::string_view content) {
+  Open out{open(file.c_str(), kNew, 0666)};
+  if (out.descriptor < 0) fail(file);
+  write_or_remove(out, file, content, false);
 }
 
 void check_writable(const std::string& file) {
@@ -102,8 +124,10 @@ void check_writable(const std::string& file) {
   make_folder_of(file);
   const std::string trial = file + ".new";
   {
-    const Open out{open(trial.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666)};
-    if (out.descriptor < 0) fail(file);
+    const Open out{open(trial.c_str(), kNew, 0666)};
+    // What is there gives way when the file is written, not before.
+    if (out.descriptor < 0 && (errno != EEXIST || fs::is_directory(trial, error))) fail(file);
+    if (out.descriptor < 0) return;
   }
   fs::remove(trial, error);
 }

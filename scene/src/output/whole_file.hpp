@@ -18,8 +18,11 @@ void write_whole(const std::string& file, std::string_view content);
 void write_whole_regular(const std::string& file, std::string_view content);
 
 /// A file that nobody reads before the run has named it elsewhere: gone again where it could not be
-/// written. Throws std::runtime_error, on a link of this name, too.
+/// written. What had its name is removed first. Throws std::runtime_error.
 void write_fresh(const std::string& file, std::string_view content);
+
+/// The same where nothing has the name; what has it stays, and std::runtime_error says so.
+void write_new(const std::string& file, std::string_view content);
 
 /// The error of `write_whole` before the work is done; makes the folder.
 void check_writable(const std::string& file);

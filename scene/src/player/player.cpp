@@ -38,7 +38,7 @@ class Player::Implementation {
         view_(view_of(scene)),
         film_(moving_, view_) {
     std::vector<std::string> others = names(scene.output);
-    others.push_back(scene.file);
+    for (const std::string& each : inputs_of(scene)) others.push_back(each);
     check_page_name(file, others);
     make_folder_of(file);
     lock_.take(file);

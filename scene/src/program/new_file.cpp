@@ -19,7 +19,7 @@ void make_new(const std::string& file, std::string_view content) {
   if (fs::exists(fs::symlink_status(file, error))) throw there;
   make_folder_of(file);
   const std::string fresh = file + ".new";
-  write_fresh(fresh, content);
+  write_new(fresh, content);
   // The whole file gets its name only where nobody else took it in between.
   const int linked = link(fresh.c_str(), file.c_str());
   const int reason = errno;

@@ -77,7 +77,9 @@ class Run {
         judge_(scene),
         engine_(engine_of(scene, options.team)) {
     const Output& o = scene.output;
-    check_names(o, {scene.file, o.state == options.restart ? "" : options.restart});
+    std::vector<std::string> inputs = inputs_of(scene);
+    if (o.state != options.restart) inputs.push_back(options.restart);
+    check_names(o, inputs);
     for (const std::string& each : names(o)) lock_.take(each);
     if (!o.state.empty()) check_writable(o.state);
     if (!o.state.empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene);

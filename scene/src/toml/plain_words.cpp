@@ -22,7 +22,8 @@ std::string files::printable(std::string_view text) {
 }
 
 bool files::is_plain(std::string_view text) {
-  return text.find_first_of("\",") == std::string_view::npos && printable(text) == text &&
+  return text.size() <= kLongestPlain && text.find_first_of("\",") == std::string_view::npos &&
+         printable(text) == text &&
          (text.empty() || std::string_view("=+-@").find(text[0]) == std::string_view::npos);
 }
 

@@ -20,6 +20,9 @@ struct Reader {
   Scene scene;
   std::map<std::string, int> bodies;  ///< by name
   std::set<std::string> materials;    ///< of bodies
+  std::set<std::string> surface_files;
+  std::size_t surface_bytes = 0;      ///< read from them so far
+  std::size_t surface_triangles = 0;  ///< of all bodies so far
 
   Fields fields(const Value* table, std::string path) const {
     return {table, std::move(path), file, report};
@@ -52,6 +55,9 @@ struct Reader {
 
  private:
   static const std::string& name_of(const std::string& name) { return name; }
+  static const std::string& name_of(const std::pair<const std::string, int>& each) {
+    return each.first;
+  }
   static const std::string& name_of(const Body& body) { return body.name; }
 };
 

@@ -25,10 +25,12 @@ class Report {
 /// characters of ASCII and Unicode, and marks that turn the direction of what follows.
 std::string printable(std::string_view text);
 /// What names and words of a scene may be: they end up in tables, XML and messages. No comma, quote
-/// or control character, and no beginning that makes spreadsheets compute: = + - @.
+/// or control character, no beginning that makes spreadsheets compute: = + - @; and not endless.
 bool is_plain(std::string_view text);
+constexpr std::size_t kLongestPlain = 1000;  // bytes
 constexpr const char* kPlain =
-    "must hold no comma, quote or control character, and not begin with = + - @";
+    "must hold no comma, quote or control character, not begin with = + - @, and have at most 1000 "
+    "bytes";
 
 /// Throws a SceneError of one problem.
 [[noreturn]] void refuse(const Place& place, std::string why);

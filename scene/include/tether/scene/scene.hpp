@@ -228,6 +228,7 @@ struct Scene {
   std::optional<EventOptions> event;  ///< none: the plan chooses with defaults
   Output output;
   std::vector<Expect> expect;
+  std::vector<std::string> surface_files;  ///< that were read with it; no output replaces them
 };
 
 /// Whether steps take over where events cannot go on.

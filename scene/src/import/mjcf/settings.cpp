@@ -54,6 +54,15 @@ void read_option(const Node& node, Model& model, Problems& problems) {
   }
 }
 
+constexpr std::size_t kMostAttributes = 100;  // of an element; MJCF has 40
+constexpr std::size_t kMostInClasses = 1000000;
+
+std::size_t size_of(const std::map<std::string, Attributes>& elements) {
+  std::size_t size = elements.size();
+  for (const auto& [name, attributes] : elements) size += attributes.size();
+  return size;
+}
+
 /// A class has what it says, and what it does not say of the one around it.
 void read_class(const Node& node, const std::string& around, Settings& out, Problems& problems,
                 Remarks& remarks) {
@@ -63,13 +72,26 @@ void read_class(const Node& node, const std::string& around, Settings& out, Prob
   if (name.empty()) tag.missing("class", "a class inside another one has a name");
   tag.finish(remarks);
   auto& own = out.classes[name];
-  if (!outermost && name != around) own = out.classes[around];
+  if (!outermost && name != around) {
+    if (out.copied > kMostInClasses) return;  // said
+    const auto& outer = out.classes[around];
+    out.copied += size_of(outer);  // a few lines may copy what many others say
+    if (out.copied > kMostInClasses)
+      return problems.add(node.GetLineNum(), path(node), "",
+                          fmt::format("all classes together have at most {} attributes, with those "
+                                      "of the classes around them",
+                                      kMostInClasses));
+    own = outer;
+  }
   for (const Node* each = node.FirstChildElement(); each != nullptr;
        each = each->NextSiblingElement()) {
     if (is(*each, "default")) continue;
     Attributes& of = own[each->Name()];
     for (const auto* a = each->FirstAttribute(); a != nullptr; a = a->Next())
       of[a->Name()] = a->Value();
+    if (of.size() > kMostAttributes)
+      return problems.add(each->GetLineNum(), path(*each), "",
+                          fmt::format("must have at most {} attributes", kMostAttributes));
   }
   for (const Node* each = node.FirstChildElement("default"); each != nullptr;
        each = each->NextSiblingElement("default"))

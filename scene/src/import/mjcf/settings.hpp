@@ -21,6 +21,7 @@ struct Settings {
   int least_group = 0, most_group = 5;  ///< of geoms that have mass
   // <default>
   std::map<std::string, std::map<std::string, Attributes>, std::less<>> classes;  ///< by element
+  std::size_t copied = 0;  ///< attributes that classes have from those around them
 
   double angle(double x) const { return degrees ? x * (linalg::kPi / 180) : x; }
   /// Attributes of `element` in a class ("": main). Reports a class that is not there.

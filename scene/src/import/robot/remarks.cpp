@@ -7,12 +7,18 @@
 
 namespace tether::scene::import {
 
+namespace {
+
+constexpr std::size_t kMostNames = 10000;  // of a line
+
+}  // namespace
+
 void Remarks::add(const std::string& what, const std::string& name) {
   const auto [found, is_new] = index_.emplace(what, lines_.size());
   if (is_new) lines_.push_back({what, {}, 0});
   Line& line = lines_[found->second];
   ++line.count;
-  if (!name.empty()) line.names.push_back(name);
+  if (!name.empty() && line.names.size() < kMostNames) line.names.push_back(name);
 }
 
 std::vector<std::string> Remarks::lines() const {
@@ -22,7 +28,8 @@ std::vector<std::string> Remarks::lines() const {
     std::sort(names.begin(), names.end());
     names.erase(std::unique(names.begin(), names.end()), names.end());
     if (!names.empty())
-      out.push_back(fmt::format("{}: {}", line.what, fmt::join(names, ", ")));
+      out.push_back(fmt::format("{}: {}{}", line.what, fmt::join(names, ", "),
+                                line.names.size() < kMostNames ? "" : ", ..."));
     else
       out.push_back(line.count > 1 ? fmt::format("{} ({} times)", line.what, line.count)
                                    : line.what);

@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t kMostShown = 20, kLongestShown = 60;
 constexpr std::size_t kLargestText = std::size_t{64} << 20;
+constexpr std::size_t kLongestName = 200;  // bytes; names stand in names and remarks made of them
 
 /// The length of the UTF-8 sequence at the start of `text`; 0: it is none.
 std::size_t sequence(std::string_view text) {
@@ -75,15 +76,21 @@ std::string shortened(std::string_view text) {
   return fmt::format("\"{}...\"", text.substr(0, end));
 }
 
-/// What tinyxml2 takes and XML does not.
+/// What tinyxml2 takes and XML does not, and names without end.
 class Inspection : public tinyxml2::XMLVisitor {
  public:
   explicit Inspection(Problems& problems) : problems_(problems) {}
   bool VisitEnter(const Node& node, const tinyxml2::XMLAttribute* first) override {
-    for (const auto* each = first; each != nullptr; each = each->Next())
+    bound(node.GetLineNum(), node.Name());
+    for (const auto* each = first; each != nullptr; each = each->Next()) {
+      bound(each->GetLineNum(), each->Name());
+      const std::string_view name = each->Name();
+      if (name == "name" || name == "class" || name == "childclass")
+        bound(each->GetLineNum(), each->Value());
       if (bad_byte(each->Value()) >= 0 || bad_byte(each->Name()) >= 0)
         problems_.add(each->GetLineNum(), path(node), "",
                       "a character reference names no character");
+    }
     return true;
   }
   bool Visit(const tinyxml2::XMLUnknown& unknown) override {
@@ -93,6 +100,12 @@ class Inspection : public tinyxml2::XMLVisitor {
   }
 
  private:
+  void bound(int line, std::string_view name) {
+    if (name.size() > kLongestName)
+      problems_.add(line, "", shortened(name),
+                    fmt::format("a name has at most {} bytes", kLongestName));
+  }
+
   Problems& problems_;
 };
 

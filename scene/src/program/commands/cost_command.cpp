@@ -73,13 +73,14 @@ void check_settings(const Scene& scene, const Arguments& arguments) {
 }
 
 // What would be lost is told before the work.
-void check_files(const Arguments& arguments) {
+void check_files(const Scene& scene, const Arguments& arguments) {
   Output files;
   files.csv = arguments.csv;
   files.svg = arguments.svg;
-  check_names(files, {arguments.file});
-  if (!arguments.html.empty())
-    check_page_name(arguments.html, {arguments.file, arguments.csv, arguments.svg});
+  std::vector<std::string> others = inputs_of(scene);
+  check_names(files, others);
+  others.insert(others.end(), {arguments.csv, arguments.svg});
+  if (!arguments.html.empty()) check_page_name(arguments.html, others);
   for (const std::string& file : {arguments.csv, arguments.svg, arguments.html})
     if (!file.empty()) check_writable(file);
 }
@@ -94,7 +95,7 @@ int run_cost(const Arguments& arguments) {
   options.reference = arguments.reference;
   options.interrupted = [] { return caught_signal() != 0; };
   catch_signals();
-  check_files(arguments);
+  check_files(scene, arguments);
   std::optional<tether::Progress> bar;
   options.progress = [&](const std::string& what, int done, int all) {
     if (done == 0)

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "import/import.hpp"
+#include "output/output_names.hpp"
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/new_file.hpp"
@@ -65,6 +66,9 @@ return out;
 /// Said once more on the standard error, since a scene may leave through a pipe.
 int write_import(const Arguments& a) {
   const import::ImportOptions options = options_of(a);
+  Output scene;
+  scene.state = a.out == "-" ? "" : a.out;
+  check_names(scene, {a.file == "-" ? "" : a.file});
   const SceneText robot = read_text(a.file);
   const import::Imported made = import::import_robot(robot.text, robot.name, options);
   catch_signals();  // the file is whole before they count

@@ -146,10 +146,14 @@ int sweep(const Arguments& arguments) {
       static_cast<std::size_t>(std::count(first.begin(), first.end(), ',')) - varied.size();
 
   catch_signals();
-  if (arguments.out != "-") check_writable(arguments.out);
-  if (arguments.out != "-" && !is_device(arguments.out) &&
-      one_name(arguments.out) == one_name(arguments.file))
-    throw std::invalid_argument("--out " + arguments.out + ": this file is the scene");
+  if (arguments.out != "-") {
+    Output table;
+    table.csv = arguments.out;
+    std::vector<std::string> inputs = plain.surface_files;
+    if (arguments.file != "-") inputs.push_back(arguments.file);
+    check_names(table, inputs);
+    check_writable(arguments.out);
+  }
   StandardOutput output(arguments.out);
   tether::Progress bar(1);
   bar.start(plain.name.empty() ? plain.file : plain.name, 1, 1);

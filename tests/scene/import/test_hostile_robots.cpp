@@ -1,0 +1,108 @@
+// Tests: robot files of somebody who means harm: size, names and classes without end.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <string>
+
+#include "import/import.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::scene;
+using import::import_robot;
+
+namespace {
+
+import::Imported imported(const std::string& text){return import_robot(text, "robot.xml", {});
+}
+
+std::string refusal(const std::string& text) {
+  try {
+    imported(text);
+  } catch (const SceneError& e) {
+    return e.what();
+  }
+  return "taken";
+}
+
+std::string times(int count, const std::string& before, const std::string& behind) {
+  std::string out;
+  for (int k = 0; k < count; ++k) out += before + std::to_string(k) + behind;
+  return out;
+}
+
+const std::string kMass =
+    "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' "
+    "iyz='0'/></inertial>";
+
+using Catch::Matchers::Contains;
+
+}  // namespace
+
+TEST_CASE("a robot file has at most 64 MiB") {
+  const std::string robot =
+      "<mujoco><worldbody><body name='b'><freejoint/><geom size='1'/></body>"
+      "</worldbody></mujoco>";
+  const std::size_t most = std::size_t{64} << 20;
+  CHECK(refusal(robot + std::string(most - robot.size(), ' ')) == "taken");
+  CHECK_THAT(refusal(robot + std::string(most - robot.size() + 1, ' ')),
+             Contains("at most 64 MiB"));
+  CHECK_THAT(refusal(std::string(most + 1, '<')), Contains("at most 64 MiB"));
+}
+
+TEST_CASE("names in a robot file have at most 200 bytes, and are shown shortened") {
+  const std::string name(201, 'n');
+  for (const std::string& text :
+       {"<robot><link name='" + name + "'/></robot>", "<robot><" + name + "/></robot>",
+        "<robot><link name='a' " + name + "='1'/></robot>",
+        "<mujoco><worldbody childclass='" + name + "'/></mujoco>"}) {
+    const std::string said = refusal(text);
+    CHECK_THAT(said, Contains("robot.xml:1") && Contains("at most 200 bytes"));
+    CHECK(said.find(name) == std::string::npos);
+  }
+  const std::string title(5000, 't');  // of the scene: left out
+  CHECK(refusal("<mujoco model='" + title +
+                "'><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>") ==
+        "taken");
+}
+
+// Each of these took a number of copies, or looks, that is the square of the file's length.
+TEST_CASE("robot files of thousands of parts cost no more than their length") {
+  // Classes inside a class that has much; 4 * 10^8 attributes.
+  CHECK_THAT(refusal("<mujoco><default>" + times(20000, "<e", " a='1'/>") +
+                     times(20000, "<default class='c", "'/>") + "</default><worldbody/></mujoco>"),
+             Contains("at most 1000000 attributes"));
+  CHECK_THAT(refusal("<mujoco><default><geom " + times(101, "a", "='1' ") +
+                     "/></default><worldbody/></mujoco>"),
+             Contains("at most 100 attributes"));
+
+  // Links without mass in a row, whose joints all go to the last one.
+  const int links = 40000;
+  std::string chain = "<robot name='r'>";
+  for (int k = 0; k <= links; ++k)
+    chain += "<link name='l" + std::to_string(k) + "'>" + (k == links || k == 0 ? kMass : "") +
+             "</link>\n";
+  for (int k = 0; k < links; ++k)
+    chain += "<joint name='j" + std::to_string(k) + "' type='continuous'><parent link='l" +
+             std::to_string(k) + "'/><child link='l" + std::to_string(k + 1) + "'/></joint>\n";
+  const std::string in_a_row = imported(chain + "</robot>").toml;
+  const std::size_t first = in_a_row.find("name = \"j0\""),
+                    last = in_a_row.find("name = \"j39999\"");
+  CHECK(first < last);
+  CHECK(last != std::string::npos);
+
+  // Links without mass that hang on one.
+  std::string fan = "<robot name='r'><link name='l'>" + kMass + "</link><link name='m'>" + kMass +
+                    "</link><joint name='k' type='continuous'><parent link='l'/><child "
+                    "link='m'/></joint>\n";
+  for (int k = 0; k < links; ++k)
+    fan += "<link name='l" + std::to_string(k) + "'>" + (k % 2 != 0 ? kMass : "") +
+           "</link><joint name='j" + std::to_string(k) +
+           "' type='continuous'><parent link='m'/><child link='l" + std::to_string(k) +
+           "'/></joint>\n";
+  const import::Imported hanging = imported(fan + "</robot>");
+  CHECK(hanging.toml.find("name = \"l39999\"") != std::string::npos);
+  CHECK(hanging.toml.find("name = \"l39998\"") == std::string::npos);
+
+  // Things of the world of one name.
+  std::string same = "<mujoco><worldbody><body name='b'><freejoint/><geom size='1'/></body>";
+  for (int k = 0; k < 20000; ++k) same += "<geom name='g' size='1'/>";
+  CHECK(imported(same + "</worldbody></mujoco>").toml.find("\"g (20000)\"") != std::string::npos);
+}
