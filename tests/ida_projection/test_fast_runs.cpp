@@ -75,7 +75,54 @@ void compare(const Problem& problem, double tolerance, bool projected, int steps
   CHECK(plain.steps() == fast.steps());
 }
 
+/// Those of IDA's vectors that its nonlinear solver works with.
+struct Inside {
+  explicit Inside(void* ida) {
+    N_Vector yn, ypn, residual;
+    void* data;
+    sunrealtype t, cj;
+    IDAGetNonlinearSystemData(ida, &t, &y_predicted, &yp_predicted, &yn, &ypn, &residual, &cj,
+                              &data);
+  }
+  N_Vector y_predicted, yp_predicted;
+};
+
+bool is_fast(N_Vector v) { return v->ops->nvlinearsum != N_VLinearSum_Serial; }
+
 }  // namespace
+
+TEST_CASE("IDA's own vectors become fast with the first move, the caller's do not") {
+  Host host(pendulum(1.0, 9.81, 10.0, "index 1"), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  const Inside inside(host.ida);
+  CHECK_FALSE(is_fast(inside.y_predicted));
+  while (host.projection().statistics().projections == 0) REQUIRE(host.step() >= 0);
+  CHECK(is_fast(inside.y_predicted));
+  CHECK(is_fast(inside.yp_predicted));
+  CHECK_FALSE(is_fast(host.y));
+  CHECK_FALSE(is_fast(host.yp));
+  REQUIRE(host.restart() >= 0);
+  REQUIRE(host.finish() >= 0);
+}
+
+TEST_CASE("where no move is needed IDA's vectors stay as they are") {
+  Host host(robertson(40.0, "index 0"), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  REQUIRE(host.finish() >= 0);
+  CHECK(host.projection().statistics().projections == 0);
+  CHECK_FALSE(is_fast(Inside(host.ida).y_predicted));
+}
+
+TEST_CASE("a vector with an operation of the caller's keeps all of them") {
+  Host host(pendulum(1.0, 9.81, 10.0, "index 1"), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  const Inside inside(host.ida);
+  inside.y_predicted->ops->nvmin = [](N_Vector v) { return N_VMin_Serial(v); };
+  for (int k = 0; k < 20; ++k) REQUIRE(host.step() >= 0);
+  CHECK(host.projection().statistics().projections > 0);
+  CHECK_FALSE(is_fast(inside.y_predicted));
+  CHECK(is_fast(inside.yp_predicted));
+}
 
 TEST_CASE("Fast vectors and factors leave every bit of plain IDA's steps on all problems") {
   for (const Problem& problem : everything())

@@ -8,8 +8,10 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #include "attach/impl.hpp"
+#include "fast/quicken.hpp"
 
 namespace tether::ida_projection {
 
@@ -316,8 +318,19 @@ double Projection::Impl::care_of_high_index(const Candidate& candidate) const {
   return kAsideFromTest * std::clamp(tighter, 1.0, kMostCare);
 }
 
+// Those of IDA's vectors that pass through here, and the plugin's own; the caller's are left alone.
+void Projection::Impl::quicken_vectors(const Candidate& candidate) {
+  N_Vector newton = nullptr;
+  if (options_.nonlinear_solver == nullptr)
+    newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
+  const StepData step = ida_.step();
+  fast::quicken({candidate.correction, candidate.weights, step.residual, newton, polish_.delta()});
+  fast::quicken_with_inputs({step.y_predicted, step.yp_predicted});
+}
+
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
 Status Projection::Impl::engage(const Candidate& candidate) {
+  quicken_vectors(candidate);
   if (!variables_.known()) derive_id(candidate);
   if (variables_.any() && options_.suppress_algebraic) {
     IDASetId(ida_.mem(), variables_.id());

@@ -96,6 +96,7 @@ class Projection::Impl {
   int look_before_moving(const Candidate& candidate, bool& done);
   void derive_id(const Candidate& candidate);
   Status engage(const Candidate& candidate);
+  void quicken_vectors(const Candidate& candidate);
   double care_of_high_index(const Candidate& candidate) const;
   Status engage_if_index_is_high(const Candidate& candidate);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance);

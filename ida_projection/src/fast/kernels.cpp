@@ -4,6 +4,8 @@
 // Compiled without contraction to fused multiply-adds and without -ffast-math: bits count.
 #include "kernels.hpp"
 
+#include "fast/quicken.hpp"
+
 #include <nvector/nvector_serial.h>
 
 #include <cmath>
@@ -198,6 +200,13 @@ struct Kernels {
     return 0;
   }
 
+  // What is combined gets these operations, too.
+  static int combination_of_others(int count, sunrealtype* c, N_Vector* X, N_Vector Z) {
+    for (int k = 0; k < count; ++k)
+      if (X[k]->ops->nvlinearsum != linear_sum) quicken({X[k]});
+    return linear_combination(count, c, X, Z);
+  }
+
   // As SUNDIALS' own one, where a program has enabled it.
   static int enabled_linear_combination(int count, sunrealtype* c, N_Vector* X, N_Vector Z) {
     if (count == 2) {
@@ -240,6 +249,13 @@ struct Kernels {
 };
 
 template <int... Lengths>
+void spread_sized(N_Vector_Ops ops, sunindextype length, std::integer_sequence<int, Lengths...>) {
+  static constexpr decltype(ops->nvlinearcombination) combine[] = {
+      Kernels<Lengths>::combination_of_others...};
+  ops->nvlinearcombination = combine[length <= kSized ? length : 0];
+}
+
+template <int... Lengths>
 void install_sized(N_Vector_Ops ops, sunindextype length, std::integer_sequence<int, Lengths...>) {
   static constexpr void (*install[])(N_Vector_Ops) = {Kernels<Lengths>::install...};
   install[length <= kSized ? length : 0](ops);
@@ -249,6 +265,10 @@ void install_sized(N_Vector_Ops ops, sunindextype length, std::integer_sequence<
 
 void install_kernels(N_Vector_Ops ops, sunindextype length) {
   install_sized(ops, length, std::make_integer_sequence<int, kSized + 1>());
+}
+
+void spread_kernels(N_Vector_Ops ops, sunindextype length) {
+  spread_sized(ops, length, std::make_integer_sequence<int, kSized + 1>());
 }
 
 }  // namespace tether::ida_projection::fast

@@ -9,6 +9,7 @@ namespace tether::ida_projection {
 struct StepData {
   double t = 0.0, cj = 0.0;
   N_Vector y_predicted = nullptr, yp_predicted = nullptr;
+  N_Vector residual = nullptr;  ///< F as it was evaluated last
   N_Vector y = nullptr;  ///< as F was evaluated last or, after the corrector, as it is accepted
 };
 
@@ -39,11 +40,11 @@ class Ida {
   }
   StepData step() const {
     StepData step;
-    N_Vector ypn, res;
+    N_Vector ypn;
     void* user_data;
     sunrealtype t = 0.0, cj = 0.0;
-    IDAGetNonlinearSystemData(mem_, &t, &step.y_predicted, &step.yp_predicted, &step.y, &ypn, &res,
-                              &cj, &user_data);
+    IDAGetNonlinearSystemData(mem_, &t, &step.y_predicted, &step.yp_predicted, &step.y, &ypn,
+                              &step.residual, &cj, &user_data);
     step.t = t;
     step.cj = cj;
     return step;
