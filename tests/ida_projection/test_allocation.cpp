@@ -63,6 +63,21 @@ TEST_CASE("no allocation in a projected step") {
   CHECK(in_steady_state(car, car.recommended_constraints()) == 0);
 }
 
+TEST_CASE("looks at whether F keeps rows that move with time do not allocate") {
+  const Problem car = car_axis("index 1");
+  Host host(car, 1e-8);
+  host.attach(car.recommended_constraints());
+  for (int i = 0; i < 30; ++i) REQUIRE(host.step() >= 0);
+  const long evaluations = host.projection().statistics().value_evaluations, start = allocations();
+  int flag = 0;
+  for (int i = 0; i < 40 && flag >= 0; ++i) flag = host.step();
+  const long made = allocations() - start;
+  REQUIRE(flag >= 0);
+  CHECK(made <= 3);  // work space, once
+  // Two for each projected step, four for each look into a doubt.
+  CHECK(host.projection().statistics().value_evaluations > evaluations + 2 * 40 + 4);
+}
+
 TEST_CASE("no allocation with options, differences or gradients") {
   const Problem index1 = pendulum(1.0, 1.0, 1000.0, "index 1");
   const tp::Constraints rows = index1.recommended_constraints();

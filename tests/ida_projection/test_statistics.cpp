@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include <chrono>
 #include <problems/pendulum.hpp>
+#include <problems/robertson.hpp>
 #include <sstream>
 
 #include "host.hpp"
@@ -84,6 +85,26 @@ TEST_CASE("counts agree with each other") {
       CHECK(s.residual_evaluations > 0);
       CHECK(s.residual_evaluations < residuals);
     }
+}
+
+TEST_CASE("rows that IDA keeps by itself are looked at, without C in most steps") {
+  // Chemistry: mass is a linear combination of rates, or an equation of F.
+  Host untouched(robertson(40.0, "index 0"), 1e-6);
+  untouched.attach(untouched.problem.recommended_constraints());
+  REQUIRE(untouched.finish() >= 0);
+  const tp::Statistics looks = untouched.projection().statistics();
+  CHECK(looks.projections == 0);
+  CHECK(looks.skipped >= untouched.steps());
+  CHECK(looks.jacobian_evaluations < looks.skipped / 8);
+  CHECK(looks.seconds == 0.0);  // no clock is read
+
+  Host begun(robertson(40.0, "index 1"), 1e-6);
+  begun.attach(begun.problem.recommended_constraints());
+  REQUIRE(begun.finish() >= 0);
+  const tp::Statistics moves = begun.projection().statistics();
+  CHECK(moves.projections > 0);
+  CHECK(moves.projections + moves.skipped >= begun.steps());
+  CHECK(moves.jacobian_evaluations < moves.skipped / 3);
 }
 
 TEST_CASE("reset") {

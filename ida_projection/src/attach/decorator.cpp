@@ -56,26 +56,29 @@ int Projection::Impl::initialize() {
   return corrector_.initialize();
 }
 
-// Times every 16th projection: reading the clock costs as much as a small projection. What drift is
-// left is looked at on the same ones.
+// Times the first projection and every 16th: reading the clock costs as much as a small one, and
+// more than a look at rows that need none. What drift is left is looked at on the same ones.
 class Projection::Impl::Stopwatch {
  public:
-  explicit Stopwatch(Impl& owner)
-      : owner_(owner), running_(owner.statistics_.projections % kSampleEvery == 0) {
-    if (running_) begin_ = Clock::now();
+  explicit Stopwatch(Impl& owner) : owner_(owner) {
+    if (owner.run_.engaged) start();
   }
   ~Stopwatch() {
     if (!running_) return;
     owner_.tally_.timed.add(std::chrono::duration<double>(Clock::now() - begin_).count());
   }
   bool running() const { return running_; }
+  void start() {
+    running_ = owner_.tally_.attempts++ % kSampleEvery == 0;
+    if (running_) begin_ = Clock::now();
+  }
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
  private:
   using Clock = std::chrono::steady_clock;
   Impl& owner_;
-  bool running_;
+  bool running_ = false;
   Clock::time_point begin_;
 };
 
@@ -151,11 +154,14 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   if (watch_.rejections.collapsed() && report_.warning() != Status::collapsed)
     report_.warn(Status::collapsed, watch_.rejections.cause(at, step, variables_, corrector_));
   if (frequency_.on() && !needs_projection(at, step, tolerance)) return finish(Status::success, "");
-  const Stopwatch stopwatch(*this);
+  Stopwatch stopwatch(*this);
   if (!run_.engaged) {
     bool done = false;
     const int outcome = look_before_moving(at, done);
     if (done) return outcome;
+    stopwatch.start();
+    const Status engaged = engage(at);
+    if (engaged != Status::success) return finish(engaged, movers_.used->message());
   }
 
   Move move = move_and_polish(at, step.cj, tolerance);
@@ -213,8 +219,6 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done)
     statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, first.drift_before);
     return finish(Status::success, "");
   }
-  const Status engaged = engage(candidate);
-  if (engaged != Status::success) return finish(engaged, movers_.used->message());
   done = false;
   return 0;
 }
@@ -353,7 +357,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
 
 void Projection::Impl::account(const Move& move, const StepData& step, bool sampled) {
   Statistics& s = statistics_;
-  ++s.projections;
+  ++(move.looked ? s.skipped : s.projections);
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
   if (frequency_.on()) frequency_.projected(move.length, std::abs(ida_.step_size()));

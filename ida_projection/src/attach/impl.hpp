@@ -155,7 +155,8 @@ class Projection::Impl {
   // What the caller is told of the moves.
   struct Tally {
     double move_sum = 0.0;
-    SampledTime timed;
+    long attempts = 0;  // since moves began
+    SampledTime timed;  // of every 16th
     Progress progress;
     long progress_count = 0;
   };

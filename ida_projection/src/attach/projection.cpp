@@ -148,13 +148,14 @@ Statistics Projection::Impl::statistics() {
   s.steps_without_plugin = watch_.bypass.steps();
   const long moved = s.projections + s.chord_projections - s.failures();
   s.mean_move = moved > 0 ? tally_.move_sum / static_cast<double>(moved) : 0.0;
-  s.seconds = tally_.timed.total(s.projections);
+  s.seconds = tally_.timed.total(tally_.attempts);
   return s;
 }
 
 void Projection::Impl::reset_statistics() {
   statistics_ = Statistics{};
   tally_.move_sum = 0.0;
+  tally_.attempts = 0;
   tally_.timed = SampledTime();
 }
 

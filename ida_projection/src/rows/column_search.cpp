@@ -17,25 +17,19 @@ using linalg::at;
 
 }  // namespace
 
-// Sets of groups without a common row, each group in the first set that takes it.
-std::vector<std::vector<std::size_t>> ColumnSearch::separate() const {
-  std::vector<std::vector<std::size_t>> sets, sets_of_row(at(m_));
-  std::vector<std::size_t> taken;  // by set: the last group that cannot join it
-  for (std::size_t k = 0; k < groups_.size(); ++k) {
-    for (const int i : groups_[k].rows)
-      for (const std::size_t set : sets_of_row[at(i)]) taken[set] = k + 1;
-    std::size_t set = 0;
-    while (set < sets.size() && taken[set] == k + 1) ++set;
-    if (set == sets.size()) {
-      // More sets than probes: the search is about to end, whatever else is found out.
-      if (static_cast<long>(sets.size()) > left_) return sets;
-      sets.emplace_back();
-      taken.push_back(0);
-    }
-    sets[set].push_back(k);
-    for (const int i : groups_[k].rows) sets_of_row[at(i)].push_back(set);
+// Of the groups that wait, each that shares no row with those before it in the set.
+void ColumnSearch::take_set() {
+  set_.clear();
+  rest_.clear();
+  taken_.assign(at(m_), 0);
+  for (const std::size_t k : waiting_) {
+    const std::vector<int>& rows = groups_[k].rows;
+    const auto is_taken = [this](int i) { return taken_[at(i)] != 0; };
+    const bool joins = std::none_of(rows.begin(), rows.end(), is_taken);
+    (joins ? set_ : rest_).push_back(k);
+    for (std::size_t e = 0; joins && e < rows.size(); ++e) taken_[at(rows[e])] = 1;
   }
-  return sets;
+  waiting_.swap(rest_);
 }
 
 void ColumnSearch::change(const Group& group) {
@@ -82,15 +76,20 @@ ColumnSearch::Outcome ColumnSearch::probe_together(const std::vector<std::size_t
 ColumnSearch::Outcome ColumnSearch::run(std::vector<char>* filled) {
   filled->assign(at(n_), 0);
   groups_.clear();
+  columns_.reserve(at(n_));
   if (n_ == 0) return Outcome::found;
   groups_.push_back({0, n_, std::vector<int>(at(m_))});
   std::iota(groups_[0].rows.begin(), groups_[0].rows.end(), 0);
   while (!groups_.empty()) {
-    for (const auto& set : separate()) {
-      const Outcome outcome = probe_together(set);
+    waiting_.resize(groups_.size());
+    std::iota(waiting_.begin(), waiting_.end(), std::size_t{0});
+    while (!waiting_.empty()) {
+      take_set();
+      const Outcome outcome = probe_together(set_);
       if (outcome != Outcome::found) return outcome;
     }
     std::vector<Group> halves;
+    halves.reserve(2 * groups_.size());
     std::size_t answers = 0;
     for (Group& group : groups_) {
       if (group.rows.empty()) continue;

@@ -29,7 +29,7 @@ class ColumnSearch {
     int begin, end;
     std::vector<int> rows;  // that can answer
   };
-  std::vector<std::vector<std::size_t>> separate() const;
+  void take_set();
   Outcome probe_together(const std::vector<std::size_t>& members);
   Outcome probe_alone(Group& group);
   void change(const Group& group);
@@ -38,8 +38,9 @@ class ColumnSearch {
   Probe probe_;
   long left_;
   std::vector<Group> groups_;
+  std::vector<std::size_t> waiting_, set_, rest_;  // groups not yet probed; those of one probe
   std::vector<int> columns_;
-  std::vector<char> changed_;
+  std::vector<char> changed_, taken_;
 };
 
 }  // namespace tether::ida_projection

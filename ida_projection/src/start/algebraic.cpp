@@ -49,6 +49,8 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
     return corrector.residual(ycor, f) == 0;
   };
   for (int k = 0; k < kSizes; ++k) {
+    change[k].reserve(n);
+    y[k].reserve(n);
     for (std::size_t j = 0; j < n; ++j) {
       const double w = candidate.weight_entries[j];
       const double irregular = 1.5 + 0.5 * std::sin(1.0 + (2.3 + k) * static_cast<double>(j));

@@ -125,30 +125,33 @@ std::string FirstSteps::false_row(int row, const RowDoubt& doubt, const StepData
                                   Corrector& corrector) {
   const auto i = static_cast<std::size_t>(row);
   const auto size = static_cast<int>(point_.size());
-  Evaluator evaluator(constraints_, statistics_);
-  std::vector<double> plus(row_doubts_.size()), minus(row_doubts_.size()), y(point_);
+  evaluator_.forget();
+  plus_.resize(row_doubts_.size());
+  minus_.resize(row_doubts_.size());
+  moved_ = point_;
   double fastest = 1.0 / std::max(1.0, std::abs(step.t));
-  for (std::size_t j = 0; j < y.size(); ++j)
+  for (std::size_t j = 0; j < moved_.size(); ++j)
     fastest = std::max(fastest, std::abs(slope_[j]) / std::max(1.0, std::abs(point_[j])));
   const double dt = std::cbrt(2e-16) / fastest;
   const auto difference = [&](bool along, double* slope) {
     const auto at = [&](double change, std::vector<double>& g) {
-      for (std::size_t j = 0; along && j < y.size(); ++j) y[j] = point_[j] + change * slope_[j];
-      return evaluator.value(step.t + change, y.data(), size, g.data()) == Status::success;
+      for (std::size_t j = 0; along && j < moved_.size(); ++j)
+        moved_[j] = point_[j] + change * slope_[j];
+      return evaluator_.value(step.t + change, moved_.data(), size, g.data()) == Status::success;
     };
-    const bool known = at(dt, plus) && at(-dt, minus);
-    *slope = known ? (plus[i] - minus[i]) / (2.0 * dt) : 0.0;
-    y = point_;
+    const bool known = at(dt, plus_) && at(-dt, minus_);
+    *slope = known ? (plus_[i] - minus_[i]) / (2.0 * dt) : 0.0;
+    moved_ = point_;
     return known;
   };
   double along = 0.0, in_time = 0.0;
   const bool known = difference(true, &along) && difference(false, &in_time);
-  if (evaluator.fatal()) corrector.stop(-1, evaluator.message());
+  if (evaluator_.fatal()) corrector.stop(-1, evaluator_.message());
   if (!known) return {};
   const double terms = tangency_.terms[i] + std::abs(in_time);
   const double felt = doubt.felt * std::sqrt(static_cast<double>(size)) * tangency_.tolerance[i];
-  std::ostringstream out;
   if (std::abs(along) > doubt.share * terms && std::abs(along * h) > felt) {
+    std::ostringstream out;
     out << "F does not keep row " << row << " (" << constraints_.name(row) << "): at t = " << step.t
         << " C y' + g_t = " << along << ", its terms sum up to " << terms
         << " in absolute value; check the row, its constants and F";

@@ -30,7 +30,7 @@ class FirstSteps {
       100;  ///< accepted steps in which rows and tolerances are looked at
 
   FirstSteps(const Constraints& constraints, Statistics& statistics)
-      : constraints_(constraints), statistics_(statistics) {}
+      : constraints_(constraints), evaluator_(constraints, statistics) {}
 
   void reset();  ///< a new run starts
   /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
@@ -51,7 +51,7 @@ class FirstSteps {
   std::string wrong_entry(double t) const;
 
   const Constraints& constraints_;
-  Statistics& statistics_;
+  Evaluator evaluator_;
   Tangency tangency_;  // of the caller's rows
   // of each row, for each kind of doubt: steps in a row in which F did not seem to keep it
   std::vector<std::array<int, 2>> row_doubts_;
@@ -60,6 +60,7 @@ class FirstSteps {
   double largest_ = 0.0;               // size of the solution so far, in tolerances
   long searched_ = 0;                  // unknowns compared
   std::vector<double> point_, slope_;  // y and y' as the corrector left them
+  std::vector<double> plus_, minus_, moved_;  // work space: g to both sides, and where
   OwnedVector work_;
 };
 

@@ -8,10 +8,10 @@ namespace {
 
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
 constexpr double kForLater = 0.1;
-constexpr double kNothing = 1e-8;  // tolerances: as good as no move
-constexpr double kTurned = 4.0;    // by so much C of an earlier look may mislead
-constexpr int kLooks = 16;         // looks with the factors of one
-constexpr int kQuick = 3;          // moves with a whole C
+constexpr double kTurned = 4.0;  // by so much C of an earlier look may mislead
+constexpr int kLooks = 16;       // looks with the factors of one
+constexpr int kQuiet = 8;        // moves that were none, then looks begin again
+constexpr int kQuick = 3;        // moves with a whole C
 
 }  // namespace
 
@@ -94,10 +94,28 @@ bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
   return !(length <= limit);
 }
 
+// The same where moves have begun, after some that were none: rows that F contains, or that IDA
+// keeps by itself between the steps that need them.
+template <class Rows>
+bool ContiguousMover<Rows>::still_nothing(const Candidate& candidate, Move& result) {
+  if (nothing_in_row_ < kQuiet || options_.frequency > 1) return false;
+  result.status = rows_.value(candidate.t);
+  if (result.status != Status::success) return true;
+  result.looked = still_ = plainly_nothing();
+  if (!still_) return false;
+  result.drift_before = result.drift_after = rows_.drift();
+  rows_.set_metric(false);
+  move_length_ = 0.0;
+  reused_ = firm_only_ = false;
+  return true;
+}
+
 template <class Rows>
 Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
   rows_.at.load(candidate);
+  still_ = false;
+  if (still_nothing(candidate, result)) return result;
   reused_ = keeps_factors() && rows_.factors.there;
   ++kept_.age;
   rows_.factors.decided = false;
@@ -106,7 +124,10 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   if (options_.frequency > 1) keep_old_move(candidate.t);
   rows_.set_metric(!reused_);
   firm_only_ = start_known_ = false;
+  looks_ = 0;
   result = newton(candidate, rows_.drift());
+  const bool nothing = result.status == Status::success && result.length <= kNothing;
+  nothing_in_row_ = nothing && !keeps_factors() ? nothing_in_row_ + 1 : 0;
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
   if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
@@ -194,7 +215,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
 
     if (result.moves == 1) {
       result.length = move_length_ = length;
-      compare_with_old_move();
+      if (options_.frequency > 1) compare_with_old_move();
       double limit = 0.0;
       if (!std::isfinite(length) || too_long(length, limit)) {
         if (options_.long_move == LongMove::reject || !std::isfinite(length)) {

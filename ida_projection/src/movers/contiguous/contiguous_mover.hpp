@@ -16,7 +16,8 @@ namespace tether::ida_projection {
 constexpr double kLargestFloor = 0.1;  // tolerances
 // What a move leaves where nothing is known yet.
 constexpr double kUnknownSlope = 0.03;
-constexpr double kLong = 1.0;  // tolerances: such a move is made with fresh factors
+constexpr double kLong = 1.0;      // tolerances: such a move is made with fresh factors
+constexpr double kNothing = 1e-8;  // tolerances: as good as no move
 
 /// Factors of an earlier step leave the part slope * age of a move, age in candidates.
 struct SlopeOfFactors {
@@ -61,6 +62,7 @@ class ContiguousMover final : public Mover {
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
   Status finish(const Candidate& candidate) override {
+    if (still_) return Status::success;
     // Where a move costs little beside the step, what Newton's method left is taken, too.
     if (takes_rest_) return take_rest(candidate, move_length_);
     if (!keeps_factors()) return Status::success;
@@ -73,6 +75,8 @@ class ContiguousMover final : public Mover {
     staleness_.reset();
     wear_ = FactorWear();
     misdirection_ = Misdirection();
+    nothing_in_row_ = 0;
+    still_ = false;
   }
 
  private:
@@ -90,6 +94,7 @@ class ContiguousMover final : public Mover {
   double first_solve() { return rows_.first_solve(firm_only_); }
   bool contradicts();
   bool plainly_nothing();
+  bool still_nothing(const Candidate& candidate, Move& result);
   bool must_learn(double length) const;
   double in_metric(const std::vector<double>& dy);
   void keep_old_move(double t);
@@ -110,7 +115,9 @@ class ContiguousMover final : public Mover {
   double move_length_ = 0.0;  // of the last first move, in tolerances
   bool reused_ = false;       // factors of an earlier step are in use for this one
   SlopeOfFactors kept_;       // these
-  int looks_ = 0;             // of measure() with the factors of an earlier one
+  int looks_ = 0;             // with the factors of an earlier candidate
+  int nothing_in_row_ = 0;    // moves that were none
+  bool still_ = false;        // the last candidate was only looked at
   Staleness staleness_;
   FactorWear wear_;  // for follow(), as is what comes next
   Misdirection misdirection_;

@@ -34,13 +34,16 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
     const Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
     double length = rows_.solve();
-    if (takes_rest_ && !rows_.dropped_follow()) {
-      rows_.factors.lasting = false;
+    const bool lost = takes_rest_ && !rows_.dropped_follow();
+    if (lost || (still_ && kept_.age > 0 && length > kNothing)) {
+      if (lost) rows_.factors.lasting = false;
+      if (still_) rows_.set_metric(true);
       const Status made = factor(candidate.t);
       if (made != Status::success) return made;
       length = first_solve();
     }
     rows_.apply(1.0, candidate.correction_entries);
+    if (still_ && kept_.age > 0) break;  // by next to nothing, which says nothing about its rate
     // Where moves are cheap only what is seen on this candidate counts.
     const double expected = takes_rest_ ? length * (k > 0 ? length / previous : kUnknownSlope)
                                         : staleness_.left(reach, length);

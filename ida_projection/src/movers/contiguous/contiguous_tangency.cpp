@@ -10,10 +10,10 @@ bool ContiguousMover<Rows>::tangency(const std::vector<double>& yp, const double
   // C of an earlier candidate says nothing about y' here.
   if (!rows_.blocks.structured() || !rows_.factors.there || kept_.age > 0) return false;
   const auto rows = static_cast<std::size_t>(rows_.reported());
-  const std::vector<double>& WT = rows_.at.WT();
-  out.rate.assign(rows, 0.0);
-  out.terms.assign(rows, 0.0);
-  out.tolerance.assign(rows, 0.0);
+  const double* w = rows_.at.w;
+  out.rate.resize(rows);
+  out.terms.resize(rows);
+  out.tolerance.resize(rows);
   for (std::size_t i = 0; i < rows; ++i) {
     double rate = 0.0, terms = 0.0, square = 0.0;
     bool algebraic = false;
@@ -22,7 +22,8 @@ bool ContiguousMover<Rows>::tangency(const std::vector<double>& yp, const double
       algebraic = algebraic || (c != 0.0 && id != nullptr && id[j] == 0.0);
       rate += c * yp[k];
       terms += std::abs(c * yp[k]);
-      square += (c * WT[k]) * (c * WT[k]);
+      const double moved = w[k] > 0.0 ? c / w[k] : 0.0;
+      square += moved * moved;
     });
     out.rate[i] = rate;
     out.terms[i] = algebraic ? -1.0 : terms;
