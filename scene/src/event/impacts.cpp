@@ -94,7 +94,7 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
   const VectorXd before = rows.velocities(u);
   const Impact impact = expect(set, before, rows.size(), plastic);
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_friction(rows.A(), impact.b, impact.mu);
+  const FrictionAnswer answer = solve_impact(rows.A(), impact.b, impact.mu, bands().part);
   if (!answer.solved)
     fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", set.size(),
                      answer.error));

@@ -81,7 +81,10 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     }
   }
   ++counts_.contact_problems;
-  const AccelerationAnswer solved = solve_accelerations(model_, rows, slides);
+  std::vector<bool> closed;
+  for (const int i : candidates) closed.push_back(motion_.modes()[at(i)].mode != Mode::open);
+  const AccelerationAnswer solved =
+      solve_accelerations(model_, rows, slides, bands().of_accelerations(), closed);
   const FrictionAnswer& answer = solved.contacts;
   if (!answer.solved) fail("the forces of closed contacts are not solved");
   for (int k = 0; k < n && !jammed_; ++k)

@@ -14,6 +14,7 @@ struct Bands {
   double part = 0;  ///< the tolerance; of the largest force, and of sizes
   std::vector<double> gaps, approaches, slips;
 
+  double of_accelerations() const { return 0.1 * part; }  ///< of the largest
   double gap(int contact) const { return gaps[static_cast<std::size_t>(contact)]; }
   double approach(int contact) const { return approaches[static_cast<std::size_t>(contact)]; }
   double slip(int contact) const { return slips[static_cast<std::size_t>(contact)]; }

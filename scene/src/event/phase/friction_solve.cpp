@@ -6,18 +6,24 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/linalg/index.hpp>
+
+#include "shared_forces.hpp"
 
 namespace tether::scene::event {
 
 using contact::Regime;
+using linalg::at;
 
 namespace {
 
 constexpr double kDependent = 1e-11;
 constexpr double kLocked = 1e-12;  // A_nn of the largest
 constexpr double kSame = 1e-7;     // of the answer's size: the exact one against the library's
-constexpr double kSolve = 1e-12;
+constexpr double kSolve = 1e-12, kNear = 1e-8;
 constexpr double kFarAbove = 1e5;
+constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
+constexpr double kNoChange = 3e-9;  // of accelerations or velocities
 
 MatrixXd pseudo_solve(const MatrixXd& S, const MatrixXd& right) {
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
@@ -106,6 +112,99 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
   answer.w = w;
 }
 
+/// All stay closed, and stick where they do not slide already.
+Regimes all_held(const VectorXd& mu, int block, const std::vector<VectorXd>& slides) {
+  Regimes out;
+  for (int i = 0; i < mu.size(); ++i) {
+    const bool slides_on = slides[at(i)].size() > 0;
+    out.of.push_back(slides_on || mu[i] == 0 ? Regime::sliding : Regime::sticking);
+    out.directions.push_back(slides_on    ? slides[at(i)]
+                             : mu[i] == 0 ? VectorXd::Zero(block - 1)
+                                          : VectorXd());
+    out.fixed.push_back(slides_on || mu[i] == 0);
+  }
+  return out;
+}
+
+std::vector<int> held_rows(const Regimes& regimes, int block) {
+  std::vector<int> rows;
+  for (int i = 0; i < static_cast<int>(regimes.of.size()); ++i)
+    for (int k = 0; k < (regimes.of[at(i)] == Regime::sticking ? block : 1); ++k)
+      rows.push_back(block * i + k);
+  return rows;
+}
+
+void take(const SharedForces& from, const Regimes& regimes, FrictionAnswer& to) {
+  to.x = from.x;
+  to.w = from.w;
+  to.regimes = regimes.of;
+  to.error = 0;
+  to.solved = true;
+}
+
+bool is_solved(const contact::Solution& answer) {
+  return answer.status == contact::Status::solved || answer.status == contact::Status::round_off ||
+         (answer.error < kNear && answer.status != contact::Status::infeasible);
+}
+
+/// The shortest forces with the regimes of an answer: what begins to slip goes against its force.
+/// The answer stays where the law has none.
+bool share_as(const std::vector<bool>& open, double no_slip, const MatrixXd& A, const VectorXd& b,
+              const VectorXd& mu, Regimes held, FrictionAnswer& answer) {
+  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
+  for (int k = 0; k < n; ++k) {
+    const VectorXd slip = answer.w.segment(block * k + 1, block - 1);
+    if (open[at(k)]) held.of[at(k)] = Regime::separating;
+    if (held.of[at(k)] != Regime::sticking || slip.norm() <= no_slip) continue;
+    const VectorXd force = answer.x.segment(block * k + 1, block - 1);
+    held.of[at(k)] = Regime::sliding;
+    held.directions[at(k)] = force.norm() > 0 ? VectorXd(-force.normalized()) : slip.normalized();
+  }
+  const SharedForces shared = share_forces(A, b, mu, held);
+  if (shared.lawful) take(shared, held, answer);
+  return shared.lawful;
+}
+
+/// What is `closed`, or does not open, stays closed where it may.
+bool settle(const std::vector<bool>& closed, double none, const MatrixXd& A, const VectorXd& b,
+            const VectorXd& mu, const Regimes& held, FrictionAnswer& answer) {
+  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
+  std::vector<bool> open(at(n));
+  for (int k = 0; k < n; ++k)
+    open[at(k)] = answer.regimes[at(k)] == Regime::separating &&
+                  (closed.empty() ? answer.w[block * k] > none : !closed[at(k)]);
+  return share_as(open, none, A, b, mu, held, answer);
+}
+
+/// Where several answers exist an iteration ends at any of them. Compliant contacts share their
+/// forces in one way: from soft to stiff, the first answer whose regimes hold for stiff ones, too.
+bool solve_compliant(const std::vector<bool>& closed, double none, const MatrixXd& A,
+                     const VectorXd& b, const VectorXd& all, const VectorXd& mu,
+                     const Regimes& held, FrictionAnswer& out) {
+  contact::Options options;
+  options.law = contact::Law::coulomb;
+  options.tolerance = kSolve;
+  options.strict = true;
+  options.warm_start = true;
+  options.max_work = kCompliantWork;
+  contact::Solver solver(options);
+  FrictionAnswer answer;
+  for (double part = 1; part >= kStiffest; part *= kStiffer) {
+    MatrixXd compliant = A;
+    compliant.diagonal().array() += part * A.diagonal().mean();
+    const contact::Solution found = solver.solve(contact::Problem::dense(compliant, b, mu));
+    if (!is_solved(found)) return false;
+    if (found.regimes == answer.regimes) continue;
+    answer.x = found.impulses;
+    answer.w = found.velocities;
+    answer.regimes = found.regimes;
+    if (!settle(closed, none, A, all, mu, held, answer)) continue;
+    out = answer;
+    return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 ContactRows::ContactRows(Model& model, std::vector<int> contacts)
@@ -148,19 +247,51 @@ VectorXd ContactRows::free_accelerations() {
 }
 
 AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
-                                       const std::vector<VectorXd>& slides) {
+                                       const std::vector<VectorXd>& slides, double part,
+                                       const std::vector<bool>& closed) {
   const int block = rows.size(), n = static_cast<int>(rows.contacts().size());
   AccelerationAnswer out;
   const VectorXd free = rows.free_accelerations();
   out.scale = free.cwiseAbs().maxCoeff();
   out.far = kFarAbove * std::max(out.scale, 1e-12);
   VectorXd b = -free, mu(n);
-  for (int k = 0; k < n; ++k) {
-    const std::size_t place = static_cast<std::size_t>(k);
-    mu[k] = model.law(rows.contacts()[place]).friction;
-    if (slides[place].size() > 0) b.segment(block * k + 1, block - 1) -= out.far * slides[place];
+  for (int k = 0; k < n; ++k) mu[k] = model.law(rows.contacts()[at(k)]).friction;
+  Regimes regimes = all_held(mu, block, slides);
+  b = without_contradictions(rows.A(), b, held_rows(regimes, block), part * out.scale);
+  SharedForces shared = share_forces(rows.A(), b, mu, regimes);
+  if (shared.lawful) {
+    take(shared, regimes, out.contacts);
+    return out;
   }
+  const VectorXd all = b;
+  for (int k = 0; k < n; ++k)
+    if (slides[at(k)].size() > 0) b.segment(block * k + 1, block - 1) -= out.far * slides[at(k)];
+  const bool decides = shared.several && !closed.empty();
+  const double none = kNoChange * out.scale;
+  if (decides && solve_compliant(closed, none, rows.A(), b, all, mu, regimes, out.contacts))
+    return out;
   out.contacts = solve_friction(rows.A(), b, mu);
+  if (decides && out.contacts.solved)
+    settle(closed, none, rows.A(), all, mu, regimes, out.contacts);
+  return out;
+}
+
+FrictionAnswer solve_impact(const MatrixXd& A, const VectorXd& given, const VectorXd& mu,
+                            double band) {
+  const int n = static_cast<int>(mu.size()), block = static_cast<int>(given.size()) / n;
+  if (!A.allFinite() || !given.allFinite()) return solve_friction(A, given, mu);
+  Regimes regimes = all_held(mu, block, std::vector<VectorXd>(at(n)));
+  const VectorXd b = without_contradictions(A, given, held_rows(regimes, block), band);
+  FrictionAnswer out;
+  const SharedForces shared = share_forces(A, b, mu, regimes);
+  if (shared.lawful) {
+    take(shared, regimes, out);
+    return out;
+  }
+  const double none = kNoChange * b.cwiseAbs().maxCoeff();
+  if (shared.several && solve_compliant({}, none, A, b, b, mu, regimes, out)) return out;
+  out = solve_friction(A, b, mu);
+  if (shared.several && out.solved) settle({}, none, A, b, mu, regimes, out);
   return out;
 }
 
@@ -206,9 +337,7 @@ FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const Vector
   inner.w = answer.velocities;
   inner.regimes = answer.regimes;
   inner.error = answer.error;
-  inner.solved = answer.status == contact::Status::solved ||
-                 answer.status == contact::Status::round_off ||
-                 (answer.error < 1e-8 && answer.status != contact::Status::infeasible);
+  inner.solved = is_solved(answer);
   if (inner.solved) sharpen(part, right, friction, block, inner);
   out.solved = inner.solved;
   out.error = inner.error;

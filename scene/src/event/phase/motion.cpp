@@ -320,7 +320,8 @@ bool Motion::forces_are_lawful() const {
   }
   const VectorXd left = row_scale_.cwiseProduct(R_ * a_ + r_);
   const double scale = row_scale_.cwiseProduct(r_).norm() + a_.norm();
-  return left.size() == 0 || left.cwiseAbs().maxCoeff() <= kHeld * scale;
+  return left.size() == 0 ||
+         left.cwiseAbs().maxCoeff() <= std::max(kHeld, bands_.of_accelerations()) * scale;
 }
 
 std::vector<VectorXd> Motion::contact_forces() {
@@ -340,7 +341,8 @@ std::vector<VectorXd> Motion::contact_forces() {
   }
   if (lawful || !hyperstatic_) return out;
   ContactRows rows(model_, closed_);
-  const AccelerationAnswer answer = solve_accelerations(model_, rows, slides());
+  const AccelerationAnswer answer =
+      solve_accelerations(model_, rows, slides(), bands_.of_accelerations());
   if (!answer.contacts.solved) return out;
   for (std::size_t k = 0; k < closed_.size(); ++k)
     out[k] = answer.contacts.x.segment(rows.size() * static_cast<int>(k), rows.size());

@@ -147,7 +147,8 @@ double Watcher::support() {
   const std::vector<VectorXd> slides = motion_.slides();
   const bool sliding = std::any_of(slides.begin(), slides.end(),
                                    [](const VectorXd& each) { return each.size() > 0; });
-  const AccelerationAnswer answer = solve_accelerations(motion_.model(), rows, slides);
+  const AccelerationAnswer answer =
+      solve_accelerations(motion_.model(), rows, slides, bands().of_accelerations());
   if (!answer.contacts.solved) return -answer.scale;
   double largest = 0;
   for (std::size_t k = 0; k < slides.size(); ++k) {
@@ -157,7 +158,7 @@ double Watcher::support() {
       largest = std::max(largest, answer.contacts.w.segment(row + 1, block - 1).norm());
   }
   const double noise = std::max(sliding ? kSlidingNoise : kNoise, 100 * answer.contacts.error);
-  support_band_ = std::max(0.1 * bands().part, noise) * answer.scale;
+  support_band_ = std::max(bands().of_accelerations(), noise) * answer.scale;
   return support_band_ - largest;
 }
 

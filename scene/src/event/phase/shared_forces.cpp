@@ -1,0 +1,219 @@
+// Tether: forces of contacts that share them in more than one way. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "shared_forces.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <tether/linalg/index.hpp>
+
+namespace tether::scene::event {
+
+using contact::Regime;
+using linalg::at;
+
+namespace {
+
+constexpr double kSameForces = 1e-11;
+constexpr double kContradicts = 1e-10;  // of b
+constexpr double kOutOfCone = 1e-9;     // of the largest force
+constexpr double kNoSlip = 3e-9;        // of b: no velocity or acceleration
+constexpr double kFollow = 0.99;
+constexpr int kConeSteps = 1000;
+constexpr int kTurns = 50;
+constexpr double kSettles = 0.9;
+
+/// The closed contacts' unknowns: x_n, and x_t where it sticks.
+class HeldRows {
+ public:
+  HeldRows(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, const Regimes& regimes)
+      : A_(A), b_(b), mu_(mu), block_(static_cast<int>(b.size() / mu.size())), regimes_(regimes) {
+    for (int i = 0; i < mu.size(); ++i) {
+      if (regimes.of[at(i)] == Regime::separating) continue;
+      first_.push_back(static_cast<int>(rows_.size()));
+      contacts_.push_back(i);
+      for (int k = 0; k < (regimes.of[at(i)] == Regime::sticking ? block_ : 1); ++k)
+        rows_.push_back(block_ * i + k);
+    }
+    const int m = static_cast<int>(rows_.size());
+    right_.resize(m);
+    S_.resize(m, m);
+    VectorXd column;
+    for (int c = 0; c < m; ++c) {
+      const int row = rows_[at(c)], i = row / block_;
+      right_[c] = b[row];
+      column = A.col(row);
+      if (slides(i))
+        column -= mu[i] * A.middleCols(row + 1, block_ - 1) * regimes.directions[at(i)];
+      for (int r = 0; r < m; ++r) S_(r, c) = column[rows_[at(r)]];
+    }
+  }
+
+  bool several() const { return free_.cols() > 0; }
+
+  /// False: nothing holds all rows.
+  bool solve() {
+    if (rows_.empty()) return false;
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
+    factor.setThreshold(kSameForces);
+    factor.compute(S_);
+    x_ = factor.solve(right_);
+    Eigen::ColPivHouseholderQR<MatrixXd> of_rows;
+    of_rows.setThreshold(kSameForces);
+    of_rows.compute(S_.transpose());
+    const MatrixXd Q = of_rows.householderQ() * MatrixXd::Identity(S_.rows(), S_.cols());
+    free_ = Q.rightCols(S_.cols() - of_rows.rank());
+    return (S_ * x_ - right_).cwiseAbs().maxCoeff() <= kContradicts * b_.cwiseAbs().maxCoeff();
+  }
+
+  /// They act against what closes the contacts: else contacts that could open as well press
+  /// themselves together (Painleve).
+  bool resists() const { return x_.dot(right_) >= 0; }
+
+  bool is_lawful(const VectorXd& x) const {
+    const double least = -kOutOfCone * x.cwiseAbs().maxCoeff();
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      const int i = contacts_[k], row = first_[k];
+      if (x[row] < least) return false;
+      if (!slides(i) && mu_[i] * x[row] - x.segment(row + 1, block_ - 1).norm() < least)
+        return false;
+    }
+    return true;
+  }
+
+  /// x + N z onto the cones: alternating directions for the shortest z. A few digits of it do: w
+  /// is that of any z.
+  bool move_into_cones() {
+    if (is_lawful(x_)) return true;
+    if (!several()) return false;
+    VectorXd moved = x_, inside, off = VectorXd::Zero(x_.size());
+    for (int k = 0; k < kConeSteps; ++k) {
+      inside = moved + off;
+      project(inside);
+      off += moved - inside;
+      moved = x_ + kFollow * free_ * (free_.transpose() * (inside - off - x_));
+      if (is_lawful(moved)) {
+        x_ = moved;
+        return true;
+      }
+    }
+    return false;
+  }
+
+  VectorXd forces() const {
+    VectorXd x = VectorXd::Zero(b_.size());
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      const int i = contacts_[k], row = first_[k];
+      x[block_ * i] = std::max(0.0, x_[row]);
+      if (slides(i))
+        x.segment(block_ * i + 1, block_ - 1) =
+            -mu_[i] * x[block_ * i] * regimes_.directions[at(i)];
+      else
+        x.segment(block_ * i + 1, block_ - 1) = x_.segment(row + 1, block_ - 1);
+    }
+    return x;
+  }
+
+ private:
+  /// The nearest point of the cones.
+  void project(VectorXd& x) const {
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      const int i = contacts_[k];
+      double& normal = x[first_[k]];
+      if (slides(i)) {
+        normal = std::max(0.0, normal);
+        continue;
+      }
+      auto tangents = x.segment(first_[k] + 1, block_ - 1);
+      const double length = tangents.norm(), mu = mu_[i];
+      if (length <= mu * normal) continue;
+      const double on = std::max(0.0, (normal + mu * length) / (1 + mu * mu));
+      normal = on;
+      tangents *= length > 0 ? mu * on / length : 0;
+    }
+  }
+  bool slides(int i) const { return regimes_.of[at(i)] == Regime::sliding; }
+
+  const MatrixXd& A_;
+  const VectorXd& b_;
+  const VectorXd& mu_;
+  int block_;
+  const Regimes& regimes_;
+  std::vector<int> contacts_, first_, rows_;
+  MatrixXd S_, free_;
+  VectorXd right_, x_;
+};
+
+/// Directions of slip turn towards those of w: where they hardly slip, w turns by what the friction
+/// moves. Returns how far w is from them.
+double turn(const MatrixXd& A, const SharedForces& now, Regimes& regimes) {
+  const int n = static_cast<int>(regimes.of.size()), block = static_cast<int>(now.x.size()) / n;
+  std::vector<int> turning;
+  for (int i = 0; i < n; ++i)
+    if (regimes.of[at(i)] == Regime::sliding && !regimes.fixed[at(i)]) turning.push_back(i);
+  double largest = 0;
+  for (const int i : turning) {
+    VectorXd& d = regimes.directions[at(i)];
+    const VectorXd slip = now.w.segment(block * i + 1, block - 1);
+    const double along = slip.dot(d);
+    const VectorXd across = slip - along * d;
+    largest = std::max({largest, across.norm(), -along});
+    double moves = std::abs(along);
+    for (const int k : turning)
+      moves += A.block(block * i + 1, block * k + 1, block - 1, block - 1).norm() *
+               now.x.segment(block * k + 1, block - 1).norm();
+    if (moves > 0) d = (d + across / moves).normalized();
+  }
+  return largest;
+}
+
+}  // namespace
+
+VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
+                                double band) {
+  const int m = static_cast<int>(rows.size());
+  MatrixXd part(m, m);
+  VectorXd right(m);
+  for (int r = 0; r < m; ++r) {
+    right[r] = b[rows[at(r)]];
+    for (int c = 0; c < m; ++c) part(r, c) = A(rows[at(r)], rows[at(c)]);
+  }
+  Eigen::ColPivHouseholderQR<MatrixXd> factor;
+  factor.setThreshold(kSameForces);
+  factor.compute(part);
+  const MatrixXd Q = factor.householderQ() * MatrixXd::Identity(m, m);
+  const auto none = Q.rightCols(m - factor.rank());
+  const VectorXd against = none * (none.transpose() * right);
+  VectorXd out = b;
+  if (m > 0 && against.cwiseAbs().maxCoeff() <= band)
+    for (int r = 0; r < m; ++r) out[rows[at(r)]] -= against[r];
+  return out;
+}
+
+SharedForces share_forces(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
+                          Regimes& regimes) {
+  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
+  const double none = kNoSlip * b.cwiseAbs().maxCoeff();
+  SharedForces out;
+  double off = 0, before = 0;
+  for (int pass = 0; pass < kTurns; ++pass) {
+    HeldRows rows(A, b, mu, regimes);
+    const bool held = rows.solve();
+    out.several = rows.several();
+    if (!held || !out.several || !rows.resists() || !rows.move_into_cones()) return out;
+    out.x = rows.forces();
+    out.w = A * out.x - b;
+    const Regimes now = regimes;
+    before = off;
+    off = turn(A, out, regimes);
+    if (off == 0 || (pass > 0 && off <= none && off >= kSettles * before)) {
+      regimes = now;
+      break;
+    }
+  }
+  out.lawful = off <= none;
+  for (int i = 0; i < n; ++i) out.lawful = out.lawful && out.w[block * i] >= -none;
+  return out;
+}
+
+}  // namespace tether::scene::event

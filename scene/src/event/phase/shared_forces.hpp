@@ -1,0 +1,43 @@
+// Tether: forces of contacts that share them in more than one way. SPDX-License-Identifier:
+// BSD-3-Clause
+//
+// Feet of one body on a plane, corners of one face on another: accelerations may be unique, forces
+// are not, and with friction several sets of regimes may obey Coulomb's law. An iteration ends at
+// any of them; here the regimes are given, and the answer is the shortest of all forces that the
+// law allows with them. It is unique, so that what is symmetric stays symmetric.
+#pragma once
+
+#include <Eigen/Core>
+#include <tether/contact/problem.hpp>
+#include <vector>
+
+namespace tether::scene::event {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Regimes of a problem w = A x - b. Where a contact slides: x_t = -mu x_n d.
+struct Regimes {
+  std::vector<contact::Regime> of;
+  std::vector<VectorXd> directions;  ///< d; empty where it does not slide
+  std::vector<bool> fixed;           ///< d stays; else it is that of w_t
+};
+
+struct SharedForces {
+  bool several = false;  ///< other forces lead to the same w
+  bool lawful = false;   ///< the law allows x and w, which are set then
+  VectorXd x, w;
+};
+
+/// w_n = 0 where contacts are closed, w_t = 0 where they stick. Directions that are not fixed turn
+/// to those of w.
+SharedForces share_forces(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
+                          Regimes& regimes);
+
+/// b of w = A x - b without what no x can do in these rows, which depend on each other, where that
+/// is at most `band`: the error of a state makes them contradict each other, and an answer that
+/// holds all of them would not exist.
+VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
+                                double band);
+
+}  // namespace tether::scene::event
