@@ -56,10 +56,26 @@ int ida_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vecto
 tp::Constraints spoilt(const tp::Constraints& set, const std::shared_ptr<Spoiler>& of_g,
                        const std::shared_ptr<Spoiler>& of_C) {
   tp::Constraints out = set;
-  out.value = [set, of_g](double t, tp::ConstVector y, tp::Vector g) {
-    const int flag = set.value(t, y, g);
-    return flag != 0 ? flag : (*of_g)(g.data(), g.size());
-  };
+  if (set.value)
+    out.value = [set, of_g](double t, tp::ConstVector y, tp::Vector g) {
+      const int flag = set.value(t, y, g);
+      return flag != 0 ? flag : (*of_g)(g.data(), g.size());
+    };
+  if (auto* own = std::get_if<tp::Gradients>(&out.jacobian)) {
+    own->value = [value = own->value, of_g, m = set.count](double t, N_Vector y, double* g) {
+      const int flag = value(t, y, g);
+      return flag != 0 ? flag : (*of_g)(g, m);
+    };
+    own->fill = [fill = own->fill, of_C](double t, N_Vector y, N_Vector* rows) {
+      const int flag = fill(t, y, rows);
+      return flag != 0 ? flag : (*of_C)(N_VGetArrayPointer(rows[0]), N_VGetLength(rows[0]));
+    };
+  }
+  if (auto* own = std::get_if<tp::DistributedRows>(&out.jacobian))
+    own->fill = [fill = own->fill, of_C](double t, tp::ConstVector y, tp::Vector entries) {
+      const int flag = fill(t, y, entries);
+      return flag != 0 ? flag : (*of_C)(entries.data(), entries.size());
+    };
   if (const auto* dense = std::get_if<tp::DenseJacobian>(&set.jacobian))
     out.jacobian =
         tp::DenseJacobian([fill = dense->fill, of_C](double t, tp::ConstVector y, tp::Matrix C) {
@@ -89,6 +105,18 @@ struct Case {
   double t_out;
 };
 
+/// Sparse rows of one process, without ghosts.
+tp::Constraints as_distributed(tp::Constraints rows, int n) {
+  const auto& sparse = std::get<tp::SparseJacobian>(rows.jacobian);
+  tp::DistributedRows spread;
+  spread.unknowns = n;
+  spread.starts = sparse.starts;
+  spread.columns = sparse.columns;
+  spread.fill = sparse.fill;
+  rows.jacobian = std::move(spread);
+  return rows;
+}
+
 std::vector<Case> cases() {
   std::vector<Case> all;
   const Problem index1 = pendulum(1.0, 1.0, 3.0, "index 1");
@@ -103,6 +131,9 @@ std::vector<Case> cases() {
   all.push_back({"index 1", index1, index1.recommended_constraints(), {}, 1.0});
   all.push_back({"differences", index1, differences, {}, 1.0});
   all.push_back({"sparse", index1, as_sparse(index1.recommended_constraints(), 5), {}, 1.0});
+  const tp::Constraints all_rows = index1.recommended_constraints();
+  all.push_back({"gradients", index1, gradients_of(all_rows, 5), {}, 1.0});
+  all.push_back({"distributed", index1, as_distributed(as_sparse(all_rows, 5), 5), {}, 1.0});
   all.push_back({"frequency", index0, index0.recommended_constraints(), between, 3.0});
   all.push_back({"GGL", ggl, ggl.select({"position", "velocity"}), {}, 0.5});
   all.push_back({"joined equations", wheel, wheel.select({"gap", "rate", "energy"}), {}, 0.2});
