@@ -1,6 +1,7 @@
 // Tether: the program. SPDX-License-Identifier: BSD-3-Clause
 #include <exception>
 #include <iostream>
+#include <new>
 #include <string>
 
 #include "commands.hpp"
@@ -39,6 +40,10 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return flushed(app.exit(e) == 0 ? kGood : kWrong);
+  } catch (const std::bad_alloc&) {
+    std::cerr << "tether: the memory has ended: what is asked for is too large for this machine, or "
+                 "for its limit (ulimit -v)\n";
+    return kFailed;
   } catch (const std::exception& e) {
     if (const int lost = flushed(kWrong); lost != kWrong) return lost;
     complain(e);
