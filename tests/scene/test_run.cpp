@@ -268,6 +268,9 @@ TEST_CASE("times that no run can have are refused") {
   bad([&](Scene& s) { s.output.checkpoint = 1e-300; }, "checkpoint");
   bad([&](Scene& s) { s.stepping->step = 1e-300; }, "step");
   CostOptions options;
-  options.settings = {1e-300};
+  int begun = 0;
+  options.progress = [&](const std::string&, int, int) { ++begun; };
+  options.settings = {1e-2, 1e-300};  // before the first of them is run
   CHECK_THROWS_AS(cost(good, options), std::invalid_argument);
+  CHECK(begun == 0);
 }

@@ -63,6 +63,10 @@ std::vector<Setting> settings_of(const Scene& scene, const Plan& plan, bool even
       if (!(each > 0) || !std::isfinite(each))
         throw std::invalid_argument(
             fmt::format("a tolerance or time step must be > 0, not {}", each));
+      if (method == Method::steps && !(scene.end / each <= kMostSteps))
+        throw std::invalid_argument(
+            fmt::format("time step {}: end / step must be at most {:g}, the end is {} s", each,
+                        kMostSteps, scene.end));
       out.push_back({method, each});
     }
   };

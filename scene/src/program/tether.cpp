@@ -41,8 +41,9 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return flushed(app.exit(e) == 0 ? kGood : kWrong);
   } catch (const std::bad_alloc&) {
-    std::cerr << "tether: the memory has ended: what is asked for is too large for this machine, or "
-                 "for its limit (ulimit -v)\n";
+    std::cerr
+        << "tether: the memory has ended: what is asked for is too large for this machine, or "
+           "for its limit (ulimit -v)\n";
     return kFailed;
   } catch (const std::exception& e) {
     if (const int lost = flushed(kWrong); lost != kWrong) return lost;
