@@ -8,6 +8,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "run_files.hpp"
 #include "support/catch.hpp"
 
 namespace {
@@ -15,14 +16,10 @@ namespace {
 namespace fs = std::filesystem;
 namespace ts = tether::scene;
 
-// A folder of its own with a scene's files, gone at the end.
+// A folder of its own with a scene's files.
 struct Folder {
-  fs::path path = fs::temp_directory_path() / fs::path("tether_surfaces");
-  Folder() {
-    fs::remove_all(path);
-    fs::create_directories(path / "scenes");
-  }
-  ~Folder() { fs::remove_all(path); }
+  fs::path path = tether::test::folder("surfaces");
+  Folder() { fs::create_directories(path / "scenes"); }
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(path / "scenes" / name, std::ios::binary) << text;
   }
