@@ -27,10 +27,16 @@ struct JoinedEquations {
   std::vector<char> moves;                ///< N: algebraic variables that move with the rest
 };
 
-/// Do rows contain free algebraic variables, at y or away from it? Without F.
-bool contain_algebraic(Evaluator& rows, double t, const std::vector<double>& y,
-                       const std::vector<double>& WT, const std::vector<bool>& hold,
-                       const double* id);
+/// The rows that contain free algebraic variables, at y or away from it. Without F.
+std::vector<int> rows_with_algebraic(Evaluator& rows, double t, const std::vector<double>& y,
+                                     const std::vector<double>& WT, const std::vector<bool>& hold,
+                                     const double* id);
+
+/// Are these rows, up to factors, the equations of F without y', all of them? Where F is of index 1
+/// nothing has to be joined then, which three evaluations of F tell.
+bool are_the_equations(Evaluator& rows, const Residual& residual, const std::vector<int>& which,
+                       const std::vector<char>& derivative_free, double t,
+                       const std::vector<double>& y, const std::vector<double>& WT);
 
 /// Finds them at the point y, of which the candidate is `derivative_free` rows of F: those without
 /// y'. id: 1 differential, 0 algebraic. WT: error weights. Nothing is joined for rows that repeat

@@ -47,10 +47,14 @@ void JoinedRows::join(const Candidate& candidate, double cj) {
   const Residual residual = [this](const double* at, double* f) { return residual_at(at, f); };
   const double* id = variables_.mask();
   JoinedEquations found;
-  if (contain_algebraic(rows, candidate.t, y, WT, options_.hold, id))
-    found = find_joined_equations(rows, residual,
-                                  variables_.derivative_free_equations(candidate, corrector_, cj),
-                                  candidate.t, y, WT, options_.hold, id);
+  const std::vector<int> with = rows_with_algebraic(rows, candidate.t, y, WT, options_.hold, id);
+  if (!with.empty()) {
+    const std::vector<char> free = variables_.derivative_free_equations(candidate, corrector_, cj);
+    const bool plain = variables_.index_known() && !variables_.high_index() &&
+                       are_the_equations(rows, residual, with, free, candidate.t, y, WT);
+    if (!plain)
+      found = find_joined_equations(rows, residual, free, candidate.t, y, WT, options_.hold, id);
+  }
   if (rows.fatal()) corrector_.stop(-1, rows.message());
   if (found.moves.empty()) return;
   moved_id_ = OwnedVector(candidate.base);

@@ -28,6 +28,7 @@ void FirstSteps::reset() {
   row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), {});
   vanished_.assign(row_doubts_.size(), 0);
   looks_ = small_looks_ = 0;
+  doubted_ = false;
   largest_ = 0.0;
   searched_ = 0;
 }
@@ -40,7 +41,9 @@ std::string FirstSteps::look(const Candidate& candidate, const StepData& step, l
   if (largest_ < 1.0) found = look_at_tolerances(candidate, step, h, corrected);
   // In forms of index 2 and more y' and multipliers carry the error of derivatives that F lacks.
   if (!found.empty() || variables.high_index() || !variables.index_known()) return found;
-  if (candidate.base_entries != nullptr && has_values(constraints_) && looks_ < kLooks)
+  // Where the last look met no doubt every second step is enough.
+  const bool due = doubted_ || steps % 2 == 0;
+  if (due && candidate.base_entries != nullptr && has_values(constraints_) && looks_ < kLooks)
     found = look_for_false_rows(candidate, step, h, corrected, variables.mask(), mover, corrector);
   return found;
 }
@@ -82,7 +85,9 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
   std::string text_of_side = one_sided_row(step.t);
   if (!text_of_side.empty()) return text_of_side;
   const double root = std::sqrt(static_cast<double>(n));
+  doubted_ = false;
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
+    doubted_ |= tangency_.tolerance[i] == 0.0;
     const double rate = tangency_.rate[i], terms = tangency_.terms[i];
     for (std::size_t kind = 0; kind < kDoubts.size(); ++kind) {
       const RowDoubt& doubt = kDoubts[kind];
@@ -92,6 +97,7 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
         seen = 0;
         continue;
       }
+      doubted_ = true;
       seen = rate > 0.0 ? std::max(seen, 0) + 1 : std::min(seen, 0) - 1;
       if (std::abs(seen) < doubt.steps) continue;
       seen = 0;

@@ -56,6 +56,7 @@ class FirstSteps {
   // of each row, for each kind of doubt: steps in a row in which F did not seem to keep it
   std::vector<std::array<int, 2>> row_doubts_;
   std::vector<int> vanished_;          // steps in which a row of C was zero
+  bool doubted_ = false;               // the last look at the rows met something
   int looks_ = 0, small_looks_ = 0;    // at doubts in rows; at a solution below its tolerances
   double largest_ = 0.0;               // size of the solution so far, in tolerances
   long searched_ = 0;                  // unknowns compared
