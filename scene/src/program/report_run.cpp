@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
@@ -109,8 +110,8 @@ void print_work(const Scene& scene, const Summary& s, const Counts& c) {
 void print_summary(const Scene& scene, const RunResult& r) {
   const Summary& s = r.summary;
   const Counts& c = r.counts;
-  fmt::print("{}: {} engine, {:g} s\n", scene.name.empty() ? scene.file : scene.name, r.engine,
-             r.time);
+  fmt::print("{}: {} engine, {:g} s\n", scene.name.empty() ? on_terminal(scene.file) : scene.name,
+             r.engine, r.time);
   fmt::print(
       "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
       s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
@@ -120,7 +121,7 @@ void print_summary(const Scene& scene, const RunResult& r) {
                r.hand_over->time, scene.stepping.value_or(SteppingOptions{}).step,
                r.hand_over->why);
   if (r.engine != "event" || r.hand_over) print_work(scene, s, c);
-  if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, r.failure);
+  if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, on_terminal(r.failure));
 }
 
 void print_times(const RunResult& r, double wall) {
@@ -170,8 +171,8 @@ void print_costs(const RunResult& r) {
 }
 
 void print_files(const RunResult& r) {
-  for (const std::string& file : r.written) fmt::print("written: {}\n", file);
-  for (const std::string& remark : r.remarks) fmt::print("note: {}\n", remark);
+  for (const std::string& file : r.written) fmt::print("written: {}\n", on_terminal(file));
+  for (const std::string& remark : r.remarks) fmt::print("note: {}\n", on_terminal(remark));
 }
 
 int exit_code(const RunResult& r) {

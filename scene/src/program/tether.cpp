@@ -2,16 +2,20 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <sstream>
 #include <string>
 
 #include "commands.hpp"
 #include "contact_command.hpp"
 #include "program/process/standard_streams.hpp"
+#include "program/terminal_text.hpp"
 
 namespace {
 
 /// A message of several problems starts each of them on its line.
-void complain(const std::exception& e) { std::cerr << "tether: " << e.what() << "\n"; }
+void complain(const std::exception& e) {
+  std::cerr << "tether: " << tether::scene::on_terminal(e.what()) << "\n";
+}
 
 }  // namespace
 
@@ -39,7 +43,11 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return flushed(app.exit(e) == 0 ? kGood : kWrong);
+    std::ostringstream out, error;
+    const int code = app.exit(e, out, error);
+    std::cout << out.str() << std::flush;
+    std::cerr << on_terminal(error.str());
+    return flushed(code == 0 ? kGood : kWrong);
   } catch (const std::bad_alloc&) {
     std::cerr
         << "tether: the memory has ended: what is asked for is too large for this machine, or "

@@ -7,6 +7,7 @@
 
 #include "program/commands.hpp"
 #include "program/scene_text.hpp"
+#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
@@ -34,13 +35,13 @@ int check(const Arguments& arguments) {
       if (arguments.print)
         fmt::print("{}", write_scene(with_options(scene, plan.engine)));
       else
-        fmt::print("{}: right (bodies: {}, effects: {}, expectations: {})\n", file, plan.bodies,
-                   plan.effects.size(), scene.expect.size());
+        fmt::print("{}: right (bodies: {}, effects: {}, expectations: {})\n", on_terminal(file),
+                   plan.bodies, plan.effects.size(), scene.expect.size());
     } catch (const SceneError& e) {
       fmt::print(stderr, "{}\n", e.what());
       status = kWrong;
     } catch (const std::exception& e) {
-      fmt::print(stderr, "{}: {}\n", file, e.what());
+      fmt::print(stderr, "{}: {}\n", on_terminal(file), on_terminal(e.what()));
       status = kWrong;
     }
   }

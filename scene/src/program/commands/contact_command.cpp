@@ -1,5 +1,6 @@
 // Tether: `tether contact`: solves contact problems in files. SPDX-License-Identifier: BSD-3-Clause
 #include "program/contact_command.hpp"
+#include "program/terminal_text.hpp"
 
 #include <cstdio>
 #include <map>
@@ -72,8 +73,8 @@ int run(const Arguments& arguments) {
       if (s.status != Status::solved && status == 0) status = 1;
       if (arguments.csv) {
         std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e\n",
-                    file.c_str(), problem.contacts(), name(o.law), name(o.method), o.tolerance,
-                    name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
+                    table_field(file).c_str(), problem.contacts(), name(o.law), name(o.method),
+                    o.tolerance, name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
                     s.counts.factorisations, s.replaced.size(), r.signorini, r.cone, r.alignment,
                     r.dissipation, r.energy_change, r.fixed_point, r.natural_map,
                     r.natural_map_data);
@@ -81,7 +82,8 @@ int run(const Arguments& arguments) {
       }
       int count[3] = {0, 0, 0};
       for (Regime regime : s.regimes) ++count[static_cast<int>(regime)];
-      std::printf("%s: %d contacts, %s\n", file.c_str(), problem.contacts(), name(o.law));
+      std::printf("%s: %d contacts, %s\n", on_terminal(file).c_str(), problem.contacts(),
+                  name(o.law));
       std::printf("  %s, error %.3e; %d sweeps, %d ADMM iterations, %d factorisations\n",
                   name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
                   s.counts.factorisations);
@@ -98,7 +100,7 @@ int run(const Arguments& arguments) {
       }
       if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
     } catch (const std::exception& e) {
-      std::fprintf(stderr, "tether contact: %s\n", e.what());
+      std::fprintf(stderr, "tether contact: %s\n", on_terminal(e.what()).c_str());
       status = 2;
     }
   }

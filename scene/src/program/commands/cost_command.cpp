@@ -14,6 +14,7 @@
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
 #include "program/settings.hpp"
+#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
@@ -39,7 +40,7 @@ void print_row(const Scene& scene, const CostTable& table, const CostRow& row) {
 }
 
 void print(const Scene& scene, const CostTable& table) {
-  fmt::print("{}: errors against {}\n", scene.name.empty() ? scene.file : scene.name,
+  fmt::print("{}: errors against {}\n", scene.name.empty() ? on_terminal(scene.file) : scene.name,
              table.reference);
   fmt::print("  (which may be off by {:.1e}; the errors include that)\n", table.reference_error);
   if (!table.no_events.empty()) fmt::print("  events are not compared: {}\n", table.no_events);

@@ -17,6 +17,7 @@
 #include "program/process/standard_streams.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
+#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
@@ -81,7 +82,7 @@ int write_import(const Arguments& a) {
   }
   for (const std::string& remark : made.remarks)
     fmt::print(stderr, "left out or changed: {}\n", remark);
-  if (a.out != "-") fmt::print("written: {0}\nnext: tether run {0}\n", a.out);
+  if (a.out != "-") fmt::print("written: {0}\nnext: tether run {0}\n", on_terminal(a.out));
   return a.strict && !made.remarks.empty() ? kNotMet : kGood;
 }
 

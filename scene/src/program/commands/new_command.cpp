@@ -10,6 +10,7 @@
 #include "program/new_file.hpp"
 #include "program/process/signals.hpp"
 #include "program/process/standard_streams.hpp"
+#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
@@ -47,7 +48,7 @@ int write_new(const Arguments& arguments) {
     write_whole(file, text);
   else
     make_new(file, text);
-  fmt::print("written: {0}\nnext: tether run {0}\n", file);
+  fmt::print("written: {0}\nnext: tether run {0}\n", on_terminal(file));
   return kGood;
 }
 

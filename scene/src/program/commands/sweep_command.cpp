@@ -20,6 +20,7 @@
 #include "program/process/worker_processes.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
+#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
@@ -33,17 +34,6 @@ struct Arguments {
   int jobs = 0;
   bool quiet = false;
 };
-
-/// A field of CSV: quoted where it has to be; control characters become blanks.
-std::string field(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-    out += control ? ' ' : c;
-    if (c == '"') out += '"';
-  }
-  return out.find_first_of(",\"") == std::string::npos ? out : '"' + out + '"';
-}
 
 /// All combinations, the last range being the fastest.
 std::vector<std::vector<Setting>> combinations(const std::vector<VariedNumber>& varied) {
@@ -65,7 +55,7 @@ std::vector<std::vector<Setting>> combinations(const std::vector<VariedNumber>& 
 
 std::string header(const Scene& scene, const std::vector<VariedNumber>& varied) {
   std::string text;
-  for (const VariedNumber& each : varied) text += field(each.path) + ',';
+  for (const VariedNumber& each : varied) text += table_field(each.path) + ',';
   text +=
       "status,met,expectations,time_s,start_energy_J,end_energy_J,lowest_change_J,largest_change_J,"
       "drift,penetration_m,residual,contacts,steps,contact_problems,unsolved,seconds";
@@ -74,9 +64,9 @@ std::string header(const Scene& scene, const std::vector<VariedNumber>& varied) 
     const std::string of =
         e.body >= 0 ? scene.bodies[static_cast<std::size_t>(e.body)].name + '.' : std::string();
     for (int i = 0; i < components(e.quantity); ++i)
-      text += ',' + field(fmt::format("{}{}{}@{:g}", of, word(e.quantity),
-                                      components(e.quantity) > 1 ? fmt::format("[{}]", i + 1) : "",
-                                      e.time));
+      text += ',' + table_field(fmt::format(
+                        "{}{}{}@{:g}", of, word(e.quantity),
+                        components(e.quantity) > 1 ? fmt::format("[{}]", i + 1) : "", e.time));
   }
   return text + ",failure\n";
 }
@@ -102,7 +92,7 @@ std::string row_of(const Scene& scene, const RunResult& r) {
       const auto at = static_cast<std::size_t>(i);
       row += at < value.size() ? fmt::format(",{}", value[at]) : ",";
     }
-  return row + ',' + field(r.failure);
+  return row + ',' + table_field(r.failure);
 }
 
 /// A row without its settings: of a run, or with what is wrong and empty fields between.
@@ -117,7 +107,7 @@ std::string row_of(const std::string& text, const std::string& name,
     options.interrupted = [] { return caught_signal() != 0; };
     return row_of(scene, run(scene, options));
   } catch (const std::exception& e) {
-    return "wrong" + std::string(fields, ',') + field(e.what());
+    return "wrong" + std::string(fields, ',') + table_field(e.what());
   }
 }
 
@@ -163,7 +153,7 @@ int sweep(const Arguments& arguments) {
     return row_of(scene_text.text, scene_text.name, all[k], fields);
   };
   workers.lost = [&](const std::string& why) {
-    return "failed" + std::string(fields, ',') + field(why);
+    return "failed" + std::string(fields, ',') + table_field(why);
   };
   workers.stopped = [] { return caught_signal() != 0; };
   if (!arguments.quiet)
@@ -186,7 +176,7 @@ int sweep(const Arguments& arguments) {
   fmt::print("{} runs: {} ok, {} not met, {} failed, {} wrong{}\n", rows.size(), count("ok"),
              count("not met"), count("failed"), count("wrong"),
              caught_signal() != 0 ? ", the others interrupted" : "");
-  if (arguments.out != "-") fmt::print("written: {}\n", arguments.out);
+  if (arguments.out != "-") fmt::print("written: {}\n", on_terminal(arguments.out));
   return caught_signal() != 0 ? kSignal + caught_signal() : exit_code(rows);
 }
 
