@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "attach/impl.hpp"
+#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
 
 namespace tether::ida_projection {
@@ -128,8 +129,7 @@ void check_rows(const Constraints& set, long unknowns, N_Vector like) {
 
 void require(bool condition, const char* name, double value, const char* right) {
   if (!condition)
-    reject(std::string("options.") + name + " = " + std::to_string(value) + "; it must be " +
-           right);
+    reject(std::string("options.") + name + " = " + shortest(value) + "; it must be " + right);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <sunmatrix/sunmatrix_dense.h>
 #include <tether/reverse_ida.hpp>
 
+#include "attach/shortest.hpp"
 #include "reverse/fiber.hpp"
 
 namespace tether::reverse_ida {
@@ -73,14 +74,14 @@ void check(const Equations& e) {
   const auto finite = [&](const char* name, const std::vector<double>& values) {
     for (std::size_t i = 0; i < values.size(); ++i)
       if (!std::isfinite(values[i]))
-        refuse(std::string(name) + "[" + std::to_string(i) + "]", std::to_string(values[i]),
+        refuse(std::string(name) + "[" + std::to_string(i) + "]", tp::shortest(values[i]),
                "finite");
   };
   finite("y", e.y), finite("yp", e.yp), finite("atol", e.atol), finite("id", e.id);
-  if (!std::isfinite(e.t0)) refuse("t0", std::to_string(e.t0), "finite");
-  if (!(e.rtol >= 0) || !std::isfinite(e.rtol)) refuse("rtol", std::to_string(e.rtol), ">= 0");
+  if (!std::isfinite(e.t0)) refuse("t0", tp::shortest(e.t0), "finite");
+  if (!(e.rtol >= 0) || !std::isfinite(e.rtol)) refuse("rtol", tp::shortest(e.rtol), ">= 0");
   for (const double a : e.atol)
-    if (a < 0) refuse("atol", std::to_string(a), ">= 0");
+    if (a < 0) refuse("atol", tp::shortest(a), ">= 0");
   if (e.constraints < 0) refuse("constraints", std::to_string(e.constraints), ">= 0");
   if (!e.names.empty() && e.names.size() != static_cast<std::size_t>(e.constraints))
     length("names", e.names.size(), "0 or the number of constraints");

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
+#include "attach/shortest.hpp"
 #include "host/operations.hpp"
 #include "rows/rounding.hpp"
 #include "sensitivity/wrapped.hpp"
@@ -47,7 +48,7 @@ void check(const Sensitivities& given, const Constraints& constraints) {
   whole(given.list.size(), "list");
   for (const double scale : given.scales)
     if (!(std::abs(scale) > 0.0) || !std::isfinite(scale))
-      refuse("Sensitivities::scales has an entry " + std::to_string(scale) +
+      refuse("Sensitivities::scales has an entry " + shortest(scale) +
              ", all must be finite and not 0");
   for (const int index : given.list)
     if (index < 0) refuse("Sensitivities::list has an entry " + std::to_string(index) + " < 0");
