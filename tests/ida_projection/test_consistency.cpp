@@ -232,6 +232,58 @@ TEST_CASE("project: nearest point, tangent velocity, report") {
   CHECK(contains(thrown([&] { host.projection().project(0.0, nullptr); }), "yy"));
 }
 
+TEST_CASE("project: points between steps by the factors of the step, which they do not change") {
+  const Problem problem = pendulum(1.0, 9.81, 3.0, "index 1");
+  const auto end_of = [&problem](bool output, long* gradients) {
+    const auto length = row(
+        "length", [](double, const double* y) { return y[0] * y[0] + y[1] * y[1] - 1.0; },
+        [gradients](double, const double* y, double* c) {
+          ++*gradients;
+          c[0] = 2.0 * y[0];
+          c[1] = 2.0 * y[1];
+        });
+    const auto rate = row(
+        "rate", [](double, const double* y) { return y[0] * y[2] + y[1] * y[3]; },
+        [](double, const double* y, double* c) {
+          for (int i = 0; i < 4; ++i) c[i] = y[(i + 2) % 4];
+        });
+    Host host(problem, 1e-6);
+    tp::Projection& projection = host.attach(length + rate);
+    while (host.t < 2.0) {
+      REQUIRE(host.step() >= 0);
+      double h = 0.0;
+      IDAGetLastStep(host.ida, &h);
+      if (!output || host.steps() < 15) continue;  // first steps turn C by much
+      std::vector<double> between(5);
+      N_Vector y = host.vector(between), yp = host.vector(between), whole = host.vector(between);
+      const double* p = N_VGetArrayPointer(y);
+      const double t = host.t - 0.4 * h;
+      REQUIRE(IDAGetDky(host.ida, t, 0, y) == 0);
+      REQUIRE(IDAGetDky(host.ida, t, 1, yp) == 0);
+      N_VScale(1.0, y, whole);
+      const long before = *gradients;
+      const tp::ConsistencyReport report = projection.project(t, y);
+      REQUIRE(report);
+      CHECK(*gradients == before);
+      CHECK(report.rank == 2);
+      CHECK(std::abs(p[0] * p[0] + p[1] * p[1] - 1.0) < 1e-12);
+      CHECK(std::abs(p[0] * p[2] + p[1] * p[3]) < 1e-11);
+      // With y' the nearest point in the error weights is found by C there.
+      REQUIRE(projection.project(t, whole, yp));
+      CHECK(*gradients > before);
+      N_VLinearSum(1.0, whole, -1.0, y, whole);
+      CHECK(N_VMaxNorm(whole) < 5e-7);
+      projection.rows_changed();
+      const long known = *gradients;
+      REQUIRE(projection.project(t, y));
+      CHECK(*gradients > known);
+    }
+    return host.state();
+  };
+  long with = 0, without = 0;
+  CHECK(same_bits(end_of(true, &with), end_of(false, &without)));
+}
+
 TEST_CASE("project: tangent of a constraint that moves") {
   // x = sin t: x' must be cos t.
   Problem problem = still({0.0, 0.0});

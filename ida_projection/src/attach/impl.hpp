@@ -43,6 +43,9 @@ class Projection::Impl {
   // consistency.cpp
   ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp, const Consistency& how);
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp);
+  void rows_changed() {
+    if (movers_.used != nullptr) movers_.used->rows_changed();
+  }
   int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
 
   // sensitivities.cpp

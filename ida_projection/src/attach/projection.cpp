@@ -172,6 +172,8 @@ ConsistencyReport Projection::make_consistent(double t0, N_Vector yy, N_Vector y
                                               const Consistency& how) {
   return impl_->make_consistent(t0, yy, yp, how);
 }
+void Projection::rows_changed() { impl_->rows_changed(); }
+
 ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
   return impl_->project(t, yy, yp);
 }

@@ -50,6 +50,19 @@ class Mover {
   /// the correction has to be put back. `again`: the correction was changed after such a move.
   virtual Move follow(const Candidate&, bool /*again*/) { return {}; }
 
+  /// Rank of the factors for solve_with_factors(); -1: there are none.
+  virtual int rank_of_factors() const { return -1; }
+  /// The caller's rows are others than those of the factors at hand.
+  virtual void rows_changed() {}
+  /// dy (N entries) for g, near a hundredth, by the factors at hand. The moves that follow are the
+  /// same with it and without. False: not known.
+  virtual bool solve_with_factors(const std::vector<double>& /*g*/, std::vector<double>& /*dy*/) {
+    return false;
+  }
+  /// After that: what rows that the factors leave out ask for beyond the others, in tolerances; 0
+  /// where there are none.
+  virtual double left_of_dropped(const std::vector<double>& /*WT*/) { return 0.0; }
+
   /// C y' row by row with C as it was evaluated last, over the first `reported` rows. False: not
   /// known. `id` as in set_algebraic().
   virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {

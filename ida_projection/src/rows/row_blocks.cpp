@@ -267,6 +267,15 @@ bool RowBlocks::contradict(const std::vector<double>& WT) {
   return false;
 }
 
+double RowBlocks::left_of_dropped(const std::vector<double>& WT) const {
+  double largest = 0.0;
+  for (const Block* block : {&d, &a})
+    largest = std::max(largest, ida_projection::left_of_dropped(*block, n_, [&](int i) {
+                         return in_tolerances(*block, i, WT);
+                       }));
+  return largest;
+}
+
 void RowBlocks::weigh_dropped(const std::vector<double>& WT) {
   for (Block* block : {&d, &a})
     ida_projection::weigh_dropped(*block, n_, [&](int i) { return in_tolerances(*block, i, WT); });

@@ -101,18 +101,27 @@ bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, i
   return false;
 }
 
-/// Before left_of_dropped(), for the present factors; arguments as of contradicts().
-template <class Solver, class Norm>
-void weigh_dropped(BlockOf<Solver>& block, int n, Norm in_tolerances) {
+/// weight(k, i, tolerances in a unit of its inconsistency) for each dropped row, k in pivot order,
+/// i in the block, with the present factors; other arguments as of contradicts().
+template <class Solver, class Norm, class Weight>
+void visit_dropped(const BlockOf<Solver>& block, int n, Norm in_tolerances, Weight weight) {
   const Solver& solver = block.solver;
   for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
     const auto i = static_cast<std::size_t>(solver.pivot(k));
     const double norm = solver.row_norm(solver.pivot(k));
     const bool vanished = !(norm > std::numeric_limits<double>::min());
     // A row that vanishes has no distance: what contradicts() tolerates stands for one tolerance.
-    block.tolerances[i] =
-        vanished ? 1e12 : norm / (std::sqrt(n) * std::max(in_tolerances(block.rows[i]), 1e-300));
+    weight(
+        k, i,
+        vanished ? 1e12 : norm / (std::sqrt(n) * std::max(in_tolerances(block.rows[i]), 1e-300)));
   }
+}
+
+/// Before left_of_dropped().
+template <class Solver, class Norm>
+void weigh_dropped(BlockOf<Solver>& block, int n, Norm in_tolerances) {
+  visit_dropped(block, n, in_tolerances,
+                [&](int, std::size_t i, double weight) { block.tolerances[i] = weight; });
 }
 
 /// After solve(): the largest inconsistency of a dropped row, in tolerances.
@@ -123,6 +132,16 @@ double left_of_dropped(const BlockOf<Solver>& block) {
   for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k)
     largest = std::max(largest, solver.inconsistency(k) *
                                     block.tolerances[static_cast<std::size_t>(solver.pivot(k))]);
+  return largest;
+}
+
+/// The same where weigh_dropped() was not called.
+template <class Solver, class Norm>
+double left_of_dropped(const BlockOf<Solver>& block, int n, Norm in_tolerances) {
+  double largest = 0.0;
+  visit_dropped(block, n, in_tolerances, [&](int k, std::size_t, double weight) {
+    largest = std::max(largest, block.solver.inconsistency(k) * weight);
+  });
   return largest;
 }
 
@@ -196,6 +215,7 @@ class RowBlocks {
     else
       solve_both(g);
   }
+  void solve_roughly(const std::vector<double>& g) { solve(g); }
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   /// The rows whose move is measured in tolerances.
   Block& counted() { return d.rows.empty() ? a : d; }
@@ -223,6 +243,7 @@ class RowBlocks {
   double left_of_dropped() const {
     return std::max(ida_projection::left_of_dropped(d), ida_projection::left_of_dropped(a));
   }
+  double left_of_dropped(const std::vector<double>& WT) const;
 
   Contradiction contradiction;
   std::string message;

@@ -12,7 +12,6 @@ namespace {
 
 // Sine of the angle at which a row counts as dependent: its square is what A A^T tells from zero.
 constexpr double kRankTolerance = 1e-6;
-constexpr double kSolved = 1e-8;  // of g: Newton's next move takes the rest
 
 using linalg::at;
 
@@ -245,14 +244,14 @@ bool SparseRows::factor() {
   return a.solver.factor(kRankTolerance);
 }
 
-void SparseRows::solve(const std::vector<double>& g) {
+void SparseRows::solve(const std::vector<double>& g, double solved) {
   for (std::size_t k = 0; k < d.rows.size(); ++k) d.g[k] = g[at(d.rows[k])];
-  d.solver.solve(d.g.data(), d.dy.data(), kSolved);
+  d.solver.solve(d.g.data(), d.dy.data(), solved);
   if (a.rows.empty()) return;
   d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
   for (std::size_t k = 0; k < a.rows.size(); ++k)
     a.g[k] = g[at(a.rows[k])] - times(a.rows[k], moved_.data());
-  a.solver.solve(a.g.data(), a.dy.data(), kSolved);
+  a.solver.solve(a.g.data(), a.dy.data(), solved);
 }
 
 double SparseRows::terms(int i, const double* y) const {
@@ -283,6 +282,15 @@ bool SparseRows::contradict(const std::vector<double>& WT) {
     if (contradicts(*block, constraints_, n_, norm, &contradiction)) return true;
   }
   return false;
+}
+
+double SparseRows::left_of_dropped(const std::vector<double>& WT) const {
+  double largest = 0.0;
+  for (const Block* block : {&d, &a})
+    largest = std::max(largest, ida_projection::left_of_dropped(*block, n_, [&](int i) {
+                         return in_tolerances(*block, i, WT);
+                       }));
+  return largest;
 }
 
 void SparseRows::weigh_dropped(const std::vector<double>& WT) {

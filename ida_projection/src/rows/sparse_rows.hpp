@@ -75,7 +75,9 @@ class SparseRows {
   void look_again_soon() { look_.soon(); }
   bool factor();
   bool factor_kept() { return false; }
-  void solve(const std::vector<double>& g);
+  void solve(const std::vector<double>& g) { solve(g, kSolved); }
+  /// One step with the regularised factors, where the next solve takes the rest.
+  void solve_roughly(const std::vector<double>& g) { solve(g, 1.0); }
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
   double terms(int i, const double* y) const;
@@ -85,6 +87,7 @@ class SparseRows {
   double left_of_dropped() const {
     return std::max(ida_projection::left_of_dropped(d), ida_projection::left_of_dropped(a));
   }
+  double left_of_dropped(const std::vector<double>& WT) const;
   /// f(column, entry) for the entries of row i.
   template <class Visit>
   void visit_row(int i, Visit f) const {
@@ -95,6 +98,9 @@ class SparseRows {
   std::string message;
 
  private:
+  static constexpr double kSolved = 1e-8;  // of g: Newton's next move takes the rest
+
+  void solve(const std::vector<double>& g, double solved);
   double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;
   Status find_full_columns(Evaluator& evaluator, double t, const std::vector<double>& y,
                            const std::vector<double>& WT);

@@ -16,6 +16,10 @@ namespace {
 constexpr int kMaximumIterations = 60;
 constexpr double kSmallestDamping = 1.0 / 1024.0;
 constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off
+// Of follow(): steps by factors of another point.
+constexpr int kSimplifiedSteps = 14;
+constexpr double kNear = 1.0, kShrinks = 0.25;
+constexpr double kAside = 10.0;  // what dropped rows may ask for, beside the others
 
 // `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
 template <class Rows>
@@ -29,6 +33,8 @@ class GaussNewtonOn final : public GaussNewton {
 
   void project(double t, std::vector<double>& y, const std::vector<double>& WT,
                const std::vector<bool>& hold, const double* id, ConsistencyReport& report) override;
+  bool follow(double t, std::vector<double>& y, const std::vector<double>& WT, Mover& near,
+              ConsistencyReport& report) override;
   bool tangent(double t, const std::vector<double>& y, double* yp) override;
   bool fatal() const override { return evaluator_.fatal(); }
   const std::string& message() const override { return evaluator_.message(); }
@@ -42,6 +48,7 @@ class GaussNewtonOn final : public GaussNewton {
   void fill_metric();
   double correction();  // solves for the present g, returns its length
   double largest(const std::vector<double>& g) const;
+  double floor_of(const std::vector<double>& y) const;
   bool rounding_only(const std::vector<double>& y) const;
 
   Statistics counts_;
@@ -108,6 +115,14 @@ double GaussNewtonOn<Rows>::largest(const std::vector<double>& g) const {
   return value;
 }
 
+// A move, in tolerances, that rounding of y alone explains.
+template <class Rows>
+double GaussNewtonOn<Rows>::floor_of(const std::vector<double>& y) const {
+  double size = 0.0;
+  for (std::size_t i = 0; i < y.size(); ++i) size += y[i] / WT_[i] * (y[i] / WT_[i]);
+  return 64.0 * kEpsilon * std::sqrt(size / n_);
+}
+
 // Does the rounding of its own terms explain every g_i at y, where C was evaluated?
 template <class Rows>
 bool GaussNewtonOn<Rows>::rounding_only(const std::vector<double>& y) const {
@@ -154,9 +169,7 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
     }
     const double length = correction();
     report.rank = blocks_.rank();
-    double size = 0.0;
-    for (std::size_t i = 0; i < y.size(); ++i) size += y[i] / WT_[i] * (y[i] / WT_[i]);
-    const double floor = 64.0 * kEpsilon * std::sqrt(size / n_);
+    const double floor = floor_of(y);
     if (length <= std::max(kConverged, floor)) break;
     // Rounding: small already, and no longer shrinking.
     if (previous >= 0.0 && length <= 1e4 * floor && length > 0.5 * previous) break;
@@ -222,6 +235,39 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
         "says little about it; write the rows without squares";
   }
   if (report.status == Status::success) y0 = y;
+}
+
+// What the last step leaves is known from how it has shrunk.
+template <class Rows>
+bool GaussNewtonOn<Rows>::follow(double t, std::vector<double>& y0, const std::vector<double>& WT,
+                                 Mover& near, ConsistencyReport& report) {
+  WT_ = WT;
+  evaluator_.forget();
+  std::vector<double> y = y0, dy(y.size());
+  const double enough = std::max(kConverged, floor_of(y));
+  double previous = kNear / kShrinks;
+  if (!evaluate(t, y, report)) return false;
+  report.drift_before = largest(g_);
+  report.rank = near.rank_of_factors();
+  for (report.iterations = 0; report.iterations < kSimplifiedSteps;) {
+    if (!near.solve_with_factors(g_, dy)) return false;
+    double sum = 0.0;
+    for (std::size_t i = 0; i < y.size(); ++i) sum += dy[i] / WT_[i] * (dy[i] / WT_[i]);
+    const double length = std::sqrt(sum / n_), rate = length / previous;
+    if (!(length <= enough || rate <= kShrinks)) return false;
+    for (std::size_t i = 0; i < y.size(); ++i) y[i] -= dy[i];
+    if (!evaluate(t, y, report)) return false;
+    if (length <= enough || (++report.iterations > 1 && rate * length <= enough)) {
+      report.drift_after = largest(g_);
+      if (near.left_of_dropped(WT_) > 0.0 &&
+          (!near.solve_with_factors(g_, dy) || near.left_of_dropped(WT_) > kAside * enough))
+        return false;
+      y0 = y;
+      return true;
+    }
+    previous = length;
+  }
+  return false;
 }
 
 template <class Rows>

@@ -37,27 +37,52 @@ void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hol
   N_VLinearSum(1.0, y, 1.0, correction, y);
 }
 
+std::vector<double> PointProjection::tolerances(N_Vector y, N_Vector weights) {
+  const double *values = N_VGetArrayPointer(y), *w = N_VGetArrayPointer(weights);
+  std::vector<double> WT(static_cast<std::size_t>(N_VGetLength(y)));
+  for (std::size_t i = 0; i < WT.size(); ++i)
+    WT[i] = w[i] > 0.0 ? 1.0 / w[i] : std::max(1.0, std::abs(values[i]));
+  return WT;
+}
+
+// Did a callback end the run on the way, perhaps at a trial point?
+bool PointProjection::refused(ConsistencyReport& report) const {
+  if (!nearest_->fatal()) return false;
+  report.status = Status::callback_fatal;
+  report.message = nearest_->message();
+  return true;
+}
+
+GaussNewton& PointProjection::nearest(N_Vector y) {
+  if (!nearest_) nearest_ = make_gauss_newton(constraints_, static_cast<int>(N_VGetLength(y)));
+  return *nearest_;
+}
+
+bool PointProjection::follow(double t, N_Vector y, N_Vector weights, Mover& near,
+                             ConsistencyReport& report) {
+  if (!has_values(constraints_) || near.rank_of_factors() < 0) return false;
+  double* values = N_VGetArrayPointer(y);
+  std::vector<double> point(values, values + N_VGetLength(y));
+  ConsistencyReport found;
+  if (!nearest(y).follow(t, point, tolerances(y, weights), near, found)) return refused(report);
+  report = found;
+  std::copy(point.begin(), point.end(), values);
+  return true;
+}
+
 void PointProjection::project_values(double t, N_Vector y, const std::vector<bool>& hold,
                                      N_Vector id, N_Vector weights, ConsistencyReport& report) {
-  const auto size = static_cast<int>(N_VGetLength(y));
-  const auto n = static_cast<std::size_t>(size);
   double* values = N_VGetArrayPointer(y);
-  const double* w = N_VGetArrayPointer(weights);
-  std::vector<double> point(values, values + size), WT(n);
+  std::vector<double> point(values, values + N_VGetLength(y));
   std::vector<bool> held = given_.hold;
-  for (std::size_t i = 0; i < n; ++i) {
-    WT[i] = w[i] > 0.0 ? 1.0 / w[i] : std::max(1.0, std::abs(point[i]));
-    if (!hold.empty() && hold[i]) {
-      held.resize(n, false);
+  for (std::size_t i = 0; i < hold.size(); ++i)
+    if (hold[i]) {
+      held.resize(point.size(), false);
       held[i] = true;
     }
-  }
-  if (!nearest_) nearest_ = make_gauss_newton(constraints_, size);
-  nearest_->project(t, point, WT, held, id != nullptr ? N_VGetArrayPointer(id) : nullptr, report);
-  if (nearest_->fatal()) {  // met on the way, perhaps at a trial point
-    report.status = Status::callback_fatal;
-    report.message = nearest_->message();
-  }
+  nearest(y).project(t, point, tolerances(y, weights), held,
+                     id != nullptr ? N_VGetArrayPointer(id) : nullptr, report);
+  refused(report);
   if (report.status == Status::success) std::copy(point.begin(), point.end(), values);
 }
 
@@ -66,10 +91,7 @@ bool PointProjection::tangent(double t, N_Vector y, N_Vector yp, ConsistencyRepo
   const double* values = N_VGetArrayPointer(y);
   const bool found =
       nearest_->tangent(t, {values, values + N_VGetLength(y)}, N_VGetArrayPointer(yp));
-  if (!nearest_->fatal()) return found;
-  report.status = Status::callback_fatal;
-  report.message = nearest_->message();
-  return false;
+  return !refused(report) && found;
 }
 
 }  // namespace tether::ida_projection

@@ -109,7 +109,9 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     // index 2 scale with cj, as IDA's own factor does: the refresh with old factors makes errors at
     // tight tolerances up to thirty times larger.
     projection.refresh_algebraic = options.formulation == Formulation::index1;
-    projection.progress = [&system](const ida_projection::Progress&) { system.look_at_rows(); };
+    projection.progress = [this](const ida_projection::Progress&) {
+      if (system_.look_at_rows()) projection_->rows_changed();
+    };
     projection_.emplace(ida_, system.constraints(), projection);
   }
 }

@@ -63,7 +63,8 @@ class System {
   ida_projection::Constraints constraints();
   /// Chooses the rows of the joints that are used from here on, see rows_in_use.cpp.
   void choose_rows(double t, const double* y, double tolerance);
-  void look_at_rows() { in_use_.look(); }  ///< after a step
+  /// After a step. True: constraints() give other rows from here on.
+  bool look_at_rows() { return in_use_.look(); }
   double weakest_pivot() const { return in_use_.weakest_pivot(); }
   /// At a state near a dead point: joints whose rows depend on each other there. Empty elsewhere.
   std::vector<std::string> dependent_joints(double t, const double* y);

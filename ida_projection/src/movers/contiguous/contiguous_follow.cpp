@@ -21,6 +21,21 @@ Move ContiguousMover<Rows>::follow(const Candidate& candidate, bool again) {
       kMayFollowLeave);
 }
 
+template <class Rows>
+bool ContiguousMover<Rows>::solve_with_factors(const std::vector<double>& g,
+                                               std::vector<double>& dy) {
+  if (g.size() != static_cast<std::size_t>(rows_.count())) return false;
+  Rows& blocks = rows_.blocks;
+  blocks.solve_roughly(g);
+  std::fill(dy.begin(), dy.end(), 0.0);
+  for (const auto* block : {&blocks.d, &blocks.a})
+    if (!block->rows.empty())
+      block->for_columns([&dy, from = block->dy.data()](int k, int i) {
+        dy[static_cast<std::size_t>(i)] = from[k];
+      });
+  return true;
+}
+
 // rms of dy_i / D_i, dy over the columns that count.
 template <class Rows>
 double ContiguousMover<Rows>::in_metric(const std::vector<double>& dy) {
@@ -54,6 +69,10 @@ void ContiguousMover<Rows>::compare_with_old_move() {
 
 template Move ContiguousMover<RowBlocks>::follow(const Candidate&, bool);
 template Move ContiguousMover<SparseRows>::follow(const Candidate&, bool);
+template bool ContiguousMover<RowBlocks>::solve_with_factors(const std::vector<double>&,
+                                                             std::vector<double>&);
+template bool ContiguousMover<SparseRows>::solve_with_factors(const std::vector<double>&,
+                                                              std::vector<double>&);
 template double ContiguousMover<RowBlocks>::in_metric(const std::vector<double>&);
 template double ContiguousMover<SparseRows>::in_metric(const std::vector<double>&);
 template void ContiguousMover<RowBlocks>::keep_old_move(double);

@@ -46,6 +46,18 @@ class ContiguousMover final : public Mover {
     return rows_.factors.there && !rows_.factors.thin && wear_.usable();
   }
   Move follow(const Candidate& candidate, bool again) override;
+  // What dropped rows among many ask for costs a solve each.
+  int rank_of_factors() const override {
+    const FactorState& at_hand = rows_.factors;
+    const bool serve = at_hand.there && !at_hand.thin && !at_hand.partial && !at_hand.foreign &&
+                       (Rows::kKeepsRank || !rows_.blocks.dropped_rows());
+    return serve ? rows_.blocks.rank() : -1;
+  }
+  double left_of_dropped(const std::vector<double>& WT) override {
+    return rows_.blocks.dropped_rows() ? rows_.blocks.left_of_dropped(WT) : 0.0;
+  }
+  void rows_changed() override { rows_.factors.foreign = true; }
+  bool solve_with_factors(const std::vector<double>& g, std::vector<double>& dy) override;
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
   Status settle(const Candidate& candidate, N_Vector change) override;
   double remaining_drift(const Candidate& candidate) override {

@@ -62,6 +62,7 @@ Status FactoredRows<Rows>::factor(double t) {
     return Status::not_finite;
   }
   factors.there = true;
+  factors.foreign = false;
   return Status::success;
 }
 
@@ -69,6 +70,7 @@ Status FactoredRows<Rows>::factor(double t) {
 template <class Rows>
 bool FactoredRows<Rows>::decide() {
   ++statistics_.factorizations;
+  factors.partial = false;
   if (!blocks.factor()) return false;
   if (blocks.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kThinRows) factors.thin = RowTrust::has_thin_rows(blocks.counted().solver);
@@ -91,11 +93,13 @@ double FactoredRows<Rows>::first_solve([[maybe_unused]] bool firm_only) {
     solver.use_rank(firm);
     const double firm_length = solve();
     --statistics_.iterations;
+    factors.partial = firm < all;
     if (!firm_only) {
       solver.use_rank(all);
       const int trusted = blocks.trust.trusted_rows(solver, firm_length);
       solver.use_rank(trusted);
       factors.lasting = RowTrust::lasting(solver, firm, trusted);
+      factors.partial = trusted < all;
       if (trusted > firm) {
         --statistics_.iterations;
         if (whole && trusted < all) ++statistics_.rank_drops;

@@ -23,6 +23,8 @@ struct FactorState {
   bool thin = false;     ///< the last factor() found rows that need RowTrust
   bool lasting = false;  ///< which rows it has kept is right for the next steps, too
   bool decided = false;  ///< it found that out for this candidate
+  bool partial = false;  ///< independent rows are left out, too thin to be trusted
+  bool foreign = false;  ///< the caller's rows are others now
 };
 
 /// A candidate and the rows there: evaluates them, factors C in the metric and solves. It decides

@@ -147,9 +147,10 @@ void RowsInUse::choose_sparse() {
   wait_ = weakest_ > kGoodByEntries ? kWait : 1;
 }
 
-void RowsInUse::choose() {
+bool RowsInUse::choose() {
   if (sparse_) choose_sparse();
-  if (count_ == 0 || in_place_) return;
+  if (count_ == 0 || in_place_) return false;
+  before_ = used_;
   gradient_.form(rows_, bodies_);
   Eigen::MatrixXd& G = gradient_.G;
   for (int i = 0; i < rows_.count(); ++i) G.row(i) /= std::max(G.row(i).norm(), 1e-300);
@@ -173,6 +174,7 @@ void RowsInUse::choose() {
                  ? std::abs(row_choice_.matrixR()(count_ - 1, count_ - 1))
                  : 0;
   choose_multipliers();
+  return used_ != before_;
 }
 
 // A change costs IDA a new matrix, so the rows stay while others are not much better.
@@ -198,8 +200,6 @@ void RowsInUse::choose_multipliers() {
   for (Eigen::Index i = 0; i < count_; ++i) carries_[static_cast<std::size_t>(order[i])] = 1;
 }
 
-void RowsInUse::look() {
-  if (--wait_ <= 0) choose();
-}
+bool RowsInUse::look() { return --wait_ <= 0 && choose(); }
 
 }  // namespace tether::scene::smooth

@@ -35,14 +35,15 @@ class RowsInUse {
 
   /// Chooses at the state that is set, for this local tolerance from now on.
   void choose(double tolerance);
-  void look();  ///< after a step, at the state that is set
+  /// After a step, at the state that is set. True: used() has other rows than before.
+  bool look();
   void look_now() { choose(); }
 
  private:
   bool independent_by_structure() const;
   int count_needed_beyond(Eigen::Index rank, const Eigen::VectorXd& length,
                           const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr);
-  void choose();
+  bool choose();
   void choose_sparse();
   void choose_multipliers();
 
@@ -52,7 +53,7 @@ class RowsInUse {
   bool in_place_ = false;
   std::unique_ptr<SparseRowChoice> sparse_;  // in place, with closed loops
   int count_ = 0;
-  std::vector<int> used_, place_of_used_;
+  std::vector<int> used_, before_, place_of_used_;
   std::vector<char> carries_;
   double weakest_ = 1;
   int multiplier_choices_ = 0;
