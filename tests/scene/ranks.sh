@@ -32,13 +32,22 @@ awk 'BEGIN {
   print "position = [0.25, 5, 1]\nangular_velocity = [0, 0, 1]"
   print "[[joint]]\nname = \"hinge\"\nkind = \"hinge\"\nbodies = [\"door\", \"world\"]\nat = [0, 5, 1]\naxis = [0, 0, 1]"
 }' > heap.toml
-"$program" run heap.toml --quiet --csv one.csv --state one.state > one.log || fail "one process: $(cat one.log)"
+# Points in the frame f/bodies_NUMBER of a film, in however many pieces.
+points() { grep -a -o 'NumberOfPoints="[0-9]*"' "$@" | sed 's/.*="//; s/"//' | awk '{ n += $1 } END { print n }'; }
+"$program" run heap.toml --quiet --csv one.csv --state one.state --vtk one.pvd > one.log || fail "one process: $(cat one.log)"
 for ranks in 2 3; do
-  over $ranks heap.toml --quiet --csv $ranks.csv --state $ranks.state > $ranks.log 2>&1 ||
+  over $ranks heap.toml --quiet --csv $ranks.csv --state $ranks.state --vtk $ranks.pvd > $ranks.log 2>&1 ||
     fail "$ranks ranks: $(cat $ranks.log)"
   cmp one.csv $ranks.csv || fail "$ranks ranks: another table"
   cmp one.state $ranks.state || fail "$ranks ranks: another state"
   [ "$(grep -c 'stepping engine' $ranks.log)" = 1 ] || fail "$ranks ranks: not one summary: $(cat $ranks.log)"
+  # A film in pieces, one of each process, with all bodies and contacts.
+  [ "$(grep -c '\.pvtp"' $ranks.pvd)" = "$(grep -c '\.vtp"' one.pvd)" ] || fail "$ranks ranks: $(cat $ranks.pvd)"
+  for what in bodies contacts; do
+    [ "$(grep -c '<Piece ' $ranks/${what}_000004.pvtp)" = $ranks ] || fail "$ranks ranks: pieces of $what"
+    [ "$(points $ranks/${what}_000004_p*.vtp)" = "$(points one/${what}_000004.vtp)" ] ||
+      fail "$ranks ranks: another number of points of $what"
+  done
   grep -q "$ranks processes, which shared [1-9]" $ranks.log || fail "$ranks ranks shared nothing"
 done
 

@@ -87,7 +87,7 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
   take("vtk", film_folder(o.vtk));
   for (const std::string& other : {o.csv, o.svg, o.state}) {
     const fs::path path = one_name(other);
-    if (!other.empty() && path.extension() == ".vtp" &&
+    if (!other.empty() && (path.extension() == ".vtp" || path.extension() == ".pvtp") &&
         path.parent_path() == one_name(film_folder(o.vtk)))
       throw std::invalid_argument(
           fmt::format("\"{}\": frames of vtk = \"{}\" have such names", other, o.vtk));

@@ -36,7 +36,7 @@ std::unique_ptr<Recorder> make_event_recorder(const Scene& scene, const std::str
 std::unique_ptr<Recorder> make_contact_recorder(const Scene& scene, const std::string& file,
                                                 const Resume& resume);
 std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::string& file,
-                                            const Resume& resume);
+                                            const Resume& resume, const Processes& among);
 std::unique_ptr<Recorder> make_picture_recorder(const Scene& scene, const std::string& file,
                                                 double start_energy);
 

@@ -1,10 +1,10 @@
 // Tether: a run for ParaView: a .pvd of the times, a .vtp of the bodies and one of the contacts for
-// each. SPDX-License-Identifier: BSD-3-Clause
+// each; of several processes a .pvtp that joins a .vtp of each. SPDX-License-Identifier:
+// BSD-3-Clause
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
 
@@ -12,6 +12,7 @@
 #include "output/output_names.hpp"
 #include "output/whole_file.hpp"
 #include "record/number_at.hpp"
+#include "record/poly_data.hpp"
 #include "recorder.hpp"
 
 namespace tether::scene {
@@ -24,79 +25,21 @@ using Eigen::Vector3d;
 constexpr std::size_t kMostSurfaces = 1000;
 constexpr int kAround = 24;
 
-/// Binary arrays behind the XML, each with its length in front.
-class Appended {
- public:
-  template <class T>
-  std::size_t add(const std::vector<T>& values) {
-    const std::size_t offset = bytes_.size();
-    const std::uint64_t length = values.size() * sizeof(T);
-    append(&length, sizeof length);
-    append(values.data(), length);
-    return offset;
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  void append(const void* data, std::size_t length) {
-    if (length > 0) bytes_.append(static_cast<const char*>(data), length);
-  }
-  std::string bytes_;
-};
-
-/// One .vtp file: points, then single points and polygons on them, then data of the points.
-class PolyData {
- public:
-  std::vector<float> points;
-  std::vector<std::int32_t> vertices, polygons, ends;  // `ends`: of each polygon in `polygons`
-
-  void scalars(const char* name, const std::vector<float>& values) { data(name, values, 1); }
-  void vectors(const char* name, const std::vector<float>& values) { data(name, values, 3); }
-
-  void write(const std::string& file) {
-    std::vector<std::int32_t> each(vertices.size());
-    for (std::size_t i = 0; i < each.size(); ++i) each[i] = static_cast<std::int32_t>(i + 1);
-    std::string xml = fmt::format(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" "
-        "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n<Piece "
-        "NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"0\" NumberOfStrips=\"0\" "
-        "NumberOfPolys=\"{}\">\n",
-        points.size() / 3, vertices.size(), ends.size());
-    xml += "<PointData>\n" + data_ + "</PointData>\n<Points>\n" +
-           array("Float32", "Points", 3, appended_.add(points)) + "</Points>\n<Verts>\n" +
-           array("Int32", "connectivity", 1, appended_.add(vertices)) +
-           array("Int32", "offsets", 1, appended_.add(each)) + "</Verts>\n<Polys>\n" +
-           array("Int32", "connectivity", 1, appended_.add(polygons)) +
-           array("Int32", "offsets", 1, appended_.add(ends)) +
-           "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_";
-    write_fresh(file, xml + appended_.bytes() + "\n</AppendedData>\n</VTKFile>\n");
-  }
-
- private:
-  static std::string array(const char* type, const char* name, int components, std::size_t offset) {
-    return fmt::format(
-        "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" "
-        "offset=\"{}\"/>\n",
-        type, name, components, offset);
-  }
-  void data(const char* name, const std::vector<float>& values, int components) {
-    data_ += array("Float32", name, components, appended_.add(values));
-  }
-  std::string data_;
-  Appended appended_;
-};
-
 void put(std::vector<float>& out, const Vector3d& v) {
   for (int i = 0; i < 3; ++i) out.push_back(static_cast<float>(v[i]));
 }
 
 class VtkRecorder : public Recorder {
  public:
-  VtkRecorder(const Scene& scene, const std::string& file, const Resume& resume)
-      : file_(film_file(file)), folder_(film_folder(file)), forces_(scene.output.forces) {
+  VtkRecorder(const Scene& scene, const std::string& file, const Resume& resume,
+              const Processes& among)
+      : file_(film_file(file)),
+        folder_(film_folder(file)),
+        forces_(scene.output.forces),
+        among_(among) {
     if (resume.restarted) keep_up_to(resume.time);
     make_folder_of(folder_ + "/x");
-    check_writable(file_);
+    if (among_.rank == 0) check_writable(file_);
     std::size_t surfaces = 0;
     for (const Body& body : scene.bodies) surfaces += body.shapes.size();
     const double half_plane = 2 * extent(scene);
@@ -111,33 +54,44 @@ class VtkRecorder : public Recorder {
   }
 
   void record(const Engine& engine, const Diagnostics&) override {
-    add("bodies", 0, engine.time(), bodies(engine));
-    if (!engine.contacts().empty())
-      add("contacts", 1, engine.time(), contacts(engine));
+    const double time = engine.time();
+    add("bodies", 0, time, meshes_.size(), [&](Range of) { return bodies(engine, of); });
+    const auto& touching = engine.contacts();
+    if (!touching.empty())
+      add("contacts", 1, time, touching.size(), [&](Range of) { return contacts(touching, of); });
     else
       remove_frame("contacts");
     if (forces_) {
       const Forces forces = engine.forces();
-      if (!forces.joints.empty()) add("joints", 2, engine.time(), joints(forces));
-      if (!forces.springs.empty()) add("springs", 3, engine.time(), springs(forces));
+      if (!forces.joints.empty())
+        add("joints", 2, time, forces.joints.size(), [&](Range of) { return joints(forces, of); });
+      if (!forces.springs.empty())
+        add("springs", 3, time, forces.springs.size(),
+            [&](Range of) { return springs(forces, of); });
     }
     ++number_;
+    // What the film names is there.
+    if (among_.ranks > 1 && among_.meet) among_.meet();
   }
 
   void keep(const Engine&) override { write_film(); }
 
   void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
     write_film();
-    written.push_back(file_);
+    if (among_.rank == 0) written.push_back(file_);
   }
 
  private:
+  struct Range {
+    std::size_t first, last;
+  };
   struct Part {
     Mesh mesh;
     double radius;
   };
 
   void write_film() {
+    if (among_.rank != 0) return;
     write_whole(file_,
                 "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
                 "byte_order=\"LittleEndian\">\n<Collection>\n" +
@@ -150,23 +104,44 @@ class VtkRecorder : public Recorder {
     return half;
   }
 
-  void add(const char* what, int part, double time, PolyData data) {
-    const std::string name = fmt::format("{}/{}_{:06}.vtp", folder_, what, number_);
-    data.write(name);
-    sets_ += fmt::format("<DataSet timestep=\"{}\" part=\"{}\" file=\"{}/{}_{:06}.vtp\"/>\n", time,
-                         part, std::filesystem::path(folder_).filename().string(), what, number_);
+  std::string frame(const std::string& what, const std::string& end) const {
+    return fmt::format("{}_{:06}{}", what, number_, end);
+  }
+  static std::string piece(int rank) { return fmt::format("_p{}.vtp", rank); }
+
+  /// A frame of `count` things, made of a range of them: each process writes its part.
+  template <class Make>
+  void add(const char* what, int part, double time, std::size_t count, Make make) {
+    std::string end = ".vtp";
+    if (among_.ranks <= 1) {
+      make({0, count}).write(folder_ + '/' + frame(what, end));
+    } else {
+      const auto pieces = std::max<std::size_t>(1, std::min<std::size_t>(count, among_.ranks)),
+                 mine = static_cast<std::size_t>(among_.rank);
+      end = ".pvtp";
+      if (mine < pieces) {
+        PolyData data = make({count * mine / pieces, count * (mine + 1) / pieces});
+        data.write(folder_ + '/' + frame(what, piece(among_.rank)));
+        std::vector<std::string> names;
+        for (int r = 0; r < static_cast<int>(pieces); ++r) names.push_back(frame(what, piece(r)));
+        if (mine == 0) data.write_joined(folder_ + '/' + frame(what, end), names);
+      }
+    }
+    sets_ += fmt::format("<DataSet timestep=\"{}\" part=\"{}\" file=\"{}/{}\"/>\n", time, part,
+                         std::filesystem::path(folder_).filename().string(), frame(what, end));
   }
 
   // That of an earlier run, of which this one takes the names.
   void remove_frame(const char* what) const {
     std::error_code ignored;
-    std::filesystem::remove(fmt::format("{}/{}_{:06}.vtp", folder_, what, number_), ignored);
+    for (const std::string& end : {std::string(".vtp"), std::string(".pvtp"), piece(among_.rank)})
+      std::filesystem::remove(folder_ + '/' + frame(what, end), ignored);
   }
 
-  PolyData bodies(const Engine& engine) const {
+  PolyData bodies(const Engine& engine, Range of) const {
     PolyData out;
     std::vector<float> index, radius, velocity, spin;
-    for (std::size_t b = 0; b < meshes_.size(); ++b) {
+    for (std::size_t b = of.first; b < of.last; ++b) {
       const BodyState& state = engine.bodies()[b];
       const Eigen::Matrix3d R = state.orientation.toRotationMatrix();
       for (const Part& part : meshes_[b]) {
@@ -195,10 +170,11 @@ class VtkRecorder : public Recorder {
     return out;
   }
 
-  PolyData contacts(const Engine& engine) const {
+  PolyData contacts(const std::vector<ContactState>& all, Range of) const {
     PolyData out;
     std::vector<float> impulse, normal, gap, force, slip;
-    for (const ContactState& c : engine.contacts()) {
+    for (std::size_t k = of.first; k < of.last; ++k) {
+      const ContactState& c = all[k];
       out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
       put(out.points, c.point);
       put(impulse, c.impulse);
@@ -216,10 +192,11 @@ class VtkRecorder : public Recorder {
     return out;
   }
 
-  static PolyData joints(const Forces& forces) {
+  static PolyData joints(const Forces& forces, Range of) {
     PolyData out;
     std::vector<float> force, moment, drive;
-    for (const JointForce& each : forces.joints) {
+    for (std::size_t k = of.first; k < of.last; ++k) {
+      const JointForce& each = forces.joints[k];
       out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
       put(out.points, each.at);
       put(force, each.force);
@@ -233,10 +210,11 @@ class VtkRecorder : public Recorder {
   }
 
   // In the middle between its ends.
-  static PolyData springs(const Forces& forces) {
+  static PolyData springs(const Forces& forces, Range of) {
     PolyData out;
     std::vector<float> tension;
-    for (const SpringForce& each : forces.springs) {
+    for (std::size_t k = of.first; k < of.last; ++k) {
+      const SpringForce& each = forces.springs[k];
       out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
       put(out.points, 0.5 * (each.at + each.at_second));
       tension.push_back(static_cast<float>(each.tension));
@@ -265,6 +243,7 @@ class VtkRecorder : public Recorder {
 
   std::string file_, folder_, sets_;
   bool forces_;
+  Processes among_;
   long number_ = 0;
   std::vector<std::vector<Part>> meshes_;
 };
@@ -272,8 +251,8 @@ class VtkRecorder : public Recorder {
 }  // namespace
 
 std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::string& file,
-                                            const Resume& resume) {
-  return std::make_unique<VtkRecorder>(scene, file, resume);
+                                            const Resume& resume, const Processes& among) {
+  return std::make_unique<VtkRecorder>(scene, file, resume, among);
 }
 
 }  // namespace tether::scene

@@ -80,7 +80,8 @@ class Run {
     std::vector<std::string> inputs = inputs_of(scene);
     if (o.state != options.restart) inputs.push_back(options.restart);
     check_names(o, inputs);
-    for (const std::string& each : names(o)) lock_.take(each);
+    if (options.among.rank == 0)
+      for (const std::string& each : names(o)) lock_.take(each);
     if (!o.state.empty()) check_writable(o.state);
     if (!o.state.empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene);
     result_.engine = engine_->name();
@@ -97,7 +98,8 @@ class Run {
       recorders_.push_back(make_event_recorder(scene, event_file(o.csv), resume_, engine_->time()));
     if (!o.csv.empty() && o.forces && !scene.pairs.empty())
       recorders_.push_back(make_contact_recorder(scene, contact_file(o.csv), resume_));
-    if (!o.vtk.empty()) recorders_.push_back(make_vtk_recorder(scene, o.vtk, resume_));
+    if (!o.vtk.empty())
+      recorders_.push_back(make_vtk_recorder(scene, o.vtk, resume_, options.among));
     if (!o.svg.empty())
       recorders_.push_back(make_picture_recorder(scene, o.svg, summary().start_energy));
   }

@@ -109,9 +109,9 @@ class Projection {
                                     const Consistency& how = {});
 
   /// A point between steps (interpolated output, a root, a restart) onto the constraints; yp (may
-  /// be null) onto their tangent C y' + g_t = 0. On failure both are unchanged. Where yp is null and
-  /// the point is near, the factors of the last step bring it there in their metric, by values of g
-  /// alone; steps are the same with and without.
+  /// be null) onto their tangent C y' + g_t = 0. On failure both are unchanged. Where yp is null
+  /// and the point is near, the factors of the last step bring it there in their metric, by values
+  /// of g alone; steps are the same with and without.
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp = nullptr);
 
   /// Of a host whose Constraints give other rows from here on: project() then does without factors

@@ -34,6 +34,12 @@ struct Summary {
   int contacts = 0;
 };
 
+/// Which of the processes that make the same run this is. Each writes its piece of a film.
+struct Processes {
+  int rank = 0, ranks = 1;
+  std::function<void()> meet;  ///< waits until all have called it
+};
+
 struct RunOptions {
   std::string restart;                        ///< a saved state to go on from; empty: from t = 0
   bool force = false;                         ///< the state may be of another scene or version
@@ -43,8 +49,10 @@ struct RunOptions {
   /// Called after every step; if it returns true, the run ends there, with all its files complete.
   std::function<bool()> interrupted;
   /// Processes that make the same run, of the stepping engine, and share its contact problems; all
-  /// but one without names in Scene::output, and `interrupted` says the same to each.
+  /// but the first without names in Scene::output besides `vtk`, and `interrupted` says the same to
+  /// each.
   contact::SolverTeam* team = nullptr;
+  Processes among;  ///< with a team
 };
 
 struct RunResult {

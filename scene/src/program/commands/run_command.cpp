@@ -88,9 +88,9 @@ void overlay(const Arguments& arguments, Scene& scene) {
   scene.end = *arguments.end;
 }
 
-/// Of several processes the first writes.
-void write_nothing(Output& o, std::string& html) {
-  for (std::string* file : {&o.csv, &o.vtk, &o.svg, &o.state, &html}) file->clear();
+/// Of several processes the first writes all but its share of a film.
+void write_film_alone(Output& o, std::string& html) {
+  for (std::string* file : {&o.csv, &o.svg, &o.state, &html}) file->clear();
 }
 
 /// ranks: processes that make the same run, null: there is one.
@@ -102,7 +102,7 @@ int run_scene(const Arguments& arguments, Ranks* ranks) {
   Scene scene = read_scene_argument(arguments.file);
   overlay(arguments, scene);
   std::string html = arguments.html;
-  if (!first) write_nothing(scene.output, html);
+  if (!first) write_film_alone(scene.output, html);
   if (!html.empty() && html != "-" && !arguments.folder.empty())
     html = (std::filesystem::path(arguments.folder) / html).string();
   catch_signals();
@@ -119,7 +119,11 @@ int run_scene(const Arguments& arguments, Ranks* ranks) {
     return signal != 0;
   };
   std::optional<contact::RankTeam> team;
-  if (ranks) options.team = &team.emplace(ranks->messages());
+  if (ranks) {
+    options.team = &team.emplace(ranks->messages());
+    options.among = {ranks->messages().rank(), ranks->messages().size(),
+                     [ranks] { ranks->largest(0); }};
+  }
   if (first) bar.start(scene.name, scene.end, 1);
   if (!arguments.quiet && first) options.progress = [&](double t) { bar.at(t); };
   if (player) options.record = [&](const Engine& engine) { player->record(engine); };
