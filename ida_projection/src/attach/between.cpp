@@ -17,7 +17,9 @@ bool Projection::Impl::needs_projection(const Candidate& candidate, const StepDa
     ++statistics_.left_alone;
     return false;
   }
-  return !(run_.engaged && movers_.used->may_follow() && follow(candidate, step, tolerance));
+  // Where stiff components have answered to moves, none may go astray.
+  return !(run_.engaged && !metric_choice_.by_levels() && movers_.used->may_follow() &&
+           follow(candidate, step, tolerance));
 }
 
 // Only the iteration that removes noise. False: old factors misled the corrector, which a projected

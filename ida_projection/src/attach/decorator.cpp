@@ -53,6 +53,7 @@ int Projection::Impl::initialize() {
   if (sensitivities_) sensitivities_->forget_run();
   control_.reset();
   frequency_.reset();
+  metric_choice_.reset();
   return corrector_.initialize();
 }
 
@@ -230,7 +231,11 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
     judge_capped(move);
     return move;  // the steps below would make the whole move
   }
-  if (move.status == Status::success)
+  const bool stiff = choose_metric(candidate, move);
+  if (move.status != Status::success) return move;
+  if (stiff && stiff_move_.make(candidate, cj, polish_, *movers_.used))
+    move.status = settle_stiff_move(candidate, cj, tolerance);
+  else
     move.status = wants_polish(move.length) ? polish(candidate, cj, tolerance)
                                             : movers_.used->finish(candidate);
   return move;

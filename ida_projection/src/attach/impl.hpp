@@ -18,8 +18,10 @@
 #include "start/joined_rows.hpp"
 #include "start/point.hpp"
 #include "step/frequency.hpp"
+#include "step/metric_choice.hpp"
 #include "step/polish.hpp"
 #include "step/step_control.hpp"
+#include "step/stiff_move.hpp"
 #include "watch/bypass.hpp"
 #include "watch/collapse.hpp"
 #include "watch/first_steps.hpp"
@@ -116,6 +118,12 @@ class Projection::Impl {
   bool leave_alone(const Candidate& candidate, const StepData& step, double tolerance);
   bool follow(const Candidate& candidate, const StepData& step, double tolerance);
 
+  // choose_metric.cpp
+  bool choose_metric(const Candidate& candidate, Move& move);
+  AnsweredMove try_other_metric(const Candidate& candidate, const AnsweredMove& present,
+                                Move& move);
+  Status settle_stiff_move(const Candidate& candidate, double cj, double tolerance);
+
   // consistency.cpp
   struct JointStart;
   bool probe(double t0, N_Vector yy, N_Vector yp);
@@ -173,6 +181,7 @@ class Projection::Impl {
   AlgebraicVariables variables_;
   Polish polish_;
   StepControl control_;
+  StiffMove stiff_move_;
   FrequencyPolicy frequency_;
   Movers movers_;
   PointProjection point_;
@@ -182,6 +191,7 @@ class Projection::Impl {
   std::unique_ptr<TangentRows> tangent_;  // of project_gradient()
   Unknowns unknowns_;
   Metric wanted_metric_;
+  MetricChoice metric_choice_;
   Run run_;
   Inquiry inquiry_;
   Attempts attempts_;

@@ -75,6 +75,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       variables_(options_, statistics_),
       polish_(options_, statistics_, corrector_, variables_),
       control_(ida_, options_, statistics_),
+      stiff_move_(variables_),
       frequency_(options_.frequency),
       movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),

@@ -19,6 +19,7 @@ constexpr double kMetricDecay = 0.8;   // per accepted step
 void LocalMetric::reset() {
   std::fill(scale_.begin(), scale_.end(), 0.0);
   std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
+  levels_.clear();
 }
 
 // s <- max(0.8 s, |correction|)
@@ -46,14 +47,14 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
       D[k] = local ? std::max(s, kMetricFloor * weight) : weight;
     });
   }
-  if (!local || options_.group.empty()) return;
+  if (!local || group().empty()) return;
   find_group_scales(at);
   const std::vector<double>& WT = at.WT();
   for (Block* block : {&d, &a}) {
     double* D = block->D();
     for (std::size_t c = 0; c < block->columns.size(); ++c) {
       const auto i = static_cast<std::size_t>(block->columns[c]);
-      if (options_.group[i] < 0) continue;
+      if (group()[i] < 0) continue;
       D[c] = std::max(trial_scale_[i], kMetricFloor * (WT[i] > 0.0 ? WT[i] : trial_scale_[i]));
     }
   }
@@ -69,22 +70,22 @@ void LocalMetric::current(const LoadedCandidate& at, double* D) const {
 
 // One scale for each group: rms of |correction| in tolerances over its members.
 void LocalMetric::find_group_scales(LoadedCandidate& at) {
-  const int groups = 1 + *std::max_element(options_.group.begin(), options_.group.end());
+  const int groups = 1 + *std::max_element(group().begin(), group().end());
   std::vector<double>& sum = group_sum_;  // no allocation after the first step
   std::vector<int>& members = group_members_;
   sum.assign(static_cast<std::size_t>(groups), 0.0);
   members.assign(static_cast<std::size_t>(groups), 0);
   for (std::size_t i = 0; i < scale_.size(); ++i) {
-    if (options_.group[i] < 0) continue;
-    const auto k = static_cast<std::size_t>(options_.group[i]);
+    if (group()[i] < 0) continue;
+    const auto k = static_cast<std::size_t>(group()[i]);
     const double s = std::max(kMetricDecay * scale_[i], std::abs(at.ycor[i]));
     sum[k] += s * at.w[i] * s * at.w[i];
     ++members[k];
   }
   const std::vector<double>& WT = at.WT();
   for (std::size_t i = 0; i < scale_.size(); ++i) {
-    if (options_.group[i] < 0) continue;
-    const auto k = static_cast<std::size_t>(options_.group[i]);
+    if (group()[i] < 0) continue;
+    const auto k = static_cast<std::size_t>(group()[i]);
     trial_scale_[i] = WT[i] * std::sqrt(sum[k] / members[k]);
   }
 }

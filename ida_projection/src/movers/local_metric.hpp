@@ -24,14 +24,20 @@ class LocalMetric {
   void fill(LoadedCandidate& at, Block& d, Block& a);
   /// D of every component, by the candidate that look() or fill() saw last.
   void current(const LoadedCandidate& at, double* D) const;
+  /// One scale for each of these groups, in place of Options::group.
+  void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
+  bool by_levels() const { return !levels_.empty(); }
+  void forget_levels() { levels_.clear(); }
   void accept() { std::swap(scale_, trial_scale_); }
   void reset();
 
  private:
+  const std::vector<int>& group() const { return levels_.empty() ? options_.group : levels_; }
   void find_group_scales(LoadedCandidate& at);
 
   const Options& options_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
+  std::vector<int> levels_;
   std::vector<double> group_sum_;
   std::vector<int> group_members_;
 };

@@ -83,6 +83,16 @@ class Mover {
   /// D as the last candidate had it, of every component; false: there is none.
   virtual bool metric(N_Vector /*D*/) const { return false; }
 
+  /// One scale for all unknowns of a level (row_levels.hpp) in the local metric, from the next move
+  /// on, or each its own again. False: nothing changes, there are too few rows or levels.
+  virtual bool use_levels(bool) { return false; }
+  /// Are rows many enough for that?
+  virtual bool may_use_levels() const { return false; }
+
+  /// dy, over all unknowns, of one move from the candidate as it is now, with the factors at hand;
+  /// nothing is moved. False: it cannot be had.
+  virtual bool solve_at(const Candidate&, double* /*dy*/) { return false; }
+
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 

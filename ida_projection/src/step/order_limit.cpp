@@ -12,9 +12,11 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kLogLarge = -0.36, kLogSmall = -1.2;  // of r: 0.7, 0.3
+constexpr double kLogLargeIfStiff = -0.6;              // 0.55
 constexpr int kSamples = 6, kSamplesAgain = 3;         // in the mean
 constexpr long kEarly = 10, kTrial = 40;         // steps with the limit; it is judged after them
 constexpr double kHopeless = 0.5, kWorth = 0.9;  // of the step before it
+constexpr double kPatience = 0.5;                // of these where vibrations are likely
 constexpr long kFirstWait = 100;                 // steps, after a limit that did not pay
 constexpr int kTries = 8;
 constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
@@ -25,6 +27,7 @@ constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
 void OrderLimit::reset() {
   end();
   on_ = wanted_;
+  stiff_ = false;
   begun_ = 0;
   pending_steps_ = -1;
   samples_ = highest_ = 0;
@@ -80,7 +83,9 @@ double OrderLimit::control(long steps, double t, double norm) {
 void OrderLimit::watch(long steps, int order) {
   const int needed = kept_ ? kSamplesAgain : kSamples;
   take_sample(steps, needed);
-  if (samples_ < needed || mean_ < kLogLarge || steps < not_before_ || order <= kLimit) return;
+  if (samples_ < needed || mean_ < (stiff_ ? kLogLargeIfStiff : kLogLarge) || steps < not_before_ ||
+      order <= kLimit)
+    return;
   phase_ = Phase::lowering;
   ++begun_;
   tries_ = samples_ = 0;
@@ -119,7 +124,9 @@ void OrderLimit::judge(long steps, double t) {
   const bool early = taken == kEarly && trials_ == 0;
   if (taken != kTrial && !early) return;
   const double mean = std::abs(t - t_since_) / static_cast<double>(taken);
-  if (mean < (trials_ > 0 ? kWorth : kHopeless) * std::abs(step_before_))
+  // A vibration that a higher order excites, however long its steps are, grows.
+  const double patience = stiff_ ? kPatience : 1.0;
+  if (mean < patience * (trials_ > 0 ? kWorth : kHopeless) * std::abs(step_before_))
     return release(steps, wait_);
   if (early) return;
   kept_ = kept_ || trials_ > 0;  // the first may pass before the oscillation is damped
@@ -138,7 +145,7 @@ void OrderLimit::release(long steps, long wait) {
   } else {
     kept_ = false;
     not_before_ = steps + wait;
-    wait_ *= 4;
+    if (!stiff_) wait_ *= 4;
   }
 }
 

@@ -23,6 +23,8 @@ class OrderLimit {
   OrderLimit(void* ida_mem, const Options& options)
       : ida_mem_(ida_mem), wanted_(options.limit_order) {}
 
+  /// Stiff components have answered to moves: oscillations are likely, and looked for at smaller r.
+  void expect_oscillations() { stiff_ = true; }
   /// Before the first step.
   void reset();
   /// No limit for the rest of the run.
@@ -53,7 +55,7 @@ class OrderLimit {
   void hold_step(bool hold);
 
   void* ida_mem_;
-  bool wanted_, on_ = false;
+  bool wanted_, on_ = false, stiff_ = false;
   Phase phase_ = Phase::watching;
   long begun_ = 0;
 

@@ -56,6 +56,7 @@ bool Polish::wanted(double length, bool smoothing) const {
 
 void Polish::keep(const Candidate& candidate) {
   corrector_was_right_ = true;
+  noise_known_ = step_known_ = false;
   if (contiguous_)
     for (int j = 0; j < size_; ++j) corrected_entries_[j] = candidate.correction_entries[j];
   else
@@ -87,17 +88,35 @@ bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
   return evaluated && corrector_.solve_linear(delta_);
 }
 
-bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  if (!newton_step_at_moved_point(candidate)) return false;
+double Polish::answer(const Candidate& candidate) {
+  if (!noise_) noise_ = OwnedVector(candidate.correction);
+  if (!noise_known_) {
+    if (corrector_.residual(corrected_, noise_) != 0) return -1.0;
+    ++statistics_.residual_evaluations;
+    N_VScale(-1.0, noise_, noise_);
+    if (!corrector_.solve_linear(noise_)) return -1.0;
+    noise_known_ = true;
+  }
+  step_known_ = false;
+  if (!newton_step_at_moved_point(candidate)) return -1.0;
   ++statistics_.residual_evaluations;
+  step_known_ = true;
+  N_VLinearSum(1.0, delta_, -1.0, noise_, work_);
+  const double length = differential_length(candidate, work_entries_);
+  return std::isfinite(length) ? length : -1.0;
+}
+
+bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
+  if (!step_known_) {
+    if (!newton_step_at_moved_point(candidate)) return false;
+    ++statistics_.residual_evaluations;
+  }
+  step_known_ = false;
   iterations_ = 1;
 
-  // IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
-  // equations contain y'; algebraic ones take the plain solution.
-  const double plain = cj_at_setup_ != 0.0 ? 0.5 * (1.0 + cj / cj_at_setup_) : 1.0;
-  const double algebraic = options_.refresh_algebraic ? plain : 0.0;
+  const double algebraic = algebraic_factor(cj);
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
-  const double length = differential_length(candidate);
+  const double length = differential_length(candidate, delta_entries_);
   corrector_was_right_ = length <= kMisled * tolerance;
   const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
@@ -106,8 +125,9 @@ bool Polish::add_newton_step(const Candidate& candidate, double cj, double toler
   return true;
 }
 
-// WRMS length of delta over the differential variables.
-double Polish::differential_length(const Candidate& candidate) {
+// WRMS length of delta, whose entries are these where vectors are contiguous, over the differential
+// variables.
+double Polish::differential_length(const Candidate& candidate, const double* entries) {
   if (!contiguous_) {
     if (!variables_.any()) return N_VWrmsNorm(delta_, candidate.weights);
     N_VProd(variables_.id(), delta_, work_);
@@ -116,7 +136,7 @@ double Polish::differential_length(const Candidate& candidate) {
   const double* id = variables_.mask();
   double sum = 0.0;
   for (int j = 0; j < size_; ++j) {
-    const double change = delta_entries_[j] * candidate.weight_entries[j];
+    const double change = entries[j] * candidate.weight_entries[j];
     sum += id == nullptr || id[j] != 0.0 ? change * change : 0.0;
   }
   return std::sqrt(sum / size_);

@@ -30,12 +30,33 @@ class Polish {
 
   /// Is an iteration worth its price after a move of this length? `smoothing`: steps are smoothed.
   bool wanted(double length, bool smoothing) const;
+  /// Can answer() be had?
+  bool hears_answers() const { return contiguous_ && corrector_.solves() && !iterative_; }
+  /// After a move: the length of F's answer to it, -J^-1 F_y dy, over the differential variables
+  /// in tolerances; -1: F or the linear solver fails.
+  double answer(const Candidate& candidate);
+  /// That answer, until the next one; work space otherwise.
+  const double* answer_entries() const { return work_entries_; }
+  /// What follows is not the move that answer() was asked for last.
+  void forget_answer() { step_known_ = false; }
+  /// After a move that the answers are part of: the next add_newton_step() does without them.
+  void leave_answers_out() {
+    N_VScale(1.0, noise_, delta_);
+    step_known_ = true;
+  }
+  /// IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
+  /// equations contain y'; algebraic ones take the plain solution.
+  double algebraic_factor(double cj) const {
+    const double plain = cj_at_setup_ != 0.0 ? 0.5 * (1.0 + cj / cj_at_setup_) : 1.0;
+    return options_.refresh_algebraic ? plain : 0.0;
+  }
   /// Before the move: keeps the corrector's ycor.
   void keep(const Candidate& candidate);
   /// After it: ycor <- ycor + delta, as far as delta is to be trusted. False: there is none.
   bool add_newton_step(const Candidate& candidate, double cj, double tolerance);
   /// The corrector's ycor again.
-  void restore(const Candidate& candidate) const {
+  void restore(const Candidate& candidate) {
+    forget_answer();
     N_VScale(1.0, corrected_, candidate.correction);
   }
 
@@ -47,7 +68,7 @@ class Polish {
 
  private:
   bool newton_step_at_moved_point(const Candidate& candidate);
-  double differential_length(const Candidate& candidate);
+  double differential_length(const Candidate& candidate, const double* entries);
   void apply(const Candidate& candidate, double differential, double algebraic);
 
   const Options& options_;
@@ -56,7 +77,9 @@ class Polish {
   const AlgebraicVariables& variables_;
   bool contiguous_ = false;
   int size_ = 0;
-  OwnedVector delta_, corrected_, work_;
+  OwnedVector delta_, corrected_, work_, noise_;
+  bool noise_known_ = false;  // -J^-1 F at corrected_
+  bool step_known_ = false;   // delta_ is that of the present moved point
   double *delta_entries_ = nullptr, *corrected_entries_ = nullptr, *work_entries_ = nullptr;
   bool iterative_ = false;  // IDA's linear solver is a Krylov method
   bool corrector_was_right_ = true;

@@ -37,6 +37,7 @@ class StepControl {
   void begin_smoothing(double care);
   /// For each new step.
   void look_for_refusals(bool engaged);
+  void expect_oscillations() { order_limit_.expect_oscillations(); }
   /// Before the first move: does IDA fail on algebraic variables in its error test, which would be
   /// taken out of it with that move?
   bool struggling() const;

@@ -96,6 +96,9 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   if (options.projection) {
     ida_projection::Options projection;
     projection.id = vectors_.id;
+    // Close to dead points F answers to any move, without being stiff: no other metric is to be
+    // tried.
+    projection.metric = ida_projection::Metric::local_correction;
     projection.print_fatal = false;
     projection.print_warnings = false;
     // Behind a dead point rows come back, and weights narrow, with errors of earlier steps: no

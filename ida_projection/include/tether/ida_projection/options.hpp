@@ -21,7 +21,10 @@ enum class Metric {
   /// local_correction, but error_weights where the linear solver is iterative and the rows are
   /// Gradients or at most a 16th of the unknowns, as the invariants of a field: s has a kink
   /// wherever the correction changes its sign along a grid, the move then has rough parts, and they
-  /// take a Krylov method the most iterations.
+  /// take a Krylov method the most iterations. With a direct solver and more than 16 rows: one
+  /// scale
+  /// for all unknowns of a kind (positions, velocities), as Options::group has it, where stiff
+  /// components answer less to such moves, and moves that they take part in as F has it.
   automatic,
 };
 

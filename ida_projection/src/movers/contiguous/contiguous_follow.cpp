@@ -36,6 +36,22 @@ bool ContiguousMover<Rows>::solve_with_factors(const std::vector<double>& g,
   return true;
 }
 
+template <class Rows>
+bool ContiguousMover<Rows>::solve_at(const Candidate& candidate, double* dy) {
+  rows_.at.y.swap(elsewhere_);
+  rows_.at.y.resize(elsewhere_.size());
+  rows_.at.restart(candidate);
+  const bool known = rows_.value(candidate.t) == Status::success;
+  if (known) {
+    rows_.look();
+    std::fill(dy, dy + elsewhere_.size(), 0.0);
+    const auto& block = rows_.blocks.d;
+    block.for_columns([&](int k, int i) { dy[i] = block.dy[static_cast<std::size_t>(k)]; });
+  }
+  rows_.at.y.swap(elsewhere_);
+  return known;
+}
+
 // rms of dy_i / D_i, dy over the columns that count.
 template <class Rows>
 double ContiguousMover<Rows>::in_metric(const std::vector<double>& dy) {
@@ -73,6 +89,8 @@ template bool ContiguousMover<RowBlocks>::solve_with_factors(const std::vector<d
                                                              std::vector<double>&);
 template bool ContiguousMover<SparseRows>::solve_with_factors(const std::vector<double>&,
                                                               std::vector<double>&);
+template bool ContiguousMover<RowBlocks>::solve_at(const Candidate&, double*);
+template bool ContiguousMover<SparseRows>::solve_at(const Candidate&, double*);
 template double ContiguousMover<RowBlocks>::in_metric(const std::vector<double>&);
 template double ContiguousMover<SparseRows>::in_metric(const std::vector<double>&);
 template void ContiguousMover<RowBlocks>::keep_old_move(double);

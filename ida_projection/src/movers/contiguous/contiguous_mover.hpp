@@ -16,6 +16,7 @@ namespace tether::ida_projection {
 constexpr double kLargestFloor = 0.1;  // tolerances
 // What a move leaves where nothing is known yet.
 constexpr double kUnknownSlope = 0.03;
+constexpr int kFewForLevels = 16;
 constexpr double kLong = 1.0;      // tolerances: such a move is made with fresh factors
 constexpr double kNothing = 1e-8;  // tolerances: as good as no move
 
@@ -71,6 +72,18 @@ class ContiguousMover final : public Mover {
     rows_.metric.current(rows_.at, N_VGetArrayPointer(D));
     return true;
   }
+  // Few rows make no rough moves. Where rows are about to depend on each other, at dead points, F
+  // answers to any move, stiff or not.
+  bool may_use_levels() const override {
+    return rows_.count() > kFewForLevels && !rows_.factors.thin && !rows_.blocks.dropped_rows();
+  }
+  bool use_levels(bool on) override {
+    if (on && !rows_.find_levels()) return false;
+    if (!on) rows_.metric.forget_levels();
+    rows_.factors.there = false;
+    return true;
+  }
+  bool solve_at(const Candidate& candidate, double* dy) override;
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
   Status finish(const Candidate& candidate) override {
@@ -133,7 +146,8 @@ class ContiguousMover final : public Mover {
   Staleness staleness_;
   FactorWear wear_;  // for follow(), as is what comes next
   Misdirection misdirection_;
-  std::vector<double> old_move_;  // with the factors that move() found; empty: unknown
+  std::vector<double> elsewhere_;  // work space of solve_at()
+  std::vector<double> old_move_;   // with the factors that move() found; empty: unknown
 };
 
 }  // namespace tether::ida_projection

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "rows/row_levels.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
@@ -17,6 +19,21 @@ Status FactoredRows<Rows>::structure(const Candidate& candidate, const double* i
   const Status status = blocks.structure(evaluator, candidate.t, at.y, at.WT(), options_.hold, id);
   if (status != Status::success) message_ = blocks.message;
   return status;
+}
+
+template <class Rows>
+bool FactoredRows<Rows>::find_levels() {
+  std::vector<int> starts = {0}, columns;
+  for (const int i : blocks.d.rows) {
+    blocks.visit_row(i, [&](int j, double entry) {
+      if (entry != 0.0) columns.push_back(j);
+    });
+    starts.push_back(static_cast<int>(columns.size()));
+  }
+  std::vector<int> levels = levels_of_columns(starts, columns, unknowns());
+  if (*std::max_element(levels.begin(), levels.end()) < 1) return false;
+  metric.use_levels(std::move(levels));
+  return true;
 }
 
 // C at the present y, and g if wanted.

@@ -63,6 +63,9 @@ class FactoredRows {
     else
       metric.look(at);
   }
+  /// One scale for each level of the columns from now on, from the entries of C. False: there is
+  /// one level only.
+  bool find_levels();
   /// At the candidate, whose variables are algebraic where `id` is 0.
   Status structure(const Candidate& candidate, const double* id);
   /// g at the present y.

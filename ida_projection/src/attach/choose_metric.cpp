@@ -1,0 +1,58 @@
+// Tether: what becomes of moves to which stiff components answer. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "attach/impl.hpp"
+
+namespace tether::ida_projection {
+
+// Moves to which stiff components answer excite them, and scales made of what they then do make
+// the next moves worse. True: they answer to the best move there is.
+bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
+  const Mover& mover = *movers_.used;
+  const bool free = wanted_metric_ == Metric::automatic && options_.group.empty() &&
+                    options_.metric == Metric::local_correction && &mover == movers_.own.get();
+  if (!free || move.status != Status::success || !mover.may_use_levels() ||
+      !polish_.hears_answers() || !metric_choice_.due())
+    return false;
+  AnsweredMove at{move.length, polish_.answer(candidate)};
+  if (at.answer < 0.0) return false;
+  if (metric_choice_.doubts(at)) at = try_other_metric(candidate, at, move);
+  if (!metric_choice_.stiff(at)) return false;
+  // Multipliers of index 2 answer to any move, by more than its length over h.
+  if (variables_.high_index()) metric_choice_.pause();
+  return !variables_.high_index();
+}
+
+AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
+                                                const AnsweredMove& present, Move& move) {
+  Mover& mover = *movers_.used;
+  const bool by_levels = metric_choice_.by_levels();
+  if (!mover.use_levels(!by_levels)) {
+    metric_choice_.found_none();
+    return present;
+  }
+  polish_.restore(candidate);
+  const Move other = mover.move(candidate);
+  const bool moved = other.status == Status::success && !other.capped;
+  const AnsweredMove its{other.length, moved ? polish_.answer(candidate) : -1.0};
+  if (its.answer >= 0.0 && metric_choice_.prefers(its, present)) {
+    move = other;
+    control_.expect_oscillations();
+    return its;
+  }
+  if (its.answer < 0.0) metric_choice_.found_none();
+  mover.use_levels(by_levels);
+  polish_.restore(candidate);
+  move = mover.move(candidate);
+  return present;
+}
+
+// Its answers are part of it: of the iteration after moves, what IDA's own test left is still due.
+Status Projection::Impl::settle_stiff_move(const Candidate& candidate, double cj,
+                                           double tolerance) {
+  polish_.leave_answers_out();
+  if (options_.extra_iterations > 0 && polish_.add_newton_step(candidate, cj, tolerance))
+    N_VLinearSum(1.0, stiff_move_.change(), 1.0, polish_.delta(), stiff_move_.change());
+  return movers_.used->settle(candidate, stiff_move_.change());
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,54 @@
+// Tether: which metric moves are made in. SPDX-License-Identifier: BSD-3-Clause
+#include "step/metric_choice.hpp"
+
+#include <algorithm>
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr int kFirstLooks = 16;  // in a row: a start excites what is stiff
+constexpr int kSeldom = 8, kLongestWait = 64;
+constexpr double kPart = 0.1;    // of a move: so much is answered by what is not stiff
+constexpr double kHarm = 1e-4;   // tolerances: a shorter answer does none
+constexpr double kBetter = 0.5;  // of the length
+
+}  // namespace
+
+bool MetricChoice::due() {
+  if (pause_ > 0) --pause_;
+  return pause_ == 0;
+}
+
+bool MetricChoice::stiff(const AnsweredMove& at) const {
+  return at.answer > kPart * at.move && at.answer > kHarm;
+}
+
+bool MetricChoice::doubts(const AnsweredMove& at) {
+  if (stiff(at)) return wait_ == 0 || --wait_ == 0;
+  pause();
+  return false;
+}
+
+void MetricChoice::pause() {
+  if (looks_ < kFirstLooks)
+    ++looks_;
+  else
+    pause_ = kSeldom;
+}
+
+bool MetricChoice::prefers(const AnsweredMove& other, const AnsweredMove& present) {
+  if (other.move + other.answer <= kBetter * (present.move + present.answer)) {
+    by_levels_ = !by_levels_;
+    return true;
+  }
+  found_none();
+  return false;
+}
+
+void MetricChoice::found_none() {
+  wait_ = next_wait_;
+  next_wait_ = std::min(2 * next_wait_, kLongestWait);
+}
+
+}  // namespace tether::ida_projection

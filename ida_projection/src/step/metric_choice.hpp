@@ -1,0 +1,38 @@
+// Tether: which metric moves are made in. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace tether::ida_projection {
+
+/// A move and what F answers to it over the differential variables, in tolerances.
+struct AnsweredMove {
+  double move = 0.0, answer = 0.0;
+};
+
+/// When to look at what F answers to moves, and when to try the other metric (README, section 3).
+class MetricChoice {
+ public:
+  void reset() { *this = MetricChoice(); }
+  /// Is it time to look at the present move?
+  bool due();
+  /// Do stiff components answer to it so much that it harms?
+  bool stiff(const AnsweredMove& at) const;
+  /// After a look: do they, and is it time to try the other metric?
+  bool doubts(const AnsweredMove& at);
+  /// After that trial: is the other one taken from now on?
+  bool prefers(const AnsweredMove& other, const AnsweredMove& present);
+  /// Nothing will be done about the answers: look again later.
+  void pause();
+  /// There is no other one, or its move failed.
+  void found_none();
+  bool by_levels() const { return by_levels_; }  ///< the present one
+
+ private:
+  static constexpr int kFirstWait = 2;
+  bool by_levels_ = false;
+  int looks_ = 0;               // that found nothing
+  int pause_ = 0;               // moves until the next look
+  int wait_ = 0;                // looks with stiff answers until the next trial
+  int next_wait_ = kFirstWait;  // after one that changed nothing
+};
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,45 @@
+// Tether: a move that stiff components take part in as F has it. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "movers/mover.hpp"
+#include "start/algebraic.hpp"
+#include "step/polish.hpp"
+
+namespace tether::ida_projection {
+
+/// Replaces a move p by what F makes of it, z = p - J^-1 F_y p = J^-1 cj F_y' p: the step of BDF
+/// from a history moved by p. Stiff components hardly move in it; p is chosen so that z ends on the
+/// constraints. Contiguous vectors.
+class StiffMove {
+ public:
+  explicit StiffMove(const AlgebraicVariables& variables) : variables_(variables) {}
+
+  /// After mover.move(): ycor <- corrected - z. False, and ycor as it was: z is too long, or F, g
+  /// or the linear solver fails.
+  bool make(const Candidate& candidate, double cj, Polish& polish, Mover& mover);
+  /// What that has changed in ycor after mover.move().
+  N_Vector change() const { return change_; }
+
+ private:
+  static constexpr int kMost = 6;  // directions
+  using Vector = std::vector<double>;
+
+  void allocate(const Candidate& candidate);
+  double dot(const Vector& a, const Vector& b) const;
+  bool answer(const Candidate& candidate, Polish& polish, const Vector& p, Vector& z);
+  int search(const Candidate& candidate, Polish& polish, Mover& mover, double length);
+  void combine(int count, double algebraic);
+
+  const AlgebraicVariables& variables_;
+  const double* weights_ = nullptr;
+  const double* mask_ = nullptr;
+  Vector first_, moved_, left_, total_;
+  Vector directions_[kMost + 1], answered_[kMost];
+  double H_[kMost + 1][kMost] = {}, rhs_[kMost] = {};
+  OwnedVector change_;
+};
+
+}  // namespace tether::ida_projection
