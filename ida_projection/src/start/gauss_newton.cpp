@@ -19,7 +19,8 @@ constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes 
 // Of follow(): steps by factors of another point.
 constexpr int kSimplifiedSteps = 14;
 constexpr double kNear = 1.0, kShrinks = 0.25;
-constexpr double kAside = 10.0;  // what dropped rows may ask for, beside the others
+constexpr double kFollowed = 1e-12;  // tolerances: no last step makes more of it, as above
+constexpr double kAside = 10.0;      // what dropped rows may ask for, beside the others
 
 // `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
 template <class Rows>
@@ -244,7 +245,7 @@ bool GaussNewtonOn<Rows>::follow(double t, std::vector<double>& y0, const std::v
   WT_ = WT;
   evaluator_.forget();
   std::vector<double> y = y0, dy(y.size());
-  const double enough = std::max(kConverged, floor_of(y));
+  const double floor = floor_of(y), enough = std::max(kFollowed, floor);
   double previous = kNear / kShrinks;
   if (!evaluate(t, y, report)) return false;
   report.drift_before = largest(g_);
@@ -260,7 +261,8 @@ bool GaussNewtonOn<Rows>::follow(double t, std::vector<double>& y0, const std::v
     if (length <= enough || (++report.iterations > 1 && rate * length <= enough)) {
       report.drift_after = largest(g_);
       if (near.left_of_dropped(WT_) > 0.0 &&
-          (!near.solve_with_factors(g_, dy) || near.left_of_dropped(WT_) > kAside * enough))
+          (!near.solve_with_factors(g_, dy) ||
+           near.left_of_dropped(WT_) > kAside * std::max(kConverged, floor)))
         return false;
       y0 = y;
       return true;
