@@ -90,6 +90,23 @@ TEST_CASE("event: a ball of other units bounces alike") {
   CHECK(std::abs(rests[0].time - 1.3545709229571927 * clock) < 10 * tolerance * clock);
 }
 
+TEST_CASE("event: a ball far from the origin bounces as one near it") {
+  // Once an error of 1e-6 of its place counted as none: at 600 m 80 tolerances.
+  for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+    CAPTURE(tolerance);
+    const std::string text =
+        "[[body]]\nname = \"floor\"\nshape = \"plane\"\nfixed = true\nmaterial = \"floor\"\n"
+        "position = [600, -800, 300]\n[[body]]\nname = \"ball\"\nshape = \"sphere\"\n"
+        "radius = 0.25\nmass = 3\nmaterial = \"body\"\nposition = [600.3, -800, 302.55]\n" +
+        pair("restitution = 0.7");
+    const auto engine = run(text, tolerance, 5);
+    const auto rests = of_kind(*engine, Kind::rest);
+    REQUIRE(rests.size() == 1);
+    CHECK(std::abs(rests[0].time - std::sqrt(2 * 2.3 / 9.81) * 1.7 / 0.3) < 10 * tolerance);
+    CHECK(std::abs(engine->bodies()[1].position.z() - 300.25) < 10 * tolerance);
+  }
+}
+
 TEST_CASE("event: a rotating ball slips after its impact, then rolls (Capobianco)") {
   for (const double tolerance : kLadder) {
     CAPTURE(tolerance);

@@ -44,6 +44,8 @@ struct Phase::Ida {
   Ida(const Ida&) = delete;
   Ida& operator=(const Ida&) = delete;
 
+  static int weights(N_Vector y, N_Vector w, void* self);
+  double size_of(int i, double value) const { return sizes[i] + std::abs(value - origin[i]); }
   static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
   static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
                       void* self, N_Vector, N_Vector, N_Vector);
@@ -64,7 +66,7 @@ struct Phase::Ida {
   decltype(SUNNonlinearSolver {} -> ops->solve) iterate = nullptr;  // SUNDIALS' Newton
   void* memory = nullptr;
   std::optional<ida_projection::Projection> projection;
-  VectorXd rate, near, near_rate, sizes;
+  VectorXd rate, near, near_rate, sizes, origin;
   VectorXd slips, slips_of_matrix;
   MatrixXd slope;  // d(y')/dy at
   VectorXd slope_at;
@@ -76,6 +78,7 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
     : motion(of), tolerance(tol), start(start_time) {
   const int N = motion.size();
   sizes = motion.model().sizes();
+  origin = motion.model().origin();
   rate.setZero(N);
   near_rate.setZero(N);
   VectorXd rate0(N);
@@ -92,10 +95,7 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
   context.keep_messages_of(memory);
   IDAInit(memory, residual, 0.0, y, yp);
   IDASetUserData(memory, this);
-  N_Vector absolute = N_VClone(y);
-  for (int i = 0; i < N; ++i) N_VGetArrayPointer(absolute)[i] = tolerance * sizes[i];
-  IDASVtolerances(memory, tolerance, absolute);
-  N_VDestroy(absolute);
+  IDAWFtolerances(memory, weights);
   IDASetMaxNumSteps(memory, -1);
   if (max_step > 0) IDASetMaxStep(memory, max_step);
   double first = first_step(y0, rate0);
@@ -143,6 +143,15 @@ Phase::Ida::~Ida() {
   for (N_Vector v : {y, yp, id}) N_VDestroy(v);
 }
 
+int Phase::Ida::weights(N_Vector y, N_Vector w, void* self) {
+  const Ida& me = *static_cast<Ida*>(self);
+  for (int i = 0; i < me.sizes.size(); ++i)
+    N_VGetArrayPointer(w)[i] =
+        1 / (me.tolerance * std::abs(N_VGetArrayPointer(y)[i] - me.origin[i]) +
+             me.tolerance * me.sizes[i]);
+  return 0;
+}
+
 int Phase::Ida::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
   Ida& me = *static_cast<Ida*>(self);
   me.motion.rate(me.start + t, N_VGetArrayPointer(y), me.rate.data());
@@ -184,7 +193,8 @@ bool Phase::Ida::may_reuse(double t, N_Vector at) {
   if (failed || slope_at.size() == 0) return false;
   for (Eigen::Index i = 0; i < slope_at.size(); ++i) {
     const double there = N_VGetArrayPointer(at)[i];
-    if (!(std::abs(there - slope_at[i]) <= kMoved * (sizes[i] + std::abs(there)))) return false;
+    if (!(std::abs(there - slope_at[i]) <= kMoved * size_of(static_cast<int>(i), there)))
+      return false;
   }
   return !has_turned(t, at);
 }
@@ -200,7 +210,7 @@ void Phase::Ida::differentiate(double t, const double* from) {
   for (int j = 0; j < N; ++j) {
     if (j == motion.work()) continue;
     const double kept = near[j];
-    double step = kDifference * std::max(sizes[j], std::abs(kept));
+    double step = kDifference * std::max(sizes[j], std::abs(kept - origin[j]));
     if (j >= motion.coordinates()) step = std::min(step, longest);
     near[j] = kept + step;
     motion.rate(start + t, near.data(), near_rate.data());
@@ -226,7 +236,7 @@ int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SU
 double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
   double speed = 0;
   for (int i = 0; i < y0.size(); ++i)
-    speed = std::max(speed, std::abs(rate0[i]) / (sizes[i] + std::abs(y0[i])));
+    speed = std::max(speed, std::abs(rate0[i]) / size_of(i, y0[i]));
   if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
   const double look = kLook / speed;
   const VectorXd ahead = y0 + look * rate0;
@@ -234,7 +244,7 @@ double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
   motion.rate(start + look, ahead.data(), rate_ahead.data());
   double sum = 0;
   for (int i = 0; i < y0.size(); ++i) {
-    const double change = (rate_ahead[i] - rate0[i]) / (tolerance * (sizes[i] + std::abs(y0[i])));
+    const double change = (rate_ahead[i] - rate0[i]) / (tolerance * size_of(i, y0[i]));
     sum += change * change;
   }
   const double curvature = std::sqrt(sum / static_cast<double>(y0.size())) / look;
