@@ -67,6 +67,7 @@ class Automatic {
 
   bool sweep_first(Search& search, const Rotation& r);
   bool sweep_and_solve_parts(Search& search, double until);
+  void sweep_beside_parts(Search& search, AcceleratedSweeps::Leave leave);
   bool mostly_sticks(Search& search);
   bool infeasible(Search& search);
   bool at_round_off(Search& search, int steps);

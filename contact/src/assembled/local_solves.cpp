@@ -9,6 +9,13 @@
 
 namespace tether::contact::detail {
 
+namespace {
+
+// Of contacts, in place_: not in a part, or not yet.
+constexpr int kOutside = -1, kReached = -2;
+
+}  // namespace
+
 struct LocalSolves::Part {
   Search search;
   Automatic automatic;
@@ -26,6 +33,38 @@ void LocalSolves::reset(int contacts) {
   z_.resize(at(n_));
   error_.resize(at(n_));
   place_.resize(at(n_));
+  held_.assign(at(n_), 0);
+  held_count_ = 0;
+}
+
+// False: there is nothing to solve.
+bool LocalSolves::find_errors(Search& search, const Packed& x) {
+  search.system.changes(x.data(), z_.data(), error_.data());
+  search.counts.work += search.sweep_cost;
+  most_ = 0;
+  for (double error : error_) most_ = std::max(most_, error);
+  return most_ > 0 && std::isfinite(most_);
+}
+
+// The contacts that hang together with `seed` by reached ones, unless they are too many.
+void LocalSolves::add_part(const Problem& p, int seed, int largest) {
+  if (place_[at(seed)] != kReached) return;
+  const std::size_t first = list_.size();
+  list_.push_back(seed);
+  place_[at(seed)] = 0;
+  for (std::size_t k = first; k < list_.size(); ++k)
+    for (int q = p.row_start()[at(list_[k])]; q < p.row_start()[at(list_[k] + 1)]; ++q) {
+      const int j = p.columns()[at(q)];
+      if (place_[at(j)] != kReached) continue;
+      place_[at(j)] = 0;
+      list_.push_back(j);
+    }
+  if (static_cast<int>(list_.size() - first) > largest) {
+    list_.resize(first);
+    return;
+  }
+  std::sort(list_.begin() + static_cast<std::ptrdiff_t>(first), list_.end());
+  start_.push_back(static_cast<int>(list_.size()));
 }
 
 // Parts: connected sets of contacts with an error near the largest and of `layers_` of neighbours.
@@ -33,11 +72,7 @@ void LocalSolves::reset(int contacts) {
 bool LocalSolves::find_parts(Search& search, const Packed& x) {
   constexpr int kLargest = 300;  // contacts of a part
   const Problem& p = search.system.problem();
-  search.system.changes(x.data(), z_.data(), error_.data());
-  search.counts.work += search.sweep_cost;
-  most_ = 0;
-  for (double error : error_) most_ = std::max(most_, error);
-  if (!(most_ > 0) || !std::isfinite(most_)) return false;
+  if (!find_errors(search, x)) return false;
   // Where many contacts have errors of one size solving some of them only disturbs the others. But
   // where sweeps do not settle for long, parts of them may hold what is unstable by itself.
   constexpr double kNearLargest = 0.1, kFew = 0.03;
@@ -47,7 +82,6 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
     ++refused_;
     return false;
   }
-  constexpr int kOutside = -1, kReached = -2;
   for (double cut : {0.3, 0.6, 0.9}) {
     std::fill(place_.begin(), place_.end(), kOutside);
     std::vector<int> reached;
@@ -69,37 +103,21 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
     if (static_cast<int>(reached.size()) > n_ / 3) continue;
     list_.clear();
     start_.assign(1, 0);
-    for (int seed : reached) {
-      if (place_[at(seed)] != kReached) continue;
-      const std::size_t first = list_.size();
-      list_.push_back(seed);
-      place_[at(seed)] = 0;
-      for (std::size_t k = first; k < list_.size(); ++k)
-        for (int q = p.row_start()[at(list_[k])]; q < p.row_start()[at(list_[k] + 1)]; ++q) {
-          const int j = p.columns()[at(q)];
-          if (place_[at(j)] != kReached) continue;
-          place_[at(j)] = 0;
-          list_.push_back(j);
-        }
-      if (list_.size() - first > kLargest) {
-        list_.resize(first);
-        continue;
-      }
-      std::sort(list_.begin() + static_cast<std::ptrdiff_t>(first), list_.end());
-      start_.push_back(static_cast<int>(list_.size()));
-    }
+    for (int seed : reached) add_part(p, seed, kLargest);
     if (start_.size() > 1) return true;
   }
   return false;
 }
 
-bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x) {
+// near: x is so near to a solution that Newton's method may find it at once.
+bool LocalSolves::solve_part(Search& search, int part, double budget, bool near, Packed& x) {
   constexpr double kGain = 1e-3;  // of the error
+  constexpr int kProblems = 2;
   const System& system = search.system;
   const Problem& p = system.problem();
   const int first = start_[at(part)], m = start_[at(part + 1)] - first;
   const int* contacts = list_.data() + first;
-  std::fill(place_.begin(), place_.end(), -1);
+  std::fill(place_.begin(), place_.end(), kOutside);
   for (int r = 0; r < m; ++r) place_[at(contacts[r])] = r;
   std::vector<MatrixBlock> blocks;
   Eigen::VectorXd b(3 * m), mu(m);
@@ -136,12 +154,41 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x)
   local.system.belong_to(system, contacts);
   local.system.to_own_units(start.data());
   part_->automatic.reset(m, options, false);
-  const bool solved = part_->automatic.run_part(local, start) == Status::solved;
+  if (near) {
+    local.test(start.data(), Method::gauss_seidel);
+    part_->automatic.prepare(local);
+    if (!local.solved()) part_->automatic.newton.run(local, start.data(), kProblems);
+    start = local.best;
+  }
+  const bool solved = local.solved() || part_->automatic.run_part(local, start) == Status::solved;
   search.counts.add(local.counts);
   if (!solved) return false;
   local.system.to_given_units(local.best.data());
   for (int r = 0; r < m; ++r) x[at(contacts[r])] = local.best[at(r)];
   return true;
+}
+
+void LocalSolves::hold(int part, bool held) {
+  for (int k = start_[at(part)]; k < start_[at(part + 1)]; ++k) {
+    char& now = held_[at(list_[at(k)])];
+    held_count_ += held - now;
+    now = held;
+  }
+}
+
+bool LocalSolves::run_held(Search& search, Packed& x, double budget) {
+  if (!find_errors(search, x)) return false;
+  for (int i = 0; i < n_; ++i) place_[at(i)] = held_[at(i)] ? kReached : kOutside;
+  list_.clear();
+  start_.assign(1, 0);
+  for (int i = 0; i < n_; ++i) add_part(search.system.problem(), i, n_);
+  bool any = false;
+  for (int part = 0; part + 1 < static_cast<int>(start_.size()) && !search.exhausted(); ++part) {
+    const bool solved = solve_part(search, part, budget, true, x);
+    if (!solved) hold(part, false);
+    any = any || solved;
+  }
+  return any;
 }
 
 bool LocalSolves::run(Search& search, Packed& x, double budget) {
@@ -155,8 +202,12 @@ bool LocalSolves::run(Search& search, Packed& x, double budget) {
     layers_ = std::min(kMostLayers, layers_ + 1);
   if (!part_) part_ = std::make_unique<Part>();
   bool any = false;
-  for (int part = 0; part + 1 < static_cast<int>(start_.size()) && !search.exhausted(); ++part)
-    any = solve_part(search, part, budget, x) || any;
+  for (int part = 0; part + 1 < static_cast<int>(start_.size()) && !search.exhausted(); ++part) {
+    if (solve_part(search, part, budget, false, x)) {
+      hold(part, true);
+      any = true;
+    }
+  }
   if (!any) layers_ = layers_ > 1 ? layers_ - 1 : 2;
   solved_ = any;
   return any;

@@ -11,6 +11,8 @@ namespace {
 // Sweeps that a factorisation costs, from which on sweeps go on before stages that take many of
 // them.
 constexpr double kDear = 30;
+// Contacts from which on a solve of a few of them costs little beside some sweeps.
+constexpr int kMany = 4000;
 
 }  // namespace
 
@@ -35,6 +37,7 @@ bool Automatic::sweep_first(Search& search, const Rotation& r) {
   constexpr double kLookAround = 0.5;  // factorisations
   constexpr double kWorth = 3;
   constexpr double kSmallPart = 0.1;
+  constexpr double kSpread = 100;  // sweeps before parts are solved
   const double begin = search.counts.work;
   for (int look = 0; look < 2; ++look) {
     AcceleratedSweeps::Leave leave;
@@ -44,13 +47,35 @@ bool Automatic::sweep_first(Search& search, const Rotation& r) {
     leave.least_work = kLookAround * price - (search.counts.work - begin);
     if (look == 0 && interior.cost_by_width(search) > kDear * search.sweep_cost)
       leave.least_work = std::max(leave.least_work, interior.order_cost(search) / kSmallPart);
-    sweeps.run(search, leave);
+    if (contacts_ > kMany && look == 0 && leave.least_work > kSpread * search.sweep_cost) {
+      AcceleratedSweeps::Leave first = leave;
+      first.most_work = kSpread * search.sweep_cost;
+      sweeps.run(search, first);
+      if (!search.solved()) sweep_and_solve_parts(search, begin + leave.least_work);
+      leave.least_work = 0;
+    }
+    if (!search.solved() && !search.exhausted()) sweeps.run(search, leave);
     if (search.solved() || search.exhausted()) return search.solved();
     if (look == 0) interior.order(search);
   }
   if (r.regular && (interior.cost(search) < kDear * search.sweep_cost || mostly_sticks(search)))
     interior.stick(search);
   return search.solved();
+}
+
+// Sweeps, between which the parts that have been solved once are solved again.
+void Automatic::sweep_beside_parts(Search& search, AcceleratedSweeps::Leave leave) {
+  constexpr double kBetween = 10, kPartShare = 0.1;  // sweeps, of the work before
+  const double end = search.counts.work + leave.least_work;
+  leave.price = 0;
+  leave.most_work = kBetween * search.sweep_cost;
+  while (search.counts.work < end && parts_.holds()) {
+    sweeps.run(search, leave);
+    if (search.solved() || search.exhausted()) return;
+    x_.assign(sweeps.point(), sweeps.point() + contacts_);
+    parts_.run_held(search, x_, kPartShare * search.counts.work);
+    sweeps.amend(search, x_);
+  }
 }
 
 // Sweeps in turn with solves of the parts where they do not settle, until so much work is done. A
@@ -67,7 +92,10 @@ bool Automatic::sweep_and_solve_parts(Search& search, double until) {
     leave.price = search.counts.work;
     leave.least_work = between * search.sweep_cost;
     leave.most_work = until - search.counts.work;
-    sweeps.run(search, leave);
+    if (contacts_ > kMany && parts_.holds())
+      sweep_beside_parts(search, leave);
+    else
+      sweeps.run(search, leave);
     if (search.solved()) break;
     if (search.best_error < 0.7 * halved) {
       halved = search.best_error;

@@ -45,6 +45,14 @@ void AcceleratedSweeps::replace(const PackedVector* x) {
   later_ = {sweeps_, 0};
 }
 
+void AcceleratedSweeps::amend(Search& search, const Packed& x) {
+  swept_ = g_;
+  g_ = x;
+  momentum_.rest_where_changed(g_, swept_);
+  anderson_.clear();
+  carry_on(search, f_now_, true);
+}
+
 // x_n > 0 and the cone: 0 separated, 1 sticking, 2 sliding. Counts what is not as in the last
 // sweep.
 int AcceleratedSweeps::toggles(const System& system) {
@@ -159,7 +167,7 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
         f2 += f * f;
       }
     }
-    const double f = std::sqrt(f2);
+    const double f = f_now_ = std::sqrt(f2);
     if (sweep >= next_test || last_error * f < kForeseen * search.options.tolerance * last_f) {
       last_error = search.test(g_.data(), Method::anderson);
       last_f = f;
