@@ -11,6 +11,15 @@ using namespace tether::contact;
 
 namespace {
 
+// The solution, which meets the law.
+Solution solved(const Problem& p, const Options& o) {
+  const Solution s = Solver(o).solve(p);
+  INFO(name(s.status) << " " << s.error << ", work " << s.counts.work);
+  CHECK(s.status == Status::solved);
+  CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1e-6);
+  return s;
+}
+
 // A jittered face-centred lattice, neighbours nearer than `reach` in contact: two and a half
 // contacts a body, or four with a reach of 1.08 and a jitter of 0.05.
 random::Packing close_packing(int cells, bool spheres, double mu, std::uint64_t seed,
@@ -108,9 +117,7 @@ double over_better_sweeps(const Problem& p, double most) {
   Options o;
   o.law = Law::coulomb;
   o.tolerance = 1e-6;
-  const Solution s = Solver(o).solve(p);
-  CHECK(s.status == Status::solved);
-  CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1e-6);
+  const Solution s = solved(p, o);
   double best = most;
   for (Method method : {Method::gauss_seidel, Method::anderson}) {
     o.method = method;
@@ -178,10 +185,7 @@ TEST_CASE("packings: parts that are unstable under sweeps follow them, 10600 con
     o.law = Law::coulomb;
     o.tolerance = 1e-6;
     o.max_work = 2e9;
-    const Solution s = Solver(o).solve(p);
-    INFO(name(s.status) << " " << s.error << ", work " << s.counts.work);
-    CHECK(s.status == Status::solved);
-    CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1e-6);
+    solved(p, o);
   }
 }
 
@@ -227,10 +231,8 @@ TEST_CASE(
       o.law = Law::coulomb;
       o.tolerance = 1e-6;
       o.max_work = kMost;
-      const Solution s = Solver(o).solve(p);
-      INFO("mu " << mu << ", seed " << seed << ": " << name(s.status) << " " << s.error);
-      CHECK(s.status == Status::solved);
-      CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1e-6);
+      INFO("mu " << mu << ", seed " << seed);
+      const Solution s = solved(p, o);
       mine += s.counts.work;
       double best = kMost;
       for (Method method : {Method::gauss_seidel, Method::anderson}) {
@@ -272,10 +274,7 @@ TEST_CASE("packings: a lattice on which sweeps wander is solved on the path from
   o.law = Law::coulomb;
   o.tolerance = 1e-6;
   o.max_work = 6e8;
-  const Solution s = Solver(o).solve(p);
-  INFO(name(s.status) << " " << s.error << ", work " << s.counts.work);
-  CHECK(s.status == Status::solved);
-  CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1e-6);
+  const Solution s = solved(p, o);
   CHECK(s.counts.factorisations < 150);
 }
 
