@@ -1,0 +1,151 @@
+// Tether: contact problems over products of cones. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <tether/contact/evaluate.hpp>
+#include <tether/contact/solver.hpp>
+#include <tether/export.hpp>
+#include <tether/linalg/eigen.hpp>
+#include <vector>
+
+TETHER_EXPORT_BEGIN
+namespace tether::contact {
+
+/// One factor of the cone K of a ConeProblem: what its rows of the impulse x may be, and what that
+/// asks of their velocities w (README, section 21).
+struct Cone {
+  enum class Kind : std::uint8_t {
+    free,         ///< any number of rows, of any sign: w = 0 (joints)
+    nonnegative,  ///< 1 row: x >= 0 complementary to w >= 0 (limits, contacts without friction)
+    bounded,      ///< 1 row: |x| <= bound; -w in the normal cone there (motors, dry joints)
+    planar,       ///< 2 rows: normal, tangent
+    friction,     ///< 3: normal, tangent, tangent; |x_t| <= mu x_n
+    torsional,    ///< 4: and the moment about the normal, at most `torsional` x_n
+    rolling,      ///< 5: the first three and two moments across it, |y_t| <= rolling x_n
+    rolling_torsional  ///< 6: normal, tangents, moment about the normal, two across it
+  };
+
+  Kind kind = Kind::free;
+  int rows = 1;
+  double mu = 0, rolling = 0, torsional = 0, bound = 0;
+
+  static Cone free(int rows = 1) { return {Kind::free, rows}; }
+  static Cone nonnegative() { return {Kind::nonnegative, 1}; }
+  static Cone bounded(double bound) { return {Kind::bounded, 1, 0, 0, 0, bound}; }
+  static Cone planar(double mu) { return {Kind::planar, 2, mu}; }
+  static Cone friction(double mu) { return {Kind::friction, 3, mu}; }
+  static Cone with_torsional(double mu, double torsional) {
+    return {Kind::torsional, 4, mu, 0, torsional};
+  }
+  static Cone with_rolling(double mu, double rolling) { return {Kind::rolling, 5, mu, rolling}; }
+  static Cone with_rolling(double mu, double rolling, double torsional) {
+    return {Kind::rolling_torsional, 6, mu, rolling, torsional};
+  }
+};
+
+const char* name(Cone::Kind kind);
+
+struct MatrixEntry {
+  int row = 0, column = 0;
+  double value = 0;
+};
+
+/// w = A x - b for rows in blocks, each with its cone, in any order and of any units. A may be
+/// singular (redundant joints, many contacts). A value; fixed once made.
+class ConeProblem {
+ public:
+  ConeProblem() = default;
+  /// compliance: velocity over impulse of each row, >= 0, added to the diagonal of A; empty: none.
+  /// Throws std::invalid_argument (here and below) on sizes that do not match, values that are not
+  /// finite or out of range, contacts whose normal nothing moves and indefinite diagonal blocks.
+  static ConeProblem dense(const linalg::MatrixView& A, const linalg::VectorView& b,
+                           std::vector<Cone> cones,
+                           const linalg::VectorView& compliance = linalg::VectorX());
+  /// Entries in any order; equal positions are summed.
+  static ConeProblem sparse(const std::vector<MatrixEntry>& A, const linalg::VectorView& b,
+                            std::vector<Cone> cones,
+                            const linalg::VectorView& compliance = linalg::VectorX());
+  /// M v = J'x + f, w = J v + bias: A = J M^-1 J' and b = -(J M^-1 f + bias). M, symmetric and
+  /// positive definite, has f.size() rows; both of its halves are given. Parts of M that hang
+  /// together are factored by themselves (Cholesky); A is dense over the rows of each.
+  static ConeProblem saddle(const std::vector<MatrixEntry>& M, const std::vector<MatrixEntry>& J,
+                            const linalg::VectorView& f, const linalg::VectorView& bias,
+                            std::vector<Cone> cones,
+                            const linalg::VectorView& compliance = linalg::VectorX());
+
+  int rows() const { return static_cast<int>(b_.size()); }
+  const std::vector<Cone>& cones() const { return cones_; }
+  int first_row(int cone) const { return first_[static_cast<std::size_t>(cone)]; }
+  const linalg::VectorX& b() const { return b_; }
+  /// With the compliance. Rows ascend, columns ascend in each.
+  const std::vector<MatrixEntry>& entries() const { return entries_; }
+  const std::vector<int>& row_start() const { return row_start_; }
+  linalg::MatrixX dense_matrix() const;
+  /// A x - b, sums in long double.
+  linalg::VectorX velocities(const linalg::VectorView& impulses) const;
+  /// What a row's velocity is multiplied by to be compared with others: 1/sqrt of the mean of the
+  /// diagonal of A over the rows that belong together (normal and tangents; both rolling moments;
+  /// any other row alone). 0 where that is 0.
+  const std::vector<double>& row_scale() const { return scale_; }
+
+ private:
+  linalg::VectorX b_;
+  std::vector<Cone> cones_;
+  std::vector<int> first_, row_start_;
+  std::vector<MatrixEntry> entries_;
+  std::vector<double> scale_;
+};
+
+/// How far impulses are from the law, block by block, without units: the error in velocity of each
+/// row times row_scale(), over the largest that a block of its island needs (README, section 21).
+struct ConeResiduals {
+  double error = Residuals::kNone;  ///< the largest
+  int worst = -1;                   ///< the block that has it
+  std::vector<double> blocks;       ///< at least what round-off makes of A x
+};
+
+/// Law::coulomb takes every cone, frictionless no bounds and moments, maximum_dissipation no free
+/// rows either (it follows each contact's own block of A, which they change):
+/// std::invalid_argument. NaN where an impulse is not finite.
+ConeResiduals evaluate(const ConeProblem& problem, Law law, const linalg::VectorView& impulses);
+
+struct ConeSolution {
+  Status status = Status::unsolved;
+  linalg::VectorX impulses, velocities;  ///< x and w = A x - b, by row
+  ConeResiduals residuals;
+  double error = Residuals::kNone;  ///< residuals.error: what was compared with the tolerance
+  /// Free rows that nothing satisfies together (status infeasible); the impulses are those of least
+  /// squares then, nearly.
+  std::vector<int> contradicting;
+  /// Blocks that approach though free rows hold their normal (status infeasible).
+  std::vector<int> blocked;
+  /// As Solution::infeasible_direction, by row; free rows answer to it.
+  std::vector<double> infeasible_direction;
+  Counts counts;
+  std::string advice;
+};
+
+/// Solves ConeProblems by a Solver: free rows are eliminated (sparse factors of their part of A,
+/// proximal steps where rows depend on each other), and every other cone is made of 3-D friction
+/// cones. Keeps nothing but what Options::warm_start asks for.
+class ConeSolver {
+ public:
+  /// `measure` and `strict` are not used. Throws std::invalid_argument on illegal values.
+  explicit ConeSolver(const Options& options = {});
+  ~ConeSolver();
+  ConeSolver(ConeSolver&&) noexcept;
+  ConeSolver& operator=(ConeSolver&&) noexcept;
+
+  ConeSolution solve(const ConeProblem& problem);
+  /// Start from the given impulses, by row.
+  ConeSolution solve(const ConeProblem& problem, const linalg::VectorView& start);
+
+ private:
+  struct TETHER_HIDDEN Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace tether::contact
+TETHER_EXPORT_END

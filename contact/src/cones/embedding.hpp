@@ -1,0 +1,83 @@
+// Tether: a problem over cones as one of 3-D friction cones. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/cones.hpp>
+#include <tether/contact/problem.hpp>
+#include <vector>
+
+#include "cones/free_rows.hpp"
+
+namespace tether::contact::detail {
+
+/// Every row that is not free is a component of a contact, in units of row_scale(), others are
+/// directions of their own that no other row moves (README, section 21):
+///
+///     nonnegative   (row, own, own), mu = 0
+///     bounded       (own, row, own), mu = 1; its normal is pressed with the bound, so x_n = bound
+///     planar        (row, row, own)
+///     friction      (row, row, row)
+///     moments       (own, row, own) and (own, row, row), mu the length; w_n = a (x_n - x_n of the
+///                   contact), so that x_n is that of the contact: an unsymmetric row
+///
+/// Of the matrix of these rows the free ones are eliminated: A_cc - A_cf A_ff^-1 A_fc.
+class Embedding {
+ public:
+  /// `open`: by block, whether its contact is known to be open, so that the normals of its moments
+  /// must not be at their kink; empty: none.
+  Embedding(const ConeProblem& problem, double tolerance, const std::vector<char>& open = {});
+
+  const Problem& contacts() const { return contacts_; }
+  const FreeRows& free_rows() const { return free_; }
+  const std::vector<int>& blocked() const { return blocked_; }
+  int block_of(int contact) const { return block_of_[static_cast<std::size_t>(contact)]; }
+  /// Contact whose normal is the block's; -1: none, or held.
+  int main_contact(int block) const { return main_[static_cast<std::size_t>(block)]; }
+
+  Eigen::VectorXd lift(const linalg::VectorView& impulses) const;
+  /// By row; free rows zero.
+  Eigen::VectorXd lower(const linalg::VectorView& contacts) const;
+  /// All of x: free rows answer to those of the cones, A_ff x_f = g_f - A_fc x_c.
+  Eigen::VectorXd complete(const Eigen::VectorXd& cones, const linalg::VectorView& g) const;
+
+  /// Change of the contacts' b for one of b, by row; of the bounds for `bounds` by block.
+  Eigen::VectorXd lift_b(const linalg::VectorView& db) const;
+  /// Transposed.
+  Eigen::VectorXd lower_b(const linalg::VectorView& db3) const;
+  /// Where the bound of a block enters b, and by which factor; contact -1: nowhere.
+  struct Bound {
+    int contact = -1;
+    double factor = 0;
+  };
+  Bound bound_of(int block) const { return bounds_[static_cast<std::size_t>(block)]; }
+  /// Contacts of the moments of a block (-1: none), and mu of each over its length.
+  struct Moments {
+    int spin = -1, rolling = -1;
+    double spin_factor = 0, rolling_factor = 0;
+  };
+  const Moments& moments_of(int block) const { return moments_[static_cast<std::size_t>(block)]; }
+
+ private:
+  struct Place {
+    int contact = -1, component = 0;
+  };
+  void eliminate(const ConeProblem& problem);
+  void place_rows(const ConeProblem& problem, double tolerance);
+  void clear_held(const ConeProblem& problem);
+  void assemble(const ConeProblem& problem, const std::vector<char>& open);
+
+  FreeRows free_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> A_;  // of the cones' rows, scaled, eliminated
+  Eigen::VectorXd b_, scale_;
+  std::vector<Place> places_;  // by row
+  std::vector<int> block_of_, main_, blocked_, row_of_;
+  std::vector<Bound> bounds_;
+  std::vector<Moments> moments_;
+  std::vector<double> mu_;
+  double need_ = 0;
+  Problem contacts_;
+};
+
+/// The largest that a block needs, times row_scale(): what bounds are weighed by.
+double largest_need(const ConeProblem& problem);
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,87 @@
+// Tether: the free rows of a problem over cones. SPDX-License-Identifier: BSD-3-Clause
+#include "cones/free_rows.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tether/linalg/index.hpp>
+
+namespace tether::contact::detail {
+
+namespace {
+
+using linalg::at;
+
+// Singular values of a unit matrix above it are solved in a few steps; rounding makes 1e-16 over it
+// of directions that A does not see.
+constexpr double kProximal = 1e-8;
+constexpr int kSteps = 40;
+
+}  // namespace
+
+FreeRows::FreeRows(const ConeProblem& problem) : place_(at(problem.rows()), -1) {
+  for (std::size_t k = 0; k < problem.cones().size(); ++k) {
+    if (problem.cones()[k].kind != Cone::Kind::free) continue;
+    for (int r = 0; r < problem.cones()[k].rows; ++r) {
+      const int row = problem.first_row(static_cast<int>(k)) + r;
+      place_[at(row)] = static_cast<int>(rows_.size());
+      rows_.push_back(row);
+    }
+  }
+  const auto n = static_cast<int>(rows_.size());
+  std::vector<Eigen::Triplet<double>> own, down, up;
+  scale_.resize(n);
+  std::vector<int> parent(at(n));
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int i) {
+    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
+    return i;
+  };
+  for (int i = 0; i < n; ++i) scale_[i] = problem.row_scale()[at(rows_[at(i)])];
+  for (const MatrixEntry& e : problem.entries()) {
+    const int r = place_[at(e.row)], c = place_[at(e.column)];
+    if (r >= 0 && c >= 0) {
+      own.emplace_back(r, c, scale_[r] * e.value * scale_[c]);
+      if (e.value != 0) parent[at(std::max(root(r), root(c)))] = std::min(root(r), root(c));
+    } else if (c >= 0) {
+      down.emplace_back(e.row, c, e.value);
+    } else if (r >= 0) {
+      up.emplace_back(r, e.column, e.value);
+    }
+  }
+  for (int i = 0; i < n; ++i) part_.push_back(root(i) == i ? parts_++ : part_[at(root(i))]);
+  A_.resize(n, n);
+  A_.setFromTriplets(own.begin(), own.end());
+  coupling_.resize(problem.rows(), n);
+  coupling_.setFromTriplets(down.begin(), down.end());
+  back_.resize(n, problem.rows());
+  back_.setFromTriplets(up.begin(), up.end());
+  if (n == 0) return;
+  Eigen::SparseMatrix<double> raised(n, n);
+  raised.setIdentity();
+  raised = (A_ + kProximal * raised).eval();
+  factor_.compute(raised);
+}
+
+Eigen::MatrixXd FreeRows::solve(const Eigen::MatrixXd& G) const {
+  Eigen::MatrixXd X(G.rows(), G.cols());
+  for (Eigen::Index k = 0; k < G.cols(); ++k) {
+    const Eigen::VectorXd g = scale_.cwiseProduct(G.col(k));
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(g.size()), r = g, best = x;
+    double least = r.norm();
+    for (int step = 0; step < kSteps && least > 0; ++step) {
+      x += factor_.solve(r);
+      r = g - A_ * x;
+      const double now = r.norm();
+      if (!(now < least)) break;
+      best = x;
+      const bool slow = !(now < 0.5 * least);
+      least = now;
+      if (slow || now <= std::numeric_limits<double>::epsilon() * g.norm()) break;
+    }
+    X.col(k) = scale_.cwiseProduct(best);
+  }
+  return X;
+}
+
+}  // namespace tether::contact::detail

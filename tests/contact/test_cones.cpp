@@ -1,0 +1,549 @@
+// Problems over products of cones: closed forms, elimination, other units and orders.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <tether/contact.hpp>
+
+#include "support/catch.hpp"
+
+using namespace tether::contact;
+using Catch::Contains;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kTolerance = 1e-10;
+
+ConeSolution solve(const ConeProblem& p, double tolerance = kTolerance, Law law = Law::coulomb) {
+  Options o;
+  o.law = law;
+  o.tolerance = tolerance;
+  return ConeSolver(o).solve(p);
+}
+
+struct Data {
+  MatrixXd A;
+  VectorXd b;
+  std::vector<Cone> cones;
+  ConeProblem problem() const { return ConeProblem::dense(A, b, cones); }
+};
+
+// One of each, and free rows between them.
+std::vector<Cone> one_of_each() {
+  return {Cone::friction(0.6),
+          Cone::free(2),
+          Cone::bounded(0.3),
+          Cone::nonnegative(),
+          Cone::planar(0.4),
+          Cone::with_rolling(0.5, 0.2),
+          Cone::free(1),
+          Cone::with_torsional(0.7, 0.3),
+          Cone::with_rolling(0.4, 0.1, 0.2)};
+}
+
+// A = J J' of the given rank share, diagonally strong where `alone` is large (then the law has one
+// solution).
+Data any_data(const std::vector<Cone>& cones, unsigned seed, double alone, double share = 1.2) {
+  std::mt19937 g(seed);
+  std::normal_distribution<double> normal;
+  int rows = 0;
+  for (const Cone& c : cones) rows += c.rows;
+  const int rank = std::max(1, static_cast<int>(share * rows));
+  const MatrixXd J = MatrixXd::NullaryExpr(rows, rank, [&] { return normal(g); });
+  Data out{J * J.transpose(), J * VectorXd::NullaryExpr(rank, [&] { return normal(g); }), cones};
+  out.A.diagonal().array() += alone * rank;
+  return out;
+}
+
+// The law from its words, not from residuals: how far x, w are from it, in the units of both.
+double broken_law(const ConeProblem& p, const VectorXd& x, const VectorXd& w) {
+  double most = 0;
+  const auto say = [&](double v) { most = std::max(most, v); };
+  // |m| <= r; at rest below it, against w at it.
+  const auto disc = [&](const VectorXd& m, const VectorXd& v, double r) {
+    say(m.norm() - r);
+    if (v.norm() < 1e-8) return;
+    say(std::abs(m.norm() - r));
+    say((m + r * v / v.norm()).norm());
+  };
+  for (int k = 0; k < static_cast<int>(p.cones().size()); ++k) {
+    const Cone& c = p.cones()[static_cast<std::size_t>(k)];
+    const VectorXd xk = x.segment(p.first_row(k), c.rows), wk = w.segment(p.first_row(k), c.rows);
+    if (c.kind == Cone::Kind::free) {
+      say(wk.cwiseAbs().maxCoeff());
+      continue;
+    }
+    if (c.kind == Cone::Kind::bounded) {
+      disc(xk, wk, c.bound);
+      continue;
+    }
+    say(-xk[0]);
+    say(-wk[0]);
+    say(std::min(xk[0], wk[0]));
+    const int tangents = c.rows == 1 ? 0 : c.rows == 2 ? 1 : 2;
+    disc(xk.segment(1, tangents), wk.segment(1, tangents), c.mu * xk[0]);
+    if (c.kind == Cone::Kind::torsional || c.kind == Cone::Kind::rolling_torsional)
+      disc(xk.segment(3, 1), wk.segment(3, 1), c.torsional * xk[0]);
+    if (c.kind == Cone::Kind::rolling || c.kind == Cone::Kind::rolling_torsional)
+      disc(xk.tail(2), wk.tail(2), c.rolling * xk[0]);
+  }
+  return most;
+}
+
+// A ball of 2 kg, r = 0.1, on a floor: rows n, t, t and the moments about n and across it.
+struct Ball {
+  double mass = 2, r = 0.1, inertia = 0.4 * 2 * 0.1 * 0.1;
+  MatrixXd A() const {
+    MatrixXd J = MatrixXd::Identity(6, 6);
+    J(1, 5) = r;  // turning about the second tangent moves the point along the first
+    J(2, 4) = -r;
+    VectorXd inverse(6);
+    inverse << 1 / mass, 1 / mass, 1 / mass, 1 / inertia, 1 / inertia, 1 / inertia;
+    return J * inverse.asDiagonal() * J.transpose();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("cones: blocks alone have the impulses of their closed forms") {
+  const auto one = [](double a, double b, const Cone& cone) {
+    return solve(ConeProblem::dense(MatrixXd::Constant(1, 1, a), VectorXd::Constant(1, b), {cone}));
+  };
+  CHECK(one(2, 3, Cone::free()).impulses[0] == Approx(1.5).epsilon(1e-14));
+  CHECK(one(2, -3, Cone::free()).impulses[0] == Approx(-1.5).epsilon(1e-14));
+  CHECK(one(2, 3, Cone::nonnegative()).impulses[0] == Approx(1.5).epsilon(1e-14));
+  CHECK(one(2, -3, Cone::nonnegative()).impulses[0] == 0);
+  CHECK(one(2, 3, Cone::bounded(1)).impulses[0] == Approx(1).epsilon(1e-14));
+  CHECK(one(2, -3, Cone::bounded(1)).impulses[0] == Approx(-1).epsilon(1e-14));
+  CHECK(one(2, 1, Cone::bounded(1)).impulses[0] == Approx(0.5).epsilon(1e-14));
+  CHECK(one(2, 1, Cone::bounded(1e9)).impulses[0] == Approx(0.5).epsilon(1e-14));
+  CHECK(one(2, 1, Cone::bounded(0)).impulses[0] == 0);
+
+  const Ball ball;
+  // It comes with 1 m/s and slides with 0.5 m/s: friction of 0.1 leaves slip, of 0.9 makes it roll.
+  VectorXd b = VectorXd::Zero(6);
+  b[0] = 1;
+  b[1] = -0.5;
+  for (double mu : {0.1, 0.9}) {
+    const ConeSolution s =
+        solve(ConeProblem::dense(ball.A().topLeftCorner(3, 3), b.head(3), {Cone::friction(mu)}));
+    CHECK(s.status == Status::solved);
+    CHECK(s.impulses[0] == Approx(ball.mass).epsilon(1e-12));
+    CHECK(s.impulses[1] ==
+          Approx(-std::min(mu * ball.mass, 0.5 * ball.mass * 2 / 7)).epsilon(1e-12));
+  }
+  // Rolling with v, turning about the normal with omega: moments of c x_n and d x_n. With full
+  // grip the moment c x_n changes v by -c x_n r / (7/5 m r^2).
+  const double c = 0.003, d = 0.002, omega = 7;
+  b << 1, 0, 0, -omega, 0, -5;  // b = -(velocity): rolls towards the first tangent
+  const ConeSolution s = solve(ConeProblem::dense(ball.A(), b, {Cone::with_rolling(1, c, d)}));
+  CHECK(s.status == Status::solved);
+  CHECK(s.impulses[0] == Approx(ball.mass).epsilon(1e-12));
+  CHECK(s.impulses[3] == Approx(-d * ball.mass).epsilon(1e-12));
+  CHECK(s.impulses.tail(2).norm() == Approx(c * ball.mass).epsilon(1e-12));
+  const double spin = 5 - c * ball.mass / (1.4 * ball.mass * ball.r * ball.r);
+  CHECK(s.velocities[5] == Approx(spin).epsilon(1e-12));
+  CHECK(s.velocities.segment(1, 2).norm() < 1e-10);
+}
+
+TEST_CASE("cones: a problem with one block of each obeys the law that is written there") {
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    CAPTURE(seed);
+    const double share = seed % 3 == 0 ? 0.5 : 1.2;  // singular A, too
+    const ConeProblem p = any_data(one_of_each(), seed, 0, share).problem();
+    const ConeSolution s = solve(p, 1e-11);
+    REQUIRE(s.status == Status::solved);
+    CHECK(s.error <= 1e-11);
+    CHECK(s.error == evaluate(p, Law::coulomb, s.impulses).error);
+    CHECK((s.velocities - (p.dense_matrix() * s.impulses - p.b())).norm() <
+          1e-11 * (1 + s.impulses.norm()) * p.dense_matrix().norm());
+    CHECK(broken_law(p, s.impulses, s.velocities) < 2e-7);
+  }
+}
+
+TEST_CASE("cones: free rows against their elimination by singular values") {
+  int pressed = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    CAPTURE(seed);
+    // Free rows depend on each other in every other problem.
+    const std::vector<Cone> cones = {Cone::friction(0.5), Cone::free(6), Cone::friction(0.8),
+                                     Cone::free(3)};
+    Data d = any_data(cones, seed, 0, 1.5);
+    if (seed % 2 == 0) {
+      const auto copy = [&](int to, int from) {
+        d.A.row(to) = -2 * d.A.row(from);
+        d.A.col(to) = -2 * d.A.col(from);
+        d.A(to, to) = 4 * d.A(from, from);
+        d.b[to] = -2 * d.b[from];
+      };
+      copy(12, 4);
+      copy(14, 13);
+    }
+    std::vector<int> f = {3, 4, 5, 6, 7, 8, 12, 13, 14}, c = {0, 1, 2, 9, 10, 11};
+    const auto pick = [&](const std::vector<int>& r, const std::vector<int>& k) {
+      return MatrixXd(MatrixXd::NullaryExpr(
+          static_cast<Eigen::Index>(r.size()), static_cast<Eigen::Index>(k.size()),
+          [&](Eigen::Index i, Eigen::Index j) {
+            return d.A(r[static_cast<std::size_t>(i)], k[static_cast<std::size_t>(j)]);
+          }));
+    };
+    const auto rows = [&](const VectorXd& x, const std::vector<int>& r) {
+      return VectorXd(
+          VectorXd::NullaryExpr(static_cast<Eigen::Index>(r.size()),
+                                [&](Eigen::Index i) { return x[r[static_cast<std::size_t>(i)]]; }));
+    };
+    Eigen::JacobiSVD<MatrixXd> svd(pick(f, f), Eigen::ComputeThinU | Eigen::ComputeThinV);
+    svd.setThreshold(1e-11);
+    const MatrixXd Y = svd.solve(pick(f, c));
+    const Problem contacts =
+        Problem::dense(pick(c, c) - pick(c, f) * Y,
+                       rows(d.b, c) - pick(c, f) * svd.solve(rows(d.b, f)), Vector2d(0.5, 0.8));
+    Options o;
+    o.law = Law::coulomb;
+    o.tolerance = 1e-12;
+    const Solution wanted = Solver(o).solve(contacts);
+    REQUIRE(wanted.status == Status::solved);
+    const ConeSolution s = solve(d.problem(), 1e-12);
+    REQUIRE(s.status == Status::solved);
+    CHECK(s.contradicting.empty());
+    pressed += wanted.impulses[0] > 0 && wanted.impulses[3] > 0;
+    CHECK((rows(s.impulses, c) - wanted.impulses).norm() <= 1e-8 * wanted.impulses.norm());
+    CHECK(rows(s.velocities, f).norm() < 1e-10 * d.b.norm());
+  }
+  CHECK(pressed >= 5);
+}
+
+TEST_CASE("cones: another order of the blocks has the same impulses") {
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    CAPTURE(seed);
+    const Data d = any_data(one_of_each(), seed, 3);
+    const ConeProblem p = d.problem();
+    const ConeSolution s = solve(p, 1e-12);
+    std::vector<int> order(d.cones.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::shuffle(order.begin(), order.end(), std::mt19937(seed));
+    std::vector<Cone> cones;
+    std::vector<int> row;
+    for (int k : order) {
+      cones.push_back(d.cones[static_cast<std::size_t>(k)]);
+      for (int r = 0; r < cones.back().rows; ++r) row.push_back(p.first_row(k) + r);
+    }
+    std::vector<MatrixEntry> entries;  // backwards, and in two halves
+    VectorXd b(d.b.size());
+    for (int i = static_cast<int>(row.size()) - 1; i >= 0; --i) {
+      b[i] = d.b[row[static_cast<std::size_t>(i)]];
+      for (int j = 0; j < static_cast<int>(row.size()); ++j)
+        for (int half = 0; half < 2; ++half)
+          entries.push_back(
+              {i, j,
+               0.5 * d.A(row[static_cast<std::size_t>(i)], row[static_cast<std::size_t>(j)])});
+    }
+    const ConeSolution t = solve(ConeProblem::sparse(entries, b, cones), 1e-12);
+    REQUIRE(s.status == Status::solved);
+    REQUIRE(t.status == Status::solved);
+    for (int i = 0; i < static_cast<int>(row.size()); ++i)
+      CHECK(t.impulses[i] ==
+            Approx(s.impulses[row[static_cast<std::size_t>(i)]]).margin(1e-9 * s.impulses.norm()));
+  }
+}
+
+TEST_CASE("cones: units change nothing, those of single rows neither") {
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    CAPTURE(seed);
+    const Data d = any_data(one_of_each(), seed, 1);
+    // Velocities of row r in units of u[r]: one for normals and tangents of a block, one for
+    // moments, one for any other row. Then all masses, and all velocities.
+    std::mt19937 g(seed);
+    std::uniform_real_distribution<double> power(-6, 6);
+    VectorXd u(d.b.size());
+    Data e = d;
+    int row = 0;
+    for (Cone& c : e.cones) {
+      const double normal = std::pow(10, power(g)), spin = std::pow(10, power(g)),
+                   roll = std::pow(10, power(g));
+      for (int r = 0; r < c.rows; ++r) {
+        double& own = u[row++];
+        own = normal;
+        if (c.kind == Cone::Kind::free) own = std::pow(10, power(g));
+        if (r >= 3) own = c.rows != 5 && r == 3 ? spin : roll;
+      }
+      c.rolling *= normal / roll;
+      c.torsional *= normal / spin;
+      c.bound /= normal;
+    }
+    const double mass = std::pow(10, power(g)), speed = std::pow(10, power(g));
+    e.A = mass * u.asDiagonal() * d.A * u.asDiagonal();
+    e.b = speed * u.cwiseProduct(d.b);
+    for (Cone& c : e.cones) c.bound *= speed / mass;
+    const ConeSolution s = solve(d.problem()), t = solve(e.problem());
+    REQUIRE(s.status == Status::solved);
+    CHECK(t.status == Status::solved);
+    const VectorXd same = mass / speed * u.cwiseProduct(t.impulses);
+    CHECK((same - s.impulses).norm() < 1e-8 * s.impulses.norm());
+    // The same error of the same impulses.
+    const VectorXd wrong = s.impulses * 1.01,
+                   there = (speed / mass * wrong.array() / u.array()).matrix();
+    const ConeResiduals a = evaluate(d.problem(), Law::coulomb, wrong),
+                        b = evaluate(e.problem(), Law::coulomb, there);
+    CHECK(b.error == Approx(a.error).epsilon(1e-9));
+    for (std::size_t k = 0; k < a.blocks.size(); ++k)
+      CHECK(b.blocks[k] == Approx(a.blocks[k]).epsilon(1e-8).margin(1e-12));
+  }
+}
+
+TEST_CASE("cones: an impulse outside of its cone is seen in its block") {
+  const ConeProblem p = any_data(one_of_each(), 5, 3).problem();
+  const ConeSolution s = solve(p, 1e-12);
+  REQUIRE(s.status == Status::solved);
+  for (int k = 0; k < static_cast<int>(p.cones().size()); ++k) {
+    const Cone& c = p.cones()[static_cast<std::size_t>(k)];
+    CAPTURE(name(c.kind));
+    for (int r = 0; r < c.rows; ++r) {
+      VectorXd x = s.impulses;
+      const int row = p.first_row(k) + r;
+      const double scale = p.row_scale()[static_cast<std::size_t>(row)];
+      x[row] -= 100 * scale;  // far out of any bound; of normals, below 0
+      const ConeResiduals residuals = evaluate(p, Law::coulomb, x);
+      CHECK(residuals.blocks[static_cast<std::size_t>(k)] > 1);
+    }
+  }
+  VectorXd x = s.impulses;
+  x[2] = std::nan("");
+  CHECK(std::isnan(evaluate(p, Law::coulomb, x).error));
+}
+
+TEST_CASE("cones: ten copies of free rows share their impulse, and change no other") {
+  const auto cones = [](int copies) {
+    return std::vector<Cone>{Cone::friction(0.5), Cone::free(2 * copies)};
+  };
+  const Data once = any_data(cones(1), 3, 0.5);
+  Data ten{MatrixXd(23, 23), VectorXd(23), cones(10)};
+  const auto source = [](int i) { return i < 3 ? i : 3 + (i - 3) % 2; };
+  for (int i = 0; i < 23; ++i) {
+    ten.b[i] = once.b[source(i)];
+    for (int j = 0; j < 23; ++j) ten.A(i, j) = once.A(source(i), source(j));
+  }
+  const ConeSolution a = solve(once.problem()), b = solve(ten.problem());
+  REQUIRE(a.status == Status::solved);
+  REQUIRE(b.status == Status::solved);
+  CHECK((a.impulses.head(3) - b.impulses.head(3)).norm() < 1e-9 * a.impulses.norm());
+  for (int i = 3; i < 23; ++i)
+    CHECK(b.impulses[i] == Approx(0.1 * a.impulses[source(i)]).epsilon(1e-7));
+}
+
+TEST_CASE("cones: free rows that contradict each other, and contacts that they lock, are named") {
+  Data d = any_data({Cone::free(1), Cone::friction(0.5), Cone::free(1)}, 4, 1);
+  d.A.row(4) = d.A.row(0);
+  d.A.col(4) = d.A.col(0);
+  d.A(4, 4) = d.A(0, 0);
+  d.b[4] = d.b[0] + 1;
+  const ConeSolution s = solve(d.problem());
+  CHECK(s.status == Status::infeasible);
+  CHECK(s.contradicting == std::vector<int>{0, 4});
+  CHECK_THAT(s.advice, Contains("free row 0 contradicts"));
+  d.b[4] = d.b[0];
+  CHECK(solve(d.problem()).status == Status::solved);
+
+  // A free row that is the contact's normal: w_n = A_nf x_f - b_n is what that row asks for.
+  for (double rate : {-1.0, 1.0}) {
+    Data held = any_data({Cone::friction(0.5), Cone::free(1)}, 4, 1);
+    held.A.row(3) = held.A.row(0);
+    held.A.col(3) = held.A.col(0);
+    held.A(3, 3) = held.A(0, 0);
+    held.b[3] = held.b[0] + rate;  // w_n = rate
+    const ConeSolution t = solve(held.problem());
+    CHECK(t.status == (rate < 0 ? Status::infeasible : Status::solved));
+    CHECK(t.blocked == (rate < 0 ? std::vector<int>{0} : std::vector<int>{}));
+    CHECK(t.velocities[0] == Approx(rate).epsilon(1e-9));
+    CHECK(t.impulses.head(3).norm() == 0);
+  }
+  // Nothing moves the row at all.
+  const ConeProblem dead =
+      ConeProblem::dense(MatrixXd::Zero(1, 1), VectorXd::Ones(1), {Cone::free()});
+  CHECK(solve(dead).status == Status::infeasible);
+  CHECK(solve(dead).contradicting == std::vector<int>{0});
+}
+
+TEST_CASE("cones: spheres with rolling friction as block sweeps solve them") {
+  // A column of three balls on a floor, pushed and turned: blocks of six rows.
+  RollingProblem bodies;
+  std::mt19937 g(2);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const double r = 0.1;
+  for (int k = 0; k < 3; ++k) {
+    RigidBody ball;
+    ball.inverse_mass = 1 / (1 + 0.3 * k);
+    ball.inverse_inertia = Eigen::Matrix3d::Identity() * 2.5 * ball.inverse_mass / (r * r);
+    ball.velocity = 0.3 * Vector3d(u(g), u(g), 0) - Vector3d(0, 0, 1);
+    ball.angular_velocity = Vector3d(u(g), u(g), u(g));
+    bodies.bodies.push_back(ball);
+    RollingContact c;
+    c.point.first = k;
+    c.point.second = k - 1;
+    c.point.normal = Vector3d::UnitZ();
+    c.point.r1 = -r * Vector3d::UnitZ();
+    c.point.r2 = r * Vector3d::UnitZ();
+    if (k == 0) c.point.r2.setZero();
+    c.point.mu = 0.4;
+    c.rolling = 0.01;
+    c.torsional = 0.02;
+    bodies.contacts.push_back(c);
+  }
+  const RollingSolution wanted = solve(bodies, 1e-13, 10000);
+  REQUIRE(wanted.status == Status::solved);
+  // The same by M and J: six rows a contact in its frame.
+  const Eigen::Matrix3d frame = tangent_frame(Vector3d::UnitZ());
+  std::vector<MatrixEntry> M, J;
+  VectorXd f(18), bias = VectorXd::Zero(18);
+  std::vector<Cone> cones;
+  for (int k = 0; k < 3; ++k) {
+    const RigidBody& ball = bodies.bodies[static_cast<std::size_t>(k)];
+    const Matrix6d inverse = ball.inverse_mass_matrix();
+    for (int i = 0; i < 6; ++i) M.push_back({6 * k + i, 6 * k + i, 1 / inverse(i, i)});
+    f.segment(6 * k, 6) = inverse.inverse() * ball.velocities();
+    cones.push_back(Cone::with_rolling(0.4, 0.01, 0.02));
+    const ContactRows rows = ContactRows::at_point(k, k - 1, -r * Vector3d::UnitZ(),
+                                                   k == 0 ? Vector3d::Zero() : Vector3d(0, 0, r),
+                                                   Vector3d::UnitZ(), 0.4);
+    for (int side = 0; side < (k == 0 ? 1 : 2); ++side)
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 6; ++j) {
+          J.push_back({6 * k + i, 6 * (k - side) + j, (side == 0 ? rows.J1 : rows.J2)(i, j)});
+          if (j >= 3)
+            J.push_back(
+                {6 * k + 3 + i, 6 * (k - side) + j, (side == 0 ? 1 : -1) * frame(i, j - 3)});
+        }
+  }
+  const ConeProblem p = ConeProblem::saddle(M, J, f, bias, cones);
+  const ConeSolution s = solve(p, 1e-12);
+  REQUIRE(s.status == Status::solved);
+  for (int k = 0; k < 3; ++k) {
+    const std::size_t i = static_cast<std::size_t>(k);
+    CHECK((frame.transpose() * s.impulses.segment<3>(6 * k) - wanted.impulses[i]).norm() < 1e-9);
+    CHECK((frame.transpose() * s.impulses.segment<3>(6 * k + 3) - wanted.moments[i]).norm() < 1e-9);
+  }
+  // Started where it ends, it has nothing to do.
+  Options o;
+  o.law = Law::coulomb;
+  o.tolerance = 1e-9;
+  const ConeSolution again = ConeSolver(o).solve(p, s.impulses);
+  CHECK(again.status == Status::solved);
+  CHECK(again.counts.sweeps <= 2);
+  CHECK(again.counts.factorisations == 0);
+  o.warm_start = true;
+  ConeSolver keeps(o);
+  const int cold = keeps.solve(p).counts.sweeps;
+  CHECK(keeps.solve(p).counts.sweeps < cold);
+}
+
+TEST_CASE("cones: M and J of a tree of masses give what their dense inverse gives") {
+  std::mt19937 g(7);
+  std::normal_distribution<double> normal;
+  const int n = 12, m = 7;
+  MatrixXd mass = MatrixXd::Zero(n, n), rows = MatrixXd::Zero(m, n);
+  for (int part = 0; part < 3; ++part) {  // three parts that M does not connect
+    const MatrixXd L = MatrixXd::NullaryExpr(4, 4, [&] { return normal(g); });
+    mass.block(4 * part, 4 * part, 4, 4) = L * L.transpose() + MatrixXd::Identity(4, 4);
+  }
+  rows = MatrixXd::NullaryExpr(m, n, [&] { return normal(g); });
+  rows.topRightCorner(3, 8).setZero();
+  const VectorXd f = VectorXd::NullaryExpr(n, [&] { return normal(g); }),
+                 bias = VectorXd::NullaryExpr(m, [&] { return normal(g); });
+  const auto entries = [](const MatrixXd& A) {
+    std::vector<MatrixEntry> out;
+    for (int r = 0; r < A.rows(); ++r)
+      for (int c = 0; c < A.cols(); ++c)
+        if (A(r, c) != 0) out.push_back({r, c, A(r, c)});
+    return out;
+  };
+  const std::vector<Cone> cones = {Cone::friction(0.5), Cone::free(1), Cone::friction(0.2)};
+  const VectorXd soft = VectorXd::LinSpaced(m, 0, 0.6);
+  const ConeProblem p = ConeProblem::saddle(entries(mass), entries(rows), f, bias, cones, soft);
+  const MatrixXd inverse = mass.inverse();
+  const MatrixXd A = rows * inverse * rows.transpose() + MatrixXd(soft.asDiagonal());
+  CHECK((p.dense_matrix() - A).norm() < 1e-12 * A.norm());
+  CHECK((p.b() + rows * inverse * f + bias).norm() < 1e-12 * p.b().norm());
+  const ConeSolution s = solve(p);
+  REQUIRE(s.status == Status::solved);
+  CHECK(broken_law(p, s.impulses, s.velocities) < 1e-7);
+}
+
+TEST_CASE("cones: a compliant row yields by its impulse") {
+  // x = b / (a + c); a free row, one that presses, one within its bound; and a redundant pair of
+  // springs, which share as their compliances say.
+  const Cone cones[] = {Cone::free(), Cone::nonnegative(), Cone::bounded(10)};
+  for (const Cone& cone : cones) {
+    const ConeSolution s = solve(ConeProblem::dense(
+        MatrixXd::Constant(1, 1, 2), VectorXd::Constant(1, 3), {cone}, VectorXd::Constant(1, 4)));
+    CHECK(s.impulses[0] == Approx(0.5).epsilon(1e-13));
+    CHECK(std::abs(s.velocities[0]) < 1e-12);
+  }
+  const ConeSolution two = solve(ConeProblem::dense(MatrixXd::Constant(2, 2, 1), Vector2d(1, 1),
+                                                    {Cone::free(2)}, Vector2d(0.5, 1)));
+  CHECK(two.impulses[0] == Approx(2 * two.impulses[1]).epsilon(1e-12));
+  CHECK(two.impulses.sum() + 0.5 * two.impulses[0] == Approx(1).epsilon(1e-12));
+  CHECK_THROWS_WITH(ConeProblem::dense(MatrixXd::Identity(1, 1), VectorXd::Ones(1), {Cone::free()},
+                                       VectorXd::Constant(1, -1)),
+                    Contains("compliance = -1"));
+}
+
+TEST_CASE("cones: other laws solve contacts, and refuse what they say nothing of by name") {
+  const std::vector<Cone> contacts = {Cone::friction(0.5), Cone::planar(0.3), Cone::nonnegative()};
+  for (Law law : {Law::maximum_dissipation, Law::frictionless}) {
+    const ConeProblem p = any_data(contacts, 8, 1).problem();
+    const ConeSolution s = solve(p, kTolerance, law);
+    CHECK(s.status == Status::solved);
+    CHECK(evaluate(p, law, s.impulses).error <= kTolerance);
+    const ConeProblem rolls = any_data({Cone::with_rolling(0.5, 0.1)}, 8, 1).problem();
+    CHECK_THROWS_WITH(solve(rolls, kTolerance, law), Contains("rolling needs coulomb"));
+    const ConeProblem bounded = any_data({Cone::bounded(1)}, 8, 1).problem();
+    CHECK_THROWS_WITH(evaluate(bounded, law, VectorXd::Zero(1)), Contains("bounded needs coulomb"));
+  }
+  const ConeProblem held = any_data({Cone::friction(0.5), Cone::free(2)}, 8, 1).problem();
+  CHECK(solve(held, kTolerance, Law::frictionless).status == Status::solved);
+  CHECK_THROWS_WITH(solve(held, kTolerance, Law::maximum_dissipation),
+                    Contains("free needs coulomb"));
+}
+
+TEST_CASE("cones: a floor that closes on a ceiling has a direction that proves it") {
+  // One mass between two planes that come closer; a free row holds another mass.
+  Data d{MatrixXd(3, 3),
+         Vector3d(1, 1, 0.5),
+         {Cone::nonnegative(), Cone::nonnegative(), Cone::free()}};
+  d.A << 1, -1, 0, -1, 1, 0, 0, 0, 2;
+  const ConeSolution s = solve(d.problem());
+  CHECK(s.status == Status::infeasible);
+  REQUIRE(s.infeasible_direction.size() == 3);
+  const Vector3d v(s.infeasible_direction[0], s.infeasible_direction[1], s.infeasible_direction[2]);
+  CHECK((d.A * v).norm() < 1e-12);
+  CHECK(d.b.dot(v) > 0.5);
+}
+
+TEST_CASE("cones: bad blocks are refused by name") {
+  const MatrixXd A = MatrixXd::Identity(3, 3);
+  const VectorXd b = VectorXd::Ones(3);
+  CHECK_THROWS_WITH(ConeProblem::dense(A, b, {Cone::planar(0.5)}), Contains("b has 3 entries"));
+  CHECK_THROWS_WITH(ConeProblem::dense(A, b, {Cone::friction(-1)}), Contains("block 0: mu = -1"));
+  CHECK_THROWS_WITH(ConeProblem::dense(A, b, {Cone::free(2), Cone::bounded(std::nan(""))}),
+                    Contains("block 1: bound"));
+  CHECK_THROWS_WITH(ConeProblem::dense(A, b, {Cone::free(0), Cone::friction(1)}),
+                    Contains("block 0: 0 rows"));
+  CHECK_THROWS_WITH(ConeProblem::dense(-A, b, {Cone::free(2), Cone::nonnegative()}),
+                    Contains("block 0: least eigenvalue of A"));
+  CHECK_THROWS_WITH(ConeProblem::dense(0 * A, b, {Cone::friction(1)}),
+                    Contains("block 0: A_nn = 0"));
+  CHECK_THROWS_WITH(ConeProblem::sparse({{0, 3, 1.0}}, b, {Cone::free(3)}),
+                    Contains("A(0, 3) is outside"));
+  CHECK_THROWS_WITH(ConeProblem::saddle({{0, 0, -1.0}}, {{0, 0, 1.0}}, VectorXd::Zero(1),
+                                        VectorXd::Zero(1), {Cone::free()}),
+                    Contains("M is not symmetric and positive definite in the part of row 0"));
+  CHECK_THROWS_WITH(
+      ConeSolver().solve(ConeProblem::dense(A, b, {Cone::friction(1)}), VectorXd::Ones(2)),
+      Contains("start has 2 entries"));
+}
