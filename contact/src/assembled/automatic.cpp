@@ -48,6 +48,7 @@ const Automatic::Turn Automatic::kRotation[] = {
     // stage, when, budget
     {&Automatic::sweep_while_cheap, always, 20},                // factorisations it may forecast
     {&Automatic::end_of_work, always, 0},                       //
+    {&Automatic::paths_from_sweeps, first_and_dear, 3},         // paths
     {&Automatic::interior_points_near, first_and_near, 30},     // steps
     {&Automatic::interior_points, first_and_far_or_cheap, 40},  // steps, from sticking
     {&Automatic::round_off, always, kRoundOffSteps},            // steps

@@ -48,6 +48,7 @@ class Automatic {
   // Rows of the tables, with their budgets.
   Status sweep_while_cheap(Search& search, Rotation& r, int factorisations);
   Status sweep_few_bodies(Search& search, Rotation& r, int factorisations);
+  Status paths_from_sweeps(Search& search, Rotation& r, int paths);
   Status sticking_point(Search& search, Rotation& r, int);
   Status interior_points(Search& search, Rotation& r, int steps);
   Status interior_points_near(Search& search, Rotation& r, int steps);
@@ -67,6 +68,7 @@ class Automatic {
 
   bool sweep_first(Search& search, const Rotation& r);
   bool sweep_and_solve_parts(Search& search, double until);
+  void newton_from_sweeps(Search& search);
   void sweep_beside_parts(Search& search, AcceleratedSweeps::Leave leave);
   bool mostly_sticks(Search& search);
   bool infeasible(Search& search);

@@ -78,6 +78,17 @@ void Automatic::sweep_beside_parts(Search& search, AcceleratedSweeps::Leave leav
   }
 }
 
+// Near enough to a solution a few steps reach it, wherever the sweeps would go from here.
+void Automatic::newton_from_sweeps(Search& search) {
+  constexpr double kShare = 0.06;  // of the work before
+  constexpr int kSteps = 3, kProblems = 2;
+  const double budget = kShare * search.counts.work, end = search.work_end;
+  if (budget < kSteps * newton.cost(search)) return;
+  search.work_end = std::min(end, search.counts.work + budget);
+  newton.run(search, x_.data(), kProblems);
+  search.work_end = end;
+}
+
 // Sweeps in turn with solves of the parts where they do not settle, until so much work is done. A
 // round that does not halve the error, once the sweeps have spread it, is followed by twice as many
 // sweeps: those that need no help are soon left alone.
@@ -85,7 +96,8 @@ bool Automatic::sweep_and_solve_parts(Search& search, double until) {
   constexpr double kShare = 0.5, kCheap = 0.1, kPartShare = 0.1;      // of the work before
   constexpr double kBetween = 50, kMostBetween = 400, kGrowth = 1.4;  // sweeps
   const double begin = search.counts.work;
-  double in_parts = 0, halved = search.best_error, between = kBetween;
+  constexpr double kLater = 1.5;  // times the work before
+  double in_parts = 0, halved = search.best_error, between = kBetween, newton_from = begin;
   while (!search.solved() && !search.exhausted() && search.counts.work < until) {
     AcceleratedSweeps::Leave leave;
     leave.partly = true;
@@ -110,6 +122,11 @@ bool Automatic::sweep_and_solve_parts(Search& search, double until) {
     in_parts += search.counts.work - before;
     if (!changed || in_parts > kCheap * (before - begin))
       between = std::min(kMostBetween, kGrowth * between);
+    if (search.counts.work > newton_from) {
+      newton_from_sweeps(search);
+      newton_from = kLater * search.counts.work;
+      if (search.solved()) break;
+    }
     if (!changed) continue;
     search.test(x_.data(), Method::anderson);
     sweeps.replace(x_.data());
@@ -144,6 +161,25 @@ Status Automatic::sweep_while_cheap(Search& search, Rotation& r, int factorisati
     sweep_work_ += search.counts.work - begin;
   }
   r.swept = search.best_error;
+  return Status::unsolved;
+}
+
+// Where a solution repels sweeps they pass it by, and proximal problems from where they are may
+// lead to it: where one of these is not solved it was the wrong place, and sweeps go on to another.
+Status Automatic::paths_from_sweeps(Search& search, Rotation& r, int paths) {
+  constexpr double kStay = 15;  // factorisations
+  constexpr int kMostProblems = 100;
+  for (int path = 0; path < paths && !search.solved() && !search.exhausted(); ++path) {
+    const double begin = search.counts.work, end = search.work_end;
+    if (path > 0) sweep_and_solve_parts(search, begin + kStay * interior.cost(search));
+    sweep_work_ += search.counts.work - begin;
+    r.swept = search.best_error;
+    if (search.solved() || search.exhausted()) break;
+    x_.assign(sweeps.point(), sweeps.point() + contacts_);
+    search.work_end = std::min(end, 2 * search.counts.work);
+    interior.run_proximal(search, x_.data(), kMostProblems, newton, false);
+    search.work_end = end;
+  }
   return Status::unsolved;
 }
 

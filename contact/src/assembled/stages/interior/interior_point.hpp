@@ -22,8 +22,9 @@ class InteriorPoint {
   // Proximal point iteration from x, at most `most` problems A + tau D, b + tau D x, which a small
   // tau D makes solvable where the path of the problem itself ends. Each is solved by a few steps
   // of `newton` from the point to which the last step leads or, where that fails, along its own
-  // path.
-  void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton);
+  // path. whole: where one cannot be solved a larger tau is tried, and so on, else it ends there.
+  void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton,
+                    bool whole = true);
   // From near x, the matrix shifted as far as steps along its null space ask for: where the path of
   // the problem ends, without the problems of run_proximal(). At most `most` factorisations.
   void run_shifted(Search& search, const PackedVector* x, int most);

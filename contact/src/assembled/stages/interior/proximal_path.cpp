@@ -7,7 +7,7 @@ namespace tether::contact::detail {
 // Implicit Euler steps 1 / tau of D x' = -F(x): where the contacts that stick and slide admit no
 // solution, x drifts at a constant rate until one of them changes (README, section 9).
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
-                                 ProximalNewton& newton) {
+                                 ProximalNewton& newton, bool whole) {
   constexpr int kCorrections = 4, kSteps = 20, kPatience = 700, kSweeps = 3;
   constexpr double kLeast = 1e-9, kMost = 1;  // tau
   System& system = search.system;
@@ -48,6 +48,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       gain = outer;
     }
     if (search.exhausted() || outer - gain > kPatience) break;
+    if (!found && !whole) break;
     if (!found) {
       tau = std::min(kMost, 3 * tau);
       continue;
