@@ -33,17 +33,15 @@ class BentRods {
   }
   tp::Constraints rows() const { return chain_.dense_rows(); }
 
-  double kinetic_energy(const double* y) const {
-    double sum = 0.0;
-    for (int i = 0; i < 2 * N; ++i) sum += 0.5 * y[2 * N + i] * y[2 * N + i];
-    return sum;
-  }
-  /// 0 at the start, and for ever.
-  double energy(const double* y) const {
-    double sum = kinetic_energy(y);
+  /// The energy over its kinetic part: 0 at the start, and for ever.
+  double relative_energy(const std::vector<double>& state) const {
+    const double* y = state.data();
+    double kinetic = 0.0;
+    for (int i = 0; i < 2 * N; ++i) kinetic += 0.5 * y[2 * N + i] * y[2 * N + i];
+    double sum = kinetic;
     for (int i = 0; i < N; ++i) sum += kGravity * y[2 * i + 1];
     for (int a = 0; a + 2 < 2 * N; ++a) sum += 0.5 * kSpring * bend(y, a) * bend(y, a);
-    return sum;
+    return sum / kinetic;
   }
 
  private:
@@ -82,22 +80,28 @@ class BentRods {
 
 }  // namespace
 
-TEST_CASE("rods with bending springs: no more steps than plain IDA, no vibration is started") {
+TEST_CASE("rods with bending springs: fewer steps than plain IDA, no vibration is started") {
   const BentRods rods;
   const Problem problem = rods.problem(0.3);
-  double mean = 0.0;
-  for (const double tolerance : {3e-3, 1e-3, 5e-4, 3e-4, 1e-4}) {
+  const std::vector<double> tolerances = {3e-3, 1.4e-3, 1e-3, 5e-4, 3e-4, 2e-4, 1e-4};
+  double mean = 0.0, off = 0.0, off_plain = 0.0;
+  for (const double tolerance : tolerances) {
     INFO("tolerance " << tolerance);
     const Run run = integrate(problem, tolerance, rods.rows(), {}, false);
     const Run plain = integrate_plain(problem, tolerance);
     REQUIRE(run.flag >= 0);
     const double ratio = static_cast<double>(run.steps) / static_cast<double>(plain.steps);
-    CHECK(ratio <= 1.3);
-    mean += 0.2 * std::log(ratio);
-    // Vibrations that moves start grow to a tenth of the energy.
-    const double* y = run.y.data();
-    CHECK(std::abs(rods.energy(y)) <= 1e-3 * rods.kinetic_energy(y));
-    CHECK(value(rods.rows(), 0.0, y, problem.size).cwiseAbs().maxCoeff() <= 1e-3 * tolerance);
+    CHECK(ratio <= 0.8);
+    mean += std::log(ratio) / static_cast<double>(tolerances.size());
+    // Multipliers that follow late fail no corrector: without that 1 to 30 in each run.
+    CHECK(run.statistics.corrector_failures <= 1);
+    // Vibrations that moves start grow to a tenth of the energy; the formulas themselves damp.
+    CHECK(rods.relative_energy(run.y) <= 1e-3);
+    off += std::abs(rods.relative_energy(run.y));
+    off_plain += std::abs(rods.relative_energy(plain.y));
+    CHECK(value(rods.rows(), 0.0, run.y.data(), problem.size).cwiseAbs().maxCoeff() <=
+          1e-3 * tolerance);
   }
-  CHECK(std::exp(mean) <= 0.9);
+  CHECK(std::exp(mean) <= 0.6);
+  CHECK(off <= 0.5 * off_plain);
 }

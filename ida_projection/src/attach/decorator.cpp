@@ -133,6 +133,8 @@ int Projection::Impl::caught(Status outcome, const char* text) noexcept {
 int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup) {
   static const std::vector<int> none;
   const bool may_leave_out = run_.engaged && options_.suppress_algebraic;
+  corrector_.expect_followers(may_leave_out && !variables_.high_index() ? variables_.id()
+                                                                        : nullptr);
   return corrector_.correct(candidate, tolerance, call_setup,
                             may_leave_out ? variables_.undetermined() : none);
 }
@@ -165,16 +167,17 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     if (engaged != Status::success) return finish(engaged, movers_.used->message());
   }
 
-  Move move = move_and_polish(at, step.cj, tolerance);
-  if (move.status == Status::success && !polish_.corrector_was_right() && !call_setup &&
-      corrector_.has_setup()) {
-    // Old factors fooled IDA's convergence test: correct again, with fresh ones.
+  const bool fresh = call_setup || !corrector_.has_setup();
+  Move move = move_and_polish(at, step.cj, tolerance, fresh);
+  if (move.status == Status::success && !polish_.corrector_was_right() && !fresh) {
+    // Old factors fooled IDA's convergence test, or serve no stiff move: correct again, with fresh
+    // ones.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, at.correction);
     flag = correct(at, tolerance, true);
     if (flag != 0) return corrector_failed(flag);
     polish_.note_setup(step.cj);
-    move = move_and_polish(at, step.cj, tolerance);
+    move = move_and_polish(at, step.cj, tolerance, true);
   }
   if (stopwatch.running()) move.drift_after = movers_.used->remaining_drift(at);
   account(move, step, stopwatch.running());
@@ -224,7 +227,9 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done)
   return 0;
 }
 
-Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance) {
+// `fresh`: of IDA's factors there are no better ones.
+Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
+                                       bool fresh) {
   polish_.keep(candidate);
   Move move = movers_.used->move(candidate);
   if (move.capped) {
@@ -233,7 +238,13 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
   }
   const bool stiff = choose_metric(candidate, move);
   if (move.status != Status::success) return move;
-  if (stiff && stiff_move_.make(candidate, cj, polish_, *movers_.used))
+  const bool made =
+      stiff && stiff_move_.make(candidate, cj, polish_, *movers_.used, !attempts_.repeated);
+  if (stiff && !fresh && !stiff_move_.trusted()) {
+    polish_.doubt_corrector();
+    return move;
+  }
+  if (made)
     move.status = settle_stiff_move(candidate, cj, tolerance);
   else
     move.status = wants_polish(move.length) ? polish(candidate, cj, tolerance)

@@ -104,7 +104,7 @@ class Projection::Impl {
   void quicken_vectors(const Candidate& candidate);
   double care_of_high_index(const Candidate& candidate) const;
   Status engage_if_index_is_high(const Candidate& candidate);
-  Move move_and_polish(const Candidate& candidate, double cj, double tolerance);
+  Move move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
   void judge_capped(Move& move);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   Status polish(const Candidate& candidate, double cj, double tolerance);

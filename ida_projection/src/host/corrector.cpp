@@ -45,6 +45,32 @@ int Corrector::correct(const Candidate& candidate, double tolerance, bool call_s
   return flag;
 }
 
+int Corrector::set_convergence_test(SUNNonlinSolConvTestFn f, void* data) {
+  test_ = f;
+  test_data_ = data;
+  return SUNNonlinSolSetConvTestFn(inner_, test_convergence, this);
+}
+
+// IDA takes an iteration for divergent whose second change is 0.9 of the first or more. Algebraic
+// variables follow the others: where their first change happens to be small, the second one, which
+// is quadratic in that of the others, is longer, and the third one next to nothing.
+int Corrector::test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
+                                sunrealtype tolerance, N_Vector weights, void* self) {
+  Corrector& ours = *static_cast<Corrector*>(self);
+  const int flag = ours.test_(solver, ycor, change, tolerance, weights, ours.test_data_);
+  const bool failed = flag == SUN_NLS_CONV_RECVR && ours.differential_ != nullptr;
+  return failed && ours.followers_move(ycor, change, tolerance, weights) ? SUN_NLS_CONTINUE : flag;
+}
+
+// Have the differential variables converged, their rate being that of the last change?
+bool Corrector::followers_move(N_Vector ycor, N_Vector change, double tolerance, N_Vector weights) {
+  if (!before_) before_ = OwnedVector(ycor);
+  N_VLinearSum(1.0, ycor, -1.0, change, before_);
+  const double last = N_VWrmsNormMask(change, weights, differential_);
+  const double before = N_VWrmsNormMask(before_, weights, differential_);
+  return last < before && last * last <= tolerance * (before - last);
+}
+
 int Corrector::residual(N_Vector ycor, N_Vector into) {
   if (stopped()) return stop_flag_;
   const int flag = system_(ycor, into, mem_);

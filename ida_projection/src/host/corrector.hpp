@@ -24,6 +24,7 @@ class Corrector {
   void set_system(SUNNonlinSolSysFn f) { system_ = f; }
   void set_linear_solve(SUNNonlinSolLSolveFn f) { linear_solve_ = f; }
   void set_has_setup(bool has) { has_setup_ = has; }
+  int set_convergence_test(SUNNonlinSolConvTestFn f, void* data);
   void set_maximum_iterations(int n) {
     maximum_iterations_ = n;
     heard_ = true;
@@ -40,6 +41,9 @@ class Corrector {
   /// or more, whose rounding, divided by the step, fails it, and nothing but they depends on them.
   int correct(const Candidate& candidate, double tolerance, bool call_setup,
               const std::vector<int>& rounding);
+  /// Where the variables that are 0 here move, when these that are 1 have converged, IDA's
+  /// convergence test has to wait, not to fail. Null: there are none.
+  void expect_followers(N_Vector differential) { differential_ = differential; }
   /// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be
   /// evaluated. Once it asked for the end of the run it is not called again.
   int residual(N_Vector ycor, N_Vector into);
@@ -70,6 +74,14 @@ class Corrector {
   void* mem_ = nullptr;
   int stop_flag_ = 0;  // < 0: a callback ended the run in an evaluation of the plugin's own
   std::string stop_text_;
+  static int test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
+                              sunrealtype tolerance, N_Vector weights, void* self);
+  bool followers_move(N_Vector ycor, N_Vector change, double tolerance, N_Vector weights);
+
+  SUNNonlinSolConvTestFn test_ = nullptr;  // IDA's
+  void* test_data_ = nullptr;
+  N_Vector differential_ = nullptr;
+  OwnedVector before_;
   int failures_in_row_ = 0;
   bool rounding_fails_ = false;
   OwnedVector weights_;  // without those that rounding fails

@@ -91,7 +91,7 @@ class Operations {
     return SUNNonlinSolSetLSolveFn(self(s).corrector().inner(), f);
   }
   static int set_convergence_test(SUNNonlinearSolver s, SUNNonlinSolConvTestFn f, void* data) {
-    return SUNNonlinSolSetConvTestFn(self(s).corrector().inner(), f, data);
+    return self(s).corrector().set_convergence_test(f, data);
   }
   static int set_maximum_iterations(SUNNonlinearSolver s, int n) {
     self(s).corrector().set_maximum_iterations(n);

@@ -64,6 +64,7 @@ class Polish {
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor
   /// Was the correction as small as IDA's convergence test predicted?
   bool corrector_was_right() const { return corrector_was_right_; }
+  void doubt_corrector() { corrector_was_right_ = false; }
   long iterations() const { return iterations_; }  ///< in this solve()
 
  private:

@@ -19,7 +19,10 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kLeft = 1e-3;   // of the move: the last moves onto the constraints take it
-constexpr double kLonger = 4.0;  // than p: no cure
+constexpr double kLonger = 4.0;  // than p and what answers to it: no cure
+constexpr double kShort = 1.0;   // tolerances: never too long
+// Old factors leave a part of what answers, which then vibrates; with them GMRES is slow as well.
+constexpr double kCancelled = 0.1;  // tolerances
 
 }  // namespace
 
@@ -86,7 +89,8 @@ int StiffMove::search(const Candidate& candidate, Polish& polish, Mover& mover, 
     H_[k][k] = both;
     rhs_[k] = c[k] * rotated;
     rotated *= -s[k];
-    if (std::abs(rotated) <= kLeft || norm <= kLeft * both) return k + 1;
+    trusted_ = std::abs(rotated) <= kLeft || norm <= kLeft * both;
+    if (trusted_) return k + 1;
     for (double& x : next) x /= norm;
   }
   return kMost;
@@ -106,7 +110,14 @@ void StiffMove::combine(int count, double algebraic) {
     if (mask_[j] == 0.0) total_[j] = std::isfinite(total_[j]) ? algebraic * total_[j] : 0.0;
 }
 
-bool StiffMove::make(const Candidate& candidate, double cj, Polish& polish, Mover& mover) {
+bool StiffMove::too_long(double length) const {
+  const double answered = std::sqrt(dot(answered_[0], answered_[0]));
+  return !(std::sqrt(dot(total_, total_)) <= std::max(kLonger * (length + answered), kShort));
+}
+
+bool StiffMove::make(const Candidate& candidate, double cj, Polish& polish, Mover& mover,
+                     bool any_length) {
+  trusted_ = false;
   allocate(candidate);
   double* ycor = candidate.correction_entries;
   const double* corrected = N_VGetArrayPointer(polish.corrected());
@@ -123,8 +134,9 @@ bool StiffMove::make(const Candidate& candidate, double cj, Polish& polish, Move
   bool made = count > 0;
   if (made) {
     combine(count, polish.algebraic_factor(cj));
-    made = std::sqrt(dot(total_, total_)) <=
-           kLonger * (length + std::sqrt(dot(answered_[0], answered_[0])));
+    const bool too_long = this->too_long(length);
+    trusted_ = trusted_ && !too_long && dot(answered_[0], answered_[0]) <= kCancelled * kCancelled;
+    made = !too_long || (any_length && std::isfinite(dot(total_, total_)));
   }
   if (!made) polish.forget_answer();
   double* change = N_VGetArrayPointer(change_);

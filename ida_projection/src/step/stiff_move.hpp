@@ -17,9 +17,12 @@ class StiffMove {
  public:
   explicit StiffMove(const AlgebraicVariables& variables) : variables_(variables) {}
 
-  /// After mover.move(): ycor <- corrected - z. False, and ycor as it was: z is too long, or F, g
-  /// or the linear solver fails.
-  bool make(const Candidate& candidate, double cj, Polish& polish, Mover& mover);
+  /// After mover.move(): ycor <- corrected - z. False, and ycor as it was: F, g or the linear
+  /// solver fails, or z is too long. With `any_length` IDA's error test is to judge that: what is
+  /// made in place of such a z excites what is stiff.
+  bool make(const Candidate& candidate, double cj, Polish& polish, Mover& mover, bool any_length);
+  /// After make(): may M be made of old factors?
+  bool trusted() const { return trusted_; }
   /// What that has changed in ycor after mover.move().
   N_Vector change() const { return change_; }
 
@@ -32,6 +35,7 @@ class StiffMove {
   bool answer(const Candidate& candidate, Polish& polish, const Vector& p, Vector& z);
   int search(const Candidate& candidate, Polish& polish, Mover& mover, double length);
   void combine(int count, double algebraic);
+  bool too_long(double length) const;
 
   const AlgebraicVariables& variables_;
   const double* weights_ = nullptr;
@@ -39,6 +43,7 @@ class StiffMove {
   Vector first_, moved_, left_, total_;
   Vector directions_[kMost + 1], answered_[kMost];
   double H_[kMost + 1][kMost] = {}, rhs_[kMost] = {};
+  bool trusted_ = false;
   OwnedVector change_;
 };
 
