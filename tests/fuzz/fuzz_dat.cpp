@@ -18,6 +18,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::solve_read(contact::read_dat(file.path()));
   } catch (const std::runtime_error&) {  // the file says why
   }
+  try {
+    fuzz::solve_read(contact::read_cones_dat(file.path()));
+  } catch (const std::runtime_error&) {
+  }
   return 0;
 }
 

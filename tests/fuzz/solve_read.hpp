@@ -25,4 +25,16 @@ inline void solve_read(const contact::Problem& problem) {
   }
 }
 
+inline void solve_read(const contact::ConeProblem& problem) {
+  if (problem.rows() > 120) return;
+  contact::Options options;
+  options.law = contact::Law::coulomb;
+  options.max_work = 1e5;
+  try {
+    const contact::ConeSolution solution = contact::ConeSolver(options).solve(problem);
+    if (solution.status == contact::Status::solved && !solution.impulses.allFinite()) std::abort();
+  } catch (const std::invalid_argument&) {  // a block that is not positive, say
+  }
+}
+
 }  // namespace tether::fuzz

@@ -17,6 +17,8 @@ namespace {
 
 using linalg::at;
 
+constexpr double kUnsymmetric = 1e-2;  // of |M|: files of others keep six digits, or less
+
 [[noreturn]] void fail(const std::string& what) { throw std::invalid_argument(what); }
 
 std::string block(int k) { return "block " + std::to_string(k) + ": "; }
@@ -198,8 +200,9 @@ ConeProblem ConeProblem::sparse(const std::vector<MatrixEntry>& A, const linalg:
       // Rows of moments have units of their own: correlations say the same.
       Vector6d root = Vector6d::Zero();
       for (int r = 0; r < 6; ++r) root[r] = D(r, r) > 0 ? 1 / std::sqrt(D(r, r)) : 1;
-      detail::require_semidefinite("A", Matrix6d(root.asDiagonal() * D * root.asDiagonal()),
-                                   [&] { return block(static_cast<int>(k)); });
+      detail::require_semidefinite(
+          "A", Matrix6d(root.asDiagonal() * (0.5 * (D + D.transpose())) * root.asDiagonal()),
+          [&] { return block(static_cast<int>(k)); });
       const detail::ConeParts parts = detail::parts_of(cone.kind);
       const auto set = [&](int from, int count) {
         const double mean = D.diagonal().segment(from, count).mean();
@@ -269,7 +272,14 @@ ConeProblem ConeProblem::saddle(const std::vector<MatrixEntry>& M,
     Eigen::SparseMatrix<double> Mk(size[at(part)], size[at(part)]);
     Mk.setFromTriplets(mass[at(part)].begin(), mass[at(part)].end());
     const Eigen::SparseMatrix<double> other = Mk.transpose();
-    if (!((Mk - other).norm() <= 1e-8 * Mk.norm())) refuse_part();
+    const Eigen::SparseMatrix<double> half = Mk.triangularView<Eigen::StrictlyUpper>();
+    const Eigen::SparseMatrix<double> below = Mk.triangularView<Eigen::StrictlyLower>();
+    if ((half.norm() == 0) != (below.norm() == 0)) {  // one half for both
+      Mk = (Mk + Eigen::SparseMatrix<double>((half + below).transpose())).eval();
+    } else {
+      if (!((Mk - other).norm() <= kUnsymmetric * Mk.norm())) refuse_part();
+      Mk = (0.5 * (Mk + other)).eval();
+    }
     const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor(Mk);
     if (factor.info() != Eigen::Success) refuse_part();
     std::vector<int> touched;

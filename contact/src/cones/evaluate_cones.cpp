@@ -125,6 +125,7 @@ ConeResiduals evaluate(const ConeProblem& problem, Law law, const linalg::Vector
         x[r] = scale > 0 ? impulses[first + r] / scale : 0;
         v[r] = scale * w[first + r];
       }
+      D = (0.5 * (D + D.transpose())).eval();
       error = block_error(problem, law, k, x, v, D);
     }
     const double measure = std::max(error, rounding) * inverse[at(k)];

@@ -1,34 +1,46 @@
 // Tether: the fclib HDF5 format. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/files.hpp>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <set>
 #include <stdexcept>
 
 #ifdef TETHER_HAVE_HDF5
-#include <hdf5.h>
+#include "io/hdf5_file.hpp"
 #endif
 
 namespace tether::contact {
 
-Problem read_problem(const std::string& path) {
+namespace {
+
+bool is_hdf5(const std::string& path) {
   // A pipe can be opened and read once only; HDF5 does not come through one.
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) return read_dat(path);
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error(path + ": cannot be opened");
   char head[4] = {};
   file.read(head, 4);
-  const bool hdf5 = file && head[0] == '\x89' && head[1] == 'H' && head[2] == 'D' && head[3] == 'F';
-  return hdf5 ? read_fclib(path) : read_dat(path);
+  return file && head[0] == '\x89' && head[1] == 'H' && head[2] == 'D' && head[3] == 'F';
+}
+
+}  // namespace
+
+Problem read_problem(const std::string& path) {
+  return is_hdf5(path) ? read_fclib(path) : read_dat(path);
+}
+
+ConeProblem read_cones(const std::string& path) {
+  return is_hdf5(path) ? read_cones_fclib(path) : read_cones_dat(path);
 }
 
 #ifndef TETHER_HAVE_HDF5
 
 bool has_fclib() { return false; }
 Problem read_fclib(const std::string& path) {
+  throw std::runtime_error(path + ": built without HDF5 (install libhdf5-dev)");
+}
+ConeProblem read_cones_fclib(const std::string& path) {
   throw std::runtime_error(path + ": built without HDF5 (install libhdf5-dev)");
 }
 void write_fclib(const Problem&, const std::string& path) {
@@ -39,111 +51,13 @@ void write_fclib(const Problem&, const std::string& path) {
 
 bool has_fclib() { return true; }
 
+using detail::Handle;
+using detail::Native;
+using detail::Quiet;
+using detail::read;
+using detail::read_integer;
+
 namespace {
-
-// A HDF5 identifier with its closing function.
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
-// HDF5 prints errors by itself by default.
-struct Quiet {
-  H5E_auto2_t function = nullptr;
-  void* data = nullptr;
-  Quiet() {
-    H5Eget_auto2(H5E_DEFAULT, &function, &data);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, function, data); }
-};
-
-template <class T>
-struct Native;
-template <>
-struct Native<int> {
-  static hid_t type() { return H5T_NATIVE_INT; }
-};
-template <>
-struct Native<double> {
-  static hid_t type() { return H5T_NATIVE_DOUBLE; }
-};
-
-constexpr hssize_t kMostEntries = hssize_t{1} << 31;
-constexpr hsize_t kBestCompression =
-    1032;  // of deflate; other filters are not expected to do better
-
-// What `set` claims to hold, in entries, once that is known to fit the bytes that the file has for
-// it: a damaged extent must not ask for memory.
-template <class T>
-std::size_t believable_count(hid_t file, hid_t set, const std::string& full) {
-  Handle space(H5Dget_space(set), H5Sclose);
-  const hssize_t count = H5Sget_simple_extent_npoints(space);
-  hsize_t file_size = 0;
-  if (count < 0 || count > kMostEntries || H5Fget_filesize(file, &file_size) < 0) {
-    throw std::runtime_error(full + " has a size that cannot be");
-  }
-  const hsize_t stored = std::min(H5Dget_storage_size(set), file_size);
-  if (static_cast<hsize_t>(count) * sizeof(T) > kBestCompression * stored) {
-    throw std::runtime_error(full + " says that it has " + std::to_string(count) +
-                             " entries, but the file holds " + std::to_string(stored) +
-                             " bytes of it");
-  }
-  return static_cast<std::size_t>(count);
-}
-
-// A file may lead to others by links, by storage that lies outside and by virtual data; and name
-// filters, which HDF5 would load as code, or the same one twice, which may expand without a bound.
-herr_t no_other_file(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) {
-  return -1;
-}
-
-void check_storage(hid_t set, const std::string& full) {
-  Handle made(H5Dget_create_plist(set), H5Pclose);
-  if (H5Pget_external_count(made) != 0 || H5Pget_layout(made) == H5D_VIRTUAL)
-    throw std::runtime_error(full + " lies in another file, which is not read");
-  std::set<H5Z_filter_t> filters;
-  for (int k = 0; k < H5Pget_nfilters(made); ++k) {
-    std::size_t values = 0;
-    const H5Z_filter_t filter = H5Pget_filter2(made, static_cast<unsigned>(k), nullptr, &values,
-                                               nullptr, 0, nullptr, nullptr);
-    if (filter < 0 || filter >= H5Z_FILTER_RESERVED || !filters.insert(filter).second)
-      throw std::runtime_error(full + " has a filter that HDF5 does not come with, or one twice");
-  }
-}
-
-template <class T>
-std::vector<T> read(hid_t file, const std::string& path, const std::string& name) {
-  const std::string full = path + ": /fclib_local/" + name;
-  Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
-  H5Pset_elink_cb(access, no_other_file, nullptr);
-  Handle set(H5Dopen2(file, ("/fclib_local/" + name).c_str(), access), H5Dclose);
-  if (set < 0) throw std::runtime_error(full + " is missing, damaged or a link to another file");
-  check_storage(set, full);
-  const std::size_t count = believable_count<T>(file, set, full);
-  std::vector<T> out(count);
-  if (count > 0 && H5Dread(set, Native<T>::type(), H5S_ALL, H5S_ALL, H5P_DEFAULT, out.data()) < 0) {
-    throw std::runtime_error(full + " cannot be read; the file is truncated or of another kind");
-  }
-  return out;
-}
-
-int read_integer(hid_t file, const std::string& path, const std::string& name) {
-  const std::vector<int> v = read<int>(file, path, name);
-  if (v.size() != 1)
-    throw std::runtime_error(path + ": /fclib_local/" + name + " is not a single number");
-  return v[0];
-}
 
 template <class T>
 void write(hid_t file, const std::string& path, const std::string& name, const T* data,
@@ -167,14 +81,18 @@ Problem read_fclib(const std::string& path) {
   Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (file < 0) throw std::runtime_error(path + ": not an HDF5 file, or truncated");
   const auto fail = [&](const std::string& what) { throw std::runtime_error(path + ": " + what); };
-  const int d = read_integer(file, path, "spacedim");
+  const int d = read_integer(file, path, "fclib_local/spacedim");
   if (d != 2 && d != 3) fail("spacedim is " + std::to_string(d));
-  const std::vector<double> q = read<double>(file, path, "vectors/q");
-  const std::vector<double> mu = read<double>(file, path, "vectors/mu");
-  const int m = read_integer(file, path, "W/m"), n = read_integer(file, path, "W/n");
-  const int nz = read_integer(file, path, "W/nz");
-  const std::vector<int> p = read<int>(file, path, "W/p"), i = read<int>(file, path, "W/i");
-  const std::vector<double> x = read<double>(file, path, "W/x");
+  if (detail::has(file, "fclib_local/V"))
+    fail("/fclib_local/V: has rows of joints, which read_cones() reads");
+  const std::vector<double> q = read<double>(file, path, "fclib_local/vectors/q");
+  const std::vector<double> mu = read<double>(file, path, "fclib_local/vectors/mu");
+  const int m = read_integer(file, path, "fclib_local/W/m"),
+            n = read_integer(file, path, "fclib_local/W/n");
+  const int nz = read_integer(file, path, "fclib_local/W/nz");
+  const std::vector<int> p = read<int>(file, path, "fclib_local/W/p"),
+                         i = read<int>(file, path, "fclib_local/W/i");
+  const std::vector<double> x = read<double>(file, path, "fclib_local/W/x");
   const std::size_t size = mu.size() * static_cast<std::size_t>(d);
   if (q.size() != size)
     fail("q has " + std::to_string(q.size()) + " entries, " + std::to_string(size) +

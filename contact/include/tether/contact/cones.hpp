@@ -67,9 +67,10 @@ class ConeProblem {
   static ConeProblem sparse(const std::vector<MatrixEntry>& A, const linalg::VectorView& b,
                             std::vector<Cone> cones,
                             const linalg::VectorView& compliance = linalg::VectorX());
-  /// M v = J'x + f, w = J v + bias: A = J M^-1 J' and b = -(J M^-1 f + bias). M, symmetric and
-  /// positive definite, has f.size() rows; both of its halves are given. Parts of M that hang
-  /// together are factored by themselves (Cholesky); A is dense over the rows of each.
+  /// M v = J'x + f, w = J v + bias: A = J M^-1 J' and b = -(J M^-1 f + bias). M, positive
+  /// definite, has f.size() rows; of its two halves one is given, or both: their mean counts. Parts
+  /// of M that hang together are factored by themselves (Cholesky); A is dense over the rows of
+  /// each.
   static ConeProblem saddle(const std::vector<MatrixEntry>& M, const std::vector<MatrixEntry>& J,
                             const linalg::VectorView& f, const linalg::VectorView& bias,
                             std::vector<Cone> cones,

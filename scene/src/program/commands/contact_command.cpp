@@ -3,6 +3,7 @@
 #include "program/terminal_text.hpp"
 
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
@@ -55,6 +56,38 @@ void add_choice(CLI::App& command, const char* option, const char* what,
       ->default_str(now);
 }
 
+// Of files that hold more than contacts: joints, masses, rolling friction.
+Status run_cones(const Arguments& arguments, const std::string& file, const ConeProblem& problem) {
+  const Options& o = arguments.options;
+  const ConeSolution s = ConeSolver(o).solve(problem);
+  const auto blocks = static_cast<int>(problem.cones().size());
+  if (arguments.csv) {
+    std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%d,0,nan,nan,nan,nan,nan,%.3e,nan,nan\n",
+                table_field(file).c_str(), blocks, name(o.law), name(o.method), o.tolerance,
+                name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
+                s.counts.factorisations, s.error);
+    return s.status;
+  }
+  std::printf("%s: %d cones of %d rows, %s\n", on_terminal(file).c_str(), blocks, problem.rows(),
+              name(o.law));
+  std::printf("  %s, error %.3e; %d sweeps, %d ADMM iterations, %d factorisations\n",
+              name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
+              s.counts.factorisations);
+  if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
+  return s.status;
+}
+
+// Where a file is no problem of contacts alone; a pipe has been read by then.
+std::unique_ptr<ConeProblem> as_cones(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) return nullptr;
+  try {
+    return std::make_unique<ConeProblem>(read_cones(file));
+  } catch (const std::runtime_error&) {
+    return nullptr;
+  }
+}
+
 // 0: all solved, 1: some not solved, 2: some file or option is wrong.
 int run(const Arguments& arguments) {
   int status = 0;
@@ -66,7 +99,15 @@ int run(const Arguments& arguments) {
   }
   for (const std::string& file : arguments.files) {
     try {
-      const Problem problem = read_problem(file);
+      Problem problem;
+      try {
+        problem = read_problem(file);
+      } catch (const std::runtime_error&) {
+        const std::unique_ptr<ConeProblem> cones = as_cones(file);
+        if (!cones) throw;
+        if (run_cones(arguments, file, *cones) != Status::solved && status == 0) status = 1;
+        continue;
+      }
       const Options& o = arguments.options;
       const Solution s = Solver(o).solve(problem);
       const Residuals r = evaluate(problem, o.law, s.impulses);
