@@ -254,3 +254,22 @@ TEST_CASE("polyhedra: beside two edges that cross, what may close meanwhile is a
   }
   CHECK(crossing > 50);
 }
+
+TEST_CASE(
+    "polyhedra: places beside which a size is lost, and places that are no numbers, are safe") {
+  // A margin is as long as a step's way: of a body that somebody has thrown with 1e30 m/s.
+  const tc::Shape box = tc::Shape::box({1, 1, 0.5});
+  const Quaterniond turned(AngleAxisd(1e28, Vector3d(1, 2, 3).normalized()));
+  for (const double far : {1e10, 1e17, 1e30, 1e150, 1e300})
+    for (const Vector3d& way : {Vector3d(1, 0, 0), Vector3d(0, 0, -1), Vector3d(3, 2, 1)})
+      for (const Quaterniond& q : {Quaterniond::Identity(), turned}) {
+        CAPTURE(far, way.transpose());
+        const tc::NearPoints near =
+            points_of(box, pose(Vector3d::Zero()), box, pose(far * way, q), 1e305);
+        if (way.norm() == 1 && q.w() == 1) CHECK(near.count > 0);
+        for (int k = 0; k < near.count; ++k) CHECK(near.point[k].gap > 0.5 * far);
+      }
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK(points_of(box, pose(Vector3d::Zero()), box, pose({0, nan, 0})).count == 0);
+  CHECK(points_of(box, pose({nan, nan, nan}), box, pose(Vector3d::Zero())).count == 0);
+}

@@ -9,6 +9,7 @@
 #include <tether/scene/run.hpp>
 #include <vector>
 
+#include "picture/axes.hpp"
 #include "picture/canvas.hpp"
 #include "run_files.hpp"
 #include "support/catch.hpp"
@@ -119,6 +120,30 @@ TEST_CASE("a picture of costs takes any name and any table") {
   CHECK(texts.front().words.find("\xc3\xa9: what") != std::string::npos);
   scene.name = std::string(300, 'W');
   texts_of(cost_picture(scene, table));
+}
+
+TEST_CASE("a picture of numbers at the ends of their range comes to its end") {
+  // Ticks up to infinity were counted without end: of ratios beyond 1e308, and of their margins.
+  Scene scene = parse_scene(
+      "[scene]\nend = 0.02\ngravity = [0, 1e150, -9.81]\n[stepping]\nstep = 1e-3\n[[body]]\nshape "
+      "= \"sphere\"\nradius = 1\nmass = 1\n",
+      "far.toml");
+  scene.output.svg = (folder("pictures") / "far.svg").string();
+  CHECK(run(scene).failure == "");
+  CHECK(has(texts_of(content(scene.output.svg)), "energy / J"));
+  for (const double least : {5e-324, 1e-300, 1.0, 1e300})
+    for (const double most : {5e-324, 1.0, 1e300, 1e308}) {
+      CAPTURE(least, most);
+      CostTable table;
+      table.rows = {row(Method::steps, 1e-3, least, least), row(Method::steps, 1e-4, most, most)};
+      CHECK(has(texts_of(cost_picture(scene, table)), "largest error / m, rad"));
+      for (const bool logarithmic : {false, true}) {
+        const picture::Range range = picture::range_of({least, -most, most}, logarithmic);
+        CHECK(std::isfinite(range.high - range.low));
+        CHECK(range.low < range.high);
+        CHECK((!logarithmic || range.low > 0));
+      }
+    }
 }
 
 TEST_CASE("texts of the pictures of all shipped scenes are apart") {

@@ -17,7 +17,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 // Among the faces farthest along -n, the one most nearly perpendicular to n. A face that lies
-// more against n may still end above the lowest corner.
+// more against n may still end above the lowest corner. `same` may be lost beside a height; no face
+// (-1) where heights are no numbers.
 int FaceClipper::lowest_face(const Placed& other, const Vector3d& n, double same) {
   double lowest = kInfinity;
   height_.clear();
@@ -30,7 +31,7 @@ int FaceClipper::lowest_face(const Placed& other, const Vector3d& n, double same
   for (int f = 0; f < static_cast<int>(other.now.faces.size()); ++f) {
     const std::vector<int>& loop = other.loop(f);
     if (std::none_of(loop.begin(), loop.end(),
-                     [&](int v) { return height_[at(v)] < lowest + same; }))
+                     [&](int v) { return height_[at(v)] <= lowest + same; }))
       continue;
     const double c = other.face(f).normal.dot(n);
     if (best >= 0 && !(c < cosine - kRounding)) continue;
@@ -47,6 +48,7 @@ void FaceClipper::clip(const Placed& reference, int face, const Placed& other, d
   const double same = kSame * size;
   const int opposite = lowest_face(other, n, same);
   polygon_.clear();
+  if (opposite < 0) return;
   // Loops run the other way round seen from the reference face; either way serves.
   for (int k = 0; k < other.loop_size(opposite); ++k) {
     const int v = other.loop(opposite)[at(k)];

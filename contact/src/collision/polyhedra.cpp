@@ -104,6 +104,7 @@ class Polyhedra final : public PairCollision {
     if (A.separation >= margin) return;
     const FaceAxis B = best_face(b_, a_, rounding);
     if (B.separation >= margin) return;
+    if (A.face < 0 || B.face < 0) return;  // places that are no numbers: the step says so
     const EdgeAxis E = best_edges(a_, b_, rounding);
     if (E.separation >= margin) return;
     const double best = std::max(A.separation, B.separation);

@@ -12,6 +12,8 @@ namespace tether::scene::picture {
 namespace {
 
 constexpr double kSize = 12;  // of numbers
+// Powers of ten that an axis reaches to: its ends, and what lies between them, are numbers.
+constexpr double kMostPower = 300;
 
 double share(const Range& range, double value) {
   if (!range.logarithmic) return (value - range.low) / (range.high - range.low);
@@ -83,9 +85,14 @@ Range range_of(const std::vector<double>& values, bool logarithmic) {
   }
   if (!(low <= high)) low = high = 1;
   if (logarithmic) {
-    const double margin = std::pow(10, std::max(0.15, 0.06 * std::log10(high / low)));
-    return {low / margin, high * margin, true};
+    const double from = std::log10(low), to = std::log10(high);
+    const double margin = std::max(0.15, 0.06 * (to - from));
+    return {std::pow(10, std::clamp(from - margin, -kMostPower, kMostPower - 1)),
+            std::pow(10, std::clamp(to + margin, 1 - kMostPower, kMostPower)), true};
   }
+  const double most = std::pow(10, kMostPower);
+  low = std::clamp(low, -most, most);
+  high = std::clamp(high, -most, most);
   const double margin = high > low ? 0.06 * (high - low) : std::max(1e-3 * std::abs(high), 1e-12);
   return {low - margin, high + margin, false};
 }

@@ -187,6 +187,7 @@ void ConvexShape::corners(const Vector3d& direction, double height, Flat& out) c
       far = u.dot(p);
       best = k;
     }
+    if (best < 0) continue;  // heights that are no numbers
     if (out.count > 0 && (out.id[at(out.count - 1)] == best || out.id[0] == best)) continue;
     out.add(centre_ + rotation_ * corner(best), best);
   }
