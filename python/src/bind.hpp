@@ -1,6 +1,7 @@
 // Tether: what the parts of the Python module share. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <charconv>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <stdexcept>
@@ -18,6 +19,12 @@ inline std::string shape(const Array& a) {
   std::string text = "(";
   for (py::ssize_t i = 0; i < a.ndim(); ++i) text += (i ? ", " : "") + std::to_string(a.shape(i));
   return text + ")";
+}
+
+/// A number of a message, the same in every locale.
+inline std::string shown(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
 [[noreturn]] inline void refuse(const std::string& what) { throw std::invalid_argument(what); }

@@ -202,8 +202,7 @@ problem: blocks[k] (d, d) at block row rows[k] and block column columns[k].)")
           "status", [](const tc::Derivative& d) { return std::string(name(d.report().status)); },
           "unique, or minimum_norm: impulses are not unique, the least change is given")
       .def_property_readonly(
-          "strictly_regular",
-          [](const tc::Derivative& d) { return d.report().strictly_regular; },
+          "strictly_regular", [](const tc::Derivative& d) { return d.report().strictly_regular; },
           "every contact is strictly open, sticking or sliding")
       .def_property_readonly("regimes",
                              [](const tc::Derivative& d) { return words_of(d.report().regimes); })
@@ -219,9 +218,9 @@ problem: blocks[k] (d, d) at block row rows[k] and block column columns[k].)")
       .def_property_readonly("rank", [](const tc::Derivative& d) { return d.report().rank; })
       .def_property_readonly("unknowns",
                              [](const tc::Derivative& d) { return d.report().unknowns; })
-      .def_property_readonly("not_unique",
-                             [](const tc::Derivative& d) { return d.report().not_unique; },
-                             "contacts whose impulses are not determined")
+      .def_property_readonly(
+          "not_unique", [](const tc::Derivative& d) { return d.report().not_unique; },
+          "contacts whose impulses are not determined")
       .def_property_readonly("velocities_unique",
                              [](const tc::Derivative& d) { return d.report().velocities_unique; })
       .def_property_readonly("error", [](const tc::Derivative& d) { return d.report().error; })
@@ -300,8 +299,7 @@ replace the law at single contacts. What cannot be solved is a status, with advi
       .def_property_readonly("factorisations",
                              [](const tc::Solution& s) { return s.counts.factorisations; })
       .def("__repr__", [](const tc::Solution& s) {
-        return "<Solution: " + std::string(name(s.status)) + ", error " + std::to_string(s.error) +
-               ">";
+        return "<Solution: " + std::string(name(s.status)) + ", error " + shown(s.error) + ">";
       });
 
   bind_derivative(module);

@@ -177,14 +177,13 @@ Result solve(const py::object& residual, const Array& times, const py::object& y
     refuse("times has shape " + shape(times) + ", must be a vector of at least two");
   for (py::ssize_t i = 0; i < times.size(); ++i)
     if (!std::isfinite(times.at(i)) || (i > 0 && !(times.at(i) > times.at(i - 1))))
-      refuse("times[" + std::to_string(i) + "] = " + std::to_string(times.at(i)) +
+      refuse("times[" + std::to_string(i) + "] = " + shown(times.at(i)) +
              ", must be finite and rise");
   const auto begin = Array::ensure(y0);
   if (!begin) throw py::error_already_set();
   const py::ssize_t n = begin.size();
   if (n == 0) refuse("y0 is empty");
-  if (!(rtol >= 0) || !std::isfinite(rtol))
-    refuse("rtol = " + std::to_string(rtol) + ", must be >= 0");
+  if (!(rtol >= 0) || !std::isfinite(rtol)) refuse("rtol = " + shown(rtol) + ", must be >= 0");
   if (max_steps < 1) refuse("max_steps = " + std::to_string(max_steps) + ", must be at least 1");
   const Array start = vector("y0", y0, n);
 

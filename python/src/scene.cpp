@@ -1,4 +1,5 @@
 // Tether: scenes for Python. SPDX-License-Identifier: BSD-3-Clause
+#include <locale>
 #include <optional>
 #include <pybind11/stl.h>
 #include <sstream>
@@ -149,6 +150,7 @@ w, x, y, z; energy, drift, penetration, residual, contacts: (T,).)")
           "plan",
           [](const ts::Scene& s) {
             std::ostringstream out;
+            out.imbue(std::locale::classic());
             out << ts::make_plan(s);
             return out.str();
           },

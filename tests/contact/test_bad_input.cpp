@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <limits>
 #include <tether/contact.hpp>
+#include <tether/contact/joint_laws.hpp>
 
 #include "support/catch.hpp"
+#include "support/comma_locale.hpp"
 
 using namespace tether::contact;
 using Catch::Contains;
@@ -339,4 +341,20 @@ TEST_CASE("nothing to do is done") {
       Problem::dense(MatrixXd::Identity(3, 3), VectorXd::Zero(3), VectorXd::Ones(1));
   CHECK(Solver().solve(rest).impulses.isZero(0));
   CHECK(BodySolver().solve({}, {}).status == Status::solved);
+}
+
+TEST_CASE("bad input: the same words in a host whose numbers have a comma") {
+  const auto said = [] {
+    JointRows rows;
+    JointLaws laws;
+    return refused_problem([](Good& p) { p.mu[0] = -0.125; }) + "\n" +
+           refusal([&] { rows.add(12345, 0, -0.5); }) + "\n" +
+           refusal([&] { laws.add_bounded(2, 0, -0.25); });
+  };
+  const std::string plain = said();
+  for (const char* part :
+       {"mu = -0.125", "joint 12345: compliance = -0.5:", "joint 2: bound = -0.25:"})
+    CHECK_THAT(plain, Contains(part));
+  const tether::test::CommaLocale here;
+  CHECK(said() == plain);
 }

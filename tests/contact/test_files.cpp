@@ -1,5 +1,4 @@
 // Tether: files of contact problems. SPDX-License-Identifier: BSD-3-Clause
-#include <clocale>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
@@ -13,6 +12,7 @@
 
 #include "assemblies.hpp"
 #include "support/catch.hpp"
+#include "support/comma_locale.hpp"
 #include "support/skip.hpp"
 
 using namespace tether::contact;
@@ -251,15 +251,15 @@ TEST_CASE("files are written and read alike in every locale") {
   const Problem p = random::cluster(g, 0.4, 2, 3).problem();
   Temporary here("test_contact_here.dat"), there("test_contact_there.dat");
   write_dat(p, here.path);
-  const std::string before = std::setlocale(LC_ALL, nullptr);
-  bool comma = false;
-  for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "de_DE", "fr_FR.UTF-8", "fr_FR.utf8"})
-    comma = comma || std::setlocale(LC_ALL, name) != nullptr;
-  if (!comma) WARN("skipped in part: no locale with a decimal comma is installed here");
+  const tether::test::CommaLocale comma;
+  if (!comma.of_c()) WARN("skipped in part: no locale with a decimal comma is installed here");
   write_dat(p, there.path);
-  const bool same = equal(p, read_dat(here.path)) && slurp(here.path) == slurp(there.path);
-  std::setlocale(LC_ALL, before.c_str());
-  CHECK(same);
+  CHECK(equal(p, read_dat(here.path)));
+  CHECK(slurp(here.path) == slurp(there.path));
+  Temporary many("test_contact_many.dat");
+  spill(many.path, "3\n12345678.5\n");
+  CHECK_THROWS_WITH(read_dat(many.path),
+                    Catch::Contains("is 1.23457e+07; an integer from 0 to 10000000"));
 }
 
 TEST_CASE(".dat: numbers are whole words within the range of double precision") {

@@ -10,6 +10,7 @@
 #include "host.hpp"
 #include "linalg/thrown.hpp"
 #include "support/catch.hpp"
+#include "support/comma_locale.hpp"
 
 using namespace tether::test;
 using namespace tether::problems;
@@ -194,6 +195,47 @@ TEST_CASE("largest_move: a start too far away is rejected, or approached in capp
     REQUIRE(host.finish() >= 0);
     CHECK(host.projection().statistics().failures() == 0);
   }
+}
+
+TEST_CASE("messages and counts are the same in a host whose numbers have a comma") {
+  Problem far = tether::test::circle(20.0);
+  far.y0 = {1.0 + 1e-4, 0.0};
+  far.yp0 = {0.0, 1.0 + 1e-4};
+  const auto said = [&] {
+    std::string all;
+    Host host(far, 1e-6);
+    host.attach(on_circle());
+    host.finish();
+    all += host.projection().message() + "\n";
+    tp::Statistics long_run;
+    long_run.projections = 1234567;
+    long_run.largest_move = 0.25;
+    all += long_run.table() + long_run.csv_row() + "\n";
+    tp::Constraints wrong = on_circle();
+    wrong.jacobian = tp::DenseJacobian(
+        [](double, tp::ConstVector y, tp::Matrix C) { C.row(0) = 1.25 * y.transpose(); });
+    const std::vector<double> y = {0.6, 0.8};
+    all += tp::check_jacobian(wrong, 0.5, y).message + "\n";
+    wrong.value = [](double, tp::ConstVector, tp::Vector g) { g[0] = kNaN; };
+    Host none(far, 1e-6);
+    none.attach(wrong);
+    none.finish();
+    all += none.projection().message() + "\n";
+    all += thrown([&] { tp::check_jacobian(on_circle(), 0.5, y, -0.5); }) + "\n";
+    tp::Options options;
+    options.id = host.vector({1.0, 0.5});
+    all += thrown([&] { host.attach(on_circle(), options); });
+    return all;
+  };
+  const std::string plain = said();
+  INFO(plain);
+  for (const char* part : {"35.3518 tolerances long, the limit is 10 ", "= 1234567\n",
+                           "2.500000e-01", "given 1, differences give 0.8",
+                           "is not finite at t = 2.", "tolerance = -0.5;", "[1] = 0.5;"})
+    CHECK_THAT(plain, Catch::Contains(part));
+  const CommaLocale here;
+  CHECK(said() == plain);
+  if (!here.of_c()) WARN("in part: C has no locale with a decimal comma here");
 }
 
 TEST_CASE("extra_iterations = 0: no residual is evaluated beside IDA's") {

@@ -15,6 +15,7 @@
 
 #include "run_files.hpp"
 #include "support/catch.hpp"
+#include "support/comma_locale.hpp"
 #include "texts.hpp"
 
 using namespace tether::scene;
@@ -231,6 +232,55 @@ TEST_CASE("what accuracy costs: tighter settings have smaller errors and take mo
   }
   options.settings = {0};
   CHECK_THROWS_AS(cost(parse_scene(block(""), "test.toml"), options), std::invalid_argument);
+}
+
+TEST_CASE("messages, tables and states are the same in a host whose numbers have a comma") {
+  const fs::path file = folder("comma") / "a.csv";
+  const auto said = [&] {
+    std::vector<std::string> all;
+    const auto failure = [&](const std::string& text) {
+      try {
+        Scene scene = parse_scene(text, "comma.toml");
+        scene.output.csv = file.string();
+        scene.output.state = (file.parent_path() / "a.state").string();
+        all.push_back(run(scene).failure);
+        all.push_back(content(file));
+        all.push_back(content(scene.output.state));
+      } catch (const std::exception& e) {
+        all.emplace_back(e.what());
+      }
+    };
+    failure(rod(""));
+    failure(block(""));
+    // Too stiff for its steps; a start off its joint; fewer steps than it needs.
+    failure(
+        block("[[spring]]\nbodies = [\"block\", \"world\"]\nat = [[0, 0, 0.1], [0, 0, 2.5]]\n"
+              "stiffness = 1.5e7\n"));
+    std::string off = rod("");
+    off.replace(off.find("mass = 1"), 8, "mass = 1\nvelocity = [0.5, 0.25, 0]");
+    failure(off);
+    std::string few = rod("");
+    few.replace(few.find("tolerance"), 9, "max_steps = 2\ntolerance");
+    failure(few + "[output]\nevery = 0.5\n");
+    failure(block("", "friction = -0.125\n"));
+    return all;
+  };
+  const std::vector<std::string> plain = said();
+  std::string together;
+  for (const std::string& each : plain)
+    if (each.size() < 1000) together += each + "\n";
+  for (const char* part :
+       {"a step of 0.002 s is too long", "off by 0.5", "stopped at t = 5.08", "friction = -0.125"})
+    CHECK_THAT(together, Catch::Contains(part));
+  const tether::test::CommaLocale here;
+  const std::vector<std::string> there = said();
+  REQUIRE(there.size() == plain.size());
+  for (std::size_t k = 0; k < plain.size(); ++k) {
+    INFO("output " << k);
+    const bool same = there[k] == plain[k];
+    CHECK(same);
+    if (!same && plain[k].size() < 1000) CHECK(there[k] == plain[k]);
+  }
 }
 
 TEST_CASE("files that cannot be written are reported") {

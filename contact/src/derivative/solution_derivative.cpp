@@ -48,12 +48,11 @@ void SolutionDerivative::accept(const DerivativeOptions& options) {
   report_.error =
       system_.measure({0, system_.judged_fixed_point(own_x_.data()), 0, 0}, Measure::fixed_point);
   if (report_.error <= options.tolerance) return;
-  char wanted[96];
-  std::snprintf(wanted, sizeof wanted, "must be at most DerivativeOptions::tolerance = %g",
-                options.tolerance);
+  const std::string wanted =
+      "must be at most DerivativeOptions::tolerance = " + shown(options.tolerance);
   refuse(std::string("error of the impulses (Residuals::fixed_point) under the law ") +
              system_.law().name,
-         report_.error, wanted);
+         report_.error, wanted.c_str());
 }
 
 void SolutionDerivative::linearise(const DerivativeOptions& options) {

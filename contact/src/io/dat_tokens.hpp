@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <locale>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -51,6 +52,7 @@ class Tokens {
     if (!(value >= static_cast<double>(least) && value <= static_cast<double>(most)) ||
         value != std::floor(value)) {
       std::ostringstream text;
+      text.imbue(std::locale::classic());
       text << what << " is " << value << "; an integer from " << least << " to " << most
            << " is expected";
       fail(text.str());

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "problem/refuse.hpp"
+
 namespace tether::contact {
 
 namespace {
@@ -12,7 +14,7 @@ namespace {
 void demand(bool holds, int joint, const char* what, double value, const char* range) {
   if (!holds)
     throw std::invalid_argument("joint " + std::to_string(joint) + ": " + what + " = " +
-                                std::to_string(value) + ": must be " + range);
+                                detail::shown(value) + ": must be " + range);
 }
 
 }  // namespace

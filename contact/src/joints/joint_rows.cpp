@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "problem/refuse.hpp"
+
 namespace tether::contact {
 
 void JointRows::clear() {
@@ -18,9 +20,9 @@ void JointRows::clear() {
 void JointRows::add(int joint, double rate, double compliance) {
   const std::string where = "joint " + std::to_string(joint) + ": ";
   if (!std::isfinite(rate))
-    throw std::invalid_argument(where + "rate = " + std::to_string(rate) + ": must be finite");
+    throw std::invalid_argument(where + "rate = " + detail::shown(rate) + ": must be finite");
   if (!(compliance >= 0) || !std::isfinite(compliance))
-    throw std::invalid_argument(where + "compliance = " + std::to_string(compliance) +
+    throw std::invalid_argument(where + "compliance = " + detail::shown(compliance) +
                                 ": must be >= 0 and finite");
   joint_.push_back(joint);
   rate_.push_back(rate);

@@ -1,16 +1,19 @@
 // Tether: bad input is refused. SPDX-License-Identifier: BSD-3-Clause
 #include "problem/refuse.hpp"
 
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 
 namespace tether::contact::detail {
 
-void refuse(const std::string& argument, double value, const char* wanted) {
+std::string shown(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  throw std::invalid_argument(argument + " = " + text + ": " + wanted);
+  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 9).ptr};
+}
+
+void refuse(const std::string& argument, double value, const char* wanted) {
+  throw std::invalid_argument(argument + " = " + shown(value) + ": " + wanted);
 }
 
 void refuse_size(const std::string& argument, Eigen::Index entries, Eigen::Index needed,

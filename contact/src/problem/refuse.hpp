@@ -10,6 +10,9 @@
 
 namespace tether::contact::detail {
 
+// A number of a message: nine digits, the same in every locale.
+std::string shown(double value);
+
 // std::invalid_argument "argument = value: wanted", wanted: what would be right.
 [[noreturn]] void refuse(const std::string& argument, double value, const char* wanted);
 [[noreturn]] void refuse_size(const std::string& argument, Eigen::Index entries,

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "problem/refuse.hpp"
 #include "rolling/rolling_part.hpp"
 #include "stepping/detection/collide.hpp"
 #include "stepping/stepper_parts.hpp"
@@ -193,8 +194,8 @@ void Stepper::set_memory(const StepperMemory& m) {
 void Stepper::start_anew(long steps, double late) {
   Implementation& s = *implementation_;
   if (!(late >= 0 && late < s.options.step))
-    throw std::invalid_argument("stepping: a start that is " + std::to_string(late) +
-                                " s late, but a step has " + std::to_string(s.options.step) + " s");
+    throw std::invalid_argument("stepping: a start that is " + detail::shown(late) +
+                                " s late, but a step has " + detail::shown(s.options.step) + " s");
   s.counts.steps = steps;
   s.late = late;
   s.parts.control = {};

@@ -11,6 +11,7 @@
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #include "attach/impl.hpp"
+#include "attach/shortest.hpp"
 #include "fast/quicken.hpp"
 
 namespace tether::ida_projection {
@@ -265,10 +266,9 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
 void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, attempts_.left_before)) return;
   move.status = Status::move_too_long;
-  attempts_.capped_message =
-      "the move onto the constraints, capped at " + std::to_string(move.length) +
-      " tolerances (Options::largest_move), leaves " + std::to_string(move.left) +
-      ", which the error test does not allow; use a larger largest_move";
+  attempts_.capped_message = "the move onto the constraints, capped at " + brief(move.length) +
+                             " tolerances (Options::largest_move), leaves " + brief(move.left) +
+                             ", which the error test does not allow; use a larger largest_move";
 }
 
 // A few invariants of many unknowns, as on grids; rows of mechanisms are many and local.

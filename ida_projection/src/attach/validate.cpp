@@ -229,7 +229,7 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
     const double* id = N_VGetArrayPointer(options.id);
     for (sunindextype j = 0; j < length; ++j)
       if (id[j] != 0.0 && id[j] != 1.0)
-        reject("options.id[" + std::to_string(j) + "] = " + std::to_string(id[j]) +
+        reject("options.id[" + std::to_string(j) + "] = " + shortest(id[j]) +
                "; it must be 1 (differential) or 0 (algebraic)");
   }
 }

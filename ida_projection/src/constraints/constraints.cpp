@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 #include <tether/ida_projection/constraints.hpp>
 
+#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
 
 namespace tether::ida_projection {
@@ -88,7 +88,7 @@ Constraints operator+(Constraints a, const Constraints& b) {
 namespace {
 
 std::string unequal(double together, double alone, const char* function) {
-  std::ostringstream text;
+  PlainText text;
   text.precision(10);
   text << "fill_with_value gives " << together << ", " << function << " gives " << alone;
   return text.str();
@@ -138,7 +138,7 @@ bool check_both(const Constraints& constraints, Evaluator& evaluator, double t, 
 JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,
                               double tolerance) {
   if (!(tolerance > 0.0))
-    throw std::invalid_argument("check_jacobian: tolerance = " + std::to_string(tolerance) +
+    throw std::invalid_argument("check_jacobian: tolerance = " + brief(tolerance) +
                                 "; it must be > 0");
   if (kind(constraints)[0] != '\0')
     throw std::invalid_argument(
@@ -202,7 +202,7 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
       report.correct = check_both(constraints, evaluator, t, y, increments, columns, given,
                                   tolerance, require, report);
   } else {
-    std::ostringstream text;
+    PlainText text;
     text.precision(10);
     text << "row " << report.row << " (" << constraints.name(report.row) << "), column "
          << report.column << ": given " << report.given << ", differences give " << report.expected;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "attach/shortest.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
@@ -120,8 +122,8 @@ void Evaluator::count(bool with_value) {
 Status Evaluator::not_finite(double t, const double* g) {
   const long bad = first_not_finite(g, rows_);
   if (bad < 0) return Status::success;
-  message_ = "g of " + constraints_.name(static_cast<int>(bad)) +
-             " is not finite at t = " + std::to_string(t);
+  message_ =
+      "g of " + constraints_.name(static_cast<int>(bad)) + " is not finite at t = " + brief(t);
   return Status::not_finite;
 }
 

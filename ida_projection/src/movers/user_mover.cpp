@@ -1,4 +1,5 @@
 // Tether: a projection that the caller does himself. SPDX-License-Identifier: BSD-3-Clause
+#include "attach/shortest.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 
@@ -55,9 +56,8 @@ class UserMover final : public Mover {
       if (!(result.length <= limit)) {
         if (options_.long_move == LongMove::reject || !std::isfinite(result.length)) {
           result.status = std::isfinite(result.length) ? Status::move_too_long : Status::not_finite;
-          message_ = "the user's projection moved by " + std::to_string(result.length) +
-                     " tolerances, the limit is " + std::to_string(limit) +
-                     " (Options::largest_move)";
+          message_ = "the user's projection moved by " + brief(result.length) +
+                     " tolerances, the limit is " + brief(limit) + " (Options::largest_move)";
           return result;
         }
         factor = limit / result.length;

@@ -10,6 +10,7 @@
 #include <tether/linalg/minimum_norm.hpp>
 #include <vector>
 
+#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
 #include "rows/kinds_of_unknowns.hpp"
 #include "rows/rounding.hpp"
@@ -82,7 +83,7 @@ bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, i
     found->rows = {row};
     if (vanished) {
       found->message =
-          constraints.name(row) + ": the gradient vanishes although g = " + std::to_string(left);
+          constraints.name(row) + ": the gradient vanishes although g = " + brief(left);
       return true;
     }
     const std::vector<double> share = solver.dependence(k);
@@ -94,7 +95,7 @@ bool contradicts(const BlockOf<Solver>& block, const Constraints& constraints, i
     for (int i : found->rows)
       found->message += " " + std::to_string(i) + " (" + constraints.name(i) + ")";
     found->message += "; a distance of " +
-                      std::to_string(left / (std::sqrt(n) * std::max(row_in_tolerances, 1e-300))) +
+                      brief(left / (std::sqrt(n) * std::max(row_in_tolerances, 1e-300))) +
                       " tolerances stays unsolved";
     return true;
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
@@ -134,8 +135,7 @@ class ContiguousTangent final : public TangentRows {
     }
     ++statistics_.factorizations;
     if (!blocks_.factor()) {
-      message_ =
-          "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t_);
+      message_ = "the constraint Jacobian C has an entry that is not finite at t = " + brief(t_);
       return Status::not_finite;
     }
     if constexpr (Rows::kThinRows)

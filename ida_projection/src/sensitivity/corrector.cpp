@@ -279,7 +279,7 @@ Status SensitivityCorrector::too_long(const Candidate& candidate, int k, double 
   const double limit = state_.options.largest_move * std::max(1.0, change);
   if (length <= limit) return Status::success;
   message_ = "the move of sensitivity " + std::to_string(k) + " onto C s + dg/dp = 0 is " +
-             std::to_string(length) + " tolerances long, the limit is " + std::to_string(limit) +
+             brief(length) + " tolerances long, the limit is " + brief(limit) +
              " (Options::largest_move); start with make_sensitivities_consistent, and check dg/dp";
   return Status::move_too_long;
 }

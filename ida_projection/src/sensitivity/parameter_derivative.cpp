@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
 
 namespace tether::ida_projection {
@@ -49,8 +50,8 @@ Status ParameterDerivative::evaluate(double t, N_Vector y, int parameter, std::s
     status = differences(t, y, parameter, value, g_p);
   }
   if (status != Status::success || all_finite(g_p.data(), g_p.size())) return status;
-  message_ = "dg/dp of parameter " + std::to_string(parameter) +
-             " is not finite at t = " + std::to_string(t);
+  message_ =
+      "dg/dp of parameter " + std::to_string(parameter) + " is not finite at t = " + brief(t);
   return Status::not_finite;
 }
 

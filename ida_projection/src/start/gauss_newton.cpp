@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "attach/shortest.hpp"
 #include "rows/rounding.hpp"
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
@@ -226,8 +227,8 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
       report.contradicting_rows = blocks_.contradiction.rows;
     } else {
       report.message = "no point on the constraints was found near the given one: |g| is " +
-                       std::to_string(report.drift_before) + " there and stalls at " +
-                       std::to_string(report.drift_after) +
+                       brief(report.drift_before) + " there and stalls at " +
+                       brief(report.drift_after) +
                        "; the rows may have no common solution, or the start is too far away";
     }
   } else if (report.slow_convergence) {

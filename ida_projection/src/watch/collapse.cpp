@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <vector>
 
+#include "attach/shortest.hpp"
 #include "watch/first_steps.hpp"
 #include "watch/kink.hpp"
 
@@ -41,7 +41,7 @@ void RejectionWatch::count(bool repeated, long steps) {
 
 std::string RejectionWatch::cause(const Candidate& candidate, const StepData& step,
                                   const AlgebraicVariables& variables, Corrector& corrector) const {
-  std::ostringstream out;
+  PlainText out;
   out << "IDA rejected " << rejections_ - rejections_before_ << " attempts in the last " << kWindow
       << " accepted steps before t = " << step.t;
   if (variables.all())
@@ -152,7 +152,7 @@ std::string RejectionWatch::suspected_row(const Candidate& candidate, const Step
   for (std::size_t i = 0; i < m; ++i)
     if (std::abs(rate[i]) * size[worst] > std::abs(rate[worst]) * size[i]) worst = i;
   if (!(std::abs(rate[worst]) > kNoInvariant * size[worst])) return {};
-  std::ostringstream out;
+  PlainText out;
   out << "F does not keep row " << worst << " (" << constraints_.name(static_cast<int>(worst))
       << "): C y' + g_t = " << rate[worst] << ", its terms sum up to " << size[worst]
       << " in absolute value";

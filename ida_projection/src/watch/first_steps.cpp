@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
+#include "attach/shortest.hpp"
 #include "watch/kink.hpp"
 
 namespace tether::ida_projection {
@@ -61,7 +61,7 @@ std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const Ste
   largest_ = std::max(largest_, size);
   if (!(size < 1.0) || grows || !(change > kMoves * size)) return {};
   if (++small_looks_ != kSmallLooks) return {};
-  std::ostringstream out;
+  PlainText out;
   out << "the whole solution is " << size << " tolerances long at t = " << step.t
       << ", so that IDA's error test cannot see it: reduce atol";
   return out.str();
@@ -157,7 +157,7 @@ std::string FirstSteps::false_row(int row, const RowDoubt& doubt, const StepData
   const double terms = tangency_.terms[i] + std::abs(in_time);
   const double felt = doubt.felt * std::sqrt(static_cast<double>(size)) * tangency_.tolerance[i];
   if (std::abs(along) > doubt.share * terms && std::abs(along * h) > felt) {
-    std::ostringstream out;
+    PlainText out;
     out << "F does not keep row " << row << " (" << constraints_.name(row) << "): at t = " << step.t
         << " C y' + g_t = " << along << ", its terms sum up to " << terms
         << " in absolute value; check the row, its constants and F";
@@ -167,8 +167,7 @@ std::string FirstSteps::false_row(int row, const RowDoubt& doubt, const StepData
       searched_ + size <= kSearchLimit) {
     searched_ += size;  // C at hand may be of an earlier step: mostly nothing is wrong
     const std::string found = wrong_entry(step.t);
-    if (!found.empty())
-      return "check_jacobian finds at t = " + std::to_string(step.t) + ": " + found;
+    if (!found.empty()) return "check_jacobian finds at t = " + brief(step.t) + ": " + found;
   }
   return {};
 }

@@ -2,7 +2,8 @@
 #include "watch/report.hpp"
 
 #include <cstdio>
-#include <sstream>
+
+#include "attach/shortest.hpp"
 
 namespace tether::ida_projection {
 
@@ -78,7 +79,7 @@ void Report::count_failure_in_step(const std::string& text, long steps) {
   failing_step_ = steps;
   if (failures_in_step_ < (steps == 0 ? kSayAfterAtFirst : kSayAfter) || said_failures_) return;
   said_failures_ = true;
-  std::ostringstream out;
+  PlainText out;
   out << "step " << steps + 1 << " was tried " << failures_in_step_
       << " times without a point on the constraints: " << text;
   say(out.str());

@@ -2,9 +2,10 @@
 #include <iomanip>
 #include <limits>
 #include <ostream>
-#include <sstream>
 #include <tether/ida_projection/statistics.hpp>
 #include <vector>
+
+#include "attach/shortest.hpp"
 
 namespace tether::ida_projection {
 
@@ -69,7 +70,7 @@ void write(std::ostream& out, const Entry& entry) {
 }  // namespace
 
 std::string Statistics::table() const {
-  std::ostringstream out;
+  PlainText out;
   for (const Entry& entry : entries(*this)) {
     out << std::left << std::setw(34) << entry.label << " = ";
     write(out, entry);
@@ -97,7 +98,7 @@ double Statistics::number(const std::string& column) const {
 }
 
 std::string Statistics::csv_row() const {
-  std::ostringstream out;
+  PlainText out;
   const char* separator = "";
   for (const Entry& entry : entries(*this)) {
     out << separator;

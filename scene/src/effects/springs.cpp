@@ -4,8 +4,9 @@
 //
 //   tension k (|d| - rest) + c d|d|/dt along d,   potential k (|d| - rest)^2 / 2,
 //   power of the damper -c (d|d|/dt)^2
+#include <fmt/format.h>
+
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 
 #include "mechanics/effect.hpp"
@@ -156,12 +157,10 @@ class SpringForces : public Force {
       if ((dt * s.stiffness + 2 * s.damping) * dt * inverse < 4) continue;
       const double c = 2 * s.damping * inverse, k = s.stiffness * inverse;
       const double most = k > 0 ? (std::sqrt(c * c + 16 * k) - c) / (2 * k) : 4 / c;
-      std::ostringstream text;
-      text << scene.file << ":" << scene.springs[i].place.line << ": spring \""
-           << scene.springs[i].name << "\": a step of " << dt
-           << " s is too long for it to be stable; stepping.step must be below about " << most
-           << " s (or, without contacts, use the smooth engine)";
-      throw std::invalid_argument(text.str());
+      throw std::invalid_argument(fmt::format(
+          "{}:{}: spring \"{}\": a step of {:g} s is too long for it to be stable; stepping.step "
+          "must be below about {:g} s (or, without contacts, use the smooth engine)",
+          scene.file, scene.springs[i].place.line, scene.springs[i].name, dt, most));
     }
   }
   // One after the other, so that each damper sees the velocities that the others leave.

@@ -1,7 +1,8 @@
 // Tether: the engine of scenes without contact. SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <istream>
 #include <limits>
 #include <ostream>
@@ -227,17 +228,14 @@ class SmoothEngine : public Engine {
       const double allowed = half == 0 ? position * size : velocity * speed;
       if (value <= allowed) continue;
       const double unit = half == 0 ? units_.length : units_.speed();
-      char text[300];
-      std::snprintf(text, sizeof text, ": its bodies are off by %.3g %s at t = 0 (at most %.3g %s)",
-                    unit * g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s",
-                    unit * allowed, why);
-      throw std::invalid_argument(
-          std::string("the start of the scene contradicts the ") +
-          (half == 0 ? "position" : "velocity") + " of joint \"" + system_->joint_of_row(worst) +
-          "\"" + text +
-          (half == 0 ? ""
-                     : "; give both bodies velocities and angular velocities that the joint "
-                       "allows, and those of a prescribed motion"));
+      throw std::invalid_argument(fmt::format(
+          "the start of the scene contradicts the {} of joint \"{}\": its bodies are off by {:.3g} "
+          "{} at t = 0 (at most {:.3g} {}){}",
+          half == 0 ? "position" : "velocity", system_->joint_of_row(worst),
+          unit * g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s", unit * allowed, why,
+          half == 0 ? ""
+                    : "; give both bodies velocities and angular velocities that the joint "
+                      "allows, and those of a prescribed motion"));
     }
   }
 

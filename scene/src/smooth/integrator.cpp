@@ -2,11 +2,11 @@
 // BSD-3-Clause
 #include "integrator.hpp"
 
+#include <fmt/format.h>
 #include <nvector/nvector_serial.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace tether::scene::smooth {
 
@@ -256,11 +256,10 @@ Eigen::VectorXd Integrator::at_step_end() const {
 std::string Integrator::failure(int flag) const {
   double h = 0;
   IDAGetLastStep(ida_, &h);
-  char text[200];
-  std::snprintf(text, sizeof text, "the smooth engine stopped at t = %.6g s (last step %.3g s): ",
-                system_.units().time * t_, system_.units().time * h);
   char* name = IDAGetReturnFlagName(flag);
-  std::string message = text + std::string(name) + ". ";
+  std::string message =
+      fmt::format("the smooth engine stopped at t = {:.6g} s (last step {:.3g} s): {}. ",
+                  system_.units().time * t_, system_.units().time * h, name);
   std::free(name);
   if (!context_.message().empty()) message += "IDA: " + context_.message() + " ";
   if (projection_ && projection_->status() != ida_projection::Status::success &&

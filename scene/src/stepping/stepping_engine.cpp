@@ -1,12 +1,13 @@
 // Tether: the engine that steps with impulses. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping_engine.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstring>
 #include <istream>
 #include <limits>
 #include <ostream>
-#include <sstream>
 #include <stdexcept>
 #include <tether/scene/run.hpp>
 #include <utility>
@@ -131,34 +132,33 @@ void SteppingEngine::step() {
   try {
     stepper_.step();
   } catch (const std::invalid_argument& e) {  // by contacts whose gap or place is no number
-    std::ostringstream text;
-    text << "t = " << time() << " s: the motion has left the range of numbers: " << e.what();
-    throw SimulationError(text.str());
+    throw SimulationError(
+        fmt::format("t = {:g} s: the motion has left the range of numbers: {}", time(), e.what()));
   }
 }
 
 void SteppingEngine::report_failure() const {
-  std::ostringstream text;
   for (const BodyState& b : bodies_)
     if (!b.position.allFinite() || !b.orientation.coeffs().allFinite() || !b.velocity.allFinite() ||
-        !b.angular_velocity.allFinite()) {
-      text << "t = " << time() << " s: the motion has left the range of numbers, about 1e-150 to "
-           << "1e150 in SI units, or a step is far too long for it";
-      throw SimulationError(text.str());
-    }
-  text << "t = " << time() << " s: the contact problem (" << stepper_.contacts().points.size()
-       << " contacts) was not solved: " << contact::name(stepper_.status()) << " at a residual of "
-       << stepper_.residual() << ", wanted " << stepper_.options().tolerance
-       << ", also in parts of "
-       << std::ldexp(stepper_.options().step, -stepper_.options().max_halvings)
-       << " s; raise stepping.tolerance or stepping.max_halvings, reduce stepping.step, or set "
-          "on_failure = \"warn\"";
+        !b.angular_velocity.allFinite())
+      throw SimulationError(fmt::format(
+          "t = {:g} s: the motion has left the range of numbers, about 1e-150 to 1e150 in SI "
+          "units, or a step is far too long for it",
+          time()));
+  std::string text = fmt::format(
+      "t = {:g} s: the contact problem ({} contacts) was not solved: {} at a residual of {:g}, "
+      "wanted {:g}, also in parts of {:g} s; raise stepping.tolerance or stepping.max_halvings, "
+      "reduce stepping.step, or set on_failure = \"warn\"",
+      time(), stepper_.contacts().points.size(), contact::name(stepper_.status()),
+      stepper_.residual(), stepper_.options().tolerance,
+      std::ldexp(stepper_.options().step, -stepper_.options().max_halvings));
   if (stepper_.status() == contact::Status::infeasible)
-    text << "; no impulses keep the bodies apart: joints, prescribed motions or fixed bodies drive "
-            "them into each other";
+    text +=
+        "; no impulses keep the bodies apart: joints, prescribed motions or fixed bodies drive "
+        "them into each other";
   if (stepper_.joint_drift() > 0)
-    text << "; joints are off by up to " << stepper_.joint_drift() << " m or rad";
-  throw SimulationError(text.str());
+    text += fmt::format("; joints are off by up to {:g} m or rad", stepper_.joint_drift());
+  throw SimulationError(text);
 }
 
 void SteppingEngine::read_bodies() {

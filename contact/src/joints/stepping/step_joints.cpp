@@ -8,6 +8,7 @@
 #include <tether/linalg/index.hpp>
 
 #include "joints/joint_islands.hpp"
+#include "problem/refuse.hpp"
 #include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {
@@ -92,7 +93,7 @@ void StepJoints::factor(const BodySet& bodies, double t) {
 // All storage is as long as the first rows, and on their bodies.
 void StepJoints::check_rows(double t) {
   const auto refuse_other = [t](const std::string& what) {
-    throw std::invalid_argument(what + " (JointEquations::add_rows at t = " + std::to_string(t) +
+    throw std::invalid_argument(what + " (JointEquations::add_rows at t = " + shown(t) +
                                 " s): rows and their bodies do not change");
   };
   if (at(rows_.count()) != row_.g.size())
@@ -245,9 +246,9 @@ void StepJoints::refuse(const BodySet& bodies, double t) {
     if (!(std::abs(row_.g[at(row)]) < 0.1 * most)) names.insert(equations_->name(rows_.joint(row)));
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  throw std::invalid_argument("joints contradict each other at t = " + std::to_string(t) +
+  throw std::invalid_argument("joints contradict each other at t = " + shown(t) +
                               " s: no positions near these satisfy " + text + " (off by up to " +
-                              std::to_string(most) + " m or rad)");
+                              shown(most) + " m or rad)");
 }
 
 void StepJoints::refuse_rates() {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
 #include <deal.II/base/config.h>
 #include <deal.II/base/index_set.h>
 #include <deal.II/lac/block_vector.h>
@@ -47,6 +48,12 @@ struct Run {
 };
 
 namespace detail {
+
+// The same in every locale.
+inline std::string number(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
 
 // IDA's memory and context are private members without an accessor; an explicit instantiation may
 // name them all the same. A deal.II that calls them otherwise does not compile here.
@@ -156,13 +163,13 @@ Run solve_dae(::dealii::SUNDIALS::IDA<VectorType>& ida, const Rows<VectorType>& 
   // In its release mode deal.II 9.4 does not look at what IDASolve returns, and goes on for ever.
   const auto check = [&](double t) {
     if (static_cast<int>(projection->status()) < 0 || !(t > last))
-      throw std::runtime_error("deal_ii::solve_dae: IDA ended at t = " + std::to_string(t) + ": " +
+      throw std::runtime_error("deal_ii::solve_dae: IDA ended at t = " + detail::number(t) + ": " +
                                projection->message());
     last = t;
     const auto view = ::dealii::SUNDIALS::internal::make_nvector_view(solution, context);
     const ConsistencyReport moved = projection->project(t, view);
     if (!moved)
-      throw std::runtime_error("deal_ii::solve_dae: the output at t = " + std::to_string(t) +
+      throw std::runtime_error("deal_ii::solve_dae: the output at t = " + detail::number(t) +
                                " is not on the rows: " + moved.message);
   };
   // deal.II resets IDA, calls output_step, and then in turn steps, asks whether to restart (again

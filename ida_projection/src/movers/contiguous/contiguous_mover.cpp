@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "contiguous_mover.hpp"
 
+#include "attach/shortest.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
@@ -220,8 +222,8 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       if (!std::isfinite(length) || too_long(length, limit)) {
         if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
           result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
-          message_ = "the move onto the constraints is " + std::to_string(length) +
-                     " tolerances long, the limit is " + std::to_string(limit) +
+          message_ = "the move onto the constraints is " + brief(length) +
+                     " tolerances long, the limit is " + brief(limit) +
                      " (Options::largest_move); start closer with make_consistent, or use a "
                      "smaller step";
           return result;
@@ -261,7 +263,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       result.status = Status::not_converged;
       message_ =
           "move " + std::to_string(result.moves) + " onto the constraints still is " +
-          std::to_string(length) +
+          brief(length) +
           " tolerances long; check the constraint Jacobian with check_jacobian, or whether "
           "the rows have a common solution here; rows written as squares have none but double "
           "roots, and rows with |.| or max no derivative: neither lets Newton's moves shrink";

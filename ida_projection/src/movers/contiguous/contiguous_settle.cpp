@@ -1,5 +1,6 @@
 // Tether: moves a polished candidate back onto the constraints, on contiguous vectors.
 // SPDX-License-Identifier: BSD-3-Clause
+#include "attach/shortest.hpp"
 #include "contiguous_mover.hpp"
 
 namespace tether::ida_projection {
@@ -92,7 +93,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
   rows_.factors.there = false;
   if (previous <= std::min(kLargestFloor, rows_.rounding_length())) return Status::success;
   message_ = "after " + std::to_string(options_.maximum_iterations) +
-             " moves with kept factors the next one still is " + std::to_string(previous) +
+             " moves with kept factors the next one still is " + brief(previous) +
              " tolerances long (Options::maximum_iterations)";
   return Status::not_converged;
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "attach/shortest.hpp"
 #include "rows/row_levels.hpp"
 
 namespace tether::ida_projection {
@@ -74,8 +75,7 @@ Status FactoredRows<Rows>::factor(double t) {
     factors.thin = false;
     ++(Rows::many(count()) ? statistics_.refactorizations : statistics_.factorizations);
   } else if (!decide()) {
-    message_ =
-        "the constraint Jacobian C has an entry that is not finite at t = " + std::to_string(t);
+    message_ = "the constraint Jacobian C has an entry that is not finite at t = " + brief(t);
     return Status::not_finite;
   }
   factors.there = true;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "attach/shortest.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/factor_wear.hpp"
 #include "movers/mover.hpp"
@@ -190,8 +191,8 @@ class VectorMover final : public Mover {
         if (!(length <= limit)) {
           if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
             result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
-            message_ = "the move onto the constraints is " + std::to_string(length) +
-                       " tolerances long, the limit is " + std::to_string(limit) +
+            message_ = "the move onto the constraints is " + brief(length) +
+                       " tolerances long, the limit is " + brief(limit) +
                        " (Options::largest_move)";
             return result;
           }
@@ -211,7 +212,7 @@ class VectorMover final : public Mover {
       if (verdict == Monitor::Verdict::failed || result.moves >= options_.maximum_iterations) {
         result.status = Status::not_converged;
         message_ = "move " + std::to_string(result.moves) + " onto the constraints still is " +
-                   std::to_string(length) + " tolerances long; check C";
+                   brief(length) + " tolerances long; check C";
         return result;
       }
       if ((result.status = value(candidate.t)) != Status::success) return result;
