@@ -301,6 +301,16 @@ Eigen::VectorXd Embedding::complete(const Eigen::VectorXd& cones,
   return x;
 }
 
+Eigen::VectorXd Embedding::raise(const linalg::VectorView& gradient) const {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(3 * contacts_.contacts());
+  for (std::size_t r = 0; r < places_.size(); ++r) {
+    const auto row = static_cast<Eigen::Index>(r);
+    if (places_[r].contact >= 0)
+      out[3 * places_[r].contact + places_[r].component] = scale_[row] * gradient[row];
+  }
+  return out;
+}
+
 Eigen::VectorXd Embedding::lift_b(const linalg::VectorView& db) const {
   Eigen::VectorXd b = db;
   if (!free_.empty()) {
@@ -309,13 +319,7 @@ Eigen::VectorXd Embedding::lift_b(const linalg::VectorView& db) const {
       bf[static_cast<Eigen::Index>(i)] = db[free_.rows()[i]];
     b -= free_.to_cones(free_.solve(bf));
   }
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(3 * contacts_.contacts());
-  for (std::size_t r = 0; r < places_.size(); ++r) {
-    const auto row = static_cast<Eigen::Index>(r);
-    if (places_[r].contact >= 0)
-      out[3 * places_[r].contact + places_[r].component] = scale_[row] * b[row];
-  }
-  return out;
+  return raise(b);
 }
 
 Eigen::VectorXd Embedding::lower_b(const linalg::VectorView& db3) const {

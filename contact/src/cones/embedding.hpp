@@ -34,6 +34,8 @@ class Embedding {
   int main_contact(int block) const { return main_[static_cast<std::size_t>(block)]; }
 
   Eigen::VectorXd lift(const linalg::VectorView& impulses) const;
+  /// Transposed lower(): a gradient by row as one by component of the contacts.
+  Eigen::VectorXd raise(const linalg::VectorView& gradient) const;
   /// By row; free rows zero.
   Eigen::VectorXd lower(const linalg::VectorView& contacts) const;
   /// All of x: free rows answer to those of the cones, A_ff x_f = g_f - A_fc x_c.

@@ -1,0 +1,211 @@
+// Tether: derivatives of solutions over products of cones. SPDX-License-Identifier: BSD-3-Clause
+//
+// README, section 21. A enters through w = A x - b alone: dA does what -dA x does to b.
+#include <tether/contact/cone_derivative.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <tether/linalg/index.hpp>
+
+#include "cones/cone_rows.hpp"
+#include "cones/embedding.hpp"
+#include "problem/refuse.hpp"
+
+namespace tether::contact {
+
+using linalg::at;
+
+namespace {
+
+// Blocks whose contact separates.
+std::vector<char> open_blocks(const ConeProblem& problem, const linalg::VectorView& impulses) {
+  std::vector<char> out;
+  const linalg::VectorX w = problem.velocities(impulses);
+  for (std::size_t k = 0; k < problem.cones().size(); ++k) {
+    const int row = problem.first_row(static_cast<int>(k));
+    const double a = detail::diagonal_block(problem, row, 1)(0, 0);
+    out.push_back(detail::is_contact(problem.cones()[k].kind) && w[row] > a * impulses[row]);
+  }
+  return out;
+}
+
+void check_entries(const char* argument, const linalg::VectorView& v, Eigen::Index needed,
+                   const char* why) {
+  if (v.size() != 0 && v.size() != needed) detail::refuse_size(argument, v.size(), needed, why);
+  detail::require_finite(argument, v);
+}
+
+const ConeProblem& checked(const ConeProblem& problem, const linalg::VectorView& impulses,
+                           const DerivativeOptions& options) {
+  const ConeResiduals residuals = evaluate(problem, Law::coulomb, impulses);
+  if (!(residuals.error <= options.tolerance))
+    detail::refuse(
+        "error of the impulses", residuals.error,
+        ("must be <= tolerance = " + std::to_string(options.tolerance) + ": they are no solution")
+            .c_str());
+  return problem;
+}
+
+DerivativeOptions for_contacts(DerivativeOptions options) {
+  options.replaced.clear();
+  // Judged by evaluate() already; the contacts' own scale may be smaller.
+  options.tolerance = std::max(options.tolerance, 1e-3);
+  return options;
+}
+
+}  // namespace
+
+struct detail::ConeDerivativeParts {
+  ConeDerivativeParts(const ConeProblem& given, const linalg::VectorView& x,
+                      const DerivativeOptions& options)
+      : problem(checked(given, x, options)),
+        impulses(x),
+        embedding(problem, options.tolerance, open_blocks(problem, x)),
+        contacts(derivative(embedding.contacts(), Law::coulomb, embedding.lift(x),
+                            for_contacts(options))),
+        report(contacts.report()) {
+    report.error = evaluate(problem, Law::coulomb, x).error;
+    const std::vector<Regime> of_contacts = report.regimes;
+    report.regimes.clear();
+    for (int k = 0; k < static_cast<int>(problem.cones().size()); ++k) {
+      const int contact = embedding.main_contact(k);
+      report.regimes.push_back(problem.cones()[at(k)].kind == Cone::Kind::free ? Regime::sticking
+                               : contact >= 0 ? of_contacts[at(contact)]
+                                              : Regime::separating);
+    }
+    for (Kink& kink : report.kinks) kink.contact = embedding.block_of(kink.contact);
+    for (int& contact : report.not_unique) contact = embedding.block_of(contact);
+  }
+
+  // By row: what direction.A does to A x.
+  Eigen::VectorXd shift(const ConeDirection& direction) const {
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(problem.rows());
+    for (const MatrixEntry& e : direction.A) {
+      if (e.row < 0 || e.row >= problem.rows() || e.column < 0 || e.column >= problem.rows())
+        throw std::invalid_argument("A(" + std::to_string(e.row) + ", " + std::to_string(e.column) +
+                                    ") is outside of the matrix");
+      if (!std::isfinite(e.value)) refuse("A", e.value, "must be finite");
+      out[e.row] += e.value * impulses[e.column];
+    }
+    return out;
+  }
+
+  ConeProblem problem;
+  Eigen::VectorXd impulses;
+  Embedding embedding;
+  Derivative contacts;
+  DerivativeReport report;
+};
+
+ConeDerivative::ConeDerivative(std::unique_ptr<detail::ConeDerivativeParts> parts)
+    : parts_(std::move(parts)) {}
+ConeDerivative::~ConeDerivative() = default;
+ConeDerivative::ConeDerivative(ConeDerivative&&) noexcept = default;
+ConeDerivative& ConeDerivative::operator=(ConeDerivative&&) noexcept = default;
+
+const DerivativeReport& ConeDerivative::report() const { return parts_->report; }
+
+ConeSolutionDirection ConeDerivative::forward(const ConeDirection& direction) const {
+  const ConeProblem& p = parts_->problem;
+  const detail::Embedding& e = parts_->embedding;
+  const auto blocks = static_cast<Eigen::Index>(p.cones().size());
+  check_entries("b", direction.b, p.rows(), "one for each row");
+  check_entries("mu", direction.mu, blocks, "one for each block");
+  check_entries("rolling", direction.rolling, blocks, "one for each block");
+  check_entries("torsional", direction.torsional, blocks, "one for each block");
+  check_entries("bound", direction.bound, blocks, "one for each block");
+  Eigen::VectorXd db = -parts_->shift(direction);
+  if (direction.b.size() > 0) db += direction.b;
+  ProblemDirection of_contacts;
+  Eigen::VectorXd b = e.lift_b(db), mu = Eigen::VectorXd::Zero(e.contacts().contacts());
+  for (int k = 0; k < static_cast<int>(blocks); ++k) {
+    const int contact = e.main_contact(k);
+    if (contact < 0) continue;
+    const detail::Embedding::Moments& m = e.moments_of(k);
+    const detail::Embedding::Bound bound = e.bound_of(k);
+    if (bound.contact >= 0) {
+      if (direction.bound.size() > 0) b[3 * bound.contact] += bound.factor * direction.bound[k];
+      continue;
+    }
+    if (direction.mu.size() > 0) mu[contact] = direction.mu[k];
+    if (m.spin >= 0 && direction.torsional.size() > 0)
+      mu[m.spin] = m.spin_factor * direction.torsional[k];
+    if (m.rolling >= 0 && direction.rolling.size() > 0)
+      mu[m.rolling] = m.rolling_factor * direction.rolling[k];
+  }
+  of_contacts.b = b;
+  of_contacts.mu = mu;
+  ConeSolutionDirection out;
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(p.rows());
+  if (e.contacts().contacts() > 0) {
+    const SolutionDirection found = parts_->contacts.forward(of_contacts);
+    out.residual = found.residual;
+    x = e.lower(found.impulses);
+  }
+  out.impulses = e.complete(x, db);
+  out.velocities = -db;
+  for (const MatrixEntry& a : p.entries())
+    out.velocities[a.row] += a.value * out.impulses[a.column];
+  return out;
+}
+
+ConeDirection ConeDerivative::adjoint(const linalg::VectorView& impulses,
+                                      const linalg::VectorView& velocities) const {
+  const ConeProblem& p = parts_->problem;
+  const detail::Embedding& e = parts_->embedding;
+  check_entries("impulses", impulses, p.rows(), "one for each row");
+  check_entries("velocities", velocities, p.rows(), "one for each row");
+  // Of x and of b, by rows: dw = A dx - db.
+  Eigen::VectorXd gx = Eigen::VectorXd::Zero(p.rows()), gb = gx;
+  if (impulses.size() > 0) gx = impulses;
+  if (velocities.size() > 0) {
+    gb = -velocities;
+    for (const MatrixEntry& a : p.entries()) gx[a.column] += a.value * velocities[a.row];
+  }
+  // x_f = A_ff^+ (b_f - A_fc x_c)
+  const detail::FreeRows& f = e.free_rows();
+  if (!f.empty()) {
+    Eigen::VectorXd gf(static_cast<Eigen::Index>(f.rows().size()));
+    for (std::size_t i = 0; i < f.rows().size(); ++i)
+      gf[static_cast<Eigen::Index>(i)] = gx[f.rows()[i]];
+    const Eigen::VectorXd y = f.solve(gf);
+    for (std::size_t i = 0; i < f.rows().size(); ++i) {
+      gb[f.rows()[i]] += y[static_cast<Eigen::Index>(i)];
+      gx[f.rows()[i]] = 0;
+    }
+    gx -= f.back().transpose() * y;
+  }
+  const auto blocks = static_cast<Eigen::Index>(p.cones().size());
+  ConeDirection out;
+  for (linalg::VectorX* v : {&out.mu, &out.rolling, &out.torsional, &out.bound})
+    *v = Eigen::VectorXd::Zero(blocks);
+  if (e.contacts().contacts() > 0) {
+    const ProblemDirection g = parts_->contacts.adjoint(e.raise(gx));
+    gb += e.lower_b(g.b);
+    for (int k = 0; k < static_cast<int>(blocks); ++k) {
+      const int contact = e.main_contact(k);
+      if (contact < 0) continue;
+      const detail::Embedding::Moments& m = e.moments_of(k);
+      const detail::Embedding::Bound bound = e.bound_of(k);
+      if (bound.contact >= 0) {
+        out.bound[k] = bound.factor * g.b[3 * bound.contact];
+        continue;
+      }
+      if (p.cones()[at(k)].kind != Cone::Kind::nonnegative) out.mu[k] = g.mu[contact];
+      if (m.spin >= 0) out.torsional[k] = m.spin_factor * g.mu[m.spin];
+      if (m.rolling >= 0) out.rolling[k] = m.rolling_factor * g.mu[m.rolling];
+    }
+  }
+  out.b = gb;
+  for (const MatrixEntry& a : p.entries())
+    out.A.push_back({a.row, a.column, -gb[a.row] * parts_->impulses[a.column]});
+  return out;
+}
+
+ConeDerivative derivative(const ConeProblem& problem, const linalg::VectorView& impulses,
+                          const DerivativeOptions& options) {
+  return ConeDerivative(std::make_unique<detail::ConeDerivativeParts>(problem, impulses, options));
+}
+
+}  // namespace tether::contact
