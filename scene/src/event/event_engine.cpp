@@ -22,6 +22,8 @@ using mechanics::at;
 
 constexpr const char* kDamaged = "the saved state is damaged";
 constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '3'};
+// The same of a scene far from the origin: that of the engine comes first.
+constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '3'};
 
 DriverOptions driver_options(const Scene& scene) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -39,7 +41,8 @@ class EventEngine : public Engine {
  public:
   explicit EventEngine(const Scene& scene)
       : units_(event::units_of(scene)),
-        scene_(scaled(scene, units_)),
+        origin_(event::origin_of(scaled(scene, units_))),
+        scene_(event::seen_from(origin_, scaled(scene, units_))),
         options_(driver_options(scene_)),
         model_(scene_, units_.time),
         driver_(std::make_unique<Driver>(model_, options_, 0.0, model_.start())),
@@ -97,8 +100,15 @@ class EventEngine : public Engine {
   void look_at_contacts() const;
   void look_at_events();
 
+  bool far() const { return !origin_.isZero(0); }
+  /// What is in SI, from the world's origin.
+  void to_world(Vector3d& place) const {
+    if (far()) place += units_.length * origin_;
+  }
+
   smooth::Units units_;
-  Scene scene_;  // in these units, as everything here but the results
+  Vector3d origin_;
+  Scene scene_;  // in these units and from this origin, as everything here but the results
   DriverOptions options_;
   mutable SceneModel model_;  // forces are found at the state that it is set to
   std::unique_ptr<Driver> driver_;
@@ -116,12 +126,21 @@ void EventEngine::look() {
   const smooth::MovingBodies& bodies = model_.bodies();
   bodies.read(model_.bodies_state(), bodies_);
   for (std::size_t b = 0; b < bodies_.size(); ++b)
-    if (!scene_.bodies[b].fixed) smooth::to_si(units_, bodies_[b]);
+    if (!scene_.bodies[b].fixed) {
+      smooth::to_si(units_, bodies_[b]);
+      to_world(bodies_[b].position);
+    }
   Diagnostics d;
   d.potential_energy = model_.potential();
   d.kinetic_energy = bodies.kinetic_energy();
   d.momentum = bodies.momentum();
   d.angular_momentum = bodies.angular_momentum();
+  if (far()) {
+    d.angular_momentum += origin_.cross(d.momentum);
+    for (const Body& body : scene_.bodies)
+      if (!body.fixed && scene_.gravity)
+        d.potential_energy -= body.mass * scene_.gravity->dot(origin_);
+  }
   contacts_known_ = false;
   d.contacts = static_cast<int>(driver_->motion().closed().size());
   // A point behind a face that has a border is not always in the body.
@@ -156,6 +175,7 @@ void EventEngine::look_at_contacts() const {
     c.first = pair.first;
     c.second = pair.second;
     c.point = units_.length * touch.point;
+    to_world(c.point);
     c.normal = touch.normal;
     c.gap = units_.length * touch.gap;
     c.force = units_.force() * model_.in_space(contact, forces[k]);
@@ -170,6 +190,11 @@ Forces EventEngine::forces() const {
   driver_->state_with_forces();
   Forces out = model_.forces_of(reactions_, driver_->motion().joint_forces());
   smooth::to_si(units_, scene_, out);
+  for (JointForce& each : out.joints) to_world(each.at);
+  for (SpringForce& each : out.springs) {
+    to_world(each.at);
+    to_world(each.at_second);
+  }
   return out;
 }
 
@@ -193,7 +218,12 @@ void EventEngine::look_at_events() {
 void EventEngine::save(std::ostream& out) const {
   const Driver::Memory m = driver_->memory();
   put_bodies(out, time(), bodies_);
-  out.write(kMagic, sizeof kMagic);
+  if (far()) {
+    out.write(kFarMagic, sizeof kFarMagic);
+    for (const double x : origin_) binary::put(out, x);
+  } else {
+    out.write(kMagic, sizeof kMagic);
+  }
   binary::put(out, static_cast<std::uint64_t>(m.y.size()),
               static_cast<std::uint64_t>(m.modes.size()), units_.length, units_.time, units_.mass,
               m.time, driver_->time(), m.kept_energy, m.lost, m.first_energy,
@@ -219,8 +249,14 @@ void EventEngine::restore(std::istream& in, Restore how) {
     get_bodies(in, bodies);
     in.read(magic, sizeof magic);
   }
-  if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
+  const bool from_far = in && std::equal(magic, magic + sizeof magic, kFarMagic);
+  if (!in || !(from_far || std::equal(magic, magic + sizeof magic, kMagic)))
     throw std::runtime_error("this is not a state of the event engine");
+  Vector3d origin = Vector3d::Zero();
+  if (from_far)
+    for (double& x : origin) binary::get(in, x);
+  if (origin != origin_)
+    throw std::runtime_error("the saved state is of another scene: somewhere else");
   std::uint64_t size = 0, contacts = 0;
   smooth::Units units;
   Driver::Memory m;

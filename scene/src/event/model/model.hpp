@@ -42,9 +42,6 @@ class Model {
   /// and of the energy. 1 in units in which these are near 1.
   virtual VectorXd sizes() const { return VectorXd::Ones(coordinates() + velocities() + 1); }
 
-  /// From where coordinates count: their errors are relative to what is beyond it.
-  virtual VectorXd origin() const { return VectorXd::Zero(coordinates() + velocities() + 1); }
-
   virtual double time_unit() const { return 1; }  ///< s, for what users read
 
   virtual void set(double t, const double* q, const double* u) = 0;

@@ -1,7 +1,9 @@
-// Tether: a scene with its shapes in other units. SPDX-License-Identifier: BSD-3-Clause
+// Tether: a scene with its shapes in other units, and from another origin. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "smooth/units.hpp"
 
@@ -31,6 +33,44 @@ inline Scene scaled(const Scene& scene, const smooth::Units& u) {
     }
   if (out.event) out.event->max_step /= u.time;
   return out;
+}
+
+/// Where the engine has its origin, in a scene in its units: 0, but for scenes further away than 30
+/// of their sizes. There positions lose digits that gaps and joints are made of, and tolerances
+/// relative to them mean nothing. Multiples of a power of two: near bodies are moved exactly.
+inline Eigen::Vector3d origin_of(const Scene& scene) {
+  constexpr double kFarAway = 30;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  int moving = 0;
+  for (const Body& body : scene.bodies)
+    if (!body.fixed) {
+      middle += body.position;
+      ++moving;
+    }
+  if (moving == 0) return middle;
+  middle /= moving;
+  double size = 1;
+  for (const Body& body : scene.bodies)
+    if (!body.fixed) size = std::max(size, (body.position - middle).norm());
+  if (!(middle.norm() > kFarAway * size)) return Eigen::Vector3d::Zero();
+  const double grid = std::exp2(std::ceil(std::log2(size)));
+  return (middle / grid).array().round() * grid;
+}
+
+/// The scene as it is seen from `origin`: what it says in world coordinates.
+inline Scene seen_from(const Eigen::Vector3d& origin, Scene scene) {
+  if (origin.isZero(0)) return scene;
+  for (Body& body : scene.bodies) body.position -= origin;
+  for (Joint& joint : scene.joints) {
+    joint.at -= origin;
+    joint.at_second -= origin;
+  }
+  for (Spring& spring : scene.springs) {
+    spring.at -= origin;
+    spring.at_second -= origin;
+  }
+  for (CentralGravity& each : scene.central_gravity) each.at -= origin;
+  return scene;
 }
 
 }  // namespace tether::scene::event

@@ -13,8 +13,7 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
-constexpr double kOtherNormal = 1e-4;  // squared sine
-constexpr double kFarAway = 30;  // m in the units of the model, and times the size of the scene
+constexpr double kOtherNormal = 1e-4;   // squared sine
 constexpr double kFarFromNormal = 0.1;  // squared sine: an axis that the tangents keep to
 
 /// Adds the velocity gradient of a force at a point, times the sign.
@@ -60,23 +59,6 @@ VectorXd SceneModel::start() const {
     std::copy_n(y.data() + kBody * k, 7, out.data() + 7 * k);
     std::copy_n(y.data() + kBody * k + kVelocity, 6, out.data() + coordinates() + 6 * k);
   }
-  return out;
-}
-
-// Near zero rounding and relative tolerances are what they are; a scene that was moved far away is
-// as exact as it was.
-VectorXd SceneModel::origin() const {
-  VectorXd out = Model::origin();
-  const int n = bodies_.count();
-  Vector3d middle = Vector3d::Zero();
-  const auto place = [&](int k) {
-    return Eigen::Map<const Vector3d>(bodies_.start().data() + kBody * k);
-  };
-  for (int k = 0; k < n; ++k) middle += place(k) / n;
-  double size = 1;
-  for (int k = 0; k < n; ++k) size = std::max(size, (place(k) - middle).norm());
-  if (middle.norm() > kFarAway * size)
-    for (int k = 0; k < n; ++k) out.segment<3>(7 * k) = middle;
   return out;
 }
 

@@ -34,7 +34,6 @@ class SceneModel final : public Model {
     return {pair(contact).friction, pair(contact).restitution};
   }
 
-  VectorXd origin() const override;
   void set(double t, const double* q, const double* u) override;
   void settle() override;
   void rates(double* q_rate) const override;

@@ -45,7 +45,7 @@ struct Phase::Ida {
   Ida& operator=(const Ida&) = delete;
 
   static int weights(N_Vector y, N_Vector w, void* self);
-  double size_of(int i, double value) const { return sizes[i] + std::abs(value - origin[i]); }
+  double size_of(int i, double value) const { return sizes[i] + std::abs(value); }
   static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
   static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
                       void* self, N_Vector, N_Vector, N_Vector);
@@ -66,7 +66,7 @@ struct Phase::Ida {
   decltype(SUNNonlinearSolver {} -> ops->solve) iterate = nullptr;  // SUNDIALS' Newton
   void* memory = nullptr;
   std::optional<ida_projection::Projection> projection;
-  VectorXd rate, near, near_rate, sizes, origin;
+  VectorXd rate, near, near_rate, sizes;
   VectorXd slips, slips_of_matrix;
   MatrixXd slope;  // d(y')/dy at
   VectorXd slope_at;
@@ -78,7 +78,6 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
     : motion(of), tolerance(tol), start(start_time) {
   const int N = motion.size();
   sizes = motion.model().sizes();
-  origin = motion.model().origin();
   rate.setZero(N);
   near_rate.setZero(N);
   VectorXd rate0(N);
@@ -147,8 +146,7 @@ int Phase::Ida::weights(N_Vector y, N_Vector w, void* self) {
   const Ida& me = *static_cast<Ida*>(self);
   for (int i = 0; i < me.sizes.size(); ++i)
     N_VGetArrayPointer(w)[i] =
-        1 / (me.tolerance * std::abs(N_VGetArrayPointer(y)[i] - me.origin[i]) +
-             me.tolerance * me.sizes[i]);
+        1 / (me.tolerance * std::abs(N_VGetArrayPointer(y)[i]) + me.tolerance * me.sizes[i]);
   return 0;
 }
 
@@ -210,7 +208,7 @@ void Phase::Ida::differentiate(double t, const double* from) {
   for (int j = 0; j < N; ++j) {
     if (j == motion.work()) continue;
     const double kept = near[j];
-    double step = kDifference * std::max(sizes[j], std::abs(kept - origin[j]));
+    double step = kDifference * std::max(sizes[j], std::abs(kept));
     if (j >= motion.coordinates()) step = std::min(step, longest);
     near[j] = kept + step;
     motion.rate(start + t, near.data(), near_rate.data());
