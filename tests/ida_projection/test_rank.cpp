@@ -85,6 +85,59 @@ struct BodiesOf {
   }
 };
 
+/// Two masses of 1 kg on rods of 1 m from (0, 0) and (2, 0), held 2 m apart, in the order q, v,
+/// forces; from the position in which all rods lie on the x axis, the masses moving up at `speed`.
+struct FourBar {
+  static tp::Matrix::PlainObject jacobian(const double* q) {
+    tp::Matrix::PlainObject C = tp::Matrix::PlainObject::Zero(3, 4);
+    C.row(0) << q[0], q[1], 0.0, 0.0;
+    C.row(1) << 0.0, 0.0, q[2] - 2.0, q[3];
+    C.row(2) << q[0] - q[2], q[1] - q[3], q[2] - q[0], q[3] - q[1];
+    return C;
+  }
+
+  /// Rows of velocities in F (index 2), or of accelerations (index 1).
+  static Problem problem(double speed, int index) {
+    Problem p;
+    p.size = 11;
+    p.index = index;
+    p.t_end = 1.0;
+    p.y0 = {1.0, 0.0, 3.0, 0.0, 0.0, speed, 0.0, speed, 0.0, 0.0, 0.0};
+    p.yp0 = {0.0, speed, 0.0, speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    p.id = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+    p.residual = [index](double, const double* y, const double* yp, double* r) {
+      const auto C = jacobian(y);
+      const Eigen::Map<const Eigen::Vector4d> v(y + 4), a(yp + 4);
+      for (int i = 0; i < 4; ++i) {
+        r[i] = yp[i] - y[4 + i];
+        r[4 + i] = a[i] + (i % 2 == 1 ? 9.81 : 0.0) + C.col(i).dot(Eigen::Vector3d(y + 8));
+      }
+      Eigen::Map<Eigen::Vector3d>(r + 8) = index == 2 ? C * v : C * a;
+      if (index == 2) return;
+      r[8] += v[0] * v[0] + v[1] * v[1];
+      r[9] += v[2] * v[2] + v[3] * v[3];
+      r[10] += std::pow(v[2] - v[0], 2) + std::pow(v[3] - v[1], 2);
+    };
+    return p;
+  }
+
+  static tp::Constraints lengths() {
+    tp::Constraints set;
+    set.count = 3;
+    set.names = {"left rod", "right rod", "coupler"};
+    set.value = [](double, tp::ConstVector q, tp::Vector g) {
+      g[0] = 0.5 * (q[0] * q[0] + q[1] * q[1] - 1.0);
+      g[1] = 0.5 * (std::pow(q[2] - 2.0, 2) + q[3] * q[3] - 1.0);
+      g[2] = 0.5 * (std::pow(q[2] - q[0], 2) + std::pow(q[3] - q[1], 2) - 4.0);
+    };
+    set.jacobian = tp::DenseJacobian([](double, tp::ConstVector y, tp::Matrix C) {
+      C.setZero();
+      C.leftCols(4) = jacobian(y.data());
+    });
+    return set;
+  }
+};
+
 using Bodies = BodiesOf<27>;  // 108 rows, 63 of them independent
 
 }  // namespace
@@ -191,6 +244,21 @@ TEST_CASE("many redundant rows: one that becomes independent is found") {
   CHECK(run.distance <= tp::Options().tolerance);
   CHECK(run.drift <= 1e-10);
   CHECK(run.statistics.factorizations <= run.statistics.projections / 5);
+}
+
+TEST_CASE("a start at a dead point is named, whether IDA goes on or not") {
+  for (const int index : {1, 2})
+    for (const double speed : {0.0, 1.0})
+      for (const double tolerance : {1e-4, 1e-6}) {
+        INFO("index " << index << ", speed " << speed << ", tolerance " << tolerance);
+        const Run run =
+            integrate(FourBar::problem(speed, index), tolerance, FourBar::lengths(), {}, false);
+        INFO(run.message);
+        CHECK(run.status == (run.flag < 0 ? tp::Status::corrector_failed : tp::Status::doubtful));
+        if (speed == 0.0) CHECK(run.flag < 0);
+        CHECK(run.message.find("y[8], y[9] and y[10]") != std::string::npos);
+        CHECK(run.message.find("the rows left rod, right rod and coupler") != std::string::npos);
+      }
 }
 
 TEST_CASE("full rank: two evaluations, one factorisation for most steps") {

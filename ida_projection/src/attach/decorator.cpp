@@ -13,6 +13,7 @@
 #include "attach/impl.hpp"
 #include "attach/shortest.hpp"
 #include "fast/quicken.hpp"
+#include "watch/dead_point.hpp"
 
 namespace tether::ida_projection {
 
@@ -21,6 +22,7 @@ namespace {
 constexpr long kSampleEvery = 16;
 // Multipliers of index 2: see README, section 9.
 constexpr double kAsideFromTest = 1.5, kProportional = 1e-4, kMostCare = 5.0, kManyFree = 0.4;
+constexpr int kNameAfter = 3;            // failed correctors in a row
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
@@ -40,6 +42,8 @@ int Projection::Impl::initialize() {
   }
   run_.initialized = true;
   run_.engaged = false;
+  run_.start = OwnedVector();
+  run_.undetermined.clear();
   run_.linear_solver = LinearSolverKind();
   options_.metric = wanted_metric_;
   attempts_ = Attempts();
@@ -141,6 +145,8 @@ int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool
 }
 
 int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup) {
+  if (attempts_.steps < 0 && movers_.used != nullptr && unknowns_.contiguous)
+    keep_point_before(candidate, run_.start);
   if (movers_.used != nullptr && !run_.engaged && !variables_.index_known() &&
       control_.in_trouble(attempts_.steps)) {
     const Status engaged = engage_if_index_is_high(candidate);
@@ -148,7 +154,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   }
   int flag = correct(candidate, tolerance, call_setup);
   if (movers_.used == nullptr) return flag;
-  if (flag != 0) return corrector_failed(flag);
+  if (flag != 0) return corrector_failed(candidate, flag);
   if (!run_.linear_solver.known()) look_at_linear_solver();
 
   const StepData step = ida_.step();
@@ -176,7 +182,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     ++statistics_.corrections_repeated;
     N_VConst(0.0, at.correction);
     flag = correct(at, tolerance, true);
-    if (flag != 0) return corrector_failed(flag);
+    if (flag != 0) return corrector_failed(candidate, flag);
     polish_.note_setup(step.cj);
     move = move_and_polish(at, step.cj, tolerance, true);
   }
@@ -196,7 +202,17 @@ void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepDat
   if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
 }
 
-int Projection::Impl::corrector_failed(int flag) {
+// y before this step; of a later one, up to its curvature.
+void Projection::Impl::keep_point_before(const Candidate& candidate, OwnedVector& y) {
+  if (!y) y = OwnedVector(candidate.base);
+  N_VLinearSum(1.0, candidate.base, -ida_.step_size(), ida_.step().yp_predicted, y);
+}
+
+std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vector y) {
+  return undetermined_multipliers(candidate, y, variables_, corrector_, constraints_, statistics_);
+}
+
+int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
   ++statistics_.corrector_failures;
   report_.status = Status::corrector_failed;
   if (flag > 0 && run_.engaged) control_.corrector_failed();
@@ -204,6 +220,18 @@ int Projection::Impl::corrector_failed(int flag) {
     report_.message =
         "IDA's corrector failed; in forms of index 2 or more multipliers carry rounding divided by "
         "the step, which may not allow this tolerance: try a larger one, or a form of index 1 or 0";
+  if (variables_.high_index() && !run_.undetermined.empty())
+    report_.message += "; " + run_.undetermined;
+  if (flag > 0 && unknowns_.contiguous && corrector_.failures_in_row() == kNameAfter) {
+    Candidate before = candidate;
+    before.t = ida_.step().t;
+    if (!variables_.known()) derive_id(before);
+    OwnedVector y;
+    keep_point_before(before, y);
+    const std::string found = undetermined_at(before, y);
+    if (!found.empty())
+      run_.undetermined = report_.message = "before t = " + std::to_string(before.t) + " " + found;
+  }
   return flag;
 }
 
@@ -362,7 +390,14 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();
-  if (variables_.high_index()) control_.begin_smoothing(care_of_high_index(candidate));
+  if (variables_.high_index()) {
+    control_.begin_smoothing(care_of_high_index(candidate));
+    const std::string found = run_.start ? undetermined_at(candidate, run_.start) : std::string();
+    if (!found.empty()) {
+      run_.undetermined = "the motion from the start is not determined: there " + found;
+      report_.warn(Status::doubtful, run_.undetermined);
+    }
+  }
   movers_.joined.join(candidate, cj);
   movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;

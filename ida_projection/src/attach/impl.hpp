@@ -97,7 +97,9 @@ class Projection::Impl {
   void look_at_linear_solver();
   bool rows_of_field() const;
   void account_for_previous_attempt(const StepData& step);
-  int corrector_failed(int flag);
+  int corrector_failed(const Candidate& candidate, int flag);
+  void keep_point_before(const Candidate& candidate, OwnedVector& y);
+  std::string undetermined_at(const Candidate& candidate, N_Vector y);
   int look_before_moving(const Candidate& candidate, bool& done);
   void derive_id(const Candidate& candidate);
   Status engage(const Candidate& candidate);
@@ -158,6 +160,8 @@ class Projection::Impl {
     bool broken = false;   // an exception left things half done: the run cannot go on
     bool engaged = false;  // the policy acts from the first move that was needed
     LinearSolverKind linear_solver;
+    OwnedVector start;         // its first y, of contiguous vectors
+    std::string undetermined;  // multipliers at the start, or where correctors fail
   };
   struct Inquiry {  // make_consistent() looks around
     Probe probe = Probe::none;

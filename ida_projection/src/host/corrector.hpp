@@ -49,6 +49,7 @@ class Corrector {
   int residual(N_Vector ycor, N_Vector into);
   bool solve_linear(N_Vector rhs);
   long iterations() const;  ///< of the last correction
+  int failures_in_row() const { return failures_in_row_; }
 
   bool has_setup() const { return has_setup_; }
   bool solves() const { return linear_solve_ != nullptr; }

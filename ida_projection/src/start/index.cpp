@@ -1,9 +1,9 @@
 // Tether: whether F is of index 1 in its own variables. SPDX-License-Identifier: BSD-3-Clause
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "start/algebraic.hpp"
+#include "start/undetermined_columns.hpp"
 
 namespace tether::ida_projection {
 
@@ -12,40 +12,7 @@ namespace {
 // Unknowns. Beyond the first size the look would be felt, except where each Jacobian of IDA takes
 // as many evaluations as there are unknowns, and dense factors: it costs two of these.
 constexpr int kLargestSize = 200, kLargestDense = 2000;
-constexpr double kDependentPivot =
-    1e-6;                            // of the largest pivot; difference quotients are this good
 constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
-
-// Columns that the matrix does not determine: those with an entry in a null vector. Rows and
-// columns scaled to 1, as their units differ. Empty: none, or not known.
-std::vector<char> undetermined_columns(Eigen::MatrixXd a) {
-  if (!a.allFinite()) return {};
-  for (int pass = 0; pass < 2; ++pass) {
-    for (int i = 0; i < a.rows(); ++i) {
-      const double largest = a.row(i).lpNorm<Eigen::Infinity>();
-      if (largest > 0.0) a.row(i) /= largest;
-    }
-    for (int j = 0; j < a.cols(); ++j) {
-      const double largest = a.col(j).lpNorm<Eigen::Infinity>();
-      if (largest > 0.0) a.col(j) /= largest;
-    }
-  }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
-  qr.setThreshold(kDependentPivot);
-  const Eigen::Index n = a.cols(), rank = qr.rank();
-  if (rank == n) return {};
-  // R11 z1 + R12 z2 = 0, in the order of the pivots.
-  Eigen::MatrixXd null = Eigen::MatrixXd::Identity(n, n).rightCols(n - rank);
-  null.topRows(rank) = -qr.matrixR()
-                            .topLeftCorner(rank, rank)
-                            .triangularView<Eigen::Upper>()
-                            .solve(qr.matrixR().topRightCorner(rank, n - rank));
-  null = qr.colsPermutation() * null;
-  std::vector<char> found(static_cast<std::size_t>(n));
-  for (Eigen::Index j = 0; j < n; ++j)
-    found[static_cast<std::size_t>(j)] = null.row(j).lpNorm<Eigen::Infinity>() > kDependentPivot;
-  return found;
-}
 
 }  // namespace
 
@@ -95,7 +62,7 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
   }
   N_VScale(1.0, saved, candidate.base);
   const std::vector<char> left =
-      known ? undetermined_columns(std::move(slopes)) : std::vector<char>();
+      known ? undetermined_columns(std::move(slopes), true) : std::vector<char>();
   undetermined_.clear();
   for (int j = 0; id != nullptr && j < static_cast<int>(left.size()); ++j)
     if (left[static_cast<std::size_t>(j)] && id[j] == 0.0) undetermined_.push_back(j);
