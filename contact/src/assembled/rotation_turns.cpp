@@ -116,10 +116,13 @@ Status Automatic::end_of_round(Search& search, Rotation& r, int) {
   return Status::unsolved;
 }
 
-// From the convex problem, which needs no start; for no more work than all before it.
+// From the convex problem, which needs no start; for no more work than all before it, and than what
+// is left.
 Status Automatic::coupling_path(Search& search, Rotation& r, int factorisations) {
   r.coupled = true;
-  const double affordable = search.counts.work / interior.cost(search);
+  const double left = search.work_end - search.counts.work;
+  const double affordable = std::min(search.counts.work, left) / interior.cost(search);
+  if (affordable < 1) return Status::unsolved;
   interior.run_coupling(search, static_cast<int>(std::min<double>(factorisations, affordable)));
   return Status::unsolved;
 }

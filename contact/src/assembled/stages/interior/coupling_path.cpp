@@ -156,6 +156,7 @@ bool InteriorPoint::centre(Search& search, double nu) {
     advance(point_, newton_.change(), step);
     equations_.evaluate(search.system, point_);
     if (step >= 1 && centred(search.system, nu)) return true;
+    if (search.exhausted()) return false;
   }
   return false;
 }
