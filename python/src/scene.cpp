@@ -133,6 +133,9 @@ w, x, y, z; energy, drift, penetration, residual, contacts: (T,).)")
           "met", [](const Film& f) { return f.result.met(); },
           "Every expectation of the scene that counts was judged and holds.")
       .def_property_readonly("remarks", [](const Film& f) { return f.result.remarks; })
+      .def_property_readonly(
+          "warnings", [](const Film& f) { return f.result.warnings; },
+          "Why the motion is not to be trusted; empty: nothing was seen.")
       .def_property_readonly("counts", &counts);
 
   py::class_<ts::Scene>(module, "Scene", "A scene: every default filled in.")

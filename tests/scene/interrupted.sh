@@ -42,6 +42,27 @@ for case in INT:130 TERM:143 INT:130 TERM:143; do
     code=$?
   [ "$code" -le 1 ] || die "the restart exits with $code"
 done
+# A run that waits for a state from a pipe that nobody writes: the first signal ends it.
+mkfifo "$work/never_written"
+signal=INT
+"$program" run "$scene" --quiet --restart "$work/never_written" >"$work/said" 2>&1 &
+child=$!
+left=200  # looks; a signal at every 50th of them: the first one may come before the program listens
+while kill -0 "$child" 2>/dev/null && [ $left -gt 0 ]; do
+  left=$((left - 1))
+  sleep 0.1
+  [ $((left % 50)) -ne 45 ] || kill -s INT "$child" 2>/dev/null || true
+done
+[ $left -gt 0 ] || { kill -s KILL "$child"; die "a run that waits for a state does not hear"; }
+code=0
+wait "$child" || code=$?
+[ "$code" -eq 130 ] || die "waiting for a state: exit code $code"
+grep -q 'was waited for' "$work/said" || die "not said why"
+# A state through a pipe is one.
+"$program" run "$scene" --quiet --end 0.1 --state "$work/piped" >"$work/said" 2>&1 || [ $? -eq 1 ] || die "no state"
+cat "$work/piped" >"$work/never_written" &
+"$program" run "$scene" --quiet --end 0.2 --restart "$work/never_written" >"$work/said" 2>&1 || [ $? -eq 1 ] ||
+  die "a state through a pipe"
 # A run that waits for a reader of its table, and cannot end by itself: two signals at once leave it alone, one
 # more than a second later ends it.
 mkfifo "$work/never_read"

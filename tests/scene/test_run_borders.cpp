@@ -1,6 +1,7 @@
 // Runs at the borders: numbers that are none, files of two runs, names, many bodies.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -78,6 +79,23 @@ TEST_CASE("a motion that leaves the range of numbers is a failure, never a succe
       CHECK(result.failure != "");
       CHECK_FALSE(result.met());
     }
+}
+
+TEST_CASE("a rotation that steps do not resolve is a warning") {
+  const auto warnings = [](double spin, double step) {
+    return run(parse_scene(
+                   fmt::format("[scene]\nend = 0.5\n[stepping]\nstep = {0}\n[[body]]\nname = "
+                               "\"box\"\nshape = \"box\"\nsize = [1, 2, 3]\nmass = 1\n"
+                               "angular_velocity = [{1}, {2}, {1}]\n",
+                               step, 0.1 * spin, spin),
+                   "spin.toml"))
+        .warnings;
+  };
+  CHECK(warnings(1e5, 1e-2).size() == 1);  // it gains 80 % of energy
+  CHECK_THAT(warnings(1e5, 1e-2)[0],
+             Catch::Contains("body \"box\" turns by 1.86e+03 rad in a step") &&
+                 Catch::Contains("should be below 5.4e-07 s"));
+  CHECK(warnings(1e3, 1e-4).empty());
 }
 
 TEST_CASE("what is no number is never met") {
@@ -216,7 +234,14 @@ TEST_CASE("a picture has the name that is asked for, whatever shells make of it"
   const fs::path before = fs::current_path();
   fs::current_path(path);
   scene.output.svg = "| touch pwned; cat > x";
+  const auto largest_child = [] {
+    rusage used{};
+    getrusage(RUSAGE_CHILDREN, &used);
+    return used.ru_maxrss;
+  };
+  const long before_it = largest_child();
   run(scene);
+  CHECK(largest_child() == before_it);  // no other program has run
   fs::current_path(before);
   CHECK_FALSE(fs::exists(path / "pwned"));
   CHECK_FALSE(fs::exists(path / "x"));

@@ -29,8 +29,7 @@ inline double get_bodies(std::istream& in, std::vector<BodyState>& bodies) {
   const double time = binary::get<double>(in);
   for (BodyState& b : bodies) {
     binary::get_array(in, b.position, b.orientation.coeffs(), b.velocity, b.angular_velocity);
-    if (!b.position.allFinite() || !(std::abs(b.orientation.norm() - 1) < 1e-6) ||
-        !b.velocity.allFinite() || !b.angular_velocity.allFinite())
+    if (!b.is_finite() || !(std::abs(b.orientation.norm() - 1) < 1e-6))
       throw std::runtime_error("the saved state is damaged");
   }
   return time;

@@ -121,6 +121,8 @@ void print_summary(const Scene& scene, const RunResult& r) {
                r.hand_over->time, scene.stepping.value_or(SteppingOptions{}).step,
                r.hand_over->why);
   if (r.engine != "event" || r.hand_over) print_work(scene, s, c);
+  for (const std::string& warning : r.warnings)
+    fmt::print("  WARNING      {}\n", on_terminal(warning));
   if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, on_terminal(r.failure));
 }
 

@@ -207,9 +207,7 @@ class Run {
           engine_->time(), what));
     };
     for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
-      const BodyState& b = engine_->bodies()[i];
-      if (!b.position.allFinite() || !b.orientation.coeffs().allFinite() ||
-          !b.velocity.allFinite() || !b.angular_velocity.allFinite())
+      if (!engine_->bodies()[i].is_finite())
         refuse(fmt::format("the state of body \"{}\"", scene_.bodies[i].name));
     }
     if (!std::isfinite(d.kinetic_energy + d.potential_energy)) refuse("the energy");
@@ -238,10 +236,14 @@ class Run {
     if (saved_) result_.written.push_back(scene_.output.state);
     // Beyond a radian a step the midpoint rule of rotations is no longer near the motion.
     if (fastest_turn_ > 1)
-      result_.remarks.push_back(fmt::format(
-          "body \"{}\" turns by {:.3g} rad in a step: its rotation is not resolved, and collisions "
-          "may take its energy; stepping.step should be below {:.2g} s",
+      result_.warnings.push_back(fmt::format(
+          "body \"{}\" turns by {:.3g} rad in a step: its rotation is not resolved, its energy not "
+          "kept; stepping.step should be below {:.2g} s",
           scene_.bodies[fastest_].name, fastest_turn_, 0.1 * *step_ / fastest_turn_));
+    if (result_.counts.unsolved > 0)
+      result_.warnings.push_back(
+          fmt::format("{} contact problems were not solved (stepping.on_failure = \"warn\")",
+                      result_.counts.unsolved));
     result_.whole_seconds = watch_.processor();
     result_.whole_wall = watch_.wall();
   }
@@ -260,7 +262,7 @@ class Run {
   }
 
   void restore(const std::string& file) {
-    const SavedState saved = read_state(file, scene_hash_, options_.force);
+    const SavedState saved = read_state(file, scene_hash_, options_.force, options_.interrupted);
     if (!options_.force) return restore(file, saved.content, Engine::Restore::exact);
     try {
       return restore(file, saved.content,

@@ -1,8 +1,12 @@
 // Tether: the file of a saved state. SPDX-License-Identifier: BSD-3-Clause
 #include "saved_state.hpp"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
 #include <array>
-#include <fstream>
+#include <cerrno>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
@@ -36,18 +40,36 @@ std::uint32_t crc32(std::string_view bytes) {
   return c ^ 0xffffffffu;
 }
 
-std::string all_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error("cannot open the saved state " + file);
+struct Open {
+  int descriptor;
+  ~Open() {
+    if (descriptor >= 0) close(descriptor);
+  }
+};
+
+// Without blocking: a pipe may never have a writer, and the first signal is only noted.
+std::string all_of(const std::string& file, const std::function<bool()>& interrupted) {
+  const Open in{open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)};
+  if (in.descriptor < 0) throw std::runtime_error("cannot open the saved state " + file);
   // A device has no end; states hold a few hundred bytes a body.
   constexpr std::size_t kLargest = std::size_t{1} << 32;
+  constexpr int kLook = 100;  // ms
   std::string all, block(std::size_t{1} << 16, '\0');
-  while (in && all.size() <= kLargest) {
-    in.read(block.data(), static_cast<std::streamsize>(block.size()));
-    all.append(block.data(), static_cast<std::size_t>(in.gcount()));
-    if (all.compare(0, kFormat.size(), kFormat) != 0)
-      throw std::runtime_error(file + " is not a saved state");
+  const auto is_state = [&] { return all.compare(0, kFormat.size(), kFormat) == 0; };
+  while (all.size() <= kLargest) {
+    pollfd ready{in.descriptor, POLLIN, 0};
+    if (poll(&ready, 1, kLook) <= 0) {
+      if (interrupted && interrupted())
+        throw Interrupted("interrupted while the saved state " + file + " was waited for");
+      continue;
+    }
+    const ssize_t count = read(in.descriptor, block.data(), block.size());
+    if (count < 0 && (errno == EAGAIN || errno == EINTR)) continue;
+    if (count <= 0) break;
+    all.append(block.data(), static_cast<std::size_t>(count));
+    if (all.size() >= kFormat.size() && !is_state()) break;
   }
+  if (!is_state()) throw std::runtime_error(file + " is not a saved state");
   return all;
 }
 
@@ -92,8 +114,9 @@ void write_state(const std::string& file, std::uint64_t scene, const std::string
   write_whole_regular(file, bytes + check.str());
 }
 
-SavedState read_state(const std::string& file, std::uint64_t scene, bool any_scene) {
-  const std::string bytes = all_of(file);
+SavedState read_state(const std::string& file, std::uint64_t scene, bool any_scene,
+                      const std::function<bool()>& interrupted) {
+  const std::string bytes = all_of(file, interrupted);
   const std::size_t line = bytes.find('\n');
   constexpr std::size_t kNumbers = 2 * sizeof(std::uint64_t), kCheck = sizeof(std::uint32_t);
   if (line == std::string::npos || bytes.size() < line + 1 + kNumbers + kCheck)

@@ -10,6 +10,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <stdexcept>
 #include <string>
 #include <tether/scene/scene.hpp>
 
@@ -27,8 +29,15 @@ struct SavedState {
   bool same = true;  ///< scene and version
 };
 
+/// Somebody does not want to wait for a state that comes through a pipe.
+struct Interrupted : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Throws std::runtime_error, naming the fault, on anything that write_state did not write, and on
-/// a state of another scene or version unless `any_scene`.
-SavedState read_state(const std::string& file, std::uint64_t scene, bool any_scene);
+/// a state of another scene or version unless `any_scene`; Interrupted where the file is a pipe and
+/// `interrupted` says so before its writer has ended.
+SavedState read_state(const std::string& file, std::uint64_t scene, bool any_scene,
+                      const std::function<bool()>& interrupted = {});
 
 }  // namespace tether::scene

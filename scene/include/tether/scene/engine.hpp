@@ -24,6 +24,10 @@ struct BodyState {
   linalg::Quaternion orientation = linalg::Quaternion::Identity();
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+  bool is_finite() const {
+    return position.allFinite() && orientation.coeffs().allFinite() && velocity.allFinite() &&
+           angular_velocity.allFinite();
+  }
 };
 
 struct ContactState {

@@ -69,7 +69,8 @@ struct RunResult {
   std::vector<EffectCost> costs;
   std::vector<Judgement> judgements;  ///< one for each Scene::expect
   std::vector<std::string> written;   ///< files
-  std::vector<std::string> remarks;   ///< warnings, and data that the files do not contain
+  std::vector<std::string> remarks;   ///< data that the files do not contain
+  std::vector<std::string> warnings;  ///< why the motion is not to be trusted; empty: nothing seen
 
   bool met() const;  ///< every expectation that counts was judged and holds
 };

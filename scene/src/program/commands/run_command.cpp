@@ -19,6 +19,8 @@
 #include "program/report_run.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
+#include "program/terminal_text.hpp"
+#include "run/saved_state.hpp"
 
 namespace tether::scene {
 
@@ -28,7 +30,7 @@ struct Arguments {
   std::string file, restart, folder, html;
   std::optional<std::string> csv, vtk, svg, state, otherwise;
   std::optional<double> end, every;
-  bool force = false, quiet = false;
+  bool force = false, quiet = false, strict = false;
 };
 
 /// A link to what is not there: nobody can tell where it leads.
@@ -134,7 +136,8 @@ int run_scene(const Arguments& arguments, Ranks* ranks) {
     if (!arguments.restart.empty())
       result.remarks.push_back(html + " shows the motion from the restart on");
   }
-  const int code = result.interrupted ? kSignal + signal : exit_code(result);
+  int code = result.interrupted ? kSignal + signal : exit_code(result);
+  if (arguments.strict && !result.warnings.empty() && code == kGood) code = kNotMet;
   if (!first) return code;
   bar.hide();
   standard_output.copy();
@@ -158,7 +161,12 @@ int run_scene(const Arguments& arguments, Ranks* ranks) {
 /// By all processes that mpirun has started, by the one that there is otherwise.
 int run_together(const Arguments& arguments) {
   const std::unique_ptr<Ranks> ranks = join_ranks();
-  if (!ranks) return run_scene(arguments, nullptr);
+  if (!ranks) try {
+      return run_scene(arguments, nullptr);
+    } catch (const Interrupted& e) {
+      fmt::print(stderr, "tether: {}\n", on_terminal(e.what()));
+      return kSignal + caught_signal();
+    }
   int status = kWrong;
   std::string why;
   try {
@@ -197,6 +205,10 @@ void add_run_command(CLI::App& app, int* status) {
                     "With --restart: the state may be of another scene; positions and velocities "
                     "are taken over, bits are not the same");
   command->add_flag("--quiet", a->quiet, "No progress bar");
+  command->add_flag(
+      "--strict", a->strict,
+      "Exit code 1 if the summary has a WARNING: of steps too long for a rotation, or "
+      "of contact problems that were not solved");
   command->footer(
       "Exit code: 0 every expectation is met, 1 one is not, 2 the scene, a file or an option is\n"
       "wrong, 3 the run could not go on, 130 (143) ended by Ctrl-C (SIGTERM), with all files "

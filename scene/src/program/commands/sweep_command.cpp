@@ -92,7 +92,10 @@ std::string row_of(const Scene& scene, const RunResult& r) {
       const auto at = static_cast<std::size_t>(i);
       row += at < value.size() ? fmt::format(",{}", value[at]) : ",";
     }
-  return row + ',' + table_field(r.failure);
+  std::string why = r.failure;
+  for (const std::string& each : r.warnings)
+    why += (why.empty() ? "WARNING: " : "; WARNING: ") + each;
+  return row + ',' + table_field(why);
 }
 
 /// A row without its settings: of a run, or with what is wrong and empty fields between.
