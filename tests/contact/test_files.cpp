@@ -144,14 +144,14 @@ void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& 
 // One contact, W the identity in compressed columns with the given pointers. claimed > 0: W/x says
 // that it has so many entries, none of them written.
 void write_columns(const std::string& path, const std::vector<int>& pointers, hsize_t claimed = 0,
-                   hid_t made = H5P_DEFAULT) {
+                   hid_t made = H5P_DEFAULT, const std::vector<int>& rows = {0, 1, 2}) {
   const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   put<int>(file, "spacedim", H5T_NATIVE_INT, {3});
   put<int>(file, "W/m", H5T_NATIVE_INT, {3});
   put<int>(file, "W/n", H5T_NATIVE_INT, {3});
   put<int>(file, "W/nz", H5T_NATIVE_INT, {-1});
   put<int>(file, "W/p", H5T_NATIVE_INT, pointers);
-  put<int>(file, "W/i", H5T_NATIVE_INT, {0, 1, 2});
+  put<int>(file, "W/i", H5T_NATIVE_INT, rows);
   put<double>(file, "W/x", H5T_NATIVE_DOUBLE, {1, 1, 1}, claimed, made);
   put<double>(file, "vectors/q", H5T_NATIVE_DOUBLE, {-1, 0, 0});
   put<double>(file, "vectors/mu", H5T_NATIVE_DOUBLE, {0.5});
@@ -173,6 +173,10 @@ TEST_CASE(
                                            {0, -5, 2, 3}}) {
     write_columns(file.path, pointers);
     CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("W/p must ascend from 0"));
+  }
+  for (const std::vector<int>& rows : {std::vector<int>{0, 1, 3}, {0, -1, 2}, {2147483647, 1, 2}}) {
+    write_columns(file.path, {0, 1, 2, 3}, 0, H5P_DEFAULT, rows);
+    CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("W has an index outside"));
   }
   write_columns(file.path, {0, 1, 2, 100000000});
   CHECK_THROWS_WITH(read_fclib(file.path), Catch::Contains("fewer entries than W/p says"));

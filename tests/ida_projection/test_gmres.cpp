@@ -1,6 +1,7 @@
 // Tether: systems too large for matrices, solved by GMRES. SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <nvector/nvector_serial.h>
+#include <problems/pendulum.hpp>
 #include <sunlinsol/sunlinsol_spgmr.h>
 
 #include "host.hpp"
@@ -12,7 +13,8 @@ using namespace tether::test;
 namespace {
 
 /// With GMRES: a dense matrix of 4000 unknowns takes 128 MB. `rows` null: plain IDA.
-Run integrate_without_matrix(const Problem& given, double tolerance, const tp::Constraints* rows) {
+Run integrate_without_matrix(const Problem& given, double tolerance, const tp::Constraints* rows,
+                             const tp::Options& options = {}) {
   Problem problem = given;
   Context context;
   N_Vector y = N_VNew_Serial(problem.size, context), yp = N_VClone(y);
@@ -32,7 +34,7 @@ Run integrate_without_matrix(const Problem& given, double tolerance, const tp::C
   Run run;
   {
     std::unique_ptr<tp::Projection> projection;
-    if (rows != nullptr) projection = std::make_unique<tp::Projection>(ida, *rows, tp::Options());
+    if (rows != nullptr) projection = std::make_unique<tp::Projection>(ida, *rows, options);
     sunrealtype t = 0.0;
     while (t < problem.t_end && run.flag >= 0) {
       run.flag = IDASolve(ida, problem.t_end, &t, y, yp, IDA_ONE_STEP);
@@ -158,4 +160,18 @@ TEST_CASE("a wave equation, GMRES: where it fails the order rises no further tha
     CHECK(static_cast<double>(run.steps) <= 1.2 * static_cast<double>(plain.steps));
     CHECK(apart(run, reference) <= 1.2 * apart(plain, reference));
   }
+}
+
+TEST_CASE("GMRES: few rows of a mechanism keep their own metric, the weights are for fields") {
+  const Problem swing = tether::problems::pendulum(1.0, 1.0, 3.0, "index 1");
+  const tp::Constraints rows = swing.recommended_constraints();
+  const auto end = [&](tp::Metric metric) {
+    tp::Options options;
+    options.metric = metric;
+    const Run done = integrate_without_matrix(swing, 1e-6, &rows, options);
+    REQUIRE(done.flag >= 0);
+    return done.y;
+  };
+  CHECK(end(tp::Metric::automatic) == end(tp::Metric::local_correction));
+  CHECK(end(tp::Metric::automatic) != end(tp::Metric::error_weights));
 }

@@ -4,8 +4,11 @@
 #include <tether/scene/files.hpp>
 
 #include "support/catch.hpp"
+#include "support/growth.hpp"
 
 using namespace tether::scene;
+using tether::test::growth;
+using tether::test::kLinear;
 
 namespace {
 
@@ -89,6 +92,11 @@ TEST_CASE("messages about a file hold nothing that a terminal obeys") {
 }
 
 TEST_CASE("names that a spreadsheet would compute in a table are refused") {
+  for (const std::string name : {"a,b", "a\\\"b", "a\\nb", "a\\tb", "a\\u0085b"}) {
+    INFO(name);
+    CHECK_THROWS_WITH(parse_scene(body("name = \"" + name + "\"\n"), "sheet.toml"),
+                      Catch::Contains("no comma, quote or control character"));
+  }
   for (const std::string name : {"=1+1", "+1", "-1", "@a", "=cmd|' /C calc'!A0"}) {
     INFO(name);
     CHECK_THROWS_WITH(parse_scene(body("name = \"" + name + "\"\n"), "sheet.toml"),
@@ -98,38 +106,54 @@ TEST_CASE("names that a spreadsheet would compute in a table are refused") {
 }
 
 TEST_CASE("wrong names and missing pairs in thousands cost no more than the file") {
-  // Quadratic work over 30 000 lines would be a thousand million comparisons of texts: minutes.
-  std::string references, materials = "[stepping]\n", fixed = body("material = \"m\"\n");
-  for (int k = 0; k < 30000; ++k) {
-    const std::string number = std::to_string(k);
-    references += body("name = \"b" + number + "\"\n") + "[[load]]\nbody = \"c" + number +
-                  "\"\nforce = [1, 1, 1]\n";
-    materials += body("material = \"m" + number + "\"\n");
-    fixed += "[[body]]\nshape = \"sphere\"\nradius = 1\nfixed = true\nmaterial = \"f" + number +
-             "\"\n[[pair]]\nbetween = [\"m\", \"f" + number + "\"]\n";
-  }
-  CHECK_THROWS_WITH(parse_scene(references, "references.toml"), Catch::Contains("no such body"));
-  CHECK_THROWS_WITH(
-      parse_scene(materials + "[[pair]]\nbetween = [\"m1\", \"m2\"]\n", "materials.toml"),
-      Catch::Contains("can touch"));
-  CHECK(parse_scene(fixed, "fixed.toml").pairs.size() == 30000);
+  // Quadratic work over 32 000 lines is a thousand million comparisons of texts.
+  const auto references = [](int n) {
+    std::string text;
+    for (int k = 0; k < n; ++k) {
+      const std::string number = std::to_string(k);
+      text += body("name = \"b" + number + "\"\n") + "[[load]]\nbody = \"c" + number +
+              "\"\nforce = [1, 1, 1]\n";
+    }
+    CHECK_THROWS_WITH(parse_scene(text, "references.toml"), Catch::Contains("no such body"));
+  };
+  const auto materials = [](int n) {
+    std::string text = "[stepping]\n";
+    for (int k = 0; k < n; ++k) text += body("material = \"m" + std::to_string(k) + "\"\n");
+    CHECK_THROWS_WITH(
+        parse_scene(text + "[[pair]]\nbetween = [\"m1\", \"m2\"]\n", "materials.toml"),
+        Catch::Contains("can touch"));
+  };
+  const auto fixed = [](int n) {
+    std::string text = body("material = \"m\"\n");
+    for (int k = 0; k < n; ++k) {
+      const std::string number = std::to_string(k);
+      text += "[[body]]\nshape = \"sphere\"\nradius = 1\nfixed = true\nmaterial = \"f" + number +
+              "\"\n[[pair]]\nbetween = [\"m\", \"f" + number + "\"]\n";
+    }
+    CHECK(parse_scene(text, "fixed.toml").pairs.size() == static_cast<std::size_t>(n));
+  };
+  CHECK(growth(references, 4000) < kLinear);
+  CHECK(growth(materials, 4000) < kLinear);
+  CHECK(growth(fixed, 4000) < kLinear);
 }
 
 TEST_CASE("names in expectations by the thousand cost no more than the file") {
-  std::string text = "[scene]\ngravity = [0, 0, -1]\n" + body("name = \"a\"\n");
-  for (int k = 0; k < 30000; ++k) {
-    const std::string number = std::to_string(k);
-    text += "[[spring]]\nname = \"s" + number +
-            "\"\nbodies = [\"a\", \"world\"]\nat = [[0, 0, 0], [0, 0, 1]]\nstiffness = 1\n"
-            "[[expect]]\nquantity = \"spring_force\"\nspring = \"s" +
-            number + "\"\nat_most = 1\n";
-  }
-  const Scene scene = parse_scene(text, "expect.toml");
-  CHECK(scene.expect.back().spring == 29999);
-  CHECK_THROWS_WITH(
-      parse_scene(text + "[[expect]]\nquantity = \"spring_force\"\nspring = \"t\"\nat_most = 1\n",
-                  "expect.toml"),
-      Catch::Contains("no such spring"));
+  const auto expectations = [](int n) {
+    std::string text = "[scene]\ngravity = [0, 0, -1]\n" + body("name = \"a\"\n");
+    for (int k = 0; k < n; ++k) {
+      const std::string number = std::to_string(k);
+      text += "[[spring]]\nname = \"s" + number +
+              "\"\nbodies = [\"a\", \"world\"]\nat = [[0, 0, 0], [0, 0, 1]]\nstiffness = 1\n"
+              "[[expect]]\nquantity = \"spring_force\"\nspring = \"s" +
+              number + "\"\nat_most = 1\n";
+    }
+    CHECK(parse_scene(text, "expect.toml").expect.back().spring == n - 1);
+    CHECK_THROWS_WITH(
+        parse_scene(text + "[[expect]]\nquantity = \"spring_force\"\nspring = \"t\"\nat_most = 1\n",
+                    "expect.toml"),
+        Catch::Contains("no such spring"));
+  };
+  CHECK(growth(expectations, 4000) < kLinear);
 }
 
 TEST_CASE("long texts of a repetition count as what they are, and braces end where they begin") {

@@ -1,5 +1,7 @@
 // Meshes and height fields of scene files: what is read, and what is refused.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <sys/stat.h>
+
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -123,6 +125,12 @@ TEST_CASE("surfaces: files are those beside the scene, and of a size", "[scene]"
              Contains("folder of the scene"));
   CHECK_THAT(folder.refusal(mesh_file("link.obj")), Contains("folder of the scene"));
   CHECK_THAT(folder.refusal(mesh_file("folder.obj")), Contains("no such file"));
+  // What never ends, or never begins.
+  REQUIRE(mkfifo((folder.path / "scenes" / "pipe.obj").c_str(), 0600) == 0);
+  CHECK_THAT(folder.refusal(mesh_file("pipe.obj")), Contains("no such file"));
+  fs::create_symlink("/dev/zero", folder.path / "scenes" / "zero.obj");
+  CHECK_THAT(folder.refusal(mesh_file("zero.obj")),
+             Contains("folder of the scene") || Contains("no such file"));
   CHECK_THAT(folder.refusal(mesh_file("none.obj")), Contains("no such file"));
   CHECK_THAT(folder.refusal(mesh_file("a.obj|x")), Contains("without |"));
   folder.write("a.ply", "ply");
@@ -170,6 +178,9 @@ TEST_CASE("surfaces: what is wrong with them is said by line", "[scene]") {
   CHECK_THAT(obj("v 0 0\n"), Contains("line 1"));
   CHECK_THAT(obj("v 0 0 1e101\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), Contains("1e100"));
   CHECK_THAT(obj("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), Contains("has an area"));
+  std::string cloud;
+  for (int k = 0; k < 200001; ++k) cloud += "v 0 0 0\n";
+  CHECK_THAT(obj(cloud), Contains("points"));
   std::string fan = three + "f";
   for (int k = 0; k < 200003; ++k) fan += " 1";
   CHECK_THAT(obj(fan + "\n"), Contains("more than 200000 triangles"));

@@ -43,6 +43,16 @@ wanted 2 "a joint that is not there" "$program" import "$robots/arm.urdf" --join
 wanted 2 "a position that is none" "$program" import "$robots/arm.urdf" --joint shoulder=nan
 wanted 2 "friction below zero" "$program" import "$robots/arm.urdf" --friction -1
 wanted 2 "a base that is none" "$program" import "$robots/arm.urdf" --base soft
+# Files that a robot names are not opened: a pipe without a writer would be waited for.
+mkfifo pipe.stl
+cat >meshes.urdf <<END
+<robot name='r'><link name='l'>
+<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>
+<visual><geometry><mesh filename='pipe.stl'/></geometry></visual>
+<collision><geometry><mesh filename='file://$work/pipe.stl'/></geometry></collision>
+</link></robot>
+END
+wanted 0 "a robot with meshes" timeout 60 "$program" import meshes.urdf --base free --out meshes.toml
 echo '<robot>' | "$program" import - 2>&1 | grep -q '^tether: standard input:1: ' || complain "place of an error"
 [ $wrong -eq 0 ] && echo "import does what it says"
 exit $wrong

@@ -4,9 +4,12 @@
 
 #include "import/import.hpp"
 #include "support/catch.hpp"
+#include "support/growth.hpp"
 
 using namespace tether::scene;
 using import::import_robot;
+using tether::test::growth;
+using tether::test::kLinear;
 
 namespace {
 
@@ -47,6 +50,18 @@ TEST_CASE("a robot file has at most 64 MiB") {
   CHECK_THAT(refusal(std::string(most + 1, '<')), Contains("at most 64 MiB"));
 }
 
+// The limit is that of the XML library, 100 or, of later ones, 500.
+TEST_CASE(
+    "elements of a robot file inside each other are bounded before anything is made of them") {
+  const auto deep = [](int depth) {
+    std::string open, close;
+    for (int k = 0; k < depth; ++k) open += "<a>", close += "</a>";
+    return refusal("<robot name='r'><link name='l'>" + open + close + "</link></robot>");
+  };
+  CHECK_THAT(deep(90), !Contains("inside each other"));
+  for (const int depth : {600, 2000000}) CHECK_THAT(deep(depth), Contains("inside each other"));
+}
+
 TEST_CASE("names in a robot file have at most 200 bytes, and are shown shortened") {
   const std::string name(201, 'n');
   for (const std::string& text :
@@ -74,35 +89,45 @@ TEST_CASE("robot files of thousands of parts cost no more than their length") {
              Contains("at most 100 attributes"));
 
   // Links without mass in a row, whose joints all go to the last one.
-  const int links = 40000;
-  std::string chain = "<robot name='r'>";
-  for (int k = 0; k <= links; ++k)
-    chain += "<link name='l" + std::to_string(k) + "'>" + (k == links || k == 0 ? kMass : "") +
-             "</link>\n";
-  for (int k = 0; k < links; ++k)
-    chain += "<joint name='j" + std::to_string(k) + "' type='continuous'><parent link='l" +
-             std::to_string(k) + "'/><child link='l" + std::to_string(k + 1) + "'/></joint>\n";
-  const std::string in_a_row = imported(chain + "</robot>").toml;
-  const std::size_t first = in_a_row.find("name = \"j0\""),
-                    last = in_a_row.find("name = \"j39999\"");
-  CHECK(first < last);
-  CHECK(last != std::string::npos);
+  const auto chain = [](int links) {
+    std::string text = "<robot name='r'>";
+    for (int k = 0; k <= links; ++k)
+      text += "<link name='l" + std::to_string(k) + "'>" + (k == links || k == 0 ? kMass : "") +
+              "</link>\n";
+    for (int k = 0; k < links; ++k)
+      text += "<joint name='j" + std::to_string(k) + "' type='continuous'><parent link='l" +
+              std::to_string(k) + "'/><child link='l" + std::to_string(k + 1) + "'/></joint>\n";
+    const std::string in_a_row = imported(text + "</robot>").toml;
+    const std::size_t first = in_a_row.find("name = \"j0\""),
+                      last = in_a_row.find("name = \"j" + std::to_string(links - 1) + "\"");
+    CHECK(first < last);
+    CHECK(last != std::string::npos);
+  };
+  CHECK(growth(chain, 2000) < kLinear);
 
   // Links without mass that hang on one.
-  std::string fan = "<robot name='r'><link name='l'>" + kMass + "</link><link name='m'>" + kMass +
-                    "</link><joint name='k' type='continuous'><parent link='l'/><child "
-                    "link='m'/></joint>\n";
-  for (int k = 0; k < links; ++k)
-    fan += "<link name='l" + std::to_string(k) + "'>" + (k % 2 != 0 ? kMass : "") +
-           "</link><joint name='j" + std::to_string(k) +
-           "' type='continuous'><parent link='m'/><child link='l" + std::to_string(k) +
-           "'/></joint>\n";
-  const import::Imported hanging = imported(fan + "</robot>");
-  CHECK(hanging.toml.find("name = \"l39999\"") != std::string::npos);
-  CHECK(hanging.toml.find("name = \"l39998\"") == std::string::npos);
+  const auto fan = [](int links) {
+    std::string text = "<robot name='r'><link name='l'>" + kMass + "</link><link name='m'>" +
+                       kMass +
+                       "</link><joint name='k' type='continuous'><parent link='l'/><child "
+                       "link='m'/></joint>\n";
+    for (int k = 0; k < links; ++k)
+      text += "<link name='l" + std::to_string(k) + "'>" + (k % 2 != 0 ? kMass : "") +
+              "</link><joint name='j" + std::to_string(k) +
+              "' type='continuous'><parent link='m'/><child link='l" + std::to_string(k) +
+              "'/></joint>\n";
+    const import::Imported hanging = imported(text + "</robot>");
+    CHECK(hanging.toml.find("name = \"l" + std::to_string(links - 1) + "\"") != std::string::npos);
+    CHECK(hanging.toml.find("name = \"l" + std::to_string(links - 2) + "\"") == std::string::npos);
+  };
+  CHECK(growth(fan, 2000) < kLinear);
 
   // Things of the world of one name.
-  std::string same = "<mujoco><worldbody><body name='b'><freejoint/><geom size='1'/></body>";
-  for (int k = 0; k < 20000; ++k) same += "<geom name='g' size='1'/>";
-  CHECK(imported(same + "</worldbody></mujoco>").toml.find("\"g (20000)\"") != std::string::npos);
+  const auto same = [](int things) {
+    std::string text = "<mujoco><worldbody><body name='b'><freejoint/><geom size='1'/></body>";
+    for (int k = 0; k < things; ++k) text += "<geom name='g' size='1'/>";
+    CHECK(imported(text + "</worldbody></mujoco>")
+              .toml.find("\"g (" + std::to_string(things) + ")\"") != std::string::npos);
+  };
+  CHECK(growth(same, 2000) < kLinear);
 }
