@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <tether/contact/cones.hpp>
 #include <tether/linalg/index.hpp>
 
 namespace tether::contact {
@@ -139,6 +140,65 @@ void RollingSweeps::solve(double tolerance, int min_sweeps, int max_sweeps) {
     }
   }
   error = residual();
+  if (solve_together(tolerance)) status = Status::solved;
+}
+
+// Where sweeps cycle: all rows at once, as cones. Keeps what is better.
+bool RollingSweeps::solve_together(double tolerance) {
+  constexpr std::size_t kMost = 100;  // A is dense in stacks
+  constexpr double kMostWork = 1e8;
+  if (rows_.size() > kMost) return false;
+  const auto size = static_cast<Eigen::Index>(6 * rows_.size());
+  const std::vector<Vector6d> kept = velocity_;
+  Eigen::VectorXd b(size), x(size);
+  std::vector<Cone> cones;
+  for (std::size_t k = 0; k < rows_.size(); ++k) push(rows_[k], -rows_[k].x);
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(6 * k);
+    b.segment<6>(row) = -relative(rows_[k]);
+    x.segment<6>(row) = rows_[k].x;
+    const RollingBlock& block = rows_[k].block;
+    cones.push_back(Cone::with_rolling(block.mu, block.roll, block.spin));
+  }
+  std::vector<MatrixEntry> A;
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const Row& from = rows_[k];
+    for (int c = 0; c < 6; ++c) {
+      std::fill(velocity_.begin(), velocity_.end(), Vector6d::Zero());
+      push(from, Vector6d::Unit(c));
+      for (std::size_t i = 0; i < rows_.size(); ++i) {
+        const Row& to = rows_[i];
+        Vector6d w = relative(to);
+        w[0] -= to.bias;
+        for (int r = 0; r < 6; ++r)
+          if (w[r] != 0)
+            A.push_back({static_cast<int>(6 * i) + r, static_cast<int>(6 * k) + c, w[r]});
+      }
+    }
+  }
+  Options options;
+  options.law = Law::coulomb;
+  options.tolerance = 0.1 * tolerance;  // of another measure
+  options.max_work = kMostWork;
+  const Eigen::VectorXd found =
+      ConeSolver(options).solve(ConeProblem::sparse(A, b, std::move(cones)), x).impulses;
+  velocity_ = kept;
+  const auto take = [&](const Eigen::VectorXd& impulses) {
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      const Vector6d to = impulses.segment<6>(static_cast<Eigen::Index>(6 * k));
+      push(rows_[k], to - rows_[k].x);
+      rows_[k].x = to;
+    }
+  };
+  take(found);
+  const double now = residual();
+  if (now < error) {
+    error = now;
+    return error <= tolerance;
+  }
+  take(x);
+  velocity_ = kept;
+  return false;
 }
 
 Vector3d RollingSweeps::impulse(int contact) const {

@@ -37,6 +37,7 @@ class RollingSweeps {
     Vector6d x;
   };
 
+  bool solve_together(double tolerance);
   Vector6d relative(const Row& row) const;
   void push(const Row& row, const Vector6d& impulse);
 
