@@ -7,7 +7,7 @@
 #   sh tests/matrix.sh --sundials DIR [--sundials DIR2] sundials      against other installations
 #   sh tests/matrix.sh -l                              what the rows are
 #
-# QUICK=1: only the tests of a few seconds. JOBS: parallel jobs (default: all processors). Builds in
+# QUICK=1: of rows that run all tests only those of a few seconds. JOBS: parallel jobs (default: all processors). Builds in
 # build/matrix/<row>; each row ends as "ran", "FAILED" or "skipped: why".
 set -u
 
@@ -49,6 +49,21 @@ build_and_test() {
   else
     note "$row" "ran: $(grep -E 'tests passed' "$build/test.log")"
   fi
+}
+
+describe() {
+  cat <<'END'
+gcc         g++, all tests, a warning is an error
+clang       clang++, all tests
+assertions  assertions of Eigen and of the standard library, all tests
+sanitizers  addresses, leaks, undefined behaviour (tests/sanitize.sh)
+threads     what starts threads under the thread sanitizer (tests/sanitize.sh)
+scalar      contact and scenes without vector instructions
+native      programs with -march=native against libraries without, and other consumers of the package
+qemu        contact on a processor without AVX2 (qemu-user)
+mpi         rows and gradients over processes
+sundials    projection and problems against other SUNDIALS: --sundials DIR
+END
 }
 
 row_gcc() {
@@ -119,7 +134,7 @@ row_sundials() {
 
 while [ $# -gt 0 ]; do
   case $1 in
-    -l) echo "$rows"; exit 0 ;;
+    -l) describe; exit 0 ;;
     --sundials) folders="$folders $2"; shift ;;
     *) case " $rows " in *" $1 "*) wanted="$wanted $1" ;; *) echo "no row \"$1\"; rows: $rows" >&2; exit 2 ;; esac ;;
   esac
