@@ -1,6 +1,7 @@
 // Tether: files of problems over cones. SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <tether/contact/files.hpp>
 
@@ -268,6 +269,42 @@ TEST_CASE("files of cones: fclib, local and global with joints, with rolling fri
     put(id, "/fclib_global/vectors/mu", Eigen::VectorXd::Constant(1, 0.5));
     H5Fclose(id);
     CHECK_THROWS_WITH(read_cones(file.path), Catch::Contains("H is 6 x 2, 6 x 3 is expected"));
+  }
+}
+
+TEST_CASE("files of cones: joints that fclib claims without end are refused") {
+  Temporary file("test_contact_cones_claims.hdf5");
+  constexpr int kMost = std::numeric_limits<int>::max();
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(3, 3);
+  // A matrix of one entry, as far away as the claim goes.
+  const auto claim = [](hid_t id, const std::string& name, int m, int n) {
+    put<int>(id, name + "/m", H5T_NATIVE_INT, {m});
+    put<int>(id, name + "/n", H5T_NATIVE_INT, {n});
+    put<int>(id, name + "/nz", H5T_NATIVE_INT, {1});
+    put<int>(id, name + "/p", H5T_NATIVE_INT, {n - 1});
+    put<int>(id, name + "/i", H5T_NATIVE_INT, {m - 1});
+    put<double>(id, name + "/x", H5T_NATIVE_DOUBLE, {1});
+  };
+  for (const bool local : {true, false}) {
+    CAPTURE(local);
+    const hid_t id = H5Fcreate(file.path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    const std::string group = local ? "/fclib_local/" : "/fclib_global/";
+    put<int>(id, group + "spacedim", H5T_NATIVE_INT, {3});
+    put(id, group + "vectors/mu", Eigen::VectorXd::Constant(1, 0.5));
+    put(id, group + (local ? "W" : "M"), one, 0);
+    if (local) {
+      claim(id, group + "V", 3, kMost);
+      claim(id, group + "R", kMost, kMost);
+      put(id, group + "vectors/q", Eigen::VectorXd::Ones(3));
+    } else {
+      put(id, group + "H", one, 0);
+      claim(id, group + "G", 3, kMost);
+      put(id, group + "vectors/f", Eigen::VectorXd::Ones(3));
+      put(id, group + "vectors/w", Eigen::VectorXd::Ones(3));
+    }
+    H5Fclose(id);
+    CHECK_THROWS_WITH(read_cones(file.path),
+                      Catch::Contains("2147483647 rows of joints, more than there can be"));
   }
 }
 

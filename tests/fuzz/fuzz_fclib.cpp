@@ -1,8 +1,9 @@
 // Fuzz target of the fclib reader: files that are HDF5, with contents of any kind.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// An input is a text, a data set on each line: its name, i or d, how many entries it claims to have
-// (-: as many as follow), and its entries. Damaged HDF5 itself is the HDF5 library's to refuse.
+// An input is a text, a data set on each line: its name (in fclib_local, or from the root with /),
+// i or d, how many entries it claims to have (-: as many as follow), and its entries. Damaged HDF5
+// itself is the HDF5 library's to refuse.
 #include <hdf5.h>
 
 #include <sstream>
@@ -47,8 +48,8 @@ void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& 
   const hid_t space = H5Screate_simple(1, &size, nullptr);
   const hid_t links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
-  const hid_t set = H5Dcreate2(file, ("/fclib_local/" + name).c_str(), type, space, links,
-                               H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t set = H5Dcreate2(file, (name[0] == '/' ? name : "/fclib_local/" + name).c_str(), type,
+                               space, links, H5P_DEFAULT, H5P_DEFAULT);
   if (set >= 0 && size == values.size() && size > 0)
     H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
   if (set >= 0) H5Dclose(set);
@@ -78,6 +79,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     fuzz::solve_read(contact::read_fclib(place.path()));
   } catch (const std::runtime_error&) {  // the file says why
+  }
+  try {
+    fuzz::solve_read(contact::read_cones_fclib(place.path()));
+  } catch (const std::runtime_error&) {
   }
   return 0;
 }

@@ -103,8 +103,10 @@ ConeProblem read_cones_fclib(const std::string& path) {
       fail(std::string(name) + " is " + std::to_string(A.rows) + " x " + std::to_string(A.columns) +
            ", " + std::to_string(m) + " x " + std::to_string(n) + " is expected");
   };
-  // Rows of joints follow those of the contacts.
+  // Rows of joints follow those of the contacts. Their number may be claimed by few bytes.
   const auto add_joints = [&](int joints) {
+    if (joints > std::numeric_limits<int>::max() - rows)
+      fail("has " + std::to_string(joints) + " rows of joints, more than there can be");
     if (joints > 0) cones.push_back(Cone::free(joints));
   };
   try {
@@ -118,6 +120,7 @@ ConeProblem read_cones_fclib(const std::string& path) {
                          R = read_matrix(file, path, group + "R");
         need("V", V, rows, R.rows);
         need("R", R, R.rows, R.rows);
+        add_joints(R.rows);
         for (const MatrixEntry& e : V.entries) {
           A.push_back({e.row, rows + e.column, e.value});
           A.push_back({rows + e.column, e.row, e.value});
@@ -128,7 +131,6 @@ ConeProblem read_cones_fclib(const std::string& path) {
             read_vector(file, path, group + "vectors/s", static_cast<std::size_t>(R.rows));
         b.conservativeResize(rows + R.rows);
         b.tail(R.rows) = -s;
-        add_joints(R.rows);
       }
       return ConeProblem::sparse(A, b, std::move(cones));
     }
@@ -144,11 +146,11 @@ ConeProblem read_cones_fclib(const std::string& path) {
     if (has(file, group + "G")) {
       const Hdf5Matrix G = read_matrix(file, path, group + "G");
       need("G", G, M.rows, G.columns);
+      add_joints(G.columns);
       for (const MatrixEntry& e : G.entries) J.push_back({rows + e.column, e.row, e.value});
       bias.conservativeResize(rows + G.columns);
       bias.tail(G.columns) =
           read_vector(file, path, group + "vectors/b", static_cast<std::size_t>(G.columns));
-      add_joints(G.columns);
     }
     return ConeProblem::saddle(M.entries, J, f, bias, std::move(cones));
   } catch (const std::invalid_argument& e) {
