@@ -43,7 +43,7 @@ class Corrector {
               const std::vector<int>& rounding);
   /// Where the variables that are 0 here move, when these that are 1 have converged, IDA's
   /// convergence test has to wait, not to fail. Null: there are none.
-  void expect_followers(N_Vector differential) { differential_ = differential; }
+  void expect_followers(N_Vector differential);
   /// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be
   /// evaluated. Once it asked for the end of the run it is not called again.
   int residual(N_Vector ycor, N_Vector into);
