@@ -279,3 +279,20 @@ TEST_CASE("event: corners that contradict each other by an error of the state ho
     CHECK(std::abs(slides.x[3 * k + 1] / slides.x[3 * k + 2] - slides.x[1] / slides.x[2]) < 0.2);
   }
 }
+
+// Round-off is all that moves such a contact: the library would refuse it, or take it for one that
+// approaches.
+TEST_CASE("event: a contact that the joints lock carries nothing") {
+  namespace event = tether::scene::event;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Identity(6, 6);
+  Eigen::VectorXd b(6), mu = Eigen::VectorXd::Constant(2, 0.5);
+  b << 1, 0.1, -0.2, 3e-17, 0, 1e-17;
+  for (const double left : {0.0, 1e-16}) {
+    CAPTURE(left);
+    A.bottomRightCorner(3, 3) = left * Eigen::Matrix3d::Identity();
+    const event::FrictionAnswer answer = event::solve_friction(A, b, mu);
+    REQUIRE(answer.solved);
+    CHECK((answer.x.head(3) - b.head(3)).norm() < 1e-14);
+    CHECK(answer.x.tail(3).norm() == 0);
+  }
+}

@@ -98,6 +98,18 @@ repeat = { count = 4 }
   CHECK(written(right) == written(spelt));
 }
 
+TEST_CASE("repetitions: each point of a list of points moves") {
+  const std::string bodies = kHead + ball("a", "[0, 0, 0]") + ball("b", "[1, 0, 0]");
+  const auto spring = [](const std::string& name, const std::string& at) {
+    return "[[spring]]\nname = \"" + name +
+           "\"\nbodies = [\"a\", \"b\"]\nstiffness = 5\nat = " + at + "\n";
+  };
+  CHECK(written(bodies + spring("s", "[[0, 0, 0], [1, 0, 0]]") +
+                "repeat = { count = 2, step = [0, 0.25, -0.5] }\n") ==
+        written(bodies + spring("s 1", "[[0, 0, 0], [1, 0, 0]]") +
+                spring("s 2", "[[0, 0.25, -0.5], [1, 0.25, -0.5]]")));
+}
+
 TEST_CASE("repetitions that are wrong, or too many, are refused by place before anything is made") {
   const auto refused = [](const std::string& repeat, const std::string& because) {
     const std::string said = error(kHead + ball("b", "[0, 0, 0]", "repeat = " + repeat + "\n"));
