@@ -298,6 +298,23 @@ TEST_CASE("packings: that there is a proof of infeasibility is ruled out by impu
   CHECK(s.counts.factorisations < 25);
 }
 
+// 1.77 and 1.15 times max_work where the iteration of the frictionless problem had a share of its
+// own.
+TEST_CASE("packings: that no proof of infeasibility is found keeps max_work") {
+  random::Packing packing = random::packing(6, false, 1);
+  for (PointContact& c : packing.contacts) c.mu = 1;
+  const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
+  for (const double most : {2e7, 1e8}) {
+    Options o;
+    o.law = Law::coulomb;
+    o.method = Method::anderson;
+    o.max_work = most;
+    const Solution s = Solver(o).solve(p);
+    CHECK(s.status == Status::work_limit);
+    CHECK(s.counts.work < 1.13 * most);
+  }
+}
+
 // Sweeps wander on this lattice (5e-5 after work 6e8); from the convex problem the law is reached
 // in 52 factorisations.
 TEST_CASE("packings: a lattice on which sweeps wander is solved on the path from the convex one") {

@@ -75,6 +75,7 @@ bool rule_out_proofs(const System& system, double tolerance, const Packed& w) {
 // converge to such a d, the faster the smaller tau; where it has one, soon no w_n is below zero.
 bool proves_infeasible(Search& search, Packed& d) {
   constexpr int kSteps = 40, kSweeps = 20, kCorrections = 12;
+  constexpr double kBeyond = 0.1;  // of max_work
   const Problem& problem = search.system.problem();
   const std::size_t n = at(problem.contacts());
   Options options = search.options;
@@ -83,15 +84,16 @@ bool proves_infeasible(Search& search, Packed& d) {
   options.history = false;
   Search smooth;
   smooth.reset(problem, options, Measure::fixed_point);
-  // A few factorisations are always worth it.
-  smooth.work_end = std::max(40 * search.sweep_cost * kSteps, search.work_end - search.counts.work);
+  // Where all work is spent a little more is worth it.
+  smooth.work_end = std::max(search.work_end - search.counts.work,
+                             std::min(40 * search.sweep_cost * kSteps, kBeyond * options.max_work));
   ProximalNewton newton;
   newton.reset(problem.contacts());
   Packed anchor(n), point(n), w(n);
   double tau = 1e-2;
   int sweeps = kSweeps;
   bool found = false;
-  for (int step = 0; step < kSteps && !found && !smooth.exhausted(); ++step) {
+  for (int step = 0; step < kSteps && !found && newton.affordable(smooth); ++step) {
     for (int sweep = 0; sweep < sweeps; ++sweep) {
       smooth.system.sweep(point.data(), {tau, anchor.data()});
       smooth.count_sweep();

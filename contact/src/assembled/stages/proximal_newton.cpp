@@ -218,7 +218,7 @@ int ProximalNewton::correct(Search& search, double tau, const PackedVector* anch
   const Proximal proximal{tau, anchor_.data()};
   double res = residual(search, x_, z_, proximal, true);
   for (int step = 1; step <= most; ++step) {
-    if (!direction(search, tau)) return 0;
+    if (!affordable(search) || !direction(search, tau)) return 0;
     double move = 0;
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) x_[at(i)].v[c] += dx_[at(i)].v[c];

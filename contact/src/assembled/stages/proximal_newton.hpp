@@ -24,6 +24,10 @@ class ProximalNewton {
   int correct(Search& search, double tau, const PackedVector* anchor, Packed& x, int most);
   // Estimated ns of one Newton step.
   double cost(const Search& search) const { return matrix_.cost(search); }
+  // Whether the work that is left allows for another.
+  bool affordable(const Search& search) const {
+    return search.counts.work + cost(search) <= search.work_end;
+  }
 
  private:
   // Solves the proximal problem at tau from x_ in place; Newton steps used, or -1.
