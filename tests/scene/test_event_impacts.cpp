@@ -90,6 +90,29 @@ TEST_CASE("event: a ball of other units bounces alike") {
   CHECK(std::abs(rests[0].time - 1.3545709229571927 * clock) < 10 * tolerance * clock);
 }
 
+TEST_CASE("event: a ball told in millimetres comes to rest on a turned floor as one in metres") {
+  // Its last bounces of 1e-5 mm/s were lower than rounding: it touched, and no rest was told.
+  const double e = 0.63, first = std::sqrt(2 * 0.37 / 9.81);
+  const Vector3d up = Eigen::AngleAxisd(2.3, Vector3d(-2, 0.3, 1).normalized()) * Vector3d::UnitZ();
+  const auto along = [&](double x) {
+    return "[" + number(x * up.x()) + ", " + number(x * up.y()) + ", " + number(x * up.z()) + "]";
+  };
+  const std::string text =
+      "[[body]]\nname = \"ball\"\nshape = \"sphere\"\nradius = 210\nmass = 0.0073\n"
+      "material = \"body\"\nposition = " +
+      along(580) +
+      "\n[[body]]\nname = \"floor\"\n"
+      "shape = \"plane\"\nfixed = true\nmaterial = \"floor\"\nnormal = " +
+      along(1) + "\n" + pair("restitution = 0.63");
+  for (const double tolerance : {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10}) {
+    CAPTURE(tolerance);
+    const auto engine = run(text, tolerance, 3, along(-9810));
+    const auto rests = of_kind(*engine, Kind::rest);
+    REQUIRE(rests.size() == 1);
+    CHECK(std::abs(rests[0].time - first * (1 + e) / (1 - e)) < 10 * tolerance);
+  }
+}
+
 TEST_CASE("event: a ball far from the origin bounces as one near it") {
   // Once an error of 1e-6 of its place counted as none, at 600 m 80 tolerances; and rounding there
   // made 180 to 760 of 1e-10.

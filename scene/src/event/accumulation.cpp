@@ -18,8 +18,9 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kAgree = 0.05;       // of ratios
-constexpr double kUnresolved = 1e-5;  // m/s in the units of the model: heights near round-off
+constexpr double kAgree = 0.05;         // of ratios
+constexpr double kUnresolved = 1e-5;    // m/s in the units of the model: heights near round-off
+constexpr double kLeastHeight = 5e-12;  // of a flight, of the largest coordinate: the same
 
 using linalg::at;
 
@@ -39,9 +40,13 @@ void Driver::remember(int contact, double approach) {
 
 bool Driver::has_accumulated(int contact, double approach, double& rest) const {
   const Bounces& b = bounces_[at(contact)];
-  if (b.count < 3 || approach * approach > b.speed[0] * std::max(options_.tolerance, kUnresolved))
-    return false;
+  if (b.count < 3) return false;
   const double dt = event_time_ - b.time[0], last = b.time[0] - b.time[1];
+  // Numbers of thousands, as of scenes in millimetres, lose heights at higher speeds.
+  const double largest = y_.head(motion_.coordinates()).cwiseAbs().maxCoeff();
+  const bool unseen = approach * dt / 4 <= kLeastHeight * largest;
+  if (approach * approach > b.speed[0] * std::max(options_.tolerance, kUnresolved) && !unseen)
+    return false;
   const double r = approach / b.speed[0], previous = b.speed[0] / b.speed[1];
   if (!(r < 1 && std::abs(r - previous) < kAgree * (1 - previous) && dt > 0 &&
         std::abs(dt / last - r) < kAgree))
