@@ -18,7 +18,7 @@ refused() {
   shift
   tried=$((tried + 1))
   before=$(cksum <"$file")
-  timeout 60 "$program" "$@" >said 2>&1
+  timeout -s KILL 60 "$program" "$@" >said 2>&1
   code=$?
   [ $code -eq 2 ] || { echo "$*: exit code $code"; cat said; wrong=1; }
   [ -f "$file" ] && [ "$(cksum <"$file")" = "$before" ] || { echo "$*: $file is lost"; wrong=1; make; }
@@ -78,17 +78,17 @@ for name in x.svg x.state f.pvd; do
   option=${name#*.}
   [ $option = pvd ] && option=vtk
   mkfifo out/$name.new
-  timeout 60 "$program" run s.toml --quiet --end 0.1 --output out --$option $name >said 2>&1
+  timeout -s KILL 60 "$program" run s.toml --quiet --end 0.1 --output out --$option $name >said 2>&1
   code=$?
   [ $code -le 1 ] && [ -s out/$name ] || { echo "a pipe $name.new: exit code $code"; cat said; wrong=1; }
   rm -rf out && mkdir out && ln s.toml out/$name.new
   before=$(cksum <s.toml)
-  timeout 60 "$program" run s.toml --quiet --end 0.1 --output out --$option $name >said 2>&1
+  timeout -s KILL 60 "$program" run s.toml --quiet --end 0.1 --output out --$option $name >said 2>&1
   [ "$(cksum <s.toml)" = "$before" ] || { echo "a second name $name.new: the scene is lost"; wrong=1; make; }
   rm -rf out && mkdir out
 done
 mkdir out/f && mkfifo out/f/bodies_000000.vtp && ln s.toml out/f/bodies_000001.vtp
-timeout 60 "$program" run s.toml --quiet --end 0.1 --every 0.05 --output out --vtk f.pvd >said 2>&1 ||
+timeout -s KILL 60 "$program" run s.toml --quiet --end 0.1 --every 0.05 --output out --vtk f.pvd >said 2>&1 ||
   { [ $? -eq 1 ] || { echo "a pipe among the frames"; cat said; wrong=1; }; }
 grep -q '\[\[body\]\]' s.toml || { echo "a second name among the frames: the scene is lost"; wrong=1; }
 

@@ -69,7 +69,7 @@ for kind in csv svg state; do
   rm -rf "$work/here" && mkdir "$work/here" && cd "$work/here" && mkfifo a
   printf '[scene]\nend = 0.1\n[output]\n%s = "a"\n[[body]]\nshape = "sphere"\nradius = 1\nmass = 1\n' $kind >scene.toml
   code=0
-  timeout 60 "$program" run scene.toml --quiet >"$work/said" 2>&1 || code=$?
+  timeout -s KILL 60 "$program" run scene.toml --quiet >"$work/said" 2>&1 || code=$?
   [ $code -eq 2 ] && [ -p a ] || { echo "$kind = a pipe: exit code $code"; wrong=1; }
 done
 [ $wrong -eq 0 ] && echo "nothing outside the folder is written"

@@ -52,7 +52,7 @@ cat >meshes.urdf <<END
 <collision><geometry><mesh filename='file://$work/pipe.stl'/></geometry></collision>
 </link></robot>
 END
-wanted 0 "a robot with meshes" timeout 60 "$program" import meshes.urdf --base free --out meshes.toml
+wanted 0 "a robot with meshes" timeout -s KILL 60 "$program" import meshes.urdf --base free --out meshes.toml
 echo '<robot>' | "$program" import - 2>&1 | grep -q '^tether: standard input:1: ' || complain "place of an error"
 [ $wrong -eq 0 ] && echo "import does what it says"
 exit $wrong
