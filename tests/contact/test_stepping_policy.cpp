@@ -172,3 +172,22 @@ TEST_CASE("stepping: what is accepted is not halved, and halving is no way to mo
   CHECK(accepted > 0);
   CHECK(s.counts().accepted >= accepted);
 }
+
+// Ten times as much as is accepted at once: a motion that ends there loses more.
+TEST_CASE("stepping: the shortest parts are used within 1e-3 where anything is accepted") {
+  for (const bool accepts : {true, false}) {
+    Scene scene = hard(1e-9, accepts ? 1e5 : 1, 2);
+    scene.options.max_sweeps = 20;
+    tc::Stepper s = scene.stepper();
+    int between = 0, above = 0;
+    for (int k = 0; k < 100; ++k) {
+      s.step();
+      between += s.residual() > 1e-4 && s.residual() <= 1e-3;
+      above += s.residual() > 1e-3;
+      CHECK(s.succeeded() == (s.residual() <= (accepts ? 1e-3 : 1e-4)));
+    }
+    INFO(between << " between, " << above << " above");
+    CHECK(between > 0);
+    CHECK(above > 0);
+  }
+}

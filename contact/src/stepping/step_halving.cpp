@@ -85,7 +85,8 @@ void Stepper::Implementation::set_judged(const detail::Judgement& b) {
 // Accepts the solution, or not; one that a shorter step replaces leaves no trace.
 void Stepper::Implementation::judge() {
   const bool solved = solution.status == Status::solved;
-  const double most = std::max(accepted_residual(options), shortest() ? detail::kGood : 0.0);
+  const double last = options.acceptance > 1 ? detail::kLast : detail::kGood;
+  const double most = std::max(accepted_residual(options), shortest() ? last : 0.0);
   part.failed = !solved && !(solution.error <= most);
   if (part.failed && part.may_halve) return;
   counts.accepted += !solved && !part.failed;

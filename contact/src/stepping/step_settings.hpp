@@ -11,8 +11,9 @@ namespace tether::contact::detail {
 /// answer than `kEnough` is worth no more than a quarter of max_work, and than `kGood` none of what
 /// is added to max_work where a shorter step would not help. Answers within `kUseful` are as good
 /// as the step: it moves bodies by velocities of its end, an error of half of what it changes them
-/// by, while one contact is off by so much in a problem that is not solved.
-constexpr double kEnough = 1e-6, kGood = 1e-4, kUseful = 1e-2;
+/// by, while one contact is off by so much in a problem that is not solved. Where anything is
+/// accepted the shortest parts, which nothing makes easier any more, are used within `kLast`.
+constexpr double kEnough = 1e-6, kGood = 1e-4, kLast = 1e-3, kUseful = 1e-2;
 
 /// Throws std::invalid_argument.
 void check(const SteppingOptions& o);

@@ -104,8 +104,8 @@ struct SteppingOptions {
   /// A step whose problem is not accepted is repeated as two halves, each of these as two quarters,
   /// and so on, at most this many times. The shortest parts, and parts with an impact (which a
   /// shorter step does not make easier), accept residuals up to 1e-4 at least, after five times
-  /// max_work where needed. A shortest part above that is used all the same and counted as
-  /// `unsolved`. 0: no halving.
+  /// max_work where needed, and if acceptance > 1 up to 1e-3 then. A shortest part above that is
+  /// used all the same and counted as `unsolved`. 0: no halving.
   int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
   /// A penetration of depth d is reduced at the speed min(error_reduction d / dt,
