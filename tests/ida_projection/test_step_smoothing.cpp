@@ -249,6 +249,64 @@ TEST_CASE("smooth steps begin at once at any size whose Jacobians cost as much a
 
 namespace {
 
+/// A pendulum beside 300 unknowns that rest, and one, w = x^2, that F determines.
+Problem pendulum_among_many(const std::string& form) {
+  const Problem small = pendulum(1.0, 1.0, 20.0, form);
+  Problem p = small;
+  const int w = small.size;
+  p.size += 301;
+  for (auto* values : {&p.y0, &p.yp0, &p.id})
+    values->resize(static_cast<std::size_t>(p.size), values == &p.id ? 1.0 : 0.0);
+  p.id[static_cast<std::size_t>(w)] = 0.0;
+  p.y0[static_cast<std::size_t>(w)] = p.y0[0] * p.y0[0];
+  if (!p.atol_scale.empty()) p.atol_scale.resize(p.y0.size(), 1.0);
+  p.residual = [small, w, n = p.size](double t, const double* y, const double* yp, double* r) {
+    small.residual(t, y, yp, r);
+    r[w] = y[w] - y[0] * y[0];
+    std::copy(yp + w + 1, yp + n, r + w + 1);
+  };
+  p.jacobian = [small, w, n = p.size](double t, double cj, const double* y, const double* yp,
+                                      double* J) {
+    std::vector<double> inner(static_cast<std::size_t>(w) * static_cast<std::size_t>(w), 0.0);
+    small.jacobian(t, cj, y, yp, inner.data());
+    for (int j = 0; j < w; ++j) std::copy_n(inner.data() + j * w, w, J + j * n);
+    J[w] = -2.0 * y[0];
+    J[w * n + w] = 1.0;
+    for (int j = w + 1; j < n; ++j) J[j * n + j] = cj;
+  };
+  return p;
+}
+
+tp::Constraints length_of(const Problem& problem) {
+  const int n = problem.size;
+  return row(
+      "length", [](double, const double* y) { return (y[0] * y[0] + y[1] * y[1] - 1.0) / 2.0; },
+      [n](double, const double* y, double* c) {
+        std::fill(c, c + n, 0.0);
+        c[0] = y[0];
+        c[1] = y[1];
+      });
+}
+
+}  // namespace
+
+TEST_CASE("multipliers of velocity rows are seen among many unknowns, by eight evaluations of F") {
+  for (const char* form : {"index 1", "index 2", "GGL"}) {
+    INFO(form);
+    Host host(pendulum_among_many(form), 1e-6);
+    REQUIRE(host.problem.jacobian);
+    tp::Options options;
+    options.id = host.vector(host.problem.id);
+    host.attach(length_of(host.problem), options);
+    REQUIRE(host.finish() >= 0);
+    const tp::Statistics statistics = host.projection().statistics();
+    CHECK(statistics.smoothing_begun == (std::string(form) == "index 1" ? 0 : 1));
+    CHECK(statistics.residual_evaluations <= 40 + 3 * host.steps());
+  }
+}
+
+namespace {
+
 /// GGL pendulum beside z' = zs' - 5 (z - zs), zs = (1 - cos 5 t)^2, z >= 0: an inequality of IDA,
 /// which refuses attempts that the plugin has finished. `look` is called in each residual.
 Problem beside_an_inequality(std::function<void()> look) {

@@ -46,6 +46,7 @@ class AlgebraicVariables {
  private:
   // index.cpp
   bool exceeds_one(const Candidate& candidate, Corrector& corrector, double cj, long usual);
+  bool has_rows_of_zeros(const Candidate& candidate, Corrector& corrector, double cj);
 
   const Options& options_;
   Statistics& statistics_;

@@ -16,6 +16,49 @@ constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight to
 
 }  // namespace
 
+// The matrix of exceeds_one() is singular where it has rows of zeros: equations of F that contain
+// neither y' nor y_a, as those of positions and velocities. Where there are as many of them as
+// algebraic variables, it leaves all of these free. Eight evaluations of F, of any size.
+bool AlgebraicVariables::has_rows_of_zeros(const Candidate& candidate, Corrector& corrector,
+                                           double cj) {
+  if (!any_ || all_) return false;
+  std::vector<char> zero = derivative_free_equations(candidate, corrector, cj);
+  const std::size_t n = zero.size();
+  OwnedVector none(candidate.base), base(candidate.base), other(candidate.base),
+      saved(candidate.base);
+  N_VScale(1.0, candidate.base, saved);
+  N_VConst(0.0, none);
+  const double* original = N_VGetArrayPointer(saved);
+  const auto residual = [&](N_Vector into) {
+    ++statistics_.residual_evaluations;
+    return corrector.residual(none, into) == 0;
+  };
+  bool known = residual(base), answered = false;
+  for (const double size : {1.0, -1e3}) {
+    for (std::size_t j = 0; j < n; ++j) {
+      if (mask()[j] != 0.0) continue;
+      const double w = candidate.weight_entries[j];
+      const double irregular = 1.5 + 0.5 * std::sin(1.0 + 2.3 * static_cast<double>(j));
+      candidate.base_entries[j] =
+          original[j] +
+          size * irregular * std::max(w > 0.0 ? 1.0 / w : 1.0, kIncrement * std::abs(original[j]));
+    }
+    const bool evaluated = residual(other);
+    N_VScale(1.0, saved, candidate.base);
+    if (!evaluated) continue;  // F refuses these y; the other size decides
+    answered = true;
+    for (std::size_t i = 0; i < n; ++i)
+      zero[i] = zero[i] && N_VGetArrayPointer(base)[i] == N_VGetArrayPointer(other)[i];
+  }
+  const auto zeros = std::count(zero.begin(), zero.end(), 1);
+  undetermined_.clear();
+  if (!known || !answered || zeros == 0) return false;
+  for (std::size_t j = 0; j < n; ++j)
+    if (mask()[j] == 0.0) undetermined_.push_back(static_cast<int>(j));
+  if (static_cast<std::size_t>(zeros) != undetermined_.size()) undetermined_.clear();
+  return true;
+}
+
 // F determines y'_d and y_a, its index is 1 at most, where the matrix of F_y'_j (j differential)
 // and F_y_j (j algebraic) is regular. It is singular for multipliers of position or velocity rows
 // (index 2 and 3), and where combinations of differential variables are algebraic. The columns are
@@ -26,7 +69,8 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
                                      long usual) {
   if (candidate.base_entries == nullptr) return false;
   const int size = static_cast<int>(N_VGetLength(candidate.base));
-  if (size > (usual >= size ? kLargestDense : kLargestSize)) return false;
+  if (size > (usual >= size ? kLargestDense : kLargestSize))
+    return has_rows_of_zeros(candidate, corrector, cj);
   OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base),
       saved(candidate.base);
   N_VConst(0.0, ycor);

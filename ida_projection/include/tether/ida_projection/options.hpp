@@ -97,8 +97,9 @@ struct Options {
   /// longest step here (0: none), and IDASetMaxOrd's order, if it was called.
   bool step_smoothing = false;
   /// Begin step_smoothing during the run where IDA's own rule is known to harm: F is not of index 1
-  /// in its own variables (tested once, up to 200 unknowns in serial vectors), or ten steps in a
-  /// row had a failed error test. IDASetMaxStep is not used then.
+  /// in its own variables (tested once in serial vectors; above 200 unknowns by equations of F that
+  /// contain neither y' nor algebraic variables), or ten steps in a row had a failed error test.
+  /// IDASetMaxStep is not used then.
   bool smooth_where_needed = true;
   double smoothing_setpoint = 4.0;
   double maximum_step = 0.0;
