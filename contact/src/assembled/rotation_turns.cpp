@@ -21,14 +21,21 @@ bool Automatic::infeasible(Search& search) {
 // boxes of masses 1 : 1e6 to 1 : 1e12.
 // Where steps near the point are stuck far above that, others come from further away.
 bool Automatic::at_round_off(Search& search, int steps) {
-  constexpr double kGain = 0.7, kUnits = 4;
-  constexpr int kOthers = 60;
+  constexpr double kGain = 0.7, kUnits = 4, kNearly = 100;
+  constexpr int kProblems = 8, kOthers = 60;
   while (search.explained_by_round_off() && !search.solved()) {
     const double before = search.best_error;
     prepare(search);
     interior.run_near(search, search.best.data(), steps);
-    if (search.best_error > kGain * before &&
-        search.best_error > kUnits * search.system.rounding(search.best.data())) {
+    const auto stuck_above = [&] {
+      return search.best_error > kGain * before &&
+             search.best_error > kUnits * search.system.rounding(search.best.data());
+    };
+    if (stuck_above() && search.best_error < kNearly * search.options.tolerance) {
+      x_ = search.best;
+      interior.run_proximal(search, x_.data(), kProblems, newton, false);
+    }
+    if (stuck_above()) {
       x_ = search.best;
       interior.run_shifted(search, x_.data(), kOthers);
     }
@@ -181,6 +188,14 @@ Status Automatic::shifted_path(Search& search, Rotation&, int steps) {
 
 Status Automatic::proximal_path(Search& search, Rotation&, int problems) {
   interior.run_proximal(search, x_.data(), problems, newton);
+  return Status::unsolved;
+}
+
+// Where the path of interior points has ended near a solution a few proximal problems lead to it;
+// one that is not solved says that they do not.
+Status Automatic::proximal_path_at_best(Search& search, Rotation&, int problems) {
+  x_ = search.best;
+  interior.run_proximal(search, x_.data(), problems, newton, false);
   return Status::unsolved;
 }
 
