@@ -9,6 +9,7 @@
 #include <problems/rigid_body.hpp>
 #include <sunlinsol/sunlinsol_spgmr.h>
 #include <sunmatrix/sunmatrix_dense.h>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #include "host.hpp"
 #include "linalg/thrown.hpp"
@@ -59,12 +60,34 @@ struct End {
   long steps;
   std::vector<double> y;
   tp::Statistics statistics;
+  int shifted;  ///< steps that left IDA another prediction than its own
 };
 
 struct LinearSystem {
   SUNLinearSolver solver;
   SUNMatrix matrix;
 };
+
+/// IDA's prediction, as its own Newton iteration left it in the present step.
+struct Prediction {
+  N_Vector vector = nullptr;
+  std::vector<double> then;
+  int (*solve)(SUNNonlinearSolver, N_Vector, N_Vector, N_Vector, sunrealtype, sunbooleantype,
+               void*) = nullptr;
+} prediction;
+
+SUNNonlinearSolver newton_that_notes_predictions(N_Vector y, SUNContext context) {
+  SUNNonlinearSolver newton = SUNNonlinSol_Newton(y, context);
+  prediction.solve = newton->ops->solve;
+  newton->ops->solve = [](SUNNonlinearSolver s, N_Vector y0, N_Vector ycor, N_Vector weights,
+                          sunrealtype tolerance, sunbooleantype setup, void* mem) {
+    const int flag = prediction.solve(s, y0, ycor, weights, tolerance, setup, mem);
+    prediction.vector = y0;
+    prediction.then.assign(entries(y0), entries(y0) + NV_LENGTH_S(y0));
+    return flag;
+  };
+  return newton;
+}
 
 /// To the end of the problem with the linear system that `attach(ida, y, context)` made.
 template <class Attach>
@@ -83,15 +106,21 @@ End run_with(Kind kind, const Problem& problem, double tolerance, const tp::Cons
   {
     tp::Options options;
     options.id = id;
+    SUNNonlinearSolver newton = newton_that_notes_predictions(y, context);
+    options.nonlinear_solver = newton;
     tp::Projection projection(ida, set, options);
     sunrealtype t = 0.0;
-    while (t < problem.t_end && end.flag >= 0)
+    while (t < problem.t_end && end.flag >= 0) {
       end.flag = IDASolve(ida, problem.t_end, &t, y, yp, IDA_ONE_STEP);
+      const auto now = entries(prediction.vector);
+      end.shifted += !std::equal(prediction.then.begin(), prediction.then.end(), now);
+    }
     if (end.flag >= 0) IDAGetDky(ida, problem.t_end, 0, y);
     IDAGetNumSteps(ida, &end.steps);
     end.statistics = projection.statistics();
     end.y.assign(entries(y), entries(y) + problem.size);
     IDAFree(&ida);
+    SUNNonlinSolFree(newton);
   }
   SUNLinSolFree(system.solver);
   if (system.matrix) SUNMatDestroy(system.matrix);
@@ -112,6 +141,7 @@ End run(Kind kind, const Problem& problem, double tolerance, const tp::Constrain
 void close(const End& a, const End& b, double tolerance) {
   REQUIRE(a.flag >= 0);
   REQUIRE(b.flag >= 0);
+  CHECK(a.shifted + b.shifted == 0);
   for (std::size_t i = 0; i < a.y.size(); ++i) CHECK(std::abs(a.y[i] - b.y[i]) < tolerance);
   CHECK(std::abs(a.steps - b.steps) <= 0.02 * static_cast<double>(b.steps) + 2.0);
 }
@@ -284,6 +314,7 @@ TEST_CASE("gradients on custom vectors, direct solver: polished as on serial one
     CHECK(custom.statistics.extra_iterations > custom.steps / 4);
     CHECK(custom.statistics.extra_iterations == serial.statistics.extra_iterations);
     CHECK(custom.steps == serial.steps);
+    CHECK(custom.shifted + serial.shifted == 0);
     for (std::size_t i = 0; i < serial.y.size(); ++i)
       CHECK(std::abs(custom.y[i] - serial.y[i]) <= 1e-8);
   }
