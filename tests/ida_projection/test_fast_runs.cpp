@@ -16,6 +16,8 @@
 #include <problems/slider_crank.hpp>
 #include <problems/slider_crank_equal.hpp>
 #include <problems/transistor_amplifier.hpp>
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_dense.h>
 
 #include "host.hpp"
 #include "support/catch.hpp"
@@ -103,6 +105,40 @@ TEST_CASE("IDA's own vectors become fast with the first move, the caller's do no
   CHECK_FALSE(is_fast(host.yp));
   REQUIRE(host.restart() >= 0);
   REQUIRE(host.finish() >= 0);
+}
+
+TEST_CASE("IDA's work space and its linear solution become fast with its own vectors") {
+  Host host(pendulum(1.0, 9.81, 10.0, "index 1"), 1e-6);
+  static bool work_is_fast, solution_is_fast;
+  static decltype(_generic_SUNLinearSolver_Ops::solve) solve;
+  const SUNMatrix matrix = SUNDenseMatrix(host.problem.size, host.problem.size, host.context);
+  const SUNLinearSolver solver = SUNLinSol_Dense(host.y, matrix, host.context);
+  solve = solver->ops->solve;
+  solver->ops->solve = [](SUNLinearSolver S, SUNMatrix A, N_Vector x, N_Vector b,
+                          sunrealtype tolerance) {
+    solution_is_fast = is_fast(x);
+    return solve(S, A, x, b, tolerance);
+  };
+  REQUIRE(IDASetLinearSolver(host.ida, solver, matrix) == IDA_SUCCESS);
+  const auto jacobian = [](sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vector,
+                           SUNMatrix J, void* data, N_Vector work, N_Vector, N_Vector) {
+    work_is_fast = is_fast(work);
+    static_cast<const Problem*>(data)->jacobian(t, cj, N_VGetArrayPointer(y),
+                                                N_VGetArrayPointer(yp), SM_DATA_D(J));
+    return 0;
+  };
+  REQUIRE(IDASetJacFn(host.ida, jacobian) == IDA_SUCCESS);
+  host.attach(host.problem.recommended_constraints());
+  work_is_fast = solution_is_fast = true;
+  REQUIRE(host.step() >= 0);
+  CHECK_FALSE(work_is_fast);
+  REQUIRE(host.finish() >= 0);
+  CHECK(work_is_fast);
+  CHECK(solution_is_fast);
+  CHECK_FALSE(is_fast(host.y));
+  IDAFree(&host.ida);
+  SUNLinSolFree(solver);
+  SUNMatDestroy(matrix);
 }
 
 TEST_CASE("where no move is needed IDA's vectors stay as they are") {

@@ -125,7 +125,8 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
   const int flag = correct_and_move(candidate, tolerance, call_setup);
   if (flag != 0) return flag;
   const bool suppressed = run_.engaged && options_.suppress_algebraic;
-  control_.control(candidate, run_.engaged, suppressed ? variables_.id() : nullptr);
+  const long steps = movers_.used != nullptr ? attempts_.steps : ida_.steps();
+  control_.control(candidate, steps, run_.engaged, suppressed ? variables_.id() : nullptr);
   return 0;
 }
 
@@ -372,8 +373,8 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
   if (options_.nonlinear_solver == nullptr)
     newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
   const StepData step = ida_.step();
-  fast::quicken({candidate.correction, candidate.weights, step.residual, newton, polish_.delta()});
-  fast::quicken_with_inputs({step.y_predicted, step.yp_predicted});
+  fast::quicken({candidate.correction, step.residual, polish_.delta()});
+  fast::quicken_with_inputs({step.y_predicted, step.yp_predicted, candidate.weights, newton});
 }
 
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.

@@ -200,11 +200,21 @@ struct Kernels {
     return 0;
   }
 
-  // What is combined gets these operations, too.
+  // The same for results whose arguments get these operations, too.
+  static void spread(N_Vector X) {
+    if (X->ops->nvlinearsum != linear_sum) quicken({X});
+  }
   static int combination_of_others(int count, sunrealtype* c, N_Vector* X, N_Vector Z) {
-    for (int k = 0; k < count; ++k)
-      if (X[k]->ops->nvlinearsum != linear_sum) quicken({X[k]});
+    for (int k = 0; k < count; ++k) spread(X[k]);
     return linear_combination(count, c, X, Z);
+  }
+  static void scale_of_other(sunrealtype c, N_Vector X, N_Vector Z) {
+    spread(X);
+    scale(c, X, Z);
+  }
+  static void inverse_of_other(N_Vector X, N_Vector Z) {
+    spread(X);
+    inverse(X, Z);
   }
 
   // As SUNDIALS' own one, where a program has enabled it.
@@ -246,29 +256,31 @@ struct Kernels {
     ops->nvlinearsumvectorarray = linear_sums;
     ops->nvscalevectorarray = scale_each;
   }
+  static void install_spreading(N_Vector_Ops ops) {
+    install(ops);
+    ops->nvlinearcombination = combination_of_others;
+    ops->nvscale = scale_of_other;
+    ops->nvinv = inverse_of_other;
+  }
 };
 
 template <int... Lengths>
-void spread_sized(N_Vector_Ops ops, sunindextype length, std::integer_sequence<int, Lengths...>) {
-  static constexpr decltype(ops->nvlinearcombination) combine[] = {
-      Kernels<Lengths>::combination_of_others...};
-  ops->nvlinearcombination = combine[length <= kSized ? length : 0];
-}
-
-template <int... Lengths>
-void install_sized(N_Vector_Ops ops, sunindextype length, std::integer_sequence<int, Lengths...>) {
+void install_sized(N_Vector_Ops ops, sunindextype length, bool spreading,
+                   std::integer_sequence<int, Lengths...>) {
   static constexpr void (*install[])(N_Vector_Ops) = {Kernels<Lengths>::install...};
-  install[length <= kSized ? length : 0](ops);
+  static constexpr void (*install_spreading[])(N_Vector_Ops) = {
+      Kernels<Lengths>::install_spreading...};
+  (spreading ? install_spreading : install)[length <= kSized ? length : 0](ops);
 }
 
 }  // namespace
 
 void install_kernels(N_Vector_Ops ops, sunindextype length) {
-  install_sized(ops, length, std::make_integer_sequence<int, kSized + 1>());
+  install_sized(ops, length, false, std::make_integer_sequence<int, kSized + 1>());
 }
 
-void spread_kernels(N_Vector_Ops ops, sunindextype length) {
-  spread_sized(ops, length, std::make_integer_sequence<int, kSized + 1>());
+void install_spreading_kernels(N_Vector_Ops ops, sunindextype length) {
+  install_sized(ops, length, true, std::make_integer_sequence<int, kSized + 1>());
 }
 
 }  // namespace tether::ida_projection::fast

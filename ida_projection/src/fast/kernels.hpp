@@ -16,7 +16,8 @@ constexpr sunindextype kSized = 16;
 /// Overwrites the operations of a vector that has `length` elements.
 void install_kernels(N_Vector_Ops ops, sunindextype length);
 
-/// After install_kernels(): vectors that are combined into this one are made fast by quicken().
-void spread_kernels(N_Vector_Ops ops, sunindextype length);
+/// The same, and vectors that are combined, scaled or inverted into this one are made fast by
+/// quicken().
+void install_spreading_kernels(N_Vector_Ops ops, sunindextype length);
 
 }  // namespace tether::ida_projection::fast

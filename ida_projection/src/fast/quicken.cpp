@@ -48,12 +48,7 @@ void quicken_by(void (*install)(N_Vector_Ops, sunindextype),
 void quicken(std::initializer_list<N_Vector> vectors) { quicken_by(install_kernels, vectors); }
 
 void quicken_with_inputs(std::initializer_list<N_Vector> vectors) {
-  quicken_by(
-      [](N_Vector_Ops ops, sunindextype length) {
-        install_kernels(ops, length);
-        spread_kernels(ops, length);
-      },
-      vectors);
+  quicken_by(install_spreading_kernels, vectors);
 }
 
 }  // namespace tether::ida_projection::fast

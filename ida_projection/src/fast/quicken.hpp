@@ -11,8 +11,9 @@ namespace tether::ida_projection::fast {
 /// program may count or change them), stays as it is; so do null pointers.
 void quicken(std::initializer_list<N_Vector> vectors);
 
-/// The same, and all that is combined into one of them from now on: IDA's history, of which its
-/// predictions are made.
+/// The same, and all that is combined, scaled or inverted into one of them from now on: IDA's
+/// history, of which its predictions are made; tolerances, of which its weights are; what a linear
+/// solver returns, of which corrections are.
 void quicken_with_inputs(std::initializer_list<N_Vector> vectors);
 
 }  // namespace tether::ida_projection::fast

@@ -47,14 +47,22 @@ int Corrector::correct(const Candidate& candidate, double tolerance, bool call_s
 
 // All that test_convergence needs: SUNDIALS' own functions stand between it and what catches.
 void Corrector::expect_followers(N_Vector differential) {
+  if (differential == differential_) return;
   if (differential != nullptr && !before_) before_ = OwnedVector(differential);
   differential_ = differential;
+  install_convergence_test();
 }
 
 int Corrector::set_convergence_test(SUNNonlinSolConvTestFn f, void* data) {
   test_ = f;
   test_data_ = data;
-  return SUNNonlinSolSetConvTestFn(inner_, test_convergence, this);
+  return install_convergence_test();
+}
+
+// IDA's own, where nothing has to be added to it.
+int Corrector::install_convergence_test() {
+  return differential_ != nullptr ? SUNNonlinSolSetConvTestFn(inner_, test_convergence, this)
+                                  : SUNNonlinSolSetConvTestFn(inner_, test_, test_data_);
 }
 
 // IDA takes an iteration for divergent whose second change is 0.9 of the first or more. Algebraic
@@ -64,8 +72,9 @@ int Corrector::test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vect
                                 sunrealtype tolerance, N_Vector weights, void* self) {
   Corrector& ours = *static_cast<Corrector*>(self);
   const int flag = ours.test_(solver, ycor, change, tolerance, weights, ours.test_data_);
-  const bool failed = flag == SUN_NLS_CONV_RECVR && ours.differential_ != nullptr;
-  return failed && ours.followers_move(ycor, change, tolerance, weights) ? SUN_NLS_CONTINUE : flag;
+  return flag == SUN_NLS_CONV_RECVR && ours.followers_move(ycor, change, tolerance, weights)
+             ? SUN_NLS_CONTINUE
+             : flag;
 }
 
 // Have the differential variables converged, their rate being that of the last change?

@@ -77,6 +77,7 @@ class Corrector {
   std::string stop_text_;
   static int test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
                               sunrealtype tolerance, N_Vector weights, void* self);
+  int install_convergence_test();
   bool followers_move(N_Vector ycor, N_Vector change, double tolerance, N_Vector weights);
 
   SUNNonlinSolConvTestFn test_ = nullptr;  // IDA's

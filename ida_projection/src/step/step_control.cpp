@@ -36,9 +36,9 @@ void StepControl::restore_weights(N_Vector weights, long last_steps) {
 }
 
 // |ycor| decides the next step size, and what it is beside the second difference the order.
-void StepControl::control(const Candidate& candidate, bool engaged, N_Vector differential) {
+void StepControl::control(const Candidate& candidate, long steps, bool engaged,
+                          N_Vector differential) {
   if (!engaged && !smoother_.on()) return;
-  const long steps = ida_.steps();
   const auto norm = [&] {
     return error_norm(candidate.correction, candidate.weights, differential);
   };
@@ -49,7 +49,7 @@ void StepControl::control(const Candidate& candidate, bool engaged, N_Vector dif
   } else {
     compare_slopes(candidate, steps, differential);
     weights_factor_ =
-        order_limit_.control(steps, ida_.step().t, order_limit_.lowering() ? norm() : 0.0);
+        order_limit_.control(steps, candidate.t, order_limit_.lowering() ? norm() : 0.0);
     statistics_.order_limited = order_limit_.begun();
     // Both set the same bounds.
     if (order_limit_.lowering())

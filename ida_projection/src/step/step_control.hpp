@@ -25,9 +25,10 @@ class StepControl {
 
   /// At the begin of a solve: restores the weights that the last one changed in the same step.
   void restore_weights(N_Vector weights, long last_steps);
-  /// At the end of a successful one. `engaged`: the projection acts; `differential`: the variables
-  /// of IDA's error test (null: all).
-  void control(const Candidate& candidate, bool engaged, N_Vector differential);
+  /// At the end of a successful one, `steps` accepted before it. `engaged`: the projection acts,
+  /// and the candidate's time is known; `differential`: the variables of IDA's error test (null:
+  /// all).
+  void control(const Candidate& candidate, long steps, bool engaged, N_Vector differential);
   double weights_factor() const { return weights_factor_; }
   /// The corrector failed in a way that a smaller step may cure.
   void corrector_failed();
