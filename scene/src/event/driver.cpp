@@ -50,7 +50,8 @@ double flight_time(double gap, double rate, double back) {
 
 }  // namespace
 
-Driver::Driver(Model& model, const DriverOptions& options, double t, const VectorXd& y)
+Driver::Driver(Model& model, const DriverOptions& options, double t, const VectorXd& y,
+               const StartState& start)
     : model_(model),
       options_(options),
       local_(local_tolerance(options.tolerance)),
@@ -61,8 +62,10 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
       bounces_(at(model.contacts())) {
   y_.setZero(motion_.size());
   y_.head(motion_.work()) = y;
+  counts_ = start.so_far;
   model_.set(t, y_.data(), y_.data() + motion_.coordinates());
   model_.settle();
+  if (start.gap > 0) close_contacts(start);
   check_start();
   const std::vector<int> close = touching(-1);
   collide(close, EventKind::impact, -1);

@@ -35,6 +35,17 @@ struct DriverCounts {
   long events = 0, impacts = 0;
 };
 
+/// How exact the state is that a driver begins with.
+struct StartState {
+  /// Contacts with gaps and normal speeds up to these are closed there, and moved to be so: of
+  /// steps. 0: those that are within their bands.
+  double gap = 0, speed = 0;
+  DriverCounts so_far;
+};
+
+/// Contacts that are closed at the state that is set: see StartState. Nothing: others overlap.
+std::optional<std::vector<int>> closed_contacts(Model& model, const StartState& state);
+
 /// The last impacts of one contact, the latest first.
 struct Bounces {
   double time[3] = {0, 0, 0}, speed[3] = {0, 0, 0};
@@ -45,7 +56,8 @@ class Driver {
  public:
   /// `y`: q, then u. Moves it onto joints and closed contacts. Throws std::invalid_argument where
   /// bodies overlap.
-  Driver(Model& model, const DriverOptions& options, double t, const VectorXd& y);
+  Driver(Model& model, const DriverOptions& options, double t, const VectorXd& y,
+         const StartState& start = {});
 
   /// Goes on with the bits of the driver that made the memory.
   struct Memory;
@@ -74,6 +86,7 @@ class Driver {
  private:
   const Bands& bands() const { return motion_.bands(); }
   void check_start() const;
+  void close_contacts(const StartState& start);
   void begin_phase();
   void settle_velocities();
   void start_phase();

@@ -9,6 +9,7 @@
 #include "driver.hpp"
 #include "event/model/scaled_scene.hpp"
 #include "event/model/scene_model.hpp"
+#include "event/resumable.hpp"
 #include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
 #include "output/saved_bodies.hpp"
@@ -37,21 +38,23 @@ DriverOptions driver_options(const Scene& scene) {
 
 // The state that is saved is the start of the present phase and the time reached, as that of the
 // smooth engine: IDA's history cannot be given to it.
-class EventEngine : public Engine {
+class EventEngine : public ResumableEngine {
  public:
-  explicit EventEngine(const Scene& scene)
+  EventEngine(const Scene& scene, Begin begin)
       : units_(event::units_of(scene)),
         origin_(event::origin_of(scaled(scene, units_))),
         scene_(event::seen_from(origin_, scaled(scene, units_))),
         options_(driver_options(scene_)),
-        model_(scene_, units_.time),
-        driver_(std::make_unique<Driver>(model_, options_, 0.0, model_.start())),
+        model_(std::make_unique<SceneModel>(scene_, units_.time)),
         reactions_(scene_, mechanics::placed_bodies(scene_)) {
     bodies_.resize(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
       bodies_[b].position = scene.bodies[b].position;
       bodies_[b].orientation = scene.bodies[b].orientation.normalized();
     }
+    now_.setZero(model_->coordinates() + model_->velocities() + 1);
+    if (begin == Begin::later) return;
+    driver_ = std::make_unique<Driver>(*model_, options_, 0.0, model_->start());
     look();
   }
 
@@ -95,7 +98,15 @@ class EventEngine : public Engine {
   void save(std::ostream& out) const override;
   void restore(std::istream& in, Restore how) override;
 
+  std::optional<std::vector<int>> closed_in(const SteppedState& state) override {
+    const VectorXd y = coordinates_of(state.bodies);
+    return closed_contacts(*model_, exactness_of(*model_, state, y));
+  }
+  void resume(const SteppedState& state, const Counts& so_far) override;
+
  private:
+  VectorXd coordinates_of(const std::vector<BodyState>& bodies) const;
+  StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const;
   void look();
   void look_at_contacts() const;
   void look_at_events();
@@ -110,7 +121,7 @@ class EventEngine : public Engine {
   Vector3d origin_;
   Scene scene_;  // in these units and from this origin, as everything here but the results
   DriverOptions options_;
-  mutable SceneModel model_;  // forces are found at the state that it is set to
+  std::unique_ptr<SceneModel> model_;  // forces are found at the state that it is set to
   std::unique_ptr<Driver> driver_;
   joints::Reactions reactions_;
   VectorXd now_;
@@ -123,15 +134,15 @@ class EventEngine : public Engine {
 
 void EventEngine::look() {
   now_ = driver_->state();
-  const smooth::MovingBodies& bodies = model_.bodies();
-  bodies.read(model_.bodies_state(), bodies_);
+  const smooth::MovingBodies& bodies = model_->bodies();
+  bodies.read(model_->bodies_state(), bodies_);
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     if (!scene_.bodies[b].fixed) {
       smooth::to_si(units_, bodies_[b]);
       to_world(bodies_[b].position);
     }
   Diagnostics d;
-  d.potential_energy = model_.potential();
+  d.potential_energy = model_->potential();
   d.kinetic_energy = bodies.kinetic_energy();
   d.momentum = bodies.momentum();
   d.angular_momentum = bodies.angular_momentum();
@@ -145,15 +156,15 @@ void EventEngine::look() {
   d.contacts = static_cast<int>(driver_->motion().closed().size());
   // A point behind a face that has a border is not always in the body.
   const std::vector<ContactMode>& modes = driver_->motion().modes();
-  for (int i = 0; i < model_.contacts(); ++i) {
+  for (int i = 0; i < model_->contacts(); ++i) {
     const bool closed = modes[at(i)].mode != Mode::open;
     double rate = 0;
-    if (closed || std::isinf(model_.margin(i)))
-      d.penetration = std::max(d.penetration, -model_.gap(i, rate) * units_.length);
+    if (closed || std::isinf(model_->margin(i)))
+      d.penetration = std::max(d.penetration, -model_->gap(i, rate) * units_.length);
   }
   VectorXd g, rate, rest;
   MatrixXd W;
-  model_.joints(g, W, rate, rest);
+  model_->joints(g, W, rate, rest);
   if (g.size() > 0) d.drift = g.cwiseAbs().maxCoeff() * units_.length;
   smooth::to_si(units_, d);
   diagnostics_ = d;
@@ -169,8 +180,8 @@ void EventEngine::look_at_contacts() const {
   const std::vector<VectorXd> forces = motion.contact_forces();
   for (std::size_t k = 0; k < forces.size(); ++k) {
     const int contact = motion.closed()[k];
-    const FeaturePair& pair = model_.pair(contact);
-    const Touch touch = pair.look(model_.bodies().all());
+    const FeaturePair& pair = model_->pair(contact);
+    const Touch touch = pair.look(model_->bodies().all());
     ContactState c;
     c.first = pair.first;
     c.second = pair.second;
@@ -178,17 +189,17 @@ void EventEngine::look_at_contacts() const {
     to_world(c.point);
     c.normal = touch.normal;
     c.gap = units_.length * touch.gap;
-    c.force = units_.force() * model_.in_space(contact, forces[k]);
+    c.force = units_.force() * model_->in_space(contact, forces[k]);
     VectorXd slip(3);
     slip << 0, motion.slip(static_cast<int>(k));
-    c.slip = units_.speed() * model_.in_space(contact, slip);
+    c.slip = units_.speed() * model_->in_space(contact, slip);
     contacts_.push_back(c);
   }
 }
 
 Forces EventEngine::forces() const {
   driver_->state_with_forces();
-  Forces out = model_.forces_of(reactions_, driver_->motion().joint_forces());
+  Forces out = model_->forces_of(reactions_, driver_->motion().joint_forces());
   smooth::to_si(units_, scene_, out);
   for (JointForce& each : out.joints) to_world(each.at);
   for (SpringForce& each : out.springs) {
@@ -205,14 +216,69 @@ void EventEngine::look_at_events() {
     ContactEvent e;
     e.time = units_.time * from.time;
     e.kind = from.kind;
-    e.first = model_.pair(from.contact).first;
-    e.second = model_.pair(from.contact).second;
+    e.first = model_->pair(from.contact).first;
+    e.second = model_->pair(from.contact).second;
     e.before = units_.speed() * from.before;
     e.after = units_.speed() * from.after;
     e.lost = units_.energy() * from.lost;
     e.impulse = units_.mass * units_.speed() * from.impulse;
     events_.push_back(e);
   }
+}
+
+VectorXd EventEngine::coordinates_of(const std::vector<BodyState>& bodies) const {
+  const smooth::MovingBodies& moving = model_->bodies();
+  const int nq = model_->coordinates();
+  VectorXd y(nq + model_->velocities());
+  for (int k = 0; k < moving.count(); ++k) {
+    const BodyState& b = bodies[at(moving.body(k))];
+    Vector3d place = b.position / units_.length;
+    if (far()) place -= origin_;
+    const linalg::Quaternion& q = b.orientation;
+    y.segment<3>(7 * k) = place;
+    y.segment<4>(7 * k + 3) << q.w(), q.x(), q.y(), q.z();
+    y.segment<3>(nq + 6 * k) = b.velocity / units_.speed();
+    y.segment<3>(nq + 6 * k + 3) = q.conjugate() * (b.angular_velocity * units_.time);
+  }
+  return y;
+}
+
+// Contacts that a step has closed fall and are stopped by as much as the accelerations make of it.
+StartState EventEngine::exactness_of(SceneModel& model, const SteppedState& state,
+                                     const VectorXd& y) const {
+  constexpr double kSteps = 4, kLeast = 1e-6;
+  model.set(state.time / units_.time, y.data(), y.data() + model.coordinates());
+  VectorXd a;
+  model.forces(a);
+  model.divide_by_mass(a);
+  double fastest = 0;
+  for (int k = 0; k < model.bodies().count(); ++k)
+    fastest = std::max(fastest, a.segment<3>(6 * k).norm());
+  const double step = state.step / units_.time;
+  StartState out;
+  out.speed = kSteps * fastest * step + kLeast;
+  out.gap = out.speed * step + kLeast;
+  return out;
+}
+
+void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
+  // What a model remembers of earlier states is not in a saved one.
+  auto model = std::make_unique<SceneModel>(scene_, units_.time);
+  const VectorXd y = coordinates_of(state.bodies);
+  StartState start = exactness_of(*model, state, y);
+  start.so_far.events = so_far.events;
+  start.so_far.impacts = so_far.impacts;
+  start.so_far.contact_problems = so_far.contact_problems;
+  PhaseCounts& phases = start.so_far.phases;
+  phases.steps = so_far.steps;
+  phases.residuals = so_far.residual_evaluations;
+  phases.jacobians = so_far.jacobian_evaluations;
+  phases.projections = so_far.projections;
+  phases.error_test_failures = so_far.error_test_failures;
+  driver_ = std::make_unique<Driver>(*model, options_, state.time / units_.time, y, start);
+  model_ = std::move(model);
+  events_.clear();
+  look();
 }
 
 void EventEngine::save(std::ostream& out) const {
@@ -266,7 +332,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
               m.kept_energy, m.lost, m.first_energy, at_one_time, events, impacts);
   if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass ||
       size != static_cast<std::uint64_t>(now_.size()) ||
-      contacts != static_cast<std::uint64_t>(model_.contacts()))
+      contacts != static_cast<std::uint64_t>(model_->contacts()))
     throw std::runtime_error("the saved state is of another scene: of another size");
   m.at_one_time = static_cast<long>(at_one_time);
   m.events = static_cast<long>(events);
@@ -280,7 +346,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
     ContactMode& each = m.modes.emplace_back();
     each.mode = static_cast<Mode>(mode);
     const bool slides = each.mode == Mode::slide;
-    if (mode < 0 || mode > 2 || (directions != model_.tangents() && (slides || directions != 0)))
+    if (mode < 0 || mode > 2 || (directions != model_->tangents() && (slides || directions != 0)))
       throw std::runtime_error(kDamaged);
     each.direction.resize(directions);
     for (double& x : each.direction) binary::get(in, x);
@@ -294,11 +360,11 @@ void EventEngine::restore(std::istream& in, Restore how) {
     throw std::runtime_error(kDamaged);
   events_.clear();
   if (how == Restore::near) {
-    driver_ =
-        std::make_unique<Driver>(model_, options_, reached, VectorXd(saved.head(saved.size() - 1)));
+    driver_ = std::make_unique<Driver>(*model_, options_, reached,
+                                       VectorXd(saved.head(saved.size() - 1)));
     return look();
   }
-  driver_ = std::make_unique<Driver>(model_, options_, m);
+  driver_ = std::make_unique<Driver>(*model_, options_, m);
   bool arrives = false;
   try {
     arrives = driver_->arrive(reached);
@@ -314,39 +380,15 @@ void EventEngine::restore(std::istream& in, Restore how) {
 
 }  // namespace
 
-const char* name(ContactEvent::Kind kind) {
-  switch (kind) {
-    case ContactEvent::Kind::impact:
-      return "impact";
-    case ContactEvent::Kind::touch:
-      return "touch";
-    case ContactEvent::Kind::lift:
-      return "lift";
-    case ContactEvent::Kind::slip:
-      return "slip";
-    case ContactEvent::Kind::stop:
-      return "stop";
-    case ContactEvent::Kind::rest:
-      return "rest";
-    case ContactEvent::Kind::jam:
-      return "jam";
-    case ContactEvent::Kind::border:
-      return "border";
-    case ContactEvent::Kind::hand_over:
-      return "hand_over";
-  }
-  return "?";
-}
-
-const std::vector<ContactEvent>& Engine::events() const {
-  static const std::vector<ContactEvent> none;
-  return none;
+std::unique_ptr<event::ResumableEngine> event::make_resumable_engine(const Scene& scene,
+                                                                     Begin begin) {
+  const std::string no = event_engine_refusal(scene);
+  if (!no.empty()) throw std::invalid_argument(no);
+  return std::make_unique<EventEngine>(scene, begin);
 }
 
 std::unique_ptr<Engine> make_event_engine(const Scene& scene) {
-  const std::string no = event_engine_refusal(scene);
-  if (!no.empty()) throw std::invalid_argument(no);
-  return std::make_unique<EventEngine>(scene);
+  return event::make_resumable_engine(scene, event::Begin::at_start);
 }
 
 }  // namespace tether::scene

@@ -1,11 +1,17 @@
-// Tether: events, and steps from where they cannot go on. SPDX-License-Identifier: BSD-3-Clause
+// Tether: events, and steps where they cannot go on. SPDX-License-Identifier: BSD-3-Clause
+//
+// Steps stand in until they have brought the bodies to where the same contacts stay closed: what
+// events could not decide or end (accumulation, a storm) is over then.
 #include <algorithm>
+#include <cmath>
 #include <istream>
 #include <iterator>
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
+#include "event/resumable.hpp"
 #include "output/binary.hpp"
 #include "output/saved_bodies.hpp"
 #include "stepping/stepping_engine.hpp"
@@ -14,8 +20,15 @@ namespace tether::scene {
 
 namespace {
 
-constexpr char kHandedOver[8] = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '1'};
-constexpr std::uint64_t kLongestWhy = 100000;
+constexpr char kHandedOver[8] = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '2'};
+constexpr char kHandedOverOnce[8] = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '1'};
+constexpr std::uint64_t kLongestWhy = 100000, kMostClosed = 100000;
+constexpr const char* kUnsound = "the saved state is damaged";
+
+// Steps go on until this many of them have left the same contacts closed. It doubles where events
+// have come less far than that before they were given up again.
+constexpr std::int64_t kCalmSteps = 20, kMostCalmSteps = std::int64_t{1} << 40;
+constexpr std::uint64_t kMostHandOvers = 1000;  // then steps go to the end
 
 /// Those that the event engine has.
 template <class Counts, class F>
@@ -25,36 +38,46 @@ void each_number(Counts& c, const F& f) {
     f(*n);
 }
 
-/// A state of the event engine until the hand-over; behind it that of the stepping engine, after
-/// the bodies (for a scene of steps alone), the time and why.
+/// Those that the stepping engine has.
+void add_steps(Counts& sum, const Counts& c) {
+  sum.steps += c.steps;
+  sum.contact_problems += c.contact_problems;
+  sum.sweeps += c.sweeps;
+  sum.unsolved += c.unsolved;
+  sum.accepted += c.accepted;
+  sum.halved += c.halved;
+  sum.error_test_failures += c.error_test_failures;
+}
+
+double energy_of(const Engine& engine) {
+  const Diagnostics d = engine.diagnostics();
+  return d.kinetic_energy + d.potential_energy;
+}
+
+/// A state of the event engine until the first hand-over; then, after the bodies (for a scene of
+/// steps alone), the hand-overs and the state of the engine that is at work.
 class EventsThenSteps final : public Engine {
  public:
-  explicit EventsThenSteps(const Scene& scene) : scene_(scene) {
+  EventsThenSteps(const Scene& scene, event::MakeResumable make)
+      : step_(scene.stepping.value_or(SteppingOptions{}).step),
+        scene_(scene),
+        make_(std::move(make)) {
     scene_.event->otherwise = Otherwise::stop;
     steps_scene_ = scene_;
     steps_scene_.event.reset();
     steps_scene_.engine = EngineChoice::stepping;
     try {
-      events_ = make_event_engine(scene_);
-      pass_interrupts_to(*events_);
+      begin_events(event::Begin::at_start);
     } catch (const SimulationError& e) {  // in impacts at the start
+      begin_events(event::Begin::later);
       begin_steps();
-      tell({0, e.what(), {}});
+      tell({0, e.what(), {}, {}, 0}, energy_of(*steps_));
     }
   }
 
   const char* name() const override { return "event"; }
   double time() const override { return now().time(); }
-
-  void advance(double t) override {
-    if (!steps_) try {
-        events_->advance(t);
-        return tell_events();
-      } catch (const SimulationError& e) {
-        take_over(e.what());
-      }
-    steps_->advance(t);
-  }
+  void advance(double t) override;
 
   const std::vector<BodyState>& bodies() const override { return now().bodies(); }
   Diagnostics diagnostics() const override { return now().diagnostics(); }
@@ -62,39 +85,44 @@ class EventsThenSteps final : public Engine {
   Forces forces() const override { return now().forces(); }
   const std::vector<ContactEvent>& events() const override { return told_; }
   std::vector<EffectCost> costs() const override { return now().costs(); }
-  std::optional<HandOver> hand_over() const override { return hand_over_; }
+  const std::vector<HandOver>& hand_overs() const override { return hand_overs_; }
 
   Counts counts() const override {
-    Counts c = now().counts();
-    if (!hand_over_) return c;
-    const double step = scene_.stepping.value_or(SteppingOptions{}).step;
-    c.steps -= static_cast<long>(hand_over_->time / step);  // counted from t = 0
-    c.events = hand_over_->before.events;
-    c.impacts = hand_over_->before.impacts;
+    if (hand_overs_.empty()) return events_->counts();
+    Counts c = steps_before_;
+    if (steps_) add_steps(c, counts_of_steps());
+    const Counts of_events = counts_of_events();
+    c.events = of_events.events;
+    c.impacts = of_events.impacts;
     return c;
   }
-
-  void save(std::ostream& out) const override {
-    if (!steps_) return events_->save(out);
-    put_bodies(out, time(), bodies());
-    out.write(kHandedOver, sizeof kHandedOver);
-    each_number(hand_over_->before,
-                [&](long n) { binary::put(out, static_cast<std::int64_t>(n)); });
-    binary::put(out, hand_over_->time, static_cast<std::uint64_t>(hand_over_->why.size()));
-    out << hand_over_->why;
-    steps_->save(out);
+  Counts counts_of_events() const override {
+    return steps_ ? hand_overs_.back().before : events_->counts();
   }
 
+  void save(std::ostream& out) const override;
   void restore(std::istream& in, Restore how) override;
 
  private:
-  const Engine& now() const { return steps_ ? static_cast<const Engine&>(*steps_) : *events_; }
+  const Engine& now() const {
+    return steps_ ? static_cast<const Engine&>(*steps_) : static_cast<const Engine&>(*events_);
+  }
   void pass_interrupts_to(Engine& engine) {
     engine.stop_when([this] { return interrupted(); });
+  }
+  void begin_events(event::Begin begin) {
+    events_ = make_(scene_, begin);
+    pass_interrupts_to(*events_);
+    from_events_ = 0;
   }
   void begin_steps() {
     steps_ = std::make_unique<stepping::SteppingEngine>(steps_scene_);
     pass_interrupts_to(*steps_);
+  }
+  Counts counts_of_steps() const {
+    Counts c = steps_->counts();
+    c.steps -= static_cast<long>(hand_overs_.back().time / step_);  // counted from t = 0
+    return c;
   }
 
   void tell_events() {
@@ -102,27 +130,161 @@ class EventsThenSteps final : public Engine {
     told_.insert(told_.end(), all.begin() + static_cast<std::ptrdiff_t>(from_events_), all.end());
     from_events_ = all.size();
   }
-  void tell(HandOver hand_over) {
+  void tell(HandOver hand_over, double energy) {
     ContactEvent event;
     event.time = hand_over.time;
     event.kind = ContactEvent::Kind::hand_over;
     told_.push_back(event);
-    hand_over_ = std::move(hand_over);
+    hand_overs_.push_back(std::move(hand_over));
+    energy_ = energy;
+    calm_ = 0;
+    closed_.clear();
   }
-  void take_over(const std::string& why) {
-    tell_events();
-    begin_steps();
-    tell({events_->time(), why, events_->counts()});
-    steps_->begin_at(events_->time(), events_->bodies());
-  }
+  void take_over(const std::string& why);
+  void look_back();
+  void give_back();
+  bool may_give_back() const;
+  void put_hand_overs(std::ostream& out) const;
+  void get_hand_over(std::istream& in, bool once);
+  void get_hand_overs(std::istream& in);
 
+  double step_;
   Scene scene_, steps_scene_;
-  std::unique_ptr<Engine> events_;
-  std::unique_ptr<stepping::SteppingEngine> steps_;  // from the hand-over on
-  std::optional<HandOver> hand_over_;
+  event::MakeResumable make_;
+  std::unique_ptr<event::ResumableEngine> events_;
+  std::unique_ptr<stepping::SteppingEngine> steps_;  // while they stand in
+  std::vector<HandOver> hand_overs_;
   std::vector<ContactEvent> told_;
   std::size_t from_events_ = 0;
+  Counts steps_before_;  // of steps that have given back
+  double energy_ = 0;    // at the last hand-over
+  std::int64_t calm_ = 0, enough_ = kCalmSteps;
+  std::vector<int> closed_;  // contacts, for `calm_` steps
 };
+
+void EventsThenSteps::advance(double t) {
+  const double slack = 1e-9 * step_;  // as the stepping engine has it
+  while (true) {
+    if (!steps_) try {
+        events_->advance(t);
+        return tell_events();
+      } catch (const SimulationError& e) {
+        take_over(e.what());
+      }
+    while (steps_ && time() < t - slack) {
+      const double before = time();
+      steps_->advance(before + 0.5 * step_);
+      if (!(time() > before)) return;  // interrupted
+      look_back();
+    }
+    if (steps_ || time() >= t) return;
+  }
+}
+
+void EventsThenSteps::take_over(const std::string& why) {
+  tell_events();
+  const double since = hand_overs_.empty() ? 0 : *hand_overs_.back().back;
+  const double calm = static_cast<double>(enough_) * step_;
+  if (events_->time() - since >= calm)
+    enough_ = kCalmSteps;
+  else if (!hand_overs_.empty())
+    enough_ = std::min(2 * enough_, kMostCalmSteps);
+  begin_steps();
+  tell({events_->time(), why, events_->counts(), {}, 0}, energy_of(*events_));
+  steps_->begin_at(events_->time(), events_->bodies());
+}
+
+// Not where the event engine has had all the work that it may have.
+bool EventsThenSteps::may_give_back() const {
+  const EventOptions& options = *scene_.event;
+  const Counts& before = hand_overs_.back().before;
+  return before.events <= options.max_events && before.steps <= options.max_steps &&
+         hand_overs_.size() < kMostHandOvers;
+}
+
+void EventsThenSteps::look_back() {
+  if (!may_give_back()) return;
+  std::optional<std::vector<int>> closed = events_->closed_in({time(), bodies(), step_});
+  calm_ = closed && (calm_ == 0 || *closed == closed_) ? calm_ + 1 : 0;
+  if (closed) closed_ = std::move(*closed);
+  if (calm_ < enough_) return;
+  try {
+    give_back();
+  } catch (const SimulationError&) {
+    enough_ = std::min(2 * enough_, kMostCalmSteps);
+  } catch (const std::invalid_argument&) {
+    enough_ = std::min(2 * enough_, kMostCalmSteps);
+  }
+}
+
+void EventsThenSteps::give_back() {
+  HandOver& last = hand_overs_.back();
+  events_->resume({time(), bodies(), step_}, last.before);
+  from_events_ = 0;
+  double lost = energy_ - energy_of(*events_);
+  for (const ContactEvent& each : events_->events()) lost -= each.lost;
+  last.back = time();
+  last.lost = lost;
+  ContactEvent event;
+  event.time = time();
+  event.kind = ContactEvent::Kind::resume;
+  event.lost = lost;
+  told_.push_back(event);
+  add_steps(steps_before_, counts_of_steps());
+  steps_.reset();
+  tell_events();
+}
+
+void EventsThenSteps::put_hand_overs(std::ostream& out) const {
+  binary::put(out, static_cast<std::uint64_t>(hand_overs_.size()));
+  for (const HandOver& each : hand_overs_) {
+    each_number(each.before, [&](long n) { binary::put(out, static_cast<std::int64_t>(n)); });
+    binary::put(out, each.time, each.back.value_or(-1), each.lost,
+                static_cast<std::uint64_t>(each.why.size()));
+    out << each.why;
+  }
+  binary::put(out, energy_, calm_, enough_, static_cast<std::uint64_t>(closed_.size()));
+  for (const int contact : closed_) binary::put(out, static_cast<std::int32_t>(contact));
+}
+
+void EventsThenSteps::save(std::ostream& out) const {
+  if (hand_overs_.empty()) return events_->save(out);
+  put_bodies(out, time(), bodies());
+  out.write(kHandedOver, sizeof kHandedOver);
+  put_hand_overs(out);
+  now().save(out);
+}
+
+void EventsThenSteps::get_hand_over(std::istream& in, bool once) {
+  HandOver& each = hand_overs_.emplace_back();
+  each_number(each.before, [&](long& n) { n = static_cast<long>(binary::get<std::int64_t>(in)); });
+  std::uint64_t length = 0;
+  double back = -1;
+  binary::get(in, each.time);
+  if (!once) binary::get(in, back, each.lost);
+  binary::get(in, length);
+  if (length > kLongestWhy || !std::isfinite(each.time) || !std::isfinite(each.lost) ||
+      !std::isfinite(back))
+    throw std::runtime_error(kUnsound);
+  if (back >= 0) each.back = back;
+  each.why.resize(length);
+  in.read(each.why.data(), static_cast<std::streamsize>(length));
+}
+
+void EventsThenSteps::get_hand_overs(std::istream& in) {
+  const auto count = binary::get<std::uint64_t>(in);
+  if (count == 0 || count > kMostHandOvers) throw std::runtime_error(kUnsound);
+  for (std::uint64_t k = 0; k < count; ++k) {
+    if (k > 0 && !hand_overs_.back().back) throw std::runtime_error(kUnsound);
+    get_hand_over(in, false);
+  }
+  std::uint64_t closed = 0;
+  binary::get(in, energy_, calm_, enough_, closed);
+  if (!std::isfinite(energy_) || calm_ < 0 || enough_ < kCalmSteps || enough_ > kMostCalmSteps ||
+      closed > kMostClosed)
+    throw std::runtime_error(kUnsound);
+  for (std::uint64_t k = 0; k < closed; ++k) closed_.push_back(binary::get<std::int32_t>(in));
+}
 
 void EventsThenSteps::restore(std::istream& in, Restore how) {
   const std::string all{std::istreambuf_iterator<char>(in), {}};
@@ -135,37 +297,46 @@ void EventsThenSteps::restore(std::istream& in, Restore how) {
     content.read(magic, sizeof magic);
   }
   told_.clear();
-  from_events_ = 0;
-  if (!content || !std::equal(magic, magic + sizeof magic, kHandedOver)) {
-    if (!events_) events_ = make_event_engine(scene_);
-    pass_interrupts_to(*events_);
-    steps_.reset();
-    hand_over_.reset();
-    std::istringstream whole(all);
-    events_->restore(whole, how);
-    if (whole.peek() != std::char_traits<char>::eof())
-      throw std::runtime_error("the saved state is longer than this scene needs");
-    return;
+  hand_overs_.clear();
+  closed_.clear();
+  steps_.reset();
+  steps_before_ = Counts();
+  const bool once = std::equal(magic, magic + sizeof magic, kHandedOverOnce);
+  const bool ever = once || std::equal(magic, magic + sizeof magic, kHandedOver);
+  begin_events(event::Begin::later);
+  if (!content || !ever) {
+    content = std::istringstream(all);
+    events_->restore(content, how);
+  } else {
+    if (once)
+      get_hand_over(content, true);
+    else
+      get_hand_overs(content);
+    if (hand_overs_.back().back) {
+      events_->restore(content, how);
+    } else {
+      begin_steps();
+      steps_->restore(content, how);
+      if (once) energy_ = energy_of(*steps_);
+    }
   }
-  HandOver was;
-  std::uint64_t length = 0;
-  each_number(was.before,
-              [&](long& n) { n = static_cast<long>(binary::get<std::int64_t>(content)); });
-  binary::get(content, was.time, length);
-  if (length > kLongestWhy) throw std::runtime_error("the saved state is damaged");
-  was.why.resize(length);
-  content.read(was.why.data(), static_cast<std::streamsize>(length));
-  begin_steps();
-  steps_->restore(content, how);
   if (content.peek() != std::char_traits<char>::eof())
     throw std::runtime_error("the saved state is longer than this scene needs");
-  hand_over_ = std::move(was);
 }
 
 }  // namespace
 
+const std::vector<HandOver>& Engine::hand_overs() const {
+  static const std::vector<HandOver> none;
+  return none;
+}
+
+std::unique_ptr<Engine> event::make_events_then_steps(const Scene& scene, MakeResumable make) {
+  return std::make_unique<EventsThenSteps>(scene, std::move(make));
+}
+
 std::unique_ptr<Engine> make_event_engine_with_steps(const Scene& scene) {
-  return std::make_unique<EventsThenSteps>(scene);
+  return event::make_events_then_steps(scene, event::make_resumable_engine);
 }
 
 }  // namespace tether::scene

@@ -139,7 +139,8 @@ std::string others(const Plan& plan) {
   const bool free = plan.invariants == 0;  // only the smooth engine keeps some
   if (plan.engine == EngineKind::event && plan.then_steps > 0)
     return fmt::format(
-        "          where it cannot go on, [stepping] takes over, at steps of {:g} s\n",
+        "          where it cannot go on, [stepping] takes over, at steps of {:g} s, and gives "
+        "back\n",
         plan.then_steps);
   if (plan.engine == EngineKind::event)
     return "          [stepping] could move it, too, at fixed steps or within an accuracy\n";

@@ -80,6 +80,21 @@ void print_events(const Summary& s, const Counts& c) {
              c.steps, c.residual_evaluations, c.jacobian_evaluations, c.error_test_failures);
 }
 
+void print_hand_overs(const Scene& scene, const RunResult& r) {
+  constexpr std::size_t kTold = 5;
+  for (std::size_t k = 0; k < std::min(kTold, r.hand_overs.size()); ++k) {
+    const HandOver& each = r.hand_overs[k];
+    fmt::print(
+        "  HANDED OVER  at {:.9g} s events could not go on; steps of {:g} s did{}: {}\n", each.time,
+        scene.stepping.value_or(SteppingOptions{}).step,
+        each.back ? fmt::format(" until {:.9g} s, and took {:.3g} J", *each.back, each.lost) : "",
+        each.why);
+  }
+  if (r.hand_overs.size() > kTold)
+    fmt::print("               and {} times more, the last time at {:.9g} s\n",
+               r.hand_overs.size() - kTold, r.hand_overs.back().time);
+}
+
 void print_work(const Scene& scene, const Summary& s, const Counts& c) {
   if (c.contact_problems > 0) {
     fmt::print("  contacts     at most {}; penetration {:.2e} m; residual {:.2e}\n", s.contacts,
@@ -115,12 +130,9 @@ void print_summary(const Scene& scene, const RunResult& r) {
   fmt::print(
       "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
       s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
-  if (r.engine == "event") print_events(s, r.hand_over ? r.hand_over->before : c);
-  if (r.hand_over)
-    fmt::print("  HANDED OVER  at {:.9g} s events could not go on; steps of {:g} s did: {}\n",
-               r.hand_over->time, scene.stepping.value_or(SteppingOptions{}).step,
-               r.hand_over->why);
-  if (r.engine != "event" || r.hand_over) print_work(scene, s, c);
+  if (r.engine == "event") print_events(s, r.counts_of_events);
+  print_hand_overs(scene, r);
+  if (r.engine != "event" || !r.hand_overs.empty()) print_work(scene, s, c);
   for (const std::string& warning : r.warnings)
     fmt::print("  WARNING      {}\n", on_terminal(warning));
   if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, on_terminal(r.failure));

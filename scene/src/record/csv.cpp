@@ -45,7 +45,7 @@ class CsvRecorder : public Recorder {
     add(d.kinetic_energy), add(d.potential_energy), add(energy), add(energy - start_energy_);
     add3(d.momentum), add3(d.angular_momentum);
     add(d.drift);
-    if (tells_steps_) add(engine.hand_over() ? 1 : 0);
+    if (tells_steps_) add(engine.in_steps() ? 1 : 0);
     const Forces forces = forces_ ? total_forces(engine) : Forces();
     for (const mechanics::Column& column : columns_) add(column.value(d, forces));
     for (const std::size_t i : moving_) {

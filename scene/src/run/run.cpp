@@ -131,7 +131,7 @@ class Run {
  private:
   // Where events cannot go on, steps can.
   void hand_over() {
-    if (make_plan(scene_).engine != EngineKind::event || engine_->hand_over()) return;
+    if (make_plan(scene_).engine != EngineKind::event || engine_->in_steps()) return;
     if (scene_.output.state.empty()) {
       result_.remarks.emplace_back(
           "with [event] otherwise = \"stepping\" (--otherwise stepping) the run goes on in steps "
@@ -163,7 +163,8 @@ class Run {
   void move(double time) {
     const Stopwatch watch;
     engine_->advance(time);
-    if (!step_ && engine_->hand_over()) step_ = scene_.stepping.value_or(SteppingOptions{}).step;
+    if (!step_ && !engine_->hand_overs().empty())
+      step_ = scene_.stepping.value_or(SteppingOptions{}).step;
     result_.seconds += watch.processor();
     result_.wall += watch.wall();
   }
@@ -217,7 +218,7 @@ class Run {
   }
 
   void look_for_fast_turns() {
-    if (!step_) return;
+    if (!step_ || (!engine_->hand_overs().empty() && !engine_->in_steps())) return;
     for (std::size_t i = 0; i < scene_.bodies.size(); ++i)
       if (const double turn = *step_ * engine_->bodies()[i].angular_velocity.norm();
           turn > fastest_turn_) {
@@ -229,7 +230,8 @@ class Run {
   void finish() {
     result_.time = engine_->time();
     result_.counts = engine_->counts();
-    result_.hand_over = engine_->hand_over();
+    result_.hand_overs = engine_->hand_overs();
+    result_.counts_of_events = engine_->counts_of_events();
     result_.costs = engine_->costs();
     result_.judgements = judge_.judgements();
     for (const auto& recorder : recorders_) recorder->finish(result_.written, result_.remarks);

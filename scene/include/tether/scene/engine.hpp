@@ -69,15 +69,16 @@ struct Forces {
 /// What happened to one contact at an instant of the event engine. An instant may have several.
 struct ContactEvent {
   enum class Kind : std::uint8_t {
-    impact,    ///< a gap closes with speed
-    touch,     ///< a gap closes without
-    lift,      ///< a normal force vanishes
-    slip,      ///< a stuck contact begins to slide
-    stop,      ///< a slip vanishes
-    rest,      ///< impacts accumulate: `time` is when the last one is over
-    jam,       ///< sliding has no forces any more: an impact without collision
-    border,    ///< a contact leaves its face
-    hand_over  ///< steps take over from here on; of no contact
+    impact,     ///< a gap closes with speed
+    touch,      ///< a gap closes without
+    lift,       ///< a normal force vanishes
+    slip,       ///< a stuck contact begins to slide
+    stop,       ///< a slip vanishes
+    rest,       ///< impacts accumulate: `time` is when the last one is over
+    jam,        ///< sliding has no forces any more: an impact without collision
+    border,     ///< a contact leaves its face
+    hand_over,  ///< steps take over from here on; of no contact
+    resume      ///< events go on; `lost` is what the steps took. Of no contact
   };
   double time = 0;  ///< s
   Kind kind = Kind::impact;
@@ -109,7 +110,9 @@ struct Counts {
 struct HandOver {
   double time = 0;  ///< s
   std::string why;
-  Counts before;  ///< of the event engine
+  Counts before;               ///< of the event engine, since the start
+  std::optional<double> back;  ///< when events went on, s; nothing: steps have it
+  double lost = 0;             ///< energy that the steps took, friction's work with it, J
 };
 
 /// Wall time spent on one effect since the start, s.
@@ -142,9 +145,12 @@ class Engine {
   /// Since the start, or the state that was restored.
   virtual const std::vector<ContactEvent>& events() const;
   virtual Counts counts() const = 0;
-  /// Whether steps have taken over (EventOptions::otherwise); counts() has their work then, and the
-  /// events before.
-  virtual std::optional<HandOver> hand_over() const { return {}; }
+  /// Where steps have taken over (EventOptions::otherwise), and given back. With any, counts() has
+  /// the work of steps and the number of events.
+  virtual const std::vector<HandOver>& hand_overs() const;
+  /// Work of the event engine, also of one that steps stand in for.
+  virtual Counts counts_of_events() const { return counts(); }
+  bool in_steps() const { return !hand_overs().empty() && !hand_overs().back().back; }
   virtual std::vector<EffectCost> costs() const = 0;
   /// Writes the state without changing it. An engine of the same scene that restores it continues
   /// bit by bit.
@@ -171,7 +177,8 @@ Forces total_forces(const Engine& engine);
 std::unique_ptr<Engine> make_smooth_engine(const Scene& scene);
 std::unique_ptr<Engine> make_stepping_engine(const Scene& scene);
 std::unique_ptr<Engine> make_event_engine(const Scene& scene);
-/// Events, and steps from where these cannot go on. Its time then is that of a boundary of steps.
+/// Events, and steps where these cannot go on, until what they could not decide is over. In steps
+/// its time is that of a boundary of them.
 std::unique_ptr<Engine> make_event_engine_with_steps(const Scene& scene);
 /// Why the event engine cannot move the scene; empty: it can.
 std::string event_engine_refusal(const Scene& scene);

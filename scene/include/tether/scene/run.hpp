@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <tether/export.hpp>
 #include <tether/scene/engine.hpp>
@@ -63,7 +62,8 @@ struct RunResult {
   double whole_wall = 0, whole_seconds = 0;  ///< of the whole run, with what it records
   std::string failure;                       ///< why the run could not go on; empty: it could
   bool interrupted = false;                  ///< RunOptions::interrupted ended it
-  std::optional<HandOver> hand_over;  ///< from events to steps; counts has those of the steps
+  std::vector<HandOver> hand_overs;  ///< from events to steps, and back; see Engine::hand_overs()
+  Counts counts_of_events;           ///< with hand-overs; `counts` has those of steps then
   Summary summary;
   Counts counts;
   std::vector<EffectCost> costs;

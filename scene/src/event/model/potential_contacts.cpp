@@ -19,7 +19,7 @@ namespace tether::scene::event {
 namespace {
 
 /// More than these belong to stepping: every contact is looked at in every step.
-constexpr std::size_t kMostContacts = 4000;
+constexpr std::size_t kMostContacts = 16000;
 constexpr long kMostMoving = 100;
 
 PlaneFeature plane_of(const Shape& shape) {
