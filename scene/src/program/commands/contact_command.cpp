@@ -61,11 +61,14 @@ Status run_cones(const Arguments& arguments, const std::string& file, const Cone
   const Options& o = arguments.options;
   const ConeSolution s = ConeSolver(o).solve(problem);
   const auto blocks = static_cast<int>(problem.cones().size());
+  const double dissipation = s.impulses.dot(s.velocities);
+  const double energy_change = 0.5 * s.impulses.dot(s.velocities - problem.b());
   if (arguments.csv) {
-    std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%d,0,nan,nan,nan,nan,nan,%.3e,nan,nan\n",
-                table_field(file).c_str(), blocks, name(o.law), name(o.method), o.tolerance,
-                name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
-                s.counts.factorisations, s.error);
+    // The other measures are of contacts of one kind: empty.
+    std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%d,,,,,%.3e,%.3e,%.3e,,\n", table_field(file).c_str(),
+                blocks, name(o.law), name(o.method), o.tolerance, name(s.status), s.error,
+                s.counts.sweeps, s.counts.admm_iterations, s.counts.factorisations, dissipation,
+                energy_change, s.error);
     return s.status;
   }
   std::printf("%s: %d cones of %d rows, %s\n", on_terminal(file).c_str(), blocks, problem.rows(),
@@ -73,6 +76,7 @@ Status run_cones(const Arguments& arguments, const std::string& file, const Cone
   std::printf("  %s, error %.3e; %d sweeps, %d ADMM iterations, %d factorisations\n",
               name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
               s.counts.factorisations);
+  std::printf("  energy change %.9e\n", energy_change);
   if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
   return s.status;
 }
