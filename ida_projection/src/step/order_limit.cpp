@@ -17,6 +17,7 @@ constexpr int kSamples = 6, kSamplesAgain = 3;         // in the mean
 constexpr long kEarly = 10, kTrial = 40;         // steps with the limit; it is judged after them
 constexpr double kHopeless = 0.5, kWorth = 0.9;  // of the step before it
 constexpr double kPatience = 0.5;                // of these where vibrations are likely
+constexpr long kFirstSteps = 60;                 // steps: what is stiff is excited by a start
 constexpr long kFirstWait = 100;                 // steps, after a limit that did not pay
 constexpr int kTries = 8;
 constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
@@ -29,6 +30,7 @@ void OrderLimit::reset() {
   on_ = wanted_;
   stiff_ = false;
   begun_ = 0;
+  early_ = acted_early_ = false;
   pending_steps_ = -1;
   samples_ = highest_ = 0;
   kept_ = false;
@@ -48,7 +50,7 @@ void OrderLimit::note_differences(long steps, double ycor, double curvature) {
   int order = 1;
   IDAGetCurrentOrder(ida_mem_, &order);
   pending_steps_ = -1;
-  if (order < (phase_ == Phase::limited ? kLimit : 3)) return;
+  if (order < (phase_ == Phase::limited || at_start(steps) ? kLimit : 3)) return;
   if (!(ycor > 0.0) || !(curvature > 0.0)) return;
   pending_ = std::log(ycor / curvature) / (order - 1);
   pending_steps_ = steps;
@@ -80,9 +82,22 @@ double OrderLimit::control(long steps, double t, double norm) {
   return 1.0;
 }
 
+// A start excites what is stiff; orders 3 and 4, which IDA has after a few steps, keep that up.
+bool OrderLimit::at_start(long steps) const {
+  return stiff_ && steps < kFirstSteps && begun_ == (acted_early_ ? 1 : 0);
+}
+
 void OrderLimit::watch(long steps, int order) {
   const int needed = kept_ ? kSamplesAgain : kSamples;
   take_sample(steps, needed);
+  early_ = at_start(steps) && order > kLimit && (samples_ == 0 || mean_ > kLogSmall);
+  if (early_) {
+    phase_ = Phase::lowering;
+    if (!acted_early_) ++begun_;
+    acted_early_ = true;
+    tries_ = 0;
+    return;
+  }
   if (samples_ < needed || mean_ < (stiff_ ? kLogLargeIfStiff : kLogLarge) || steps < not_before_ ||
       order <= kLimit)
     return;
@@ -95,6 +110,11 @@ void OrderLimit::watch(long steps, int order) {
 // IDA lowers its order by one where that makes the estimated error no larger: weights that
 // underflow make all estimates 0. Only where the error test would be passed: it is not made then.
 double OrderLimit::lower(int order, long steps, double t, double norm) {
+  if (order <= kLimit && early_) {
+    hold_step(false);
+    phase_ = Phase::watching;
+    return 1.0;
+  }
   if (order <= kLimit) {
     // IDA never raises the order beyond a limit that it has reached.
     IDASetMaxOrd(ida_mem_, kLimit);

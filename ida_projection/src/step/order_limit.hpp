@@ -16,8 +16,10 @@ namespace tether::ida_projection {
 /// 2 sin(w h / 2) of the oscillation that dominates the error. A motion worth resolving, of an
 /// amplitude of 1000 tolerances, has r < 0.4 at order 5. Where r stays large, the order is limited
 /// to 2. The limit ends where the steps become shorter with it, and where r shows that a higher
-/// order would pay. For three steps IDA's error weights are next to nothing: all its estimates are
-/// then zero, and it lowers the order by itself; IDAGetErrWeights is of no use there.
+/// order would pay. Where stiff components answer to moves the first steps return to order 2 each
+/// time that IDA raises it, unless r is small, without a limit that outlasts them. For three steps
+/// IDA's error weights are next to nothing: all its estimates are then zero, and it lowers the
+/// order by itself; IDAGetErrWeights is of no use there.
 class OrderLimit {
  public:
   OrderLimit(void* ida_mem, const Options& options)
@@ -48,6 +50,7 @@ class OrderLimit {
   enum class Phase { watching, lowering, limited };
 
   void take_sample(long steps, int most);
+  bool at_start(long steps) const;
   void watch(long steps, int order);
   double lower(int order, long steps, double t, double norm);
   void judge(long steps, double t);
@@ -66,9 +69,10 @@ class OrderLimit {
   double mean_ = 0.0;  // of log r
 
   int tries_ = 0, highest_ = 0;
-  bool kept_ = false;         // a limit that made the steps no shorter
-  double step_before_ = 0.0;  // the limit
-  long since_ = 0;            // steps when it was judged last
+  bool early_ = false, acted_early_ = false;  // lowering in the first steps: now, ever
+  bool kept_ = false;                         // a limit that made the steps no shorter
+  double step_before_ = 0.0;                  // the limit
+  long since_ = 0;                            // steps when it was judged last
   double t_since_ = 0.0;
   long trials_ = 0, duration_ = 1;  // of kTrial steps each, passed and at least wanted
   long not_before_ = 0, wait_ = 0;  // after one that made the steps shorter
