@@ -90,7 +90,7 @@ bool OrderLimit::at_start(long steps) const {
 void OrderLimit::watch(long steps, int order) {
   const int needed = kept_ ? kSamplesAgain : kSamples;
   take_sample(steps, needed);
-  early_ = at_start(steps) && order > kLimit && (samples_ == 0 || mean_ > kLogSmall);
+  early_ = at_start(steps) && order > kLimit && (samples_ == 0 || mean_ > kLogLargeIfStiff);
   if (early_) {
     phase_ = Phase::lowering;
     if (!acted_early_) ++begun_;
