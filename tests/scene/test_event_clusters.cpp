@@ -222,6 +222,16 @@ std::string dominoes(int count) {
 
 }  // namespace
 
+TEST_CASE("event: twelve dominoes are few enough, thirteen have too many pairs of features") {
+  const auto refusal = [](int count) {
+    return event_engine_refusal(parse_scene(
+        "[scene]\nend = 1\ngravity = [0, 0, -9.81]\nengine = \"event\"\n" + dominoes(count),
+        "test"));
+  };
+  CHECK(refusal(12).empty());
+  CHECK(refusal(13).find("more than 16000") != std::string::npos);
+}
+
 TEST_CASE("event: dominoes that share their forces fall as symmetric ones do") {
   // Once one of two feet was let go where the other could carry all, and the rest rattled askew:
   // 856 times of events at 1e-7 for four of them, 603 for five at 1e-6, centimetres off.
