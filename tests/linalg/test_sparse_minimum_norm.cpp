@@ -63,16 +63,14 @@ Eigen::VectorXd solve(SparseMinimumNorm& solver, const Eigen::VectorXd& g) {
   return dy;
 }
 
-/// Distances between n x n balls on a wavy surface, along both diagonals, too: more rows than the
-/// 3 n^2 - 6 ways to move them, and many that depend on others up to 1e-6 and less of themselves.
-SparseCase net(int n, double bend) {
+/// Distances between n x n balls at `place(i, j)`, along both diagonals, too: more rows than the
+/// 3 n^2 - 6 ways to move them.
+template <class Place>
+SparseCase net_on(int n, const Place& place) {
   SparseCase c;
   std::vector<Eigen::Vector3d> balls;
   for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) {
-      const double x = i / (n - 1.0) - 0.5, y = j / (n - 1.0) - 0.5;
-      balls.emplace_back(x, y, 0.1 * bend * std::sin(6.0 * x) * std::cos(5.0 * y));
-    }
+    for (int j = 0; j < n; ++j) balls.push_back(place(double(i), double(j)));
   std::vector<Eigen::Vector3d> directions;
   const auto link = [&](int a, int b) {
     directions.push_back(balls[static_cast<std::size_t>(b)] - balls[static_cast<std::size_t>(a)]);
@@ -97,6 +95,14 @@ SparseCase net(int n, double bend) {
   return c;
 }
 
+/// On a wavy surface: many rows depend on others up to 1e-6 and less of themselves.
+SparseCase net(int n, double bend) {
+  return net_on(n, [=](double i, double j) {
+    const double x = i / (n - 1.0) - 0.5, y = j / (n - 1.0) - 0.5;
+    return Eigen::Vector3d(x, y, 0.1 * bend * std::sin(6.0 * x) * std::cos(5.0 * y));
+  });
+}
+
 Eigen::VectorXd times(const SparseCase& c, const Eigen::VectorXd& x) {
   Eigen::VectorXd product = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(c.starts.size()) - 1);
   for (int i = 0; i < product.size(); ++i)
@@ -107,12 +113,12 @@ Eigen::VectorXd times(const SparseCase& c, const Eigen::VectorXd& x) {
   return product;
 }
 
-SparseMinimumNorm factored_net(const SparseCase& c) {
+SparseMinimumNorm factored_net(const SparseCase& c, double rank_tolerance = 1e-6) {
   SparseMinimumNorm solver;
   solver.resize(static_cast<int>(c.dense.D.size()), c.starts, c.columns, 0);
   std::copy(c.values.begin(), c.values.end(), solver.entries());
   std::copy_n(c.dense.D.data(), solver.columns(), solver.metric());
-  REQUIRE(solver.factor());
+  REQUIRE(solver.factor(rank_tolerance));
   return solver;
 }
 
@@ -250,6 +256,21 @@ TEST_CASE("nets of nearly dependent rows: solved, never longer than the least no
         contradiction = std::max(contradiction, solver.inconsistency(k));
       CHECK(contradiction < 1e-6);
     }
+}
+
+TEST_CASE("rows with large coefficients over those before are told from independent ones") {
+  // Rigid, with singular values from 5e-5 on. Of a dependent row with coefficients c, d is
+  // eps |c|^2: far above eps.
+  const int n = 14;
+  const SparseCase c = net_on(n, [=](double i, double j) -> Eigen::Vector3d {
+    return Eigen::Vector3d(i, j, 0.2 * i * i - 0.1 * j * j + 0.1 * i * j) / n;
+  });
+  SparseMinimumNorm solver = factored_net(c, 3.25e-7);
+  Eigen::MatrixXd A = dense_rows(c);
+  A.rowwise().normalize();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
+  qr.setThreshold(1e-10);
+  CHECK(solver.rank() == qr.rank());
 }
 
 TEST_CASE("every direction of a net, however thin: at most the least norm, and no residual grows") {

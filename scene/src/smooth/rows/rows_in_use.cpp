@@ -37,7 +37,6 @@ constexpr double kMuchWorse = 0.1;
 constexpr int kWait = 4;  // steps between looks while all pivots are good
 // Looking at dense rows costs the cube of their number. Of many, those of a tree are independent at
 // every state; those of closed loops are chosen by their entries.
-constexpr double kGoodByEntries = 0.03;  // in an order that looks at fill only
 constexpr double kLeastWeakByEntries = 1.2e-4;
 
 }  // namespace
@@ -144,7 +143,7 @@ void RowsInUse::choose(double tolerance) {
 void RowsInUse::choose_sparse() {
   multiplier_choices_ += sparse_->choose(std::max(weak_, kLeastWeakByEntries));
   weakest_ = sparse_->carriers().weakest;
-  wait_ = weakest_ > kGoodByEntries ? kWait : 1;
+  wait_ = weakest_ > sparse_->good() ? kWait : 1;
 }
 
 bool RowsInUse::choose() {

@@ -48,6 +48,7 @@ SparseJointGradient::SparseJointGradient(const JointRows& rows, const MovingBodi
   factors_.resize(6 * bodies.count(), starts_, std::move(columns), 0);
   std::fill_n(factors_.metric(), 6 * bodies.count(), 1.0);
   least_.setZero(6 * bodies.count());
+  rates_.setZero(rows.count());
 }
 
 void SparseJointGradient::factor() { factor(nullptr, kRankTolerance); }
@@ -94,9 +95,20 @@ void SparseJointGradient::solve(const Eigen::VectorXd& right, Eigen::VectorXd& a
                                 Eigen::VectorXd& lambda) {
   factors_.solve(right.data(), least_.data());
   factors_.multipliers(least_.data(), lambda.data());
+  a.setZero();
+  add_least(1.0, a);
+}
+
+void SparseJointGradient::release(Eigen::VectorXd& v) {
+  multiply(v, rates_);
+  factors_.solve(rates_.data(), least_.data());
+  add_least(-1.0, v);
+}
+
+void SparseJointGradient::add_least(double share, Eigen::VectorXd& a) const {
   for (int k = 0; k < bodies_.count(); ++k) {
-    a.segment<3>(6 * k) = least_.segment<3>(6 * k) / std::sqrt(bodies_.inertia(k).mass);
-    a.segment<3>(6 * k + 3) = roots_[at(k)] * least_.segment<3>(6 * k + 3);
+    a.segment<3>(6 * k) += share / std::sqrt(bodies_.inertia(k).mass) * least_.segment<3>(6 * k);
+    a.segment<3>(6 * k + 3) += share * (roots_[at(k)] * least_.segment<3>(6 * k + 3));
   }
 }
 

@@ -28,6 +28,8 @@ class SparseJointGradient {
   std::vector<int> dependent() const;
   /// Of least kinetic energy a^T M a / 2: a with G a = right, and lambda with M a = G^T lambda.
   void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda);
+  /// Takes from velocities v what the factored rows forbid.
+  void release(Eigen::VectorXd& v);
   /// Of G with each moving body's velocities.
   void multiply(const Eigen::VectorXd& a, Eigen::VectorXd& rates) const;
   /// Diagonal of G M^-1 G^T; after factor().
@@ -35,6 +37,7 @@ class SparseJointGradient {
 
  private:
   void factor(const char* wanted, double rank_tolerance);
+  void add_least(double share, Eigen::VectorXd& a) const;  // share times the last solution
   template <class Put>
   void each_entry(const Put& put) const;
 
@@ -43,7 +46,7 @@ class SparseJointGradient {
   std::vector<Eigen::Matrix3d> roots_;  // L of each moving body's inverse inertia L L^T
   std::vector<int> starts_;
   linalg::SparseMinimumNorm factors_;
-  Eigen::VectorXd least_;
+  Eigen::VectorXd least_, rates_;
 };
 
 }  // namespace tether::scene::smooth

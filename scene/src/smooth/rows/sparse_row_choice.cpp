@@ -5,10 +5,18 @@
 // of these can be chosen in its place. Where rows are independent but for a dead point at the start
 // is seen a little way off: behind a free move of length s they have pivots of order s, and rows
 // that are implied for good, once the loops are closed again, have none.
+//
+// Closed nets have rows that are independent for good and yet thin: n x n balls, both diagonals,
+// are one rigid body down to singular values of n^-4. Who leaves them out of the equations has
+// another mechanism, whose joints drift. The factors tell them from dependent ones to about
+// sqrt(eps) times the coefficients; the rest show in velocities that the others allow. What is thin
+// all along is no dead point: that is where pivots are much smaller than elsewhere.
 #include "sparse_row_choice.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "mechanics/quaternions.hpp"
 
@@ -16,14 +24,21 @@ namespace tether::scene::smooth {
 
 namespace {
 
-// GramFactor weighs the coefficients of rows up to d = 1e6 eps: then of all that are this short.
-constexpr double kDependentByEntries = 1.2e-4;
-constexpr double kWay = 1e-3;  // of the free move, of a link's length and in rad
+constexpr double kDependentByEntries = 1.3e-6;  // the least that A A^T + eps allows
+constexpr double kWay = 1e-3;                   // of the free move, of a link's length and in rad
 constexpr int kCloseMoves = 3;
 constexpr double kClosed = 1e-12;  // of a link's length
 constexpr double kStandsOut = 0.1, kGoodChoice = 0.03;
 constexpr double kMuchWorseChoice = 0.1;
-constexpr int kLooks = 16;  // from one search to the next
+constexpr int kLooks = 16;                      // from one search to the next
+constexpr double kUsual = 0.3, kUnusual = 0.1;  // of the best weakest pivot so far
+// Velocities that look for thin rows at once, how often what rows forbid is taken from each, and
+// what they must show of a row of unit length.
+constexpr int kProbes = 16, kReleases = 12, kMostRounds = 20;
+constexpr double kReleased = 1e-15, kShown = 1e-10;
+// Of what a velocity may show by error. A row too few changes the motion, and IDA stops (net of
+// 30 x 30 balls: one); one too many leaves a multiplier undetermined, which is borne (same net: 9).
+constexpr double kDoubt = 0.02;
 
 }  // namespace
 
@@ -39,8 +54,52 @@ SparseRowChoice::SparseRowChoice(JointRows& rows, MovingBodies& bodies)
   }
   const int count = independent_among(all_, kDependentByEntries).count;
   carriers_ = best(count, kDependentByEntries);
+  add_thin(carriers_);
+  const RowSet seen = independent_among(carriers_.has, kDependentByEntries);
+  seen_ = seen.count;
+  usual_ = seen.weakest;
   bodies_.set_state(bodies_.start().data());
-  kept_ = independent_among(all_, kDependentByEntries);
+  kept_ = carriers_;
+}
+
+// Rows that are too thin for the factors of A A^T. A velocity that all rows of the set allow, to
+// `left`, is known to left / (their least singular value) only.
+void SparseRowChoice::add_thin(RowSet& set) {
+  const int n = 6 * bodies_.count(), m = rows_.count();
+  if (set.count == m) return;
+  gradient_.factor(all_, kDependentByEntries);
+  const Eigen::VectorXd length = gradient_.size_of_rows().cwiseSqrt().cwiseMax(1e-300);
+  Eigen::VectorXd v(n), rates(m);
+  Eigen::MatrixXd shown(kProbes, m);
+  std::uint32_t random = 1;
+  for (int round = 0, added = 1; round < kMostRounds && added > 0; ++round) {
+    gradient_.factor(set.has, kDependentByEntries);
+    double left = 0;
+    for (int probe = 0; probe < kProbes; ++probe) {
+      for (double& component : v) {
+        random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
+        component = random / 4294967296.0 - 0.5;
+      }
+      double before = 1, now = 1;
+      for (int k = 0; k < kReleases && now > kReleased; ++k) {
+        gradient_.release(v);
+        v.normalize();
+        gradient_.multiply(v, rates);
+        rates = rates.cwiseQuotient(length);
+        shown.row(probe) = rates.transpose();
+        for (int i = 0; i < m; ++i) (set.has[at(i)] ? shown(probe, i) : rates[i]) = 0;
+        now = rates.cwiseAbs().maxCoeff();
+        if (k > 0 && now > 0.5 * before) break;
+        before = now;
+      }
+      left = std::max(left, now);
+    }
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(shown);
+    const double least = std::max(kShown, kDoubt * left / (0.25 * kDependentByEntries));
+    for (added = 0; added < kProbes && std::abs(qr.matrixR()(added, added)) > least; ++added)
+      set.has[at(qr.colsPermutation().indices()[added])] = 1;
+    set.count += added;
+  }
 }
 
 RowSet SparseRowChoice::independent_among(const std::vector<char>& wanted, double dependent) {
@@ -80,12 +139,9 @@ void SparseRowChoice::move(std::vector<double>& y, const Eigen::VectorXd& v) con
 void SparseRowChoice::move_freely(std::vector<double>& y) {
   const int n = 6 * bodies_.count();
   const double length = reach();
-  Eigen::VectorXd v(n), rates(rows_.count()), forbidden(n), multipliers(rows_.count());
+  Eigen::VectorXd v(n);
   for (int i = 0; i < n; ++i) v[i] = std::sin(1.0 + 12.9898 * i) * (i % 6 < 3 ? length : 1.0);
-  forbidden.setZero();
-  gradient_.multiply(v, rates);
-  gradient_.solve(rates, forbidden, multipliers);
-  v -= forbidden;
+  gradient_.release(v);
   double largest = 0;
   for (int i = 0; i < n; ++i)
     largest = std::max(largest, std::abs(v[i]) / (i % 6 < 3 ? length : 1.0));
@@ -120,14 +176,18 @@ RowSet SparseRowChoice::best(int count, double weak) {
   return independent_among(all_, weak);
 }
 
+double SparseRowChoice::good() const { return std::min(kGoodChoice, kUsual * usual_); }
+
 // There are never more independent rows than a little way off the start: at loose tolerances bodies
 // are off the joints by more than rounding, and rows that are implied seem independent.
 bool SparseRowChoice::choose(double weak) {
-  RowSet carried = independent_among(carriers_.has, kDependentByEntries);
-  if (carried.count < carriers_.count) carried.weakest = 0;
-  carriers_.weakest = carried.weakest;
+  const RowSet seen = independent_among(carriers_.has, kDependentByEntries);
+  if (seen.count >= seen_) usual_ = std::max(usual_, seen.weakest);
+  weak = std::min(weak, kUnusual * usual_);
+  RowSet carried = carriers_;
+  carried.weakest = carriers_.weakest = seen.count < seen_ ? 0 : seen.weakest;
   const bool as_it_was = carried.weakest > kMuchWorseChoice * weakest_found_ && --looks_left_ > 0;
-  if (carried.weakest > kGoodChoice || (as_it_was && carried.weakest > weak)) {
+  if (carried.weakest > good() || (as_it_was && carried.weakest > weak)) {
     kept_ = std::move(carried);
     return false;
   }
@@ -140,6 +200,7 @@ bool SparseRowChoice::choose(double weak) {
     return false;
   }
   carriers_ = kept_;
+  seen_ = kept_.count;
   return true;
 }
 

@@ -28,9 +28,12 @@ class SparseRowChoice {
   bool choose(double weak);
   bool keeps(int row) const { return kept_.has[at(row)] != 0; }
   const RowSet& carriers() const { return carriers_; }
+  /// From which weakest pivot of the carriers on nothing is to be feared for some steps.
+  double good() const;
 
  private:
   RowSet independent_among(const std::vector<char>& wanted, double dependent);
+  void add_thin(RowSet& set);
   RowSet best(int count, double weak);
   double reach() const;
   void move(std::vector<double>& y, const Eigen::VectorXd& v) const;
@@ -42,6 +45,8 @@ class SparseRowChoice {
   SparseJointGradient gradient_;
   std::vector<char> all_;
   RowSet kept_, carriers_;
+  int seen_ = 0;              // of the carriers, those that the factors tell from dependent ones
+  double usual_ = 1;          // the largest that their weakest pivot was so far
   double weakest_found_ = 0;  // of the carriers at the last search for better ones
   int looks_left_ = 0;        // until the next one
 };
