@@ -146,8 +146,10 @@ int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool
 }
 
 int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup) {
-  if (attempts_.steps < 0 && movers_.used != nullptr && unknowns_.contiguous)
-    keep_point_before(candidate, run_.start);
+  if (attempts_.steps < 0 && movers_.used != nullptr) {
+    quicken_vectors(candidate);
+    if (unknowns_.contiguous) keep_point_before(candidate, run_.start);
+  }
   if (movers_.used != nullptr && !run_.engaged && !variables_.index_known() &&
       control_.in_trouble(attempts_.steps)) {
     const Status engaged = engage_if_index_is_high(candidate);
@@ -379,7 +381,6 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
 
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
 Status Projection::Impl::engage(const Candidate& candidate) {
-  quicken_vectors(candidate);
   if (!variables_.known()) derive_id(candidate);
   if (variables_.any() && options_.suppress_algebraic) {
     IDASetId(ida_.mem(), variables_.id());

@@ -4,6 +4,7 @@
 #include <nvector/nvector_serial.h>
 
 #include "fast/kernels.hpp"
+#include "host/owned_vector.hpp"
 
 // A host without serial vectors may lack it: then there is nothing to be made fast.
 #pragma weak N_VNewEmpty_Serial
@@ -29,6 +30,19 @@ bool same_operations(const _generic_N_Vector_Ops& a, const _generic_N_Vector_Ops
          a.nvscalevectorarray == b.nvscalevectorarray;
 }
 
+// A SUNDIALS compiled with fused multiply-adds has other bits than the kernels.
+bool rounds_one_by_one(N_Vector like) {
+  const OwnedVector x(like), y(like), sum(like);
+  const double a = 1.0 + 0x1p-27;  // a^2 - 1 is 2^-26, fused 2^-26 + 2^-54
+  N_VConst(a, x);
+  N_VConst(-1.0, y);
+  N_VLinearSum(a, x, 1.0, y, sum);
+  const double* sums = N_VGetArrayPointer(sum);
+  for (sunindextype i = 0; i < NV_LENGTH_S(like); ++i)
+    if (sums[i] != 0x1p-26) return false;
+  return true;
+}
+
 // `install` for each vector that has SUNDIALS' own operations.
 void quicken_by(void (*install)(N_Vector_Ops, sunindextype),
                 std::initializer_list<N_Vector> vectors) {
@@ -38,7 +52,9 @@ void quicken_by(void (*install)(N_Vector_Ops, sunindextype),
     if (!is_serial(v)) continue;
     if (untouched == nullptr) untouched = N_VNewEmpty_Serial(NV_LENGTH_S(v), v->sunctx);
     if (untouched == nullptr) return;
-    if (same_operations(*v->ops, *untouched->ops)) install(v->ops, NV_LENGTH_S(v));
+    if (!same_operations(*v->ops, *untouched->ops)) continue;
+    static const bool same_bits = rounds_one_by_one(v);
+    if (same_bits) install(v->ops, NV_LENGTH_S(v));
   }
   if (untouched != nullptr) N_VDestroy(untouched);
 }
