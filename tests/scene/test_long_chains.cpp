@@ -235,9 +235,9 @@ TEST_CASE("a net moves the same way turned, renumbered and in other units", "[sm
 }
 
 TEST_CASE("a braced net, rigid by rows thinner than 1e-3, swings as one body", "[smooth]") {
-  // 348 rows, 299 independent ones, singular values from 1.7e-4 on. Rows that are left out let
-  // joints drift by 1e-3 at once.
-  const int n = 10;
+  // Singular values from 5e-5 on, many rows that depend on others by coefficients of 1e3. Rows that
+  // are left out let joints drift by 1e-3 at once, rows too many stall the run.
+  const int n = 14;
   const auto engine = make_smooth_engine(net(n, true, 1e-6));
   const auto apart = [&](int a, int b) {
     return (engine->bodies()[std::size_t(a)].position - engine->bodies()[std::size_t(b)].position)
@@ -249,7 +249,7 @@ TEST_CASE("a braced net, rigid by rows thinner than 1e-3, swings as one body", "
   CHECK(engine->diagnostics().drift < 1e-9);
   CHECK(std::abs(apart(0, n * n - 1) - corners) < 1e-6);
   CHECK(std::abs(apart(n / 2, n * n - n / 2) - sides) < 1e-6);
-  CHECK(engine->bodies()[n * n - 1].position.z() < 1.3);
+  CHECK(engine->bodies()[n * n - 1].position.z() < 2.25);
   CHECK(std::abs(energy(*engine) - before) < 1e-6 * before);
   CHECK(engine->counts().steps < 150);
 }

@@ -26,9 +26,9 @@ void BorderedGram::analyse(int n, const std::vector<int>& starts, const std::vec
   dependent_.assign(at(full), 0);
 }
 
-int BorderedGram::factor(const double* A, const double* norm, double eps) {
+int BorderedGram::factor(const double* A, const double* norm, double eps, double thin) {
   eps_ = eps;
-  int count = sparse_.factor(A, norm, eps);
+  int count = sparse_.factor(A, norm, eps, thin);
   for (int f = 0; f < full_; ++f) {
     std::copy(coupling(f), coupling(f) + m_, solved(f));
     sparse_.solve(solved(f));

@@ -29,7 +29,7 @@ class BorderedGram {
               static_cast<std::size_t>(e)];
   }
 
-  int factor(const double* A, const double* norm, double eps);
+  int factor(const double* A, const double* norm, double eps, double thin);
   void solve(double* z);
   void forward(double* z);
   void depend(double* z, int last);

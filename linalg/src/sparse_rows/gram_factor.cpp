@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kDependent = 16.0;  // eps (1 + |c|^2)
 constexpr double kThin = 1e6;        // eps
-constexpr double kThinRow = 1e-6;    // at least: large coefficients make eps |c|^2 of it
 constexpr int kTogether = 4;         // columns of L that are applied in one pass
 
 }  // namespace
@@ -205,7 +204,7 @@ double GramFactor::coefficients_square(int k) {
   return square;
 }
 
-int GramFactor::factor(const double* A, const double* norm, double eps) {
+int GramFactor::factor(const double* A, const double* norm, double eps, double thin) {
   std::fill(L_.filled.begin(), L_.filled.end(), 0);
   std::fill(PA_.met.begin(), PA_.met.end(), 0);
   eps_ = eps;
@@ -214,8 +213,8 @@ int GramFactor::factor(const double* A, const double* norm, double eps) {
     scatter_products(k, A);
     // Without rounding d is at least eps.
     const double d = std::max(eliminate(k, 1.0 + eps), eps);
-    const bool thin = d <= std::max(kThin * eps, kThinRow);
-    const bool dependent = (thin && d <= kDependent * eps * (1.0 + coefficients_square(k))) ||
+    const bool looked_at = d <= std::max(kThin * eps, thin);
+    const bool dependent = (looked_at && d <= kDependent * eps * (1.0 + coefficients_square(k))) ||
                            !(norm[row_at_[at(k)]] > 0.0);
     dependent_[at(k)] = dependent;
     count += dependent;

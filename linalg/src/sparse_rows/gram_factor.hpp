@@ -18,8 +18,9 @@ class GramFactor {
   void analyse(int n, const std::vector<int>& starts, const std::vector<int>& columns);
 
   /// From the entries of A; norm[i] is 0 where row i is zero. Rows that are zero or have
-  /// d_k <= 10 eps count as dependent; they take part all the same. Returns their number.
-  int factor(const double* A, const double* norm, double eps);
+  /// d_k <= 16 eps count as dependent; where d_k <= thin (or 1e6 eps) those with
+  /// d_k <= 16 eps (1 + |c|^2) do. They take part all the same. Returns their number.
+  int factor(const double* A, const double* norm, double eps, double thin);
 
   /// z <- (A A^T + eps I)^-1 z.
   void solve(double* z);

@@ -116,11 +116,11 @@ double SparseMinimumNorm::inconsistency(int k) const {
   return parts_->dependent.inconsistency(static_cast<std::size_t>(k - rank()));
 }
 
-bool SparseMinimumNorm::factor(double rank_tolerance) {
+bool SparseMinimumNorm::factor(double rank_tolerance, double thin) {
   Parts& p = *parts_;
   if (!p.rows.scale()) return false;
   p.eps = std::max(rank_tolerance * rank_tolerance, kSmallestEps);
-  p.dependent.find(p.gram, p.rows.factor(p.gram, p.eps));
+  p.dependent.find(p.gram, p.rows.factor(p.gram, p.eps, thin));
   return true;
 }
 

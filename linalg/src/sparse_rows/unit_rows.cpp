@@ -148,13 +148,13 @@ bool UnitRows::scale_full() {
   return true;
 }
 
-int UnitRows::factor(BorderedGram& gram, double eps) {
+int UnitRows::factor(BorderedGram& gram, double eps, double thin) {
   for (int f = 0; f < full_; ++f) {
     const double* a = full_row(f);
     for (int i = 0; i < sparse_; ++i) gram.coupling(f)[i] = row_dot(i, a);
     for (int e = 0; e <= f; ++e) gram.product(f, e) = dot(a, full_row(e), width());
   }
-  return gram.factor(A_.data(), norm_.data(), eps);
+  return gram.factor(A_.data(), norm_.data(), eps, thin);
 }
 
 void UnitRows::spread(int i, std::vector<double>& row) const {

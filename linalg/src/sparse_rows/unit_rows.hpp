@@ -33,7 +33,7 @@ class UnitRows {
   /// C to A. False: an entry is not finite.
   bool scale();
   /// A A^T + eps I; returns the number of dependent rows.
-  int factor(BorderedGram& gram, double eps);
+  int factor(BorderedGram& gram, double eps, double thin);
   /// |row_i(C D)| and its inverse; 0 for a row that vanishes.
   double norm(std::size_t i) const { return norm_[i]; }
   double inverse_norm(std::size_t i) const { return inverse_norm_[i]; }

@@ -25,7 +25,7 @@ namespace tether::linalg {
 /// are, |du| stays below |b| / (2 sqrt(eps)) for each step, and below the least norm altogether.
 ///
 /// Rank: with unit rows d_k is the squared sine of the angle between row k and those before it, in
-/// the elimination's order, plus a small multiple of eps. A row with d_k <= 10 eps is called
+/// the elimination's order, plus a small multiple of eps. A row with d_k <= 16 eps is called
 /// dropped. It takes part in the solution all the same; rows that contradict each other share what
 /// cannot be solved (least squares), and inconsistency() says how much that is.
 ///
@@ -55,9 +55,11 @@ class SparseMinimumNorm {
   /// Writable storage for D, n entries >= 0, that the next factor() reads; D_j = 0 keeps dy_j = 0.
   double* metric();
 
-  /// eps = rank_tolerance^2, at least 1e-13, which rounding of A A^T needs. False if C D has an
-  /// entry that is not finite; the factors are then unusable.
-  bool factor(double rank_tolerance = 1e-6);
+  /// eps = rank_tolerance^2, at least 1e-13, which rounding of A A^T needs. Coefficients c of a row
+  /// over those before it make eps |c|^2 of a dependent one's d_k; they are looked at where d_k is
+  /// below `thin` (0 to 1). False if C D has an entry that is not finite; the factors are then
+  /// unusable.
+  bool factor(double rank_tolerance = 1e-6, double thin = 1e-6);
   /// dy (n entries) from the kept factors; g has m entries in the units of the rows. Stops at
   /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() is the value reached.
   void solve(const double* g, double* dy, double tolerance = kTolerance);

@@ -12,6 +12,9 @@ namespace {
 using Row6 = Eigen::Matrix<double, 1, 6>;
 
 constexpr double kRankTolerance = 1e-6;
+// Coefficients of rows of nets reach 1e4: looked at below this, dependent rows of 14 x 14 balls are
+// told as such. One that is not carries a multiplier that nothing determines, and steps collapse.
+constexpr double kThin = 1e-4;
 
 }  // namespace
 
@@ -88,7 +91,7 @@ void SparseJointGradient::factor(const char* wanted, double rank_tolerance) {
     to.head<3>() += force.transpose() / std::sqrt(bodies_.inertia(slot).mass);
     to.tail<3>() += torque.transpose() * roots_[at(slot)];
   });
-  factors_.factor(rank_tolerance);
+  factors_.factor(rank_tolerance, kThin);
 }
 
 void SparseJointGradient::solve(const Eigen::VectorXd& right, Eigen::VectorXd& a,
