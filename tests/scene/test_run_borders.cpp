@@ -98,6 +98,28 @@ TEST_CASE("a rotation that steps do not resolve is a warning") {
   CHECK(warnings(1e3, 1e-4).empty());
 }
 
+TEST_CASE("a contact problem that is used above what the scene accepts is a warning") {
+  const auto warnings = [](const char* tolerance, const char* acceptance) {
+    std::string text = fmt::format(
+        "[scene]\nend = 0.05\ngravity = [0, 0, -9.81]\n[stepping]\nstep = 5e-3\nmax_halvings = 1\n"
+        "tolerance = {}\nacceptance = {}\n[[pair]]\nbetween = [\"a\", \"a\"]\nfriction = 0.3\n"
+        "[[body]]\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n",
+        tolerance, acceptance);
+    for (const char* each :
+         {"mass = 1\nposition = [0, 0, 0.1]", "mass = 1\nposition = [0.2, 0, 0.1]",
+          "mass = 300\nposition = [0.1, 0.173, 0.1]",
+          "mass = 70\nposition = [0.1, 0.0577, 0.263]\nvelocity = [0.01, 0.03, 0]"})
+      text +=
+          fmt::format("[[body]]\nshape = \"sphere\"\nradius = 0.1\nmaterial = \"a\"\n{}\n", each);
+    return run(parse_scene(text, "pyramid.toml")).warnings;
+  };
+  const auto beyond = warnings("1e-15", "1.5");  // below rounding
+  REQUIRE(beyond.size() == 1);
+  CHECK_THAT(beyond[0],
+             Catch::Contains("above the 1.5e-15") && Catch::Contains("stepping.acceptance"));
+  CHECK(warnings("1e-15", "1e5").empty());
+}
+
 TEST_CASE("what is no number is never met") {
   const double nan = std::nan("");
   Scene scene = parse_scene(falling(""), "judge.toml");
