@@ -7,23 +7,22 @@
 
 namespace tether::test {
 
-/// Processor time of job(8 n) over that of job(n), the least of a few runs of each: about 8 where
-/// work grows with the length, 64 with its square.
+constexpr double kLinear = 3;  // between what grows with the length, and with its square
+
+/// Processor time of job(8 n) over that of eight job(n), the runs side by side: about 1 where work
+/// grows with the length, 8 with its square. Others on the machine slow some of them: the least of
+/// several looks, of no more than are needed to come below kLinear.
 template <class Job>
 double growth(const Job& job, int n) {
   const auto seconds = [&job](int length, int times) {
-    double least = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < times; ++k) {
-      const std::clock_t start = std::clock();
-      job(length);
-      least = std::min(least, static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
-    }
-    return std::max(least, 1e-6);
+    const std::clock_t start = std::clock();
+    for (int k = 0; k < times; ++k) job(length);
+    return std::max(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 1e-6);
   };
-  const double small = seconds(n, 5);
-  return seconds(8 * n, 2) / small;
+  double least = std::numeric_limits<double>::infinity();
+  for (int look = 0; look < 10 && !(least < kLinear); ++look)
+    least = std::min(least, seconds(8 * n, 1) / seconds(n, 8));
+  return least;
 }
-
-constexpr double kLinear = 24;  // below it: the length, its logarithm, and a busy machine's caches
 
 }  // namespace tether::test

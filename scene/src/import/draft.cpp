@@ -31,7 +31,13 @@ class Drafting {
  public:
   Drafting(const Model& model, const std::vector<Part>& parts, const ImportOptions& options,
            Remarks& remarks)
-      : model_(model), parts_(parts), options_(options), remarks_(remarks) {}
+      : model_(model),
+        parts_(parts),
+        options_(options),
+        remarks_(remarks),
+        has_ground_(options.ground || std::any_of(parts.begin(), parts.end(), [](const Part& part) {
+                      return part.fixed() && part.scenery && part.touch;
+                    })) {}
   Draft take() {
     draft_.scene.name = clean_title(model_.name);
     draft_.scene.end = options_.end;
@@ -57,11 +63,6 @@ class Drafting {
   }
 
  private:
-  bool touches_ground() const {
-    return options_.ground || std::any_of(parts_.begin(), parts_.end(), [](const Part& part) {
-             return part.fixed() && part.scenery && part.touch;
-           });
-  }
   void add_ground() {
     if (!options_.ground) return;
     Body body;
@@ -95,8 +96,8 @@ class Drafting {
       shape.orientation.normalize();
     }
     // The base of a URDF is part of the robot, which does not touch itself.
-    const bool touches = touches_ground() && part.touch && !part.shapes.empty() &&
-                         (!part.fixed() || model_.base_is_said);
+    const bool touches =
+        has_ground_ && part.touch && !part.shapes.empty() && (!part.fixed() || model_.base_is_said);
     if (touches)
       body.material = part.fixed() ? material(*part.touch, still_, "ground")
                                    : material(*part.touch, moving_, "robot");
@@ -172,6 +173,7 @@ class Drafting {
   const std::vector<Part>& parts_;
   const ImportOptions& options_;
   Remarks& remarks_;
+  bool has_ground_;  // anything that a robot could touch
   Draft draft_;
   std::vector<int> body_of_;  // of each part
   Materials moving_, still_;
