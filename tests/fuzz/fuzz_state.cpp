@@ -21,7 +21,8 @@ namespace {
 
 constexpr double kSaved = 0.03, kEnd = 0.05;
 
-// One for each engine, and for what a state of it holds: joints, laws, moments, parts of steps.
+// One for each engine, and for what a state of it holds: joints, laws, moments, parts of steps,
+// hand-overs.
 const char* const kScenes[] = {
     R"([scene]
 gravity = [0, 0, -9.81]
@@ -198,6 +199,32 @@ quantity = "contact_force"
 body = "rolls"
 against = "felt"
 at_most = 1e3
+)",
+    R"([scene]
+gravity = [0, 0, -9.81]
+[event]
+tolerance = 1e-4
+max_events = 2
+otherwise = "stepping"
+[stepping]
+step = 1e-3
+[[body]]
+name = "floor"
+shape = "plane"
+fixed = true
+material = "a"
+[[pair]]
+between = ["a", "a"]
+friction = 0.3
+restitution = 0.5
+[[body]]
+name = "ball"
+shape = "sphere"
+radius = 0.1
+mass = 1
+position = [0, 0, 0.1001]
+velocity = [1, 0, -0.02]
+material = "a"
 )"};
 
 Scene scene_of(std::size_t k) {

@@ -213,6 +213,44 @@ TEST_CASE("hand-over: a run goes on with its bits in events, in steps and in eve
   }
 }
 
+// Bit patterns of another machine's or an enemy's making: sums over them would overflow.
+TEST_CASE("hand-over: a state with times or counts that no run has is refused") {
+  const Scene scene = box_and_ball(1e-3);
+  const std::vector<double> times = {0.2, 0.7};
+  const auto engine = engine_that_gives_up(scene, times);
+  engine->advance(0.71);  // steps stand in for the second time
+  REQUIRE(engine->hand_overs().size() == 2);
+  REQUIRE(engine->in_steps());
+  std::ostringstream out;
+  engine->save(out);
+  const std::string state = out.str();
+  const auto place_of = [&state](double x) {
+    const std::size_t at =
+        state.find(std::string(reinterpret_cast<const char*>(&x), sizeof x), state.find("handed"));
+    REQUIRE(at != std::string::npos);
+    return at;
+  };
+  const auto tried = [&](std::size_t at, auto x) {
+    std::string changed = state;
+    changed.replace(at, sizeof x, reinterpret_cast<const char*>(&x), sizeof x);
+    std::istringstream in(changed);
+    engine_that_gives_up(scene, times)->restore(in);
+  };
+  const auto damaged = Catch::Contains("the saved state is damaged");
+  const std::size_t first = place_of(engine->hand_overs()[0].time),
+                    back = place_of(*engine->hand_overs()[0].back),
+                    second = place_of(engine->hand_overs()[1].time);
+  CHECK_NOTHROW(tried(first, 0.2));
+  for (const double time : {-1.0, 0.65, 1e300}) CHECK_THROWS_WITH(tried(first, time), damaged);
+  for (const double time : {-1.0, 0.1, 0.72, 1e300}) CHECK_THROWS_WITH(tried(back, time), damaged);
+  for (const double time : {0.201, 0.72, 1e300}) CHECK_THROWS_WITH(tried(second, time), damaged);
+  for (std::size_t k = 1; k <= 8; ++k)
+    for (const std::int64_t n : {std::int64_t{-1}, std::int64_t{1} << 62}) {
+      CHECK_THROWS_WITH(tried(first - 8 * k, n), damaged);
+      CHECK_THROWS_WITH(tried(second - 8 * k, n), damaged);
+    }
+}
+
 TEST_CASE("hand-over: tables say when steps had the run, and when events went on") {
   Scene scene = box_and_ball(1e-3);
   const std::filesystem::path folder = tether::test::folder("hand_over_tables");

@@ -29,6 +29,7 @@ constexpr const char* kUnsound = "the saved state is damaged";
 // have come less far than that before they were given up again.
 constexpr std::int64_t kCalmSteps = 20, kMostCalmSteps = std::int64_t{1} << 40;
 constexpr std::uint64_t kMostHandOvers = 1000;  // then steps go to the end
+constexpr long kMostCounted = 1L << 40;         // in a state: sums of a few of them are numbers
 
 /// Those that the event engine has.
 template <class Counts, class F>
@@ -147,6 +148,7 @@ class EventsThenSteps final : public Engine {
   void put_hand_overs(std::ostream& out) const;
   void get_hand_over(std::istream& in, bool once);
   void get_hand_overs(std::istream& in);
+  bool are_sound() const;
 
   double step_;
   Scene scene_, steps_scene_;
@@ -281,9 +283,21 @@ void EventsThenSteps::get_hand_overs(std::istream& in) {
   std::uint64_t closed = 0;
   binary::get(in, energy_, calm_, enough_, closed);
   if (!std::isfinite(energy_) || calm_ < 0 || enough_ < kCalmSteps || enough_ > kMostCalmSteps ||
-      closed > kMostClosed)
+      calm_ > kMostCalmSteps || closed > kMostClosed)
     throw std::runtime_error(kUnsound);
   for (std::uint64_t k = 0; k < closed; ++k) closed_.push_back(binary::get<std::int32_t>(in));
+}
+
+// Each begins where the one before has ended, or later, and none after now.
+bool EventsThenSteps::are_sound() const {
+  double since = 0;
+  bool sound = true;
+  for (const HandOver& each : hand_overs_) {
+    each_number(each.before, [&](long n) { sound = sound && n >= 0 && n <= kMostCounted; });
+    sound = sound && each.time >= since && each.back.value_or(each.time) >= each.time;
+    since = each.back.value_or(each.time);
+  }
+  return sound && since <= time() + step_;  // a boundary may lie shortly before
 }
 
 void EventsThenSteps::restore(std::istream& in, Restore how) {
@@ -319,6 +333,7 @@ void EventsThenSteps::restore(std::istream& in, Restore how) {
       steps_->restore(content, how);
       if (once) energy_ = energy_of(*steps_);
     }
+    if (!are_sound()) throw std::runtime_error(kUnsound);
   }
   if (content.peek() != std::char_traits<char>::eof())
     throw std::runtime_error("the saved state is longer than this scene needs");
