@@ -127,12 +127,12 @@ if $as_nobody "$program" check "$work/pendulum.toml" >/dev/null 2>&1; then
     fresh
     chmod 555 "$work/out"
     # shellcheck disable=SC2086
-    try "a read-only folder" 2 $name $as_nobody timeout 5
+    try "a read-only folder" 2 $name $as_nobody timeout 60
     [ -z "$(ls -A "$work/out")" ] || complain "$what: something in it"
   done
   for file in csv vtk svg html state; do
     # shellcheck disable=SC2086
-    $as_nobody timeout 5 "$program" run "$work/pendulum.toml" --end 99999 --quiet --output "$work/out" --$file a.$file \
+    $as_nobody timeout 60 "$program" run "$work/pendulum.toml" --end 99999 --quiet --output "$work/out" --$file a.$file \
       >"$work/said" 2>&1
     code=$?
     [ $code -eq 2 ] || complain "--$file into a read-only folder: exit code $code"
