@@ -245,6 +245,7 @@ bool Driver::Memory::is_sound() const {
   for (const double x : {time, kept_energy, lost, first_energy}) sound = sound && std::isfinite(x);
   for (const ContactMode& each : modes) sound = sound && each.direction.allFinite();
   for (const double level : levels) sound = sound && std::isfinite(level);
+  for (const int axis : axes) sound = sound && axis >= 0 && axis <= 2;
   for (const Bounces& each : bounces) {
     sound = sound && each.count >= 0 && each.count <= 3;
     for (int k = 0; k < 3; ++k)
@@ -264,9 +265,11 @@ void Driver::anchor() {
 }
 
 Driver::Memory Driver::memory() const {
+  std::vector<int> axes;
+  for (int i = 0; i < model_.contacts(); ++i) axes.push_back(model_.axis(i));
   return {event_time_,    motion_.kept_energy(), lost_,    first_energy_, y_,
-          modes_,         motion_.levels(),      bounces_, at_one_time_,  counts_.events,
-          counts_.impacts};
+          modes_,         motion_.levels(),      bounces_, axes,          at_one_time_,
+          counts_.events, counts_.impacts};
 }
 
 Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
@@ -284,6 +287,8 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
       at_one_time_(memory.at_one_time) {
   counts_.events = memory.events;
   counts_.impacts = memory.impacts;
+  for (std::size_t i = 0; i < memory.axes.size(); ++i)
+    model_.set_axis(static_cast<int>(i), memory.axes[i]);
   model_.set(time_, y_.data(), y_.data() + motion_.coordinates());
   model_.settle();
   motion_.keep_energy(memory.kept_energy);

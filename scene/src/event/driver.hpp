@@ -151,6 +151,7 @@ struct Driver::Memory {
   std::vector<ContactMode> modes;
   std::vector<double> levels;  ///< gaps of closed contacts
   std::vector<Bounces> bounces;
+  std::vector<int> axes;  ///< of the tangents of each contact; of an older state: none
   long at_one_time = 0, events = 0, impacts = 0;
 
   /// Numbers are finite, counts are counts.

@@ -22,9 +22,10 @@ using namespace event;
 using mechanics::at;
 
 constexpr const char* kDamaged = "the saved state is damaged";
-constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '3'};
+constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '4'};
 // The same of a scene far from the origin: that of the engine comes first.
-constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '3'};
+constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '4'};
+constexpr char kWithoutAxes = '3';
 
 DriverOptions driver_options(const Scene& scene) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -303,7 +304,7 @@ void EventEngine::save(std::ostream& out) const {
     binary::put(out, m.levels[i]);
     const Bounces& b = m.bounces[i];
     for (int k = 0; k < 3; ++k) binary::put(out, b.time[k], b.speed[k]);
-    binary::put(out, static_cast<std::int32_t>(b.count));
+    binary::put(out, static_cast<std::int32_t>(b.count), static_cast<std::int32_t>(m.axes[i]));
   }
 }
 
@@ -315,6 +316,8 @@ void EventEngine::restore(std::istream& in, Restore how) {
     get_bodies(in, bodies);
     in.read(magic, sizeof magic);
   }
+  const bool axes = magic[sizeof magic - 1] != kWithoutAxes;
+  if (!axes) magic[sizeof magic - 1] = kMagic[sizeof magic - 1];
   const bool from_far = in && std::equal(magic, magic + sizeof magic, kFarMagic);
   if (!in || !(from_far || std::equal(magic, magic + sizeof magic, kMagic)))
     throw std::runtime_error("this is not a state of the event engine");
@@ -355,6 +358,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
     for (int k = 0; k < 3; ++k) binary::get(in, b.time[k], b.speed[k]);
     binary::get(in, count);
     b.count = count;
+    if (axes) m.axes.push_back(binary::get<std::int32_t>(in));
   }
   if (!m.is_sound() || !saved.allFinite() || !(reached >= m.time) || !std::isfinite(reached))
     throw std::runtime_error(kDamaged);

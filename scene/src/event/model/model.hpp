@@ -47,6 +47,10 @@ class Model {
   virtual void set(double t, const double* q, const double* u) = 0;
   /// A smooth phase begins at the state that is set: tangents turn smoothly from here on.
   virtual void settle() {}
+  /// The axis of space next to which the tangents of a contact are chosen, 0 to 2. It hangs on the
+  /// phases before: a state that goes on has to name it.
+  virtual int axis(int /*contact*/) const { return 0; }
+  virtual void set_axis(int /*contact*/, int /*axis*/) {}
   virtual void rates(double* q_rate) const = 0;
   /// X <- M^-1 X, `velocities()` rows.
   virtual void divide_by_mass(Eigen::Ref<MatrixXd> X) const = 0;

@@ -82,6 +82,14 @@ void SceneModel::settle() {
   }
 }
 
+int SceneModel::axis(int contact) const {
+  Eigen::Index k = 0;
+  axes_[at(contact)].maxCoeff(&k);
+  return static_cast<int>(k);
+}
+
+void SceneModel::set_axis(int contact, int axis) { axes_[at(contact)] = Vector3d::Unit(axis); }
+
 void SceneModel::rates(double* q_rate) const {
   for (int k = 0; k < bodies_.count(); ++k) {
     const double* s = y_.data() + kBody * k;

@@ -36,6 +36,8 @@ class SceneModel final : public Model {
 
   void set(double t, const double* q, const double* u) override;
   void settle() override;
+  int axis(int contact) const override;
+  void set_axis(int contact, int axis) override;
   void rates(double* q_rate) const override;
   void divide_by_mass(Eigen::Ref<MatrixXd> X) const override;
   void forces(VectorXd& h) override;
