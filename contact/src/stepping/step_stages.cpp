@@ -1,11 +1,19 @@
 // Tether: the stages of a step. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <limits>
 
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
 
 using Eigen::Vector3d;
+
+namespace {
+
+// What rounding makes of gaps in many steps, in parts of the positions.
+constexpr double kClosed = 1e3 * std::numeric_limits<double>::epsilon();
+
+}  // namespace
 
 void Stepper::Implementation::make_stages() {
   using I = Implementation;
@@ -56,11 +64,16 @@ void Stepper::Implementation::find_contacts() {
   part.before = judged();
 }
 
+// Gaps that rounding leaves differ from contact to contact, and where bodies rest on more contacts
+// than they need no velocities have them all: in gap / dt they would choose who carries the load.
 void Stepper::Implementation::set_gaps() {
   for (std::size_t k = 0; k < contacts.gaps.size(); ++k) {
     const double gap = contacts.gaps[k];
     outcome.deepest = std::max(outcome.deepest, -gap);
-    contacts.points[k].bias = gap > 0 ? gap / part.dt : 0;
+    PointContact& c = contacts.points[k];
+    const double size = c.r1.lpNorm<1>() + bodies.position[at(c.first)].lpNorm<1>();
+    const double open = std::min(gap, 2 * (gap - kClosed * size));
+    c.bias = open > 0 ? open / part.dt : 0;
   }
 }
 
