@@ -165,6 +165,45 @@ TEST_CASE("a start off the constraints is explained once on stderr") {
   CHECK(run(problem, 1e-8, problem.recommended_constraints(), 2000, silent, 0.3).printed.empty());
 }
 
+TEST_CASE("a start off by fewer tolerances than a move may be long is named, too") {
+  // Its moves are made; IDA's error test refuses all of them and says so in its own words only.
+  for (const double tolerance : {1e-4, 1e-6}) {
+    const Problem problem = swing(20.0);
+    const Ended end = run(problem, tolerance, problem.recommended_constraints(), 2000, {},
+                          15.0 * tolerance * (1.0 + problem.y0[0]));
+    INFO(end.flag << " " << end.message);
+    CHECK(end.flag == IDA_ERR_FAIL);
+    CHECK(end.status == tp::Status::doubtful);
+    CHECK(contains(end.message, "tolerances off the constraints"));
+    CHECK(count(end.printed, "make_consistent") == 1);
+  }
+}
+
+TEST_CASE("moves that do not converge: what is wrong with C or the tolerances is in the message") {
+  const Problem problem = swing(50.0);
+  const tp::Constraints wrong =
+      problem.select({"position"}) +
+      row(
+          "across", [](double, const double* y) { return y[0] * y[2] + y[1] * y[3]; },
+          [](double, const double* y, double* c) {
+            c[0] = y[2];
+            c[1] = y[3];
+            c[2] = -y[0];
+            c[3] = y[1];
+          });
+  int ended = 0;
+  for (const double tolerance : {1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
+    const Ended end = run(problem, tolerance, wrong, 4000);
+    INFO(end.flag << " " << end.message);
+    if (end.flag != IDA_CONV_FAIL) continue;
+    ++ended;
+    CHECK(end.status == tp::Status::not_converged);
+    CHECK(contains(end.message, "check_jacobian finds there: row 1 (across), column 2"));
+    CHECK(contains(end.printed, "row 1 (across), column 2"));
+  }
+  CHECK(ended > 0);
+}
+
 TEST_CASE("a healthy run says nothing while IDA looks for its first step") {
   // Octave's ode15s begins with y' = 0 unless told otherwise, so that IDA tries long steps.
   for (const double t_end : {2.0, 20.0, 74.0, 500.0}) {

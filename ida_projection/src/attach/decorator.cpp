@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <utility>
 
 #include "attach/impl.hpp"
 #include "attach/shortest.hpp"
@@ -23,6 +24,7 @@ constexpr long kSampleEvery = 16;
 // Multipliers of index 2: see README, section 9.
 constexpr double kAsideFromTest = 1.5, kProportional = 1e-4, kMostCare = 5.0, kManyFree = 0.4;
 constexpr int kNameAfter = 3;            // failed correctors in a row
+constexpr int kRefusedStarts = 5;        // of the ten error tests that IDA tries
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
@@ -191,8 +193,38 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   }
   if (stopwatch.running()) move.drift_after = movers_.used->remaining_drift(at);
   account(move, step, stopwatch.running());
-  if (move.status == Status::success) look_for_doubts(at, step);
+  if (move.status == Status::success) {
+    look_at_start(move);
+    look_for_doubts(at, step);
+  }
+  if (move.status == Status::not_converged)
+    return finish(move.status, with_suspicion(movers_.used->message(), at));
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
+}
+
+// Moves that do not converge: a wrong C as a rule. Looked into once a step, where it is to be said.
+std::string Projection::Impl::with_suspicion(std::string text, const Candidate& candidate) {
+  if (!report_.says_failures(attempts_.steps)) return text;
+  if (attempts_.suspected != attempts_.steps) {
+    attempts_.suspected = attempts_.steps;
+    attempts_.suspicion = watch_.rejections.suspicion(candidate, corrector_);
+  }
+  return std::move(text) + attempts_.suspicion;
+}
+
+// From a start off the constraints moves do not shrink with the step. Above Options::largest_move
+// they are refused by name, below IDA's error test refuses them, with words of its own.
+void Projection::Impl::look_at_start(const Move& move) {
+  if (attempts_.steps != 0) return;
+  const double before = std::exchange(attempts_.first_move, move.length);
+  const bool stays = attempts_.repeated && move.length > 1.0 && move.length > 0.5 * before;
+  attempts_.refused_starts = stays ? attempts_.refused_starts + 1 : 0;
+  if (attempts_.refused_starts != kRefusedStarts) return;
+  report_.warn(Status::doubtful,
+               "IDA's error test refuses the first step, however short it is: "
+               "the start is " +
+                   brief(move.length) +
+                   " tolerances off the constraints; call make_consistent first");
 }
 
 void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {

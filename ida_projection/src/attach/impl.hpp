@@ -85,6 +85,10 @@ class Projection::Impl {
     // What capped moves lacked, in tolerances: in the last accepted step, and in this attempt.
     double left_before = 0.0, left = 0.0;
     std::string capped_message;
+    long suspected = -1;      // the step whose failures were looked into
+    std::string suspicion;    // found then
+    double first_move = 0.0;  // of the last attempt at the first step, in tolerances
+    int refused_starts = 0;   // attempts at it with a move that does not shrink
   };
 
   void attach();
@@ -110,6 +114,8 @@ class Projection::Impl {
   void judge_capped(Move& move);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   Status polish(const Candidate& candidate, double cj, double tolerance);
+  std::string with_suspicion(std::string text, const Candidate& candidate);
+  void look_at_start(const Move& move);
   void look_for_doubts(const Candidate& candidate, const StepData& step);
   void account(const Move& move, const StepData& step, bool sampled);
   void note(const Move& move, const StepData& step);

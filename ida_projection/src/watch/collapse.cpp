@@ -17,6 +17,21 @@ namespace {
 constexpr long kWindow = 200;         // accepted steps
 constexpr int kLargestSearch = 2000;  // unknowns up to which columns are looked at one by one
 
+// Most unknowns below their tolerances: the error test cannot see them.
+std::string large_tolerances(const Candidate& candidate) {
+  const auto size = static_cast<int>(N_VGetLength(candidate.base));
+  int below = 0;
+  for (int j = 0; j < size; ++j) {
+    const double y = candidate.base_entries[j] + candidate.correction_entries[j];
+    below += std::abs(y) * candidate.weight_entries[j] < 1.0 ? 1 : 0;
+  }
+  if (2 * below <= size) return {};
+  PlainText out;
+  out << "; " << below << " of " << size
+      << " unknowns are smaller than their tolerances: reduce atol";
+  return out.str();
+}
+
 }  // namespace
 
 void RejectionWatch::reset() {
@@ -48,24 +63,25 @@ std::string RejectionWatch::cause(const Candidate& candidate, const StepData& st
     out << "; the id vector calls every variable algebraic: differential ones have to be 1 "
            "(Options::id)";
   const bool contiguous = candidate.base_entries != nullptr;
-  if (contiguous) {
-    const auto size = static_cast<int>(N_VGetLength(candidate.base));
-    int below = 0;
-    for (int j = 0; j < size; ++j) {
-      const double y = candidate.base_entries[j] + candidate.correction_entries[j];
-      below += std::abs(y) * candidate.weight_entries[j] < 1.0 ? 1 : 0;
-    }
-    if (2 * below > size)
-      out << "; " << below << " of " << size
-          << " unknowns are smaller than their tolerances: reduce atol";
-  }
-  std::string row = contiguous ? suspected_row(candidate, step) : std::string();
+  if (contiguous) out << large_tolerances(candidate);
+  std::string row = contiguous ? wrong_entry(candidate) : std::string();
+  if (row.empty() && contiguous) row = suspected_row(candidate, step);
   if (row.empty() && contiguous) row = squared_row(candidate, corrector);
   if (row.empty())
     out << "; check the rows with check_jacobian, the id vector and the tolerances";
   else
     out << "; " << row;
   return out.str();
+}
+
+// The candidate is where moves have led: y' need not fulfil F there.
+std::string RejectionWatch::suspicion(const Candidate& candidate, Corrector& corrector) const {
+  if (candidate.base_entries == nullptr) return {};
+  std::string found = wrong_entry(candidate);
+  if (!found.empty()) return "; " + found;
+  if (!(found = large_tolerances(candidate)).empty()) return found;  // any row bends over these
+  found = squared_row(candidate, corrector);
+  return found.empty() ? found : "; " + found;
 }
 
 // A row with a double root: Newton's move for it alone leaves a fourth of g.
@@ -104,7 +120,25 @@ std::string RejectionWatch::squared_row(const Candidate& candidate, Corrector& c
   return found;
 }
 
-// A wrong row of C, or a row that F does not keep: C y' + g_t, term by term from differences of g.
+// By differences of g.
+std::string RejectionWatch::wrong_entry(const Candidate& candidate) const {
+  const auto length = static_cast<int>(N_VGetLength(candidate.base));
+  if (!has_values(constraints_) || length > kLargestSearch) return {};
+  std::vector<double> y(static_cast<std::size_t>(length));
+  for (std::size_t j = 0; j < y.size(); ++j)
+    y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
+  try {
+    const JacobianReport report = check_jacobian(constraints_, candidate.t, y, 1e-3);
+    if (report.correct) return {};
+    const bool kink =
+        has_kink(constraints_, report.row, report.column, report.given, candidate.t, y);
+    return "check_jacobian finds there: " + report.message + (kink ? kKink : "");
+  } catch (const std::exception&) {  // g refuses a point nearby: nothing is known
+    return {};
+  }
+}
+
+// A row that F does not keep: C y' + g_t, term by term from differences of g.
 std::string RejectionWatch::suspected_row(const Candidate& candidate, const StepData& step) const {
   const auto length = static_cast<int>(N_VGetLength(candidate.base));
   if (!has_values(constraints_) || length > kLargestSearch) return {};
@@ -114,16 +148,6 @@ std::string RejectionWatch::suspected_row(const Candidate& candidate, const Step
   for (std::size_t j = 0; j < n; ++j) {
     y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
     yp[j] = predicted[j] + step.cj * candidate.correction_entries[j];
-  }
-  try {
-    const JacobianReport report = check_jacobian(constraints_, candidate.t, y, 1e-3);
-    if (!report.correct)
-      return "check_jacobian finds there: " + report.message +
-             (has_kink(constraints_, report.row, report.column, report.given, candidate.t, y)
-                  ? kKink
-                  : "");
-  } catch (const std::exception&) {  // g refuses a point nearby: nothing is known
-    return {};
   }
   Statistics ignored;
   Evaluator evaluator(constraints_, ignored);

@@ -23,8 +23,11 @@ class RejectionWatch {
   /// The fault found at the corrector's point, where y' = yppred + cj ycor fulfils F.
   std::string cause(const Candidate& candidate, const StepData& step,
                     const AlgebraicVariables& variables, Corrector& corrector) const;
+  /// What may keep moves from shrinking at this point, with "; " before it; empty: nothing found.
+  std::string suspicion(const Candidate& candidate, Corrector& corrector) const;
 
  private:
+  std::string wrong_entry(const Candidate& candidate) const;
   std::string suspected_row(const Candidate& candidate, const StepData& step) const;
   std::string squared_row(const Candidate& candidate, Corrector& corrector) const;
 

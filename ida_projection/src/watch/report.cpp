@@ -74,10 +74,16 @@ void Report::print_fatal(const char* text) noexcept {
   std::fprintf(stderr, "tether: %s: %s\n", to_string(status), text);
 }
 
+bool Report::says_failures(long steps) const {
+  const int failures = steps == failing_step_ ? failures_in_step_ + 1 : 1;
+  return failures >= (steps == 0 ? kSayAfterAtFirst : kSayAfter);
+}
+
 void Report::count_failure_in_step(const std::string& text, long steps) {
+  const bool say_it = says_failures(steps) && !said_failures_;
   failures_in_step_ = steps == failing_step_ ? failures_in_step_ + 1 : 1;
   failing_step_ = steps;
-  if (failures_in_step_ < (steps == 0 ? kSayAfterAtFirst : kSayAfter) || said_failures_) return;
+  if (!say_it) return;
   said_failures_ = true;
   PlainText out;
   out << "step " << steps + 1 << " was tried " << failures_in_step_

@@ -28,6 +28,8 @@ class Report {
   int finish(Status outcome, const std::string& text, long steps);
   /// The same for an exception, which must not pass through IDA's C functions.
   int caught(Status outcome, const char* text) noexcept;
+  /// Is the next failure in the step after `steps` one of those that are said?
+  bool says_failures(long steps) const;
   /// The reason why IDA rejects most steps, or results are doubtful.
   void warn(Status kind, const std::string& text);
   /// On stderr, where Options::print_warnings allows it.
