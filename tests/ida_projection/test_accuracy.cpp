@@ -1,4 +1,5 @@
 // Tether: what the slides claim, and the order of the method. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <problems/pendulum.hpp>
 
@@ -164,4 +165,94 @@ TEST_CASE("order, fixed steps: BDF k stays of order k") {
     CHECK(rate > order - 0.35);
     CHECK(rate < order + 0.5);
   }
+}
+
+namespace {
+
+/// Masses on a ring that push each other away exponentially (Toda), N = 80.
+Problem ring_of_masses() {
+  constexpr int kMasses = 40;
+  std::vector<double> start;
+  for (int i = 0; i < kMasses; ++i) start.push_back(0.1 * std::sin(2.3 * i));
+  for (int i = 0; i < kMasses; ++i) start.push_back(std::cos(1.7 * i));
+  return ode(start, 10.0, [](double, const double* y, double* f) {
+    for (int i = 0; i < kMasses; ++i) {
+      const int before = (i + kMasses - 1) % kMasses, after = (i + 1) % kMasses;
+      f[i] = y[kMasses + i];
+      f[kMasses + i] = std::exp(y[before] - y[i]) - std::exp(y[i] - y[after]);
+    }
+  });
+}
+
+tp::Constraints energy_of(const Problem& ring) {
+  const int masses = ring.size / 2;
+  const auto energy = [masses](const double* y) {
+    double sum = 0.0;
+    for (int i = 0; i < masses; ++i)
+      sum += 0.5 * y[masses + i] * y[masses + i] + std::exp(y[i] - y[(i + 1) % masses]);
+    return sum;
+  };
+  return row(
+      "energy",
+      [=, start = energy(ring.y0.data())](double, const double* y) { return energy(y) - start; },
+      [masses](double, const double* y, double* c) {
+        for (int i = 0; i < masses; ++i) {
+          c[masses + i] = y[masses + i];
+          c[i] =
+              std::exp(y[i] - y[(i + 1) % masses]) - std::exp(y[(i + masses - 1) % masses] - y[i]);
+        }
+      });
+}
+
+/// Points that turn by t - sin(20 t) / 25: from fast to slow in half of a period of 0.3.
+Problem unsteady_circles() {
+  constexpr int kPoints = 35;
+  std::vector<double> start;
+  for (int i = 0; i < kPoints; ++i) start.insert(start.end(), {std::cos(i), std::sin(i)});
+  Problem p = ode(start, 6.0, [](double t, const double* y, double* f) {
+    const double rate = 1.0 - 0.8 * std::cos(20.0 * t);
+    for (int i = 0; i < kPoints; ++i) {
+      f[2 * i] = -rate * y[2 * i + 1];
+      f[2 * i + 1] = rate * y[2 * i];
+    }
+  });
+  const double angle = p.t_end - std::sin(20.0 * p.t_end) / 25.0;
+  for (int i = 0; i < kPoints; ++i)
+    p.reference.insert(p.reference.end(), {std::cos(i + angle), std::sin(i + angle)});
+  p.error_components = p.size;
+  return p;
+}
+
+tp::Constraints radius_of(const Problem& circles) {
+  return row(
+      "radius",
+      [n = circles.size](double, const double* y) {
+        double sum = 0.0;
+        for (int j = 0; j < n; ++j) sum += y[j] * y[j];
+        return 0.5 * sum - 0.25 * n;
+      },
+      [n = circles.size](double, const double* y, double* c) { std::copy(y, y + n, c); });
+}
+
+}  // namespace
+
+TEST_CASE("many unknowns: the iteration after moves is foretold where F is not stiff") {
+  Problem ring = ring_of_masses();
+  ring.error_components = ring.size;
+  ring.reference = integrate_plain(ring, 1e-12).y;
+  const Problem circles = unsteady_circles();
+  double ratios = 0.0;
+  // The part of moves that an iteration follows.
+  const auto iterated = [&](const Problem& problem, double tolerance, const tp::Constraints& rows) {
+    const Run run = integrate(problem, tolerance, rows, {}, false);
+    REQUIRE(run.flag >= 0);
+    ratios += std::log(run.error / integrate_plain(problem, tolerance).error);
+    return static_cast<double>(run.statistics.extra_iterations) /
+           static_cast<double>(run.statistics.projections);
+  };
+  CHECK(iterated(ring, 1e-6, energy_of(ring)) < 0.6);        // found 0.45
+  CHECK(iterated(ring, 1e-8, energy_of(ring)) < 0.3);        // 0.15
+  CHECK(iterated(circles, 1e-8, radius_of(circles)) < 0.4);  // 0.20
+  CHECK(iterated(circles, 1e-4, radius_of(circles)) > 0.5);  // 0.77: here they change
+  CHECK(std::exp(ratios / 4) < 1.3);                         // 0.73
 }

@@ -16,6 +16,7 @@
 // what it is to remove.
 #include "step/polish.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tether::ida_projection {
@@ -26,6 +27,9 @@ namespace {
 constexpr double kMisled = 2.0;
 constexpr double kAnswered = 0.1;  // tolerances: a shorter move needs no answer of y_a
 constexpr double kAnsweredByMultipliers = 0.01;  // the same where they are of index 2
+constexpr int kDear = 64;          // unknowns: F and a solution cost as much as a move of many rows
+constexpr double kUnseen = 0.002;  // tolerances: so much may a change that is foretold miss
+constexpr int kMostForetold = 7;   // changes in a row
 
 }  // namespace
 
@@ -107,7 +111,9 @@ double Polish::answer(const Candidate& candidate) {
 }
 
 bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  if (!step_known_) {
+  if (foretell(candidate, cj, tolerance)) return true;
+  const bool asked = step_known_;
+  if (!asked) {
     if (!newton_step_at_moved_point(candidate)) return false;
     ++statistics_.residual_evaluations;
   }
@@ -118,10 +124,66 @@ bool Polish::add_newton_step(const Candidate& candidate, double cj, double toler
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
   const double length = differential_length(candidate, delta_entries_);
   corrector_was_right_ = length <= kMisled * tolerance;
+  if (!asked) look_at_pattern(candidate, cj);
   const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (variables_.any() && algebraic > 0.0) ++statistics_.refreshes;
+  return true;
+}
+
+// IDA multiplies its linear solutions by 2 / (1 + r), which leaves the part (r - 1) / (r + 1) of a
+// correction where F is not stiff. While factors and cj are the same, delta is next to a multiple
+// of the correction then, and what it is beyond that changes slowly.
+void Polish::look_at_pattern(const Candidate& candidate, double cj) {
+  if (!contiguous_ || size_ < kDear || variables_.any() || options_.extra_iterations == 0 ||
+      corrector_.iterations() != 1) {
+    cj_of_pattern_ = 0.0;
+    return;
+  }
+  beyond_.resize(static_cast<std::size_t>(size_));
+  const double* ycor = corrected_entries_;
+  const auto length = [&](const auto& entry) {
+    double square = 0.0;
+    for (int j = 0; j < size_; ++j) {
+      const double part = entry(j) * candidate.weight_entries[j];
+      square += part * part;
+    }
+    return std::sqrt(square / size_);
+  };
+  const auto beyond = [&](int j) { return delta_entries_[j] - share_ * ycor[j]; };
+  if (cj_of_pattern_ == cj) {
+    const bool right = length([&](int j) { return beyond(j) - beyond_[j]; }) <= kUnseen;
+    patience_ = right ? std::min(kMostForetold, 2 * patience_ + 1) : patience_ / 2;
+  } else {
+    patience_ = -1;
+  }
+  share_ = share_of(candidate);
+  if (patience_ < 0) patience_ = length(beyond) <= kUnseen ? 1 : 0;
+  for (int j = 0; j < size_; ++j) beyond_[j] = beyond(j);
+  cj_of_pattern_ = cj;
+  foretold_in_row_ = 0;
+}
+
+// Of ycor in delta.
+double Polish::share_of(const Candidate& candidate) const {
+  double square = 0.0, product = 0.0;
+  for (int j = 0; j < size_; ++j) {
+    const double w = candidate.weight_entries[j], e = corrected_entries_[j] * w;
+    square += e * e;
+    product += e * (delta_entries_[j] * w);
+  }
+  return square > 0.0 ? product / square : 0.0;
+}
+
+bool Polish::foretell(const Candidate& candidate, double cj, double tolerance) {
+  if (foretold_in_row_ >= patience_ || cj != cj_of_pattern_ || step_known_ ||
+      corrector_.iterations() != 1)
+    return false;
+  for (int j = 0; j < size_; ++j) delta_entries_[j] = share_ * corrected_entries_[j] + beyond_[j];
+  if (!(differential_length(candidate, delta_entries_) <= kMisled * tolerance)) return false;
+  ++foretold_in_row_;
+  for (int j = 0; j < size_; ++j) candidate.correction_entries[j] += delta_entries_[j];
   return true;
 }
 

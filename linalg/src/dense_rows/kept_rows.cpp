@@ -18,6 +18,7 @@ void KeptRows::resize(int rows, int columns) {
   const auto each_row = static_cast<std::size_t>(most);
   n_ = columns;
   places_.resize(rows, columns);
+  looked_at_ = -1;
   A_.assign(entries, 0.0);
   gathered_.assign(each_column, 0.0);
   heads_.assign(each_column, -1);
@@ -37,8 +38,10 @@ void KeptRows::resize(int rows, int columns) {
 }
 
 bool KeptRows::load(const double* wide, int width, const int* rows, const int* columns,
-                    const double* D, double* row_norm) {
+                    const double* D, double* row_norm, long places) {
   const int m = n_ > 0 ? static_cast<int>(A_.size()) / n_ : 0;
+  const bool known = places >= 0 && places == looked_at_;
+  looked_at_ = -1;  // an entry may turn out not to be finite
   const bool adjacent = n_ > 0 && columns[n_ - 1] - columns[0] + 1 == n_;
   for (int i = 0; i < m; ++i) {
     const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
@@ -48,7 +51,7 @@ bool KeptRows::load(const double* wide, int width, const int* rows, const int* c
       for (int j = 0; j < n_; ++j) gathered_[static_cast<std::size_t>(j)] = c[columns[j]];
       c = gathered_.data();
     }
-    places_.look(i, c);
+    if (!known) places_.look(i, c);
     double square = 0.0;
     double* const a = A_.data() + static_cast<std::ptrdiff_t>(i) * n_;
     int count = 0;
@@ -64,6 +67,7 @@ bool KeptRows::load(const double* wide, int width, const int* rows, const int* c
     const double factor = length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
     for (int e = 0; e < count; ++e) a[e] *= factor;
   }
+  looked_at_ = places;
   return true;
 }
 

@@ -20,9 +20,9 @@ class KeptRows {
   void resize(int rows, int columns);
 
   /// A from C(i, j) = wide[rows[i] * width + columns[j]] and D; row_norm receives |row_i(C D)|.
-  /// False: an entry is not finite.
+  /// False: an entry is not finite. `places` as of MinimumNorm::factor_kept().
   bool load(const double* wide, int width, const int* rows, const int* columns, const double* D,
-            double* row_norm);
+            double* row_norm, long places);
   /// A itself, row i at unit_rows + i columns.
   void load(const double* unit_rows);
   /// A A^T = L L^T of the first `rank` rows of the order. False: not positive definite.
@@ -59,6 +59,7 @@ class KeptRows {
 
   int n_ = 0;
   FilledPlaces places_;    // columns of each row
+  long looked_at_ = -1;    // the caller's number for them
   std::vector<double> A_;  // the entries there, of row i from i n_ on
   std::vector<double> gathered_;
   struct Link {

@@ -133,7 +133,8 @@ double MinimumNorm::least_of_decided() {
                                                                            : 0.0;
 }
 
-bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns) {
+bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns,
+                              long places) {
   const int r = rank_;
   if (r == 0 || (kernel_ != nullptr && r < m_)) return false;
   if (!kept_) decided_least_ = least_of_decided();
@@ -142,7 +143,8 @@ bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, co
   if (kernel_ != nullptr)
     return kept_ = factor_kept_small({wide, width, rows, columns, metric_.data()});
   KeptRows& kept = large_->kept;
-  if (!kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data())) return false;
+  if (!kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data(), places))
+    return false;
   if (!kept.factor(large_->qr.colsPermutation().indices().data(), r)) return false;
   const double least = kept.least_part(r);
   if (!(least >= std::max(kLeastSine, kLeastShare * decided_least_))) return false;

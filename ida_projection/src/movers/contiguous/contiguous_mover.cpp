@@ -19,8 +19,12 @@ constexpr int kQuick = 3;        // moves with a whole C
 
 template <class Rows>
 Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector id) {
+  // Which of many rows are independent costs some ten steps: what a look before the first move has
+  // found out about them stays right where no variable is algebraic.
+  if (takes_rest_ && id == nullptr && looked_at_all_) return Status::success;
   rows_.at.load(candidate);
   const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
+  looked_at_all_ = false;
   return rows_.structure(candidate, mask);
 }
 
@@ -55,9 +59,11 @@ template <class Rows>
 Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   Move result;
   rows_.at.load(candidate);
-  if (!rows_.blocks.structured() &&
-      (result.status = rows_.structure(candidate, nullptr)) != Status::success)
-    return result;
+  if (!rows_.blocks.structured()) {
+    result.status = rows_.structure(candidate, nullptr);
+    if (result.status != Status::success) return result;
+    looked_at_all_ = true;
+  }
   const bool may_do = rows_.factors.there && looks_ < kLooks;  // with g alone
   result.status = may_do ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;

@@ -101,7 +101,7 @@ class ContiguousMover final : public Mover {
     wear_ = FactorWear();
     misdirection_ = Misdirection();
     nothing_in_row_ = 0;
-    still_ = false;
+    still_ = looked_at_all_ = false;
   }
 
  private:
@@ -137,12 +137,13 @@ class ContiguousMover final : public Mover {
   bool firm_only_ = false;     // this attempt does without thin rows
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;
-  double move_length_ = 0.0;  // of the last first move, in tolerances
-  bool reused_ = false;       // factors of an earlier step are in use for this one
-  SlopeOfFactors kept_;       // these
-  int looks_ = 0;             // with the factors of an earlier candidate
-  int nothing_in_row_ = 0;    // moves that were none
-  bool still_ = false;        // the last candidate was only looked at
+  bool looked_at_all_ = false;  // the rows are arranged as if all variables were differential
+  double move_length_ = 0.0;    // of the last first move, in tolerances
+  bool reused_ = false;         // factors of an earlier step are in use for this one
+  SlopeOfFactors kept_;         // these
+  int looks_ = 0;               // with the factors of an earlier candidate
+  int nothing_in_row_ = 0;      // moves that were none
+  bool still_ = false;          // the last candidate was only looked at
   Staleness staleness_;
   FactorWear wear_;  // for follow(), as is what comes next
   Misdirection misdirection_;

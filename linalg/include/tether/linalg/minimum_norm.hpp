@@ -63,8 +63,10 @@ class MinimumNorm {
   /// from A A^T of these alone: some tenth of the work, less where rows have few entries, and up to
   /// 16 x 32 half of it, without the chain of one pivot after the other. False: an entry is not
   /// finite, a row depends on those before it but for a sine below 1e-3 or a third of what factor()
-  /// found least, or a small system has dropped rows: then factor() is due.
-  bool factor_kept(const double* wide, int width, const int* rows, const int* columns);
+  /// found least, or a small system has dropped rows: then factor() is due. `places`: a number that
+  /// changes where C has come to fill a place that it did not fill before; -1: each C may.
+  bool factor_kept(const double* wide, int width, const int* rows, const int* columns,
+                   long places = -1);
 
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
   /// Dropped rows take no part; see inconsistency().
