@@ -1,5 +1,6 @@
 // Tether: minimum-norm solves where the rank is clear. SPDX-License-Identifier: BSD-3-Clause
 #include <limits>
+#include <utility>
 
 #include "cases.hpp"
 #include "support/catch.hpp"
@@ -337,8 +338,9 @@ TEST_CASE(
     "rows of few entries in groups: parts of L between the determinant and the angles, late "
     "entries too") {
   const int m = 24, n = 60, groups = 3, width = 2 * n + 1;
-  for (const bool adjacent : {true, false}) {
-    INFO((adjacent ? "adjacent columns" : "columns with gaps"));
+  for (const auto [adjacent, told] :
+       {std::pair{true, false}, {false, false}, {true, true}, {false, true}}) {
+    INFO((adjacent ? "adjacent columns" : "columns with gaps") << (told ? ", places told" : ""));
     std::mt19937 random(17);
     Case c{RowMajor::Zero(m, n), random_vector(n, random, 0.5, 2.0), random_vector(m, random)};
     for (int i = 0; i < m; ++i)  // of its group's 20 columns, in which groups take turns
@@ -348,19 +350,23 @@ TEST_CASE(
     for (int i = 0; i < m; ++i) rows.push_back(i);
     for (int j = 0; j < n; ++j) columns.push_back(adjacent ? 1 + j : 1 + 2 * j);
     RowMajor wide(m, width);
+    tether::linalg::FilledPlaces places;
+    places.resize(m, width);
     MinimumNorm solver(m, n);
     std::copy_n(c.D.data(), n, solver.metric());
     const auto spread = [&] {
       wide.setConstant(std::numeric_limits<double>::quiet_NaN());
       for (int i = 0; i < m; ++i)
         for (int j = 0; j < n; ++j) wide(i, columns[static_cast<std::size_t>(j)]) = c.C(i, j);
+      for (int i = 0; i < m; ++i) places.look(i, wide.row(i).data());
     };
     spread();
     REQUIRE(solver.factor(wide.data(), width, rows.data(), columns.data(), 1e-12));
     REQUIRE(solver.rank() == m);
     const auto check = [&] {
       spread();
-      REQUIRE(solver.factor_kept(wide.data(), width, rows.data(), columns.data()));
+      REQUIRE(solver.factor_kept(wide.data(), width, rows.data(), columns.data(),
+                                 told ? &places : nullptr));
       RowMajor A = c.C * c.D.asDiagonal();
       for (int k = 0; k < m; ++k) {
         A.row(k) = c.C.row(solver.pivot(k)).cwiseProduct(c.D.transpose());
@@ -382,6 +388,12 @@ TEST_CASE(
     c.C(5, 0) = 0.7;  // its group has no such column
     check();
     c.C(5, 0) = 0.0;
+    check();
+    c.C(7, 0) = 0.6;
+    spread();  // and is not factored
+    c.C(7, 0) = 0.0;
+    check();
+    c.C(7, 0) = 0.5;
     check();
     for (int j = 0; j < n; ++j) c.C.row(4)[j] += 0.01 * std::sin(1.0 + j);
     check();

@@ -253,7 +253,7 @@ class RowBlocks {
   bool keep(Block& block) {
     return block.rows.empty() ||
            block.solver.factor_kept(C_.data(), n_, block.rows.data(), block.columns.data(),
-                                    zero_elsewhere_ ? places_.known() : -1);
+                                    zero_elsewhere_ ? &places_ : nullptr);
   }
   Status fill(Evaluator& evaluator, double t, const double* y, const double* WT, double* g);
   void solve_both(const std::vector<double>& g);

@@ -38,10 +38,10 @@ void KeptRows::resize(int rows, int columns) {
 }
 
 bool KeptRows::load(const double* wide, int width, const int* rows, const int* columns,
-                    const double* D, double* row_norm, long places) {
+                    const double* D, double* row_norm, const FilledPlaces* places) {
   const int m = n_ > 0 ? static_cast<int>(A_.size()) / n_ : 0;
-  const bool known = places >= 0 && places == looked_at_;
-  looked_at_ = -1;  // an entry may turn out not to be finite
+  if (m > 0 && places != nullptr && places->known() != looked_at_)
+    learn(*places, width, rows, columns);
   const bool adjacent = n_ > 0 && columns[n_ - 1] - columns[0] + 1 == n_;
   for (int i = 0; i < m; ++i) {
     const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
@@ -51,7 +51,7 @@ bool KeptRows::load(const double* wide, int width, const int* rows, const int* c
       for (int j = 0; j < n_; ++j) gathered_[static_cast<std::size_t>(j)] = c[columns[j]];
       c = gathered_.data();
     }
-    if (!known) places_.look(i, c);
+    if (places == nullptr) places_.look(i, c);
     double square = 0.0;
     double* const a = A_.data() + static_cast<std::ptrdiff_t>(i) * n_;
     int count = 0;
@@ -67,8 +67,22 @@ bool KeptRows::load(const double* wide, int width, const int* rows, const int* c
     const double factor = length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
     for (int e = 0; e < count; ++e) a[e] *= factor;
   }
-  looked_at_ = places;
   return true;
+}
+
+// All of them, also those that no C filled which came here.
+void KeptRows::learn(const FilledPlaces& wide, int width, const int* rows, const int* columns) {
+  const int m = static_cast<int>(A_.size()) / n_;
+  marks_.assign(static_cast<std::size_t>(width), 0.0);
+  for (int i = 0; i < m; ++i) {
+    for (const int *j = wide.begin(rows[i]), *last = wide.end(rows[i]); j != last; ++j)
+      marks_[static_cast<std::size_t>(*j)] = 1.0;
+    for (int j = 0; j < n_; ++j)
+      gathered_[static_cast<std::size_t>(j)] = marks_[static_cast<std::size_t>(columns[j])];
+    places_.look(i, gathered_.data());
+    wide.clear(rows[i], marks_.data());
+  }
+  looked_at_ = wide.known();
 }
 
 void KeptRows::load(const double* unit_rows) {

@@ -22,7 +22,7 @@ class KeptRows {
   /// A from C(i, j) = wide[rows[i] * width + columns[j]] and D; row_norm receives |row_i(C D)|.
   /// False: an entry is not finite. `places` as of MinimumNorm::factor_kept().
   bool load(const double* wide, int width, const int* rows, const int* columns, const double* D,
-            double* row_norm, long places);
+            double* row_norm, const FilledPlaces* places);
   /// A itself, row i at unit_rows + i columns.
   void load(const double* unit_rows);
   /// A A^T = L L^T of the first `rank` rows of the order. False: not positive definite.
@@ -41,6 +41,7 @@ class KeptRows {
   void dependence(int i, int rank, double* x) const;
 
  private:
+  void learn(const FilledPlaces& wide, int width, const int* rows, const int* columns);
   // Above this share of entries dense products are cheaper.
   static constexpr double kDense = 0.25;
 
@@ -58,9 +59,10 @@ class KeptRows {
   void multiply_dense(int rank);
 
   int n_ = 0;
-  FilledPlaces places_;    // columns of each row
-  long looked_at_ = -1;    // the caller's number for them
-  std::vector<double> A_;  // the entries there, of row i from i n_ on
+  FilledPlaces places_;        // columns of each row
+  long looked_at_ = -1;        // how many of the caller's are among them
+  std::vector<double> marks_;  // of a row of the caller's
+  std::vector<double> A_;      // the entries there, of row i from i n_ on
   std::vector<double> gathered_;
   struct Link {
     int next, row;

@@ -134,7 +134,7 @@ double MinimumNorm::least_of_decided() {
 }
 
 bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns,
-                              long places) {
+                              const FilledPlaces* places) {
   const int r = rank_;
   if (r == 0 || (kernel_ != nullptr && r < m_)) return false;
   if (!kept_) decided_least_ = least_of_decided();

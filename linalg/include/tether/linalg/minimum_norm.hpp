@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <tether/export.hpp>
+#include <tether/linalg/filled.hpp>
 #include <vector>
 
 TETHER_EXPORT_BEGIN
@@ -63,10 +64,10 @@ class MinimumNorm {
   /// from A A^T of these alone: some tenth of the work, less where rows have few entries, and up to
   /// 16 x 32 half of it, without the chain of one pivot after the other. False: an entry is not
   /// finite, a row depends on those before it but for a sine below 1e-3 or a third of what factor()
-  /// found least, or a small system has dropped rows: then factor() is due. `places`: a number that
-  /// changes where C has come to fill a place that it did not fill before; -1: each C may.
+  /// found least, or a small system has dropped rows: then factor() is due. `places`: those that
+  /// `wide` has ever filled, in a list that lives as long as this; null: not known.
   bool factor_kept(const double* wide, int width, const int* rows, const int* columns,
-                   long places = -1);
+                   const FilledPlaces* places = nullptr);
 
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
   /// Dropped rows take no part; see inconsistency().
