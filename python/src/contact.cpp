@@ -1,31 +1,15 @@
 // Tether: contact problems for Python. SPDX-License-Identifier: BSD-3-Clause
-#include <array>
 #include <map>
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 #include <tether/contact.hpp>
 #include <tether/contact/files.hpp>
 
-#include "bind.hpp"
+#include "contact_parts.hpp"
 
 namespace tether::python {
 
 namespace {
-
-namespace tc = tether::contact;
-
-constexpr std::array kMethods = {
-    tc::Method::automatic,       tc::Method::gauss_seidel,   tc::Method::sor,
-    tc::Method::jacobi,          tc::Method::anderson,       tc::Method::admm,
-    tc::Method::proximal_newton, tc::Method::interior_point, tc::Method::convex_relaxation};
-
-using View = Eigen::Map<const Eigen::VectorXd>;
-
-View vector(const char* argument, const Array& a) {
-  if (a.ndim() != 1)
-    refuse(std::string(argument) + " has shape " + shape(a) + ", must be a vector");
-  return {a.data(), a.size()};
-}
 
 int dimension(const Array& b, const Array& mu) {
   for (const int d : {2, 3})
@@ -107,19 +91,6 @@ tc::Solution solve(const tc::Problem& problem, const std::string& law, double to
   return solver.solve(problem, x);
 }
 
-std::vector<std::string> words_of(const std::vector<tc::Regime>& regimes) {
-  std::vector<std::string> words;
-  words.reserve(regimes.size());
-  for (const tc::Regime regime : regimes) words.emplace_back(name(regime));
-  return words;
-}
-
-/// An argument that may be None: no change.
-Eigen::VectorXd entries(const char* argument, const py::object& value) {
-  if (value.is_none()) return {};
-  return vector(argument, value.cast<Array>());
-}
-
 tc::Derivative derivative(const tc::Problem& problem, const tc::Solution& solution,
                           const std::string& law, double tolerance, double kink) {
   tc::DerivativeOptions options;
@@ -182,11 +153,11 @@ py::dict adjoint(const tc::Derivative& d, const py::object& impulses,
 
 void bind_derivative(py::module_& module) {
   using namespace py::literals;
-  py::class_<tc::Derivative>(module, "Derivative", R"(Derivative of the solution x(A, b, mu).
+  py::class_<tc::Derivative> made(module, "Derivative", R"(Derivative of the solution x(A, b, mu).
 
 By implicit differentiation on the branch of the present regimes; factors are kept. Made by
-Problem.derivative.)")
-      .def("forward", &forward, py::kw_only(), "A"_a = py::none(), "b"_a = py::none(),
+Problem.derivative.)");
+  made.def("forward", &forward, py::kw_only(), "A"_a = py::none(), "b"_a = py::none(),
            "mu"_a = py::none(),
            R"(J v: (dx, dw, residual) for changes of the data.
 
@@ -197,34 +168,8 @@ hyperstatic problem: the solution then jumps.)")
            R"(J' v: the gradient of impulses.x + velocities.w, a dict.
 
 impulses, velocities: (d n,) rows; None: 0. Result: b (d n,), mu (n,), and of A the blocks of the
-problem: blocks[k] (d, d) at block row rows[k] and block column columns[k].)")
-      .def_property_readonly(
-          "status", [](const tc::Derivative& d) { return std::string(name(d.report().status)); },
-          "unique, or minimum_norm: impulses are not unique, the least change is given")
-      .def_property_readonly(
-          "strictly_regular", [](const tc::Derivative& d) { return d.report().strictly_regular; },
-          "every contact is strictly open, sticking or sliding")
-      .def_property_readonly("regimes",
-                             [](const tc::Derivative& d) { return words_of(d.report().regimes); })
-      .def_property_readonly(
-          "kinks",
-          [](const tc::Derivative& d) {
-            py::list out;
-            for (const tc::Kink& k : d.report().kinks)
-              out.append(py::make_tuple(k.contact, name(k.branch), name(k.other), k.margin));
-            return out;
-          },
-          "(contact, branch whose derivative is given, other regime, relative margin)")
-      .def_property_readonly("rank", [](const tc::Derivative& d) { return d.report().rank; })
-      .def_property_readonly("unknowns",
-                             [](const tc::Derivative& d) { return d.report().unknowns; })
-      .def_property_readonly(
-          "not_unique", [](const tc::Derivative& d) { return d.report().not_unique; },
-          "contacts whose impulses are not determined")
-      .def_property_readonly("velocities_unique",
-                             [](const tc::Derivative& d) { return d.report().velocities_unique; })
-      .def_property_readonly("error", [](const tc::Derivative& d) { return d.report().error; })
-      .def_property_readonly("advice", [](const tc::Derivative& d) { return d.report().advice; });
+problem: blocks[k] (d, d) at block row rows[k] and block column columns[k].)");
+  def_report(made);
 }
 
 }  // namespace
@@ -303,6 +248,7 @@ replace the law at single contacts. What cannot be solved is a status, with advi
       });
 
   bind_derivative(module);
+  bind_cones(module);
 
   module.def("read", &tc::read_problem, "path"_a,
              "A problem from a Siconos .dat or fclib .hdf5 file.");

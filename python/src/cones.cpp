@@ -1,0 +1,306 @@
+// Tether: contact problems over products of cones for Python. SPDX-License-Identifier: BSD-3-Clause
+#include <optional>
+#include <tether/contact/cone_derivative.hpp>
+#include <tether/contact/cones.hpp>
+#include <tether/contact/files.hpp>
+#include <utility>
+
+#include "contact_parts.hpp"
+
+namespace tether::python {
+
+namespace {
+
+using Entries = std::vector<tc::MatrixEntry>;
+
+struct ConeDerivative : tc::ConeDerivative {
+  ConeDerivative(tc::ConeDerivative&& made, int n) : tc::ConeDerivative(std::move(made)), rows(n) {}
+  int rows;  // of the problem
+};
+
+/// Of an array or a scipy.sparse matrix, which has `rows` rows and `columns` columns.
+Entries matrix_entries(const char* argument, const py::object& matrix, py::ssize_t rows,
+                       py::ssize_t columns) {
+  const auto check = [&](py::ssize_t r, py::ssize_t c) {
+    if (r != rows || c != columns)
+      refuse(std::string(argument) + " is " + std::to_string(r) + " x " + std::to_string(c) +
+             ", must be " + std::to_string(rows) + " x " + std::to_string(columns));
+  };
+  Entries out;
+  if (py::hasattr(matrix, "tocoo")) {
+    const py::object given = matrix.attr("tocoo")();
+    const auto size = given.attr("shape").cast<std::array<py::ssize_t, 2>>();
+    check(size[0], size[1]);
+    const auto i = given.attr("row").cast<py::array_t<int, py::array::forcecast>>();
+    const auto j = given.attr("col").cast<py::array_t<int, py::array::forcecast>>();
+    const auto values = given.attr("data").cast<Array>();
+    out.reserve(static_cast<std::size_t>(values.size()));
+    for (py::ssize_t k = 0; k < values.size(); ++k) out.push_back({i.at(k), j.at(k), values.at(k)});
+    return out;
+  }
+  const auto dense = Array::ensure(matrix);
+  if (!dense) throw py::error_already_set();
+  if (dense.ndim() != 2)
+    refuse(std::string(argument) + " has " + std::to_string(dense.ndim()) +
+           " axes, must be a matrix");
+  check(dense.shape(0), dense.shape(1));
+  const auto value = dense.unchecked<2>();
+  for (py::ssize_t i = 0; i < rows; ++i)
+    for (py::ssize_t j = 0; j < columns; ++j)
+      if (value(i, j) != 0) out.push_back({static_cast<int>(i), static_cast<int>(j), value(i, j)});
+  return out;
+}
+
+tc::ConeProblem make_problem(const py::object& A, const Array& b, std::vector<tc::Cone> cones,
+                             const py::object& compliance) {
+  const View rows = vector("b", b);
+  return tc::ConeProblem::sparse(matrix_entries("A", A, b.size(), b.size()), rows, std::move(cones),
+                                 entries("compliance", compliance));
+}
+
+tc::ConeProblem make_saddle(const py::object& M, const py::object& J, const Array& f,
+                            const Array& bias, std::vector<tc::Cone> cones,
+                            const py::object& compliance) {
+  const View force = vector("f", f), rate = vector("bias", bias);
+  return tc::ConeProblem::saddle(matrix_entries("M", M, f.size(), f.size()),
+                                 matrix_entries("J", J, bias.size(), f.size()), force, rate,
+                                 std::move(cones), entries("compliance", compliance));
+}
+
+View by_row(const char* argument, const Array& given, const tc::ConeProblem& problem) {
+  const View x = vector(argument, given);
+  if (x.size() != problem.rows())
+    refuse(std::string(argument) + " has " + std::to_string(x.size()) + " entries, must have " +
+           std::to_string(problem.rows()));
+  return x;
+}
+
+py::dict residuals_of(const tc::ConeResiduals& r) {
+  using namespace py::literals;
+  return py::dict("error"_a = r.error, "worst"_a = r.worst,
+                  "blocks"_a = array(r.blocks.data(), static_cast<py::ssize_t>(r.blocks.size())));
+}
+
+tc::ConeSolution solve(const tc::ConeProblem& problem, const std::string& law, double tolerance,
+                       const std::string& method, const py::object& start, double max_work) {
+  tc::Options options;
+  options.law = named<tc::Law>("law", law, tc::laws());
+  options.method = named<tc::Method>("method", method, kMethods);
+  options.tolerance = tolerance;
+  options.max_work = max_work;
+  tc::ConeSolver solver(options);
+  if (start.is_none()) {
+    const py::gil_scoped_release others_run;
+    return solver.solve(problem);
+  }
+  const auto given = start.cast<Array>();
+  const View x = by_row("start", given, problem);
+  const py::gil_scoped_release others_run;
+  return solver.solve(problem, x);
+}
+
+ConeDerivative derivative(const tc::ConeProblem& problem, const Array& impulses, double tolerance,
+                          double kink) {
+  tc::DerivativeOptions options;
+  options.tolerance = tolerance;
+  options.kink = kink;
+  const View x = by_row("impulses", impulses, problem);
+  const py::gil_scoped_release others_run;
+  return {tc::derivative(problem, x, options), problem.rows()};
+}
+
+py::tuple forward(const ConeDerivative& d, const py::object& A, const py::object& b,
+                  const py::object& mu, const py::object& rolling, const py::object& torsional,
+                  const py::object& bound) {
+  tc::ConeDirection v;
+  v.b = entries("b", b);
+  v.mu = entries("mu", mu);
+  v.rolling = entries("rolling", rolling);
+  v.torsional = entries("torsional", torsional);
+  v.bound = entries("bound", bound);
+  if (!A.is_none()) v.A = matrix_entries("A", A, d.rows, d.rows);
+  const tc::ConeSolutionDirection found = d.forward(v);
+  return py::make_tuple(Eigen::VectorXd(found.impulses), Eigen::VectorXd(found.velocities),
+                        found.residual);
+}
+
+py::dict adjoint(const ConeDerivative& d, const py::object& impulses,
+                 const py::object& velocities) {
+  using namespace py::literals;
+  const tc::ConeDirection g =
+      d.adjoint(entries("impulses", impulses), entries("velocities", velocities));
+  const auto count = static_cast<py::ssize_t>(g.A.size());
+  py::array_t<int> rows(count), columns(count);
+  Array values(count);
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const tc::MatrixEntry& entry = g.A[static_cast<std::size_t>(k)];
+    rows.mutable_at(k) = entry.row;
+    columns.mutable_at(k) = entry.column;
+    values.mutable_at(k) = entry.value;
+  }
+  return py::dict("b"_a = Eigen::VectorXd(g.b), "mu"_a = Eigen::VectorXd(g.mu),
+                  "rolling"_a = Eigen::VectorXd(g.rolling),
+                  "torsional"_a = Eigen::VectorXd(g.torsional),
+                  "bound"_a = Eigen::VectorXd(g.bound), "rows"_a = rows, "columns"_a = columns,
+                  "values"_a = values);
+}
+
+void bind_cone(py::module_& module) {
+  using namespace py::literals;
+  py::class_<tc::Cone>(module, "Cone", R"(A factor of the cone K of a ConeProblem.
+
+What its rows of the impulse x may be, and what that asks of their velocities w. Made by the
+functions below.)")
+      .def_static("free", py::overload_cast<int>(&tc::Cone::free), "rows"_a = 1,
+                  "x of any sign, w = 0: joints. The only one with any number of rows.")
+      .def_static("nonnegative", &tc::Cone::nonnegative,
+                  "1 row: x >= 0 complementary to w >= 0: limits, contacts without friction.")
+      .def_static("bounded", py::overload_cast<double>(&tc::Cone::bounded), "bound"_a,
+                  "1 row: |x| <= bound; where w is not 0, x = -bound sign w: motors, dry joints.")
+      .def_static("planar", &tc::Cone::planar, "mu"_a, "2 rows: normal, tangent.")
+      .def_static("friction", &tc::Cone::friction, "mu"_a,
+                  "3 rows: normal, tangent, tangent; |x_t| <= mu x_n.")
+      .def_static("with_torsional", &tc::Cone::with_torsional, "mu"_a, "torsional"_a,
+                  "4 rows: friction's, and the moment about the normal, at most torsional x_n.")
+      .def_static(
+          "with_rolling",
+          [](double mu, double rolling, const std::optional<double>& torsional) {
+            return torsional ? tc::Cone::with_rolling(mu, rolling, *torsional)
+                             : tc::Cone::with_rolling(mu, rolling);
+          },
+          "mu"_a, "rolling"_a, "torsional"_a = py::none(),
+          R"(5 rows: friction's and two moments across the normal, |y_t| <= rolling x_n.
+
+With torsional 6: normal, tangents, moment about the normal, two across it.)")
+      .def_property_readonly("kind", [](const tc::Cone& c) { return std::string(name(c.kind)); })
+      .def_readonly("rows", &tc::Cone::rows)
+      .def_readonly("mu", &tc::Cone::mu)
+      .def_readonly("rolling", &tc::Cone::rolling)
+      .def_readonly("torsional", &tc::Cone::torsional)
+      .def_readonly("bound", &tc::Cone::bound)
+      .def("__repr__", [](const tc::Cone& c) {
+        return "<Cone: " + std::string(name(c.kind)) + ", rows " + std::to_string(c.rows) + ">";
+      });
+}
+
+void bind_problem(py::module_& module) {
+  using namespace py::literals;
+  py::class_<tc::ConeProblem>(module, "ConeProblem", R"(w = A x - b over a product of cones.
+
+A: (n, n) array or scipy.sparse matrix, b: (n,), cones: list of Cone whose rows add up to n, in
+their order; compliance: (n,) velocity over impulse of each row, >= 0, added to the diagonal of A.
+Rows of any units. A may be singular (redundant joints, many contacts). Raises ValueError on sizes
+that do not match, values that are not finite or out of range and contacts that nothing moves.)")
+      .def(py::init(&make_problem), "A"_a, "b"_a, "cones"_a, "compliance"_a = py::none())
+      .def_static("saddle", &make_saddle, "M"_a, "J"_a, "f"_a, "bias"_a, "cones"_a,
+                  "compliance"_a = py::none(),
+                  R"(M v = J' x + f, w = J v + bias.
+
+M: (m, m) positive definite, one of its halves or both; J: (n, m); arrays or scipy.sparse; f: (m,),
+bias: (n,).)")
+      .def_property_readonly("rows", &tc::ConeProblem::rows)
+      .def_property_readonly("cones", &tc::ConeProblem::cones)
+      .def_property_readonly(
+          "first_rows",
+          [](const tc::ConeProblem& p) {
+            std::vector<int> rows;
+            for (int k = 0; k < static_cast<int>(p.cones().size()); ++k)
+              rows.push_back(p.first_row(k));
+            return rows;
+          },
+          "the first row of each cone")
+      .def_property_readonly(
+          "A", [](const tc::ConeProblem& p) { return Eigen::MatrixXd(p.dense_matrix()); },
+          "with the compliance")
+      .def_property_readonly("b", [](const tc::ConeProblem& p) { return Eigen::VectorXd(p.b()); })
+      .def(
+          "residuals",
+          [](const tc::ConeProblem& p, const Array& impulses, const std::string& law) {
+            return residuals_of(tc::evaluate(p, named<tc::Law>("law", law, tc::laws()),
+                                             by_row("impulses", impulses, p)));
+          },
+          "impulses"_a, "law"_a = "coulomb",
+          R"(How far any impulses are from the law, without units: a dict.
+
+blocks: error in velocity of each cone, over what its island needs; error: the largest; worst: the
+cone that has it.)")
+      .def("derivative", &derivative, "impulses"_a, py::kw_only(), "tolerance"_a = 1e-5,
+           "kink"_a = 1e-6,
+           R"(The derivative of the solution `impulses` under "coulomb": a ConeDerivative.
+
+tolerance: largest error of a solution that is taken; kink: cones nearer to another regime than
+this (relative) are listed. Raises ValueError where the impulses are no solution.)")
+      .def("solve", &solve, "law"_a = "coulomb", py::kw_only(), "tolerance"_a = 1e-9,
+           "method"_a = "automatic", "start"_a = py::none(), "max_work"_a = 1e10,
+           R"(The impulses that obey the law: a ConeSolution.
+
+law: coulomb takes every cone, frictionless no bounds and moments, maximum_dissipation no free rows
+either. start: impulses to begin with. max_work: about nanoseconds. What cannot be solved is a
+status, with advice.)");
+}
+
+void bind_solution(py::module_& module) {
+  py::class_<tc::ConeSolution>(module, "ConeSolution", "An answer and how good it is.")
+      .def_property_readonly(
+          "solved", [](const tc::ConeSolution& s) { return s.status == tc::Status::solved; })
+      .def_property_readonly("status",
+                             [](const tc::ConeSolution& s) { return std::string(name(s.status)); })
+      .def_property_readonly("impulses",
+                             [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.impulses); })
+      .def_property_readonly(
+          "velocities", [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.velocities); })
+      .def_property_readonly("residuals",
+                             [](const tc::ConeSolution& s) { return residuals_of(s.residuals); })
+      .def_readonly("error", &tc::ConeSolution::error)
+      .def_readonly("contradicting", &tc::ConeSolution::contradicting,
+                    "free rows that nothing satisfies together")
+      .def_readonly("blocked", &tc::ConeSolution::blocked,
+                    "cones that approach though free rows hold their normal")
+      .def_property_readonly("infeasible_direction",
+                             [](const tc::ConeSolution& s) {
+                               return array(
+                                   s.infeasible_direction.data(),
+                                   static_cast<py::ssize_t>(s.infeasible_direction.size()));
+                             })
+      .def_readonly("advice", &tc::ConeSolution::advice)
+      .def_property_readonly("work", [](const tc::ConeSolution& s) { return s.counts.work; })
+      .def("__repr__", [](const tc::ConeSolution& s) {
+        return "<ConeSolution: " + std::string(name(s.status)) + ", error " + shown(s.error) + ">";
+      });
+}
+
+void bind_derivative(py::module_& module) {
+  using namespace py::literals;
+  py::class_<ConeDerivative> made(module, "ConeDerivative",
+                                  R"(Derivative of the solution of a ConeProblem.
+
+As Derivative; contacts in it are cones. Made by ConeProblem.derivative.)");
+  made.def("forward", &forward, py::kw_only(), "A"_a = py::none(), "b"_a = py::none(),
+           "mu"_a = py::none(), "rolling"_a = py::none(), "torsional"_a = py::none(),
+           "bound"_a = py::none(),
+           R"(J v: (dx, dw, residual) for changes of the data.
+
+A: (n, n) array or scipy.sparse matrix (a change of the compliance is one of its diagonal), b:
+(n,); the others by cone, of cones that have none ignored; None: no change.)")
+      .def("adjoint", &adjoint, "impulses"_a = py::none(), "velocities"_a = py::none(),
+           R"(J' v: the gradient of impulses.x + velocities.w, a dict.
+
+b by row; mu, rolling, torsional and bound by cone; of the entries of A values[k] at rows[k],
+columns[k].)");
+  def_report(made);
+}
+
+}  // namespace
+
+void bind_cones(py::module_& module) {
+  bind_cone(module);
+  bind_problem(module);
+  bind_solution(module);
+  bind_derivative(module);
+  using namespace py::literals;
+  module.def("read_cones", &tc::read_cones, "path"_a,
+             "A ConeProblem from a .dat of Siconos or an fclib file: with joints, rolling friction "
+             "or in global form (M, H), too.");
+}
+
+}  // namespace tether::python
