@@ -390,6 +390,49 @@ TEST_CASE("event: a storm of events is bounded by its work") {
   CHECK(engine->counts().events == 51);
 }
 
+TEST_CASE("event: a motion too fast for its length of time ends with its reason") {
+  CHECK_THROWS_WITH(run(R"(
+[[body]]
+name = "pendulum"
+mass = 1
+inertia = [1, 1, 1]
+position = [0, 0, -1]
+velocity = [1e150, 0, 0]
+[[joint]]
+kind = "distance"
+bodies = ["pendulum", "world"]
+at = [[0, 0, -1], [0, 0, 0]]
+)",
+                        1e-6, 1),
+                    Catch::Contains("100000 steps") && Catch::Contains("too fast"));
+}
+
+TEST_CASE("event: a start with impacts is one of the times of events") {
+  const auto engine = run(R"(
+[[body]]
+name = "floor"
+shape = "plane"
+fixed = true
+material = "floor"
+[[body]]
+name = "ball"
+shape = "sphere"
+radius = 0.1
+mass = 1
+position = [0, 0, 0.1]
+velocity = [0, 0, -1]
+material = "ball"
+[[pair]]
+between = ["floor", "ball"]
+restitution = 0.5
+)",
+                          1e-6, 0.05);
+  REQUIRE(engine->events().size() == 1);
+  CHECK(engine->events()[0].time == 0);
+  CHECK(engine->counts().events == 1);
+  CHECK(engine->counts().impacts == 1);
+}
+
 TEST_CASE("event: the plan names the engine, and what it does not have is refused by name") {
   const Scene bounces = parse_scene("[scene]\ngravity = [0, 0, -9.81]\n" + ball(1, 0.5), "test");
   CHECK(make_plan(bounces).engine == EngineKind::stepping);

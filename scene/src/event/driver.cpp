@@ -37,6 +37,10 @@ constexpr double kFlightError = 0.003, kLeastWay = 1e-15;
 constexpr long kMostAtOneTime = 300;
 constexpr double kStartTolerance = 1e-4;
 constexpr long kAnchor = 5000;  // steps
+// Steps that cover less than this part of what is left come to no end: at a microsecond each some
+// thousand years.
+constexpr long kManySteps = 100000;
+constexpr double kNoWay = 1e-12;
 
 using linalg::at;
 
@@ -69,6 +73,7 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   check_start();
   const std::vector<int> close = touching(-1);
   collide(close, EventKind::impact, -1);
+  if (!events_.empty()) ++counts_.events;
   // Figures of a scene are rounded: its energy is that of the start which joints allow.
   const std::vector<ContactMode> modes = decide(touching(-1), -1, {});
   motion_.choose(t, y_, modes);
@@ -226,6 +231,7 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
     phase_->step();
     if (counts_.phases.steps + phase_->counts().steps > options_.max_steps)
       fail(fmt::format("max_steps = {} steps are taken", options_.max_steps));
+    check_pace(t);
     next_ = watcher_.look(*phase_);
     if (!next_) turn_slips();
   }
@@ -257,8 +263,21 @@ bool Driver::Memory::is_sound() const {
   return sound;
 }
 
+// Since the last event.
+void Driver::check_pace(double t) const {
+  const long steps = paced_.steps + phase_->counts().steps;
+  const double way = paced_.way + phase_->step_end();
+  if (steps < kManySteps || !(way < kNoWay * (t - time_))) return;
+  fail(
+      fmt::format("the last {} steps are {:.3g} s together, and {:.3g} s are left: a motion too "
+                  "fast for its length of time",
+                  steps, way * model_.time_unit(), (t - time_) * model_.time_unit()));
+}
+
 // A phase without events may be long; a saved state is arrived at again from its start.
 void Driver::anchor() {
+  paced_.steps += phase_->counts().steps;
+  paced_.way += phase_->step_end();
   event_time_ = phase_->start() + phase_->step_end();
   phase_->projected_at(phase_->step_end(), y_);
   start_phase();
@@ -336,6 +355,7 @@ void Driver::record(EventKind kind, int contact, double before, double after, do
 }
 
 void Driver::handle(const Zero& zero) {
+  paced_ = {};
   const double now = phase_->start() + zero.time;
   at_one_time_ = now > event_time_ ? 0 : at_one_time_ + 1;
   if (at_one_time_ == 0) lifted_.clear();

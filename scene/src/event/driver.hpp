@@ -32,6 +32,7 @@ struct DriverCounts {
   PhaseCounts phases;
   long evaluations = 0;  ///< of the accelerations, for whatever they were needed
   long contact_problems = 0;
+  /// Times at which something happens, that of a start with impacts among them; contacts that hit.
   long events = 0, impacts = 0;
 };
 
@@ -92,6 +93,7 @@ class Driver {
   void start_phase();
   void handle(const Zero& zero);
   void anchor();
+  void check_pace(double t) const;
   void collide(const std::vector<int>& near, EventKind otherwise, int contact);
   std::vector<int> struck(const std::vector<int>& near, int first);
   void strike(const std::vector<int>& set, bool plastic);
@@ -131,6 +133,10 @@ class Driver {
   std::vector<EventRecord> events_;
   double lost_ = 0, first_energy_ = 0;
   DriverCounts counts_;
+  struct {
+    long steps = 0;
+    double way = 0;  // s
+  } paced_;          // of the phases before this one since the last event
   long at_one_time_ = 0;
   std::vector<int> lifted_;  // at this time
   bool jammed_ = false;      // at this event

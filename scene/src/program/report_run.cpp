@@ -73,7 +73,7 @@ std::string subject(const Scene& scene, const Expect& e) {
 namespace {
 
 void print_events(const Summary& s, const Counts& c) {
-  fmt::print("  events       {}, {} of them impacts; {} contact problems\n", c.events, c.impacts,
+  fmt::print("  events       at {} times; {} impacts, {} contact problems\n", c.events, c.impacts,
              c.contact_problems);
   fmt::print("  drift        {:.2e} m; penetration {:.2e} m\n", s.drift, s.penetration);
   fmt::print("  work         {} steps, {} residuals, {} Jacobians, {} failed error tests\n",

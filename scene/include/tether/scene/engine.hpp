@@ -101,9 +101,11 @@ struct Diagnostics {
 struct Counts {
   long steps = 0, residual_evaluations = 0, jacobian_evaluations = 0, projections = 0;
   long contact_problems = 0, sweeps = 0, unsolved = 0, error_test_failures = 0;
-  long accepted = 0;             ///< contact problems above the tolerance, within what is accepted
-  long halved = 0;               ///< steps, or parts of them, taken in two halves
-  long events = 0, impacts = 0;  ///< of the event engine
+  long accepted = 0;  ///< contact problems above the tolerance, within what is accepted
+  long halved = 0;    ///< steps, or parts of them, taken in two halves
+  /// Of the event engine: times at which something happens, that of a start with impacts among
+  /// them; contacts that hit.
+  long events = 0, impacts = 0;
 };
 
 /// Where a run of events went on in steps.
