@@ -308,6 +308,7 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
     polish_.doubt_corrector();
     return move;
   }
+  if (made) ++statistics_.stiff_moves;
   if (made)
     move.status = settle_stiff_move(candidate, cj, tolerance);
   else
