@@ -1,5 +1,6 @@
 // Tether: a falling chain of many links, with sparse factors. SPDX-License-Identifier: BSD-3-Clause
 #include <array>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <problems/link_chain.hpp>
@@ -92,7 +93,8 @@ class FallingChain {
 };
 
 // Centres and angles of the rods from angles and rates.
-void place(std::size_t links, const State& state, std::vector<double>* q, std::vector<double>* v) {
+template <class Angles>
+void place(std::size_t links, const Angles& state, std::vector<double>* q, std::vector<double>* v) {
   Real x = 0, y = 0, vx = 0, vy = 0;
   for (std::size_t i = 0; i < links; ++i) {
     const Real hx = kLength / 2.0L * std::cos(state[i]), hy = kLength / 2.0L * std::sin(state[i]);
@@ -219,9 +221,9 @@ ida_projection::Constraints sparse_rows(const LinkagePointer& linkage, const Pro
 }  // namespace
 
 Problem link_chain(int N, double t_end) {
-  if (N < 2 || N > static_cast<int>(kMost))
-    throw std::invalid_argument("link chain: N = " + std::to_string(N) + "; it must be 2 .. " +
-                                std::to_string(kMost));
+  if (N < 2 || N > 100000)
+    throw std::invalid_argument("link chain: N = " + std::to_string(N) +
+                                "; it must be 2 .. 100000");
   const auto links = static_cast<std::size_t>(N);
   auto linkage = std::make_shared<Linkage>();
   linkage->rods.assign(links, Rod{kMass, kLength});
@@ -229,11 +231,16 @@ Problem link_chain(int N, double t_end) {
   for (int i = 1; i < N; ++i)
     linkage->pins.push_back({i, -kLength / 2.0, i - 1, kLength / 2.0, 0.0, 0.0});
   std::vector<double> q0, v0, q, v;
-  place(links, State{}, &q0, &v0);
+  place(links, std::vector<Real>(2 * links, 0.0L), &q0, &v0);
   Problem p = build("chain of " + std::to_string(N), linkage, "index 1", 0.0, t_end, q0, v0);
   p.atol_scale.clear();  // no redundant rows
-  place(links, reference_solution<2 * kMost>(FallingChain(links), State{}, t_end), &q, &v);
-  set_reference(q, v, &p);
+  if (links <= kMost) {
+    place(links, reference_solution<2 * kMost>(FallingChain(links), State{}, t_end), &q, &v);
+    set_reference(q, v, &p);
+  } else {
+    set_reference(std::vector<double>(q0.size(), std::numeric_limits<double>::quiet_NaN()),
+                  std::vector<double>(v0.size(), std::numeric_limits<double>::quiet_NaN()), &p);
+  }
   p.sparse = sparse_jacobian(linkage, p);
   p.sparse_constraints = sparse_rows(linkage, p) + p.select({"energy"});
   return p;

@@ -9,7 +9,7 @@ namespace tether::problems {
 /// axis, gravity 9.81, form "index 1" of pinned_rods.hpp: 8 N unknowns, 4 N + 1 rows, sparse
 /// Jacobian for KLU, rows as a `SparseJacobian`. Energy stays 0; the tip falls freely at
 /// first. Reference from absolute angles with the pins' forces from a block-tridiagonal system,
-/// long double.
+/// long double, up to N = 128; unknown above.
 Problem link_chain(int N, double t_end);
 
 }  // namespace tether::problems

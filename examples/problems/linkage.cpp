@@ -1,6 +1,7 @@
 // Tether: planar rods held together by pins, in any arrangement. SPDX-License-Identifier:
 // BSD-3-Clause
 #include <Eigen/Dense>
+#include <Eigen/SparseCholesky>
 #include <limits>
 #include <problems/linkage.hpp>
 #include <problems/pinned_rods.hpp>
@@ -89,16 +90,14 @@ void add_rows(const LinkagePointer& linkage, const std::vector<double>& q0,
 
 }  // namespace
 
-void solve_motion(const Linkage& linkage, double epsilon, const double* q, const double* v,
-                  std::vector<double>* acceleration, std::vector<double>* multipliers) {
+namespace {
+
+// Accelerations and multipliers with solve(right) = (G M^-1 G^T + epsilon)^-1 right.
+template <class Solve>
+void refined_motion(const Linkage& linkage, double epsilon, const double* q, const double* v,
+                    Solve solve, std::vector<double>* acceleration,
+                    std::vector<double>* multipliers) {
   const int n = linkage.n(), m = linkage.m();
-  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(m, n);
-  linkage.gradient(q, [&G](int i, int j, double entry) { G(i, j) = entry; });
-  Eigen::MatrixXd left = G;
-  for (int j = 0; j < n; ++j) left.col(j) /= linkage.mass(j);
-  Eigen::MatrixXd S = left * G.transpose();
-  S.diagonal().array() += epsilon;
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor(S);
   acceleration->assign(static_cast<std::size_t>(n), 0.0);
   multipliers->assign(static_cast<std::size_t>(m), 0.0);
   Eigen::Map<Eigen::VectorXd> a(acceleration->data(), n), lam(multipliers->data(), m);
@@ -108,8 +107,46 @@ void solve_motion(const Linkage& linkage, double epsilon, const double* q, const
     linkage.dynamics(q, none.data(), lam.data(), r.data());
     for (int i = 0; i < n; ++i) a[i] = -r[i] / linkage.mass(i);
     linkage.acceleration(q, v, a.data(), second.data());
-    if (refinement < 3) lam += factor.solve(second - epsilon * lam);
+    if (refinement < 3) lam += solve(Eigen::VectorXd(second - epsilon * lam));
   }
+}
+
+}  // namespace
+
+void solve_motion(const Linkage& linkage, double epsilon, const double* q, const double* v,
+                  std::vector<double>* acceleration, std::vector<double>* multipliers) {
+  const int n = linkage.n(), m = linkage.m();
+  constexpr int kLargestDense = 600;  // above: rows must be independent
+  if (m > kLargestDense) {
+    std::vector<Eigen::Triplet<double>> entries, scaled;
+    linkage.gradient(q, [&](int i, int j, double entry) {
+      entries.emplace_back(i, j, entry);
+      scaled.emplace_back(i, j, entry / linkage.mass(j));
+    });
+    Eigen::SparseMatrix<double> G(m, n), left(m, n), S(m, m);
+    G.setFromTriplets(entries.begin(), entries.end());
+    left.setFromTriplets(scaled.begin(), scaled.end());
+    S.setIdentity();
+    S *= epsilon;
+    S += Eigen::SparseMatrix<double>(left * G.transpose());
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(S);
+    refined_motion(
+        linkage, epsilon, q, v,
+        [&factor](const Eigen::VectorXd& right) { return Eigen::VectorXd(factor.solve(right)); },
+        acceleration, multipliers);
+    return;
+  }
+  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(m, n);
+  linkage.gradient(q, [&G](int i, int j, double entry) { G(i, j) = entry; });
+  Eigen::MatrixXd left = G;
+  for (int j = 0; j < n; ++j) left.col(j) /= linkage.mass(j);
+  Eigen::MatrixXd S = left * G.transpose();
+  S.diagonal().array() += epsilon;
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor(S);
+  refined_motion(
+      linkage, epsilon, q, v,
+      [&factor](const Eigen::VectorXd& right) { return Eigen::VectorXd(factor.solve(right)); },
+      acceleration, multipliers);
 }
 
 Problem build(const std::string& name, const LinkagePointer& linkage, const std::string& form,

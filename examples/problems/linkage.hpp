@@ -173,7 +173,8 @@ Problem build(const std::string& name, const LinkagePointer& linkage, const std:
 /// q and v at the end; the multipliers stay unknown.
 void set_reference(const std::vector<double>& q, const std::vector<double>& v, Problem* p);
 
-/// Accelerations and multipliers of 0 = M a - f + G^T lam, g'' = epsilon lam.
+/// Accelerations and multipliers of 0 = M a - f + G^T lam, g'' = epsilon lam. Above 600 rows, with
+/// epsilon = 0, these must be independent.
 void solve_motion(const Linkage& linkage, double epsilon, const double* q, const double* v,
                   std::vector<double>* a, std::vector<double>* lam);
 

@@ -149,6 +149,29 @@ TEST_CASE("sparse and full rows: equal to a complete orthogonal decomposition") 
     }
 }
 
+TEST_CASE("one step: symmetric, and the solution of least norm but for eps") {
+  const SparseCase c = banded(40, 2, 5);
+  SparseMinimumNorm solver = factored(c);
+  const auto n = static_cast<int>(c.dense.C.cols());
+  const auto once = [&](const Eigen::VectorXd& g) {
+    Eigen::VectorXd dy(n);
+    solver.one_step(g.data(), dy.data());
+    return dy;
+  };
+  // In u = D^-1 dy: a . H b = b . H a.
+  std::mt19937 random(8);
+  const Eigen::VectorXd a = random_vector(n, random), b = random_vector(n, random);
+  const auto H = [&](const Eigen::VectorXd& u) {
+    return Eigen::VectorXd(once(c.dense.C * c.dense.D.asDiagonal() * u).cwiseQuotient(c.dense.D));
+  };
+  CHECK(std::abs(a.dot(H(b)) - b.dot(H(a))) <= 1e-12 * a.norm() * b.norm());
+  const Eigen::VectorXd expected = oracle(c.dense);
+  const RowMajor A = c.dense.C * c.dense.D.asDiagonal();
+  const RowMajor unit = A.rowwise().norm().cwiseInverse().asDiagonal() * A;
+  const double least = unit.jacobiSvd().singularValues().minCoeff();
+  CHECK(length(once(c.dense.g) - expected, c.dense.D) <=
+        2e-12 / (least * least) * length(expected, c.dense.D));
+}
 TEST_CASE("redundant sparse and full rows: dropped, explained, the rest still solved") {
   SparseCase c = banded(30, 2, 9);
   c.dense.D.setOnes();

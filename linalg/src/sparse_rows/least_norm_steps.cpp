@@ -105,6 +105,13 @@ void LeastNormSteps::solve(const UnitRows& rows, BorderedGram& gram, const doubl
   residual_ = size_ > 0.0 ? left / size_ : 0.0;
 }
 
+const double* LeastNormSteps::one(const UnitRows& rows, BorderedGram& gram, const double* g) {
+  for (std::size_t i = 0; i < z_.size(); ++i) z_[i] = g[i] * rows.inverse_norm(i);
+  gram.solve(z_.data());
+  rows.transposed(z_.data(), step_.data());
+  return step_.data();
+}
+
 void LeastMultipliers::resize(const UnitRows& rows) {
   step_.assign(rows.width(), 0.0);
   rest_.assign(rows.width(), 0.0);

@@ -17,6 +17,9 @@ class LeastNormSteps {
   /// b_i = g_i / |row_i(C D)|. Stops at |b - A du| <= tolerance |b| + 4e-16 |du|.
   void solve(const UnitRows& rows, BorderedGram& gram, const double* g, double tolerance);
 
+  /// A^T M^-1 b, valid until the next call.
+  const double* one(const UnitRows& rows, BorderedGram& gram, const double* g);
+
   const double* solution() const { return du_.data(); }
   /// b - A du
   const std::vector<double>& left() const { return left_; }

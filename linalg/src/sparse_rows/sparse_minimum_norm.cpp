@@ -132,6 +132,12 @@ void SparseMinimumNorm::solve(const double* g, double* dy, double tolerance) {
   for (std::size_t j = 0; j < p.rows.width(); ++j) dy[j] = du[j] * D[j];
 }
 
+void SparseMinimumNorm::one_step(const double* g, double* dy) {
+  Parts& p = *parts_;
+  const double *step = p.steps.one(p.rows, p.gram, g), *D = p.rows.metric();
+  for (std::size_t j = 0; j < p.rows.width(); ++j) dy[j] = step[j] * D[j];
+}
+
 void SparseMinimumNorm::multipliers(const double* dy, double* x) {
   parts_->multipliers.find(parts_->rows, parts_->gram, parts_->eps, dy, x);
 }

@@ -17,8 +17,8 @@ namespace {
 using linalg::at;
 
 constexpr double kRankTolerance = 1e-6;
-constexpr double kLocallySolved = 1e-12;  // or H is not symmetric
-constexpr double kSolved = 1e-6;          // of the move; more is left to the next one
+constexpr double kLocallySolved = 1e-12;
+constexpr double kSolved = 1e-6;  // of the move; more is left to the next one
 // Nothing must seem to be left of a full row that depends on the others, however small the
 // eigenvalues of H that take part.
 constexpr double kSolvedForBorder = 1e-11;
@@ -227,9 +227,13 @@ double DistributedStore::times(int row, const Numbers& v) const {
   return sum;
 }
 
-// sum_p A_p^+ linear_p in the unknowns u = D^-1 dy.
+// sum_p A_p^+ linear_p in the unknowns u = D^-1 dy. Where gradients follow, one step of each
+// process does for A_p^+: H is symmetric to the last bit then, and consistent rows have the same
+// solution.
 void DistributedStore::shortest(N_Vector to) {
-  if (m_ > 0)
+  if (m_ > 0 && coupled_)
+    solver_.one_step(linear_.data(), dy_.data());
+  else if (m_ > 0)
     solver_.solve(linear_.data(), dy_.data(), kLocallySolved);
   else
     std::fill(dy_.begin(), dy_.end(), 0.0);

@@ -64,6 +64,11 @@ class SparseMinimumNorm {
   /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() is the value reached.
   void solve(const double* g, double* dy, double tolerance = kTolerance);
 
+  /// The first of solve()'s steps alone, dy = D A^T M^-1 b: D^-1 dy is symmetric in u for b = A u,
+  /// whatever rounding decides, and short of the least norm by eps / (s^2 + eps). Leaves residual()
+  /// and iterations() as they are.
+  void one_step(const double* g, double* dy);
+
   /// The least x (m entries, each measured in the inverse unit of its row's |row_i(C D)|) with
   /// D^2 C^T x = dy, for dy from solve(), or a sum of such: the multipliers of the rows. Of a row
   /// that is given k times each copy gets a k-th. Does not allocate, leaves residual() as it is.
