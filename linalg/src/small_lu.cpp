@@ -44,17 +44,6 @@ TETHER_CLONES void take_columns_backwards(const double* __restrict first, int n,
     out[i] = (((out[i] - c3[i] * k3) - c2[i] * k2) - c1[i] * k1) - first[i] * k0;
 }
 
-// The columns behind the k-th less what its multipliers take from them.
-TETHER_CLONES void eliminate(double* a, int n, int k) {
-  const double* __restrict pivots = a + static_cast<std::ptrdiff_t>(k) * n;
-  for (int j = k + 1; j < n; ++j) {
-    double* __restrict changed = a + static_cast<std::ptrdiff_t>(j) * n;
-    const double share = changed[k];
-    if (share == 0.0) continue;  // and 0 * infinity would be NaN
-    for (int i = k + 1; i < n; ++i) changed[i] -= share * pivots[i];
-  }
-}
-
 }  // namespace
 
 int SmallLU::factor(double* a, int n) {
@@ -72,7 +61,12 @@ int SmallLU::factor(double* a, int n) {
     }
     const double inverse = 1.0 / pivots[k];
     for (int i = k + 1; i < n; ++i) pivots[i] *= inverse;
-    eliminate(a, n, k);
+    for (int j = k + 1; j < n; ++j) {
+      double* changed = column(j);
+      const double share = changed[k];
+      if (share == 0.0) continue;  // and 0 * infinity would be NaN
+      for (int i = k + 1; i < n; ++i) changed[i] -= share * pivots[i];
+    }
   }
   return 0;
 }
