@@ -152,6 +152,13 @@ void read_expect(Fields& in, Reader& r, const Names& joints, const Names& spring
   r.scene.expect.push_back(std::move(expect));
 }
 
+/// None where the key is not there.
+std::vector<Value>& items_of(Value& document, std::string_view key) {
+  for (Entry& each : document.entries)
+    if (each.key == key) return each.value.items;
+  return document.items;  // of a table: none
+}
+
 }  // namespace
 
 Scene read(Value document, const std::string& name) {
@@ -162,7 +169,12 @@ Scene read(Value document, const std::string& name) {
   Fields root(&document, "", name, report);
 
   read_scene_table(root, r);
+  // Of a hundred thousand of them the document need not stand beside what is read.
+  std::vector<Value>& bodies = items_of(document, "body");
+  r.scene.bodies.reserve(bodies.size());
   r.each(root, "body", [&](Fields& in) {
+    const std::size_t before = r.scene.bodies.size();
+    if (before > 0 && before <= bodies.size()) bodies[before - 1].entries = {};
     Body body = read_body(in, r);
     for (const effects::Effect* each : effects::all()) each->read_body(in, r, body);
     r.bodies.emplace(body.name, static_cast<int>(r.scene.bodies.size()));

@@ -14,16 +14,20 @@ namespace tether::scene::files {
 
 namespace {
 
-Value plain(const toml::node& node);
+Value plain(toml::node& node);
 
-void add_items(const toml::array& array, Value& out) {
+// Of a hundred thousand bodies the document would otherwise stand beside its copy as a whole.
+void add_items(toml::array& array, Value& out) {
   out.items.reserve(array.size());
-  for (const toml::node& item : array) out.items.push_back(plain(item));
+  for (toml::node& item : array) {
+    out.items.push_back(plain(item));
+    if (toml::table* table = item.as_table()) table->clear();
+  }
 }
 
-void add_entries(const toml::table& table, Value& out) {
+void add_entries(toml::table& table, Value& out) {
   out.entries.reserve(table.size());
-  for (const auto& [key, value] : table) {
+  for (auto&& [key, value] : table) {
     Entry entry;
     entry.key = std::string(key.str());
     entry.line = static_cast<int>(key.source().begin.line);
@@ -34,7 +38,7 @@ void add_entries(const toml::table& table, Value& out) {
 }
 
 // The depth of nesting is bounded before anything is parsed, so recursion is safe.
-Value plain(const toml::node& node) {
+Value plain(toml::node& node) {
   Value out;
   out.line = static_cast<int>(node.source().begin.line);
   out.column = static_cast<int>(node.source().begin.column);
@@ -51,10 +55,10 @@ Value plain(const toml::node& node) {
   } else if (const auto* flag = node.as_boolean()) {
     out.kind = Value::Kind::boolean;
     out.boolean = flag->get();
-  } else if (const auto* array = node.as_array()) {
+  } else if (auto* array = node.as_array()) {
     out.kind = Value::Kind::array;
     add_items(*array, out);
-  } else if (const auto* table = node.as_table()) {
+  } else if (auto* table = node.as_table()) {
     out.kind = Value::Kind::table;
     add_entries(*table, out);
   } else {
@@ -107,7 +111,8 @@ Value parse_document(std::string_view text, const std::string& name) {
                     "their parts",
                     kDeepest));
   try {
-    return plain(toml::parse(text, name));
+    toml::table document = toml::parse(text, name);
+    return plain(document);
   } catch (const toml::parse_error& e) {
     const Place place{name, static_cast<int>(e.source().begin.line),
                       static_cast<int>(e.source().begin.column)};
