@@ -41,6 +41,27 @@ inline Array array(const double* values, py::ssize_t n) {
   return a;
 }
 
+/// What has that name as an array of doubles: numpy casts other things, or says nothing of them.
+template <class Numbers = Array>
+Numbers numbers(const char* name, const py::object& given) {
+  const py::array any = py::array::ensure(given);
+  const bool real = any && any.dtype().kind() != 'c';
+  Numbers out = real ? Numbers::ensure(any) : py::reinterpret_steal<Numbers>(py::handle());
+  if (!out)
+    refuse(std::string(name) + " has entries of type " +
+           std::string(any ? py::str(any.dtype()) : py::str(py::type::of(given).attr("__name__"))) +
+           ", must be real numbers");
+  return out;
+}
+
+template <class Matrix = Array>
+Matrix matrix(const char* name, const py::object& given) {
+  Matrix out = numbers<Matrix>(name, given);
+  if (out.ndim() != 2)
+    refuse(std::string(name) + " has " + std::to_string(out.ndim()) + " axes, must be a matrix");
+  return out;
+}
+
 /// The value of an enumeration that has this name.
 template <class E, class List>
 E named(const char* argument, const std::string& word, const List& all) {

@@ -19,7 +19,7 @@ struct ConeDerivative : tc::ConeDerivative {
 };
 
 /// Of an array or a scipy.sparse matrix, which has `rows` rows and `columns` columns.
-Entries matrix_entries(const char* argument, const py::object& matrix, py::ssize_t rows,
+Entries matrix_entries(const char* argument, const py::object& whole, py::ssize_t rows,
                        py::ssize_t columns) {
   const auto check = [&](py::ssize_t r, py::ssize_t c) {
     if (r != rows || c != columns)
@@ -27,8 +27,8 @@ Entries matrix_entries(const char* argument, const py::object& matrix, py::ssize
              ", must be " + std::to_string(rows) + " x " + std::to_string(columns));
   };
   Entries out;
-  if (py::hasattr(matrix, "tocoo")) {
-    const py::object given = matrix.attr("tocoo")();
+  if (py::hasattr(whole, "tocoo")) {
+    const py::object given = whole.attr("tocoo")();
     const auto size = given.attr("shape").cast<std::array<py::ssize_t, 2>>();
     check(size[0], size[1]);
     const auto i = given.attr("row").cast<py::array_t<int, py::array::forcecast>>();
@@ -38,11 +38,7 @@ Entries matrix_entries(const char* argument, const py::object& matrix, py::ssize
     for (py::ssize_t k = 0; k < values.size(); ++k) out.push_back({i.at(k), j.at(k), values.at(k)});
     return out;
   }
-  const auto dense = Array::ensure(matrix);
-  if (!dense) throw py::error_already_set();
-  if (dense.ndim() != 2)
-    refuse(std::string(argument) + " has " + std::to_string(dense.ndim()) +
-           " axes, must be a matrix");
+  const auto dense = matrix(argument, whole);
   check(dense.shape(0), dense.shape(1));
   const auto value = dense.unchecked<2>();
   for (py::ssize_t i = 0; i < rows; ++i)

@@ -18,6 +18,8 @@ int dimension(const Array& b, const Array& mu) {
          ": must be two (plane) or three (space) for each contact");
 }
 
+using Columns = py::array_t<double, py::array::f_style | py::array::forcecast>;
+
 /// The entries of a scipy.sparse matrix, in 2 x 2 or 3 x 3 blocks.
 tc::Problem sparse(const py::object& A, const Array& b, const Array& mu) {
   const int d = dimension(b, mu);
@@ -47,10 +49,7 @@ tc::Problem sparse(const py::object& A, const Array& b, const Array& mu) {
 tc::Problem make_problem(const py::object& A, const Array& b, const Array& mu) {
   vector("b", b), vector("mu", mu);
   if (py::hasattr(A, "tocoo")) return sparse(A, b, mu);
-  const auto dense = py::array_t<double, py::array::f_style | py::array::forcecast>::ensure(A);
-  if (!dense) throw py::error_already_set();
-  if (dense.ndim() != 2)
-    refuse("A has " + std::to_string(dense.ndim()) + " axes, must be a matrix");
+  const auto dense = matrix<Columns>("A", A);
   return tc::Problem::dense(
       Eigen::Map<const Eigen::MatrixXd>(dense.data(), dense.shape(0), dense.shape(1)),
       vector("b", b), vector("mu", mu));
@@ -107,11 +106,10 @@ py::tuple forward(const tc::Derivative& d, const py::object& A, const py::object
   v.b = entries("b", b);
   v.mu = entries("mu", mu);
   if (!A.is_none()) {
-    const auto dense = py::array_t<double, py::array::f_style | py::array::forcecast>::ensure(
-        py::hasattr(A, "toarray") ? A.attr("toarray")() : A);
-    if (!dense) throw py::error_already_set();
+    const py::object filled = py::hasattr(A, "toarray") ? py::object(A.attr("toarray")()) : A;
+    const auto dense = matrix<Columns>("A", filled);
     const py::ssize_t size = d.impulses().size();
-    if (dense.ndim() != 2 || dense.shape(0) != size || dense.shape(1) != size)
+    if (dense.shape(0) != size || dense.shape(1) != size)
       refuse("A must be a change of the matrix, " + std::to_string(size) + " x " +
              std::to_string(size));
     const Eigen::Map<const Eigen::MatrixXd> whole(dense.data(), size, size);

@@ -33,8 +33,7 @@ struct FreeSolver {
 };
 
 Array vector(const char* argument, const py::object& given, py::ssize_t n) {
-  const auto a = Array::ensure(given);
-  if (!a) throw py::error_already_set();
+  const auto a = numbers(argument, given);
   if (a.ndim() != 1 || a.size() != n)
     refuse(std::string(argument) + " has shape " + shape(a) + ", must be (" + std::to_string(n) +
            ",)");
@@ -56,8 +55,7 @@ class System {
     try {
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
       const py::object result = function();
-      const auto a = Array::ensure(result);
-      if (!a) throw py::error_already_set();
+      const auto a = numbers(name, result);
       py::ssize_t size = 1;
       for (const py::ssize_t length : lengths) size *= length;
       const bool fits = a.size() == size && (lengths.size() < 2 || a.ndim() == 2) &&
@@ -109,8 +107,7 @@ class System {
 tp::Constraints constraints(System& system, const py::object& g, const py::object& C, double t,
                             const Array& y) {
   tp::Constraints set;
-  const auto value = Array::ensure(g(t, y));
-  if (!value) throw py::error_already_set();
+  const auto value = numbers("constraints", g(t, y));
   if (value.ndim() > 1) refuse("constraints returned shape " + shape(value) + ", must be a vector");
   set.count = static_cast<int>(value.size());
   if (set.count == 0) refuse("constraints returned no values");
@@ -179,8 +176,7 @@ Result solve(const py::object& residual, const Array& times, const py::object& y
     if (!std::isfinite(times.at(i)) || (i > 0 && !(times.at(i) > times.at(i - 1))))
       refuse("times[" + std::to_string(i) + "] = " + shown(times.at(i)) +
              ", must be finite and rise");
-  const auto begin = Array::ensure(y0);
-  if (!begin) throw py::error_already_set();
+  const auto begin = numbers("y0", y0);
   const py::ssize_t n = begin.size();
   if (n == 0) refuse("y0 is empty");
   if (!(rtol >= 0) || !std::isfinite(rtol)) refuse("rtol = " + shown(rtol) + ", must be >= 0");

@@ -170,6 +170,8 @@ class Refusals(unittest.TestCase):
             (lambda: ConeProblem(np.eye(4), np.ones(3), [Cone.friction(0.5)]), "A is 4 x 4"),
             (lambda: ConeProblem(Triplets(np.eye(4)), np.ones(3), [Cone.friction(0.5)]), "A is 4 x 4"),
             (lambda: ConeProblem(np.ones(3), np.ones(3), [Cone.friction(0.5)]), "axes"),
+            (lambda: ConeProblem([[1, "a"], [0, 1]], [1, 1], [Cone.free(2)]), "A has entries of type <U"),
+            (lambda: ConeProblem(1j * np.eye(3), np.ones(3), [Cone.friction(0.5)]), "A has entries of type complex"),
             (lambda: ConeProblem(np.eye(3), np.ones(3), [Cone.planar(0.5)]), "cones"),
             (lambda: ConeProblem(np.eye(3), np.ones(3), [Cone.friction(-1)]), "mu"),
             (lambda: ConeProblem([[np.nan]], [1], [Cone.free()]), "finite"),

@@ -165,6 +165,8 @@ class Refusals(unittest.TestCase):
             (lambda: contact.Problem(A, [np.nan, 0, 0], mu), "finite"),
             (lambda: contact.Problem(np.eye(3)[0], b, mu), "axes"),
             (lambda: contact.Problem(A, b, [[0.5]]), "mu has shape"),
+            (lambda: contact.Problem("A", b, mu), "A has entries of type <U1"),
+            (lambda: contact.Problem(object(), b, mu), "A has entries of type object"),
             (lambda: contact.Problem(A, b, mu).solve("columb"), "coulomb"),
             (lambda: contact.Problem(A, b, mu).solve(method="magic"), "gauss_seidel"),
             (lambda: contact.Problem(A, b, mu).solve(tolerance=-1), "tolerance"),
