@@ -1,6 +1,5 @@
 // Tether: minimum-norm solves where the rank is clear. SPDX-License-Identifier: BSD-3-Clause
 #include <limits>
-#include <utility>
 
 #include "cases.hpp"
 #include "support/catch.hpp"
