@@ -13,6 +13,18 @@ TETHER_CLONES std::int64_t filled_entries(const double* c, int n) {
   return count;
 }
 
+TETHER_CLONES bool any_filled(const double* c, std::size_t n) {
+  std::uint64_t bits = 0;
+  for (std::size_t e = 0; e < n; ++e) {
+    std::uint64_t entry;
+    std::memcpy(&entry, c + e, sizeof entry);
+    bits |= entry;
+  }
+  return (bits << 1) != 0;  // but for the sign
+}
+
+constexpr std::size_t kFew = 4;  // entries for each place, where all places are kept in one list
+
 }  // namespace
 
 void FilledPlaces::resize(int rows, int columns) {
@@ -20,6 +32,44 @@ void FilledPlaces::resize(int rows, int columns) {
   known_ = 0;
   places_.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns), 0);
   counts_.assign(static_cast<std::size_t>(rows), 0);
+  lifted_.resize(places_.size() / kFew);
+  list_.resize(places_.size() / kFew);
+  listed_ = 0;
+}
+
+bool FilledPlaces::list_all() {
+  if (known_ == listed_) return true;
+  if (static_cast<std::size_t>(known_) > list_.size()) return false;
+  std::ptrdiff_t* next = list_.data();
+  for (int i = 0; i < static_cast<int>(counts_.size()); ++i)
+    for (const int *j = begin(i), *last = end(i); j != last; ++j)
+      *next++ = static_cast<std::ptrdiff_t>(i) * n_ + *j;
+  listed_ = known_;
+  return true;
+}
+
+// Known entries are zero while the others are looked at.
+void FilledPlaces::look_at_all(double* c) {
+  const auto rows = static_cast<int>(counts_.size());
+  bool any = !list_all();
+  if (!any) {
+    const auto listed = static_cast<std::size_t>(listed_);
+    for (std::size_t e = 0; e < listed; ++e) {
+      double& entry = c[list_[e]];
+      lifted_[e] = entry;
+      entry = 0.0;
+    }
+    any = any_filled(c, places_.size());
+    for (std::size_t e = 0; e < listed; ++e) c[list_[e]] = lifted_[e];
+  }
+  for (int i = 0; any && i < rows; ++i) look(i, c + static_cast<std::ptrdiff_t>(i) * n_);
+}
+
+void FilledPlaces::clear_all(double* c) {
+  if (list_all())
+    for (std::size_t e = 0; e < static_cast<std::size_t>(listed_); ++e) c[list_[e]] = 0.0;
+  else
+    std::fill_n(c, places_.size(), 0.0);
 }
 
 // Counts entries, of which there are no more than in the known places if all others are zero.

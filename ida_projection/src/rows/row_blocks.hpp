@@ -136,6 +136,32 @@ double left_of_dropped(const BlockOf<Solver>& block) {
   return largest;
 }
 
+/// Not less than that: no row is longer in the metric than in tolerances by more than `ratio`.
+template <class Solver>
+double most_left_of_dropped(const BlockOf<Solver>& block, int n, double ratio) {
+  const Solver& solver = block.solver;
+  double largest = 0.0;
+  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
+    if (!(solver.row_norm(solver.pivot(k)) > std::numeric_limits<double>::min()))
+      return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, solver.inconsistency(k));
+  }
+  return largest == 0.0 ? 0.0 : largest * ratio / std::sqrt(n);
+}
+
+/// The largest D_j / WT_j of the block's columns.
+template <class Solver>
+double most_of_metric(BlockOf<Solver>& block, const std::vector<double>& WT) {
+  double largest = 0.0;
+  const double* D = block.D();
+  block.for_columns([&](int k, int j) {
+    const double weight = WT[static_cast<std::size_t>(j)];
+    largest =
+        std::max(largest, weight > 0.0 ? D[k] / weight : std::numeric_limits<double>::infinity());
+  });
+  return largest;
+}
+
 /// The same where weigh_dropped() was not called.
 template <class Solver, class Norm>
 double left_of_dropped(const BlockOf<Solver>& block, int n, Norm in_tolerances) {

@@ -8,35 +8,40 @@ namespace tether::linalg {
 
 /// G = L L^T, of each row the entries from the first one that can be filled up to the diagonal: L
 /// fills no other ones (George and Liu, Computer Solution of Large Sparse Positive Definite
-/// Systems, chapter 4). resize() allocates, nothing else does.
+/// Systems, chapter 4). Four rows and four columns are one block. resize() allocates, nothing else
+/// does.
 class Envelope {
  public:
+  static constexpr int kStride = 4;  ///< from one column of a row to the next
+
   void resize(int most);
 
   void begin() { size_ = 0; }
   /// The next row's first column.
   void add_row(int first);
+  /// After the last one.
+  void plan();
   int size() const { return size_; }
 
-  /// The lower triangle of G is zero, to be filled by add() with column <= row, inside the
-  /// envelope.
+  /// The lower triangle of G is zero, to be filled in row(k)[kStride column], inside the envelope.
   void clear();
-  void add(int row, int column, double entry) { row_at(row)[column] += entry; }
+  double* row(int k) { return L_.data() + starts_[static_cast<std::size_t>(k / 4)] + k % 4; }
   /// G to L. False: not positive definite.
   bool factor();
-  double diagonal(int k) const { return row_at(k)[k]; }
-  /// x <- G^-1 x.
+  double diagonal(int k) const { return diagonal_[static_cast<std::size_t>(k)]; }
+  /// x <- G^-1 x; x has room for three entries more.
   void solve(double* x) const;
 
  private:
-  const double* row_at(int k) const { return L_.data() + rows_[static_cast<std::size_t>(k)]; }
-  double* row_at(int k) { return L_.data() + rows_[static_cast<std::size_t>(k)]; }
+  int count() const { return (size_ + 3) / 4; }
 
   int size_ = 0;
   std::ptrdiff_t entries_ = 0;
+  // Of each four rows: the first four columns, and where the first columns of all would be.
   std::vector<int> firsts_;
-  std::vector<std::ptrdiff_t> rows_;  // where column 0 of each row would be
-  std::vector<double> L_, inverse_;   // row by row; 1 / L_kk
+  std::vector<std::ptrdiff_t> starts_;
+  std::vector<double> L_;  // four rows after the other, each column by column
+  std::vector<double> diagonal_, inverse_;
 };
 
 }  // namespace tether::linalg

@@ -30,7 +30,7 @@ void KeptRows::resize(int rows, int columns) {
   sorted_.assign(each_row, 0);
   row_order_.resize(most, columns);
   firsts_.assign(each_column, 0);
-  permuted_.assign(each_row, 0.0);
+  permuted_.assign(each_row + 3, 0.0);
   envelope_.resize(most);
   planned_places_ = -1;
   L_.resize(most, most);
@@ -135,6 +135,7 @@ void KeptRows::plan(const int* order, int rank) {
     }
     envelope_.add_row(first);
   }
+  envelope_.plan();
 }
 
 void KeptRows::spread(int i) const {
@@ -150,16 +151,17 @@ void KeptRows::multiply_by_columns(int rank) {
   std::fill(heads_.begin(), heads_.end(), -1);
   envelope_.clear();
   int count = 0;
-  for (int k = 0; k < rank; ++k)
+  Link* const links = links_.data();
+  for (int k = 0; k < rank; ++k) {
+    double* const products = envelope_.row(k);
     visit(sorted_[static_cast<std::size_t>(k)], [&](int j, double a) {
       int& head = heads_[static_cast<std::size_t>(j)];
-      links_[static_cast<std::size_t>(count)] = {head, k, a};
+      links[count] = {head, Envelope::kStride * k, a};
+      for (int e = head; e >= 0; e = links[e].next) products[links[e].at] += a * links[e].entry;
+      products[Envelope::kStride * k] += a * a;
       head = count++;
-      for (int e = head; e >= 0; e = links_[static_cast<std::size_t>(e)].next) {
-        const Link& before = links_[static_cast<std::size_t>(e)];
-        envelope_.add(k, before.row, a * before.entry);
-      }
     });
+  }
 }
 
 void KeptRows::multiply_dense(int rank) {

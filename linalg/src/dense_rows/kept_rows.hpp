@@ -65,7 +65,7 @@ class KeptRows {
   std::vector<double> A_;      // the entries there, of row i from i n_ on
   std::vector<double> gathered_;
   struct Link {
-    int next, row;
+    int next, at;  // in rows of the envelope
     double entry;
   };
   std::vector<int> heads_;  // of each column: its last entry so far in links_

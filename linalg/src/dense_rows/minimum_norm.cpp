@@ -214,10 +214,11 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
 // du = A^T (A A^T)^-1 b over the rows that take part; the others' inconsistency is b - A du.
 void MinimumNorm::solve_kept(const double* g, double* dy) {
   double* z = large_->rhs.data();
-  for (int k = 0; k < rank_; ++k) z[k] = scaled(g, pivot(k));
+  const int* order = large_->qr.colsPermutation().indices().data();
+  for (int k = 0; k < rank_; ++k) z[k] = scaled(g, order[k]);
   large_->kept.solve(rank_, z, dy);
   for (int k = rank_; k < m_; ++k) {
-    const int i = pivot(k);
+    const int i = order[k];
     inconsistency_[static_cast<std::size_t>(k)] =
         std::abs(scaled(g, i) - large_->kept.times(i, dy));
   }

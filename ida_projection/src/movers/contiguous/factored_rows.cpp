@@ -71,6 +71,7 @@ Status FactoredRows<Rows>::factor(double t) {
   const bool known = Rows::kKeepsRank && factors.lasting && factors.there;
   factors.there = false;
   weighed_ = false;
+  most_d_ = -1.0;
   if (known && blocks.factor_kept()) {
     factors.thin = false;
     ++(Rows::many(count()) ? statistics_.refactorizations : statistics_.factorizations);
@@ -144,7 +145,8 @@ Status FactoredRows<Rows>::learn_trust(double t, double length) {
 template <class Rows>
 bool FactoredRows<Rows>::contradicts() {
   if (!blocks.dropped_rows()) return false;
-  if (weighed_ && blocks.left_of_dropped() <= kContradiction) return false;
+  if (weighed_ ? blocks.left_of_dropped() <= kContradiction : left_below(kContradiction))
+    return false;
   if (!blocks.contradict(at.WT())) return false;
   message_ = blocks.contradiction.message;
   return true;

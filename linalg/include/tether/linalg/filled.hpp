@@ -39,6 +39,11 @@ class FilledPlaces {
   void look(int i, const double* c) {
     if (others(i, c)) learn(i, c);
   }
+  /// The same for all rows, which follow each other from c on, at a third of the work. c is as
+  /// before in the end.
+  void look_at_all(double* c);
+  /// Zeros in the known places of all rows, which follow each other from c on.
+  void clear_all(double* c);
   /// Zeros in the known places of row i.
   void clear(int i, double* c) const {
     for (const int *j = begin(i), *last = end(i); j != last; ++j) c[*j] = 0.0;
@@ -56,6 +61,11 @@ class FilledPlaces {
   int n_ = 0;
   long known_ = 0;
   std::vector<int> places_, counts_;
+  // Of all rows, while they are few.
+  bool list_all();
+  std::vector<std::ptrdiff_t> list_;
+  long listed_ = 0;
+  std::vector<double> lifted_;  // work space of look_at_all()
 };
 
 }  // namespace tether::linalg
