@@ -142,6 +142,39 @@ TEST_CASE("an id vector that calls everything algebraic is named") {
   CHECK(contains(end.message, "id"));
 }
 
+TEST_CASE("an id vector that takes some variables for the other kind is named") {
+  struct Case {
+    const char* form;
+    std::vector<double> id;
+    std::vector<const char*> said;
+  };
+  const std::vector<Case> cases = {
+      {"index 1", {1, 1, 1, 1, 1}, {"the id vector calls y[4] differential"}},
+      {"index 1", {1, 1, 0, 1, 0}, {"the id vector calls y[2] algebraic"}},
+      {"index 1", {0, 1, 0, 1, 1}, {"calls y[0] and y[2] algebraic", "it calls y[4] differential"}},
+      {"index 2", {1, 1, 1, 0, 0}, {"the id vector calls y[3] algebraic"}},
+      {"GGL", {1, 1, 1, 1, 1, 0}, {"the id vector calls y[4] differential"}},
+      {"index 1", {1, 1, 1, 1, 0}, {}},
+      {"index 1 w", {1, 1, 1, 1, 0, 0, 0}, {}},
+      {"index 0", {1, 1, 1, 1, 1}, {}},
+      {"index 2", {1, 1, 1, 1, 0}, {}},
+      {"GGL", {1, 1, 1, 1, 0, 0}, {}}};
+  for (const Case& what : cases) {
+    const Problem problem = pendulum(1.3, 6.1, 3.0, what.form);
+    Host owner(problem, 1e-6);
+    tp::Options options;
+    options.id = owner.vector(what.id);
+    const Ended end = run(problem, 1e-6, problem.recommended_constraints(), 3000, options);
+    INFO(what.form << ": " << end.flag << " " << end.message);
+    CHECK(contains(end.message, "id vector") == !what.said.empty());
+    for (const char* said : what.said) {
+      CHECK(contains(end.message, said));
+      CHECK(contains(end.printed, said));
+      CHECK(end.status == tp::Status::doubtful);
+    }
+  }
+}
+
 TEST_CASE("a squared row, whose gradient vanishes on the set, is suspected by name") {
   const tp::Constraints square = length_through(
       "square", [](double u) { return u * u; }, [](double u) { return 2.0 * u; });

@@ -8,6 +8,7 @@
 
 #include "contact_points.hpp"
 #include "host.hpp"
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::test;
@@ -206,4 +207,21 @@ TEST_CASE(
             REQUIRE(host.finish() >= 0);
             CHECK(host.steps() <= 100);
           }
+}
+
+TEST_CASE("contact points: energy without the rows that keep the body in contact is told so") {
+  int told = 0;
+  const double tolerance = std::pow(10.0, -4.5);
+  for (const std::string form : {"index 1", "index 1 a"})
+    for (const Problem& problem :
+         {wheel_on_rail(form, false, 2.3, 0.13), ellipsoid_on_plane(form, false, 2.7)}) {
+      INFO(form << ", " << problem.size << " unknowns");
+      const Run alone = integrate(problem, tolerance, problem.select({"energy"}), {}, false);
+      INFO(alone.message);
+      CHECK((alone.message.empty() || contains(alone.message, "give also the rows")));
+      told += alone.status == tp::Status::doubtful ? 1 : 0;
+      const Run all = integrate(problem, tolerance, problem.recommended_constraints(), {}, false);
+      CHECK(all.message.empty());
+    }
+  CHECK(told >= 1);
 }

@@ -112,7 +112,7 @@ TEST_CASE("rods with bending springs: a small first step excites nothing, at ord
   const BentRods rods;
   Problem problem = rods.problem(0.3);
   problem.initial_step = 1e-5;
-  double mean = 0.0;
+  double mean = 0.0, mean_high = 0.0;
   const std::vector<double> tolerances = {2.4e-4, 1.42e-4, 1.3e-4, 1.1e-4};
   for (const double tolerance : tolerances) {
     INFO("tolerance " << tolerance);
@@ -125,13 +125,17 @@ TEST_CASE("rods with bending springs: a small first step excites nothing, at ord
       IDAGetLastOrder(host.ida, &order);
       high += host.steps() <= 40 && order > 2 ? 1 : 0;
     }
-    CHECK(high <= 14);  // one in five, and those before the first move
+    // Rounding decides single runs: of 30 tolerances from 1e-4 to 2.5e-4 the mean is 13.2 and the
+    // largest 19, with two ways to sum up A A^T.
+    CHECK(high <= 20);
+    mean_high += high / static_cast<double>(tolerances.size());
     CHECK(host.projection().statistics().order_limited >= 1);
     const Run plain = integrate_plain(problem, tolerance);
     const double ratio = static_cast<double>(host.steps()) / static_cast<double>(plain.steps);
     CHECK(ratio <= 0.9);
     mean += std::log(ratio) / static_cast<double>(tolerances.size());
   }
+  CHECK(mean_high <= 14.0);  // one in five, and those before the first move
   CHECK(std::exp(mean) <= 0.65);
 }
 
@@ -157,13 +161,14 @@ TEST_CASE(
   for (const double spring : {2e5, 1e6}) {
     const BentRods rods(spring);
     const Problem problem = rods.problem(0.3);
-    for (const double tolerance : {2.6e-3, 2.35e-3, 2.1e-3, 1.83e-3}) {
+    for (const double tolerance : {2.58e-3, 2.35e-3, 2.09e-3, 1.85e-3, 1.8e-3, 1.64e-3}) {
       const Run run = integrate(problem, tolerance, rods.rows(), {}, false);
       REQUIRE(run.flag >= 0);
       stiff_moves += run.statistics.stiff_moves;
       repeated += run.statistics.corrections_repeated;
     }
   }
-  CHECK(stiff_moves >= 40);  // found 104
-  CHECK(repeated >= 1);      // found 5; rounding decides where
+  CHECK(stiff_moves >= 60);
+  // One run in ten, of 48 for each of two ways to sum up A A^T; two of these tolerances in both.
+  CHECK(repeated >= 1);
 }

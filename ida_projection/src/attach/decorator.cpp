@@ -425,10 +425,13 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();
+  const bool given = options_.id != nullptr;
+  const std::string doubts = given ? variables_.doubts(candidate, corrector_, cj) : std::string();
+  if (!doubts.empty()) report_.warn(Status::doubtful, doubts);
   if (variables_.high_index()) {
     control_.begin_smoothing(care_of_high_index(candidate));
     const std::string found = run_.start ? undetermined_at(candidate, run_.start) : std::string();
-    if (!found.empty()) {
+    if (!found.empty() && doubts.empty()) {
       run_.undetermined = "the motion from the start is not determined: there " + found;
       report_.warn(Status::doubtful, run_.undetermined);
     }

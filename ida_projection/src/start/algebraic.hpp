@@ -39,11 +39,20 @@ class AlgebraicVariables {
   const std::vector<int>& undetermined() const { return undetermined_; }
   void forget_index();  ///< a new run starts
 
+  /// Of an id vector that the caller gave, after look_at_index(): variables that it calls algebraic
+  /// although F contains their derivatives, or differential although F does not. Empty: none is
+  /// known. Four evaluations of F, more where there are some.
+  std::string doubts(const Candidate& candidate, Corrector& corrector, double cj) const;
+
   /// The equations of F that notice no change of y', bit for bit.
   std::vector<char> derivative_free_equations(const Candidate& candidate, Corrector& corrector,
                                               double cj) const;
 
  private:
+  // given_id.cpp
+  std::vector<int> with_derivative(const Candidate& candidate, Corrector& corrector,
+                                   double cj) const;
+
   // index.cpp
   bool exceeds_one(const Candidate& candidate, Corrector& corrector, double cj, long usual);
   bool has_rows_of_zeros(const Candidate& candidate, Corrector& corrector, double cj);
@@ -54,6 +63,7 @@ class AlgebraicVariables {
   bool any_ = false, all_ = false;
   bool high_index_ = false, index_known_ = false;
   std::vector<int> undetermined_;
+  std::vector<int> without_derivative_;  // differential ones whose y' look_at_index() found nowhere
 };
 
 }  // namespace tether::ida_projection

@@ -88,6 +88,7 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
   };
 
   bool known = true;
+  without_derivative_.clear();
   Eigen::MatrixXd slopes(size, size);
   for (int j = 0; j < size && known; ++j) {
     const bool differential = id == nullptr || id[j] != 0.0;
@@ -103,6 +104,7 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
     e[j] = 0.0;
     predicted[j] = original[j];
     for (int i = 0; i < size; ++i) slopes(i, j) = (after[i] - before[i]) / change;
+    if (differential && known && slopes.col(j).isZero(0.0)) without_derivative_.push_back(j);
   }
   N_VScale(1.0, saved, candidate.base);
   const std::vector<char> left =
@@ -122,6 +124,7 @@ void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& co
 void AlgebraicVariables::forget_index() {
   high_index_ = index_known_ = false;
   undetermined_.clear();
+  without_derivative_.clear();
 }
 
 }  // namespace tether::ida_projection

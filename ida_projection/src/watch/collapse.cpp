@@ -179,7 +179,7 @@ std::string RejectionWatch::suspected_row(const Candidate& candidate, const Step
   PlainText out;
   out << "F does not keep row " << worst << " (" << constraints_.name(static_cast<int>(worst))
       << "): C y' + g_t = " << rate[worst] << ", its terms sum up to " << size[worst]
-      << " in absolute value";
+      << " in absolute value" << kRowAdvice;
   return out.str();
 }
 

@@ -159,8 +159,8 @@ std::string FirstSteps::false_row(int row, const RowDoubt& doubt, const StepData
   if (std::abs(along) > doubt.share * terms && std::abs(along * h) > felt) {
     PlainText out;
     out << "F does not keep row " << row << " (" << constraints_.name(row) << "): at t = " << step.t
-        << " C y' + g_t = " << along << ", its terms sum up to " << terms
-        << " in absolute value; check the row, its constants and F";
+        << " C y' + g_t = " << along << ", its terms sum up to " << terms << " in absolute value"
+        << kRowAdvice;
     return out.str();
   }
   if (std::abs(tangency_.rate[i] + in_time - along) > doubt.share * terms &&
