@@ -165,10 +165,22 @@ void IslandSweeps::add_impulse(int contact, Kind k, int place, const Vector3d& p
   bodies_.push(graph_->slot[at(second)], minus, c.r2.cross(minus));
 }
 
+// Each thread's own contacts, as it sweeps them: what another thread has swept comes from that
+// one's cache, which takes longer than to sweep it.
+template <class Operation>
+void IslandSweeps::own_chunks(const Island& island, const Team& team,
+                              const Operation& operation) const {
+  for (int k = island.colour_begin; k < island.colour_end; ++k) {
+    const int first = graph_->colours[at(k)], last = graph_->colours[at(k + 1)];
+    operation(cut(first, last, team.thread, team.threads),
+              cut(first, last, team.thread + 1, team.threads));
+  }
+}
+
 void IslandSweeps::extrapolate(const Island& island, const Team& team, double beta) {
-  const int end = team.to(island.chunk_begin, island.chunk_end);
-  for (int chunk = team.from(island.chunk_begin, island.chunk_end); chunk < end; ++chunk)
-    contacts_.extrapolate(graph_->chunks[at(chunk)], graph_->chunks[at(chunk + 1)], beta);
+  own_chunks(island, team, [&](int begin, int end) {
+    contacts_.extrapolate(graph_->chunks[at(begin)], graph_->chunks[at(end)], beta);
+  });
   bodies_.extrapolate(team.from(island.body_begin, island.body_end),
                       team.to(island.body_begin, island.body_end), beta);
   team.meet();
@@ -179,9 +191,9 @@ void IslandSweeps::combine(const Island& island, const Team& team, bool start) {
   const int begin = team.from(island.body_begin, island.body_end);
   const int end = team.to(island.body_begin, island.body_end);
   team.once([&] { team.partners->collect(bodies_); });
-  const int last = team.to(island.chunk_begin, island.chunk_end);
-  for (int chunk = team.from(island.chunk_begin, island.chunk_end); chunk < last; ++chunk)
-    contacts_.relax(graph_->chunks[at(chunk)], graph_->chunks[at(chunk + 1)], start ? 0 : part);
+  own_chunks(island, team, [&](int from, int to) {
+    contacts_.relax(graph_->chunks[at(from)], graph_->chunks[at(to)], start ? 0 : part);
+  });
   if (!start) bodies_.relax(begin, end, part);
   team.meet();
   team.once([&] { team.partners->share(bodies_); });

@@ -9,13 +9,40 @@
 
 namespace tether::contact::detail {
 
-// All threads meet; the last one to come lets the others go. Waiting spins for about the time by
-// which the shares of a colour differ, then sleeps: a thread that only yields may share a core with
-// the one that it waits for, while a sleeping one is woken on a core that is free.
+// How long a thread spins before it sleeps. A thread that sleeps is woken tens of microseconds
+// later, late for the next meeting, where the other one sleeps then: where all have a core,
+// spinning for longer than that is the cheaper way to wait. Where others have taken the core it
+// waits for nothing: a wait in vain is followed by short ones, twice as many each time.
+class Patience {
+ public:
+  int spins() const { return short_waits_ > 0 ? kShort : kLong; }
+  void met() {
+    if (short_waits_ > 0)
+      --short_waits_;
+    else if (in_vain_ > kFirst)
+      in_vain_ /= 2;
+  }
+  void slept() {
+    if (short_waits_ > 0) {
+      --short_waits_;
+      return;
+    }
+    short_waits_ = in_vain_;
+    if (in_vain_ < kMost) in_vain_ *= 2;
+  }
+
+ private:
+  static constexpr int kShort = 400, kLong = 5000;  // of 20 to 50 ns
+  static constexpr int kFirst = 8, kMost = 1024;    // meetings
+  int short_waits_ = 0, in_vain_ = kFirst;
+};
+
+// All threads meet; the last one to come lets the others go. A thread that only yields may share a
+// core with the one that it waits for, while a sleeping one is woken on a core that is free.
 class Barrier {
  public:
   void reset(int threads) { threads_ = threads; }
-  void wait() {
+  void wait(Patience& patience) {
     if (threads_ == 1) return;
     const int round = round_.load();
     if (come_.fetch_add(1) + 1 == threads_) {
@@ -24,12 +51,16 @@ class Barrier {
       if (sleepers_.load() > 0) wake();
       return;
     }
-    for (int spins = 0; spins < 400; ++spins) {
-      if (round_.load(std::memory_order_acquire) != round) return;
+    for (int left = patience.spins(); left > 0; --left) {
+      if (round_.load(std::memory_order_acquire) != round) {
+        patience.met();
+        return;
+      }
 #if defined(__x86_64__) || defined(__i386__)
       __builtin_ia32_pause();
 #endif
     }
+    patience.slept();
     sleep(round);
   }
 
