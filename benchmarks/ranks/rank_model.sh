@@ -46,7 +46,7 @@ echo "ranks  contacts     most    sweep sweeping  telling  summing efficiency me
 for ranks in "$@"; do
   smpirun -np "$ranks" -platform "$folder/cluster.xml" -hostfile "$folder/hosts" \
     --cfg=network/model:CM02 --cfg=network/crosstraffic:0 --cfg=smpi/privatization:no \
-    --cfg=smpi/simulate-computation:no --cfg=smpi/host-speed:1Gf \
+    --cfg=smpi/simulate-computation:no --cfg=smpi/host-speed:1Gf --cfg=smpi/coll-selector:ompi \
     --cfg=smpi/os:0:3e-7:0 --cfg=smpi/or:0:3e-7:0 \
     --log=root.thres:error \
     "$folder/rank_model" "$contacts" "$ns" 20
