@@ -4,7 +4,7 @@
 #
 #   sh benchmarks/ranks/rank_model.sh BUILD [contacts a rank = 5000] [ns a contact and sweep = 15] [ranks ...]
 #
-# BUILD: a build directory with tether_contact. Needs SimGrid (Debian: libsimgrid-dev); without it a
+# SWEEPS in the environment: how many, 20. BUILD: a build directory with tether_contact. Needs SimGrid (Debian: libsimgrid-dev); without it a
 # message says so, exit code 0. The cluster: one rank a node, 100 Gb/s, 1.5 us from node to node
 # through a switch that never blocks, 0.3 us of a processor for each message sent and received.
 set -eu
@@ -49,5 +49,5 @@ for ranks in "$@"; do
     --cfg=smpi/simulate-computation:no --cfg=smpi/host-speed:1Gf --cfg=smpi/coll-selector:ompi \
     --cfg=smpi/os:0:3e-7:0 --cfg=smpi/or:0:3e-7:0 \
     --log=root.thres:error \
-    "$folder/rank_model" "$contacts" "$ns" 20
+    "$folder/rank_model" "$contacts" "$ns" "${SWEEPS:-20}"
 done
