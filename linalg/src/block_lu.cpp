@@ -218,6 +218,17 @@ bool BlockLu::end_row() {
   return regular;
 }
 
+int BlockLu::determinant_sign() const {
+  bool negative = false;
+  for (int r = 0; r < n_; ++r) {
+    const BlockPivot& d = pivot_[at(r)];
+    for (double reciprocal : d.reciprocal) negative ^= reciprocal < 0;
+    const bool even = (d.order[1] - d.order[0] + 3) % 3 == 1;  // (0 1 2), (1 2 0), (2 0 1)
+    negative ^= !even;
+  }
+  return negative ? -1 : 1;
+}
+
 void BlockLu::solve(PackedVector* x) {
   for (int r = 0; r < n_; ++r) rhs_[at(r)] = x[block_row_[at(r)]];
   substitute(n_, lower_start_.data(), lower_.data(), L_.data(), upper_start_.data(), upper_.data(),

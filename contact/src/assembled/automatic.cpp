@@ -80,7 +80,9 @@ const Automatic::Turn Automatic::kFewBodies[] = {
     {&Automatic::sweep_few_bodies, always, 20},           // factorisations it may forecast
     {&Automatic::end_of_work, always, 0},                 //
     {&Automatic::sticking_point, always, 1},              // factorisation
-    {&Automatic::shifted_path, always, 1000},             // steps, from where the sweeps were
+    {&Automatic::shifted_path, always, 100},              // steps, from where the sweeps were
+    {&Automatic::arclength_path, always, 800},            // factorisations, from sticking
+    {&Automatic::shifted_path, always, 1000},             // steps
     {&Automatic::round_off, always, kRoundOffSteps},      // steps
     {&Automatic::end_of_work, always, 0},                 //
     {&Automatic::interior_points, at_a_small_price, 40},  // steps

@@ -186,6 +186,12 @@ Status Automatic::shifted_path(Search& search, Rotation&, int steps) {
   return Status::unsolved;
 }
 
+Status Automatic::arclength_path(Search& search, Rotation&, int factorisations) {
+  interior.run_arclength(search, factorisations, newton);
+  x_ = search.best;
+  return Status::unsolved;
+}
+
 Status Automatic::proximal_path(Search& search, Rotation&, int problems) {
   interior.run_proximal(search, x_.data(), problems, newton);
   return Status::unsolved;

@@ -181,6 +181,12 @@ void System::velocities(const PackedVector* x, PackedVector* w) const {
   detail::velocities(*problem_, x, w);
 }
 
+void System::velocities(const PackedVector* x, const PackedVector* b, PackedVector* w) const {
+  View s = view(*problem_, nullptr, nullptr, nullptr);
+  s.b = b;
+  multiply(s, x, w);
+}
+
 void exact_velocities(const Problem& problem, const PackedVector* x, PackedVector* w) {
   const View s = view(problem, nullptr, nullptr, nullptr);
   for (int i = 0; i < s.n; ++i) {

@@ -74,6 +74,8 @@ class System {
   void changes(const PackedVector* x, PackedVector* z, double* change);
   // w = A x - b
   void velocities(const PackedVector* x, PackedVector* w) const;
+  // The same for another b: changes keep digits that b would take.
+  void velocities(const PackedVector* x, const PackedVector* b, PackedVector* w) const;
   // Natural map with the norms of x and w (scratch is overwritten), or the block fixed point alone.
   Test natural_map(const PackedVector* x, PackedVector* scratch);
   Test fixed_point(const PackedVector* x);

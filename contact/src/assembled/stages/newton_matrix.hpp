@@ -36,6 +36,10 @@ class NewtonMatrix {
 
   linalg::BlockLu& contacts() { return lu_; }
   BodyNewton& bodies() { return bodies_; }
+  /// Of the matrix, or of one with the same sign where its blocks D have a positive determinant.
+  int determinant_sign() const {
+    return by_bodies_ ? bodies_.determinant_sign() : lu_.determinant_sign();
+  }
   void solve(PackedVector* x) { by_bodies_ ? bodies_.solve(x) : lu_.solve(x); }
 
  private:

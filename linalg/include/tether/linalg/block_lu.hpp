@@ -34,6 +34,9 @@ class BlockLu {
   void add(int block_column, const double* block);
   bool end_row();  ///< eliminates; false: singular pivot
 
+  /// -1 or 1, after the last row.
+  int determinant_sign() const;
+
   /// Solves in place; vector indexed by block row, inactive entries untouched.
   void solve(PackedVector* x);
   /// The same with the transposed matrix.

@@ -31,6 +31,9 @@ class InteriorPoint {
   // From the convex problem to the law, at most `most` factorisations: in theta s(u) the path of
   // theta from 0 to 1 at constant x.u, then run().
   void run_coupling(Search& search, int most);
+  // The path of run() by its arclength, through the turns where its steps are blocked; `newton`
+  // finishes. At most `most` factorisations.
+  void run_arclength(Search& search, int most, ProximalNewton& newton);
   // Orders the matrix, so that cost() knows its fill.
   void order(Search& search);
   // Estimated ns of one step; by a guess of the fill before order().
@@ -47,6 +50,7 @@ class InteriorPoint {
 
  private:
   struct CouplingPath;
+  struct ArclengthPath;
   struct Progress;
   bool start(Search& search);
   bool start_near(Search& search, const PackedVector* start, double near);
@@ -60,6 +64,7 @@ class InteriorPoint {
   double test_point(Search& search);
   bool centred(const System& system, double nu) const;
   bool centre(Search& search, double nu);
+  void evaluate_with_digits(Search& search);
 
   int n_ = 0;
   InteriorEquations equations_;

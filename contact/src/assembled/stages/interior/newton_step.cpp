@@ -35,6 +35,7 @@ void InteriorNewton::reset(int contacts) {
   n_ = contacts;
   for (ConePair* p : {&change_, &scaled_, &affine_}) p->resize(n_);
   for (Packed* p : {&step_, &aim_, &defect_, &z_, &w_}) p->resize(at(n_));
+  none_.assign(at(n_), PackedVector());
   scaling_.resize(at(n_));
   sides_.resize(at(n_));
   matrix_.reset();
@@ -196,17 +197,16 @@ double InteriorNewton::expand(const System& system, const InteriorEquations& equ
     s.turn_back(e, d);
     z_[at(i)] = {{equations.flat(i) ? d[0] : d[0] / p.local(i).mu, d[1], d[2], 0}};
   }
-  system.velocities(z_.data(), w_.data());
+  system.velocities(z_.data(), none_.data(), w_.data());
   double defect = 0, size = 0;
   for (int i = 0; i < n_; ++i) {
     const ConeScaling& s = scaling_[at(i)];
     const Sides& sides = sides_[at(i)];
     const LocalBlock& L = p.local(i);
     const double* w = w_[at(i)].v;
-    const double* b = p.packed_b()[at(i)].v;
     const double* r = equations.residual()[at(i)].v;
     // J du = P^-1 (A + tau D) P^-1 dx + r
-    double v[3] = {w[0] + b[0], w[1] + b[1], w[2] + b[2]}, e[3], g[3];
+    double v[3] = {w[0], w[1], w[2]}, e[3], g[3];
     if (tau > 0) add_block(L, tau, z_[at(i)].v, v);
     if (equations.flat(i)) {
       v[0] += r[0];
@@ -250,6 +250,19 @@ void InteriorNewton::direction(const System& system, const InteriorEquations& eq
     const double before = defect;
     defect = expand(system, equations);
     if (!(defect < 0.5 * before)) break;
+  }
+}
+
+void InteriorNewton::metric(const ConePair& d, ConePair& out) const {
+  for (int i = 0; i < n_; ++i) {
+    const ConeScaling& s = scaling_[at(i)];
+    double e[3];
+    s.turn(d.x[at(i)].v, e);
+    for (int c = 0; c < 3; ++c) e[c] *= s.d[c] * s.d[c];
+    s.turn_back(e, out.x[at(i)].v);
+    s.turn(d.u[at(i)].v, e);
+    for (int c = 0; c < 3; ++c) e[c] /= s.d[c] * s.d[c];
+    s.turn_back(e, out.u[at(i)].v);
   }
 }
 

@@ -28,6 +28,8 @@ class InteriorNewton {
   /// The step along the last direction at which the point reaches a cone.
   double longest_step(const InteriorEquations& equations) const;
   const ConePair& change() const { return change_; }
+  // W^2 dx and W^-2 du of a change: over x.u its parts of x and u.
+  void metric(const ConePair& d, ConePair& out) const;
 
   /// Added to the matrix, relative to A: bounds steps along its null space, more of it where they
   /// are short.
@@ -58,7 +60,7 @@ class InteriorNewton {
   ConePair scaled_, affine_;  // W dx and W^-1 du; the same of the predictor
   // In the frames of the scalings: W dx, the aim lambda \ (...) and the residual of the equations.
   Packed step_, aim_, defect_;
-  Packed z_, w_;  // dx as impulses, and A dx - b
+  Packed z_, w_, none_;  // dx as impulses, A dx, and zeros
 };
 
 }  // namespace tether::contact::detail
