@@ -32,6 +32,15 @@ bool has_joint_laws(const Scene& scene) {
                      [&](const Effect* each) { return each->has_joint_laws(scene); });
 }
 
+std::vector<double> kinks_of(const Scene& scene) {
+  std::vector<double> times;
+  for (const Effect* each : all()) each->add_kinks(scene, times);
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  times.erase(times.begin(), std::upper_bound(times.begin(), times.end(), 0.0));
+  return times;
+}
+
 mechanics::Momenta momenta_of(const Scene& scene) {
   mechanics::Momenta momenta(scene);
   for (const Effect* each : all()) each->limit_momenta(momenta);

@@ -18,6 +18,9 @@ std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
 /// Whether joints have limits, motors or friction, which stepping alone has.
 bool has_joint_laws(const Scene& scene);
 
+/// When forces have kinks or jump: in order, each once, after t = 0.
+std::vector<double> kinks_of(const Scene& scene);
+
 /// Components of momentum and angular momentum that all effects together conserve.
 mechanics::Momenta momenta_of(const Scene& scene);
 

@@ -1,7 +1,12 @@
-// Tether: constant forces and torques. SPDX-License-Identifier: BSD-3-Clause
+// Tether: given forces and torques. SPDX-License-Identifier: BSD-3-Clause
 //
-//   force at the centre of mass and torque, both constant in world axes
+//   force at the centre of mass and torque in world axes, both constant or with a factor
+//   mean + sin(2 pi f t + phase), or that of a table, straight between its times
+//
+// Steps take the mean of the factor over their length: impulses of given forces are exact.
+#include <algorithm>
 #include <cmath>
+#include <tether/linalg/pi.hpp>
 
 #include "mechanics/effect.hpp"
 
@@ -11,6 +16,44 @@ using namespace mechanics;
 
 namespace {
 
+using Knot = LoadHistory::Knot;
+
+bool is_before(const Knot& knot, double time) { return knot.time < time; }
+
+/// From the left; from the right where the motion begins anew at t.
+double value(const std::vector<Knot>& table, double t, bool anew) {
+  auto after = std::lower_bound(table.begin(), table.end(), t, is_before);
+  while (anew && after != table.end() && after->time == t) ++after;
+  if (after == table.begin()) return after->factor;
+  const Knot& a = *(after - 1);
+  if (after == table.end()) return a.factor;
+  return a.factor + (after->factor - a.factor) * ((t - a.time) / (after->time - a.time));
+}
+
+/// Over [from, to].
+double mean(const std::vector<Knot>& table, double from, double to) {
+  double sum = 0, t = from, here = value(table, from, true);
+  for (auto next = std::lower_bound(table.begin(), table.end(), from, is_before);
+       next != table.end() && next->time < to; ++next) {
+    sum += 0.5 * (next->time - t) * (here + next->factor);
+    t = next->time;
+    here = next->factor;
+  }
+  return (sum + 0.5 * (to - t) * (here + value(table, to, false))) / (to - from);
+}
+
+double factor_of(const Load& load, const Bodies& bodies) {
+  if (!load.history) return 1;
+  const LoadHistory& h = *load.history;
+  const double t = bodies.time, span = bodies.span;
+  if (h.table.empty()) {
+    const double half = linalg::kPi * h.frequency * span;
+    const double part = half > 0 ? std::sin(half) / half : 1;
+    return h.mean + part * std::sin(2 * linalg::kPi * h.frequency * (t + span / 2) + h.phase);
+  }
+  return span > 0 ? mean(h.table, t, t + span) : value(h.table, t, t == bodies.since);
+}
+
 class LoadForce : public Force {
  public:
   explicit LoadForce(std::vector<Load> loads) : loads_(std::move(loads)) {}
@@ -19,8 +62,9 @@ class LoadForce : public Force {
   void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
     for (const Load& each : loads_) {
       Load6& load = loads[at(bodies.inertia[at(each.body)].slot)];
-      load.force += each.force;
-      load.torque_world += each.torque;
+      const double factor = factor_of(each, bodies);
+      load.force += factor * each.force;
+      load.torque_world += factor * each.torque;
     }
   }
   // d(R^T torque) = [R^T torque]x turn
@@ -28,7 +72,7 @@ class LoadForce : public Force {
     for (const Load& each : loads_) {
       const int slot = bodies.inertia[at(each.body)].slot;
       const Matrix3d& R = bodies.frames[at(each.body)].R;
-      J.add_turn(J.motion_row(slot, 3), slot, -skew(R.transpose() * each.torque));
+      J.add_turn(J.motion_row(slot, 3), slot, -skew(R.transpose() * torque_of(each, bodies)));
     }
   }
   bool has_power() const override { return true; }
@@ -36,16 +80,17 @@ class LoadForce : public Force {
     double sum = 0;
     for (const Load& each : loads_) {
       const Frame<double>& f = bodies.frames[at(each.body)];
-      sum += each.force.dot(f.v) + each.torque.dot(f.W);
+      sum += factor_of(each, bodies) * (each.force.dot(f.v) + each.torque.dot(f.W));
     }
     return sum;
   }
   void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Load& each : loads_) {
       const int slot = bodies.inertia[at(each.body)].slot;
-      const Vector3d torque = bodies.frames[at(each.body)].R.transpose() * each.torque;
+      const Vector3d torque = bodies.frames[at(each.body)].R.transpose() * torque_of(each, bodies);
+      const Vector3d force = factor_of(each, bodies) * each.force;
       for (int k = 0; k < 3; ++k) {
-        J.add(J.work_row, kBody * slot + kVelocity + k, -each.force[k]);
+        J.add(J.work_row, kBody * slot + kVelocity + k, -force[k]);
         J.add(J.work_row, kBody * slot + kSpin + k, -torque[k]);
       }
       const Vector3d turn = bodies.w[at(each.body)].cross(torque);
@@ -55,8 +100,43 @@ class LoadForce : public Force {
   }
 
  private:
+  static Vector3d torque_of(const Load& load, const Bodies& bodies) {
+    return factor_of(load, bodies) * load.torque;
+  }
+
   std::vector<Load> loads_;  // on bodies that move
 };
+
+constexpr std::size_t kMostKnots = 100000;
+
+void read_table(files::Fields& in, LoadHistory& history) {
+  const files::Value* value = in.find("table");
+  const auto is_number = [](const files::Value& x) {
+    return x.kind == files::Value::Kind::number && files::kAny.holds(x.number);
+  };
+  bool right = value->kind == files::Value::Kind::array && !value->items.empty() &&
+               value->items.size() <= kMostKnots;
+  for (std::size_t k = 0; right && k < value->items.size(); ++k) {
+    const std::vector<files::Value>& row = value->items[k].items;
+    right = value->items[k].kind == files::Value::Kind::array && row.size() == 2 &&
+            is_number(row[0]) && is_number(row[1]) &&
+            (history.table.empty() || row[0].number >= history.table.back().time);
+    if (right) history.table.push_back({row[0].number, row[1].number});
+  }
+  if (right) return;
+  history.table.clear();
+  in.wrong("table", fmt::format("must be an array of up to {} [time (s), factor], no time before "
+                                "the one above it",
+                                kMostKnots));
+}
+
+void read_sine(files::Reader& r, files::Fields& in, LoadHistory& history) {
+  files::Fields sine = r.fields(in.table("sine"), in.field("sine"));
+  history.mean = sine.number("mean", history.mean, files::kAny, "part of the load");
+  history.frequency = sine.number("frequency", history.frequency, files::kNotNegative, "Hz");
+  history.phase = sine.angle("phase_", history.phase);
+  sine.finish();
+}
 
 class LoadEffect : public Effect {
  public:
@@ -69,6 +149,14 @@ class LoadEffect : public Effect {
       load.torque = in.vector("torque", load.torque, files::kAny, "N m");
       if (!in.has("force") && !in.has("torque"))
         in.missing("force", "give force (N), torque (N m) or both");
+      if (in.has("sine") && in.has("table")) {
+        in.wrong("table", "give sine or table, not both");
+      } else if (in.has("sine")) {
+        read_sine(r, in, load.history.emplace());
+      } else if (in.has("table")) {
+        read_table(in, load.history.emplace());
+        if (load.history->table.empty()) load.history.reset();
+      }
       r.scene.loads.push_back(load);
     });
   }
@@ -78,7 +166,20 @@ class LoadEffect : public Effect {
       out.field("body", scene.bodies[at(load.body)].name);
       out.field("force", load.force, "N");
       out.field("torque", load.torque, "N m");
+      if (load.history) write_history(*load.history, out);
     }
+  }
+  static void write_history(const LoadHistory& history, files::Writer& out) {
+    using files::toml;
+    if (history.table.empty())
+      return out.raw(
+          "sine", fmt::format("{{ mean = {}, frequency = {}, phase_rad = {} }}", toml(history.mean),
+                              toml(history.frequency), toml(history.phase)));
+    std::string rows;
+    for (const Knot& knot : history.table)
+      rows +=
+          fmt::format("{}[{}, {}]", rows.empty() ? "" : ", ", toml(knot.time), toml(knot.factor));
+    out.raw("table", "[" + rows + "]");
   }
   void check(const Scene& scene, files::Report& report) const override {
     for (const Load& load : scene.loads)
@@ -88,24 +189,41 @@ class LoadEffect : public Effect {
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const std::size_t count = scene.loads.size();
+    const auto in_time = std::count_if(scene.loads.begin(), scene.loads.end(),
+                                       [](const Load& load) { return load.history.has_value(); });
     if (count > 0)
-      lines.push_back({"loads", fmt::format("{} load{}", count, count == 1 ? "" : "s")});
+      lines.push_back(
+          {"loads",
+           fmt::format("{} load{}{}", count, count == 1 ? "" : "s",
+                       in_time > 0 ? fmt::format(", {} of them change with time", in_time) : "")});
   }
   void take_rates(const Scene& scene, double length, double mass, Largest& rate) const override {
     for (const Load& load : scene.loads) {
       rate.take(std::sqrt(load.force.norm() / (mass * length)));
       rate.take(std::sqrt(load.torque.norm() / (mass * length * length)));
+      if (load.history) rate.take(load.history->frequency);
     }
+  }
+  void add_kinks(const Scene& scene, std::vector<double>& times) const override {
+    for (const Load& load : scene.loads)
+      if (load.history)
+        for (const Knot& knot : load.history->table) times.push_back(knot.time);
   }
   void convert(Scene& scene, const Units& units) const override {
     for (Load& load : scene.loads) {
       load.force /= units.force();
       load.torque /= units.energy();
+      if (!load.history) continue;
+      load.history->frequency *= units.time;
+      for (Knot& knot : load.history->table) knot.time /= units.time;
     }
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Load& load : momenta.scene.loads) {
-      if (!momenta.is_outside(load.body)) momenta.steady_force += load.force;
+      if (load.history)
+        momenta.push("a load that changes with time");
+      else if (!momenta.is_outside(load.body))
+        momenta.steady_force += load.force;
       momenta.axes.none("a load");
     }
   }

@@ -13,21 +13,21 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kLeastLocal = 1e-11, kLeastInFlight = 2e-13;
+constexpr double kLeast = 1e-13, kLeastInFlight = 2e-13;  // of IDA: more is rounding
+constexpr double kTight = 1e-11;
 
-// IDA bounds the error of a step; as in the smooth engine.
+// IDA bounds the error of a step. What it adds up to over tens of events, and tens of periods
+// between them, is to be within ten tolerances (a mass that rubs to rest in thirteen turns).
 double wanted_tolerance(double tolerance) {
-  return std::min(1.0, std::pow(tolerance / 1e-4, 1.0 / 6.0)) * 0.1 * tolerance;
+  return std::min(1.0, std::pow(tolerance / 1e-4, 0.1)) * 0.04 * tolerance;
 }
 
-double local_tolerance(double tolerance) {
-  return std::max({wanted_tolerance(tolerance), std::min(0.1 * tolerance, kLeastLocal), 1e-13});
-}
+double local_tolerance(double tolerance) { return std::max(wanted_tolerance(tolerance), kLeast); }
 
 // From a bounce on: an error of the height is one of the time of the next impact, over its speed.
 double flight_tolerance(double tolerance, double speed) {
   const double wanted = wanted_tolerance(tolerance), local = local_tolerance(tolerance);
-  if (wanted >= local) return local;
+  if (wanted >= kTight) return local;
   return std::min(local, std::max(kLeastInFlight, wanted * std::min(1.0, speed)));
 }
 
@@ -36,7 +36,8 @@ double flight_tolerance(double tolerance, double speed) {
 constexpr double kFlightError = 0.003, kLeastWay = 1e-15;
 constexpr long kMostAtOneTime = 300;
 constexpr double kStartTolerance = 1e-4;
-constexpr long kAnchor = 5000;  // steps
+constexpr double kAtGaps = 0.01;  // of their bands: gaps that are no rounding
+constexpr long kAnchor = 5000;    // steps
 // Steps that cover less than this part of what is left come to no end: at a microsecond each some
 // thousand years.
 constexpr long kManySteps = 100000;
@@ -145,9 +146,31 @@ std::vector<int> Driver::without_doubles(const std::vector<int>& contacts) const
 void Driver::begin_phase() {
   settle_velocities();
   motion_.keep_energy_of(event_time_, y_);
-  if (!move_onto_constraints(motion_, local_, event_time_, y_))
-    fail("the state cannot be moved onto joints and closed contacts");
+  const VectorXd before = y_;
+  if (!move_onto_constraints(motion_, local_, event_time_, y_)) {
+    y_ = before;
+    model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+    fail(contradiction());
+  }
   start_phase();
+}
+
+std::string Driver::contradiction() const {
+  double gap = 0, band = 0, rate = 0;
+  for (const int i : motion_.closed()) {
+    gap = std::max(gap, std::abs(model_.gap(i, rate)));
+    band = std::max(band, bands().gap(i));
+  }
+  const double unit = model_.length_unit();
+  std::string text = "the state cannot be moved onto joints and closed contacts";
+  // Both sides of a clearance, say.
+  if (gap > kAtGaps * band)
+    text += fmt::format(
+        ": at this tolerance gaps of up to {:.3g} m count as closed, and of the {} contacts that "
+        "do so "
+        "one has {:.3g} m. A smaller tolerance tells them apart",
+        unit * band, motion_.closed().size(), unit * gap);
+  return text;
 }
 
 // What is left of the velocities of contacts that close: less than their bands.
@@ -163,6 +186,7 @@ void Driver::settle_velocities() {
 // on with the same bits.
 void Driver::start_phase() {
   modes_ = motion_.modes();
+  model_.begin_anew(event_time_);
   motion_.choose(event_time_, y_, modes_);
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
   std::vector<bool> leaving(at(model_.contacts()), false);
@@ -177,7 +201,9 @@ void Driver::start_phase() {
   if (phase_) counts_.phases.add(phase_->counts());
   phase_.reset();
   const double first = longest_first_step(leaving);
-  phase_ = std::make_unique<Phase>(motion_, local, options_.max_step, event_time_, y_, first);
+  kink_ = model_.next_kink(event_time_);
+  phase_ = std::make_unique<Phase>(motion_, local, options_.max_step, event_time_, y_, first,
+                                   kink_ - event_time_);
   watcher_.begin(event_time_, y_, leaving);
   next_.reset();
 }
@@ -224,7 +250,7 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
       if (interrupted && interrupted()) return;
       continue;
     }
-    if (phase_->counts().steps >= kAnchor) {
+    if (phase_->counts().steps >= kAnchor || phase_->is_at_end()) {
       anchor();
       continue;
     }
@@ -274,11 +300,12 @@ void Driver::check_pace(double t) const {
                   steps, way * model_.time_unit(), (t - time_) * model_.time_unit()));
 }
 
-// A phase without events may be long; a saved state is arrived at again from its start.
+// A phase without events may be long; a saved state is arrived at again from its start. Where
+// forces have a kink motion begins anew, with the step at which a state before it has ended.
 void Driver::anchor() {
   paced_.steps += phase_->counts().steps;
   paced_.way += phase_->step_end();
-  event_time_ = phase_->start() + phase_->step_end();
+  event_time_ = phase_->is_at_end() ? kink_ : phase_->start() + phase_->step_end();
   phase_->projected_at(phase_->step_end(), y_);
   start_phase();
 }

@@ -89,6 +89,7 @@ class Driver {
   void check_start() const;
   void close_contacts(const StartState& start);
   void begin_phase();
+  std::string contradiction() const;
   void settle_velocities();
   void start_phase();
   void handle(const Zero& zero);
@@ -125,6 +126,7 @@ class Driver {
   Motion motion_;
   Watcher watcher_;
   double time_, event_time_;
+  double kink_ = 0;                 // the next one of forces
   VectorXd y_;                      // at the start of the phase
   std::vector<ContactMode> modes_;  // there; directions of slip turn since
   std::unique_ptr<Phase> phase_;

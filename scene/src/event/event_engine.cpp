@@ -46,7 +46,7 @@ class EventEngine : public ResumableEngine {
         origin_(event::origin_of(scaled(scene, units_))),
         scene_(event::seen_from(origin_, scaled(scene, units_))),
         options_(driver_options(scene_)),
-        model_(std::make_unique<SceneModel>(scene_, units_.time)),
+        model_(std::make_unique<SceneModel>(scene_, units_.time, units_.length)),
         reactions_(scene_, mechanics::placed_bodies(scene_)) {
     bodies_.resize(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
@@ -264,7 +264,7 @@ StartState EventEngine::exactness_of(SceneModel& model, const SteppedState& stat
 
 void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
   // What a model remembers of earlier states is not in a saved one.
-  auto model = std::make_unique<SceneModel>(scene_, units_.time);
+  auto model = std::make_unique<SceneModel>(scene_, units_.time, units_.length);
   const VectorXd y = coordinates_of(state.bodies);
   StartState start = exactness_of(*model, state, y);
   start.so_far.events = so_far.events;

@@ -57,6 +57,10 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     if (std::abs(rate) <= bands().approach(i) && !leaves_its_feature(i)) candidates.push_back(i);
   }
   if (candidates.empty()) return modes;
+  for (const int i : candidates) {
+    const std::string why = model_.undecided(i);
+    if (!why.empty()) fail(why);
+  }
   candidates = without_doubles(candidates);
   ContactRows rows(model_, candidates);
   const int block = rows.size(), n = static_cast<int>(candidates.size());

@@ -23,6 +23,8 @@ struct Bodies {
   std::vector<Vector3d> w;                         ///< angular velocities in body axes
   std::vector<Eigen::Matrix<double, 3, 4>> turns;  ///< of the moving bodies: turn_of_quaternion
   int moving = 0;
+  double time = 0, span = 0;  ///< s; forces are means from `time` on over `span`, 0: of that time
+  double since = -1;          ///< when the motion began anew: forces that jump then have jumped
 
   int world() const { return static_cast<int>(inertia.size()) - 1; }
   bool moves(int body) const { return inertia[at(body)].slot >= 0; }

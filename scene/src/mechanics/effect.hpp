@@ -102,6 +102,8 @@ class Effect {
   /// Divides its numbers by their units.
   virtual void convert(Scene&, const Units&) const {}
 
+  /// Adds the times at which its forces have kinks or jump, s.
+  virtual void add_kinks(const Scene&, std::vector<double>& /*times*/) const {}
   virtual void limit_momenta(Momenta&) const {}
   /// Whether it gives or takes energy that no potential counts.
   virtual bool does_work(const Scene&) const { return false; }

@@ -16,6 +16,11 @@ class SteppedBodies {
   explicit SteppedBodies(const Scene& scene);
 
   const Bodies& bodies() const { return bodies_; }
+  /// A step from `time` on.
+  void set_time(double time, double span) {
+    bodies_.time = time;
+    bodies_.span = span;
+  }
   /// Takes over positions and velocities; later calls change `set`.
   void read(contact::BodySet& set);
   /// Both, for what changes nothing.

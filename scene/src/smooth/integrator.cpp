@@ -201,6 +201,8 @@ int Integrator::step_past(double t, long& steps_left, const std::function<bool()
       return IDA_TOO_MUCH_WORK;
     }
     const long before = steps();
+    const double kink = system_.next_kink(step_end());
+    if (std::isfinite(kink)) IDASetStopTime(ida_, kink);  // no step passes over one
     const int flag = IDASolve(ida_, t, &t_, vectors_.y, vectors_.yp, IDA_ONE_STEP);
     if (flag < 0) return flag;
     steps_left -= steps() - before;

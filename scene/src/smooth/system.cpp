@@ -18,6 +18,7 @@ System::System(const Scene& scene, const Units& units)
       invariants_(scene, bodies_, forces_, first_work()),
       dynamics_(rows_, bodies_, form_ == Formulation::index0),
       terms_{bodies_, rows_, forces_} {
+  kinks_ = effects::kinks_of(scene);
   size_ = first_multiplier();
   if (form_ == Formulation::index1) size_ += rows();
   if (form_ == Formulation::stabilised_index2) size_ += 2 * rows();
@@ -42,6 +43,7 @@ Eigen::VectorXd System::start_state() const {
 
 void System::update(double t, const double* y) {
   rows_.set_time(t);
+  bodies_.set_time(t);
   bodies_.set_state(y);
 }
 

@@ -16,6 +16,8 @@
 // power).
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <string>
 #include <tether/ida_projection.hpp>
@@ -78,6 +80,11 @@ class System {
   std::string joint_of_row(int row) const { return rows_.joint_of(row); }
 
   void bodies(const double* y, std::vector<BodyState>& out) const { bodies_.read(y, out); }
+  /// The first time after t at which forces have a kink or jump; infinite: there is none.
+  double next_kink(double t) const {
+    const auto next = std::upper_bound(kinks_.begin(), kinks_.end(), t);
+    return next != kinks_.end() ? *next : std::numeric_limits<double>::infinity();
+  }
   Diagnostics diagnostics(double t, const double* y);  ///< drift in SI, the rest in units()
   /// In units().
   scene::Forces forces(double t, const double* y, const joints::Reactions& reactions);
@@ -118,6 +125,7 @@ class System {
   ForwardDynamics dynamics_;
   JacobianTerms terms_;
   std::unique_ptr<AccelerationJacobian> acceleration_jacobian_;  // index 0
+  std::vector<double> kinks_;                                    // of forces, by time
   int size_ = 0;
   std::vector<Load6> loads_, pulls_;  // sums on each moving body: forces, and G^T eta
   Eigen::VectorXd joint_values_;      // workspace

@@ -104,11 +104,12 @@ void SteppingEngine::add_forces(const Scene& scene) {
     for (const auto& force : forces_) {
       if (force->stepping() != wanted) continue;
       force->check_step(scene, stepped_.bodies(), stepper_.options().step);
-      stepper_.add_force(force->name(),
-                         [this, force = force.get()](contact::BodySet& bodies, double, double dt) {
-                           stepped_.read(bodies);
-                           force->step(stepped_, dt);
-                         });
+      stepper_.add_force(force->name(), [this, force = force.get()](contact::BodySet& bodies,
+                                                                    double t, double dt) {
+        stepped_.set_time(t, dt);
+        stepped_.read(bodies);
+        force->step(stepped_, dt);
+      });
     }
 }
 

@@ -66,11 +66,23 @@ struct Spring {
   Place place;
 };
 
-/// A constant force at the centre and torque on one body, world axes.
+/// The factor of a load: mean + sin(2 pi frequency t + phase), or of a table.
+struct LoadHistory {
+  double mean = 0, frequency = 0, phase = 0;  // Hz, rad
+  struct Knot {
+    double time = 0, factor = 0;
+  };
+  /// Straight lines between them, two of one time are a jump; constant before and behind. Empty:
+  /// the sine.
+  std::vector<Knot> table;
+};
+
+/// A force at the centre and torque on one body, world axes; constant without a history.
 struct Load {
   int body = 0;
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
   Place place;
+  std::optional<LoadHistory> history = {};
 };
 
 /// A point at rest that attracts every body: force -GM m r / |r|^3 at the centre of mass, r from

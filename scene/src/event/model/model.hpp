@@ -42,9 +42,14 @@ class Model {
   /// and of the energy. 1 in units in which these are near 1.
   virtual VectorXd sizes() const { return VectorXd::Ones(coordinates() + velocities() + 1); }
 
-  virtual double time_unit() const { return 1; }  ///< s, for what users read
+  virtual double time_unit() const { return 1; }    ///< s, for what users read
+  virtual double length_unit() const { return 1; }  ///< m, likewise
 
   virtual void set(double t, const double* q, const double* u) = 0;
+  /// The first time after t at which forces have a kink or jump; infinite: there is none.
+  virtual double next_kink(double /*t*/) const { return std::numeric_limits<double>::infinity(); }
+  /// Motion begins anew at t: forces that jump then have jumped.
+  virtual void begin_anew(double /*t*/) {}
   /// A smooth phase begins at the state that is set: tangents turn smoothly from here on.
   virtual void settle() {}
   /// The axis of space next to which the tangents of a contact are chosen, 0 to 2. It hangs on the
@@ -64,6 +69,9 @@ class Model {
 
   /// How far the contact is inside the border of its features, m; infinite: they have none.
   virtual double margin(int /*contact*/) { return std::numeric_limits<double>::infinity(); }
+
+  /// Why the contact cannot be decided about at the state that is set; empty: it can.
+  virtual std::string undecided(int /*contact*/) { return {}; }
 
   /// Whether both contacts are of one point of the same two bodies, with other normals: on the edge
   /// or at the corner of a face, within `distance`, m.

@@ -66,6 +66,28 @@ void add_polyhedron(const std::vector<Vector3d>& points, Outline& out) {
   }
 }
 
+Segment axis_of(const Shape& shape) {
+  Segment axis;
+  axis.at = placed(shape, {0, 0, -0.5 * shape.length});
+  axis.along = shape.orientation * Vector3d(0, 0, 1);
+  axis.length = shape.length;
+  axis.radius = shape.radius;
+  return axis;
+}
+
+void add_cylinder(const Shape& shape, Outline& out) {
+  out.segments.push_back(axis_of(shape));
+  for (const double side : {-1.0, 1.0}) {
+    Round disc;
+    disc.at = placed(shape, {0, 0, 0.5 * side * shape.length});
+    disc.shape =
+        shape.orientation.toRotationMatrix() * Vector3d(shape.radius, shape.radius, 0).asDiagonal();
+    disc.outward = shape.orientation * Vector3d(0, 0, side);
+    out.rounds.push_back(disc);
+    out.ends.push_back({{disc.at, disc.outward, {}}, shape.radius});
+  }
+}
+
 }  // namespace
 
 Outline outline_of(const Shape& shape) {
@@ -75,17 +97,11 @@ Outline outline_of(const Shape& shape) {
     case ShapeKind::sphere:
       out.knobs.push_back({shape.position, shape.radius, {}});
       break;
-    case ShapeKind::capsule: {
+    case ShapeKind::capsule:
       for (const double end : {-0.5, 0.5})
         out.knobs.push_back({placed(shape, {0, 0, end * shape.length}), shape.radius, {}});
-      Segment axis;
-      axis.at = out.knobs[0].at;
-      axis.along = shape.orientation * Vector3d(0, 0, 1);
-      axis.length = shape.length;
-      axis.radius = shape.radius;
-      out.segments.push_back(axis);
+      out.segments.push_back(axis_of(shape));
       break;
-    }
     case ShapeKind::box:
       points = corners_of_box(shape.size);
       break;
@@ -93,10 +109,18 @@ Outline outline_of(const Shape& shape) {
     case ShapeKind::points:
       points = shape.points;
       break;
-    case ShapeKind::plane:
-    case ShapeKind::ellipsoid:  // refused before
+    case ShapeKind::ellipsoid: {
+      Round round;
+      round.at = shape.position;
+      round.shape = shape.orientation.toRotationMatrix() * shape.size.asDiagonal();
+      out.rounds.push_back(round);
+      break;
+    }
     case ShapeKind::cylinder:
-    case ShapeKind::mesh:
+      add_cylinder(shape, out);
+      break;
+    case ShapeKind::plane:
+    case ShapeKind::mesh:  // refused before
       break;
   }
   for (Vector3d& p : points) {

@@ -16,12 +16,21 @@ struct Knob {
   std::vector<Vector3d> edges = {};
 };
 
+/// A flat end of a cylinder: a plane with a circle about its middle.
+struct End {
+  PlaneFeature plane;
+  double radius = 0;
+};
+
 /// In the axes of the body. Points with a radius (spheres, ends of capsules) and vertices; edges
-/// and axes of capsules; faces with their borders.
+/// and axes of capsules and cylinders; faces with their borders; ellipsoids and the discs of
+/// cylinders; the ends of these.
 struct Outline {
   std::vector<Knob> knobs;
   std::vector<Segment> segments;
   std::vector<PlaneFeature> faces;
+  std::vector<Round> rounds;
+  std::vector<End> ends;
 };
 
 Outline outline_of(const Shape& shape);

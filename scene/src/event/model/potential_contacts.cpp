@@ -1,8 +1,9 @@
 // Tether: which features of a scene may touch. SPDX-License-Identifier: BSD-3-Clause
 //
 // The engine has contacts whose gaps are smooth: points (vertices, centres of spheres, ends of
-// capsules) with planes, faces, lines and points, and lines (edges, axes of capsules) with lines.
-// Every such pair is a contact of its own.
+// capsules) and round things (ellipsoids, discs of cylinders) with planes, faces, lines, points and
+// each other, and lines (edges, axes of capsules and cylinders) with lines. Every such pair is a
+// contact of its own.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -45,6 +46,11 @@ class Contacts {
     out_.back().on_second.emplace<Feature>(std::move(feature));
   }
 
+  template <class Feature>
+  void put(Feature feature) {
+    put(Knob{}, std::move(feature));
+  }
+
   /// Points of the first on faces and lines of the second. Sharp points and edges meet by chance
   /// only.
   void put_points(const Outline& a, const Outline& b) {
@@ -53,6 +59,32 @@ class Contacts {
       for (const Segment& s : b.segments)
         if (knob.radius + s.radius > 0) put(knob, LineFeature{s.at, s.along, s.length, s.radius});
     }
+  }
+  void put_on_plane(const Outline& a, const PlaneFeature& plane) {
+    for (const Knob& knob : a.knobs) put(knob, plane);
+    for (const Round& round : a.rounds) put(RoundOnPlane{round, plane, 0});
+  }
+
+  /// Of the first on all of the second but round things.
+  void put_rounds(const Outline& a, const Outline& b) {
+    for (const Round& round : a.rounds) {
+      for (const PlaneFeature& face : b.faces) put(RoundOnPlane{round, face, 0});
+      for (const End& end : b.ends) put(RoundOnPlane{round, end.plane, end.radius});
+      for (const Segment& s : b.segments) put(RoundOnLine{round, s});
+    }
+    for (const Knob& knob : a.knobs) {
+      const Round point{knob.at, Matrix3d::Zero(), knob.radius, Vector3d::Zero()};
+      for (const End& end : b.ends) put(RoundOnPlane{point, end.plane, end.radius});
+      for (const Round& round : b.rounds)
+        if (!round.is_disc()) put(RoundOnRound{point, round});
+      if (knob.radius > 0)
+        for (const End& end : b.ends)
+          put(knob, PointOnCircle{end.plane.at, end.plane.normal, end.radius});
+    }
+  }
+  void put_rounds_on_each_other(const Outline& a, const Outline& b) {
+    for (const Round& round : a.rounds)
+      for (const Round& other : b.rounds) put(RoundOnRound{round, other});
   }
   void put_points_and_edges(const Outline& a, const Outline& b) {
     for (const Knob& knob : a.knobs)
@@ -74,8 +106,7 @@ class Contacts {
 };
 
 void refuse_unknown(const Shape& shape) {
-  if (shape.kind == ShapeKind::ellipsoid || shape.kind == ShapeKind::cylinder ||
-      shape.kind == ShapeKind::mesh)
+  if (shape.kind == ShapeKind::mesh)
     throw std::invalid_argument(
         fmt::format("the event engine does not know where a shape = \"{}\" touches: use [stepping]",
                     name(shape.kind)));
@@ -88,14 +119,14 @@ void add(const Shape& a, const Shape& b, const FeaturePair& bodies, std::vector<
   if (points || (a.kind == ShapeKind::plane && b.kind == ShapeKind::plane)) return;  // never touch
   const Outline of_a = outline_of(a), of_b = outline_of(b);
   Contacts contacts(bodies, out), swapped = contacts.swapped();
-  if (b.kind == ShapeKind::plane)
-    for (const Knob& knob : of_a.knobs) contacts.put(knob, plane_of(b));
-  if (a.kind == ShapeKind::plane)
-    for (const Knob& knob : of_b.knobs) swapped.put(knob, plane_of(a));
-  if (a.kind == ShapeKind::plane || b.kind == ShapeKind::plane) return;
+  if (b.kind == ShapeKind::plane) return contacts.put_on_plane(of_a, plane_of(b));
+  if (a.kind == ShapeKind::plane) return swapped.put_on_plane(of_b, plane_of(a));
   contacts.put_points(of_a, of_b);
   swapped.put_points(of_b, of_a);
   contacts.put_points_and_edges(of_a, of_b);
+  contacts.put_rounds(of_a, of_b);
+  swapped.put_rounds(of_b, of_a);
+  contacts.put_rounds_on_each_other(of_a, of_b);
 }
 
 std::set<std::pair<int, int>> jointed(const Scene& scene) {

@@ -3,6 +3,7 @@
 #include "scene_model.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "effects/list.hpp"
 #include "mechanics/quaternions.hpp"
@@ -37,11 +38,13 @@ struct Material {
 
 }  // namespace
 
-SceneModel::SceneModel(const Scene& scene, double time_unit)
+SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
     : time_unit_(time_unit),
+      length_unit_(length_unit),
       bodies_(scene),
       rows_(scene, bodies_.all()),
       forces_(effects::make_forces(scene, bodies_.all())),
+      kinks_(effects::kinks_of(scene)),
       pairs_(potential_contacts(scene)),
       y_(bodies_.start()),
       loads_(at(bodies_.count())) {
@@ -68,8 +71,14 @@ void SceneModel::set(double t, const double* q, const double* u) {
     std::copy_n(u + 6 * k, 6, y_.data() + kBody * k + kVelocity);
   }
   rows_.set_time(t);
+  bodies_.set_time(t);
   bodies_.set_state(y_.data());
   bodies_.set_turns(y_.data());
+}
+
+double SceneModel::next_kink(double t) const {
+  const auto next = std::upper_bound(kinks_.begin(), kinks_.end(), t);
+  return next != kinks_.end() ? *next : std::numeric_limits<double>::infinity();
 }
 
 void SceneModel::settle() {
@@ -182,6 +191,12 @@ Forces SceneModel::forces_of(const joints::Reactions& reactions,
   out.joints = reactions.find(rows_, bodies_.all(), multipliers.data());
   for (const auto& force : forces_) force->report(bodies_.all(), out);
   return out;
+}
+
+std::string SceneModel::undecided(int contact) {
+  return pair(contact).is_flush(bodies_.all())
+             ? "a cylinder lies on its flat end, whose contact the event engine does not have"
+             : "";
 }
 
 bool SceneModel::are_at_one_edge(int contact, int other, double distance) {

@@ -20,11 +20,12 @@ namespace tether::scene::event {
 class SceneModel final : public Model {
  public:
   /// Throws std::invalid_argument, naming what the engine does not have; see potential_contacts.
-  /// `time_unit`: of the scene, s.
-  explicit SceneModel(const Scene& scene, double time_unit = 1);
+  /// `time_unit`, `length_unit`: of the scene, s, m.
+  explicit SceneModel(const Scene& scene, double time_unit = 1, double length_unit = 1);
   ~SceneModel() override;
 
   double time_unit() const override { return time_unit_; }
+  double length_unit() const override { return length_unit_; }
   int coordinates() const override { return 7 * bodies_.count(); }
   int velocities() const override { return 6 * bodies_.count(); }
   int joint_rows() const override { return rows_.count(); }
@@ -35,6 +36,8 @@ class SceneModel final : public Model {
   }
 
   void set(double t, const double* q, const double* u) override;
+  double next_kink(double t) const override;
+  void begin_anew(double t) override { bodies_.begin_anew(t); }
   void settle() override;
   int axis(int contact) const override;
   void set_axis(int contact, int axis) override;
@@ -51,6 +54,8 @@ class SceneModel final : public Model {
   }
 
   double margin(int contact) override { return pair(contact).margin(bodies_.all()); }
+
+  std::string undecided(int contact) override;
 
   bool are_at_one_edge(int contact, int other, double distance) override;
   bool are_one(int contact, int other, double distance) override;
@@ -80,10 +85,11 @@ class SceneModel final : public Model {
   double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
 
-  double time_unit_;
+  double time_unit_, length_unit_;
   smooth::MovingBodies bodies_;
   joints::JointRows rows_;
   std::vector<std::unique_ptr<Force>> forces_;
+  std::vector<double> kinks_;  // of forces, by time
   std::vector<FeaturePair> pairs_;
   std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen
   std::vector<double> y_;       // of MovingBodies

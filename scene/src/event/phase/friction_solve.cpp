@@ -231,18 +231,39 @@ ContactRows::ContactRows(Model& model, std::vector<int> contacts)
     model.joints(g, G_, rate, joint_rest_);
     MG_ = G_.transpose();
     model.divide_by_mass(MG_);
-    GMG_ = G_ * MG_;
-    PL_ -= MG_ * pseudo_solve(GMG_, G_ * PL_);
+    look_at_joints();
+    // With the forces of the joints: A = F' M^-1 F is never indefinite, and light bodies, whose
+    // parts cancel in L P L', leave no rounding in it.
+    const MatrixXd F = L_.transpose() - G_.transpose() * joint_solve(G_ * PL_);
+    PL_ = F;
+    model.divide_by_mass(PL_);
+    A_ = F.transpose() * PL_;
+  } else {
+    A_ = L_ * PL_;
   }
-  A_ = L_ * PL_;
   A_ = (0.5 * (A_ + A_.transpose())).eval();
+}
+
+// Rows of unit length: which of them depend on others hangs on no mass.
+void ContactRows::look_at_joints() {
+  scale_.setOnes(G_.rows());
+  for (int i = 0; i < G_.rows(); ++i) {
+    const double square = G_.row(i).dot(MG_.col(i));
+    if (square > 0) scale_[i] = 1 / std::sqrt(square);
+  }
+  factor_.setThreshold(kDependent);
+  factor_.compute(scale_.asDiagonal() * (G_ * MG_) * scale_.asDiagonal());
+}
+
+MatrixXd ContactRows::joint_solve(const MatrixXd& right) const {
+  return scale_.asDiagonal() * factor_.solve(scale_.asDiagonal() * right);
 }
 
 VectorXd ContactRows::free_accelerations() {
   VectorXd a;
   model_.forces(a);
   model_.divide_by_mass(a);
-  if (G_.rows() > 0) a -= MG_ * pseudo_solve(GMG_, G_ * a + joint_rest_);
+  if (G_.rows() > 0) a -= MG_ * joint_solve(G_ * a + joint_rest_);
   return L_ * a + rest_;
 }
 

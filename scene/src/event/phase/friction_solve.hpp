@@ -26,11 +26,15 @@ class ContactRows {
   VectorXd change(const VectorXd& x) const { return PL_ * x; }
 
  private:
+  void look_at_joints();
+  MatrixXd joint_solve(const MatrixXd& right) const;  ///< (G M^-1 G')^+ right
+
   Model& model_;
   std::vector<int> contacts_;
   int block_;
-  MatrixXd L_, PL_, A_, G_, MG_, GMG_;
-  VectorXd rate_, rest_, joint_rest_;
+  MatrixXd L_, PL_, A_, G_, MG_;
+  VectorXd rate_, rest_, joint_rest_, scale_;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor_;
 };
 
 /// Answer of a frictional problem w = A x - b.

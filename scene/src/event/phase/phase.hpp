@@ -26,8 +26,9 @@ struct PhaseCounts {
 class Phase {
  public:
   /// `tolerance`: rtol and atol of IDA; `longest_first`: the first step is no longer, 0: free.
+  /// No step passes `length` (s, may be infinite), where forces have a kink.
   Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
-        double longest_first);
+        double longest_first, double length);
   ~Phase();
   Phase(const Phase&) = delete;
   Phase& operator=(const Phase&) = delete;
@@ -37,6 +38,7 @@ class Phase {
   double start() const { return start_; }       ///< s
   double step_begin() const { return begin_; }  ///< since the start, s
   double step_end() const { return end_; }
+  bool is_at_end() const { return end_ >= length_; }  ///< of its length
   /// y at a time of the last step, since the start: interpolated.
   void at(double time, VectorXd& y) const;
   /// The same, moved onto the constraints; false: it could not be.
@@ -46,7 +48,7 @@ class Phase {
  private:
   struct Ida;
   Motion& motion_;
-  double start_, begin_ = 0, end_ = 0;
+  double start_, begin_ = 0, end_ = 0, length_;
   std::unique_ptr<Ida> ida_;
 };
 

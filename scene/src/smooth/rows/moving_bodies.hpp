@@ -27,6 +27,8 @@ class MovingBodies {
   const Vector3d& spin(int slot) const { return bodies_.w[at(body(slot))]; }  ///< body axes
   const std::vector<double>& start() const { return start_; }                 ///< y at t = 0
 
+  void set_time(double t) { bodies_.time = t; }
+  void begin_anew(double t) { bodies_.since = t; }
   void set_state(const double* y);           ///< frames, without accelerations
   void set_accelerations(const double* yp);  ///< of the state that is set
   void set_turns(const double* y);           ///< for derivatives by quaternions
