@@ -164,7 +164,7 @@ std::vector<Value>& items_of(Value& document, std::string_view key) {
 Scene read(Value document, const std::string& name) {
   repeat_elements(document, name);
   Report report;
-  Reader r{name, report, {}, {}, {}};
+  Reader r{name, report, {}, {}, {}, {}};
   r.scene.file = name;
   Fields root(&document, "", name, report);
 
