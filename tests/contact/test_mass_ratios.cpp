@@ -307,3 +307,28 @@ TEST_CASE("mass ratios: stacks of 1 : 1e6 whose boxes move and spin") {
   CHECK(unsolved <= 1);
   CHECK(work < 2e9);
 }
+
+// Their paths turn; without the arclength none is solved within this work.
+TEST_CASE("mass ratios: stacks that move and spin are solved by paths that turn") {
+  struct Case {
+    int boxes, heavy;
+    std::uint64_t seed;
+  };
+  int unsolved = 0;
+  double work = 0;
+  for (const Case& c : {Case{100, 0, 8}, Case{100, 1, 6}, Case{200, 0, 2}, Case{200, 0, 7}}) {
+    const Problem p = moving_stack(c.boxes, c.heavy, c.seed).problem();
+    Options o;
+    o.law = Law::coulomb;
+    o.tolerance = 1e-6;
+    o.max_work = 1e9;
+    const Solution s = Solver(o).solve(p);
+    UNSCOPED_INFO(c.boxes << " boxes, seed " << c.seed << ": " << name(s.status) << " " << s.error
+                          << ", work " << s.counts.work);
+    CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1.01 * s.error);
+    unsolved += s.status != Status::solved;
+    work += s.counts.work;
+  }
+  CHECK(unsolved <= 1);
+  CHECK(work < 2.5e9);  // 4e9
+}

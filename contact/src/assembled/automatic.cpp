@@ -55,11 +55,12 @@ const Automatic::Turn Automatic::kRotation[] = {
     {&Automatic::interior_points_near, first_and_near, 30},     // steps
     {&Automatic::interior_points, first_and_far_or_cheap, 40},  // steps, from sticking
     {&Automatic::round_off, always, kRoundOffSteps},            // steps
-    {&Automatic::proximal_path_at_best, first_cheap_and_near, 20},    // problems
-    {&Automatic::shifted_path_at_best, first_and_cheap, 150},         // steps
-    {&Automatic::proximal_path_at_best, first_cheap_and_near, 80},    // problems
-    {&Automatic::coupling_path, first_and_dear, 150},                 // factorisations
-    {&Automatic::directions, unless_first_and_dear, 200},             // iterations
+    {&Automatic::proximal_path_at_best, first_cheap_and_near, 20},  // problems
+    {&Automatic::shifted_path_at_best, first_and_cheap, 150},       // steps
+    {&Automatic::arclength_path, first_and_cheap, 400},             // factorisations, from sticking
+    {&Automatic::proximal_path_at_best, first_cheap_and_near, 80},  // problems
+    {&Automatic::coupling_path, first_and_dear, 150},               // factorisations
+    {&Automatic::directions, unless_first_and_dear, 200},           // iterations
     {&Automatic::interior_points_at_best, first_that_came_near, 30},  // steps
     {&Automatic::proximal_newton, unless_first_and_dear, 12},         // proximal problems
     {&Automatic::no_solution, unless_first_and_dear, 1},              // once in a solve
