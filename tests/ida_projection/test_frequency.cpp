@@ -110,6 +110,27 @@ TEST_CASE("frequency: moves by factors of a shorter step do not start vibrations
   }
 }
 
+TEST_CASE("frequency: steps left alone do not start vibrations where IDA rejects many") {
+  // Single runs take up to three times each other's steps, also those of n = 1: sums are compared.
+  const Problem problem = slider_crank("index 2");
+  const tp::Constraints rows = problem.recommended_constraints();
+  const auto sum = [&](int n) {
+    long steps = 0;
+    for (int k = 0; k < 36; ++k) {
+      const Run run = every(n, problem, 1.7e-4 * std::pow(2.0, k / 36.0), rows);
+      REQUIRE(run.flag >= 0);
+      steps += run.steps;
+    }
+    return static_cast<double>(steps);
+  };
+  const double each = sum(1);
+  for (const int n : {20, 50}) {
+    const double some = sum(n);
+    INFO("every " << n << ": " << some / each << " of the steps of every 1");
+    CHECK(some <= 1.1 * each);
+  }
+}
+
 TEST_CASE("frequency: the search for the first step size is that of every step") {
   // IDA keeps a size until it can double it: a start that differs may end at half the size.
   const Problem problem = tether::test::circle(100.0);

@@ -8,9 +8,10 @@ namespace tether::ida_projection {
 /// projected in full. Drift that piles up over steps left alone would enter the history as a jump
 /// a, of which a predictor of degree k makes binomial(k + 1, k / 2) a, 10 a at order 5, long after;
 /// IDA answers with low orders and short steps. So between them a step is left alone only while the
-/// drift to be expected is too short for that, and else moved with the factors at hand. Not while
-/// the step grows: IDA keeps a size until it can double it, so that a start that differs a little
-/// may end at half the size for good.
+/// drift to be expected is too short for that, and else moved with the factors at hand. Where IDA
+/// rejects often there may be stiff components, to which a small part of a tolerance is a jump:
+/// there only few steps in a row are left alone. None are while the step grows: IDA keeps a size
+/// until it can double it, so that a start that differs a little may end at half the size for good.
 class FrequencyPolicy {
  public:
   enum class Need { nothing, chord, projection };
@@ -39,6 +40,7 @@ class FrequencyPolicy {
   double rate_ = 0.0;      // drift of one step, tolerances
   double h_ = 0.0;         // step at which it was looked at
   double full_h_ = 0.0;    // step of the last full projection
+  long repeated_at_ = 0;   // steps accepted before the last rejection
   int alone_ = 0;          // steps left alone since
   int allowed_ = 0;        // so many at most
   long started_ = 1;       // IDA is looking for its first step size up to this one
