@@ -180,13 +180,15 @@ TEST_CASE("closed loops by entries move as dense ones do: three rows of four-bar
 }
 
 TEST_CASE("forty four-bars pass the point where forty rows become dependent", "[smooth]") {
-  const double tolerance = 1e-6;
+  // Near it the rounding of joints 40 m away, over their sine, is beyond the finer tolerances.
+  const double tolerance = GENERATE(1e-6, 1e-7, 5e-9, 3e-9);
+  INFO("tolerance " << tolerance);
   const auto engine = make_smooth_engine(four_bar(40, tolerance));
   engine->advance(1.0);
   CHECK(in_plane(end_of(*engine, 0), -0.115356880632110, -0.993324111300450) < 10 * tolerance);
   CHECK(std::abs(energy(*engine) - 620.338333333333) < 1e-9 * 620);
   CHECK(engine->diagnostics().drift < 2e-9);
-  CHECK(engine->counts().steps < 400);
+  CHECK(engine->counts().steps < 400 * std::pow(1e-6 / tolerance, 0.2));
 }
 
 TEST_CASE("coordinates are eliminated before velocities: a quarter less in the factors of a net",

@@ -264,6 +264,11 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
     if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
         length <= std::min(kLargestFloor, rows_.rounding_length()))
       verdict = Monitor::Verdict::done;
+    // One that answers nothing but rounding of g leads nowhere, however long it is.
+    if (verdict == Monitor::Verdict::failed && rows_.rounding_only()) {
+      rows_.apply(-1.0, correction);
+      break;
+    }
     if (verdict == Monitor::Verdict::done) break;
     if (verdict == Monitor::Verdict::failed) {
       result.status = Status::not_converged;

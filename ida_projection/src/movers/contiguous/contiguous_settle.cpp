@@ -12,6 +12,7 @@ constexpr double kCheapRest = 1e-4;
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
 constexpr double kWorn = 0.06, kSlow = 0.1;
+constexpr double kHalving = 0.5;  // moves that leave more of each other do not converge
 
 }  // namespace
 
@@ -82,6 +83,8 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
       part = 0.0;
       previous = -1.0;
     }
+    // Almost parallel rows magnify rounding: moves would follow it without end.
+    if (part > kHalving && rows_.rounding_only()) return Status::success;
     rows_.apply(1.0, candidate.correction_entries);
     const bool small = length <= std::max(floor, kSafe * options_.tolerance);
     if (follow && (small || (part > 0.0 && part * length <= kSafe * options_.tolerance))) {
