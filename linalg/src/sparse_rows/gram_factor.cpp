@@ -227,13 +227,69 @@ double GramFactor::independent_part(int i) const {
   return std::sqrt(std::max(0.0, 1.0 / inverse_d_[at(place_of(i))] - eps_));
 }
 
+// Four columns that are alike in one pass: each row index is read once and each x once.
 void GramFactor::forward_in_place() {
   double* __restrict x = solution_.data();
   const double* __restrict L = L_.value.data();
-  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data();
-  for (int j = 0; j < m_; ++j) {
-    const double xj = x[j];
-    for (int q = starts[j]; q < starts[j + 1]; ++q) x[rows[q]] -= L[q] * xj;
+  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data(),
+            *alike = L_.alike.data();
+  for (int j = 0; j < m_;) {
+    if (alike[j] >= kTogether) {
+      const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
+                   *L3 = L + starts[j + 3];
+      const double x0 = x[j];
+      const double x1 = x[j + 1] -= L0[0] * x0;
+      const double x2 = x[j + 2] -= L0[1] * x0 + L1[0] * x1;
+      const double x3 = x[j + 3] -= L0[2] * x0 + L1[1] * x1 + L2[0] * x2;
+      const int* row = rows + starts[j + 3];
+      const int count = starts[j + 4] - starts[j + 3];
+      for (int q = 0; q < count; ++q)
+        x[row[q]] -= L0[q + 3] * x0 + L1[q + 2] * x1 + L2[q + 1] * x2 + L3[q] * x3;
+      j += kTogether;
+    } else {
+      const double xj = x[j];
+      for (int q = starts[j]; q < starts[j + 1]; ++q) x[rows[q]] -= L[q] * xj;
+      ++j;
+    }
+  }
+}
+
+// D and L^T.
+void GramFactor::back_in_place() {
+  double* __restrict x = solution_.data();
+  const double* __restrict L = L_.value.data();
+  const double* __restrict inverse_d = inverse_d_.data();
+  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data(),
+            *alike = L_.alike.data();
+  for (int j = m_ - 1; j >= 0;) {
+    const int first = j - (kTogether - 1);
+    if (first >= 0 && alike[first] >= kTogether) {
+      const double *L0 = L + starts[first], *L1 = L + starts[first + 1],
+                   *L2 = L + starts[first + 2], *L3 = L + starts[j];
+      double x0 = x[first] * inverse_d[first], x1 = x[first + 1] * inverse_d[first + 1],
+             x2 = x[first + 2] * inverse_d[first + 2], x3 = x[j] * inverse_d[j];
+      const int* row = rows + starts[j];
+      const int count = starts[j + 1] - starts[j];
+      for (int q = 0; q < count; ++q) {
+        const double xq = x[row[q]];
+        x0 -= L0[q + 3] * xq;
+        x1 -= L1[q + 2] * xq;
+        x2 -= L2[q + 1] * xq;
+        x3 -= L3[q] * xq;
+      }
+      x2 -= L2[0] * x3;
+      x1 -= L1[0] * x2 + L1[1] * x3;
+      x0 -= L0[0] * x1 + L0[1] * x2 + L0[2] * x3;
+      x[first] = x0;
+      x[first + 1] = x1;
+      x[first + 2] = x2;
+      x[j] = x3;
+      j = first - 1;
+    } else {
+      double xj = x[j] * inverse_d[j];
+      for (int q = starts[j]; q < starts[j + 1]; ++q) xj -= L[q] * x[rows[q]];
+      x[j--] = xj;
+    }
   }
 }
 
@@ -244,19 +300,10 @@ void GramFactor::forward(double* z) {
 }
 
 void GramFactor::solve(double* z) {
-  double* __restrict x = solution_.data();
-  const double* __restrict L = L_.value.data();
-  const double* __restrict inverse_d = inverse_d_.data();
-  const int *rows = L_.column_rows.data(), *starts = L_.column_starts.data(),
-            *place = place_.data();
-  for (int i = 0; i < m_; ++i) x[place[i]] = z[i];
+  for (int i = 0; i < m_; ++i) solution_[at(place_of(i))] = z[i];
   forward_in_place();
-  for (int j = m_ - 1; j >= 0; --j) {
-    double xj = x[j] * inverse_d[j];
-    for (int q = starts[j]; q < starts[j + 1]; ++q) xj -= L[q] * x[rows[q]];
-    x[j] = xj;
-  }
-  for (int i = 0; i < m_; ++i) z[i] = x[place[i]];
+  back_in_place();
+  for (int i = 0; i < m_; ++i) z[i] = solution_[at(place_of(i))];
 }
 
 // c = L^-T D^-1 L^-1 z over the rows before the last. A dependent row among them gives its share to

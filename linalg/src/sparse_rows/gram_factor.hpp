@@ -46,6 +46,7 @@ class GramFactor {
   double coefficients_square(int k);
   void scatter_products(int k, const double* A);
   void forward_in_place();
+  void back_in_place();
 
   // P A by rows (where each entry is in A, and its column) and by columns (rows of P A, ascending,
   // and the values of those that factor() has met).
