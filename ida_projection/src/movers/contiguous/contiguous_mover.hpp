@@ -47,11 +47,9 @@ class ContiguousMover final : public Mover {
     return rows_.factors.there && !rows_.factors.thin && wear_.usable();
   }
   Move follow(const Candidate& candidate, bool again) override;
-  // What dropped rows among many ask for costs a solve each.
   int rank_of_factors() const override {
     const FactorState& at_hand = rows_.factors;
-    const bool serve = at_hand.there && !at_hand.thin && !at_hand.partial && !at_hand.foreign &&
-                       (Rows::kKeepsRank || !rows_.blocks.dropped_rows());
+    const bool serve = at_hand.there && !at_hand.thin && !at_hand.partial && !at_hand.foreign;
     return serve ? rows_.blocks.rank() : -1;
   }
   double left_of_dropped(const std::vector<double>& WT) override {
