@@ -8,25 +8,15 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <sunnonlinsol/sunnonlinsol_newton.h>
-#include <utility>
 
 #include "attach/impl.hpp"
 #include "attach/shortest.hpp"
-#include "fast/quicken.hpp"
-#include "watch/dead_point.hpp"
 
 namespace tether::ida_projection {
 
 namespace {
 
 constexpr long kSampleEvery = 16;
-// Multipliers of index 2: see README, section 9.
-constexpr double kAsideFromTest = 1.5, kProportional = 1e-4, kMostCare = 5.0, kManyFree = 0.4;
-constexpr int kNameAfter = 3;            // failed correctors in a row
-constexpr int kRefusedStarts = 5;        // of the ten error tests that IDA tries
-constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
-constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
 }  // namespace
 
@@ -202,95 +192,6 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
-// Moves that do not converge: a wrong C as a rule. Looked into once a step, where it is to be said.
-std::string Projection::Impl::with_suspicion(std::string text, const Candidate& candidate) {
-  if (!report_.says_failures(attempts_.steps)) return text;
-  if (attempts_.suspected != attempts_.steps) {
-    attempts_.suspected = attempts_.steps;
-    attempts_.suspicion = watch_.rejections.suspicion(candidate, corrector_);
-  }
-  return std::move(text) + attempts_.suspicion;
-}
-
-// From a start off the constraints moves do not shrink with the step. Above Options::largest_move
-// they are refused by name, below IDA's error test refuses them, with words of its own.
-void Projection::Impl::look_at_start(const Move& move) {
-  if (attempts_.steps != 0) return;
-  const double before = std::exchange(attempts_.first_move, move.length);
-  const bool stays = attempts_.repeated && move.length > 1.0 && move.length > 0.5 * before;
-  attempts_.refused_starts = stays ? attempts_.refused_starts + 1 : 0;
-  if (attempts_.refused_starts != kRefusedStarts) return;
-  report_.warn(Status::doubtful,
-               "IDA's error test refuses the first step, however short it is: "
-               "the start is " +
-                   brief(move.length) +
-                   " tolerances off the constraints; call make_consistent first");
-}
-
-void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {
-  if (attempts_.steps > FirstSteps::kSteps || attempts_.repeated ||
-      report_.warning() != Status::success)
-    return;
-  const std::string doubt =
-      watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
-                              polish_.corrected(), variables_, *movers_.used, corrector_);
-  if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
-}
-
-// y before this step; of a later one, up to its curvature.
-void Projection::Impl::keep_point_before(const Candidate& candidate, OwnedVector& y) {
-  if (!y) y = OwnedVector(candidate.base);
-  N_VLinearSum(1.0, candidate.base, -ida_.step_size(), ida_.step().yp_predicted, y);
-}
-
-std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vector y) {
-  return undetermined_multipliers(candidate, y, variables_, corrector_, constraints_, statistics_);
-}
-
-int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
-  ++statistics_.corrector_failures;
-  report_.status = Status::corrector_failed;
-  if (flag > 0 && run_.engaged) control_.corrector_failed();
-  if (variables_.high_index())
-    report_.message =
-        "IDA's corrector failed; in forms of index 2 or more multipliers carry rounding divided by "
-        "the step, which may not allow this tolerance: try a larger one, or a form of index 1 or 0";
-  if (variables_.high_index() && !run_.undetermined.empty())
-    report_.message += "; " + run_.undetermined;
-  if (flag > 0 && unknowns_.contiguous && corrector_.failures_in_row() == kNameAfter) {
-    Candidate before = candidate;
-    before.t = ida_.step().t;
-    if (!variables_.known()) derive_id(before);
-    OwnedVector y;
-    keep_point_before(before, y);
-    const std::string found = undetermined_at(before, y);
-    if (!found.empty())
-      run_.undetermined = report_.message = "before t = " + std::to_string(before.t) + " " + found;
-  }
-  return flag;
-}
-
-// Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
-int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done) {
-  const Move first = movers_.used->measure(candidate);
-  if (frequency_.on()) frequency_.projected(first.length, std::abs(ida_.step_size()));
-  done = true;
-  if (first.status != Status::success) {
-    const int code = finish(first.status, movers_.used->message());
-    // Before the first step a smaller step cannot cure rows that contradict each other.
-    return attempts_.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
-  }
-  if (first.length <= std::max(kOnConstraints, first.floor) && !control_.struggling()) {
-    ++statistics_.skipped;
-    statistics_.largest_drift_before =
-        std::max(statistics_.largest_drift_before, first.drift_before);
-    statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, first.drift_before);
-    return finish(Status::success, "");
-  }
-  done = false;
-  return 0;
-}
-
 // `fresh`: of IDA's factors there are no better ones.
 Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
                                        bool fresh) {
@@ -335,23 +236,6 @@ void Projection::Impl::judge_capped(Move& move) {
                              ", which the error test does not allow; use a larger largest_move";
 }
 
-// A few invariants of many unknowns, as on grids; rows of mechanisms are many and local.
-bool Projection::Impl::rows_of_field() const {
-  if (std::holds_alternative<DistributedRows>(constraints_.jacobian)) return false;
-  const bool gradients = std::holds_alternative<Gradients>(constraints_.jacobian);
-  return gradients || kFew * constraints_.total_count() <= N_VGetLength(unknowns_.weights);
-}
-
-void Projection::Impl::look_at_linear_solver() {
-  run_.linear_solver.look(ida_, attempts_.steps);
-  const bool iterative = run_.linear_solver.iterative();
-  if (wanted_metric_ == Metric::automatic)
-    options_.metric =
-        iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;
-  polish_.note_linear_solver(iterative);
-  movers_.used->expect_no_settle(iterative);
-}
-
 // IDA does not tell whether it accepted an attempt; the count of steps does, at the next one.
 void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   const long steps = ida_.steps(), setups = ida_.setups();
@@ -371,77 +255,6 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   }
   attempts_.steps = steps;
   attempts_.pending = false;
-}
-
-// Readable through message() as long as nothing else is wrong.
-void Projection::Impl::derive_id(const Candidate& candidate) {
-  const std::string unknown = variables_.derive(candidate, corrector_, ida_.step().cj);
-  if (!unknown.empty())
-    report_.advice = "algebraic variables were not derived (" + unknown +
-                     ") and stay in the error test; give IDA's id vector in Options::id";
-}
-
-// Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
-// corrector fail: too late for the policy to begin.
-Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
-  if (!variables_.known()) derive_id(candidate);
-  variables_.look_at_index(candidate, corrector_, ida_.step().cj, ida_.evaluations_for_jacobian());
-  return variables_.high_index() && variables_.any() ? engage(candidate) : Status::success;
-}
-
-// By how much more than smoothing_setpoint errors are kept below the tolerance. Those at the end
-// follow (tolerance / s)^(k/(k+1)), k the order; s that grows by its (-1/k)-th power, k = 5, makes
-// them follow the tolerance. Rows that leave few directions free take most of the errors with them.
-double Projection::Impl::care_of_high_index(const Candidate& candidate) const {
-  const N_Vector id = variables_.id();
-  if (variables_.undetermined().empty()) return kAsideFromTest;
-  const double differential = N_VDotProd(id, id);
-  if (constraints_.total_count() > (1.0 - kManyFree) * differential) return kAsideFromTest;
-  const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
-  const double tighter = std::pow(kProportional * unknowns, 0.2);
-  return kAsideFromTest * std::clamp(tighter, 1.0, kMostCare);
-}
-
-// Those of IDA's vectors that pass through here, and the plugin's own; the caller's are left alone.
-void Projection::Impl::quicken_vectors(const Candidate& candidate) {
-  N_Vector newton = nullptr;
-  if (options_.nonlinear_solver == nullptr)
-    newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
-  const StepData step = ida_.step();
-  fast::quicken({candidate.correction, step.residual, polish_.delta()});
-  fast::quicken_with_inputs({step.y_predicted, step.yp_predicted, candidate.weights, newton});
-}
-
-// The first move that is needed switches the policy on; until then IDA runs as it would alone.
-Status Projection::Impl::engage(const Candidate& candidate) {
-  if (!variables_.known()) derive_id(candidate);
-  if (variables_.any() && options_.suppress_algebraic) {
-    IDASetId(ida_.mem(), variables_.id());
-    IDASetSuppressAlg(ida_.mem(), 1);
-  }
-  const double cj = ida_.step().cj;
-  // Multipliers of higher index answer to a change of h by errors proportional to the change.
-  if (options_.smooth_where_needed)
-    variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
-  else
-    variables_.note_index_as_low();
-  const bool given = options_.id != nullptr;
-  const std::string doubts = given ? variables_.doubts(candidate, corrector_, cj) : std::string();
-  if (!doubts.empty()) report_.warn(Status::doubtful, doubts);
-  if (variables_.high_index()) {
-    control_.begin_smoothing(care_of_high_index(candidate));
-    const std::string found = run_.start ? undetermined_at(candidate, run_.start) : std::string();
-    if (!found.empty() && doubts.empty()) {
-      run_.undetermined = "the motion from the start is not determined: there " + found;
-      report_.warn(Status::doubtful, run_.undetermined);
-    }
-  }
-  movers_.joined.join(candidate, cj);
-  movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
-  if (corrector_.stopped()) return Status::callback_fatal;
-  const Status structured = movers_.used->set_algebraic(candidate, movers_.joined.moved_id());
-  run_.engaged = structured == Status::success;  // else the next attempt looks again
-  return structured;
 }
 
 void Projection::Impl::account(const Move& move, const StepData& step, bool sampled) {

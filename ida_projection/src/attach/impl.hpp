@@ -98,28 +98,32 @@ class Projection::Impl {
   int attempt(Candidate& candidate, double tolerance, bool call_setup);
   int correct(const Candidate& candidate, double tolerance, bool call_setup);
   int correct_and_move(Candidate& candidate, double tolerance, bool call_setup);
-  void look_at_linear_solver();
-  bool rows_of_field() const;
   void account_for_previous_attempt(const StepData& step);
-  int corrector_failed(const Candidate& candidate, int flag);
-  void keep_point_before(const Candidate& candidate, OwnedVector& y);
-  std::string undetermined_at(const Candidate& candidate, N_Vector y);
-  int look_before_moving(const Candidate& candidate, bool& done);
-  void derive_id(const Candidate& candidate);
-  Status engage(const Candidate& candidate);
-  void quicken_vectors(const Candidate& candidate);
-  double care_of_high_index(const Candidate& candidate) const;
-  Status engage_if_index_is_high(const Candidate& candidate);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
   void judge_capped(Move& move);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   Status polish(const Candidate& candidate, double cj, double tolerance);
-  std::string with_suspicion(std::string text, const Candidate& candidate);
-  void look_at_start(const Move& move);
-  void look_for_doubts(const Candidate& candidate, const StepData& step);
   void account(const Move& move, const StepData& step, bool sampled);
   void note(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
+
+  // engage.cpp
+  void look_at_linear_solver();
+  bool rows_of_field() const;
+  void derive_id(const Candidate& candidate);
+  Status engage_if_index_is_high(const Candidate& candidate);
+  double care_of_high_index(const Candidate& candidate) const;
+  void quicken_vectors(const Candidate& candidate);
+  int look_before_moving(const Candidate& candidate, bool& done);
+  Status engage(const Candidate& candidate);
+
+  // doubts.cpp
+  std::string with_suspicion(std::string text, const Candidate& candidate);
+  void look_at_start(const Move& move);
+  void look_for_doubts(const Candidate& candidate, const StepData& step);
+  void keep_point_before(const Candidate& candidate, OwnedVector& y);
+  std::string undetermined_at(const Candidate& candidate, N_Vector y);
+  int corrector_failed(const Candidate& candidate, int flag);
 
   // between.cpp
   bool needs_projection(const Candidate& candidate, const StepData& step, double tolerance);

@@ -1,0 +1,86 @@
+// Tether: what the caller is told of failed steps and starts. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <utility>
+
+#include "attach/impl.hpp"
+#include "attach/shortest.hpp"
+#include "watch/dead_point.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr int kNameAfter = 3;      // failed correctors in a row
+constexpr int kRefusedStarts = 5;  // of the ten error tests that IDA tries
+
+}  // namespace
+
+// Moves that do not converge: a wrong C as a rule. Looked into once a step, where it is to be said.
+std::string Projection::Impl::with_suspicion(std::string text, const Candidate& candidate) {
+  if (!report_.says_failures(attempts_.steps)) return text;
+  if (attempts_.suspected != attempts_.steps) {
+    attempts_.suspected = attempts_.steps;
+    attempts_.suspicion = watch_.rejections.suspicion(candidate, corrector_);
+  }
+  return std::move(text) + attempts_.suspicion;
+}
+
+// From a start off the constraints moves do not shrink with the step. Above Options::largest_move
+// they are refused by name, below IDA's error test refuses them, with words of its own.
+void Projection::Impl::look_at_start(const Move& move) {
+  if (attempts_.steps != 0) return;
+  const double before = std::exchange(attempts_.first_move, move.length);
+  const bool stays = attempts_.repeated && move.length > 1.0 && move.length > 0.5 * before;
+  attempts_.refused_starts = stays ? attempts_.refused_starts + 1 : 0;
+  if (attempts_.refused_starts != kRefusedStarts) return;
+  report_.warn(Status::doubtful,
+               "IDA's error test refuses the first step, however short it is: "
+               "the start is " +
+                   brief(move.length) +
+                   " tolerances off the constraints; call make_consistent first");
+}
+
+void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {
+  if (attempts_.steps > FirstSteps::kSteps || attempts_.repeated ||
+      report_.warning() != Status::success)
+    return;
+  const std::string doubt =
+      watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
+                              polish_.corrected(), variables_, *movers_.used, corrector_);
+  if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
+}
+
+// y before this step; of a later one, up to its curvature.
+void Projection::Impl::keep_point_before(const Candidate& candidate, OwnedVector& y) {
+  if (!y) y = OwnedVector(candidate.base);
+  N_VLinearSum(1.0, candidate.base, -ida_.step_size(), ida_.step().yp_predicted, y);
+}
+
+std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vector y) {
+  return undetermined_multipliers(candidate, y, variables_, corrector_, constraints_, statistics_);
+}
+
+int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
+  ++statistics_.corrector_failures;
+  report_.status = Status::corrector_failed;
+  if (flag > 0 && run_.engaged) control_.corrector_failed();
+  if (variables_.high_index())
+    report_.message =
+        "IDA's corrector failed; in forms of index 2 or more multipliers carry rounding divided by "
+        "the step, which may not allow this tolerance: try a larger one, or a form of index 1 or 0";
+  if (variables_.high_index() && !run_.undetermined.empty())
+    report_.message += "; " + run_.undetermined;
+  if (flag > 0 && unknowns_.contiguous && corrector_.failures_in_row() == kNameAfter) {
+    Candidate before = candidate;
+    before.t = ida_.step().t;
+    if (!variables_.known()) derive_id(before);
+    OwnedVector y;
+    keep_point_before(before, y);
+    const std::string found = undetermined_at(before, y);
+    if (!found.empty())
+      run_.undetermined = report_.message = "before t = " + std::to_string(before.t) + " " + found;
+  }
+  return flag;
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,130 @@
+// Tether: how moves begin in a run, and what is looked at for that. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+
+#include "attach/impl.hpp"
+#include "fast/quicken.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+// Multipliers of index 2: see README, section 9.
+constexpr double kAsideFromTest = 1.5, kProportional = 1e-4, kMostCare = 5.0, kManyFree = 0.4;
+constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
+constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
+
+}  // namespace
+
+// A few invariants of many unknowns, as on grids; rows of mechanisms are many and local.
+bool Projection::Impl::rows_of_field() const {
+  if (std::holds_alternative<DistributedRows>(constraints_.jacobian)) return false;
+  const bool gradients = std::holds_alternative<Gradients>(constraints_.jacobian);
+  return gradients || kFew * constraints_.total_count() <= N_VGetLength(unknowns_.weights);
+}
+
+void Projection::Impl::look_at_linear_solver() {
+  run_.linear_solver.look(ida_, attempts_.steps);
+  const bool iterative = run_.linear_solver.iterative();
+  if (wanted_metric_ == Metric::automatic)
+    options_.metric =
+        iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;
+  polish_.note_linear_solver(iterative);
+  movers_.used->expect_no_settle(iterative);
+}
+
+// Readable through message() as long as nothing else is wrong.
+void Projection::Impl::derive_id(const Candidate& candidate) {
+  const std::string unknown = variables_.derive(candidate, corrector_, ida_.step().cj);
+  if (!unknown.empty())
+    report_.advice = "algebraic variables were not derived (" + unknown +
+                     ") and stay in the error test; give IDA's id vector in Options::id";
+}
+
+// Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
+// corrector fail: too late for the policy to begin.
+Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
+  if (!variables_.known()) derive_id(candidate);
+  variables_.look_at_index(candidate, corrector_, ida_.step().cj, ida_.evaluations_for_jacobian());
+  return variables_.high_index() && variables_.any() ? engage(candidate) : Status::success;
+}
+
+// By how much more than smoothing_setpoint errors are kept below the tolerance. Those at the end
+// follow (tolerance / s)^(k/(k+1)), k the order; s that grows by its (-1/k)-th power, k = 5, makes
+// them follow the tolerance. Rows that leave few directions free take most of the errors with them.
+double Projection::Impl::care_of_high_index(const Candidate& candidate) const {
+  const N_Vector id = variables_.id();
+  if (variables_.undetermined().empty()) return kAsideFromTest;
+  const double differential = N_VDotProd(id, id);
+  if (constraints_.total_count() > (1.0 - kManyFree) * differential) return kAsideFromTest;
+  const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
+  const double tighter = std::pow(kProportional * unknowns, 0.2);
+  return kAsideFromTest * std::clamp(tighter, 1.0, kMostCare);
+}
+
+// Those of IDA's vectors that pass through here, and the plugin's own; the caller's are left alone.
+void Projection::Impl::quicken_vectors(const Candidate& candidate) {
+  N_Vector newton = nullptr;
+  if (options_.nonlinear_solver == nullptr)
+    newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
+  const StepData step = ida_.step();
+  fast::quicken({candidate.correction, step.residual, polish_.delta()});
+  fast::quicken_with_inputs({step.y_predicted, step.yp_predicted, candidate.weights, newton});
+}
+
+// Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
+int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done) {
+  const Move first = movers_.used->measure(candidate);
+  if (frequency_.on()) frequency_.projected(first.length, std::abs(ida_.step_size()));
+  done = true;
+  if (first.status != Status::success) {
+    const int code = finish(first.status, movers_.used->message());
+    // Before the first step a smaller step cannot cure rows that contradict each other.
+    return attempts_.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
+  }
+  if (first.length <= std::max(kOnConstraints, first.floor) && !control_.struggling()) {
+    ++statistics_.skipped;
+    statistics_.largest_drift_before =
+        std::max(statistics_.largest_drift_before, first.drift_before);
+    statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, first.drift_before);
+    return finish(Status::success, "");
+  }
+  done = false;
+  return 0;
+}
+
+// The first move that is needed switches the policy on; until then IDA runs as it would alone.
+Status Projection::Impl::engage(const Candidate& candidate) {
+  if (!variables_.known()) derive_id(candidate);
+  if (variables_.any() && options_.suppress_algebraic) {
+    IDASetId(ida_.mem(), variables_.id());
+    IDASetSuppressAlg(ida_.mem(), 1);
+  }
+  const double cj = ida_.step().cj;
+  // Multipliers of higher index answer to a change of h by errors proportional to the change.
+  if (options_.smooth_where_needed)
+    variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
+  else
+    variables_.note_index_as_low();
+  const bool given = options_.id != nullptr;
+  const std::string doubts = given ? variables_.doubts(candidate, corrector_, cj) : std::string();
+  if (!doubts.empty()) report_.warn(Status::doubtful, doubts);
+  if (variables_.high_index()) {
+    control_.begin_smoothing(care_of_high_index(candidate));
+    const std::string found = run_.start ? undetermined_at(candidate, run_.start) : std::string();
+    if (!found.empty() && doubts.empty()) {
+      run_.undetermined = "the motion from the start is not determined: there " + found;
+      report_.warn(Status::doubtful, run_.undetermined);
+    }
+  }
+  movers_.joined.join(candidate, cj);
+  movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
+  if (corrector_.stopped()) return Status::callback_fatal;
+  const Status structured = movers_.used->set_algebraic(candidate, movers_.joined.moved_id());
+  run_.engaged = structured == Status::success;  // else the next attempt looks again
+  return structured;
+}
+
+}  // namespace tether::ida_projection
