@@ -91,4 +91,17 @@ inline std::string pair(const std::string& values) {
   return "[[pair]]\nbetween = [\"floor\", \"body\"]\n" + values + "\n";
 }
 
+/// Above the floor.
+inline std::string ball(double height, double restitution) {
+  return kFloor + R"(
+[[body]]
+name = "ball"
+shape = "sphere"
+radius = 0.1
+mass = 2
+material = "body"
+position = [0, 0, )" +
+         number(height + 0.1) + "]\n" + pair("restitution = " + number(restitution));
+}
+
 }  // namespace event_runs

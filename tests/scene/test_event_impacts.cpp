@@ -1,23 +1,9 @@
 // Impacts of the event engine against closed forms. SPDX-License-Identifier: BSD-3-Clause
-#include <sstream>
-
 #include "event_runs.hpp"
 
 using namespace event_runs;
 
 namespace {
-
-std::string ball(double height, double restitution) {
-  return kFloor + R"(
-[[body]]
-name = "ball"
-shape = "sphere"
-radius = 0.1
-mass = 2
-material = "body"
-position = [0, 0, )" +
-         number(height + 0.1) + "]\n" + pair("restitution = " + number(restitution));
-}
 
 // Capobianco et al. (2021): a ball of radius 0.1 m, y0 = 1 m, friction 0.2.
 std::string rotating_ball(double x, double v, double restitution) {
@@ -369,100 +355,4 @@ rest = 10
     CHECK(std::abs(impacts[0].time - 1.20286553850472322) < 10 * tolerance / 6e-3);
     CHECK(std::abs(impacts[0].before + 6.3834432936448e-3) < 10 * tolerance / 6e-3);
   }
-}
-
-TEST_CASE("event: a run that is cut inside accumulating impacts goes on with its bits") {
-  const std::string text =
-      "[scene]\nengine = \"event\"\nend = 2\ngravity = [0, 0, -9.81]\n" + ball(1, 0.5);
-  const Scene scene = parse_scene(text, "test");
-  const auto whole = make_engine(scene);
-  for (const double cut : {1.0, 1.35, 1.3545, 1.354565, 1.5}) goes_on_with_its_bits(scene, cut, 2);
-  whole->advance(2);
-  CHECK(whole->counts().events == 20);
-}
-
-TEST_CASE("event: a storm of events is bounded by its work") {
-  const std::string text =
-      "[scene]\nengine = \"event\"\nend = 90\ngravity = [0, 0, -9.81]\n[event]\nmax_events = 50\n" +
-      ball(1, 0.99);
-  const auto engine = make_engine(parse_scene(text, "test"));
-  CHECK_THROWS_AS(engine->advance(90), SimulationError);
-  CHECK(engine->counts().events == 51);
-}
-
-TEST_CASE("event: a motion too fast for its length of time ends with its reason") {
-  CHECK_THROWS_WITH(run(R"(
-[[body]]
-name = "pendulum"
-mass = 1
-inertia = [1, 1, 1]
-position = [0, 0, -1]
-velocity = [1e150, 0, 0]
-[[joint]]
-kind = "distance"
-bodies = ["pendulum", "world"]
-at = [[0, 0, -1], [0, 0, 0]]
-)",
-                        1e-6, 1),
-                    Catch::Contains("100000 steps") && Catch::Contains("too fast"));
-}
-
-TEST_CASE("event: a start with impacts is one of the times of events") {
-  const auto engine = run(R"(
-[[body]]
-name = "floor"
-shape = "plane"
-fixed = true
-material = "floor"
-[[body]]
-name = "ball"
-shape = "sphere"
-radius = 0.1
-mass = 1
-position = [0, 0, 0.1]
-velocity = [0, 0, -1]
-material = "ball"
-[[pair]]
-between = ["floor", "ball"]
-restitution = 0.5
-)",
-                          1e-6, 0.05);
-  REQUIRE(engine->events().size() == 1);
-  CHECK(engine->events()[0].time == 0);
-  CHECK(engine->counts().events == 1);
-  CHECK(engine->counts().impacts == 1);
-}
-
-TEST_CASE("event: the plan names the engine, and what it does not have is refused by name") {
-  const Scene bounces = parse_scene("[scene]\ngravity = [0, 0, -9.81]\n" + ball(1, 0.5), "test");
-  CHECK(make_plan(bounces).engine == EngineKind::stepping);
-  CHECK(make_plan(bounces).no_event.empty());
-  const std::string boxes = R"(
-[[body]]
-name = "a"
-shape = "box"
-size = [1, 1, 1]
-fixed = true
-material = "m"
-[[body]]
-name = "b"
-shape = "box"
-size = [1, 1, 1]
-density = 1
-position = [0, 0, 2]
-material = "m"
-[[pair]]
-between = ["m", "m"]
-)";
-  const Scene stack = parse_scene(boxes, "test");
-  CHECK(make_plan(stack).engine == EngineKind::stepping);
-  CHECK(make_plan(stack).no_event.empty());
-  std::string many = boxes;
-  for (int k = 0; k < 20; ++k)
-    many += "[[body]]\nshape = \"box\"\nsize = [1, 1, 1]\ndensity = 1\nposition = [0, 0, " +
-            std::to_string(4 + 2 * k) + "]\nmaterial = \"m\"\n";
-  CHECK(make_plan(parse_scene(many, "test")).no_event.find("potential contact") !=
-        std::string::npos);
-  CHECK_THROWS_AS(make_plan(parse_scene("[scene]\nengine = \"event\"\n" + many, "test")),
-                  std::invalid_argument);
 }
