@@ -126,3 +126,29 @@ TEST_CASE("loads: histories are read, written again and refused by name") {
   refused("sine = { rate = 1 }", "rate");
   refused("sine = { frequency = 1 }\ntable = [[0, 1]]", "not both");
 }
+
+TEST_CASE("loads and motions: a frequency whose phases are lost in rounding is refused by name") {
+  const std::string driven =
+      kPoint + "[[joint]]\nkind = \"slider\"\nbodies = [\"body\", \"world\"]\naxis = [1, 0, 0]\n";
+  const auto sine = [](const std::string& f) {
+    return load("force = [1, 0, 0]\nsine = { frequency = " + f + " }");
+  };
+  for (const char* frequency : {"1e300", "1e15", "2.1e13"}) {
+    CAPTURE(frequency);
+    const std::string motion =
+        driven + "motion = { amplitude = 1, frequency = " + std::string(frequency) + " }\n";
+    const std::vector<std::string> scenes = {kPoint + sine(frequency), motion};
+    for (const std::string& text : scenes)
+      CHECK_THROWS_WITH(parse_scene("[scene]\nend = 5\n" + text, "loads.toml"),
+                        Catch::Contains("frequency = ") && Catch::Contains("2e+13 Hz"));
+  }
+  // Also where the end comes later, and in scenes that no file has checked.
+  for (const char* engine : {"smooth", "stepping", "event"}) {
+    Scene scene = parse_scene(
+        "[scene]\nend = 1\nengine = \"" + std::string(engine) + "\"\n" + kPoint + sine("1e13"),
+        "loads.toml");
+    CHECK(std::string(make_engine(scene)->name()) == engine);
+    scene.end = 11;
+    CHECK_THROWS_WITH(make_engine(scene), Catch::Contains("frequency of a load"));
+  }
+}

@@ -9,6 +9,7 @@
 #include <tether/linalg/pi.hpp>
 
 #include "mechanics/effect.hpp"
+#include "periods.hpp"
 
 namespace tether::scene::effects {
 
@@ -186,6 +187,10 @@ class LoadEffect : public Effect {
       if (scene.bodies[at(load.body)].fixed)
         report.add(load.place, "load: body",
                    fmt::format("\"{}\"", scene.bodies[at(load.body)].name), "must be able to move");
+    for (const Load& load : scene.loads)
+      if (load.history)
+        check_frequency(scene, load.history->frequency, load.place, "load: sine: frequency",
+                        report);
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const std::size_t count = scene.loads.size();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <tether/linalg/pi.hpp>
 
+#include "effects/periods.hpp"
 #include "list.hpp"
 #include "mechanics/effect.hpp"
 
@@ -62,6 +63,12 @@ class PrescribedMotion : public Effect {
     if (count > 0)
       lines.push_back(
           {"prescribed motion", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
+  }
+  void check(const Scene& scene, files::Report& report) const override {
+    for (const Joint& joint : scene.joints)
+      if (joint.motion)
+        check_frequency(scene, joint.motion->frequency, joint.place, "joint: motion: frequency",
+                        report);
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
     for (const Joint& joint : scene.joints)

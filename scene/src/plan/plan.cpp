@@ -8,6 +8,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "effects/list.hpp"
+#include "effects/periods.hpp"
 #include "joints/list.hpp"
 #include "smooth/rows/sizes.hpp"
 
@@ -75,6 +76,15 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   const auto refuse = [&](bool wrong, const std::string& text) {
     if (wrong) refusal += (refusal.empty() ? "" : "\n") + text;
   };
+  const auto resolves = [&](double frequency, const char* of) {
+    refuse(
+        !effects::is_resolved(frequency, s.end),
+        fmt::format("the frequency of {}, {} Hz, {}", of, frequency, effects::unresolved(s.end)));
+  };
+  for (const Load& load : s.loads)
+    if (load.history) resolves(load.history->frequency, "a load");
+  for (const Joint& joint : s.joints)
+    if (joint.motion) resolves(joint.motion->frequency, "the motion of a joint");
   const bool contact = !s.pairs.empty();
   const bool projected = std::any_of(s.invariants.begin(), s.invariants.end(),
                                      [](const Invariant& each) { return each.project; });
