@@ -5,6 +5,7 @@
 
 #include "mechanisms.hpp"
 #include "support/catch.hpp"
+#include "turned.hpp"
 
 using namespace mechanisms;
 using namespace tether::scene;
@@ -86,20 +87,6 @@ Scene cart(double friction, double step) {
     s.joints.push_back(hinge(d, 0, hub, kY));
   }
   add_wall(s, {0, 0, 0}, Vector3d::UnitZ(), friction);
-  return s;
-}
-
-Scene turned(Scene s, const Vector3d& axis, double angle) {
-  const tether::linalg::Quaternion by(Eigen::AngleAxisd(angle, axis.normalized()));
-  *s.gravity = by * *s.gravity;
-  for (Body& body : s.bodies) {
-    body.position = by * body.position;
-    body.orientation = by * body.orientation;
-  }
-  for (Joint& joint : s.joints) {
-    joint.at = by * joint.at;
-    joint.axis = by * joint.axis;
-  }
   return s;
 }
 

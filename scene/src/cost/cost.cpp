@@ -7,6 +7,7 @@
 #include <tether/scene/cost.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "effects/list.hpp"
 #include "reference.hpp"
 
 namespace tether::scene {
@@ -171,7 +172,8 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
   CostTable table;
   const Plan plan = make_plan(scene);
   table.smooth = plan.engine != EngineKind::stepping;
-  const bool contact = plan.engine != EngineKind::smooth && plan.pairs > 0;
+  const bool contact =
+      plan.engine != EngineKind::smooth && (plan.pairs > 0 || effects::has_joint_laws(scene));
   if (contact) table.no_events = no_events(scene, plan);
   const bool events = plan.engine == EngineKind::event || (contact && table.no_events.empty());
   const std::vector<Setting> settings = settings_of(scene, plan, events, options);

@@ -19,7 +19,7 @@ constexpr double kTight = 1e-11;
 // IDA bounds the error of a step. What it adds up to over tens of events, and tens of periods
 // between them, is to be within ten tolerances (a mass that rubs to rest in thirteen turns).
 double wanted_tolerance(double tolerance) {
-  return std::min(1.0, std::pow(tolerance / 1e-4, 0.1)) * 0.04 * tolerance;
+  return std::min(1.0, std::pow(tolerance / 1e-4, 0.066)) * 0.025 * tolerance;
 }
 
 double local_tolerance(double tolerance) { return std::max(wanted_tolerance(tolerance), kLeast); }
@@ -186,6 +186,7 @@ void Driver::settle_velocities() {
 // on with the same bits.
 void Driver::start_phase() {
   modes_ = motion_.modes();
+  rows_are_weak_ = false;
   model_.begin_anew(event_time_);
   motion_.choose(event_time_, y_, modes_);
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
@@ -250,7 +251,7 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
       if (interrupted && interrupted()) return;
       continue;
     }
-    if (phase_->counts().steps >= kAnchor || phase_->is_at_end()) {
+    if (phase_->counts().steps >= kAnchor || phase_->is_at_end() || rows_are_weak_) {
       anchor();
       continue;
     }
@@ -259,7 +260,9 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
       fail(fmt::format("max_steps = {} steps are taken", options_.max_steps));
     check_pace(t);
     next_ = watcher_.look(*phase_);
-    if (!next_) turn_slips();
+    if (next_) continue;
+    turn_slips();
+    rows_are_weak_ = phase_->has_weak_rows();
   }
 }
 

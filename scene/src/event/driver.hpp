@@ -130,6 +130,7 @@ class Driver {
   VectorXd y_;                      // at the start of the phase
   std::vector<ContactMode> modes_;  // there; directions of slip turn since
   std::unique_ptr<Phase> phase_;
+  bool rows_are_weak_ = false;  // of joints, those in use
   std::optional<Zero> next_;
   std::vector<Bounces> bounces_;
   std::vector<EventRecord> events_;

@@ -10,6 +10,7 @@
 #include "event/model/scaled_scene.hpp"
 #include "event/model/scene_model.hpp"
 #include "event/resumable.hpp"
+#include "joints/list.hpp"
 #include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
 #include "output/saved_bodies.hpp"
@@ -154,13 +155,13 @@ void EventEngine::look() {
         d.potential_energy -= body.mass * scene_.gravity->dot(origin_);
   }
   contacts_known_ = false;
-  d.contacts = static_cast<int>(driver_->motion().closed().size());
+  for (const int i : driver_->motion().closed()) d.contacts += !model_->is_law(i);
   // A point behind a face that has a border is not always in the body.
   const std::vector<ContactMode>& modes = driver_->motion().modes();
   for (int i = 0; i < model_->contacts(); ++i) {
     const bool closed = modes[at(i)].mode != Mode::open;
     double rate = 0;
-    if (closed || std::isinf(model_->margin(i)))
+    if (!model_->is_law(i) && (closed || std::isinf(model_->margin(i))))
       d.penetration = std::max(d.penetration, -model_->gap(i, rate) * units_.length);
   }
   VectorXd g, rate, rest;
@@ -181,6 +182,7 @@ void EventEngine::look_at_contacts() const {
   const std::vector<VectorXd> forces = motion.contact_forces();
   for (std::size_t k = 0; k < forces.size(); ++k) {
     const int contact = motion.closed()[k];
+    if (model_->is_law(contact)) continue;
     const FeaturePair& pair = model_->pair(contact);
     const Touch touch = pair.look(model_->bodies().all());
     ContactState c;
@@ -200,7 +202,12 @@ void EventEngine::look_at_contacts() const {
 
 Forces EventEngine::forces() const {
   driver_->state_with_forces();
-  Forces out = model_->forces_of(reactions_, driver_->motion().joint_forces());
+  event::Motion& motion = driver_->motion();
+  Forces out = model_->forces_of(reactions_, motion.joint_forces());
+  const std::vector<VectorXd> forces = motion.contact_forces();
+  for (std::size_t k = 0; k < forces.size(); ++k)
+    if (const int contact = motion.closed()[k]; model_->is_law(contact))
+      model_->add_law_force(contact, forces[k], out);
   smooth::to_si(units_, scene_, out);
   for (JointForce& each : out.joints) to_world(each.at);
   for (SpringForce& each : out.springs) {
@@ -217,12 +224,21 @@ void EventEngine::look_at_events() {
     ContactEvent e;
     e.time = units_.time * from.time;
     e.kind = from.kind;
-    e.first = model_->pair(from.contact).first;
-    e.second = model_->pair(from.contact).second;
-    e.before = units_.speed() * from.before;
-    e.after = units_.speed() * from.after;
+    double arm = 1;  // of what turns, m
+    if (model_->is_law(from.contact)) {
+      const int number = model_->joint_laws().joint(model_->joint_law(from.contact));
+      const Joint& joint = scene_.joints[at(number)];
+      e.first = joint.first;
+      e.second = joint.second;
+      if (joints::is_angle(joint)) arm = units_.length;
+    } else {
+      e.first = model_->pair(from.contact).first;
+      e.second = model_->pair(from.contact).second;
+    }
+    e.before = units_.speed() / arm * from.before;
+    e.after = units_.speed() / arm * from.after;
     e.lost = units_.energy() * from.lost;
-    e.impulse = units_.mass * units_.speed() * from.impulse;
+    e.impulse = units_.mass * units_.speed() * arm * from.impulse;
     events_.push_back(e);
   }
 }

@@ -28,6 +28,7 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
   std::vector<int> out;
   bool any = false;
   for (const int i : near) {
+    if (model_.law(i).is_bounded()) continue;  // no impulse
     double rate = 0;
     const double gap = model_.gap(i, rate), band = bands().approach(i);
     // Which of two corners is first may be a matter of the error of their gaps. What bounces

@@ -25,7 +25,8 @@ bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int 
   const int block = rows.size();
   std::vector<int> others;
   for (int i = 0; i < static_cast<int>(answer.regimes.size()); ++i)
-    if (i != k && answer.regimes[at(i)] != contact::Regime::separating) others.push_back(block * i);
+    if (i != k && !rows.is_bounded(i) && answer.regimes[at(i)] != contact::Regime::separating)
+      others.push_back(block * i);
   if (others.empty()) return false;
   const int n = static_cast<int>(others.size());
   MatrixXd A(n, n);
@@ -102,8 +103,9 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
   for (int k = 0; k < n; ++k) {
     const int i = candidates[at(k)];
     ContactMode& mode = modes[at(i)];
+    const bool bounded = model_.law(i).is_bounded();
     const contact::Regime regime = answer.regimes[at(k)];
-    if (regime == contact::Regime::separating &&
+    if (regime == contact::Regime::separating && !bounded &&
         !(std::abs(answer.w[block * k]) <= kNegligible * solved.scale &&
           rests_on_others(rows, answer, k)))
       continue;
@@ -144,15 +146,18 @@ bool Driver::leaves_its_feature(int contact) {
 void Driver::jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu) {
   const int block = rows.size();
   VectorXd b = -velocities;
-  for (int k = 0; k < mu.size(); ++k)
+  VectorXd friction = mu;
+  for (int k = 0; k < mu.size(); ++k) {
     b[block * k] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
+    if (rows.is_bounded(k)) friction[k] = 0;  // no impulse
+  }
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_friction(rows.A(), b, mu);
+  const FrictionAnswer answer = solve_friction(rows.A(), b, friction);
   if (!answer.solved) fail("an impact without collision is not solved");
   const double lost = change_velocities(rows.change(answer.x));
   bool first = true;
   for (int k = 0; k < mu.size(); ++k) {
-    if (answer.x[block * k] <= 0) continue;
+    if (answer.x[block * k] <= 0 || rows.is_bounded(k)) continue;
     record(EventKind::jam, rows.contacts()[at(k)], velocities[block * k],
            rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()))[block * k],
            first ? lost : 0);

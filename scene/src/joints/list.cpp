@@ -26,6 +26,10 @@ std::string name_of(const Joint& joint, std::size_t index) {
                             : joint.name;
 }
 
+bool is_angle(const Joint& joint) {
+  return type(joint.kind).motion() == JointType::MotionOf::angle;
+}
+
 int row_count(const Joint& joint) {
   JointRows rows;
   Frame<double> origin;

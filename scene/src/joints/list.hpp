@@ -11,6 +11,9 @@ const JointType& type(JointKind kind);
 /// That of the scene or, without one, its kind and index.
 std::string name_of(const Joint& joint, std::size_t index);
 
+/// Its free or prescribed coordinate is an angle.
+bool is_angle(const Joint& joint);
+
 /// Rows of a joint on positions and orientations.
 int row_count(const Joint& joint);
 

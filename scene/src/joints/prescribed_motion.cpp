@@ -50,6 +50,7 @@ void write_motion(const Motion& m, bool angle, files::Writer& out) {
 namespace effects {
 
 using namespace mechanics;
+using joints::is_angle;
 
 namespace {
 
@@ -92,11 +93,6 @@ class PrescribedMotion : public Effect {
   }
   bool does_work(const Scene& scene) const override {
     return std::any_of(scene.joints.begin(), scene.joints.end(), is_driven);
-  }
-
- private:
-  static bool is_angle(const Joint& joint) {
-    return joints::type(joint.kind).motion() == joints::JointType::MotionOf::angle;
   }
 };
 

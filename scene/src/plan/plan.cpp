@@ -16,6 +16,8 @@ namespace tether::scene {
 
 namespace {
 
+constexpr const char* kNothingTouches = "nothing touches";
+
 std::string number(int n, const char* one) {
   return fmt::format("{} {}{}", n, one, n == 1 ? "" : "s");
 }
@@ -107,9 +109,7 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   refuse((contact || stepping || laws) && !event && projected,
          "the stepping engine projects no invariants: give them project = false, or, without "
          "contacts, use [smooth]");
-  no_event = laws               ? has_laws + "event engine does not have"
-             : contact || event ? event_engine_refusal(s)
-                                : std::string("nothing touches");
+  no_event = contact || laws || event ? event_engine_refusal(s) : std::string(kNothingTouches);
   refuse(event && !then_steps && !no_event.empty(), no_event);
   refuse(then_steps && projected,
          "[event] otherwise = \"stepping\": the stepping engine projects no invariants: give them "
@@ -121,7 +121,9 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
     return EngineKind::stepping;
   }
   if (event) {
-    why = contact ? "bodies touch, and the scene asks for it" : "the scene asks for it";
+    why = contact ? "bodies touch, and the scene asks for it"
+          : laws  ? "joints have limits, motors or friction, and the scene asks for it"
+                  : "the scene asks for it";
     return EngineKind::event;
   }
   if (contact) {
@@ -156,7 +158,8 @@ std::string others(const Plan& plan) {
     return "          [stepping] could move it, too, at fixed steps or within an accuracy\n";
   if (plan.engine == EngineKind::smooth)
     return free ? "          [stepping] and engine = \"event\" could move it, too\n" : "";
-  if (plan.pairs == 0) return free ? "          [smooth] could move it, too\n" : "";
+  if (plan.pairs == 0 && plan.no_event == kNothingTouches)
+    return free ? "          [smooth] could move it, too\n" : "";
   return plan.no_event.empty() ? "          engine = \"event\" could move it, too\n"
                                : "          " + plan.no_event + "\n";
 }

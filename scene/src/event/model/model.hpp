@@ -24,6 +24,10 @@ struct ContactLook {
 /// Newton's restitution and Coulomb's friction of one contact.
 struct ContactLaw {
   double friction = 0, restitution = 0;
+  /// >= 0: it has no gap and always this normal force: a motor or the friction of a joint, along
+  /// the first of the tangents. friction is 1 then.
+  double bound = -1;
+  bool is_bounded() const { return bound >= 0; }
 };
 
 /// q' = N(q) u, M(q) u' = h(t, q, u) + joints + contacts. Everything is asked of the state that was

@@ -46,6 +46,7 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
       forces_(effects::make_forces(scene, bodies_.all())),
       kinks_(effects::kinks_of(scene)),
       pairs_(potential_contacts(scene)),
+      laws_(scene, bodies_.all()),
       y_(bodies_.start()),
       loads_(at(bodies_.count())) {
   bodies_.set_state(y_.data());
@@ -92,12 +93,15 @@ void SceneModel::settle() {
 }
 
 int SceneModel::axis(int contact) const {
+  if (is_law(contact)) return 0;
   Eigen::Index k = 0;
   axes_[at(contact)].maxCoeff(&k);
   return static_cast<int>(k);
 }
 
-void SceneModel::set_axis(int contact, int axis) { axes_[at(contact)] = Vector3d::Unit(axis); }
+void SceneModel::set_axis(int contact, int axis) {
+  if (!is_law(contact)) axes_[at(contact)] = Vector3d::Unit(axis);
+}
 
 void SceneModel::rates(double* q_rate) const {
   for (int k = 0; k < bodies_.count(); ++k) {
@@ -148,6 +152,7 @@ void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest
 }
 
 void SceneModel::look(int contact, ContactLook& out) {
+  if (is_law(contact)) return laws_.look(contact - pairs(), bodies_.all(), out);
   const FeaturePair& p = pair(contact);
   const Bodies& bodies = bodies_.all();
   const Touch touch = p.look(bodies);
@@ -180,6 +185,7 @@ std::array<Vector3d, 2> SceneModel::tangents_of(int contact, const Vector3d& nor
 }
 
 Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
+  if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
   const Vector3d normal = pair(contact).look(bodies_.all()).normal;
   const std::array<Vector3d, 2> tangent = tangents_of(contact, normal);
   return parts[0] * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
@@ -193,8 +199,18 @@ Forces SceneModel::forces_of(const joints::Reactions& reactions,
   return out;
 }
 
+void SceneModel::add_law_force(int contact, const VectorXd& parts, Forces& out) const {
+  const int law = joint_law(contact);
+  const bool bounded = this->law(contact).is_bounded();
+  JointForce& force = out.joints[at(joint_laws().joint(law))];
+  const double x = bounded ? parts[1] : parts[0];
+  const bool angle = joint_laws().coordinate(law).what() == joints::JointType::MotionOf::angle;
+  (angle ? force.moment : force.force) += x * law_direction(contact);
+  force.drive += joint_laws().sign(law) * x;
+}
+
 std::string SceneModel::undecided(int contact) {
-  return pair(contact).is_flush(bodies_.all())
+  return !is_law(contact) && pair(contact).is_flush(bodies_.all())
              ? "a cylinder lies on its flat end, whose contact the event engine does not have"
              : "";
 }
@@ -211,6 +227,7 @@ bool SceneModel::are_one(int contact, int other, double distance) {
 
 // Of the sine between the normals of contacts of one point; -1: they are of two.
 double SceneModel::square_between(int contact, int other, double distance) {
+  if (is_law(contact) || is_law(other)) return -1;
   const FeaturePair &p = pair(contact), &q = pair(other);
   if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return -1;
   const Touch a = p.look(bodies_.all()), b = q.look(bodies_.all());

@@ -9,6 +9,7 @@
 #include "features.hpp"
 #include "joints/joint_rows.hpp"
 #include "joints/laws/reactions.hpp"
+#include "law_contacts.hpp"
 #include "mechanics/force.hpp"
 #include "model.hpp"
 #include "smooth/rows/moving_bodies.hpp"
@@ -29,9 +30,12 @@ class SceneModel final : public Model {
   int coordinates() const override { return 7 * bodies_.count(); }
   int velocities() const override { return 6 * bodies_.count(); }
   int joint_rows() const override { return rows_.count(); }
-  int contacts() const override { return static_cast<int>(pairs_.size()); }
+  /// Pairs of features, then the laws of joints.
+  int contacts() const override { return pairs() + laws_.count(); }
+  int pairs() const { return static_cast<int>(pairs_.size()); }
   int tangents() const override { return 2; }
   ContactLaw law(int contact) const override {
+    if (is_law(contact)) return laws_.law(contact - pairs());
     return {pair(contact).friction, pair(contact).restitution};
   }
 
@@ -48,12 +52,15 @@ class SceneModel final : public Model {
   std::string joint_name(int row) const override { return "joint \"" + rows_.joint_of(row) + "\""; }
   void look(int contact, ContactLook& out) override;
   double gap(int contact, double& rate) override {
+    if (is_law(contact)) return laws_.gap(contact - pairs(), bodies_.all(), rate);
     const Touch touch = pair(contact).look(bodies_.all());
     rate = touch.rate;
     return touch.gap;
   }
 
-  double margin(int contact) override { return pair(contact).margin(bodies_.all()); }
+  double margin(int contact) override {
+    return is_law(contact) ? kNoBorder : pair(contact).margin(bodies_.all());
+  }
 
   std::string undecided(int contact) override;
 
@@ -74,11 +81,21 @@ class SceneModel final : public Model {
 
   /// q, then u, at t = 0.
   VectorXd start() const;
+  bool is_law(int contact) const { return contact >= pairs(); }
   const FeaturePair& pair(int contact) const { return pairs_[at(contact)]; }
+  /// Of a contact that is one of the laws of joints.
+  const joints::JointLaws& joint_laws() const { return laws_.all(); }
+  int joint_law(int contact) const { return laws_.place(contact - pairs()); }
+  /// The same, in world axes: the force or moment on the first body.
+  Vector3d law_direction(int contact) const {
+    return laws_.direction(contact - pairs(), bodies_.all());
+  }
   const smooth::MovingBodies& bodies() const { return bodies_; }
   const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
   double potential() const;
   /// Of joints, by the multipliers of their rows, and of springs, at the state that is set.
+  /// Adds the force of a closed contact that is a law of a joint to its joint's.
+  void add_law_force(int contact, const VectorXd& parts, Forces& out) const;
   Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
 
  private:
@@ -91,6 +108,7 @@ class SceneModel final : public Model {
   std::vector<std::unique_ptr<Force>> forces_;
   std::vector<double> kinks_;  // of forces, by time
   std::vector<FeaturePair> pairs_;
+  LawContacts laws_;
   std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen
   std::vector<double> y_;       // of MovingBodies
   std::vector<Load6> loads_;

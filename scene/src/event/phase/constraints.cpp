@@ -36,11 +36,12 @@ void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
     rates.head(joints_) += joint_rate_.head(joints_);
   }
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const int row = row_of_[k];
-    positions[row] = looks_[k].gap - levels_[index(closed_[k])];
-    rates[row] += looks_[k].normal_rate;
-    if (modes_[index(closed_[k])].mode == Mode::stick)
-      rates.segment(row + 1, tangents_) += looks_[k].slip_rate;
+    const int row = row_of_[k], tangents = tangents_of(k);
+    if (normals_of(k) > 0) {
+      positions[row] = looks_[k].gap - levels_[index(closed_[k])];
+      rates[row] += looks_[k].normal_rate;
+    }
+    rates.segment(row + normals_of(k), tangents) += looks_[k].slip_rate.head(tangents);
   }
 }
 

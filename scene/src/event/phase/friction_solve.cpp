@@ -23,6 +23,8 @@ constexpr double kSame = 1e-7;     // of the answer's size: the exact one agains
 constexpr double kSolve = 1e-12, kNear = 1e-8;
 constexpr double kFarAbove = 1e5;
 constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
+// Of bounds over what accelerations ask of forces, see BoundedLaws.
+constexpr double kCutBound = 1e3, kMostBound = 1e12;
 constexpr double kNoChange = 3e-9;  // of accelerations or velocities
 
 MatrixXd pseudo_solve(const MatrixXd& S, const MatrixXd& right) {
@@ -205,81 +207,16 @@ bool solve_compliant(const std::vector<bool>& closed, double none, const MatrixX
   return false;
 }
 
-}  // namespace
-
-ContactRows::ContactRows(Model& model, std::vector<int> contacts)
-    : model_(model), contacts_(std::move(contacts)), block_(1 + model.tangents()) {
-  const int n = block_ * static_cast<int>(contacts_.size());
-  L_.resize(n, model.velocities());
-  rate_.resize(n);
-  rest_.resize(n);
-  ContactLook look;
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const int row = block_ * static_cast<int>(k);
-    model.look(contacts_[k], look);
-    L_.row(row) = look.normal;
-    rate_[row] = look.normal_rate;
-    rest_[row] = look.normal_rest;
-    L_.middleRows(row + 1, block_ - 1) = look.tangents;
-    rate_.segment(row + 1, block_ - 1) = look.slip_rate;
-    rest_.segment(row + 1, block_ - 1) = look.slip_rest;
-  }
-  PL_ = L_.transpose();
-  model.divide_by_mass(PL_);
-  if (model.joint_rows() > 0) {
-    VectorXd g, rate;
-    model.joints(g, G_, rate, joint_rest_);
-    MG_ = G_.transpose();
-    model.divide_by_mass(MG_);
-    look_at_joints();
-    // With the forces of the joints: A = F' M^-1 F is never indefinite, and light bodies, whose
-    // parts cancel in L P L', leave no rounding in it.
-    const MatrixXd F = L_.transpose() - G_.transpose() * joint_solve(G_ * PL_);
-    PL_ = F;
-    model.divide_by_mass(PL_);
-    A_ = F.transpose() * PL_;
-  } else {
-    A_ = L_ * PL_;
-  }
-  A_ = (0.5 * (A_ + A_.transpose())).eval();
-}
-
-// Rows of unit length: which of them depend on others hangs on no mass.
-void ContactRows::look_at_joints() {
-  scale_.setOnes(G_.rows());
-  for (int i = 0; i < G_.rows(); ++i) {
-    const double square = G_.row(i).dot(MG_.col(i));
-    if (square > 0) scale_[i] = 1 / std::sqrt(square);
-  }
-  factor_.setThreshold(kDependent);
-  factor_.compute(scale_.asDiagonal() * (G_ * MG_) * scale_.asDiagonal());
-}
-
-MatrixXd ContactRows::joint_solve(const MatrixXd& right) const {
-  return scale_.asDiagonal() * factor_.solve(scale_.asDiagonal() * right);
-}
-
-VectorXd ContactRows::free_accelerations() {
-  VectorXd a;
-  model_.forces(a);
-  model_.divide_by_mass(a);
-  if (G_.rows() > 0) a -= MG_ * joint_solve(G_ * a + joint_rest_);
-  return L_ * a + rest_;
-}
-
-AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
-                                       const std::vector<VectorXd>& slides, double part,
-                                       const std::vector<bool>& closed) {
-  const int block = rows.size(), n = static_cast<int>(rows.contacts().size());
+AccelerationAnswer solve_contacts(const MatrixXd& A, const VectorXd& free, const VectorXd& mu,
+                                  const std::vector<VectorXd>& slides, double part,
+                                  const std::vector<bool>& closed) {
+  const int n = static_cast<int>(mu.size()), block = static_cast<int>(free.size()) / n;
   AccelerationAnswer out;
-  const VectorXd free = rows.free_accelerations();
   out.scale = free.cwiseAbs().maxCoeff();
   out.far = kFarAbove * std::max(out.scale, 1e-12);
-  VectorXd b = -free, mu(n);
-  for (int k = 0; k < n; ++k) mu[k] = model.law(rows.contacts()[at(k)]).friction;
   Regimes regimes = all_held(mu, block, slides);
-  b = without_contradictions(rows.A(), b, held_rows(regimes, block), part * out.scale);
-  SharedForces shared = share_forces(rows.A(), b, mu, regimes);
+  VectorXd b = without_contradictions(A, -free, held_rows(regimes, block), part * out.scale);
+  SharedForces shared = share_forces(A, b, mu, regimes);
   if (shared.lawful) {
     take(shared, regimes, out.contacts);
     return out;
@@ -289,11 +226,100 @@ AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
     if (slides[at(k)].size() > 0) b.segment(block * k + 1, block - 1) -= out.far * slides[at(k)];
   const bool decides = shared.several && !closed.empty();
   const double none = kNoChange * out.scale;
-  if (decides && solve_compliant(closed, none, rows.A(), b, all, mu, regimes, out.contacts))
-    return out;
-  out.contacts = solve_friction(rows.A(), b, mu);
-  if (decides && out.contacts.solved)
-    settle(closed, none, rows.A(), all, mu, regimes, out.contacts);
+  if (decides && solve_compliant(closed, none, A, b, all, mu, regimes, out.contacts)) return out;
+  out.contacts = solve_friction(A, b, mu);
+  if (decides && out.contacts.solved) settle(closed, none, A, all, mu, regimes, out.contacts);
+  return out;
+}
+
+/// Bounded laws among the contacts. One that slides is a force that is known; one that sticks is a
+/// contact whose normal force x_n is given by its own row, a x_n = b_n with the b_n of the
+/// accelerations, and mu x_n the bound. Bounds far above what accelerations ask for would be
+/// another scale of forces: they count by `most` only, unless something slides there.
+struct BoundedLaws {
+  MatrixXd A;
+  VectorXd free, mu;
+  std::vector<VectorXd> slides;
+  std::vector<int> cut;  // bounds that are not whole
+
+  BoundedLaws(const Model& model, ContactRows& rows, const std::vector<VectorXd>& given,
+              double most)
+      : A(rows.A()), free(rows.free_accelerations()), slides(given) {
+    const int block = rows.size(), n = static_cast<int>(given.size());
+    mu.resize(n);
+    const auto is_known = [&](int k) { return rows.is_bounded(k) && given[at(k)].size() > 0; };
+    for (int k = 0; k < n; ++k) {
+      const ContactLaw law = model.law(rows.contacts()[at(k)]);
+      mu[k] = law.friction;
+      if (is_known(k))
+        free -= law.bound * rows.A().middleCols(block * k + 1, block - 1) * given[at(k)];
+    }
+    for (int k = 0; k < n; ++k) {
+      if (!is_known(k)) continue;
+      const int row = block * k + 1;
+      const double own = A(row, row);
+      A.row(row).setZero();
+      A.col(row).setZero();
+      A(row, row) = own;
+      free.segment(block * k, block).setZero();
+      slides[at(k)] = VectorXd();
+      mu[k] = 0;
+    }
+    const double scale = free.cwiseAbs().maxCoeff();
+    for (int k = 0; k < n; ++k) {
+      if (!rows.is_bounded(k) || is_known(k)) continue;
+      const double bound = model.law(rows.contacts()[at(k)]).bound;
+      const double own = A(block * k, block * k), asked = scale > 0 ? scale : bound * own;
+      free[block * k] = -asked;
+      mu[k] = asked > 0 ? bound * own / asked : 1;
+      if (mu[k] <= most) continue;
+      mu[k] = most;
+      cut.push_back(k);
+    }
+  }
+};
+
+}  // namespace
+
+AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
+                                       const std::vector<VectorXd>& slides, double part,
+                                       const std::vector<bool>& closed) {
+  const int block = rows.size(), n = static_cast<int>(rows.contacts().size());
+  AccelerationAnswer out;
+  const auto any = [&](const auto& is) {
+    for (int k = 0; k < n; ++k)
+      if (is(k)) return true;
+    return false;
+  };
+  if (!any([&](int k) { return rows.is_bounded(k); })) {
+    VectorXd mu(n);
+    for (int k = 0; k < n; ++k) mu[k] = model.law(rows.contacts()[at(k)]).friction;
+    return solve_contacts(rows.A(), rows.free_accelerations(), mu, slides, part, closed);
+  }
+  for (double most = kCutBound; most <= kMostBound; most *= kCutBound) {
+    const BoundedLaws laws(model, rows, slides, most);
+    out = solve_contacts(laws.A, laws.free, laws.mu, laws.slides, part, closed);
+    const auto slides_there = [&](int k) {
+      return out.contacts.solved && out.contacts.regimes[at(k)] != Regime::sticking;
+    };
+    if (std::none_of(laws.cut.begin(), laws.cut.end(), slides_there)) break;
+  }
+  if (!out.contacts.solved) return out;
+  // Their own normals are nobody's, and what slides has its force and acceleration.
+  VectorXd& x = out.contacts.x;
+  for (int k = 0; k < n; ++k) {
+    if (!rows.is_bounded(k)) continue;
+    const bool slid = slides[at(k)].size() > 0;
+    if (slid) {
+      x.segment(block * k + 1, block - 1) =
+          -model.law(rows.contacts()[at(k)]).bound * slides[at(k)];
+      out.contacts.regimes[at(k)] = Regime::sliding;
+    }
+    x[block * k] = 0;
+  }
+  const VectorXd w = rows.A() * x + rows.free_accelerations();
+  for (int k = 0; k < n; ++k)
+    if (rows.is_bounded(k)) out.contacts.w.segment(block * k, block) = w.segment(block * k, block);
   return out;
 }
 

@@ -5,37 +5,9 @@
 #include <tether/contact/solver.hpp>
 #include <vector>
 
-#include "event/model/model.hpp"
+#include "contact_rows.hpp"
 
 namespace tether::scene::event {
-
-/// Some contacts of a model at the state that is set: rows L = (n, T) of each, and what forces x in
-/// them do to velocities through the joints,
-///   P L' x,   P = M^-1 - M^-1 G' (G M^-1 G')^+ G M^-1,   A = L P L'.
-class ContactRows {
- public:
-  ContactRows(Model& model, std::vector<int> contacts);
-
-  const std::vector<int>& contacts() const { return contacts_; }
-  int size() const { return block_; }  ///< rows of a contact: n, then its tangents
-  const MatrixXd& A() const { return A_; }
-  /// Velocities of the contacts: of each w_n, then its slip.
-  VectorXd velocities(const VectorXd& u) const { return L_ * u + rate_; }
-  /// Accelerations of the contacts without forces in them, and those of the model.
-  VectorXd free_accelerations();
-  VectorXd change(const VectorXd& x) const { return PL_ * x; }
-
- private:
-  void look_at_joints();
-  MatrixXd joint_solve(const MatrixXd& right) const;  ///< (G M^-1 G')^+ right
-
-  Model& model_;
-  std::vector<int> contacts_;
-  int block_;
-  MatrixXd L_, PL_, A_, G_, MG_;
-  VectorXd rate_, rest_, joint_rest_, scale_;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor_;
-};
 
 /// Answer of a frictional problem w = A x - b.
 struct FrictionAnswer {

@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kRank = 1e-10;  // of rows of unit length
 constexpr double kIndependent = 1e-6;
+constexpr double kClearlyMore = 1.1;  // else the earlier one is taken
+constexpr double kWeakened = 0.3;
 constexpr double kAhead = 1e-5;   // s in the units of the model
 constexpr double kLawful = 1e-9;  // of the largest force
 constexpr double kHeld = 1e-9;    // of the accelerations
@@ -47,6 +49,56 @@ class IndependentRows {
   const Model& model_;
   MatrixXd basis_, dual_;
   int rank_ = 0;
+};
+
+/// Of rows (as columns) those that imply all others: each time the one that adds most to those
+/// before it, in the metric of the masses.
+struct RowChoice {
+  std::vector<int> rows;  // ascending
+  double least = 1;       // what a row added, of its length
+
+  RowChoice(const Model& model, MatrixXd V) {
+    const Eigen::Index m = V.cols();
+    MatrixXd D = V;
+    model.divide_by_mass(D);
+    VectorXd length(m);
+    for (Eigen::Index j = 0; j < m; ++j) {
+      const double square = V.col(j).dot(D.col(j));
+      length[j] = square > 0 ? 1 : 0;
+      if (!(square > 0)) continue;
+      V.col(j) /= std::sqrt(square);
+      D.col(j) /= std::sqrt(square);
+    }
+    std::vector<Eigen::Index> taken;
+    while (static_cast<Eigen::Index>(rows.size()) < std::min(m, V.rows())) {
+      Eigen::Index best = 0;
+      for (Eigen::Index j = 1; j < m; ++j)
+        if (length[j] > kClearlyMore * length[best]) best = j;
+      if (length[best] < kIndependent) break;
+      // Once more against those before: what is left of it may be small.
+      for (const Eigen::Index k : taken) subtract(V, D, k, best);
+      const double left = std::sqrt(V.col(best).dot(D.col(best)));
+      least = std::min(least, left);
+      V.col(best) /= left;
+      D.col(best) /= left;
+      length[best] = 0;
+      taken.push_back(best);
+      rows.push_back(static_cast<int>(best));
+      for (Eigen::Index j = 0; j < m; ++j) {
+        if (!(length[j] > 0)) continue;
+        subtract(V, D, best, j);
+        length[j] = std::sqrt(std::max(0.0, V.col(j).dot(D.col(j))));
+      }
+    }
+    std::sort(rows.begin(), rows.end());
+  }
+
+ private:
+  static void subtract(MatrixXd& V, MatrixXd& D, Eigen::Index k, Eigen::Index from) {
+    const double part = D.col(k).dot(V.col(from));
+    V.col(from) -= part * V.col(k);
+    D.col(from) -= part * D.col(k);
+  }
 };
 
 }  // namespace
@@ -94,7 +146,8 @@ void Motion::slips_with_friction(double t, const double* y, VectorXd& slips) {
   Eigen::Index size = 0;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int contact = closed_[k];
-    if (modes_[index(contact)].mode != Mode::slide || model_.law(contact).friction == 0) continue;
+    const ContactLaw law = model_.law(contact);
+    if (sticks(k) || law.friction == 0 || law.is_bounded()) continue;
     model_.look(contact, looks_[k]);
     slips.segment(size, tangents_) = held_slip(static_cast<int>(k));
     size += tangents_;
@@ -118,11 +171,11 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   rows_ = joints_;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     row_of_[k] = rows_;
-    rows_ += modes_[index(closed_[k])].mode == Mode::stick ? 1 + tangents_ : 1;
+    rows_ += normals_of(k) + tangents_of(k);
   }
   works_ = model_.does_work();
-  for (const int i : closed_)
-    works_ = works_ || (modes_[index(i)].mode == Mode::slide && model_.law(i).friction > 0);
+  for (std::size_t k = 0; k < closed_.size(); ++k)
+    works_ = works_ || is_bounded(k) || (!sticks(k) && model_.law(closed_[k]).friction > 0);
   R_.setZero(rows_, nu_);
   C_.setZero(nu_, rows_);
   r_.setZero(rows_);
@@ -167,16 +220,22 @@ void Motion::choose_joints() {
   joints_in_use_.clear();
   if (model_.joint_rows() == 0) return;
   model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
-  IndependentRows independent(model_, nu_, model_.joint_rows());
-  MatrixXd w(nu_, 1);
-  for (int i = 0; i < model_.joint_rows(); ++i) {
-    w.col(0) = joint_W_.row(i).transpose();
-    model_.divide_by_mass(w);
-    const double square = joint_W_.row(i).dot(w.col(0));
-    if (square > 0 && independent.add(joint_W_.row(i).transpose() / std::sqrt(square)))
-      joints_in_use_.push_back(i);
-  }
+  RowChoice choice(model_, joint_W_.transpose());
+  joints_in_use_ = std::move(choice.rows);
   joints_ = static_cast<int>(joints_in_use_.size());
+  least_joint_row_ = choice.least;
+}
+
+// As a mechanism moves, rows that were far from implying each other may come to do so.
+bool Motion::other_joint_rows_are_better(double t, const VectorXd& y) {
+  if (joints_ == model_.joint_rows()) return false;
+  set(t, y.data());
+  look_at_joints();
+  const double now = RowChoice(model_, joint_W_.topRows(joints_).transpose()).least;
+  if (now > kWeakened * least_joint_row_) return false;
+  least_joint_row_ = std::min(least_joint_row_, now);
+  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  return now <= kWeakened * RowChoice(model_, joint_W_.transpose()).least;
 }
 
 // Those in use, first.
@@ -205,16 +264,18 @@ void Motion::gather() {
     const int row = row_of_[k];
     ContactLook& look = looks_[k];
     model_.look(closed_[k], look);
-    const ContactMode& mode = modes_[index(closed_[k])];
-    R_.row(row) = look.normal;
-    C_.col(row) = look.normal.transpose();
-    r_[row] = look.normal_rest;
-    if (mode.mode == Mode::stick) {
-      R_.middleRows(row + 1, tangents_) = look.tangents;
-      C_.middleCols(row + 1, tangents_) = look.tangents.transpose();
-      r_.segment(row + 1, tangents_) = look.slip_rest;
-      continue;
+    if (normals_of(k) > 0) {
+      R_.row(row) = look.normal;
+      C_.col(row) = look.normal.transpose();
+      r_[row] = look.normal_rest;
     }
+    if (const int n = tangents_of(k); n > 0) {
+      const int first = row + normals_of(k);
+      R_.middleRows(first, n) = look.tangents.topRows(n);
+      C_.middleCols(first, n) = look.tangents.topRows(n).transpose();
+      r_.segment(first, n) = look.slip_rest.head(n);
+    }
+    if (sticks(k) || is_bounded(k)) continue;
     const double mu = model_.law(closed_[k]).friction;
     if (mu == 0) continue;
     const VectorXd s = held_slip(static_cast<int>(k));
@@ -239,11 +300,11 @@ int Motion::choose_rows() {
   // Joints come first, then normals, then tangents: the earlier row is kept.
   std::vector<int> normals, order;
   for (int i = 0; i < joints_; ++i) order.push_back(i);
-  for (const int row : row_of_) order.push_back(row);
+  for (std::size_t k = 0; k < closed_.size(); ++k)
+    if (normals_of(k) > 0) order.push_back(row_of_[k]);
   const std::size_t positions = order.size();
   for (std::size_t k = 0; k < closed_.size(); ++k)
-    if (modes_[index(closed_[k])].mode == Mode::stick)
-      for (int j = 1; j <= tangents_; ++j) order.push_back(row_of_[k] + j);
+    for (int j = 0; j < tangents_of(k); ++j) order.push_back(row_of_[k] + normals_of(k) + j);
   IndependentRows independent(model_, nu_, rows_);
   int rank_of_joints = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
@@ -262,6 +323,9 @@ void Motion::rate(double t, const double* y, double* y_rate) {
   set(t, y);
   gather();
   model_.forces(h_);
+  for (std::size_t k = 0; k < closed_.size(); ++k)
+    if (is_bounded(k) && !sticks(k))
+      h_ += looks_[k].tangents.transpose() * friction_force(static_cast<int>(k));
   a_ = h_;
   model_.divide_by_mass(a_);
   if (rows_ > 0) {
@@ -281,7 +345,9 @@ void Motion::rate(double t, const double* y, double* y_rate) {
   double power = model_.power();
   for (int i = 0; i < joints_; ++i) power -= lambda_[i] * joint_rate_[i];
   for (std::size_t k = 0; k < closed_.size(); ++k)
-    if (modes_[index(closed_[k])].mode == Mode::slide)
+    if (is_bounded(k))  // on the bodies: a motor works at its speed, too
+      power += friction_force(static_cast<int>(k)).dot(looks_[k].tangents * u_);
+    else if (!sticks(k))
       power += friction_force(static_cast<int>(k)).dot(slip_of(looks_[k]));
   y_rate[work()] = power;
 }
@@ -344,16 +410,28 @@ std::vector<VectorXd> Motion::contact_forces() {
   const AccelerationAnswer answer =
       solve_accelerations(model_, rows, slides(), bands_.of_accelerations());
   if (!answer.contacts.solved) return out;
-  for (std::size_t k = 0; k < closed_.size(); ++k)
-    out[k] = answer.contacts.x.segment(rows.size() * static_cast<int>(k), rows.size());
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const auto x = answer.contacts.x.segment(rows.size() * static_cast<int>(k), rows.size());
+    if (is_bounded(k))
+      out[k].tail(tangents_) = x.tail(tangents_);
+    else
+      out[k] = x;
+  }
   return out;
 }
 
 VectorXd Motion::friction_force(int closed) const {
-  const int row = row_of_[index(closed)];
-  const ContactMode& mode = modes_[index(closed_[index(closed)])];
-  if (mode.mode == Mode::stick) return lambda_.segment(row + 1, tangents_);
-  const double mu = model_.law(closed_[index(closed)]).friction;
+  const auto k = index(closed);
+  const int row = row_of_[k];
+  const ContactLaw law = model_.law(closed_[k]);
+  if (sticks(k)) {
+    const int n = tangents_of(k);
+    VectorXd force = VectorXd::Zero(tangents_);
+    force.head(n) = lambda_.segment(row + normals_of(k), n);
+    return force;
+  }
+  if (law.is_bounded()) return -law.bound * modes_[index(closed_[k])].direction;
+  const double mu = law.friction;
   if (mu == 0) return VectorXd::Zero(tangents_);
   const VectorXd s = held_slip(closed);
   return -mu * lambda_[row] / s.norm() * s;

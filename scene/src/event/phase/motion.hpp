@@ -10,6 +10,8 @@
 //   closed   row n            column n' where it sticks, n' - mu T' d where it slides, d = s / |s|
 //   stuck    rows T, too      columns T'
 //
+// A bounded law of a joint has one row and column T where it sticks, else its bound is part of h.
+//
 // lambda is eliminated: R M^-1 C lambda = -(r + R M^-1 h), in the sense of the shortest lambda
 // where rows depend on each other. So y' is a function of (t, y), and so is every force.
 #pragma once
@@ -44,6 +46,8 @@ class Motion {
   /// The modes from now on, at the state y: rows that others imply are left out of constraints().
   /// A contact that closes keeps the gap that it has: moving bodies would give or take energy.
   void choose(double t, const VectorXd& y, std::vector<ContactMode> modes);
+  /// Whether those rows of joints that stand for all would be better chosen anew at (t, y).
+  bool other_joint_rows_are_better(double t, const VectorXd& y);
   const std::vector<double>& levels() const { return levels_; }  ///< gaps of closed contacts
   void set_levels(std::vector<double> levels) { levels_ = std::move(levels); }
   /// Takes what closed contacts and joints do not allow from the velocities, as impulses would.
@@ -65,7 +69,10 @@ class Motion {
   /// y' at (t, y); afterwards acceleration() and force() are those there.
   void rate(double t, const double* y, double* y_rate);
   const VectorXd& acceleration() const { return a_; }
-  double normal_force(int closed) const { return lambda_[row_of_[index(closed)]]; }
+  double normal_force(int closed) const {  ///< of a bounded law: its bound
+    const ContactLaw law = model_.law(closed_[index(closed)]);
+    return law.is_bounded() ? law.bound : lambda_[row_of_[index(closed)]];
+  }
   VectorXd friction_force(int closed) const;  ///< by tangents
   /// Of all rows of joints: redundant ones share.
   VectorXd joint_forces();
@@ -102,6 +109,15 @@ class Motion {
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
   VectorXd slip_of(const ContactLook& look) const;
   VectorXd held_slip(int closed) const;
+  bool is_bounded(std::size_t closed) const { return model_.law(closed_[closed]).is_bounded(); }
+  bool sticks(std::size_t closed) const {
+    return modes_[index(closed_[closed])].mode == Mode::stick;
+  }
+  /// Its rows: from row_of_ on the normal, then the tangents where it sticks.
+  int normals_of(std::size_t closed) const { return is_bounded(closed) ? 0 : 1; }
+  int tangents_of(std::size_t closed) const {
+    return !sticks(closed) ? 0 : is_bounded(closed) ? 1 : tangents_;
+  }
   void set(double t, const double* y);
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
@@ -118,6 +134,7 @@ class Motion {
   std::vector<ContactLook> looks_;  // of the closed ones
   int rows_ = 0, joints_ = 0;
   std::vector<int> joints_in_use_;
+  double least_joint_row_ = 1;  // what a row in use added to the others, of its length
   std::vector<int> positions_in_use_, rates_in_use_;  // rows of the projection
   bool hyperstatic_ = false;
   double kept_energy_ = 0;

@@ -298,6 +298,12 @@ bool Phase::projected_at(double time, VectorXd& y) {
   return good;
 }
 
+bool Phase::has_weak_rows() const {
+  VectorXd y;
+  at(end_, y);
+  return motion_.other_joint_rows_are_better(start_ + end_, y);
+}
+
 PhaseCounts Phase::counts() const {
   PhaseCounts c;
   IDAGetNumSteps(ida_->memory, &c.steps);

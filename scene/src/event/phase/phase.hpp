@@ -43,6 +43,8 @@ class Phase {
   void at(double time, VectorXd& y) const;
   /// The same, moved onto the constraints; false: it could not be.
   bool projected_at(double time, VectorXd& y);
+  /// Joints would be better held by other rows than those that were chosen at the start.
+  bool has_weak_rows() const;
   PhaseCounts counts() const;
 
  private:

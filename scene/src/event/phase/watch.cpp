@@ -78,7 +78,8 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   for (std::size_t k = 0; k < closed.size(); ++k) {
     const int i = closed[k], place = static_cast<int>(k);
     const bool single = !motion_.is_hyperstatic();
-    if (single) add(Watch::normal_force, i, place, false);
+    const bool bounded = motion_.model().law(i).is_bounded();
+    if (single && !bounded) add(Watch::normal_force, i, place, false);
     const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
     if (stuck && single) add(Watch::cone, i, place, false);
     if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place, false);
@@ -112,8 +113,10 @@ double Watcher::band(const Function& f) const {
       return 0;
     case Watch::slip:
       return bands().slip(f.contact);
-    default:
-      return bands().part * force_;
+    default: {
+      const double bound = motion_.model().law(f.contact).bound;
+      return bands().part * (bound >= 0 ? bound : force_);
+    }
   }
 }
 
@@ -169,7 +172,8 @@ void Watcher::evaluate(double t, const VectorXd& y) {
   else
     motion_.rate(t, y.data(), rate_.data());
   for (std::size_t k = 0; k < motion_.closed().size(); ++k)
-    force_ = std::max(force_, std::abs(motion_.normal_force(static_cast<int>(k))));
+    if (!motion_.model().law(motion_.closed()[k]).is_bounded())
+      force_ = std::max(force_, std::abs(motion_.normal_force(static_cast<int>(k))));
   for (Function& f : functions_) {
     f.before = f.value;
     f.slope_before = f.slope;

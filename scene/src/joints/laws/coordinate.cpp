@@ -34,6 +34,26 @@ double Coordinate::value(const Bodies& bodies) const {
   return fixed_direction_ ? d.dot(B(bodies).R * axis_) : d.norm();
 }
 
+double Coordinate::rate(const Bodies& bodies) const {
+  Wrench<double> on_first, on_second;
+  gradient(bodies, on_first, on_second);
+  return on_first.force.dot(A(bodies).v) + on_first.torque.dot(A(bodies).W) +
+         on_second.force.dot(B(bodies).v) + on_second.torque.dot(B(bodies).W);
+}
+
+double Coordinate::rest(const Bodies& bodies) const {
+  if (what_ == JointType::MotionOf::angle)
+    return B(bodies).W.cross(direction(bodies)).dot(A(bodies).W - B(bodies).W);
+  const Jet<double> a = point<2>(A(bodies), at_first_), b = point<2>(B(bodies), at_second_);
+  const Vector3d d = a.x - b.x, d1 = a.x1 - b.x1, d2 = a.x2 - b.x2;
+  if (fixed_direction_) {
+    const Jet<double> u = mechanics::direction<2>(B(bodies), axis_);
+    return d2.dot(u.x) + 2 * d1.dot(u.x1) + d.dot(u.x2);
+  }
+  const double length = d.norm(), along = d.dot(d1) / length;
+  return (d1.squaredNorm() - along * along + d.dot(d2)) / length;
+}
+
 Vector3d Coordinate::direction(const Bodies& bodies) const {
   if (fixed_direction_) return B(bodies).R * axis_;
   return (place(bodies) - point<0>(B(bodies), at_second_).x).stableNormalized();

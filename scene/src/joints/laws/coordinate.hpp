@@ -23,6 +23,9 @@ class Coordinate {
   Vector3d place(const Bodies& bodies) const;
 
   double value(const Bodies& bodies) const;
+  double rate(const Bodies& bodies) const;
+  /// Its second derivative without accelerations of the bodies.
+  double rest(const Bodies& bodies) const;
   /// The unit of force along it, on the first body: what() == angle, the moment u; length, the
   /// force u. World axes.
   Vector3d direction(const Bodies& bodies) const;

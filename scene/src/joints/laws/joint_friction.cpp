@@ -28,6 +28,10 @@ class JointFrictionEffect : public Effect {
     if (count > 0)
       lines.push_back({"joint friction", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
   }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Joint& joint : scene.joints)
+      joint.friction /= joints::is_angle(joint) ? units.energy() : units.force();
+  }
   void add_laws(const Joint& joint, int number, double, JointLawList& out) const override {
     if (rubs(joint)) out.bounded(number, 0, joint.friction);
   }

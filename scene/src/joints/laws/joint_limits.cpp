@@ -57,6 +57,13 @@ class JointLimitEffect : public Effect {
     if (count > 0)
       lines.push_back({"joint limits", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
   }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Joint& joint : scene.joints) {
+      if (!joint.limits || joints::is_angle(joint)) continue;
+      joint.limits->lower /= units.length;
+      joint.limits->upper /= units.length;
+    }
+  }
   void add_laws(const Joint& joint, int number, double value, JointLawList& out) const override {
     if (!joint.limits) return;
     out.limit(number, value - joint.limits->lower, joint.limits->restitution, 1);

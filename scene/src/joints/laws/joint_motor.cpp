@@ -41,6 +41,19 @@ class JointMotorEffect : public Effect {
     if (count > 0)
       lines.push_back({"motors", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
   }
+  void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
+    for (const Joint& joint : scene.joints)
+      if (joint.motor)
+        rate.take(std::abs(joint.motor->rate) / (joints::is_angle(joint) ? 1 : length));
+  }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Joint& joint : scene.joints) {
+      if (!joint.motor) continue;
+      const bool angle = joints::is_angle(joint);
+      joint.motor->rate *= units.time / (angle ? 1 : units.length);
+      joint.motor->bound /= angle ? units.energy() : units.force();
+    }
+  }
   void add_laws(const Joint& joint, int number, double, JointLawList& out) const override {
     if (joint.motor) out.bounded(number, joint.motor->rate, joint.motor->bound);
   }
