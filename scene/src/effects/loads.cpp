@@ -206,7 +206,8 @@ class LoadEffect : public Effect {
     for (const Load& load : scene.loads) {
       rate.take(std::sqrt(load.force.norm() / (mass * length)));
       rate.take(std::sqrt(load.torque.norm() / (mass * length * length)));
-      if (load.history) rate.take(load.history->frequency);
+      // Not its frequency: a fast sine hardly moves a body, and tolerances of speeds that large
+      // would not see it.
     }
   }
   void add_kinks(const Scene& scene, std::vector<double>& times) const override {

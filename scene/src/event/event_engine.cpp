@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "driver.hpp"
+#include "effects/periods.hpp"
 #include "event/model/scaled_scene.hpp"
 #include "event/model/scene_model.hpp"
 #include "event/resumable.hpp"
@@ -32,7 +33,7 @@ DriverOptions driver_options(const Scene& scene) {
   const EventOptions o = scene.event.value_or(EventOptions{});
   DriverOptions out;
   out.tolerance = o.tolerance;
-  out.max_step = o.max_step;
+  out.max_step = effects::longest_step(scene, o.max_step);
   out.max_events = o.max_events;
   out.max_steps = o.max_steps;
   return out;

@@ -6,6 +6,7 @@
 #include <ostream>
 #include <stdexcept>
 #include <tether/scene/plan.hpp>
+#include <tether/scene/run.hpp>
 
 #include "effects/list.hpp"
 #include "effects/periods.hpp"
@@ -114,6 +115,15 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   refuse(then_steps && projected,
          "[event] otherwise = \"stepping\": the stepping engine projects no invariants: give them "
          "project = false");
+  if (!stepping && !then_steps && (event || smooth || !(contact || laws)))
+    for (const Load& load : s.loads) {
+      if (!effects::pushes(load)) continue;
+      const double steps = effects::kStepsOfPeriod * load.history->frequency * s.end;
+      refuse(!(steps <= kMostSteps),
+             fmt::format("a load of {:g} Hz takes {:.3g} steps until the end in the engines smooth "
+                         "and event, {:g} at most are taken: use [stepping], which takes means",
+                         load.history->frequency, steps, kMostSteps));
+    }
   if (!refusal.empty()) throw std::invalid_argument(refusal);
 
   if (then_steps && !no_event.empty()) {

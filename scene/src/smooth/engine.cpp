@@ -8,6 +8,7 @@
 #include <ostream>
 
 #include "effects/list.hpp"
+#include "effects/periods.hpp"
 #include "integrator.hpp"
 #include "mechanics/placed_bodies.hpp"
 #include "output/binary.hpp"
@@ -41,6 +42,7 @@ class SmoothEngine : public Engine {
         scene_(in_units(scene, units_)),
         options_(scene_.smooth.value_or(SmoothOptions{})),
         system_(std::make_unique<System>(scene_, units_)) {
+    options_.max_step = effects::longest_step(scene_, options_.max_step);
     bodies_.resize(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
       bodies_[b].position = scene.bodies[b].position;
