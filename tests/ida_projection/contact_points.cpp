@@ -26,6 +26,8 @@ Dual operator/(Dual x, Dual y) { return {x.a / y.a, (x.b - x.a / y.a * y.b) / y.
 Dual sin(Dual x) { return {std::sin(x.a), std::cos(x.a) * x.b}; }
 Dual cos(Dual x) { return {std::cos(x.a), -std::sin(x.a) * x.b}; }
 Dual sqrt(Dual x) { return {std::sqrt(x.a), x.b / (2.0 * std::sqrt(x.a))}; }
+Dual power(Dual x, double p) { return {std::pow(x.a, p), p * std::pow(x.a, p - 1.0) * x.b}; }
+double power(double x, double p) { return std::pow(x, p); }
 using std::cos;
 using std::sin;
 using std::sqrt;
@@ -173,6 +175,23 @@ struct Ellipsoid {
   template <class T>
   T potential(const T* q) const {
     return gravity * q[2];
+  }
+};
+
+/// sum over x_i = s_i / half_i of x_i^p + x_i^2 / 2 is 3/2; the fourth unknown scales the normal.
+struct Superquadric : Ellipsoid {
+  static constexpr int ns = 4;
+  double p = 4.0;
+  template <class T>
+  void tangency(const T* q, const T* s, T* r) const {
+    T R[3][3], sum = -1.5;
+    rotation(q + 3, R);
+    for (int i = 0; i < 3; ++i) {
+      const T x = s[i] / half[i], high = power(x * x, 0.5 * p - 1.0);
+      sum = sum + x * x * (high + 0.5);
+      r[i] = x * (p * high + 1.0) / half[i] + s[3] * R[2][i];
+    }
+    r[3] = sum;
   }
 };
 
@@ -398,15 +417,28 @@ problems::Problem wheel_on_rail(const std::string& form, bool rolling, double t_
   return p;
 }
 
-problems::Problem ellipsoid_on_plane(const std::string& form, bool rolling, double t_end) {
-  const Ellipsoid body{rolling};
+namespace {
+
+template <class Body>
+problems::Problem body_on_plane(const std::string& name, const Body& body, const std::string& form,
+                                double t_end, std::vector<double> s) {
   const double w[3] = {0.4, 1.5, 0.7}, h = body.half[2];
   // Upright, so that body and space agree; the contact point is (0, 0, -h).
   const std::vector<double> v = {
-      rolling ? w[1] * h : 0.2, rolling ? -w[0] * h : 0.0, 0.0, w[0], w[1], w[2]};
-  return Rolling<Ellipsoid>(body).make(
-      std::string("ellipsoid on plane") + (rolling ? ", rolling" : ""), form,
-      {0.0, 0.0, h, 1.0, 0.0, 0.0, 0.0}, v, {0.0, 0.0, -h}, t_end);
+      body.rolling ? w[1] * h : 0.2, body.rolling ? -w[0] * h : 0.0, 0.0, w[0], w[1], w[2]};
+  s[2] = -h;
+  return Rolling<Body>(body).make(name + " on plane" + (body.rolling ? ", rolling" : ""), form,
+                                  {0.0, 0.0, h, 1.0, 0.0, 0.0, 0.0}, v, s, t_end);
+}
+
+}  // namespace
+
+problems::Problem ellipsoid_on_plane(const std::string& form, bool rolling, double t_end) {
+  return body_on_plane("ellipsoid", Ellipsoid{rolling}, form, t_end, {0.0, 0.0, 0.0});
+}
+
+problems::Problem superquadric_on_plane(const std::string& form, bool rolling, double t_end) {
+  return body_on_plane("superquadric", Superquadric{{rolling}}, form, t_end, {0.0, 0.0, 0.0, 1.0});
 }
 
 }  // namespace tether::test

@@ -37,4 +37,9 @@ problems::Problem wheel_on_rail(const std::string& form, bool rolling, double t_
 /// solves s = -A^2 n / |A n|, n the plane's normal seen from the body.
 problems::Problem ellipsoid_on_plane(const std::string& form, bool rolling, double t_end);
 
+/// The same for a superquadric of exponent 4, made regular where its curvature would vanish:
+/// x^4 + y^4 + z^4 + (x^2 + y^2 + z^2) / 2 = 3/2 in units of the half axes; the inertia is that of
+/// the ellipsoid. The contact point and a multiplier of the normal solve its equations.
+problems::Problem superquadric_on_plane(const std::string& form, bool rolling, double t_end);
+
 }  // namespace tether::test

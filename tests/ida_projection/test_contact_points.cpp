@@ -85,6 +85,19 @@ TEST_CASE("contact point of an ellipsoid on a plane as algebraic unknown") {
   CHECK(std::exp(count.error / count.runs) <= 2.0);
 }
 
+TEST_CASE("contact point of a superquadric on a plane as algebraic unknown") {
+  Count count;
+  for (const bool rolling : {false, true}) {
+    const Problem reduced = superquadric_on_plane("explicit", rolling, 0.8);
+    for (const std::string& form : contact_forms()) {
+      const Problem problem = with_reference(superquadric_on_plane(form, rolling, 0.8), reduced);
+      for (const double tolerance : {1e-4, 1e-7}) check(problem, tolerance, &count);
+    }
+  }
+  CHECK(std::exp(count.steps / count.runs) <= 1.0);
+  CHECK(std::exp(count.error / count.runs) <= 1.0);
+}
+
 TEST_CASE("contact points in other units: a rail of micrometres and one of kilometres") {
   for (const double scale : {1e-6, 1e3}) {
     const double t_end = 1.5 * std::sqrt(scale);
