@@ -88,21 +88,23 @@ TEST_CASE("walls: 64 bricks with random velocities") {
       solved += s.status == Status::solved;
       digits -= std::log10(s.error) / 8;
     }
-  CHECK(solved >= 4);
-  CHECK(digits > 6);  // in the mean; one is solved and it is 4.2 without bounded steps
+  CHECK(solved >= 7);
+  CHECK(digits > 8);  // in the mean; one is solved and it is 4.2 without bounded steps
 }
 
-// The path of interior points turns, up to eight times here; by its arclength it goes on.
+// The path of interior points turns, up to eight times here; by its arclength it goes on, with as
+// many steps where contacts slide as elsewhere. Along straight lines, which leave a cone after the
+// root of the gap, eight of 32 such walls were not solved.
 TEST_CASE("walls: 64 bricks with random velocities are solved by paths that turn") {
   double work = 0;
   for (double push : {0.0, 1.0})
-    for (unsigned seed = 1; seed <= 6; ++seed) {
+    for (unsigned seed = 1; seed <= 8; ++seed) {
       const Wall wall(8, 0.6, push, seed);
       const Problem problem = delassus(wall.bodies, wall.contacts);
       Options options;
       options.law = Law::coulomb;
       options.tolerance = 1e-9;
-      options.max_work = 1e9;
+      options.max_work = 2e8;
       const Solution s = Solver(options).solve(problem);
       INFO("push " << push << ", seed " << seed << ": " << name(s.status) << " " << s.error
                    << ", work " << s.counts.work);
@@ -111,7 +113,7 @@ TEST_CASE("walls: 64 bricks with random velocities are solved by paths that turn
       work += s.counts.work;
     }
   INFO("work " << work);
-  CHECK(work < 1.4e9);  // 2.2e9 and one unsolved without
+  CHECK(work < 1.2e9);  // found 9.5e8
 }
 
 TEST_CASE("walls: nine bricks, by bodies and by contacts, in a few steps") {

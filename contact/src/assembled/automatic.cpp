@@ -55,12 +55,12 @@ const Automatic::Turn Automatic::kRotation[] = {
     {&Automatic::interior_points_near, first_and_near, 30},     // steps
     {&Automatic::interior_points, first_and_far_or_cheap, 40},  // steps, from sticking
     {&Automatic::round_off, always, kRoundOffSteps},            // steps
-    {&Automatic::proximal_path_at_best, first_cheap_and_near, 20},  // problems
-    {&Automatic::shifted_path_at_best, first_and_cheap, 150},       // steps
-    {&Automatic::arclength_path, first_and_cheap, 400},             // factorisations, from sticking
-    {&Automatic::proximal_path_at_best, first_cheap_and_near, 80},  // problems
-    {&Automatic::coupling_path, first_and_dear, 150},               // factorisations
-    {&Automatic::directions, unless_first_and_dear, 200},           // iterations
+    {&Automatic::proximal_path_at_best, first_cheap_and_near, 20},    // problems
+    {&Automatic::shifted_path, first_and_cheap, 150},                 // steps
+    {&Automatic::arclength_path, first_and_cheap, 400},               // factorisations
+    {&Automatic::proximal_path_at_best, first_cheap_and_near, 80},    // problems
+    {&Automatic::coupling_path, first_and_dear, 150},                 // factorisations
+    {&Automatic::directions, unless_first_and_dear, 200},             // iterations
     {&Automatic::interior_points_at_best, first_that_came_near, 30},  // steps
     {&Automatic::proximal_newton, unless_first_and_dear, 12},         // proximal problems
     {&Automatic::no_solution, unless_first_and_dear, 1},              // once in a solve
@@ -75,14 +75,13 @@ const Automatic::Turn Automatic::kRotation[] = {
 };
 
 // Many contacts between few bodies, such as the bricks of a wall: impulses are far from unique, the
-// path of interior points ends where contacts that stick and slide admit no solution, and sweeps
-// hardly move. The proximal problems have a path, and factorisations by bodies are cheap.
+// path of interior points turns where contacts that stick and slide admit no solution, and sweeps
+// hardly move. By its arclength it goes on, and factorisations by bodies are cheap.
 const Automatic::Turn Automatic::kFewBodies[] = {
     {&Automatic::sweep_few_bodies, always, 20},           // factorisations it may forecast
     {&Automatic::end_of_work, always, 0},                 //
     {&Automatic::sticking_point, always, 1},              // factorisation
-    {&Automatic::shifted_path, always, 100},              // steps, from where the sweeps were
-    {&Automatic::arclength_path, always, 800},            // factorisations, from sticking
+    {&Automatic::arclength_path, always, 800},            // factorisations, from the best point
     {&Automatic::shifted_path, always, 1000},             // steps
     {&Automatic::round_off, always, kRoundOffSteps},      // steps
     {&Automatic::end_of_work, always, 0},                 //

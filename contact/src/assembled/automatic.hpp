@@ -56,7 +56,6 @@ class Automatic {
   Status directions(Search& search, Rotation& r, int iterations);
   Status proximal_newton(Search& search, Rotation& r, int problems);
   Status shifted_path(Search& search, Rotation& r, int steps);
-  Status shifted_path_at_best(Search& search, Rotation& r, int steps);
   Status proximal_path(Search& search, Rotation& r, int problems);
   Status proximal_path_at_best(Search& search, Rotation& r, int problems);
   Status arclength_path(Search& search, Rotation& r, int factorisations);

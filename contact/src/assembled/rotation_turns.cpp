@@ -173,14 +173,8 @@ Status Automatic::sticking_point(Search& search, Rotation& r, int) {
   return Status::unsolved;
 }
 
-Status Automatic::shifted_path_at_best(Search& search, Rotation&, int steps) {
-  x_ = search.best;
-  interior.run_shifted(search, x_.data(), steps);
-  return Status::unsolved;
-}
-
-// From where the sweeps were.
 Status Automatic::shifted_path(Search& search, Rotation&, int steps) {
+  x_ = search.best;
   interior.run_shifted(search, x_.data(), steps);
   x_ = search.best;
   return Status::unsolved;

@@ -1,26 +1,19 @@
 // Tether: the path of interior points by its arclength. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "assembled/stages/interior/interior_point.hpp"
+#include "assembled/stages/interior/smoothed_pairs.hpp"
 
 namespace tether::contact::detail {
 namespace {
 
-double inner(const ConePair& a, const ConePair& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.x.size(); ++i)
-    for (int c = 0; c < 3; ++c) sum += a.x[i].v[c] * b.x[i].v[c] + a.u[i].v[c] * b.u[i].v[c];
-  return sum;
-}
-
-// to = factor to + other_factor other
-void combine(ConePair& to, double factor, double other_factor, const ConePair& other) {
-  for (auto [p, q] : {std::pair(&to.x, &other.x), std::pair(&to.u, &other.u)})
-    for (std::size_t i = 0; i < p->size(); ++i)
-      for (int c = 0; c < 3; ++c)
-        (*p)[i].v[c] = factor * (*p)[i].v[c] + other_factor * (*q)[i].v[c];
+// to += factor other
+void add(Packed& to, double factor, const Packed& other) {
+  for (std::size_t i = 0; i < to.size(); ++i)
+    for (int c = 0; c < 3; ++c) to[i].v[c] += factor * other[i].v[c];
 }
 
 }  // namespace
@@ -28,119 +21,148 @@ void combine(ConePair& to, double factor, double other_factor, const ConePair& o
 // The solutions of x o u = nu e, A x - b = w(u), nu > 0, are a smooth curve that comes from
 // nu = infinity. Where contacts that stick and slide admit no solution nearby it turns: nu grows
 // for a while, Newton's matrix is singular at the turn, and steps towards smaller nu are blocked.
-// By its arclength nothing happens there (README, section 9).
+// By its arclength in z and log nu nothing happens there (README, section 9).
 struct InteriorPoint::ArclengthPath {
-  ArclengthPath(InteriorPoint& of, Search& s) : own(of), search(s) {
-    for (ConePair* p : {&newton, &rate, &metric, &tangent.direction}) p->resize(of.n_);
+  ArclengthPath(InteriorPoint& of, Search& s) : own(of), search(s), pairs(s.system, of.equations_) {
+    newton.resize(at(of.n_));
+    rate.resize(at(of.n_));
   }
 
-  // Changes of a contact count by their parts of its own x and u (the metric of the scaling), those
-  // of nu by its logarithm: at a turn one contact moves and nu does not.
   struct Tangent {
-    ConePair direction;
+    Packed z;
     double log_nu = 0;
   };
   // A point near the curve, with its tangent and the step that was tried from there, in parts of
-  // the way to the cones.
-  struct Place {
-    ConePair point;
+  // what changes the first contact's regime.
+  struct Point {
+    SmoothedPairs::Place place;
     Tangent tangent;
     double step;
   };
 
   InteriorPoint& own;
   Search& search;
+  SmoothedPairs pairs;
   double step = 0.5;
-  ConePair newton, rate, metric;  // rate: d / d log nu
+  Packed newton, rate;  // to the curve, with newton_log_nu; d / d log nu along it
+  double newton_log_nu = 0;
   Tangent tangent;
-  std::vector<Place> places;  // the last ones
+  std::vector<Point> points;  // the last ones
   int returns = 0;
 
-  // Newton's direction to the curve at the present mean x.u, and the curve's rate.
-  bool directions() {
-    const System& system = search.system;
-    const double nu = own.equations_.complementarity(own.point_);
-    if (!(nu > 0) || !own.newton_.factor(search, own.equations_, own.point_)) return false;
-    own.newton_.direction(system, own.equations_, nu, false);
-    newton = own.newton_.change();
-    own.newton_.direction(system, own.equations_, 2 * nu, false);
-    rate = own.newton_.change();
-    combine(rate, 1, -1, newton);
-    own.newton_.metric(rate, metric);
-    // Along the curve det F_y d nu / ds keeps its sign, F(y, nu) = 0 being its equations.
-    const double forward = own.newton_.matrix().determinant_sign() > 0 ? -1 : 1;
-    const double unit = forward / std::sqrt(inner(metric, rate) / nu + 1);
-    if (!std::isfinite(unit)) return false;
-    tangent.direction = rate;
-    combine(tangent.direction, unit, 0, rate);
-    tangent.log_nu = unit;
-    // Across the tangent: Newton's direction with another nu.
-    const double across = inner(metric, rate) * unit / nu + unit;
-    combine(newton, 1, -inner(metric, newton) * unit / nu / across, rate);
-    return true;
-  }
-
-  void go_along(const Tangent& along) {
-    constexpr double kMostFall = 0.98, kMostRise = 2;
-    double length = step * own.equations_.longest_step(own.point_, along.direction);
-    if (along.log_nu < 0) length = std::min(length, kMostFall / -along.log_nu);
-    if (along.log_nu > 0) length = std::min(length, kMostRise / along.log_nu);
-    advance(own.point_, along.direction, length);
+  void evaluate() {
+    pairs.set(own.point_);
     own.evaluate_with_digits(search);
   }
 
-  // A shorter step from the last place, or from the one before; false: none is left.
-  bool go_back() {
-    constexpr double kShorter = 0.25, kMuchShorter = 0.1, kLeast = 1e-3, kFinish = 0.05;
-    constexpr int kReturns = 20;
-    if (places.empty()) return false;
-    step *= kShorter;
-    if (step < kFinish && search.best_error < kNearby) return false;  // Newton's method takes over
-    if (step < kLeast) {
-      if (places.size() < 2 || ++returns > kReturns) return false;
-      places.pop_back();
-      step = kMuchShorter * places.back().step;
-    }
-    own.point_ = places.back().point;
-    go_along(places.back().tangent);
+  // Newton's direction to the curve, at the present nu or across the tangent, and the tangent.
+  bool directions(bool across) {
+    const System& system = search.system;
+    const double nu = pairs.nu();
+    if (!own.newton_.factor(search, own.equations_, own.point_)) return false;
+    own.newton_.plain_direction(system, own.equations_, nu);
+    pairs.change_of(own.newton_.change(), newton);
+    own.newton_.plain_direction(system, own.equations_, 2 * nu);
+    pairs.change_of(own.newton_.change(), rate);
+    add(rate, -1, newton);
+    const double square = pairs.inner(rate, rate) + 1;
+    // Along the curve det F_y d nu / ds keeps its sign, F(y, nu) = 0 being its equations.
+    const double forward = own.newton_.matrix().determinant_sign() > 0 ? -1 : 1;
+    tangent.log_nu = forward / std::sqrt(square);
+    if (!std::isfinite(tangent.log_nu)) return false;
+    tangent.z.assign(rate.size(), PackedVector());
+    add(tangent.z, tangent.log_nu, rate);
+    newton_log_nu = across ? -pairs.inner(rate, newton) / square : 0;
+    add(newton, newton_log_nu, rate);
     return true;
   }
 
-  // To the curve and on along it; false: it is lost.
+  // How many times Newton's direction could be followed.
+  double reach() const {
+    constexpr double kLogNu = 3;
+    return 1 / std::max(pairs.largest(newton), std::abs(newton_log_nu) / kLogNu);
+  }
+
+  void go_along(const Tangent& along) {
+    constexpr double kMostFall = 4.6, kMostRise = 2;  // of log nu
+    double length = step / pairs.largest(along.z);
+    if (along.log_nu < 0) length = std::min(length, kMostFall / -along.log_nu);
+    if (along.log_nu > 0) length = std::min(length, kMostRise / along.log_nu);
+    pairs.move(along.z, length, length * along.log_nu);
+    evaluate();
+  }
+
+  // A shorter step from the last point, or from the one before; false: none is left.
+  bool go_back() {
+    constexpr double kShorter = 0.25, kMuchShorter = 0.1, kLeast = 1e-3, kFinish = 0.05;
+    constexpr int kReturns = 20;
+    if (points.empty()) return false;
+    step *= kShorter;
+    if (step < kFinish && search.best_error < kNearby) return false;  // Newton's method takes over
+    if (step < kLeast) {
+      if (points.size() < 2 || ++returns > kReturns) return false;
+      points.pop_back();
+      step = kMuchShorter * points.back().step;
+    }
+    pairs.go_to(points.back().place);
+    go_along(points.back().tangent);
+    return true;
+  }
+
+  // The first point: Newton's method at constant nu.
+  bool begin(double nu) {
+    constexpr double kLeast = 1e-3;
+    constexpr int kMost = 40;
+    pairs.take(own.point_, nu);
+    evaluate();
+    for (int iteration = 0; iteration < kMost && !search.exhausted(); ++iteration) {
+      if (!directions(false)) return false;
+      const double longest = reach();
+      if (!(longest >= kLeast)) return false;
+      pairs.move(newton, std::min(1.0, kInside * longest), 0);
+      evaluate();
+      if (longest >= kLast) return keep();
+    }
+    return false;
+  }
+
+  bool keep() {
+    constexpr std::size_t kPoints = 5;
+    if (points.size() == kPoints) points.erase(points.begin());
+    points.push_back({pairs.place(), tangent, step});
+    return true;
+  }
+
+  // Along the curve and back to it; false: it is lost.
   bool go_on() {
     // A direction that could be followed for so long is taken, and is the last one where it could
     // be for longer. The next one may not be much shorter.
-    constexpr double kTaken = 1.2, kLast = 4, kFewer = 0.7, kInside = 0.9, kMore = 1.7;
-    constexpr int kMost = 6;
-    constexpr std::size_t kPlaces = 5;
+    constexpr double kTaken = 1, kFewer = 0.7, kMore = 1.7, kLongest = 1;
+    constexpr int kMost = 6, kMany = 3;
+    go_along(tangent);
     double before = 0;
     for (int iteration = 1; !search.exhausted(); ++iteration) {
-      double longest = 0;
-      if (directions()) longest = own.equations_.longest_step(own.point_, newton);
-      const bool near = longest >= kLast || (places.empty() && longest >= kTaken);
-      if (!near && (longest < std::max(kTaken, kFewer * before) || iteration > kMost)) {
+      const double longest = directions(true) ? reach() : 0;
+      const bool near = longest >= kLast;
+      if (!near && (!(longest >= std::max(kTaken, kFewer * before)) || iteration > kMost)) {
         if (!go_back()) return false;
         iteration = 0;
         before = 0;
         continue;
       }
       before = longest;
-      advance(own.point_, newton, std::min(1.0, kInside * longest));
-      if (!near) {
-        own.evaluate_with_digits(search);
-        continue;
-      }
-      if (iteration <= 2) step = std::min(kInside, kMore * step);
-      if (iteration >= 4) step *= kFewer;
-      if (places.size() == kPlaces) places.erase(places.begin());
-      places.push_back({own.point_, tangent, step});
-      go_along(tangent);
-      return true;
+      const double length = std::min(1.0, kInside * longest);
+      pairs.move(newton, length, length * newton_log_nu);
+      evaluate();
+      if (!near) continue;
+      if (iteration == 1) step = std::min(kLongest, kMore * step);
+      if (iteration >= kMany) step *= kFewer;
+      return keep();
     }
     return false;
   }
 
-  static constexpr double kNearby = 1e-5;
+  static constexpr double kNearby = 1e-7, kLast = 4, kInside = 0.9;
 };
 
 // Close to the end of a path round-off of A x - b would hide what is left of the residual.
@@ -151,31 +173,36 @@ void InteriorPoint::evaluate_with_digits(Search& search) {
 }
 
 void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newton) {
-  constexpr double kTry = 1e-4, kGain = 0.1;
-  constexpr int kFirstProblems = 3, kLastProblems = 30, kLastSteps = 20;
+  // The shift, relative to A, keeps digits where contacts stick: there 1 / W^2 = x / u grows
+  // without bound, and takes those of the bodies that slide.
+  constexpr double kShift = 1e-11, kNear = 1, kFar = 1e5, kFarther = 100;
+  constexpr double kTested = 1e-5, kEnd = 1e-24;  // of the first nu
+  constexpr double kTry = 1e-6, kGain = 0.1;
+  constexpr int kFirstProblems = 3, kLastProblems = 30;
   const int end = search.counts.factorisations + most;
   equations_.set_tau(0);
-  newton_.set_shift(0);
-  if (!start(search)) return;
-  bool on_path = false;
-  for (double nu = equations_.complementarity(point_); !on_path && !search.exhausted(); nu *= 10) {
-    on_path = centre(search, nu);
-    if (!std::isfinite(nu)) return;
-  }
+  newton_.set_shift(kShift);
   ArclengthPath path(*this, search);
-  for (double tried = kTry; path.go_on() && search.counts.factorisations < end;) {
+  double first = 0;
+  bool on_path = false;
+  for (double near = kNear; !on_path && near <= kFar && !search.exhausted(); near *= kFarther) {
+    if (!start_near(search, search.best.data(), near)) return;
+    first = equations_.complementarity(point_);
+    on_path = path.begin(first);
+  }
+  for (double tried = kTry; on_path; on_path = path.go_on()) {
+    if (search.exhausted() || search.counts.factorisations > end) break;
+    if (path.pairs.nu() > kTested * first) continue;
     const double error = test_point(search);
     if (search.solved() || search.exhausted()) return;
+    if (path.pairs.nu() < kEnd * first) break;
     if (!(error < kTry && search.best_error < kGain * tried)) continue;
     tried = search.best_error;
     newton.run(search, search.best.data(), kFirstProblems);
     if (search.solved()) return;
   }
-  if (path.places.empty() || search.exhausted()) return;
-  point_ = path.places.back().point;
-  evaluate_with_digits(search);
-  follow(search, kLastSteps, 0);
-  if (!search.solved()) newton.run(search, search.best.data(), kLastProblems);
+  if (!path.points.empty() && !search.exhausted())
+    newton.run(search, search.best.data(), kLastProblems);
 }
 
 }  // namespace tether::contact::detail

@@ -253,17 +253,11 @@ void InteriorNewton::direction(const System& system, const InteriorEquations& eq
   }
 }
 
-void InteriorNewton::metric(const ConePair& d, ConePair& out) const {
-  for (int i = 0; i < n_; ++i) {
-    const ConeScaling& s = scaling_[at(i)];
-    double e[3];
-    s.turn(d.x[at(i)].v, e);
-    for (int c = 0; c < 3; ++c) e[c] *= s.d[c] * s.d[c];
-    s.turn_back(e, out.x[at(i)].v);
-    s.turn(d.u[at(i)].v, e);
-    for (int c = 0; c < 3; ++c) e[c] /= s.d[c] * s.d[c];
-    s.turn_back(e, out.u[at(i)].v);
-  }
+void InteriorNewton::plain_direction(const System& system, const InteriorEquations& equations,
+                                     double centre) {
+  aim(equations, centre, false);
+  matrix_.solve(step_.data());
+  expand(system, equations);
 }
 
 void InteriorNewton::keep_predictor() {

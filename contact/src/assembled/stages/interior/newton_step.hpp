@@ -23,13 +23,13 @@ class InteriorNewton {
   /// term of the predictor.
   void direction(const System& system, const InteriorEquations& equations, double centre,
                  bool corrected);
+  /// Towards x o u = centre e as the matrix has it, with its shift, not refined.
+  void plain_direction(const System& system, const InteriorEquations& equations, double centre);
   /// The last direction is the predictor.
   void keep_predictor();
   /// The step along the last direction at which the point reaches a cone.
   double longest_step(const InteriorEquations& equations) const;
   const ConePair& change() const { return change_; }
-  // W^2 dx and W^-2 du of a change: over x.u its parts of x and u.
-  void metric(const ConePair& d, ConePair& out) const;
 
   /// Added to the matrix, relative to A: bounds steps along its null space, more of it where they
   /// are short.
