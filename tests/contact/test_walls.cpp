@@ -105,6 +105,7 @@ TEST_CASE("walls: 64 bricks with random velocities are solved by paths that turn
       options.law = Law::coulomb;
       options.tolerance = 1e-9;
       options.max_work = 2e8;
+      options.enough = 1e-6;  // as steps have it
       const Solution s = Solver(options).solve(problem);
       INFO("push " << push << ", seed " << seed << ": " << name(s.status) << " " << s.error
                    << ", work " << s.counts.work);

@@ -8,7 +8,7 @@
 namespace tether::contact::detail {
 
 /// Parts of the largest velocity that a contact needs. Where the tolerance is not met a better
-/// answer than `kEnough` is worth no more than a quarter of max_work, and than `kGood` none of what
+/// answer than `kEnough` is worth no more than 3/4 of max_work, and than `kGood` none of what
 /// is added to max_work where a shorter step would not help. Answers within `kUseful` are as good
 /// as the step: it moves bodies by velocities of its end, an error of half of what it changes them
 /// by, while one contact is off by so much in a problem that is not solved. Where anything is

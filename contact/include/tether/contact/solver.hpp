@@ -60,7 +60,7 @@ struct Options {
   double relaxation = 1.0;  ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
   int max_sweeps = 200000;  ///< of the plain methods and anderson
   double max_work = 1e10;   ///< automatic: estimated nanoseconds, counted from operations
-  /// Once a quarter of max_work is spent, an error of at most this ends the solve, as work_limit:
+  /// Once 3/4 of max_work are spent, an error of at most this ends the solve, as work_limit:
   /// a hard problem then does not use all of max_work. 0: off.
   double enough = 0;
   int anderson_depth = 10;  ///< 1 .. 20

@@ -98,7 +98,7 @@ struct SteppingOptions {
   double tolerance = 1e-9;
   /// A contact problem that ends above the tolerance is used, and counted as `accepted`, if its
   /// residual is at most min(acceptance * tolerance, 1e-2) (README, section 13). Below 1e-6 the
-  /// solver stops after a quarter of max_work. 1: nothing above the tolerance is
+  /// solver stops after 3/4 of max_work. 1: nothing above the tolerance is
   /// accepted.
   double acceptance = 1;
   /// A step whose problem is not accepted is repeated as two halves, each of these as two quarters,

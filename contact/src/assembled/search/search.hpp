@@ -31,7 +31,7 @@ struct Search {
   bool solved() const { return best_error <= options.tolerance; }
   bool exhausted() const {
     return counts.work > work_end ||
-           (best_error <= options.enough && counts.work > 0.25 * options.max_work);
+           (best_error <= options.enough && counts.work > 0.75 * options.max_work);
   }
   void count_sweep(double factor = 1) {
     ++counts.sweeps;
