@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/linalg/index.hpp>
 
 #include "stepping/stepper_parts.hpp"
 
@@ -22,6 +23,8 @@ constexpr double kShortest = 1e-9;   // of a step: parts that are accepted as th
 constexpr double kAtOnce = 0.1;      // of the accuracy: what an impact may come too early
 constexpr int kManyImpacts = 1000;   // in a step: from then on they end it in as many parts at most
 constexpr double kSlips = 1 - 1e-6;  // of the cone
+constexpr double kStill = 0.01;      // of the accuracy: a slip that moves nothing in a part
+constexpr double kBeforeEnd = 0.95;  // of a part: a switch that ends it
 
 Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaternion& to) {
   linalg::Quaternion d = to * from.conjugate();
@@ -29,6 +32,22 @@ Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaterni
   const double sine = d.vec().norm();
   return sine > 0 ? Vector3d(2 * std::atan2(sine, d.w()) / sine * d.vec())
                   : Vector3d(Vector3d::Zero());
+}
+
+Vector3d slip_of(const std::vector<RigidBody>& motion, const PointContact& c) {
+  const auto velocity = [&](int body, const Vector3d& r) -> Vector3d {
+    if (body < 0) return Vector3d::Zero();
+    const RigidBody& b = motion[linalg::at(body)];
+    return b.velocity + b.angular_velocity.cross(r);
+  };
+  const Vector3d v = velocity(c.first, c.r1) - velocity(c.second, c.r2);
+  return v - c.normal.dot(v) * c.normal;
+}
+
+/// Where the line through (ta, a) and (tb, b), b behind a, is zero behind b; infinite: nowhere.
+double zero_behind(double ta, double a, double tb, double b) {
+  if (!(b > 0 && a > b)) return std::numeric_limits<double>::infinity();
+  return tb + b * (tb - ta) / (a - b);
 }
 
 }  // namespace
@@ -68,6 +87,13 @@ void Stepper::Implementation::list_active(double length, std::vector<Active>& li
     const Vector3d tangent = x - normal * c.normal;
     const bool slips = c.mu > 0 && !(tangent.norm() < kSlips * c.mu * normal);
     list.push_back({c.id, slips ? 2 : 1, slips ? tangent : Vector3d::Zero()});
+    Active& a = list.back();
+    a.force = normal / length;
+    a.margin = (c.mu * normal - tangent.norm()) / length;
+    for (const int body : {c.first, c.second})
+      if (body >= 0) a.size = std::max(a.size, parts.radius[at(body)]);
+    a.came = slip_of(parts.before.motion, c);
+    a.speed = slip_of(bodies.motion, c).norm();
   }
   for (const detail::Impact& i : impacts->list())
     if (moment(i, length).early < length)
@@ -128,6 +154,45 @@ double Stepper::Implementation::first_impact(double length, double& at_once) con
   return first;
 }
 
+// When the first contact that does not do the same all over a part lifts, stops or begins to slip,
+// by straight lines: slips from where the part begins or, where they end in its first half, from
+// the part before it; forces from that. Infinite: none is known to.
+double Stepper::Implementation::first_switch(double length) const {
+  double first = std::numeric_limits<double>::infinity();
+  const auto find = [](const std::vector<Active>& list, std::uint64_t id) -> const Active* {
+    const auto found = std::find_if(list.begin(), list.end(),
+                                    [&](const Active& a) { return a.id == id && a.what <= 2; });
+    return found != list.end() ? &*found : nullptr;
+  };
+  for (const Active& a : parts.active[1]) {
+    if (a.what > 2) continue;
+    const Active* past = find(parts.past, a.id);
+    // Friction stops what slips, or has turned against what it did at the start.
+    const double came = a.came.norm();
+    if (came * length > kStill * options.accuracy * a.size &&
+        (a.what == 1 || a.slip.dot(a.came) > 0)) {
+      const double way = 2 * parts.past_length;
+      first = std::min(first, past != nullptr && past->what == 2
+                                  ? zero_behind(-way, past->came.norm(), 0, came)
+                                  : length / 4);
+      continue;
+    }
+    const Active* then = find(parts.active[2], a.id);
+    const bool turns =
+        then != nullptr && a.what == 2 && then->what == 2 && !(then->slip.dot(a.slip) > 0);
+    if (then != nullptr && then->what == a.what && !turns) continue;
+    if (then != nullptr && a.what == 2) {
+      first = std::min(first, zero_behind(0, came, length / 2, a.speed));
+      continue;
+    }
+    if (past == nullptr || past->what != a.what) continue;
+    const bool lifts = then == nullptr;
+    first = std::min(first, zero_behind(-parts.past_length / 2, lifts ? past->force : past->margin,
+                                        length / 4, lifts ? a.force : a.margin));
+  }
+  return first;
+}
+
 // Of the halves, in the bodies, from the whole part; 1: the accuracy. Relative to the size of each
 // body; velocities, where they are smooth, by what they move it in the part.
 double Stepper::Implementation::part_error(const PartState& whole, double length,
@@ -182,7 +247,7 @@ double Stepper::Implementation::take_part(double time, double length, bool short
     restore_part(parts.before);
     set_judged(before);
   };
-  bool cut = shortened;
+  bool cut = shortened, switched = false;
   for (;;) {
     advance_part(time, length);
     if (!(length > shortest)) break;
@@ -208,6 +273,14 @@ double Stepper::Implementation::take_part(double time, double length, bool short
     const bool smooth =
         same(parts.active[0], parts.active[1]) && same(parts.active[1], parts.active[2]);
     const double error = std::max(part_error(parts.whole, length, smooth), 1e-4);
+    const double when = smooth || switched ? length : first_switch(length);
+    if (when > shortest && when < kBeforeEnd * length && error > 0.05) {
+      back();
+      ++counts.rejected;
+      length = when;
+      cut = switched = true;
+      continue;
+    }
     if (error > 1) {
       back();
       ++counts.rejected;
@@ -217,6 +290,8 @@ double Stepper::Implementation::take_part(double time, double length, bool short
       parts.control.last = 0;
       continue;
     }
+    parts.past = parts.active[2];
+    parts.past_length = length / 2;
     if (smooth) {
       extrapolate(parts.whole);
       if (joints) joints->begin(bodies, time + length);
@@ -237,6 +312,7 @@ double Stepper::Implementation::take_part(double time, double length, bool short
 
 void Stepper::Implementation::advance_accurately(double start, double length) {
   double done = 0, shortest = kShortest * length;
+  parts.past.clear();  // a run that goes on from a saved state has none
   for (int taken_parts = 0; done < length; ++taken_parts) {
     if (taken_parts == kManyImpacts) shortest = length / kManyImpacts;
     const double left = length - done, least = std::min(shortest, left);

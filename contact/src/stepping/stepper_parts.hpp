@@ -37,11 +37,18 @@ struct PartControl {
     std::uint64_t id;
     int what;              // 1: sticks, 2: slips, 3: an impact; > 3: a law of a joint
     Eigen::Vector3d slip;  // impulse against it
+    // Of a contact: normal force and what is left of the cone, means of the part; its slip
+    // where the part begins, and how fast it is where it ends.
+    double force = 0, margin = 0, speed = 0, size = 0;
+    Eigen::Vector3d came = Eigen::Vector3d::Zero();
   };
   StepperMemory::Control control;
   std::vector<double> radius;  // of bodies
   PartState before, whole;
   std::array<std::vector<Active>, 3> active;
+  // Of the second half of the part before this one, in the same step; its length.
+  std::vector<Active> past;
+  double past_length = 0;
 };
 
 /// How the contact problems of a step have ended, the worst of its parts.
@@ -126,6 +133,7 @@ struct Stepper::Implementation {
   static bool same(const std::vector<detail::PartControl::Active>& a,
                    const std::vector<detail::PartControl::Active>& b);
   double first_impact(double length, double& at_once) const;
+  double first_switch(double length) const;
   double part_error(const detail::PartState& whole, double length, bool smooth) const;
   void extrapolate(const detail::PartState& whole);
   double take_part(double time, double length, bool shortened, double shortest);
