@@ -1,7 +1,9 @@
 // Tether: what the slides claim, and the order of the method. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <problems/kepler.hpp>
 #include <problems/pendulum.hpp>
+#include <problems/slider_crank.hpp>
 
 #include "host.hpp"
 #include "support/catch.hpp"
@@ -255,4 +257,24 @@ TEST_CASE("many unknowns: the iteration after moves is foretold where F is not s
   CHECK(iterated(circles, 1e-8, radius_of(circles)) < 0.4);  // 0.20
   CHECK(iterated(circles, 1e-4, radius_of(circles)) > 0.5);  // 0.77: here they change
   CHECK(std::exp(ratios / 4) < 1.3);                         // 0.73
+}
+
+TEST_CASE("few unknowns: the iteration after moves is foretold where F is not stiff") {
+  double errors = 0.0;
+  // The part of moves that an iteration follows.
+  const auto iterated = [&](const Problem& problem, double tolerance) {
+    const Run run = integrate(problem, tolerance, problem.recommended_constraints(), {}, false);
+    REQUIRE(run.flag >= 0);
+    errors += std::log(run.error / tolerance);
+    return static_cast<double>(run.statistics.extra_iterations) /
+           static_cast<double>(run.statistics.projections);
+  };
+  const Problem swing = pendulum(1.7, 3.3, 30.0, "index 0"), orbit = kepler(0.3, 60.0);
+  CHECK(iterated(swing, 1e-8) < 0.3);
+  CHECK(iterated(swing, 1e-6) < 0.6);
+  CHECK(iterated(orbit, 1e-8) < 0.3);
+  CHECK(iterated(orbit, 1e-6) < 0.5);
+  CHECK(std::exp(errors / 4) < 60.0);
+  CHECK(iterated(slider_crank("index 0"), 1e-6) > 0.5);
+  CHECK(iterated(pendulum(1.7, 3.3, 30.0, "index 1"), 1e-8) > 0.9);  // y_a answers to every move
 }

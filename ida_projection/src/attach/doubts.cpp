@@ -64,6 +64,7 @@ int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
   ++statistics_.corrector_failures;
   report_.status = Status::corrector_failed;
   if (flag > 0 && run_.engaged) control_.corrector_failed();
+  polish_.corrector_failed();
   if (variables_.high_index())
     report_.message =
         "IDA's corrector failed; in forms of index 2 or more multipliers carry rounding divided by "

@@ -92,6 +92,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) {
     polish_.allocate(like, unknowns_.contiguous);
+    if (options_.frequency == 1) polish_.may_foretell();
     unknowns_.weights = OwnedVector(like);
     if (options_.id != nullptr) {
       variables_.set(options_.id);

@@ -27,9 +27,6 @@ namespace {
 constexpr double kMisled = 2.0;
 constexpr double kAnswered = 0.1;  // tolerances: a shorter move needs no answer of y_a
 constexpr double kAnsweredByMultipliers = 0.01;  // the same where they are of index 2
-constexpr int kDear = 64;          // unknowns: F and a solution cost as much as a move of many rows
-constexpr double kUnseen = 0.002;  // tolerances: so much may a change that is foretold miss
-constexpr int kMostForetold = 7;   // changes in a row
 
 }  // namespace
 
@@ -111,7 +108,7 @@ double Polish::answer(const Candidate& candidate) {
 }
 
 bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  if (foretell(candidate, cj, tolerance)) return true;
+  if (may_foretell_ && foretell(candidate, cj, tolerance)) return true;
   const bool asked = step_known_;
   if (!asked) {
     if (!newton_step_at_moved_point(candidate)) return false;
@@ -132,58 +129,21 @@ bool Polish::add_newton_step(const Candidate& candidate, double cj, double toler
   return true;
 }
 
-// IDA multiplies its linear solutions by 2 / (1 + r), which leaves the part (r - 1) / (r + 1) of a
-// correction where F is not stiff. While factors and cj are the same, delta is next to a multiple
-// of the correction then, and what it is beyond that changes slowly.
 void Polish::look_at_pattern(const Candidate& candidate, double cj) {
-  if (!contiguous_ || size_ < kDear || variables_.any() || options_.extra_iterations == 0 ||
-      corrector_.iterations() != 1) {
-    cj_of_pattern_ = 0.0;
-    return;
-  }
-  beyond_.resize(static_cast<std::size_t>(size_));
-  const double* ycor = corrected_entries_;
-  const auto length = [&](const auto& entry) {
-    double square = 0.0;
-    for (int j = 0; j < size_; ++j) {
-      const double part = entry(j) * candidate.weight_entries[j];
-      square += part * part;
-    }
-    return std::sqrt(square / size_);
-  };
-  const auto beyond = [&](int j) { return delta_entries_[j] - share_ * ycor[j]; };
-  if (cj_of_pattern_ == cj) {
-    const bool right = length([&](int j) { return beyond(j) - beyond_[j]; }) <= kUnseen;
-    patience_ = right ? std::min(kMostForetold, 2 * patience_ + 1) : patience_ / 2;
-  } else {
-    patience_ = -1;
-  }
-  share_ = share_of(candidate);
-  if (patience_ < 0) patience_ = length(beyond) <= kUnseen ? 1 : 0;
-  for (int j = 0; j < size_; ++j) beyond_[j] = beyond(j);
-  cj_of_pattern_ = cj;
-  foretold_in_row_ = 0;
+  if (!may_foretell_) return;
+  const bool tells = !variables_.any() && options_.extra_iterations > 0;
+  if (!tells || corrector_.iterations() != 1) return foretold_.forget();
+  if (!foretold_.allocated()) foretold_.allocate(delta_);
+  foretold_.learn(candidate.weights, corrected_, delta_, cj);
 }
 
-// Of ycor in delta.
-double Polish::share_of(const Candidate& candidate) const {
-  double square = 0.0, product = 0.0;
-  for (int j = 0; j < size_; ++j) {
-    const double w = candidate.weight_entries[j], e = corrected_entries_[j] * w;
-    square += e * e;
-    product += e * (delta_entries_[j] * w);
-  }
-  return square > 0.0 ? product / square : 0.0;
-}
-
+// ycor <- ycor + delta, if earlier steps tell delta.
 bool Polish::foretell(const Candidate& candidate, double cj, double tolerance) {
-  if (foretold_in_row_ >= patience_ || cj != cj_of_pattern_ || step_known_ ||
-      corrector_.iterations() != 1)
-    return false;
-  for (int j = 0; j < size_; ++j) delta_entries_[j] = share_ * corrected_entries_[j] + beyond_[j];
-  if (!(differential_length(candidate, delta_entries_) <= kMisled * tolerance)) return false;
-  ++foretold_in_row_;
-  for (int j = 0; j < size_; ++j) candidate.correction_entries[j] += delta_entries_[j];
+  if (step_known_ || corrector_.iterations() != 1 || !foretold_.tells(cj)) return false;
+  foretold_.tell(cj, corrected_, delta_);
+  if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisled * tolerance)) return false;
+  foretold_.used();
+  N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
   return true;
 }
 

@@ -1,13 +1,12 @@
 // Tether: one Newton iteration after the move. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <vector>
-
 #include "host/candidate.hpp"
 #include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
+#include "step/foretold.hpp"
 
 namespace tether::ida_projection {
 
@@ -24,8 +23,11 @@ class Polish {
   void begin() { iterations_ = 0; }
   void note_setup(double cj) {
     cj_at_setup_ = cj;
-    cj_of_pattern_ = 0.0;
+    foretold_.renewed(cj);
   }
+  void corrector_failed() { foretold_.doubt(); }
+  /// Corrections are those of one vector, each of them polished.
+  void may_foretell() { may_foretell_ = true; }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
   /// For the iteration of sensitivities, which has the same linear solver.
   void follow(const Polish& other) {
@@ -74,9 +76,8 @@ class Polish {
 
  private:
   bool newton_step_at_moved_point(const Candidate& candidate);
-  void look_at_pattern(const Candidate& candidate, double cj);
   bool foretell(const Candidate& candidate, double cj, double tolerance);
-  double share_of(const Candidate& candidate) const;
+  void look_at_pattern(const Candidate& candidate, double cj);
   double differential_length(const Candidate& candidate, const double* entries);
   void apply(const Candidate& candidate, double differential, double algebraic);
 
@@ -93,10 +94,8 @@ class Polish {
   bool iterative_ = false;  // IDA's linear solver is a Krylov method
   bool corrector_was_right_ = true;
   double cj_at_setup_ = 0.0;
-  double cj_of_pattern_ = 0.0;  // 0: delta is not known to be a multiple of the correction
-  double share_ = 0.0;          // delta is next to share ycor + beyond
-  std::vector<double> beyond_;
-  int patience_ = 0, foretold_in_row_ = 0;
+  Foretold foretold_;
+  bool may_foretell_ = false;
   long iterations_ = 0;
 };
 

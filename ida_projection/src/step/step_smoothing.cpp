@@ -37,6 +37,7 @@ StepSmoother::StepSmoother(void* ida_mem, const Options& options)
 void StepSmoother::reset() {
   const bool was_on = on_;
   on_ = owns_max_step_ = wanted_;
+  known_to_ida_ = false;
   pending_ = has_previous_ = false;
   steps_ = -1;
   known_ = block_ = 0;
@@ -121,7 +122,7 @@ double StepSmoother::control(long steps, double norm) {
   }
 
   const double error = error_constant(h, order) * norm;
-  const double own_ratio = std::pow(2.0 * error + 1e-4, -1.0 / (order + 1));  // IDA's tmp
+  const bool grows = 2.0 * error + 1e-4 <= 1.0;  // IDA's tmp >= 1
   const double log_c = -std::log(setpoint_ * care_ * error + 1e-4);
   pending_ = true;
   steps_ = steps;
@@ -131,9 +132,9 @@ double StepSmoother::control(long steps, double norm) {
   if (!std::isfinite(log_c)) {
     hold();
   } else if (order >= max_order_) {
-    return request(filter(log_c, order), h, own_ratio, norm);
+    return request(filter(log_c, order), h, grows, norm);
   } else if (block_ + 1 >= order + 2) {  // with this one, k + 2 steps of one size
-    return request(filter((block_sum_ + log_c) / (block_ + 1), order), h, own_ratio, norm);
+    return request(filter((block_sum_ + log_c) / (block_ + 1), order), h, grows, norm);
   } else {
     hold();
   }
@@ -143,8 +144,9 @@ double StepSmoother::control(long steps, double norm) {
 // Keep h, or reduce it by IDA's own rule.
 void StepSmoother::hold() { set(kLowestFixed, kAnyRatio, kLargest, 0.0, max_step_); }
 
-double StepSmoother::request(double ratio, double h, double own_ratio, double norm) {
-  if (own_ratio < 1.0) {
+// `grows`: IDA's own ratio is 1 or more.
+double StepSmoother::request(double ratio, double h, bool grows, double norm) {
+  if (!grows) {
     if (ratio < 1.0)
       set(kLowestFixed, kAnyRatio, kLargest, ratio, max_step_);
     else
@@ -174,13 +176,21 @@ double StepSmoother::gentle_reduction(double ratio, double h, double norm) {
   return factor;
 }
 
+// IDA checks what each function is given: those whose value stays are left out.
 void StepSmoother::set(double lowest_fixed, double highest_fixed, double largest, double low,
                        double max_step) {
-  IDASetEtaFixedStepBounds(ida_mem_, lowest_fixed, highest_fixed);
-  IDASetEtaMax(ida_mem_, largest);
-  IDASetEtaLow(ida_mem_, low > 0.0 ? low : kLow);
-  IDASetEtaMin(ida_mem_, low > 0.0 ? low : kMin);
-  if (owns_max_step_) IDASetMaxStep(ida_mem_, max_step);
+  const Settings now{lowest_fixed, highest_fixed, largest, low, max_step};
+  const bool all = !known_to_ida_;
+  if (all || now.lowest_fixed != set_.lowest_fixed || now.highest_fixed != set_.highest_fixed)
+    IDASetEtaFixedStepBounds(ida_mem_, lowest_fixed, highest_fixed);
+  if (all || now.largest != set_.largest) IDASetEtaMax(ida_mem_, largest);
+  if (all || now.low != set_.low) {
+    IDASetEtaLow(ida_mem_, low > 0.0 ? low : kLow);
+    IDASetEtaMin(ida_mem_, low > 0.0 ? low : kMin);
+  }
+  if (owns_max_step_ && (all || now.max_step != set_.max_step)) IDASetMaxStep(ida_mem_, max_step);
+  set_ = now;
+  known_to_ida_ = true;
 }
 
 }  // namespace tether::ida_projection

@@ -28,6 +28,7 @@ class StepSmoother {
   /// used. The setpoint is `care` times Options::smoothing_setpoint.
   void begin(double care) {
     on_ = true;
+    known_to_ida_ = false;
     care_ = care;
   }
   bool on() const { return on_; }
@@ -44,11 +45,17 @@ class StepSmoother {
   double test_constant(double h, int order) const;
   double filter(double log_c, int order) const;
   void hold();
-  double request(double ratio, double h, double own_ratio, double norm);
+  double request(double ratio, double h, bool grows, double norm);
   double gentle_reduction(double ratio, double h, double norm);
   void set(double lowest_fixed, double highest_fixed, double largest, double low, double max_step);
 
+  struct Settings {
+    double lowest_fixed = 0.0, highest_fixed = 0.0, largest = 0.0, low = 0.0, max_step = 0.0;
+  };
+
   void* ida_mem_;
+  Settings set_;               // IDA has these
+  bool known_to_ida_ = false;  // if so
   bool wanted_, on_ = false, owns_max_step_ = false;
   double setpoint_, care_ = 1.0, max_step_;
   int max_order_;

@@ -1,0 +1,50 @@
+// Tether: the iteration after the move, foretold. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "host/owned_vector.hpp"
+
+namespace tether::ida_projection {
+
+/// What one more Newton iteration adds to a correction, from what earlier ones have added; in forms
+/// without algebraic variables. See foretold.cpp.
+class Foretold {
+ public:
+  /// Before the others; once.
+  void allocate(N_Vector like) {
+    beyond_ = OwnedVector(like);
+    work_ = OwnedVector(like);
+  }
+  bool allocated() const { return static_cast<bool>(beyond_); }
+  void forget() { cj_ = 0.0; }
+  /// New factors, made for this cj.
+  void renewed(double cj) {
+    cj_at_setup_ = cj;
+    forget();
+  }
+  /// A corrector failed: what follows may be as difficult.
+  void doubt();
+  /// An iteration added delta to ycor.
+  void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj);
+  /// May it be foretold for a correction with this cj?
+  bool tells(double cj) const { return used_in_row_ < patience_ && wait_ == 0 && known(cj); }
+  void tell(double cj, N_Vector ycor, N_Vector delta) const {
+    N_VLinearSum(share_at(cj), ycor, 1.0, beyond_, delta);
+  }
+  void used() { ++used_in_row_; }
+
+ private:
+  double kappa(double cj) const { return (cj - cj_at_setup_) / (cj + cj_at_setup_); }
+  bool known(double cj) const { return cj_ != 0.0 && (cj == cj_ || not_stiff_); }
+  double share_at(double cj) const { return share_ + kappa(cj_) - kappa(cj); }
+  double share_of(N_Vector weights, N_Vector ycor, N_Vector delta);
+
+  OwnedVector beyond_, work_;
+  double cj_at_setup_ = 0.0;
+  double cj_ = 0.0;         // of the last iteration; 0: there was none with these factors
+  double share_ = 0.0;      // delta was share ycor + beyond
+  bool not_stiff_ = false;  // and next to -kappa ycor
+  int patience_ = 0, used_in_row_ = 0;
+  int wait_ = 0;  // iterations until it is foretold again
+};
+
+}  // namespace tether::ida_projection
