@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/index.hpp>
+#include <tuple>
 
 #include "problem/block_units.hpp"
 #include "problem/body_form.hpp"
@@ -54,6 +55,36 @@ std::vector<int> find_islands(int n, const std::vector<int>& row_start,
 
 }  // namespace
 
+namespace {
+
+constexpr std::size_t kZero = std::numeric_limits<std::size_t>::max();
+
+/// Where a block goes; kZero: there is none, but the place has to be.
+struct Position {
+  int row, column;
+  std::size_t block;
+
+  bool is_at(const Position& other) const { return row == other.row && column == other.column; }
+};
+
+/// Of all blocks by row, column and their order, with a place on the other side, which keeps the
+/// pattern symmetric, and on the diagonal.
+std::vector<Position> positions(const std::vector<MatrixBlock>& blocks, int n) {
+  std::vector<Position> out;
+  out.reserve(2 * blocks.size() + at(n));
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    out.push_back({blocks[k].row, blocks[k].column, k});
+    if (blocks[k].row != blocks[k].column) out.push_back({blocks[k].column, blocks[k].row, kZero});
+  }
+  for (int i = 0; i < n; ++i) out.push_back({i, i, kZero});
+  std::sort(out.begin(), out.end(), [](const Position& p, const Position& q) {
+    return std::tie(p.row, p.column, p.block) < std::tie(q.row, q.column, q.block);
+  });
+  return out;
+}
+
+}  // namespace
+
 Problem Problem::dense(const linalg::MatrixView& A, const linalg::VectorView& b,
                        const linalg::VectorView& mu) {
   const int d = dimension_of(b, mu), n = static_cast<int>(mu.size());
@@ -64,11 +95,18 @@ Problem Problem::dense(const linalg::MatrixView& A, const linalg::VectorView& b,
                                 ", as b has " + size + " entries");
   }
   detail::require_finite("A", A);
+  const auto has_block = [&](int i, int j) {
+    return i == j || !(A.block(d * i, d * j, d, d).array() == 0).all();
+  };
+  std::size_t count = 0;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) count += has_block(i, j) ? 1 : 0;
   std::vector<MatrixBlock> blocks;
+  blocks.reserve(count);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
+      if (!has_block(i, j)) continue;
       const auto part = A.block(d * i, d * j, d, d);
-      if (i != j && (part.array() == 0).all()) continue;
       MatrixBlock block{i, j, Eigen::Matrix3d::Zero()};
       block.value.topLeftCorner(d, d) = part;
       blocks.push_back(block);
@@ -102,26 +140,26 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const li
           "A", block.value.topLeftCorner(d, d),
           "block (" + std::to_string(block.row) + ", " + std::to_string(block.column) + "): ");
     }
-    // A zero on the other side keeps the pattern symmetric.
-    if (block.row != block.column) {
-      blocks.push_back({blocks[k].column, blocks[k].row, Eigen::Matrix3d::Zero()});
-    }
   }
-  for (int i = 0; i < n; ++i) blocks.push_back({i, i, Eigen::Matrix3d::Zero()});
-  std::stable_sort(blocks.begin(), blocks.end(), [](const MatrixBlock& p, const MatrixBlock& q) {
-    return p.row != q.row ? p.row < q.row : p.column < q.column;
-  });
+  const std::vector<Position> order = positions(blocks, n);
 
   Problem out;
   out.dimension_ = d;
   out.b_ = b;
   out.row_start_.assign(at(n + 1), 0);
-  for (std::size_t k = 0; k < blocks.size();) {
+  std::size_t distinct = 0;
+  for (std::size_t k = 0; k < order.size(); ++k)
+    distinct += k == 0 || !order[k].is_at(order[k - 1]) ? 1 : 0;
+  out.columns_.reserve(distinct);
+  out.blocks_.reserve(distinct);
+  out.local_.reserve(at(n));
+  for (std::size_t k = 0; k < order.size();) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    const int row = blocks[k].row, column = blocks[k].column;
-    for (; k < blocks.size() && blocks[k].row == row && blocks[k].column == column; ++k) {
-      sum.topLeftCorner(d, d) += blocks[k].value.topLeftCorner(d, d);
-    }
+    const Position& first = order[k];
+    const int row = first.row, column = first.column;
+    for (; k < order.size() && order[k].is_at(first); ++k)
+      if (order[k].block != kZero)
+        sum.topLeftCorner(d, d) += blocks[order[k].block].value.topLeftCorner(d, d);
     // The plane is a 3-D contact whose second tangent is decoupled and at rest.
     if (d == 2 && row == column) sum(2, 2) = sum(1, 1) > 0 ? sum(1, 1) : sum(0, 0);
     if (!sum.allFinite()) {
