@@ -106,7 +106,7 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   const bool laws = effects::has_joint_laws(s);
   const std::string has_laws =
       "the joints of the scene have limits, motors or friction, which the ";
-  refuse(laws && smooth, has_laws + "smooth engine does not have: use [stepping]");
+  refuse(laws && smooth, has_laws + "smooth engine does not have: use [stepping] or [event]");
   refuse((contact || stepping || laws) && !event && projected,
          "the stepping engine projects no invariants: give them project = false, or, without "
          "contacts, use [smooth]");

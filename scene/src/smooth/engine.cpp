@@ -265,10 +265,12 @@ class SmoothEngine : public Engine {
 std::unique_ptr<Engine> make_smooth_engine(const Scene& scene) {
   if (!scene.pairs.empty())
     throw std::invalid_argument(
-        "the smooth engine has no contacts, but the scene has [[pair]] tables: use [stepping]");
+        "the smooth engine has no contacts, but the scene has [[pair]] tables: use [stepping] or "
+        "[event]");
   if (effects::has_joint_laws(scene))
     throw std::invalid_argument(
-        "the smooth engine has no limits, motors and friction of joints: use [stepping]");
+        "the smooth engine has no limits, motors and friction of joints: use [stepping] or "
+        "[event]");
   const SmoothOptions options = scene.smooth.value_or(SmoothOptions{});
   if (!(options.tolerance > 0 && options.tolerance < 1))
     throw std::invalid_argument("[smooth] tolerance must be between 0 and 1");
