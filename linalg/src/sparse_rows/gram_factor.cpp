@@ -18,6 +18,38 @@ constexpr double kDependent = 16.0;  // eps (1 + |c|^2)
 constexpr double kThin = 1e6;        // eps
 constexpr int kTogether = 4;         // columns of L that are applied in one pass
 
+/// Columns j to j + 3 of L, which have the same `count` rows below them.
+struct FourColumns {
+  FourColumns(const double* L, const int* starts, const int* rows, int j)
+      : L0(L + starts[j]),
+        L1(L + starts[j + 1]),
+        L2(L + starts[j + 2]),
+        L3(L + starts[j + 3]),
+        row(rows + starts[j + 3]) {}
+
+  /// x_j to x_(j+3), in z, of L^T x = z, from x below them.
+  void back(const double* __restrict x, int count, double* __restrict z) const {
+    double x0 = z[0], x1 = z[1], x2 = z[2], x3 = z[3];
+    for (int q = 0; q < count; ++q) {
+      const double xq = x[row[q]];
+      x0 -= L0[q + 3] * xq;
+      x1 -= L1[q + 2] * xq;
+      x2 -= L2[q + 1] * xq;
+      x3 -= L3[q] * xq;
+    }
+    x2 -= L2[0] * x3;
+    x1 -= L1[0] * x2 + L1[1] * x3;
+    x0 -= L0[0] * x1 + L0[1] * x2 + L0[2] * x3;
+    z[0] = x0;
+    z[1] = x1;
+    z[2] = x2;
+    z[3] = x3;
+  }
+
+  const double *L0, *L1, *L2, *L3;
+  const int* row;
+};
+
 }  // namespace
 
 void GramFactor::analyse(int n, const std::vector<int>& starts, const std::vector<int>& columns) {
@@ -133,13 +165,11 @@ double GramFactor::eliminate(int k, double d) {
   while (column < end) {
     const int j = *column;
     if (L_.alike[at(j)] >= kTogether && end - column >= kTogether) {
-      const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
-                   *L3 = L + starts[j + 3];
+      const auto [L0, L1, L2, L3, row] = FourColumns(L, starts, rows, j);
       const double y0 = y[j];
       const double y1 = y[j + 1] - L0[0] * y0;
       const double y2 = y[j + 2] - L0[1] * y0 - L1[0] * y1;
       const double y3 = y[j + 3] - L0[2] * y0 - L1[1] * y1 - L2[0] * y2;
-      const int* row = rows + starts[j + 3];
       const int count = filled[j + 3];
       for (int q = 0; q < count; ++q)
         y[row[q]] -= L0[q + 3] * y0 + L1[q + 2] * y1 + L2[q + 1] * y2 + L3[q] * y3;
@@ -170,26 +200,12 @@ double GramFactor::coefficients_square(int k) {
   while (column > first) {
     const int j = column[-1] - (kTogether - 1);  // of four columns, if they are alike
     if (column - first >= kTogether && column[-kTogether] == j && L_.alike[at(j)] >= kTogether) {
-      const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
-                   *L3 = L + starts[j + 3];
-      const int* row = rows + starts[j + 3];
+      const FourColumns L4(L, starts, rows, j);
       const int count = L_.filled[at(j + 3)] - 1;  // the last entry is that of row k
-      double x0 = L0[count + 3], x1 = L1[count + 2], x2 = L2[count + 1], x3 = L3[count];
-      for (int q = 0; q < count; ++q) {
-        const double xq = x[row[q]];
-        x0 -= L0[q + 3] * xq;
-        x1 -= L1[q + 2] * xq;
-        x2 -= L2[q + 1] * xq;
-        x3 -= L3[q] * xq;
-      }
-      x2 -= L2[0] * x3;
-      x1 -= L1[0] * x2 + L1[1] * x3;
-      x0 -= L0[0] * x1 + L0[1] * x2 + L0[2] * x3;
-      x[j] = x0;
-      x[j + 1] = x1;
-      x[j + 2] = x2;
-      x[j + 3] = x3;
-      square += x0 * x0 + x1 * x1 + x2 * x2 + x3 * x3;
+      double z[kTogether] = {L4.L0[count + 3], L4.L1[count + 2], L4.L2[count + 1], L4.L3[count]};
+      L4.back(x, count, z);
+      std::copy(z, z + kTogether, x + j);
+      square += z[0] * z[0] + z[1] * z[1] + z[2] * z[2] + z[3] * z[3];
       column -= kTogether;
     } else {
       const int last = starts[column[-1]] + L_.filled[at(column[-1])] - 1;
@@ -235,13 +251,11 @@ void GramFactor::forward_in_place() {
             *alike = L_.alike.data();
   for (int j = 0; j < m_;) {
     if (alike[j] >= kTogether) {
-      const double *L0 = L + starts[j], *L1 = L + starts[j + 1], *L2 = L + starts[j + 2],
-                   *L3 = L + starts[j + 3];
+      const auto [L0, L1, L2, L3, row] = FourColumns(L, starts, rows, j);
       const double x0 = x[j];
       const double x1 = x[j + 1] -= L0[0] * x0;
       const double x2 = x[j + 2] -= L0[1] * x0 + L1[0] * x1;
       const double x3 = x[j + 3] -= L0[2] * x0 + L1[1] * x1 + L2[0] * x2;
-      const int* row = rows + starts[j + 3];
       const int count = starts[j + 4] - starts[j + 3];
       for (int q = 0; q < count; ++q)
         x[row[q]] -= L0[q + 3] * x0 + L1[q + 2] * x1 + L2[q + 1] * x2 + L3[q] * x3;
@@ -264,26 +278,10 @@ void GramFactor::back_in_place() {
   for (int j = m_ - 1; j >= 0;) {
     const int first = j - (kTogether - 1);
     if (first >= 0 && alike[first] >= kTogether) {
-      const double *L0 = L + starts[first], *L1 = L + starts[first + 1],
-                   *L2 = L + starts[first + 2], *L3 = L + starts[j];
-      double x0 = x[first] * inverse_d[first], x1 = x[first + 1] * inverse_d[first + 1],
-             x2 = x[first + 2] * inverse_d[first + 2], x3 = x[j] * inverse_d[j];
-      const int* row = rows + starts[j];
-      const int count = starts[j + 1] - starts[j];
-      for (int q = 0; q < count; ++q) {
-        const double xq = x[row[q]];
-        x0 -= L0[q + 3] * xq;
-        x1 -= L1[q + 2] * xq;
-        x2 -= L2[q + 1] * xq;
-        x3 -= L3[q] * xq;
-      }
-      x2 -= L2[0] * x3;
-      x1 -= L1[0] * x2 + L1[1] * x3;
-      x0 -= L0[0] * x1 + L0[1] * x2 + L0[2] * x3;
-      x[first] = x0;
-      x[first + 1] = x1;
-      x[first + 2] = x2;
-      x[j] = x3;
+      double z[kTogether];
+      for (int k = 0; k < kTogether; ++k) z[k] = x[first + k] * inverse_d[first + k];
+      FourColumns(L, starts, rows, first).back(x, starts[j + 1] - starts[j], z);
+      std::copy(z, z + kTogether, x + first);
       j = first - 1;
     } else {
       double xj = x[j] * inverse_d[j];
