@@ -329,6 +329,22 @@ TEST_CASE("packings: a lattice on which sweeps wander is solved on the path from
   CHECK(s.counts.factorisations < 150);
 }
 
+// Sweeps wander on both, and what starts from where they are leads nowhere: 3.6e-6 and 6e-4 after
+// 6.6e8 and 7.6e8. The curve has one end, wherever the sweeps are.
+TEST_CASE("packings: sweeps that wander are followed by the path of interior points") {
+  for (bool mixed : {true, false}) {
+    const random::Packing packing = mixed ? close_packing(3, false, 0.85, 2, 0.03, 1, true)
+                                          : close_packing(3, true, 1, 1, 0.05, 1.08);
+    const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
+    Options o;
+    o.law = Law::coulomb;
+    o.tolerance = 1e-6;
+    o.max_work = 3e8;
+    INFO((mixed ? "mixed radii" : "four contacts a body"));
+    solved(p, o);
+  }
+}
+
 TEST_CASE("packings: four contacts a body are factorised by bodies, to the same answer") {
   for (bool spheres : {true, false}) {
     const random::Packing packing = close_packing(4, spheres, 0.2, 31, 0.05, 1.08);

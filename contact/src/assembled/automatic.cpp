@@ -49,12 +49,14 @@ bool at_a_small_price(const Search&, const Rotation& r) { return r.small; }
 // start from the best point, the sweeps from their own.
 const Automatic::Turn Automatic::kRotation[] = {
     // stage, when, budget
-    {&Automatic::sweep_while_cheap, always, 20},                // factorisations it may forecast
-    {&Automatic::end_of_work, always, 0},                       //
-    {&Automatic::paths_from_sweeps, first_and_dear, 3},         // paths
-    {&Automatic::interior_points_near, first_and_near, 30},     // steps
-    {&Automatic::interior_points, first_and_far_or_cheap, 40},  // steps, from sticking
-    {&Automatic::round_off, always, kRoundOffSteps},            // steps
+    {&Automatic::sweep_while_cheap, always, 20},             // factorisations it may forecast
+    {&Automatic::end_of_work, always, 0},                    //
+    {&Automatic::paths_from_sweeps, first_and_dear, 1},      // paths
+    {&Automatic::arclength_path, first_and_dear, 400},       // factorisations, from the best point
+    {&Automatic::paths_from_sweeps, first_and_dear, 2},      // paths
+    {&Automatic::interior_points_near, first_and_near, 30},  // steps
+    {&Automatic::interior_points, first_and_far_or_cheap, 40},        // steps, from sticking
+    {&Automatic::round_off, always, kRoundOffSteps},                  // steps
     {&Automatic::proximal_path_at_best, first_cheap_and_near, 20},    // problems
     {&Automatic::shifted_path, first_and_cheap, 150},                 // steps
     {&Automatic::arclength_path, first_and_cheap, 400},               // factorisations

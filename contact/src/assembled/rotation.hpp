@@ -18,6 +18,7 @@ struct Automatic::Rotation {
   double kappa = 1;      // factorisations that sweeps stay for
   double tenth = 0, halved = 0;  // errors at the last gain of ten and of two
   int rounds = 0;                // since the last rescue
+  int paths = 0;                 // from sweeps, so far
   int bursts = 4, burst = 500, outers = 12;
   int patience = 0, most_patience = 3;
 };

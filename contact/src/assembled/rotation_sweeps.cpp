@@ -171,7 +171,7 @@ Status Automatic::paths_from_sweeps(Search& search, Rotation& r, int paths) {
   constexpr int kMostProblems = 100;
   for (int path = 0; path < paths && !search.solved() && !search.exhausted(); ++path) {
     const double begin = search.counts.work, end = search.work_end;
-    if (path > 0) sweep_and_solve_parts(search, begin + kStay * interior.cost(search));
+    if (r.paths++ > 0) sweep_and_solve_parts(search, begin + kStay * interior.cost(search));
     sweep_work_ += search.counts.work - begin;
     r.swept = search.best_error;
     if (search.solved() || search.exhausted()) break;
