@@ -2,7 +2,8 @@
 #
 #   tether_find_parallel_vectors()        tether::parallel_vectors with IDA, the projection and MPI;
 #                                         no target where something is missing
-#   tether_mpi_test(NAME TARGET RANKS)    a test that runs TARGET on RANKS processes
+#   tether_mpi_test(NAME TARGET RANKS [ARGUMENT...])
+#                                         a test that runs TARGET on RANKS processes
 
 function(tether_find_parallel_vectors)
   if(TARGET tether::parallel_vectors OR NOT TARGET tether_ida_projection OR NOT TARGET tether::sundials_ida)
@@ -30,7 +31,7 @@ function(tether_find_parallel_vectors)
 endfunction()
 
 function(tether_mpi_test name target ranks)
-  add_test(NAME ${name} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}>)
+  add_test(NAME ${name} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}> ${ARGN})
   set_tests_properties(${name} PROPERTIES LABELS ida_projection PROCESSORS 2 TIMEOUT 300 ENVIRONMENT
     "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1")
 endfunction()
