@@ -109,6 +109,7 @@ void Automatic::prepare(Search& search) {
   interior.reset(contacts_);
   parts_.reset(contacts_);
   sweep_work_ = search.counts.work;
+  held_work_ = 0;
   ready_ = true;
 }
 

@@ -82,6 +82,7 @@ class Automatic {
   int contacts_ = 0;
   bool ready_ = false, proofs_ = true, looked_for_proof_ = false;
   double sweep_work_ = 0;  // of the accelerated sweeps
+  double held_work_ = 0;   // of parts that are solved again between sweeps
 };
 
 }  // namespace tether::contact::detail

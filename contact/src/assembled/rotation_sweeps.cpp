@@ -66,14 +66,18 @@ bool Automatic::sweep_first(Search& search, const Rotation& r) {
 // Sweeps, between which the parts that have been solved once are solved again.
 void Automatic::sweep_beside_parts(Search& search, AcceleratedSweeps::Leave leave) {
   constexpr double kBetween = 10, kPartShare = 0.1;  // sweeps, of the work before
+  constexpr double kHeldShare = 1.0 / 3;             // of all other work
   const double end = search.counts.work + leave.least_work;
   leave.price = 0;
   leave.most_work = kBetween * search.sweep_cost;
   while (search.counts.work < end && parts_.holds()) {
     sweeps.run(search, leave);
     if (search.solved() || search.exhausted()) return;
+    const double before = search.counts.work;
+    if (held_work_ > kHeldShare * (before - held_work_)) continue;
     x_.assign(sweeps.point(), sweeps.point() + contacts_);
-    parts_.run_held(search, x_, kPartShare * search.counts.work);
+    parts_.run_held(search, x_, kPartShare * before);
+    held_work_ += search.counts.work - before;
     sweeps.amend(search, x_);
   }
 }
