@@ -23,6 +23,7 @@ class Entries {
     slots_ = std::move(slots);
     recording_ = false;
   }
+  const std::vector<int>& slots() const { return slots_; }
   /// `values`: zero on entry.
   void begin(double* values) {
     values_ = values;

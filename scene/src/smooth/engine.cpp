@@ -57,7 +57,7 @@ class SmoothEngine : public Engine {
       // Invariants keep the values of the start once it is consistent.
       system_->keep_invariants_of(0.0, y_);
       for (int pass = 0; pass < 2; ++pass) {
-        Integrator start(*system_, with, 0.0, y_, yp_);
+        Integrator start(*system_, with, 0.0, y_, yp_, Integrator::For::start);
         const ida_projection::ConsistencyReport report = start.make_consistent(0.0);
         if (report.status == ida_projection::Status::not_converged &&
             report.drift_before <= kRounding * std::max(1.0, y_.lpNorm<Eigen::Infinity>()))

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <nvector/nvector_serial.h>
+#include <sunlinsol/sunlinsol_spgmr.h>
 
 #include <algorithm>
 #include <cmath>
@@ -68,7 +69,7 @@ Integrator::Vectors::~Vectors() {
 }
 
 Integrator::Integrator(System& system, const SmoothOptions& options, double t,
-                       const Eigen::VectorXd& y, const Eigen::VectorXd& yp)
+                       const Eigen::VectorXd& y, const Eigen::VectorXd& yp, For purpose)
     : system_(system),
       options_(options),
       t_(t),
@@ -84,9 +85,14 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   IDASetMaxNumSteps(ida_, -1);  // counted in step_past
   if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
   IDASetInitStep(ida_, first_step(t, y, yp));
-  matrix_.emplace(system, t, vectors_.y, vectors_.yp, context_);
-  IDASetLinearSolver(ida_, matrix_->solver(), matrix_->matrix());
-  IDASetJacFn(ida_, jacobian);
+  if (purpose == For::motion) {
+    matrix_.emplace(system, t, vectors_.y, vectors_.yp, context_);
+    IDASetLinearSolver(ida_, matrix_->solver(), matrix_->matrix());
+    IDASetJacFn(ida_, jacobian);
+  } else {  // IDA wants a solver to begin with; this one has no matrix
+    unused_ = SUNLinSol_SPGMR(vectors_.y, SUN_PREC_NONE, 1, context_);
+    IDASetLinearSolver(ida_, unused_, nullptr);
+  }
   IDASetId(ida_, vectors_.id);
   // Multipliers are derived quantities in every form: IDA judges the motion.
   IDASetSuppressAlg(ida_, 1);
@@ -122,6 +128,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
 Integrator::~Integrator() {
   IDAFree(&ida_);
   projection_.reset();
+  if (unused_ != nullptr) SUNLinSolFree(unused_);
 }
 
 // IDA begins with half a tolerance / |y'|, at tight tolerances 1e-12 s. There the multipliers of

@@ -19,9 +19,12 @@ namespace tether::scene::smooth {
 /// that it is asked for: they are interpolated.
 class Integrator {
  public:
+  /// What it is made for: without a matrix it can only make a start consistent.
+  enum class For { motion, start };
+
   /// `y` and `yp` are consistent up to errors that `make_consistent` repairs.
   Integrator(System& system, const SmoothOptions& options, double t, const Eigen::VectorXd& y,
-             const Eigen::VectorXd& yp);
+             const Eigen::VectorXd& yp, For purpose = For::motion);
   ~Integrator();
   Integrator(const Integrator&) = delete;
   Integrator& operator=(const Integrator&) = delete;
@@ -78,6 +81,7 @@ class Integrator {
   QuietContext context_;
   Vectors vectors_;
   std::optional<NewtonMatrix> matrix_;
+  SUNLinearSolver unused_ = nullptr;  // in place of its solver
   void* ida_ = nullptr;
   std::optional<ida_projection::Projection> projection_;
   Spent spent_;

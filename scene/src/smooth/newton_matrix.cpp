@@ -9,7 +9,9 @@
 #endif
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <random>
 #include <tether/ida_projection.hpp>
 
 #include "smooth/rows/elimination_order.hpp"
@@ -58,7 +60,7 @@ NewtonMatrix::NewtonMatrix(System& system, double t, N_Vector y, N_Vector yp, SU
   system_.jacobian(t, 1.0, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), entries_);
 #ifdef TETHER_SCENE_KLU
   if (system_.size() >= kManyUnknowns) {
-    make_sparse(y, context);
+    make_sparse(t, y, yp, context);
     return;
   }
 #endif
@@ -82,58 +84,126 @@ void NewtonMatrix::make_dense(N_Vector y, SUNContext context) {
 }
 
 #ifdef TETHER_SCENE_KLU
-void NewtonMatrix::make_sparse(N_Vector y, SUNContext context) {
+void NewtonMatrix::make_sparse(double t, N_Vector y, N_Vector yp, SUNContext context) {
   const int N = system_.size();
-  const auto& places = entries_.places;
-  std::vector<int> slots(places.size());
-  std::vector<std::size_t> order(places.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto column_first = [&](std::size_t a, std::size_t b) {
-    return std::pair(places[a].second, places[a].first) <
-           std::pair(places[b].second, places[b].first);
-  };
-  std::sort(order.begin(), order.end(), column_first);
-  column_starts_.assign(static_cast<std::size_t>(N) + 1, 0);
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const auto [row, column] = places[order[k]];
-    if (k == 0 || places[order[k - 1]] != places[order[k]]) {
-      row_indices_.push_back(row);
-      ++column_starts_[static_cast<std::size_t>(column) + 1];
-    }
-    slots[order[k]] = static_cast<int>(row_indices_.size()) - 1;
-  }
-  std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
+  writes_.assign(entries_.places.size(), 0);
+  look_nearby(t, y, yp);
+  arrange();
   matrix_ = SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context);
   solver_ = SUNLinSol_KLU(y, matrix_, context);
-  if (by_entries(system_.rows(), system_.moving())) {
-    order_ = elimination_order(N, system_.moving(), kBody, kVelocity, places);
-    use_order(solver_, order_);
-  }
+  if (!order_.empty()) use_order(solver_, order_);
   solver_->ops->setup = factor_or_try_smaller_step;
+}
+
+// Entries that are zero at the start, where all may lie in a plane or rest, are seen at two states
+// nearby.
+void NewtonMatrix::look_nearby(double t, N_Vector y, N_Vector yp) {
+  const double *state = N_VGetArrayPointer(y), *rate = N_VGetArrayPointer(yp);
+  const std::vector<double> y0(state, state + system_.size()), yp0(rate, rate + system_.size());
+  std::mt19937 random(1);
+  const auto moved = [&](std::vector<double> x) {
+    constexpr double kFar = 0.25;
+    for (double& value : x)
+      value += kFar * (random() / 2147483648.0 - 1.0) * std::max(1.0, std::abs(value));
+    return x;
+  };
+  for (const double cj : {1.0, 0.7}) {
+    const std::vector<double> near_y = moved(y0), near_yp = moved(yp0);
+    look_at_calls(t, cj, near_y, near_yp);
+  }
+  look_at_calls(t, 1.0, y0, yp0);  // last: the system is left as it was
+}
+
+void NewtonMatrix::look_at_calls(double t, double cj, const std::vector<double>& y,
+                                 const std::vector<double>& yp) {
+  std::vector<double> written(writes_.size(), 0.0);
+  std::vector<int> one_by_one(writes_.size());
+  std::iota(one_by_one.begin(), one_by_one.end(), 0);
+  entries_.finish(std::move(one_by_one));
+  entries_.begin(written.data());
+  system_.jacobian(t, cj, y.data(), yp.data(), entries_);
+  for (std::size_t k = 0; k < written.size(); ++k)
+    if (written[k] != 0.0) writes_[k] = 1;
+}
+
+// The pattern of what is written, and an order of elimination for it.
+void NewtonMatrix::arrange() {
+  const auto N = static_cast<std::size_t>(system_.size());
+  const auto& places = entries_.places;
+  std::vector<std::size_t> ends(N + 1, 0);  // of the calls of each column, first their number
+  for (std::size_t k = 0; k < places.size(); ++k)
+    if (writes_[k] != 0) ++ends[static_cast<std::size_t>(places[k].second) + 1];
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  std::vector<std::pair<int, int>> calls(ends.back());  // row, call
+  for (std::size_t k = 0; k < places.size(); ++k)
+    if (writes_[k] != 0)
+      calls[ends[static_cast<std::size_t>(places[k].second)]++] = {places[k].first,
+                                                                   static_cast<int>(k)};
+  row_indices_.clear();
+  column_starts_.assign(N + 1, 0);
+  std::vector<int> slots(places.size(), -1);
+  std::vector<std::pair<int, int>> written;
+  std::size_t begin = 0;
+  for (std::size_t column = 0; column < N; begin = ends[column++]) {
+    std::sort(calls.begin() + static_cast<std::ptrdiff_t>(begin),
+              calls.begin() + static_cast<std::ptrdiff_t>(ends[column]));
+    for (std::size_t k = begin; k < ends[column]; ++k) {
+      if (k == begin || calls[k].first != calls[k - 1].first) {
+        row_indices_.push_back(calls[k].first);
+        written.emplace_back(calls[k].first, static_cast<int>(column));
+      }
+      slots[static_cast<std::size_t>(calls[k].second)] = static_cast<int>(row_indices_.size()) - 1;
+    }
+    column_starts_[column + 1] = static_cast<sunindextype>(row_indices_.size());
+  }
+  std::size_t behind = row_indices_.size();
+  for (int& slot : slots)
+    if (slot < 0) slot = static_cast<int>(behind++);
+  values_.assign(behind, 0.0);
   entries_.finish(std::move(slots));
+  if (by_entries(system_.rows(), system_.moving()))
+    order_ = elimination_order(static_cast<int>(N), system_.moving(), kBody, kVelocity, written);
+}
+
+// Has anything been written behind the pattern? Then it belongs to it from here on.
+bool NewtonMatrix::grow() {
+  const auto behind = values_.begin() + static_cast<std::ptrdiff_t>(row_indices_.size());
+  if (std::all_of(behind, values_.end(), [](double value) { return value == 0.0; })) return false;
+  for (std::size_t k = 0; k < writes_.size(); ++k)
+    if (values_[static_cast<std::size_t>(entries_.slots()[k])] != 0.0) writes_[k] = 1;
+  arrange();
+  return true;
 }
 #endif
 
 void NewtonMatrix::fill(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J) {
-  double* values = nullptr;
+  const auto write = [&](double* values) {
+    entries_.begin(values);
+    system_.jacobian(t, cj, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), entries_);
+  };
 #ifdef TETHER_SCENE_KLU
   if (!row_indices_.empty()) {
+    const auto write_all = [&] {
+      std::fill_n(values_.begin(), row_indices_.size(), 0.0);
+      write(values_.data());
+    };
+    write_all();
+    const bool grows = grow();
+    if (grows) {
+      write_all();
+      SUNSparseMatrix_Reallocate(J, static_cast<sunindextype>(row_indices_.size()));
+    }
     std::copy(column_starts_.begin(), column_starts_.end(), SUNSparseMatrix_IndexPointers(J));
     std::copy(row_indices_.begin(), row_indices_.end(), SUNSparseMatrix_IndexValues(J));
-    values = SUNSparseMatrix_Data(J);
-    std::fill(values, values + row_indices_.size(), 0.0);
-    if (multiplier_choices_ != system_.multiplier_choices()) {
-      multiplier_choices_ = system_.multiplier_choices();
+    std::copy_n(values_.begin(), row_indices_.size(), SUNSparseMatrix_Data(J));
+    if (grows || multiplier_choices_ != system_.multiplier_choices())
       SUNLinSol_KLUReInit(solver_, J, 0, SUNKLU_REINIT_PARTIAL);  // other pivots
-    }
+    multiplier_choices_ = system_.multiplier_choices();
+    return;
   }
 #endif
-  if (!values) {
-    SUNMatZero(J);
-    values = SUNDenseMatrix_Data(J);
-  }
-  entries_.begin(values);
-  system_.jacobian(t, cj, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), entries_);
+  SUNMatZero(J);
+  write(SUNDenseMatrix_Data(J));
 }
 
 }  // namespace tether::scene::smooth

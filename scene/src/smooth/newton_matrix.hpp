@@ -9,7 +9,10 @@
 
 namespace tether::scene::smooth {
 
-/// dF/dy + cj dF/dy' of a system: dense, or sparse with KLU where there are many unknowns.
+/// dF/dy + cj dF/dy' of a system: dense, or sparse with KLU where there are many unknowns. The
+/// assembly writes whole blocks, of which more than half may be zero for all states (a ball joint's
+/// force does not turn with its bodies); the sparse pattern has what is not zero at states about
+/// the first one, and grows where that changes.
 class NewtonMatrix {
  public:
   /// Its entries are those of the Jacobian at t, y and y'.
@@ -25,14 +28,23 @@ class NewtonMatrix {
 
  private:
   void make_dense(N_Vector y, SUNContext context);
-  void make_sparse(N_Vector y, SUNContext context);
+  void make_sparse(double t, N_Vector y, N_Vector yp, SUNContext context);
+  void look_at_calls(double t, double cj, const std::vector<double>& y,
+                     const std::vector<double>& yp);
+  void look_nearby(double t, N_Vector y, N_Vector yp);
+  void arrange();
+  bool grow();
 
   System& system_;
   SUNMatrix matrix_ = nullptr;
   SUNLinearSolver solver_ = nullptr;
   Entries entries_;
-  std::vector<sunindextype> column_starts_, row_indices_;  // sparse: the pattern
-  std::vector<int> order_;                                 // sparse: of KLU's elimination
+  // Sparse. Of each call of Entries::add: has it written anything but zero? Those that have not
+  // write behind the entries of the pattern.
+  std::vector<char> writes_;
+  std::vector<double> values_;
+  std::vector<sunindextype> column_starts_, row_indices_;  // the pattern
+  std::vector<int> order_;                                 // of KLU's elimination
   int multiplier_choices_ = 0;                             // those that KLU's pivots are for
 };
 
