@@ -310,6 +310,10 @@ void Driver::anchor() {
   paced_.way += phase_->step_end();
   event_time_ = phase_->is_at_end() ? kink_ : phase_->start() + phase_->step_end();
   phase_->projected_at(phase_->step_end(), y_);
+  // Rows that were not in use are met by what the others leave of them only.
+  motion_.choose(event_time_, y_, modes_);
+  const VectorXd before = y_;
+  if (!move_onto_constraints(motion_, local_, event_time_, y_)) y_ = before;
   start_phase();
 }
 

@@ -52,22 +52,19 @@ class IndependentRows {
 };
 
 /// Of rows (as columns) those that imply all others: each time the one that adds most to those
-/// before it, in the metric of the masses.
+/// before it. In the metric of the projection, whose moves they are to determine: by masses a body
+/// that is thin about an axis would count as held about it by rows that hardly turn it.
 struct RowChoice {
   std::vector<int> rows;  // ascending
   double least = 1;       // what a row added, of its length
 
-  RowChoice(const Model& model, MatrixXd V) {
+  explicit RowChoice(MatrixXd V) {
     const Eigen::Index m = V.cols();
-    MatrixXd D = V;
-    model.divide_by_mass(D);
-    VectorXd length(m);
+    VectorXd length = V.colwise().norm();
     for (Eigen::Index j = 0; j < m; ++j) {
-      const double square = V.col(j).dot(D.col(j));
-      length[j] = square > 0 ? 1 : 0;
-      if (!(square > 0)) continue;
-      V.col(j) /= std::sqrt(square);
-      D.col(j) /= std::sqrt(square);
+      if (!(length[j] > 0)) continue;
+      V.col(j) /= length[j];
+      length[j] = 1;
     }
     std::vector<Eigen::Index> taken;
     while (static_cast<Eigen::Index>(rows.size()) < std::min(m, V.rows())) {
@@ -76,28 +73,25 @@ struct RowChoice {
         if (length[j] > kClearlyMore * length[best]) best = j;
       if (length[best] < kIndependent) break;
       // Once more against those before: what is left of it may be small.
-      for (const Eigen::Index k : taken) subtract(V, D, k, best);
-      const double left = std::sqrt(V.col(best).dot(D.col(best)));
+      for (const Eigen::Index k : taken) subtract(V, k, best);
+      const double left = V.col(best).norm();
       least = std::min(least, left);
       V.col(best) /= left;
-      D.col(best) /= left;
       length[best] = 0;
       taken.push_back(best);
       rows.push_back(static_cast<int>(best));
       for (Eigen::Index j = 0; j < m; ++j) {
         if (!(length[j] > 0)) continue;
-        subtract(V, D, best, j);
-        length[j] = std::sqrt(std::max(0.0, V.col(j).dot(D.col(j))));
+        subtract(V, best, j);
+        length[j] = V.col(j).norm();
       }
     }
     std::sort(rows.begin(), rows.end());
   }
 
  private:
-  static void subtract(MatrixXd& V, MatrixXd& D, Eigen::Index k, Eigen::Index from) {
-    const double part = D.col(k).dot(V.col(from));
-    V.col(from) -= part * V.col(k);
-    D.col(from) -= part * D.col(k);
+  static void subtract(MatrixXd& V, Eigen::Index k, Eigen::Index from) {
+    V.col(from) -= V.col(k).dot(V.col(from)) * V.col(k);
   }
 };
 
@@ -220,7 +214,7 @@ void Motion::choose_joints() {
   joints_in_use_.clear();
   if (model_.joint_rows() == 0) return;
   model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
-  RowChoice choice(model_, joint_W_.transpose());
+  const RowChoice choice(joint_W_.transpose());
   joints_in_use_ = std::move(choice.rows);
   joints_ = static_cast<int>(joints_in_use_.size());
   least_joint_row_ = choice.least;
@@ -231,11 +225,11 @@ bool Motion::other_joint_rows_are_better(double t, const VectorXd& y) {
   if (joints_ == model_.joint_rows()) return false;
   set(t, y.data());
   look_at_joints();
-  const double now = RowChoice(model_, joint_W_.topRows(joints_).transpose()).least;
+  const double now = RowChoice(joint_W_.topRows(joints_).transpose()).least;
   if (now > kWeakened * least_joint_row_) return false;
   least_joint_row_ = std::min(least_joint_row_, now);
   model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
-  return now <= kWeakened * RowChoice(model_, joint_W_.transpose()).least;
+  return now <= kWeakened * RowChoice(joint_W_.transpose()).least;
 }
 
 // Those in use, first.
