@@ -99,3 +99,17 @@ between = ["m", "m"]
   CHECK_THROWS_AS(make_plan(parse_scene("[scene]\nengine = \"event\"\n" + many, "test")),
                   std::invalid_argument);
 }
+
+TEST_CASE("event: what joints drive into a wall is named") {
+  const std::string text =
+      "[[body]]\nname = \"wall\"\nshape = \"plane\"\nnormal = [-1, 0, 0]\nposition = [1.6, 0, 0]\n"
+      "fixed = true\nmaterial = \"floor\"\n"
+      "[[body]]\nname = \"piston\"\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nmaterial = "
+      "\"body\"\n"
+      "velocity = [2, 0, 0]\n[[joint]]\nkind = \"slider\"\nbodies = [\"piston\", \"world\"]\n"
+      "axis = [1, 0, 0]\nmotion = { rate = 2 }\n" +
+      pair("friction = 0.3");
+  CHECK_THROWS_WITH(run(text, 1e-6, 1),
+                    Catch::Contains("t = 0.75") &&
+                        Catch::Contains("no impulses keep \"piston\" and \"wall\" apart: joints"));
+}

@@ -1,4 +1,5 @@
 // Limits, motors and friction of joints in the event engine. SPDX-License-Identifier: BSD-3-Clause
+#include "event/phase/shared_forces.hpp"
 #include "event_runs.hpp"
 
 using namespace event_runs;
@@ -347,4 +348,36 @@ TEST_CASE("event: a run of joint laws goes on from saved states with the same bi
       "motor = { rate_deg = 50, torque = 3 }\n",
       "laws");
   for (const double cut : {0.2, 0.7, 1.5}) goes_on_with_its_bits(scene, cut, 3);
+}
+
+TEST_CASE("event: a law's own normal does not count where contacts press themselves together") {
+  using namespace tether::scene::event;
+  // Two contacts in one place that slide so that pressing opens them (Painleve, a_nn < mu a_nt),
+  // and nothing closes them: of their forces 0 is right. Beside them a motor, pressed with 10.
+  const auto lawful = [](bool motor) {
+    const int n = motor ? 3 : 2;
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(2 * n, 2 * n);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(2 * n), mu = Eigen::VectorXd::Constant(n, 2);
+    Eigen::Matrix2d each;
+    each << 1, 0.8, 0.8, 1;
+    for (int i = 0; i < 2; ++i) {
+      for (int k = 0; k < 2; ++k) A.block<2, 2>(2 * i, 2 * k) = each;
+      b.segment<2>(2 * i) << -0.3, -5;
+    }
+    Regimes regimes;
+    regimes.of.assign(2, tether::contact::Regime::sliding);
+    regimes.directions.assign(2, Eigen::VectorXd::Ones(1));
+    regimes.fixed.assign(2, true);
+    if (motor) {
+      A.block<2, 2>(4, 4) = Eigen::Matrix2d::Identity();
+      b[4] = 10;
+      mu[2] = 1;
+      regimes.of.push_back(tether::contact::Regime::sticking);
+      regimes.directions.emplace_back();
+      regimes.fixed.push_back(false);
+    }
+    return share_forces(A, b, mu, regimes).lawful;
+  };
+  CHECK_FALSE(lawful(false));
+  CHECK_FALSE(lawful(true));
 }

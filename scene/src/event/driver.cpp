@@ -9,49 +9,21 @@
 #include <tether/linalg/index.hpp>
 #include <tether/scene/engine.hpp>
 
+#include "local_tolerance.hpp"
+
 namespace tether::scene::event {
 
 namespace {
 
-constexpr double kLeast = 1e-13, kLeastInFlight = 2e-13;  // of IDA: more is rounding
-constexpr double kTight = 1e-11;
-
-// IDA bounds the error of a step. What it adds up to over tens of events, and tens of periods
-// between them, is to be within ten tolerances (a mass that rubs to rest in thirteen turns).
-double wanted_tolerance(double tolerance) {
-  return std::min(1.0, std::pow(tolerance / 1e-4, 0.066)) * 0.025 * tolerance;
-}
-
-double local_tolerance(double tolerance) { return std::max(wanted_tolerance(tolerance), kLeast); }
-
-// From a bounce on: an error of the height is one of the time of the next impact, over its speed.
-double flight_tolerance(double tolerance, double speed) {
-  const double wanted = wanted_tolerance(tolerance), local = local_tolerance(tolerance);
-  if (wanted >= kTight) return local;
-  return std::min(local, std::max(kLeastInFlight, wanted * std::min(1.0, speed)));
-}
-
-// The first steps of a bounce are of order 1: some ten times (h / T)^2 is their error in its length
-// T. A way of less than kLeastWay (m in the units of the model) is lost in rounding.
-constexpr double kFlightError = 0.003, kLeastWay = 1e-15;
 constexpr long kMostAtOneTime = 300;
 constexpr double kStartTolerance = 1e-4;
-constexpr double kAtGaps = 0.01;  // of their bands: gaps that are no rounding
-constexpr long kAnchor = 5000;    // steps
+constexpr long kAnchor = 5000;  // steps
 // Steps that cover less than this part of what is left come to no end: at a microsecond each some
 // thousand years.
 constexpr long kManySteps = 100000;
 constexpr double kNoWay = 1e-12;
 
 using linalg::at;
-
-/// Until a gap that falls with the acceleration `back` is zero, s; 0: never.
-double flight_time(double gap, double rate, double back) {
-  const double square = rate * rate + 2 * back * gap;
-  if (square < 0) return 0;
-  const double root = std::sqrt(square);
-  return rate > 0 ? (back > 0 ? (rate + root) / back : 0) : 2 * gap / (root - rate);
-}
 
 }  // namespace
 
@@ -141,97 +113,6 @@ std::vector<int> Driver::without_doubles(const std::vector<int>& contacts) const
       *twin = motion_.modes()[at(i)].mode == Mode::open ? *twin : i;
   }
   return out;
-}
-
-void Driver::begin_phase() {
-  settle_velocities();
-  motion_.keep_energy_of(event_time_, y_);
-  const VectorXd before = y_;
-  if (!move_onto_constraints(motion_, local_, event_time_, y_)) {
-    y_ = before;
-    model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-    fail(contradiction());
-  }
-  start_phase();
-}
-
-std::string Driver::contradiction() const {
-  double gap = 0, band = 0, rate = 0;
-  for (const int i : motion_.closed()) {
-    gap = std::max(gap, std::abs(model_.gap(i, rate)));
-    band = std::max(band, bands().gap(i));
-  }
-  const double unit = model_.length_unit();
-  std::string text = "the state cannot be moved onto joints and closed contacts";
-  // Both sides of a clearance, say.
-  if (gap > kAtGaps * band)
-    text += fmt::format(
-        ": at this tolerance gaps of up to {:.3g} m count as closed, and of the {} contacts that "
-        "do so "
-        "one has {:.3g} m. A smaller tolerance tells them apart",
-        unit * band, motion_.closed().size(), unit * gap);
-  return text;
-}
-
-// What is left of the velocities of contacts that close: less than their bands.
-void Driver::settle_velocities() {
-  const double energy = model_.energy();
-  motion_.settle_velocities(event_time_, y_);
-  const double lost = energy - model_.energy();
-  lost_ += lost;
-  if (!events_.empty() && events_.back().time == event_time_) events_.back().lost += lost;
-}
-
-// Everything from (event_time_, y_), the modes and the energy that is kept: whoever has these goes
-// on with the same bits.
-void Driver::start_phase() {
-  modes_ = motion_.modes();
-  rows_are_weak_ = false;
-  model_.begin_anew(event_time_);
-  motion_.choose(event_time_, y_, modes_);
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-  std::vector<bool> leaving(at(model_.contacts()), false);
-  double local = local_;
-  for (int i = 0; i < model_.contacts(); ++i) {
-    double rate = 0;
-    const double gap = model_.gap(i, rate);
-    leaving[at(i)] = motion_.modes()[at(i)].mode == Mode::open && std::abs(gap) <= bands().gap(i) &&
-                     rate > bands().approach(i);
-    if (leaving[at(i)]) local = std::min(local, flight_tolerance(options_.tolerance, rate));
-  }
-  if (phase_) counts_.phases.add(phase_->counts());
-  phase_.reset();
-  const double first = longest_first_step(leaving);
-  kink_ = model_.next_kink(event_time_);
-  phase_ = std::make_unique<Phase>(motion_, local, options_.max_step, event_time_, y_, first,
-                                   kink_ - event_time_);
-  watcher_.begin(event_time_, y_, leaving);
-  next_.reset();
-}
-
-// A flight that is shorter than the tolerance's first step must be resolved all the same: bounces,
-// and the ways of contacts that are about to close.
-double Driver::longest_first_step(const std::vector<bool>& leaving) {
-  VectorXd rate(motion_.size());
-  motion_.rate(event_time_, y_.data(), rate.data());
-  const VectorXd a = motion_.acceleration();
-  const double part = std::min(1e-3, std::sqrt(kFlightError * options_.tolerance));
-  double longest = 0;
-  ContactLook look;
-  for (int i = 0; i < model_.contacts(); ++i) {
-    if (motion_.modes()[at(i)].mode != Mode::open) continue;
-    double speed = 0;
-    const double gap = leaving[at(i)] ? 0 : model_.gap(i, speed);
-    if (leaving[at(i)]) model_.gap(i, speed);
-    const bool closing = gap > 0 && gap <= bands().gap(i) && speed < -bands().approach(i);
-    if (!leaving[at(i)] && !closing) continue;
-    model_.look(i, look);
-    const double flight = flight_time(gap, speed, -(look.normal.dot(a) + look.normal_rest));
-    if (!(flight > 0)) continue;
-    const double first = std::max(part * flight, kLeastWay / std::abs(speed));
-    longest = longest > 0 ? std::min(longest, first) : first;
-  }
-  return longest;
 }
 
 void Driver::advance(double t, const std::function<bool()>& interrupted) {

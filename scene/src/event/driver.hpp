@@ -99,6 +99,7 @@ class Driver {
   std::vector<int> struck(const std::vector<int>& near, int first);
   void strike(const std::vector<int>& set, bool plastic);
   struct Impact;
+  void refuse_blocked(const std::vector<int>& set, const Impact& impact, const MatrixXd& A);
   Impact expect(const std::vector<int>& set, const VectorXd& before, int block, bool plastic);
   double change_velocities(const VectorXd& change);
   void tell_impacts(const std::vector<int>& touching, const Impact& impact, const VectorXd& before,
@@ -113,6 +114,7 @@ class Driver {
   std::vector<int> touching(int always) const;
   bool are_one(int contact, int other) const;
   std::vector<int> without_doubles(const std::vector<int>& contacts) const;
+  double slowest_turn();
   double longest_first_step(const std::vector<bool>& leaving);
   void turn_slips();
   void record(EventKind kind, int contact, double before, double after, double lost);

@@ -14,9 +14,10 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kNoImpulse = 1e-9;  // of the largest of an impact
-constexpr int kMostRounds = 2000;    // of one instant
-constexpr double kUnknownGap = 0.1;  // of its band
+constexpr double kNoImpulse = 1e-9;      // of the largest of an impact
+constexpr int kMostRounds = 2000;        // of one instant
+constexpr double kUnknownGap = 0.1;      // of its band
+constexpr double kHeldByJoints = 1e-10;  // of a normal's mobility without joints
 
 using linalg::at;
 
@@ -89,11 +90,31 @@ Driver::Impact Driver::expect(const std::vector<int>& set, const VectorXd& befor
   return out;
 }
 
+// Contacts that close though joints hold their normals: no impulse stops that.
+void Driver::refuse_blocked(const std::vector<int>& set, const Impact& impact, const MatrixXd& A) {
+  const Eigen::Index block = A.rows() / static_cast<Eigen::Index>(set.size());
+  ContactLook look;
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    if (!impact.hits[k]) continue;
+    model_.look(set[k], look);
+    MatrixXd moved = look.normal.transpose();
+    model_.divide_by_mass(moved);
+    const double alone = look.normal.dot(moved.col(0));
+    const auto row = block * static_cast<Eigen::Index>(k);
+    if (!(A(row, row) <= kHeldByJoints * alone)) continue;
+    fail(
+        fmt::format("no impulses keep {} apart: joints, prescribed motions or fixed bodies drive "
+                    "them into each other",
+                    model_.contact_name(set[k])));
+  }
+}
+
 void Driver::strike(const std::vector<int>& set, bool plastic) {
   ContactRows rows(model_, set);
   const auto u = y_.segment(motion_.coordinates(), motion_.velocities());
   const VectorXd before = rows.velocities(u);
   const Impact impact = expect(set, before, rows.size(), plastic);
+  refuse_blocked(set, impact, rows.A());
   ++counts_.contact_problems;
   const FrictionAnswer answer = solve_impact(rows.A(), impact.b, impact.mu, bands().part);
   if (!answer.solved)

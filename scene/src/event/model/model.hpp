@@ -68,6 +68,7 @@ class Model {
   /// g, and with W: g' = W u + rate, g'' = W u' + rest.
   virtual void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) = 0;
   virtual std::string joint_name(int /*row*/) const { return "a joint"; }
+  virtual std::string contact_name(int /*contact*/) const { return "a contact"; }
   virtual void look(int contact, ContactLook& out) = 0;
   virtual double gap(int contact, double& rate) = 0;  ///< and its rate
 

@@ -49,6 +49,8 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
       laws_(scene, bodies_.all()),
       y_(bodies_.start()),
       loads_(at(bodies_.count())) {
+  for (const Body& each : scene.bodies) body_names_.push_back(each.name);
+  for (const Joint& each : scene.joints) joint_names_.push_back(each.name);
   bodies_.set_state(y_.data());
   axes_.assign(pairs_.size(), Vector3d::Zero());
   settle();
@@ -64,6 +66,13 @@ VectorXd SceneModel::start() const {
     std::copy_n(y.data() + kBody * k + kVelocity, 6, out.data() + coordinates() + 6 * k);
   }
   return out;
+}
+
+std::string SceneModel::contact_name(int contact) const {
+  if (is_law(contact))
+    return "the limit of joint \"" + joint_names_[at(laws_.all().joint(joint_law(contact)))] + "\"";
+  const FeaturePair& p = pair(contact);
+  return "\"" + body_names_[at(p.first)] + "\" and \"" + body_names_[at(p.second)] + "\"";
 }
 
 void SceneModel::set(double t, const double* q, const double* u) {

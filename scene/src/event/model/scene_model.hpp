@@ -50,6 +50,7 @@ class SceneModel final : public Model {
   void forces(VectorXd& h) override;
   void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) override;
   std::string joint_name(int row) const override { return "joint \"" + rows_.joint_of(row) + "\""; }
+  std::string contact_name(int contact) const override;
   void look(int contact, ContactLook& out) override;
   double gap(int contact, double& rate) override {
     if (is_law(contact)) return laws_.gap(contact - pairs(), bodies_.all(), rate);
@@ -108,6 +109,7 @@ class SceneModel final : public Model {
   std::vector<std::unique_ptr<Force>> forces_;
   std::vector<double> kinks_;  // of forces, by time
   std::vector<FeaturePair> pairs_;
+  std::vector<std::string> body_names_, joint_names_;
   LawContacts laws_;
   std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen
   std::vector<double> y_;       // of MovingBodies

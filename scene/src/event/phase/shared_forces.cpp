@@ -67,8 +67,15 @@ class HeldRows {
   }
 
   /// They act against what closes the contacts: else contacts that could open as well press
-  /// themselves together (Painleve).
-  bool resists() const { return x_.dot(right_) >= 0; }
+  /// themselves together (Painleve). What no other row moves and that moves none, such as the
+  /// normal of a bounded law, says nothing of them.
+  bool resists() const {
+    double sum = 0;
+    for (Eigen::Index r = 0; r < x_.size(); ++r)
+      if ((S_.row(r).array() != 0).count() > 1 || (S_.col(r).array() != 0).count() > 1)
+        sum += x_[r] * right_[r];
+    return sum >= 0;
+  }
 
   bool is_lawful(const VectorXd& x) const {
     const double least = -kOutOfCone * x.cwiseAbs().maxCoeff();
