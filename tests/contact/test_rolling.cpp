@@ -203,9 +203,6 @@ TEST_CASE("rolling: what it does not go with is refused by name") {
   scene.options.restitution_law = tc::RestitutionLaw::poisson;
   CHECK_THROWS_WITH(scene.stepper(), Catch::Contains("restitution_law = newton"));
   scene.options.restitution_law = tc::RestitutionLaw::newton;
-  scene.options.accuracy = 1e-3;
-  CHECK_THROWS_WITH(scene.stepper(), Catch::Contains("accuracy"));
-  scene.options.accuracy = 0;
   scene.meetings[0].rolling = -1;
   CHECK_THROWS_WITH(scene.stepper(), Catch::Contains("rolling"));
 }

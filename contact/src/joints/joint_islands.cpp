@@ -37,6 +37,24 @@ StepJointIslands::StepJointIslands(Mechanisms& mechanisms, LawRows& laws, LawUse
 
 void StepJointIslands::set_options(const BodyOptions& options) {
   solver_.set_options(solver_options(options));
+  if (rolling_) rolling_->set_options(options);
+}
+
+void StepJointIslands::set_rolling(const NearContacts& near, std::unique_ptr<JointIslands> others,
+                                   const std::vector<Vector3d>* moments_of_others,
+                                   std::vector<Vector3d>* moments) {
+  near_ = &near;
+  rolling_ = std::move(others);
+  moments_of_rest_ = moments_of_others;
+  told_ = moments;
+}
+
+void StepJointIslands::solve_others(BodySolver& others, const std::vector<RigidBody>& bodies,
+                                    const std::vector<PointContact>& contacts, BodySolution& out) {
+  if (rolling_)
+    rolling_->solve(others, bodies, contacts, out);
+  else
+    others.solve(bodies, contacts, out);
 }
 
 // Islands of moving bodies, connected by contacts and mechanisms.
@@ -84,7 +102,8 @@ void StepJointIslands::solve_jointed(const std::vector<RigidBody>& bodies,
       x_.segment<3>(row) = tangent_frame(p.normal) * *last;
   }
   add_laws();
-  result_ = solver_.solve(mechanisms_, contacts_, own_, v_, x_);
+  add_moments(contacts);
+  result_ = solver_.solve(mechanisms_, contacts_, own_, v_, x_, normal_of_);
   take_laws();
 }
 
@@ -108,6 +127,38 @@ void StepJointIslands::take_laws() {
   if (use_ != LawUse::all) return;
   for (std::size_t l = 0; l < law_of_.size(); ++l)
     laws_.impulses[at(law_of_[l])] = laws_.impulse(law_of_[l], law_impulse(l));
+}
+
+// Their normals start from what the contact starts from.
+void StepJointIslands::add_moments(const std::vector<PointContact>& contacts) {
+  moments_.clear();
+  normal_of_.clear();
+  if (near_ == nullptr || law_ == Law::frictionless) return;
+  for (std::size_t k = 0; k < jointed_.size(); ++k) {
+    const PointContact& p = contacts[at(jointed_[k])];
+    const Meeting& m = near_->meeting(p);
+    moments_.add(p, m.rolling, m.torsional, static_cast<int>(k), mechanisms_, contacts_);
+  }
+  if (moments_.count() == 0) return;
+  own_.resize(contacts_.size() - at(moments_.count()), Vector3d::Zero());
+  for (int k = 0; k < moments_.count(); ++k) {
+    own_.push_back(moments_.own(k));
+    normal_of_.push_back(moments_.main(k));
+    const Vector3d* last = warm_ ? memory_.find(moments_.id(k)) : nullptr;
+    const auto row = static_cast<Eigen::Index>(x_.size());
+    x_.conservativeResize(row + 3);
+    const double normal = std::max(0.0, x_[3 * static_cast<Eigen::Index>(moments_.main(k))]);
+    x_.segment<3>(row) = moments_.start(k, normal, last != nullptr ? *last : Vector3d::Zero());
+  }
+}
+
+void StepJointIslands::take_moments(const std::vector<PointContact>& contacts) {
+  if (told_ == nullptr) return;
+  told_->assign(contacts.size(), Vector3d::Zero());
+  for (std::size_t k = 0; k < rest_.size() && k < moments_of_rest_->size(); ++k)
+    (*told_)[at(rest_[k])] = (*moments_of_rest_)[k];
+  for (int k = 0; k < moments_.count(); ++k)
+    (*told_)[at(jointed_[at(moments_.main(k))])] += moment(k);
 }
 
 void StepJointIslands::merge(const std::vector<RigidBody>& bodies,
@@ -150,13 +201,16 @@ void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& b
   find_islands(contacts);
   const bool laws = use_ != LawUse::none && laws_.laws.count() > 0;
   if (jointed_.empty() && !laws) {
-    others.solve(bodies, contacts, out);
+    solve_others(others, bodies, contacts, out);
+    moments_.clear();
+    take_moments(contacts);
     return remember(contacts, out);
   }
   points_.clear();
   for (const int k : rest_) points_.push_back(contacts[at(k)]);
-  others.solve(bodies, points_, solution_);
+  solve_others(others, bodies, points_, solution_);
   solve_jointed(bodies, contacts);
+  take_moments(contacts);
   merge(bodies, contacts, out);
   remember(contacts, out);
   memory_.get(start_);
@@ -170,6 +224,7 @@ void StepJointIslands::remember(const std::vector<PointContact>& contacts,
   memory_.keep(contacts, out.impulses);
   for (std::size_t l = 0; l < law_of_.size(); ++l)
     memory_.add(laws_.id(law_of_[l]), law_impulse(l));
+  for (int k = 0; k < moments_.count(); ++k) memory_.add(moments_.id(k), moment(k));
 }
 
 }  // namespace tether::contact::detail

@@ -7,6 +7,8 @@
 #include "joints/jointed_contacts.hpp"
 #include "joints/law_rows.hpp"
 #include "joints/mechanisms.hpp"
+#include "joints/moment_rows.hpp"
+#include "stepping/detection/near_contacts.hpp"
 #include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
@@ -16,6 +18,11 @@ class StepJointIslands final : public JointIslands {
  public:
   /// The mechanisms belong to the joints of the stepper, and are as they left them last.
   StepJointIslands(Mechanisms& mechanisms, LawRows& laws, LawUse use, const BodyOptions& options);
+  /// Contacts of meetings with such lengths hold moments, told to `moments` (of all contacts of a
+  /// solve, world axes, N m s; null: nobody). `others`: the islands without joints, and theirs.
+  void set_rolling(const NearContacts& near, std::unique_ptr<JointIslands> others,
+                   const std::vector<Eigen::Vector3d>* moments_of_others,
+                   std::vector<Eigen::Vector3d>* moments);
 
   void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
              const std::vector<PointContact>& contacts, BodySolution& out) override;
@@ -38,6 +45,14 @@ class StepJointIslands final : public JointIslands {
     return x_.segment<3>(3 * static_cast<Eigen::Index>(jointed_.size() + l));
   }
   void take_laws();
+  void add_moments(const std::vector<PointContact>& contacts);
+  void take_moments(const std::vector<PointContact>& contacts);
+  void solve_others(BodySolver& others, const std::vector<RigidBody>& bodies,
+                    const std::vector<PointContact>& contacts, BodySolution& out);
+  Eigen::Vector3d moment(int k) const {
+    const auto first = static_cast<Eigen::Index>(jointed_.size() + law_of_.size());
+    return moments_.moment(k, x_.segment<3>(3 * (first + k)));
+  }
 
   Mechanisms& mechanisms_;
   LawRows& laws_;
@@ -54,6 +69,13 @@ class StepJointIslands final : public JointIslands {
   std::vector<ContactRows> contacts_;  // jointed_, then laws
   std::vector<int> law_of_;            // of the latter
   std::vector<Eigen::Vector3d> own_;   // mobilities of contacts_; empty: none has any
+  // Only where a meeting names rolling or torsional friction.
+  const NearContacts* near_ = nullptr;
+  std::unique_ptr<JointIslands> rolling_;
+  const std::vector<Eigen::Vector3d>* moments_of_rest_ = nullptr;
+  std::vector<Eigen::Vector3d>* told_ = nullptr;
+  MomentRows moments_;
+  std::vector<int> normal_of_;
   std::vector<Vector6d> v_;
   linalg::VectorX x_;
   ImpulseHistory memory_;

@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tether/contact/evaluate.hpp>
 #include <tether/linalg/index.hpp>
+
+#include "joints/held_start.hpp"
 
 namespace tether::contact::detail {
 
@@ -14,7 +17,8 @@ namespace {
 
 // A_nn over that without joints; both are squares of lengths, the one left by rounding 1e-14.
 constexpr double kHeld = 1e-14;
-constexpr double kSlip = 1e-12;  // of the speeds that a slip is the difference of
+constexpr Eigen::Index kFew = 20;  // contacts whose dense factors cost little beside their solve
+constexpr double kSlip = 1e-12;    // of the speeds that a slip is the difference of
 
 using linalg::at;
 
@@ -130,6 +134,22 @@ void JointedContacts::assemble(Mechanisms& mechanisms, const std::vector<Eigen::
   for (Eigen::Index i = 0; i < n && !own.empty(); ++i)
     A_.diagonal().segment<3>(3 * i) += own[at(members_[static_cast<std::size_t>(i)])];
   clear_held_slips();
+  tie_normals();
+}
+
+// w_n = a (x_n - x_n of the other), a the mobility of that: a row that is not symmetric.
+void JointedContacts::tie_normals() {
+  tied_to_.assign(members_.size(), -1);
+  for (std::size_t l = 0; l < members_.size(); ++l) {
+    if (members_[l] < first_tied_) continue;
+    const int of = normal_of_[at(members_[l] - first_tied_)];
+    const auto place = std::lower_bound(members_.begin(), members_.end(), of) - members_.begin();
+    tied_to_[l] = static_cast<int>(place);
+    const auto row = 3 * static_cast<Eigen::Index>(l);
+    const double a = A_(3 * place, 3 * place);
+    A_(row, row) = a;
+    A_(row, 3 * place) = -a;
+  }
 }
 
 // Directions of slip that the joints hold: what rounding leaves of them in A would be divided by
@@ -159,6 +179,10 @@ void JointedContacts::drop_held(const std::vector<ContactRows>& contacts,
   kept_.clear();
   for (std::size_t l = 0; l < members_.size(); ++l) {
     const int i = static_cast<int>(l);
+    if (tied_to_[l] >= 0) {
+      if (std::binary_search(kept_.begin(), kept_.end(), tied_to_[l])) kept_.push_back(i);
+      continue;
+    }
     if (A_(3 * i, 3 * i) > kHeld * alone_[i]) {
       kept_.push_back(i);
       continue;
@@ -206,6 +230,9 @@ void JointedContacts::solve_kept(const std::vector<ContactRows>& contacts,
     start.segment<3>(3 * i) = x.segment<3>(3 * contact);
   }
   const Problem problem = Problem::dense(A_.topLeftCorner(3 * n, 3 * n), b, mu);
+  const double tolerance = solver_.options().tolerance;
+  if (n <= kFew && !(evaluate(problem, solver_.options().law, start).fixed_point <= tolerance))
+    hold_all(A_.topLeftCorner(3 * n, 3 * n), b, mu, tolerance, start);
   const Solution solution = solver_.solve(problem, start);
   result_.counts.add(solution.counts);
   if (!(solution.error <= result_.error)) result_.error = solution.error;
@@ -248,9 +275,11 @@ void JointedContacts::apply(Mechanisms& mechanisms, const linalg::VectorX& x,
 const JointedContacts::Result& JointedContacts::solve(Mechanisms& mechanisms,
                                                       const std::vector<ContactRows>& contacts,
                                                       const std::vector<Eigen::Vector3d>& own,
-                                                      std::vector<Vector6d>& v,
-                                                      linalg::VectorX& x) {
+                                                      std::vector<Vector6d>& v, linalg::VectorX& x,
+                                                      const std::vector<int>& normal_of) {
   result_ = {};
+  normal_of_ = normal_of;
+  first_tied_ = static_cast<int>(contacts.size() - normal_of.size());
   if (contacts.empty()) return result_;
   find_islands(mechanisms, contacts);
   for (std::size_t k = 0; k + 1 < island_start_.size(); ++k) {

@@ -25,10 +25,11 @@ class JointedContacts {
   /// Changes velocities that the joints already allow, v, by impulses that keep them so, and adds
   /// what the joints do to the pulls. x (3 each, contact frame): where to start from, and the
   /// impulses found. own: what an impulse moves a contact by besides the bodies, in each direction,
-  /// on the diagonal of A; empty: nothing.
+  /// on the diagonal of A; empty: nothing. The last of the contacts, as many as `normal_of` has,
+  /// have no normal of their own, but the impulse of that of the contact named there (MomentRows).
   const Result& solve(Mechanisms& mechanisms, const std::vector<ContactRows>& contacts,
                       const std::vector<Eigen::Vector3d>& own, std::vector<Vector6d>& v,
-                      linalg::VectorX& x);
+                      linalg::VectorX& x, const std::vector<int>& normal_of = {});
 
  private:
   /// One body of a contact that moves, and the contact's rows on its u. node: its mechanism, or,
@@ -47,6 +48,7 @@ class JointedContacts {
   void assemble(Mechanisms& mechanisms, const std::vector<Eigen::Vector3d>& own);
   void add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end);
   void clear_held_slips();
+  void tie_normals();
   void drop_held(const std::vector<ContactRows>& contacts, const std::vector<Vector6d>& v);
   Eigen::Vector3d approach(int place, const ContactRows& contact,
                            const std::vector<Vector6d>& v) const;
@@ -61,6 +63,10 @@ class JointedContacts {
   // sides of all, and A, and its diagonal without joints (normals, and sums of
   // both tangents).
   std::vector<int> members_, kept_;
+  // Of contacts without a normal of their own: the first; by contact from there on, the one whose
+  // impulse it has. Of the members, where that is; -1: they have one.
+  int first_tied_ = 0;
+  std::vector<int> normal_of_, tied_to_;
   std::vector<Side> sides_;
   std::vector<HeldSlip> held_slips_;
   Eigen::MatrixXd A_, answer_;

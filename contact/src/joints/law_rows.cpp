@@ -86,6 +86,21 @@ Eigen::Vector3d LawRows::start(int law, const Eigen::Vector3d* last) const {
   return {N, std::clamp(x[1], -N, N), 0};
 }
 
+LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {
+  const JointLaws::Law& each = laws[law];
+  LawState out;
+  out.side = at_bound(law);
+  out.limit = each.limit;
+  out.impulse = impulses[at(law)];
+  out.body = moving_along(law);
+  if (each.limit) return out;
+  out.came = speed(law, coming_) - each.rate;
+  out.left = speed(law, v) - each.rate;
+  out.bound = each.bound * dt_;
+  return out;
+}
+
+// Sign of the impulse; 0: the bound does not hold it.
 int LawRows::at_bound(int law) const {
   if (laws[law].limit) return 0;
   const double x = impulses[at(law)], N = laws[law].bound * dt_;

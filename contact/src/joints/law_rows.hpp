@@ -37,11 +37,12 @@ class LawRows {
   /// Its impulse in the contact frame, and back.
   Eigen::Vector3d start(int law, const Eigen::Vector3d* last) const;
   double impulse(int law, const Eigen::Vector3d& x) const { return laws[law].limit ? x[0] : x[1]; }
-  /// Whether the bound holds it: sign of the impulse then, else 0.
-  int at_bound(int law) const;
+  /// v: at the end of the part.
+  LawState state(int law, const std::vector<Vector6d>& v) const;
 
  private:
   static constexpr std::uint64_t kFirstId = std::uint64_t{1} << 63;
+  int at_bound(int law) const;
   int moving_along(int law) const;
   double speed(int law, const std::vector<Vector6d>& v) const;
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <tether/linalg/index.hpp>
 
+#include "rolling/rolling_part.hpp"
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
@@ -25,6 +26,7 @@ constexpr int kManyImpacts = 1000;   // in a step: from then on they end it in a
 constexpr double kSlips = 1 - 1e-6;  // of the cone
 constexpr double kStill = 0.01;      // of the accuracy: a slip that moves nothing in a part
 constexpr double kBeforeEnd = 0.95;  // of a part: a switch that ends it
+constexpr int kRolls = 4, kSpins = 6;  // Active::what of moments at their bound, else the next
 
 Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaternion& to) {
   linalg::Quaternion d = to * from.conjugate();
@@ -77,7 +79,7 @@ void Stepper::Implementation::advance_part(double time, double length) {
 // What contacts have done in the part just taken.
 void Stepper::Implementation::list_active(double length, std::vector<Active>& list) const {
   list.clear();
-  if (joints) list_laws(list);
+  if (joints) list_laws(length, list);
   if (!near) return;
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
     const PointContact& c = contacts.points[k];
@@ -95,6 +97,7 @@ void Stepper::Implementation::list_active(double length, std::vector<Active>& li
     a.came = slip_of(parts.before.motion, c);
     a.speed = slip_of(bodies.motion, c).norm();
   }
+  if (rolling) list_moments(list);
   for (const detail::Impact& i : impacts->list())
     if (moment(i, length).early < length)
       list.push_back({contacts.points[at(i.contact)].id, 3, Vector3d::Zero()});
@@ -103,19 +106,47 @@ void Stepper::Implementation::list_active(double length, std::vector<Active>& li
   });
 }
 
-// Limits that press and laws at a bound: as contacts, behind all of them.
-void Stepper::Implementation::list_laws(std::vector<Active>& list) const {
-  std::vector<int> what;
-  joints->list_laws(what);
-  for (std::size_t k = 0; k < what.size(); ++k)
-    if (what[k] != 0) list.push_back({~std::uint64_t{0} - k, 10 + what[k], Vector3d::Zero()});
+// As contacts, behind all of them: limits that press stick, laws at their bound slip.
+void Stepper::Implementation::list_laws(double length, std::vector<Active>& list) const {
+  std::vector<detail::LawState> laws;
+  joints->list_laws(laws);
+  for (std::size_t k = 0; k < laws.size(); ++k) {
+    const detail::LawState& law = laws[k];
+    if (law.impulse == 0) continue;
+    list.push_back({~std::uint64_t{0} - k, law.side != 0 ? 2 : 1, law.side * Vector3d::UnitX()});
+    Active& a = list.back();
+    a.force = std::abs(law.impulse) / length;
+    a.margin = (law.bound - std::abs(law.impulse)) / length;
+    a.size = law.body < 0 ? 1 : parts.radius[at(law.body)];
+    a.came = law.came * Vector3d::UnitX();
+    a.speed = std::abs(law.left);
+  }
+}
+
+// Moments that their bound holds, and others.
+void Stepper::Implementation::list_moments(std::vector<Active>& list) const {
+  const std::vector<Vector3d>& moments = joints ? joints->moments() : rolling->moments();
+  for (std::size_t k = 0; k < std::min(moments.size(), contacts.points.size()); ++k) {
+    const PointContact& c = contacts.points[k];
+    const double normal = c.normal.dot(contacts.impulses[k]);
+    if (!(normal > 0)) continue;
+    const Meeting& m = near->meeting(c);
+    const Vector3d spin = c.normal.dot(moments[k]) * c.normal, roll = moments[k] - spin;
+    if (m.rolling > 0) {
+      const bool turns = !(roll.norm() < kSlips * m.rolling * normal);
+      list.push_back({c.id, turns ? kRolls : kRolls + 1, turns ? roll : Vector3d::Zero()});
+    }
+    if (m.torsional > 0) {
+      const bool turns = !(spin.norm() < kSlips * m.torsional * normal);
+      list.push_back({c.id, turns ? kSpins : kSpins + 1, turns ? spin : Vector3d::Zero()});
+    }
+  }
 }
 
 bool Stepper::Implementation::same(const std::vector<Active>& a, const std::vector<Active>& b) {
   return a.size() == b.size() &&
          std::equal(a.begin(), a.end(), b.begin(), [](const Active& p, const Active& q) {
-           return p.id == q.id && p.what == q.what &&
-                  (p.what != 2 || p.slip.isZero(0) || p.slip.dot(q.slip) > 0);
+           return p.id == q.id && p.what == q.what && (p.slip.isZero(0) || p.slip.dot(q.slip) > 0);
          });
 }
 

@@ -55,8 +55,6 @@ static void check_rolling(const SteppingOptions& options) {
         std::string("rolling and torsional friction need law = coulomb, not ") + name(options.law));
   if (options.restitution_law != RestitutionLaw::newton)
     throw std::invalid_argument("rolling and torsional friction need restitution_law = newton");
-  if (options.accuracy > 0)
-    throw std::invalid_argument("rolling and torsional friction need accuracy = 0");
 }
 
 // Of bodies, m: the reach of their surfaces, or the radius of gyration.
@@ -113,7 +111,9 @@ BodySet& Stepper::bodies() { return implementation_->bodies; }
 const StepContacts& Stepper::contacts() const { return implementation_->contacts; }
 const std::vector<Eigen::Vector3d>& Stepper::contact_moments() const {
   static const std::vector<Eigen::Vector3d> none;
-  return implementation_->rolling ? implementation_->rolling->moments() : none;
+  const Implementation& s = *implementation_;
+  if (!s.rolling) return none;
+  return s.joints ? s.joints->moments() : s.rolling->moments();
 }
 double Stepper::penetration() const { return implementation_->outcome.deepest; }
 double Stepper::residual() const { return implementation_->outcome.residual; }

@@ -35,8 +35,8 @@ struct PartState {
 struct PartControl {
   struct Active {
     std::uint64_t id;
-    int what;              // 1: sticks, 2: slips, 3: an impact; > 3: a law of a joint
-    Eigen::Vector3d slip;  // impulse against it
+    int what;  // 1: sticks, 2: slips, 3: an impact; > 3: a moment; laws of joints as contacts
+    Eigen::Vector3d slip;  // impulse, or moment, against it
     // Of a contact: normal force and what is left of the cone, means of the part; its slip
     // where the part begins, and how fast it is where it ends.
     double force = 0, margin = 0, speed = 0, size = 0;
@@ -129,7 +129,8 @@ struct Stepper::Implementation {
   Moment moment(double gap, double came, double comes, double size, double length) const;
   Moment moment(const detail::Impact& i, double length) const;
   void list_active(double length, std::vector<detail::PartControl::Active>& list) const;
-  void list_laws(std::vector<detail::PartControl::Active>& list) const;
+  void list_laws(double length, std::vector<detail::PartControl::Active>& list) const;
+  void list_moments(std::vector<detail::PartControl::Active>& list) const;
   static bool same(const std::vector<detail::PartControl::Active>& a,
                    const std::vector<detail::PartControl::Active>& b);
   double first_impact(double length, double& at_once) const;

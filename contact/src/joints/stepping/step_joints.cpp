@@ -71,12 +71,17 @@ bool StepJoints::are_joined(int first, int second) const {
 }
 
 std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& options, LawUse laws) {
-  return std::make_unique<StepJointIslands>(mechanisms_, laws_, laws, options);
+  auto out = std::make_unique<StepJointIslands>(mechanisms_, laws_, laws, options);
+  if (rolling_ == nullptr || laws == LawUse::limits) return out;
+  // The first are those of a step's velocities (RollingPart).
+  std::unique_ptr<JointIslands> others = rolling_->make_islands(options, laws);
+  out->set_rolling(*near_, std::move(others), &rolling_->moments(),
+                   std::exchange(first_islands_, false) ? &moments_ : nullptr);
+  return out;
 }
 
-void StepJoints::list_laws(std::vector<int>& out) const {
-  for (int k = 0; k < laws_.laws.count(); ++k)
-    out.push_back(laws_.impulses[at(k)] == 0 ? 0 : laws_.at_bound(k) != 0 ? laws_.at_bound(k) : 2);
+void StepJoints::list_laws(std::vector<LawState>& out) const {
+  for (int k = 0; k < laws_.laws.count(); ++k) out.push_back(laws_.state(k, v_));
 }
 
 // Equations of the positions at time t. Factors are of no place while they are made: the caller's
@@ -351,6 +356,9 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
       change_[at(p.second)].head<3>() += x;
       change_[at(p.second)].tail<3>() += p.r2.cross(x);
     }
+    if (moments_.empty()) continue;
+    if (holds(p.first)) change_[at(p.first)].tail<3>() -= moments_[c];
+    if (p.second >= 0 && holds(p.second)) change_[at(p.second)].tail<3>() += moments_[c];
   }
   const JointRows& laws = laws_.laws.rows();
   for (int k = 0; k < laws.count(); ++k)

@@ -9,6 +9,7 @@
 
 #include "joints/law_rows.hpp"
 #include "joints/mechanisms.hpp"
+#include "rolling/rolling_part.hpp"
 #include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
@@ -27,6 +28,11 @@ class StepJoints final : public JointPart {
   const std::vector<std::pair<int, int>>& links() const override { return links_; }
   bool are_joined(int first, int second) const override;
   std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
+  void set_rolling(const NearContacts& near, RollingPart& rolling) override {
+    near_ = &near;
+    rolling_ = &rolling;
+  }
+  const std::vector<Eigen::Vector3d>& moments() const override { return moments_; }
 
   /// Start of a step, before its forces: where the bodies have been moved from outside, they are
   /// put back onto the joints by the least move, and their velocities. Throws std::invalid_argument
@@ -41,7 +47,7 @@ class StepJoints final : public JointPart {
   bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) override;
 
   bool has_laws() const override { return has_laws_; }
-  void list_laws(std::vector<int>& out) const override;
+  void list_laws(std::vector<LawState>& out) const override;
   const std::vector<Strike>& strikes() const override { return laws_.strikes; }
   const std::vector<double>& law_impulses() const override { return laws_.impulses; }
 
@@ -99,6 +105,10 @@ class StepJoints final : public JointPart {
   Mechanisms mechanisms_;
   bool has_laws_;
   LawRows laws_;
+  const NearContacts* near_ = nullptr;  // only where a meeting names rolling friction
+  RollingPart* rolling_ = nullptr;
+  bool first_islands_ = true;
+  std::vector<Eigen::Vector3d> moments_;  // of contacts, in the last problem of velocities
   JointRows rows_;
   std::vector<int> bodies_of_rows_;  // of the first rows; -1 behind each
   int laws_in_step_ = -1;            // of the first step

@@ -15,9 +15,6 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   if (s.joints || !s.force.empty())
     throw std::invalid_argument("Stepper::add_joints: once, and before add_force");
   if (!joints || joints->rows() == 0) return;
-  if (s.rolling)
-    throw std::invalid_argument(
-        "Stepper::add_joints: joints do not go with rolling and torsional friction (Meeting)");
   if (joints->has_laws() && s.options.law != Law::coulomb)
     throw std::invalid_argument(
         std::string(
@@ -30,6 +27,10 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   s.joints =
       std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
   s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
+  if (s.rolling) {
+    s.rolling = std::make_unique<detail::RollingPart>(*s.near);
+    s.joints->set_rolling(*s.near, *s.rolling);
+  }
   if (s.solver)
     s.give_islands(*s.joints);
   else if (s.joints->has_laws())

@@ -9,6 +9,9 @@
 
 namespace tether::contact::detail {
 
+class NearContacts;
+class RollingPart;
+
 /// Laws of joints (JointLaws) in a problem: of velocities, of positions, that leaves them out.
 enum class LawUse { all, limits, none };
 
@@ -17,6 +20,15 @@ struct Strike {
   double gap;          ///< m or rad, at the start of the part
   double came, comes;  ///< approach before and with the forces of the part, > 0
   int body;            ///< one that moves along; -1: the coordinate is an angle
+};
+
+/// What a law of a joint has done in a part of a step.
+struct LawState {
+  int side = 0;                   ///< sign of the impulse that its bound allows no more of; else 0
+  bool limit = false;             ///< else bounded
+  double came = 0, left = 0;      ///< speeds beside the wanted one, where the part began and ended
+  double impulse = 0, bound = 0;  ///< N s, N m s
+  int body = -1;                  ///< as of Strike
 };
 
 /// Contact problems of islands with joints. Abstract, as JointPart: who adds no joints to a Stepper
@@ -57,14 +69,15 @@ class JointPart : public IslandMaker {
   virtual bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) = 0;
   /// Whether there are laws; then contact problems are solved without contacts, too.
   virtual bool has_laws() const = 0;
-  /// Sign of each law's impulse in the last part where its bound holds it, else 2 where it has one,
-  /// 0 where it has none.
-  virtual void list_laws(std::vector<int>& out) const = 0;
+  virtual void list_laws(std::vector<LawState>& out) const = 0;
   virtual const std::vector<Strike>& strikes() const = 0;
   virtual const std::vector<double>& law_impulses() const = 0;
   virtual double drift() const = 0;
   virtual void set_drift(double drift) = 0;
   virtual const std::vector<double>& impulses() const = 0;
+  /// Rolling and torsional friction of contacts, before islands are made.
+  virtual void set_rolling(const NearContacts& near, RollingPart& rolling) = 0;
+  virtual const std::vector<Eigen::Vector3d>& moments() const = 0;  ///< as of RollingPart
 };
 
 /// A BodySolver, and JointIslands where there are joints.

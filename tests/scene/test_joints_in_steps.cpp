@@ -1,0 +1,163 @@
+// What joints in steps keep and refuse, and chains that come to rest. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <sstream>
+
+#include "jointed_scenes.hpp"
+#include "support/catch.hpp"
+
+using namespace jointed_scenes;
+
+TEST_CASE("joints and contact: a free chain keeps momentum and angular momentum to round-off") {
+  Scene s = stepping(2e-3, Vector3d::Zero());
+  s.gravity.reset();
+  Vector3d end(0, 0, 0);
+  for (int k = 0; k < 6; ++k) {
+    const Vector3d next = end + Vector3d(std::cos(k), std::sin(k), 0.3 * k);
+    Body link = rod("link " + std::to_string(k), end, next, 1 + k, 0.1);
+    link.velocity = Vector3d(k, 1 - k, 0.5);
+    link.angular_velocity = Vector3d(1, -k, 2);
+    add(s, link);
+    if (k > 0) s.joints.push_back(joint(JointKind::ball, k, k - 1, end));
+    end = next;
+  }
+  const auto engine = make_engine(s);
+  const Diagnostics start = engine->diagnostics();
+  engine->advance(2);
+  const Diagnostics now = engine->diagnostics();
+  CHECK((now.momentum - start.momentum).norm() < 1e-12 * start.momentum.norm());
+  CHECK((now.angular_momentum - start.angular_momentum).norm() <
+        1e-11 * start.angular_momentum.norm());
+  CHECK(now.drift < 1e-11);
+  CHECK(std::abs(now.kinetic_energy / start.kinetic_energy - 1) < 1e-3);
+}
+
+TEST_CASE("joints and contact: contradicting joints are refused by name") {
+  Scene s = stepping(1e-3, Vector3d(0, 0, -kGravity));
+  add(s, ball("bob", {1, 0, 0}));
+  s.joints.push_back(joint(JointKind::distance, 0, kWorld, {1, 0, 0}, {0, 0, 0}));
+  s.joints.push_back(joint(JointKind::distance, 0, kWorld, {1, 0, 0}, {3, 0, 0}));
+  s.joints[0].name = "left";
+  s.joints[1].name = "right";
+  s.joints[1].length = 1.5;
+  CHECK_THROWS_WITH(make_engine(s), Catch::Matchers::Contains("joints contradict each other") &&
+                                        Catch::Matchers::Contains("\"left\"") &&
+                                        Catch::Matchers::Contains("\"right\""));
+}
+
+TEST_CASE("joints and contact: a driven slider grazes the floor that it does not press") {
+  const double step = 1e-3, mu = 0.3, speed = 0.5;
+  Scene s = stepping(step, Vector3d(0, 0, -kGravity));
+  Body driven = ball("driven", {0, 0, 0.1}, 5);
+  touch(driven, {{0, 0, 0}});
+  add(s, driven);
+  s.joints.push_back(joint(JointKind::slider, 0, kWorld, {0, 0, 0.1}));
+  s.joints.back().axis = Vector3d::UnitX();
+  s.joints.back().motion.emplace().rate = speed;
+  add_wall(s, {0, 0, 0}, Vector3d::UnitZ(), mu);
+  const auto engine = make_engine(s);
+  engine->advance(0.5);
+  // The slider carries the weight: the floor that it grazes is not pressed.
+  CHECK(engine->bodies()[0].velocity.x() == Approx(speed).epsilon(1e-12));
+  CHECK(engine->bodies()[0].position.x() == Approx(speed * 0.5).epsilon(1e-12));
+  CHECK(engine->diagnostics().drift < 1e-13);
+  CHECK(engine->counts().unsolved == 0);
+}
+
+TEST_CASE("joints and contact: bodies that a joint connects pass through each other") {
+  Scene s = stepping(1e-3, Vector3d(0, 0, -kGravity));
+  for (int k = 0; k < 2; ++k) {
+    Body half = ball(k == 0 ? "first" : "second", {0.05 * k, 0, 1});
+    touch_sphere(half, 0.1);
+    add(s, half);
+  }
+  s.joints.push_back(joint(JointKind::ball, 0, 1, {0.025, 0, 1}));
+  s.pairs.emplace_back();
+  s.pairs.back().first = s.pairs.back().second = "part";
+  const auto engine = make_engine(s);
+  engine->advance(0.1);
+  const Diagnostics now = engine->diagnostics();
+  CHECK(now.contacts == 0);
+  CHECK(now.penetration == 0);
+  CHECK(engine->bodies()[0].velocity.z() == Approx(-0.1 * kGravity).epsilon(1e-12));
+}
+
+TEST_CASE("joints and contact: a motor that drives a body into the floor is told so") {
+  Scene s = stepping(1e-3, Vector3d(0, 0, -kGravity));
+  Body arm = ball("arm", {1, 0, 0.3});
+  touch_sphere(arm, 0.1);
+  add(s, arm);
+  s.joints.push_back(hinge(0, kWorld, {0, 0, 0.3}, kY));
+  s.joints.back().motion.emplace().rate = 1;
+  add_wall(s, {0, 0, 0}, Vector3d::UnitZ(), 0.3);
+  const auto engine = make_engine(s);
+  CHECK_THROWS_WITH(engine->advance(1), Catch::Matchers::Contains("drive them into each other"));
+}
+
+TEST_CASE("joints and contact: a run that goes on from a saved state has the same bits") {
+  const Scene s = ladder(60, 0.2, 2e-3);
+  const auto whole = make_engine(s), first = make_engine(s), second = make_engine(s);
+  whole->advance(0.4);
+  first->advance(0.2);
+  std::stringstream state;
+  first->save(state);
+  second->restore(state);
+  second->advance(0.4);
+  for (std::size_t i = 0; i < whole->bodies().size(); ++i) {
+    CHECK(whole->bodies()[i].position == second->bodies()[i].position);
+    CHECK(whole->bodies()[i].velocity == second->bodies()[i].velocity);
+    CHECK(whole->bodies()[i].orientation.coeffs() == second->bodies()[i].orientation.coeffs());
+  }
+}
+
+TEST_CASE("joints and contact: a closed chain of redundant hinges falls and comes to rest") {
+  Scene s = stepping(2e-3, Vector3d(0, 0, -kGravity));
+  const int n = 20;
+  const double radius = 0.05 / std::sin(M_PI / n);
+  const auto corner = [&](int k) {
+    const double a = 2 * M_PI * k / n;
+    return Vector3d(radius * std::cos(a), 0, radius + 0.1 + radius * std::sin(a));
+  };
+  for (int k = 0; k < n; ++k) {
+    Body link = rod("link " + std::to_string(k), corner(k), corner(k + 1), 0.1, 0.05);
+    touch_sphere(link, 0.03);
+    add(s, link);
+    s.joints.push_back(hinge(k, (k + n - 1) % n, corner(k), kY));
+  }
+  add_wall(s, {0, 0, 0}, Vector3d::UnitZ(), 0.5);
+  const auto engine = make_engine(s);
+  double before = energy(*engine), drift = 0;
+  for (int k = 1; k <= 10; ++k) {
+    engine->advance(0.1 * k);
+    CHECK(energy(*engine) < before + 1e-8);
+    before = energy(*engine);
+    drift = std::max(drift, engine->diagnostics().drift);
+  }
+  CHECK(engine->diagnostics().kinetic_energy < 1e-15);
+  CHECK(drift < 1e-12);
+  CHECK(engine->counts().unsolved == 0);
+}
+
+TEST_CASE("joints and contact: a chain of 100 links falls on the floor and comes to rest") {
+  Scene s = stepping(5e-3, Vector3d(0, 0, -kGravity));
+  const auto joint_at = [](int k) {
+    return Vector3d(0.095 * k, 0, 0.1 + 0.03 * std::sin(0.7 * k));
+  };
+  for (int k = 0; k < 100; ++k) {
+    Body link = rod("link " + std::to_string(k), joint_at(k), joint_at(k + 1), 0.1, 0.05);
+    touch_sphere(link, 0.03);
+    add(s, link);
+    if (k > 0) s.joints.push_back(joint(JointKind::ball, k, k - 1, joint_at(k)));
+  }
+  add_wall(s, {0, 0, 0}, Vector3d::UnitZ(), 0.5);
+  const auto engine = make_engine(s);
+  double before = energy(*engine), drift = 0;
+  for (int k = 1; k <= 10; ++k) {
+    engine->advance(0.1 * k);
+    CHECK(energy(*engine) < before + 1e-8 * 100);
+    before = energy(*engine);
+    drift = std::max(drift, engine->diagnostics().drift);
+  }
+  CHECK(engine->diagnostics().kinetic_energy < 1e-12);
+  CHECK(drift < 1e-10);
+  CHECK(engine->counts().unsolved == 0);
+}
