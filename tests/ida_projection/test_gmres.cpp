@@ -86,6 +86,25 @@ TEST_CASE("sparse rows of a thousand rods: plain IDA's steps, smaller errors, li
   CHECK(std::exp(mean) <= 1.1);
 }
 
+TEST_CASE("dense rows of three hundred rods: the motion of sparse ones") {
+  const RodChain chain(300, 0.1);  // 600 rows of 1200 unknowns
+  const Problem problem = chain.problem(0.5);
+  const tp::Constraints dense = chain.dense_rows(), sparse = chain.sparse_rows();
+  const Run reference = integrate_without_matrix(problem, 1e-9, &sparse);
+  for (const double tolerance : {1e-4, 1e-6}) {
+    INFO("tolerance " << tolerance);
+    const Run run = integrate_without_matrix(problem, tolerance, &dense);
+    const Run of_sparse = integrate_without_matrix(problem, tolerance, &sparse);
+    REQUIRE(run.flag >= 0);
+    REQUIRE(of_sparse.flag >= 0);
+    CHECK(run.drift <= tolerance);
+    CHECK(10 * run.steps <= 12 * of_sparse.steps);
+    CHECK(10 * of_sparse.steps <= 12 * run.steps);
+    CHECK(apart(run, reference) <= 1.5 * apart(of_sparse, reference) + tolerance);
+    CHECK(run.statistics.failures() == 0);
+  }
+}
+
 TEST_CASE("a thousand rods, GMRES: a step size at which it failed is not tried again at once") {
   const RodChain chain(1000, 0.1);
   const Problem problem = chain.problem(0.5);

@@ -87,6 +87,40 @@ TEST_CASE("envelope: what is not positive definite is refused, in every row") {
     }
 }
 
+TEST_CASE("envelope: rows of which little is left are left out") {
+  std::mt19937 random(6);
+  for (const int size : {1, 4, 11}) {
+    Envelope envelope;
+    envelope.resize(size);
+    for (int out = 0; out < size; ++out) {
+      INFO(size << " rows, without row " << out);
+      Matrix matrix(size, random);
+      const Eigen::MatrixXd L = Eigen::LLT<Eigen::MatrixXd>(matrix.G).matrixL();
+      matrix.G(out, out) -= L(out, out) * L(out, out) * (1.0 - 1e-9);
+      matrix.load(&envelope);
+      REQUIRE(envelope.factor(1e-6));
+      // The same without it.
+      Eigen::MatrixXd G = matrix.G;
+      G.row(out).setZero();
+      G.col(out).setZero();
+      G(out, out) = 1.0;
+      const Eigen::LLT<Eigen::MatrixXd> reference(G);
+      Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(size, -1.0, 2.0);
+      std::vector<double> x(right.data(), right.data() + size);
+      x.resize(static_cast<std::size_t>(size) + 3);
+      envelope.solve(x.data());
+      right[out] = 0.0;
+      const Eigen::VectorXd expected = reference.solve(right);
+      for (int k = 0; k < size; ++k) {
+        CHECK(x[static_cast<std::size_t>(k)] ==
+              Approx(expected[k]).epsilon(1e-9).margin(1e-10 * expected.norm()));
+        CHECK(envelope.diagonal(k) ==
+              Approx(k == out ? 0.0 : reference.matrixL()(k, k)).epsilon(1e-9));
+      }
+    }
+  }
+}
+
 TEST_CASE("filled places: of all rows at once as of each row by itself") {
   constexpr int kRows = 7, kColumns = 30;
   FilledPlaces all, each;

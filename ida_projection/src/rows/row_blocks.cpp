@@ -212,8 +212,9 @@ Status RowBlocks::learn_trust(Evaluator& evaluator, double t, const double* y, c
 
 bool RowBlocks::factor() {
   for (Block* block : {&d, &a})
-    if (!block->rows.empty() && !block->solver.factor(C_.data(), n_, block->rows.data(),
-                                                      block->columns.data(), rank_tolerance_))
+    if (!block->rows.empty() &&
+        !block->solver.factor(C_.data(), n_, block->rows.data(), block->columns.data(),
+                              rank_tolerance_, zero_elsewhere_ ? &places_ : nullptr))
       return false;
   return true;
 }

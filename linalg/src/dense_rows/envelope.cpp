@@ -38,11 +38,17 @@ TETHER_INLINE void subtract_products(v4_of_envelope* c, const double* rows, cons
   c[3] = c3;
 }
 
-// The four rows on the diagonal, `corner` their own columns. False: not positive definite.
-TETHER_INLINE bool factor_corner(double* corner, double* diagonal, double* inverse) {
+// The four rows on the diagonal, `corner` their own columns. Rows of which no more than `least` is
+// left are left out; false: there is one, `least` is 0.
+TETHER_INLINE bool factor_corner(double least, double* corner, double* diagonal, double* inverse) {
   for (int c = 0; c < kFour; ++c) {
     double* const column = corner + kFour * c;
-    if (!(column[c] > 0.0)) return false;
+    if (!(column[c] > least)) {
+      if (!(least > 0.0)) return false;
+      for (int r = c; r < kFour; ++r) column[r] = 0.0;
+      diagonal[c] = inverse[c] = 0.0;
+      continue;
+    }
     diagonal[c] = std::sqrt(column[c]);
     inverse[c] = 1.0 / diagonal[c];
     for (int r = c + 1; r < kFour; ++r) column[r] *= inverse[c];
@@ -53,8 +59,9 @@ TETHER_INLINE bool factor_corner(double* corner, double* diagonal, double* inver
 }
 
 // Four rows after the other, each against four columns at a time.
-TETHER_CLONES bool factor_fours(int count, const int* firsts, const std::ptrdiff_t* starts,
-                                double* L, double* diagonal, double* inverse) {
+TETHER_CLONES bool factor_fours(double least, int count, const int* firsts,
+                                const std::ptrdiff_t* starts, double* L, double* diagonal,
+                                double* inverse) {
   for (int k = 0; k < count; ++k) {
     double* const rows = L + starts[k];
     v4_of_envelope c[kFour];
@@ -72,7 +79,7 @@ TETHER_CLONES bool factor_fours(int count, const int* firsts, const std::ptrdiff
       }
       for (int i = 0; i < kFour; ++i) store(block + kFour * i, c[i]);
     }
-    if (!factor_corner(rows + kFour * kFour * k, diagonal + kFour * k, inverse + kFour * k))
+    if (!factor_corner(least, rows + kFour * kFour * k, diagonal + kFour * k, inverse + kFour * k))
       return false;
   }
   return true;
@@ -150,8 +157,8 @@ void Envelope::clear() {
     row(k)[kFour * k] = 1.0;  // rows that fill the last four
 }
 
-bool Envelope::factor() {
-  return factor_fours(count(), firsts_.data(), starts_.data(), L_.data(), diagonal_.data(),
+bool Envelope::factor(double least) {
+  return factor_fours(least, count(), firsts_.data(), starts_.data(), L_.data(), diagonal_.data(),
                       inverse_.data());
 }
 

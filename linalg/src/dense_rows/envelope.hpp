@@ -26,8 +26,9 @@ class Envelope {
   /// The lower triangle of G is zero, to be filled in row(k)[kStride column], inside the envelope.
   void clear();
   double* row(int k) { return L_.data() + starts_[static_cast<std::size_t>(k / 4)] + k % 4; }
-  /// G to L. False: not positive definite.
-  bool factor();
+  /// G to L. False: not positive definite. least > 0: rows whose diagonal entry, less what the rows
+  /// before explain of it, is no larger are left out: x_k = 0 in solve(), and diagonal(k) = 0.
+  bool factor(double least = 0.0);
   double diagonal(int k) const { return diagonal_[static_cast<std::size_t>(k)]; }
   /// x <- G^-1 x; x has room for three entries more.
   void solve(double* x) const;

@@ -14,8 +14,7 @@ namespace tether::linalg {
 void KeptRows::resize(int rows, int columns) {
   const auto entries = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
   const auto each_column = static_cast<std::size_t>(columns);
-  const int most = std::min(rows, columns);
-  const auto each_row = static_cast<std::size_t>(most);
+  const auto each_row = static_cast<std::size_t>(rows);
   n_ = columns;
   places_.resize(rows, columns);
   looked_at_ = -1;
@@ -28,13 +27,13 @@ void KeptRows::resize(int rows, int columns) {
   order_.reserve(each_row);
   place_.assign(each_row, 0);
   sorted_.assign(each_row, 0);
-  row_order_.resize(most, columns);
+  row_order_.resize(rows, columns);
   firsts_.assign(each_column, 0);
   permuted_.assign(each_row + 3, 0.0);
-  envelope_.resize(most);
+  envelope_.resize(rows);
   planned_places_ = -1;
-  L_.resize(most, most);
-  spread_.resize(columns, most);
+  L_.resize(rows, rows);
+  spread_.resize(columns, rows);
 }
 
 bool KeptRows::load(const double* wide, int width, const int* rows, const int* columns,
@@ -101,9 +100,20 @@ bool KeptRows::factor(const int* order, int rank) {
     multiply_by_columns(rank);
     return envelope_.factor();
   }
+  return factor_dense(rank);
+}
+
+bool KeptRows::factor_dense(int rank) {
   multiply_dense(rank);
   Eigen::Ref<Eigen::MatrixXd> L = L_.topLeftCorner(rank, rank);
   return Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(L).info() == Eigen::Success;
+}
+
+bool KeptRows::factor_firm(const int* order, int rank, double sine) {
+  if (!planned(order, rank)) plan(order, rank);
+  if (dense_) return rank <= n_ && factor_dense(rank) && least_part(rank) >= sine;
+  multiply_by_columns(rank);
+  return envelope_.factor(sine * sine);
 }
 
 bool KeptRows::planned(const int* order, int rank) const {
@@ -218,6 +228,21 @@ void KeptRows::dependence(int i, int rank, double* x) const {
   for (int k = 0; k < rank; ++k) x[k] = times(order_[static_cast<std::size_t>(k)], work_.data());
   clear(i);
   solve_factored(rank, x);
+}
+
+// Twice: the first projection leaves rounding, magnified by the condition of A A^T.
+void KeptRows::remainder(int i, int rank, double* z, double* left) const {
+  std::fill(left, left + n_, 0.0);
+  visit(i, [left](int j, double a) { left[j] = a; });
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int k = 0; k < rank; ++k) z[k] = times(order_[static_cast<std::size_t>(k)], left);
+    solve_factored(rank, z);
+    for (int k = 0; k < rank; ++k) {
+      const double share = z[k];
+      visit(order_[static_cast<std::size_t>(k)],
+            [left, share](int j, double a) { left[j] -= share * a; });
+    }
+  }
 }
 
 }  // namespace tether::linalg

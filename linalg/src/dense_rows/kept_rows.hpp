@@ -27,6 +27,9 @@ class KeptRows {
   void load(const double* unit_rows);
   /// A A^T = L L^T of the first `rank` rows of the order. False: not positive definite.
   bool factor(const int* order, int rank);
+  /// The same of rows that need not be independent: those with an independent part below `sine` are
+  /// left out, theirs is 0 then. False: places are many, and there are such rows.
+  bool factor_firm(const int* order, int rank, double sine);
   /// L_kk: how much of row k of the order is independent of those that the factors have before it.
   double independent_part(int k) const {
     return dense_ ? L_(k, k) : envelope_.diagonal(place_[static_cast<std::size_t>(k)]);
@@ -39,6 +42,8 @@ class KeptRows {
   double times(int i, const double* du) const;
   /// x with A_i = sum_k x_k A_order(k), k < rank, in the sense of least squares.
   void dependence(int i, int rank, double* x) const;
+  /// What these rows leave of A_i, n entries; z: work space, rank entries.
+  void remainder(int i, int rank, double* z, double* left) const;
 
  private:
   void learn(const FilledPlaces& wide, int width, const int* rows, const int* columns);
@@ -57,6 +62,7 @@ class KeptRows {
   void plan(const int* order, int rank);
   void multiply_by_columns(int rank);
   void multiply_dense(int rank);
+  bool factor_dense(int rank);
 
   int n_ = 0;
   FilledPlaces places_;        // columns of each row

@@ -1,11 +1,11 @@
 // Tether: minimum-norm solution of C dy = g in a diagonal metric.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <Eigen/Dense>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/minimum_norm.hpp>
 
-#include "kept_rows.hpp"
+#include "large_rows.hpp"
 #include "small_kept_rows.hpp"
 #include "small_orthogonal.hpp"
 
@@ -13,17 +13,12 @@ namespace tether::linalg {
 
 namespace {
 
-// Of factor_kept(): the square of this sine A A^T gives to 1e-10 of itself.
-constexpr double kLeastSine = 1e-3, kLeastShare = 1.0 / 3.0;
+constexpr double kLeastShare = 1.0 / 3.0;  // of factor_kept()
+// Entries of C above which A A^T is tried first: the orthogonal factorisation goes through a matrix
+// that no longer fits into fast memory once for each row.
+constexpr double kMany = 262144.0;
 
 }  // namespace
-
-struct MinimumNorm::Large {
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-  Eigen::VectorXd work, rhs;
-  KeptRows kept;  // of factor_kept()
-};
 
 MinimumNorm::MinimumNorm() = default;
 MinimumNorm::MinimumNorm(int rows, int columns) { resize(rows, columns); }
@@ -58,8 +53,18 @@ void MinimumNorm::resize(int rows, int columns) {
     large_->work.resize(std::max(rows, columns));
     large_->rhs.resize(std::max(rows, columns));
     large_->kept.resize(rows, columns);
+    large_->order.assign(m, 0);
+    large_->split = false;
+    if (splits()) {
+      large_->natural.resize(m);
+      std::iota(large_->natural.begin(), large_->natural.end(), 0);
+      large_->rest.resize(rows, columns);
+      large_->left.resize(rows);
+    }
   }
 }
+
+bool MinimumNorm::splits() const { return static_cast<double>(m_) * n_ > kMany; }
 
 void MinimumNorm::set_rank(int rank) {
   rank_ = factored_rank_ = rank;
@@ -78,14 +83,22 @@ bool MinimumNorm::factor(const double* D, double rank_tolerance) {
   for (int j = 0; j < n_; ++j) metric_[static_cast<std::size_t>(j)] = D[j];
   set_rank(0);
   kept_ = false;
-  if (kernel_ == nullptr) return factor_large(rank_tolerance);
+  if (kernel_ == nullptr) {
+    large_->split = false;
+    if (!scale_large()) return false;
+    if (splits()) {
+      large_->kept.load(large_->A.data());
+      if (factor_split(rank_tolerance)) return true;
+    }
+    return factor_orthogonal(rank_tolerance);
+  }
   if (!kernel_->form_rows(*small_, m_, metric_.data())) return false;
   set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
   return true;
 }
 
 bool MinimumNorm::factor(const double* wide, int width, const int* rows, const int* columns,
-                         double rank_tolerance) {
+                         double rank_tolerance, const FilledPlaces* places) {
   set_rank(0);
   kept_ = false;
   if (kernel_ != nullptr) {
@@ -94,8 +107,14 @@ bool MinimumNorm::factor(const double* wide, int width, const int* rows, const i
     set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
     return true;
   }
+  large_->split = false;
+  if (splits()) {
+    if (!large_->kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data(), places))
+      return false;
+    if (factor_split(rank_tolerance)) return true;
+  }
   gather_large(wide, width, rows, columns);
-  return factor_large(rank_tolerance);
+  return scale_large() && factor_orthogonal(rank_tolerance);
 }
 
 void MinimumNorm::gather_large(const double* wide, int width, const int* rows, const int* columns) {
@@ -128,24 +147,25 @@ double MinimumNorm::least_of_decided() {
   const double least = independent_part(rank_ - 1);
   if (kernel_ != nullptr || least < kLeastSine) return least;
   KeptRows& kept = large_->kept;
-  kept.load(large_->A.data());
-  return kept.factor(large_->qr.colsPermutation().indices().data(), rank_) ? kept.least_part(rank_)
-                                                                           : 0.0;
+  if (!large_->split) kept.load(large_->A.data());
+  return kept.factor(large_->order.data(), rank_) ? kept.least_part(rank_) : 0.0;
 }
 
 bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns,
                               const FilledPlaces* places) {
   const int r = rank_;
   if (r == 0 || (kernel_ != nullptr && r < m_)) return false;
-  if (!kept_) decided_least_ = least_of_decided();
+  const bool split = kernel_ == nullptr && large_->split;
+  if (!kept_ || split) decided_least_ = least_of_decided();
   if (decided_least_ < kLeastSine) return false;
   kept_ = false;
+  if (split) large_->split = false;
   if (kernel_ != nullptr)
     return kept_ = factor_kept_small({wide, width, rows, columns, metric_.data()});
   KeptRows& kept = large_->kept;
   if (!kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data(), places))
     return false;
-  if (!kept.factor(large_->qr.colsPermutation().indices().data(), r)) return false;
+  if (!kept.factor(large_->order.data(), r)) return false;
   const double least = kept.least_part(r);
   if (!(least >= std::max(kLeastSine, kLeastShare * decided_least_))) return false;
   kept_ = true;
@@ -170,11 +190,12 @@ bool MinimumNorm::factor_kept_small(const small::Gathered& from) {
   return true;
 }
 
-bool MinimumNorm::factor_large(double rank_tolerance) {
-  if (!scale_large()) return false;
-  auto& [A, qr, work, rhs, kept] = *large_;
+bool MinimumNorm::factor_orthogonal(double rank_tolerance) {
+  auto& qr = large_->qr;
   qr.setThreshold(rank_tolerance);
-  qr.compute(A.transpose());
+  qr.compute(large_->A.transpose());
+  const int* const pivots = qr.colsPermutation().indices().data();
+  large_->order.assign(pivots, pivots + m_);
   set_rank(qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0);
   return true;
 }
@@ -188,7 +209,10 @@ void MinimumNorm::solve(const double* g, double* dy) {
   if (kernel_ != nullptr && kept_)
     small_kept_->solve(*small_kept_, small_->pivot, n_, g, metric_.data(), dy);
   else
-    kernel_ != nullptr ? solve_small(g, dy) : kept_ ? solve_kept(g, dy) : solve_large(g, dy);
+    kernel_ != nullptr ? solve_small(g, dy)
+    : kept_            ? solve_kept(g, dy)
+    : large_->split    ? solve_split(g, dy)
+                       : solve_orthogonal(g, dy);
 }
 
 void MinimumNorm::solve_small(const double* g, double* dy) {
@@ -214,7 +238,7 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
 // du = A^T (A A^T)^-1 b over the rows that take part; the others' inconsistency is b - A du.
 void MinimumNorm::solve_kept(const double* g, double* dy) {
   double* z = large_->rhs.data();
-  const int* order = large_->qr.colsPermutation().indices().data();
+  const int* order = large_->order.data();
   for (int k = 0; k < rank_; ++k) z[k] = scaled(g, order[k]);
   large_->kept.solve(rank_, z, dy);
   for (int k = rank_; k < m_; ++k) {
@@ -225,8 +249,10 @@ void MinimumNorm::solve_kept(const double* g, double* dy) {
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
 
-void MinimumNorm::solve_large(const double* g, double* dy) {
-  auto& [A, qr, work, rhs, kept] = *large_;
+void MinimumNorm::solve_orthogonal(const double* g, double* dy) {
+  auto& qr = large_->qr;
+  auto& work = large_->work;
+  auto& rhs = large_->rhs;
   const auto& R = qr.matrixQR();
   for (int k = 0; k < rank_; ++k) rhs[k] = scaled(g, pivot(k));
   R.topLeftCorner(rank_, rank_)
@@ -247,8 +273,7 @@ void MinimumNorm::solve_large(const double* g, double* dy) {
 }
 
 int MinimumNorm::pivot(int k) const {
-  return kernel_ != nullptr ? small_->pivot[k]
-                            : static_cast<int>(large_->qr.colsPermutation().indices()[k]);
+  return kernel_ != nullptr ? small_->pivot[k] : large_->order[static_cast<std::size_t>(k)];
 }
 
 double MinimumNorm::row_norm(int i) const {
@@ -273,6 +298,8 @@ std::vector<double> MinimumNorm::dependence(int k) const {
     for (int j = 0; j < r; ++j) x[j] *= length(j) / length(k);
   } else if (kept_) {
     large_->kept.dependence(pivot(k), r, x.data());
+  } else if (large_->split) {
+    return dependence_split(k);
   } else {
     x = large_->qr.matrixQR().col(k).head(r);
     large_->qr.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solveInPlace(x);
@@ -282,7 +309,8 @@ std::vector<double> MinimumNorm::dependence(int k) const {
 
 double MinimumNorm::independent_part(int k) const {
   if (kernel_ != nullptr) return std::sqrt(small_->ratio[k]);
-  return kept_ ? large_->kept.independent_part(k) : std::abs(large_->qr.matrixQR()(k, k));
+  if (kept_) return large_->kept.independent_part(k);
+  return large_->split ? independent_part_split(k) : std::abs(large_->qr.matrixQR()(k, k));
 }
 
 double MinimumNorm::condition() const {

@@ -24,10 +24,14 @@ struct Gathered;
 /// With A = S C D, S = diag(1 / |row_i(C D)|), the columns of A^T are unit vectors. They are made
 /// orthogonal with pivoting, A^T P = Q [R11 R12; 0 0] (Golub and Van Loan, sections 5.4 and 5.6.2);
 /// then dy = D Q [R11^-T (P^T S g)_1..r; 0]. Because the rows are unit vectors, the rank decision
-/// |R_kk| > rank_tolerance does not depend on the units of g. A A^T is never formed.
+/// |R_kk| > rank_tolerance does not depend on the units of g. A A^T is not formed for it.
 ///
 /// Up to 16 x 32: Gram-Schmidt with reorthogonalisation in loops of fixed length; beyond that
-/// Eigen's ColPivHouseholderQR. resize() allocates, factor() and solve() do not.
+/// Eigen's ColPivHouseholderQR. Above 262144 entries A A^T = L L^T is formed after all, by the
+/// places that are filled: rows with L_kk above 1e-3 are independent, their squares known to 1e-10,
+/// and come first. What they leave of each other row is made orthogonal with pivoting. Where there
+/// are such rows and a quarter of A is filled, it is the QR again. resize() allocates, factor() and
+/// solve() do not.
 class MinimumNorm {
  public:
   static constexpr int kSmallRows = 16;
@@ -56,16 +60,16 @@ class MinimumNorm {
   double* metric() { return metric_.data(); }
 
   /// The same for C(i, j) = wide[rows[i] * width + columns[j]], with D from metric(): nothing is
-  /// copied twice. rows has m entries, columns n, ascending.
+  /// copied twice. rows has m entries, columns n, ascending. `places`: those that `wide` has ever
+  /// filled, in a list that lives as long as this; null: not known.
   bool factor(const double* wide, int width, const int* rows, const int* columns,
-              double rank_tolerance);
+              double rank_tolerance, const FilledPlaces* places = nullptr);
 
   /// The same with the rows that the last factor() and use_rank() let take part, in their order,
   /// from A A^T of these alone: some tenth of the work, less where rows have few entries, and up to
   /// 16 x 32 half of it, without the chain of one pivot after the other. False: an entry is not
   /// finite, a row depends on those before it but for a sine below 1e-3 or a third of what factor()
-  /// found least, or a small system has dropped rows: then factor() is due. `places`: those that
-  /// `wide` has ever filled, in a list that lives as long as this; null: not known.
+  /// found least, or a small system has dropped rows: then factor() is due.
   bool factor_kept(const double* wide, int width, const int* rows, const int* columns,
                    const FilledPlaces* places = nullptr);
 
@@ -75,14 +79,17 @@ class MinimumNorm {
 
   /// Until the next factor() only the first `rank` rows of the pivot order take part, at most as
   /// many as factor() has kept.
-  void use_rank(int rank) { rank_ = rank < factored_rank_ ? rank : factored_rank_; }
+  void use_rank(int rank) {
+    rank_ = rank < factored_rank_ ? rank : factored_rank_;
+    if (kernel_ == nullptr) limit_rank();
+  }
 
   int rank() const { return rank_; }
   int dropped() const { return m_ - rank_; }
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
   int pivot(int k) const;
   /// |R_kk|, k < rank(): how much of a unit row is independent of those before it; from factor() no
-  /// larger than the one before.
+  /// larger than the one before, but for those of at least 1e-3 where A A^T has found them.
   double independent_part(int k) const;
   /// The square of the smallest one that factor() has kept; 1 for rank 0.
   double least_square() const { return least_square_; }
@@ -101,11 +108,17 @@ class MinimumNorm {
   void set_rank(int rank);
   void gather_large(const double* wide, int width, const int* rows, const int* columns);
   bool scale_large();
-  bool factor_large(double rank_tolerance);
+  bool splits() const;
+  bool factor_split(double rank_tolerance);
+  void limit_rank();
+  void solve_split(const double* g, double* dy);
+  std::vector<double> dependence_split(int k) const;
+  double independent_part_split(int k) const;
+  bool factor_orthogonal(double rank_tolerance);
   double least_of_decided();
   bool factor_kept_small(const small::Gathered& from);
   void solve_kept(const double* g, double* dy);
-  void solve_large(const double* g, double* dy);
+  void solve_orthogonal(const double* g, double* dy);
   void solve_small(const double* g, double* dy);
   double scaled(const double* g, int i) const;
 

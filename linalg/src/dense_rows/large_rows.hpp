@@ -1,0 +1,32 @@
+// Tether: factors of more rows than small_orthogonal.hpp takes. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <Eigen/Dense>
+#include <tether/linalg/minimum_norm.hpp>
+#include <vector>
+
+#include "kept_rows.hpp"
+#include "remainders.hpp"
+
+namespace tether::linalg {
+
+// Of factor_kept(): the square of this sine A A^T gives to 1e-10 of itself.
+constexpr double kLeastSine = 1e-3;
+
+struct MinimumNorm::Large {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  Eigen::VectorXd work, rhs;
+  std::vector<int> order;  // pivot order
+  KeptRows kept;           // of factor_kept() and factor_split()
+
+  // of factor_split()
+  bool split = false;
+  int firm = 0;              // of the pivot order
+  std::vector<int> natural;  // 0, 1, ..
+  Remainders rest;           // of the others
+  Eigen::VectorXd left;
+};
+
+}  // namespace tether::linalg
