@@ -61,6 +61,7 @@ void StepControl::control(const Candidate& candidate, long steps, bool engaged,
 }
 
 void StepControl::corrector_failed() {
+  smoother_.refuse(std::abs(ida_.step_size()));
   if (!smoother_.on() && !order_limit_.lowering()) refused_size_.refuse(std::abs(ida_.step_size()));
 }
 

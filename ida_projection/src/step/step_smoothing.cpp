@@ -21,6 +21,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kFilter = 4.0;  // b
+constexpr double kFar = 0.5;     // of the setpoint
 
 // IDA's defaults.
 constexpr double kLowestFixed = 1.0, kHighestFixed = 2.0, kLargest = 2.0, kLow = 0.9, kMin = 0.5;
@@ -43,6 +44,7 @@ void StepSmoother::reset() {
   known_ = block_ = 0;
   block_sum_ = 0.0;
   ratio_ = care_ = 1.0;
+  refused_ = 0.0;
   if (on_ || was_on) set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
 }
 
@@ -74,6 +76,7 @@ void StepSmoother::attempt_was_accepted() {
   for (std::size_t i = past_.size() - 1; i > 0; --i) past_[i] = past_[i - 1];
   past_[0] = h_;
   known_ = std::min(known_ + 1, kMaximumOrder);
+  if (h_ >= kNearRefused * refused_) refused_ = 0.0;
   block_sum_ += log_c_;
   ++block_;
   if (order_ >= max_order_) {
@@ -99,6 +102,7 @@ double StepSmoother::control(long steps, double norm) {
       attempt_was_accepted();
     } else {
       has_previous_ = false;  // rejected: IDA has cut the step by its own rule
+      refused_ = h_;
       ratio_ = 1.0;
       block_ = 0;
       block_sum_ = 0.0;
@@ -131,6 +135,8 @@ double StepSmoother::control(long steps, double norm) {
   log_c_ = log_c;
   if (!std::isfinite(log_c)) {
     hold();
+  } else if (!wanted_ && far_below(log_c, order) && !near_refused(kLargest * h)) {
+    return request(kLargest, h, grows, norm);
   } else if (order >= max_order_) {
     return request(filter(log_c, order), h, grows, norm);
   } else if (block_ + 1 >= order + 2) {  // with this one, k + 2 steps of one size
@@ -139,6 +145,11 @@ double StepSmoother::control(long steps, double norm) {
     hold();
   }
   return 1.0;
+}
+
+// Would the error of twice the step be that little?
+bool StepSmoother::far_below(double log_c, int order) const {
+  return log_c >= (order + 1) * std::log(kLargest) - std::log(kFar);
 }
 
 // Keep h, or reduce it by IDA's own rule.

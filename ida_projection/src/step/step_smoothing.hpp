@@ -18,6 +18,10 @@ constexpr double kAnyRatio = 1e30;
 /// its order only after k + 2 steps of one size, so a ratio for every step is asked for at the
 /// largest order only; below it the step is held for k + 2 steps and then changed once, by the
 /// geometric mean of c over them. A rejected step or a new order starts the filter anew.
+///
+/// Where it has begun by itself h is doubled at once as long as the error of the double would be
+/// half of what is steered for or less: k + 2 steps for each doubling are many after a failure in
+/// the start. Sizes that were refused are approached by the filter.
 class StepSmoother {
  public:
   StepSmoother(void* ida_mem, const Options& options);
@@ -32,6 +36,8 @@ class StepSmoother {
     care_ = care;
   }
   bool on() const { return on_; }
+  /// The corrector failed at this step size.
+  void refuse(double h) { refused_ = h; }
   /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
   /// norm of IDA's error test. Returns by how much IDA's error weights are to be multiplied for
   /// the rest of this attempt (1: left alone); see gentle_reduction().
@@ -39,11 +45,14 @@ class StepSmoother {
 
  private:
   static constexpr int kMaximumOrder = 5;
+  static constexpr double kNearRefused = 0.9;  // of a size that was refused: as good as that
 
   void attempt_was_accepted();
   double error_constant(double h, int order) const;
   double test_constant(double h, int order) const;
   double filter(double log_c, int order) const;
+  bool far_below(double log_c, int order) const;
+  bool near_refused(double h) const { return refused_ > 0.0 && h >= kNearRefused * refused_; }
   void hold();
   double request(double ratio, double h, bool grows, double norm);
   double gentle_reduction(double ratio, double h, double norm);
@@ -68,6 +77,7 @@ class StepSmoother {
   long steps_ = -1;
   std::array<double, kMaximumOrder> past_{};  // sizes, the latest first
   int known_ = 0;
+  double refused_ = 0.0;   // size of the last attempt that failed, until one as long is accepted
   double ratio_ = 1.0;     // of the last change of h
   double previous_ = 0.0;  // log c before the present step or block
   bool has_previous_ = false;
