@@ -1,6 +1,6 @@
 // Tether: waves over MPI ranks whose mass and energy stay. SPDX-License-Identifier: BSD-3-Clause
 //
-// mpiexec -n 4 example_ranks_waves
+// mpiexec -n 4 example_ranks_waves [end time, 20]
 //
 // The regularised long-wave equation of Benjamin, Bona and Mahony (1972) on a ring,
 //
@@ -18,6 +18,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <tether/ida_projection.hpp>
 #include <vector>
@@ -27,7 +28,7 @@ namespace tp = tether::ida_projection;
 namespace {
 
 constexpr int kPoints = 400;
-constexpr double kLength = 100, kSpacing = kLength / kPoints, kEnd = 20, kTolerance = 1e-6;
+constexpr double kLength = 100, kSpacing = kLength / kPoints, kTolerance = 1e-6;
 constexpr double kSpeed = 1.5;  // of the solitary wave
 
 // A part of the ring, with the points beside it.
@@ -124,14 +125,16 @@ struct End {
   int flag = 0;
 };
 
-End run(Part part, bool project) {
+End run(Part part, bool project, double seconds) {
   SUNContext context = nullptr;
 #if SUNDIALS_VERSION_MAJOR >= 7
   SUNContext_Create(part.comm, &context);
 #else
   SUNContext_Create(&part.comm, &context);
 #endif
-  N_Vector y = N_VNew_Parallel(part.comm, part.points, kPoints, context), yp = N_VClone(y);
+  N_Vector y = N_VNew_Parallel(part.comm, part.points, kPoints, context);
+  N_VEnableFusedOps_Parallel(y, 1);
+  N_Vector yp = N_VClone(y);
   for (int k = 0; k < part.points; ++k) {
     const double x = kSpacing * (part.first + k), step = 1e-4;
     NV_DATA_P(y)[k] = solitary_wave(x, 0);
@@ -143,14 +146,16 @@ End run(Part part, bool project) {
   IDASStolerances(ida, kTolerance, kTolerance);
   IDASetUserData(ida, &part);
   IDASetMaxNumSteps(ida, 100000);
+  // One message for all scalar products of an iteration, not one for each.
   SUNLinearSolver solver = SUNLinSol_SPGMR(y, SUN_PREC_NONE, 40, context);
+  SUNLinSol_SPGMRSetGSType(solver, SUN_CLASSICAL_GS);
   IDASetLinearSolver(ida, solver, nullptr);
   End end;
   {
     std::unique_ptr<tp::Projection> projection;
     if (project) projection = std::make_unique<tp::Projection>(ida, rows(part, start));
     double t = 0;
-    end.flag = IDASolve(ida, kEnd, &t, y, yp, IDA_NORMAL);
+    end.flag = IDASolve(ida, seconds, &t, y, yp, IDA_NORMAL);
     if (projection) projection->project(t, y, yp);
     IDAGetNumSteps(ida, &end.steps);
     IDAFree(&ida);
@@ -160,7 +165,7 @@ End run(Part part, bool project) {
   for (std::size_t i = 0; i < 2; ++i)
     end.drift = std::max(end.drift, std::abs(now[i] / start[i] - 1));
   for (int k = 0; k < part.points; ++k) {
-    const double exact = solitary_wave(kSpacing * (part.first + k), kEnd);
+    const double exact = solitary_wave(kSpacing * (part.first + k), seconds);
     end.error = std::max(end.error, std::abs(end.own[static_cast<std::size_t>(k)] - exact));
   }
   MPI_Allreduce(MPI_IN_PLACE, &end.error, 1, MPI_DOUBLE, MPI_MAX, part.comm);
@@ -176,7 +181,15 @@ End run(Part part, bool project) {
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
   const Part all(MPI_COMM_SELF), mine(MPI_COMM_WORLD);
-  const End alone = run(all, true), plain = run(mine, false), spread = run(mine, true);
+  const double seconds = argc > 1 ? std::atof(argv[1]) : 20.0;
+  if (argc > 2 || !(seconds > 0.0 && seconds <= 1000.0)) {
+    if (mine.first == 0)
+      std::fprintf(stderr, "usage: example_ranks_waves [end time, above 0, at most 1000]\n");
+    MPI_Finalize();
+    return 2;
+  }
+  const End alone = run(all, true, seconds), plain = run(mine, false, seconds),
+            spread = run(mine, true, seconds);
   double apart = 0;
   for (int k = 0; k < mine.points; ++k) {
     const auto own = static_cast<std::size_t>(k), same = static_cast<std::size_t>(mine.first + k);
