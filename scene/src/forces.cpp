@@ -28,6 +28,9 @@ Forces total_forces(const Engine& engine) {
   for (const ContactState& c : engine.contacts()) {
     add(c.first, c.force, c.point);
     add(c.second, -c.force, c.point);
+    if (c.moment.isZero(0)) continue;
+    if (c.first >= 0) out.contact_moment[static_cast<std::size_t>(c.first)] += c.moment;
+    if (c.second >= 0) out.contact_moment[static_cast<std::size_t>(c.second)] -= c.moment;
   }
   return out;
 }

@@ -1,6 +1,10 @@
 // Limits, motors and friction of joints in the event engine. SPDX-License-Identifier: BSD-3-Clause
+#include <filesystem>
+#include <tether/scene/run.hpp>
+
 #include "event/phase/shared_forces.hpp"
 #include "event_runs.hpp"
+#include "run_files.hpp"
 
 using namespace event_runs;
 
@@ -348,6 +352,31 @@ TEST_CASE("event: a run of joint laws goes on from saved states with the same bi
       "motor = { rate_deg = 50, torque = 3 }\n",
       "laws");
   for (const double cut : {0.2, 0.7, 1.5}) goes_on_with_its_bits(scene, cut, 3);
+}
+
+TEST_CASE("event: the table of events names the joint, and none where bodies touch") {
+  const std::filesystem::path folder = tether::test::folder("events_of_joints");
+  const std::string text =
+      "[[body]]\nname = \"ball\"\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nmaterial = \"body\"\n"
+      "position = [0, 0, 1]\n[[body]]\nname = \"bead\"\nmass = 1\ninertia = [1, 1, 1]\n"
+      "position = [5, 0, 0]\n[[joint]]\nname = \"wire\"\nkind = \"slider\"\n"
+      "bodies = [\"bead\", \"world\"]\naxis = [0, 0, 1]\nlimits = [-0.5, 1]\n";
+  Scene scene = parse_scene("[scene]\nengine = \"event\"\ngravity = [0, 0, -9.81]\nend = 0.5\n" +
+                                kFloor + text + pair(""),
+                            "test");
+  scene.output.csv = (folder / "a.csv").string();
+  REQUIRE(tether::scene::run(scene).failure.empty());
+  const std::string table = tether::test::content(folder / "a.events.csv");
+  CHECK(table.find(",impulse_z_N_s,joint\n") != std::string::npos);
+  std::istringstream lines(table);
+  int joints = 0, others = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find(",bead,,") != std::string::npos)
+      joints += line.substr(line.size() - 5) == ",wire";
+    if (line.find(",ball,floor,") != std::string::npos) others += line.back() == ',';
+  }
+  CHECK(joints >= 1);
+  CHECK(others >= 1);
 }
 
 TEST_CASE("event: a law's own normal does not count where contacts press themselves together") {

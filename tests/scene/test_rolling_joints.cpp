@@ -82,6 +82,11 @@ TEST_CASE("joints and contact: torsional friction stops a spindle after I w / (d
   CHECK(engine->bodies()[1].angular_velocity.norm() < 1e-10);
   CHECK(engine->bodies()[0].velocity.norm() < 1e-10);
   CHECK(engine->counts().unsolved == 0);
+  // Carried by the contact, moment included.
+  CHECK(std::abs(total_forces(*engine).contact[1].z() - 4 * kGravity) < 1e-6);
+  const auto turning = make_engine(spindle(-speed, d));
+  turning->advance(0.1);
+  CHECK(total_forces(*turning).contact_moment[1].z() == Approx(d * 4 * kGravity).epsilon(1e-6));
 }
 
 TEST_CASE("joints and contact: a ball that nothing joins rolls beside a cart as alone") {

@@ -229,6 +229,7 @@ void EventEngine::look_at_events() {
     if (model_->is_law(from.contact)) {
       const int number = model_->joint_laws().joint(model_->joint_law(from.contact));
       const Joint& joint = scene_.joints[at(number)];
+      e.joint = number;
       e.first = joint.first;
       e.second = joint.second;
       if (joints::is_angle(joint)) arm = units_.length;

@@ -18,7 +18,7 @@ class EventRecorder : public TableRecorder {
             LongTable(
                 file,
                 "time_s,kind,first,second,normal_speed_before_m_per_s,normal_speed_after_m_per_s,"
-                "energy_lost_J,impulse_x_N_s,impulse_y_N_s,impulse_z_N_s\n",
+                "energy_lost_J,impulse_x_N_s,impulse_y_N_s,impulse_z_N_s,joint\n",
                 resume.restarted, [now, left = resume.events](const std::string& row) mutable {
                   const bool before =
                       !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
@@ -36,9 +36,9 @@ class EventRecorder : public TableRecorder {
     const std::vector<ContactEvent>& all = engine.events();
     for (; next_ < all.size(); ++next_) {
       const ContactEvent& e = all[next_];
-      table_.put(fmt::format("{},{},{},{},{},{},{},{},{},{}\n", e.time, name(e.kind), body(e.first),
-                             body(e.second), e.before, e.after, e.lost, e.impulse.x(),
-                             e.impulse.y(), e.impulse.z()));
+      table_.put(fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", e.time, name(e.kind),
+                             body(e.first), body(e.second), e.before, e.after, e.lost,
+                             e.impulse.x(), e.impulse.y(), e.impulse.z(), joint(e.joint)));
     }
   }
 

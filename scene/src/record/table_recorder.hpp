@@ -24,6 +24,9 @@ class TableRecorder : public Recorder {
   std::string body(int index) const {
     return index < 0 ? std::string() : scene_.bodies[static_cast<std::size_t>(index)].name;
   }
+  std::string joint(int index) const {
+    return index < 0 ? std::string() : scene_.joints[static_cast<std::size_t>(index)].name;
+  }
 
   LongTable table_;
 

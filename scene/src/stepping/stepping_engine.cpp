@@ -188,6 +188,7 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
   contacts_of_ = stepper_.counts().steps;
   const contact::StepContacts& c = stepper_.contacts();
   const contact::BodySet& b = stepper_.bodies();
+  const std::vector<Vector3d>& moments = stepper_.contact_moments();
   const double dt = stepper_.last_part();
   contacts_.resize(c.points.size());
   for (std::size_t k = 0; k < c.points.size(); ++k) {
@@ -202,6 +203,7 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
     s.force = dt > 0 ? Vector3d(s.impulse / dt) : Vector3d::Zero();
     s.slip = velocity(b, p.first, p.r1) - velocity(b, p.second, p.r2);
     s.slip -= p.normal.dot(s.slip) * p.normal;
+    s.moment = k < moments.size() && dt > 0 ? Vector3d(moments[k] / dt) : Vector3d::Zero();
   }
   return contacts_;
 }

@@ -38,6 +38,8 @@ struct ContactState {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< on `first`, N; see Forces
   /// Velocity of `first` against `second` at the point, without its normal part, m/s.
   Eigen::Vector3d slip = Eigen::Vector3d::Zero();
+  /// Of rolling and torsional friction, on `first`, beside that of the force, N m.
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
 };
 
 /// What a joint does to its first body (to the second the opposite), world axes.
@@ -86,6 +88,7 @@ struct ContactEvent {
   double before = 0, after = 0;  ///< normal velocities of an impact, m/s
   double lost = 0;               ///< energy of all contacts of the instant, in its first event, J
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< on `first`, world axes, N s
+  int joint = -1;                                     ///< whose limit, motor or friction; -1: none
 };
 const char* name(ContactEvent::Kind kind);
 
