@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <limits>
 #include <random>
 #include <tether/linalg.hpp>
 #include <vector>
@@ -83,6 +84,19 @@ inline double distance(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
 
 inline double length(const Eigen::VectorXd& a, const Eigen::VectorXd& D) {
   return distance(a, Eigen::VectorXd::Zero(a.size()), D);
+}
+
+/// What the shares of solver.dependence(k) leave of dropped row k, all rows of unit length in D.
+inline double left_of_dependence(const Case& c, const linalg::MinimumNorm& solver, int k) {
+  RowMajor A = c.C * c.D.asDiagonal();
+  A = A.rowwise().normalized();
+  const std::vector<double> share = solver.dependence(k);
+  if (share.size() != static_cast<std::size_t>(solver.rank()))
+    return std::numeric_limits<double>::infinity();
+  Eigen::RowVectorXd left = A.row(solver.pivot(k));
+  for (int i = 0; i < solver.rank(); ++i)
+    left -= share[static_cast<std::size_t>(i)] * A.row(solver.pivot(i));
+  return left.norm();
 }
 
 }  // namespace tether::test

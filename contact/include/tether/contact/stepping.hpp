@@ -77,8 +77,7 @@ struct Meeting {
   double friction = 0;
   double restitution = 0;  ///< 0 .. 1
   /// Moments that a contact holds, over its normal force: about axes in the surface and about the
-  /// normal, m (README, section 19). Only with law = coulomb and restitution_law =
-  /// newton.
+  /// normal, m (README, section 19). Only with law = coulomb and restitution_law = newton.
   double rolling = 0, torsional = 0;
 };
 
