@@ -74,9 +74,11 @@ class Automatic {
   bool mostly_sticks(Search& search);
   bool infeasible(Search& search);
   bool at_round_off(Search& search, int steps);
+  void solve_parts_of_end(Search& search);
+  void follow_to_the_end(Search& search);
 
   Options options_;
-  LocalSolves parts_;
+  LocalSolves parts_, end_parts_;
   SoftStart soft_;
   Packed x_, z_, pressed_;
   int contacts_ = 0;

@@ -30,7 +30,6 @@ void LocalSolves::reset(int contacts) {
   refused_ = 0;
   most_ = 0;
   solved_ = false;
-  z_.resize(at(n_));
   error_.resize(at(n_));
   place_.resize(at(n_));
   held_.assign(at(n_), 0);
@@ -39,10 +38,7 @@ void LocalSolves::reset(int contacts) {
 
 // False: there is nothing to solve.
 bool LocalSolves::find_errors(Search& search, const Packed& x) {
-  search.system.changes(x.data(), z_.data(), error_.data());
-  search.counts.work += search.sweep_cost;
-  most_ = 0;
-  for (double error : error_) most_ = std::max(most_, error);
+  most_ = search.errors(x.data(), error_.data());
   return most_ > 0 && std::isfinite(most_);
 }
 
@@ -111,7 +107,7 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
 
 // near: x is so near to a solution that Newton's method may find it at once.
 bool LocalSolves::solve_part(Search& search, int part, double budget, bool near, Packed& x) {
-  constexpr double kGain = 1e-3;  // of the error
+  constexpr double kGain = 1e-3, kEnough = 0.3;  // of the error, of the tolerance
   constexpr int kProblems = 2;
   const System& system = search.system;
   const Problem& p = system.problem();
@@ -124,13 +120,16 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, bool near,
   Packed start(at(m));
   for (int r = 0; r < m; ++r) {
     const int i = contacts[r];
-    double rest[3] = {p.packed_b()[at(i)].v[0], p.packed_b()[at(i)].v[1], p.packed_b()[at(i)].v[2]};
+    // Long sums: held impulses of heavy bodies nearly cancel.
+    long double rest[3];
+    for (int q = 0; q < 3; ++q) rest[q] = p.packed_b()[at(i)].v[q];
     for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
       const int j = p.columns()[at(k)];
       const double* A = p.blocks()[at(k)].column;
       if (place_[at(j)] < 0) {
         for (int c = 0; c < 3; ++c)
-          for (int q = 0; q < 3; ++q) rest[q] -= A[4 * c + q] * x[at(j)].v[c];
+          for (int q = 0; q < 3; ++q)
+            rest[q] -= static_cast<long double>(A[4 * c + q]) * x[at(j)].v[c];
         continue;
       }
       MatrixBlock block{r, place_[at(j)], Eigen::Matrix3d()};
@@ -138,7 +137,7 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, bool near,
         for (int q = 0; q < 3; ++q) block.value(q, c) = A[4 * c + q];
       blocks.push_back(block);
     }
-    for (int q = 0; q < 3; ++q) b[3 * r + q] = rest[q];
+    for (int q = 0; q < 3; ++q) b[3 * r + q] = static_cast<double>(rest[q]);
     mu[r] = p.mu(i);
     start[at(r)] = x[at(i)];
   }
@@ -147,11 +146,12 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, bool near,
   const Problem problem = Problem::sparse(3, std::move(blocks), b, mu);
   Options options = search.options;
   options.history = false;
-  options.tolerance = kGain * most_;
+  options.tolerance = std::max(kGain * most_, kEnough * search.options.tolerance);
   options.max_work = budget;
   Search& local = part_->search;
   local.reset(problem, options, Measure::fixed_point);
   local.system.belong_to(system, contacts);
+  local.system.share_as(system, contacts);
   local.system.to_own_units(start.data());
   part_->automatic.reset(m, options, false);
   if (near) {

@@ -42,7 +42,6 @@ class LocalSolves {
   std::vector<double> error_;
   std::vector<int> list_, start_, place_;  // contacts part by part; place of a contact in its part
   std::vector<char> held_;
-  Packed z_;
   std::unique_ptr<Part> part_;
 };
 

@@ -31,6 +31,8 @@ bool Automatic::at_round_off(Search& search, int steps) {
       return search.best_error > kGain * before &&
              search.best_error > kUnits * search.system.rounding(search.best.data());
     };
+    if (stuck_above() && search.best_error < kNearly * search.options.tolerance)
+      follow_to_the_end(search);
     if (stuck_above() && search.best_error < kNearly * search.options.tolerance) {
       x_ = search.best;
       interior.run_proximal(search, x_.data(), kProblems, newton, false);
@@ -94,8 +96,37 @@ Status Automatic::interior_points_at_best(Search& search, Rotation&, int steps) 
   return Status::unsolved;
 }
 
+// Between light and heavy bodies the products x.u of a contact that parts and of one that holds a
+// heavy body differ by what round-off takes: interior points end with the former too large, few
+// and far from each other, and all others solved.
+void Automatic::solve_parts_of_end(Search& search) {
+  constexpr double kShare = 0.1;  // of the work before
+  constexpr int kRounds = 8;
+  if (search.solved() || search.exhausted()) return;
+  const double before = search.counts.work;
+  x_ = interior.impulses();
+  end_parts_.reset(contacts_);
+  for (int round = 0; round < kRounds && search.counts.work < (1 + kShare) * before; ++round) {
+    if (!end_parts_.run(search, x_, kShare * before)) return;
+    search.test(x_.data(), Method::interior_point);
+    if (search.solved() || search.exhausted()) return;
+  }
+}
+
+// From the point where everything sticks, on and on after the error has ceased to fall.
+void Automatic::follow_to_the_end(Search& search) {
+  constexpr int kSteps = 10, kBursts = 12;
+  interior.run(search, kSteps);
+  for (int burst = 1;; ++burst) {
+    solve_parts_of_end(search);
+    if (burst == kBursts || search.solved() || search.exhausted()) return;
+    interior.go_on(search, kSteps);
+  }
+}
+
 Status Automatic::interior_points(Search& search, Rotation&, int steps) {
   interior.run(search, steps);
+  solve_parts_of_end(search);
   return Status::unsolved;
 }
 

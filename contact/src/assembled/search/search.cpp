@@ -45,6 +45,16 @@ double Search::fixed_point_error(const PackedVector* x, Method stage) {
   return std::max(system.exact_fixed_point(x), rounding);
 }
 
+double Search::errors(const PackedVector* x, double* each) {
+  if (near_round_off()) {
+    counts.work += kExactCost * test_cost;
+    return system.exact_fixed_point(x, each);
+  }
+  counts.work += sweep_cost;
+  system.changes(x, scratch_.data(), each);
+  return *std::max_element(each, each + system.size());
+}
+
 bool Search::explained_by_round_off() {
   const double rounding = system.rounding(best.data());
   hidden_ = kSumUnits * rounding;

@@ -28,6 +28,9 @@ struct Search {
   // Whether round-off may be what is left of the best point, whose error is then found with long
   // sums.
   bool explained_by_round_off();
+  // Errors of all contacts, as velocities over the scales of their islands: what a block solution
+  // changes, or with long sums near_round_off() what is judged. Returns the largest.
+  double errors(const PackedVector* x, double* each);
   bool solved() const { return best_error <= options.tolerance; }
   bool exhausted() const {
     return counts.work > work_end ||

@@ -214,8 +214,8 @@ double System::judged_fixed_point(const PackedVector* x) {
   const double round_off = rounding(x), fast = fixed_point(x).fixed;
   return std::max(fast <= kSumUnits * round_off ? exact_fixed_point(x) : fast, round_off);
 }
-double System::exact_fixed_point(const PackedVector* x) {
-  return kernels().exact_error(error_view(), x);
+double System::exact_fixed_point(const PackedVector* x, double* each) {
+  return kernels().exact_error(error_view(), x, each);
 }
 View System::error_view() {
   View s = view(*problem_, rule_.data(), lambda_.data(), nullptr);

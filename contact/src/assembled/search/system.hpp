@@ -82,7 +82,8 @@ class System {
   double measure(const Test& test, Measure measure) const;
   // Both with long sums (law/exact_error.hpp): where rounding() is not far below what counts.
   void exact_velocities(const PackedVector* x, PackedVector* w) const;
-  double exact_fixed_point(const PackedVector* x);
+  // Null, or where the errors of all contacts go.
+  double exact_fixed_point(const PackedVector* x, double* each = nullptr);
   // The larger one of error and round-off, with long sums where it needs them: what is reported.
   double judged_fixed_point(const PackedVector* x);
   // What round-off makes of w = A x - b, relative to the velocity scale of the island: the largest

@@ -55,7 +55,7 @@ struct AssembledKernels {
                    LocalDerivative*);
   Test (*natural_map)(const View&, const PackedVector* x, PackedVector* w);
   double (*error)(const View&, const PackedVector* x);
-  double (*exact_error)(const View&, const PackedVector* x);  // exact_error.hpp
+  double (*exact_error)(const View&, const PackedVector* x, double* each);  // exact_error.hpp
 };
 struct BodyKernels {
   Squares (*sweep)(const BodyArrays&, GeneralContact* begin, GeneralContact* end);

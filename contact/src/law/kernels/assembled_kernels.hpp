@@ -196,8 +196,8 @@ TETHER_INLINE double worst_error(const View& s, const PackedVector* x) {
   TETHER_CLONES double name##_error(const View& s, const PackedVector* x) {                     \
     return worst_error<name##_rule>(s, x);                                                      \
   }                                                                                             \
-  double name##_exact_error(const View& s, const PackedVector* x) {                             \
-    return exact_error<name##_rule>(s, x);                                                      \
+  double name##_exact_error(const View& s, const PackedVector* x, double* each) {               \
+    return exact_error<name##_rule>(s, x, each);                                                \
   }                                                                                             \
   constexpr AssembledKernels name = {name##_sweep,   name##_sweep_some, name##_blocks,          \
                                      name##_natural, name##_error,      name##_exact_error};

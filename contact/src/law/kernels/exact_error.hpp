@@ -103,9 +103,9 @@ inline Wide wide_error(const LocalBlock& L, double mu, const double* gamma, cons
   return std::max(std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]), outside);
 }
 
-// worst_error() (assembled_kernels.hpp) with that.
+// worst_error() (assembled_kernels.hpp) with that; null, or the errors of all contacts.
 template <class Rule>
-double exact_error(const View& s, const PackedVector* x) {
+double exact_error(const View& s, const PackedVector* x, double* each) {
   int count = 0;
   Wide most = 0;
   for (int i = 0; i < s.n; ++i) {
@@ -121,6 +121,7 @@ double exact_error(const View& s, const PackedVector* x) {
     Rule::gamma(s.rule, i, L, gamma);
     const Wide error = wide_error(L, Rule::kFriction ? L.mu : 0, gamma, point, w, z, regime) *
                        s.inverse_scale[i] / s.share[i];
+    if (each != nullptr) each[i] = static_cast<double>(error);
     if (!(error < std::numeric_limits<double>::infinity()))
       return std::numeric_limits<double>::infinity();
     most = std::max(most, error);

@@ -17,6 +17,8 @@ class InteriorPoint {
   void stick(Search& search);
   // From the point where everything sticks; at most `most` steps. The result is search.best.
   void run(Search& search, int most);
+  // From the last point of a run.
+  void go_on(Search& search, int most) { follow(search, most, 0); }
   // From near x.
   void run_near(Search& search, const PackedVector* x, int most);
   // Proximal point iteration from x, at most `most` problems A + tau D, b + tau D x, which a small
@@ -34,6 +36,8 @@ class InteriorPoint {
   // The path of run() by its arclength, through the turns where its steps are blocked; `newton`
   // finishes. At most `most` factorisations.
   void run_arclength(Search& search, int most, ProximalNewton& newton);
+  // Of the last point of a run.
+  const Packed& impulses() const { return equations_.impulses(); }
   // Orders the matrix, so that cost() knows its fill.
   void order(Search& search);
   // Estimated ns of one step; by a guess of the fill before order().
