@@ -290,8 +290,8 @@ struct MovingCase {
   std::uint64_t seed;
 };
 
-// At most one is left unsolved within max_work each; all the work is returned.
-double solve_moving(const std::vector<MovingCase>& cases) {
+// So many are left unsolved within max_work each at most; all the work is returned.
+double solve_moving(const std::vector<MovingCase>& cases, int most_unsolved = 1) {
   int unsolved = 0;
   double work = 0;
   for (const MovingCase& c : cases) {
@@ -307,7 +307,7 @@ double solve_moving(const std::vector<MovingCase>& cases) {
     unsolved += s.status != Status::solved;
     work += s.counts.work;
   }
-  CHECK(unsolved <= 1);
+  CHECK(unsolved <= most_unsolved);
   return work;
 }
 
@@ -329,4 +329,12 @@ TEST_CASE("mass ratios: stacks of 1 : 1e6 whose boxes move and spin") {
 // Their paths turn; without the arclength none is solved within this work.
 TEST_CASE("mass ratios: stacks that move and spin are solved by paths that turn") {
   CHECK(solve_moving({{100, 0, 8}, {100, 1, 6}, {200, 0, 2}, {200, 0, 7}}) < 2.5e9);  // 4e9
+}
+
+// Interior points solved all but two to ten contacts that part, whose x.u is below the round-off of
+// that of contacts on which heavy bodies lie. All ended as round_off at 1.3e-6 to 2.6e-6, twenty
+// times above it, for 3.3e9.
+TEST_CASE("mass ratios: stacks that move and spin, down to round-off") {
+  CHECK(solve_moving({{200, 1, 29}, {200, 0, 1012}, {200, 0, 1027}, {200, 0, 2012}, {200, 0, 2013}},
+                     0) < 1e9);
 }

@@ -102,7 +102,7 @@ Status Automatic::interior_points_at_best(Search& search, Rotation&, int steps) 
 void Automatic::solve_parts_of_end(Search& search) {
   constexpr double kShare = 0.1;  // of the work before
   constexpr int kRounds = 8;
-  if (search.solved() || search.exhausted()) return;
+  if (!search.near_round_off() || search.solved() || search.exhausted()) return;
   const double before = search.counts.work;
   x_ = interior.impulses();
   end_parts_.reset(contacts_);
