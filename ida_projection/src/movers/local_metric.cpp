@@ -60,6 +60,19 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
   }
 }
 
+void LocalMetric::fill_few(const LoadedCandidate& at, int first, int columns,
+                           double* __restrict D) {
+  double* __restrict trial = trial_scale_.data() + first;
+  const double* __restrict scale = scale_.data() + first;
+  const double* __restrict w = at.w + first;
+  const double* __restrict ycor = at.ycor + first;
+  for (int k = 0; k < columns; ++k) {
+    const double s = std::max(kMetricDecay * scale[k], std::abs(ycor[k]));
+    trial[k] = s;
+    D[k] = std::max(s, kMetricFloor * (w[k] > 0.0 ? 1.0 / w[k] : s));
+  }
+}
+
 void LocalMetric::current(const LoadedCandidate& at, double* D) const {
   const bool local = options_.metric == Metric::local_correction;
   for (std::size_t i = 0; i < scale_.size(); ++i) {

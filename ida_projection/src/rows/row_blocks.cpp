@@ -139,6 +139,8 @@ void RowBlocks::rearrange() {
                          static_cast<int>(block->columns.size()));
     block->resize();
   }
+  few_ = !many(m_) && static_cast<int>(d.columns.size()) <= linalg::MinimumNorm::kSmallColumns &&
+         a.rows.empty() && d.first >= 0 && static_cast<int>(d.rows.size()) == m_;
   columns_.clear();
   for (int j = 0; j < n_; ++j)
     if (used[static_cast<std::size_t>(j)]) columns_.push_back(j);

@@ -244,6 +244,12 @@ class RowBlocks {
   }
   void solve_roughly(const std::vector<double>& g) { solve(g); }
   int rank() const { return d.solver.rank() + a.solver.rank(); }
+  /// Are these few rows over adjacent columns, none of them for algebraic variables?
+  bool few() const { return few_; }
+  /// factor_kept() of them.
+  bool factor_kept_few() {
+    return d.solver.factor_kept(C_.data(), n_, d.rows.data(), d.columns.data());
+  }
   /// The rows whose move is measured in tolerances.
   Block& counted() { return d.rows.empty() ? a : d; }
   /// After a move of this length with the C at hand: C at y, where it is time to learn from it.
@@ -311,6 +317,7 @@ class RowBlocks {
   LookAgain look_;
   bool outgrown_ = false;
   bool structured_ = false;
+  bool few_ = false;
 };
 
 }  // namespace tether::ida_projection

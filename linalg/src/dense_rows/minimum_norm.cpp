@@ -153,15 +153,14 @@ double MinimumNorm::least_of_decided() {
 
 bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns,
                               const FilledPlaces* places) {
+  if (kernel_ != nullptr) return factor_kept_small({wide, width, rows, columns, metric_.data()});
   const int r = rank_;
-  if (r == 0 || (kernel_ != nullptr && r < m_)) return false;
-  const bool split = kernel_ == nullptr && large_->split;
+  if (r == 0) return false;
+  const bool split = large_->split;
   if (!kept_ || split) decided_least_ = least_of_decided();
   if (decided_least_ < kLeastSine) return false;
   kept_ = false;
   if (split) large_->split = false;
-  if (kernel_ != nullptr)
-    return kept_ = factor_kept_small({wide, width, rows, columns, metric_.data()});
   KeptRows& kept = large_->kept;
   if (!kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data(), places))
     return false;
@@ -175,17 +174,21 @@ bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, co
 }
 
 bool MinimumNorm::factor_kept_small(const small::Gathered& from) {
+  if (rank_ == 0 || rank_ < m_) return false;
   small::Storage& s = *small_;
+  if (!kept_) {
+    decided_least_ = least_of_decided();
+    if (decided_least_ < kLeastSine) return false;
+    for (int k = 0; k < m_; ++k) s.scale[k] = 1.0;
+  }
   const double sine = std::max(kLeastSine, kLeastShare * decided_least_);
-  if (!small_kept_->factor(*small_kept_, from, s.pivot, m_, n_, sine * sine, s.square, s.ratio)) {
+  kept_ = small_kept_->factor(*small_kept_, from, s.pivot, m_, n_, sine * sine, s.square, s.ratio);
+  if (!kept_) {
     set_rank(0);  // what was known of the rows is overwritten
     return false;
   }
   double least = 1.0;
-  for (int k = 0; k < m_; ++k) {
-    s.scale[k] = 1.0;
-    least = s.ratio[k] < least ? s.ratio[k] : least;
-  }
+  for (int k = 0; k < m_; ++k) least = s.ratio[k] < least ? s.ratio[k] : least;
   least_square_ = least;
   return true;
 }

@@ -130,10 +130,9 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;
   if (options_.frequency > 1) keep_old_move(candidate.t);
-  rows_.set_metric(!reused_);
   firm_only_ = start_known_ = false;
   looks_ = 0;
-  result = newton(candidate, rows_.drift());
+  if (quick_move(candidate, result)) return result;
   const bool nothing = result.status == Status::success && result.length <= kNothing;
   nothing_in_row_ = nothing && !keeps_factors() ? nothing_in_row_ + 1 : 0;
   const bool broken =
@@ -145,6 +144,38 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
       !reused_ && contradicts())
     result.status = Status::inconsistent;
   return result;
+}
+
+// The usual move of few rows: independent as before, and short enough to be the only one. False:
+// it was made as a whole, whatever it took.
+template <class Rows>
+bool ContiguousMover<Rows>::quick_move(const Candidate& candidate, Move& result) {
+  const double drift = rows_.drift();
+  result.drift_before = result.drift_after = drift;
+  bool solved = false;
+  double length = 0.0;
+  if (!reused_) {
+    result.status = rows_.quick_solve(candidate.t, solved, length);
+    if (result.status != Status::success) return true;
+  }
+  if (!solved) {
+    rows_.set_metric(!reused_);
+    result = newton(candidate, drift);
+    return false;
+  }
+  renewed(candidate.t);
+  monitor_.start();
+  if (options_.frequency > 1 || !(length <= options_.largest_move) ||
+      !monitor_.plainly_done(length)) {
+    result = newton(candidate, drift, &length);
+    return false;
+  }
+  rows_.apply(1.0, candidate.correction_entries);
+  result.moves = 1;
+  result.length = move_length_ = length;
+  result.status = Status::success;
+  nothing_in_row_ = length <= kNothing ? nothing_in_row_ + 1 : 0;
+  return true;
 }
 
 // Back to the correction before the move.
@@ -174,16 +205,18 @@ Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, co
   return failed;
 }
 
-// Newton's method from rows_.at.y, with g_ known there.
+// Newton's method from rows_.at.y, with g_ known there. `first`: the length of the first move is
+// known, too, from fresh factors of independent rows.
 template <class Rows>
-Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_before) {
+Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_before,
+                                   const double* first) {
   Move result;
   double* correction = candidate.correction_entries;
   result.drift_before = result.drift_after = drift_before;
 
-  monitor_.start();
-  bool fresh = false;  // factors belong to the present y
-  bool have_factors = reused_;
+  if (first == nullptr) monitor_.start();
+  bool fresh = first != nullptr;  // factors belong to the present y
+  bool have_factors = reused_ || fresh;
   const bool was_reused = reused_;
   if (Rows::kThinRows && was_reused)
     std::copy(correction, correction + start_.size(), start_.begin());
@@ -198,7 +231,8 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
           std::copy(correction, correction + start_.size(), start_.begin());
       }
     }
-    const double length = fresh ? first_solve() : rows_.solve();
+    const double length = first != nullptr ? *first : fresh ? first_solve() : rows_.solve();
+    first = nullptr;
     if (result.moves == 0 && !tried && must_learn(length)) {
       // The firm rows' move shows how C turns; then all rows are judged, from the start.
       tried = true;

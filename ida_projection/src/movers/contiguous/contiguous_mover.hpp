@@ -108,11 +108,13 @@ class ContiguousMover final : public Mover {
   Status take_rest(const Candidate& candidate, double reach);
   Status factor(double t) {
     const Status status = rows_.factor(t);
-    if (status != Status::success) return status;
+    if (status == Status::success) renewed(t);
+    return status;
+  }
+  void renewed(double t) {
     kept_ = {kUnknownSlope, 0};
     wear_.renewed();
     misdirection_.renewed(t);
-    return status;
   }
   double first_solve() { return rows_.first_solve(firm_only_); }
   bool contradicts();
@@ -123,7 +125,8 @@ class ContiguousMover final : public Mover {
   void keep_old_move(double t);
   void compare_with_old_move();
   void restart(const Candidate& candidate);
-  Move newton(const Candidate& candidate, double drift_before);
+  bool quick_move(const Candidate& candidate, Move& result);
+  Move newton(const Candidate& candidate, double drift_before, const double* first = nullptr);
   Move newton_with_firm_rows(const Candidate& candidate, const Move& failed);
   bool too_long(double length, double& limit) const;
 

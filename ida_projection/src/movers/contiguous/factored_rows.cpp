@@ -84,6 +84,36 @@ Status FactoredRows<Rows>::factor(double t) {
   return Status::success;
 }
 
+template <class Rows>
+Status FactoredRows<Rows>::quick_solve(double t, bool& solved, double& length) {
+  solved = false;
+  if constexpr (Rows::kThinRows) {
+    if (!blocks.few() || !factors.lasting || !factors.there || !metric.plain())
+      return Status::success;
+    if (!rows_known_) {
+      const Status status = rows(t, nullptr);
+      if (status != Status::success) return status;
+      rows_known_ = true;
+      if (!factors.there) return Status::success;
+    }
+    Block& d = blocks.d;
+    const int columns = static_cast<int>(d.columns.size());
+    metric.fill_few(at, d.first, columns, d.D());
+    if (!blocks.factor_kept_few()) return Status::success;
+    rows_known_ = weighed_ = factors.thin = factors.foreign = false;
+    most_d_ = -1.0;
+    ++statistics_.factorizations;
+    ++statistics_.iterations;
+    d.solver.solve(g_.data(), d.dy.data());
+    const double *dy = d.dy.data(), *w = at.w + d.first;
+    double sum = 0.0;
+    for (int k = 0; k < columns; ++k) sum += (dy[k] * w[k]) * (dy[k] * w[k]);
+    length = wrms(sum);
+    solved = true;
+  }
+  return Status::success;
+}
+
 // Factors from which it can be seen which rows are independent. False: an entry is not finite.
 template <class Rows>
 bool FactoredRows<Rows>::decide() {

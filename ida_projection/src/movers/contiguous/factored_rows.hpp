@@ -92,6 +92,10 @@ class FactoredRows {
   /// The first solve() after factor(): decides which of the thin rows take part until the next one,
   /// none of them if `firm_only`.
   double first_solve(bool firm_only);
+  /// The same with set_metric() and factor() before it, of few rows that are known to be
+  /// independent: in one pass. `solved` is false where they are not; then nothing is done that
+  /// these would not do again.
+  Status quick_solve(double t, bool& solved, double& length);
   /// y and the correction move by -factor dy.
   void apply(double factor, double* correction);
   /// After the first move, of this length: by how much has C turned?
@@ -190,6 +194,9 @@ bool FactoredRows<Rows>::dropped_follow() {
 
 template <class Rows>
 void FactoredRows<Rows>::apply(double factor, double* correction) {
+  if (const Block& d = blocks.d; blocks.a.rows.empty() && d.first >= 0)
+    return take(factor, d.dy.data(), static_cast<int>(d.columns.size()), correction + d.first,
+                at.y.data() + d.first);
   for (const Block* block : {&blocks.d, &blocks.a}) {
     if (block->rows.empty()) continue;
     if (block->first >= 0)
