@@ -75,6 +75,7 @@ void Evaluator::flatten(const Constraints& set) {
   if (set.count > 0) {
     parts_.push_back({&set, rows_});
     rows_ += set.count;
+    all_dense_ &= std::holds_alternative<DenseJacobian>(set.jacobian);
     if (std::holds_alternative<FiniteDifferences>(set.jacobian)) uses_differences_ = true;
     if (const auto* given = std::get_if<DenseJacobian>(&set.jacobian))
       gives_both_ |= static_cast<bool>(given->fill_with_value);
@@ -96,11 +97,19 @@ Status Evaluator::checked(int flag, const char* what, const Part& part) {
 Status Evaluator::value(double t, const double* y, int n, double* g) {
   if (fatal_) return Status::callback_fatal;
   ++statistics_.value_evaluations;
-  for (const Part& part : parts_) {
-    const Status status = value_of(part, t, y, n, g);
-    if (status != Status::success) return status;
-  }
-  return finite(t, g);
+  const Part* at = nullptr;
+  const int flag = guarded(
+      [&] {
+        int told = 0;
+        for (const Part& part : parts_) {
+          at = &part;
+          told = part.set->value(t, ConstVector(y, n), Vector(g + part.first_row, part.set->count));
+          if (told != 0) break;
+        }
+        return told;
+      },
+      thrown_);
+  return flag == 0 ? finite(t, g) : checked(flag, "value", *at);
 }
 
 Status Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
@@ -184,6 +193,7 @@ Status Evaluator::jacobian_into_zeros(double t, const double* y, int n, const do
                                       const std::vector<int>& columns, double* C, double* value) {
   if (fatal_) return Status::callback_fatal;
   count(value != nullptr);
+  if (all_dense_) return dense_parts(t, y, n, C, value);
   for (const Part& part : parts_) {
     double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
     const Status status = part.sparse != nullptr
@@ -192,6 +202,39 @@ Status Evaluator::jacobian_into_zeros(double t, const double* y, int n, const do
     if (status != Status::success) return status;
   }
   return value == nullptr ? Status::success : finite(t, value);
+}
+
+// The parts one after the other, as dense() does each, under one guard.
+Status Evaluator::dense_parts(double t, const double* y, int n, double* C, double* g) {
+  const Part* at = nullptr;
+  const char* what = "";
+  const ConstVector point(y, n);
+  const int flag = guarded(
+      [&] {
+        int told = 0;
+        for (const Part& part : parts_) {
+          at = &part;
+          const int count = part.set->count;
+          const Matrix block(C + static_cast<std::ptrdiff_t>(part.first_row) * n, count, n);
+          if (g != nullptr && part.dense->fill_with_value) {
+            what = "value with jacobian";
+            told = part.dense->fill_with_value(t, point, Vector(g + part.first_row, count), block);
+          } else {
+            if (g != nullptr) {
+              what = "value";
+              told = part.set->value(t, point, Vector(g + part.first_row, count));
+              if (told != 0) break;
+            }
+            what = "jacobian";
+            told = part.dense->fill(t, point, block);
+          }
+          if (told != 0) break;
+        }
+        return told;
+      },
+      thrown_);
+  if (flag != 0) return checked(flag, what, *at);
+  return g == nullptr ? Status::success : finite(t, g);
 }
 
 // Sparse rows as full ones.

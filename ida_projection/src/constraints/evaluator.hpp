@@ -102,6 +102,7 @@ class Evaluator {
     return std::isfinite(sum) ? Status::success : not_finite(t, g);
   }
   Status not_finite(double t, const double* g);
+  Status dense_parts(double t, const double* y, int n, double* C, double* g);
   Status value_of(const Part& part, double t, const double* y, int n, double* g);
   void count(bool with_value);
   Status dense(const Part& part, double t, const double* y, int n, const double* scale,
@@ -118,6 +119,7 @@ class Evaluator {
   std::string message_, thrown_;
   int rows_ = 0;
   bool uses_differences_ = false, gives_both_ = false;
+  bool all_dense_ = true;  // each part has a DenseJacobian
   bool fatal_ = false;
 };
 

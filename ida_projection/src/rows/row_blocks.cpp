@@ -48,13 +48,17 @@ RowBlocks::RowBlocks(const Constraints& constraints, const Evaluator& evaluator,
 // failed has left is not known.
 Status RowBlocks::fill(Evaluator& evaluator, double t, const double* y, const double* WT,
                        double* g) {
-  if (by_places_ && zero_elsewhere_)
+  if (!by_places_) {
+    std::fill(C_.begin(), C_.end(), 0.0);
+    return evaluator.jacobian_into_zeros(t, y, n_, WT, columns_, C_.data(), g);
+  }
+  if (zero_elsewhere_)
     places_.clear_all(C_.data());
   else
     std::fill(C_.begin(), C_.end(), 0.0);
   zero_elsewhere_ = false;
   const Status status = evaluator.jacobian_into_zeros(t, y, n_, WT, columns_, C_.data(), g);
-  if (!by_places_ || status != Status::success) return status;
+  if (status != Status::success) return status;
   places_.look_at_all(C_.data());
   zero_elsewhere_ = by_places_ =
       kFewPlaces * static_cast<double>(places_.known()) <= static_cast<double>(C_.size());

@@ -7,7 +7,7 @@
 // too.
 #include "step/foretold.hpp"
 
-#include <algorithm>
+#include <cmath>
 
 namespace tether::ida_projection {
 
@@ -15,9 +15,22 @@ namespace {
 
 constexpr double kUnseen = 0.003;   // tolerances: so much may delta miss
 constexpr double kNotStiff = 0.03;  // the same of what is beyond -kappa ycor
-constexpr int kMost = 15;           // in a row
-
 constexpr int kWait = 30;
+
+// Lengths of delta + factor ycor, and of that beyond what `known` is, if it is given.
+struct Lengths {
+  double whole, beyond;
+};
+Lengths lengths(const double* w, const double* ycor, double factor, const double* delta,
+                const double* known, int n) {
+  double whole = 0.0, beyond = 0.0;
+  for (int i = 0; i < n; ++i) {
+    const double sum = factor * ycor[i] + delta[i];
+    whole += (sum * w[i]) * (sum * w[i]);
+    if (known != nullptr) beyond += ((sum - known[i]) * w[i]) * ((sum - known[i]) * w[i]);
+  }
+  return {std::sqrt(whole / n), std::sqrt(beyond / n)};
+}
 
 }  // namespace
 
@@ -36,20 +49,38 @@ void Foretold::doubt() {
 
 void Foretold::learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj) {
   if (wait_ > 0) --wait_;
-  const bool followed = known(cj);
-  if (followed) {
+  const bool told = known(cj);
+  if (told) {
     N_VLinearSum(1.0, delta, -share_at(cj), ycor, work_);
     N_VLinearSum(1.0, work_, -1.0, beyond_, work_);
-    const bool right = N_VWrmsNorm(work_, weights) <= kUnseen;
-    patience_ = right ? std::min(kMost, 2 * patience_ + 1) : patience_ / 2;
+    followed(N_VWrmsNorm(work_, weights) <= kUnseen);
   }
   share_ = share_of(weights, ycor, delta);
   N_VLinearSum(1.0, delta, -share_, ycor, beyond_);
-  if (!followed) patience_ = N_VWrmsNorm(beyond_, weights) <= kUnseen ? 1 : 0;
+  if (!told) patience_ = N_VWrmsNorm(beyond_, weights) <= kUnseen ? 1 : 0;
   cj_ = cj;
   used_in_row_ = 0;
   N_VLinearSum(1.0, delta, kappa(cj), ycor, work_);
   not_stiff_ = N_VWrmsNorm(work_, weights) <= kNotStiff;
+}
+
+void Foretold::learn(const double* w, const double* ycor, const double* delta, int n, double cj) {
+  double* beyond = N_VGetArrayPointer(beyond_);
+  if (wait_ > 0) --wait_;
+  const bool told = known(cj);
+  if (told) followed(lengths(w, ycor, -share_at(cj), delta, beyond, n).beyond <= kUnseen);
+  double square = 0.0, product = 0.0;
+  for (int i = 0; i < n; ++i) {
+    const double weighted = ycor[i] * w[i];
+    square += weighted * weighted;
+    product += weighted * w[i] * delta[i];
+  }
+  share_ = square > 0.0 ? product / square : 0.0;
+  if (!told) patience_ = lengths(w, ycor, -share_, delta, nullptr, n).whole <= kUnseen ? 1 : 0;
+  for (int i = 0; i < n; ++i) beyond[i] = -share_ * ycor[i] + delta[i];
+  cj_ = cj;
+  used_in_row_ = 0;
+  not_stiff_ = lengths(w, ycor, kappa(cj), delta, nullptr, n).whole <= kNotStiff;
 }
 
 }  // namespace tether::ida_projection

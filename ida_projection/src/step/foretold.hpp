@@ -25,6 +25,8 @@ class Foretold {
   void doubt();
   /// An iteration added delta to ycor.
   void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj);
+  /// The same of n entries.
+  void learn(const double* weights, const double* ycor, const double* delta, int n, double cj);
   /// May it be foretold for a correction with this cj?
   bool tells(double cj) const { return used_in_row_ < patience_ && wait_ == 0 && known(cj); }
   void tell(double cj, N_Vector ycor, N_Vector delta) const {
@@ -37,6 +39,10 @@ class Foretold {
   bool known(double cj) const { return cj_ != 0.0 && (cj == cj_ || not_stiff_); }
   double share_at(double cj) const { return share_ + kappa(cj_) - kappa(cj); }
   double share_of(N_Vector weights, N_Vector ycor, N_Vector delta);
+  void followed(bool right) {
+    patience_ = right ? (2 * patience_ + 1 < kMost ? 2 * patience_ + 1 : kMost) : patience_ / 2;
+  }
+  static constexpr int kMost = 15;  // in a row
 
   OwnedVector beyond_, work_;
   double cj_at_setup_ = 0.0;

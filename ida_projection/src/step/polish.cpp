@@ -134,7 +134,10 @@ void Polish::look_at_pattern(const Candidate& candidate, double cj) {
   const bool tells = !variables_.any() && options_.extra_iterations > 0;
   if (!tells || corrector_.iterations() != 1) return foretold_.forget();
   if (!foretold_.allocated()) foretold_.allocate(delta_);
-  foretold_.learn(candidate.weights, corrected_, delta_, cj);
+  if (contiguous_)
+    foretold_.learn(candidate.weight_entries, corrected_entries_, delta_entries_, size_, cj);
+  else
+    foretold_.learn(candidate.weights, corrected_, delta_, cj);
 }
 
 // ycor <- ycor + delta, if earlier steps tell delta.
@@ -143,6 +146,10 @@ bool Polish::foretell(const Candidate& candidate, double cj, double tolerance) {
   foretold_.tell(cj, corrected_, delta_);
   if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisled * tolerance)) return false;
   foretold_.used();
+  if (contiguous_) {
+    for (int j = 0; j < size_; ++j) candidate.correction_entries[j] += delta_entries_[j];
+    return true;
+  }
   N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
   return true;
 }
@@ -157,6 +164,12 @@ double Polish::differential_length(const Candidate& candidate, const double* ent
   }
   const double* id = variables_.mask();
   double sum = 0.0;
+  if (id == nullptr) {
+    for (int j = 0; j < size_; ++j)
+      sum +=
+          (entries[j] * candidate.weight_entries[j]) * (entries[j] * candidate.weight_entries[j]);
+    return std::sqrt(sum / size_);
+  }
   for (int j = 0; j < size_; ++j) {
     const double change = entries[j] * candidate.weight_entries[j];
     sum += id == nullptr || id[j] != 0.0 ? change * change : 0.0;
@@ -169,6 +182,14 @@ double Polish::differential_length(const Candidate& candidate, const double* ent
 void Polish::apply(const Candidate& candidate, double differential, double algebraic) {
   if (contiguous_) {
     const double* id = variables_.mask();
+    if (id == nullptr && differential == 1.0) {
+      double sum = 0.0;  // finite only where all entries are
+      for (int j = 0; j < size_; ++j) sum += delta_entries_[j];
+      if (std::isfinite(sum)) {
+        for (int j = 0; j < size_; ++j) candidate.correction_entries[j] += delta_entries_[j];
+        return;
+      }
+    }
     for (int j = 0; j < size_; ++j) {
       const double factor = id == nullptr || id[j] != 0.0 ? differential : algebraic;
       double& delta = delta_entries_[j];

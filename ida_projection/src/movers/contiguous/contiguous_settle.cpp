@@ -18,11 +18,12 @@ constexpr double kHalving = 0.5;  // moves that leave more of each other do not 
 
 template <class Rows>
 Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change) {
-  const double* e = N_VGetArrayPointer(change);
-  for (std::size_t i = 0; i < rows_.at.y.size(); ++i) rows_.at.y[i] += e[i];
+  const double *e = N_VGetArrayPointer(change), *w = rows_.at.w;
+  double* y = rows_.at.y.data();
+  for (int i = 0, n = static_cast<int>(rows_.at.y.size()); i < n; ++i) y[i] += e[i];
   if (keeps_factors()) return take_back(candidate);
   double sum = 0.0;
-  for (int j : rows_.blocks.d.columns) sum += (e[j] * rows_.at.w[j]) * (e[j] * rows_.at.w[j]);
+  rows_.blocks.d.for_columns([&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); });
   return take_rest(candidate, move_length_ + rows_.wrms(sum));
 }
 
