@@ -34,7 +34,7 @@ class Polyhedra final : public PairCollision {
       return k == ShapeKind::box || k == ShapeKind::convex;
     };
     const auto round = [](ShapeKind k) {
-      return k == ShapeKind::sphere || k == ShapeKind::capsule;
+      return k == ShapeKind::sphere || k == ShapeKind::capsule || k == ShapeKind::points;
     };
     return (polyhedron(a) && (polyhedron(b) || round(b))) || (round(a) && polyhedron(b));
   }
@@ -44,6 +44,7 @@ class Polyhedra final : public PairCollision {
     entry.kind = shape.kind;
     entry.radius = shape.radius;
     entry.half = shape.kind == ShapeKind::capsule ? 0.5 * shape.length : 0;
+    if (shape.kind == ShapeKind::points) entry.points = shape.points;
     if (shape.kind == ShapeKind::box || shape.kind == ShapeKind::convex)
       entry.shape = detail::make_polyhedron(shape);
     entries_[surface] = std::move(entry);
@@ -57,8 +58,13 @@ class Polyhedra final : public PairCollision {
     if (a.shape.vertices.empty() || b.shape.vertices.empty()) {
       const bool turned = !a.shape.vertices.empty();
       place(turned ? a : b, turned ? first_pose : second_pose, b_);
-      round_on_polyhedron(placed(turned ? b : a, turned ? second_pose : first_pose), b_, margin,
-                          out);
+      const Entry& other = turned ? b : a;
+      Pose pose = turned ? second_pose : first_pose;
+      pose.position -= origin_;
+      if (other.kind == ShapeKind::points)
+        points_on_polyhedron(other.points, pose, b_, margin, out);
+      else
+        round_on_polyhedron(placed(other, pose), b_, margin, out);
       if (turned) turn(out, from);
     } else {
       place(a, first_pose, a_);
@@ -76,6 +82,7 @@ class Polyhedra final : public PairCollision {
     ShapeKind kind;
     double radius = 0, half = 0;
     Polyhedron shape;
+    std::vector<Vector3d> points;
   };
 
   void place(const Entry& entry, const Pose& pose, Placed& to) {
@@ -84,10 +91,10 @@ class Polyhedra final : public PairCollision {
     detail::place(entry.shape, pose, origin_, to.now);
   }
 
-  detail::Round placed(const Entry& entry, const Pose& pose) const {
+  static detail::Round placed(const Entry& entry, const Pose& pose) {
     const Vector3d half =
         entry.half > 0 ? Vector3d(entry.half * pose.rotation.col(2)) : Vector3d(Vector3d::Zero());
-    return {pose.position - origin_, half, entry.radius, entry.half > 0};
+    return {pose.position, half, entry.radius, entry.half > 0};
   }
 
   static void turn(NearPoints& out, int from) {

@@ -1,4 +1,4 @@
-// Tether: balls and capsules on polyhedra. SPDX-License-Identifier: BSD-3-Clause
+// Tether: balls, capsules and points on polyhedra. SPDX-License-Identifier: BSD-3-Clause
 #include "collision/round_contacts.hpp"
 
 #include <algorithm>
@@ -51,6 +51,16 @@ double nearest_point(const Placed& b, const Vector3d& c, Vector3d& point, Vector
 }
 
 }  // namespace
+
+void points_on_polyhedron(const std::vector<Vector3d>& points, const Pose& pose, const Placed& b,
+                          double margin, NearPoints& out) {
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Vector3d c = pose.position + pose.rotation * points[k];
+    Vector3d p, n;
+    const double gap = nearest_point(b, c, p, n);
+    if (gap < margin) out.add(c, p, n, gap, static_cast<int>(k));
+  }
+}
 
 void round_on_polyhedron(const Round& round, const Placed& b, double margin, NearPoints& out) {
   const Vector3d &middle = round.middle, &half = round.half;

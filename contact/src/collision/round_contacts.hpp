@@ -1,4 +1,4 @@
-// Tether: balls and capsules on polyhedra. SPDX-License-Identifier: BSD-3-Clause
+// Tether: balls, capsules and points on polyhedra. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "collision/separating_axes.hpp"
@@ -15,5 +15,9 @@ struct Round {
 // Both ends of a capsule as balls, and where its axis passes an edge between them.
 void round_on_polyhedron(const Round& round, const Placed& polyhedron, double margin,
                          NearPoints& out);
+
+/// Each point by itself; `pose` is about the same origin as the polyhedron.
+void points_on_polyhedron(const std::vector<Eigen::Vector3d>& points, const Pose& pose,
+                          const Placed& polyhedron, double margin, NearPoints& out);
 
 }  // namespace tether::contact::detail

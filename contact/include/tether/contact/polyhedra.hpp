@@ -9,7 +9,8 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// Boxes and convex hulls against each other, capsules against both, spheres against hulls.
+/// Boxes and convex hulls against each other, capsules against both, spheres and points against
+/// hulls.
 ///
 /// Touching faces are found to round-off and without any margin or skin: the separating axis is
 /// chosen among all face normals and edge products (README, section 15), then the face that lies

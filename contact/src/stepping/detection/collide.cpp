@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "stepping/detection/convex_pair.hpp"
+#include "stepping/detection/point_contacts.hpp"
 
 namespace tether::contact {
 
@@ -155,24 +156,11 @@ void ball_ball(const Vector3d& c1, double r1, const Vector3d& c2, double r2, dou
 
 void sphere_box(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
                 NearPoints& out) {
-  const Vector3d p = B.rotation.transpose() * (A.position - B.position), half = 0.5 * b.size;
-  const Vector3d inside = p.cwiseMax(-half).cwiseMin(half);
   // In the axes of the box: differences of world positions have no direction on its surface.
-  const Vector3d d = p - inside;
-  const double distance = d.norm();
-  if (distance > 0) {
-    if (!(distance - a.radius < margin)) return;
-    const Vector3d n = B.rotation * (d / distance);
-    out.add(A.position - a.radius * n, B.position + B.rotation * inside, n, distance - a.radius, 0);
-    return;
-  }
-  // The centre is in the box: out through the nearest face.
-  int axis = 0;
-  const double depth = (half - p.cwiseAbs()).minCoeff(&axis);
-  Vector3d face = p;
-  face[axis] = p[axis] < 0 ? -half[axis] : half[axis];
-  const Vector3d n = (p[axis] < 0 ? -1 : 1) * B.rotation.col(axis);
-  out.add(A.position - a.radius * n, B.position + B.rotation * face, n, -depth - a.radius, 0);
+  const Nearest at = nearest_on(b, B.rotation.transpose() * (A.position - B.position));
+  if (!(at.gap - a.radius < margin)) return;
+  const Vector3d n = B.rotation * at.normal;
+  out.add(A.position - a.radius * n, B.position + B.rotation * at.point, n, at.gap - a.radius, 0);
 }
 
 Vector3d nearest_on_segment(const Vector3d& p, const Vector3d& from, const Vector3d& to) {
@@ -242,6 +230,12 @@ void collide_ordered(const Shape& a, const Pose& A, const Shape& b, const Pose& 
   if (b.kind == ShapeKind::plane)
     return collide_plane(a, A, B.position, B.rotation * b.normal, margin, out);
   if (is_convex_pair(a.kind, b.kind)) return collide_convex(a, A, b, B, margin, out);
+  if (b.kind == ShapeKind::points) {
+    if (a.kind == ShapeKind::points) return;  // points pass through each other
+    const int from = out.count;
+    collide_points(b, B, a, A, margin, out);
+    return turn(out, from);
+  }
   if (a.kind == ShapeKind::sphere) {
     if (b.kind == ShapeKind::sphere)
       return ball_ball(A.position, a.radius, B.position, b.radius, margin, 0, out);
@@ -293,6 +287,7 @@ bool has_own_collision(ShapeKind a, ShapeKind b) {
   if (b == ShapeKind::mesh) return rank(a) <= rank(ShapeKind::convex);  // by MeshContacts
   if (b == ShapeKind::plane) return a != ShapeKind::plane;
   if (is_convex_pair(a, b)) return true;
+  if (b == ShapeKind::points) return a == ShapeKind::points || touches_points(a);
   if (a == ShapeKind::sphere) return rank(b) <= rank(ShapeKind::box);
   return a == ShapeKind::capsule && b == ShapeKind::capsule;
 }

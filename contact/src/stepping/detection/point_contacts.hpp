@@ -1,0 +1,24 @@
+// Tether: where a point is nearest to a shape. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/shapes.hpp>
+
+namespace tether::contact::detail {
+
+/// Of the surface of a shape, to a point. In the axes of the shape.
+struct Nearest {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, out of the shape
+  double gap = 0;                                     ///< along it to the given point; < 0: inside
+};
+
+/// Sphere, capsule, box, ellipsoid, cylinder; exact outside and inside. README, section 15.
+Nearest nearest_on(const Shape& shape, const Eigen::Vector3d& p);
+
+bool touches_points(ShapeKind kind);  ///< whether nearest_on() treats it
+
+/// Touching points, each by itself, against another shape; normals point to the points.
+void collide_points(const Shape& points, const Pose& pose, const Shape& shape,
+                    const Pose& shape_pose, double margin, NearPoints& out);
+
+}  // namespace tether::contact::detail
