@@ -88,8 +88,8 @@ template <class Rows>
 Status FactoredRows<Rows>::quick_solve(double t, bool& solved, double& length) {
   solved = false;
   if constexpr (Rows::kThinRows) {
-    if (!blocks.few() || !factors.lasting || !factors.there || !metric.plain())
-      return Status::success;
+    const bool independent = factors.lasting && factors.there && !blocks.dropped_rows();
+    if (!blocks.few() || !independent || !metric.plain()) return Status::success;
     if (!rows_known_) {
       const Status status = rows(t, nullptr);
       if (status != Status::success) return status;
