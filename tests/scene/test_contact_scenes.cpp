@@ -164,3 +164,25 @@ TEST_CASE("scene: free rotation keeps energy and momentum for 100 s, turns over 
   CHECK(coarse / middle == Approx(4).epsilon(0.15));
   CHECK(middle / fine == Approx(4).epsilon(0.15));
 }
+
+TEST_CASE("scene: the shipped woodpecker comes down in steps as it does in events") {
+  // Heights of the sleeve at 0.15 s and 0.3 s by events; tolerances 1e-9 and 1e-10 agree to 1e-10.
+  struct Case {
+    double step, accuracy, within;
+  };
+  const auto [step, accuracy, within] =
+      GENERATE(Case{1e-4, 0, 4e-4}, Case{2e-5, 0, 8e-5}, Case{5e-4, 1e-4, 2e-4});
+  Scene scene = read_scene(TETHER_SHIPPED_SCENES "/woodpecker.toml");
+  scene.event.reset();
+  scene.engine = EngineChoice::stepping;
+  scene.stepping.emplace();
+  scene.stepping->step = step;
+  scene.stepping->accuracy = accuracy;
+  const auto engine = make_engine(scene);
+  CAPTURE(step, accuracy);
+  engine->advance(0.15);
+  CHECK(std::abs(engine->bodies()[2].position.z() + 0.0192001972) < within);
+  engine->advance(0.3);
+  CHECK(std::abs(engine->bodies()[2].position.z() + 0.0342250844) < within);
+  CHECK(engine->counts().unsolved == 0);
+}
