@@ -10,7 +10,7 @@
 namespace tether::contact::detail {
 namespace {
 
-constexpr double kBlock = 20;  // ns that it takes to soften a block of the problem
+constexpr double kSoftBlock = 20;  // ns that it takes to soften a block of the problem
 
 }  // namespace
 
@@ -31,7 +31,7 @@ bool SoftStart::find(Search& search, double budget, Packed& x) {
   std::fill(x.begin(), x.end(), PackedVector());
   for (double tau : {std::sqrt(tolerance), tolerance}) {
     const Problem problem = system.problem().softened(tau);
-    search.counts.work += kBlock * static_cast<double>(problem.blocks().size());
+    search.counts.work += kSoftBlock * static_cast<double>(problem.blocks().size());
     Options options = search.options;
     options.history = false;
     options.tolerance = tau;
