@@ -136,11 +136,12 @@ Status Automatic::rotate(Search& search, bool last) {
     search.system.gamma(i, gamma);
     r.regular = r.regular && std::hypot(gamma[0], gamma[1]) < kStronglyCoupled;
   }
-  if (r.regular && interior.order_bodies(search)) {
+  if (r.regular && !sweep_before_look(search) && interior.order_bodies(search)) {
     const Status status = take_turns(search, r, kFewBodies);
     if (status != Status::unsolved) return status;
     sweeps.start(search.best.data());
   }
+  if (search.solved()) return Status::solved;
   for (;; r.first = false) {
     const Status status = take_turns(search, r, kRotation);
     if (status != Status::unsolved) return status;

@@ -47,6 +47,7 @@ class Automatic {
 
   // Rows of the tables, with their budgets.
   Status sweep_while_cheap(Search& search, Rotation& r, int factorisations);
+  bool sweep_before_look(Search& search);
   Status sweep_few_bodies(Search& search, Rotation& r, int factorisations);
   Status paths_from_sweeps(Search& search, Rotation& r, int paths);
   Status sticking_point(Search& search, Rotation& r, int);

@@ -187,6 +187,18 @@ Status Automatic::paths_from_sweeps(Search& search, Rotation& r, int paths) {
   return Status::unsolved;
 }
 
+// Most problems are solved before a look at the rank of A would have paid.
+bool Automatic::sweep_before_look(Search& search) {
+  constexpr double kSweeps = 50;
+  const double look = interior.look_cost(search);
+  if (!(look > 0)) return false;
+  AcceleratedSweeps::Leave leave;
+  leave.partly = true;
+  leave.most_work = std::max(look, kSweeps * search.sweep_cost);
+  sweeps.run(search, leave);
+  return search.solved();
+}
+
 // As long as they forecast less than a run of interior points: one body on hundreds of points,
 // which slides on all of them, is solved by them.
 Status Automatic::sweep_few_bodies(Search& search, Rotation&, int factorisations) {

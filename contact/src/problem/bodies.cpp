@@ -90,25 +90,22 @@ namespace {
 std::shared_ptr<const detail::BodyForm> body_form(const std::vector<RigidBody>& bodies,
                                                   const std::vector<ContactRows>& contacts) {
   auto form = std::make_shared<detail::BodyForm>();
-  form->bodies = static_cast<int>(bodies.size());
+  form->nodes = 2 * static_cast<int>(bodies.size());
   std::vector<Matrix6d> C;
   for (const RigidBody& body : bodies)
     C.push_back(detail::inverse_mass_root(body.inverse_mass_matrix()));
-  form->contacts.resize(contacts.size());
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const ContactRows& c = contacts[i];
-    detail::BodyForm::Contact& to = form->contacts[i];
-    const int body[2] = {c.first, c.second};
-    for (int s = 0; s < 2; ++s) {
-      const bool moves = body[s] >= 0 && bodies[at(body[s])].moves();
-      to.body[s] = moves ? body[s] : -1;
-      if (!moves) continue;
-      const Matrix36d H = (s == 0 ? c.J1 : c.J2) * C[at(body[s])];
-      for (int h = 0; h < 2; ++h)
+  for (const ContactRows& c : contacts) {
+    for (int body : {c.first, c.second}) {
+      if (body < 0 || !bodies[at(body)].moves()) continue;
+      const Matrix36d H = (body == c.first ? c.J1 : c.J2) * C[at(body)];
+      for (int h = 0; h < 2; ++h) {
+        linalg::PackedBlock block;
         for (int r = 0; r < 3; ++r)
-          for (int k = 0; k < 3; ++k)
-            to.H[s][h].column[4 * k + r] = to.turned[s][h].column[4 * r + k] = H(r, 3 * h + k);
+          for (int k = 0; k < 3; ++k) block.column[4 * k + r] = H(r, 3 * h + k);
+        form->add(2 * body + h, block);
+      }
     }
+    form->end_contact();
   }
   return form;
 }

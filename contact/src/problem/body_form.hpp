@@ -10,29 +10,40 @@
 
 namespace tether::contact::detail {
 
-/// A = H H' with H = J C, C C' the inverse mass of each body. Of each body a contact has two
-/// blocks, of its linear and its angular velocity: nodes 2 k and 2 k + 1 of body k.
+/// A = H H' in blocks of three columns, the nodes. H = J C, C C' the inverse mass of each body:
+/// nodes 2 k and 2 k + 1 are the linear and angular velocity of body k, and a contact has those of
+/// its one or two bodies that move. Or any other factor, see rank_form().
 struct BodyForm {
-  struct Contact {
-    int body[2];                       // -1: none, or one that is fixed
-    linalg::PackedBlock H[2][2];       // of each body: linear, angular; contact rows
-    linalg::PackedBlock turned[2][2];  // the same, transposed
-  };
-  int bodies = 0;
-  std::vector<Contact> contacts;
+  int nodes = 0;
+  std::vector<int> start{0}, node;             // of contact i: start[i] <= k < start[i + 1]
+  std::vector<linalg::PackedBlock> H, turned;  // contact rows; the same, transposed
+
+  int contacts() const { return static_cast<int>(start.size()) - 1; }
+  void add(int to, const linalg::PackedBlock& block) {
+    node.push_back(to);
+    H.push_back(block);
+    linalg::PackedBlock across;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) across.column[4 * r + c] = block.column[4 * c + r];
+    turned.push_back(across);
+  }
+  void end_contact() { start.push_back(static_cast<int>(node.size())); }
 };
 
-/// Of some contacts, with the bodies that they have.
+/// Of some contacts, with the nodes that they have.
 inline std::shared_ptr<const BodyForm> part_of(const BodyForm& whole,
                                                const std::vector<int>& contacts) {
   auto out = std::make_shared<BodyForm>();
   std::map<int, int> number;
   for (int i : contacts) {
-    out->contacts.push_back(whole.contacts[linalg::at(i)]);
-    for (int& body : out->contacts.back().body)
-      if (body >= 0) body = number.emplace(body, static_cast<int>(number.size())).first->second;
+    for (int k = whole.start[linalg::at(i)]; k < whole.start[linalg::at(i) + 1]; ++k) {
+      const int node = whole.node[linalg::at(k)];
+      out->add(number.emplace(node, static_cast<int>(number.size())).first->second,
+               whole.H[linalg::at(k)]);
+    }
+    out->end_contact();
   }
-  out->bodies = static_cast<int>(number.size());
+  out->nodes = static_cast<int>(number.size());
   return out;
 }
 

@@ -32,65 +32,55 @@ TETHER_INLINE void apply(const PackedBlock& A, const double* x, double* y, doubl
   *reinterpret_cast<v4*>(y) += sign * (a[0] * x[0] + a[1] * x[1] + a[2] * x[2]);
 }
 
-TETHER_CLONES void add_contact(const BodyForm::Contact& c, const PackedBlock& X,
-                               const int (*at)[2][2], PackedBlock* values) {
-  for (int s = 0; s < 2; ++s) {
-    if (c.body[s] < 0) continue;
-    PackedBlock right[2];
-    for (int h = 0; h < 2; ++h) multiply(X, c.H[s][h], right[h]);
-    for (int r = 0; r < 2; ++r) {
-      if (c.body[r] < 0) continue;
-      for (int node = 0; node < 2; ++node)
-        for (int h = 0; h < 2; ++h)
-          add_product(c.turned[r][node], right[h], values[at[r][node][s] + h]);
-    }
+// values += H' X H for one contact, all pairs of its nodes.
+TETHER_CLONES void add_contact(const PackedBlock* H, const PackedBlock* turned, int nodes,
+                               const PackedBlock& X, const int* place, PackedBlock* values) {
+  for (int s = 0; s < nodes; ++s) {
+    PackedBlock right;
+    multiply(X, H[s], right);
+    for (int r = 0; r < nodes; ++r) add_product(turned[r], right, values[place[r * nodes + s]]);
   }
 }
 
 }  // namespace
 
-bool BodyNewton::order(const Problem& problem) {
-  form_ = problem.body_form();
-  if (form_ == nullptr) return false;
-  const std::size_t nodes = 2 * at(form_->bodies);
-  std::vector<std::vector<int>> others(at(form_->bodies));
-  for (int k = 0; k < form_->bodies; ++k) others[at(k)].push_back(k);
-  for (const BodyForm::Contact& c : form_->contacts) {
-    if (c.body[0] < 0 || c.body[1] < 0) continue;
-    others[at(c.body[0])].push_back(c.body[1]);
-    others[at(c.body[1])].push_back(c.body[0]);
-  }
+void BodyNewton::order(const BodyForm& form) {
+  form_ = &form;
+  std::vector<std::vector<int>> others(at(form.nodes));
+  for (int k = 0; k < form.nodes; ++k) others[at(k)].push_back(k);
+  for (int i = 0; i < form.contacts(); ++i)
+    for (int r = form.start[at(i)]; r < form.start[at(i) + 1]; ++r)
+      for (int s = form.start[at(i)]; s < form.start[at(i) + 1]; ++s)
+        if (s != r) others[at(form.node[at(r)])].push_back(form.node[at(s)]);
   start_.assign(1, 0);
   columns_.clear();
   for (std::vector<int>& list : others) {
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
-    for (int node = 0; node < 2; ++node) {
-      for (const int k : list) columns_.insert(columns_.end(), {2 * k, 2 * k + 1});
-      start_.push_back(static_cast<int>(columns_.size()));
-    }
+    columns_.insert(columns_.end(), list.begin(), list.end());
+    start_.push_back(static_cast<int>(columns_.size()));
   }
-  const BlockPattern pattern{static_cast<int>(start_.size()) - 1, start_.data(), columns_.data()};
+  const BlockPattern pattern{form.nodes, start_.data(), columns_.data()};
   lu_.order(pattern);
   lu_.analyse(pattern, nullptr);
-  place_.resize(form_->contacts.size());
-  for (std::size_t i = 0; i < place_.size(); ++i) {
-    const int* body = form_->contacts[i].body;
-    for (int r = 0; r < 2; ++r)
-      for (int s = 0; s < 2; ++s) {
-        if (body[r] < 0 || body[s] < 0) continue;
-        const std::vector<int>& list = others[at(body[r])];
-        const auto found = std::lower_bound(list.begin(), list.end(), body[s]) - list.begin();
-        for (int node = 0; node < 2; ++node)
-          place_[i].at[r][node][s] = start_[at(2 * body[r] + node)] + 2 * static_cast<int>(found);
+  place_.clear();
+  place_start_.assign(1, 0);
+  for (int i = 0; i < form.contacts(); ++i) {
+    for (int r = form.start[at(i)]; r < form.start[at(i) + 1]; ++r)
+      for (int s = form.start[at(i)]; s < form.start[at(i) + 1]; ++s) {
+        const int row = form.node[at(r)];
+        const auto begin = columns_.begin() + start_[at(row)];
+        const auto end = columns_.begin() + start_[at(row) + 1];
+        place_.push_back(
+            static_cast<int>(std::lower_bound(begin, end, form.node[at(s)]) - columns_.begin()));
       }
+    place_start_.push_back(static_cast<int>(place_.size()));
   }
   values_.resize(columns_.size());
-  inverse_.resize(place_.size());
-  inverse_left_.resize(place_.size());
-  right_inverse_.resize(place_.size());
-  p_.resize(nodes);
-  return true;
+  inverse_.resize(at(form.contacts()));
+  inverse_left_.resize(inverse_.size());
+  right_inverse_.resize(inverse_.size());
+  p_.resize(at(form.nodes));
 }
 
 void BodyNewton::begin() {
@@ -109,7 +99,10 @@ void BodyNewton::add(int i, const PackedBlock& D, const PackedBlock& L, const Pa
   multiply(R, inverse_[at(i)], right_inverse_[at(i)]);
   multiply(inverse_[at(i)], L, inverse_left_[at(i)]);
   multiply(right_inverse_[at(i)], L, X);
-  add_contact(form_->contacts[at(i)], X, place_[at(i)].at, values_.data());
+  const int first = form_->start[at(i)];
+  add_contact(form_->H.data() + first, form_->turned.data() + first,
+              form_->start[at(i) + 1] - first, X, place_.data() + place_start_[at(i)],
+              values_.data());
 }
 
 bool BodyNewton::factor() {
@@ -125,25 +118,21 @@ bool BodyNewton::factor() {
 
 void BodyNewton::solve(PackedVector* y) {
   std::fill(p_.begin(), p_.end(), PackedVector());
-  const std::size_t n = place_.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    const BodyForm::Contact& c = form_->contacts[i];
+  const int n = form_->contacts();
+  for (int i = 0; i < n; ++i) {
     alignas(32) double z[4] = {0, 0, 0, 0};
-    apply(right_inverse_[i], y[i].v, z, 1);
-    for (int s = 0; s < 2; ++s)
-      for (int h = 0; h < 2 && c.body[s] >= 0; ++h)
-        apply(c.turned[s][h], z, p_[at(2 * c.body[s] + h)].v, 1);
+    apply(right_inverse_[at(i)], y[i].v, z, 1);
+    for (int k = form_->start[at(i)]; k < form_->start[at(i) + 1]; ++k)
+      apply(form_->turned[at(k)], z, p_[at(form_->node[at(k)])].v, 1);
   }
   lu_.solve(p_.data());
-  for (std::size_t i = 0; i < n; ++i) {
-    const BodyForm::Contact& c = form_->contacts[i];
+  for (int i = 0; i < n; ++i) {
     alignas(32) double z[4] = {0, 0, 0, 0}, out[4] = {0, 0, 0, 0};
-    for (int s = 0; s < 2; ++s)
-      for (int h = 0; h < 2 && c.body[s] >= 0; ++h)
-        apply(c.H[s][h], p_[at(2 * c.body[s] + h)].v, z, 1);
-    apply(inverse_[i], y[i].v, out, 1);
-    apply(inverse_left_[i], z, out, -1);
-    for (int k = 0; k < 3; ++k) y[i].v[k] = out[k];
+    for (int k = form_->start[at(i)]; k < form_->start[at(i) + 1]; ++k)
+      apply(form_->H[at(k)], p_[at(form_->node[at(k)])].v, z, 1);
+    apply(inverse_[at(i)], y[i].v, out, 1);
+    apply(inverse_left_[at(i)], z, out, -1);
+    for (int c = 0; c < 3; ++c) y[i].v[c] = out[c];
   }
 }
 

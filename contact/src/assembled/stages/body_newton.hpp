@@ -14,15 +14,18 @@ namespace tether::contact::detail {
 ///
 ///     (1 + H' R D^-1 L H) p = H' R D^-1 r,   y = D^-1 (r - L H p)
 ///
-/// with six rows a body in place of three a contact. Where bodies touch at many points, a wall of
-/// bricks, that is a tenth of the work and less; digits that D^-1 L H p cancels come back by
-/// refinement.
+/// with six rows a body in place of three a contact, or the rank of A. Where bodies touch at many
+/// points, a wall of bricks, that is a tenth of the work and less; digits that D^-1 L H p cancels
+/// come back by refinement.
 class BodyNewton {
  public:
-  /// Orders the bodies; false: the problem was not given by bodies.
-  bool order(const Problem& problem);
+  /// Orders the nodes of a form, which lives as long as it is used.
+  void order(const BodyForm& form);
   /// Estimated ns of a factorisation.
-  double cost() const { return 4 * lu_.operations() + 800.0 * static_cast<double>(place_.size()); }
+  double cost() const {
+    return 4 * lu_.operations() + 200.0 * static_cast<double>(inverse_.size()) +
+           37.5 * static_cast<double>(place_.size());
+  }
 
   void begin();
   /// Blocks of contact i, three columns of four.
@@ -33,14 +36,10 @@ class BodyNewton {
   void solve(PackedVector* y);
 
  private:
-  // First entries in values_ of the rows of both nodes of body r under body c.
-  struct Place {
-    int at[2][2][2];  // [r][node of r][c]
-  };
   const BodyForm* form_ = nullptr;
   BlockLu lu_;
   std::vector<int> start_, columns_;
-  std::vector<Place> place_;
+  std::vector<int> place_, place_start_;  // in values_, of all pairs of nodes of a contact
   std::vector<PackedBlock> values_;
   std::vector<PackedBlock> inverse_, inverse_left_, right_inverse_;  // D^-1, D^-1 L, R D^-1
   Packed p_;

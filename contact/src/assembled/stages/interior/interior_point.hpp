@@ -51,6 +51,8 @@ class InteriorPoint {
   // True, and ordered, where bodies have so many contacts that equations of bodies take the place
   // of those of contacts.
   bool order_bodies(Search& search);
+  // Estimated ns of the look at the rank that it takes; 0: none.
+  double look_cost(const Search& search) const { return newton_.matrix().look_cost(search); }
 
  private:
   struct CouplingPath;
