@@ -370,13 +370,12 @@ TEST_CASE("event: a run that has been handed over is saved and goes on with its 
 
 TEST_CASE("event: what the event engine does not have is stepped where the scene allows it") {
   const std::string rolls =
-      "[[body]]\nname = \"roller\"\nshape = \"sphere\"\nradius = 0.1\nmass = 1\n"
-      "position = [5, 0, 5]\nmaterial = \"rubber\"\n"
-      "[[pair]]\nbetween = [\"floor\", \"rubber\"]\nrolling = 0.01\n"
+      "[[body]]\nname = \"hill\"\nshape = \"mesh\"\npoints = [[0, 0, 0], [9, 0, 0], [0, 9, 0]]\n"
+      "triangles = [[0, 1, 2]]\nposition = [5, 0, -5]\nfixed = true\nmaterial = \"rubber\"\n"
       "[[pair]]\nbetween = [\"body\", \"rubber\"]\n";
   const Plan plan = make_plan(handed_over(rolls));
   CHECK(plan.engine == EngineKind::stepping);
-  CHECK(plan.why.find("rolling and torsional") != std::string::npos);
+  CHECK(plan.why.find("mesh") != std::string::npos);
   Scene refused = handed_over(rolls);
   refused.event->otherwise = Otherwise::stop;
   refused.stepping.reset();

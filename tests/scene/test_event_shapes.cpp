@@ -366,19 +366,6 @@ TEST_CASE("event: a box that stands askew tips over the edge that it shares with
   }
 }
 
-TEST_CASE("events: rolling and torsional friction are refused by name") {
-  for (const std::string& length :
-       {std::string("rolling = 1e-3"), std::string("torsional = 1e-3")}) {
-    const Scene scene = parse_scene(
-        "[event]\n[[body]]\nshape = \"sphere\"\nradius = 1\nmass = 1\nposition = [0, 0, 1]\n"
-        "material = \"a\"\n[[body]]\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n"
-        "[[pair]]\nbetween = [\"a\", \"a\"]\nfriction = 0.5\n" +
-            length + "\n",
-        "rolling.toml");
-    CHECK_THROWS_WITH(make_event_engine(scene), Catch::Contains("[[pair]] rolling, torsional"));
-  }
-}
-
 TEST_CASE("events: meshes are refused by name, and steps take the scene") {
   const std::string text =
       "[scene]\nend = 1\ngravity = [0, 0, -9.81]\n" +

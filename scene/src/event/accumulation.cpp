@@ -63,7 +63,7 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
   const VectorXd w = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
   std::vector<int> slow;
   for (int k = 0; k < static_cast<int>(touching.size()); ++k) {
-    if (std::abs(w[block * k]) > speed) continue;
+    if (model_.law(touching[at(k)]).is_moment() || std::abs(w[block * k]) > speed) continue;
     slow.push_back(block * k);
     if (!(model_.law(touching[at(k)]).friction > 0)) continue;
     for (int j = 1; j < block; ++j)

@@ -77,6 +77,7 @@ void Driver::check_start() const {
           model_.joint_name(i), g[i], speeds[i], kStartTolerance));
   double slope = 0;
   for (int i = 0; i < model_.contacts(); ++i) {
+    if (model_.is_apart(i, 0)) continue;
     const double gap = model_.gap(i, slope);
     if (std::isinf(model_.margin(i)) && gap < -kStartTolerance * size)
       throw std::invalid_argument(fmt::format(
@@ -89,7 +90,9 @@ std::vector<int> Driver::touching(int always) const {
   std::vector<int> out;
   for (int i = 0; i < model_.contacts(); ++i) {
     double rate = 0;
+    if (model_.law(i).is_moment()) continue;  // see with_moments
     const bool closed = motion_.modes()[at(i)].mode != Mode::open;
+    if (!closed && i != always && model_.is_apart(i, bands().gap(i))) continue;
     const bool near = std::abs(model_.gap(i, rate)) <= bands().gap(i) &&
                       model_.margin(i) >= -kBesideBorder * bands().gap(i);
     if (i == always || closed || near) out.push_back(i);
@@ -113,6 +116,17 @@ std::vector<int> Driver::without_doubles(const std::vector<int>& contacts) const
       *twin = motion_.modes()[at(i)].mode == Mode::open ? *twin : i;
   }
   return out;
+}
+
+std::vector<int> Driver::with_moments(std::vector<int> contacts) const {
+  const auto end = static_cast<std::ptrdiff_t>(contacts.size());
+  for (int i = 0; i < model_.contacts(); ++i) {
+    const int by = model_.law(i).held_by;
+    if (by >= 0 &&
+        std::find(contacts.begin(), contacts.begin() + end, by) != contacts.begin() + end)
+      contacts.push_back(i);
+  }
+  return contacts;
 }
 
 void Driver::advance(double t, const std::function<bool()>& interrupted) {
@@ -291,8 +305,8 @@ void Driver::handle(const Zero& zero) {
   else if (zero.what != Watch::support)
     record(zero.what == Watch::normal_force ? EventKind::lift
            : zero.what == Watch::border     ? EventKind::border
-           : zero.what == Watch::cone       ? EventKind::slip
-                                            : EventKind::stop,
+           : zero.what == Watch::cone       ? slip_begins(zero.contact)
+                                            : slip_ends(zero.contact),
            zero.contact, 0, 0, 0);
   std::vector<ContactMode> modes =
       decide(close, closing ? -1 : zero.contact,
@@ -302,15 +316,25 @@ void Driver::handle(const Zero& zero) {
   begin_phase();
 }
 
+EventKind Driver::slip_begins(int contact) const {
+  return model_.law(contact).is_moment() ? EventKind::roll : EventKind::slip;
+}
+EventKind Driver::slip_ends(int contact) const {
+  return model_.law(contact).is_moment() ? EventKind::roll_stop : EventKind::stop;
+}
+
 // Of contacts that share their forces.
 void Driver::record_changes(const std::vector<ContactMode>& before,
                             const std::vector<ContactMode>& after, double lag) {
   for (std::size_t i = 0; i < after.size(); ++i) {
     if (before[i].mode == after[i].mode) continue;
-    record(after[i].mode == Mode::open    ? EventKind::lift
-           : after[i].mode == Mode::slide ? EventKind::slip
-                                          : EventKind::stop,
-           static_cast<int>(i), 0, 0, 0);
+    const int contact = static_cast<int>(i);
+    const bool lifts = after[i].mode == Mode::open;
+    if (lifts && model_.law(contact).is_moment()) continue;
+    record(lifts                          ? EventKind::lift
+           : after[i].mode == Mode::slide ? slip_begins(contact)
+                                          : slip_ends(contact),
+           contact, 0, 0, 0);
     events_.back().time -= lag;
   }
 }

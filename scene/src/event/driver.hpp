@@ -114,9 +114,13 @@ class Driver {
   std::vector<int> touching(int always) const;
   bool are_one(int contact, int other) const;
   std::vector<int> without_doubles(const std::vector<int>& contacts) const;
+  /// Contacts, and the moments that they hold, behind them.
+  std::vector<int> with_moments(std::vector<int> contacts) const;
   double slowest_turn();
   double longest_first_step(const std::vector<bool>& leaving);
   void turn_slips();
+  EventKind slip_begins(int contact) const;
+  EventKind slip_ends(int contact) const;
   void record(EventKind kind, int contact, double before, double after, double lost);
   void record_changes(const std::vector<ContactMode>& before, const std::vector<ContactMode>& after,
                       double lag);

@@ -156,13 +156,14 @@ void EventEngine::look() {
         d.potential_energy -= body.mass * scene_.gravity->dot(origin_);
   }
   contacts_known_ = false;
-  for (const int i : driver_->motion().closed()) d.contacts += !model_->is_law(i);
+  for (const int i : driver_->motion().closed()) d.contacts += model_->is_pair(i);
   // A point behind a face that has a border is not always in the body.
   const std::vector<ContactMode>& modes = driver_->motion().modes();
   for (int i = 0; i < model_->contacts(); ++i) {
     const bool closed = modes[at(i)].mode != Mode::open;
     double rate = 0;
-    if (!model_->is_law(i) && (closed || std::isinf(model_->margin(i))))
+    if (!closed && model_->is_apart(i, 0)) continue;
+    if (model_->is_pair(i) && (closed || std::isinf(model_->margin(i))))
       d.penetration = std::max(d.penetration, -model_->gap(i, rate) * units_.length);
   }
   VectorXd g, rate, rest;
@@ -181,9 +182,16 @@ void EventEngine::look_at_contacts() const {
   if (motion.closed().empty()) return;
   driver_->state_with_forces();
   const std::vector<VectorXd> forces = motion.contact_forces();
+  std::vector<int> holders;
   for (std::size_t k = 0; k < forces.size(); ++k) {
     const int contact = motion.closed()[k];
-    if (model_->is_law(contact)) continue;
+    if (model_->is_moment(contact)) {
+      const auto by = std::find(holders.begin(), holders.end(), model_->law(contact).held_by);
+      contacts_[at(static_cast<int>(by - holders.begin()))].moment +=
+          units_.force() * units_.length * model_->in_space(contact, forces[k]);
+    }
+    if (!model_->is_pair(contact)) continue;
+    holders.push_back(contact);
     const FeaturePair& pair = model_->pair(contact);
     const Touch touch = pair.look(model_->bodies().all());
     ContactState c;
@@ -234,8 +242,10 @@ void EventEngine::look_at_events() {
       e.second = joint.second;
       if (joints::is_angle(joint)) arm = units_.length;
     } else {
-      e.first = model_->pair(from.contact).first;
-      e.second = model_->pair(from.contact).second;
+      const int by = model_->law(from.contact).held_by;
+      const FeaturePair& pair = model_->pair(by >= 0 ? by : from.contact);
+      e.first = pair.first;
+      e.second = pair.second;
     }
     e.before = units_.speed() / arm * from.before;
     e.after = units_.speed() / arm * from.after;
@@ -378,6 +388,10 @@ void EventEngine::restore(std::istream& in, Restore how) {
     b.count = count;
     if (axes) m.axes.push_back(binary::get<std::int32_t>(in));
   }
+  for (int i = 0; i < model_->contacts(); ++i)
+    if (const int by = model_->law(i).held_by;
+        by >= 0 && m.modes[at(i)].mode != Mode::open && m.modes[at(by)].mode == Mode::open)
+      throw std::runtime_error(kDamaged);
   if (!m.is_sound() || !saved.allFinite() || !(reached >= m.time) || !std::isfinite(reached))
     throw std::runtime_error(kDamaged);
   events_.clear();

@@ -25,6 +25,10 @@ const char* name(ContactEvent::Kind kind) {
       return "hand_over";
     case ContactEvent::Kind::resume:
       return "resume";
+    case ContactEvent::Kind::roll:
+      return "roll";
+    case ContactEvent::Kind::roll_stop:
+      return "roll_stop";
   }
   return "?";
 }

@@ -29,7 +29,7 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
   std::vector<int> out;
   bool any = false;
   for (const int i : near) {
-    if (model_.law(i).is_bounded()) continue;  // no impulse
+    if (!model_.law(i).has_normal()) continue;  // bounded: no impulse
     double rate = 0;
     const double gap = model_.gap(i, rate), band = bands().approach(i);
     // Which of two corners is first may be a matter of the error of their gaps. What bounces
@@ -44,7 +44,7 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
     any = any || hits;
   }
   if (!any) out.clear();
-  return without_doubles(out);
+  return with_moments(without_doubles(out));
 }
 
 // One impact may strike others that are near. With corners in turns there are infinitely many in no
@@ -59,7 +59,7 @@ void Driver::collide(const std::vector<int>& near, EventKind otherwise, int cont
     if (round < kMostRounds)
       strike(set, false);
     else
-      strike(near, true);
+      strike(with_moments(near), true);
   }
 }
 
@@ -77,7 +77,7 @@ Driver::Impact Driver::expect(const std::vector<int>& set, const VectorXd& befor
     const ContactLaw law = model_.law(i);
     const double approach = -before[block * k];
     out.mu[k] = law.friction;
-    if (approach <= bands().approach(i)) continue;
+    if (!law.has_normal() || approach <= bands().approach(i)) continue;
     out.hits[at(k)] = true;
     if (plastic) continue;
     if (has_accumulated(i, approach, out.rest[k])) {
@@ -116,7 +116,8 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
   const Impact impact = expect(set, before, rows.size(), plastic);
   refuse_blocked(set, impact, rows.A());
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_impact(rows.A(), impact.b, impact.mu, bands().part);
+  const FrictionAnswer answer =
+      solve_impact(rows.A(), impact.b, impact.mu, bands().part, rows.holders());
   if (!answer.solved)
     fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", set.size(),
                      answer.error));

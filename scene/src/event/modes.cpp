@@ -25,7 +25,7 @@ bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int 
   const int block = rows.size();
   std::vector<int> others;
   for (int i = 0; i < static_cast<int>(answer.regimes.size()); ++i)
-    if (i != k && !rows.is_bounded(i) && answer.regimes[at(i)] != contact::Regime::separating)
+    if (i != k && rows.has_normal(i) && answer.regimes[at(i)] != contact::Regime::separating)
       others.push_back(block * i);
   if (others.empty()) return false;
   const int n = static_cast<int>(others.size());
@@ -62,7 +62,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     const std::string why = model_.undecided(i);
     if (!why.empty()) fail(why);
   }
-  candidates = without_doubles(candidates);
+  candidates = with_moments(without_doubles(candidates));
   ContactRows rows(model_, candidates);
   const int block = rows.size(), n = static_cast<int>(candidates.size());
   const VectorXd velocities = rows.velocities(u);
@@ -105,13 +105,16 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
     ContactMode& mode = modes[at(i)];
     const bool bounded = model_.law(i).is_bounded();
     const contact::Regime regime = answer.regimes[at(k)];
-    if (regime == contact::Regime::separating && !bounded &&
+    const bool moment = model_.law(i).is_moment();
+    if (moment && modes[at(model_.law(i).held_by)].mode == Mode::open) continue;
+    if (regime == contact::Regime::separating && !bounded && !moment &&
         !(std::abs(answer.w[block * k]) <= kNegligible * solved.scale &&
           rests_on_others(rows, answer, k)))
       continue;
     const bool lifted =
         std::any_of(lifted_.begin(), lifted_.end(), [&](int each) { return are_one(i, each); });
-    if (lifted && answer.x[block * k] <= kNoForce * answer.x.cwiseAbs().maxCoeff()) continue;
+    if (lifted && !moment && answer.x[block * k] <= kNoForce * answer.x.cwiseAbs().maxCoeff())
+      continue;
     const VectorXd& d = slides[at(k)];
     if (d.size() > 0) {
       mode.mode = Mode::slide;
@@ -148,11 +151,12 @@ void Driver::jam(const ContactRows& rows, const VectorXd& velocities, const Vect
   VectorXd b = -velocities;
   VectorXd friction = mu;
   for (int k = 0; k < mu.size(); ++k) {
-    b[block * k] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
+    if (rows.has_normal(k) || rows.is_bounded(k))
+      b[block * k] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
     if (rows.is_bounded(k)) friction[k] = 0;  // no impulse
   }
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_friction(rows.A(), b, friction);
+  const FrictionAnswer answer = solve_friction(rows.A(), b, friction, rows.holders());
   if (!answer.solved) fail("an impact without collision is not solved");
   const double lost = change_velocities(rows.change(answer.x));
   bool first = true;

@@ -79,6 +79,7 @@ void Driver::start_phase() {
   std::vector<bool> leaving(at(model_.contacts()), false);
   double local = local_;
   for (int i = 0; i < model_.contacts(); ++i) {
+    if (model_.is_apart(i, bands().gap(i))) continue;
     double rate = 0;
     const double gap = model_.gap(i, rate);
     leaving[at(i)] = motion_.modes()[at(i)].mode == Mode::open && std::abs(gap) <= bands().gap(i) &&
@@ -126,6 +127,7 @@ double Driver::longest_first_step(const std::vector<bool>& leaving) {
   ContactLook look;
   for (int i = 0; i < model_.contacts(); ++i) {
     if (motion_.modes()[at(i)].mode != Mode::open) continue;
+    if (model_.is_apart(i, bands().gap(i))) continue;
     double speed = 0;
     const double gap = leaving[at(i)] ? 0 : model_.gap(i, speed);
     if (leaving[at(i)]) model_.gap(i, speed);

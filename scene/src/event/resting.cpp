@@ -16,7 +16,8 @@ using linalg::at;
 std::optional<std::vector<int>> closed_contacts(Model& model, const StartState& state) {
   std::vector<int> out;
   for (int i = 0; i < model.contacts(); ++i) {
-    if (model.law(i).is_bounded()) continue;
+    if (!model.law(i).has_normal()) continue;
+    if (model.is_apart(i, state.gap)) continue;
     double rate = 0;
     const double gap = model.gap(i, rate), margin = model.margin(i);
     if (gap > state.gap || margin < -state.gap) continue;

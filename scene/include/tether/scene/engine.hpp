@@ -80,7 +80,9 @@ struct ContactEvent {
     jam,        ///< sliding has no forces any more: an impact without collision
     border,     ///< a contact leaves its face
     hand_over,  ///< steps take over from here on; of no contact
-    resume      ///< events go on; `lost` is what the steps took. Of no contact
+    resume,     ///< events go on; `lost` is what the steps took. Of no contact
+    roll,       ///< a contact begins to roll or spin against its moment of friction
+    roll_stop   ///< it rolls or spins no longer
   };
   double time = 0;  ///< s
   Kind kind = Kind::impact;

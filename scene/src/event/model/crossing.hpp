@@ -69,6 +69,7 @@ inline Touch CrossingFeature::look(const Frame<double>& A, const Frame<double>& 
   const double along2 = n1.dot(s * c1) + n.dot(s * c2);
   const Vector3d n2 = (s * c2 - along2 * n - 2 * along1 * n1) / D;
   t.normal = n;
+  t.normal_rate = n1;
   t.gap = n.dot(d) - first.radius - second.radius;
   t.rate = n1.dot(d) + n.dot(d1);
   t.second = n2.dot(d) + 2 * n1.dot(d1) + n.dot(d2);

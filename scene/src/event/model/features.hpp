@@ -84,6 +84,8 @@ struct FeaturePair {
                RoundOnLine, PointOnCircle>
       on_second;
   double friction = 0, restitution = 0;
+  double rolling = 0, torsional = 0;  ///< m
+  double reach = kNoBorder;           ///< of both shapes from the centres of their bodies, together
 
   Touch look(const Bodies& bodies) const {
     return std::visit(
@@ -91,6 +93,10 @@ struct FeaturePair {
           return feature.look(bodies.frames[at(first)], bodies.frames[at(second)], centre, radius);
         },
         on_second);
+  }
+  bool is_apart(const Bodies& bodies, double by) const {
+    const double most = reach + by;
+    return (bodies.frames[at(first)].x - bodies.frames[at(second)].x).squaredNorm() > most * most;
   }
   /// It touches in more points than one contact can stand for.
   bool is_flush(const Bodies& bodies) const {

@@ -27,7 +27,15 @@ struct ContactLaw {
   /// >= 0: it has no gap and always this normal force: a motor or the friction of a joint, along
   /// the first of the tangents. friction is 1 then.
   double bound = -1;
+  /// >= 0: a moment without a gap, whose normal force is that of this contact, and friction a
+  /// length: of rolling, across the normal, along both tangents; `spin`: about it, along the first.
+  int held_by = -1;
+  bool spin = false;
+
   bool is_bounded() const { return bound >= 0; }
+  bool is_moment() const { return held_by >= 0; }
+  bool has_normal() const { return !is_bounded() && !is_moment(); }
+  bool is_line() const { return is_bounded() || spin; }  ///< it has one tangent only
 };
 
 /// q' = N(q) u, M(q) u' = h(t, q, u) + joints + contacts. Everything is asked of the state that was
@@ -71,6 +79,10 @@ class Model {
   virtual std::string contact_name(int /*contact*/) const { return "a contact"; }
   virtual void look(int contact, ContactLook& out) = 0;
   virtual double gap(int contact, double& rate) = 0;  ///< and its rate
+
+  /// Whether the bodies are further apart than `by`, as it is seen with little work: spheres about
+  /// them do not meet. What such a contact's gap says is of no matter then.
+  virtual bool is_apart(int /*contact*/, double /*by*/) { return false; }
 
   /// How far the contact is inside the border of its features, m; infinite: they have none.
   virtual double margin(int /*contact*/) { return std::numeric_limits<double>::infinity(); }

@@ -131,4 +131,16 @@ Outline outline_of(const Shape& shape) {
   return out;
 }
 
+double reach_of(const Shape& shape) {
+  if (shape.kind == ShapeKind::plane) return kNoBorder;
+  const Outline outline = outline_of(shape);
+  double far = 0;
+  for (const Knob& each : outline.knobs) far = std::max(far, each.at.norm() + each.radius);
+  for (const Round& each : outline.rounds) far = std::max(far, each.at.norm() + each.size());
+  for (const End& each : outline.ends) far = std::max(far, each.plane.at.norm() + each.radius);
+  for (const Segment& s : outline.segments)
+    far = std::max({far, s.at.norm() + s.radius, (s.at + s.length * s.along).norm() + s.radius});
+  return far;
+}
+
 }  // namespace tether::scene::event

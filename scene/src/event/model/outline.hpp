@@ -34,5 +34,7 @@ struct Outline {
 };
 
 Outline outline_of(const Shape& shape);
+/// How far it reaches from the centre of its body; of a plane infinitely.
+double reach_of(const Shape& shape);
 
 }  // namespace tether::scene::event

@@ -24,6 +24,7 @@ struct PlaneFeature {
     t.rate = n.x1.dot(d) + n.x.dot(d1);
     t.second = n.x2.dot(d) + 2 * n.x1.dot(d1) + n.x.dot(d2);
     t.normal = n.x;
+    t.normal_rate = n.x1;
     t.point = c.x - radius * n.x;
     t.point_velocity = c.x1 - radius * n.x1;
     return t;
@@ -47,7 +48,7 @@ inline Touch apart(const Vector3d& d, const Vector3d& d1, const Vector3d& d2, do
   t.gap = D - radius_first - radius;
   t.rate = t.normal.dot(d1);
   t.second = t.normal.dot(d2) + (d1.squaredNorm() - t.rate * t.rate) / D;
-  n1 = (d1 - t.normal * t.rate) / D;
+  t.normal_rate = n1 = (d1 - t.normal * t.rate) / D;
   return t;
 }
 

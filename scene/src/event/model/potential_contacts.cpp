@@ -157,15 +157,14 @@ std::vector<FeaturePair> potential_contacts(const Scene& scene) {
       if ((a.fixed && b.fixed) || apart.count({i, j}) > 0) continue;
       const auto found = meet.find(std::minmax(a.material, b.material));
       if (found == meet.end()) continue;
-      if (found->second->rolling > 0 || found->second->torsional > 0)
-        throw std::invalid_argument(
-            "the event engine has no rolling and torsional friction ([[pair]] rolling, torsional): "
-            "use [stepping]");
       for (const Shape& s : a.shapes)
         for (const Shape& o : b.shapes) {
           FeaturePair pair;
           pair.friction = found->second->friction;
           pair.restitution = found->second->restitution;
+          pair.rolling = found->second->rolling;
+          pair.torsional = found->second->torsional;
+          pair.reach = reach_of(s) + reach_of(o);
           pair.first = i;
           pair.second = j;
           add(s, o, pair, out);

@@ -133,6 +133,7 @@ Touch touch_at(const Between& between, const Vector3d& n, const Jet<double>& d,
   const Vector3d n1 = turning + T * z;
   Touch t;
   t.normal = n;
+  t.normal_rate = n1;
   t.gap = here.f;
   t.rate = here.f_t;
   t.second = here.f_tt + 2 * n1.dot(here.g_t) - n1.dot(here.H * n1) - here.f * n1.squaredNorm();
@@ -162,6 +163,7 @@ Touch RoundOnPlane::look(const Frame<double>& A, const Frame<double>& B, const V
   const Support::At s = Support(A, first).at(n.x);
   Touch t;
   t.normal = n.x;
+  t.normal_rate = n.x1;
   t.gap = n.x.dot(d.x) - s.s;
   t.rate = n.x1.dot(d.x - s.point) + n.x.dot(d.x1) - s.s_t;
   t.second = n.x2.dot(d.x - s.point) + 2 * n.x1.dot(d.x1 - s.point_t) + n.x.dot(d.x2) - s.s_tt -

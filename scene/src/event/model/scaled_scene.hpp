@@ -31,6 +31,10 @@ inline Scene scaled(const Scene& scene, const smooth::Units& u) {
       shape.position /= u.length;
       for (Eigen::Vector3d& p : shape.points) p /= u.length;
     }
+  for (Pair& pair : out.pairs) {
+    pair.rolling /= u.length;
+    pair.torsional /= u.length;
+  }
   if (out.event) out.event->max_step /= u.time;
   return out;
 }

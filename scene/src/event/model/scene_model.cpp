@@ -53,6 +53,7 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
   for (const Joint& each : scene.joints) joint_names_.push_back(each.name);
   bodies_.set_state(y_.data());
   axes_.assign(pairs_.size(), Vector3d::Zero());
+  add_moments();
   settle();
 }
 
@@ -68,7 +69,15 @@ VectorXd SceneModel::start() const {
   return out;
 }
 
+void SceneModel::add_moments() {
+  for (int k = 0; k < pairs(); ++k) {
+    if (pair(k).rolling > 0) moments_.push_back({k, false, pair(k).rolling});
+    if (pair(k).torsional > 0) moments_.push_back({k, true, pair(k).torsional});
+  }
+}
+
 std::string SceneModel::contact_name(int contact) const {
+  if (is_moment(contact)) contact = moment(contact).pair;
   if (is_law(contact))
     return "the limit of joint \"" + joint_names_[at(laws_.all().joint(joint_law(contact)))] + "\"";
   const FeaturePair& p = pair(contact);
@@ -93,6 +102,7 @@ double SceneModel::next_kink(double t) const {
 
 void SceneModel::settle() {
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    if (!axes_[i].isZero(0) && pairs_[i].is_apart(bodies_.all(), 0)) continue;
     const Vector3d normal = pairs_[i].look(bodies_.all()).normal;
     if (axes_[i].cross(normal).squaredNorm() > kFarFromNormal) continue;
     Eigen::Index least = 0;
@@ -102,14 +112,14 @@ void SceneModel::settle() {
 }
 
 int SceneModel::axis(int contact) const {
-  if (is_law(contact)) return 0;
+  if (!is_pair(contact)) return 0;
   Eigen::Index k = 0;
   axes_[at(contact)].maxCoeff(&k);
   return static_cast<int>(k);
 }
 
 void SceneModel::set_axis(int contact, int axis) {
-  if (!is_law(contact)) axes_[at(contact)] = Vector3d::Unit(axis);
+  if (is_pair(contact)) axes_[at(contact)] = Vector3d::Unit(axis);
 }
 
 void SceneModel::rates(double* q_rate) const {
@@ -162,6 +172,7 @@ void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest
 
 void SceneModel::look(int contact, ContactLook& out) {
   if (is_law(contact)) return laws_.look(contact - pairs(), bodies_.all(), out);
+  if (is_moment(contact)) return look(moment(contact), out);
   const FeaturePair& p = pair(contact);
   const Bodies& bodies = bodies_.all();
   const Touch touch = p.look(bodies);
@@ -188,6 +199,37 @@ void SceneModel::look(int contact, ContactLook& out) {
   }
 }
 
+// Slip e.w of the turning w of one body against the other, e a tangent, or the normal; where it
+// turns, (e.w)' = e.w' + e'.w.
+void SceneModel::look(const Moment& moment, ContactLook& out) {
+  const FeaturePair& p = pair(moment.pair);
+  const Bodies& bodies = bodies_.all();
+  const Touch touch = p.look(bodies);
+  const Vector3d n = touch.normal, n1 = touch.normal_rate;
+  const std::array<Vector3d, 2> t = tangents_of(moment.pair, n);
+  const Vector3d c1 = n1.cross(axes_[at(moment.pair)]);
+  const Vector3d first1 = (c1 - t[0] * t[0].dot(c1)) / n.cross(axes_[at(moment.pair)]).norm();
+  const std::array<Vector3d, 2> along = {moment.spin ? n : t[0], t[1]};
+  const std::array<Vector3d, 2> turning = {moment.spin ? n1 : first1,
+                                           n1.cross(t[0]) + n.cross(first1)};
+  const Vector3d spin = bodies.frames[at(p.first)].W - bodies.frames[at(p.second)].W;
+  out.gap = out.normal_rate = out.normal_rest = 0;
+  out.normal.setZero(velocities());
+  out.tangents.setZero(2, velocities());
+  out.slip_rate.setZero(2);
+  out.slip_rest.setZero(2);
+  for (int k = 0; k < (moment.spin ? 1 : 2); ++k) {
+    for (const int body : {p.first, p.second}) {
+      const int slot = bodies.inertia[at(body)].slot;
+      if (slot < 0) continue;
+      const double sign = body == p.first ? 1 : -1;
+      out.tangents.block<1, 3>(k, 6 * slot + 3) =
+          sign * (bodies.frames[at(body)].R.transpose() * along[at(k)]).transpose();
+    }
+    out.slip_rest[k] = turning[at(k)].dot(spin);
+  }
+}
+
 std::array<Vector3d, 2> SceneModel::tangents_of(int contact, const Vector3d& normal) const {
   const Vector3d t1 = normal.cross(axes_[at(contact)]).normalized();
   return {t1, normal.cross(t1)};
@@ -195,9 +237,12 @@ std::array<Vector3d, 2> SceneModel::tangents_of(int contact, const Vector3d& nor
 
 Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
+  const bool turns = is_moment(contact), spins = turns && moment(contact).spin;
+  if (turns) contact = moment(contact).pair;
   const Vector3d normal = pair(contact).look(bodies_.all()).normal;
   const std::array<Vector3d, 2> tangent = tangents_of(contact, normal);
-  return parts[0] * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
+  if (spins) return parts[1] * normal;
+  return (turns ? 0 : parts[0]) * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
 }
 
 Forces SceneModel::forces_of(const joints::Reactions& reactions,
@@ -219,7 +264,7 @@ void SceneModel::add_law_force(int contact, const VectorXd& parts, Forces& out) 
 }
 
 std::string SceneModel::undecided(int contact) {
-  return !is_law(contact) && pair(contact).is_flush(bodies_.all())
+  return is_pair(contact) && pair(contact).is_flush(bodies_.all())
              ? "a cylinder lies on its flat end, whose contact the event engine does not have"
              : "";
 }
@@ -236,7 +281,7 @@ bool SceneModel::are_one(int contact, int other, double distance) {
 
 // Of the sine between the normals of contacts of one point; -1: they are of two.
 double SceneModel::square_between(int contact, int other, double distance) {
-  if (is_law(contact) || is_law(other)) return -1;
+  if (!is_pair(contact) || !is_pair(other)) return -1;
   const FeaturePair &p = pair(contact), &q = pair(other);
   if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return -1;
   const Touch a = p.look(bodies_.all()), b = q.look(bodies_.all());

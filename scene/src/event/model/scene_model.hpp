@@ -30,12 +30,13 @@ class SceneModel final : public Model {
   int coordinates() const override { return 7 * bodies_.count(); }
   int velocities() const override { return 6 * bodies_.count(); }
   int joint_rows() const override { return rows_.count(); }
-  /// Pairs of features, then the laws of joints.
-  int contacts() const override { return pairs() + laws_.count(); }
+  /// Pairs of features, then the laws of joints, then moments of pairs.
+  int contacts() const override { return first_moment() + static_cast<int>(moments_.size()); }
   int pairs() const { return static_cast<int>(pairs_.size()); }
   int tangents() const override { return 2; }
   ContactLaw law(int contact) const override {
     if (is_law(contact)) return laws_.law(contact - pairs());
+    if (is_moment(contact)) return law_of(moment(contact));
     return {pair(contact).friction, pair(contact).restitution};
   }
 
@@ -54,13 +55,17 @@ class SceneModel final : public Model {
   void look(int contact, ContactLook& out) override;
   double gap(int contact, double& rate) override {
     if (is_law(contact)) return laws_.gap(contact - pairs(), bodies_.all(), rate);
+    if (is_moment(contact)) return rate = 0;
     const Touch touch = pair(contact).look(bodies_.all());
     rate = touch.rate;
     return touch.gap;
   }
 
+  bool is_apart(int contact, double by) override {
+    return is_pair(contact) && pair(contact).is_apart(bodies_.all(), by);
+  }
   double margin(int contact) override {
-    return is_law(contact) ? kNoBorder : pair(contact).margin(bodies_.all());
+    return is_pair(contact) ? pair(contact).margin(bodies_.all()) : kNoBorder;
   }
 
   std::string undecided(int contact) override;
@@ -82,7 +87,9 @@ class SceneModel final : public Model {
 
   /// q, then u, at t = 0.
   VectorXd start() const;
-  bool is_law(int contact) const { return contact >= pairs(); }
+  bool is_pair(int contact) const { return contact < pairs(); }
+  bool is_law(int contact) const { return contact >= pairs() && contact < first_moment(); }
+  bool is_moment(int contact) const { return contact >= first_moment(); }
   const FeaturePair& pair(int contact) const { return pairs_[at(contact)]; }
   /// Of a contact that is one of the laws of joints.
   const joints::JointLaws& joint_laws() const { return laws_.all(); }
@@ -100,6 +107,19 @@ class SceneModel final : public Model {
   Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
 
  private:
+  /// Of rolling or torsional friction of a pair.
+  struct Moment {
+    int pair;
+    bool spin;
+    double length;  // moment over normal force, m
+  };
+  int first_moment() const { return pairs() + laws_.count(); }
+  const Moment& moment(int contact) const { return moments_[at(contact - first_moment())]; }
+  static ContactLaw law_of(const Moment& moment) {
+    return {moment.length, 0, -1, moment.pair, moment.spin};
+  }
+  void add_moments();
+  void look(const Moment& moment, ContactLook& out);
   double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
 
@@ -111,6 +131,7 @@ class SceneModel final : public Model {
   std::vector<FeaturePair> pairs_;
   std::vector<std::string> body_names_, joint_names_;
   LawContacts laws_;
+  std::vector<Moment> moments_;
   std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen
   std::vector<double> y_;       // of MovingBodies
   std::vector<Load6> loads_;

@@ -22,6 +22,7 @@ constexpr double kFlush = 0.1;
 struct Touch {
   double gap = 0, rate = 0, second = 0;
   Vector3d normal = Vector3d::UnitZ(), point = Vector3d::Zero();
+  Vector3d normal_rate = Vector3d::Zero();     ///< n'
   Vector3d point_velocity = Vector3d::Zero();  ///< of the contact point as it moves over the bodies
 };
 

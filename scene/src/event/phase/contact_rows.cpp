@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include "contact_rows.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <tether/linalg/index.hpp>
 
@@ -12,6 +13,7 @@ using linalg::at;
 namespace {
 
 constexpr double kDependentJoints = 1e-11;
+constexpr double kHeldMoment = 1e-10;  // of the mobility without joints
 
 }  // namespace
 
@@ -50,14 +52,45 @@ ContactRows::ContactRows(Model& model, std::vector<int> contacts)
     A_ = L_ * PL_;
   }
   A_ = (0.5 * (A_ + A_.transpose())).eval();
+  find_holders();
+  if (!holders_.empty() && G_.rows() > 0) free_held_moments();
   complete();
 }
 
 bool ContactRows::is_bounded(int k) const { return model_.law(contacts_[at(k)]).is_bounded(); }
 
+void ContactRows::find_holders() {
+  const auto begin = contacts_.begin();
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const int by = model_.law(contacts_[k]).held_by;
+    if (by < 0) continue;
+    holders_.resize(contacts_.size(), -1);
+    holders_[k] = static_cast<int>(std::find(begin, contacts_.end(), by) - begin);
+  }
+}
+
+// Moments about axes that joints hold do nothing: what is left of them is rounding.
+void ContactRows::free_held_moments() {
+  MatrixXd alone = L_.transpose();
+  model_.divide_by_mass(alone);
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    if (holders_[k] < 0) continue;
+    const int row = block_ * static_cast<int>(k);
+    double most = 0;
+    for (int i = row + 1; i < row + block_; ++i) most = std::max(most, L_.row(i).dot(alone.col(i)));
+    for (int i = row + 1; i < row + block_; ++i) {
+      if (A_(i, i) > kHeldMoment * most) continue;
+      A_.row(i).setZero();
+      A_.col(i).setZero();
+      PL_.col(i).setZero();
+      A_(i, i) = most;
+    }
+  }
+}
+
 void ContactRows::complete() {
   for (int k = 0; k < static_cast<int>(contacts_.size()); ++k) {
-    const int row = block_ * k, there = is_bounded(k) ? row + 1 : row;
+    const int row = block_ * k, there = has_normal(k) ? row : row + 1;
     for (int i = row; i < row + block_; ++i)
       if (L_.row(i).isZero(0)) A_(i, i) = A_(there, there);
   }

@@ -8,7 +8,7 @@
 #include <limits>
 #include <tether/linalg/index.hpp>
 
-#include "shared_forces.hpp"
+#include "cone_blocks.hpp"
 
 namespace tether::scene::event {
 
@@ -20,7 +20,7 @@ namespace {
 constexpr double kDependent = 1e-11;
 constexpr double kLocked = 1e-12;  // A_nn of the largest
 constexpr double kSame = 1e-7;     // of the answer's size: the exact one against the library's
-constexpr double kSolve = 1e-12, kNear = 1e-8;
+constexpr double kSolve = 1e-12;
 constexpr double kFarAbove = 1e5;
 constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
 // Of bounds over what accelerations ask of forces, see BoundedLaws.
@@ -37,7 +37,7 @@ MatrixXd pseudo_solve(const MatrixXd& S, const MatrixXd& right) {
 /// The same regimes without the error of an iteration: stuck rows vanish, and where a contact
 /// slides x_t = -mu x_n d, d the direction of w_t.
 void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block,
-             FrictionAnswer& answer) {
+             const Holders& holders, FrictionAnswer& answer) {
   const int n = static_cast<int>(mu.size());
   const auto slides = [&](int i) {
     return answer.regimes[static_cast<std::size_t>(i)] == Regime::sliding;
@@ -46,7 +46,7 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
   std::vector<VectorXd> directions(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) {
     if (answer.regimes[static_cast<std::size_t>(i)] == Regime::separating) continue;
-    rows.push_back(block * i);
+    if (!is_held(holders, i)) rows.push_back(block * i);
     if (slides(i)) {
       const VectorXd wt = answer.w.segment(block * i + 1, block - 1);
       const VectorXd xt = answer.x.segment(block * i + 1, block - 1);
@@ -61,6 +61,11 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
       for (int k = 1; k < block; ++k) rows.push_back(block * i + k);
     }
   }
+  const auto with_normal_of = [&](int i, auto&& each) {
+    each(i);
+    for (int k = 0; k < static_cast<int>(holders.size()); ++k)
+      if (holders[at(k)] == i) each(k);
+  };
   if (rows.empty()) {
     answer.x.setZero();
     answer.w = -b;
@@ -74,9 +79,11 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
     for (int c = 0; c < m; ++c) {
       const int row = rows[static_cast<std::size_t>(c)], i = row / block;
       columns.col(c) = A.col(row);
-      if (row % block == 0 && slides(i))
-        columns.col(c) -=
-            mu[i] * A.middleCols(row + 1, block - 1) * directions[static_cast<std::size_t>(i)];
+      if (row % block == 0)
+        with_normal_of(i, [&](int k) {
+          if (slides(k))
+            columns.col(c) -= mu[k] * A.middleCols(block * k + 1, block - 1) * directions[at(k)];
+        });
       right[c] = b[row];
     }
     for (int r = 0; r < m; ++r) S.row(r) = columns.row(rows[static_cast<std::size_t>(r)]);
@@ -85,8 +92,10 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
     for (int c = 0; c < m; ++c) {
       const int row = rows[static_cast<std::size_t>(c)], i = row / block;
       x[row] = part[c];
-      if (row % block == 0 && slides(i))
-        x.segment(row + 1, block - 1) = -mu[i] * part[c] * directions[static_cast<std::size_t>(i)];
+      if (row % block == 0)
+        with_normal_of(i, [&](int k) {
+          if (slides(k)) x.segment(block * k + 1, block - 1) = -mu[k] * part[c] * directions[at(k)];
+        });
     }
     w = A * x - b;
     double turned = 0;
@@ -105,7 +114,7 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
   // Still an answer of the law?
   const double force = answer.x.cwiseAbs().maxCoeff(), speed = b.cwiseAbs().maxCoeff();
   for (int i = 0; i < n; ++i) {
-    const double xn = x[block * i], wn = w[block * i];
+    const double xn = x[block * (is_held(holders, i) ? holders[at(i)] : i)], wn = w[block * i];
     if (xn < -kSame * force || wn < -kSame * speed) return;
     if (x.segment(block * i + 1, block - 1).norm() > mu[i] * xn + kSame * force) return;
   }
@@ -115,8 +124,10 @@ void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block
 }
 
 /// All stay closed, and stick where they do not slide already.
-Regimes all_held(const VectorXd& mu, int block, const std::vector<VectorXd>& slides) {
+Regimes all_held(const VectorXd& mu, int block, const std::vector<VectorXd>& slides,
+                 const Holders& holders) {
   Regimes out;
+  out.holders = holders;
   for (int i = 0; i < mu.size(); ++i) {
     const bool slides_on = slides[at(i)].size() > 0;
     out.of.push_back(slides_on || mu[i] == 0 ? Regime::sliding : Regime::sticking);
@@ -131,7 +142,8 @@ Regimes all_held(const VectorXd& mu, int block, const std::vector<VectorXd>& sli
 std::vector<int> held_rows(const Regimes& regimes, int block) {
   std::vector<int> rows;
   for (int i = 0; i < static_cast<int>(regimes.of.size()); ++i)
-    for (int k = 0; k < (regimes.of[at(i)] == Regime::sticking ? block : 1); ++k)
+    for (int k = is_held(regimes.holders, i) ? 1 : 0;
+         k < (regimes.of[at(i)] == Regime::sticking ? block : 1); ++k)
       rows.push_back(block * i + k);
   return rows;
 }
@@ -142,11 +154,6 @@ void take(const SharedForces& from, const Regimes& regimes, FrictionAnswer& to) 
   to.regimes = regimes.of;
   to.error = 0;
   to.solved = true;
-}
-
-bool is_solved(const contact::Solution& answer) {
-  return answer.status == contact::Status::solved || answer.status == contact::Status::round_off ||
-         (answer.error < kNear && answer.status != contact::Status::infeasible);
 }
 
 /// The shortest forces with the regimes of an answer: what begins to slip goes against its force.
@@ -175,6 +182,8 @@ bool settle(const std::vector<bool>& closed, double none, const MatrixXd& A, con
   for (int k = 0; k < n; ++k)
     open[at(k)] = answer.regimes[at(k)] == Regime::separating &&
                   (closed.empty() ? answer.w[block * k] > none : !closed[at(k)]);
+  for (int k = 0; k < n; ++k)
+    if (is_held(held.holders, k)) open[at(k)] = open[at(held.holders[at(k)])];
   return share_as(open, none, A, b, mu, held, answer);
 }
 
@@ -189,17 +198,15 @@ bool solve_compliant(const std::vector<bool>& closed, double none, const MatrixX
   options.strict = true;
   options.warm_start = true;
   options.max_work = kCompliantWork;
-  contact::Solver solver(options);
+  ConeBlocks solver(options, held.holders);
   FrictionAnswer answer;
   for (double part = 1; part >= kStiffest; part *= kStiffer) {
     MatrixXd compliant = A;
     compliant.diagonal().array() += part * A.diagonal().mean();
-    const contact::Solution found = solver.solve(contact::Problem::dense(compliant, b, mu));
-    if (!is_solved(found)) return false;
+    const FrictionAnswer found = solver.solve(compliant, b, mu);
+    if (!found.solved) return false;
     if (found.regimes == answer.regimes) continue;
-    answer.x = found.impulses;
-    answer.w = found.velocities;
-    answer.regimes = found.regimes;
+    answer = found;
     if (!settle(closed, none, A, all, mu, held, answer)) continue;
     out = answer;
     return true;
@@ -208,13 +215,13 @@ bool solve_compliant(const std::vector<bool>& closed, double none, const MatrixX
 }
 
 AccelerationAnswer solve_contacts(const MatrixXd& A, const VectorXd& free, const VectorXd& mu,
-                                  const std::vector<VectorXd>& slides, double part,
-                                  const std::vector<bool>& closed) {
+                                  const Holders& holders, const std::vector<VectorXd>& slides,
+                                  double part, const std::vector<bool>& closed) {
   const int n = static_cast<int>(mu.size()), block = static_cast<int>(free.size()) / n;
   AccelerationAnswer out;
   out.scale = free.cwiseAbs().maxCoeff();
   out.far = kFarAbove * std::max(out.scale, 1e-12);
-  Regimes regimes = all_held(mu, block, slides);
+  Regimes regimes = all_held(mu, block, slides, holders);
   VectorXd b = without_contradictions(A, -free, held_rows(regimes, block), part * out.scale);
   SharedForces shared = share_forces(A, b, mu, regimes);
   if (shared.lawful) {
@@ -227,7 +234,7 @@ AccelerationAnswer solve_contacts(const MatrixXd& A, const VectorXd& free, const
   const bool decides = shared.several && !closed.empty();
   const double none = kNoChange * out.scale;
   if (decides && solve_compliant(closed, none, A, b, all, mu, regimes, out.contacts)) return out;
-  out.contacts = solve_friction(A, b, mu);
+  out.contacts = solve_friction(A, b, mu, holders);
   if (decides && out.contacts.solved) settle(closed, none, A, all, mu, regimes, out.contacts);
   return out;
 }
@@ -294,11 +301,12 @@ AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
   if (!any([&](int k) { return rows.is_bounded(k); })) {
     VectorXd mu(n);
     for (int k = 0; k < n; ++k) mu[k] = model.law(rows.contacts()[at(k)]).friction;
-    return solve_contacts(rows.A(), rows.free_accelerations(), mu, slides, part, closed);
+    return solve_contacts(rows.A(), rows.free_accelerations(), mu, rows.holders(), slides, part,
+                          closed);
   }
   for (double most = kCutBound; most <= kMostBound; most *= kCutBound) {
     const BoundedLaws laws(model, rows, slides, most);
-    out = solve_contacts(laws.A, laws.free, laws.mu, laws.slides, part, closed);
+    out = solve_contacts(laws.A, laws.free, laws.mu, rows.holders(), laws.slides, part, closed);
     const auto slides_there = [&](int k) {
       return out.contacts.solved && out.contacts.regimes[at(k)] != Regime::sticking;
     };
@@ -324,10 +332,10 @@ AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
 }
 
 FrictionAnswer solve_impact(const MatrixXd& A, const VectorXd& given, const VectorXd& mu,
-                            double band) {
+                            double band, const Holders& holders) {
   const int n = static_cast<int>(mu.size()), block = static_cast<int>(given.size()) / n;
-  if (!A.allFinite() || !given.allFinite()) return solve_friction(A, given, mu);
-  Regimes regimes = all_held(mu, block, std::vector<VectorXd>(at(n)));
+  if (!A.allFinite() || !given.allFinite()) return solve_friction(A, given, mu, holders);
+  Regimes regimes = all_held(mu, block, std::vector<VectorXd>(at(n)), holders);
   const VectorXd b = without_contradictions(A, given, held_rows(regimes, block), band);
   FrictionAnswer out;
   const SharedForces shared = share_forces(A, b, mu, regimes);
@@ -337,12 +345,13 @@ FrictionAnswer solve_impact(const MatrixXd& A, const VectorXd& given, const Vect
   }
   const double none = kNoChange * b.cwiseAbs().maxCoeff();
   if (shared.several && solve_compliant({}, none, A, b, b, mu, regimes, out)) return out;
-  out = solve_friction(A, b, mu);
+  out = solve_friction(A, b, mu, holders);
   if (shared.several && out.solved) settle({}, none, A, b, mu, regimes, out);
   return out;
 }
 
-FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const VectorXd& mu) {
+FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
+                              const Holders& holders) {
   const int n = static_cast<int>(mu.size());
   const int block = static_cast<int>(b.size()) / n;
   FrictionAnswer out;
@@ -354,10 +363,19 @@ FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const Vector
     return out;
   }
   double largest = 0;
-  for (int i = 0; i < n; ++i) largest = std::max(largest, A(block * i, block * i));
-  std::vector<int> free;
   for (int i = 0; i < n; ++i)
-    if (A(block * i, block * i) > kLocked * largest) free.push_back(i);
+    if (!is_held(holders, i)) largest = std::max(largest, A(block * i, block * i));
+  std::vector<int> free, place(at(n), -1);
+  Holders held;
+  for (int i = 0; i < n; ++i) {
+    const int by = is_held(holders, i) ? place[at(holders[at(i)])] : -1;
+    const int of = is_held(holders, i) ? holders[at(i)] : i;
+    if (!(A(block * of, block * of) > kLocked * largest)) continue;
+    place[at(i)] = static_cast<int>(free.size());
+    free.push_back(i);
+    held.push_back(by);
+  }
+  if (holders.empty()) held.clear();
   if (free.empty()) {
     out.solved = true;
     return out;
@@ -377,15 +395,8 @@ FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const Vector
   options.law = contact::Law::coulomb;
   options.tolerance = kSolve;
   options.strict = true;
-  contact::Solver solver(options);
-  const contact::Solution answer = solver.solve(contact::Problem::dense(part, right, friction));
-  FrictionAnswer inner;
-  inner.x = answer.impulses;
-  inner.w = answer.velocities;
-  inner.regimes = answer.regimes;
-  inner.error = answer.error;
-  inner.solved = is_solved(answer);
-  if (inner.solved) sharpen(part, right, friction, block, inner);
+  FrictionAnswer inner = ConeBlocks(options, held).solve(part, right, friction);
+  if (inner.solved) sharpen(part, right, friction, block, held, inner);
   out.solved = inner.solved;
   out.error = inner.error;
   for (int i = 0; i < m; ++i) {

@@ -2,28 +2,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tether/contact/solver.hpp>
 #include <vector>
 
+#include "cone_blocks.hpp"
 #include "contact_rows.hpp"
 
 namespace tether::scene::event {
 
-/// Answer of a frictional problem w = A x - b.
-struct FrictionAnswer {
-  bool solved = false;
-  VectorXd x, w;
-  std::vector<contact::Regime> regimes;
-  double error = 0;
-};
-
 /// Coulomb's law, exact to round-off where the regimes that the contact library finds allow.
 /// Contacts that the joints lock (A_nn = 0) carry nothing.
-FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const VectorXd& mu);
+FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
+                              const Holders& holders = {});
 
 /// The same of an impact: of contacts that share their impulses all stop if the law has any
 /// impulses for that; always the shortest ones. `band`: error of velocities.
-FrictionAnswer solve_impact(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, double band);
+FrictionAnswer solve_impact(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, double band,
+                            const Holders& holders = {});
 
 /// Coulomb's law for accelerations at the state that is set: w = A x - b = (a_n, a_t) where a
 /// contact has no slip, and (a_n, S d + a_t) where it slides along d (else empty), S far above all

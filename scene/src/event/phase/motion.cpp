@@ -149,6 +149,16 @@ void Motion::slips_with_friction(double t, const double* y, VectorXd& slips) {
   slips.conservativeResize(size);
 }
 
+void Motion::find_holders() {
+  holder_.resize(closed_.size());
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const int by = model_.law(closed_[k]).held_by;
+    const auto from = by < 0 ? closed_.begin() + static_cast<std::ptrdiff_t>(k)
+                             : std::lower_bound(closed_.begin(), closed_.end(), by);
+    holder_[k] = static_cast<std::size_t>(from - closed_.begin());
+  }
+}
+
 void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes) {
   closed_.clear();
   set(t, y.data());
@@ -161,6 +171,7 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   modes_ = std::move(modes);
   looks_.resize(closed_.size());
   row_of_.resize(closed_.size());
+  find_holders();
   choose_joints();
   rows_ = joints_;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
@@ -274,7 +285,7 @@ void Motion::gather() {
     if (mu == 0) continue;
     const VectorXd s = held_slip(static_cast<int>(k));
     smallest_slip_ = std::min(smallest_slip_, s.norm());
-    C_.col(row) -= mu / s.norm() * look.tangents.transpose() * s;
+    C_.col(normal_row(k)) -= mu / s.norm() * look.tangents.transpose() * s;
   }
 }
 
@@ -406,7 +417,7 @@ std::vector<VectorXd> Motion::contact_forces() {
   if (!answer.contacts.solved) return out;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const auto x = answer.contacts.x.segment(rows.size() * static_cast<int>(k), rows.size());
-    if (is_bounded(k))
+    if (normals_of(k) == 0)
       out[k].tail(tangents_) = x.tail(tangents_);
     else
       out[k] = x;
@@ -428,7 +439,7 @@ VectorXd Motion::friction_force(int closed) const {
   const double mu = law.friction;
   if (mu == 0) return VectorXd::Zero(tangents_);
   const VectorXd s = held_slip(closed);
-  return -mu * lambda_[row] / s.norm() * s;
+  return -mu * lambda_[normal_row(k)] / s.norm() * s;
 }
 
 }  // namespace tether::scene::event

@@ -11,6 +11,8 @@
 //   stuck    rows T, too      columns T'
 //
 // A bounded law of a joint has one row and column T where it sticks, else its bound is part of h.
+// A moment of rolling or torsional friction has rows T where it sticks; where it slides it adds
+// -r T' d to the column of the normal that holds it.
 //
 // lambda is eliminated: R M^-1 C lambda = -(r + R M^-1 h), in the sense of the shortest lambda
 // where rows depend on each other. So y' is a function of (t, y), and so is every force.
@@ -71,7 +73,7 @@ class Motion {
   const VectorXd& acceleration() const { return a_; }
   double normal_force(int closed) const {  ///< of a bounded law: its bound
     const ContactLaw law = model_.law(closed_[index(closed)]);
-    return law.is_bounded() ? law.bound : lambda_[row_of_[index(closed)]];
+    return law.is_bounded() ? law.bound : lambda_[normal_row(index(closed))];
   }
   VectorXd friction_force(int closed) const;  ///< by tangents
   /// Of all rows of joints: redundant ones share.
@@ -114,11 +116,16 @@ class Motion {
     return modes_[index(closed_[closed])].mode == Mode::stick;
   }
   /// Its rows: from row_of_ on the normal, then the tangents where it sticks.
-  int normals_of(std::size_t closed) const { return is_bounded(closed) ? 0 : 1; }
-  int tangents_of(std::size_t closed) const {
-    return !sticks(closed) ? 0 : is_bounded(closed) ? 1 : tangents_;
+  int normals_of(std::size_t closed) const {
+    return model_.law(closed_[closed]).has_normal() ? 1 : 0;
   }
+  int tangents_of(std::size_t closed) const {
+    return !sticks(closed) ? 0 : model_.law(closed_[closed]).is_line() ? 1 : tangents_;
+  }
+  /// Its own, or that which holds it.
+  int normal_row(std::size_t closed) const { return row_of_[holder_[closed]]; }
   void set(double t, const double* y);
+  void find_holders();
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
   int choose_rows();
@@ -131,7 +138,8 @@ class Motion {
   std::vector<ContactMode> modes_;  // of all contacts
   std::vector<double> levels_;
   std::vector<int> closed_, row_of_;
-  std::vector<ContactLook> looks_;  // of the closed ones
+  std::vector<std::size_t> holder_;  // place of the contact whose normal force it has
+  std::vector<ContactLook> looks_;   // of the closed ones
   int rows_ = 0, joints_ = 0;
   std::vector<int> joints_in_use_;
   double least_joint_row_ = 1;  // what a row in use added to the others, of its length

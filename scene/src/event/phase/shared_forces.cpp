@@ -23,16 +23,21 @@ constexpr int kConeSteps = 1000;
 constexpr int kTurns = 50;
 constexpr double kSettles = 0.9;
 
-/// The closed contacts' unknowns: x_n, and x_t where it sticks.
+/// The closed contacts' unknowns: x_n where it is their own, and x_t where it sticks.
 class HeldRows {
  public:
   HeldRows(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, const Regimes& regimes)
       : A_(A), b_(b), mu_(mu), block_(static_cast<int>(b.size() / mu.size())), regimes_(regimes) {
     for (int i = 0; i < mu.size(); ++i) {
       if (regimes.of[at(i)] == Regime::separating) continue;
-      first_.push_back(static_cast<int>(rows_.size()));
+      const bool held = is_held(regimes.holders, i);
+      const int by = held ? place_of(regimes.holders[at(i)]) : -1;
+      if (held && by < 0) continue;
+      const int first = static_cast<int>(rows_.size());
       contacts_.push_back(i);
-      for (int k = 0; k < (regimes.of[at(i)] == Regime::sticking ? block_ : 1); ++k)
+      normal_.push_back(held ? normal_[at(by)] : first);
+      tangents_.push_back(held ? first : first + 1);
+      for (int k = held ? 1 : 0; k < (regimes.of[at(i)] == Regime::sticking ? block_ : 1); ++k)
         rows_.push_back(block_ * i + k);
     }
     const int m = static_cast<int>(rows_.size());
@@ -43,8 +48,10 @@ class HeldRows {
       const int row = rows_[at(c)], i = row / block_;
       right_[c] = b[row];
       column = A.col(row);
-      if (slides(i))
-        column -= mu[i] * A.middleCols(row + 1, block_ - 1) * regimes.directions[at(i)];
+      if (row % block_ == 0)
+        for (const int k : with_normal_of(i))
+          if (slides(k))
+            column -= mu[k] * A.middleCols(block_ * k + 1, block_ - 1) * regimes.directions[at(k)];
       for (int r = 0; r < m; ++r) S_(r, c) = column[rows_[at(r)]];
     }
   }
@@ -80,9 +87,10 @@ class HeldRows {
   bool is_lawful(const VectorXd& x) const {
     const double least = -kOutOfCone * x.cwiseAbs().maxCoeff();
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      const int i = contacts_[k], row = first_[k];
-      if (x[row] < least) return false;
-      if (!slides(i) && mu_[i] * x[row] - x.segment(row + 1, block_ - 1).norm() < least)
+      const int i = contacts_[k];
+      const double normal = x[normal_[k]];
+      if (normal < least) return false;
+      if (!slides(i) && mu_[i] * normal - x.segment(tangents_[k], block_ - 1).norm() < least)
         return false;
     }
     return true;
@@ -110,43 +118,70 @@ class HeldRows {
   VectorXd forces() const {
     VectorXd x = VectorXd::Zero(b_.size());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      const int i = contacts_[k], row = first_[k];
-      x[block_ * i] = std::max(0.0, x_[row]);
+      const int i = contacts_[k];
+      const double normal = std::max(0.0, x_[normal_[k]]);
+      if (!is_held(regimes_.holders, i)) x[block_ * i] = normal;
       if (slides(i))
-        x.segment(block_ * i + 1, block_ - 1) =
-            -mu_[i] * x[block_ * i] * regimes_.directions[at(i)];
+        x.segment(block_ * i + 1, block_ - 1) = -mu_[i] * normal * regimes_.directions[at(i)];
       else
-        x.segment(block_ * i + 1, block_ - 1) = x_.segment(row + 1, block_ - 1);
+        x.segment(block_ * i + 1, block_ - 1) = x_.segment(tangents_[k], block_ - 1);
     }
     return x;
   }
 
  private:
-  /// The nearest point of the cones.
+  /// The nearest point of the cones: those of one normal that its tangents are out of raise it.
   void project(VectorXd& x) const {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      const int i = contacts_[k];
-      double& normal = x[first_[k]];
-      if (slides(i)) {
-        normal = std::max(0.0, normal);
-        continue;
+      if (is_held(regimes_.holders, contacts_[k])) continue;
+      double& normal = x[normal_[k]];
+      std::vector<std::size_t> out;
+      for (const int i : with_normal_of(contacts_[k]))
+        if (const int place = place_of(i); place >= 0 && !slides(i)) out.push_back(at(place));
+      const auto length = [&](std::size_t j) { return x.segment(tangents_[j], block_ - 1).norm(); };
+      double on = normal;
+      for (std::size_t count = out.size() + 1; out.size() < count;) {
+        count = out.size();
+        out.erase(
+            std::remove_if(out.begin(), out.end(),
+                           [&](std::size_t j) { return length(j) <= mu_[contacts_[j]] * on; }),
+            out.end());
+        double sum = normal, weight = 1;
+        for (const std::size_t j : out) {
+          const double mu = mu_[contacts_[j]];
+          sum += mu * length(j);
+          weight += mu * mu;
+        }
+        on = std::max(0.0, sum / weight);
       }
-      auto tangents = x.segment(first_[k] + 1, block_ - 1);
-      const double length = tangents.norm(), mu = mu_[i];
-      if (length <= mu * normal) continue;
-      const double on = std::max(0.0, (normal + mu * length) / (1 + mu * mu));
       normal = on;
-      tangents *= length > 0 ? mu * on / length : 0;
+      for (const std::size_t j : out) {
+        const double all = length(j);
+        x.segment(tangents_[j], block_ - 1) *= all > 0 ? mu_[contacts_[j]] * on / all : 0;
+      }
     }
   }
   bool slides(int i) const { return regimes_.of[at(i)] == Regime::sliding; }
+  /// Of a contact among the closed ones; -1: it is open.
+  int place_of(int i) const {
+    const auto found = std::lower_bound(contacts_.begin(), contacts_.end(), i);
+    return found != contacts_.end() && *found == i ? static_cast<int>(found - contacts_.begin())
+                                                   : -1;
+  }
+  /// The contact and those that it holds.
+  std::vector<int> with_normal_of(int i) const {
+    std::vector<int> out = {i};
+    for (int k = 0; k < static_cast<int>(regimes_.holders.size()); ++k)
+      if (regimes_.holders[at(k)] == i) out.push_back(k);
+    return out;
+  }
 
   const MatrixXd& A_;
   const VectorXd& b_;
   const VectorXd& mu_;
   int block_;
   const Regimes& regimes_;
-  std::vector<int> contacts_, first_, rows_;
+  std::vector<int> contacts_, normal_, tangents_, rows_;  // places of unknowns
   MatrixXd S_, free_;
   VectorXd right_, x_;
 };

@@ -16,11 +16,20 @@ namespace tether::scene::event {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Of each contact of a problem the one whose normal force it has, as |moment| <= r x_n has: its
+/// own rows are its tangents, x_n of it is zero, and it comes behind its holder. -1: it has its
+/// own. Empty: all have.
+using Holders = std::vector<int>;
+inline bool is_held(const Holders& holders, int contact) {
+  return !holders.empty() && holders[static_cast<std::size_t>(contact)] >= 0;
+}
+
 /// Regimes of a problem w = A x - b. Where a contact slides: x_t = -mu x_n d.
 struct Regimes {
   std::vector<contact::Regime> of;
   std::vector<VectorXd> directions;  ///< d; empty where it does not slide
   std::vector<bool> fixed;           ///< d stays; else it is that of w_t
+  Holders holders;
 };
 
 struct SharedForces {

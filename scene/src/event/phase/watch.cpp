@@ -15,6 +15,7 @@ constexpr int kMostIterations = 80;
 constexpr int kPolish = 3;
 constexpr double kApart = 1e4;  // of the resolution of times
 constexpr double kFewOfBand = 0.02;
+constexpr double kFasterWithin = 2;  // a step, than at its end
 // Of accelerations, by the contact library's tolerance and by what stands for a large slip.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
@@ -69,38 +70,42 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   functions_.clear();
   force_ = 0;
   const auto add = [&](Watch what, int contact, int closed, bool leaves) {
-    functions_.push_back({what, contact, closed, false, leaves, false, 0, 0, 0, 0, 0});
+    functions_.push_back({what, contact, closed, false, leaves, false, false, 0, 0, 0, 0, 0});
   };
   const std::vector<int>& closed = motion_.closed();
   for (int i = 0; i < motion_.model().contacts(); ++i)
-    if (motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::open)
+    if (motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::open &&
+        motion_.model().law(i).has_normal())
       add(Watch::gap, i, -1, leaving[static_cast<std::size_t>(i)]);
   for (std::size_t k = 0; k < closed.size(); ++k) {
     const int i = closed[k], place = static_cast<int>(k);
     const bool single = !motion_.is_hyperstatic();
-    const bool bounded = motion_.model().law(i).is_bounded();
-    if (single && !bounded) add(Watch::normal_force, i, place, false);
+    if (single && motion_.model().law(i).has_normal()) add(Watch::normal_force, i, place, false);
     const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
     if (stuck && single) add(Watch::cone, i, place, false);
     if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place, false);
     if (!stuck && motion_.model().law(i).friction > 0) add(Watch::slip, i, place, false);
   }
   if (motion_.is_hyperstatic()) add(Watch::support, -1, -1, false);
-  evaluate(t, y);
-  for (Function& f : functions_) {
-    const bool gap = f.what == Watch::gap;
-    f.dormant = gap && f.value < -bands().gap(f.contact);
-    if (gap && f.value < 0 && !f.dormant) {
-      f.level = f.value;
-      f.value = 0;
-    }
-    if (f.what == Watch::border && f.value < 0) {  // it comes in over it
-      f.level = f.value;
-      f.value = 0;
-    }
-    const bool closing = gap && f.value > 0 && f.slope < -bands().approach(f.contact);
-    f.armed = closing || f.value > band(f);
+  evaluate(t, y, 0);
+  for (Function& f : functions_) arm(f);
+}
+
+void Watcher::arm(Function& f) {
+  const bool gap = f.what == Watch::gap;
+  f.dormant = f.far || (gap && f.value < -bands().gap(f.contact));
+  f.armed = false;
+  if (f.far) return;
+  if (gap && f.value < 0 && !f.dormant) {
+    f.level = f.value;
+    f.value = 0;
   }
+  if (f.what == Watch::border && f.value < 0) {  // it comes in over it
+    f.level = f.value;
+    f.value = 0;
+  }
+  const bool closing = gap && f.value > 0 && f.slope < -bands().approach(f.contact);
+  f.armed = closing || f.value > band(f);
 }
 
 double Watcher::band(const Function& f) const {
@@ -114,8 +119,9 @@ double Watcher::band(const Function& f) const {
     case Watch::slip:
       return bands().slip(f.contact);
     default: {
-      const double bound = motion_.model().law(f.contact).bound;
-      return bands().part * (bound >= 0 ? bound : force_);
+      const ContactLaw law = motion_.model().law(f.contact);
+      const double size = law.is_moment() ? law.friction : 1;
+      return bands().part * (law.is_bounded() ? law.bound : size * force_);
     }
   }
 }
@@ -165,16 +171,41 @@ double Watcher::support() {
   return support_band_ - largest;
 }
 
-void Watcher::evaluate(double t, const VectorXd& y) {
+// Bodies that were apart, and no longer surely were so in all of the last step: their gaps count
+// from its start.
+void Watcher::wake(Phase& phase, const VectorXd& at_end, double by) {
+  Model& model = motion_.model();
+  model.set(phase.start() + phase.step_end(), at_end.data(), at_end.data() + motion_.coordinates());
+  waking_.clear();
+  for (std::size_t k = 0; k < functions_.size(); ++k)
+    if (functions_[k].far && !model.is_apart(functions_[k].contact, by)) waking_.push_back(k);
+  if (waking_.empty()) return;
+  phase.at(phase.step_begin(), y_);
+  model.set(phase.start() + phase.step_begin(), y_.data(), y_.data() + motion_.coordinates());
+  for (const std::size_t k : waking_) {
+    Function& f = functions_[k];
+    f.far = false;
+    f.level = 0;
+    f.value = of_state(f);
+    arm(f);
+  }
+}
+
+void Watcher::evaluate(double t, const VectorXd& y, double by) {
   rate_.resize(motion_.size());
   if (motion_.closed().empty())
     motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
   else
     motion_.rate(t, y.data(), rate_.data());
   for (std::size_t k = 0; k < motion_.closed().size(); ++k)
-    if (!motion_.model().law(motion_.closed()[k]).is_bounded())
+    if (motion_.model().law(motion_.closed()[k]).has_normal())
       force_ = std::max(force_, std::abs(motion_.normal_force(static_cast<int>(k))));
   for (Function& f : functions_) {
+    if (f.what == Watch::gap && motion_.model().is_apart(f.contact, by)) {
+      f.far = f.dormant = true;
+      f.armed = false;
+      continue;
+    }
     f.before = f.value;
     f.slope_before = f.slope;
     f.value = of_state(f);
@@ -268,18 +299,26 @@ double Watcher::lag(Phase& phase, const Function& f, double time) {
   return growth > 0 ? std::min((support_band_ - here) / growth, phase.start() + time) : 0;
 }
 
+// More than two bodies can come nearer to each other in the last step, by the fastest speed.
+double Watcher::way(const Phase& phase, const VectorXd& at_end) const {
+  const double fastest = at_end.segment(motion_.coordinates(), motion_.velocities()).norm();
+  return kFasterWithin * 2 * fastest * (phase.step_end() - phase.step_begin());
+}
+
 std::optional<Zero> Watcher::look(Phase& phase) {
   phase.at(phase.step_end(), y_);
   const VectorXd at_end = y_;
-  evaluate(phase.start() + phase.step_end(), at_end);
+  const double by = way(phase, at_end);
+  wake(phase, at_end, by);
+  evaluate(phase.start() + phase.step_end(), at_end, by);
   std::optional<Zero> first;
   for (Function& f : functions_) {
     const double edge = band(f);
-    if (f.value == kNowhere) {
+    if (!f.far && f.value == kNowhere) {
       f.dormant = true;
       f.armed = false;
     }
-    if (f.dormant) continue;
+    if (f.far || f.dormant) continue;
     bool hit = f.value < (f.armed ? 0 : -edge);
     // Else it is on its way out; its first gaps are lost in rounding.
     const bool from_zero = !f.armed || (f.leaving && f.value > -bands().gap(f.contact));
@@ -302,6 +341,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
   }
   if (!first)
     for (Function& f : functions_) {
+      if (f.far) continue;
       f.armed = f.armed || f.value > band(f);
       f.dormant = f.dormant && !f.armed;
     }

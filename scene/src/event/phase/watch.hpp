@@ -45,11 +45,15 @@ class Watcher {
     int contact, closed;  // closed: place among the closed contacts
     bool armed, leaving;
     bool dormant;  // a gap that is negative beside its feature: no contact
+    bool far;      // a gap of bodies that are apart: not looked at
     double value, before;
     double slope, slope_before;  // of a gap, m/s, or of a slip, m/s^2
     double level;                // from which a gap or a border counts, m
   };
-  void evaluate(double t, const VectorXd& y);
+  void arm(Function& f);
+  void wake(Phase& phase, const VectorXd& at_end, double by);
+  void evaluate(double t, const VectorXd& y, double by);
+  double way(const Phase& phase, const VectorXd& at_end) const;
   double value(Function f, double t, const VectorXd& y);
   double slope(Function f, double t, const VectorXd& y);
   double value_of(Function& f, double t, const VectorXd& y);
@@ -66,6 +70,7 @@ class Watcher {
   Motion& motion_;
   std::vector<Function> functions_;
   VectorXd rate_, y_;
+  std::vector<std::size_t> waking_;
   double force_ = 0;         // the largest so far
   double support_band_ = 0;  // of accelerations
 };
