@@ -224,3 +224,24 @@ TEST_CASE("event: a state of format 3, without the axes, is read") {
   std::istringstream older(state);
   CHECK_THROWS_WITH(again->restore(older), Catch::Contains("not a state of the event engine"));
 }
+
+TEST_CASE("event: a storm of events is bounded by work, and named") {
+  const Scene scene = parse_scene(
+      "[scene]\ngravity = [0, 0, -9.81]\nengine = \"event\"\n[event]\n" + ball(1, 0.99), "storm");
+  DriverOptions options;
+  options.end = 1000;
+  SceneModel model(scene);
+  {
+    Driver driver(model, options, 0, model.start());
+    driver.advance(90);  // a thousand impacts that come to rest cost far less than the bound
+    CHECK(driver.counts().impacts > 1000);
+    CHECK(driver.motion().work_done() > 1e8);
+    CHECK(driver.motion().work_done() < 0.05 * options.storm);
+  }
+  options.storm = 1e8;
+  SceneModel again(scene);
+  Driver driver(again, options, 0, again.start());
+  CHECK_THROWS_WITH(driver.advance(90), Catch::Contains("a storm of events: the last"));
+  CHECK(driver.counts().events >= 100);
+  CHECK(driver.time() < 89.85);  // it rests at 89.853
+}

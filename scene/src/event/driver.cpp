@@ -22,6 +22,8 @@ constexpr long kAnchor = 5000;  // steps
 // thousand years.
 constexpr long kManySteps = 100000;
 constexpr double kNoWay = 1e-12;
+constexpr long kFewEvents = 100;
+constexpr double kMostStorms = 25;  // as much work again for the rest of the run
 
 using linalg::at;
 
@@ -198,6 +200,19 @@ void Driver::check_pace(double t) const {
                   steps, way * model_.time_unit(), (t - time_) * model_.time_unit()));
 }
 
+// Bodies that rattle without end cost all of their rows at each event. Two minutes of work, and at
+// this pace an hour for the rest of the run: no accumulation of single contacts costs as much.
+void Driver::check_storm() {
+  const double work = motion_.work_done();
+  if (!(options_.end > 0) || work - storm_.work < options_.storm) return;
+  const double way = event_time_ - storm_.time, left = options_.end - event_time_;
+  const long events = counts_.events - storm_.events;
+  if (events >= kFewEvents && way * kMostStorms < left)
+    fail(fmt::format("a storm of events: the last {} took {:.3g} s together, and {:.3g} s are left",
+                     events, way * model_.time_unit(), left * model_.time_unit()));
+  storm_ = {work, event_time_, counts_.events};
+}
+
 // A phase without events may be long; a saved state is arrived at again from its start. Where
 // forces have a kink motion begins anew, with the step at which a state before it has ended.
 void Driver::anchor() {
@@ -294,6 +309,7 @@ void Driver::handle(const Zero& zero) {
   if (++counts_.events > options_.max_events)
     fail(fmt::format("max_events = {} events are over", options_.max_events));
   event_time_ = now;
+  check_storm();
   y_ = zero.y;
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
   model_.settle();

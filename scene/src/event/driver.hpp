@@ -26,6 +26,9 @@ struct DriverOptions {
   double max_step = 0;      ///< s; 0: free
   long max_events = 1000000;
   long max_steps = 100000000;  ///< of IDA
+  double end = 0;              ///< of the run, s; 0: unknown, and storms are not bounded
+  /// Work, in operations, after which events may be a storm, see check_storm.
+  double storm = 2e11;
 };
 
 struct DriverCounts {
@@ -95,6 +98,7 @@ class Driver {
   void handle(const Zero& zero);
   void anchor();
   void check_pace(double t) const;
+  void check_storm();
   void collide(const std::vector<int>& near, EventKind otherwise, int contact);
   std::vector<int> struck(const std::vector<int>& near, int first);
   void strike(const std::vector<int>& set, bool plastic);
@@ -146,6 +150,10 @@ class Driver {
     long steps = 0;
     double way = 0;  // s
   } paced_;          // of the phases before this one since the last event
+  struct {
+    double work = 0, time = 0;
+    long events = 0;
+  } storm_;  // where the work was looked at last
   long at_one_time_ = 0;
   std::vector<int> lifted_;  // at this time
   bool jammed_ = false;      // at this event

@@ -29,13 +29,14 @@ constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '4'};
 constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '4'};
 constexpr char kWithoutAxes = '3';
 
-DriverOptions driver_options(const Scene& scene) {
+DriverOptions driver_options(const Scene& scene, double time_unit) {
   const EventOptions o = scene.event.value_or(EventOptions{});
   DriverOptions out;
   out.tolerance = o.tolerance;
   out.max_step = effects::longest_step(scene, o.max_step);
   out.max_events = o.max_events;
   out.max_steps = o.max_steps;
+  out.end = scene.end / time_unit;
   return out;
 }
 
@@ -47,7 +48,7 @@ class EventEngine : public ResumableEngine {
       : units_(event::units_of(scene)),
         origin_(event::origin_of(scaled(scene, units_))),
         scene_(event::seen_from(origin_, scaled(scene, units_))),
-        options_(driver_options(scene_)),
+        options_(driver_options(scene_, units_.time)),
         model_(std::make_unique<SceneModel>(scene_, units_.time, units_.length)),
         reactions_(scene_, mechanics::placed_bodies(scene_)) {
     bodies_.resize(scene.bodies.size());

@@ -46,6 +46,9 @@ class Model {
 
   virtual int coordinates() const = 0;
   virtual int velocities() const = 0;
+  /// Of each body; what no row connects is solved apart.
+  virtual int velocity_block() const { return velocities(); }
+  virtual int coordinate_block() const { return coordinates(); }
   virtual int joint_rows() const = 0;
   virtual int contacts() const = 0;
   virtual int tangents() const = 0;  ///< of a contact: 1 in the plane, 2 in space

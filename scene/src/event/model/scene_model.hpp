@@ -29,6 +29,8 @@ class SceneModel final : public Model {
   double length_unit() const override { return length_unit_; }
   int coordinates() const override { return 7 * bodies_.count(); }
   int velocities() const override { return 6 * bodies_.count(); }
+  int velocity_block() const override { return 6; }
+  int coordinate_block() const override { return 7; }
   int joint_rows() const override { return rows_.count(); }
   /// Pairs of features, then the laws of joints, then moments of pairs.
   int contacts() const override { return first_moment() + static_cast<int>(moments_.size()); }

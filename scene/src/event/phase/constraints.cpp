@@ -71,6 +71,25 @@ void Motion::constraints(double t, const double* y, double* g) {
   if (keeps_energy_) *g = model_.energy() - y[work()] - kept_energy_;
 }
 
+// Of the contacts of the body whose coordinate j is changed in the state that is set.
+void Motion::differentiate_contacts(int j, double step, const VectorXd& rates, int first_rate,
+                                    Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
+  const int block = model_.velocity_block(), body = j / model_.coordinate_block();
+  VectorXd now;
+  for (std::size_t k = 0; k < closed_.size(); ++k) {
+    const int row = row_of_[k], normals = normals_of(k), rows = normals + tangents_of(k);
+    if (rows == 0 || R_.block(row, block * body, rows, block).isZero(0)) continue;
+    ContactLook& look = looks_[k];
+    model_.look(closed_[k], look);
+    now.resize(rows);
+    if (normals > 0) now[0] = look.normal.dot(u_) + look.normal_rate;
+    now.tail(rows - normals) = (look.tangents * u_ + look.slip_rate).head(rows - normals);
+    for (int r = 0; r < rows; ++r)
+      if (const int place = rate_place_[index(row + r)]; place >= 0)
+        C(first_rate + place, j) = (now[r] - rates[row + r]) / step;
+  }
+}
+
 void Motion::constraint_gradient(double t, const double* y,
                                  Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
   set(t, y);
@@ -96,8 +115,12 @@ void Motion::constraint_gradient(double t, const double* y,
     const double step = 1e-7 * std::max(1.0, std::abs(y[j]));
     near[j] = y[j] + step;
     set(t, near.data());
-    values_of_rows(positions, moved);
     near[j] = y[j];
+    if (joints_ == 0) {
+      differentiate_contacts(j, step, rates, first_rate, C);
+      continue;
+    }
+    values_of_rows(positions, moved);
     for (std::size_t k = 0; k < rates_in_use_.size(); ++k)
       C(first_rate + static_cast<int>(k), j) =
           (moved[rates_in_use_[k]] - rates[rates_in_use_[k]]) / step;

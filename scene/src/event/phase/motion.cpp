@@ -7,93 +7,19 @@
 #include <limits>
 
 #include "friction_solve.hpp"
+#include "row_choice.hpp"
 
 namespace tether::scene::event {
 
 namespace {
 
-constexpr double kRank = 1e-10;  // of rows of unit length
-constexpr double kIndependent = 1e-6;
-constexpr double kClearlyMore = 1.1;  // else the earlier one is taken
+constexpr double kRank = 1e-10;  // of the rows of joints
 constexpr double kWeakened = 0.3;
-constexpr double kAhead = 1e-5;   // s in the units of the model
-constexpr double kLawful = 1e-9;  // of the largest force
-constexpr double kHeld = 1e-9;    // of the accelerations
-constexpr double kStill = 1e-3;   // speeds and accelerations in the units of the model
-
-/// Rows that the earlier ones do not imply, in the metric of the masses; Gram and Schmidt, twice.
-class IndependentRows {
- public:
-  IndependentRows(const Model& model, int velocities, int rows)
-      : model_(model),
-        basis_(velocities, std::min(velocities, rows)),
-        dual_(velocities, std::min(velocities, rows)) {}
-  int rank() const { return rank_; }
-
-  /// Whether the row, of length 1, adds to those before it.
-  bool add(VectorXd v) {
-    if (rank_ == basis_.cols()) return false;
-    for (int pass = 0; pass < 2; ++pass)
-      v -= basis_.leftCols(rank_) * (dual_.leftCols(rank_).transpose() * v);
-    MatrixXd w = v;
-    model_.divide_by_mass(w);
-    const double length = std::sqrt(std::max(0.0, v.dot(w.col(0))));
-    if (length < kIndependent) return false;
-    basis_.col(rank_) = v / length;
-    dual_.col(rank_) = w.col(0) / length;
-    ++rank_;
-    return true;
-  }
-
- private:
-  const Model& model_;
-  MatrixXd basis_, dual_;
-  int rank_ = 0;
-};
-
-/// Of rows (as columns) those that imply all others: each time the one that adds most to those
-/// before it. In the metric of the projection, whose moves they are to determine: by masses a body
-/// that is thin about an axis would count as held about it by rows that hardly turn it.
-struct RowChoice {
-  std::vector<int> rows;  // ascending
-  double least = 1;       // what a row added, of its length
-
-  explicit RowChoice(MatrixXd V) {
-    const Eigen::Index m = V.cols();
-    VectorXd length = V.colwise().norm();
-    for (Eigen::Index j = 0; j < m; ++j) {
-      if (!(length[j] > 0)) continue;
-      V.col(j) /= length[j];
-      length[j] = 1;
-    }
-    std::vector<Eigen::Index> taken;
-    while (static_cast<Eigen::Index>(rows.size()) < std::min(m, V.rows())) {
-      Eigen::Index best = 0;
-      for (Eigen::Index j = 1; j < m; ++j)
-        if (length[j] > kClearlyMore * length[best]) best = j;
-      if (length[best] < kIndependent) break;
-      // Once more against those before: what is left of it may be small.
-      for (const Eigen::Index k : taken) subtract(V, k, best);
-      const double left = V.col(best).norm();
-      least = std::min(least, left);
-      V.col(best) /= left;
-      length[best] = 0;
-      taken.push_back(best);
-      rows.push_back(static_cast<int>(best));
-      for (Eigen::Index j = 0; j < m; ++j) {
-        if (!(length[j] > 0)) continue;
-        subtract(V, best, j);
-        length[j] = V.col(j).norm();
-      }
-    }
-    std::sort(rows.begin(), rows.end());
-  }
-
- private:
-  static void subtract(MatrixXd& V, Eigen::Index k, Eigen::Index from) {
-    V.col(from) -= V.col(k).dot(V.col(from)) * V.col(k);
-  }
-};
+constexpr double kAhead = 1e-5;                         // s in the units of the model
+constexpr double kLawful = 1e-9;                        // of the largest force
+constexpr double kHeld = 1e-9;                          // of the accelerations
+constexpr double kFactorisation = 4, kLookWork = 1000;  // operations
+constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
 
 }  // namespace
 
@@ -187,6 +113,7 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   lambda_.setZero(rows_);
   gather();
   const int rank = choose_rows();
+  if (rows_ > 0) islands_.choose(R_, C_, model_.velocity_block());
   VectorXd y_rate(size());
   rate(t, y.data(), y_rate.data());
   // Of what stands still energy is known to rounding only, and says nothing of the state.
@@ -293,6 +220,7 @@ void Motion::gather() {
 int Motion::choose_rows() {
   positions_in_use_.clear();
   rates_in_use_.clear();
+  rate_place_.assign(index(rows_), -1);
   row_scale_.setOnes(rows_);
   hyperstatic_ = false;
   if (rows_ == 0) return 0;
@@ -317,34 +245,45 @@ int Motion::choose_rows() {
     if (!independent.add(row_scale_[row] * R_.row(row).transpose())) continue;
     if (row < joints_) ++rank_of_joints;
     if (k < positions) positions_in_use_.push_back(row);
+    rate_place_[index(row)] = static_cast<int>(rates_in_use_.size());
     rates_in_use_.push_back(row);
   }
   hyperstatic_ = independent.rank() - rank_of_joints < rows_ - joints_;
   return independent.rank();
 }
 
-void Motion::rate(double t, const double* y, double* y_rate) {
-  ++evaluations_;
+// Accelerations without the forces of rows, and the columns of these.
+void Motion::prepare(double t, const double* y) {
   set(t, y);
   gather();
+  work_done_ += kLookWork * static_cast<double>(closed_.size() + 1) + 4.0 * rows_ * (nu_ + rows_);
   model_.forces(h_);
   for (std::size_t k = 0; k < closed_.size(); ++k)
     if (is_bounded(k) && !sticks(k))
       h_ += looks_[k].tangents.transpose() * friction_force(static_cast<int>(k));
   a_ = h_;
   model_.divide_by_mass(a_);
+  if (rows_ == 0) return;
+  MC_ = C_;
+  model_.divide_by_mass(MC_);
+  for (int i = 0; i < rows_; ++i) MC_.col(i) *= row_scale_[i];
+}
+
+void Motion::rate(double t, const double* y, double* y_rate) {
+  ++evaluations_;
+  prepare(t, y);
   if (rows_ > 0) {
-    MC_ = C_;
-    model_.divide_by_mass(MC_);
-    for (int i = 0; i < rows_; ++i) MC_.col(i) *= row_scale_[i];
-    K_.noalias() = row_scale_.asDiagonal() * R_ * MC_;
-    VectorXd right = -row_scale_.cwiseProduct(r_ + R_ * a_);
-    factor_.setThreshold(kRank);
-    factor_.compute(K_);
-    const VectorXd scaled = factor_.solve(right);
+    islands_.factor(R_, MC_, row_scale_);
+    work_done_ += kFactorisation * islands_.work();
+    const VectorXd right = -row_scale_.cwiseProduct(r_ + R_ * a_);
+    const VectorXd scaled = islands_.solve(right);
     a_.noalias() += MC_ * scaled;
     lambda_ = row_scale_.cwiseProduct(scaled);
   }
+  finish_rate(y_rate);
+}
+
+void Motion::finish_rate(double* y_rate) {
   model_.rates(y_rate);
   Eigen::Map<VectorXd>(y_rate + nq_, nu_) = a_;
   double power = model_.power();

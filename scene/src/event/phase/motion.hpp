@@ -18,10 +18,10 @@
 // where rows depend on each other. So y' is a function of (t, y), and so is every force.
 #pragma once
 
-#include <Eigen/QR>
 #include <vector>
 
 #include "bands.hpp"
+#include "row_islands.hpp"
 
 namespace tether::scene::event {
 
@@ -89,6 +89,7 @@ class Motion {
   VectorXd slip(int closed) const { return slip_of(looks_[index(closed)]); }
   VectorXd slip_rate(int closed) const;  ///< at the state of the last rate()
   long evaluations() const { return evaluations_; }
+  double work_done() const { return work_done_; }  ///< operations, roughly
   /// Of the contacts that slide with friction at (t, y), one after the other.
   void slips_with_friction(double t, const double* y, VectorXd& slips);
   /// Of contacts that slide with friction, at the last state: forces turn within such a change.
@@ -126,8 +127,12 @@ class Motion {
   int normal_row(std::size_t closed) const { return row_of_[holder_[closed]]; }
   void set(double t, const double* y);
   void find_holders();
+  void prepare(double t, const double* y);
+  void finish_rate(double* y_rate);
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
+  void differentiate_contacts(int j, double step, const VectorXd& rates, int first_rate,
+                              Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
   int choose_rows();
   void choose_joints();
   void look_at_joints();
@@ -144,15 +149,17 @@ class Motion {
   std::vector<int> joints_in_use_;
   double least_joint_row_ = 1;  // what a row in use added to the others, of its length
   std::vector<int> positions_in_use_, rates_in_use_;  // rows of the projection
+  std::vector<int> rate_place_;                       // of each row in rates_in_use_, or -1
   bool hyperstatic_ = false;
   double kept_energy_ = 0;
   bool keeps_energy_ = true, works_ = false;
 
   VectorXd u_, h_, a_, lambda_, r_;
   VectorXd joint_g_, joint_rate_, joint_rest_, row_scale_;
-  MatrixXd joint_W_, R_, C_, MC_, K_;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor_;
+  MatrixXd joint_W_, R_, C_, MC_;
+  RowIslands islands_;
   long evaluations_ = 0;
+  double work_done_ = 0;
   double smallest_slip_ = 0;
 };
 

@@ -1,0 +1,36 @@
+// Tether: forces of rows, island by island. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/QR>
+#include <vector>
+
+#include "event/model/model.hpp"
+
+namespace tether::scene::event {
+
+/// K = S R M^-1 C S of rows R and columns C, S a diagonal. Rows of bodies that no row connects do
+/// not meet in it: each such island has factors of its own.
+class RowIslands {
+ public:
+  /// By what rows and columns are not zero in; bodies have `block` velocities each.
+  void choose(const MatrixXd& R, const MatrixXd& C, int block);
+  /// MC: M^-1 C S.
+  void factor(const MatrixXd& R, const MatrixXd& MC, const VectorXd& scale);
+  /// The shortest x of K x = right, in the sense of least squares.
+  VectorXd solve(const VectorXd& right) const;
+  /// Of a factorisation: the cubes of the numbers of rows.
+  double work() const;
+
+ private:
+  struct Island {
+    std::vector<int> rows, bodies;
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
+  };
+  void take(const Island& island, const MatrixXd& R, const MatrixXd& MC);
+
+  int block_ = 1;
+  std::vector<Island> islands_;
+  MatrixXd R_, MC_, K_;  // of one island
+};
+
+}  // namespace tether::scene::event
