@@ -15,6 +15,11 @@ bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
     return false;
   AnsweredMove at{move.length, polish_.answer(candidate)};
   if (at.answer < 0.0) return false;
+  // So they do in index 0, where F keeps them by a derivative of theirs.
+  if (metric_choice_.stiff(at) && !variables_.any() && movers_.used->has_forces_in_rows()) {
+    metric_choice_.pause();
+    return false;
+  }
   if (metric_choice_.doubts(at)) at = try_other_metric(candidate, at, move);
   if (!metric_choice_.stiff(at)) return false;
   // Multipliers of index 2 answer to any move, by more than its length over h.

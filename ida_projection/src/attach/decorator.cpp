@@ -155,6 +155,11 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   const StepData step = ida_.step();
   account_for_previous_attempt(step);
   candidate.t = step.t;
+  if (unknowns_.contiguous) {
+    candidate.h = std::abs(ida_.step_size());
+    candidate.cj = step.cj;
+    candidate.predicted_rate = N_VGetArrayPointer(step.yp_predicted);
+  }
   const Candidate& at = candidate;
   if (watch_.rejections.collapsed() && report_.warning() != Status::collapsed)
     report_.warn(Status::collapsed, watch_.rejections.cause(at, step, variables_, corrector_));

@@ -15,6 +15,9 @@ struct Candidate {
   double* base_entries = nullptr;
   double* correction_entries = nullptr;
   const double* weight_entries = nullptr;
+  /// y' = predicted_rate + cj correction; 0 and null where there is no step, as at a start.
+  double h = 0.0, cj = 0.0;
+  const double* predicted_rate = nullptr;
 
   Candidate& with_entries() {
     base_entries = N_VGetArrayPointer(base);

@@ -18,6 +18,9 @@ class LoadedCandidate {
   void load(const Candidate& candidate) {
     ycor = candidate.correction_entries;
     w = candidate.weight_entries;
+    h = candidate.h;
+    cj_ = candidate.cj;
+    predicted_rate_ = candidate.predicted_rate;
     WT_known_ = false;
     restart(candidate);
   }
@@ -39,6 +42,11 @@ class LoadedCandidate {
     return std::sqrt(sum * (1.0 / static_cast<double>(y.size())));
   }
 
+  bool knows_rates() const { return predicted_rate_ != nullptr; }
+  /// y'_i before the move.
+  double rate(std::size_t i) const { return predicted_rate_[i] + cj_ * ycor[i]; }
+
+  double h = 0.0;  ///< the step; 0: there is none
   std::vector<double> y;
   const double *w = nullptr, *ycor = nullptr;  ///< error weights; the corrector's change
 
@@ -50,6 +58,8 @@ class LoadedCandidate {
 
   std::vector<double> WT_;
   bool WT_known_ = false;
+  double cj_ = 0.0;
+  const double* predicted_rate_ = nullptr;
 };
 
 }  // namespace tether::ida_projection

@@ -20,6 +20,7 @@ void LocalMetric::reset() {
   std::fill(scale_.begin(), scale_.end(), 0.0);
   std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
   levels_.clear();
+  levels_of_rates_.clear();
 }
 
 // s <- max(0.8 s, |correction|)
@@ -47,7 +48,15 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
       D[k] = local ? std::max(s, kMetricFloor * weight) : weight;
     });
   }
-  if (!local || group().empty()) return;
+  if (!local) return;
+  if (!group().empty())
+    use_groups(at, d, a);
+  else if (!levels_of_rates_.empty())
+    limit(at, d);
+}
+
+template <class Block>
+void LocalMetric::use_groups(LoadedCandidate& at, Block& d, Block& a) {
   find_group_scales(at);
   const std::vector<double>& WT = at.WT();
   for (Block* block : {&d, &a}) {
@@ -71,6 +80,26 @@ void LocalMetric::fill_few(const LoadedCandidate& at, int first, int columns,
     trial[k] = s;
     D[k] = std::max(s, kMetricFloor * (w[k] > 0.0 ? 1.0 / w[k] : s));
   }
+}
+
+// Errors of positions are h times those of velocities. Corrections do not show that in the short
+// steps of a start, where those of positions are the quadratic part of the motion that the next
+// order will have: then errors of velocities are repaired by sliding positions along, and where
+// these are stiff, as beside the pin of a long chain, it is felt for long.
+template <class Block>
+void LocalMetric::limit(const LoadedCandidate& at, Block& block) const {
+  double* const D = block.D();
+  double sum[2] = {0.0, 0.0};
+  block.for_columns([&](int k, int i) {
+    const int level = levels_of_rates_[static_cast<std::size_t>(i)];
+    if (level == 0 || level == 1) sum[level] += D[k] * D[k];
+  });
+  const double longest = at.h * std::sqrt(sum[1]), length = std::sqrt(sum[0]);
+  if (!(longest > 0.0) || length <= longest) return;
+  const double factor = longest / length;
+  block.for_columns([&](int k, int i) {
+    if (levels_of_rates_[static_cast<std::size_t>(i)] == 0) D[k] *= factor;
+  });
 }
 
 void LocalMetric::current(const LoadedCandidate& at, double* D) const {

@@ -34,16 +34,24 @@ class LocalMetric {
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
   bool by_levels() const { return !levels_.empty(); }
   void forget_levels() { levels_.clear(); }
+  /// Unknowns of level 1 are the rates of those of level 0: scales obey that from now on, see
+  /// limit().
+  void use_rates(std::vector<int> levels) { levels_of_rates_ = std::move(levels); }
+  bool by_rates() const { return !levels_of_rates_.empty(); }
   void accept() { std::swap(scale_, trial_scale_); }
   void reset();
 
  private:
   const std::vector<int>& group() const { return levels_.empty() ? options_.group : levels_; }
   void find_group_scales(LoadedCandidate& at);
+  template <class Block>
+  void use_groups(LoadedCandidate& at, Block& d, Block& a);
+  template <class Block>
+  void limit(const LoadedCandidate& at, Block& block) const;
 
   const Options& options_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
-  std::vector<int> levels_;
+  std::vector<int> levels_, levels_of_rates_;
   std::vector<double> group_sum_;
   std::vector<int> group_members_;
 };

@@ -89,6 +89,9 @@ class Mover {
   /// Are rows many enough for that?
   virtual bool may_use_levels() const { return false; }
 
+  /// Are there rows with unknowns of a third level, after positions and velocities?
+  virtual bool has_forces_in_rows() { return false; }
+
   /// dy, over all unknowns, of one move from the candidate as it is now, with the factors at hand;
   /// nothing is moved. False: it cannot be had.
   virtual bool solve_at(const Candidate&, double* /*dy*/) { return false; }

@@ -16,7 +16,6 @@ namespace tether::ida_projection {
 constexpr double kLargestFloor = 0.1;  // tolerances
 // What a move leaves where nothing is known yet.
 constexpr double kUnknownSlope = 0.03;
-constexpr int kFewForLevels = 16;
 constexpr double kLong = 1.0;      // tolerances: such a move is made with fresh factors
 constexpr double kNothing = 1e-8;  // tolerances: as good as no move
 
@@ -81,6 +80,7 @@ class ContiguousMover final : public Mover {
     rows_.factors.there = false;
     return true;
   }
+  bool has_forces_in_rows() override { return rows_.has_third_level(); }
   bool solve_at(const Candidate& candidate, double* dy) override;
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }

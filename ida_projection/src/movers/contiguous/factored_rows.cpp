@@ -11,6 +11,9 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
+constexpr int kLevelLooks = 16;
+constexpr int kEarly = 64;       // factorisations, of a start
+constexpr double kAlike = 0.05;  // of a sum of squares
 
 }  // namespace
 
@@ -22,19 +25,81 @@ Status FactoredRows<Rows>::structure(const Candidate& candidate, const double* i
   return status;
 }
 
+// Level of each unknown; empty: there is one only. `zeros`: entries that are 0 now count, too.
 template <class Rows>
-bool FactoredRows<Rows>::find_levels() {
+std::vector<int> FactoredRows<Rows>::levels(bool zeros) {
   std::vector<int> starts = {0}, columns;
   for (const int i : blocks.d.rows) {
     blocks.visit_row(i, [&](int j, double entry) {
-      if (entry != 0.0) columns.push_back(j);
+      if (zeros || entry != 0.0) columns.push_back(j);
     });
     starts.push_back(static_cast<int>(columns.size()));
   }
   std::vector<int> levels = levels_of_columns(starts, columns, unknowns());
-  if (*std::max_element(levels.begin(), levels.end()) < 1) return false;
-  metric.use_levels(std::move(levels));
+  if (*std::max_element(levels.begin(), levels.end()) < 1) levels.clear();
+  return levels;
+}
+
+template <class Rows>
+bool FactoredRows<Rows>::find_levels() {
+  std::vector<int> found = levels(false);
+  if (found.empty()) return false;
+  metric.use_levels(std::move(found));
   return true;
+}
+
+// By the pattern of sparse rows, which shows all at once; else by the entries that are not zero
+// now, which at rest do not.
+template <class Rows>
+const std::vector<int>& FactoredRows<Rows>::all_levels() {
+  if (!Rows::kThinRows && found_levels_.empty()) found_levels_ = levels(true);
+  if (Rows::kThinRows || found_levels_.empty()) found_levels_ = levels(false);
+  return found_levels_;
+}
+
+template <class Rows>
+bool FactoredRows<Rows>::has_third_level() {
+  if (third_level_ || third_level_looks_ >= kLevelLooks) return third_level_;
+  ++third_level_looks_;
+  const std::vector<int>& found = all_levels();
+  third_level_ = std::any_of(found.begin(), found.end(), [](int level) { return level >= 2; });
+  return third_level_;
+}
+
+template <class Rows>
+void FactoredRows<Rows>::look_for_rates() {
+  const bool wanted = options_.metric == Metric::local_correction && at.knows_rates();
+  const bool early = factored_ <= kEarly && rate_looks_ < kLevelLooks;
+  if (!wanted || metric.by_rates() || !early) return;
+  ++rate_looks_;
+  const std::vector<int>& found = all_levels();
+  if (found.empty() || !first_are_rates_of_zeroth(found)) return;
+  metric.use_rates(found);
+  set_metric(true);
+}
+
+// Are as many unknowns and rows of level 1 as of level 0 there, and the unknowns as large as their
+// rates? With an energy there is a row more, which at rest asks the positions.
+template <class Rows>
+bool FactoredRows<Rows>::first_are_rates_of_zeroth(const std::vector<int>& levels) {
+  double rates = 0.0, values = 0.0;
+  int more = 0, more_rows = 0;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    if (levels[i] == 0) {
+      rates += at.rate(i) * at.rate(i);
+      ++more;
+    } else if (levels[i] == 1) {
+      values += at.y[i] * at.y[i];
+      --more;
+    }
+  }
+  for (const int i : blocks.d.rows) {
+    int level = -1;
+    blocks.visit_row(
+        i, [&](int j, double) { level = std::max(level, levels[static_cast<std::size_t>(j)]); });
+    more_rows += level == 0 ? 1 : level == 1 ? -1 : 0;
+  }
+  return more == 0 && more_rows == 0 && values > 0.0 && std::abs(rates - values) <= kAlike * values;
 }
 
 // C at the present y, and g if wanted.
@@ -68,6 +133,7 @@ Status FactoredRows<Rows>::factor(double t) {
     if (status != Status::success) return status;
   }
   rows_known_ = false;
+  factored_ = std::min(factored_ + 1, kEarly + 1);
   const bool known = Rows::kKeepsRank && factors.lasting && factors.there;
   factors.there = false;
   weighed_ = false;
@@ -119,6 +185,7 @@ template <class Rows>
 bool FactoredRows<Rows>::decide() {
   ++statistics_.factorizations;
   factors.partial = false;
+  if (count() > kFewForLevels) look_for_rates();
   if (!blocks.factor()) return false;
   if (blocks.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kThinRows) factors.thin = RowTrust::has_thin_rows(blocks.counted().solver);

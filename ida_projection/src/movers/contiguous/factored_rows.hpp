@@ -15,7 +15,8 @@
 
 namespace tether::ida_projection {
 
-constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
+constexpr int kFewForLevels = 16;  // rows
+constexpr double kSafe = 0.25;     // of Options::tolerance, where old factors tell what is left
 
 /// What the factors at hand are good for.
 struct FactorState {
@@ -66,6 +67,8 @@ class FactoredRows {
   /// One scale for each level of the columns from now on, from the entries of C. False: there is
   /// one level only.
   bool find_levels();
+  /// Are there unknowns of level 2? Looked for until some are found, 16 times.
+  bool has_third_level();
   /// At the candidate, whose variables are algebraic where `id` is 0.
   Status structure(const Candidate& candidate, const double* id);
   /// g at the present y.
@@ -114,6 +117,9 @@ class FactoredRows {
     metric.reset();
     if constexpr (Rows::kThinRows) blocks.trust.reset();
     usual_ = 0.0;
+    factored_ = rate_looks_ = third_level_looks_ = 0;
+    third_level_ = false;
+    found_levels_.clear();
   }
 
  private:
@@ -130,6 +136,10 @@ class FactoredRows {
   int unknowns() const { return static_cast<int>(at.y.size()); }
   Status rows(double t, double* g);
   bool decide();
+  std::vector<int> levels(bool zeros);
+  const std::vector<int>& all_levels();
+  void look_for_rates();
+  bool first_are_rates_of_zeroth(const std::vector<int>& levels);
   double left_of_dropped();
   bool left_below(double limit);
 
@@ -140,8 +150,11 @@ class FactoredRows {
   double inverse_n_;
   std::vector<double> g_;
   bool rows_known_ = false;  // C belongs to the present y
-  double usual_ = 0.0;       // left_of_dropped() after the moves, with factors.decided
-  bool weighed_ = false;     // the blocks know what a tolerance is for their dropped rows
+  int factored_ = 0, rate_looks_ = 0, third_level_looks_ = 0;
+  bool third_level_ = false;
+  std::vector<int> found_levels_;
+  double usual_ = 0.0;    // left_of_dropped() after the moves, with factors.decided
+  bool weighed_ = false;  // the blocks know what a tolerance is for their dropped rows
   double most_d_ = -1.0, most_a_ = -1.0;  // of D in tolerances, of the blocks; < 0: not known
 };
 
