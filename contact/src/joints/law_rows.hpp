@@ -22,12 +22,13 @@ class LawRows {
   void prepare(const std::vector<Vector6d>& v, double dt);
 
   JointLaws laws;
-  std::vector<double> impulses;  ///< of the last problem of velocities, by law
+  std::vector<double> impulses;  ///< of the last problem of the step's velocities, by law
 
   std::vector<Strike> strikes;  ///< of limits, in this part
 
   bool in(LawUse use, int law) const {
-    return use == LawUse::all || (use == LawUse::limits && laws[law].limit);
+    return use == LawUse::all || use == LawUse::closing ||
+           (use == LawUse::limits && laws[law].limit);
   }
   std::uint64_t id(int law) const { return kFirstId + static_cast<std::uint64_t>(law); }
   /// The contact of a law, and its own mobility in the directions that no body moves in. `place`:

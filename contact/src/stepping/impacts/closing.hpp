@@ -31,7 +31,7 @@ class Closing {
       : depenetration_(depenetration), solver_(options) {}
 
   void set_joints(IslandMaker& joints, const BodyOptions& options) {
-    solver_.set_joints(joints.make_islands(options, LawUse::all));
+    solver_.set_joints(joints.make_islands(options, LawUse::closing));
     islands_.set_links(joints.links());
   }
 

@@ -12,8 +12,9 @@ namespace tether::contact::detail {
 class NearContacts;
 class RollingPart;
 
-/// Laws of joints (JointLaws) in a problem: of velocities, of positions, that leaves them out.
-enum class LawUse { all, limits, none };
+/// Laws of joints (JointLaws) in a problem: of the step's velocities, of what closes its gaps
+/// (whose impulses are none of the step), of positions, that leaves them out.
+enum class LawUse { all, closing, limits, none };
 
 /// A limit of a joint that is struck within a part of a step.
 struct Strike {
