@@ -83,7 +83,7 @@ const Automatic::Turn Automatic::kFewBodies[] = {
     {&Automatic::sweep_few_bodies, always, 20},           // factorisations it may forecast
     {&Automatic::end_of_work, always, 0},                 //
     {&Automatic::sticking_point, always, 1},              // factorisation
-    {&Automatic::arclength_path, always, 800},            // factorisations, from the best point
+    {&Automatic::arclength_path_of_most, always, 800},    // factorisations, from the best point
     {&Automatic::shifted_path, always, 1000},             // steps
     {&Automatic::round_off, always, kRoundOffSteps},      // steps
     {&Automatic::end_of_work, always, 0},                 //

@@ -60,6 +60,7 @@ class Automatic {
   Status proximal_path(Search& search, Rotation& r, int problems);
   Status proximal_path_at_best(Search& search, Rotation& r, int problems);
   Status arclength_path(Search& search, Rotation& r, int factorisations);
+  Status arclength_path_of_most(Search& search, Rotation& r, int factorisations);
   Status coupling_path(Search& search, Rotation& r, int factorisations);
   Status rescue(Search& search, Rotation& r, int problems);
   Status round_off(Search& search, Rotation& r, int steps);

@@ -217,6 +217,24 @@ Status Automatic::arclength_path(Search& search, Rotation&, int factorisations) 
   return Status::unsolved;
 }
 
+// Where the work does not reach to the end of the path Newton steps come nearer with the last
+// quarter of it than the path does.
+Status Automatic::arclength_path_of_most(Search& search, Rotation& r, int factorisations) {
+  constexpr double kShare = 0.75;  // of the work that is left
+  constexpr int kProblems = 12;
+  const double end = search.work_end, enough = search.options.enough;
+  search.work_end = search.counts.work + kShare * (end - search.counts.work);
+  arclength_path(search, r, factorisations);
+  const bool cut = search.exhausted();
+  search.work_end = end;
+  if (!cut || search.solved()) return Status::unsolved;
+  search.options.enough = 0;
+  newton.run(search, search.best.data(), kProblems);
+  search.options.enough = enough;
+  x_ = search.best;
+  return Status::unsolved;
+}
+
 Status Automatic::proximal_path(Search& search, Rotation&, int problems) {
   interior.run_proximal(search, x_.data(), problems, newton);
   return Status::unsolved;
