@@ -159,7 +159,7 @@ Stepper::Implementation::Moment Stepper::Implementation::moment(double gap, doub
   gap = std::max(0.0, gap);
   const double a = (comes - came) / length;
   const double speed = std::sqrt(std::max(0.0, came * came + 4 * a * gap));
-  return {gap > 0 ? 2 * gap / (came + speed) : 0,
+  return {detail::closing_time(gap, came, a),
           kAtOnce * options.accuracy * size / std::max(speed, 1e-300)};
 }
 

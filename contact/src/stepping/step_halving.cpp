@@ -12,8 +12,10 @@ void Stepper::Implementation::step() {
   const double length = options.step - late;
   if (options.accuracy > 0)
     advance_accurately(start, length);
-  else
+  else {
+    part.cuts_left = cuts ? detail::StepCuts::kMost : 0;
     advance(start, length, options.max_halvings);
+  }
   if (!is_finite()) {
     outcome.succeeded = false;
     outcome.status = Status::unsolved;
@@ -38,6 +40,8 @@ void Stepper::Implementation::advance(double time, double length, int halvings) 
   if (run_stages(time)) return;
   // Nothing has moved yet.
   bodies.motion = impacts->coming();
+  if (part.cut) return advance_cut(time, length, halvings);
+  if (part.again) return advance(time, length, halvings);
   solver->take_back();
   solver->scale_warm_start(0.5);
   ++counts.halved;
@@ -46,11 +50,12 @@ void Stepper::Implementation::advance(double time, double length, int halvings) 
   solver->scale_warm_start(2);
 }
 
-// false: the contact problem failed, and the step is to be taken in halves.
+// false: the contact problem failed, and the step is to be taken in halves; or it is
+// to be cut, or taken anew with what it has woken.
 bool Stepper::Implementation::run_stages(double time) {
   using Clock = std::chrono::steady_clock;
   Clock::time_point start = Clock::now();
-  part.failed = false;
+  part.failed = part.cut = part.again = false;
   for (Stage& stage : stages) {
     if (stage.method)
       (this->*stage.method)();
@@ -59,7 +64,7 @@ bool Stepper::Implementation::run_stages(double time) {
     const Clock::time_point end = Clock::now();
     stage.seconds += std::chrono::duration<double>(end - start).count();
     start = end;
-    if (part.failed && part.may_halve) return false;
+    if (part.cut || part.again || (part.failed && part.may_halve)) return false;
   }
   return true;
 }

@@ -23,6 +23,9 @@ void check(const SteppingOptions& o) {
   demand(o.impact_threshold >= 0, "impact_threshold must be >= 0");
   demand(o.acceptance >= 1, "acceptance must be >= 1");
   demand(o.max_halvings >= 0 && o.max_halvings <= 30, "max_halvings must lie in 0 .. 30");
+  demand(o.sleep >= 0 && std::isfinite(o.sleep), "sleep must be >= 0 and finite");
+  demand(!(o.sleep > 0) || (o.gravity && o.gravity->norm() > 0), "sleep needs gravity");
+  demand(!(o.sleep > 0) || o.accuracy == 0, "sleep does not go with an accuracy");
   demand(o.near_part >= 0, "near_part must be >= 0");
 }
 

@@ -22,6 +22,7 @@ void Stepper::Implementation::make_stages() {
   const char* impact = restitution ? "restitution" : "collision";
   if (solver) add_stage(impact, &I::remember_velocities);
   if (options.gravity) add_stage("gravity", &I::apply_gravity);
+  if (falls()) add_stage("gravity", &I::remember_weight);
   after_forces = stages.size();
   if (motion.any_long()) {
     if (options.gyroscopic == Gyroscopic::explicit_step)
@@ -29,10 +30,12 @@ void Stepper::Implementation::make_stages() {
     if (options.gyroscopic == Gyroscopic::implicit_step)
       add_stage("gyroscopic term", &I::gyrate_implicit);
   }
+  if (sleeping) add_stage("sleep", &I::hold_sleepers);
   if (joints) add_stage("joints", &I::predict_joints);
   if (near) {
     add_stage("collision", &I::find_contacts);
     add_stage(impact, &I::choose_impacts);
+    if (cuts) add_stage(impact, &I::look_for_cut);
     if (restitution) add_stage("restitution", &I::choose_bounces);
     add_stage("contact", &I::solve_contacts);
     if (restitution) add_stage("restitution", &I::rebound);
@@ -45,6 +48,7 @@ void Stepper::Implementation::make_stages() {
     add_stage("joints", &I::solve_contacts);
   }
   add_stage("motion", &I::move);
+  if (falls()) add_stage("gravity", &I::fall);
   if (motion.any_free_round()) add_stage("motion", &I::turn_round);
   if (motion.any_free_long()) {
     if (options.gyroscopic == Gyroscopic::momentum)
@@ -53,12 +57,18 @@ void Stepper::Implementation::make_stages() {
       add_stage("motion", &I::turn_plain);
   }
   if (joints) add_stage("joints", &I::move_joints);
+  if (sleeping) add_stage("sleep", &I::end_sleep);
 }
 
 void Stepper::Implementation::find_contacts() {
   if (options.team) options.team->place(bodies.position);
   near->find(bodies, part.dt, contacts);
   if (joints) leave_out_joined();
+  if (sleeping && sleeping->wake_touched(*near, bodies, *impacts, part.dt, contacts)) {
+    part.again = true;
+    return;
+  }
+  if (part.before_impact) leave_out_striking();
   set_gaps();
   part.free_motion = bodies.motion;
   part.before = judged();
@@ -84,6 +94,7 @@ void Stepper::Implementation::meet_others() {
     const std::size_t before = contacts.points.size();
     if (!near->find_more(bodies, part.dt, contacts)) return;
     if (joints) leave_out_joined();
+    if (sleeping) sleeping->leave_out(contacts);
     if (contacts.points.size() == before) return;
     bodies.motion = part.free_motion;
     solver->take_back();
@@ -96,6 +107,23 @@ void Stepper::Implementation::meet_others() {
     if (restitution) rebound();
     take_later_impacts();
   }
+}
+
+void Stepper::Implementation::hold_sleepers() {
+  sleeping->hold(impacts->coming(), part.dt, bodies);
+  if (!sleeping->take_changed()) return;
+  near->set_resting(sleeping->asleep());
+  const WarmStart woken = sleeping->take_woken(part.dt);
+  if (woken.ids.empty()) return;
+  WarmStart start = solver->warm_start();
+  start.ids.insert(start.ids.end(), woken.ids.begin(), woken.ids.end());
+  start.impulses.insert(start.impulses.end(), woken.impulses.begin(), woken.impulses.end());
+  solver->set_warm_start(start);
+}
+
+void Stepper::Implementation::end_sleep() {
+  if (!part.failed && part.of_cut == false) sleeping->fall_asleep(part.dt, bodies, contacts);
+  sleeping->end(part.dt, bodies, contacts);
 }
 
 void Stepper::Implementation::choose_impacts() {
@@ -113,7 +141,7 @@ void Stepper::Implementation::solve_contacts() {
   contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
   std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
   part.failed = false;
-  if (contacts.points.empty() && !has_laws()) {
+  if ((contacts.points.empty() && !has_laws()) || (part.of_cut && nothing_presses())) {
     solver->forget();
     return;
   }

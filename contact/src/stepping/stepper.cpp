@@ -25,6 +25,8 @@ void Stepper::Implementation::make_solvers() {
   later = std::make_unique<detail::LaterImpacts>(
       detail::threshold_speed(options.impact_threshold, options),
       detail::threshold_speed(options.restitution_threshold, options), o);
+  if (options.cut_at_impacts && !(options.accuracy > 0))
+    cuts = std::make_unique<detail::StepCuts>(o);
   if (near->any_restitution()) {
     restitution = std::make_unique<detail::Restitution>(options.restitution_law, o);
     later->add_restitution(options.restitution_law, o);
@@ -46,6 +48,7 @@ void Stepper::Implementation::give_islands(detail::IslandMaker& maker) {
   if (restitution) restitution->set_joints(maker, o);
   if (positions) positions->set_joints(maker, options);
   later->set_joints(maker, o);
+  if (cuts) cuts->set_joints(maker, o);
 }
 
 // Refuses by name what it does not go with.
@@ -79,12 +82,21 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
   s.bodies = std::move(bodies);
   s.options = options;
   if (options.accuracy > 0) s.parts.radius = sizes(s.bodies, surfaces);
+  std::vector<double> size;
+  if (options.sleep > 0) size = sizes(s.bodies, surfaces);
   if (!meetings.empty() && !surfaces.empty()) {
     s.near = std::make_unique<detail::NearContacts>(s.bodies, std::move(surfaces),
                                                     std::move(meetings), options.law,
                                                     options.near_part, std::move(polyhedra));
     if (s.near->any_rolling()) check_rolling(options);
     s.make_solvers();
+    if (options.sleep > 0) {
+      if (s.near->any_rolling())
+        throw std::invalid_argument("stepping: sleep does not go with rolling friction");
+      s.sleeping = std::make_unique<detail::Sleeping>(
+          s.bodies, std::move(size), detail::threshold_speed(options.sleep, options),
+          options.gravity->norm());
+    }
   }
   s.make_stages();
 }
@@ -131,6 +143,9 @@ const std::vector<double>& Stepper::law_impulses() const {
   return implementation_->joints ? implementation_->joints->law_impulses() : none;
 }
 double Stepper::last_part() const { return implementation_->part.dt; }
+int Stepper::asleep() const {
+  return implementation_->sleeping ? implementation_->sleeping->count() : 0;
+}
 const StepCounts& Stepper::counts() const { return implementation_->counts; }
 const SteppingOptions& Stepper::options() const { return implementation_->options; }
 
@@ -163,6 +178,7 @@ StepperMemory Stepper::memory() const {
   m.status = s.outcome.status;
   m.control = s.parts.control;
   m.drift = joint_drift();
+  if (s.sleeping) m.sleep = s.sleeping->memory();
   return m;
 }
 
@@ -189,6 +205,11 @@ void Stepper::set_memory(const StepperMemory& m) {
   s.outcome.status = m.status;
   s.parts.control = m.control;
   if (s.joints) s.joints->set_drift(m.drift);
+  if (!s.sleeping) return;
+  if (m.sleep.bodies.empty())
+    s.sleeping->wake_everybody();
+  else
+    s.sleeping->set_memory(m.sleep, s.bodies);
 }
 
 void Stepper::start_anew(long steps, double late) {
@@ -202,6 +223,7 @@ void Stepper::start_anew(long steps, double late) {
   s.motion.spins().assign(s.motion.spins().size(), {});
   s.motion.turn_inertias(s.bodies);
   if (s.solver) s.make_solvers();  // nothing of the past is left
+  if (s.sleeping) s.sleeping->wake_everybody();
 }
 
 }  // namespace tether::contact

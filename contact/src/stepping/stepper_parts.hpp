@@ -11,10 +11,12 @@
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/impacts/later_impacts.hpp"
 #include "stepping/impacts/restitution.hpp"
+#include "stepping/impacts/step_cuts.hpp"
 #include "stepping/motion/free_motion.hpp"
 #include "stepping/motion/joint_part.hpp"
 #include "stepping/motion/rotation.hpp"
 #include "stepping/position_correction.hpp"
+#include "stepping/sleeping.hpp"
 #include "stepping/step_settings.hpp"
 
 namespace tether::contact {
@@ -89,7 +91,10 @@ struct Stepper::Implementation {
   std::unique_ptr<detail::Impacts> impacts;
   std::unique_ptr<detail::Restitution> restitution;
   std::unique_ptr<detail::LaterImpacts> later;
+  std::unique_ptr<detail::StepCuts> cuts;  // only where asked for
+  std::vector<double> falling;  // of impacts: what the weight of falling bodies adds to an approach
   std::unique_ptr<detail::PositionCorrection> positions;  // only with error reduction
+  std::unique_ptr<detail::Sleeping> sleeping;             // only where bodies may sleep
   StepContacts contacts;
   BodySolution solution;
   std::unique_ptr<detail::JointPart> joints;     // only where they have been added
@@ -99,6 +104,9 @@ struct Stepper::Implementation {
   struct Part {
     double start = 0, dt = 0;
     bool may_halve = false, failed = false;
+    int cuts_left = 0;  // that it may be taken in parts for
+    bool cut = false, of_cut = false, before_impact = false;
+    bool again = false;                  // what has woken takes part
     std::vector<RigidBody> free_motion;  // before its problem
     detail::Judgement before;
   } part;
@@ -140,6 +148,16 @@ struct Stepper::Implementation {
   double take_part(double time, double length, bool shortened, double shortest);
   void advance_accurately(double start, double length);
 
+  bool may_cut() const;
+  void look_for_cut();
+  void hold_sleepers();
+  void end_sleep();
+  bool nothing_presses() const;
+  void leave_out_striking();
+  bool strike();
+  void add_to_sum();
+  void advance_cut(double time, double length, int halvings);
+
   void judge();
   detail::Judgement judged() const;
   void set_judged(const detail::Judgement& b);
@@ -171,6 +189,13 @@ struct Stepper::Implementation {
   void gyrate_explicit() { motion.gyrate_explicit(part.dt, bodies); }
   void gyrate_implicit() { motion.gyrate_implicit(part.dt, bodies); }
   void move() { motion.move(part.dt, bodies); }
+  bool falls() const {
+    return options.gravity && options.cut_at_impacts && !(options.accuracy > 0);
+  }
+  void remember_weight() { motion.remember_weight(bodies); }
+  // A part moves bodies by the velocities of its end, under their weight alone half of its change
+  // too far.
+  void fall() { motion.fall(-0.5 * part.dt * part.dt * *options.gravity, contacts, bodies); }
   void turn_round() { motion.turn_round(part.dt, bodies); }
   void turn_plain() { motion.turn_plain(part.dt, bodies); }
   void turn_keeping_momentum() { motion.turn_keeping_momentum(part.dt, bodies); }

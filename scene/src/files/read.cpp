@@ -78,6 +78,17 @@ void read_engine(Fields& root, Reader& r) {
                                       kNotNegative, "of sqrt(gravity * size)");
   o.impact_threshold =
       in.number("impact_threshold", o.impact_threshold, kNotNegative, "of sqrt(gravity * size)");
+  o.cut_at_impacts = in.flag("cut_at_impacts", o.cut_at_impacts);
+  o.sleep = in.number("sleep", o.sleep, kNotNegative, "of sqrt(gravity * size); 0: none sleeps");
+  if (o.sleep > 0 && o.accuracy > 0)
+    in.wrong("sleep", "goes with fixed steps: leave out accuracy, or sleep");
+  if (o.sleep > 0 && !(r.scene.gravity && r.scene.gravity->norm() > 0))
+    in.wrong("sleep", "is a part of sqrt(gravity * size), and the scene has no gravity");
+  for (const Pair& pair : r.scene.pairs)
+    if (o.sleep > 0 && (pair.rolling > 0 || pair.torsional > 0)) {
+      in.wrong("sleep", "does not go with rolling and torsional friction of pairs");
+      break;
+    }
   o.acceptance = in.number("acceptance", o.acceptance, {1, 1e12, false, "a number from 1 to 1e12"},
                            "of the tolerance");
   o.max_halvings = in.count("max_halvings", o.max_halvings, 0, 30);

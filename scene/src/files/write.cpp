@@ -113,6 +113,8 @@ void write_stepping(const SteppingOptions& o, Writer& out) {
   out.raw("restitution_law", toml_word(o.restitution_law));
   out.field("restitution_threshold", o.restitution_threshold, "of sqrt(gravity * size)");
   out.field("impact_threshold", o.impact_threshold, "of sqrt(gravity * size)");
+  out.field("cut_at_impacts", o.cut_at_impacts);
+  out.field("sleep", o.sleep, "of sqrt(gravity * size); 0: none sleeps");
   out.field("acceptance", o.acceptance, "of the tolerance");
   out.field("max_halvings", o.max_halvings, "of a step");
   out.raw("on_failure", toml_word(o.on_failure));

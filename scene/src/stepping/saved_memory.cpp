@@ -55,6 +55,61 @@ PointContact get_contact(std::istream& in, int bodies) {
   return c;
 }
 
+void put(std::ostream& out, const contact::StepContacts& contacts) {
+  binary::put(out, static_cast<std::uint64_t>(contacts.points.size()));
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    put(out, contacts.points[k]);
+    binary::put(out, contacts.gaps[k]);
+    binary::put_array(out, contacts.impulses[k]);
+  }
+}
+
+void get_contacts(std::istream& in, int bodies, contact::StepContacts& contacts) {
+  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
+    contacts.points.push_back(get_contact(in, bodies));
+    binary::get(in, contacts.gaps.emplace_back());
+    binary::get_array(in, contacts.impulses.emplace_back());
+    demand_finite(contacts.impulses.back(), Eigen::Matrix<double, 1, 1>(contacts.gaps.back()));
+  }
+}
+
+void put(std::ostream& out, const StepperMemory::Sleep& sleep) {
+  binary::put(out, static_cast<std::uint64_t>(sleep.bodies.size()));
+  for (const StepperMemory::Rest& r : sleep.bodies) {
+    binary::put(out, r.slow, static_cast<std::int32_t>(r.island),
+                static_cast<std::int32_t>(r.fresh));
+    binary::put_array(out, r.acceleration, r.angular_acceleration);
+  }
+  put(out, sleep.contacts);
+  binary::put(out, static_cast<std::uint64_t>(sleep.neighbours.size()));
+  for (const StepperMemory::Neighbour& n : sleep.neighbours) {
+    binary::put(out, static_cast<std::int32_t>(n.body), static_cast<std::int32_t>(n.island));
+    binary::put_array(out, n.position, n.orientation.coeffs(), n.velocity, n.angular_velocity);
+  }
+}
+
+// Whether they fit the bodies is looked at by the stepper.
+void get_sleep(std::istream& in, int bodies, StepperMemory::Sleep& sleep) {
+  std::int32_t island = 0, flag = 0;
+  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
+    StepperMemory::Rest& r = sleep.bodies.emplace_back();
+    binary::get(in, r.slow, island, flag);
+    r.island = island;
+    r.fresh = flag != 0;
+    binary::get_array(in, r.acceleration, r.angular_acceleration);
+    demand_finite(r.acceleration, r.angular_acceleration, Eigen::Matrix<double, 1, 1>(r.slow));
+  }
+  get_contacts(in, bodies, sleep.contacts);
+  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
+    StepperMemory::Neighbour& n = sleep.neighbours.emplace_back();
+    binary::get(in, flag, island);
+    n.body = flag;
+    n.island = island;
+    binary::get_array(in, n.position, n.orientation.coeffs(), n.velocity, n.angular_velocity);
+    demand_finite(n.position, n.orientation.coeffs(), n.velocity, n.angular_velocity);
+  }
+}
+
 }  // namespace
 
 void put_memory(std::ostream& out, const StepperMemory& m) {
@@ -67,14 +122,10 @@ void put_memory(std::ostream& out, const StepperMemory& m) {
     binary::put_array(out, spin.momentum, spin.angular_velocity);
     for (const double x : spin.orientation) binary::put(out, x);
   }
-  binary::put(out, static_cast<std::uint64_t>(m.last.points.size()));
-  for (std::size_t k = 0; k < m.last.points.size(); ++k) {
-    put(out, m.last.points[k]);
-    binary::put(out, m.last.gaps[k]);
-    binary::put_array(out, m.last.impulses[k]);
-  }
+  put(out, m.last);
   binary::put(out, m.penetration, m.residual, static_cast<std::int32_t>(m.status));
   binary::put(out, m.control.next, m.control.last, m.control.error, m.control.length, m.drift);
+  put(out, m.sleep);
 }
 
 StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
@@ -92,12 +143,7 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
     demand_finite(spin.momentum, spin.angular_velocity,
                   Eigen::Map<const Eigen::Vector4d>(spin.orientation.data()));
   }
-  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
-    m.last.points.push_back(get_contact(in, bodies));
-    binary::get(in, m.last.gaps.emplace_back());
-    binary::get_array(in, m.last.impulses.emplace_back());
-    demand_finite(m.last.impulses.back(), Eigen::Matrix<double, 1, 1>(m.last.gaps.back()));
-  }
+  get_contacts(in, bodies, m.last);
   std::int32_t status = 0;
   binary::get(in, m.penetration, m.residual, status);
   m.status = static_cast<contact::Status>(status);
@@ -112,6 +158,7 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
   binary::get(in, m.drift);
   if (!(m.drift >= 0) || !std::isfinite(m.drift))
     throw std::runtime_error("the saved state is damaged: joints are off by no length");
+  if (format == MemoryFormat::now) get_sleep(in, bodies, m.sleep);
   return m;
 }
 

@@ -9,8 +9,14 @@
 namespace tether::scene::stepping {
 
 /// With a fourth warm start, of which nothing hung; without the control of parts of steps; without
-/// the joints' drift; as now.
-enum class MemoryFormat : std::uint8_t { with_closings, without_control, without_drift, now };
+/// the joints' drift; without sleep; as now.
+enum class MemoryFormat : std::uint8_t {
+  with_closings,
+  without_control,
+  without_drift,
+  without_sleep,
+  now
+};
 
 void put_memory(std::ostream& out, const contact::StepperMemory& memory);
 /// Throws std::runtime_error on a memory that no stepper of so many bodies has written.

@@ -120,6 +120,16 @@ struct SteppingOptions {
   /// Approaches faster than this times sqrt(g s) that would close within the step get their whole
   /// impulse at the present gap; slower ones close the gap first (bias gap / dt).
   double impact_threshold = 0.01;
+  /// Steps with at most 16 contacts are taken up to where a gap closes, the impact, and the rest,
+  /// and bodies that nothing but their weight acts upon fall along their parabola: errors go with
+  /// the step and not with the phase of impacts in it (README, section 13). Not where joints have
+  /// laws or pairs rolling friction; an accuracy has this of its own.
+  bool cut_at_impacts = false;
+  /// > 0: islands of bodies that have been slower than this times sqrt(g s) for 5 sqrt(s / g) fall
+  /// asleep: they take part in no problem until something touches them, the forces on them change
+  /// or what they lie on moves (README, section 13). Needs gravity; not with an accuracy or rolling
+  /// friction. 0: none does.
+  double sleep = 0;
   /// Points are contacts if their gap is below this part of the size of the smaller shape plus the
   /// distance that the velocities cover within the step.
   double near_part = 1e-3;
@@ -180,6 +190,27 @@ struct StepperMemory {
     double next = 0, last = 0, error = 0, length = 0;
   } control;
   double drift = 0;  ///< of the joints, m or rad
+  /// Of a body where any may sleep: how long it has been slow, s; its island, -1: awake; whether it
+  /// has not slept for a part yet; the accelerations that forces gave it last, or sleep holds.
+  struct Rest {
+    double slow = 0;
+    int island = -1;
+    bool fresh = false;
+    Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
+    Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();
+  };
+  /// What an island that sleeps lies on, as it was then.
+  struct Neighbour {
+    int body = 0, island = 0;
+    Eigen::Vector3d position;
+    linalg::Quaternion orientation;
+    Eigen::Vector3d velocity, angular_velocity;
+  };
+  struct Sleep {
+    std::vector<Rest> bodies;  ///< empty: none may sleep
+    StepContacts contacts;     ///< of those asleep, with forces in the place of impulses
+    std::vector<Neighbour> neighbours;
+  } sleep;
 };
 
 struct StageCost {
@@ -242,6 +273,7 @@ class Stepper {
   /// Length, s, of the last part of the last step, which impulses are of: forces are impulses over
   /// it. 0 before the first step, and after set_memory().
   double last_part() const;
+  int asleep() const;  ///< bodies that sleep
   const StepCounts& counts() const;
   std::vector<StageCost> costs() const;
   const SteppingOptions& options() const;

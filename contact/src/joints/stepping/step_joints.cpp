@@ -374,6 +374,14 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
   mechanisms_.impulses(impulses_.data());
 }
 
+void StepJoints::take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
+                             const StepContacts& contacts) {
+  take_velocities(bodies);
+  store(bodies);
+  for (const int i : held_) start_[at(i)] << before[at(i)].velocity, before[at(i)].angular_velocity;
+  find_impulses(bodies, contacts);
+}
+
 bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& contacts) {
   take_velocities(bodies);
   store(bodies);

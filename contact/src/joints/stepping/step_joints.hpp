@@ -56,6 +56,16 @@ class StepJoints final : public JointPart {
   void set_drift(double drift) override { drift_ = drift; }
   /// Impulses of the last step, by row.
   const std::vector<double>& impulses() const override { return impulses_; }
+  void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
+                   const StepContacts& contacts) override;
+  void begin_sum() override { sum_.assign(impulses_.size(), 0); }
+  void add_to_sum() override {
+    for (std::size_t row = 0; row < sum_.size(); ++row) sum_[row] += impulses_[row];
+  }
+  void give_sum() override {
+    add_to_sum();
+    impulses_ = sum_;
+  }
 
  private:
   struct Place {
@@ -117,7 +127,7 @@ class StepJoints final : public JointPart {
   std::vector<std::pair<int, int>> links_, joined_;
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
   RowVectors row_;
-  std::vector<double> impulses_;
+  std::vector<double> impulses_, sum_;
   std::vector<Place> place_;  // of held_, at the start of the step
   FactoredAt factored_;
   double drift_ = 0;

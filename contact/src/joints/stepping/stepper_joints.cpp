@@ -27,6 +27,7 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   s.joints =
       std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
   s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
+  if (s.sleeping) s.sleeping->set_joints(*s.joints);
   if (s.rolling) {
     s.rolling = std::make_unique<detail::RollingPart>(*s.near);
     s.joints->set_rolling(*s.near, *s.rolling);

@@ -70,6 +70,12 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     reach_[k] = reach(s.shape);
     still_[k] = !moves(bodies, s.body);
   }
+  fixed_ = still_;
+}
+
+void NearContacts::set_resting(const std::vector<char>& resting) {
+  for (std::size_t k = 0; k < bounded_.size(); ++k)
+    still_[k] = fixed_[k] != 0 || resting[at(surface(bounded_[k]).body)] != 0;
 }
 
 // Who meets whom by material and kind: refuses pairs that nobody serves, and hands the surfaces of

@@ -29,6 +29,9 @@ class NearContacts {
   /// near_part of their size. False: none.
   bool find_more(const BodySet& bodies, double dt, StepContacts& out);
 
+  /// Bodies that stay where they are, of each body: they meet only what moves.
+  void set_resting(const std::vector<char>& resting);
+
   const Surface& surface(int k) const { return surfaces_[static_cast<std::size_t>(k)]; }
   const Meeting& meeting(const PointContact& c) const;
   /// Distance of the farthest point of its smaller shape from that shape's origin, m.
@@ -63,7 +66,7 @@ class NearContacts {
   std::vector<double> reach_;
   std::vector<Eigen::Vector3d> centre_;
   std::vector<double> ball_;
-  std::vector<char> still_, faster_;
+  std::vector<char> still_, fixed_, faster_;
   StepContacts more_;
   std::vector<std::uint64_t> known_;  // identities of contacts
   NearPoints near_;

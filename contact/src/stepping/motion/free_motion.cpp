@@ -10,6 +10,8 @@ void FreeMotion::list(const BodySet& bodies, const JointPart* joints, Gyroscopic
   for (std::vector<int>* list : {&moving_, &long_, &free_, &free_round_, &free_long_})
     list->clear();
   spins_.clear();
+  may_fall_.assign(bodies.motion.size(), 0);
+  weight_only_.resize(bodies.motion.size());
   for (int i = 0; i < bodies.size(); ++i) {
     if (bodies.mass[at(i)] == 0) continue;
     moving_.push_back(i);
@@ -17,6 +19,7 @@ void FreeMotion::list(const BodySet& bodies, const JointPart* joints, Gyroscopic
     if (!round) long_.push_back(i);
     if (joints && joints->holds(i)) continue;
     free_.push_back(i);
+    may_fall_[at(i)] = 1;
     (round ? free_round_ : free_long_).push_back(i);
   }
   if (gyroscopic == Gyroscopic::momentum) spins_.resize(free_long_.size());
@@ -24,6 +27,10 @@ void FreeMotion::list(const BodySet& bodies, const JointPart* joints, Gyroscopic
 
 void FreeMotion::accelerate(const Vector3d& dv, BodySet& bodies) const {
   for (const int i : moving_) bodies.motion[at(i)].velocity += dv;
+}
+
+void FreeMotion::remember_weight(const BodySet& bodies) {
+  for (const int i : moving_) weight_only_[at(i)] = bodies.motion[at(i)].velocity;
 }
 
 void FreeMotion::gyrate_explicit(double dt, BodySet& bodies) const {
@@ -43,6 +50,21 @@ void FreeMotion::gyrate_implicit(double dt, BodySet& bodies) const {
 
 void FreeMotion::move(double dt, BodySet& bodies) const {
   for (const int i : free_) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
+}
+
+void FreeMotion::fall(const Vector3d& way, const StepContacts& contacts, BodySet& bodies) {
+  if (contacts.points.empty()) {
+    for (const int i : free_)
+      if (falls(bodies, i)) bodies.position[at(i)] += way;
+    return;
+  }
+  islands_.join(bodies, contacts);
+  pressed_.assign(bodies.motion.size(), 0);
+  for (std::size_t k = 0; k < contacts.impulses.size(); ++k)
+    if (!contacts.impulses[k].isZero(0))
+      pressed_[at(islands_.root(bodies, contacts.points[k]))] = 1;
+  for (const int i : free_)
+    if (falls(bodies, i) && !pressed_[at(islands_.root(i))]) bodies.position[at(i)] += way;
 }
 
 void FreeMotion::turn_inertias(BodySet& bodies) const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 #include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {
@@ -23,10 +24,18 @@ class FreeMotion {
   bool any_free_long() const { return !free_long_.empty(); }
 
   void accelerate(const Eigen::Vector3d& dv, BodySet& bodies) const;
+  /// Between the weight and all other forces.
+  void remember_weight(const BodySet& bodies);
   void gyrate_explicit(double dt, BodySet& bodies) const;
   void gyrate_implicit(double dt, BodySet& bodies) const;
 
   void move(double dt, BodySet& bodies) const;
+  /// Nothing but its weight has changed its velocity since, and no joint holds it.
+  bool falls(const BodySet& bodies, int body) const {
+    return may_fall_[at(body)] && bodies.motion[at(body)].velocity == weight_only_[at(body)];
+  }
+  /// Bodies that fall by `way` more, but for islands of bodies that anything has pressed.
+  void fall(const Eigen::Vector3d& way, const StepContacts& contacts, BodySet& bodies);
   void turn_round(double dt, BodySet& bodies) const;
   void turn_plain(double dt, BodySet& bodies) const;
   void turn_keeping_momentum(double dt, BodySet& bodies);
@@ -44,6 +53,10 @@ class FreeMotion {
   std::vector<int> moving_, long_;
   std::vector<int> free_, free_round_, free_long_;  // those that no joint moves
   std::vector<FreeSpin> spins_;
+  std::vector<char> may_fall_;  // bodies
+  std::vector<Eigen::Vector3d> weight_only_;
+  MovingIslands islands_;
+  std::vector<char> pressed_;  // islands, by their root
 };
 
 }  // namespace tether::contact::detail

@@ -76,6 +76,14 @@ class JointPart : public IslandMaker {
   virtual double drift() const = 0;
   virtual void set_drift(double drift) = 0;
   virtual const std::vector<double>& impulses() const = 0;
+  /// An impact has changed the velocities where the bodies are: impulses() are those that it takes.
+  virtual void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
+                           const StepContacts& contacts) = 0;
+  /// Impulses of a step that is taken in parts: add_to_sum() after each but the last, give_sum()
+  /// after that.
+  virtual void begin_sum() = 0;
+  virtual void add_to_sum() = 0;
+  virtual void give_sum() = 0;
   /// Rolling and torsional friction of contacts, before islands are made.
   virtual void set_rolling(const NearContacts& near, RollingPart& rolling) = 0;
   virtual const std::vector<Eigen::Vector3d>& moments() const = 0;  ///< as of RollingPart

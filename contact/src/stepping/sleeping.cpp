@@ -1,0 +1,322 @@
+// Tether: bodies at rest that steps leave out. SPDX-License-Identifier: BSD-3-Clause
+#include "stepping/sleeping.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kWhile = 5;       // times sqrt(size / g)
+constexpr double kSame = 1e-9;     // of the forces: changes that wake
+constexpr double kAtFirst = 1e-3;  // the same where a body has just come to rest, of its weight
+constexpr double kInPlace = 1e-8;  // of its size: what rounding may move a neighbour
+
+void push(RigidBody& body, const Vector3d& r, const Vector3d& p) {
+  body.velocity += body.inverse_mass * p;
+  body.angular_velocity += body.inverse_inertia * r.cross(p);
+}
+
+void keep_only(StepContacts& contacts, std::size_t kept) {
+  contacts.points.resize(kept);
+  contacts.gaps.resize(kept);
+  if (contacts.impulses.size() > kept) contacts.impulses.resize(kept);
+}
+
+}  // namespace
+
+Sleeping::Sleeping(const BodySet& bodies, std::vector<double> sizes, double speed, double gravity)
+    : size_(std::move(sizes)), speed_(speed), gravity_(gravity) {
+  const std::size_t n = bodies.motion.size();
+  held_.assign(n, 0);
+  may_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) may_[i] = bodies.mass[i] > 0;
+  body_.resize(n);
+  asleep_.assign(n, 0);
+  place_.resize(n);
+}
+
+void Sleeping::set_joints(const JointPart& joints) {
+  for (std::size_t i = 0; i < may_.size(); ++i) {
+    held_[i] = joints.holds(static_cast<int>(i));
+    may_[i] = may_[i] != 0 && held_[i] == 0;
+  }
+}
+
+void Sleeping::wake(int island) {
+  for (std::size_t i = 0; i < body_.size(); ++i) {
+    if (asleep_[i] == 0 || body_[i].island != island) continue;
+    asleep_[i] = 0;
+    body_[i].island = -1;
+    body_[i].slow = 0;
+    --count_;
+  }
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < kept_.points.size(); ++k) {
+    if (!sleeps(kept_.points[k])) {
+      woken_.ids.push_back(kept_.points[k].id);
+      woken_.impulses.push_back(kept_.impulses[k]);
+      continue;
+    }
+    kept_.points[kept] = kept_.points[k];
+    kept_.gaps[kept] = kept_.gaps[k];
+    kept_.impulses[kept++] = kept_.impulses[k];
+  }
+  keep_only(kept_, kept);
+  neighbours_.erase(
+      std::remove_if(neighbours_.begin(), neighbours_.end(),
+                     [&](const StepperMemory::Neighbour& n) { return n.island == island; }),
+      neighbours_.end());
+  list_kept();
+  changed_ = true;
+}
+
+void Sleeping::list_kept() {
+  kept_ids_.clear();
+  for (const PointContact& c : kept_.points) kept_ids_.push_back(c.id);
+  std::sort(kept_ids_.begin(), kept_ids_.end());
+}
+
+bool Sleeping::has_changed(int body, const Vector3d& a, const Vector3d& turn, const RigidBody& came,
+                           const BodySet& bodies) const {
+  const StepperMemory::Rest& rest = body_[at(body)];
+  const Place& place = place_[at(body)];
+  if (!came.velocity.isZero(0) || !came.angular_velocity.isZero(0) ||
+      bodies.position[at(body)] != place.position ||
+      bodies.orientation[at(body)].coeffs() != place.orientation.coeffs())
+    return true;
+  const double most =
+      rest.fresh ? kAtFirst * gravity_ : kSame * (gravity_ + rest.acceleration.norm());
+  return !((a - rest.acceleration).norm() +
+               size_[at(body)] * (turn - rest.angular_acceleration).norm() <=
+           most);
+}
+
+bool Sleeping::has_moved(const StepperMemory::Neighbour& n, const BodySet& bodies) const {
+  const std::size_t i = at(n.body);
+  const RigidBody& now = bodies.motion[i];
+  const bool fixed = bodies.mass[i] == 0;
+  const double size = fixed ? 0 : size_[i];
+  const double way = (bodies.position[i] - n.position).norm() +
+                     size * bodies.orientation[i].angularDistance(n.orientation);
+  const double speed = (now.velocity - n.velocity).norm() +
+                       size * (now.angular_velocity - n.angular_velocity).norm();
+  if (fixed)
+    return way > 0 || speed > 0 || now.angular_velocity != n.angular_velocity ||
+           bodies.orientation[i].coeffs() != n.orientation.coeffs();
+  return !(way <= kInPlace * size) || !(speed <= kAtFirst * speed_ * std::sqrt(size));
+}
+
+void Sleeping::hold(const std::vector<RigidBody>& coming, double dt, BodySet& bodies) {
+  woken_islands_.clear();
+  for (std::size_t i = 0; i < body_.size(); ++i) {
+    if (may_[i] == 0) continue;
+    const Vector3d a = (bodies.motion[i].velocity - coming[i].velocity) / dt;
+    const Vector3d turn = (bodies.motion[i].angular_velocity - coming[i].angular_velocity) / dt;
+    if (asleep_[i] != 0) {
+      const bool changed = has_changed(static_cast<int>(i), a, turn, coming[i], bodies);
+      if (changed) woken_islands_.push_back(body_[i].island);
+      if (!body_[i].fresh) continue;
+      body_[i].fresh = false;
+    }
+    body_[i].acceleration = a;
+    body_[i].angular_acceleration = turn;
+  }
+  for (const StepperMemory::Neighbour& n : neighbours_)
+    if (has_moved(n, bodies)) woken_islands_.push_back(n.island);
+  wake_all();
+  for (std::size_t i = 0; i < body_.size(); ++i) {
+    if (asleep_[i] == 0) continue;
+    bodies.motion[i].velocity.setZero();
+    bodies.motion[i].angular_velocity.setZero();
+  }
+  for (std::size_t k = 0; k < kept_.points.size(); ++k) {
+    const PointContact& c = kept_.points[k];
+    const Vector3d p = dt * kept_.impulses[k];
+    if (held_[at(c.first)] != 0) push(bodies.motion[at(c.first)], c.r1, p);
+    if (held_[at(c.second)] != 0) push(bodies.motion[at(c.second)], c.r2, -p);
+  }
+}
+
+bool Sleeping::wake_all() {
+  std::sort(woken_islands_.begin(), woken_islands_.end());
+  woken_islands_.erase(std::unique(woken_islands_.begin(), woken_islands_.end()),
+                       woken_islands_.end());
+  for (const int island : woken_islands_) wake(island);
+  return !woken_islands_.empty();
+}
+
+bool Sleeping::wake_touched(const NearContacts& near, const BodySet& bodies, const Impacts& impacts,
+                            double dt, StepContacts& contacts) {
+  woken_islands_.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = contacts.points[k];
+    const bool touches = contacts.gaps[k] + dt * normal_velocity(bodies.motion, c) <= 0;
+    if (!touches) continue;
+    if (sleeps(c)) {
+      if (!std::binary_search(kept_ids_.begin(), kept_ids_.end(), c.id))
+        woken_islands_.push_back(island_of(c));
+      continue;
+    }
+    if (-normal_velocity(impacts.coming(), c) > impacts.least_speed(near, c))
+      for (const StepperMemory::Neighbour& n : neighbours_)
+        if (held_[at(n.body)] != 0 && (n.body == c.first || n.body == c.second))
+          woken_islands_.push_back(n.island);
+  }
+  if (wake_all()) return true;
+  leave_out(contacts);
+  return false;
+}
+
+void Sleeping::leave_out(StepContacts& contacts) const {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    if (sleeps(contacts.points[k])) continue;
+    contacts.points[kept] = contacts.points[k];
+    contacts.gaps[kept++] = contacts.gaps[k];
+  }
+  keep_only(contacts, kept);
+}
+
+void Sleeping::end(double dt, BodySet& bodies, StepContacts& contacts) const {
+  for (std::size_t i = 0; i < body_.size(); ++i) {
+    if (asleep_[i] == 0) continue;
+    bodies.position[i] = place_[i].position;
+    bodies.orientation[i] = place_[i].orientation;
+    bodies.motion[i] = place_[i].motion;
+  }
+  contacts.impulses.resize(contacts.points.size(), Vector3d::Zero());
+  for (std::size_t k = 0; k < kept_.points.size(); ++k) {
+    contacts.points.push_back(kept_.points[k]);
+    contacts.gaps.push_back(kept_.gaps[k]);
+    contacts.impulses.emplace_back(dt * kept_.impulses[k]);
+  }
+}
+
+bool Sleeping::has_rested(int body) const {
+  return body_[at(body)].slow >= kWhile * std::sqrt(size_[at(body)] / gravity_);
+}
+
+void Sleeping::fall_asleep(double dt, BodySet& bodies, const StepContacts& contacts) {
+  bool any = false;
+  for (std::size_t i = 0; i < body_.size(); ++i) {
+    if (asleep_[i] != 0 || (may_[i] == 0 && held_[i] == 0)) continue;
+    const RigidBody& b = bodies.motion[i];
+    const bool slow =
+        b.velocity.norm() + size_[i] * b.angular_velocity.norm() < speed_ * std::sqrt(size_[i]);
+    body_[i].slow = slow ? body_[i].slow + dt : 0;
+    any = any || (may_[i] != 0 && has_rested(static_cast<int>(i)));
+  }
+  if (any) find_rested(dt, bodies, contacts);
+}
+
+// Islands by contacts that press, not across bodies that do not sleep.
+void Sleeping::find_rested(double dt, BodySet& bodies, const StepContacts& contacts) {
+  const auto presses = [&](std::size_t k) {
+    return k < contacts.impulses.size() && !contacts.impulses[k].isZero(0);
+  };
+  pressing_.points.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = contacts.points[k];
+    if (presses(k) && may_[at(c.first)] != 0 && may_[at(c.second)] != 0)
+      pressing_.points.push_back(c);
+  }
+  islands_.join(bodies, pressing_);
+  const auto root = [&](const PointContact& c) {
+    return islands_.root(may_[at(c.first)] != 0 ? c.first : c.second);
+  };
+  const auto sleeper = [&](const PointContact& c) {
+    return may_[at(c.first)] != 0 || may_[at(c.second)] != 0;
+  };
+  rested_.assign(body_.size(), 0);
+  for (std::size_t k = 0; k < contacts.points.size(); ++k)
+    if (presses(k) && sleeper(contacts.points[k])) rested_[at(root(contacts.points[k]))] = 1;
+  for (std::size_t i = 0; i < body_.size(); ++i)
+    if (may_[i] != 0 && (asleep_[i] != 0 || !has_rested(static_cast<int>(i))))
+      rested_[at(islands_.root(static_cast<int>(i)))] = 0;
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = contacts.points[k];
+    if (!presses(k) || !sleeper(c)) continue;
+    for (const int body : {c.first, c.second})
+      if (held_[at(body)] != 0 && !has_rested(body)) rested_[at(root(c))] = 0;
+  }
+  for (std::size_t i = 0; i < body_.size(); ++i) {
+    const int island = islands_.root(static_cast<int>(i));
+    if (may_[i] == 0 || rested_[at(island)] == 0) continue;
+    bodies.motion[i].velocity.setZero();
+    bodies.motion[i].angular_velocity.setZero();
+    place_[i] = {bodies.position[i], bodies.orientation[i], bodies.motion[i]};
+    asleep_[i] = 1;
+    body_[i].island = island;
+    body_[i].fresh = true;
+    ++count_;
+    changed_ = true;
+  }
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = contacts.points[k];
+    if (!presses(k) || !sleeper(c) || rested_[at(root(c))] == 0) continue;
+    kept_.points.push_back(c);
+    kept_.gaps.push_back(contacts.gaps[k]);
+    kept_.impulses.emplace_back(contacts.impulses[k] / dt);
+    for (const int body : {c.first, c.second})
+      if (may_[at(body)] == 0) add_neighbour(body, root(c), bodies);
+  }
+  list_kept();
+}
+
+void Sleeping::add_neighbour(int body, int island, const BodySet& bodies) {
+  for (const StepperMemory::Neighbour& n : neighbours_)
+    if (n.body == body && n.island == island) return;
+  const RigidBody& b = bodies.motion[at(body)];
+  neighbours_.push_back({body, island, bodies.position[at(body)], bodies.orientation[at(body)],
+                         b.velocity, b.angular_velocity});
+}
+
+WarmStart Sleeping::take_woken(double dt) {
+  WarmStart out = std::exchange(woken_, {});
+  for (Vector3d& x : out.impulses) x *= dt;
+  return out;
+}
+
+void Sleeping::wake_everybody() {
+  body_.assign(body_.size(), {});
+  asleep_.assign(asleep_.size(), 0);
+  count_ = 0;
+  kept_ = {};
+  neighbours_.clear();
+  woken_ = {};
+  list_kept();
+  changed_ = true;
+}
+
+StepperMemory::Sleep Sleeping::memory() const { return {body_, kept_, neighbours_}; }
+
+void Sleeping::set_memory(const StepperMemory::Sleep& m, const BodySet& bodies) {
+  const int n = bodies.size();
+  const auto known = [&](int body) { return body >= 0 && body < n; };
+  bool fits = m.bodies.size() == body_.size();
+  for (const StepperMemory::Rest& r : m.bodies) fits = fits && r.island >= -1 && r.island < n;
+  for (const StepperMemory::Neighbour& each : m.neighbours)
+    fits = fits && known(each.body) && known(each.island);
+  for (const PointContact& c : m.contacts.points) fits = fits && known(c.first) && known(c.second);
+  if (!fits) throw std::invalid_argument("stepping: a memory of the sleep of other bodies");
+  body_ = m.bodies;
+  kept_ = m.contacts;
+  neighbours_ = m.neighbours;
+  woken_ = {};
+  list_kept();
+  count_ = 0;
+  for (std::size_t i = 0; i < body_.size(); ++i) {
+    asleep_[i] = may_[i] != 0 && body_[i].island >= 0;
+    count_ += asleep_[i];
+    place_[i] = {bodies.position[i], bodies.orientation[i], bodies.motion[i]};
+  }
+  changed_ = true;
+}
+
+}  // namespace tether::contact::detail

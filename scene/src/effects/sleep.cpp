@@ -1,0 +1,30 @@
+// Tether: islands of bodies at rest that steps leave out. SPDX-License-Identifier: BSD-3-Clause
+//
+// The contact library's steps do it (contact/README.md, section 13); other engines have none.
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+class SleepEffect : public Effect {
+ public:
+  void plan(const Scene& scene, EngineKind engine,
+            std::vector<PlannedEffect>& lines) const override {
+    const double sleep = scene.stepping.value_or(SteppingOptions{}).sleep;
+    if (engine != EngineKind::stepping || !(sleep > 0)) return;
+    lines.push_back(
+        {"sleep", fmt::format("islands slower than {} sqrt(g s) for 5 sqrt(s / g)", sleep)});
+  }
+};
+
+}  // namespace
+
+const Effect& sleep_effect() {
+  static const SleepEffect effect;
+  return effect;
+}
+
+}  // namespace tether::scene::effects
