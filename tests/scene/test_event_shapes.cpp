@@ -211,6 +211,27 @@ TEST_CASE("event: a ball passes both ends of a bar, and hits them where their sp
   }
 }
 
+// At the top of its flight, where a step may end, a ball is far from what it has hit on the way up,
+// and slow.
+TEST_CASE("event: balls thrown up hit one that is small beside their way") {
+  const double r = 0.005, off = 0.003, below = std::sqrt(4 * r * r - off * off);
+  const std::string low = "shape = \"sphere\"\nradius = " + number(r);
+  for (const double tolerance : {1e-4, 1e-5})
+    for (int k = 0; k < 60; ++k) {
+      const double top = 1 + 0.3 * k, at = (0.7 + 0.26 * std::sin(7.0 * k)) * top;
+      const double v = std::sqrt(2 * 9.81 * top), speed = std::sqrt(2 * 9.81 * (top - at + below));
+      CAPTURE(tolerance, top, at);
+      const auto engine =
+          run(body("low", low, "[" + number(off) + ", 0, " + number(at) + "]", "fixed = true") +
+                  body("up", low, "[0, 0, 0]", "mass = 1\nvelocity = [0, 0, " + number(v) + "]") +
+                  law(0, 1),
+              tolerance, 1.1 * v / 9.81);
+      const auto impacts = of_kind(*engine, Kind::impact);
+      REQUIRE(!impacts.empty());
+      CHECK(std::abs(impacts[0].time - (v - speed) / 9.81) * speed < 10 * tolerance);
+    }
+}
+
 TEST_CASE("event: edges of two boxes hit each other crosswise") {
   const std::string text = body("low", "shape = \"box\"\nsize = [0.2, 2, 0.2]", "[0, 0, 0]",
                                 "fixed = true\norientation = { axis = [0, 1, 0], deg = 45 }") +

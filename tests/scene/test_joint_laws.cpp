@@ -4,7 +4,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
-#include "mechanisms.hpp"
+#include "jointed_scenes.hpp"
 #include "support/catch.hpp"
 
 using namespace mechanisms;
@@ -268,26 +268,11 @@ namespace {
 
 // Pressed by its motor, of 7 N m about y.
 Scene lever_on_floor(double friction) {
-  Scene s = steps_of(1e-3);
-  s.gravity = kDown;
-  s.bodies.push_back(rod("lever", {0, 0, 0.5}, {std::sqrt(0.75), 0, 0}, 2));
-  s.bodies[0].material = "part";
-  Shape tip;
-  tip.kind = ShapeKind::points;
-  tip.points = {{0.5, 0, 0}};
-  s.bodies[0].shapes.push_back(tip);
-  Body floor;
-  floor.name = "floor";
-  floor.fixed = true;
-  floor.material = "ground";
-  Shape plane;
-  plane.kind = ShapeKind::plane;
-  floor.shapes.push_back(plane);
-  s.bodies.push_back(floor);
-  s.pairs.emplace_back();
-  s.pairs[0].first = "part";
-  s.pairs[0].second = "ground";
-  s.pairs[0].friction = friction;
+  Scene s = jointed_scenes::stepping(1e-3, kDown);
+  const Vector3d tip(std::sqrt(0.75), 0, 0);
+  s.bodies.push_back(rod("lever", {0, 0, 0.5}, tip, 2));
+  jointed_scenes::touch(s.bodies[0], {tip});
+  jointed_scenes::add_wall(s, Vector3d::Zero(), Vector3d::UnitZ(), friction);
   s.joints.push_back(hinge(0, kWorld, {0, 0, 0.5}, {0, 1, 0}));
   s.joints[0].motor = {1, 7};  // downwards
   return s;
@@ -301,11 +286,7 @@ TEST_CASE("a motor's moment is the same in steps in which something else falls t
   Scene s = lever_on_floor(0.5);
   s.joints[0].motor->bound = 7000;
   s.bodies.push_back(ball("falling", {3, 0, 0.1 + 0.0123}, 1, 0.01));
-  s.bodies[2].material = "part";
-  Shape round;
-  round.kind = ShapeKind::sphere;
-  round.radius = 0.1;
-  s.bodies[2].shapes.push_back(round);
+  jointed_scenes::touch_sphere(s.bodies[2], 0.1);
   const auto engine = make_engine(s);
   bool fell = false, rests = false;
   for (int k = 1; k <= 100; ++k) {

@@ -172,7 +172,7 @@ double Polish::differential_length(const Candidate& candidate, const double* ent
   }
   for (int j = 0; j < size_; ++j) {
     const double change = entries[j] * candidate.weight_entries[j];
-    sum += id == nullptr || id[j] != 0.0 ? change * change : 0.0;
+    sum += id[j] != 0.0 ? change * change : 0.0;
   }
   return std::sqrt(sum / size_);
 }

@@ -28,18 +28,12 @@ bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int 
     if (i != k && rows.has_normal(i) && answer.regimes[at(i)] != contact::Regime::separating)
       others.push_back(block * i);
   if (others.empty()) return false;
-  const int n = static_cast<int>(others.size());
-  MatrixXd A(n, n);
-  VectorXd a(n);
-  for (int i = 0; i < n; ++i) {
-    a[i] = rows.A()(others[at(i)], block * k);
-    for (int j = 0; j < n; ++j) A(i, j) = rows.A()(others[at(i)], others[at(j)]);
-  }
+  const SomeRows part(rows.A(), rows.A().col(block * k), others);
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
   factor.setThreshold(kDependentForces);
-  factor.compute(A);
+  factor.compute(part.A);
   const double own = rows.A()(block * k, block * k);
-  return own - a.dot(factor.solve(a)) <= kImplied * own;
+  return own - part.b.dot(factor.solve(part.b)) <= kImplied * own;
 }
 
 }  // namespace

@@ -73,20 +73,15 @@ FrictionAnswer ConeBlocks::solve_with_moments(const MatrixXd& A, const VectorXd&
     cones.push_back(each.cone);
     rows.insert(rows.end(), each.rows.begin(), each.rows.end());
   }
-  const int m = static_cast<int>(rows.size());
-  MatrixXd part(m, m);
-  VectorXd right(m);
-  for (int r = 0; r < m; ++r) {
-    right[r] = b[rows[at(r)]];
-    for (int c = 0; c < m; ++c) part(r, c) = A(rows[at(r)], rows[at(c)]);
-  }
+  const SomeRows part(A, b, rows);
   const contact::ConeSolution found =
-      cones_.solve(contact::ConeProblem::dense(part, right, std::move(cones)));
+      cones_.solve(contact::ConeProblem::dense(part.A, part.b, std::move(cones)));
   FrictionAnswer out;
   out.solved = is_solved(found);
   out.error = found.error;
   out.x.setZero(b.size());
-  for (int r = 0; r < m; ++r) out.x[rows[at(r)]] = found.impulses[r];
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    out.x[rows[r]] = found.impulses[static_cast<Eigen::Index>(r)];
   out.w = A * out.x - b;
   for (int i = 0; i < n; ++i) {
     const int row = 3 * i, normal = is_held(holders_, i) ? 3 * holders_[at(i)] : row;

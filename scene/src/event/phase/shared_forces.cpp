@@ -211,21 +211,25 @@ double turn(const MatrixXd& A, const SharedForces& now, Regimes& regimes) {
 
 }  // namespace
 
+SomeRows::SomeRows(const MatrixXd& whole, const VectorXd& right, const std::vector<int>& rows)
+    : A(rows.size(), rows.size()), b(rows.size()) {
+  const int m = static_cast<int>(rows.size());
+  for (int r = 0; r < m; ++r) {
+    b[r] = right[rows[at(r)]];
+    for (int c = 0; c < m; ++c) A(r, c) = whole(rows[at(r)], rows[at(c)]);
+  }
+}
+
 VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
                                 double band) {
   const int m = static_cast<int>(rows.size());
-  MatrixXd part(m, m);
-  VectorXd right(m);
-  for (int r = 0; r < m; ++r) {
-    right[r] = b[rows[at(r)]];
-    for (int c = 0; c < m; ++c) part(r, c) = A(rows[at(r)], rows[at(c)]);
-  }
+  const SomeRows part(A, b, rows);
   Eigen::ColPivHouseholderQR<MatrixXd> factor;
   factor.setThreshold(kSameForces);
-  factor.compute(part);
+  factor.compute(part.A);
   const MatrixXd Q = factor.householderQ() * MatrixXd::Identity(m, m);
   const auto none = Q.rightCols(m - factor.rank());
-  const VectorXd against = none * (none.transpose() * right);
+  const VectorXd against = none * (none.transpose() * part.b);
   VectorXd out = b;
   if (m > 0 && against.cwiseAbs().maxCoeff() <= band)
     for (int r = 0; r < m; ++r) out[rows[at(r)]] -= against[r];

@@ -24,6 +24,13 @@ inline bool is_held(const Holders& holders, int contact) {
   return !holders.empty() && holders[static_cast<std::size_t>(contact)] >= 0;
 }
 
+/// These rows of w = A x - b, and these columns of A.
+struct SomeRows {
+  SomeRows(const MatrixXd& whole, const VectorXd& right, const std::vector<int>& rows);
+  MatrixXd A;
+  VectorXd b;
+};
+
 /// Regimes of a problem w = A x - b. Where a contact slides: x_t = -mu x_n d.
 struct Regimes {
   std::vector<contact::Regime> of;

@@ -15,7 +15,7 @@ constexpr int kMostIterations = 80;
 constexpr int kPolish = 3;
 constexpr double kApart = 1e4;  // of the resolution of times
 constexpr double kFewOfBand = 0.02;
-constexpr double kFasterWithin = 2;  // a step, than at its end
+constexpr double kFasterWithin = 2;  // a step, than at its ends
 // Of accelerations, by the contact library's tolerance and by what stands for a large slip.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
@@ -299,10 +299,15 @@ double Watcher::lag(Phase& phase, const Function& f, double time) {
   return growth > 0 ? std::min((support_band_ - here) / growth, phase.start() + time) : 0;
 }
 
-// More than two bodies can come nearer to each other in the last step, by the fastest speed.
-double Watcher::way(const Phase& phase, const VectorXd& at_end) const {
-  const double fastest = at_end.segment(motion_.coordinates(), motion_.velocities()).norm();
-  return kFasterWithin * 2 * fastest * (phase.step_end() - phase.step_begin());
+// More than two bodies can come nearer to each other in the last step, by the fastest speed at its
+// ends: at the one a body may be at the top of its flight.
+double Watcher::way(Phase& phase, const VectorXd& at_end) {
+  const auto fastest = [&](const VectorXd& y) {
+    return y.segment(motion_.coordinates(), motion_.velocities()).norm();
+  };
+  phase.at(phase.step_begin(), y_);
+  return kFasterWithin * 2 * std::max(fastest(y_), fastest(at_end)) *
+         (phase.step_end() - phase.step_begin());
 }
 
 std::optional<Zero> Watcher::look(Phase& phase) {

@@ -53,7 +53,7 @@ class Watcher {
   void arm(Function& f);
   void wake(Phase& phase, const VectorXd& at_end, double by);
   void evaluate(double t, const VectorXd& y, double by);
-  double way(const Phase& phase, const VectorXd& at_end) const;
+  double way(Phase& phase, const VectorXd& at_end);
   double value(Function f, double t, const VectorXd& y);
   double slope(Function f, double t, const VectorXd& y);
   double value_of(Function& f, double t, const VectorXd& y);
