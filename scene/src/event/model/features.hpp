@@ -98,6 +98,10 @@ struct FeaturePair {
     const double most = reach + by;
     return (bodies.frames[at(first)].x - bodies.frames[at(second)].x).squaredNorm() > most * most;
   }
+  double passes(const Bodies& bodies) const {
+    const Frame<double>&A = bodies.frames[at(first)], &B = bodies.frames[at(second)];
+    return (A.v - B.v).norm() / reach + (std::isinf(reach) ? 0 : A.W.norm() + B.W.norm());
+  }
   /// It touches in more points than one contact can stand for.
   bool is_flush(const Bodies& bodies) const {
     const auto* round = std::get_if<RoundOnPlane>(&on_second);

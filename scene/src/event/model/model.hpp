@@ -87,6 +87,10 @@ class Model {
   /// them do not meet. What such a contact's gap says is of no matter then.
   virtual bool is_apart(int /*contact*/, double /*by*/) { return false; }
 
+  /// How often a second its bodies, at the speeds that they have, come by the way that both reach
+  /// together. 0: one of them has no end that the other could pass.
+  virtual double passes(int /*contact*/) { return 0; }
+
   /// How far the contact is inside the border of its features, m; infinite: they have none.
   virtual double margin(int /*contact*/) { return std::numeric_limits<double>::infinity(); }
 

@@ -66,6 +66,9 @@ class SceneModel final : public Model {
   bool is_apart(int contact, double by) override {
     return is_pair(contact) && pair(contact).is_apart(bodies_.all(), by);
   }
+  double passes(int contact) override {
+    return is_pair(contact) ? pair(contact).passes(bodies_.all()) : 0;
+  }
   double margin(int contact) override {
     return is_pair(contact) ? pair(contact).margin(bodies_.all()) : kNoBorder;
   }

@@ -15,6 +15,8 @@ constexpr int kMostIterations = 80;
 constexpr int kPolish = 3;
 constexpr double kApart = 1e4;  // of the resolution of times
 constexpr double kFewOfBand = 0.02;
+constexpr double kPassing = 0.25;  // of both bodies, from which on a step is looked at in parts
+constexpr int kParts = 32;
 constexpr double kFasterWithin = 2;  // a step, than at its ends
 // Of accelerations, by the contact library's tolerance and by what stands for a large slip.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
@@ -70,7 +72,7 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   functions_.clear();
   force_ = 0;
   const auto add = [&](Watch what, int contact, int closed, bool leaves) {
-    functions_.push_back({what, contact, closed, false, leaves, false, false, 0, 0, 0, 0, 0});
+    functions_.push_back({what, contact, closed, false, leaves, false, false, 0, 0, 0, 0, 0, 0, 0});
   };
   const std::vector<int>& closed = motion_.closed();
   for (int i = 0; i < motion_.model().contacts(); ++i)
@@ -187,6 +189,7 @@ void Watcher::wake(Phase& phase, const VectorXd& at_end, double by) {
     f.far = false;
     f.level = 0;
     f.value = of_state(f);
+    f.passes = model.passes(f.contact);
     arm(f);
   }
 }
@@ -208,7 +211,9 @@ void Watcher::evaluate(double t, const VectorXd& y, double by) {
     }
     f.before = f.value;
     f.slope_before = f.slope;
+    f.passes_before = f.passes;
     f.value = of_state(f);
+    if (f.what == Watch::gap) f.passes = motion_.model().passes(f.contact);
   }
 }
 
@@ -229,15 +234,15 @@ double Watcher::slope(Function f, double t, const VectorXd& y) {
 
 // Whether a gap or slip that is positive at both ends of a step, and falls, then rises, can reach
 // zero.
-bool Watcher::may_dip(const Function& f, double step) const {
+bool Watcher::may_dip(const Function& f) const {
   return (f.what == Watch::gap || f.what == Watch::slip) && f.armed && f.slope_before < 0 &&
          f.slope > 0 && f.before > 0 &&
-         std::min(f.before, f.value) < step * std::max(-f.slope_before, f.slope);
+         std::min(f.before, f.value) < (end_ - begin_) * std::max(-f.slope_before, f.slope);
 }
 
 // The least or largest value of a gap or slip that turns in the last step.
 double Watcher::turn(Phase& phase, const Function& f, double& when) {
-  const double a = phase.step_begin(), b = phase.step_end();
+  const double a = begin_, b = end_;
   const auto slope_at = [&](double time) {
     phase.at(time, y_);
     return slope(f, phase.start() + time, y_);
@@ -248,7 +253,7 @@ double Watcher::turn(Phase& phase, const Function& f, double& when) {
 }
 
 Zero Watcher::locate(Phase& phase, const Function& f) {
-  double a = phase.step_begin(), b = phase.step_end();
+  double a = begin_, b = end_;
   double fa = f.before, fb = f.value;
   const auto at = [&](double time) {
     phase.at(time, y_);
@@ -310,6 +315,47 @@ double Watcher::way(Phase& phase, const VectorXd& at_end) {
          (phase.step_end() - phase.step_begin());
 }
 
+// Whether a function has a zero between the begin and the end of what is looked at.
+bool Watcher::is_hit(Phase& phase, const Function& f) {
+  bool hit = f.value < (f.armed ? 0 : -band(f));
+  // Else it is on its way out; its first gaps are lost in rounding.
+  const bool from_zero = !f.armed || (f.leaving && f.value > -bands().gap(f.contact));
+  if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
+  if (hit || !may_dip(f)) return hit;
+  double when = 0;
+  const double least = f.what == Watch::gap ? bands().gap(f.contact) : band(f);
+  return turn(phase, f, when) < -least;  // else it only touches
+}
+
+// Of bodies that come by each other's whole size in a step, as on a long flight, the ends do not
+// tell how often a gap has turned: parts of the step do. f becomes what it is in the part that is
+// looked at then.
+bool Watcher::is_hit_between(Phase& phase, Function& f) {
+  const double begin = phase.step_begin(), length = phase.step_end() - begin;
+  if (f.what != Watch::gap ||
+      !(std::max(f.passes_before, f.passes) * kFasterWithin * length > kPassing))
+    return false;
+  Function part = f;
+  part.value = f.before;
+  part.slope = f.slope_before;
+  end_ = begin;
+  for (int k = 1; k <= kParts; ++k) {
+    begin_ = end_;
+    end_ = begin + length * k / kParts;
+    part.before = part.value;
+    part.slope_before = part.slope;
+    phase.at(end_, y_);
+    part.value = value_of(part, phase.start() + end_, y_);
+    if (part.value == kNowhere) return false;
+    if (is_hit(phase, part)) {
+      f = part;
+      return true;
+    }
+    part.armed = part.armed || part.value > band(part);
+  }
+  return false;
+}
+
 std::optional<Zero> Watcher::look(Phase& phase) {
   phase.at(phase.step_end(), y_);
   const VectorXd at_end = y_;
@@ -318,23 +364,18 @@ std::optional<Zero> Watcher::look(Phase& phase) {
   evaluate(phase.start() + phase.step_end(), at_end, by);
   std::optional<Zero> first;
   for (Function& f : functions_) {
-    const double edge = band(f);
     if (!f.far && f.value == kNowhere) {
       f.dormant = true;
       f.armed = false;
     }
     if (f.far || f.dormant) continue;
-    bool hit = f.value < (f.armed ? 0 : -edge);
-    // Else it is on its way out; its first gaps are lost in rounding.
-    const bool from_zero = !f.armed || (f.leaving && f.value > -bands().gap(f.contact));
-    if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
-    if (!hit && may_dip(f, phase.step_end() - phase.step_begin())) {
-      double when = 0;
-      const double least = f.what == Watch::gap ? bands().gap(f.contact) : band(f);
-      hit = turn(phase, f, when) < -least;  // else it only touches
+    Function part = f;
+    if (!is_hit_between(phase, part)) {
+      begin_ = phase.step_begin();
+      end_ = phase.step_end();
+      if (!is_hit(phase, part)) continue;
     }
-    if (!hit) continue;
-    Zero zero = locate(phase, f);
+    Zero zero = locate(phase, part);
     if (f.what == Watch::support) zero.lag = lag(phase, f, zero.time);
     if (f.what == Watch::gap &&
         motion_.passes_border(phase.start() + zero.time, zero.y, f.contact)) {

@@ -47,8 +47,9 @@ class Watcher {
     bool dormant;  // a gap that is negative beside its feature: no contact
     bool far;      // a gap of bodies that are apart: not looked at
     double value, before;
-    double slope, slope_before;  // of a gap, m/s, or of a slip, m/s^2
-    double level;                // from which a gap or a border counts, m
+    double slope, slope_before;    // of a gap, m/s, or of a slip, m/s^2
+    double level;                  // from which a gap or a border counts, m
+    double passes, passes_before;  // of a gap, see Model::passes
   };
   void arm(Function& f);
   void wake(Phase& phase, const VectorXd& at_end, double by);
@@ -61,14 +62,17 @@ class Watcher {
   double support();
   double band(const Function& f) const;
   double lag(Phase& phase, const Function& f, double time);
+  bool is_hit(Phase& phase, const Function& f);
+  bool is_hit_between(Phase& phase, Function& f);
   Zero locate(Phase& phase, const Function& f);
-  bool may_dip(const Function& f, double step) const;
+  bool may_dip(const Function& f) const;
   double turn(Phase& phase, const Function& f, double& when);
 
   const Bands& bands() const { return motion_.bands(); }
 
   Motion& motion_;
   std::vector<Function> functions_;
+  double begin_ = 0, end_ = 0;  // the part of the last step that is looked at
   VectorXd rate_, y_;
   std::vector<std::size_t> waking_;
   double force_ = 0;         // the largest so far
