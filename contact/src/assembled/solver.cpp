@@ -139,6 +139,11 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   const std::size_t n = x.size();
   out.status = status;
   out.error = search.best_error;
+  if (status != Status::solved && search.measure == Measure::fixed_point) {
+    x = search.best;
+    system.to_own_units(x.data());
+    out.error = std::min(out.error, system.judged_fixed_point(x.data()));
+  }
   out.counts = search.counts;
   out.history.swap(search.history);
   problem.unpack(search.best, out.impulses);

@@ -31,7 +31,10 @@ void Search::reset(const Problem& problem, const Options& o, Measure m) {
 // what is to be solved down to round-off between light and heavy bodies they do not solve.
 double Search::fixed_point_error(const PackedVector* x, Method stage) {
   constexpr double kLook = 1e3;  // tolerances
-  const double fast = system.fixed_point(x).fixed, tolerance = options.tolerance;
+  const double tolerance = options.tolerance;
+  const Test test = system.fixed_point(x);
+  // The block fixed point leads the search, also where it has jumped away: `least` ends it.
+  const double fast = test.least <= tolerance ? test.least : test.fixed;
   const bool factorised = stage == Method::interior_point || stage == Method::proximal_newton;
   double rounding = 0;
   if (fast <= tolerance || (factorised && fast <= kLook * tolerance)) {

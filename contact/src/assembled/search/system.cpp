@@ -205,13 +205,9 @@ Test System::natural_map(const PackedVector* x, PackedVector* scratch) {
   return kernels().natural_map(s, x, scratch);
 }
 
-Test System::fixed_point(const PackedVector* x) {
-  Test out;
-  out.fixed = kernels().error(error_view(), x);
-  return out;
-}
+Test System::fixed_point(const PackedVector* x) { return kernels().error(error_view(), x); }
 double System::judged_fixed_point(const PackedVector* x) {
-  const double round_off = rounding(x), fast = fixed_point(x).fixed;
+  const double round_off = rounding(x), fast = fixed_point(x).least;
   const double hidden = kSumUnits * round_off;  // how far long sums may be from it
   // On the brink of sliding a strongly coupled contact has a second solution far away, to which the
   // last bit of b leads.

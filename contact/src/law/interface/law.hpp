@@ -46,6 +46,7 @@ struct View {
 // Results of a test: norms, and the largest error of a contact relative to its island.
 struct Test {
   double natural = 0, fixed = 0, x = 0, w = 0;
+  double least = 0;  // fixed, or less where contacts stick or slide as they do with b changed by it
 };
 
 struct AssembledKernels {
@@ -54,7 +55,7 @@ struct AssembledKernels {
   double (*blocks)(const View&, const PackedVector* x, PackedVector* out, Regime*,
                    LocalDerivative*);
   Test (*natural_map)(const View&, const PackedVector* x, PackedVector* w);
-  double (*error)(const View&, const PackedVector* x);
+  Test (*error)(const View&, const PackedVector* x);                        // fixed and least
   double (*exact_error)(const View&, const PackedVector* x, double* each);  // exact_error.hpp
 };
 struct BodyKernels {

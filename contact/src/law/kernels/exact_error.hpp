@@ -83,8 +83,38 @@ inline void wide_rhs(const LocalBlock& L, const Wide* x, const Wide* w, double* 
   for (int c = 0; c < 3; ++c) b[c] = static_cast<double>(f[c] - w[c]);
 }
 
-// |D (x - z)|, or A_nn times what x is outside of its cone; z: block solution in doubles, mu: 0
-// where the law has no friction.
+// What b has to change by for x to stick or slide as it does, wherever the block solution is: where
+// a strongly coupled contact comes to the brink of sliding, or two of its sliding solutions merge,
+// there are only others, far away, a last bit of b further. x at rest within its cone, or its point
+// p on the cone at the same x_n sliding against p_t, |w - D (x - p) - that velocity| + |D (x - p)|.
+// Infinite without friction, for jams, b_n <= 0, under a law (gamma) that has none, and below half
+// of the e up to which contacts have one solution (README, section 4), which is then near.
+template <class Real>
+TETHER_INLINE Real error_as_it_is(const LocalBlock& L, double mu, const double* gamma,
+                                  const Real* x, const Real* w) {
+  const Real none = std::numeric_limits<Real>::infinity();
+  const bool may_jam = gamma[0] == 0 && gamma[1] == 0;
+  if (!(mu > 0) || !(x[0] >= 0) ||
+      !(L.e * (L.beta[0] + L.beta[1]) > std::sqrt(L.beta[0] * L.beta[1])) ||
+      !(may_jam || L.a * x[0] + L.c[0] * x[1] + L.c[1] * x[2] - w[0] > 0))
+    return none;
+  const Real rest = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  const Real t = std::sqrt(x[1] * x[1] + x[2] * x[2]), most = mu * x[0];
+  if (!(t > 0)) return rest;
+  const Real d[2] = {(1 - most / t) * x[1], (1 - most / t) * x[2]};  // x - p
+  const Real f[3] = {L.c[0] * d[0] + L.c[1] * d[1], L.T[0] * d[0] + L.T[1] * d[1],
+                     L.T[1] * d[0] + L.T[2] * d[1]};
+  const Real v[3] = {w[0] - f[0], w[1] - f[1], w[2] - f[2]};
+  const Real q[2] = {x[1] / t + gamma[0], x[2] / t + gamma[1]}, qq = q[0] * q[0] + q[1] * q[1];
+  const Real along = qq > 0 ? -(v[1] * q[0] + v[2] * q[1]) / qq : 0, slip = along > 0 ? along : 0;
+  const Real e[3] = {v[0], v[1] + slip * q[0], v[2] + slip * q[1]};
+  const Real on_cone = std::sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) +
+                       std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+  return t > most || on_cone < rest ? on_cone : rest;
+}
+
+// |D (x - z)|, or the above if that is less, or A_nn times what x is outside of its cone; z: block
+// solution in doubles, mu: 0 where the law has no friction.
 inline Wide wide_error(const LocalBlock& L, double mu, const double* gamma, const Wide* x,
                        const Wide* w, const double* z, Regime regime) {
   Wide f[3] = {w[0], w[1], w[2]};
@@ -100,7 +130,9 @@ inline Wide wide_error(const LocalBlock& L, double mu, const double* gamma, cons
   }
   const Wide t = std::sqrt(x[1] * x[1] + x[2] * x[2]);
   const Wide outside = L.a * std::max(t - mu * x[0], -x[0]);
-  return std::max(std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]), outside);
+  Wide error = std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+  if (regime != Regime::sticking) error = std::min(error, error_as_it_is(L, mu, gamma, x, w));
+  return std::max(error, outside);
 }
 
 // worst_error() (assembled_kernels.hpp) with that; null, or the errors of all contacts.
