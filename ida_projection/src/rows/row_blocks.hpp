@@ -218,6 +218,12 @@ class RowBlocks {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
+  /// After structure() without algebraic variables: unknowns of level 2 and above take their place,
+  /// see row_levels.hpp. False: nothing has changed, there are none, or fewer than rows for them.
+  bool split_by_level();
+  /// Back to one block.
+  void join_levels();
+  bool split_levels() const { return kinds_.by_level(); }
   /// Do rows contain variables of both kinds?
   bool mixed() const { return !kinds_.mixed.empty(); }
 
