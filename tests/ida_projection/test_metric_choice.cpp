@@ -1,5 +1,11 @@
 // Tether: levels of columns, and when another metric is tried. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <nvector/nvector_serial.h>
+
+#include "host.hpp"
+#include "movers/mover.hpp"
 #include "rows/row_levels.hpp"
 #include "step/metric_choice.hpp"
 #include "support/catch.hpp"
@@ -17,6 +23,76 @@ std::vector<int> levels(const Rows& rows, int n) {
     starts.push_back(static_cast<int>(columns.size()));
   }
   return levels_of_columns(starts, columns, n);
+}
+
+/// Points on circles of radius 1 with speed 1, y = (q, v): the lengths, their rates, and the sum of
+/// all x if wanted.
+Constraints rows_of_points(int points, bool with_sum, double sum) {
+  Constraints set;
+  set.count = 2 * points + (with_sum ? 1 : 0);
+  set.value = [=](double, ConstVector y, Vector g) {
+    for (int i = 0; i < points; ++i) {
+      const auto q = y.segment<2>(2 * i), v = y.segment<2>(2 * points + 2 * i);
+      g[i] = 0.5 * (q.dot(q) - 1.0);
+      g[points + i] = q.dot(v);
+    }
+    for (int i = 0; with_sum && i < points; ++i)
+      g[2 * points] = (i == 0 ? -sum : g[2 * points]) + y[2 * i];
+  };
+  set.jacobian = DenseJacobian{[=](double, ConstVector y, Matrix C) {
+    C.setZero();
+    for (int i = 0; i < points; ++i) {
+      const auto q = y.segment<2>(2 * i), v = y.segment<2>(2 * points + 2 * i);
+      C.block<1, 2>(i, 2 * i) = C.block<1, 2>(points + i, 2 * points + 2 * i) = q.transpose();
+      C.block<1, 2>(points + i, 2 * i) = v.transpose();
+      if (with_sum) C(2 * points, 2 * i) = 1.0;
+    }
+  }};
+  return set;
+}
+
+/// All rates are wrong by 1e-6 after a correction of 1e-4 of positions and 1e-8 of velocities: the
+/// largest part of any position in the move.
+double slide(int points, double h, bool with_sum = false) {
+  const int n = 4 * points;
+  std::vector<double> y, v;
+  double sum = 0.0;
+  for (int i = 0; i < points; ++i) {
+    const double angle = 0.2 + 0.3 * i, wrong = 1e-6;
+    sum += std::cos(angle);
+    y.insert(y.end(), {std::cos(angle), std::sin(angle)});
+    v.insert(v.end(), {-std::sin(angle) + wrong * std::cos(angle),
+                       std::cos(angle) + wrong * std::sin(angle)});
+  }
+  std::vector<double> rate = v;
+  rate.resize(static_cast<std::size_t>(n), 0.0);
+  y.insert(y.end(), v.begin(), v.end());
+
+  const tether::test::Context context;
+  N_Vector base = N_VNew_Serial(n, context), correction = N_VClone(base), weights = N_VClone(base);
+  N_VConst(1e4, weights);
+  for (int i = 0; i < n; ++i) {
+    NV_Ith_S(correction, i) = i < 2 * points ? 1e-4 : 1e-8;
+    NV_Ith_S(base, i) = y[static_cast<std::size_t>(i)] - NV_Ith_S(correction, i);
+  }
+  Candidate candidate{0.0, base, correction, weights};
+  candidate.with_entries();
+  candidate.h = h;
+  candidate.predicted_rate = rate.data();
+
+  const Constraints rows = rows_of_points(points, with_sum, sum);
+  Options options;
+  options.metric = Metric::local_correction;
+  Statistics statistics;
+  const auto mover = make_dense_mover(rows, options, statistics, n);
+  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->move(candidate).status == Status::success);
+  CHECK(mover->remaining_drift(candidate) <= 1e-12);
+  double largest = 0.0;
+  for (int i = 0; i < 2 * points; ++i)
+    largest = std::max(largest, std::abs(NV_Ith_S(correction, i) - 1e-4));
+  for (N_Vector used : {base, correction, weights}) N_VDestroy(used);
+  return largest;
 }
 
 }  // namespace
@@ -67,4 +143,14 @@ TEST_CASE("choice of the metric: the other one is taken where it halves the move
   REQUIRE(choice.doubts(stiff));
   CHECK(choice.prefers({0.01, 0.001}, stiff));
   CHECK_FALSE(choice.by_levels());
+}
+
+TEST_CASE("scales: positions of many rows move at most h times as far as velocities") {
+  // Corrections alone would have the points slide along by what their rates are wrong.
+  CHECK(slide(20, 1e-4) <= 1e-8);
+  CHECK(slide(20, 1e-2) <= 1e-8);
+  CHECK(slide(8, 1e-4) >= 1e-7);         // few rows
+  CHECK(slide(20, 1e6) >= 1e-7);         // h times the velocities' scales are the larger ones
+  CHECK(slide(20, 0.0) >= 1e-7);         // there is no step
+  CHECK(slide(20, 1e-4, true) >= 1e-7);  // a row of positions has none of rates beside it
 }

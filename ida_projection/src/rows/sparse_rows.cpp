@@ -106,7 +106,7 @@ bool SparseRows::split_by_level() {
   }
   if (!kinds_.begin_by_level(levels_of_columns(starts, columns, n_), kFollowingLevel)) return false;
   rearrange();
-  if (a.rows.empty()) join_levels();
+  if (a.rows.size() != a.columns.size()) join_levels();
   return split_levels();
 }
 
