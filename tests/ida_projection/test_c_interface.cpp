@@ -206,6 +206,7 @@ TEST_CASE("C interface: every field of the options is handed on") {
   o.print_fatal = !defaults.print_fatal;
   o.print_warnings = !defaults.print_warnings;
   o.progress_interval = defaults.progress_interval + 5;
+  o.raise_order = !defaults.raise_order;
   const tp::Options cpp = tp::options_of(&o, 3);
   CHECK(cpp.metric == tp::Metric::local_correction);
   CHECK(cpp.tolerance == 0.125);
@@ -230,6 +231,7 @@ TEST_CASE("C interface: every field of the options is handed on") {
   CHECK(cpp.print_fatal != defaults.print_fatal);
   CHECK(cpp.print_warnings != defaults.print_warnings);
   CHECK(cpp.progress_interval == o.progress_interval);
+  CHECK(cpp.raise_order != defaults.raise_order);
 }
 
 TEST_CASE("C interface: a structure of an older header keeps the defaults of what it lacks") {

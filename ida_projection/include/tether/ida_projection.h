@@ -145,6 +145,7 @@ typedef struct {
   tether_progress_fn progress; /* or null */
   void* progress_data;
   int progress_interval;
+  int raise_order;
 } tether_options;
 
 /* The defaults: tether_options options; tether_options_init(&options, sizeof options); */

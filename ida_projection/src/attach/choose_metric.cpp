@@ -13,7 +13,7 @@ bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
   if (!free || move.status != Status::success || !mover.may_use_levels() ||
       !polish_.hears_answers() || !metric_choice_.due())
     return false;
-  AnsweredMove at{move.length, polish_.answer(candidate)};
+  AnsweredMove at{move.length, polish_.answer(candidate, candidate.cj)};
   if (at.answer < 0.0) return false;
   // So they do in index 0, where F keeps them by a derivative of theirs.
   if (metric_choice_.stiff(at) && !variables_.any() && movers_.used->has_forces_in_rows()) {
@@ -38,7 +38,7 @@ AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
   polish_.restore(candidate);
   const Move other = mover.move(candidate);
   const bool moved = other.status == Status::success && !other.capped;
-  const AnsweredMove its{other.length, moved ? polish_.answer(candidate) : -1.0};
+  const AnsweredMove its{other.length, moved ? polish_.answer(candidate, candidate.cj) : -1.0};
   if (its.answer >= 0.0 && metric_choice_.prefers(its, present)) {
     move = other;
     control_.expect_oscillations();

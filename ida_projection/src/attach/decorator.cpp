@@ -49,6 +49,7 @@ int Projection::Impl::initialize() {
   if (movers_.used != nullptr) movers_.used->reset();
   if (sensitivities_) sensitivities_->forget_run();
   control_.reset();
+  raised_order_.reset();
   frequency_.reset();
   metric_choice_.reset();
   return corrector_.initialize();
@@ -155,6 +156,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   const StepData step = ida_.step();
   account_for_previous_attempt(step);
   candidate.t = step.t;
+  raised_order_.begin(step.t, step.yp_predicted);
   if (unknowns_.contiguous) {
     candidate.h = std::abs(ida_.step_size());
     candidate.cj = step.cj;
@@ -197,9 +199,21 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
+// Algebraic variables would have to answer in every step.
+void Projection::Impl::raise_order(const Candidate& candidate, double cj) {
+  const bool may = options_.raise_order && options_.extra_iterations > 0 && !frequency_.on() &&
+                   !variables_.any() && !attempts_.repeated && !control_.smoothing() &&
+                   polish_.possible();
+  if (may)
+    raised_order_.raise(candidate, ida_.order(), cj, wants_polish(0.0));
+  else
+    raised_order_.leave();
+}
+
 // `fresh`: of IDA's factors there are no better ones.
 Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
                                        bool fresh) {
+  raise_order(candidate, cj);
   polish_.keep(candidate);
   Move move = movers_.used->move(candidate);
   if (move.capped) {
@@ -247,6 +261,10 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (setups != attempts_.setups) polish_.note_setup(step.cj);
   attempts_.setups = setups;
   attempts_.repeated = steps == attempts_.steps;
+  if (attempts_.steps >= 0 && steps == attempts_.steps + 1)
+    raised_order_.accepted();
+  else if (!attempts_.repeated)
+    raised_order_.forget_times();
   watch_.rejections.count(attempts_.repeated, attempts_.steps);
   if (!attempts_.repeated) control_.look_for_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {

@@ -20,6 +20,7 @@
 #include "step/frequency.hpp"
 #include "step/metric_choice.hpp"
 #include "step/polish.hpp"
+#include "step/raised_order.hpp"
 #include "step/step_control.hpp"
 #include "step/stiff_move.hpp"
 #include "watch/bypass.hpp"
@@ -101,6 +102,7 @@ class Projection::Impl {
   void account_for_previous_attempt(const StepData& step);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
   void judge_capped(Move& move);
+  void raise_order(const Candidate& candidate, double cj);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   Status polish(const Candidate& candidate, double cj, double tolerance);
   void account(const Move& move, const StepData& step, bool sampled);
@@ -193,6 +195,7 @@ class Projection::Impl {
   Report report_;
   Corrector corrector_;
   AlgebraicVariables variables_;
+  RaisedOrder raised_order_;
   Polish polish_;
   StepControl control_;
   StiffMove stiff_move_;

@@ -270,6 +270,7 @@ int tether_options_init(tether_options* options, size_t size) {
     o.print_fatal = defaults.print_fatal;
     o.print_warnings = defaults.print_warnings;
     o.progress_interval = defaults.progress_interval;
+    o.raise_order = defaults.raise_order;
     std::memcpy(options, &o, size);
     return 0;
   });

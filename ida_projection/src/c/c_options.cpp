@@ -58,6 +58,7 @@ Options options_of(const tether_options* given, long unknowns) {
       call(p.t, p.step, p.order, p.drift, p.move, p.steps, data);
     };
   options.progress_interval = o.progress_interval;
+  options.raise_order = o.raise_order != 0;
   return options;
 }
 

@@ -112,6 +112,12 @@ struct Options {
   /// order.
   bool limit_order = true;
 
+  /// At orders 3 to 5 take the leading term of the formula's own error out of each step, while F is
+  /// not stiff (ida_projection/README.md, section 9.3): smaller errors at the same tolerance and
+  /// number of steps. For forms without algebraic variables, with a direct linear solver,
+  /// extra_iterations 1 and frequency 1, while step sizes are not smoothed; else without effect.
+  bool raise_order = false;
+
   /// Components that a move must not change: true = held. Empty, or one entry for each unknown
   /// (serial vectors). For other vectors use `hold_vector`: 1 free, 0 held.
   std::vector<bool> hold;
