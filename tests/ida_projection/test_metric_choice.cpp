@@ -51,48 +51,89 @@ Constraints rows_of_points(int points, bool with_sum, double sum) {
   return set;
 }
 
-/// All rates are wrong by 1e-6 after a correction of 1e-4 of positions and 1e-8 of velocities: the
-/// largest part of any position in the move.
+/// IDA's vectors at points on circles, whose rates are wrong by 1e-6, after a correction of 1e-4 of
+/// positions and of 1e-8 of velocities.
+class PointsOnCircles {
+ public:
+  explicit PointsOnCircles(int points)
+      : n(4 * points),
+        base_(N_VNew_Serial(n, context_)),
+        correction_(N_VClone(base_)),
+        weights_(N_VClone(base_)) {
+    std::vector<double> y, v;
+    for (int i = 0; i < points; ++i) {
+      const double angle = 0.2 + 0.3 * i, wrong = 1e-6;
+      sum += std::cos(angle);
+      y.insert(y.end(), {std::cos(angle), std::sin(angle)});
+      v.insert(v.end(), {-std::sin(angle) + wrong * std::cos(angle),
+                         std::cos(angle) + wrong * std::sin(angle)});
+    }
+    rate_ = v;
+    rate_.resize(static_cast<std::size_t>(n), 0.0);
+    y.insert(y.end(), v.begin(), v.end());
+    N_VConst(1e4, weights_);
+    for (int i = 0; i < n; ++i) {
+      NV_Ith_S(correction_, i) = i < 2 * points ? 1e-4 : 1e-8;
+      NV_Ith_S(base_, i) = y[static_cast<std::size_t>(i)] - NV_Ith_S(correction_, i);
+    }
+  }
+  ~PointsOnCircles() {
+    for (N_Vector used : {base_, correction_, weights_}) N_VDestroy(used);
+  }
+  PointsOnCircles(const PointsOnCircles&) = delete;
+  PointsOnCircles& operator=(const PointsOnCircles&) = delete;
+
+  Candidate candidate(double h) {
+    Candidate made{0.0, base_, correction_, weights_};
+    made.with_entries();
+    made.h = h;
+    made.predicted_rate = rate_.data();
+    return made;
+  }
+
+  int n;
+  double sum = 0.0;  // of all x
+
+ private:
+  tether::test::Context context_;
+  N_Vector base_, correction_, weights_;
+  std::vector<double> rate_;
+};
+
+/// The largest part of any position in the move.
 double slide(int points, double h, bool with_sum = false) {
-  const int n = 4 * points;
-  std::vector<double> y, v;
-  double sum = 0.0;
-  for (int i = 0; i < points; ++i) {
-    const double angle = 0.2 + 0.3 * i, wrong = 1e-6;
-    sum += std::cos(angle);
-    y.insert(y.end(), {std::cos(angle), std::sin(angle)});
-    v.insert(v.end(), {-std::sin(angle) + wrong * std::cos(angle),
-                       std::cos(angle) + wrong * std::sin(angle)});
-  }
-  std::vector<double> rate = v;
-  rate.resize(static_cast<std::size_t>(n), 0.0);
-  y.insert(y.end(), v.begin(), v.end());
-
-  const tether::test::Context context;
-  N_Vector base = N_VNew_Serial(n, context), correction = N_VClone(base), weights = N_VClone(base);
-  N_VConst(1e4, weights);
-  for (int i = 0; i < n; ++i) {
-    NV_Ith_S(correction, i) = i < 2 * points ? 1e-4 : 1e-8;
-    NV_Ith_S(base, i) = y[static_cast<std::size_t>(i)] - NV_Ith_S(correction, i);
-  }
-  Candidate candidate{0.0, base, correction, weights};
-  candidate.with_entries();
-  candidate.h = h;
-  candidate.predicted_rate = rate.data();
-
-  const Constraints rows = rows_of_points(points, with_sum, sum);
+  PointsOnCircles at(points);
+  const Constraints rows = rows_of_points(points, with_sum, at.sum);
   Options options;
   options.metric = Metric::local_correction;
   Statistics statistics;
-  const auto mover = make_dense_mover(rows, options, statistics, n);
+  const auto mover = make_dense_mover(rows, options, statistics, at.n);
+  const Candidate candidate = at.candidate(h);
   REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::success);
   CHECK(mover->remaining_drift(candidate) <= 1e-12);
   double largest = 0.0;
   for (int i = 0; i < 2 * points; ++i)
-    largest = std::max(largest, std::abs(NV_Ith_S(correction, i) - 1e-4));
-  for (N_Vector used : {base, correction, weights}) N_VDestroy(used);
+    largest = std::max(largest, std::abs(candidate.correction_entries[i] - 1e-4));
   return largest;
+}
+
+/// Solutions until a move that is not allowed to converge is not explained by rounding either.
+long solutions_of_failure(int points, bool sparse) {
+  PointsOnCircles at(points);
+  const Constraints dense = rows_of_points(points, false, 0.0);
+  const Constraints rows = sparse ? tether::test::as_sparse(dense, at.n) : dense;
+  Options options;
+  options.metric = Metric::error_weights;
+  options.maximum_iterations = 1;
+  options.tolerance = 1e-12;
+  Statistics statistics;
+  const auto mover =
+      (sparse ? make_sparse_mover : make_dense_mover)(rows, options, statistics, at.n, -1);
+  const Candidate candidate = at.candidate(1e-4);
+  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->move(candidate).status == Status::not_converged);
+  return statistics.iterations;
 }
 
 }  // namespace
@@ -153,4 +194,12 @@ TEST_CASE("scales: positions of many rows move at most h times as far as velocit
   CHECK(slide(20, 1e6) >= 1e-7);         // h times the velocities' scales are the larger ones
   CHECK(slide(20, 0.0) >= 1e-7);         // there is no step
   CHECK(slide(20, 1e-4, true) >= 1e-7);  // a row of positions has none of rates beside it
+}
+
+TEST_CASE("what rounding of g may ask for takes few solutions, however many the rows") {
+  CHECK(solutions_of_failure(10, false) >= 20);  // one for each row, up to 32
+  CHECK(solutions_of_failure(10, false) <= 24);
+  CHECK(solutions_of_failure(60, false) <= 6);
+  CHECK(solutions_of_failure(25, true) <= 6);
+  CHECK(solutions_of_failure(100, true) <= 12);
 }

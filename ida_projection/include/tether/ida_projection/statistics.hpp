@@ -16,7 +16,7 @@ struct Statistics {
   long skipped = 0;               ///< attempts already on the constraints, nothing moved
   long left_alone = 0;            ///< attempts not looked at (Options::frequency)
   long chord_projections = 0;     ///< moved with factors of an earlier step (Options::frequency)
-  long iterations = 0;            ///< Newton moves
+  long iterations = 0;            ///< Newton moves, and solutions for what rounding asks for
   long value_evaluations = 0;     ///< g
   long jacobian_evaluations = 0;  ///< C, however formed
   long joint_evaluations = 0;     ///< of both: g and C by one call, where rows have such a function

@@ -289,10 +289,7 @@ double FactoredRows<Rows>::rounding_length() {
   for (int i = 0; i < count(); ++i)
     rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks.terms(i, at.y.data());
   double total = 0.0;
-  const auto add = [&](auto&& length) {
-    total += length(solve());
-    --statistics_.iterations;
-  };
+  const auto add = [&](auto&& length) { total += length(solve()); };
   if (count() <= kRoundedOneByOne) {
     for (std::size_t i = 0; i < g.size(); ++i) {
       std::fill(g_.begin(), g_.end(), 0.0);
