@@ -241,10 +241,13 @@ Status Automatic::proximal_path(Search& search, Rotation&, int problems) {
 }
 
 // Where the path of interior points has ended near a solution a few proximal problems lead to it;
-// one that is not solved says that they do not.
+// one that is not solved says that they do not, but for heavy bodies on light ones, where x has
+// far to go.
 Status Automatic::proximal_path_at_best(Search& search, Rotation&, int problems) {
+  constexpr int kMost = 60;
   x_ = search.best;
-  interior.run_proximal(search, x_.data(), problems, newton, false);
+  const bool loaded = search.system.load(x_.data()) > kOrdinaryLoad;
+  interior.run_proximal(search, x_.data(), loaded ? kMost : problems, newton, loaded);
   return Status::unsolved;
 }
 

@@ -2,6 +2,8 @@
 // BSD-3-Clause
 #include "assembled/stages/interior/interior_point.hpp"
 
+#include <algorithm>
+
 namespace tether::contact::detail {
 
 // Implicit Euler steps 1 / tau of D x' = -F(x): where the contacts that stick and slide admit no
@@ -9,12 +11,17 @@ namespace tether::contact::detail {
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
                                  ProximalNewton& newton, bool whole) {
   constexpr int kCorrections = 4, kSteps = 20, kPatience = 700, kSweeps = 3;
-  constexpr double kLeast = 1e-9, kMost = 1;  // tau
+  constexpr double kFirst = 1e-2, kLeast = 1e-9, kMost = 1;  // tau, for ordinary loads
+  constexpr double kLightest = 1e6;
   System& system = search.system;
   Packed rate(at(n_)), point(at(n_));  // rate: tau (x_k+1 - x_k)
   equations_.set_anchor(x);
   const Packed& anchor = equations_.anchor();
-  double tau = 1e-2, near = 1e-4;
+  // Impulses that carry heavy bodies over light ones are |A| |x| times what moves; for x to change
+  // by its size at the rate of what is left tau has to be as much smaller.
+  const double lighter = std::min(kLightest, std::max(1.0, system.load(x) / kOrdinaryLoad));
+  const double least = kLeast / lighter;
+  double tau = kFirst / lighter, near = 1e-4;
   double reference = search.best_error;
   int gain = 0;
   bool drifting = false;
@@ -66,7 +73,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
     }
     if (!search.solved()) search.test(swept_.data(), Method::interior_point);
     if (search.solved()) break;
-    tau = std::max(kLeast, (corrections == 1 ? 0.4 : 0.5) * tau);
+    tau = std::max(least, (corrections == 1 ? 0.4 : 0.5) * tau);
   }
   equations_.set_tau(0);
 }
