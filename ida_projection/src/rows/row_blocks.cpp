@@ -8,8 +8,6 @@
 #include <cstring>
 #include <utility>
 
-#include "rows/row_levels.hpp"
-
 namespace tether::ida_projection {
 
 namespace {
@@ -105,24 +103,6 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
   return Status::success;
 }
 
-bool RowBlocks::split_by_level() {
-  std::vector<int> starts = {0}, columns;
-  for (int i = 0; i < m_; ++i) {
-    for (int j = 0; j < n_; ++j)
-      if (fills(i, j)) columns.push_back(j);
-    starts.push_back(static_cast<int>(columns.size()));
-  }
-  if (!kinds_.begin_by_level(levels_of_columns(starts, columns, n_), kFollowingLevel)) return false;
-  rearrange();
-  if (a.rows.size() != a.columns.size()) join_levels();
-  return split_levels();
-}
-
-void RowBlocks::join_levels() {
-  kinds_.end_by_level();
-  rearrange();
-}
-
 void RowBlocks::rearrange() {
   const auto n = static_cast<std::size_t>(n_);
   outgrown_ = false;
@@ -191,7 +171,7 @@ void RowBlocks::watch() {
     });
   for (int i : a.rows) row_watches(i, [&](int j) { return !used[static_cast<std::size_t>(j)]; });
   kinds_.mixed.clear();
-  for (int i = 0; split && !kinds_.by_level() && i < m_; ++i)
+  for (int i = 0; split && i < m_; ++i)
     for (int j : columns_)
       if (fills(i, j) && kinds_.algebraic(j)) {
         kinds_.mixed.push_back(i);

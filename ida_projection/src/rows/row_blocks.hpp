@@ -218,13 +218,6 @@ class RowBlocks {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
-  /// After structure() without algebraic variables: unknowns of level 2 and above take their place,
-  /// see row_levels.hpp, if their rows are as many as they are, as those of forces. Velocities may
-  /// be of level 2 as well, where norms of quaternions are of level 0. False: nothing has changed.
-  bool split_by_level();
-  /// Back to one block.
-  void join_levels();
-  bool split_levels() const { return kinds_.by_level(); }
   /// Do rows contain variables of both kinds?
   bool mixed() const { return !kinds_.mixed.empty(); }
 

@@ -5,9 +5,6 @@
 
 namespace tether::ida_projection {
 
-/// Rates of rates, as forces are: what their rows ask for follows from the levels below.
-constexpr int kFollowingLevel = 2;
-
 /// Level of each of n columns; -1: no row has it. A row whose columns are some of those of another
 /// one fixes these by itself: the other one is there for the rest. So position rows have positions
 /// (level 0), velocity rows positions and velocities (these are of level 1), rows of accelerations

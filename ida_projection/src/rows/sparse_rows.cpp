@@ -6,8 +6,6 @@
 #include <tether/linalg/index.hpp>
 #include <utility>
 
-#include "rows/row_levels.hpp"
-
 namespace tether::ida_projection {
 
 namespace {
@@ -94,27 +92,6 @@ Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<d
   return Status::success;
 }
 
-bool SparseRows::split_by_level() {
-  std::vector<int> starts = {0}, columns;
-  for (int i = 0; i < m_; ++i) {
-    const StoredRows::Row& row = C_.rows[at(i)];
-    for (int e = row.begin; e < row.end; ++e)
-      if (C_.entry_fills[at(e)]) columns.push_back(C_.columns[at(e)]);
-    for (int j = 0; row.full >= 0 && j < n_; ++j)
-      if (C_.fills(row, j)) columns.push_back(j);
-    starts.push_back(static_cast<int>(columns.size()));
-  }
-  if (!kinds_.begin_by_level(levels_of_columns(starts, columns, n_), kFollowingLevel)) return false;
-  rearrange();
-  if (a.rows.size() != a.columns.size()) join_levels();
-  return split_levels();
-}
-
-void SparseRows::join_levels() {
-  kinds_.end_by_level();
-  rearrange();
-}
-
 void SparseRows::rearrange() {
   outgrown_ = false;
   split();
@@ -185,7 +162,7 @@ void SparseRows::watch() {
       if (!C_.fills(row, j) && matters(j)) watched_full_.push_back(C_.place(row.full, j));
   }
   kinds_.mixed.clear();
-  for (int i = 0; split && kinds_.any_algebraic() && !kinds_.by_level() && i < m_; ++i) {
+  for (int i = 0; split && kinds_.any_algebraic() && i < m_; ++i) {
     bool mixed = false;
     int entry = C_.rows[at(i)].begin;
     C_.visit(i, [&](int j, double) {

@@ -67,20 +67,6 @@ bool FactoredRows<Rows>::has_third_level() {
 }
 
 template <class Rows>
-bool FactoredRows<Rows>::split_levels() {
-  if (count() <= kFewForLevels || !blocks.split_by_level()) return false;
-  factors.there = factors.lasting = false;
-  third_level_ = true;
-  return true;
-}
-
-template <class Rows>
-void FactoredRows<Rows>::join_levels() {
-  blocks.join_levels();
-  factors.there = factors.lasting = false;
-}
-
-template <class Rows>
 void FactoredRows<Rows>::look_for_rates() {
   const bool wanted = options_.metric == Metric::local_correction && at.knows_rates();
   const bool early = factored_ <= kEarly && rate_looks_ < kLevelLooks;
@@ -201,11 +187,6 @@ bool FactoredRows<Rows>::decide() {
   factors.partial = false;
   if (count() > kFewForLevels) look_for_rates();
   if (!blocks.factor()) return false;
-  if (levels_split() && blocks.a.solver.dropped() > 0) {
-    join_levels();
-    set_metric(true);
-    if (!blocks.factor()) return false;
-  }
   if (blocks.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kThinRows) factors.thin = RowTrust::has_thin_rows(blocks.counted().solver);
   factors.lasting = !factors.thin;

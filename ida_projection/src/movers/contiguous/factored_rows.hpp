@@ -69,11 +69,6 @@ class FactoredRows {
   bool find_levels();
   /// Are there unknowns of level 2? Looked for until some are found, 16 times.
   bool has_third_level();
-  /// No variable being algebraic: where rows are many, those with unknowns of level 2 are solved
-  /// for these alone from now on. False: there are none.
-  bool split_levels();
-  bool levels_split() const { return blocks.split_levels(); }
-  void join_levels();
   /// At the candidate, whose variables are algebraic where `id` is 0.
   Status structure(const Candidate& candidate, const double* id);
   /// g at the present y.
@@ -88,14 +83,8 @@ class FactoredRows {
   /// C at the present y, and its factors.
   Status factor(double t);
   /// The move for g by the factors at hand; returns its WRMS length in the error norm. Algebraic
-  /// columns do not count there: they follow the others, and out of the error test.
+  /// columns do not count there: they follow the others.
   double solve();
-  /// f(block) for the blocks whose move is measured in tolerances.
-  template <class Visit>
-  void visit_counted(Visit f) {
-    f(counted());
-    if (levels_split()) f(blocks.a);
-  }
   /// The rows whose move is measured in tolerances.
   typename Rows::Block& counted() { return blocks.d.rows.empty() ? blocks.a : blocks.d; }
   /// The same where no move follows.
@@ -174,12 +163,10 @@ double FactoredRows<Rows>::solve() {
   ++statistics_.iterations;
   blocks.solve(g_);
   double sum = 0.0;
-  visit_counted([&](const Block& block) {
-    const double* dy = block.dy.data();
-    block.for_columns([&sum, dy, w = at.w](int k, int i) {
-      const double move = dy[k] * w[i];
-      sum += move * move;
-    });
+  const double* dy = counted().dy.data();
+  counted().for_columns([&sum, dy, w = at.w](int k, int i) {
+    const double move = dy[k] * w[i];
+    sum += move * move;
   });
   return wrms(sum);
 }
