@@ -8,6 +8,9 @@ root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
 cd "$root"
 
 sh cmake/install_packages.sh
+if [ ! -e build/release/CMakeCache.txt ] && command -v ninja >/dev/null; then
+  export CMAKE_GENERATOR=Ninja  # waits for no library where a source can be compiled
+fi
 cmake --preset release -DTETHER_BUILD_BENCHMARKS=OFF -DTETHER_UNITY_BUILD=ON
 cmake --build --preset release --parallel "$(nproc)"
 exec ctest --preset release --parallel "$(nproc)" "$@"

@@ -38,23 +38,7 @@ inline Case random_case(int m, int n, unsigned seed) {
 }
 
 /// dy = D (C D)^+ g by a complete orthogonal decomposition of the rows brought to unit length.
-inline Eigen::VectorXd oracle(const Case& c) {
-  RowMajor A = c.C * c.D.asDiagonal();
-  Eigen::VectorXd g = c.g;
-  for (int i = 0; i < A.rows(); ++i) {
-    const double length = A.row(i).stableNorm();
-    if (length == 0.0) {
-      g[i] = 0.0;
-      continue;
-    }
-    A.row(i) /= length;
-    g[i] /= length;
-  }
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
-  factors.setThreshold(1e-12);
-  factors.compute(A);
-  return c.D.cwiseProduct(factors.solve(g));
-}
+Eigen::VectorXd oracle(const Case& c);
 
 inline void load(linalg::MinimumNorm& solver, const RowMajor& C) {
   for (int i = 0; i < C.rows(); ++i)

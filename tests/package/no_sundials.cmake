@@ -1,0 +1,16 @@
+# linalg and contact compile where there is no SUNDIALS: none of their files includes a header of it or of
+# the libraries that need it. SPDX-License-Identifier: BSD-3-Clause
+cmake_minimum_required(VERSION 3.23)
+file(GLOB_RECURSE sources ${SOURCE}/linalg/*.cpp ${SOURCE}/linalg/*.hpp ${SOURCE}/contact/*.cpp ${SOURCE}/contact/*.hpp)
+list(LENGTH sources number)
+if(number LESS 100)
+  message(FATAL_ERROR "${number} sources of linalg and contact were found in ${SOURCE}")
+endif()
+foreach(source IN LISTS sources)
+  file(STRINGS ${source} includes REGEX "^ *# *include")
+  foreach(include IN LISTS includes)
+    if(include MATCHES "[<\"](sun|nvector|idas?/|cvodes?/|kinsol/|arkode/|tether/(ida_projection|reverse_ida))")
+      message(SEND_ERROR "${source}: ${include}")
+    endif()
+  endforeach()
+endforeach()
