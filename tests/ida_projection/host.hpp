@@ -115,6 +115,13 @@ Run integrate_plain(const Problem& problem, double tolerance);
 /// The error of a run that failed or took 60000 steps is infinite.
 Run integrate_suppressed(const Problem& problem, double tolerance);
 
+/// The defaults but for one option.
+inline tp::Options enabled(bool tp::Options::*option) {
+  tp::Options options;
+  options.*option = true;
+  return options;
+}
+
 /// Rows as gradients in vectors whose entries `entries` tells.
 tp::Constraints gradients_of(const tp::Constraints& rows, int n,
                              double* (*entries)(N_Vector) = N_VGetArrayPointer);

@@ -17,11 +17,7 @@ using namespace tether::problems;
 
 namespace {
 
-tp::Options raised() {
-  tp::Options options;
-  options.raise_order = true;
-  return options;
-}
+const tp::Options raised = enabled(&tp::Options::raise_order);
 
 /// Geometric means over tolerances of errors and steps, with it over without.
 struct Gain {
@@ -33,7 +29,7 @@ Gain gain(const Problem& p, double loosest, int tolerances) {
   for (int i = 0; i < tolerances; ++i) {
     const double tolerance = loosest * std::pow(10.0, -0.5 * i);
     INFO(p.name << ", " << p.form << ", tolerance " << tolerance);
-    const Run with = integrate(p, tolerance, p.recommended_constraints(), raised(), false);
+    const Run with = integrate(p, tolerance, p.recommended_constraints(), raised, false);
     const Run without = integrate(p, tolerance, p.recommended_constraints(), {}, false);
     REQUIRE(with.flag >= 0);
     REQUIRE(without.flag >= 0);
@@ -74,7 +70,7 @@ TEST_CASE("raised order: rows are kept as without it") {
   for (const Problem& p : {pendulum(1.0, 9.81, 10.0, "index 0"), car_axis("index 0")})
     for (const double tolerance : {1e-4, 1e-7}) {
       INFO(p.name << ", tolerance " << tolerance);
-      const Run run = integrate(p, tolerance, p.recommended_constraints(), raised());
+      const Run run = integrate(p, tolerance, p.recommended_constraints(), raised);
       REQUIRE(run.flag >= 0);
       CHECK(run.distance <= tp::Options().tolerance);
     }

@@ -16,11 +16,7 @@ using namespace tether::problems;
 
 namespace {
 
-tp::Options smooth() {
-  tp::Options options;
-  options.step_smoothing = true;
-  return options;
-}
+const tp::Options smooth = enabled(&tp::Options::step_smoothing);
 
 /// Rms distance of y from its straight line over x.
 double scatter(const std::vector<double>& x, const std::vector<double>& y) {
@@ -73,7 +69,7 @@ TEST_CASE("smooth steps: errors follow the tolerance without scatter") {
     INFO(problem.name << ", " << problem.form);
     const Scatter plain = scatter_of(problem, false, {});
     const Scatter by_ida = scatter_of(problem, true, {});
-    const Scatter filtered = scatter_of(problem, true, smooth());
+    const Scatter filtered = scatter_of(problem, true, smooth);
     CHECK(filtered.error <= 0.07);
     CHECK(filtered.error <= 0.3 * plain.error);
     CHECK(filtered.error <= 0.35 * by_ida.error);
@@ -85,7 +81,7 @@ TEST_CASE("smooth steps: errors follow the tolerance without scatter") {
 TEST_CASE("smooth steps: at the largest order every ratio is small, and the order is not frozen") {
   const Problem problem = pendulum(1, 1, 100, "index 1");
   Host host(problem, 1e-7);
-  host.attach(problem.recommended_constraints(), smooth());
+  host.attach(problem.recommended_constraints(), smooth);
   double previous = 0.0, largest = 0.0;
   long at_five = 0, count = 0, changed = 0;
   while (host.t < problem.t_end) {
@@ -110,7 +106,7 @@ TEST_CASE("smooth steps: at the largest order every ratio is small, and the orde
 TEST_CASE("smooth steps: the longest step is kept") {
   const Problem problem = pendulum(1, 1, 20, "index 1");
   Host host(problem, 1e-4);
-  tp::Options options = smooth();
+  tp::Options options = smooth;
   options.maximum_step = 0.01;
   host.attach(problem.recommended_constraints(), options);
   double longest = 0.0;
@@ -127,7 +123,7 @@ TEST_CASE("smooth steps: the longest step is kept") {
 TEST_CASE("smooth steps: a second run after IDAReInit has the bits of the first") {
   const Problem problem = pendulum(1, 1, 20, "index 1");
   Host host(problem, 1e-6);
-  host.attach(problem.recommended_constraints(), smooth());
+  host.attach(problem.recommended_constraints(), smooth);
   REQUIRE(host.finish() >= 0);
   const std::vector<double> first = host.state();
   REQUIRE(host.restart() == 0);
@@ -138,7 +134,7 @@ TEST_CASE("smooth steps: a second run after IDAReInit has the bits of the first"
 TEST_CASE("smooth steps: without constraints the filter still works") {
   const Problem problem = circle(50.0);
   Host host(problem, 1e-6), plain(problem, 1e-6);
-  host.attach({}, smooth());
+  host.attach({}, smooth);
   REQUIRE(host.finish() >= 0);
   REQUIRE(plain.finish() >= 0);
   CHECK(std::abs(std::hypot(host.data()[0], host.data()[1]) - 1.0) <= 1e-3);
@@ -410,7 +406,7 @@ TEST_CASE("smooth steps that begin by themselves are as accurate as those from t
     for (int i = 0; i <= 6; ++i) {
       const double tolerance = std::pow(10.0, -4.0 - 6.0 * i / 6.0);
       const Run begun = integrate(problem, tolerance, rows, {}, false);
-      const Run from_start = integrate(problem, tolerance, rows, smooth(), false);
+      const Run from_start = integrate(problem, tolerance, rows, smooth, false);
       REQUIRE(begun.flag >= 0);
       REQUIRE(from_start.flag >= 0);
       CHECK(static_cast<double>(begun.steps) <= 1.1 * static_cast<double>(from_start.steps));

@@ -92,8 +92,10 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) {
     polish_.allocate(like, unknowns_.contiguous);
-    raised_order_.allocate(like, unknowns_.contiguous);
-    polish_.expect_raised_order(raised_order_);
+    if (options_.raise_order) {
+      raised_order_.allocate(like, unknowns_.contiguous);
+      polish_.expect_raised_order(raised_order_);
+    }
     if (options_.frequency == 1) polish_.may_foretell();
     unknowns_.weights = OwnedVector(like);
     if (options_.id != nullptr) {
