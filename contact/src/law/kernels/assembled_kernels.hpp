@@ -142,8 +142,8 @@ TETHER_INLINE Test natural_map(const View& s, const PackedVector* x, PackedVecto
 // a number. The error of a contact: with theta contacts in its row, what |theta D (x_i - z)| is for
 // the block solution z of theta D and theta D x_i - w, and how far x_i is outside of the cone,
 // times theta A_nn; in `least` error_as_it_is where that is less. Solutions do not depend on theta;
-// with it a contact that is given twice, with
-// half the impulse each, has the same error. It is at least -w_n: z_n > x_n where w_n < 0.
+// with it a contact that is given twice, with half the impulse each, has the same error. It is at
+// least -w_n: z_n > x_n where w_n < 0.
 template <class Rule>
 TETHER_INLINE Test worst_error(const View& s, const PackedVector* x) {
   int count = 0;
