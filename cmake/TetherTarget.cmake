@@ -5,6 +5,8 @@
 #   tether_warnings(<target>)    warnings and instrumentation of the project
 #   tether_executable(<target> SOURCES ... LIBRARIES ...)
 #   tether_library(<name>)       target tether_<name>, alias tether::<name>
+#   tether_by_folders(<target>)  with TETHER_UNITY_BUILD: the sources of a folder compile as one
+#   tether_precompile(<target> <header> ...)  with TETHER_UNITY_BUILD: compiled once for the target's sources
 #   TETHER_KEEP_BITS             options for sources whose rounding is part of their promise
 include(GNUInstallDirs)
 include(${CMAKE_CURRENT_LIST_DIR}/TetherPrivate.cmake)
@@ -47,9 +49,28 @@ function(tether_group_by_folder target)
     cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE OUTPUT_VARIABLE folder)
     cmake_path(RELATIVE_PATH folder BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
     cmake_path(GET folder PARENT_PATH folder)
-    string(MAKE_C_IDENTIFIER "${folder}" group)
+    string(MAKE_C_IDENTIFIER "in_${folder}" group)
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
   endforeach()
+endfunction()
+
+# With TETHER_UNITY_BUILD: see above.
+function(tether_by_folders target)
+  if(TETHER_UNITY_BUILD)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+    cmake_language(EVAL CODE "cmake_language(DEFER CALL tether_group_by_folder ${target})")
+    # A source that another one includes is no header: its unnamed namespace may be in its classes.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  endif()
+endfunction()
+
+# A third of the time of many small sources. Builds without TETHER_UNITY_BUILD show a missing include.
+function(tether_precompile target)
+  if(TETHER_UNITY_BUILD)
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+    # ccache asks for it.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
+  endif()
 endfunction()
 
 function(tether_library name)
@@ -62,15 +83,9 @@ function(tether_library name)
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON  # see tether/export.hpp
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   # Installed shared libraries find each other in their own folder.
-  set_target_properties(tether_${name} PROPERTIES
-    INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>
-    UNITY_BUILD ${TETHER_UNITY_BUILD} UNITY_BUILD_MODE GROUP)
+  set_target_properties(tether_${name} PROPERTIES INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>)
   tether_warnings(tether_${name})
-  if(TETHER_UNITY_BUILD)
-    cmake_language(EVAL CODE "cmake_language(DEFER CALL tether_group_by_folder tether_${name})")
-    # A source that another one includes is no header: its unnamed namespace may be in its classes.
-    target_compile_options(tether_${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
-  endif()
+  tether_by_folders(tether_${name})
   tether_keep_private(tether_${name})
   set_property(GLOBAL APPEND PROPERTY TETHER_LIBRARIES ${name})
 endfunction()

@@ -13,7 +13,7 @@ namespace tether::scene {
 
 namespace {
 
-struct Arguments {
+struct CheckArguments {
   std::vector<std::string> files;
   bool print = false;
 };
@@ -26,7 +26,7 @@ Scene with_options(Scene scene, EngineKind engine) {
   return scene;
 }
 
-int check(const Arguments& arguments) {
+int check(const CheckArguments& arguments) {
   int status = kGood;
   for (const std::string& file : arguments.files) {
     try {
@@ -51,7 +51,7 @@ int check(const Arguments& arguments) {
 }  // namespace
 
 void add_check_command(CLI::App& app, int* status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CheckArguments>();
   CLI::App* command = app.add_subcommand(
       "check", "Reads scene files and names what is wrong, with line, field and what is allowed");
   command->add_option("scenes", arguments->files, "Scene files (TOML); - is the standard input")

@@ -16,7 +16,7 @@ namespace {
 
 using namespace tether::contact;
 
-struct Arguments {
+struct ContactArguments {
   std::vector<std::string> files;
   Options options;
   bool csv = false;
@@ -57,7 +57,8 @@ void add_choice(CLI::App& command, const char* option, const char* what,
 }
 
 // Of files that hold more than contacts: joints, masses, rolling friction.
-Status run_cones(const Arguments& arguments, const std::string& file, const ConeProblem& problem) {
+Status run_cones(const ContactArguments& arguments, const std::string& file,
+                 const ConeProblem& problem) {
   const Options& o = arguments.options;
   const ConeSolution s = ConeSolver(o).solve(problem);
   const auto blocks = static_cast<int>(problem.cones().size());
@@ -93,7 +94,7 @@ std::unique_ptr<ConeProblem> as_cones(const std::string& file) {
 }
 
 // 0: all solved, 1: some not solved, 2: some file or option is wrong.
-int run(const Arguments& arguments) {
+int run(const ContactArguments& arguments) {
   int status = 0;
   if (arguments.csv) {
     std::printf(
@@ -155,7 +156,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_contact_command(CLI::App& app, int* status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ContactArguments>();
   CLI::App* command =
       app.add_subcommand("contact", "Solves frictional contact problems (.dat, fclib .hdf5)");
   command->add_option("files", arguments->files, "Problem files")->required();

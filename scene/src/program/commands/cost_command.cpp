@@ -20,7 +20,7 @@ namespace tether::scene {
 
 namespace {
 
-struct Arguments {
+struct CostArguments {
   std::string file, csv, svg, html;
   std::vector<std::string> tolerances, steps, accuracies;
   std::optional<double> reference, wanted;
@@ -62,7 +62,7 @@ std::string table_text(const CostTable& table) {
 }
 
 // Settings of engines that the scene does not have are refused by name.
-void check_settings(const Scene& scene, const Arguments& arguments) {
+void check_settings(const Scene& scene, const CostArguments& arguments) {
   const Plan plan = make_plan(scene);
   const bool of_steps = !arguments.steps.empty() || !arguments.accuracies.empty();
   if (plan.engine == EngineKind::smooth && of_steps)
@@ -74,7 +74,7 @@ void check_settings(const Scene& scene, const Arguments& arguments) {
 }
 
 // What would be lost is told before the work.
-void check_files(const Scene& scene, const Arguments& arguments) {
+void check_files(const Scene& scene, const CostArguments& arguments) {
   Output files;
   files.csv = arguments.csv;
   files.svg = arguments.svg;
@@ -86,7 +86,7 @@ void check_files(const Scene& scene, const Arguments& arguments) {
     if (!file.empty()) check_writable(file);
 }
 
-int run_cost(const Arguments& arguments) {
+int run_cost(const CostArguments& arguments) {
   const Scene scene = read_scene(arguments.file);
   check_settings(scene, arguments);
   CostOptions options;
@@ -135,7 +135,7 @@ int run_cost(const Arguments& arguments) {
 }  // namespace
 
 void add_cost_command(CLI::App& app, int* status) {
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<CostArguments>();
   CLI::App* command = app.add_subcommand(
       "cost", "What accuracy costs in time: runs a scene over a range of tolerances or time steps");
   command->add_option("scene", a->file, "Scene file (TOML)")->required();

@@ -23,7 +23,7 @@ namespace tether::scene {
 
 namespace {
 
-struct Arguments {
+struct ImportArguments {
   std::string file, out = "-", base;
   std::vector<std::string> joints, held;
   std::optional<double> ground, friction;
@@ -42,7 +42,7 @@ std::pair<std::string, double> read_position(const std::string& word) {
   return {word.substr(0, equals), value};
 }
 
-import::ImportOptions options_of(const Arguments& a){import::ImportOptions out;
+import::ImportOptions options_of(const ImportArguments& a){import::ImportOptions out;
 out.base = a.base == "fixed"  ? import::Base::fixed
            : a.base == "free" ? import::Base::free
                               : import::Base::as_file;
@@ -65,7 +65,7 @@ return out;
 }  // namespace
 
 /// Said once more on the standard error, since a scene may leave through a pipe.
-int write_import(const Arguments& a) {
+int write_import(const ImportArguments& a) {
   const import::ImportOptions options = options_of(a);
   Output scene;
   scene.state = a.out == "-" ? "" : a.out;
@@ -89,7 +89,7 @@ int write_import(const Arguments& a) {
 }  // namespace tether::scene
 
 void add_import_command(CLI::App& app, int* status) {
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<ImportArguments>();
   CLI::App* command = app.add_subcommand(
       "import", "Makes a scene of a robot (URDF, or MuJoCo's MJCF), and says what it leaves out");
   command->add_option("robot", a->file, "Robot file (XML); - is the standard input")->required();

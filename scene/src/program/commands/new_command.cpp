@@ -16,7 +16,7 @@ namespace tether::scene {
 
 namespace {
 
-struct Arguments {
+struct NewArguments {
   std::string kind, file;
   bool force = false, list = false;
 };
@@ -27,7 +27,7 @@ std::string summary(std::string_view text) {
   return std::string(line.substr(std::min<std::size_t>(2, line.size())));
 }
 
-int write_new(const Arguments& arguments) {
+int write_new(const NewArguments& arguments) {
   if (arguments.list) {
     for (const Kind& each : kinds()) fmt::print("{:<24} {}\n", each.name, summary(each.text));
     return kGood;
@@ -55,7 +55,7 @@ int write_new(const Arguments& arguments) {
 }  // namespace
 
 void add_new_command(CLI::App& app, int* status) {
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<NewArguments>();
   CLI::App* command =
       app.add_subcommand("new", "Writes a scene to start from, with comments on its fields");
   std::vector<std::string> names;

@@ -16,12 +16,12 @@ namespace tether::scene {
 
 namespace {
 
-struct Arguments {
+struct PlanArguments {
   std::string file;
   bool run = false;
 };
 
-int plan(const Arguments& arguments) {
+int plan(const PlanArguments& arguments) {
   const Scene scene = read_scene_argument(arguments.file);
   std::cout << make_plan(scene) << std::flush;
   if (!arguments.run) return kGood;
@@ -43,7 +43,7 @@ int plan(const Arguments& arguments) {
 }  // namespace
 
 void add_plan_command(CLI::App& app, int* status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<PlanArguments>();
   CLI::App* command = app.add_subcommand(
       "plan", "Tells which effects a scene asks for, which engine moves it, and how large it is");
   command->add_option("scene", arguments->file, "Scene file (TOML); - is the standard input")

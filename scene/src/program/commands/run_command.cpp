@@ -26,7 +26,7 @@ namespace tether::scene {
 
 namespace {
 
-struct Arguments {
+struct RunArguments {
   std::string file, restart, folder, html;
   std::optional<std::string> csv, vtk, svg, state, otherwise;
   std::optional<double> end, every;
@@ -59,7 +59,7 @@ void stay_inside(const std::string& folder, const Output& o) {
 }
 
 /// Settings of the command line override those of the scene.
-void overlay(const Arguments& arguments, Scene& scene) {
+void overlay(const RunArguments& arguments, Scene& scene) {
   Output& o = scene.output;
   Output by_scene = o;
   if (arguments.csv) by_scene.csv.clear();
@@ -96,7 +96,7 @@ void write_film_alone(Output& o, std::string& html) {
 }
 
 /// ranks: processes that make the same run, null: there is one.
-int run_scene(const Arguments& arguments, Ranks* ranks) {
+int run_scene(const RunArguments& arguments, Ranks* ranks) {
   const auto begin = std::chrono::steady_clock::now();
   const bool first = !ranks || ranks->messages().rank() == 0;
   if (ranks && arguments.file == "-")
@@ -159,7 +159,7 @@ int run_scene(const Arguments& arguments, Ranks* ranks) {
 }
 
 /// By all processes that mpirun has started, by the one that there is otherwise.
-int run_together(const Arguments& arguments) {
+int run_together(const RunArguments& arguments) {
   const std::unique_ptr<Ranks> ranks = join_ranks();
   if (!ranks) try {
       return run_scene(arguments, nullptr);
@@ -181,7 +181,7 @@ int run_together(const Arguments& arguments) {
 }  // namespace
 
 void add_run_command(CLI::App& app, int* status) {
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<RunArguments>();
   CLI::App* command = app.add_subcommand(
       "run", "Moves a scene, records what its [output] names, and judges it by its [[expect]]");
   command->add_option("scene", a->file, "Scene file (TOML); - is the standard input")->required();

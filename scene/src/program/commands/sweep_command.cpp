@@ -28,7 +28,7 @@ namespace {
 
 constexpr std::size_t kMostRuns = 100000;
 
-struct Arguments {
+struct SweepArguments {
   std::string file, out = "-";
   std::vector<std::string> vary;
   int jobs = 0;
@@ -127,7 +127,7 @@ int exit_code(const std::vector<std::string>& rows) {
   return any("not met") ? kNotMet : kGood;
 }
 
-int sweep(const Arguments& arguments) {
+int sweep(const SweepArguments& arguments) {
   const SceneText scene_text = read_scene_text(arguments.file);
   std::vector<VariedNumber> varied;
   for (const std::string& each : arguments.vary) varied.push_back(read_varied(each));
@@ -186,7 +186,7 @@ int sweep(const Arguments& arguments) {
 }  // namespace
 
 void add_sweep_command(CLI::App& app, int* status) {
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<SweepArguments>();
   CLI::App* command =
       app.add_subcommand("sweep", "Runs a scene over ranges of its numbers: one row of CSV a run");
   command->add_option("scene", a->file, "Scene file (TOML); - is the standard input")->required();
