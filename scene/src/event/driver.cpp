@@ -134,7 +134,8 @@ std::vector<int> Driver::with_moments(std::vector<int> contacts) const {
 void Driver::advance(double t, const std::function<bool()>& interrupted) {
   while (time_ < t) {
     const double end = next_ ? next_->time : phase_->step_end();
-    const double reached = phase_->start() + end;
+    // An event of a phase that was taken again may lie before a time that was told already.
+    const double reached = next_ ? std::max(time_, phase_->start() + end) : phase_->start() + end;
     if (reached > time_ || (next_ && reached >= time_)) {
       if (reached > t) {
         time_ = t;
@@ -157,10 +158,27 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
       fail(fmt::format("max_steps = {} steps are taken", options_.max_steps));
     check_pace(t);
     next_ = watcher_.look(*phase_);
+    if (take_again()) continue;
     if (next_) continue;
     turn_slips();
     rows_are_weak_ = phase_->has_weak_rows();
   }
+}
+
+// A gap that is zero where it hardly moves: the phase from its start, at the tolerance that tells.
+bool Driver::take_again() {
+  double tolerance = std::max(watcher_.telling_tolerance(), kLeastInFlight);
+  if (next_ && next_->what == Watch::gap && !next_->was_near) {
+    double rate = 0;
+    model_.set(phase_->start() + next_->time, next_->y.data(),
+               next_->y.data() + motion_.coordinates());
+    model_.gap(next_->contact, rate);
+    tolerance = std::min(tolerance, graze_tolerance(options_.tolerance, std::abs(rate)));
+  }
+  if (!(tolerance < 0.5 * phase_->tolerance())) return false;
+  motion_.choose(event_time_, y_, modes_);
+  start_phase(tolerance);
+  return true;
 }
 
 // No event lies in between, and no more steps than a phase has: what says otherwise never was a

@@ -94,7 +94,8 @@ class Driver {
   void begin_phase();
   std::string contradiction() const;
   void settle_velocities();
-  void start_phase();
+  void start_phase(double most = 1);  // tolerance of IDA
+  bool take_again();
   void handle(const Zero& zero);
   void anchor();
   void check_pace(double t) const;

@@ -26,6 +26,13 @@ inline double flight_tolerance(double tolerance, double speed) {
   return std::min(local, std::max(kLeastInFlight, wanted * std::min(1.0, speed)));
 }
 
+// To an impact with this speed that does not end a bounce. Errors of gaps are those of its time,
+// over the speed; what the phase before has left is a part of the tolerance.
+inline double graze_tolerance(double tolerance, double speed) {
+  constexpr double kSlow = 0.02;
+  return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, speed / kSlow));
+}
+
 // Of a slip that begins at rest with this acceleration. Where rounding is near it gains nothing.
 inline double turn_tolerance(double tolerance, double acceleration) {
   const double wanted = wanted_tolerance(tolerance);

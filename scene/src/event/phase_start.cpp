@@ -70,14 +70,14 @@ void Driver::settle_velocities() {
 
 // Everything from (event_time_, y_), the modes and the energy that is kept: whoever has these goes
 // on with the same bits.
-void Driver::start_phase() {
+void Driver::start_phase(double most) {
   modes_ = motion_.modes();
   rows_are_weak_ = false;
   model_.begin_anew(event_time_);
   motion_.choose(event_time_, y_, modes_);
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
   std::vector<bool> leaving(at(model_.contacts()), false);
-  double local = local_;
+  double local = std::min(local_, most);
   for (int i = 0; i < model_.contacts(); ++i) {
     if (model_.is_apart(i, bands().gap(i))) continue;
     double rate = 0;

@@ -254,6 +254,7 @@ double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
 Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
              double longest_first, double length)
     : motion_(motion),
+      tolerance_(tolerance),
       start_(t),
       length_(length),
       ida_(std::make_unique<Ida>(motion, tolerance, max_step, t, y, longest_first)) {

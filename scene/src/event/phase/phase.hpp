@@ -35,8 +35,9 @@ class Phase {
 
   /// One step of IDA; throws SimulationError.
   void step();
-  double start() const { return start_; }       ///< s
-  double step_begin() const { return begin_; }  ///< since the start, s
+  double tolerance() const { return tolerance_; }  ///< of IDA
+  double start() const { return start_; }          ///< s
+  double step_begin() const { return begin_; }     ///< since the start, s
   double step_end() const { return end_; }
   bool is_at_end() const { return end_ >= length_; }  ///< of its length
   /// y at a time of the last step, since the start: interpolated.
@@ -50,7 +51,7 @@ class Phase {
  private:
   struct Ida;
   Motion& motion_;
-  double start_, begin_ = 0, end_ = 0, length_;
+  double tolerance_, start_, begin_ = 0, end_ = 0, length_;
   std::unique_ptr<Ida> ida_;
 };
 

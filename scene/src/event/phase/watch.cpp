@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tether::scene::event {
 
@@ -18,6 +19,8 @@ constexpr double kFewOfBand = 0.02;
 constexpr double kPassing = 0.25;  // of both bodies, from which on a step is looked at in parts
 constexpr int kParts = 32;
 constexpr double kFasterWithin = 2;  // a step, than at its ends
+constexpr double kKnown = 5;         // errors of gaps, in the tolerance of the phase
+constexpr double kUnseen = 5;        // of the band of approach: impacts that may be missed
 // Of accelerations, by the contact library's tolerance and by what stands for a large slip.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
@@ -72,7 +75,8 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   functions_.clear();
   force_ = 0;
   const auto add = [&](Watch what, int contact, int closed, bool leaves) {
-    functions_.push_back({what, contact, closed, false, leaves, false, false, 0, 0, 0, 0, 0, 0, 0});
+    functions_.push_back(
+        {what, contact, closed, false, leaves, false, false, false, 0, 0, 0, 0, 0, 0, 0});
   };
   const std::vector<int>& closed = motion_.closed();
   for (int i = 0; i < motion_.model().contacts(); ++i)
@@ -98,6 +102,7 @@ void Watcher::arm(Function& f) {
   f.dormant = f.far || (gap && f.value < -bands().gap(f.contact));
   f.armed = false;
   if (f.far) return;
+  f.was_near = gap && std::abs(f.value) <= bands().gap(f.contact);
   if (gap && f.value < 0 && !f.dormant) {
     f.level = f.value;
     f.value = 0;
@@ -322,9 +327,23 @@ bool Watcher::is_hit(Phase& phase, const Function& f) {
   const bool from_zero = !f.armed || (f.leaving && f.value > -bands().gap(f.contact));
   if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
   if (hit || !may_dip(f)) return hit;
+  return dips(phase, f);
+}
+
+// Else it only touches. An impact that is not seen at a depth of d changes velocities by
+// 2 (2 a d)^1/2: how exactly gaps are known decides, not the tolerance.
+bool Watcher::dips(Phase& phase, const Function& f) {
   double when = 0;
-  const double least = f.what == Watch::gap ? bands().gap(f.contact) : band(f);
-  return turn(phase, f, when) < -least;  // else it only touches
+  const double least = turn(phase, f, when);
+  if (f.what != Watch::gap) return least < -band(f);
+  const double part = bands().gap(f.contact) / bands().part;
+  const double known = kKnown * part * phase.tolerance();
+  if (least < -known || least > known) return least < 0;
+  const double turns = (f.slope - f.slope_before) / (end_ - begin_);
+  const double tells = 0.5 * std::pow(kUnseen * bands().approach(f.contact), 2) / turns;
+  const double tolerance = tells / (kKnown * part);
+  if (tolerance < doubt_.tolerance) doubt_ = {when, tolerance};
+  return false;
 }
 
 // Of bodies that come by each other's whole size in a step, as on a long flight, the ends do not
@@ -363,6 +382,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
   wake(phase, at_end, by);
   evaluate(phase.start() + phase.step_end(), at_end, by);
   std::optional<Zero> first;
+  doubt_ = {0, std::numeric_limits<double>::infinity()};
   for (Function& f : functions_) {
     if (!f.far && f.value == kNowhere) {
       f.dormant = true;
@@ -377,6 +397,7 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     }
     Zero zero = locate(phase, part);
     if (f.what == Watch::support) zero.lag = lag(phase, f, zero.time);
+    zero.was_near = f.was_near;
     if (f.what == Watch::gap &&
         motion_.passes_border(phase.start() + zero.time, zero.y, f.contact)) {
       f.dormant = true;
@@ -385,6 +406,8 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     }
     if (!first || zero.time < first->time) first = std::move(zero);
   }
+  if (first && first->time < doubt_.time)
+    doubt_.tolerance = std::numeric_limits<double>::infinity();
   if (!first)
     for (Function& f : functions_) {
       if (f.far) continue;

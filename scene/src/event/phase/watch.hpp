@@ -25,9 +25,10 @@ enum class Watch : unsigned char { gap, normal_force, cone, slip, border, suppor
 struct Zero {
   Watch what = Watch::gap;
   int contact = -1;
-  double time = 0;  ///< since the start of the phase
-  VectorXd y;       ///< there, on the constraints
-  double lag = 0;   ///< how much earlier the function was zero that is told by its band only, s
+  double time = 0;        ///< since the start of the phase
+  VectorXd y;             ///< there, on the constraints
+  bool was_near = false;  ///< a gap within its band when the phase began, as between two bounces
+  double lag = 0;  ///< how much earlier the function was zero that is told by its band only, s
 };
 
 class Watcher {
@@ -38,6 +39,9 @@ class Watcher {
   void begin(double t, const VectorXd& y, const std::vector<bool>& leaving);
   /// The first event in the last step of the phase.
   std::optional<Zero> look(Phase& phase);
+  /// The tolerance of a phase that would tell whether gaps that turned in the last step, before its
+  /// event, were zero there; infinite where this one does.
+  double telling_tolerance() const { return doubt_.tolerance; }
 
  private:
   struct Function {
@@ -46,6 +50,7 @@ class Watcher {
     bool armed, leaving;
     bool dormant;  // a gap that is negative beside its feature: no contact
     bool far;      // a gap of bodies that are apart: not looked at
+    bool was_near;
     double value, before;
     double slope, slope_before;    // of a gap, m/s, or of a slip, m/s^2
     double level;                  // from which a gap or a border counts, m
@@ -66,6 +71,7 @@ class Watcher {
   bool is_hit_between(Phase& phase, Function& f);
   Zero locate(Phase& phase, const Function& f);
   bool may_dip(const Function& f) const;
+  bool dips(Phase& phase, const Function& f);
   double turn(Phase& phase, const Function& f, double& when);
 
   const Bands& bands() const { return motion_.bands(); }
@@ -77,6 +83,9 @@ class Watcher {
   std::vector<std::size_t> waking_;
   double force_ = 0;         // the largest so far
   double support_band_ = 0;  // of accelerations
+  struct {
+    double time, tolerance;
+  } doubt_ = {};
 };
 
 }  // namespace tether::scene::event
