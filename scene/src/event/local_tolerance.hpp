@@ -29,7 +29,7 @@ inline double flight_tolerance(double tolerance, double speed) {
 // To an impact with this speed that does not end a bounce. Errors of gaps are those of its time,
 // over the speed; what the phase before has left is a part of the tolerance.
 inline double graze_tolerance(double tolerance, double speed) {
-  constexpr double kSlow = 0.02;
+  constexpr double kSlow = 0.04;
   return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, speed / kSlow));
 }
 
