@@ -186,3 +186,10 @@ TEST_CASE("scene: the shipped woodpecker comes down in steps as it does in event
   CHECK(std::abs(engine->bodies()[2].position.z() + 0.0342250844) < within);
   CHECK(engine->counts().unsolved == 0);
 }
+
+TEST_CASE("scene: the shipped woodpecker comes down in events") {
+  // Rows of three bodies in quaternions, which are others in every phase.
+  const auto engine = make_engine(read_scene(TETHER_SHIPPED_SCENES "/woodpecker.toml"));
+  engine->advance(0.15);
+  CHECK(std::abs(engine->bodies()[2].position.z() + 0.0192001972) < 1e-8);
+}

@@ -6,6 +6,7 @@
 
 #include "attach/impl.hpp"
 #include "fast/quicken.hpp"
+#include "start/forces.hpp"
 
 namespace tether::ida_projection {
 
@@ -122,7 +123,14 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   movers_.joined.join(candidate, cj);
   movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;
-  const Status structured = movers_.used->set_algebraic(candidate, movers_.joined.moved_id());
+  const N_Vector moved = movers_.joined.moved_id();
+  const Status structured = movers_.used->set_algebraic(candidate, moved);
+  if (structured == Status::success && moved == nullptr) {
+    movers_.used->split_forces([&](const RowChain& chain) {
+      return are_forces(chain, candidate, corrector_, cj, statistics_);
+    });
+    if (corrector_.stopped()) return Status::callback_fatal;
+  }
   run_.engaged = structured == Status::success;  // else the next attempt looks again
   return structured;
 }

@@ -26,8 +26,26 @@ struct KindsOfUnknowns {
     held.assign(static_cast<std::size_t>(n), 0);
     for (std::size_t j = 0; j < hold.size(); ++j) held[j] = hold[j] ? 1 : 0;
     id_.assign(id, id != nullptr ? id + n : id);
+    by_level_ = false;
     without.assign(static_cast<std::size_t>(rows), 0);
   }
+  /// Where none is algebraic: unknowns from this level on are taken for such, whatever their part
+  /// in a row. False: there are none.
+  bool begin_by_level(const std::vector<int>& levels, int first) {
+    id_.assign(levels.size(), 1.0);
+    for (std::size_t j = 0; j < levels.size(); ++j)
+      if (levels[j] >= first) {
+        id_[j] = 0.0;
+        by_level_ = true;
+      }
+    if (!by_level_) id_.clear();
+    return by_level_;
+  }
+  void end_by_level() {
+    id_.clear();
+    by_level_ = false;
+  }
+  bool by_level() const { return by_level_; }
   bool any_algebraic() const { return !id_.empty(); }
   bool algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
   /// Looks at the mixed rows with part(row, squares): the squares of their algebraic and of their
@@ -48,6 +66,7 @@ struct KindsOfUnknowns {
 
  private:
   std::vector<double> id_;  // empty: none algebraic
+  bool by_level_ = false;
 };
 
 }  // namespace tether::ida_projection

@@ -103,6 +103,29 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
   return Status::success;
 }
 
+RowPattern RowBlocks::pattern() const {
+  RowPattern rows;
+  rows.n = n_;
+  for (int i = 0; i < m_; ++i) {
+    for (int j = 0; j < n_; ++j)
+      if (fills(i, j)) rows.columns.push_back(j);
+    rows.starts.push_back(static_cast<int>(rows.columns.size()));
+  }
+  return rows;
+}
+
+bool RowBlocks::split_by_level(const std::vector<int>& levels, int first) {
+  if (!kinds_.begin_by_level(levels, first)) return false;
+  rearrange();
+  if (a.rows.size() != a.columns.size()) join_levels();
+  return split_levels();
+}
+
+void RowBlocks::join_levels() {
+  kinds_.end_by_level();
+  rearrange();
+}
+
 void RowBlocks::rearrange() {
   const auto n = static_cast<std::size_t>(n_);
   outgrown_ = false;
@@ -171,7 +194,7 @@ void RowBlocks::watch() {
     });
   for (int i : a.rows) row_watches(i, [&](int j) { return !used[static_cast<std::size_t>(j)]; });
   kinds_.mixed.clear();
-  for (int i = 0; split && i < m_; ++i)
+  for (int i = 0; split && !kinds_.by_level() && i < m_; ++i)
     for (int j : columns_)
       if (fills(i, j) && kinds_.algebraic(j)) {
         kinds_.mixed.push_back(i);

@@ -14,6 +14,7 @@
 #include "constraints/evaluator.hpp"
 #include "rows/kinds_of_unknowns.hpp"
 #include "rows/rounding.hpp"
+#include "rows/row_chain.hpp"
 #include "rows/row_trust.hpp"
 
 namespace tether::ida_projection {
@@ -218,6 +219,14 @@ class RowBlocks {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
+  /// After structure(): which entries of C can differ from zero.
+  RowPattern pattern() const;
+  /// Where none is algebraic, unknowns of level `first` and above (row_levels.hpp) take the place
+  /// of algebraic ones. False: nothing has changed, they are not as many as their rows.
+  bool split_by_level(const std::vector<int>& levels, int first);
+  /// Back to one block.
+  void join_levels();
+  bool split_levels() const { return kinds_.by_level(); }
   /// Do rows contain variables of both kinds?
   bool mixed() const { return !kinds_.mixed.empty(); }
 

@@ -92,6 +92,32 @@ Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<d
   return Status::success;
 }
 
+RowPattern SparseRows::pattern() const {
+  RowPattern rows;
+  rows.n = n_;
+  for (int i = 0; i < m_; ++i) {
+    const StoredRows::Row& row = C_.rows[at(i)];
+    for (int e = row.begin; e < row.end; ++e)
+      if (C_.entry_fills[at(e)]) rows.columns.push_back(C_.columns[at(e)]);
+    for (int j = 0; row.full >= 0 && j < n_; ++j)
+      if (C_.fills(row, j)) rows.columns.push_back(j);
+    rows.starts.push_back(static_cast<int>(rows.columns.size()));
+  }
+  return rows;
+}
+
+bool SparseRows::split_by_level(const std::vector<int>& levels, int first) {
+  if (!kinds_.begin_by_level(levels, first)) return false;
+  rearrange();
+  if (a.rows.size() != a.columns.size()) join_levels();
+  return split_levels();
+}
+
+void SparseRows::join_levels() {
+  kinds_.end_by_level();
+  rearrange();
+}
+
 void SparseRows::rearrange() {
   outgrown_ = false;
   split();
@@ -162,7 +188,7 @@ void SparseRows::watch() {
       if (!C_.fills(row, j) && matters(j)) watched_full_.push_back(C_.place(row.full, j));
   }
   kinds_.mixed.clear();
-  for (int i = 0; split && kinds_.any_algebraic() && i < m_; ++i) {
+  for (int i = 0; split && kinds_.any_algebraic() && !kinds_.by_level() && i < m_; ++i) {
     bool mixed = false;
     int entry = C_.rows[at(i)].begin;
     C_.visit(i, [&](int j, double) {

@@ -67,6 +67,10 @@ class SparseRows {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
+  RowPattern pattern() const;
+  bool split_by_level(const std::vector<int>& levels, int first);
+  void join_levels();
+  bool split_levels() const { return kinds_.by_level(); }
   bool mixed() const { return !kinds_.mixed.empty(); }
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
                   double* g = nullptr);

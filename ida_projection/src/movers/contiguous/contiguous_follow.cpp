@@ -13,7 +13,7 @@ Move ContiguousMover<Rows>::follow(const Candidate& candidate, bool again) {
     rows_.factors.decided = false;
     misdirection_.look(candidate.t);
   }
-  const auto allows = [&] { return again || misdirection_.allows(in_metric(rows_.counted().dy)); };
+  const auto allows = [&] { return again || misdirection_.allows(in_metric(nullptr)); };
   return move_with_old_factors(
       wear_, [&] { return rows_.value(candidate.t); }, [&] { return rows_.solve(); },
       [&] { rows_.apply(1.0, candidate.correction_entries); }, [&] { return rows_.drift(); },
@@ -52,13 +52,19 @@ bool ContiguousMover<Rows>::solve_at(const Candidate& candidate, double* dy) {
   return known;
 }
 
-// rms of dy_i / D_i, dy over the columns that count.
+// rms of dy_i / D_i over the columns that count, dy the present move less `other`, null or a move.
 template <class Rows>
-double ContiguousMover<Rows>::in_metric(const std::vector<double>& dy) {
-  const double* D = rows_.counted().D();
+double ContiguousMover<Rows>::in_metric(const std::vector<double>* other) {
   double sum = 0.0;
-  for (std::size_t k = 0; k < dy.size(); ++k)
-    if (D[k] > 0.0) sum += (dy[k] / D[k]) * (dy[k] / D[k]);
+  std::size_t before = 0;
+  rows_.visit_counted([&](auto& block) {
+    const double* D = block.D();
+    for (std::size_t k = 0; k < block.dy.size(); ++k) {
+      const double dy = block.dy[k] - (other != nullptr ? (*other)[before + k] : 0.0);
+      if (D[k] > 0.0) sum += (dy / D[k]) * (dy / D[k]);
+    }
+    before += block.dy.size();
+  });
   return rows_.wrms(sum);
 }
 
@@ -69,17 +75,17 @@ void ContiguousMover<Rows>::keep_old_move(double t) {
   misdirection_.look(t);
   if (reused_ || !rows_.factors.there || rows_.factors.thin) return;
   rows_.look();
-  old_move_ = rows_.counted().dy;
+  rows_.visit_counted([this](const auto& block) {
+    old_move_.insert(old_move_.end(), block.dy.begin(), block.dy.end());
+  });
 }
 
 // After the first solve() with the factors of this candidate.
 template <class Rows>
 void ContiguousMover<Rows>::compare_with_old_move() {
-  const std::vector<double>& dy = rows_.counted().dy;
-  if (old_move_.size() == dy.size()) {
-    for (std::size_t k = 0; k < dy.size(); ++k) old_move_[k] -= dy[k];
-    misdirection_.measured(in_metric(old_move_), in_metric(dy));
-  }
+  std::size_t size = 0;
+  rows_.visit_counted([&size](const auto& block) { size += block.dy.size(); });
+  if (old_move_.size() == size) misdirection_.measured(in_metric(&old_move_), in_metric(nullptr));
   old_move_.clear();
 }
 
@@ -91,8 +97,8 @@ template bool ContiguousMover<SparseRows>::solve_with_factors(const std::vector<
                                                               std::vector<double>&);
 template bool ContiguousMover<RowBlocks>::solve_at(const Candidate&, double*);
 template bool ContiguousMover<SparseRows>::solve_at(const Candidate&, double*);
-template double ContiguousMover<RowBlocks>::in_metric(const std::vector<double>&);
-template double ContiguousMover<SparseRows>::in_metric(const std::vector<double>&);
+template double ContiguousMover<RowBlocks>::in_metric(const std::vector<double>*);
+template double ContiguousMover<SparseRows>::in_metric(const std::vector<double>*);
 template void ContiguousMover<RowBlocks>::keep_old_move(double);
 template void ContiguousMover<SparseRows>::keep_old_move(double);
 template void ContiguousMover<RowBlocks>::compare_with_old_move();

@@ -28,6 +28,18 @@ Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector
   return rows_.structure(candidate, mask);
 }
 
+// Close to a point where they depend on each other rows of forces magnify what the others leave:
+// there all unknowns are to share it, for some time.
+template <class Rows>
+void ContiguousMover<Rows>::doubt_levels(Status status) {
+  const bool failed = status == Status::not_converged || status == Status::move_too_long ||
+                      status == Status::inconsistent;
+  if (!failed || !rows_.levels_split()) return;
+  rows_.join_levels();
+  levels_joined_ = levels_joined_next_;
+  levels_joined_next_ = std::min(2 * levels_joined_next_, 1 << 20);
+}
+
 template <class Rows>
 bool ContiguousMover<Rows>::must_learn(double length) const {
   if constexpr (Rows::kThinRows)
@@ -94,10 +106,14 @@ template <class Rows>
 bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
   if (length <= options_.largest_move) return false;
   double sum = 0.0;
-  for (int j : rows_.blocks.d.columns) {
-    const double change = rows_.at.ycor[j] * rows_.at.w[j];
-    sum += change * change;
-  }
+  const auto add = [&](const auto& block) {
+    block.for_columns([&](int, int j) {
+      const double change = rows_.at.ycor[j] * rows_.at.w[j];
+      sum += change * change;
+    });
+  };
+  add(rows_.blocks.d);
+  if (rows_.levels_split()) add(rows_.blocks.a);
   limit = options_.largest_move * std::max(1.0, rows_.wrms(sum));
   return !(length <= limit);
 }
@@ -122,6 +138,7 @@ template <class Rows>
 Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
   rows_.at.load(candidate);
+  if (levels_joined_ > 0 && --levels_joined_ == 0) rows_.split_levels();
   still_ = false;
   if (still_nothing(candidate, result)) return result;
   reused_ = keeps_factors() && rows_.factors.there;
@@ -143,6 +160,7 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   if (rows_.blocks.dropped_rows() && result.status == Status::success && !result.capped &&
       !reused_ && contradicts())
     result.status = Status::inconsistent;
+  doubt_levels(result.status);
   return result;
 }
 

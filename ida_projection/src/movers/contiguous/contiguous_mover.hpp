@@ -18,6 +18,7 @@ constexpr double kLargestFloor = 0.1;  // tolerances
 constexpr double kUnknownSlope = 0.03;
 constexpr double kLong = 1.0;      // tolerances: such a move is made with fresh factors
 constexpr double kNothing = 1e-8;  // tolerances: as good as no move
+constexpr int kLevelsJoined = 16;  // moves, after one that has failed
 
 /// Factors of an earlier step leave the part slope * age of a move, age in candidates.
 struct SlopeOfFactors {
@@ -54,7 +55,11 @@ class ContiguousMover final : public Mover {
   double left_of_dropped(const std::vector<double>& WT) override {
     return rows_.blocks.dropped_rows() ? rows_.blocks.left_of_dropped(WT) : 0.0;
   }
-  void rows_changed() override { rows_.factors.foreign = true; }
+  void rows_changed() override {
+    rows_.factors.foreign = true;
+    rows_.forget_forces();
+  }
+  void split_forces(const AreForces& are_forces) override { rows_.split_forces(are_forces); }
   bool solve_with_factors(const std::vector<double>& g, std::vector<double>& dy) override;
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
   Status settle(const Candidate& candidate, N_Vector change) override;
@@ -100,9 +105,12 @@ class ContiguousMover final : public Mover {
     misdirection_ = Misdirection();
     nothing_in_row_ = 0;
     still_ = looked_at_all_ = false;
+    levels_joined_ = 0;
+    levels_joined_next_ = kLevelsJoined;
   }
 
  private:
+  void doubt_levels(Status status);
   bool keeps_factors() const { return keeps_factors_ && rows_.factors.lasting; }
   Status take_back(const Candidate& candidate);
   Status take_rest(const Candidate& candidate, double reach);
@@ -121,7 +129,7 @@ class ContiguousMover final : public Mover {
   bool plainly_nothing();
   bool still_nothing(const Candidate& candidate, Move& result);
   bool must_learn(double length) const;
-  double in_metric(const std::vector<double>& dy);
+  double in_metric(const std::vector<double>* other);
   void keep_old_move(double t);
   void compare_with_old_move();
   void restart(const Candidate& candidate);
@@ -133,6 +141,8 @@ class ContiguousMover final : public Mover {
   const Options& options_;
   Monitor monitor_;
   FactoredRows<Rows> rows_;
+  int levels_joined_ = 0;  // for so many moves
+  int levels_joined_next_ = kLevelsJoined;
   bool keeps_factors_;         // over several steps
   bool takes_rest_;            // what Newton's method leaves
   bool firm_only_ = false;     // this attempt does without thin rows

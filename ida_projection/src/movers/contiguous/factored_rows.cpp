@@ -12,8 +12,9 @@ namespace {
 
 constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
 constexpr int kLevelLooks = 16;
-constexpr int kEarly = 64;       // factorisations, of a start
-constexpr double kAlike = 0.05;  // of a sum of squares
+constexpr int kLeastOfForces = 2;  // rates of rates
+constexpr int kEarly = 64;         // factorisations, of a start
+constexpr double kAlike = 0.05;    // of a sum of squares
 
 }  // namespace
 
@@ -67,6 +68,36 @@ bool FactoredRows<Rows>::has_third_level() {
 }
 
 template <class Rows>
+void FactoredRows<Rows>::split_forces(const AreForces& are_forces) {
+  forget_forces();
+  if (count() <= kFewForLevels) return;
+  const RowPattern pattern = blocks.pattern();
+  const std::vector<int> levels = levels_of_columns(pattern.starts, pattern.columns, pattern.n);
+  const int highest = *std::max_element(levels.begin(), levels.end());
+  RowChain chain;
+  for (int first = kLeastOfForces; first <= highest && levels_with_forces_.empty(); ++first) {
+    if (!find_chain(pattern, levels, first, &chain) || !are_forces(chain)) continue;
+    levels_with_forces_ = levels;
+    level_of_forces_ = first;
+  }
+  split_levels();
+}
+
+template <class Rows>
+void FactoredRows<Rows>::split_levels() {
+  if (levels_with_forces_.empty() || !blocks.split_by_level(levels_with_forces_, level_of_forces_))
+    return;
+  factors.there = factors.lasting = false;
+  third_level_ = true;
+}
+
+template <class Rows>
+void FactoredRows<Rows>::join_levels() {
+  blocks.join_levels();
+  factors.there = factors.lasting = false;
+}
+
+template <class Rows>
 void FactoredRows<Rows>::look_for_rates() {
   const bool wanted = options_.metric == Metric::local_correction && at.knows_rates();
   const bool early = factored_ <= kEarly && rate_looks_ < kLevelLooks;
@@ -110,6 +141,7 @@ Status FactoredRows<Rows>::rows(double t, double* g) {
   Status status = blocks.evaluate(evaluator, t, at.y.data(), WT, g);
   if (status == Status::success && blocks.outgrown()) {
     blocks.rearrange();
+    if (levels_split() && blocks.a.rows.size() != blocks.a.columns.size()) blocks.join_levels();
     factors.there = factors.lasting = false;
     set_metric(true);
     status = blocks.evaluate(evaluator, t, at.y.data(), WT);
@@ -187,6 +219,11 @@ bool FactoredRows<Rows>::decide() {
   factors.partial = false;
   if (count() > kFewForLevels) look_for_rates();
   if (!blocks.factor()) return false;
+  if (levels_split() && blocks.a.solver.dropped() > 0) {
+    join_levels();
+    set_metric(true);
+    if (!blocks.factor()) return false;
+  }
   if (blocks.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kThinRows) factors.thin = RowTrust::has_thin_rows(blocks.counted().solver);
   factors.lasting = !factors.thin;

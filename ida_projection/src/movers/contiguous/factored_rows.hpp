@@ -69,6 +69,13 @@ class FactoredRows {
   bool find_levels();
   /// Are there unknowns of level 2? Looked for until some are found, 16 times.
   bool has_third_level();
+  /// No variable being algebraic: where rows are many, those with forces, if `are_forces` says that
+  /// there are some, are solved for these alone from now on.
+  void split_forces(const AreForces& are_forces);
+  /// The same as it was split before join_levels().
+  void split_levels();
+  bool levels_split() const { return blocks.split_levels(); }
+  void join_levels();
   /// At the candidate, whose variables are algebraic where `id` is 0.
   Status structure(const Candidate& candidate, const double* id);
   /// g at the present y.
@@ -83,8 +90,14 @@ class FactoredRows {
   /// C at the present y, and its factors.
   Status factor(double t);
   /// The move for g by the factors at hand; returns its WRMS length in the error norm. Algebraic
-  /// columns do not count there: they follow the others.
+  /// columns do not count there: they follow the others, and out of the error test.
   double solve();
+  /// f(block) for the blocks whose move is measured in tolerances.
+  template <class Visit>
+  void visit_counted(Visit f) {
+    f(counted());
+    if (levels_split()) f(blocks.a);
+  }
   /// The rows whose move is measured in tolerances.
   typename Rows::Block& counted() { return blocks.d.rows.empty() ? blocks.a : blocks.d; }
   /// The same where no move follows.
@@ -120,6 +133,11 @@ class FactoredRows {
     factored_ = rate_looks_ = third_level_looks_ = 0;
     third_level_ = false;
     found_levels_.clear();
+    forget_forces();
+  }
+  void forget_forces() {
+    if (levels_split()) join_levels();
+    levels_with_forces_.clear();
   }
 
  private:
@@ -153,6 +171,8 @@ class FactoredRows {
   int factored_ = 0, rate_looks_ = 0, third_level_looks_ = 0;
   bool third_level_ = false;
   std::vector<int> found_levels_;
+  std::vector<int> levels_with_forces_;  // empty: no forces are known
+  int level_of_forces_ = 0;
   double usual_ = 0.0;    // left_of_dropped() after the moves, with factors.decided
   bool weighed_ = false;  // the blocks know what a tolerance is for their dropped rows
   double most_d_ = -1.0, most_a_ = -1.0;  // of D in tolerances, of the blocks; < 0: not known
@@ -163,10 +183,12 @@ double FactoredRows<Rows>::solve() {
   ++statistics_.iterations;
   blocks.solve(g_);
   double sum = 0.0;
-  const double* dy = counted().dy.data();
-  counted().for_columns([&sum, dy, w = at.w](int k, int i) {
-    const double move = dy[k] * w[i];
-    sum += move * move;
+  visit_counted([&](const Block& block) {
+    const double* dy = block.dy.data();
+    block.for_columns([&sum, dy, w = at.w](int k, int i) {
+      const double move = dy[k] * w[i];
+      sum += move * move;
+    });
   });
   return wrms(sum);
 }
