@@ -67,6 +67,27 @@ TEST_CASE("event: a mass on a spring with friction turns at multiples of pi and 
   }
 }
 
+TEST_CASE("event: a swing that friction has left little of ends in time") {
+  // omega = 1/2: m = 4, k = 1; six turns, the last swing by 0.03. Once 12 tolerances at 1e-10.
+  const double F = 0.107, start = 1.2;
+  const std::string heavy =
+      "[[body]]\nname = \"mass\"\nshape = \"points\"\npoints = [[0, 0, 0]]\n"
+      "mass = 4\ninertia = [1, 1, 1]\nposition = [" +
+      number(start) +
+      ", 0, 0]\nmaterial = \"body\"\n[[spring]]\nbodies = [\"mass\", \"world\"]\nat = [[" +
+      number(start) + ", 0, 0], [-20, 0, 0]]\nstiffness = 1\nrest = 20\n";
+  for (const double tolerance : {1e-8, 1e-9, 3e-10, 1e-10}) {
+    CAPTURE(tolerance);
+    const auto engine = run(kFloor + heavy + mu(F / 4), tolerance, 12 * M_PI + 1, kUnitGravity);
+    const auto stops = of_kind(*engine, Kind::stop);
+    REQUIRE(stops.size() == 6);
+    for (std::size_t k = 0; k < 6; ++k)
+      CHECK(std::abs(stops[k].time - static_cast<double>(k + 1) * 2 * M_PI) < 5 * tolerance);
+    CHECK(std::abs(engine->bodies()[1].position.x() - (start - 12 * F)) < 5 * tolerance);
+    CHECK(engine->counts().residual_evaluations < 12000);
+  }
+}
+
 TEST_CASE("event: a mass on a belt slips once, then touches the belt's speed without sticking") {
   const std::string text =
       belt(1) + point_mass("[0, 0, 0]", "[1, 0, 0]") + spring(0, "world", -10) + mu(0.3);

@@ -33,11 +33,9 @@ inline double graze_tolerance(double tolerance, double speed) {
   return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, speed / kSlow));
 }
 
-// Of a slip that begins at rest with this acceleration. Where rounding is near it gains nothing.
+// Of a slip that begins at rest with this acceleration.
 inline double turn_tolerance(double tolerance, double acceleration) {
-  const double wanted = wanted_tolerance(tolerance);
-  if (wanted < kTight) return local_tolerance(tolerance);
-  return std::max(kLeastLocal, wanted * std::min(1.0, acceleration));
+  return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, acceleration));
 }
 
 }  // namespace tether::scene::event
