@@ -13,7 +13,8 @@ namespace tether::ida_projection {
 namespace {
 
 // Multipliers of index 2: see README, section 9.
-constexpr double kAsideFromTest = 1.5, kProportional = 1e-4, kMostCare = 5.0, kManyFree = 0.4;
+constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
+                 kManyFree = 0.4;
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
@@ -55,14 +56,17 @@ Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
 // By how much more than smoothing_setpoint errors are kept below the tolerance. Those at the end
 // follow (tolerance / s)^(k/(k+1)), k the order; s that grows by its (-1/k)-th power, k = 5, makes
 // them follow the tolerance. Rows that leave few directions free take most of the errors with them.
-double Projection::Impl::care_of_high_index(const Candidate& candidate) const {
+// At loose tolerances runs are short, and most of their steps of low orders: there half of it is
+// left.
+Care Projection::Impl::care_of_high_index(const Candidate& candidate) const {
   const N_Vector id = variables_.id();
-  if (variables_.undetermined().empty()) return kAsideFromTest;
+  const Care usual{kAsideFromTest, kAsideFromTest};
+  if (variables_.undetermined().empty()) return usual;
   const double differential = N_VDotProd(id, id);
-  if (constraints_.total_count() > (1.0 - kManyFree) * differential) return kAsideFromTest;
+  if (constraints_.total_count() > (1.0 - kManyFree) * differential) return usual;
   const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
-  const double tighter = std::pow(kProportional * unknowns, 0.2);
-  return kAsideFromTest * std::clamp(tighter, 1.0, kMostCare);
+  const double tighter = std::clamp(std::pow(kProportional * unknowns, 0.2), 1.0, kMostCare);
+  return {kAsideFromTest * tighter, kAtLowOrders * tighter * tighter};
 }
 
 // Those of IDA's vectors that pass through here, and the plugin's own; the caller's are left alone.

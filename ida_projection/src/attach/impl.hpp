@@ -114,7 +114,7 @@ class Projection::Impl {
   bool rows_of_field() const;
   void derive_id(const Candidate& candidate);
   Status engage_if_index_is_high(const Candidate& candidate);
-  double care_of_high_index(const Candidate& candidate) const;
+  Care care_of_high_index(const Candidate& candidate) const;
   void quicken_vectors(const Candidate& candidate);
   int look_before_moving(const Candidate& candidate, bool& done);
   Status engage(const Candidate& candidate);

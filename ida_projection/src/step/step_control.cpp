@@ -90,7 +90,7 @@ void StepControl::look_for_refusals(bool engaged) {
   const long failures = ida_.error_test_failures();
   refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;
   last_error_failures_ = failures;
-  if (engaged && refused_in_row_ >= kTrapped) begin_smoothing(1.0);
+  if (engaged && refused_in_row_ >= kTrapped) begin_smoothing(Care());
 }
 
 bool StepControl::struggling() const {
@@ -105,7 +105,7 @@ bool StepControl::in_trouble(long steps) const {
   return statistics_.corrector_failures > 0 || (failures > 1 && kOftenRefused * failures > steps);
 }
 
-void StepControl::begin_smoothing(double care) {
+void StepControl::begin_smoothing(const Care& care) {
   if (smoother_.on() || !options_.smooth_where_needed) return;
   smoother_.begin(care);
   ++statistics_.smoothing_begun;

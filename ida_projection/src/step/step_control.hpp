@@ -34,8 +34,8 @@ class StepControl {
   void corrector_failed();
 
   bool smoothing() const { return smoother_.on(); }
-  /// Errors are steered to a `care`-th of what smoothing asks for.
-  void begin_smoothing(double care);
+  /// Errors are steered to a part of what smoothing asks for.
+  void begin_smoothing(const Care& care);
   /// For each new step.
   void look_for_refusals(bool engaged);
   void expect_oscillations() { order_limit_.expect_oscillations(); }

@@ -20,8 +20,9 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kFilter = 4.0;  // b
-constexpr double kFar = 0.5;     // of the setpoint
+constexpr double kFilter = 4.0;     // b
+constexpr double kFar = 0.5;        // of the setpoint
+constexpr double kOfOrder = 1.348;  // setpoints of neighbouring orders: 6^(1/6)
 
 // IDA's defaults.
 constexpr double kLowestFixed = 1.0, kHighestFixed = 2.0, kLargest = 2.0, kLow = 0.9, kMin = 0.5;
@@ -43,7 +44,8 @@ void StepSmoother::reset() {
   steps_ = -1;
   known_ = block_ = 0;
   block_sum_ = 0.0;
-  ratio_ = care_ = 1.0;
+  ratio_ = 1.0;
+  care_ = Care();
   refused_ = 0.0;
   if (on_ || was_on) set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
 }
@@ -83,6 +85,13 @@ void StepSmoother::attempt_was_accepted() {
     previous_ = log_c_;
     has_previous_ = true;
   }
+}
+
+// s makes steps s^(1/(k+1)) times shorter: 6 at order 5 as much as 2.4 at order 2, at which short
+// runs stay.
+double StepSmoother::setpoint(int order) const {
+  const double graded = care_.most * std::pow(kOfOrder, order - max_order_);
+  return setpoint_ * std::max(graded, std::min(care_.least, care_.most));
 }
 
 double StepSmoother::filter(double log_c, int order) const {
@@ -127,7 +136,7 @@ double StepSmoother::control(long steps, double norm) {
 
   const double error = error_constant(h, order) * norm;
   const bool grows = 2.0 * error + 1e-4 <= 1.0;  // IDA's tmp >= 1
-  const double log_c = -std::log(setpoint_ * care_ * error + 1e-4);
+  const double log_c = -std::log(setpoint(order) * error + 1e-4);
   pending_ = true;
   steps_ = steps;
   h_ = h;

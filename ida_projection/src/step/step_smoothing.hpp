@@ -9,6 +9,12 @@ namespace tether::ida_projection {
 /// Of steps, as a bound of IDASetEtaFixedStepBounds that is never reached: keep h.
 constexpr double kAnyRatio = 1e30;
 
+/// Factors of Options::smoothing_setpoint: at the largest order, and what is left of it at least
+/// below that, see StepSmoother::setpoint().
+struct Care {
+  double most = 1.0, least = 1.0;
+};
+
 /// Soederlind's filter H211b (ACM TOMS 29 (2003) 1-26), p = k + 1, k the order:
 ///
 ///     r_n = (c_n c_{n-1})^(1 / (b p)) rho_{n-1}^(-1/b),   c = 1 / (s err + 1e-4),
@@ -29,8 +35,8 @@ class StepSmoother {
   /// Before the first step: on only if Options::step_smoothing says so.
   void reset();
   /// From here on, in the middle of a run; leaves IDASetMaxStep alone, which the host may have
-  /// used. The setpoint is `care` times Options::smoothing_setpoint.
-  void begin(double care) {
+  /// used. The setpoint is `care.most` times Options::smoothing_setpoint.
+  void begin(const Care& care) {
     on_ = true;
     known_to_ida_ = false;
     care_ = care;
@@ -48,6 +54,7 @@ class StepSmoother {
   static constexpr double kNearRefused = 0.9;  // of a size that was refused: as good as that
 
   void attempt_was_accepted();
+  double setpoint(int order) const;
   double error_constant(double h, int order) const;
   double test_constant(double h, int order) const;
   double filter(double log_c, int order) const;
@@ -66,7 +73,8 @@ class StepSmoother {
   Settings set_;               // IDA has these
   bool known_to_ida_ = false;  // if so
   bool wanted_, on_ = false, owns_max_step_ = false;
-  double setpoint_, care_ = 1.0, max_step_;
+  double setpoint_, max_step_;
+  Care care_;
   int max_order_;
 
   // the attempt that IDA has not yet judged
