@@ -276,6 +276,24 @@ TEST_CASE("sparse rows of whipping chains: every step on the constraints, as den
   }
 }
 
+TEST_CASE("sparse factors that serve several steps: few solutions a step, plain IDA's errors") {
+  for (const auto& [links, t_end] : {std::make_pair(50, 0.5), {110, 0.3}})
+    for (const auto& [tolerance, solutions] : {std::make_pair(1e-4, 4.0), {1e-6, 3.6}}) {
+      INFO(links << " links, tolerance " << tolerance);
+      const Problem problem = link_chain(links, t_end);
+      Host host(problem, tolerance), plain(problem, tolerance);
+      host.attach(*problem.sparse_constraints);
+      REQUIRE(host.finish() >= 0);
+      REQUIRE(plain.finish() >= 0);
+      const tp::Statistics s = host.projection().statistics();
+      CHECK(s.failures() == 0);
+      CHECK(s.largest_drift_after <= 1e-2 * tolerance);
+      CHECK(static_cast<double>(s.iterations) <= solutions * static_cast<double>(s.projections));
+      CHECK(host.steps() <= plain.steps());
+      CHECK(host.error() <= 2.0 * plain.error() + tolerance);
+    }
+}
+
 TEST_CASE("sparse rows of lower rank: the steps and the motion of dense rows") {
   for (const double tolerance : {1e-4, 1e-6, 1e-9}) {
     INFO("tolerance " << tolerance);
@@ -307,7 +325,7 @@ TEST_CASE("id of many unknowns: the right one, by few evaluations of F") {
   const long evaluations = derived.projection().statistics().residual_evaluations -
                            given.projection().statistics().residual_evaluations;
   CHECK(evaluations > 0);
-  CHECK(evaluations <= 100);
+  CHECK(evaluations <= 60);
 }
 
 TEST_CASE("id where equations share derivatives, with equal coefficients of opposite sign") {

@@ -172,6 +172,29 @@ TEST_CASE("one step: symmetric, and the solution of least norm but for eps") {
   CHECK(length(once(c.dense.g) - expected, c.dense.D) <=
         2e-12 / (least * least) * length(expected, c.dense.D));
 }
+TEST_CASE("a loose tolerance: what residual() says is left, with one step where that is enough") {
+  // The last full row is the first one, but for `apart` in a column: both stages of its border are
+  // long and cancel.
+  for (const double apart : {1.0, 1e-3, 1e-5, 1e-8})
+    for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
+      INFO("apart " << apart << ", tolerance " << tolerance);
+      SparseCase c = banded(150, 3, 7);
+      c.dense.C.row(152) = c.dense.C.row(150) + 0.5 * c.dense.C.row(10);
+      c.dense.C(152, 3) += apart;
+      c.dense.g = c.dense.C * c.dense.D.cwiseProduct(Eigen::VectorXd::LinSpaced(229, -1.0, 2.0));
+      SparseMinimumNorm solver = factored(c);
+      Eigen::VectorXd dy(solver.columns());
+      solver.solve(c.dense.g.data(), dy.data(), tolerance);
+      const RowMajor A = c.dense.C * c.dense.D.asDiagonal();
+      const Eigen::VectorXd inverse = A.rowwise().norm().cwiseInverse();
+      const Eigen::VectorXd b = inverse.asDiagonal() * c.dense.g;
+      const Eigen::VectorXd left = b - inverse.asDiagonal() * (c.dense.C * dy);
+      CHECK(left.norm() <= tolerance * b.norm());
+      CHECK(std::abs(solver.residual() * b.norm() - left.norm()) <= 0.02 * tolerance * b.norm());
+      if (apart == 1.0 && tolerance >= 1e-6) CHECK(solver.iterations() == 1);
+    }
+}
+
 TEST_CASE("redundant sparse and full rows: dropped, explained, the rest still solved") {
   SparseCase c = banded(30, 2, 9);
   c.dense.D.setOnes();

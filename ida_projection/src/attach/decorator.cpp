@@ -215,6 +215,9 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
                                        bool fresh) {
   raise_order(candidate, cj);
   polish_.keep(candidate);
+  const bool first = polishes_first() && polish_.add_newton_step(candidate, cj, tolerance);
+  if (first && !fresh && !polish_.corrector_was_right()) return {Status::success};
+  if (first) polish_.keep(candidate);
   Move move = movers_.used->move(candidate);
   if (move.capped) {
     judge_capped(move);
@@ -229,12 +232,21 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
     return move;
   }
   if (made) ++statistics_.stiff_moves;
+  const bool polishes = first ? move.length > polish_.longest_unanswered(control_.smoothing())
+                              : wants_polish(move.length);
   if (made)
     move.status = settle_stiff_move(candidate, cj, tolerance);
   else
-    move.status = wants_polish(move.length) ? polish(candidate, cj, tolerance)
-                                            : movers_.used->finish(candidate);
+    move.status =
+        polishes ? polish(candidate, cj, tolerance) : movers_.used->finish(candidate, first);
   return move;
+}
+
+// What an iteration before the move adds the move then takes back, too: a solution less. Only where
+// nothing answers to moves: it would be left out.
+bool Projection::Impl::polishes_first() {
+  return metric_choice_.calm() && !raised_order_.raised() && wants_polish(0.0) &&
+         movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing()));
 }
 
 Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance) {
@@ -242,7 +254,7 @@ Status Projection::Impl::polish(const Candidate& candidate, double cj, double to
   // failure is to end the run; then the corrector has kept it.
   return polish_.add_newton_step(candidate, cj, tolerance)
              ? movers_.used->settle(candidate, polish_.delta())
-             : movers_.used->finish(candidate);
+             : movers_.used->finish(candidate, false);
 }
 
 // A cap is meant for a start off the constraints, which is approached step by step. A step that

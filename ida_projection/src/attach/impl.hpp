@@ -104,6 +104,7 @@ class Projection::Impl {
   void judge_capped(Move& move);
   void raise_order(const Candidate& candidate, double cj);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
+  bool polishes_first();
   Status polish(const Candidate& candidate, double cj, double tolerance);
   void account(const Move& move, const StepData& step, bool sampled);
   void note(const Move& move, const StepData& step);

@@ -104,8 +104,11 @@ class Mover {
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 
-  /// No settle() follows the last move(): completes it.
-  virtual Status finish(const Candidate&) { return Status::success; }
+  /// May the correction be polished before the next move()? So it is where factors of an earlier
+  /// step will make that move, and the last one was not longer than this, in tolerances.
+  virtual bool may_polish_first(double /*longest*/) const { return false; }
+  /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
+  virtual Status finish(const Candidate&, bool /*polished*/) { return Status::success; }
 
   /// The attempt that used the last candidate was accepted: keep its effect on the metric.
   virtual void accept() {}

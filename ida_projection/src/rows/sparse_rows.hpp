@@ -102,7 +102,7 @@ class SparseRows {
   std::string message;
 
  private:
-  static constexpr double kSolved = 1e-8;  // of g: Newton's next move takes the rest
+  static constexpr double kSolved = 1e-6;  // of g: Newton's next move takes the rest
 
   void solve(const std::vector<double>& g, double solved);
   double in_tolerances(const Block& block, int i, const std::vector<double>& WT) const;

@@ -22,11 +22,26 @@ void AlgebraicVariables::set(N_Vector id) {
   all_ = algebraic == size;
 }
 
+namespace {
+
+// Does nothing answer to a change of all columns that did not?
+bool others_are_silent(const std::vector<char>& filled, const ColumnSearch::Probe& probe) {
+  std::vector<int> others;
+  for (std::size_t j = 0; j < filled.size(); ++j)
+    if (!filled[j]) others.push_back(static_cast<int>(j));
+  std::vector<char> changed(filled.size(), 0);
+  return others.empty() ||
+         (probe(others, changed) && std::count(changed.begin(), changed.end(), 1) == 0);
+}
+
+}  // namespace
+
 // Component j is algebraic if F does not change at all when y'_j does. F is reached through IDA's
 // own residual callback: it evaluates F(t, ypred + ycor, yppred + cj ycor), and ypred can be
 // shifted by -ycor (and put back bit for bit) so that only y' feels ycor. Two changes of different
 // size are made of many y' at once (ColumnSearch); their sizes vary irregularly with j, so that
-// those of one equation do not cancel.
+// those of one equation do not cancel. One size looks for the columns, the other one looks at those
+// that did not answer, all at once.
 std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& corrector,
                                        double cj) {
   if (candidate.base_entries == nullptr) return "vectors without contiguous memory";
@@ -64,10 +79,11 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
     known[k] = residual();
     before[k].assign(values, values + size);
   }
+  bool wanted[kSizes] = {known[0], known[1] && !known[0]};
   const auto probe = [&](const std::vector<int>& columns, std::vector<char>& changed) {
     bool answered = false;
     for (int k = 0; k < kSizes; ++k) {
-      if (!known[k]) continue;  // F refuses this y'; the other size decides
+      if (!wanted[k]) continue;  // F refuses this y', or the other size decides
       std::copy(y[k].begin(), y[k].end(), predicted);
       for (const int i : columns) {
         const auto j = static_cast<std::size_t>(i);
@@ -83,7 +99,19 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
     return answered;
   };
   std::vector<char> filled;
-  const auto outcome = ColumnSearch(size, size, probe, 2L * options_.derive_id_limit).run(&filled);
+  const long most = 4L * options_.derive_id_limit;
+  const auto search = [&](long probes) {
+    return ColumnSearch(size, size, probe, probes).run(&filled);
+  };
+  auto outcome = search(most / 2);
+  if (known[0] && known[1]) {
+    std::swap(wanted[0], wanted[1]);
+    if (outcome == ColumnSearch::Outcome::refused ||
+        (outcome == ColumnSearch::Outcome::found && !others_are_silent(filled, probe))) {
+      wanted[0] = wanted[1] = true;
+      outcome = search(most / 4);
+    }
+  }
   N_VScale(1.0, saved, candidate.base);
   if (outcome == ColumnSearch::Outcome::refused) return "F could not be evaluated at other y'";
   if (outcome != ColumnSearch::Outcome::found)

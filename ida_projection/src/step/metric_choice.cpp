@@ -27,10 +27,12 @@ bool MetricChoice::stiff(const AnsweredMove& at) const {
 bool MetricChoice::doubts(const AnsweredMove& at) {
   if (stiff(at)) return wait_ == 0 || --wait_ == 0;
   pause();
+  calm_ = true;
   return false;
 }
 
 void MetricChoice::pause() {
+  calm_ = false;
   if (looks_ < kFirstLooks)
     ++looks_;
   else

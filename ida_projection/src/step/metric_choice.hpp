@@ -14,6 +14,8 @@ class MetricChoice {
   void reset() { *this = MetricChoice(); }
   /// Is it time to look at the present move?
   bool due();
+  /// Is no look due for the next move, since the last one found nothing?
+  bool calm() const { return calm_ && pause_ > 1; }
   /// Do stiff components answer to it so much that it harms?
   bool stiff(const AnsweredMove& at) const;
   /// After a look: do they, and is it time to try the other metric?
@@ -28,7 +30,7 @@ class MetricChoice {
 
  private:
   static constexpr int kFirstWait = 2;
-  bool by_levels_ = false;
+  bool by_levels_ = false, calm_ = false;
   int looks_ = 0;               // that found nothing
   int pause_ = 0;               // moves until the next look
   int wait_ = 0;                // looks with stiff answers until the next trial

@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tether::ida_projection {
 
@@ -51,8 +52,12 @@ bool Polish::wanted(double length, bool smoothing) const {
   // those need two iterations in nearly every step, and answer to shorter moves.
   const bool high_index = variables_.any() && variables_.high_index();
   if (smoothing && !high_index) return true;
-  const double answered = smoothing ? kAnsweredByMultipliers : kAnswered;
-  return corrector_.iterations() <= 1 || (variables_.any() && length > answered);
+  return corrector_.iterations() <= 1 || length > longest_unanswered(smoothing);
+}
+
+double Polish::longest_unanswered(bool smoothing) const {
+  if (!variables_.any()) return std::numeric_limits<double>::infinity();
+  return smoothing ? kAnsweredByMultipliers : kAnswered;
 }
 
 void Polish::keep(const Candidate& candidate) {

@@ -40,6 +40,8 @@ class Polish {
   bool possible() const { return corrector_.solves() && !iterative_; }
   /// Is an iteration worth its price after a move of this length? `smoothing`: steps are smoothed.
   bool wanted(double length, bool smoothing) const;
+  /// Longer moves want an answer of the algebraic variables; infinity where there are none.
+  double longest_unanswered(bool smoothing) const;
   /// Can answer() be had?
   bool hears_answers() const { return contiguous_ && corrector_.solves() && !iterative_; }
   /// After a move: the length of F's answer to it, -J^-1 F_y dy, over the differential variables
@@ -47,6 +49,8 @@ class Polish {
   double answer(const Candidate& candidate, double cj);
   /// That answer, until the next one; work space otherwise.
   const double* answer_entries() const { return work_entries_; }
+  /// Is it that of the candidate as it is now?
+  bool answer_known() const { return step_known_; }
   /// What follows is not the move that answer() was asked for last.
   void forget_answer() { step_known_ = false; }
   /// After a move that the answers are part of: the next add_newton_step() does without them.

@@ -53,7 +53,9 @@ bool StiffMove::answer(const Candidate& candidate, Polish& polish, const Vector&
 }
 
 // Directions p / length and what becomes of them, H the matrix of Arnoldi's method; how many.
-int StiffMove::search(const Candidate& candidate, Polish& polish, Mover& mover, double length) {
+// `known`: so is the answer to the first one, which is the move itself.
+int StiffMove::search(const Candidate& candidate, Polish& polish, Mover& mover, double length,
+                      bool known) {
   const double* corrected = N_VGetArrayPointer(polish.corrected());
   const auto differential = [this](std::size_t j) { return mask_ == nullptr || mask_[j] != 0.0; };
   Vector& p = total_;
@@ -63,7 +65,12 @@ int StiffMove::search(const Candidate& candidate, Polish& polish, Mover& mover, 
     const Vector& direction = directions_[k];
     for (std::size_t j = 0; j < p.size(); ++j) p[j] = length * direction[j];
     Vector& z = answered_[k];
-    if (!answer(candidate, polish, p, z)) return -1;
+    if (k == 0 && known) {
+      const double* answer = polish.answer_entries();
+      for (std::size_t j = 0; j < p.size(); ++j) z[j] = p[j] - answer[j];
+    } else if (!answer(candidate, polish, p, z)) {
+      return -1;
+    }
     for (std::size_t j = 0; j < p.size(); ++j)
       candidate.correction_entries[j] = differential(j) ? corrected[j] - z[j] : moved_[j];
     if (!mover.solve_at(candidate, left_.data())) return -1;
@@ -94,6 +101,13 @@ int StiffMove::search(const Candidate& candidate, Polish& polish, Mover& mover, 
     for (double& x : next) x /= norm;
   }
   return kMost;
+}
+
+// Did mover.move() leave the algebraic variables where the corrector had them?
+bool StiffMove::only_differential(const double* corrected) const {
+  for (std::size_t j = 0; j < moved_.size(); ++j)
+    if (mask_ != nullptr && mask_[j] == 0.0 && moved_[j] != corrected[j]) return false;
+  return true;
 }
 
 // total <- the move of all directions; algebraic variables by their own factor.
@@ -130,7 +144,8 @@ bool StiffMove::make(const Candidate& candidate, double cj, Polish& polish, Move
   const double length = std::sqrt(dot(first_, first_));
   if (!(length > 0.0)) return false;
   for (std::size_t j = 0; j < first_.size(); ++j) directions_[0][j] = first_[j] / length;
-  const int count = search(candidate, polish, mover, length);
+  const bool known = polish.answer_known() && only_differential(corrected);
+  const int count = search(candidate, polish, mover, length, known);
   bool made = count > 0;
   if (made) {
     combine(count, polish.algebraic_factor(cj));

@@ -33,7 +33,8 @@ class StiffMove {
   void allocate(const Candidate& candidate);
   double dot(const Vector& a, const Vector& b) const;
   bool answer(const Candidate& candidate, Polish& polish, const Vector& p, Vector& z);
-  int search(const Candidate& candidate, Polish& polish, Mover& mover, double length);
+  int search(const Candidate& candidate, Polish& polish, Mover& mover, double length, bool known);
+  bool only_differential(const double* corrected) const;
   void combine(int count, double algebraic);
   bool too_long(double length) const;
 

@@ -78,15 +78,17 @@ void BorderedGram::forward(double* z) {
   sparse_.forward(z);
 }
 
-void BorderedGram::solve(double* z) {
+double BorderedGram::solve(double* z) {
   double* border = z + m_;
   forward_border(z, full_);
   sparse_.solve(z);
+  const double before = full_ > 0 ? dot(z, z) : 0.0;
   for (int f = full_ - 1; f >= 0; --f) {
     border[f] /= d_[at(f)];
     for (int e = f + 1; e < full_; ++e) border[f] -= product(e, f) * border[e];
     subtract(solved(f), border[f], z);
   }
+  return std::sqrt(before);
 }
 
 void BorderedGram::depend(double* z, int last) {

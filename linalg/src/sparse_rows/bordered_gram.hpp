@@ -29,8 +29,11 @@ class BorderedGram {
               static_cast<std::size_t>(e)];
   }
 
+  double eps() const { return eps_; }
   int factor(const double* A, const double* norm, double eps, double thin);
-  void solve(double* z);
+  /// z <- M^-1 z; returns |z| before the full rows' part was taken off it, 0 where there are none:
+  /// rounding of M z goes with that and with |z|.
+  double solve(double* z);
   void forward(double* z);
   void depend(double* z, int last);
   bool dependent(int i) const {

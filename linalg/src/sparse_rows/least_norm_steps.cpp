@@ -15,7 +15,8 @@ constexpr double kHalving = 0.5;  // a step that leaves more of the residual is 
 constexpr int kProximalSteps = 8;
 constexpr int kGradientSteps = 10;
 constexpr int kFilters = 3;
-constexpr double kShort = 1e-14;  // of the multipliers: such a step is the last one
+constexpr double kRounding = 64.0 * kEpsilon;  // of M z, of the length of z
+constexpr double kShort = 1e-14;               // of the multipliers: such a step is the last one
 
 }  // namespace
 
@@ -37,7 +38,22 @@ double LeastNormSteps::find_step(const System& system) {
   z_ = left_;
   system.gram.solve(z_.data());
   ++iterations_;
-  return system.rows.transposed(z_.data(), step_.data());
+  system.rows.transposed(z_.data(), step_.data());
+  return std::sqrt(dot(step_.data(), step_.data(), step_.size()));
+}
+
+// The same from du = 0: b - A A^T z = eps z, and what rounding leaves of M z = b. True: that is
+// enough, and nothing has to be multiplied out. left_ then is eps z.
+bool LeastNormSteps::first_step(const System& system, double* left) {
+  z_ = b_;
+  const double before = system.gram.solve(z_.data()), eps = system.gram.eps();
+  ++iterations_;
+  system.rows.transposed(z_.data(), du_.data());
+  const double length = std::sqrt(dot(z_.data(), z_.data(), z_.size()));
+  if (!(eps * length + kRounding * (before + length) <= tolerance_ * size_)) return false;
+  *left = eps * length;
+  for (std::size_t i = 0; i < left_.size(); ++i) left_[i] = eps * z_[i];
+  return true;
 }
 
 // Is the residual small enough, or does du no longer change?
@@ -55,8 +71,16 @@ void LeastNormSteps::take_back(const System& system, double share, const std::ve
 // From du = 0. Returns false where more of them would reduce the residual too slowly.
 bool LeastNormSteps::proximal_steps(const System& system, double* left) {
   for (int k = 0; k < kProximalSteps; ++k) {
-    const double step = find_step(system), before = *left;
-    for (std::size_t j = 0; j < du_.size(); ++j) du_[j] += step_[j];
+    const double before = *left;
+    double step = 0.0;
+    if (k > 0) {
+      step = find_step(system);
+      for (std::size_t j = 0; j < du_.size(); ++j) du_[j] += step_[j];
+    } else {
+      if (first_step(system, left)) return true;
+      step_ = du_;
+      step = std::sqrt(dot(du_.data(), du_.data(), du_.size()));
+    }
     *left = find_left(system);
     if (*left > before) {  // rounding rules: b has no part that the rows can give
       take_back(system, 1.0, step_, left);
@@ -85,8 +109,9 @@ void LeastNormSteps::gradient_steps(const System& system, double* left) {
     for (std::size_t i = 0; i < z_.size(); ++i) z_[i] -= share * MAp_[i];
     *left = find_left(system);
     if (*left > before) return take_back(system, share, p_, left);  // rounding rules
-    const double step = system.rows.transposed(z_.data(), step_.data()), next = step * step;
-    if (done(step, *left)) return;
+    system.rows.transposed(z_.data(), step_.data());
+    const double next = dot(step_.data(), step_.data(), step_.size());
+    if (done(std::sqrt(next), *left)) return;
     for (std::size_t j = 0; j < du_.size(); ++j) p_[j] = step_[j] + next / square * p_[j];
     square = next;
   }
@@ -95,13 +120,15 @@ void LeastNormSteps::gradient_steps(const System& system, double* left) {
 void LeastNormSteps::solve(const UnitRows& rows, BorderedGram& gram, const double* g,
                            double tolerance) {
   for (std::size_t i = 0; i < b_.size(); ++i) left_[i] = b_[i] = g[i] * rows.inverse_norm(i);
-  std::fill(du_.begin(), du_.end(), 0.0);
   iterations_ = 0;
   tolerance_ = tolerance;
   size_ = std::sqrt(dot(b_.data(), b_.data(), b_.size()));
   double left = size_;
   const System system{rows, gram};
-  if (size_ > 0.0 && !proximal_steps(system, &left)) gradient_steps(system, &left);
+  if (!(size_ > 0.0))
+    std::fill(du_.begin(), du_.end(), 0.0);
+  else if (!proximal_steps(system, &left))
+    gradient_steps(system, &left);
   residual_ = size_ > 0.0 ? left / size_ : 0.0;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -69,12 +70,32 @@ void UnitRows::resize(int columns, std::vector<int> starts, std::vector<int> col
   full_ = full_rows;
   starts_ = std::move(starts);
   column_ = std::move(column_of);
+  list_columns();
   const auto m = static_cast<std::size_t>(rows());
   A_.assign(column_.size(), 0.0);
   metric_.assign(width(), 0.0);
   full_rows_.assign(static_cast<std::size_t>(full_) * width(), 0.0);
   norm_.assign(m, 0.0);
   inverse_norm_.assign(m, 0.0);
+}
+
+void UnitRows::list_columns() {
+  Columns& c = by_column_;
+  c.starts.assign(width() + 1, 0);
+  for (const int j : column_) ++c.starts[static_cast<std::size_t>(j) + 1];
+  std::partial_sum(c.starts.begin(), c.starts.end(), c.starts.begin());
+  c.row.resize(column_.size());
+  c.entry.resize(column_.size());
+  c.value.assign(column_.size(), 0.0);
+  std::vector<int> next(c.starts.begin(), c.starts.end() - 1);
+  for (int i = 0; i < sparse_; ++i)
+    for (int e = starts_[static_cast<std::size_t>(i)]; e < starts_[static_cast<std::size_t>(i) + 1];
+         ++e) {
+      const auto place = static_cast<std::size_t>(
+          next[static_cast<std::size_t>(column_[static_cast<std::size_t>(e)])]++);
+      c.row[place] = i;
+      c.entry[place] = e;
+    }
 }
 
 void UnitRows::analyse(BorderedGram& gram) const { gram.analyse(n_, starts_, column_, full_); }
@@ -104,22 +125,21 @@ void UnitRows::multiply(const double* u, double* z) const {
   for (int i = sparse_; i < rows(); ++i) z[i] = row_dot(i, u);
 }
 
-double UnitRows::transposed(const double* z, double* u) const {
-  std::fill(u, u + n_, 0.0);
-  const double* entry = A_.data();
-  const int* column = column_.data();
-  const int *begin = column, *starts = starts_.data();
-  for (int i = 0; i < sparse_; ++i) {
-    const double share = z[i];
-    for (const int* end = begin + starts[i + 1]; column != end; ++column, ++entry)
-      u[*column] += *entry * share;
+void UnitRows::transposed(const double* z, double* u) const {
+  const double* value = by_column_.value.data();
+  const int* row = by_column_.row.data();
+  const int *begin = row, *starts = by_column_.starts.data();
+  for (int j = 0; j < n_; ++j) {
+    double sum = 0.0;
+    for (const int* end = begin + starts[j + 1]; row != end; ++row, ++value)
+      sum += *value * z[*row];
+    u[j] = sum;
   }
   const double* a = full_rows_.data();
   for (int f = 0; f < full_; ++f, a += n_) {
     const double share = z[sparse_ + f];
     for (int j = 0; j < n_; ++j) u[j] += share * a[j];
   }
-  return std::sqrt(dot(u, u, width()));
 }
 
 bool UnitRows::scale_sparse() {
@@ -133,6 +153,8 @@ bool UnitRows::scale_sparse() {
     if (!std::isfinite(norm_[k])) return false;
     inverse_norm_[k] = norm_[k] > 0.0 ? 1.0 / norm_[k] : 0.0;
   }
+  for (std::size_t e = 0; e < by_column_.value.size(); ++e)
+    by_column_.value[e] = A[by_column_.entry[e]];
   return true;
 }
 

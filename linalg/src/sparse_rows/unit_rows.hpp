@@ -40,12 +40,18 @@ class UnitRows {
 
   /// z = A u
   void multiply(const double* u, double* z) const;
-  /// u = A^T z; returns |u|.
-  double transposed(const double* z, double* u) const;
+  /// u = A^T z
+  void transposed(const double* z, double* u) const;
   /// Row i with all its entries.
   void spread(int i, std::vector<double>& row) const;
 
  private:
+  /// The sparse rows' entries by columns: which row, where in A_, and a copy of it.
+  struct Columns {
+    std::vector<int> starts{0}, row, entry;
+    std::vector<double> value;
+  };
+  void list_columns();
   bool scale_sparse();
   bool scale_full();
   double row_dot(int i, const double* u) const;
@@ -53,6 +59,7 @@ class UnitRows {
   int n_ = 0, sparse_ = 0, full_ = 0;
   std::vector<int> starts_{0}, column_;
   std::vector<double> A_, full_rows_, metric_, norm_, inverse_norm_;
+  Columns by_column_;
 };
 
 }  // namespace tether::linalg

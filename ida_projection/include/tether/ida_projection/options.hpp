@@ -71,7 +71,7 @@ struct Options {
 
   /// IDA's id vector: 1 differential, 0 algebraic. Copied at attach. Null: derived at the first
   /// step from the columns of dF/dy' that are exactly zero (contiguous vectors). Where few
-  /// equations share a derivative that takes about 4 log2(N) evaluations of F for each derivative
+  /// equations share a derivative that takes about 2 log2(N) evaluations of F for each derivative
   /// in an equation, at most 4 derive_id_limit (0: not derived); Projection::message() tells when
   /// it cannot be derived.
   N_Vector id = nullptr;

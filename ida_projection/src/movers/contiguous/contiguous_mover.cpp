@@ -140,6 +140,7 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   rows_.at.load(candidate);
   if (levels_joined_ > 0 && --levels_joined_ == 0) rows_.split_levels();
   still_ = false;
+  by_present_factors_ = -1.0;
   if (still_nothing(candidate, result)) return result;
   reused_ = keeps_factors() && rows_.factors.there;
   ++kept_.age;
@@ -295,6 +296,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       }
     }
     rows_.apply(1.0, correction);
+    by_present_factors_ = length;
     if (reused_) {
       if (2.0 * kept_.rate() * length <= kForLater) break;
       if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
@@ -319,6 +321,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
     // One that answers nothing but rounding of g leads nowhere, however long it is.
     if (verdict == Monitor::Verdict::failed && rows_.rounding_only()) {
       rows_.apply(-1.0, correction);
+      by_present_factors_ = -1.0;
       break;
     }
     if (verdict == Monitor::Verdict::done) break;

@@ -89,13 +89,16 @@ class ContiguousMover final : public Mover {
   bool solve_at(const Candidate& candidate, double* dy) override;
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
-  Status finish(const Candidate& candidate) override {
+  bool may_polish_first(double longest) const override {
+    return keeps_factors() && rows_.factors.there && move_length_ <= std::min(longest, kLong);
+  }
+  Status finish(const Candidate& candidate, bool polished) override {
     if (still_) return Status::success;
     // Where a move costs little beside the step, what Newton's method left is taken, too.
     if (takes_rest_) return take_rest(candidate, move_length_);
     if (!keeps_factors()) return Status::success;
     const bool unseen = move_length_ > kSafe * options_.tolerance || !rows_.dropped_follow();
-    return unseen ? take_back(candidate) : Status::success;
+    return unseen ? take_back(candidate, polished ? by_present_factors_ : -1.0) : Status::success;
   }
   void reset() override {
     rows_.reset();
@@ -112,7 +115,7 @@ class ContiguousMover final : public Mover {
  private:
   void doubt_levels(Status status);
   bool keeps_factors() const { return keeps_factors_ && rows_.factors.lasting; }
-  Status take_back(const Candidate& candidate);
+  Status take_back(const Candidate& candidate, double previous);
   Status take_rest(const Candidate& candidate, double reach);
   Status factor(double t) {
     const Status status = rows_.factor(t);
@@ -150,11 +153,13 @@ class ContiguousMover final : public Mover {
   bool start_known_ = false;
   bool looked_at_all_ = false;  // the rows are arranged as if all variables were differential
   double move_length_ = 0.0;    // of the last first move, in tolerances
-  bool reused_ = false;         // factors of an earlier step are in use for this one
-  SlopeOfFactors kept_;         // these
-  int looks_ = 0;               // with the factors of an earlier candidate
-  int nothing_in_row_ = 0;      // moves that were none
-  bool still_ = false;          // the last candidate was only looked at
+  // Of the last move, which the factors at hand made; < 0: others did.
+  double by_present_factors_ = -1.0;
+  bool reused_ = false;     // factors of an earlier step are in use for this one
+  SlopeOfFactors kept_;     // these
+  int looks_ = 0;           // with the factors of an earlier candidate
+  int nothing_in_row_ = 0;  // moves that were none
+  bool still_ = false;      // the last candidate was only looked at
   Staleness staleness_;
   FactorWear wear_;  // for follow(), as is what comes next
   Misdirection misdirection_;

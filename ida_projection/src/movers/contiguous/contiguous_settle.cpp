@@ -22,7 +22,7 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
   double* y = rows_.at.y.data();
   for (int i = 0, n = static_cast<int>(rows_.at.y.size()); i < n; ++i) y[i] += e[i];
   if (keeps_factors()) {
-    const Status status = take_back(candidate);
+    const Status status = take_back(candidate, -1.0);
     doubt_levels(status);
     return status;
   }
@@ -71,18 +71,20 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
 // is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
 // two moves with the same factors, that makes the next one so; and dropped rows that follow the
 // others. Where too much is left, also of dropped rows, or a move is long, factors are made anew.
+// `previous`: length of the move before, by the same factors and with nothing in between; < 0:
+// there is none.
 template <class Rows>
-Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
+Status ContiguousMover<Rows>::take_back(const Candidate& candidate, double previous) {
   const double floor = 1e2 * kEpsilon * rows_.at.size();
-  double previous = -1.0;  // length of the move before, by the same factors
+  const double done = std::max(floor, kSafe * options_.tolerance);
   for (int k = 0; k <= options_.maximum_iterations; ++k) {
     Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
     double length = rows_.solve();
     double part = previous > 0.0 && length > floor ? length / previous : 0.0;
-    if (part > 0.0 && kept_.age > 0) kept_.slope = part / kept_.age;
+    if (part > 0.0 && kept_.age > 0 && k > 0) kept_.slope = part / kept_.age;
     bool follow = rows_.dropped_follow();
-    if (kept_.age > 0 && (part > kSlow || length > kLong || (k > 0 && !follow))) {
+    if (kept_.age > 0 && ((k > 0 && part > kSlow) || length > kLong || (k > 0 && !follow))) {
       rows_.set_metric(true);
       if ((status = factor(candidate.t)) != Status::success) return status;
       length = first_solve();
@@ -91,11 +93,13 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
       previous = -1.0;
     }
     // Almost parallel rows magnify rounding: moves would follow it without end.
-    if (part > kHalving && rows_.rounding_only()) return Status::success;
+    if (k > 0 && part > kHalving && rows_.rounding_only()) return Status::success;
     rows_.apply(1.0, candidate.correction_entries);
-    const bool small = length <= std::max(floor, kSafe * options_.tolerance);
-    if (follow && (small || (part > 0.0 && part * length <= kSafe * options_.tolerance))) {
-      if (part > kWorn) rows_.factors.there = false;
+    // The first of two moves may have been left less of than what remains then would be.
+    const double leaves = k > 0 ? part : std::max(part, kept_.rate());
+    if (follow &&
+        (length <= done || (part > 0.0 && leaves * length <= kSafe * options_.tolerance))) {
+      if (k > 0 && part > kWorn) rows_.factors.there = false;
       return Status::success;
     }
     previous = length;
@@ -110,7 +114,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate) {
 
 template Status ContiguousMover<RowBlocks>::settle(const Candidate&, N_Vector);
 template Status ContiguousMover<SparseRows>::settle(const Candidate&, N_Vector);
-template Status ContiguousMover<RowBlocks>::take_back(const Candidate&);
-template Status ContiguousMover<SparseRows>::take_back(const Candidate&);
+template Status ContiguousMover<RowBlocks>::take_back(const Candidate&, double);
+template Status ContiguousMover<SparseRows>::take_back(const Candidate&, double);
 
 }  // namespace tether::ida_projection
