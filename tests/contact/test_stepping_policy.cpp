@@ -17,6 +17,7 @@ Scene hard(double tolerance, double acceptance, int max_halvings) {
   scene.options.tolerance = tolerance;
   scene.options.acceptance = acceptance;
   scene.options.max_halvings = max_halvings;
+  scene.options.cut_at_impacts = false;  // its attempts would be among those counted
   scene.options.max_sweeps = 2;
   scene.options.min_sweeps = 0;
   scene.options.max_assembled = 0;

@@ -1,4 +1,6 @@
 // Tether: steps that are cut at impacts. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
@@ -6,19 +8,38 @@ namespace tether::contact {
 // Laws of joints and rolling friction, whose moments go with the contacts of one problem, stay in
 // whole steps; parts that keep an accuracy are cut where that asks for it.
 bool Stepper::Implementation::may_cut() const {
-  return part.cuts_left > 0 && !impacts->list().empty() && !has_laws() && !rolling;
+  return part.cuts_left > 0 && (restitution || !impacts->list().empty()) && !has_laws() && !rolling;
 }
 
+// Impacts; and, where anything bounces, contacts that are slow at the start of the part, or that
+// bodies leave and fall back to, but that an impact closes in it; or later, though the problem of
+// the part would hold them where they are above it.
 void Stepper::Implementation::look_for_cut() {
-  if (!may_cut()) return;
-  falling.clear();
-  for (const detail::Impact& i : impacts->list()) {
-    const PointContact& c = contacts.points[at(i.contact)];
-    const double apart = options.gravity ? c.normal.dot(*options.gravity) : 0;
-    falling.push_back((motion.falls(bodies, c.second) ? apart : 0) -
-                      (motion.falls(bodies, c.first) ? apart : 0));
+  if (!may_cut() || !cuts->may_cut(contacts.points.size())) return;
+  approaches.clear();
+  approaches.reserve(contacts.points.capacity());  // no more often than contacts do
+  const auto fall = [&](const PointContact& c) {
+    const double apart = options.gravity ? part.dt * c.normal.dot(*options.gravity) : 0;
+    return (motion.falls(c.second) ? apart : 0) - (motion.falls(c.first) ? apart : 0);
+  };
+  const std::vector<detail::Impact>& chosen = impacts->list();
+  for (const detail::Impact& i : chosen)
+    approaches.push_back({i.contact, i.came, i.comes, fall(contacts.points[at(i.contact)])});
+  std::size_t next = 0;  // of those chosen, which are in order
+  for (std::size_t k = 0; restitution && k < contacts.points.size(); ++k) {
+    if (next < chosen.size() && at(chosen[next].contact) == k) {
+      ++next;
+      continue;
+    }
+    const PointContact& c = contacts.points[k];
+    const double comes = -detail::normal_velocity(bodies.motion, c);
+    if (!(comes * part.dt > contacts.gaps[k])) continue;
+    const detail::Approach a{static_cast<int>(k), -detail::normal_velocity(impacts->coming(), c),
+                             comes, fall(c)};
+    if (a.more(part.dt) > 0 && impacts->is_impact(*near, c, a.speed(contacts.gaps[k], part.dt)))
+      approaches.push_back(a);
   }
-  part.cut = cuts->choose(*impacts, part.dt, contacts, falling);
+  part.cut = cuts->choose(approaches, part.dt, bodies, contacts);
 }
 
 // No contact closes by the velocities that bodies have: there is nothing to solve.
@@ -41,72 +62,84 @@ void Stepper::Implementation::leave_out_striking() {
   contacts.gaps.resize(kept);
 }
 
-// The impact, at the places where bodies are. False: its problem is not solved, and the part that
-// follows takes it as one that is not cut does.
-bool Stepper::Implementation::strike() {
+// The impact, at the places where bodies are. Unsolved: the part that follows takes it as one that
+// is not cut does.
+Stepper::Implementation::Struck Stepper::Implementation::strike() {
   near->find(bodies, part.dt, contacts);
   if (joints) leave_out_joined();
   if (sleeping) sleeping->leave_out(contacts);
+  leave_out_passive();
   contacts.impulses.assign(contacts.points.size(), Eigen::Vector3d::Zero());
-  if (!cuts->gather(*near, bodies, options.step, *impacts, contacts)) return true;
+  if (!cuts->gather(*near, bodies, options.step, *impacts, contacts)) return Struck::nothing;
   if (restitution) choose_bounces();
   const BodySolution& s = cuts->solve(bodies.motion, contacts);
   ++counts.contact_problems;
   counts.sweeps += s.sweeps;
   counts.assembled_islands += s.assembled_islands;
-  if (s.status != Status::solved && !(s.error <= accepted_residual(options))) return false;
+  if (s.status != Status::solved && !(s.error <= accepted_residual(options)))
+    return Struck::unsolved;
   for (const int i : motion.moving()) {
     bodies.motion[at(i)].velocity = s.velocities[at(i)];
     bodies.motion[at(i)].angular_velocity = s.angular_velocities[at(i)];
   }
   contacts.impulses = s.impulses;
   if (restitution) rebound();
-  if (joints) joints->take_impact(impacts->coming(), bodies, contacts);
-  add_to_sum();
-  return true;
+  if (joints && part.joints_active) joints->take_impact(impacts->coming(), bodies, contacts);
+  return Struck::impact;
 }
 
-// Of the part, or impact, that has been taken.
-void Stepper::Implementation::add_to_sum() {
-  cuts->add(contacts);
-  if (joints) joints->add_to_sum();
+void Stepper::Implementation::take_of_cut(double time, double dt, double length, int halvings) {
+  part.of_cut = true;
+  solver->scale_warm_start(dt / length);
+  advance(time, dt, halvings);
+  solver->scale_warm_start(length / dt);
 }
 
-void Stepper::Implementation::advance_cut(double time, double length, int halvings) {
-  const double when = cuts->when(), rest = length - when;
-  const int cuts_left = part.cuts_left;
-  const bool whole = cuts_left == detail::StepCuts::kMost;
-  const auto take = [&](double start, double dt, int more) {
-    part.cuts_left = more;
-    part.of_cut = true;
-    solver->scale_warm_start(dt / length);
-    advance(start, dt, halvings);
-    solver->scale_warm_start(length / dt);
-  };
-  if (whole) {
-    cuts->begin_sum();
-    if (joints) joints->begin_sum();
+// The part up to the impact; once more where bodies that turn were off the surface by then. Returns
+// its length.
+double Stepper::Implementation::approach(double time, double length, int halvings) {
+  const WarmStart start = solver->warm_start();
+  const detail::Judgement before = judged();
+  remember_part(parts.before);
+  part.before_impact = true;
+  part.cuts_left = 0;
+  double when = cuts->when();
+  take_of_cut(time, when, length, halvings);
+  const double then = std::min(when + cuts->left(*near, bodies, length), length);
+  if (then > 0 && then != when) {
+    restore_part(parts.before);
+    set_judged(before);
+    solver->set_warm_start(start);
+    when = then;
+    take_of_cut(time, when, length, halvings);
   }
+  part.before_impact = false;
+  return when;
+}
+
+// Up to the impact, the impact, and the rest; `contacts` has the impulses of all.
+void Stepper::Implementation::take_striking(double time, double length, int halvings) {
+  const int cuts_left = part.cuts_left;
+  StepContacts sum;
+  const auto add_to_sum = [&] {
+    detail::add_impulses(contacts, sum);
+    if (joints && part.joints_active) joints->add_to_sum();
+  };
   cuts->remember(solver->warm_start());
-  if (when > 0) {
-    part.before_impact = true;
-    take(time, when, 0);
-    part.before_impact = false;
-    if (!(rest > 0)) {
-      part.of_cut = !whole;
-      return;
-    }
+  double rest = length;
+  if (cuts->when() > 0) {
+    rest -= approach(time, length, halvings);
+    if (!(rest > 0)) return;
     add_to_sum();
     cuts->remember(solver->warm_start());
   }
-  part.start = time + when;
+  part.start = time + (length - rest);
   part.dt = rest;
-  take(time + when, rest, strike() ? cuts_left - 1 : 0);
-  if (!whole) return;
-  part.of_cut = false;
-  cuts->add_sum_to(contacts);
-  if (joints) joints->give_sum();
-  part.dt = length;
+  const Struck struck = strike();
+  if (struck == Struck::impact) add_to_sum();
+  part.cuts_left = struck == Struck::unsolved ? 0 : cuts_left - 1;
+  take_of_cut(part.start, rest, length, halvings);
+  detail::add_impulses(sum, contacts);
 }
 
 }  // namespace tether::contact

@@ -14,6 +14,7 @@ void Stepper::Implementation::step() {
     advance_accurately(start, length);
   else {
     part.cuts_left = cuts ? detail::StepCuts::kMost : 0;
+    if (cuts) cuts->earn();
     advance(start, length, options.max_halvings);
   }
   if (!is_finite()) {

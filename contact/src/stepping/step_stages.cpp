@@ -32,6 +32,7 @@ void Stepper::Implementation::make_stages() {
   }
   if (sleeping) add_stage("sleep", &I::hold_sleepers);
   if (joints) add_stage("joints", &I::predict_joints);
+  if (falls()) add_stage("gravity", &I::find_falling);
   if (near) {
     add_stage("collision", &I::find_contacts);
     add_stage(impact, &I::choose_impacts);
@@ -68,6 +69,7 @@ void Stepper::Implementation::find_contacts() {
     part.again = true;
     return;
   }
+  leave_out_passive();
   if (part.before_impact) leave_out_striking();
   set_gaps();
   part.free_motion = bodies.motion;
@@ -95,6 +97,7 @@ void Stepper::Implementation::meet_others() {
     if (!near->find_more(bodies, part.dt, contacts)) return;
     if (joints) leave_out_joined();
     if (sleeping) sleeping->leave_out(contacts);
+    leave_out_passive();
     if (contacts.points.size() == before) return;
     bodies.motion = part.free_motion;
     solver->take_back();
@@ -184,7 +187,7 @@ void Stepper::Implementation::leave_out_joined() {
 }
 
 void Stepper::Implementation::move_joints() {
-  if (joints->move(bodies, part.start, part.dt, contacts)) return;
+  if (!part.joints_active || joints->move(bodies, part.start, part.dt, contacts)) return;
   outcome.succeeded = false;
   if (outcome.status == Status::solved) outcome.status = Status::stalled;
 }

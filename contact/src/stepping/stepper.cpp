@@ -178,6 +178,7 @@ StepperMemory Stepper::memory() const {
   m.status = s.outcome.status;
   m.control = s.parts.control;
   m.drift = joint_drift();
+  if (s.cuts) m.cuts = s.cuts->kept();
   if (s.sleeping) m.sleep = s.sleeping->memory();
   return m;
 }
@@ -204,6 +205,7 @@ void Stepper::set_memory(const StepperMemory& m) {
   s.outcome.residual = m.residual;
   s.outcome.status = m.status;
   s.parts.control = m.control;
+  if (s.cuts) s.cuts->set_kept(std::clamp(m.cuts, 0.0, detail::StepCuts::kMostKept));
   if (s.joints) s.joints->set_drift(m.drift);
   if (!s.sleeping) return;
   if (m.sleep.bodies.empty())

@@ -66,6 +66,12 @@ struct Judgement {
   long bounces = 0, accepted = 0, unsolved = 0;
 };
 
+/// Where a part begins, or has ended.
+struct PartMark {
+  PartState bodies;
+  WarmStart contacts, corrections;
+};
+
 }  // namespace detail
 
 // A step is the list of stages, made once from the options and the bodies.
@@ -92,7 +98,7 @@ struct Stepper::Implementation {
   std::unique_ptr<detail::Restitution> restitution;
   std::unique_ptr<detail::LaterImpacts> later;
   std::unique_ptr<detail::StepCuts> cuts;  // only where asked for
-  std::vector<double> falling;  // of impacts: what the weight of falling bodies adds to an approach
+  std::vector<detail::Approach> approaches;
   std::unique_ptr<detail::PositionCorrection> positions;  // only with error reduction
   std::unique_ptr<detail::Sleeping> sleeping;             // only where bodies may sleep
   StepContacts contacts;
@@ -106,8 +112,12 @@ struct Stepper::Implementation {
     bool may_halve = false, failed = false;
     int cuts_left = 0;  // that it may be taken in parts for
     bool cut = false, of_cut = false, before_impact = false;
-    bool again = false;                  // what has woken takes part
-    std::vector<RigidBody> free_motion;  // before its problem
+    bool in_cut = false;                  // of a step that is being cut
+    std::vector<char> active;             // bodies that take part; empty: all
+    bool joints_active = true;            // those that joints hold
+    bool may_split = false, met = false;  // islands apart; they have met
+    bool again = false;                   // what has woken takes part
+    std::vector<RigidBody> free_motion;   // before its problem
     detail::Judgement before;
   } part;
   detail::Outcome outcome;
@@ -154,8 +164,19 @@ struct Stepper::Implementation {
   void end_sleep();
   bool nothing_presses() const;
   void leave_out_striking();
-  bool strike();
-  void add_to_sum();
+  enum class Struck : std::uint8_t { nothing, impact, unsolved };
+  Struck strike();
+  detail::PartMark mark() const;
+  void go_back(const detail::PartMark& m);
+  bool takes_part(int body) const { return part.active.empty() || part.active[at(body)] != 0; }
+  void set_active(std::vector<char> active);
+  void leave_out_passive();
+  void take_of_cut(double time, double dt, double length, int halvings);
+  double approach(double time, double length, int halvings);
+  void take_striking(double time, double length, int halvings);
+  void take_others(const detail::PartMark& start, const std::vector<char>& striking, double time,
+                   double length, int halvings);
+  void take_cut(double time, double length, int halvings);
   void advance_cut(double time, double length, int halvings);
 
   void judge();
@@ -163,9 +184,15 @@ struct Stepper::Implementation {
   void set_judged(const detail::Judgement& b);
 
   void remember_velocities() { impacts->remember(bodies); }
-  void begin_joints() { joints->begin(bodies, part.start); }
-  void predict_joints() { joints->predict(bodies, part.start, part.dt); }
-  void put_back_joints() { joints->put_back(bodies, part.start); }
+  void begin_joints() {
+    if (part.joints_active) joints->begin(bodies, part.start);
+  }
+  void predict_joints() {
+    if (part.joints_active) joints->predict(bodies, part.start, part.dt);
+  }
+  void put_back_joints() {
+    if (part.joints_active) joints->put_back(bodies, part.start);
+  }
   void leave_out_joined();
   void move_joints();
   void find_contacts();
@@ -189,13 +216,10 @@ struct Stepper::Implementation {
   void gyrate_explicit() { motion.gyrate_explicit(part.dt, bodies); }
   void gyrate_implicit() { motion.gyrate_implicit(part.dt, bodies); }
   void move() { motion.move(part.dt, bodies); }
-  bool falls() const {
-    return options.gravity && options.cut_at_impacts && !(options.accuracy > 0);
-  }
+  bool falls() const { return options.gravity && cuts; }
   void remember_weight() { motion.remember_weight(bodies); }
-  // A part moves bodies by the velocities of its end, under their weight alone half of its change
-  // too far.
-  void fall() { motion.fall(-0.5 * part.dt * part.dt * *options.gravity, contacts, bodies); }
+  void find_falling() { motion.find_falling(bodies); }
+  void fall() { motion.fall(*options.gravity, part.dt, contacts, bodies); }
   void turn_round() { motion.turn_round(part.dt, bodies); }
   void turn_plain() { motion.turn_plain(part.dt, bodies); }
   void turn_keeping_momentum() { motion.turn_keeping_momentum(part.dt, bodies); }

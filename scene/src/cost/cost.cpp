@@ -91,27 +91,34 @@ std::vector<Setting> settings_of(const Scene& scene, const Plan& plan, bool even
 
 // The event engine where it gets through: it has nothing in common with steps.
 Reference reference_of(const Scene& scene, const Plan& plan, bool events, double finest_step,
-                       const CostOptions& options) {
+                       const Times& times, const CostOptions& options) {
   if (plan.engine == EngineKind::smooth)
-    return smooth_reference(scene, options.reference.value_or(1e-12), options);
+    return smooth_reference(scene, options.reference.value_or(1e-12), times, options);
   const bool own = plan.engine == EngineKind::event;
   if (own || (events && !options.reference)) {
     const double tolerance = options.reference.value_or(1e-11);
-    const auto found = event_reference(scene, tolerance, options);
+    const auto found = event_reference(scene, tolerance, times, options);
     if (found) return *found;
     if (own && options.reference)
       throw std::runtime_error("no reference: the event engine does not get to the end");
   }
   return stepping_reference(
-      scene, own ? finest_step / 4 : options.reference.value_or(finest_step / 4), options);
+      scene, own ? finest_step / 4 : options.reference.value_or(finest_step / 4), times, options);
 }
 
-CostRow measure_row(const Scene& scene, Setting setting, const CostOptions& options,
-                    const Reference& reference) {
+// Where steps end there is a state to compare; what impacts leave there may last a few steps only.
+std::vector<double> times_of(const Scene& scene, Setting setting, const CostOptions& options) {
+  if (setting.method == Method::steps) return step_ends(scene, setting.value, options.samples);
+  if (setting.method == Method::accuracy) return step_ends(scene, step_of(scene), options.samples);
+  return equal_times(scene.end, options.samples);
+}
+
+CostRow measure_row(const Scene& scene, Setting setting, const std::vector<double>& times,
+                    const CostOptions& options, const Reference& reference) {
   CostRow row;
   row.method = setting.method;
   row.setting = setting.value;
-  const Measured m = measure_once(scene, options);
+  const Measured m = measure_once(scene, times, options);
   const RunResult& r = m.result;
   row.failure = r.failure;
   // On the safe side: the error of the reference may add to the difference found.
@@ -187,7 +194,13 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
 
   tell("reference");
   try {
-    const Reference reference = reference_of(scene, plan, events, finest_step, options);
+    Times times;
+    times.own = equal_times(scene.end, options.samples);
+    if (contact) times.own = merged(times.own, step_ends(scene, step_of(scene), options.samples));
+    times.all = times.own;
+    for (const Setting& each : settings)
+      times.all = merged(times.all, times_of(scene, each, options));
+    const Reference reference = reference_of(scene, plan, events, finest_step, times, options);
     table.reference = reference.what;
     table.reference_error = reference.error;
     table.reference_setting = options.reference;
@@ -195,8 +208,10 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
       table.reference_setting = options.reference.value_or(finest_step / 4);
     for (const Setting& each : settings) {
       tell(fmt::format("{} {:g}", name(each.method), each.value));
-      table.rows.push_back(
-          measure_row(with_setting(scene, each.method, each.value), each, options, reference));
+      const bool any = each.method == Method::events;
+      table.rows.push_back(measure_row(with_setting(scene, each.method, each.value), each,
+                                       any ? times.own : times_of(scene, each, options), options,
+                                       reference));
     }
   } catch (const Interrupted&) {
     table.interrupted = true;

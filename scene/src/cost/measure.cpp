@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace tether::scene::costs {
 
@@ -10,6 +11,7 @@ namespace {
 
 // Comparisons are for what ends soon: more than these are a storm.
 constexpr int kMostEvents = 50000, kMostEventSteps = 1000000;
+constexpr double kSame = 1e-12;  // of a time
 
 Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q) {
   const double angle = by.norm();
@@ -19,15 +21,17 @@ Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q
 
 }  // namespace
 
-Measured measure_once(const Scene& scene, const CostOptions& cost) {
+Measured measure_once(const Scene& scene, const std::vector<double>& times,
+                      const CostOptions& cost) {
   Measured out;
   RunOptions options;
   options.interrupted = cost.interrupted;
-  for (int k = 1; k <= cost.samples; ++k) options.stops.push_back(scene.end * k / cost.samples);
+  options.stops = times;
   // Records and expectations stop the run at other times, too.
   std::size_t next = 0;
   options.record = [&](const Engine& engine) {
-    while (next < options.stops.size() && engine.time() >= options.stops[next] * (1 - 1e-12)) {
+    while (next < options.stops.size() && engine.time() >= options.stops[next] * (1 - kSame)) {
+      out.samples.times.push_back(options.stops[next]);
       for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].fixed) continue;
         // A time step ends at its boundary; the way to it is straight, and about one axis.
@@ -45,13 +49,67 @@ Measured measure_once(const Scene& scene, const CostOptions& cost) {
   return out;
 }
 
+Samples picked(const Samples& all, const std::vector<double>& times) {
+  Samples out;
+  if (all.times.empty()) return out;
+  const std::size_t bodies = all.positions.size() / all.times.size();
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < all.times.size(); ++i) {
+    while (j < times.size() && times[j] < all.times[i] * (1 - kSame)) ++j;
+    if (j == times.size()) break;
+    if (times[j] > all.times[i] * (1 + kSame)) continue;
+    out.times.push_back(all.times[i]);
+    for (std::size_t k = i * bodies; k < (i + 1) * bodies; ++k) {
+      out.positions.push_back(all.positions[k]);
+      out.orientations.push_back(all.orientations[k]);
+    }
+  }
+  return out;
+}
+
 double distance(const Samples& a, const Samples& b) {
   double largest = 0;
-  for (std::size_t i = 0; i < std::min(a.positions.size(), b.positions.size()); ++i) {
-    largest = std::max(largest, (a.positions[i] - b.positions[i]).norm());
-    largest = std::max(largest, a.orientations[i].angularDistance(b.orientations[i]));
+  if (a.times.empty() || b.times.empty()) return largest;
+  const std::size_t bodies = a.positions.size() / a.times.size();
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < a.times.size(); ++i) {
+    while (j < b.times.size() && b.times[j] < a.times[i] * (1 - kSame)) ++j;
+    if (j == b.times.size()) break;
+    if (b.times[j] > a.times[i] * (1 + kSame)) continue;
+    for (std::size_t k = 0; k < bodies; ++k) {
+      const std::size_t m = i * bodies + k, n = j * bodies + k;
+      largest = std::max(largest, (a.positions[m] - b.positions[n]).norm());
+      largest = std::max(largest, a.orientations[m].angularDistance(b.orientations[n]));
+    }
   }
   return largest;
+}
+
+std::vector<double> equal_times(double end, int count) {
+  std::vector<double> out;
+  for (int k = 1; k <= count; ++k) out.push_back(end * k / count);
+  return out;
+}
+
+std::vector<double> step_ends(const Scene& scene, double step, int least) {
+  const auto bodies = static_cast<double>(
+      std::max<std::ptrdiff_t>(1, std::count_if(scene.bodies.begin(), scene.bodies.end(),
+                                                [](const Body& b) { return !b.fixed; })));
+  const double most = std::max(kMostPoses / bodies, static_cast<double>(least));
+  const double stride = std::max(1.0, std::ceil(scene.end / step / most));
+  std::vector<double> out;
+  for (double k = stride; k * step < scene.end * (1 - kSame); k += stride) out.push_back(k * step);
+  out.push_back(scene.end);
+  return out;
+}
+
+std::vector<double> merged(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> all;
+  std::merge(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
+  std::vector<double> out;
+  for (const double t : all)
+    if (out.empty() || t > out.back() * (1 + kSame)) out.push_back(t);
+  return out;
 }
 
 double step_of(const Scene& scene) {

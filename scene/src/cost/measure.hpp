@@ -7,8 +7,9 @@
 
 namespace tether::scene::costs {
 
-/// Poses of the moving bodies at the sampled times.
+/// Poses of the moving bodies at times, which ascend: all bodies at the first one, ...
 struct Samples {
+  std::vector<double> times;
   std::vector<Eigen::Vector3d> positions;
   std::vector<Eigen::Quaterniond> orientations;
 };
@@ -21,11 +22,23 @@ struct Measured {
 /// Thrown where somebody does not want to wait.
 struct Interrupted {};
 
-/// Runs the scene, with poses at `options.samples` equal times. Throws Interrupted.
-Measured measure_once(const Scene& scene, const CostOptions& options);
+/// Runs the scene, with poses at these times. Throws Interrupted.
+Measured measure_once(const Scene& scene, const std::vector<double>& times,
+                      const CostOptions& options);
 
-/// The largest distance (m) and angle (rad).
+/// At those of the times that it has.
+Samples picked(const Samples& all, const std::vector<double>& times);
+
+/// The largest distance (m) and angle (rad) at the times of `a` that `b` has, too.
 double distance(const Samples& a, const Samples& b);
+
+/// So many equal times.
+std::vector<double> equal_times(double end, int count);
+/// The ends of all steps; of more than kMostPoses / bodies, each second, third, ...
+std::vector<double> step_ends(const Scene& scene, double step, int least);
+constexpr int kMostPoses = 50000;
+/// Those of both, once.
+std::vector<double> merged(const std::vector<double>& a, const std::vector<double>& b);
 
 /// The scene with one setting, and nothing written.
 Scene with_setting(const Scene& scene, Method method, double setting);

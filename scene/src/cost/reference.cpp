@@ -30,15 +30,16 @@ Scene projected(const Scene& scene, double tolerance) {
 
 /// The tightest run that gets through, and by how much the next looser one differs from it.
 std::optional<Reference> tightest(Scene (*make)(const Scene&, double), const Scene& scene,
-                                  const char* name, double tolerance, const CostOptions& options) {
+                                  const char* name, double tolerance, const Times& times,
+                                  const CostOptions& options) {
   // Each ten times as loose; a mechanism at a dead point may get through from 1e-8 on only.
   constexpr int kTries = 8;
   std::optional<Reference> best;
   for (int k = 0; k < kTries && tolerance < 0.1; ++k, tolerance *= 10) {
-    const Measured m = measure_once(make(scene, tolerance), options);
+    const Measured m = measure_once(make(scene, tolerance), times.all, options);
     if (!m.result.failure.empty()) continue;
     if (best) {
-      best->error = distance(best->samples, m.samples);
+      best->error = distance(picked(best->samples, times.own), m.samples);
       return best;
     }
     best = Reference{m.samples, fmt::format("{}, tolerance {:g}", name, tolerance), 0,
@@ -63,9 +64,10 @@ Samples extrapolated(const Samples& fine, const Samples& coarse) {
 
 // Plain IDA, unless the scene's own run settles ten times as well: then that, and what plain IDA
 // says of it. Where the two agree they are right, having little in common.
-Reference smooth_reference(const Scene& scene, double tolerance, const CostOptions& options) {
-  const auto own = tightest(projected, scene, "the scene", tolerance, options);
-  const auto other = tightest(plain, scene, "plain IDA, index 0", tolerance, options);
+Reference smooth_reference(const Scene& scene, double tolerance, const Times& times,
+                           const CostOptions& options) {
+  const auto own = tightest(projected, scene, "the scene", tolerance, times, options);
+  const auto other = tightest(plain, scene, "plain IDA, index 0", tolerance, times, options);
   if (!own && !other)
     throw std::runtime_error(fmt::format(
         "no reference: neither plain IDA nor the scene itself gets to the end at tolerances from "
@@ -76,7 +78,7 @@ Reference smooth_reference(const Scene& scene, double tolerance, const CostOptio
     only.what += own ? " (plain IDA fails)" : "";
     return only;
   }
-  const double apart = distance(own->samples, other->samples);
+  const double apart = distance(picked(own->samples, times.own), other->samples);
   const bool take_own = 10 * own->error < other->error;
   Reference out = take_own ? *own : *other;
   const Reference& witness = take_own ? *other : *own;
@@ -91,14 +93,15 @@ Reference smooth_reference(const Scene& scene, double tolerance, const CostOptio
 // by what it must be there, at coarser ones: one of them may be small by chance. Where impacts or
 // chaos leave no order in the errors, the extrapolated points differ more than the runs themselves,
 // which are the reference then.
-Reference stepping_reference(const Scene& scene, double step, const CostOptions& options) {
+Reference stepping_reference(const Scene& scene, double step, const Times& times,
+                             const CostOptions& options) {
   constexpr int kRuns = 4;
   std::vector<Samples> runs;
   for (int k = 0; k < kRuns; ++k) {
     const double h = step * (1 << k);
     Scene each = with_setting(scene, Method::steps, h);
     if (k > 0) each.stepping->on_failure = OnFailure::warn;
-    const Measured m = measure_once(each, options);
+    const Measured m = measure_once(each, times.all, options);
     if (!m.result.failure.empty())
       throw std::runtime_error(
           fmt::format("no reference: at a step of {:g} s {}", h, m.result.failure));
@@ -108,9 +111,11 @@ Reference stepping_reference(const Scene& scene, double step, const CostOptions&
   for (int k = 0; k + 1 < kRuns; ++k)
     limits.push_back(
         extrapolated(runs[static_cast<std::size_t>(k)], runs[static_cast<std::size_t>(k) + 1]));
-  const double of_run = 1.5 * std::max(distance(runs[0], runs[1]), distance(runs[1], runs[2]) / 2);
-  const double of_limit =
-      std::max(distance(limits[0], limits[1]), distance(limits[1], limits[2]) / 2);
+  const auto apart = [&](const Samples& a, const Samples& b) {
+    return distance(picked(a, times.own), b);
+  };
+  const double of_run = 1.5 * std::max(apart(runs[0], runs[1]), apart(runs[1], runs[2]) / 2);
+  const double of_limit = std::max(apart(limits[0], limits[1]), apart(limits[1], limits[2]) / 2);
   Reference out;
   if (of_limit < of_run) {
     out.samples = limits[0];
@@ -125,17 +130,18 @@ Reference stepping_reference(const Scene& scene, double step, const CostOptions&
 }
 
 /// The event engine at a tight tolerance, and how far a looser one is from it.
-std::optional<Reference> event_reference(const Scene& scene, double tolerance,
+std::optional<Reference> event_reference(const Scene& scene, double tolerance, const Times& times,
                                          const CostOptions& options) {
   constexpr int kTries = 3;
   for (int k = 0; k < kTries; ++k, tolerance *= 10) {
-    const Measured tight = measure_once(with_setting(scene, Method::events, tolerance), options);
+    const Measured tight =
+        measure_once(with_setting(scene, Method::events, tolerance), times.all, options);
     const Measured loose =
-        measure_once(with_setting(scene, Method::events, 10 * tolerance), options);
+        measure_once(with_setting(scene, Method::events, 10 * tolerance), times.all, options);
     if (!tight.result.failure.empty() || !loose.result.failure.empty()) continue;
     Reference out;
     out.samples = tight.samples;
-    out.error = distance(tight.samples, loose.samples);
+    out.error = distance(picked(tight.samples, times.own), loose.samples);
     out.of_events = true;
     out.what = fmt::format("the scene's events at a tolerance of {:g}", tolerance);
     return out;

@@ -3,10 +3,17 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "measure.hpp"
 
 namespace tether::scene::costs {
+
+/// What is compared with a reference at all times, and the reference with others like it at those
+/// that do not hang on what it is asked for.
+struct Times {
+  std::vector<double> all, own;
+};
 
 struct Reference {
   Samples samples;
@@ -16,11 +23,13 @@ struct Reference {
   bool of_events = false;
 };
 
-/// Each throws std::runtime_error where there is none.
-Reference smooth_reference(const Scene& scene, double tolerance, const CostOptions& options);
-Reference stepping_reference(const Scene& scene, double step, const CostOptions& options);
+/// At the times. Each throws std::runtime_error where there is none.
+Reference smooth_reference(const Scene& scene, double tolerance, const Times& times,
+                           const CostOptions& options);
+Reference stepping_reference(const Scene& scene, double step, const Times& times,
+                             const CostOptions& options);
 /// None: the event engine does not get to the end.
-std::optional<Reference> event_reference(const Scene& scene, double tolerance,
+std::optional<Reference> event_reference(const Scene& scene, double tolerance, const Times& times,
                                          const CostOptions& options);
 
 }  // namespace tether::scene::costs

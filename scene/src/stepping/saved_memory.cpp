@@ -126,6 +126,7 @@ void put_memory(std::ostream& out, const StepperMemory& m) {
   binary::put(out, m.penetration, m.residual, static_cast<std::int32_t>(m.status));
   binary::put(out, m.control.next, m.control.last, m.control.error, m.control.length, m.drift);
   put(out, m.sleep);
+  binary::put(out, m.cuts);
 }
 
 StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
@@ -158,7 +159,12 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
   binary::get(in, m.drift);
   if (!(m.drift >= 0) || !std::isfinite(m.drift))
     throw std::runtime_error("the saved state is damaged: joints are off by no length");
-  if (format == MemoryFormat::now) get_sleep(in, bodies, m.sleep);
+  if (format == MemoryFormat::without_sleep) return m;
+  get_sleep(in, bodies, m.sleep);
+  if (format == MemoryFormat::without_cuts) return m;
+  binary::get(in, m.cuts);
+  if (!(m.cuts >= 0) || !std::isfinite(m.cuts))
+    throw std::runtime_error("the saved state is damaged: steps are cut at no impacts");
   return m;
 }
 

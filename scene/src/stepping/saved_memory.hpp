@@ -9,12 +9,13 @@
 namespace tether::scene::stepping {
 
 /// With a fourth warm start, of which nothing hung; without the control of parts of steps; without
-/// the joints' drift; without sleep; as now.
+/// the joints' drift; without sleep; without what is left for cuts; as now.
 enum class MemoryFormat : std::uint8_t {
   with_closings,
   without_control,
   without_drift,
   without_sleep,
+  without_cuts,
   now
 };
 

@@ -65,10 +65,11 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 }
 
 // The last letter is the format, see MemoryFormat.
-constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '6'};
+constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '7'};
 // Of the step, and of the time: that of a boundary up to rounding.
 constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
-constexpr char kWithClosings = '2', kWithoutControl = '3', kWithoutDrift = '4', kWithoutSleep = '5';
+constexpr char kWithClosings = '2', kWithoutControl = '3', kWithoutDrift = '4', kWithoutSleep = '5',
+               kWithoutCuts = '6';
 
 Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
   Mapped out = map_scene(scene);
@@ -289,10 +290,10 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
     throw std::runtime_error("this is no saved state of the stepping engine");
   const char format = magic[sizeof magic - 1];
   if (format != kMagic[sizeof magic - 1] && format != kWithClosings && format != kWithoutControl &&
-      format != kWithoutDrift && format != kWithoutSleep)
+      format != kWithoutDrift && format != kWithoutSleep && format != kWithoutCuts)
     throw std::runtime_error(
         std::string("the saved state has format ") + format +
-        ", and this version reads 2 to 6: read it with the version that wrote it");
+        ", and this version reads 2 to 7: read it with the version that wrote it");
   const bool same = binary::get<std::uint64_t>(in) == fingerprint_;
   if (binary::get<std::uint64_t>(in) != bodies_.size() || (!same && how == Restore::exact))
     throw std::runtime_error("the saved state is of another scene or another step");
@@ -309,6 +310,7 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
                  : format == kWithoutControl ? MemoryFormat::without_control
                  : format == kWithoutDrift   ? MemoryFormat::without_drift
                  : format == kWithoutSleep   ? MemoryFormat::without_sleep
+                 : format == kWithoutCuts    ? MemoryFormat::without_cuts
                                              : MemoryFormat::now);
   if (!(std::abs(time) <= kMostSteps * stepper_.options().step))
     throw std::runtime_error("the saved state is damaged: it has no time");

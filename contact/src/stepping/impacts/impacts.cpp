@@ -5,8 +5,6 @@
 
 namespace tether::contact::detail {
 
-namespace {}  // namespace
-
 void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
                      StepContacts& contacts) {
   list_.clear();
@@ -14,9 +12,8 @@ void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
     PointContact& c = contacts.points[k];
     const double came = -normal_velocity(coming_, c);
     if (!(came > 0)) continue;
-    const double size = std::sqrt(near.size(c));
-    const double epsilon = came > restitution_threshold_ * size ? near.meeting(c).restitution : 0;
-    if (!(came > threshold_ * size || epsilon > 0)) continue;
+    const double epsilon = given_back(near, c, came);
+    if (!(came > least_speed(near, c) || epsilon > 0)) continue;
     const double comes = -normal_velocity(bodies.motion, c);
     if (!(comes > 0) || !(comes * dt > contacts.gaps[k])) continue;
     c.bias = 0;
@@ -27,6 +24,10 @@ void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
 
 double Impacts::least_speed(const NearContacts& near, const PointContact& c) const {
   return threshold_ * std::sqrt(near.size(c));
+}
+
+double Impacts::given_back(const NearContacts& near, const PointContact& c, double speed) const {
+  return speed > restitution_threshold_ * std::sqrt(near.size(c)) ? near.meeting(c).restitution : 0;
 }
 
 }  // namespace tether::contact::detail

@@ -39,6 +39,11 @@ class Impacts {
   void add(const Impact& later) { list_.push_back(later); }
   /// Approach, m/s, from which on it is an impact.
   double least_speed(const NearContacts& near, const PointContact& c) const;
+  /// The part of an approach that comes back; 0: too slow to bounce.
+  double given_back(const NearContacts& near, const PointContact& c, double speed) const;
+  bool is_impact(const NearContacts& near, const PointContact& c, double speed) const {
+    return speed > least_speed(near, c) || given_back(near, c, speed) > 0;
+  }
 
  private:
   double threshold_, restitution_threshold_;

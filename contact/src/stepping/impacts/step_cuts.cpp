@@ -15,6 +15,17 @@ namespace {
 using linalg::at;
 
 constexpr double kSameTime = 1e-10;  // of a part
+// What strikes within this part of a step strikes together: the corners of an edge that rounding
+// has turned would else be struck one by one, and turn it.
+constexpr double kTogether = 1e-3;
+constexpr double kTouches = 1e-10;  // of the size: a gap that rounding makes of none
+// Of what forces add to it, and of the speeds of both points: an approach that is none, where the
+// least speed of an impact is 0.
+constexpr double kPresses = 1e-3, kRounding = 1e-6;
+
+double speed(const RigidBody& b, const Eigen::Vector3d& r) {
+  return b.velocity.norm() + b.angular_velocity.norm() * r.norm();
+}
 
 bool has(const std::vector<std::uint64_t>& sorted, std::uint64_t id) {
   return std::binary_search(sorted.begin(), sorted.end(), id);
@@ -23,8 +34,24 @@ bool has(const std::vector<std::uint64_t>& sorted, std::uint64_t id) {
 }  // namespace
 
 double closing_time(double gap, double came, double more) {
+  if (came < 0) return (std::sqrt(came * came + 4 * more * std::max(gap, 0.0)) - came) / (2 * more);
   if (!(gap > 0)) return 0;
   return 2 * gap / (came + std::sqrt(std::max(0.0, came * came + 4 * more * gap)));
+}
+
+void add_impulses(const StepContacts& part, StepContacts& sum) {
+  for (std::size_t k = 0; k < part.impulses.size(); ++k) {
+    if (part.impulses[k].isZero(0)) continue;
+    std::size_t j = 0;
+    while (j < sum.points.size() && sum.points[j].id != part.points[k].id) ++j;
+    if (j < sum.points.size()) {
+      sum.impulses[j] += part.impulses[k];
+      continue;
+    }
+    sum.points.push_back(part.points[k]);
+    sum.gaps.push_back(part.gaps[k]);
+    sum.impulses.push_back(part.impulses[k]);
+  }
 }
 
 StepCuts::StepCuts(const BodyOptions& options) : solver_(cold(options)) {}
@@ -36,60 +63,78 @@ void StepCuts::remember(const WarmStart& solved) {
   std::sort(pressing_.begin(), pressing_.end());
 }
 
-bool StepCuts::choose(const Impacts& impacts, double dt, const StepContacts& contacts,
-                      const std::vector<double>& falls) {
+void StepCuts::find_islands(const BodySet& bodies, const StepContacts& contacts) {
+  islands_.join(bodies, contacts);
+  size_.assign(bodies.motion.size(), 0);
+  for (const PointContact& c : contacts.points) ++size_[at(islands_.root(bodies, c))];
+}
+
+bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const BodySet& bodies,
+                      const StepContacts& contacts) {
   striking_.clear();
-  if (contacts.points.size() > kMostContacts) return false;
+  const bool many = contacts.points.size() > kMostContacts;
+  if (many && !impacts.empty()) find_islands(bodies, contacts);
   time_.clear();
-  for (std::size_t k = 0; k < impacts.list().size(); ++k) {
-    const Impact& i = impacts.list()[k];
-    // One that the forces of the step make is none of speeds: it is as well taken at its start.
-    const double more = (i.comes - i.came) / dt - 0.5 * falls[k];
-    time_.push_back(i.comes < 2 * i.came ? closing_time(contacts.gaps[at(i.contact)], i.came, more)
-                                         : std::numeric_limits<double>::infinity());
+  time_.reserve(impacts.capacity());
+  striking_.reserve(impacts.capacity());
+  for (const Approach& i : impacts) {
+    const PointContact& c = contacts.points[at(i.contact)];
+    const double speeds =
+        speed(bodies.motion[at(c.first)], c.r1) + speed(bodies.motion[at(c.second)], c.r2);
+    const double gap = contacts.gaps[at(i.contact)], then = i.speed(gap, dt);
+    const bool cuts = then > kPresses * (i.comes - i.came) && then > kRounding * speeds &&
+                      (!many || size_[at(islands_.root(bodies, c))] <= kMostContacts);
+    time_.push_back(cuts ? i.time(gap, dt) : std::numeric_limits<double>::infinity());
   }
   when_ = std::numeric_limits<double>::infinity();
   for (const double t : time_) when_ = std::min(when_, t);
   if (!std::isfinite(when_)) return false;
   if (when_ < kSameTime * dt) when_ = 0;
   when_ = when_ > (1 - kSameTime) * dt ? dt : when_;
-  const double last = when_ < dt ? when_ + kSameTime * dt : std::numeric_limits<double>::max();
+  const double last = when_ < dt ? when_ + kTogether * dt : std::numeric_limits<double>::max();
   for (std::size_t k = 0; k < time_.size(); ++k)
-    if (time_[k] <= last) striking_.push_back(contacts.points[at(impacts.list()[k].contact)].id);
+    if (time_[k] <= last) striking_.push_back(contacts.points[at(impacts[k].contact)].id);
   std::sort(striking_.begin(), striking_.end());
+  if (many) kept_ -= kPrice;
   return true;
 }
 
-void StepCuts::add(const StepContacts& contacts) {
-  for (std::size_t k = 0; k < contacts.impulses.size(); ++k) {
-    if (contacts.impulses[k].isZero(0)) continue;
-    std::size_t j = 0;
-    while (j < sum_.points.size() && sum_.points[j].id != contacts.points[k].id) ++j;
-    if (j == sum_.points.size()) {
-      sum_.points.push_back(contacts.points[k]);
-      sum_.gaps.push_back(contacts.gaps[k]);
-      sum_.impulses.push_back(contacts.impulses[k]);
-    } else {
-      sum_.impulses[j] += contacts.impulses[k];
-    }
+// Forces and joints may act from body to body: what they act upon is one island.
+bool StepCuts::find_striking(const BodySet& bodies, const StepContacts& contacts,
+                             const std::vector<int>& moving, const std::vector<char>& falls,
+                             const std::vector<char>& active, std::vector<char>& striking) {
+  islands_.join(bodies, contacts);
+  marked_.assign(bodies.motion.size(), 0);
+  const auto mark = [&](int body) -> char& { return marked_[at(islands_.root(body))]; };
+  for (const PointContact& c : contacts.points)
+    if (strikes(c)) marked_[at(islands_.root(bodies, c))] = 1;
+  const bool bound = std::any_of(moving.begin(), moving.end(),
+                                 [&](int i) { return falls[at(i)] == 0 && mark(i) != 0; });
+  for (const int i : moving)
+    if (bound && falls[at(i)] == 0) mark(i) = 1;
+  bool others = false;
+  striking.assign(bodies.motion.size(), 0);
+  for (const int i : moving) {
+    if (!active.empty() && active[at(i)] == 0) continue;
+    striking[at(i)] = mark(i);
+    others = others || mark(i) == 0;
   }
-}
-
-void StepCuts::add_sum_to(StepContacts& contacts) const {
-  for (std::size_t j = 0; j < sum_.points.size(); ++j) {
-    std::size_t k = 0;
-    while (k < contacts.points.size() && contacts.points[k].id != sum_.points[j].id) ++k;
-    if (k < contacts.points.size()) {
-      contacts.impulses[k] += sum_.impulses[j];
-      continue;
-    }
-    contacts.points.push_back(sum_.points[j]);
-    contacts.gaps.push_back(sum_.gaps[j]);
-    contacts.impulses.push_back(sum_.impulses[j]);
-  }
+  return others;
 }
 
 bool StepCuts::strikes(const PointContact& c) const { return has(striking_, c.id); }
+
+double StepCuts::left(NearContacts& near, const BodySet& bodies, double dt) {
+  near.find(bodies, dt, found_);
+  double first = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < found_.points.size(); ++k) {
+    const PointContact& c = found_.points[k];
+    const double comes = strikes(c) ? -normal_velocity(bodies.motion, c) : 0, gap = found_.gaps[k];
+    if (comes > 0)
+      first = std::min(first, std::abs(gap) > kTouches * near.size(c) ? gap / comes : 0);
+  }
+  return std::isfinite(first) ? first : 0;
+}
 
 bool StepCuts::gather(const NearContacts& near, const BodySet& bodies, double step,
                       Impacts& impacts, StepContacts& contacts) const {

@@ -1,6 +1,7 @@
 // Tether: impacts that a step is cut at. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <tether/contact/stepping.hpp>
 #include <vector>
@@ -8,46 +9,78 @@
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
 
-/// README, section 13. When an approach over this gap ends: gap = came t + more t^2.
+/// README, section 13. When an approach over this gap ends: gap = came t + more t^2; where it
+/// leaves, came < 0, needs more > 0.
 double closing_time(double gap, double came, double more);
 
-/// A step with few contacts is taken in parts: up to where the first of them closes, the impact
-/// itself, which takes no time, and the rest. Where impacts are taken at the start of a step
+/// A contact that may close in a part of a step, m/s: with forces its approach grows from `came` to
+/// `comes`. `falls`: how much of that the weight of falling bodies adds, whose positions have half
+/// of it.
+struct Approach {
+  int contact;
+  double came, comes, falls;
+  double more(double dt) const { return (comes - came - 0.5 * falls) / dt; }
+  /// When it closes a gap, s, and the speed that it has there.
+  double time(double gap, double dt) const { return closing_time(gap, came, more(dt)); }
+  double speed(double gap, double dt) const { return came + (comes - came) * time(gap, dt) / dt; }
+};
+
+/// Impulses of a step are those of all its parts and impacts: adds those of `part` by identity.
+void add_impulses(const StepContacts& part, StepContacts& sum);
+
+/// A step of the islands that strike is taken in parts: up to where the first contact closes, the
+/// impact itself, which takes no time, and the rest. Where impacts are taken at the start of a step
 /// instead, positions are off by the way that the velocities before and after it differ by, from
 /// the start to the closing: an error of the step's length times the phase of the impact in it,
 /// which no two step lengths have in common.
 class StepCuts {
  public:
-  static constexpr std::size_t kMostContacts = 16;  // as LaterImpacts
-  static constexpr int kMost = 8;                   // in a step; then as without
+  /// As LaterImpacts: of the scene, or, up to the second, of the islands that strike.
+  static constexpr std::size_t kMostContacts = 16, kMostInScene = 512;
+  static constexpr int kMost = 32;  // in a step; then as without
+  /// Of more than kMostContacts, in problems of a step: what a step may spend on cuts, kept up to
+  /// the second, what there is at the start, and what a cut takes.
+  static constexpr double kShare = 0.05, kMostKept = 16, kFirst = 3, kPrice = 3;
 
   explicit StepCuts(const BodyOptions& options);
   /// After the above.
   void set_joints(IslandMaker& joints, const BodyOptions& options) {
     solver_.set_joints(joints.make_islands(options, LawUse::none));
+    islands_.set_links(joints.links());
   }
+  /// Of each step.
+  void earn() { kept_ = std::min(kept_ + kShare, kMostKept); }
+  double kept() const { return kept_; }
+  void set_kept(double kept) { kept_ = kept; }
 
   /// Which contacts have pressed in the part before: of its solve.
   void remember(const WarmStart& solved);
-  /// After the impacts are chosen: false where none of them is on the way. `falls`: by how much of
-  /// dt the weight of falling bodies adds to each approach, whose positions have half of that.
-  bool choose(const Impacts& impacts, double dt, const StepContacts& contacts,
-              const std::vector<double>& falls);
+  /// Of so many contacts.
+  bool may_cut(std::size_t contacts) const {
+    return contacts <= kMostContacts || (contacts <= kMostInScene && kept_ >= kPrice);
+  }
+  /// Where it may: false where none of the impacts is on the way.
+  bool choose(const std::vector<Approach>& impacts, double dt, const BodySet& bodies,
+              const StepContacts& contacts);
+  /// Marks the bodies of the islands that are to strike. `falls`: bodies that nothing but contacts
+  /// connects to others. False: no other body moves among those that are `active` (empty: all).
+  bool find_striking(const BodySet& bodies, const StepContacts& contacts,
+                     const std::vector<int>& moving, const std::vector<char>& falls,
+                     const std::vector<char>& active, std::vector<char>& striking);
   /// From the start of the part to the impact, s; all of it: none before its end.
   double when() const { return when_; }
   bool strikes(const PointContact& c) const;
+  /// There: how much later, s, the first of what strikes touches by the speed that it has then.
+  double left(NearContacts& near, const BodySet& bodies, double dt);
 
   /// At the impact: leaves contacts that touch, with those that strike among `impacts`. Those that
   /// have pressed touch, and gaps that the slowest impact closes in a step. False: none strikes.
   bool gather(const NearContacts& near, const BodySet& bodies, double step, Impacts& impacts,
               StepContacts& contacts) const;
-  /// Impulses of a step are those of all its parts and impacts: add() after each but the last.
-  void begin_sum() { sum_ = {}; }
-  void add(const StepContacts& contacts);
-  void add_sum_to(StepContacts& contacts) const;
 
   const BodySolution& solve(const std::vector<RigidBody>& motion, const StepContacts& contacts) {
     solver_.solve(motion, contacts.points, solution_);
@@ -55,10 +88,15 @@ class StepCuts {
   }
 
  private:
-  double when_ = 0;
+  void find_islands(const BodySet& bodies, const StepContacts& contacts);
+
+  double when_ = 0, kept_ = kFirst;
+  MovingIslands islands_;
+  std::vector<std::size_t> size_;                   // of islands, by their root: contacts
+  std::vector<char> marked_;                        // islands, by their root
   std::vector<std::uint64_t> pressing_, striking_;  // identities, sorted
   std::vector<double> time_;                        // of impacts
-  StepContacts sum_;
+  StepContacts found_;
   StepSolver solver_;
   BodySolution solution_;
 };

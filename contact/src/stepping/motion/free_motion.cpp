@@ -2,15 +2,25 @@
 // BSD-3-Clause
 #include "stepping/motion/free_motion.hpp"
 
+#include <algorithm>
+#include <limits>
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kNothing = 1e-6;  // of its weight: what presses a body by rounding
+
+}  // namespace
 
 void FreeMotion::list(const BodySet& bodies, const JointPart* joints, Gyroscopic gyroscopic) {
   for (std::vector<int>* list : {&moving_, &long_, &free_, &free_round_, &free_long_})
     list->clear();
   spins_.clear();
   may_fall_.assign(bodies.motion.size(), 0);
+  falls_ = may_fall_;
   weight_only_.resize(bodies.motion.size());
   for (int i = 0; i < bodies.size(); ++i) {
     if (bodies.mass[at(i)] == 0) continue;
@@ -33,6 +43,11 @@ void FreeMotion::remember_weight(const BodySet& bodies) {
   for (const int i : moving_) weight_only_[at(i)] = bodies.motion[at(i)].velocity;
 }
 
+void FreeMotion::find_falling(const BodySet& bodies) {
+  for (const int i : free_)
+    falls_[at(i)] = may_fall_[at(i)] != 0 && bodies.motion[at(i)].velocity == weight_only_[at(i)];
+}
+
 void FreeMotion::gyrate_explicit(double dt, BodySet& bodies) const {
   for (const int i : long_) {
     Vector3d& w = bodies.motion[at(i)].angular_velocity;
@@ -52,19 +67,27 @@ void FreeMotion::move(double dt, BodySet& bodies) const {
   for (const int i : free_) bodies.position[at(i)] += dt * bodies.motion[at(i)].velocity;
 }
 
-void FreeMotion::fall(const Vector3d& way, const StepContacts& contacts, BodySet& bodies) {
+void FreeMotion::fall(const Vector3d& gravity, double dt, const StepContacts& contacts,
+                      BodySet& bodies) {
+  const Vector3d way = -0.5 * dt * dt * gravity;
   if (contacts.points.empty()) {
     for (const int i : free_)
-      if (falls(bodies, i)) bodies.position[at(i)] += way;
+      if (falls(i)) bodies.position[at(i)] += way;
     return;
   }
   islands_.join(bodies, contacts);
   pressed_.assign(bodies.motion.size(), 0);
-  for (std::size_t k = 0; k < contacts.impulses.size(); ++k)
-    if (!contacts.impulses[k].isZero(0))
-      pressed_[at(islands_.root(bodies, contacts.points[k]))] = 1;
+  const double weight = dt * gravity.norm();
+  for (std::size_t k = 0; k < contacts.impulses.size(); ++k) {
+    const PointContact& c = contacts.points[k];
+    double mass = std::numeric_limits<double>::infinity();
+    for (const int body : {c.first, c.second})
+      if (bodies.mass[at(body)] > 0) mass = std::min(mass, bodies.mass[at(body)]);
+    if (contacts.impulses[k].norm() > kNothing * mass * weight)
+      pressed_[at(islands_.root(bodies, c))] = 1;
+  }
   for (const int i : free_)
-    if (falls(bodies, i) && !pressed_[at(islands_.root(i))]) bodies.position[at(i)] += way;
+    if (falls(i) && !pressed_[at(islands_.root(i))]) bodies.position[at(i)] += way;
 }
 
 void FreeMotion::turn_inertias(BodySet& bodies) const {

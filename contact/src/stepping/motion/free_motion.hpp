@@ -24,18 +24,20 @@ class FreeMotion {
   bool any_free_long() const { return !free_long_.empty(); }
 
   void accelerate(const Eigen::Vector3d& dv, BodySet& bodies) const;
-  /// Between the weight and all other forces.
+  /// Between the weight and all other forces, and behind these.
   void remember_weight(const BodySet& bodies);
+  void find_falling(const BodySet& bodies);
   void gyrate_explicit(double dt, BodySet& bodies) const;
   void gyrate_implicit(double dt, BodySet& bodies) const;
 
   void move(double dt, BodySet& bodies) const;
-  /// Nothing but its weight has changed its velocity since, and no joint holds it.
-  bool falls(const BodySet& bodies, int body) const {
-    return may_fall_[at(body)] && bodies.motion[at(body)].velocity == weight_only_[at(body)];
-  }
-  /// Bodies that fall by `way` more, but for islands of bodies that anything has pressed.
-  void fall(const Eigen::Vector3d& way, const StepContacts& contacts, BodySet& bodies);
+  /// No other force than its weight acts upon it, and no joint holds it.
+  bool falls(int body) const { return falls_[at(body)] != 0; }
+  const std::vector<char>& falling() const { return falls_; }
+  /// Bodies that fall: a part moves them by the velocities of its end, half of what their weight
+  /// adds too far. Not in islands that anything has pressed by more than rounding does.
+  void fall(const Eigen::Vector3d& gravity, double dt, const StepContacts& contacts,
+            BodySet& bodies);
   void turn_round(double dt, BodySet& bodies) const;
   void turn_plain(double dt, BodySet& bodies) const;
   void turn_keeping_momentum(double dt, BodySet& bodies);
@@ -53,7 +55,7 @@ class FreeMotion {
   std::vector<int> moving_, long_;
   std::vector<int> free_, free_round_, free_long_;  // those that no joint moves
   std::vector<FreeSpin> spins_;
-  std::vector<char> may_fall_;  // bodies
+  std::vector<char> may_fall_, falls_;  // bodies
   std::vector<Eigen::Vector3d> weight_only_;
   MovingIslands islands_;
   std::vector<char> pressed_;  // islands, by their root
