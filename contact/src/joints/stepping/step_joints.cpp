@@ -21,6 +21,7 @@ namespace {
 // origin: what ends an iteration, and what may be left where it does not go on.
 constexpr double kNoMove = 1e-14, kMet = 1e-11;
 constexpr double kHalving = 0.5;
+constexpr double kRounding = 2e-15;  // of the largest coordinate
 constexpr int kMoves = 30;
 constexpr int kRowsOfJoint = 3;  // bodies that fewer rows connect may touch
 
@@ -190,6 +191,17 @@ double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
   return std::sqrt(square);
 }
 
+// Where rows lose their rank, as those of a closed chain whose links lie on one line, rounding of g
+// asks for moves that do not end.
+bool StepJoints::is_rounding(const BodySet& bodies) const {
+  double largest = 0;
+  for (const int i : held_)
+    largest = std::max(largest, bodies.position[at(i)].cwiseAbs().maxCoeff());
+  for (const double g : row_.g)
+    if (!(std::abs(g) <= kRounding * largest)) return false;
+  return true;
+}
+
 // As PositionCorrection: the angular velocity turns with the body.
 void StepJoints::turn_back(BodySet& bodies, int body, const Vector3d& turn) const {
   if (turn.isZero(0)) return;
@@ -209,7 +221,8 @@ bool StepJoints::project_positions(BodySet& bodies, double t) {
     const double move = least_move(bodies, t, 1);
     if (!std::isfinite(move)) return false;
     if (move <= kNoMove * whole) break;
-    if (k > 3 && move > kHalving * before) return move + left_ <= kMet * whole;
+    if (k > 3 && move > kHalving * before)
+      return move + left_ <= kMet * whole || is_rounding(bodies);
     before = move;
     for (const int i : held_) {
       bodies.position[at(i)] += change_[at(i)].head<3>();
@@ -301,7 +314,8 @@ bool StepJoints::meet(BodySet& bodies, double t, double dt) {
     advance_bodies(bodies, dt);
     const double move = least_move(bodies, t + dt, dt);
     if (move <= kNoMove * whole) return left_ <= kMet * whole;
-    if (k == kMoves || !(move <= kHalving * before)) return move + left_ <= kMet * whole;
+    if (k == kMoves || !(move <= kHalving * before))
+      return move + left_ <= kMet * whole || is_rounding(bodies);
     before = move;
     for (const int i : held_) v_[at(i)] += change_[at(i)];
   }

@@ -98,6 +98,7 @@ class StepJoints final : public JointPart {
   void check_laws(const BodySet& bodies);
   void take_velocities(const BodySet& bodies);
   void give_velocities(BodySet& bodies) const;
+  bool is_rounding(const BodySet& bodies) const;
   double size(const BodySet& bodies) const;
   double least_move(const BodySet& bodies, double t, double dt);
   void turn_back(BodySet& bodies, int body, const Eigen::Vector3d& turn) const;
