@@ -41,6 +41,16 @@ struct KindsOfUnknowns {
     if (!by_level_) id_.clear();
     return by_level_;
   }
+  /// The same where `rearrange` says that rows and unknowns of these levels are as many, else not.
+  template <class Rearrange>
+  bool split_by_level(const std::vector<int>& levels, int first, Rearrange rearrange) {
+    if (!begin_by_level(levels, first)) return false;
+    if (!rearrange()) {
+      end_by_level();
+      rearrange();
+    }
+    return by_level_;
+  }
   void end_by_level() {
     id_.clear();
     by_level_ = false;

@@ -107,10 +107,10 @@ RowPattern SparseRows::pattern() const {
 }
 
 bool SparseRows::split_by_level(const std::vector<int>& levels, int first) {
-  if (!kinds_.begin_by_level(levels, first)) return false;
-  rearrange();
-  if (a.rows.size() != a.columns.size()) join_levels();
-  return split_levels();
+  return kinds_.split_by_level(levels, first, [this] {
+    rearrange();
+    return a.rows.size() == a.columns.size();
+  });
 }
 
 void SparseRows::join_levels() {
