@@ -303,7 +303,12 @@ double solve_moving(const std::vector<MovingCase>& cases, int most_unsolved = 1)
     const Solution s = Solver(o).solve(p);
     UNSCOPED_INFO(c.boxes << " boxes, seed " << c.seed << ": " << name(s.status) << " " << s.error
                           << ", work " << s.counts.work);
-    CHECK(evaluate(p, o.law, s.impulses).fixed_point <= 1.01 * s.error);
+    // Sums of doubles are off by units of u |A| |x|, one of which is a tenth of the tolerance at
+    // times.
+    const double rounding = rest_of(p, s.impulses).rounding / p.b().cwiseAbs().maxCoeff();
+    const double error = evaluate(p, o.law, s.impulses).fixed_point;
+    UNSCOPED_INFO("evaluate says " << error << ", one unit of round-off: " << rounding);
+    CHECK(error <= s.error + 4 * rounding);
     unsolved += s.status != Status::solved;
     work += s.counts.work;
   }
