@@ -13,9 +13,24 @@ TETHER_CLONES std::int64_t filled_entries(const double* c, int n) {
   return count;
 }
 
+typedef std::uint64_t v4_of_filled __attribute__((vector_size(32)));
+
+// Sixteen entries at a time, or half of the work is the loop's own.
 TETHER_CLONES bool any_filled(const double* c, std::size_t n) {
+  constexpr std::size_t kFour = 4, kAtOnce = 4 * kFour;
   std::uint64_t bits = 0;
-  for (std::size_t e = 0; e < n; ++e) {
+  v4_of_filled all = {0, 0, 0, 0};
+  std::size_t e = 0;
+  for (; e + kAtOnce <= n; e += kAtOnce) {
+    v4_of_filled first, second, third, fourth;
+    std::memcpy(&first, c + e, sizeof first);
+    std::memcpy(&second, c + e + kFour, sizeof second);
+    std::memcpy(&third, c + e + 2 * kFour, sizeof third);
+    std::memcpy(&fourth, c + e + 3 * kFour, sizeof fourth);
+    all |= (first | second) | (third | fourth);
+  }
+  for (std::size_t k = 0; k < kFour; ++k) bits |= all[k];
+  for (; e < n; ++e) {
     std::uint64_t entry;
     std::memcpy(&entry, c + e, sizeof entry);
     bits |= entry;

@@ -4,15 +4,18 @@
 
 namespace tether::ida_projection {
 
+// Is the metric free, and can answers to moves be had?
+bool Projection::Impl::hears_answers() const {
+  const Mover& mover = *movers_.used;
+  return wanted_metric_ == Metric::automatic && options_.group.empty() &&
+         options_.metric == Metric::local_correction && &mover == movers_.own.get() &&
+         mover.may_use_levels() && polish_.hears_answers();
+}
+
 // Moves to which stiff components answer excite them, and scales made of what they then do make
 // the next moves worse. True: they answer to the best move there is.
 bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
-  const Mover& mover = *movers_.used;
-  const bool free = wanted_metric_ == Metric::automatic && options_.group.empty() &&
-                    options_.metric == Metric::local_correction && &mover == movers_.own.get();
-  if (!free || move.status != Status::success || !mover.may_use_levels() ||
-      !polish_.hears_answers() || !metric_choice_.due())
-    return false;
+  if (move.status != Status::success || !hears_answers() || !metric_choice_.due()) return false;
   AnsweredMove at{move.length, polish_.answer(candidate, candidate.cj)};
   if (at.answer < 0.0) return false;
   // So they do in index 0, where F keeps them by a derivative of theirs.

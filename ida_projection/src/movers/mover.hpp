@@ -104,8 +104,8 @@ class Mover {
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 
-  /// May the correction be polished before the next move()? So it is where factors of an earlier
-  /// step will make that move, and the last one was not longer than this, in tolerances.
+  /// May the correction be polished before the next move()? So it is where rows are many, those
+  /// that count are known, and the last move was not longer than this, in tolerances.
   virtual bool may_polish_first(double /*longest*/) const { return false; }
   /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
   virtual Status finish(const Candidate&, bool /*polished*/) { return Status::success; }

@@ -142,17 +142,18 @@ template <class Solver>
 double most_left_of_dropped(const BlockOf<Solver>& block, int n, double ratio) {
   const Solver& solver = block.solver;
   double largest = 0.0;
-  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
-    if (!(solver.row_norm(solver.pivot(k)) > std::numeric_limits<double>::min()))
-      return std::numeric_limits<double>::infinity();
+  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k)
     largest = std::max(largest, solver.inconsistency(k));
-  }
   return largest == 0.0 ? 0.0 : largest * ratio / std::sqrt(n);
 }
 
-/// The largest D_j / WT_j of the block's columns.
+/// That ratio: the largest D_j / WT_j of the block's columns. Dropped rows that vanish have none.
 template <class Solver>
 double most_of_metric(BlockOf<Solver>& block, const std::vector<double>& WT) {
+  const Solver& solver = block.solver;
+  for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k)
+    if (!(solver.row_norm(solver.pivot(k)) > std::numeric_limits<double>::min()))
+      return std::numeric_limits<double>::infinity();
   double largest = 0.0;
   const double* D = block.D();
   block.for_columns([&](int k, int j) {

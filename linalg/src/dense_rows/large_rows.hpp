@@ -20,6 +20,9 @@ struct MinimumNorm::Large {
   Eigen::VectorXd work, rhs;
   std::vector<int> order;  // pivot order
   KeptRows kept;           // of factor_kept() and factor_split()
+  // Where these solve alone: the factor of each row of C D, 1 where it vanishes.
+  std::vector<double> to_unit;
+  void learn_units(const std::vector<double>& row_norm);
 
   // of factor_split()
   bool split = false;

@@ -54,6 +54,7 @@ void MinimumNorm::resize(int rows, int columns) {
     large_->rhs.resize(std::max(rows, columns));
     large_->kept.resize(rows, columns);
     large_->order.assign(m, 0);
+    large_->to_unit.assign(m, 1.0);
     large_->split = false;
     if (splits()) {
       large_->natural.resize(m);
@@ -168,9 +169,15 @@ bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, co
   const double least = kept.least_part(r);
   if (!(least >= std::max(kLeastSine, kLeastShare * decided_least_))) return false;
   kept_ = true;
+  large_->learn_units(row_norm_);
   rank_ = factored_rank_ = r;
   least_square_ = least * least;
   return true;
+}
+
+void MinimumNorm::Large::learn_units(const std::vector<double>& row_norm) {
+  for (std::size_t i = 0; i < row_norm.size(); ++i)
+    to_unit[i] = row_norm[i] > std::numeric_limits<double>::min() ? 1.0 / row_norm[i] : 1.0;
 }
 
 bool MinimumNorm::factor_kept_small(const small::Gathered& from) {
@@ -242,12 +249,13 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
 void MinimumNorm::solve_kept(const double* g, double* dy) {
   double* z = large_->rhs.data();
   const int* order = large_->order.data();
-  for (int k = 0; k < rank_; ++k) z[k] = scaled(g, order[k]);
+  const double* to_unit = large_->to_unit.data();
+  for (int k = 0; k < rank_; ++k) z[k] = g[order[k]] * to_unit[order[k]];
   large_->kept.solve(rank_, z, dy);
   for (int k = rank_; k < m_; ++k) {
     const int i = order[k];
     inconsistency_[static_cast<std::size_t>(k)] =
-        std::abs(scaled(g, i) - large_->kept.times(i, dy));
+        std::abs(g[i] * to_unit[i] - large_->kept.times(i, dy));
   }
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }

@@ -35,6 +35,7 @@ bool MinimumNorm::factor_split(double rank_tolerance) {
   decided_least_ = least;
   large.split = firm < m_;
   kept_ = !large.split;
+  if (kept_) large.learn_units(row_norm_);
   return true;
 }
 
@@ -46,6 +47,7 @@ void MinimumNorm::limit_rank() {
     kept_ = false;
   } else if (large.split || kept_) {
     large.kept.factor(large.order.data(), rank_);
+    large.learn_units(row_norm_);
     kept_ = true;
   }
 }

@@ -90,7 +90,10 @@ class ContiguousMover final : public Mover {
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
   bool may_polish_first(double longest) const override {
-    return keeps_factors() && rows_.factors.there && move_length_ <= std::min(longest, kLong);
+    const FactorState& at_hand = rows_.factors;
+    // Old factors leave more of what dropped rows ask for.
+    const bool good = takes_rest_ || (keeps_factors_ && !rows_.blocks.dropped_rows());
+    return good && at_hand.lasting && at_hand.there && move_length_ <= std::min(longest, kLong);
   }
   Status finish(const Candidate& candidate, bool polished) override {
     if (still_) return Status::success;
