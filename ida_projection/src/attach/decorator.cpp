@@ -199,13 +199,13 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
-// Algebraic variables would have to answer in every step.
+// Not while steps are smoothed: in the forms of index 2 that begin it by themselves errors of some
+// mechanisms grow.
 void Projection::Impl::raise_order(const Candidate& candidate, double cj) {
   const bool may = options_.raise_order && options_.extra_iterations > 0 && !frequency_.on() &&
-                   !variables_.any() && !attempts_.repeated && !control_.smoothing() &&
-                   polish_.possible();
+                   !attempts_.repeated && !control_.smoothing() && polish_.possible();
   if (may)
-    raised_order_.raise(candidate, ida_.order(), cj, wants_polish(0.0));
+    raised_order_.raise(candidate, ida_.order(), cj, wants_polish(0.0), variables_.id());
   else
     raised_order_.leave();
 }

@@ -9,6 +9,10 @@
 // answers to that the polish adds; without it (where the corrector made two iterations, or the
 // polish is foretold) the raised formula is stable to h lambda = -0.9 at order 5, so it has to be
 // known that F is not stiff. At orders 1 and 2 it amplifies undamped oscillations that BDF damps.
+//
+// Algebraic variables have no formula and keep what the corrector gave them. That they belong to a
+// y longer by gamma e is next to nothing where nobody integrates them: the next step starts from
+// its prediction of them only.
 #include "step/raised_order.hpp"
 
 #include <algorithm>
@@ -44,7 +48,8 @@ void RaisedOrder::accepted() {
   known_ = std::min(known_ + 1, kPoints);
 }
 
-void RaisedOrder::raise(const Candidate& candidate, int order, double cj, bool polished) {
+void RaisedOrder::raise(const Candidate& candidate, int order, double cj, bool polished,
+                        N_Vector differential) {
   raised_ = false;
   if (order < kLowest || order + 1 > known_) return;
   if (polished) ++unheard_;
@@ -57,13 +62,15 @@ void RaisedOrder::raise(const Candidate& candidate, int order, double cj, bool p
   raised_ = true;
   if (!contiguous_) {
     N_VScale(gamma, candidate.correction, taken_);
+    if (differential != nullptr) N_VProd(differential, taken_, taken_);
     N_VLinearSum(1.0, candidate.correction, -1.0, taken_, candidate.correction);
     return;
   }
   double* __restrict taken = N_VGetArrayPointer(taken_);
   double* __restrict ycor = candidate.correction_entries;
+  const double* id = differential != nullptr ? N_VGetArrayPointer(differential) : nullptr;
   for (sunindextype i = 0, n = N_VGetLength(taken_); i < n; ++i) {
-    taken[i] = gamma * ycor[i];
+    taken[i] = id == nullptr || id[i] != 0.0 ? gamma * ycor[i] : 0.0;
     ycor[i] -= taken[i];
   }
 }

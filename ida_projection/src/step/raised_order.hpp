@@ -24,8 +24,10 @@ class RaisedOrder {
     raised_ = false;
   }
 
-  /// ycor <- (1 - gamma) ycor, where that is known to be right. `polished`: an iteration follows.
-  void raise(const Candidate& candidate, int order, double cj, bool polished);
+  /// ycor <- (1 - gamma) ycor, where that is known to be right. `polished`: an iteration follows;
+  /// `differential`: the variables that have a formula (null: all).
+  void raise(const Candidate& candidate, int order, double cj, bool polished,
+             N_Vector differential);
   bool raised() const { return raised_; }
   void leave() { raised_ = false; }
 

@@ -114,7 +114,7 @@ struct Options {
 
   /// At orders 3 to 5 take the leading term of the formula's own error out of each step, while F is
   /// not stiff (ida_projection/README.md, section 9.3): smaller errors at the same tolerance and
-  /// number of steps. For forms without algebraic variables, with a direct linear solver,
+  /// number of steps. For forms of index 0 and 1, with a direct linear solver,
   /// extra_iterations 1 and frequency 1, while step sizes are not smoothed; else without effect.
   bool raise_order = false;
 
