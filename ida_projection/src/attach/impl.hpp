@@ -136,6 +136,8 @@ class Projection::Impl {
 
   // choose_metric.cpp
   bool choose_metric(const Candidate& candidate, Move& move);
+  Move move_by_levels(const Candidate& candidate, bool by_levels);
+  void look_for_shorter_move(const Candidate& candidate, Move& move);
   AnsweredMove try_other_metric(const Candidate& candidate, const AnsweredMove& present,
                                 Move& move);
   Status settle_stiff_move(const Candidate& candidate, double cj, double tolerance);
