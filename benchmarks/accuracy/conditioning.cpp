@@ -1,9 +1,10 @@
 // Tether: how much a problem multiplies errors by itself. SPDX-License-Identifier: BSD-3-Clause
 #include "conditioning.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 #include <random>
+#include <tether/linalg/least_squares.hpp>
 
 #include "explicit_form.hpp"
 #include "projection/run.hpp"
@@ -21,8 +22,8 @@ void onto(const ida_projection::Constraints& rows, double t, Eigen::VectorXd& y)
   RowMajor C(rows.total_count(), y.size());
   for (int iteration = 0; iteration < 4; ++iteration) {
     evaluate_rows(rows, t, y, g, C);
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors(C);
-    factors.setThreshold(1e-9);
+    linalg::LeastSquares factors(1e-9);
+    factors.factor(C);
     y -= factors.solve(g);
   }
 }

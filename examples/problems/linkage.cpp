@@ -6,6 +6,7 @@
 #include <problems/linkage.hpp>
 #include <problems/pinned_rods.hpp>
 #include <problems/rows.hpp>
+#include <tether/linalg/least_squares.hpp>
 
 namespace tether::problems {
 
@@ -20,12 +21,11 @@ class LeastConstraint {
         B_(linkage.m(), linkage.n()),
         right_(linkage.m()),
         zero_(Eigen::VectorXd::Zero(linkage.n())),
-        solver_(linkage.m(), linkage.n()) {
+        solver_(1e-6) {
     for (int i = 0; i < linkage.n(); ++i) {
       root_[i] = std::sqrt(linkage.mass(i));
       free_[i] = linkage.force(i) / root_[i];
     }
-    solver_.setThreshold(1e-6);
   }
 
   void operator()(const Linkage& linkage, const double* q, const double* v, double* a) {
@@ -34,9 +34,9 @@ class LeastConstraint {
     linkage.acceleration(q, v, zero_.data(), right_.data());
     right_ = -right_;
     right_.noalias() -= B_ * free_;
-    solver_.compute(B_);
+    solver_.factor(B_);
     Eigen::Map<Eigen::VectorXd> out(a, linkage.n());
-    out.noalias() = solver_.solve(right_);
+    out = solver_.solve(right_);
     out = (out + free_).cwiseQuotient(root_);
   }
 
@@ -44,7 +44,7 @@ class LeastConstraint {
   Eigen::VectorXd root_, free_;
   Eigen::MatrixXd B_;
   Eigen::VectorXd right_, zero_;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver_;
+  linalg::LeastSquares solver_;
 };
 
 std::vector<std::string> pin_names(std::size_t pins, const std::string& suffix) {
@@ -142,7 +142,8 @@ void solve_motion(const Linkage& linkage, double epsilon, const double* q, const
   for (int j = 0; j < n; ++j) left.col(j) /= linkage.mass(j);
   Eigen::MatrixXd S = left * G.transpose();
   S.diagonal().array() += epsilon;
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor(S);
+  linalg::LeastSquares factor;
+  factor.factor(S);
   refined_motion(
       linkage, epsilon, q, v,
       [&factor](const Eigen::VectorXd& right) { return Eigen::VectorXd(factor.solve(right)); },

@@ -1,11 +1,11 @@
 // Problems over products of cones: closed forms, elimination, other units and orders.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <random>
 #include <tether/contact.hpp>
+#include <tether/linalg/least_squares.hpp>
 
 #include "support/catch.hpp"
 
@@ -198,12 +198,12 @@ TEST_CASE("cones: free rows against their elimination by singular values") {
           VectorXd::NullaryExpr(static_cast<Eigen::Index>(r.size()),
                                 [&](Eigen::Index i) { return x[r[static_cast<std::size_t>(i)]]; }));
     };
-    Eigen::JacobiSVD<MatrixXd> svd(pick(f, f), Eigen::ComputeThinU | Eigen::ComputeThinV);
-    svd.setThreshold(1e-11);
-    const MatrixXd Y = svd.solve(pick(f, c));
-    const Problem contacts =
-        Problem::dense(pick(c, c) - pick(c, f) * Y,
-                       rows(d.b, c) - pick(c, f) * svd.solve(rows(d.b, f)), Vector2d(0.5, 0.8));
+    tether::linalg::LeastSquares free(1e-11);
+    free.factor(pick(f, f));
+    const MatrixXd Y = free.solve_columns(pick(f, c));
+    const Problem contacts = Problem::dense(
+        pick(c, c) - pick(c, f) * Y, rows(d.b, c) - pick(c, f) * VectorXd(free.solve(rows(d.b, f))),
+        Vector2d(0.5, 0.8));
     Options o;
     o.law = Law::coulomb;
     o.tolerance = 1e-12;

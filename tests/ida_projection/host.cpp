@@ -10,6 +10,7 @@
 #include <sundials/sundials_config.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
+#include <tether/linalg/least_squares.hpp>
 #include <utility>
 
 namespace tether::test {
@@ -242,9 +243,8 @@ double distance(const Host& host, const tp::Constraints& set) {
       g[i] = 0.0;
     }
   }
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
-  factors.setThreshold(1e-9);
-  factors.compute(A);
+  tether::linalg::LeastSquares factors(1e-9);
+  factors.factor(A);
   return factors.solve(g).norm() / std::sqrt(n) + without_gradient;
 }
 

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include "oracle.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -10,6 +11,7 @@
 #include <stdexcept>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
+#include <tether/linalg/least_squares.hpp>
 
 namespace tether::problems::test {
 
@@ -145,9 +147,9 @@ Eigen::VectorXd project(const Problem& problem, double t, Eigen::VectorXd y,
       C.row(i) /= size;
       g[i] /= size;
     }
-    Eigen::JacobiSVD<Eigen::MatrixXd> svd(C, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    svd.setThreshold(1e-9);
-    Eigen::VectorXd move = svd.solve(g);
+    linalg::LeastSquares factor(1e-9);
+    factor.factor(C);
+    Eigen::VectorXd move = factor.solve(g);
     const double limit = 0.1 * (1.0 + y.norm());
     if (move.norm() > limit) move *= limit / move.norm();
     y -= move;
@@ -170,7 +172,8 @@ Eigen::VectorXd derivative(const Problem& problem, double t, const Eigen::Vector
     yp[differential[static_cast<std::size_t>(j)]] = probe;
     A.col(j) = (residual(problem, t, y, yp).head(count) - at_zero) / probe;
   }
-  const Eigen::FullPivLU<Eigen::MatrixXd> factor(A);
+  linalg::LeastSquares factor;
+  factor.factor(A);
   yp.setZero();
   for (int refinement = 0; refinement < 3; ++refinement) {
     const Eigen::VectorXd step = factor.solve(-residual(problem, t, y, yp).head(count));
@@ -193,7 +196,9 @@ Eigen::VectorXd motion(const Problem& problem, double t, Eigen::VectorXd* y) {
       };
       A.col(j) = slope(along, 0.0, 1.0);
     }
-    const Eigen::VectorXd step = A.fullPivLu().solve(-residual(problem, t, *y, yp));
+    linalg::LeastSquares factor;
+    factor.factor(A);
+    const Eigen::VectorXd step = factor.solve(-residual(problem, t, *y, yp));
     for (int j = 0; j < N; ++j)
       (problem.id[static_cast<std::size_t>(j)] == 1.0 ? yp : *y)[j] += step[j];
   }

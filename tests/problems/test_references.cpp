@@ -10,6 +10,7 @@
 #include <problems/rigid_body.hpp>
 #include <problems/slider_crank.hpp>
 #include <problems/slider_crank_equal.hpp>
+#include <tether/linalg/singular_values.hpp>
 
 #include "oracle.hpp"
 #include "support/catch.hpp"
@@ -219,11 +220,14 @@ TEST_CASE("published digits of the ordinary differential equations") {
   }
 }
 
+static int rank_of(const Eigen::MatrixXd& C, double threshold) {
+  const Eigen::VectorXd values = tether::linalg::singular_values(C);
+  return static_cast<int>((values.array() > threshold * values[0]).count());
+}
+
 TEST_CASE("rank of the rows where it is known") {
   const auto rank = [](const Problem& p, const std::string& name, const Eigen::VectorXd& y) {
-    Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian(*find(p, name), p.t0, y));
-    svd.setThreshold(1e-9);
-    return svd.rank();
+    return rank_of(jacobian(*find(p, name), p.t0, y), 1e-9);
   };
   for (const int N : {1, 2}) {
     const Problem upright = n_four_bar(N, 1.0, "index 0");
@@ -253,7 +257,5 @@ TEST_CASE("rank of the rows where it is known") {
   all << jacobian(orbit.rows[0], 0.0, vector(orbit.reference)),
       jacobian(orbit.rows[1], 0.0, vector(orbit.reference)),
       jacobian(orbit.rows[2], 0.0, vector(orbit.reference));
-  Eigen::JacobiSVD<Eigen::MatrixXd> svd(all);
-  svd.setThreshold(1e-12);
-  CHECK(svd.rank() == 3);
+  CHECK(rank_of(all, 1e-12) == 3);
 }

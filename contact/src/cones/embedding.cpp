@@ -1,10 +1,10 @@
 // Tether: a problem over cones as one of 3-D friction cones. SPDX-License-Identifier: BSD-3-Clause
 #include "cones/embedding.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 #include "cones/cone_rows.hpp"
 
@@ -128,10 +128,10 @@ void Embedding::clear_held(const ConeProblem& problem) {
     Eigen::Matrix2d T = Eigen::Matrix2d::Identity();
     for (int r = 0; r < count; ++r)
       for (int c = 0; c < count; ++c) T(r, c) = A_.coeff(from + r, from + c);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(T);
+    const linalg::SymmetricEigen<2> eigen = linalg::symmetric_eigen(T);
     for (int k = 0; k < 2; ++k) {
-      if (eigen.eigenvalues()[k] > kHeld) continue;
-      const Eigen::Vector2d d = eigen.eigenvectors().col(k);
+      if (eigen.values[k] > kHeld) continue;
+      const Eigen::Vector2d d = eigen.vectors.col(k);
       for (int r = 0; r < count; ++r)
         for (int c = 0; c < count; ++c) Q.emplace_back(from + r, from + c, -d[r] * d[c]);
       any = true;

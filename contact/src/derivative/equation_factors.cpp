@@ -1,8 +1,8 @@
 // Tether: factors of the equations of a derivative: dense, sparse, and of deficient rank.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <Eigen/QR>
 #include <tether/linalg/block_lu.hpp>
 #include <tether/linalg/eigen.hpp>
+#include <tether/linalg/least_squares.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>
 
 #include "derivative/island_equations.hpp"
@@ -26,25 +26,25 @@ void pack(const Eigen::VectorXd& from, PackedVector* y) {
 
 class DenseFactors final : public EquationFactors {
  public:
-  DenseFactors(const IslandEquations& e, double rank_tolerance) : n_(e.size()) {
+  DenseFactors(const IslandEquations& e, double rank_tolerance)
+      : n_(e.size()), factors_(rank_tolerance) {
     Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * n_, 3 * n_);
     for (int i = 0; i < n_; ++i)
       for (int k = e.starts[at(i)]; k < e.starts[at(i + 1)]; ++k)
         for (int c = 0; c < 3; ++c)
           for (int r = 0; r < 3; ++r)
             M(3 * i + r, 3 * e.columns[at(k)] + c) = e.blocks[at(k)].column[4 * c + r];
-    decomposition_.setThreshold(rank_tolerance);
-    decomposition_.compute(M);
+    factors_.factor(M);
   }
-  void solve(PackedVector* y) override { pack(decomposition_.solve(unpacked(y, n_)), y); }
+  void solve(PackedVector* y) override { pack(factors_.solve(unpacked(y, n_)), y); }
   void solve_transposed(PackedVector* y) override {
-    pack(decomposition_.transpose().solve(unpacked(y, n_)), y);
+    pack(factors_.solve_transposed(unpacked(y, n_)), y);
   }
-  int deficiency() const override { return 3 * n_ - static_cast<int>(decomposition_.rank()); }
+  int deficiency() const override { return 3 * n_ - factors_.rank(); }
 
  private:
   int n_;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition_;
+  linalg::LeastSquares factors_;
 };
 
 class SparseFactors final : public EquationFactors {

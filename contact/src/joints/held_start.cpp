@@ -1,8 +1,9 @@
 // Tether: impulses that hold all contacts of a mechanism. SPDX-License-Identifier: BSD-3-Clause
 #include "joints/held_start.hpp"
 
-#include <Eigen/QR>
 #include <cmath>
+#include <tether/linalg/least_squares.hpp>
+#include <tether/linalg/pivoted_qr.hpp>
 
 namespace tether::contact::detail {
 
@@ -22,13 +23,11 @@ bool hold_all(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::VectorXd&
   for (Eigen::Index j = 0; j < n; ++j)
     for (Eigen::Index i = 0; i < n; ++i)
       normals(i, j) = scale[3 * i] * A(3 * i, 3 * j) * scale[3 * j];
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> of_normals;
-  of_normals.setThreshold(kRank);
-  of_normals.compute(normals);
+  linalg::PivotedQr of_normals(kRank);
+  of_normals.factor(normals);
   if (of_normals.rank() == n) return false;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor;
-  factor.setThreshold(kRank);
-  factor.compute(scale.asDiagonal() * A * scale.asDiagonal());
+  linalg::LeastSquares factor(kRank);
+  factor.factor(scale.asDiagonal() * A * scale.asDiagonal());
   const Eigen::VectorXd held =
       scale.cwiseProduct(Eigen::VectorXd(factor.solve(scale.cwiseProduct(b))));
   for (Eigen::Index i = 0; i < mu.size(); ++i)

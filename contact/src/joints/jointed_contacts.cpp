@@ -1,13 +1,12 @@
 // Tether: contacts of bodies that joints hold. SPDX-License-Identifier: BSD-3-Clause
 #include "joints/jointed_contacts.hpp"
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <tether/contact/evaluate.hpp>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 #include "joints/held_start.hpp"
 
@@ -159,11 +158,11 @@ void JointedContacts::clear_held_slips() {
   slip_alone_.setZero(alone_.size());
   for (const Side& s : sides_) slip_alone_[s.contact] += s.H.bottomRows<2>().squaredNorm();
   for (Eigen::Index i = 0; i < alone_.size(); ++i) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
-        Eigen::Matrix2d(A_.block<2, 2>(3 * i + 1, 3 * i + 1)));
+    const linalg::SymmetricEigen<2> eigen =
+        linalg::symmetric_eigen(linalg::Matrix<2, 2>(A_.block<2, 2>(3 * i + 1, 3 * i + 1)));
     for (int k = 0; k < 2; ++k) {
-      if (eigen.eigenvalues()[k] > kHeld * slip_alone_[i]) continue;
-      const Eigen::Vector2d d = eigen.eigenvectors().col(k);
+      if (eigen.values[k] > kHeld * slip_alone_[i]) continue;
+      const Eigen::Vector2d d = eigen.vectors.col(k);
       held_slips_.push_back({static_cast<int>(i), d});
       auto rows = A_.middleRows<2>(3 * i + 1);
       rows -= (d * (d.transpose() * rows)).eval();

@@ -3,10 +3,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <string>
 #include <tether/contact/body_solver.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 namespace tether::contact::detail {
 
@@ -47,9 +47,7 @@ void require_semidefinite(const char* argument, const Eigen::MatrixBase<Derived>
   Eigen::Matrix<double, n, n> raised = A / trace;
   raised.diagonal().array() += kSmall;
   if (Eigen::LLT<Eigen::Matrix<double, n, n>>(raised).info() == Eigen::Success) return;
-  const double least =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, n, n>>(A, Eigen::EigenvaluesOnly)
-          .eigenvalues()[0];
+  const double least = linalg::symmetric_eigenvalues(A)[0];
   refuse(where() + "least eigenvalue of " + argument, least, "must be >= 0");
 }
 

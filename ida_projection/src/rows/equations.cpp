@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "rows/equations.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/least_squares.hpp>
 
 #include "rows/row_blocks.hpp"
 
@@ -123,7 +123,7 @@ class Span {
 // C and h at one point, scaled, and the shares x of h that make up the algebraic part of rows of C.
 struct Point {
   Dense C, h;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;  // of h_a^T
+  linalg::LeastSquares factors{kPresent};  // of h_a^T
 
   bool evaluate(Evaluator& rows, const Residual& residual, const std::vector<int>& equations,
                 double t, const std::vector<double>& y, const std::vector<double>& WT,
@@ -143,8 +143,7 @@ struct Point {
     scale(WT, &h);
     std::vector<int> every(at(h.rows()));
     for (std::size_t i = 0; i < every.size(); ++i) every[i] = static_cast<int>(i);
-    factors.setThreshold(kPresent);
-    factors.compute(select(h, every, algebraic).transpose());
+    factors.factor(select(h, every, algebraic).transpose());
     return true;
   }
 

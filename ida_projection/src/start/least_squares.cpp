@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <limits>
+#include <tether/linalg/least_squares.hpp>
 
 #include "host/owned_vector.hpp"
 
@@ -50,9 +51,8 @@ Status consistent_derivative(IDAResFn residual, void* user_data, double t, N_Vec
     // Rows of F have their own units: each is scaled by its largest entry.
     Eigen::VectorXd rows = J.rowwise().lpNorm<Eigen::Infinity>();
     for (Eigen::Index i = 0; i < n; ++i) rows[i] = rows[i] > 0.0 ? 1.0 / rows[i] : 1.0;
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
-    factors.setThreshold(1e-7);  // differences carry about half the digits
-    factors.compute(rows.asDiagonal() * J);
+    linalg::LeastSquares factors(1e-7);  // differences carry about half the digits
+    factors.factor(rows.asDiagonal() * J);
     const Eigen::VectorXd dz = factors.solve(rows.cwiseProduct(as_vector(F)));
     if (!dz.allFinite()) return failure;
     for (Eigen::Index j = 0; j < n; ++j) unknown(j) -= scale[j] * dz[j];

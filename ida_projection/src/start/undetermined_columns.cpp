@@ -1,7 +1,7 @@
 // Tether: unknowns that a linear system does not determine. SPDX-License-Identifier: BSD-3-Clause
 #include "start/undetermined_columns.hpp"
 
-#include <Eigen/QR>
+#include <tether/linalg/pivoted_qr.hpp>
 
 namespace tether::ida_projection {
 
@@ -23,20 +23,21 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a, bool scale_rows) {
       if (largest > 0.0) a.col(j) /= largest;
     }
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
-  qr.setThreshold(kDependentPivot);
+  linalg::PivotedQr qr(kDependentPivot);
+  qr.factor(a);
   const Eigen::Index n = a.cols(), rank = qr.rank();
   if (rank == n) return {};
   // R11 z1 + R12 z2 = 0, in the order of the pivots.
   Eigen::MatrixXd null = Eigen::MatrixXd::Identity(n, n).rightCols(n - rank);
-  null.topRows(rank) = -qr.matrixR()
-                            .topLeftCorner(rank, rank)
+  const Eigen::MatrixXd R = qr.R();
+  null.topRows(rank) = -R.topLeftCorner(rank, rank)
                             .triangularView<Eigen::Upper>()
-                            .solve(qr.matrixR().topRightCorner(rank, n - rank));
-  null = qr.colsPermutation() * null;
+                            .solve(R.topRightCorner(rank, n - rank));
+  const std::vector<int> order = qr.order();
   std::vector<char> found(static_cast<std::size_t>(n));
   for (Eigen::Index j = 0; j < n; ++j)
-    found[static_cast<std::size_t>(j)] = null.row(j).lpNorm<Eigen::Infinity>() > kDependentPivot;
+    found[static_cast<std::size_t>(order[static_cast<std::size_t>(j)])] =
+        null.row(j).lpNorm<Eigen::Infinity>() > kDependentPivot;
   return found;
 }
 

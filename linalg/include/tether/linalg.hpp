@@ -8,7 +8,11 @@
 #include <tether/linalg/cone_scaling.hpp>
 #include <tether/linalg/friction_cone.hpp>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/least_squares.hpp>
 #include <tether/linalg/minimum_norm.hpp>
 #include <tether/linalg/pi.hpp>
+#include <tether/linalg/pivoted_qr.hpp>
+#include <tether/linalg/singular_values.hpp>
 #include <tether/linalg/small_lu.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>

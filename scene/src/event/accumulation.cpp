@@ -7,10 +7,10 @@
 //
 // From an impact on whose bounces nobody can see, it is completed without restitution: what the
 // normal impulses of all later ones amount to is what the closed contact carries until then.
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/least_squares.hpp>
 
 #include "driver.hpp"
 
@@ -77,7 +77,9 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
     b[i] = -w[slow[at(i)]];
     for (int j = 0; j < n; ++j) A(i, j) = rows.A()(slow[at(i)], slow[at(j)]);
   }
-  const VectorXd part = Eigen::CompleteOrthogonalDecomposition<MatrixXd>(A).solve(b);
+  linalg::LeastSquares factor;
+  factor.factor(A);
+  const VectorXd part = factor.solve(b);
   for (int i = 0; i < n; ++i) x[slow[at(i)]] = part[i];
   return change_velocities(rows.change(x));
 }

@@ -1,10 +1,10 @@
 // Tether: which contacts stay closed, stick and slide. SPDX-License-Identifier: BSD-3-Clause
 //
 // By Coulomb's law for accelerations, see solve_accelerations.
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/least_squares.hpp>
 
 #include "driver.hpp"
 
@@ -29,11 +29,10 @@ bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int 
       others.push_back(block * i);
   if (others.empty()) return false;
   const SomeRows part(rows.A(), rows.A().col(block * k), others);
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(kDependentForces);
-  factor.compute(part.A);
+  linalg::LeastSquares factor(kDependentForces);
+  factor.factor(part.A);
   const double own = rows.A()(block * k, block * k);
-  return own - part.b.dot(factor.solve(part.b)) <= kImplied * own;
+  return own - part.b.dot(VectorXd(factor.solve(part.b))) <= kImplied * own;
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 // Tether: bodies of a scene file. SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 #include "geometry/hull.hpp"
 #include "geometry/mass.hpp"
@@ -138,10 +138,8 @@ bool is_inertia(const Matrix3d& inertia) {
   if (!inertia.allFinite()) return false;
   const double scale = inertia.cwiseAbs().maxCoeff();
   if (!(scale > 0)) return false;
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(inertia / scale, Eigen::EigenvaluesOnly);
-  const Vector3d moment = solver.eigenvalues();  // ascending
-  return solver.info() == Eigen::Success && moment[0] > 0 &&
-         moment[2] <= (moment[0] + moment[1]) * (1 + 1e-9);
+  const Vector3d moment = linalg::symmetric_eigenvalues(inertia / scale);  // ascending
+  return moment[0] > 0 && moment[2] <= (moment[0] + moment[1]) * (1 + 1e-9);
 }
 
 void read_mass(Fields& in, Body& body) {

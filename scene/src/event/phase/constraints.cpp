@@ -3,8 +3,8 @@
 //
 // Gaps and joints, their rates, the slips of stuck contacts, the rows of the model itself, and
 // energy less work.
-#include <Eigen/QR>
 #include <cmath>
+#include <tether/linalg/least_squares.hpp>
 
 #include "motion.hpp"
 
@@ -53,10 +53,10 @@ void Motion::settle_velocities(double t, VectorXd& y) {
   MatrixXd columns = R_.transpose() * row_scale_.asDiagonal();
   const MatrixXd rows = columns.transpose();
   model_.divide_by_mass(columns);
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(kDependentRows);
-  factor.compute(rows * columns);
-  y.segment(nq_, nu_) -= columns * factor.solve(row_scale_.cwiseProduct(rates));
+  linalg::LeastSquares factor(kDependentRows);
+  factor.factor(MatrixXd(rows * columns));
+  const VectorXd forces = factor.solve(row_scale_.cwiseProduct(rates));
+  y.segment(nq_, nu_) -= columns * forces;
   set(t, y.data());
 }
 

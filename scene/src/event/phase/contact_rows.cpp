@@ -18,7 +18,10 @@ constexpr double kHeldMoment = 1e-10;  // of the mobility without joints
 }  // namespace
 
 ContactRows::ContactRows(Model& model, std::vector<int> contacts)
-    : model_(model), contacts_(std::move(contacts)), block_(1 + model.tangents()) {
+    : model_(model),
+      contacts_(std::move(contacts)),
+      block_(1 + model.tangents()),
+      factor_(kDependentJoints) {
   const int n = block_ * static_cast<int>(contacts_.size());
   L_.resize(n, model.velocities());
   rate_.resize(n);
@@ -103,12 +106,11 @@ void ContactRows::look_at_joints() {
     const double square = G_.row(i).dot(MG_.col(i));
     if (square > 0) scale_[i] = 1 / std::sqrt(square);
   }
-  factor_.setThreshold(kDependentJoints);
-  factor_.compute(scale_.asDiagonal() * (G_ * MG_) * scale_.asDiagonal());
+  factor_.factor(scale_.asDiagonal() * (G_ * MG_) * scale_.asDiagonal());
 }
 
 MatrixXd ContactRows::joint_solve(const MatrixXd& right) const {
-  return scale_.asDiagonal() * factor_.solve(scale_.asDiagonal() * right);
+  return scale_.asDiagonal() * MatrixXd(factor_.solve_columns(scale_.asDiagonal() * right));
 }
 
 VectorXd ContactRows::free_accelerations() {

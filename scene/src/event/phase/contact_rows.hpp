@@ -2,8 +2,8 @@
 // BSD-3-Clause
 #pragma once
 
-#include <Eigen/QR>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/least_squares.hpp>
 #include <vector>
 
 #include "event/model/model.hpp"
@@ -46,7 +46,7 @@ class ContactRows {
   int block_;
   MatrixXd L_, PL_, A_, G_, MG_;
   VectorXd rate_, rest_, joint_rest_, scale_;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor_;
+  linalg::LeastSquares factor_;
 };
 
 }  // namespace tether::scene::event

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "friction_solve.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/least_squares.hpp>
 
 #include "cone_blocks.hpp"
 
@@ -28,9 +28,8 @@ constexpr double kCutBound = 1e3, kMostBound = 1e12;
 constexpr double kNoChange = 3e-9;  // of accelerations or velocities
 
 MatrixXd pseudo_solve(const MatrixXd& S, const MatrixXd& right) {
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(kDependent);
-  factor.compute(S);
+  linalg::LeastSquares factor(kDependent);
+  factor.factor(S);
   return factor.solve(right);
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/linalg/least_squares.hpp>
 
 #include "friction_solve.hpp"
 #include "row_choice.hpp"
@@ -303,9 +304,8 @@ VectorXd Motion::joint_forces() {
   VectorXd load = VectorXd::Zero(nu_);
   for (int k = 0; k < joints_; ++k)
     load += lambda_[k] * joint_W_.row(joints_in_use_[index(k)]).transpose();
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(kRank);
-  factor.compute(joint_W_.transpose());
+  linalg::LeastSquares factor(kRank);
+  factor.factor(joint_W_.transpose());
   return factor.solve(load);
 }
 

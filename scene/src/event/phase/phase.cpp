@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 #include <tether/ida_projection.hpp>
+#include <tether/linalg/least_squares.hpp>
 #include <tether/scene/engine.hpp>
 
 #include "sundials/quiet_context.hpp"
@@ -328,9 +329,8 @@ bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd&
     if (!g.allFinite()) return false;
     C.setZero();
     motion.constraint_gradient(t, y.data(), C);
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-    factor.setThreshold(1e-11);
-    factor.compute(C * sizes.asDiagonal());
+    linalg::LeastSquares factor(1e-11);
+    factor.factor(C * sizes.asDiagonal());
     const VectorXd move = factor.solve(g);
     y -= sizes.cwiseProduct(move);
     const double size = 1 + y.cwiseQuotient(sizes).cwiseAbs().maxCoeff();

@@ -39,7 +39,7 @@ void RowIslands::choose(const MatrixXd& R, const MatrixXd& C, int block) {
     int& k = island_of[at(root(first[at(i)]))];
     if (k < 0) {
       k = static_cast<int>(islands_.size());
-      islands_.emplace_back();
+      islands_.push_back({{}, {}, linalg::LeastSquares(kIslandRank)});
     }
     islands_[at(k)].rows.push_back(i);
   }
@@ -63,7 +63,6 @@ void RowIslands::take(const Island& island, const MatrixXd& R, const MatrixXd& M
 
 void RowIslands::factor(const MatrixXd& R, const MatrixXd& MC, const VectorXd& scale) {
   for (Island& each : islands_) {
-    each.factor.setThreshold(kIslandRank);
     if (static_cast<Eigen::Index>(each.rows.size()) == R.rows()) {
       K_.noalias() = scale.asDiagonal() * R * MC;
     } else {
@@ -72,7 +71,7 @@ void RowIslands::factor(const MatrixXd& R, const MatrixXd& MC, const VectorXd& s
       for (Eigen::Index i = 0; i < K_.rows(); ++i)
         K_.row(i) *= scale[each.rows[static_cast<std::size_t>(i)]];
     }
-    each.factor.compute(K_);
+    each.factor.factor(K_);
   }
 }
 
@@ -90,7 +89,7 @@ VectorXd RowIslands::solve(const VectorXd& right) const {
     part.resize(static_cast<Eigen::Index>(each.rows.size()));
     for (std::size_t i = 0; i < each.rows.size(); ++i)
       part[static_cast<Eigen::Index>(i)] = right[each.rows[i]];
-    part = each.factor.solve(part).eval();
+    part = each.factor.solve(part);
     for (std::size_t i = 0; i < each.rows.size(); ++i)
       out[each.rows[i]] = part[static_cast<Eigen::Index>(i)];
   }

@@ -1,7 +1,7 @@
 // Tether: forces of rows, island by island. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/QR>
+#include <tether/linalg/least_squares.hpp>
 #include <vector>
 
 #include "event/model/model.hpp"
@@ -24,7 +24,7 @@ class RowIslands {
  private:
   struct Island {
     std::vector<int> rows, bodies;
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
+    linalg::LeastSquares factor;
   };
   void take(const Island& island, const MatrixXd& R, const MatrixXd& MC);
 

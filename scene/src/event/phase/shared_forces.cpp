@@ -2,10 +2,11 @@
 // BSD-3-Clause
 #include "shared_forces.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/least_squares.hpp>
+#include <tether/linalg/pivoted_qr.hpp>
 
 namespace tether::scene::event {
 
@@ -61,15 +62,12 @@ class HeldRows {
   /// False: nothing holds all rows.
   bool solve() {
     if (rows_.empty()) return false;
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-    factor.setThreshold(kSameForces);
-    factor.compute(S_);
+    linalg::LeastSquares factor(kSameForces);
+    factor.factor(S_);
     x_ = factor.solve(right_);
-    Eigen::ColPivHouseholderQR<MatrixXd> of_rows;
-    of_rows.setThreshold(kSameForces);
-    of_rows.compute(S_.transpose());
-    const MatrixXd Q = of_rows.householderQ() * MatrixXd::Identity(S_.rows(), S_.cols());
-    free_ = Q.rightCols(S_.cols() - of_rows.rank());
+    linalg::PivotedQr of_rows(kSameForces);
+    of_rows.factor(S_.transpose());
+    free_ = of_rows.left_null_space();
     return (S_ * x_ - right_).cwiseAbs().maxCoeff() <= kContradicts * b_.cwiseAbs().maxCoeff();
   }
 
@@ -224,11 +222,9 @@ VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std:
                                 double band) {
   const int m = static_cast<int>(rows.size());
   const SomeRows part(A, b, rows);
-  Eigen::ColPivHouseholderQR<MatrixXd> factor;
-  factor.setThreshold(kSameForces);
-  factor.compute(part.A);
-  const MatrixXd Q = factor.householderQ() * MatrixXd::Identity(m, m);
-  const auto none = Q.rightCols(m - factor.rank());
+  linalg::PivotedQr factor(kSameForces);
+  factor.factor(part.A);
+  const MatrixXd none = factor.left_null_space();
   const VectorXd against = none * (none.transpose() * part.b);
   VectorXd out = b;
   if (m > 0 && against.cwiseAbs().maxCoeff() <= band)

@@ -1,9 +1,9 @@
 // Tether: what both formats of robots say alike. SPDX-License-Identifier: BSD-3-Clause
 #include "import/robot/geometry.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 namespace tether::scene::import {
 
@@ -24,24 +24,20 @@ bool is_inertia(const Eigen::Matrix3d& inertia) {
   if (!inertia.allFinite()) return false;
   const double scale = inertia.cwiseAbs().maxCoeff();
   if (!(scale > 1e-300)) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia / scale,
-                                                              Eigen::EigenvaluesOnly);
-  const Eigen::Vector3d moment = solver.eigenvalues();  // ascending
+  const Eigen::Vector3d moment = linalg::symmetric_eigenvalues(inertia / scale);  // ascending
   // Inside the bounds of scenes, so that rounding on the way there does no harm.
-  return solver.info() == Eigen::Success && moment[0] > 1e-13 &&
-         moment[2] <= (moment[0] + moment[1]) * (1 + 0.5e-9);
+  return moment[0] > 1e-13 && moment[2] <= (moment[0] + moment[1]) * (1 + 0.5e-9);
 }
 
 Eigen::Matrix3d mended_inertia(const Eigen::Matrix3d& inertia) {
   const double scale = inertia.cwiseAbs().maxCoeff();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia / scale);
-  Eigen::Vector3d moment = solver.eigenvalues();
+  const linalg::SymmetricEigen<3> eigen = linalg::symmetric_eigen(inertia / scale);
+  Eigen::Vector3d moment = eigen.values;
   moment = moment.cwiseMax(1e-6 * moment[2]);
   const double lacking = std::max(0.0, moment[2] * (1 + 1e-9) - moment[0] - moment[1]);
   moment[0] += lacking / 2;
   moment[1] += lacking / 2;
-  const Eigen::Matrix3d out =
-      solver.eigenvectors() * moment.asDiagonal() * solver.eigenvectors().transpose();
+  const Eigen::Matrix3d out = eigen.vectors * moment.asDiagonal() * eigen.vectors.transpose();
   return scale / 2 * (out + out.transpose());
 }
 

@@ -1,9 +1,9 @@
 // Tether: the bodies of a smooth scene and their unknowns. SPDX-License-Identifier: BSD-3-Clause
 #include "moving_bodies.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <stdexcept>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 #include "mechanics/placed_bodies.hpp"
 #include "mechanics/quaternions.hpp"
@@ -13,8 +13,7 @@ namespace tether::scene::smooth {
 namespace {
 
 Inertia inertia_of(const Body& body) {
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> moments(body.inertia, Eigen::EigenvaluesOnly);
-  if (!(body.mass > 0) || !(moments.eigenvalues()[0] > 0))
+  if (!(body.mass > 0) || !(linalg::symmetric_eigenvalues(body.inertia)[0] > 0))
     throw std::invalid_argument(
         "body \"" + body.name +
         "\" moves, so the smooth engine needs its mass and all three moments of inertia > 0 "

@@ -17,10 +17,10 @@
 // whose lengths differ by 1e-6 turns back at a pivot of 1.4e-3, and the rows must see it.
 #include "rows_in_use.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tether/linalg/singular_values.hpp>
 
 #include "sizes.hpp"
 
@@ -57,10 +57,9 @@ RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
     bodies_.set_state(bodies_.start().data());
     gradient_.form(rows_, bodies_);
     const Eigen::VectorXd length = gradient_.G.rowwise().norm().cwiseMax(1e-300);
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-    qr.setThreshold(kDependent);
-    qr.compute((length.cwiseInverse().asDiagonal() * gradient_.G).transpose());
-    count_ = static_cast<int>(qr.rank()) + count_needed_beyond(qr.rank(), length, qr);
+    linalg::PivotedQr qr(kDependent);
+    qr.factor((length.cwiseInverse().asDiagonal() * gradient_.G).transpose());
+    count_ = qr.rank() + count_needed_beyond(length, qr);
   }
   used_.assign(at(count_), 0);
   place_of_used_.assign(at(rows.count()), -1);
@@ -93,19 +92,19 @@ bool RowsInUse::independent_by_structure() const {
 }
 
 // Of the combinations n those that are dead points: n^T gamma(v) != 0 for some of a few velocities.
-int RowsInUse::count_needed_beyond(Eigen::Index r, const Eigen::VectorXd& length,
-                                   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr) {
-  const int m = rows_.count();
+int RowsInUse::count_needed_beyond(const Eigen::VectorXd& length, const linalg::PivotedQr& qr) {
+  const int m = rows_.count(), r = qr.rank();
   const Eigen::Index dependent = m - r, n = gradient_.G.cols(), freedoms = n - r;
   const int trials = static_cast<int>(std::min<Eigen::Index>(kMostTrials, 2 * freedoms));
   if (dependent <= 0 || trials <= 0) return 0;
   // The combinations N, of scaled rows: G^T P = Q (R11 R12; 0 0), N = P (-R11^-1 R12; 1).
-  Eigen::MatrixXd N(m, dependent);
-  N.topRows(r) = -qr.matrixR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(
-      qr.matrixR().topRightCorner(r, dependent));
-  N.bottomRows(dependent).setIdentity();
-  N = (qr.colsPermutation() * N).eval();
-  const Eigen::MatrixXd Q = qr.householderQ() * Eigen::MatrixXd::Identity(n, n);
+  const Eigen::MatrixXd R = qr.R(), Q = qr.Q();
+  Eigen::MatrixXd pivoted(m, dependent), N(m, dependent);
+  pivoted.topRows(r) =
+      -R.topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(R.topRightCorner(r, dependent));
+  pivoted.bottomRows(dependent).setIdentity();
+  const std::vector<int> order = qr.order();
+  for (int k = 0; k < m; ++k) N.row(order[at(k)]) = pivoted.row(k);
   Eigen::MatrixXd second(dependent, trials);
   Eigen::VectorXd values = Eigen::VectorXd::Zero(m);
   rows_.hold_motions();
@@ -128,10 +127,8 @@ int RowsInUse::count_needed_beyond(Eigen::Index r, const Eigen::VectorXd& length
     const Eigen::VectorXd gamma = values.cwiseQuotient(length);
     second.col(trial) = N.transpose() * gamma / std::max(gamma.norm(), 1e-12);
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(second);
   int needed = 0;
-  for (Eigen::Index i = 0; i < svd.singularValues().size(); ++i)
-    needed += svd.singularValues()[i] > kSecondOrder;
+  for (const double each : linalg::singular_values(second)) needed += each > kSecondOrder;
   return needed;
 }
 
@@ -153,34 +150,34 @@ bool RowsInUse::choose() {
   gradient_.form(rows_, bodies_);
   Eigen::MatrixXd& G = gradient_.G;
   for (int i = 0; i < rows_.count(); ++i) G.row(i) /= std::max(G.row(i).norm(), 1e-300);
-  row_choice_.compute(G.transpose());
-  const auto& order = row_choice_.colsPermutation().indices();
-  const Eigen::Index most = std::min<Eigen::Index>(count_, row_choice_.matrixR().rows());
+  row_choice_.factor(G.transpose());
+  const std::vector<int> order = row_choice_.order();
+  const linalg::MatrixView R = row_choice_.R();
+  const Eigen::Index most = std::min<Eigen::Index>(count_, R.rows());
   Eigen::Index count = 0;
   double pivot = 1.0;
   while (count < most) {
-    pivot = std::abs(row_choice_.matrixR()(count, count));
+    pivot = std::abs(R(count, count));
     if (pivot < weak_) break;
     ++count;
   }
   for (Eigen::Index k = 0; k < count_; ++k)
-    used_[static_cast<std::size_t>(k)] = order[k < count ? k : 0];
+    used_[static_cast<std::size_t>(k)] = order[static_cast<std::size_t>(k < count ? k : 0)];
   std::sort(used_.begin(), used_.end());
   std::fill(place_of_used_.begin(), place_of_used_.end(), -1);
   for (int k = count_ - 1; k >= 0; --k) place_of_used_[at(used_[at(k)])] = k;
   wait_ = pivot > kGood ? kWait : 1;
-  weakest_ = count_ <= row_choice_.matrixR().rows()
-                 ? std::abs(row_choice_.matrixR()(count_ - 1, count_ - 1))
-                 : 0;
+  weakest_ = count_ <= R.rows() ? std::abs(R(count_ - 1, count_ - 1)) : 0;
   choose_multipliers();
   return used_ != before_;
 }
 
 // A change costs IDA a new matrix, so the rows stay while others are not much better.
 void RowsInUse::choose_multipliers() {
-  const auto& order = row_choice_.colsPermutation().indices();
-  const auto last = [this](const auto& qr) {
-    return count_ <= qr.matrixR().rows() ? std::abs(qr.matrixR()(count_ - 1, count_ - 1)) : 0.0;
+  const std::vector<int> order = row_choice_.order();
+  const auto last = [this](const linalg::PivotedQr& qr) {
+    const linalg::MatrixView R = qr.R();
+    return count_ <= R.rows() ? std::abs(R(count_ - 1, count_ - 1)) : 0.0;
   };
   if (count_ == rows_.count()) {
     std::fill(carries_.begin(), carries_.end(), char(1));
@@ -191,12 +188,12 @@ void RowsInUse::choose_multipliers() {
   for (int i = 0; i < rows_.count(); ++i)
     if (carries_[at(i)]) carried_gradient_.col(k++) = gradient_.G.row(i).transpose();
   if (k == count_) {
-    carried_rows_.compute(carried_gradient_);
+    carried_rows_.factor(carried_gradient_);
     if (last(carried_rows_) > kMuchWorse * last(row_choice_)) return;
   }
   ++multiplier_choices_;
   std::fill(carries_.begin(), carries_.end(), char(0));
-  for (Eigen::Index i = 0; i < count_; ++i) carries_[static_cast<std::size_t>(order[i])] = 1;
+  for (int i = 0; i < count_; ++i) carries_[at(order[at(i)])] = 1;
 }
 
 bool RowsInUse::look() { return --wait_ <= 0 && choose(); }

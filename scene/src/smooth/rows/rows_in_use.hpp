@@ -1,8 +1,9 @@
 // Tether: which rows of the joints are used. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <memory>
+#include <tether/linalg/pivoted_qr.hpp>
 #include <vector>
 
 #include "joint_gradient.hpp"
@@ -41,8 +42,7 @@ class RowsInUse {
 
  private:
   bool independent_by_structure() const;
-  int count_needed_beyond(Eigen::Index rank, const Eigen::VectorXd& length,
-                          const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr);
+  int count_needed_beyond(const Eigen::VectorXd& length, const linalg::PivotedQr& qr);
   bool choose();
   void choose_sparse();
   void choose_multipliers();
@@ -60,7 +60,7 @@ class RowsInUse {
   int wait_ = 0;  // steps until the next choice
   JointGradient gradient_;
   Eigen::MatrixXd carried_gradient_;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> row_choice_, carried_rows_;
+  linalg::PivotedQr row_choice_, carried_rows_;
 };
 
 }  // namespace tether::scene::smooth

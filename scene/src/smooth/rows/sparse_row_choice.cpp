@@ -13,10 +13,10 @@
 // all along is no dead point: that is where pivots are much smaller than elsewhere.
 #include "sparse_row_choice.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <tether/linalg/pivoted_qr.hpp>
 
 #include "mechanics/quaternions.hpp"
 
@@ -94,10 +94,13 @@ void SparseRowChoice::add_thin(RowSet& set) {
       }
       left = std::max(left, now);
     }
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(shown);
+    linalg::PivotedQr qr;
+    qr.factor(shown);
+    const linalg::MatrixView R = qr.R();
+    const std::vector<int> order = qr.order();
     const double least = std::max(kShown, kDoubt * left / (0.25 * kDependentByEntries));
-    for (added = 0; added < kProbes && std::abs(qr.matrixR()(added, added)) > least; ++added)
-      set.has[at(qr.colsPermutation().indices()[added])] = 1;
+    for (added = 0; added < kProbes && std::abs(R(added, added)) > least; ++added)
+      set.has[at(order[at(added)])] = 1;
     set.count += added;
   }
 }
