@@ -5,9 +5,13 @@ cd "$(dirname -- "$0")/.."
 
 # The last column of the table, and what stands in brackets below it: names between backticks.
 missing=0
+claims=$(mktemp) tests=$(mktemp)
+trap 'rm -f "$claims" "$tests"' EXIT
+# Names of tests may be broken into two lines by the formatter: spaces count for nothing.
+find tests python/tests \( -name '*.cpp' -o -name '*.py' -o -name CMakeLists.txt \) -exec cat {} + |
+  tr -d ' "\n' >"$tests"
 { grep '^|' SECURITY.md | sed 's/|[^|]*$//; s/.*|//'; sed -n 's/.*(`\(.*\)`).*/`\1`/p' SECURITY.md; } |
-  grep -o '`[^`]*`' | tr -d '`' | sort -u >"${TMPDIR:-/tmp}/tether_claims.$$"
-trap 'rm -f "${TMPDIR:-/tmp}/tether_claims.$$"' EXIT
+  grep -o '`[^`]*`' | tr -d '`' | sort -u >"$claims"
 count=0
 while read -r name; do
   case $name in
@@ -16,13 +20,11 @@ while read -r name; do
     *) pattern=$name ;;
   esac
   count=$((count + 1))
-  # Names of tests may be broken into two lines by the formatter: spaces count for nothing.
-  squeezed=$(printf %s "$pattern" | tr -d ' ')
-  if ! { find tests python/tests \( -name '*.cpp' -o -name '*.py' -o -name CMakeLists.txt \) -exec cat {} + | tr -d ' "\n'; } | grep -qF -- "$squeezed"; then
+  if ! grep -qF -- "$(printf %s "$pattern" | tr -d ' ')" "$tests"; then
     echo "SECURITY.md names a test that is not there: $name" >&2
     missing=1
   fi
-done <"${TMPDIR:-/tmp}/tether_claims.$$"
+done <"$claims"
 # A row without a test is a claim that nothing holds.
 if grep '^|' SECURITY.md | tail -n +3 | sed 's/|[^|]*$//; s/.*|//' | grep -nv '`'; then
   echo "SECURITY.md has a row that names no test" >&2
