@@ -1,6 +1,4 @@
 // Tether: files of problems over cones. SPDX-License-Identifier: BSD-3-Clause
-#include <cstdio>
-#include <fstream>
 #include <limits>
 #include <sstream>
 #include <tether/contact/files.hpp>
@@ -11,27 +9,11 @@
 
 #include "assemblies.hpp"
 #include "support/catch.hpp"
+#include "temporary_file.hpp"
 
 using namespace tether::contact;
 
 namespace {
-
-std::string slurp(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream all;
-  all << file.rdbuf();
-  return all.str();
-}
-
-void spill(const std::string& path, const std::string& text) {
-  std::ofstream(path, std::ios::binary) << text;
-}
-
-struct Temporary {
-  std::string path;
-  explicit Temporary(const std::string& name) : path(name) {}
-  ~Temporary() { std::remove(path.c_str()); }
-};
 
 // The same law, cones and data, A and b to a relative error.
 bool alike(const ConeProblem& p, const ConeProblem& q, double error) {

@@ -18,7 +18,7 @@ namespace {
 
 const Law kLaws[] = {Law::coulomb, Law::maximum_dissipation, Law::frictionless};
 
-Options with(Law law, double tolerance, Method method = Method::automatic) {
+Options options_of(Law law, double tolerance, Method method = Method::automatic) {
   Options o;
   o.law = law;
   o.tolerance = tolerance;
@@ -144,7 +144,7 @@ TEST_CASE("criterion: what is left of the approach hangs on no units of mass") {
     for (double tolerance : {1e-3, 1e-6}) {
       for (double mass : {1e-9, 1e-3, 1.0, 1e3, 1e9}) {
         const Problem p = boxes(mass, 0.5);
-        const Solution s = Solver(with(law, tolerance)).solve(p);
+        const Solution s = Solver(options_of(law, tolerance)).solve(p);
         INFO(name(law) << ", " << mass << " kg: " << name(s.status) << " " << s.error);
         REQUIRE(s.status == Status::solved);
         CHECK(violation(p, law, s.impulses, s.replaced) <= tolerance);
@@ -160,12 +160,12 @@ TEST_CASE("criterion: other units change nothing, at any scale") {
   for (int k = 0; k < 8; ++k) {
     const Problem p = random::cluster(g, k % 3 ? 0.4 : 1.5, 3, 6).problem();
     for (Law law : kLaws) {
-      const Solution s = Solver(with(law, 1e-8)).solve(p);
+      const Solution s = Solver(options_of(law, 1e-8)).solve(p);
       for (int A : {-490, -60, -8, 10, 50, 490}) {  // even: roots of A are exact
         for (int b : {-490, -3, 490}) {
           if (std::abs(b - A) > 900) continue;  // impulses leave the range
           const Solution t =
-              Solver(with(law, 1e-8)).solve(in_units(p, std::ldexp(1, A), std::ldexp(1, b)));
+              Solver(options_of(law, 1e-8)).solve(in_units(p, std::ldexp(1, A), std::ldexp(1, b)));
           INFO(name(law) << ", 2^" << A << " A, 2^" << b << " b: " << name(t.status));
           CHECK(t.status == s.status);
           CHECK(violation(p, law, std::ldexp(1, A) * (std::ldexp(1, -b) * t.impulses),
@@ -183,7 +183,7 @@ TEST_CASE("criterion: impulses outside of the range of doubles are no solution")
     for (bool large : {true, false}) {
       const double of_A = large ? 0x1p-520 : 0x1p530, of_b = large ? 0x1p520 : 0x1p-530;
       const Problem p = in_units(random::stack(3, 1, 0.5).problem(), of_A, of_b);
-      const Solution s = Solver(with(law, 1e-8)).solve(p);
+      const Solution s = Solver(options_of(law, 1e-8)).solve(p);
       INFO(name(law) << ", " << (large ? "large" : "small") << ": " << name(s.status) << " "
                      << s.error);
       CHECK(s.status == Status::unsolved);
@@ -208,7 +208,7 @@ TEST_CASE("criterion: a body between closing walls at any scale has finite impul
   for (int of_A : {-480, 0, 480})
     for (int of_b : {-480, 0, 480}) {
       const Problem p = in_units(delassus({body}, walls), std::ldexp(1, of_A), std::ldexp(1, of_b));
-      const Solution s = Solver(with(Law::coulomb, 1e-6)).solve(p);
+      const Solution s = Solver(options_of(Law::coulomb, 1e-6)).solve(p);
       INFO("2^" << of_A << " A, 2^" << of_b << " b: " << name(s.status));
       CHECK(s.status == Status::infeasible);
       CHECK(s.impulses.allFinite());
@@ -221,7 +221,7 @@ TEST_CASE("criterion: no friction makes zero impulses a solution of an approach"
     const Problem p = boxes(1, mu);
     for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
       CHECK(evaluate(p, law, VectorXd::Zero(p.b().size())).fixed_point > 0.5);
-      const Solution s = Solver(with(law, 1e-3)).solve(p);
+      const Solution s = Solver(options_of(law, 1e-3)).solve(p);
       if (s.status == Status::solved) CHECK(violation(p, law, s.impulses, s.replaced) <= 5e-3);
     }
   }
@@ -233,7 +233,7 @@ TEST_CASE("criterion: a slip that friction cannot stop says nothing about the ap
   a.bodies[0].velocity << 1000, 0, -0.0098;
   const Problem p = a.problem();
   CHECK(evaluate(p, Law::coulomb, VectorXd::Zero(12)).fixed_point > 0.5);
-  const Solution s = Solver(with(Law::coulomb, 1e-6)).solve(p);
+  const Solution s = Solver(options_of(Law::coulomb, 1e-6)).solve(p);
   REQUIRE(s.status == Status::solved);
   for (int i = 0; i < 4; ++i) CHECK(s.velocities[3 * i] >= -1e-6 * 0.0105);
 }
@@ -246,8 +246,8 @@ TEST_CASE("criterion: a fast slip makes no error of its direction") {
   for (int k = 0; k < 300; ++k) {
     const Problem p = random::cluster(g, k % 2 ? 0.01 : 0.1, 3, 6).problem();
     for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
-      const Solution s = Solver(with(law, 1e-6)).solve(p),
-                     exact = Solver(with(law, 1e-11)).solve(p);
+      const Solution s = Solver(options_of(law, 1e-6)).solve(p),
+                     exact = Solver(options_of(law, 1e-11)).solve(p);
       REQUIRE(s.status == Status::solved);
       REQUIRE(exact.status == Status::solved);
       CHECK((s.velocities - exact.velocities).norm() <= 5e-6 * p.b().norm());
@@ -265,7 +265,7 @@ TEST_CASE("criterion: a small problem beside a large one is solved as well as al
     for (double of_b : {1e-200, 1e-12, 1e-6, 1e9, 1e150}) {
       const Problem both = joined(p, in_units(q, 1e-3, of_b));
       for (Law law : kLaws) {
-        const Solution s = Solver(with(law, 1e-7)).solve(both);
+        const Solution s = Solver(options_of(law, 1e-7)).solve(both);
         INFO(name(law) << ", " << of_b << ": " << name(s.status) << " " << s.error);
         if (s.status != Status::solved) continue;
         const Eigen::Index n = p.b().size();
@@ -315,7 +315,7 @@ TEST_CASE("criterion: a body between closing walls is infeasible, with the proof
                               Method::admm, Method::proximal_newton, Method::interior_point}) {
           if (method != Method::automatic && (mass != 1.0 || mu != 0.4)) continue;
           for (double tolerance : {1e-3, 1e-9}) {
-            Options o = with(law, tolerance, method);
+            Options o = options_of(law, tolerance, method);
             o.max_sweeps = 3000;
             const Solution s = Solver(o).solve(p);
             INFO(name(law) << ", " << name(method) << ", mu " << mu << ", " << mass
@@ -344,7 +344,7 @@ TEST_CASE("criterion: a body between closing walls is infeasible, with the proof
 TEST_CASE("criterion: b = 0 is solved by x = 0 from any start") {
   const Problem p = in_units(boxes(1, 0.5), 1, 0);
   for (Law law : kLaws) {
-    const Solution s = Solver(with(law, 1e-9)).solve(p, VectorXd::Ones(p.b().size()));
+    const Solution s = Solver(options_of(law, 1e-9)).solve(p, VectorXd::Ones(p.b().size()));
     CHECK(s.status == Status::solved);
     CHECK(s.impulses.isZero(0));
   }
@@ -381,8 +381,8 @@ TEST_CASE(
     const double of_A = kind == 3 ? std::pow(10, g.uniform(-145, 145)) : 1;
     const double of_b = kind == 3 ? std::pow(10, g.uniform(-150, 150)) : 1;
     p = random::shuffled(Problem::dense(of_A * p.dense_matrix(), of_b * b, friction(p)), g);
-    Options o = with(kLaws[static_cast<int>(g.uniform(0, 3))],
-                     std::pow(10, -3 * std::floor(g.uniform(1, 4))));
+    Options o = options_of(kLaws[static_cast<int>(g.uniform(0, 3))],
+                           std::pow(10, -3 * std::floor(g.uniform(1, 4))));
     o.max_work = 1e6;
     const Solution s = Solver(o).solve(p);
     INFO(k << " " << name(o.law) << ", mu " << mu << ", " << o.tolerance << ": " << name(s.status)

@@ -14,17 +14,17 @@ namespace {
 using namespace tether::contact;
 using Eigen::Vector3d;
 
-struct Pile {
+struct PlatePile {
   std::vector<RigidBody> bodies;
   std::vector<ContactRows> contacts;
 };
 
 // Round plates on each other and on the ground, each touching the next at `points` of its rim, with
 // random velocities downwards: three points would hold it.
-Pile pile(int plates, int points, double mu, unsigned seed) {
+PlatePile pile(int plates, int points, double mu, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> any(-1, 1);
-  Pile out;
+  PlatePile out;
   for (int k = 0; k < plates; ++k) {
     RigidBody body;
     const double mass = 1 + 0.3 * any(random);
@@ -47,7 +47,7 @@ Pile pile(int plates, int points, double mu, unsigned seed) {
 
 TEST_CASE("few bodies: the solution is that of the matrix without bodies, for less work") {
   const double mu = 0.6;
-  const Pile p = pile(6, 40, mu, 7);
+  const PlatePile p = pile(6, 40, mu, 7);
   const Problem by_bodies = delassus(p.bodies, p.contacts);
   const Eigen::VectorXd coefficients = Eigen::VectorXd::Constant(by_bodies.contacts(), mu);
   const Problem by_contacts = Problem::dense(by_bodies.dense_matrix(), by_bodies.b(), coefficients);
@@ -69,7 +69,7 @@ TEST_CASE("few bodies: the solution is that of the matrix without bodies, for le
 TEST_CASE(
     "few bodies: proximal Newton steps are those of the matrix without bodies, for less work") {
   for (const double mu : {0.2, 0.6}) {
-    const Pile p = pile(8, 30, mu, 21);
+    const PlatePile p = pile(8, 30, mu, 21);
     const Problem by_bodies = delassus(p.bodies, p.contacts);
     Problem by_contacts = by_bodies;
     by_contacts.set_body_form(nullptr);
@@ -91,7 +91,7 @@ TEST_CASE(
 
 TEST_CASE("few bodies: where interior points end, proximal problems go on") {
   for (const double mu : {0.2, 0.6}) {
-    const Pile p = pile(6, 40, mu, 7);
+    const PlatePile p = pile(6, 40, mu, 7);
     const Problem problem = delassus(p.bodies, p.contacts);
     Options options;
     options.law = Law::coulomb;
@@ -109,7 +109,7 @@ TEST_CASE("few bodies: where interior points end, proximal problems go on") {
 // they went was a matter of the last bit.
 TEST_CASE("few bodies: an inverse mass that is singular or zero serves, too") {
   for (int bits = 0; bits < 12; ++bits) {
-    Pile p = pile(5, 40, 0.4, 3);
+    PlatePile p = pile(5, 40, 0.4, 3);
     p.bodies[2] = RigidBody();              // fixed
     p.bodies[4].inverse_inertia(2, 2) = 0;  // never turns about the vertical
     p.bodies[0].velocity.x() *= 1 + 1e-15 * bits;
@@ -136,7 +136,7 @@ TEST_CASE("few bodies: islands of one problem take the work of problems of their
     options.tolerance = 1e-8;
     options.max_work = 1e9;
     for (int k = 0; k < 4; ++k) {
-      const Pile p = pile(2 + k, 14 + 5 * k, mu, 30 + static_cast<unsigned>(k));
+      const PlatePile p = pile(2 + k, 14 + 5 * k, mu, 30 + static_cast<unsigned>(k));
       const Solution s = Solver(options).solve(delassus(p.bodies, p.contacts));
       CHECK(s.status == Status::solved);
       alone += s.counts.work;
@@ -195,7 +195,7 @@ TEST_CASE("few bodies: thousands of islands are solved to round-off") {
 }
 
 TEST_CASE("few bodies: a part of a problem has the rows and columns of its contacts") {
-  const Pile p = pile(3, 5, 0.4, 7);
+  const PlatePile p = pile(3, 5, 0.4, 7);
   const Problem whole = delassus(p.bodies, p.contacts);
   const std::vector<int> contacts = {1, 4, 5, 11, 14};
   const Problem part = whole.part(contacts);
@@ -254,7 +254,7 @@ TEST_CASE("few bodies: a full matrix of small rank is factorised in the rows of 
 }
 
 TEST_CASE("few bodies: an error that is enough ends the solve after three quarters of the work") {
-  const Pile p = pile(6, 40, 0.6, 11);
+  const PlatePile p = pile(6, 40, 0.6, 11);
   const Problem problem = delassus(p.bodies, p.contacts);
   Options options;
   options.law = Law::coulomb;

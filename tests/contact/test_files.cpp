@@ -1,6 +1,5 @@
 // Tether: files of contact problems. SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
-#include <fstream>
 #include <sstream>
 #include <sys/stat.h>
 #include <tether/contact/files.hpp>
@@ -14,27 +13,11 @@
 #include "support/catch.hpp"
 #include "support/comma_locale.hpp"
 #include "support/skip.hpp"
+#include "temporary_file.hpp"
 
 using namespace tether::contact;
 
 namespace {
-
-std::string slurp(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream all;
-  all << file.rdbuf();
-  return all.str();
-}
-
-void spill(const std::string& path, const std::string& text) {
-  std::ofstream(path, std::ios::binary) << text;
-}
-
-struct Temporary {
-  std::string path;
-  explicit Temporary(const std::string& name) : path(name) {}
-  ~Temporary() { std::remove(path.c_str()); }
-};
 
 bool equal(const Problem& p, const Problem& q) {
   if (p.contacts() != q.contacts() || p.dimension() != q.dimension()) return false;
@@ -128,8 +111,8 @@ TEST_CASE("damaged fclib files are refused") {
 namespace {
 
 template <class T>
-void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& values,
-         hsize_t claimed = 0, hid_t made = H5P_DEFAULT) {
+void store(hid_t file, const std::string& name, hid_t type, const std::vector<T>& values,
+           hsize_t claimed = 0, hid_t made = H5P_DEFAULT) {
   const hsize_t size = claimed > 0 ? claimed : values.size();
   const hid_t space = H5Screate_simple(1, &size, nullptr), links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
@@ -146,15 +129,15 @@ void put(hid_t file, const std::string& name, hid_t type, const std::vector<T>& 
 void write_columns(const std::string& path, const std::vector<int>& pointers, hsize_t claimed = 0,
                    hid_t made = H5P_DEFAULT, const std::vector<int>& rows = {0, 1, 2}) {
   const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  put<int>(file, "spacedim", H5T_NATIVE_INT, {3});
-  put<int>(file, "W/m", H5T_NATIVE_INT, {3});
-  put<int>(file, "W/n", H5T_NATIVE_INT, {3});
-  put<int>(file, "W/nz", H5T_NATIVE_INT, {-1});
-  put<int>(file, "W/p", H5T_NATIVE_INT, pointers);
-  put<int>(file, "W/i", H5T_NATIVE_INT, rows);
-  put<double>(file, "W/x", H5T_NATIVE_DOUBLE, {1, 1, 1}, claimed, made);
-  put<double>(file, "vectors/q", H5T_NATIVE_DOUBLE, {-1, 0, 0});
-  put<double>(file, "vectors/mu", H5T_NATIVE_DOUBLE, {0.5});
+  store<int>(file, "spacedim", H5T_NATIVE_INT, {3});
+  store<int>(file, "W/m", H5T_NATIVE_INT, {3});
+  store<int>(file, "W/n", H5T_NATIVE_INT, {3});
+  store<int>(file, "W/nz", H5T_NATIVE_INT, {-1});
+  store<int>(file, "W/p", H5T_NATIVE_INT, pointers);
+  store<int>(file, "W/i", H5T_NATIVE_INT, rows);
+  store<double>(file, "W/x", H5T_NATIVE_DOUBLE, {1, 1, 1}, claimed, made);
+  store<double>(file, "vectors/q", H5T_NATIVE_DOUBLE, {-1, 0, 0});
+  store<double>(file, "vectors/mu", H5T_NATIVE_DOUBLE, {0.5});
   H5Fclose(file);
 }
 

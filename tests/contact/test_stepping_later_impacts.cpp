@@ -10,10 +10,11 @@ using namespace stepping_scenes;
 
 // A rod of 1 kg and 1 m that falls at 1 m/s, its ends so far above the ground, in parts of the way
 // of a step. A step that is cut has its impacts one by one: see test_stepping_cuts.
-struct Rod {
+struct LandingRod {
   Scene scene;
   int body = 0;
-  Rod(double dt, double restitution, double first_gap, double second_gap, double yaw) : scene(dt) {
+  LandingRod(double dt, double restitution, double first_gap, double second_gap, double yaw)
+      : scene(dt) {
     scene.options.gravity.reset();
     scene.options.near_part = 1;  // the second end is beyond the way of the fall
     scene.options.cut_at_impacts = false;
@@ -41,7 +42,7 @@ TEST_CASE("stepping: a rod whose second end strikes within the step has two whol
       for (const double gap : {0.85, 0.9, 0.97})
         for (const double later : {1.02, 1.2, 1.45}) {
           const double yaw = 3 * later;
-          Rod rod(dt, e, gap, later, yaw);
+          LandingRod rod(dt, e, gap, later, yaw);
           rod.scene.options.law = law;
           tc::Stepper s = rod.scene.stepper();
           s.step();
@@ -62,7 +63,7 @@ TEST_CASE("stepping: a rod whose second end strikes within the step has two whol
 TEST_CASE("stepping: a rod lands on one end, then on the other, and lies at the surface") {
   for (const double dt : {1e-2, 1e-3})
     for (const double later : {0.91, 1.02, 1.04, 1.3}) {
-      Rod rod(dt, 0, 0.9, later, 0.4);
+      LandingRod rod(dt, 0, 0.9, later, 0.4);
       tc::Stepper s = rod.scene.stepper();
       s.step();
       INFO("dt " << dt << " later " << later);

@@ -25,12 +25,12 @@ using namespace tether::problems::test;
 
 namespace {
 
-constexpr double g = 9.81;
+constexpr double kGravity = 9.81;
 
 std::vector<Problem> everything() {
   std::vector<Problem> all;
   for (const std::string& form : pendulum_forms()) {
-    all.push_back(pendulum(1.0, g, 10.0, form));
+    all.push_back(pendulum(1.0, kGravity, 10.0, form));
     all.push_back(pendulum(2.5, kPendulumPeriodTwo, 3.0, form));
   }
   for (const std::string& form : car_axis_forms()) all.push_back(car_axis(form));

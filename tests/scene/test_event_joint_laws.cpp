@@ -10,7 +10,7 @@ using namespace event_runs;
 
 namespace {
 
-constexpr double kG = 9.81;
+constexpr double kGravity = 9.81;
 
 std::string carriage(const std::string& values, double start = 0,
                      const std::string& axis = "[1, 0, 0]") {
@@ -92,13 +92,13 @@ TEST_CASE("event: a pendulum strikes the limit of its hinge: oracle 14") {
       CHECK(std::abs(found[k].impulse.y() + 1.6 * 1.8 * speed) < 30 * tolerance);
       CHECK((found[k].first == 0 && found[k].second == -1));
     }
-    CHECK(std::abs(ledger(*engine, -2 * kG * r * std::cos(start))) < 10 * tolerance);
+    CHECK(std::abs(ledger(*engine, -2 * kGravity * r * std::cos(start))) < 10 * tolerance);
   }
 }
 
 TEST_CASE("event: a carriage comes to rest on its limit as a bouncing ball does: oracle 1") {
   for (const double scale : {1.0, 1e-3}) {  // of lengths and of gravity
-    const std::string gravity = "[0, 0, " + number(-kG * scale) + "]";
+    const std::string gravity = "[0, 0, " + number(-kGravity * scale) + "]";
     const std::string text = carriage(
         "limits = [" + number(-scale) + ", " + number(9 * scale) + "]\nlimit_restitution = 0.5", 0,
         "[0, 0, 1]");
@@ -109,7 +109,7 @@ TEST_CASE("event: a carriage comes to rest on its limit as a bouncing ball does:
       REQUIRE(rests.size() == 1);
       CHECK(std::abs(rests[0].time - 1.3545709229571927134) < 10 * tolerance);
       CHECK(std::abs(engine->bodies()[0].position.z() + scale) < 10 * tolerance * scale);
-      CHECK(std::abs(engine->forces().joints[0].drive - kG * scale) < 10 * tolerance * scale);
+      CHECK(std::abs(engine->forces().joints[0].drive - kGravity * scale) < 10 * tolerance * scale);
       CHECK(engine->diagnostics().contacts == 0);
     }
   }
@@ -164,7 +164,7 @@ TEST_CASE("event: a mass on a spring in a guide that rubs: oracle 3") {
 TEST_CASE("event: a carriage on an incline that rubs stays, or slides; thrown up it returns") {
   const double angle = M_PI / 6;
   const std::string axis = "[" + number(std::cos(angle)) + ", 0, " + number(std::sin(angle)) + "]";
-  const double pull = kG * std::sin(angle);
+  const double pull = kGravity * std::sin(angle);
   for (const double part : {1 + 1e-6, 1 - 1e-6}) {
     const auto engine = run(carriage("friction = " + number(part * pull), 0, axis), 1e-8, 1);
     const double way = part > 1 ? 0 : -0.5 * (1 - part) * pull;
@@ -260,7 +260,7 @@ TEST_CASE("event: bounds far above all forces hold, and so do those of two laws 
 
 TEST_CASE("event: friction of four hinges of a mechanism holds it up to the sum of its bounds") {
   // It turns as one: (2 m l / 2 + 2 m l) g cos against four bounds.
-  const double angle = 0.5, moment = 3 * kG * std::cos(angle);
+  const double angle = 0.5, moment = 3 * kGravity * std::cos(angle);
   for (const double part : {1.001, 0.999}) {
     CAPTURE(part);
     const std::string friction = "friction = " + number(0.25 * part * moment);
@@ -322,7 +322,7 @@ TEST_CASE("event: a motor presses a lever onto the floor; a stronger load lifts 
       ", 0, 0.25]\norientation = { axis = [0, 1, 0], rad = " + number(std::asin(0.5)) +
       " }\n[[joint]]\nkind = \"hinge\"\nbodies = [\"lever\", \"world\"]\nat = [0, 0, 0.5]\n"
       "axis = [0, 1, 0]\nmotor = { rate_rad = 1, torque = 7 }\n";
-  const double weight = mass * kG * 0.5 * arm;
+  const double weight = mass * kGravity * 0.5 * arm;
   for (const double friction : {0.0, 0.5})
     for (const double tolerance : kLadder) {
       CAPTURE(friction, tolerance);

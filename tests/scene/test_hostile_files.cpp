@@ -18,7 +18,7 @@ std::string repeated(const std::string& text, int times) {
   return all;
 }
 
-std::string body(const std::string& more) {
+std::string sphere(const std::string& more) {
   return "[[body]]\nshape = \"sphere\"\nradius = 1\nmass = 1\n" + more;
 }
 
@@ -27,7 +27,7 @@ std::string body(const std::string& more) {
 TEST_CASE("names of outputs stay in the folder of the output") {
   for (const char* key : {"csv", "vtk", "svg", "state"}) {
     const auto with = [&](const std::string& name) {
-      return parse_scene(body("[output]\n") + key + " = '" + name + "'\n", "names.toml");
+      return parse_scene(sphere("[output]\n") + key + " = '" + name + "'\n", "names.toml");
     };
     for (const char* good : {"a.csv", "results/run 1/a.csv", "a..b", "./x.svg", "Ergebnis_%d.csv"})
       CHECK_NOTHROW(with(good));
@@ -59,7 +59,7 @@ TEST_CASE("depth without end is refused before it is parsed, with its place") {
   // What only looks deep: numbers, texts, comments, long lists, many tables.
   CHECK_NOTHROW(
       parse_scene("[scene]\nname = '" + repeated(".[{", 99) + "' # " + repeated("a.", 99) + "\n" +
-                      body("position = [1.5, # [[[\n 2.5,\n 3.5]\n") + repeated(body(""), 300),
+                      sphere("position = [1.5, # [[[\n 2.5,\n 3.5]\n") + repeated(sphere(""), 300),
                   "flat.toml"));
 }
 
@@ -69,12 +69,12 @@ TEST_CASE("messages about a file hold nothing that a terminal obeys") {
        {"\\u001b]0;x\\u0007", "\\u009b31m", "\\u007f", "\\u202e", "\\u2066"})
     for (const std::string& text :
          {"\"" + bad + "\" = 1\n", "[scene]\n\"a" + bad + "\" = 1\n", "[\"" + bad + "\"]\n",
-          body("name = \"" + bad + "\"\n"), "[[body]]\nshape = \"" + bad + "\"\n",
-          body("material = \"" + bad + "\"\n"), "[scene]\nend = [\"" + bad + "\"]\n",
+          sphere("name = \"" + bad + "\"\n"), "[[body]]\nshape = \"" + bad + "\"\n",
+          sphere("material = \"" + bad + "\"\n"), "[scene]\nend = [\"" + bad + "\"]\n",
           "[scene]\nend = { \"" + bad + "\" = 1 }\n",
-          body("[[expect]]\nquantity = \"" + bad + "\"\n"),
-          body("[[pair]]\nbetween = [\"" + bad + "\", \"b\"]\n"),
-          body("[[load]]\nbody = \"" + bad + "\"\n")}) {
+          sphere("[[expect]]\nquantity = \"" + bad + "\"\n"),
+          sphere("[[pair]]\nbetween = [\"" + bad + "\", \"b\"]\n"),
+          sphere("[[load]]\nbody = \"" + bad + "\"\n")}) {
       INFO(text);
       try {
         parse_scene(text, "terminal.toml");
@@ -87,22 +87,23 @@ TEST_CASE("messages about a file hold nothing that a terminal obeys") {
         CHECK(said.find('?') != std::string::npos);
       }
     }
-  CHECK(parse_scene(body("name = \"K\u00f6rper \u2192 \u4e00\"\n"), "names.toml").bodies[0].name ==
-        "K\u00f6rper \u2192 \u4e00");
+  CHECK(
+      parse_scene(sphere("name = \"K\u00f6rper \u2192 \u4e00\"\n"), "names.toml").bodies[0].name ==
+      "K\u00f6rper \u2192 \u4e00");
 }
 
 TEST_CASE("names that a spreadsheet would compute in a table are refused") {
   for (const std::string name : {"a,b", "a\\\"b", "a\\nb", "a\\tb", "a\\u0085b"}) {
     INFO(name);
-    CHECK_THROWS_WITH(parse_scene(body("name = \"" + name + "\"\n"), "sheet.toml"),
+    CHECK_THROWS_WITH(parse_scene(sphere("name = \"" + name + "\"\n"), "sheet.toml"),
                       Catch::Contains("no comma, quote or control character"));
   }
   for (const std::string name : {"=1+1", "+1", "-1", "@a", "=cmd|' /C calc'!A0"}) {
     INFO(name);
-    CHECK_THROWS_WITH(parse_scene(body("name = \"" + name + "\"\n"), "sheet.toml"),
+    CHECK_THROWS_WITH(parse_scene(sphere("name = \"" + name + "\"\n"), "sheet.toml"),
                       Catch::Contains("not begin with = + - @"));
   }
-  CHECK(parse_scene(body("name = \"a=b+c-d@e\"\n"), "sheet.toml").bodies[0].name == "a=b+c-d@e");
+  CHECK(parse_scene(sphere("name = \"a=b+c-d@e\"\n"), "sheet.toml").bodies[0].name == "a=b+c-d@e");
 }
 
 TEST_CASE("wrong names and missing pairs in thousands cost no more than the file") {
@@ -111,20 +112,20 @@ TEST_CASE("wrong names and missing pairs in thousands cost no more than the file
     std::string text;
     for (int k = 0; k < n; ++k) {
       const std::string number = std::to_string(k);
-      text += body("name = \"b" + number + "\"\n") + "[[load]]\nbody = \"c" + number +
+      text += sphere("name = \"b" + number + "\"\n") + "[[load]]\nbody = \"c" + number +
               "\"\nforce = [1, 1, 1]\n";
     }
     CHECK_THROWS_WITH(parse_scene(text, "references.toml"), Catch::Contains("no such body"));
   };
   const auto materials = [](int n) {
     std::string text = "[stepping]\n";
-    for (int k = 0; k < n; ++k) text += body("material = \"m" + std::to_string(k) + "\"\n");
+    for (int k = 0; k < n; ++k) text += sphere("material = \"m" + std::to_string(k) + "\"\n");
     CHECK_THROWS_WITH(
         parse_scene(text + "[[pair]]\nbetween = [\"m1\", \"m2\"]\n", "materials.toml"),
         Catch::Contains("can touch"));
   };
   const auto fixed = [](int n) {
-    std::string text = body("material = \"m\"\n");
+    std::string text = sphere("material = \"m\"\n");
     for (int k = 0; k < n; ++k) {
       const std::string number = std::to_string(k);
       text += "[[body]]\nshape = \"sphere\"\nradius = 1\nfixed = true\nmaterial = \"f" + number +
@@ -139,7 +140,7 @@ TEST_CASE("wrong names and missing pairs in thousands cost no more than the file
 
 TEST_CASE("names in expectations by the thousand cost no more than the file") {
   const auto expectations = [](int n) {
-    std::string text = "[scene]\ngravity = [0, 0, -1]\n" + body("name = \"a\"\n");
+    std::string text = "[scene]\ngravity = [0, 0, -1]\n" + sphere("name = \"a\"\n");
     for (int k = 0; k < n; ++k) {
       const std::string number = std::to_string(k);
       text += "[[spring]]\nname = \"s" + number +
@@ -179,7 +180,7 @@ TEST_CASE("long texts of a repetition count as what they are, and braces end whe
 
 TEST_CASE("names have at most a thousand bytes") {
   const auto named = [](std::size_t size) {
-    return parse_scene(body("name = \"" + std::string(size, 'n') + "\"\n"), "long.toml");
+    return parse_scene(sphere("name = \"" + std::string(size, 'n') + "\"\n"), "long.toml");
   };
   CHECK(named(1000).bodies[0].name.size() == 1000);
   CHECK_THROWS_WITH(named(1001), Catch::Contains("at most 1000 bytes"));

@@ -88,12 +88,13 @@ bool needs_polyhedra(const Scene& scene) {
 }
 #endif
 
-constexpr const char* kHead = "[scene]\nname = \"{}\"\nend = {}\ngravity = [0.1, 0.2, -9.81]\n";
+constexpr const char* kHeadFormat =
+    "[scene]\nname = \"{}\"\nend = {}\ngravity = [0.1, 0.2, -9.81]\n";
 
 /// A chain of rods on ball joints, with a spring and drag.
 std::string chain(int links, const char* form, double tolerance) {
   std::string text =
-      fmt::format(kHead, fmt::format("chain of {} in {}", links, form), 0.8) +
+      fmt::format(kHeadFormat, fmt::format("chain of {} in {}", links, form), 0.8) +
       fmt::format("[smooth]\ntolerance = {}\nformulation = \"{}\"\n", tolerance, form);
   for (int k = 0; k < links; ++k)
     text += fmt::format(
@@ -111,8 +112,8 @@ std::string chain(int links, const char* form, double tolerance) {
 /// Boxes, balls and capsules that fall, bounce, slide and come to rest.
 std::string tumble(int bodies, double friction, double restitution, const char* gyroscopic) {
   std::string text =
-      fmt::format(kHead, fmt::format("{} fall {} {} {}", bodies, friction, restitution, gyroscopic),
-                  0.6) +
+      fmt::format(kHeadFormat,
+                  fmt::format("{} fall {} {} {}", bodies, friction, restitution, gyroscopic), 0.6) +
       fmt::format("[stepping]\nstep = 2e-3\ngyroscopic = \"{}\"\non_failure = \"warn\"\n",
                   gyroscopic) +
       "[[body]]\nname = \"floor\"\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n" +

@@ -13,7 +13,7 @@ using tether::linalg::kPi;
 
 namespace {
 
-Scene scene_of(const std::string& text, const ImportOptions& options = {}) {
+Scene mjcf_scene(const std::string& text, const ImportOptions& options = {}) {
   return parse_scene(import_robot(text, "robot.xml", options).toml, "robot.toml");
 }
 
@@ -28,7 +28,7 @@ bool said(const std::string& text, const std::string& words) {
   return false;
 }
 
-std::string refusal(const std::string& text) {
+std::string mjcf_refusal(const std::string& text) {
   try {
     import_robot(text, "robot.xml", {});
   } catch (const std::exception& e) {
@@ -40,7 +40,7 @@ std::string refusal(const std::string& text) {
 }  // namespace
 
 TEST_CASE("MJCF: masses and inertias of geoms are those of their solids") {
-  const Scene scene = scene_of(world(
+  const Scene scene = mjcf_scene(world(
       "<body name='b'><joint axis='0 1 0'/>"
       "<geom type='box' size='.1 .2 .3' density='500' pos='1 0 0'/>"
       "<geom type='ellipsoid' size='.1 .2 .3' mass='2' pos='-1 0 0'/></body>\n"
@@ -80,7 +80,7 @@ TEST_CASE("MJCF: angles, classes and total mass are taken as the file says") {
       before);
   ImportOptions options;
   options.positions = {{"j", 1}};
-  const Scene scene = scene_of(text, options);
+  const Scene scene = mjcf_scene(text, options);
   CHECK(scene.gravity->z() == -1);
   REQUIRE(scene.stepping);
   CHECK(scene.stepping->step == 0.004);
@@ -94,7 +94,7 @@ TEST_CASE("MJCF: angles, classes and total mass are taken as the file says") {
                          Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()));
   CHECK(scene.bodies[0].orientation.angularDistance(turned) < 1e-12);
   CHECK(said(text, "damping of joints: j"));
-  const Scene degrees = scene_of(world("<body><joint range='-90 45'/><geom size='1'/></body>"));
+  const Scene degrees = mjcf_scene(world("<body><joint range='-90 45'/><geom size='1'/></body>"));
   CHECK(degrees.joints[0].limits->upper == Approx(kPi / 4));
   CHECK(degrees.joints[0].limits->lower == Approx(-kPi / 2));
 }
@@ -102,7 +102,7 @@ TEST_CASE("MJCF: angles, classes and total mass are taken as the file says") {
 TEST_CASE("MJCF: several joints of a body are one where scenes have it") {
   const auto kind = [](const std::string& joints) {
     const Scene scene =
-        scene_of(world("<body>" + joints + "<geom size='.1' pos='.3 0 0'/></body>"));
+        mjcf_scene(world("<body>" + joints + "<geom size='.1' pos='.3 0 0'/></body>"));
     REQUIRE(scene.joints.size() == 1);
     return scene.joints[0].kind;
   };
@@ -115,7 +115,7 @@ TEST_CASE("MJCF: several joints of a body are one where scenes have it") {
   const std::string two = world(
       "<body name='b'><joint axis='0 1 0'/><joint axis='0 1 0' pos='1 0 0'/>"
       "<geom size='.1' pos='.3 0 0'/></body>");
-  const Scene scene = scene_of(two);
+  const Scene scene = mjcf_scene(two);
   REQUIRE(scene.bodies.size() == 2);
   CHECK(scene.joints.size() == 2);
   CHECK(scene.bodies[1].mass == Approx(1e-6 * scene.bodies[0].mass));
@@ -129,13 +129,13 @@ TEST_CASE("MJCF: a ball falls on the floor of its world, with MuJoCo's rule of f
       "friction='.7'/></body>");
   ImportOptions options;
   options.end = 0.6;
-  const Scene scene = scene_of(text, options);
+  const Scene scene = mjcf_scene(text, options);
   REQUIRE(scene.pairs.size() == 2);
   CHECK(scene.pairs[0].friction == 0.7);  // the larger one, since the floor has condim 3
   const RunResult result = run(scene);
   CHECK(result.failure.empty());
   CHECK(result.summary.contacts == 1);
-  CHECK(scene_of(
+  CHECK(mjcf_scene(
             world("<geom type='plane' size='1 1 1' contype='2' conaffinity='2'/><body><freejoint/>"
                   "<geom size='.1'/></body>"))
             .pairs[0]
@@ -145,7 +145,7 @@ TEST_CASE("MJCF: a ball falls on the floor of its world, with MuJoCo's rule of f
 TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with its line") {
   const auto refused = [](const std::string& text, const std::string& words) {
     INFO(text);
-    const std::string why = refusal(text);
+    const std::string why = mjcf_refusal(text);
     INFO(why);
     CHECK(why.find(words) != std::string::npos);
     CHECK(why.rfind("robot.xml:", 0) == 0);

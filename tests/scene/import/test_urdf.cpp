@@ -98,7 +98,7 @@ double error(const Robot& robot, bool free_base) {
   return worst;
 }
 
-std::string refusal(const std::string& text, const ImportOptions& options = {}) {
+std::string urdf_refusal(const std::string& text, const ImportOptions& options = {}) {
   try {
     import_robot(text, "robot.urdf", options);
   } catch (const std::exception& e) {
@@ -206,7 +206,7 @@ TEST_CASE("limits and friction follow the start; what scenes do not have is said
   CHECK_FALSE(scene_of(text, options).joints.front().limits);
   options = {};
   options.held = {"j"};
-  CHECK(refusal(text, options).find("--base free") != std::string::npos);
+  CHECK(urdf_refusal(text, options).find("--base free") != std::string::npos);
   options.base = import::Base::free;
   CHECK(scene_of(text, options).joints.empty());
 }
@@ -252,7 +252,7 @@ TEST_CASE("a URDF that is wrong is refused with the line of the element") {
   const auto refused = [](const std::string& text, const std::string& words) {
     INFO(text);
     INFO(words);
-    const std::string why = refusal(text);
+    const std::string why = urdf_refusal(text);
     INFO(why);
     CHECK(why.find(words) != std::string::npos);
     CHECK(why.rfind("robot.urdf:", 0) == 0);
@@ -330,10 +330,10 @@ TEST_CASE("options of an import that name nothing are refused by name") {
   const std::string text = two_links("prismatic", "<limit lower='-1' upper='1'/>");
   ImportOptions options;
   options.positions = {{"k", 0}};
-  CHECK(refusal(text, options) == "--joint k: no joint that moves has this name; there are j");
+  CHECK(urdf_refusal(text, options) == "--joint k: no joint that moves has this name; there are j");
   options.positions = {{"j", 3}};
-  CHECK(refusal(text, options) == "--joint j=3: its limits are -1 and 1");
+  CHECK(urdf_refusal(text, options) == "--joint j=3: its limits are -1 and 1");
   options.positions.clear();
   options.held = {"none"};
-  CHECK(refusal(text, options).rfind("--hold none: no joint", 0) == 0);
+  CHECK(urdf_refusal(text, options).rfind("--hold none: no joint", 0) == 0);
 }
