@@ -171,19 +171,26 @@ class Run {
 
   // A state is that of a run which goes on: what belongs to an end on the way comes after it.
   void stop(const Event& event) {
-    const Diagnostics d = engine_->diagnostics();
-    demand_finite(d);
+    look();
     done_ = event.time;
     if (event.record || event.expect)
       judge_.look(event.time, event.record, *engine_, summary().start_energy);
     if (options_.record) options_.record(*engine_);
-    if (event.record) record(d);
+    if (event.record) record();
     if ((event.checkpoint || event.end) && !scene_.output.state.empty()) save(scene_.output.state);
-    if (event.end && !event.record) record(d);
+    if (event.end && !event.record) record();
   }
 
-  // Steps may be longer than the time between records: no state is recorded twice.
-  void record(const Diagnostics& d) {
+  // Steps may be longer than the time between stops: no state is looked at, or recorded, twice.
+  void look() {
+    if (looked_at_ == engine_->time()) return;
+    diagnostics_ = engine_->diagnostics();
+    demand_finite(diagnostics_);
+    looked_at_ = engine_->time();
+  }
+
+  void record() {
+    const Diagnostics& d = diagnostics_;
     if (recorded_ && engine_->time() == last_record_) return;
     recorded_ = true;
     last_record_ = engine_->time();
@@ -322,6 +329,8 @@ class Run {
   RunResult result_;
   Resume resume_;
   std::vector<std::unique_ptr<Recorder>> recorders_;
+  Diagnostics diagnostics_;
+  std::optional<double> looked_at_;  // the time that they are of
   std::uint64_t scene_hash_ = 0;
   double done_ = -1;  // the last event
   bool recorded_ = false, saved_ = false;

@@ -116,11 +116,9 @@ void SteppingEngine::add_forces(const Scene& scene) {
 
 void SteppingEngine::advance(double t) {
   const double slack = kSameBoundary * stepper_.options().step;
-  while (time() < t - slack) {
-    if (interrupted()) break;
-    take_step();
-  }
-  read_bodies();
+  bool moved = false;
+  for (; time() < t - slack && !interrupted(); moved = true) take_step();
+  if (moved) read_bodies();
 }
 
 void SteppingEngine::take_step() {
