@@ -269,6 +269,46 @@ TEST_CASE("what is not TOML is refused at its place") {
   CHECK(problem("x = 99999999999999999999999\n").place.line == 1);
 }
 
+TEST_CASE("a long file, which is read in pieces, means what it means as a whole") {
+  constexpr int kBodies = 4000, kLines = 8;
+  std::string text = "# of many bodies\n";
+  const auto line_of = [](int body) { return 2 + kLines * body; };
+  for (int k = 0; k < kBodies; ++k)
+    text += "[[body]]\nname = \"b" + std::to_string(k) + "\"\nshape = \"sphere\"\nradius = 1\n" +
+            "mass = 2\n  [body.drag]\n  linear = " + std::to_string(k) + "\n\n";
+  const std::string end = "[scene]\nname = \"many\"\n";
+  const auto changed = [&](int body, const std::string& from, const std::string& to) {
+    const std::size_t begin = text.find("\"b" + std::to_string(body) + "\"");
+    return std::string(text).replace(text.find(from, begin), from.size(), to) + end;
+  };
+
+  const Scene s = parse_scene(text + end, "many.toml");
+  CHECK(s.name == "many");
+  REQUIRE(s.bodies.size() == kBodies);
+  for (int k = 0; k < kBodies; ++k) {
+    const Body& body = s.bodies[static_cast<std::size_t>(k)];
+    INFO(k);
+    REQUIRE(body.name == "b" + std::to_string(k));
+    REQUIRE(body.place.line == line_of(k));
+    REQUIRE(body.drag->linear == k);
+  }
+
+  const Problem wrong = problem(changed(3000, "radius = 1", "radius = -1"));
+  CHECK(wrong.place.line == line_of(3000) + 3);
+  CHECK(wrong.place.column == 10);
+  CHECK(problem(changed(3000, "radius = 1", "radius = ")).place.line == line_of(3000) + 3);
+  // What is wrong only as a whole.
+  CHECK(contains(problem("[scene]\n" + text + end).message(), "redefine"));
+  CHECK(problem("[scene]\n" + text + end).place.line == line_of(kBodies) + 1);
+  CHECK(problem("body = [{ fixed = true }]\n" + text).place.line == 3);
+  CHECK(problem(text + "[body.drag]\nlinear = 1\n").place.line == line_of(kBodies));
+  // A text over so many lines has what looks like the beginning of a body.
+  const Problem inside =
+      problem("[scene]\nname = \"\"\"\n" + text.substr(0, text.size() / 2) + "\"\"\"\n" + text);
+  CHECK(inside.place.line == 2);
+  CHECK(contains(inside.allowed, "control character"));
+}
+
 TEST_CASE("a scene without a body, and names that clash, are refused") {
   CHECK(contains(problem("").message(), "bad.toml:1:1: [[body]]: is missing"));
   CHECK(problem("[[body]]\nfixed = true\nname = \"a\"\n[[body]]\nfixed = true\nname = \"a\"\n")

@@ -25,11 +25,11 @@ class ContactEffect : public Effect {
     using Kind = files::Value::Kind;
     const files::Value* between = in.find("between");
     if (between == nullptr) return in.missing("between", kAllowed);
-    if (between->kind != Kind::array || between->items.size() != 2 ||
-        between->items[0].kind != Kind::text || between->items[1].kind != Kind::text)
+    if (between->kind() != Kind::array || between->items().size() != 2 ||
+        between->items()[0].kind() != Kind::text || between->items()[1].kind() != Kind::text)
       return in.wrong("between", std::string("must be ") + kAllowed);
-    pair.first = between->items[0].text;
-    pair.second = between->items[1].text;
+    pair.first = between->items()[0].text();
+    pair.second = between->items()[1].text();
     for (const std::string& name : {pair.first, pair.second})
       if (r.materials.count(name) == 0)
         return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,

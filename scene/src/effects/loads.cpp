@@ -113,16 +113,16 @@ constexpr std::size_t kMostKnots = 100000;
 void read_table(files::Fields& in, LoadHistory& history) {
   const files::Value* value = in.find("table");
   const auto is_number = [](const files::Value& x) {
-    return x.kind == files::Value::Kind::number && files::kAny.holds(x.number);
+    return x.kind() == files::Value::Kind::number && files::kAny.holds(x.number());
   };
-  bool right = value->kind == files::Value::Kind::array && !value->items.empty() &&
-               value->items.size() <= kMostKnots;
-  for (std::size_t k = 0; right && k < value->items.size(); ++k) {
-    const std::vector<files::Value>& row = value->items[k].items;
-    right = value->items[k].kind == files::Value::Kind::array && row.size() == 2 &&
+  bool right = value->kind() == files::Value::Kind::array && !value->items().empty() &&
+               value->items().size() <= kMostKnots;
+  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
+    const std::vector<files::Value>& row = value->items()[k].items();
+    right = value->items()[k].kind() == files::Value::Kind::array && row.size() == 2 &&
             is_number(row[0]) && is_number(row[1]) &&
-            (history.table.empty() || row[0].number >= history.table.back().time);
-    if (right) history.table.push_back({row[0].number, row[1].number});
+            (history.table.empty() || row[0].number() >= history.table.back().time);
+    if (right) history.table.push_back({row[0].number(), row[1].number()});
   }
   if (right) return;
   history.table.clear();

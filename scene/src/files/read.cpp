@@ -150,7 +150,7 @@ void read_expect(Fields& in, Reader& r, const Names& joints, const Names& spring
 
   const std::size_t size = components(expect.quantity);
   const Value* value = in.find("value");
-  if (value != nullptr && size == 1 && value->kind == Value::Kind::number)
+  if (value != nullptr && size == 1 && value->kind() == Value::Kind::number)
     expect.value = {in.number("value", 0, kAny, "SI")};
   else if (value != nullptr)
     expect.value = in.numbers("value", {size}, "SI");
@@ -161,13 +161,6 @@ void read_expect(Fields& in, Reader& r, const Names& joints, const Names& spring
   if (value == nullptr && !expect.at_most && !expect.at_least)
     in.missing("value", "give value and within, at_most or at_least");
   r.scene.expect.push_back(std::move(expect));
-}
-
-/// None where the key is not there.
-std::vector<Value>& items_of(Value& document, std::string_view key) {
-  for (Entry& each : document.entries)
-    if (each.key == key) return each.value.items;
-  return document.items;  // of a table: none
 }
 
 }  // namespace
@@ -181,11 +174,12 @@ Scene read(Value document, const std::string& name) {
 
   read_scene_table(root, r);
   // Of a hundred thousand of them the document need not stand beside what is read.
-  std::vector<Value>& bodies = items_of(document, "body");
-  r.scene.bodies.reserve(bodies.size());
+  Entry* entry = find_entry(document, "body");
+  auto* bodies = entry != nullptr ? std::get_if<Value::Items>(&entry->value.held) : nullptr;
+  if (bodies != nullptr) r.scene.bodies.reserve(bodies->size());
   r.each(root, "body", [&](Fields& in) {
-    const std::size_t before = r.scene.bodies.size();
-    if (before > 0 && before <= bodies.size()) bodies[before - 1].entries = {};
+    if (const std::size_t before = r.scene.bodies.size(); before > 0)
+      (*bodies)[before - 1] = Value();
     Body body = read_body(in, r);
     for (const effects::Effect* each : effects::all()) each->read_body(in, r, body);
     r.bodies.emplace(body.name, static_cast<int>(r.scene.bodies.size()));
@@ -223,8 +217,7 @@ constexpr std::size_t kLargestFile = std::size_t{256} << 20;
 }  // namespace
 
 Scene parse_scene(std::string_view text, const std::string& name) {
-  constexpr std::size_t kLargest = std::size_t{256} << 20;
-  if (text.size() > kLargest) files::refuse({name, 0, 0}, "must be a file of at most 256 MiB");
+  if (text.size() > kLargestFile) files::refuse({name, 0, 0}, "must be a file of at most 256 MiB");
   try {
     return files::read(files::parse_document(text, name), name);
   } catch (const SceneError&) {

@@ -69,22 +69,22 @@ bool from_file(Fields& in, Reader& r, const Parse& parse) {
   return true;
 }
 
-bool is_number(const Value& v) { return v.kind == Value::Kind::number && kAny.holds(v.number); }
+bool is_number(const Value& v) { return v.kind() == Value::Kind::number && kAny.holds(v.number()); }
 
 std::vector<std::array<int, 3>> read_triangles(Fields& in, std::size_t points) {
   const Value* value = in.find("triangles");
-  bool right = value->kind == Value::Kind::array && !value->items.empty() &&
-               value->items.size() <= kMostTriangles;
+  bool right = value->kind() == Value::Kind::array && !value->items().empty() &&
+               value->items().size() <= kMostTriangles;
   std::vector<std::array<int, 3>> out;
-  for (std::size_t k = 0; right && k < value->items.size(); ++k) {
-    const std::vector<Value>& corners = value->items[k].items;
+  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
+    const std::vector<Value>& corners = value->items()[k].items();
     right = corners.size() == 3;
     for (const Value& c : corners)
-      right = right && is_number(c) && c.whole && c.number >= 0 &&
-              c.number < static_cast<double>(points);
+      right = right && is_number(c) && c.whole() && c.number() >= 0 &&
+              c.number() < static_cast<double>(points);
     if (right)
-      out.push_back({static_cast<int>(corners[0].number), static_cast<int>(corners[1].number),
-                     static_cast<int>(corners[2].number)});
+      out.push_back({static_cast<int>(corners[0].number()), static_cast<int>(corners[1].number()),
+                     static_cast<int>(corners[2].number())});
   }
   if (right) return out;
   in.wrong("triangles",
@@ -97,15 +97,15 @@ std::vector<std::array<int, 3>> read_triangles(Fields& in, std::size_t points) {
 Heights read_rows(Fields& in) {
   const Value* value = in.find("heights");
   Heights out;
-  bool right = value->kind == Value::Kind::array && value->items.size() >= 2;
-  for (std::size_t k = 0; right && k < value->items.size(); ++k) {
-    const std::vector<Value>& row = value->items[k].items;
+  bool right = value->kind() == Value::Kind::array && value->items().size() >= 2;
+  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
+    const std::vector<Value>& row = value->items()[k].items();
     if (k == 0) out.columns = static_cast<int>(row.size());
     right = row.size() >= 2 && static_cast<int>(row.size()) == out.columns &&
             out.values.size() + row.size() <= kMostMeshPoints &&
             std::all_of(row.begin(), row.end(), is_number);
     if (right)
-      for (const Value& each : row) out.values.push_back(each.number);
+      for (const Value& each : row) out.values.push_back(each.number());
   }
   if (right) return out;
   in.wrong("heights",

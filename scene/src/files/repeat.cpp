@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -15,25 +16,19 @@ constexpr std::array<const char*, 4> kRepeated = {"body", "joint", "spring", "lo
 constexpr std::array<char, 3> kCounters = {'i', 'j', 'k'};
 constexpr std::size_t kMostDigits = 6;  // of N in {i+N}
 
-Entry* entry(Value& table, std::string_view key) {
-  for (Entry& each : table.entries)
-    if (each.key == key) return &each;
-  return nullptr;
-}
-
 // In values: a long text, or a long key, is as large as several.
 std::size_t size_of(const Value& value) {
-  std::size_t size = 1 + value.text.size() / kBytesOfValue;
-  for (const Value& each : value.items) size += size_of(each);
-  for (const Entry& each : value.entries)
+  std::size_t size = 1 + value.text().size() / kBytesOfValue;
+  for (const Value& each : value.items()) size += size_of(each);
+  for (const Entry& each : value.entries())
     size += each.key.size() / kBytesOfValue + size_of(each.value);
   return size;
 }
 
 bool is_vector(const Value& value) {
-  if (value.kind != Value::Kind::array || value.items.size() != 3) return false;
-  for (const Value& item : value.items)
-    if (item.kind != Value::Kind::number || !std::isfinite(item.number)) return false;
+  if (value.kind() != Value::Kind::array || value.items().size() != 3) return false;
+  for (const Value& item : value.items())
+    if (item.kind() != Value::Kind::number || !std::isfinite(item.number())) return false;
   return true;
 }
 
@@ -48,10 +43,10 @@ class Repetition {
   Repetition(const Entry& repeat, std::string what, const std::string& file)
       : place_{file, repeat.line, repeat.column}, what_(std::move(what)) {
     const Value& value = repeat.value;
-    if (value.kind == Value::Kind::array && !value.items.empty() &&
-        value.items.size() <= kCounters.size())
-      for (const Value& each : value.items) add_row(each);
-    else if (value.kind == Value::Kind::table)
+    if (value.kind() == Value::Kind::array && !value.items().empty() &&
+        value.items().size() <= kCounters.size())
+      for (const Value& each : value.items()) add_row(each);
+    else if (value.kind() == Value::Kind::table)
       add_row(value);
     else
       wrong(
@@ -75,15 +70,15 @@ class Repetition {
       number /= static_cast<std::size_t>(rows_[r].count);
     }
     Value out = element;
-    for (std::size_t e = 0; e < out.entries.size(); ++e)
-      if (out.entries[e].key == "repeat")
-        out.entries.erase(out.entries.begin() + static_cast<std::ptrdiff_t>(e--));
+    auto& entries = std::get<Value::Entries>(out.held);
+    entries.erase(std::remove_if(entries.begin(), entries.end(),
+                                 [](const Entry& each) { return each.key == "repeat"; }),
+                  entries.end());
     for (const char* key : {"position", "at"})
-      if (Entry* found = entry(out, key)) shift(found->value, at);
-    Entry* name = entry(out, "name");
-    if (name != nullptr && name->value.kind == Value::Kind::text &&
-        filled(name->value.text, at) == name->value.text)
-      name->value.text += suffix(at);
+      if (Entry* found = find_entry(out, key)) shift(found->value, at);
+    Entry* entry = find_entry(out, "name");
+    auto* name = entry != nullptr ? std::get_if<std::string>(&entry->value.held) : nullptr;
+    if (name != nullptr && filled(*name, at) == *name) *name += suffix(at);
     fill(out, at);
     return out;
   }
@@ -96,19 +91,19 @@ class Repetition {
   void add_row(const Value& table) {
     Row row;
     bool counted = false;
-    if (table.kind != Value::Kind::table) wrong("must be a table { count = ..., step = [...] }");
-    for (const Entry& each : table.entries) {
+    if (table.kind() != Value::Kind::table) wrong("must be a table { count = ..., step = [...] }");
+    for (const Entry& each : table.entries()) {
       const Value& v = each.value;
       if (each.key == "count") {
-        counted = v.kind == Value::Kind::number && v.whole && v.number >= 1 &&
-                  v.number <= static_cast<double>(kMostElements);
+        counted = v.kind() == Value::Kind::number && v.whole() && v.number() >= 1 &&
+                  v.number() <= static_cast<double>(kMostElements);
         if (!counted)
           wrong(fmt::format("count = {}: must be a whole number from 1 to {}", shown(v),
                             kMostElements));
-        row.count = static_cast<long>(v.number);
+        row.count = static_cast<long>(v.number());
       } else if (each.key == "step") {
         if (!is_vector(v)) wrong(fmt::format("step = {}: must be [x, y, z], m", shown(v)));
-        for (std::size_t i = 0; i < 3; ++i) row.step[i] = v.items[i].number;
+        for (std::size_t i = 0; i < 3; ++i) row.step[i] = v.items()[i].number();
       } else {
         wrong(fmt::format("has no {}; it has count and step", each.key));
       }
@@ -119,15 +114,17 @@ class Repetition {
 
   /// Points of the world: [x, y, z] or an array of them. What is wrong is left to the reader.
   void shift(Value& value, const std::array<long, 3>& at) const {
+    auto* items = std::get_if<Value::Items>(&value.held);
+    if (items == nullptr) return;
     if (!is_vector(value)) {
-      if (value.kind != Value::Kind::array) return;
-      for (Value& each : value.items)
+      for (Value& each : *items)
         if (is_vector(each)) shift(each, at);
       return;
     }
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t r = 0; r < rows_.size(); ++r)
-        value.items[i].number += static_cast<double>(at[r]) * rows_[r].step[i];
+        std::get<Value::Number>((*items)[i].held).value +=
+            static_cast<double>(at[r]) * rows_[r].step[i];
   }
 
   std::string suffix(const std::array<long, 3>& at) const {
@@ -171,9 +168,11 @@ class Repetition {
 
   // The depth of a document is bounded.
   void fill(Value& value, const std::array<long, 3>& at) const {
-    if (value.kind == Value::Kind::text) value.text = filled(value.text, at);
-    for (Value& each : value.items) fill(each, at);
-    for (Entry& each : value.entries) fill(each.value, at);
+    if (auto* text = std::get_if<std::string>(&value.held)) *text = filled(*text, at);
+    if (auto* items = std::get_if<Value::Items>(&value.held))
+      for (Value& each : *items) fill(each, at);
+    if (auto* entries = std::get_if<Value::Entries>(&value.held))
+      for (Entry& each : *entries) fill(each.value, at);
   }
 
   Place place_;
@@ -187,12 +186,13 @@ class Repetition {
 void repeat_elements(Value& document, const std::string& file) {
   std::size_t made = 0, copied = 0;
   for (const char* kind : kRepeated) {
-    Entry* all = entry(document, kind);
-    if (all == nullptr || all->value.kind != Value::Kind::array) continue;
-    std::vector<Value> items;
-    for (std::size_t k = 0; k < all->value.items.size(); ++k) {
-      Value& item = all->value.items[k];
-      const Entry* repeat = item.kind == Value::Kind::table ? entry(item, "repeat") : nullptr;
+    Entry* entry = find_entry(document, kind);
+    auto* all = entry != nullptr ? std::get_if<Value::Items>(&entry->value.held) : nullptr;
+    if (all == nullptr) continue;
+    Value::Items items;
+    for (std::size_t k = 0; k < all->size(); ++k) {
+      Value& item = (*all)[k];
+      const Entry* repeat = find_entry(item, "repeat");
       if (repeat == nullptr) {
         items.push_back(std::move(item));
         continue;
@@ -208,7 +208,7 @@ void repeat_elements(Value& document, const std::string& file) {
       for (std::size_t n = 0; n < repetition.count(); ++n)
         items.push_back(repetition.copy(item, n));
     }
-    all->value.items = std::move(items);
+    *all = std::move(items);
   }
 }
 

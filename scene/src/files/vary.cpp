@@ -27,12 +27,6 @@ std::vector<std::string> words_of(const std::string& path) {
   throw std::invalid_argument(fmt::format("\"{}\": {}", path, why));
 }
 
-Value* wanted_entry(Value& table, const std::string& key) {
-  for (Entry& each : table.entries)
-    if (each.key == key) return &each.value;
-  return nullptr;
-}
-
 /// Counted from 1; 0: it is no such number.
 std::size_t number_of(const std::string& word, std::size_t most) {
   if (word.empty() || word.size() > 9 || word.find_first_not_of("0123456789") != std::string::npos)
@@ -42,8 +36,8 @@ std::size_t number_of(const std::string& word, std::size_t most) {
 }
 
 bool is_array_of_tables(const Value& value) {
-  return value.kind == Value::Kind::array && !value.items.empty() &&
-         value.items.front().kind == Value::Kind::table;
+  return value.kind() == Value::Kind::array && !value.items().empty() &&
+         value.items().front().kind() == Value::Kind::table;
 }
 
 class Path {
@@ -59,20 +53,22 @@ class Path {
   void walk(Value& value, std::size_t at, double number) const {
     if (at == words_.size()) return replace(value, number);
     const std::string& word = words_[at];
-    if (is_array_of_tables(value)) return walk_elements(value, at, number);
-    if (value.kind == Value::Kind::array) {
+    if (is_array_of_tables(value))
+      return walk_elements(std::get<Value::Items>(value.held), at, number);
+    if (auto* items = std::get_if<Value::Items>(&value.held)) {
       const std::size_t component =
-          word.size() == 1 && word[0] >= 'x' && word[0] <= 'z' && value.items.size() == 3
+          word.size() == 1 && word[0] >= 'x' && word[0] <= 'z' && items->size() == 3
               ? static_cast<std::size_t>(word[0] - 'x') + 1
-              : number_of(word, value.items.size());
+              : number_of(word, items->size());
       if (component == 0)
-        refuse_path(path_, fmt::format("\"{}\" is no component of an array of {}", word,
-                                       value.items.size()));
-      return walk(value.items[component - 1], at + 1, number);
+        refuse_path(path_,
+                    fmt::format("\"{}\" is no component of an array of {}", word, items->size()));
+      return walk((*items)[component - 1], at + 1, number);
     }
-    if (value.kind != Value::Kind::table)
+    auto* entries = std::get_if<Value::Entries>(&value.held);
+    if (entries == nullptr)
       refuse_path(path_, fmt::format("nothing is inside of \"{}\"", words_[at - 1]));
-    if (Value* found = wanted_entry(value, word)) return walk(*found, at + 1, number);
+    if (Entry* found = find_entry(value, word)) return walk(found->value, at + 1, number);
     const bool options = word == "smooth" || word == "stepping" || word == "event";
     if (at + 1 < words_.size() && !(at == 0 && options))
       refuse_path(path_, fmt::format("the scene has no \"{}\"", word));
@@ -80,37 +76,35 @@ class Path {
     Entry added;
     added.key = word;
     added.value.line = value.line;
-    value.entries.push_back(added);
-    walk(value.entries.back().value, at + 1, number);
+    entries->push_back(added);
+    walk(entries->back().value, at + 1, number);
   }
 
   // Names go before numbers: a body may be called "2".
-  void walk_elements(Value& all, std::size_t at, double number) const {
+  void walk_elements(Value::Items& all, std::size_t at, double number) const {
     const std::string& word = words_[at];
     if (word == "*") {
-      for (Value& each : all.items) walk(each, at + 1, number);
+      for (Value& each : all) walk(each, at + 1, number);
       return;
     }
-    for (Value& each : all.items) {
-      const Value* name = wanted_entry(each, "name");
-      if (name != nullptr && name->kind == Value::Kind::text && name->text == word)
+    for (Value& each : all) {
+      const Entry* name = find_entry(each, "name");
+      if (name != nullptr && name->value.kind() == Value::Kind::text && name->value.text() == word)
         return walk(each, at + 1, number);
     }
-    if (const std::size_t k = number_of(word, all.items.size()); k > 0)
-      return walk(all.items[k - 1], at + 1, number);
-    if (all.items.size() == 1) return walk(all.items.front(), at, number);
+    if (const std::size_t k = number_of(word, all.size()); k > 0)
+      return walk(all[k - 1], at + 1, number);
+    if (all.size() == 1) return walk(all.front(), at, number);
     refuse_path(path_,
                 fmt::format("there are {} of \"{}\", and none is called \"{}\": say which by "
                             "its name or its number, or * for all",
-                            all.items.size(), words_[at - 1], word));
+                            all.size(), words_[at - 1], word));
   }
 
   void replace(Value& value, double number) const {
-    const bool empty = value.kind == Value::Kind::table && value.entries.empty();
-    if (value.kind != Value::Kind::number && !empty) refuse_path(path_, "is not a number");
-    value.kind = Value::Kind::number;
-    value.number = number;
-    value.whole = number == std::floor(number);
+    const bool empty = value.kind() == Value::Kind::table && value.entries().empty();
+    if (value.kind() != Value::Kind::number && !empty) refuse_path(path_, "is not a number");
+    value.held = Value::Number{number, number == std::floor(number)};
   }
 
   const std::string& path_;

@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
+#include <map>
+#include <optional>
 #include <toml++/toml.h>
 
 #include "nesting.hpp"
@@ -14,57 +16,130 @@ namespace tether::scene::files {
 
 namespace {
 
-Value plain(toml::node& node);
+Value plain(toml::node& node, int lines_before);
 
-// Of a hundred thousand bodies the document would otherwise stand beside its copy as a whole.
-void add_items(toml::array& array, Value& out) {
-  out.items.reserve(array.size());
+// Where a text cannot be cut its tree would otherwise stand beside its copy as a whole.
+void add_items(toml::array& array, int lines_before, Value::Items& out) {
   for (toml::node& item : array) {
-    out.items.push_back(plain(item));
+    out.push_back(plain(item, lines_before));
     if (toml::table* table = item.as_table()) table->clear();
   }
 }
 
-void add_entries(toml::table& table, Value& out) {
-  out.entries.reserve(table.size());
-  for (auto&& [key, value] : table) {
-    Entry entry;
-    entry.key = std::string(key.str());
-    entry.line = static_cast<int>(key.source().begin.line);
-    entry.column = static_cast<int>(key.source().begin.column);
-    entry.value = plain(value);
-    out.entries.push_back(std::move(entry));
-  }
+Entry plain_entry(const toml::key& key, toml::node& value, int lines_before) {
+  Entry out;
+  out.key = std::string(key.str());
+  out.line = static_cast<int>(key.source().begin.line) + lines_before;
+  out.column = static_cast<int>(key.source().begin.column);
+  out.value = plain(value, lines_before);
+  return out;
 }
 
 // The depth of nesting is bounded before anything is parsed, so recursion is safe.
-Value plain(toml::node& node) {
+Value plain(toml::node& node, int lines_before) {
   Value out;
-  out.line = static_cast<int>(node.source().begin.line);
+  out.line = static_cast<int>(node.source().begin.line) + lines_before;
   out.column = static_cast<int>(node.source().begin.column);
   if (const auto* text = node.as_string()) {
-    out.kind = Value::Kind::text;
-    out.text = text->get();
+    out.held = text->get();
   } else if (const auto* whole = node.as_integer()) {
-    out.kind = Value::Kind::number;
-    out.whole = true;
-    out.number = static_cast<double>(whole->get());
+    out.held = Value::Number{static_cast<double>(whole->get()), true};
   } else if (const auto* real = node.as_floating_point()) {
-    out.kind = Value::Kind::number;
-    out.number = real->get();
+    out.held = Value::Number{real->get(), false};
   } else if (const auto* flag = node.as_boolean()) {
-    out.kind = Value::Kind::boolean;
-    out.boolean = flag->get();
+    out.held = flag->get();
   } else if (auto* array = node.as_array()) {
-    out.kind = Value::Kind::array;
-    add_items(*array, out);
+    Value::Items& items = out.held.emplace<Value::Items>();
+    items.reserve(array->size());
+    add_items(*array, lines_before, items);
   } else if (auto* table = node.as_table()) {
-    out.kind = Value::Kind::table;
-    add_entries(*table, out);
+    Value::Entries& entries = out.held.emplace<Value::Entries>();
+    entries.reserve(table->size());
+    for (auto&& [key, each] : *table) entries.push_back(plain_entry(key, each, lines_before));
   } else {
-    out.kind = Value::Kind::other;
+    out.held = Value::Other{};
   }
   return out;
+}
+
+// A text may be cut before a line [[key]]: what stands on either side means the same by itself as
+// long as the second only adds keys, or elements to arrays of such tables. toml++ takes 1.5 kB for
+// a body: of a hundred thousand some hundred stand in its tree at a time.
+constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes, and up to the next such line
+
+std::size_t end_of_piece(std::string_view text, std::size_t begin, std::size_t size) {
+  constexpr std::string_view kBare =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
+  std::size_t line_end = text.find("\n[[", begin + size);
+  while (line_end != std::string_view::npos) {
+    const std::size_t key = line_end + 3, end = text.find_first_not_of(kBare, key);
+    if (end != std::string_view::npos && end > key && text.substr(end, 2) == "]]")
+      return line_end + 1;
+    line_end = text.find("\n[[", key);
+  }
+  return text.size();
+}
+
+/// What was read so far of a text in pieces.
+class Pieces {
+ public:
+  /// False where the text as a whole may mean something else, or nothing.
+  bool add(toml::table& piece, int lines_before) {
+    for (auto&& [key, value] : piece) {
+      const bool grows = is_under_headers(value);
+      const auto [at, is_new] =
+          places_.try_emplace(std::string(key.str()), Known{entries_.size(), grows});
+      if (is_new)
+        entries_.push_back(plain_entry(key, value, lines_before));
+      else if (grows && at->second.grows)
+        add_items(*value.as_array(), lines_before,
+                  std::get<Value::Items>(entries_[at->second.index].value.held));
+      else
+        return false;
+    }
+    return true;
+  }
+
+  Value take() {
+    std::sort(entries_.begin(), entries_.end(),
+              [](const Entry& a, const Entry& b) { return a.key < b.key; });
+    Value out;
+    out.line = out.column = 1;
+    out.held = std::move(entries_);
+    return out;
+  }
+
+ private:
+  struct Known {
+    std::size_t index;
+    bool grows;
+  };
+
+  static bool is_under_headers(toml::node& value) {
+    const toml::array* array = value.as_array();
+    const toml::table* first =
+        array != nullptr && !array->empty() ? array->front().as_table() : nullptr;
+    return first != nullptr && !first->is_inline();
+  }
+
+  Value::Entries entries_;
+  std::map<std::string, Known> places_;
+};
+
+/// Nothing where pieces of this size do not tell what the whole is; throws where one is no TOML.
+std::optional<Value> parse_pieces(std::string_view text, const std::string& name,
+                                  std::size_t size) {
+  Pieces pieces;
+  std::size_t begin = 0;
+  int lines = 0;
+  do {
+    const std::string_view piece = text.substr(begin, end_of_piece(text, begin, size) - begin);
+    toml::table tree = toml::parse(piece, name);
+    if (!pieces.add(tree, lines)) return std::nullopt;
+    lines += static_cast<int>(std::count(piece.begin(), piece.end(), '\n'));
+    begin += piece.size();
+  } while (begin < text.size());
+  return pieces.take();
 }
 
 constexpr std::size_t kShownText = 60, kShownItems = 8;
@@ -76,30 +151,39 @@ std::string in_quotes(std::string_view text) {
 }  // namespace
 
 std::string shown(const Value& value) {
-  switch (value.kind) {
+  switch (value.kind()) {
     case Value::Kind::boolean:
-      return value.boolean ? "true" : "false";
+      return value.boolean() ? "true" : "false";
     case Value::Kind::number:
-      return fmt::format("{}", value.number);
+      return fmt::format("{}", value.number());
     case Value::Kind::text:
-      return in_quotes(value.text);
+      return in_quotes(value.text());
     case Value::Kind::array: {
       std::string out = "[";
-      for (std::size_t i = 0; i < value.items.size(); ++i) {
+      for (std::size_t i = 0; i < value.items().size(); ++i) {
         if (i > 0) out += ", ";
         if (i == kShownItems || out.size() > kShownText) return out + "...]";
-        const Value& item = value.items[i];
-        out += item.kind == Value::Kind::array ? "[...]" : shown(item);
+        const Value& item = value.items()[i];
+        out += item.kind() == Value::Kind::array ? "[...]" : shown(item);
       }
       return out + "]";
     }
     case Value::Kind::table:
-      return value.entries.empty() ? "{}"
-                                   : fmt::format("{{ {} = ... }}", value.entries.front().key);
+      return value.entries().empty() ? "{}"
+                                     : fmt::format("{{ {} = ... }}", value.entries().front().key);
     case Value::Kind::other:
       return "a date or time";
   }
   return "";
+}
+
+Value::Value() : held(Entries()) {}
+
+Entry* find_entry(Value& table, std::string_view key) {
+  if (auto* entries = std::get_if<Value::Entries>(&table.held))
+    for (Entry& each : *entries)
+      if (each.key == key) return &each;
+  return nullptr;
 }
 
 Value parse_document(std::string_view text, const std::string& name) {
@@ -111,8 +195,12 @@ Value parse_document(std::string_view text, const std::string& name) {
                     "their parts",
                     kDeepest));
   try {
-    toml::table document = toml::parse(text, name);
-    return plain(document);
+    if (std::optional<Value> document = parse_pieces(text, name, kPiece))
+      return std::move(*document);
+  } catch (const toml::parse_error&) {  // a cut inside a text or an array, or no TOML
+  }
+  try {
+    return parse_pieces(text, name, text.size()).value();
   } catch (const toml::parse_error& e) {
     const Place place{name, static_cast<int>(e.source().begin.line),
                       static_cast<int>(e.source().begin.column)};

@@ -42,7 +42,7 @@ Fields::Fields(const Value* table, std::string path, const std::string& file, Re
 const Entry* Fields::entry(std::string_view key) {
   if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.emplace_back(key);
   if (table_ == nullptr) return nullptr;
-  for (const Entry& each : table_->entries)
+  for (const Entry& each : table_->entries())
     if (each.key == key) return &each;
   return nullptr;
 }
@@ -85,7 +85,7 @@ double Fields::number(std::string_view key, double otherwise, const Range& range
   const Entry* found = entry(key);
   if (found == nullptr) return otherwise;
   const Value& value = found->value;
-  if (value.kind == Value::Kind::number && range.holds(value.number)) return value.number;
+  if (value.kind() == Value::Kind::number && range.holds(value.number())) return value.number();
   wrong(*found, value, "must be " + with_unit(range.words, unit));
   return otherwise;
 }
@@ -94,9 +94,9 @@ int Fields::count(std::string_view key, int otherwise, int low, int high) {
   const Entry* found = entry(key);
   if (found == nullptr) return otherwise;
   const Value& value = found->value;
-  if (value.kind == Value::Kind::number && value.whole && value.number >= low &&
-      value.number <= high)
-    return static_cast<int>(value.number);
+  if (value.kind() == Value::Kind::number && value.whole() && value.number() >= low &&
+      value.number() <= high)
+    return static_cast<int>(value.number());
   wrong(*found, value, fmt::format("must be a whole number from {} to {}", low, high));
   return otherwise;
 }
@@ -104,7 +104,7 @@ int Fields::count(std::string_view key, int otherwise, int low, int high) {
 bool Fields::flag(std::string_view key, bool otherwise) {
   const Entry* found = entry(key);
   if (found == nullptr) return otherwise;
-  if (found->value.kind == Value::Kind::boolean) return found->value.boolean;
+  if (found->value.kind() == Value::Kind::boolean) return found->value.boolean();
   wrong(*found, found->value, "must be true or false");
   return otherwise;
 }
@@ -112,11 +112,11 @@ bool Fields::flag(std::string_view key, bool otherwise) {
 std::string Fields::text(std::string_view key, const std::string& otherwise) {
   const Entry* found = entry(key);
   if (found == nullptr) return otherwise;
-  if (found->value.kind != Value::Kind::text) {
+  if (found->value.kind() != Value::Kind::text) {
     wrong(*found, found->value, "must be a text in quotes");
     return otherwise;
   }
-  const std::string& text = found->value.text;
+  const std::string& text = found->value.text();
   if (!is_plain(text)) {
     wrong(*found, found->value, kPlain);
     return otherwise;
@@ -148,12 +148,12 @@ std::vector<double> Fields::numbers(std::string_view key, const std::vector<std:
   if (found == nullptr) return {};
   const Value& value = found->value;
   std::vector<double> out;
-  bool right = value.kind == Value::Kind::array &&
-               std::find(lengths.begin(), lengths.end(), value.items.size()) != lengths.end();
+  bool right = value.kind() == Value::Kind::array &&
+               std::find(lengths.begin(), lengths.end(), value.items().size()) != lengths.end();
   if (right)
-    for (const Value& item : value.items) {
-      right = right && item.kind == Value::Kind::number && kAny.holds(item.number);
-      out.push_back(item.number);
+    for (const Value& item : value.items()) {
+      right = right && item.kind() == Value::Kind::number && kAny.holds(item.number());
+      out.push_back(item.number());
     }
   if (right) return out;
   wrong(*found, value,
@@ -196,18 +196,18 @@ std::vector<Eigen::Vector3d> Fields::points(std::string_view key, std::size_t le
   const Entry* found = entry(key);
   if (found == nullptr) return {};
   const Value& value = found->value;
-  bool right =
-      value.kind == Value::Kind::array && value.items.size() >= least && value.items.size() <= most;
+  bool right = value.kind() == Value::Kind::array && value.items().size() >= least &&
+               value.items().size() <= most;
   std::vector<Eigen::Vector3d> out;
   if (right)
-    for (const Value& item : value.items) {
-      right = right && item.kind == Value::Kind::array && item.items.size() == 3;
+    for (const Value& item : value.items()) {
+      right = right && item.kind() == Value::Kind::array && item.items().size() == 3;
       if (!right) break;
       Eigen::Vector3d p;
       for (int i = 0; i < 3; ++i) {
-        const Value& x = item.items[static_cast<std::size_t>(i)];
-        right = right && x.kind == Value::Kind::number && kAny.holds(x.number);
-        p[i] = x.number;
+        const Value& x = item.items()[static_cast<std::size_t>(i)];
+        right = right && x.kind() == Value::Kind::number && kAny.holds(x.number());
+        p[i] = x.number();
       }
       out.push_back(p);
     }
@@ -235,11 +235,11 @@ int Fields::choice(std::string_view key, const std::vector<std::string>& words) 
   const Entry* found = entry(key);
   if (found == nullptr) return -1;
   const Value& value = found->value;
-  if (value.kind == Value::Kind::text) {
-    const auto at = std::find(words.begin(), words.end(), value.text);
+  if (value.kind() == Value::Kind::text) {
+    const auto at = std::find(words.begin(), words.end(), value.text());
     if (at != words.end()) return static_cast<int>(at - words.begin());
   }
-  const std::string near = value.kind == Value::Kind::text ? nearest(value.text, words) : "";
+  const std::string near = value.kind() == Value::Kind::text ? nearest(value.text(), words) : "";
   wrong(*found, value,
         "must be one of " + list(words) +
             (near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
@@ -249,7 +249,7 @@ int Fields::choice(std::string_view key, const std::vector<std::string>& words) 
 const Value* Fields::table(std::string_view key) {
   const Entry* found = entry(key);
   if (found == nullptr) return nullptr;
-  if (found->value.kind == Value::Kind::table) return &found->value;
+  if (found->value.kind() == Value::Kind::table) return &found->value;
   wrong(*found, found->value, fmt::format("must be a table: [{}]", key));
   return nullptr;
 }
@@ -258,12 +258,12 @@ std::vector<const Value*> Fields::tables(std::string_view key) {
   const Entry* found = entry(key);
   if (found == nullptr) return {};
   std::vector<const Value*> out;
-  if (found->value.kind != Value::Kind::array) {
+  if (found->value.kind() != Value::Kind::array) {
     wrong(*found, found->value, fmt::format("must be an array of tables: [[{}]]", key));
     return {};
   }
-  for (const Value& item : found->value.items) {
-    if (item.kind == Value::Kind::table)
+  for (const Value& item : found->value.items()) {
+    if (item.kind() == Value::Kind::table)
       out.push_back(&item);
     else
       wrong(*found, item, fmt::format("must be a table: [[{}]]", key));
@@ -273,7 +273,7 @@ std::vector<const Value*> Fields::tables(std::string_view key) {
 
 void Fields::finish() {
   if (table_ == nullptr) return;
-  for (const Entry& each : table_->entries) {
+  for (const Entry& each : table_->entries()) {
     if (std::find(known_.begin(), known_.end(), each.key) != known_.end()) continue;
     report_.add({place_.file, each.line, each.column}, field(each.key), shown(each.value),
                 "unknown key" + (report_.full() ? "" : hint(each.key, known_)));

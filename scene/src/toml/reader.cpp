@@ -21,18 +21,18 @@ void Reader::two_bodies(Fields& in, int& first, int& second) const {
   const Value* value = in.find("bodies");
   constexpr const char* kAllowed = "two names of bodies; \"world\" is the ground";
   if (value == nullptr) return in.missing("bodies", kAllowed);
-  if (value->kind != Value::Kind::array || value->items.size() != 2)
+  if (value->kind() != Value::Kind::array || value->items().size() != 2)
     return in.wrong("bodies", std::string("must be ") + kAllowed);
   int* const out[] = {&first, &second};
   for (std::size_t i = 0; i < 2; ++i) {
-    const Value& name = value->items[i];
-    if (name.kind != Value::Kind::text)
+    const Value& name = value->items()[i];
+    if (name.kind() != Value::Kind::text)
       return in.wrong("bodies", std::string("must be ") + kAllowed);
-    if (name.text == "world") continue;
-    const auto found = bodies.find(name.text);
+    if (name.text() == "world") continue;
+    const auto found = bodies.find(name.text());
     if (found == bodies.end())
-      return in.wrong("bodies", fmt::format("there is no body \"{}\"{}", name.text,
-                                            hint_of(name.text, scene.bodies)));
+      return in.wrong("bodies", fmt::format("there is no body \"{}\"{}", name.text(),
+                                            hint_of(name.text(), scene.bodies)));
     *out[i] = found->second;
   }
   if (first == second) in.wrong("bodies", "must be two different bodies");
