@@ -17,11 +17,11 @@ constexpr double J1 = .002727, J2 = .0045339259, kRotation = 150.0;
 constexpr double rho = 7870.0;
 
 // Matrices of the elastic rod; the density is multiplied in where the test set writes it apart.
-struct ConnectingRod {
+struct Rod {
   Matrix4 M = Matrix4::Zero(), K = Matrix4::Zero(), B = Matrix4::Zero();
   Vector4 c1, c2, c12, c21;
 
-  ConnectingRod() {
+  Rod() {
     constexpr double E = 2e11, b = .008, h = .008, pi = 3.1415927;  // as published
     constexpr double mass = rho * b * h * L2, stiffness = E * b * h / L2, volume = b * h * L2;
     M(0, 0) = M(1, 1) = .5 * mass;
@@ -56,7 +56,7 @@ struct Terms {
   double A, A_D;
   Vector4 d, b, h, e;
 
-  Terms(const ConnectingRod& rod, const double* q) {
+  Terms(const Rod& rod, const double* q) {
     const double D = q[0] - q[1], C = std::cos(D), S = std::sin(D);
     const ConstMap4 elastic(q + 3);
     d = L1 * (C * rod.c1 + S * rod.c2);
@@ -71,7 +71,7 @@ struct Terms {
 struct SliderCrank {
   static constexpr int n = 7, m = 3;
   static constexpr double sign = 1.0;
-  ConnectingRod rod;
+  Rod rod;
 
   void mass(const double* q, double* M) const {
     const Terms s(rod, q);
@@ -206,20 +206,20 @@ struct SliderCrank {
   }
 };
 
-using CrankForm = Mechanism<SliderCrank>;
+using Form = Mechanism<SliderCrank>;
 
 }  // namespace
 
-std::vector<std::string> slider_crank_forms() { return CrankForm::forms(); }
+std::vector<std::string> slider_crank_forms() { return Form::forms(); }
 
 Problem slider_crank(const std::string& form, bool consistent) {
   const SliderCrank system;
   std::vector<double> q0{0.0, 0.0, .450016933, 0.0, 0.0, .103339863e-4, .169327969e-4};
   std::vector<double> v0{150.0,         -74.9957670,    -.268938672e-5, .444896105,
                          .463434311e-2, -.178591076e-5, -.268938672e-5};
-  if (consistent) CrankForm::project_start(system, 0.0, q0.data(), v0.data());
-  Problem p = CrankForm::make(system, "slider crank", form, q0, v0,
-                              {"loop, vertical", "loop, horizontal", "drive"});
+  if (consistent) Form::project_start(system, 0.0, q0.data(), v0.data());
+  Problem p = Form::make(system, "slider crank", form, q0, v0,
+                         {"loop, vertical", "loop, horizontal", "drive"});
   p.t_end = 0.1;
   // IDA's own first step, 1e-11, drowns the multipliers of the index-2 forms in round-off / step.
   if (p.index == 2) p.initial_step = 1e-6;
@@ -243,7 +243,7 @@ Problem slider_crank(const std::string& form, bool consistent) {
   std::vector<double> lam(3);
   if (consistent) {
     double a[7];
-    CrankForm::solve_motion(system, p.t_end, q.data(), v.data(), a, lam.data());
+    Form::solve_motion(system, p.t_end, q.data(), v.data(), a, lam.data());
   } else {
     q = {15.00000000000104,     -0.3311734988256260,   0.1697373328427860,
          0.1893192899613509e-3, 0.2375751249879174e-4, -0.5323896770569702e-5,
@@ -257,7 +257,7 @@ Problem slider_crank(const std::string& form, bool consistent) {
          0.1105560003626645e-2};
     lam = {-0.6232935833287916e2, -0.1637920993367306e3, 0.2529857947066878e2};
   }
-  CrankForm::set_reference(system, q, v, lam, p);
+  Form::set_reference(system, q, v, lam, p);
   return p;
 }
 

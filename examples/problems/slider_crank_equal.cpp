@@ -86,7 +86,7 @@ struct SliderCrankEqual {
   }
 };
 
-using EqualCrankForm = Mechanism<SliderCrankEqual>;
+using Form = Mechanism<SliderCrankEqual>;
 
 // On the branch th2 = -th1, x = 2 cos th1: A th'' + A' th'^2/2 + g cos th = 0, A = 2/3 + 6 sin^2
 // th.
@@ -118,9 +118,8 @@ std::vector<std::string> slider_crank_equal_forms() { return {"index 1", "index 
 
 Problem slider_crank_equal(const SliderCrankMotion& motion, double t_end, const std::string& form) {
   const SliderCrankEqual system{motion.gravity};
-  Problem p =
-      EqualCrankForm::make(system, "slider crank with equal lengths", form, positions(motion.angle),
-                           velocities(motion.angle, motion.speed), {"loop x", "loop y"});
+  Problem p = Form::make(system, "slider crank with equal lengths", form, positions(motion.angle),
+                         velocities(motion.angle, motion.speed), {"loop x", "loop y"});
   p.t_end = t_end;
   const double g = motion.gravity, s0 = std::sin(motion.angle);
   const double E = (1.0 / 3.0 + 3.0 * s0 * s0) * motion.speed * motion.speed + g * s0;
@@ -147,8 +146,8 @@ Problem slider_crank_equal(const SliderCrankMotion& motion, double t_end, const 
   const std::vector<double> q = positions(end[0]), v = velocities(end[0], end[1]);
   double a[3];
   std::vector<double> lam(2);
-  EqualCrankForm::solve_motion(system, t_end, q.data(), v.data(), a, lam.data());
-  EqualCrankForm::set_reference(system, q, v, lam, p);
+  Form::solve_motion(system, t_end, q.data(), v.data(), a, lam.data());
+  Form::set_reference(system, q, v, lam, p);
   return p;
 }
 

@@ -10,6 +10,16 @@
 
 namespace tether::contact::differences {
 
+inline constexpr Law kLaws[] = {Law::maximum_dissipation, Law::coulomb, Law::frictionless};
+
+inline Solution tight(const Problem& p, Law law) {
+  Options o;
+  o.law = law;
+  o.tolerance = 1e-12;
+  o.strict = true;
+  return Solver(o).solve(p);
+}
+
 struct Data {
   Eigen::MatrixXd A;
   Eigen::VectorXd b, mu;

@@ -167,7 +167,7 @@ TEST_CASE("cones: a problem with one block of each obeys the law that is written
   }
 }
 
-TEST_CASE("cones: free rows against their elimination by singular values") {
+TEST_CASE("cones: free rows against their elimination by least squares") {
   int pressed = 0;
   for (unsigned seed = 0; seed < 20; ++seed) {
     CAPTURE(seed);

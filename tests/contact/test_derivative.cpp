@@ -14,21 +14,13 @@
 using namespace tether::contact;
 using Catch::Contains;
 using differences::Data;
+using differences::kLaws;
+using differences::tight;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
-
-const Law kLaws[] = {Law::maximum_dissipation, Law::coulomb, Law::frictionless};
-
-Solution tight(const Problem& p, Law law) {
-  Options o;
-  o.law = law;
-  o.tolerance = 1e-12;
-  o.strict = true;
-  return Solver(o).solve(p);
-}
 
 // One contact: A, b, mu and the derivative at its solution.
 struct One {
@@ -84,7 +76,6 @@ Data table(double mu, double push) {
 }
 
 }  // namespace
-
 TEST_CASE("derivative: a contact that sticks follows A dx = db - dA x, mu does not count") {
   One one;
   one.A(0, 1) = one.A(1, 0) = 0.7;
@@ -263,222 +254,6 @@ TEST_CASE("derivative: a table that slides: not even velocities are unique at lo
   for (Regime r : d.report().regimes) CHECK(r == Regime::sliding);
   CHECK(d.report().rank < 12);
   CHECK_FALSE(d.report().not_unique.empty());
-}
-
-TEST_CASE("derivative: masses, velocities and friction of bodies, against differences") {
-  random::Generator g(5);
-  int seen = 0;
-  for (Law law : kLaws)
-    for (int k = 0; k < 6; ++k) {
-      const random::Assembly whole = random::cluster(g, 0.3, 5, 4);
-      const std::size_t n = whole.contacts.size(), count = whole.bodies.size();
-      BodyDirection v;
-      for (const RigidBody& body : whole.bodies) {
-        RigidBody& to = v.bodies.emplace_back();
-        to.inverse_mass = 0.3 * body.inverse_mass;
-        to.inverse_inertia = 0.2 * body.inverse_inertia;
-        to.inverse_inertia(0, 1) = to.inverse_inertia(1, 0) += 0.05 * body.inverse_inertia.norm();
-        to.velocity = 0.3 * g.vector();
-        to.angular_velocity = 0.3 * g.vector();
-        if (!body.moves()) to.inverse_inertia.setZero();
-      }
-      for (std::size_t i = 0; i < n; ++i) v.bias.push_back(0.1 * g.vector());
-      v.mu = VectorXd::LinSpaced(static_cast<Eigen::Index>(n), 0.1, 0.3);
-      const auto moved = [&](double h) {
-        random::Assembly out = whole;
-        for (std::size_t b = 0; b < count; ++b) {
-          out.bodies[b].inverse_mass += h * v.bodies[b].inverse_mass;
-          out.bodies[b].inverse_inertia += h * v.bodies[b].inverse_inertia;
-          out.bodies[b].velocity += h * v.bodies[b].velocity;
-          out.bodies[b].angular_velocity += h * v.bodies[b].angular_velocity;
-        }
-        for (std::size_t i = 0; i < n; ++i) {
-          out.contacts[i].bias += h * v.bias[i];
-          out.contacts[i].mu += h * v.mu[static_cast<Eigen::Index>(i)];
-        }
-        return out;
-      };
-      const auto at = [&](const random::Assembly& a) { return tight(a.problem(), law).impulses; };
-      const VectorXd x = at(whole);
-      const BodyDerivative d = derivative(whole.bodies, whole.contacts, law, x);
-      if (!d.report().strictly_regular || d.report().status != DerivativeStatus::unique) continue;
-      const ImpactDirection f = d.forward(v);
-      const double h = 1e-5;
-      const random::Assembly up = moved(h), down = moved(-h);
-      const VectorXd x1 = at(up), x0 = at(down);
-      if (derivative(up.bodies, up.contacts, law, x1).report().regimes != d.report().regimes ||
-          derivative(down.bodies, down.contacts, law, x0).report().regimes != d.report().regimes)
-        continue;
-      ++seen;
-      INFO(name(law) << ", cluster " << k);
-      CHECK(((x1 - x0) / (2 * h) - f.impulses).norm() < 1e-6 * (1 + f.impulses.norm()));
-      const auto v1 = velocities_after(up.bodies, up.contacts, x1);
-      const auto v0 = velocities_after(down.bodies, down.contacts, x0);
-      std::vector<Vector6d> rows;
-      const VectorXd row = VectorXd::LinSpaced(x.size(), -1, 2);
-      double left = row.dot(f.impulses), right = 0,
-             size = row.cwiseAbs().dot(f.impulses.cwiseAbs());
-      for (std::size_t b = 0; b < count; ++b) {
-        CHECK(((v1[b] - v0[b]) / (2 * h) - f.velocities[b]).norm() <
-              1e-6 * (1 + f.velocities[b].norm()));
-        rows.emplace_back(Vector6d::LinSpaced(6, -1, 1));
-        left += rows[b].dot(f.velocities[b]);
-        size += rows[b].cwiseAbs().dot(f.velocities[b].cwiseAbs());
-      }
-      const BodyDirection gradient = d.adjoint(row, rows);
-      for (std::size_t b = 0; b < count; ++b) {
-        const RigidBody &p = gradient.bodies[b], &q = v.bodies[b];
-        right += p.velocities().dot(q.velocities());
-        if (!whole.bodies[b].moves()) continue;
-        right += p.inverse_mass * q.inverse_mass +
-                 p.inverse_inertia.cwiseProduct(q.inverse_inertia).sum();
-      }
-      for (std::size_t i = 0; i < n; ++i) right += gradient.bias[i].dot(v.bias[i]);
-      right += gradient.mu.dot(v.mu);
-      CHECK(std::abs(left - right) < 1e-12 * (1 + size));
-    }
-  CHECK(seen >= 9);
-}
-
-TEST_CASE("derivative: at the answer of BodySolver, spheres on the ground in closed form") {
-  // A ball that falls on the ground and begins to roll: 5/7 of its speed, whatever mu.
-  std::vector<RigidBody> bodies(1);
-  bodies[0].inverse_mass = 0.5;
-  bodies[0].inverse_inertia = Eigen::Matrix3d::Identity() / (0.4 * 2 * 0.04);
-  bodies[0].velocity = {3, 0, -4};
-  std::vector<PointContact> contacts(1);
-  contacts[0].first = 0;
-  contacts[0].r1 = {0, 0, -0.2};
-  contacts[0].mu = 0.9;
-  BodyOptions o;
-  o.law = Law::coulomb;
-  o.tolerance = 1e-12;
-  const BodySolution s = BodySolver(o).solve(bodies, contacts);
-  BodyDerivative d = derivative(bodies, contacts, Law::coulomb, s);
-  CHECK(d.report().regimes[0] == Regime::sticking);
-  BodyDirection v;
-  v.bodies.resize(1);
-  v.bodies[0].velocity = {1, 0, 0};
-  CHECK(d.forward(v).velocities[0][0] == Approx(5.0 / 7));
-  v.bodies[0].velocity = {0, 0, -1};
-  CHECK(std::abs(d.forward(v).velocities[0][0]) < 1e-14);
-  // Heavier by dm = 1: d(1/m) = -1/4, inertia alike. Velocities do not change, impulses by x/m.
-  v.bodies[0].velocity.setZero();
-  v.bodies[0].inverse_mass = -0.25;
-  v.bodies[0].inverse_inertia = -0.5 * bodies[0].inverse_inertia;
-  CHECK(d.forward(v).velocities[0].norm() < 1e-13);
-  CHECK((d.forward(v).impulses - d.impulses() / 2).norm() < 1e-12);
-  // Sliding: v_x = 3 - 4 mu, so dv_x/dmu = -4.
-  contacts[0].mu = 0.1;
-  d = derivative(bodies, contacts, Law::coulomb, BodySolver(o).solve(bodies, contacts));
-  CHECK(d.report().regimes[0] == Regime::sliding);
-  v = {};
-  v.mu = VectorXd::Ones(1);
-  CHECK(d.forward(v).velocities[0][0] == Approx(-4));
-  CHECK(d.adjoint(VectorXd(), {Vector6d::Unit(0)}).mu[0] == Approx(-4));
-  CHECK(d.adjoint(VectorXd(), {Vector6d::Unit(0)}).bodies[0].velocity[2] == Approx(0.1));
-}
-
-TEST_CASE("derivative: sparse factors: the transpose, and a solution that moves as it says") {
-  for (double mu : {0.1, 0.8}) {
-    const random::Packing packing = random::packing(5, false, 3);
-    auto contacts = to_contacts(packing.contacts);
-    for (ContactRows& c : contacts) c.mu = mu;
-    const Problem p = delassus(packing.bodies, contacts);
-    REQUIRE(p.contacts() > 300);
-    const Solution s = tight(p, Law::coulomb);
-    REQUIRE(s.error < 1e-11);
-    const Derivative d = derivative(p, Law::coulomb, s);
-    INFO("mu " << mu << ": " << d.report().advice);
-    ProblemDirection v;
-    v.b = 1e-6 * p.b();
-    v.b.head(30) *= -1;
-    v.mu = VectorXd::Constant(p.contacts(), 1e-6);
-    const SolutionDirection f = d.forward(v);
-    const VectorXd row = VectorXd::LinSpaced(p.b().size(), -1, 2);
-    const ProblemDirection gradient = d.adjoint(row, row);
-    CHECK(std::abs(row.dot(f.impulses) + row.dot(f.velocities) -
-                   differences::product(gradient, v)) < 1e-12 * differences::sizes(gradient, v));
-    CHECK(f.residual < 1e-12);
-    VectorXd changed(p.contacts());
-    for (int i = 0; i < p.contacts(); ++i) changed[i] = mu + 1e-6;
-    const Problem q = Problem::dense(p.dense_matrix(), p.b() + v.b, changed);
-    const VectorXd dx = tight(q, Law::coulomb).impulses - s.impulses;
-    CHECK((dx - f.impulses).norm() < 1e-4 * dx.norm());  // second order: 1e-6 of the condition
-  }
-}
-
-TEST_CASE("derivative: stacks of deficient rank: velocities, and the least change") {
-  for (int boxes : {20, 40}) {
-    const random::RigidAssembly stack = random::rigid_stack(boxes, 1, 0.9);
-    const Problem p = delassus(stack.bodies, to_contacts(stack.contacts));
-    REQUIRE(p.contacts() == 4 * boxes);
-    const Solution s = tight(p, Law::coulomb);
-    REQUIRE(s.error < 1e-10);
-    const Derivative d = derivative(p, Law::coulomb, s);
-    INFO(d.report().advice << " rank " << d.report().rank);
-    CHECK(d.report().status == DerivativeStatus::minimum_norm);
-    CHECK(d.report().unknowns == 12 * boxes);
-    CHECK(d.report().rank == 6 * boxes);
-    CHECK(d.report().velocities_unique);
-    ProblemDirection v;
-    v.b = p.b();  // twice the approach: twice the impulses, of which only sums are determined
-    const SolutionDirection f = d.forward(v);
-    CHECK(f.residual < 1e-9);
-    CHECK(f.velocities.norm() < 1e-8 * p.b().norm());
-    CHECK(f.impulses.norm() <= s.impulses.norm() * (1 + 1e-6));
-    double of_x = 0, of_f = 0;
-    for (int leg = 0; leg < 4; ++leg) {
-      of_x += s.impulses[3 * leg];
-      of_f += f.impulses[3 * leg];
-    }
-    CHECK(of_f == Approx(of_x).epsilon(1e-6));
-    const VectorXd row = VectorXd::LinSpaced(p.b().size(), -1, 2);
-    const ProblemDirection gradient = d.adjoint(row);
-    CHECK(std::abs(row.dot(f.impulses) - differences::product(gradient, v)) <
-          1e-9 * differences::sizes(gradient, v));
-  }
-}
-
-TEST_CASE("derivative: a row of boxes pressed together, of deficient rank, by sparse factors") {
-  constexpr int kBoxes = 120;
-  random::RigidAssembly row_of;
-  for (int k = 0; k < kBoxes; ++k) {
-    row_of.bodies.push_back(random::box(1, {0.5, 0.5, 0.5}));
-    row_of.bodies.back().velocity = {0.1 * (1 - 2.0 * k / kBoxes), 0.02, -1};
-    PointContact c;
-    c.first = k;
-    c.mu = 0.7;
-    for (double x : {-0.5, 0.5})
-      for (double y : {-0.5, 0.5}) {
-        c.r1 = {x, y, -0.5};
-        row_of.contacts.push_back(c);
-      }
-    if (k == 0) continue;
-    c.second = k - 1;
-    c.normal = Vector3d::UnitX();
-    c.r1 = {-0.5, 0, 0.1};
-    c.r2 = {0.5, 0, 0.1};
-    row_of.contacts.push_back(c);
-  }
-  const Problem p = delassus(row_of.bodies, to_contacts(row_of.contacts));
-  REQUIRE(p.contacts() > 500);
-  const Solution s = tight(p, Law::coulomb);
-  REQUIRE(s.error < 1e-10);
-  const Derivative d = derivative(p, Law::coulomb, s);
-  INFO(d.report().advice << " rank " << d.report().rank << " of " << d.report().unknowns);
-  REQUIRE(d.report().status == DerivativeStatus::minimum_norm);
-  CHECK(d.report().velocities_unique);
-  ProblemDirection v;
-  v.b = p.b();
-  const SolutionDirection f = d.forward(v);
-  CHECK(f.residual < 1e-9);
-  CHECK(f.velocities.norm() < 1e-8 * p.b().norm());
-  CHECK(f.impulses.norm() <= s.impulses.norm() * (1 + 1e-6));
-  const VectorXd row = VectorXd::LinSpaced(p.b().size(), -1, 2);
-  const ProblemDirection gradient = d.adjoint(row);
-  CHECK(std::abs(row.dot(f.impulses) - differences::product(gradient, v)) <
-        1e-9 * differences::sizes(gradient, v));
 }
 
 TEST_CASE("derivative: kinks are named with the branch and the other regime") {
