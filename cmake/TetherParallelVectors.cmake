@@ -32,6 +32,6 @@ endfunction()
 
 function(tether_mpi_test name target ranks)
   add_test(NAME ${name} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}> ${ARGN})
-  set_tests_properties(${name} PROPERTIES LABELS ida_projection PROCESSORS 2 TIMEOUT 300 ENVIRONMENT
+  set_tests_properties(${name} PROPERTIES LABELS ida_projection PROCESSORS 2 TIMEOUT ${TETHER_TEST_TIMEOUT} ENVIRONMENT
     "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1")
 endfunction()

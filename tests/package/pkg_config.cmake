@@ -1,20 +1,37 @@
-# Builds the consumers with nothing but a compiler and pkg-config. SPDX-License-Identifier: BSD-3-Clause
+# Builds the consumers with nothing but a compiler and pkg-config: compiled once, linked with the static and
+# the shared libraries. SPDX-License-Identifier: BSD-3-Clause
+cmake_minimum_required(VERSION 3.23)
 file(REMOVE_RECURSE ${WORK})
 file(MAKE_DIRECTORY ${WORK})
-set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${LIBDIR}/pkgconfig)
-set(ENV{LD_LIBRARY_PATH} ${PREFIX}/${LIBDIR})
 
-function(compile_and_run program source package)
-  execute_process(COMMAND ${PKG_CONFIG} --cflags --libs ${package}
+# What pkg-config says of a package in one of the two prefixes.
+function(say result form package)
+  set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${form}/all/${LIBDIR}/pkgconfig)
+  execute_process(COMMAND ${PKG_CONFIG} ${ARGN} ${package}
     OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
   separate_arguments(flags)
+  set(${result} "${flags}" PARENT_SCOPE)
+endfunction()
+
+function(compile_and_run program source package)
   set(compiler ${COMPILER} -std=c++17)
   if(source MATCHES "[.]c$")
     set(compiler ${C_COMPILER} -std=c99)
   endif()
-  execute_process(COMMAND ${compiler} ${CMAKE_CURRENT_LIST_DIR}/${source} -o ${WORK}/${program}
-    ${flags} ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
-  execute_process(COMMAND ${WORK}/${program} COMMAND_ERROR_IS_FATAL ANY)
+  say(flags static ${package} --cflags)
+  say(of_shared shared ${package} --cflags)
+  string(REPLACE "${PREFIX}/shared/" "${PREFIX}/static/" of_shared "${of_shared}")
+  if(NOT flags STREQUAL of_shared)
+    message(SEND_ERROR "${package} is compiled with ${flags} or ${of_shared}: compile for each")
+  endif()
+  set(object ${WORK}/${program}.o)
+  execute_process(COMMAND ${compiler} ${flags} -c ${CMAKE_CURRENT_LIST_DIR}/${source} -o ${object} COMMAND_ERROR_IS_FATAL ANY)
+  foreach(form IN ITEMS static shared)
+    set(ENV{LD_LIBRARY_PATH} ${PREFIX}/${form}/all/${LIBDIR})
+    say(flags ${form} ${package} --libs)
+    execute_process(COMMAND ${compiler} ${object} -o ${WORK}/${program}_${form} ${flags} ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
+    execute_process(COMMAND ${WORK}/${program}_${form} COMMAND_ERROR_IS_FATAL ANY)
+  endforeach()
 endfunction()
 
 # The host's own SUNDIALS, in the library folder beside its headers where that is not /usr.
