@@ -38,7 +38,8 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
       watcher_(motion_),
       time_(t),
       event_time_(t),
-      bounces_(at(model.contacts())) {
+      bounces_(at(model.contacts())),
+      lifted_(at(model.contacts())) {
   y_.setZero(motion_.size());
   y_.head(motion_.work()) = y;
   counts_ = start.so_far;
@@ -248,9 +249,9 @@ void Driver::anchor() {
 Driver::Memory Driver::memory() const {
   std::vector<int> axes;
   for (int i = 0; i < model_.contacts(); ++i) axes.push_back(model_.axis(i));
-  return {event_time_,    motion_.kept_energy(), lost_,    first_energy_, y_,
-          modes_,         motion_.levels(),      bounces_, axes,          at_one_time_,
-          counts_.events, counts_.impacts};
+  return {event_time_,  motion_.kept_energy(), lost_,          first_energy_, y_,
+          modes_,       motion_.levels(),      bounces_,       axes,          lifted_,
+          at_one_time_, counts_.events,        counts_.impacts};
 }
 
 Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
@@ -265,7 +266,8 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
       bounces_(memory.bounces),
       lost_(memory.lost),
       first_energy_(memory.first_energy),
-      at_one_time_(memory.at_one_time) {
+      at_one_time_(memory.at_one_time),
+      lifted_(memory.lifted) {
   counts_.events = memory.events;
   counts_.impacts = memory.impacts;
   for (std::size_t i = 0; i < memory.axes.size(); ++i)
@@ -320,8 +322,8 @@ void Driver::handle(const Zero& zero) {
   paced_ = {};
   const double now = phase_->start() + zero.time;
   at_one_time_ = now > event_time_ ? 0 : at_one_time_ + 1;
-  if (at_one_time_ == 0) lifted_.clear();
-  if (zero.what == Watch::normal_force) lifted_.push_back(zero.contact);
+  if (at_one_time_ == 0) lifted_.assign(lifted_.size(), false);
+  if (zero.what == Watch::normal_force) lifted_[at(zero.contact)] = true;
   if (at_one_time_ > kMostAtOneTime)
     fail(fmt::format("more than {} events at one time", kMostAtOneTime));
   if (++counts_.events > options_.max_events)

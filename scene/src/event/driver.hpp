@@ -156,8 +156,8 @@ class Driver {
     long events = 0;
   } storm_;  // where the work was looked at last
   long at_one_time_ = 0;
-  std::vector<int> lifted_;  // at this time
-  bool jammed_ = false;      // at this event
+  std::vector<bool> lifted_;  // at the time of the last event, whose forces vanished
+  bool jammed_ = false;       // at this event
 };
 
 /// An impact of contacts that touch: the right hand side of its problem w = A x - b.
@@ -175,7 +175,8 @@ struct Driver::Memory {
   std::vector<ContactMode> modes;
   std::vector<double> levels;  ///< gaps of closed contacts
   std::vector<Bounces> bounces;
-  std::vector<int> axes;  ///< of the tangents of each contact; of an older state: none
+  std::vector<int> axes;     ///< of the tangents of each contact; of an older state: none
+  std::vector<bool> lifted;  ///< whose forces have vanished at this time
   long at_one_time = 0, events = 0, impacts = 0;
 
   /// Numbers are finite, counts are counts.

@@ -24,10 +24,10 @@ using namespace event;
 using mechanics::at;
 
 constexpr const char* kDamaged = "the saved state is damaged";
-constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '4'};
+constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '5'};
 // The same of a scene far from the origin: that of the engine comes first.
-constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '4'};
-constexpr char kWithoutAxes = '3';
+constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '5'};
+constexpr char kWithoutAxes = '3', kWithoutLifted = '4';
 
 DriverOptions driver_options(const Scene& scene, double time_unit) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -333,7 +333,8 @@ void EventEngine::save(std::ostream& out) const {
     binary::put(out, m.levels[i]);
     const Bounces& b = m.bounces[i];
     for (int k = 0; k < 3; ++k) binary::put(out, b.time[k], b.speed[k]);
-    binary::put(out, static_cast<std::int32_t>(b.count), static_cast<std::int32_t>(m.axes[i]));
+    binary::put(out, static_cast<std::int32_t>(b.count), static_cast<std::int32_t>(m.axes[i]),
+                static_cast<std::int32_t>(m.lifted[i]));
   }
 }
 
@@ -345,8 +346,9 @@ void EventEngine::restore(std::istream& in, Restore how) {
     get_bodies(in, bodies);
     in.read(magic, sizeof magic);
   }
-  const bool axes = magic[sizeof magic - 1] != kWithoutAxes;
-  if (!axes) magic[sizeof magic - 1] = kMagic[sizeof magic - 1];
+  char& format = magic[sizeof magic - 1];
+  const bool axes = format != kWithoutAxes, lifted = axes && format != kWithoutLifted;
+  if (!lifted) format = kMagic[sizeof magic - 1];
   const bool from_far = in && std::equal(magic, magic + sizeof magic, kFarMagic);
   if (!in || !(from_far || std::equal(magic, magic + sizeof magic, kMagic)))
     throw std::runtime_error("this is not a state of the event engine");
@@ -388,6 +390,9 @@ void EventEngine::restore(std::istream& in, Restore how) {
     binary::get(in, count);
     b.count = count;
     if (axes) m.axes.push_back(binary::get<std::int32_t>(in));
+    const std::int32_t up = lifted ? binary::get<std::int32_t>(in) : 0;
+    if (up != 0 && up != 1) throw std::runtime_error(kDamaged);
+    m.lifted.push_back(up == 1);
   }
   for (int i = 0; i < model_->contacts(); ++i)
     if (const int by = model_->law(i).held_by;

@@ -13,7 +13,7 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kNegligible = 3e-9;  // of the accelerations
-constexpr double kNoForce = 1e-9;     // of the largest; a contact that had lifted needs more
+constexpr double kNoForce = 1e-9;     // of the largest, and of what accelerates bodies that much
 constexpr double kDependentForces = 1e-11, kImplied = 1e-9;  // of A_nn
 constexpr double kLeastApproach = 1e-12;                     // of the slip
 
@@ -104,10 +104,13 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int le
         !(std::abs(answer.w[block * k]) <= kNegligible * solved.scale &&
           rests_on_others(rows, answer, k)))
       continue;
-    const bool lifted =
-        std::any_of(lifted_.begin(), lifted_.end(), [&](int each) { return are_one(i, each); });
-    if (lifted && !moment && answer.x[block * k] <= kNoForce * answer.x.cwiseAbs().maxCoeff())
-      continue;
+    bool lifted = false;
+    for (int j = 0; j < model_.contacts() && !lifted; ++j) lifted = lifted_[at(j)] && are_one(i, j);
+    const double force = answer.x[block * k];
+    if (lifted && !moment &&
+        (force <= kNoForce * answer.x.cwiseAbs().maxCoeff() ||
+         force * rows.A()(block * k, block * k) <= kNoForce * solved.scale))
+      continue;  // contacts whose forces vanish together lift together
     const VectorXd& d = slides[at(k)];
     if (d.size() > 0) {
       mode.mode = Mode::slide;
