@@ -147,6 +147,7 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   rows_.factors.decided = false;
   result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;
+  leave_rounding_out();
   if (options_.frequency > 1) keep_old_move(candidate.t);
   firm_only_ = start_known_ = false;
   looks_ = 0;

@@ -16,9 +16,10 @@ namespace tether::ida_projection {
 constexpr double kLargestFloor = 0.1;  // tolerances
 // What a move leaves where nothing is known yet.
 constexpr double kUnknownSlope = 0.03;
-constexpr double kLong = 1.0;      // tolerances: such a move is made with fresh factors
-constexpr double kNothing = 1e-8;  // tolerances: as good as no move
-constexpr int kLevelsJoined = 16;  // moves, after one that has failed
+constexpr double kLong = 1.0;          // tolerances: such a move is made with fresh factors
+constexpr double kNothing = 1e-8;      // tolerances: as good as no move
+constexpr double kBarelyMoved = 1e-4;  // tolerances: rounding of g may be a part of such a move
+constexpr int kLevelsJoined = 16;      // moves, after one that has failed
 
 /// Factors of an earlier step leave the part slope * age of a move, age in candidates.
 struct SlopeOfFactors {
@@ -129,6 +130,11 @@ class ContiguousMover final : public Mover {
     kept_ = {kUnknownSlope, 0};
     wear_.renewed();
     misdirection_.renewed(t);
+  }
+  // In the first steps IDA chooses the order by errors that are as short as moves which answer the
+  // rounding of many rows: these would keep a run at order 1 until h is long.
+  void leave_rounding_out() {
+    if (keeps_factors_ && move_length_ <= kBarelyMoved) rows_.leave_rounding_out();
   }
   double first_solve() { return rows_.first_solve(firm_only_); }
   bool contradicts();

@@ -80,6 +80,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate, double previ
   for (int k = 0; k <= options_.maximum_iterations; ++k) {
     Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
+    leave_rounding_out();
     double length = rows_.solve();
     double part = previous > 0.0 && length > floor ? length / previous : 0.0;
     if (part > 0.0 && kept_.age > 0 && k > 0) kept_.slope = part / kept_.age;

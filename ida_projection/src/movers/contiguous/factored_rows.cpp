@@ -286,15 +286,25 @@ bool FactoredRows<Rows>::contradicts() {
   return true;
 }
 
-// Does the rounding of its own terms explain every g_i? Then there is nothing to enforce, however
-// short the tolerances are that the metric would make of it.
+// Does the rounding of its own terms explain g_i?
+template <class Rows>
+bool FactoredRows<Rows>::only_rounding(std::size_t i) const {
+  return std::abs(g_[i]) <= 64.0 * kEpsilon * blocks.terms(static_cast<int>(i), at.y.data());
+}
+
+// Every g_i? Then there is nothing to enforce, however short the tolerances are that the metric
+// would make of it.
 template <class Rows>
 bool FactoredRows<Rows>::rounding_only() const {
-  for (int i = 0; i < count(); ++i) {
-    const double terms = blocks.terms(i, at.y.data());
-    if (!(std::abs(g_[static_cast<std::size_t>(i)]) <= 64.0 * kEpsilon * terms)) return false;
-  }
+  for (std::size_t i = 0; i < g_.size(); ++i)
+    if (!only_rounding(i)) return false;
   return true;
+}
+
+template <class Rows>
+void FactoredRows<Rows>::leave_rounding_out() {
+  for (std::size_t i = 0; i < g_.size(); ++i)
+    if (only_rounding(i)) g_[i] = 0.0;
 }
 
 // Length of the move that the rounding of g asks for in the worst case, with the present factors:

@@ -124,6 +124,8 @@ class FactoredRows {
   bool contradicts();
   double drift() const;
   bool rounding_only() const;
+  /// g_i = 0 where rounding explains it.
+  void leave_rounding_out();
   double rounding_length();
   void reset() {
     factors.there = false;
@@ -141,6 +143,7 @@ class FactoredRows {
   }
 
  private:
+  bool only_rounding(std::size_t i) const;
   using Block = typename Rows::Block;
 
   static void take(double factor, const double* __restrict dy, int n, double* __restrict ycor,
