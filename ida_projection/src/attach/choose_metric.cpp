@@ -1,8 +1,16 @@
 // Tether: what becomes of moves to which stiff components answer. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <variant>
+
 #include "attach/impl.hpp"
 
 namespace tether::ida_projection {
+
+namespace {
+
+constexpr int kManyRows = 128;  // above, sparse ones have factors of their own
+
+}  // namespace
 
 // Is the metric free, and can answers to moves be had?
 bool Projection::Impl::hears_answers() const {
@@ -10,6 +18,14 @@ bool Projection::Impl::hears_answers() const {
   return wanted_metric_ == Metric::automatic && options_.group.empty() &&
          options_.metric == Metric::local_correction && &mover == movers_.own.get() &&
          mover.may_use_levels() && polish_.hears_answers();
+}
+
+// What all unknowns of a long chain have to share, such as its way along, the sum over their own
+// scales makes dear, and those that have changed most, beside the pin, then repair it alone.
+void Projection::Impl::start_by_levels() {
+  const bool many = std::holds_alternative<SparseJacobian>(constraints_.jacobian) &&
+                    constraints_.total_count() > kManyRows;
+  if (many && hears_answers() && movers_.used->use_levels(true)) metric_choice_.start_by_levels();
 }
 
 // Moves to which stiff components answer excite them, and scales made of what they then do make

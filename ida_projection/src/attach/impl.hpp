@@ -105,6 +105,7 @@ class Projection::Impl {
   void raise_order(const Candidate& candidate, double cj);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   bool polishes_first();
+  void start_by_levels();
   bool hears_answers() const;
   Status polish(const Candidate& candidate, double cj, double tolerance);
   void account(const Move& move, const StepData& step, bool sampled);

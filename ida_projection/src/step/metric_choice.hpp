@@ -32,6 +32,7 @@ class MetricChoice {
   void pause();
   /// There is no other one, or its move failed.
   void found_none();
+  void start_by_levels() { by_levels_ = true; }
   bool by_levels() const { return by_levels_; }  ///< the present one
 
  private:
