@@ -99,7 +99,7 @@ std::vector<T> array(const Xml& xml, const tinyxml2::XMLElement& entry) {
   std::uint64_t length = 0;
   std::memcpy(&length, at, sizeof length);
   std::vector<T> out(length / sizeof(T));
-  std::memcpy(out.data(), at + sizeof length, length);
+  if (length > 0) std::memcpy(out.data(), at + sizeof length, length);
   return out;
 }
 
