@@ -59,7 +59,7 @@ run_piece() {
   export UBSAN_OPTIONS="${UBSAN_OPTIONS:-print_stacktrace=1}"
   export TSAN_OPTIONS="${TSAN_OPTIONS:-halt_on_error=1:second_deadlock_stack=1}"
   # shellcheck disable=SC2086
-  ctest --test-dir "$build" -L "$label" -R "$tests" -E 'NOT_BUILT|allocat|instruction_counts|no_contact_code|^projection_mpi' \
+  ctest --test-dir "$build" -L "$label" -R "$tests" -E 'NOT_BUILT|allocat|instruction_counts|no_contact_code|^projection_mpi|over_ranks' \
     $range --parallel "$jobs" --output-on-failure --no-tests=error --timeout 7200 -Q -O "$build.$1.log" ||
     { grep -A40 -E 'ERROR: |runtime error|WARNING: Thread|FAILED' "$build.$1.log" | head -200; failed="$failed $1"; }
   end=$(date +%s)
