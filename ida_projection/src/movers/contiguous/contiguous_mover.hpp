@@ -112,6 +112,8 @@ class ContiguousMover final : public Mover {
     misdirection_ = Misdirection();
     nothing_in_row_ = 0;
     still_ = looked_at_all_ = false;
+    move_length_ = 0.0;
+    begins_ = true;
     levels_joined_ = 0;
     levels_joined_next_ = kLevelsJoined;
   }
@@ -132,9 +134,11 @@ class ContiguousMover final : public Mover {
     misdirection_.renewed(t);
   }
   // In the first steps IDA chooses the order by errors that are as short as moves which answer the
-  // rounding of many rows: these would keep a run at order 1 until h is long.
+  // rounding of many rows: these would keep a run at order 1 until h is long. Later on a dead point
+  // is passed by what such moves are of rows that are about to depend on each other.
   void leave_rounding_out() {
-    if (keeps_factors_ && move_length_ <= kBarelyMoved) rows_.leave_rounding_out();
+    begins_ = begins_ && move_length_ <= kBarelyMoved;
+    if (keeps_factors_ && begins_) rows_.leave_rounding_out();
   }
   double first_solve() { return rows_.first_solve(firm_only_); }
   bool contradicts();
@@ -162,6 +166,7 @@ class ContiguousMover final : public Mover {
   bool start_known_ = false;
   bool looked_at_all_ = false;  // the rows are arranged as if all variables were differential
   double move_length_ = 0.0;    // of the last first move, in tolerances
+  bool begins_ = true;          // none was longer than kBarelyMoved
   // Of the last move, which the factors at hand made; < 0: others did.
   double by_present_factors_ = -1.0;
   bool reused_ = false;     // factors of an earlier step are in use for this one
