@@ -1,6 +1,8 @@
 // Tether: does F move unknowns as forces move bodies? SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/ida_projection/statistics.hpp>
+
 #include "host/corrector.hpp"
 #include "rows/row_chain.hpp"
 
