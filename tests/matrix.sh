@@ -53,7 +53,7 @@ build_and_test() {
 
 describe() {
   cat <<'END'
-gcc         g++, all tests, a warning is an error
+gcc         g++, all tests, each source by itself, a warning is an error
 clang       clang++, all tests
 assertions  assertions of Eigen and of the standard library, all tests
 sanitizers  addresses, leaks, undefined behaviour (tests/sanitize.sh)
@@ -68,7 +68,8 @@ END
 
 row_gcc() {
   have g++ || { note gcc 'skipped: no g++'; return; }
-  build_and_test gcc . -DCMAKE_CXX_COMPILER=g++ -DCMAKE_C_COMPILER=gcc -DCMAKE_BUILD_TYPE=Release -DTETHER_WARNINGS_AS_ERRORS=ON
+  build_and_test gcc . -DCMAKE_CXX_COMPILER=g++ -DCMAKE_C_COMPILER=gcc -DCMAKE_BUILD_TYPE=Release -DTETHER_WARNINGS_AS_ERRORS=ON \
+    -DTETHER_UNITY_BUILD=OFF
 }
 
 row_clang() {

@@ -1,6 +1,6 @@
 #!/bin/sh
 # All tests: installs what is missing, builds all but the programs of benchmarks/ (a tenth of the time) in
-# build/release, the sources of libraries by folders, and runs ctest.
+# build/release and runs ctest.
 # Arguments go to ctest, e.g. -R projection. SPDX-License-Identifier: BSD-3-Clause
 set -eu
 
@@ -11,6 +11,6 @@ sh cmake/install_packages.sh
 if [ ! -e build/release/CMakeCache.txt ] && command -v ninja >/dev/null; then
   export CMAKE_GENERATOR=Ninja  # waits for no library where a source can be compiled
 fi
-cmake --preset release -DTETHER_BUILD_BENCHMARKS=OFF -DTETHER_UNITY_BUILD=ON
+cmake --preset release -DTETHER_BUILD_BENCHMARKS=OFF
 cmake --build --preset release --parallel "$(nproc)"
 exec ctest --preset release --parallel "$(nproc)" "$@"

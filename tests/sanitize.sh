@@ -47,7 +47,7 @@ run_piece() {
   if [ ! -e "$build/CMakeCache.txt" ] && command -v ninja >/dev/null; then
     export CMAKE_GENERATOR=Ninja
   fi
-  cmake -S . -B "$build" -DTETHER_UNITY_BUILD=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo -DTETHER_SANITIZERS="$sanitizers" \
+  cmake -S . -B "$build" -DCMAKE_BUILD_TYPE=RelWithDebInfo -DTETHER_SANITIZERS="$sanitizers" \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DTETHER_BUILD_BENCHMARKS=ON >"$build.log" 2>&1 ||
     { cat "$build.log"; exit 1; }
   cmake --build "$build" --parallel "$jobs" --target "$target"
