@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
@@ -49,10 +50,10 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
     });
   }
   if (!local) return;
-  if (!group().empty())
-    use_groups(at, d, a);
-  else if (!levels_of_rates_.empty())
-    limit(at, d);
+  if (!group().empty()) use_groups(at, d, a);
+  // Few rows get levels where stiff components have answered, long after a start.
+  const bool from_start = std::is_same_v<Block, SparseRows::Block> && by_levels();
+  if ((group().empty() || from_start) && !levels_of_rates_.empty()) limit(at, d);
 }
 
 template <class Block>
