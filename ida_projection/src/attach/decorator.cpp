@@ -33,7 +33,7 @@ int Projection::Impl::initialize() {
     return kFatal;
   }
   run_.initialized = true;
-  run_.engaged = false;
+  run_.engaged = run_.suppressed = false;
   run_.start = OwnedVector();
   run_.undetermined.clear();
   run_.linear_solver = LinearSolverKind();
@@ -117,9 +117,8 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
   }
   const int flag = correct_and_move(candidate, tolerance, call_setup);
   if (flag != 0) return flag;
-  const bool suppressed = run_.engaged && options_.suppress_algebraic;
   const long steps = movers_.used != nullptr ? attempts_.steps : ida_.steps();
-  control_.control(candidate, steps, run_.engaged, suppressed ? variables_.id() : nullptr);
+  control_.control(candidate, steps, run_.engaged, run_.suppressed ? variables_.id() : nullptr);
   return 0;
 }
 
@@ -143,7 +142,8 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     quicken_vectors(candidate);
     if (unknowns_.contiguous) keep_point_before(candidate, run_.start);
   }
-  if (movers_.used != nullptr && !run_.engaged && !variables_.index_known() &&
+  const bool may_be_high = !variables_.index_known() || variables_.high_index();
+  if (movers_.used != nullptr && !run_.engaged && may_be_high &&
       control_.in_trouble(attempts_.steps)) {
     const Status engaged = engage_if_index_is_high(candidate);
     if (engaged != Status::success) return finish(engaged, movers_.used->message());
@@ -152,6 +152,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   if (movers_.used == nullptr) return flag;
   if (flag != 0) return corrector_failed(candidate, flag);
   if (!run_.linear_solver.known()) look_at_linear_solver();
+  look_for_multipliers(candidate);
 
   const StepData step = ida_.step();
   account_for_previous_attempt(step);

@@ -15,6 +15,7 @@ namespace {
 // Multipliers of index 2: see README, section 9.
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
                  kManyFree = 0.4;
+constexpr long kStart = 16;              // steps
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
@@ -43,6 +44,27 @@ void Projection::Impl::derive_id(const Candidate& candidate) {
   if (!unknown.empty())
     report_.advice = "algebraic variables were not derived (" + unknown +
                      ") and stay in the error test; give IDA's id vector in Options::id";
+}
+
+void Projection::Impl::leave_out_of_error_test() {
+  IDASetId(ida_.mem(), variables_.id());
+  IDASetSuppressAlg(ida_.mem(), 1);
+  run_.suppressed = true;
+}
+
+// IDA raises the order with each step of a start until a first error test fails, and from there on
+// only after k + 2 steps of one size. Multipliers of index 2, which are rounding over h, fail it in
+// the first steps.
+void Projection::Impl::look_for_multipliers(const Candidate& candidate) {
+  const bool may = !run_.engaged && !variables_.index_known() && options_.suppress_algebraic &&
+                   options_.smooth_where_needed && candidate.base_entries != nullptr;
+  if (!may || ida_.steps() >= kStart || ida_.error_test_failures() > 0) return;
+  // IDA multiplies that by less than 1.
+  if (!(N_VWrmsNorm(candidate.correction, candidate.weights) > 1.0)) return;
+  const double cj = ida_.step().cj;
+  if (!variables_.known()) derive_id(candidate);
+  variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
+  if (variables_.high_index() && variables_.any()) leave_out_of_error_test();
 }
 
 // Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
@@ -103,10 +125,7 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done)
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
 Status Projection::Impl::engage(const Candidate& candidate) {
   if (!variables_.known()) derive_id(candidate);
-  if (variables_.any() && options_.suppress_algebraic) {
-    IDASetId(ida_.mem(), variables_.id());
-    IDASetSuppressAlg(ida_.mem(), 1);
-  }
+  if (variables_.any() && options_.suppress_algebraic) leave_out_of_error_test();
   const double cj = ida_.step().cj;
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
   if (options_.smooth_where_needed)

@@ -116,6 +116,8 @@ class Projection::Impl {
   void look_at_linear_solver();
   bool rows_of_field() const;
   void derive_id(const Candidate& candidate);
+  void leave_out_of_error_test();
+  void look_for_multipliers(const Candidate& candidate);
   Status engage_if_index_is_high(const Candidate& candidate);
   Care care_of_high_index(const Candidate& candidate) const;
   void quicken_vectors(const Candidate& candidate);
@@ -174,8 +176,9 @@ class Projection::Impl {
   };
   struct Run {
     bool initialized = false;
-    bool broken = false;   // an exception left things half done: the run cannot go on
-    bool engaged = false;  // the policy acts from the first move that was needed
+    bool broken = false;      // an exception left things half done: the run cannot go on
+    bool suppressed = false;  // algebraic variables are out of the error test
+    bool engaged = false;     // the policy acts from the first move that was needed
     LinearSolverKind linear_solver;
     OwnedVector start;         // its first y, of contiguous vectors
     std::string undetermined;  // multipliers at the start, or where correctors fail
