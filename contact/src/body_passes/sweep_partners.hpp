@@ -37,6 +37,8 @@ class SweepPartners {
   // All sweep at once, and what they change is taken times this factor; else colour by colour.
   virtual bool relaxed() const = 0;
   virtual double relaxation() const = 0;
+  // Sweeps change more and more: a factor from now on with which they cannot.
+  virtual void grew() = 0;
   // The changes of velocities since MovingBodies::keep by others, added at one place for each body.
   virtual void collect(MovingBodies& bodies) = 0;
 

@@ -55,6 +55,7 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
   const double bound = std::max(allowed * allowed, r.floor);
   int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   int failed_tests = 0;
+  detail::AtOnce together;
   detail::Forecast forecast;
   detail::Momentum momentum;
   detail::BestPoint best(options.max_sweeps);
@@ -66,7 +67,10 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
   };
   for (;;) {
     const PassResult change = sweeps.sweep(island, team);
-    if (at_once) sweeps.combine(island, team, false);
+    if (at_once) {
+      sweeps.combine(island, team, false);
+      if (together.grows(change.sum)) team.once([&] { partners->grew(); });
+    }
     ++r.sweeps;
     if (r.sweeps == detail::BestPoint::kFirst && !(permitted && price.within(options.max_work)))
       best.want();

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include "ranks/rank_part.hpp"
 
+#include <algorithm>
 #include <tether/linalg/index.hpp>
 #include <utility>
 
@@ -20,7 +21,7 @@ RankPart::With RankPart::buffers(const RankExchanges& exchanges) {
 void RankPart::start(RankMessages& messages, const RankOptions& options) {
   messages_ = &messages;
   relaxed_ = options.mode == RankMode::relaxed;
-  relaxation_ = options.relaxation;
+  relaxation_.assign(plan_.most_ranks.size(), options.relaxation);
   after_.clear();
   share_.clear();
   collect_.clear();
@@ -51,6 +52,15 @@ void RankPart::after_colour(int colour, MovingBodies& bodies) {
 
 void RankPart::share(MovingBodies& bodies) {
   pass_on(plan_.share[at(island_)], share_[at(island_)], bodies);
+}
+
+// Each rank's change alone lowers the energy of its bodies. The energy of a body is convex, so that
+// the sum of what k ranks do to it, taken times at most 1 / k, lowers it, too; from 2 / k on it can
+// grow for ever.
+void RankPart::grew() {
+  constexpr double kTogether = 1.8;
+  double& part = relaxation_[at(island_)];
+  part = std::min(part, kTogether / plan_.most_ranks[at(island_)]);
 }
 
 // In the order of ranks.

@@ -25,7 +25,8 @@ class RankPart : public SweepPartners {
   PassResult total(const std::vector<PassResult>& sums) override;
 
   bool relaxed() const override { return relaxed_; }
-  double relaxation() const override { return relaxation_; }
+  double relaxation() const override { return relaxation_[linalg::at(island_)]; }
+  void grew() override;
   void collect(MovingBodies& bodies) override;
   void give_up(const char* why) override { messages_->give_up(why); }
 
@@ -40,7 +41,7 @@ class RankPart : public SweepPartners {
   const RankPlan& plan_;
   RankMessages* messages_ = nullptr;
   bool relaxed_ = false;
-  double relaxation_ = 1;
+  std::vector<double> relaxation_;  // of the islands
   int island_ = 0;
   std::vector<With> after_, share_, collect_;  // by colour, by island
   std::vector<double> sums_;

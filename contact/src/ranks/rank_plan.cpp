@@ -126,6 +126,7 @@ void RankPlan::build(const std::vector<RankContact>& links, const std::vector<in
   home = owner;
   after.assign(part.colours.size(), {});
   share.assign(whole.islands.size(), {});
+  most_ranks.assign(whole.islands.size(), 1);
   last_rank_.assign(at(bodies_of_all), -1);
   last_colour_.assign(at(bodies_of_all), -1);
   for (int k = 0; k < static_cast<int>(whole.islands.size()); ++k) exchanges(k, relaxed);
@@ -257,7 +258,11 @@ void RankPlan::exchanges(int k, bool relaxed) {
   std::sort(others.begin(), others.end());
   others.erase(std::unique(others.begin(), others.end()), others.end());
   ExchangeLists to_all;
+  int body = -1, ranks_of_body = 1;
   for (const auto& [b, to] : others) {
+    ranks_of_body = b == body ? ranks_of_body + 1 : 2;
+    body = b;
+    most_ranks[at(k)] = std::max(most_ranks[at(k)], ranks_of_body);
     if (home[at(b)] == rank) to_all.send(to, slot_[at(b)]);
     if (to == rank) to_all.receive(home[at(b)], slot_[at(b)]);
   }

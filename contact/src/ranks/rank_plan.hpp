@@ -41,6 +41,7 @@ class RankPlan {
 
   std::vector<RankExchanges> after;  // each colour of `part`
   std::vector<RankExchanges> share;  // of each island: from home to others
+  std::vector<int> most_ranks;       // of each island: that move one body of it
   int ranks = 1, rank = 0;
 
  private:

@@ -51,8 +51,9 @@ class RankMessages {
 
 /// exact: colour by colour, in the order of BodySolver and with its bits, for any number of ranks.
 /// relaxed: all ranks sweep at once; their changes of a body's velocity are added, and the sum (and
-/// that of the impulses) taken times `relaxation`. Fewer messages; the bits, and how many sweeps
-/// are needed, depend on the partition.
+/// that of the impulses) taken times `relaxation`; where that drives an island on, or in circles,
+/// times 1.8 / k at most, k ranks moving one of its bodies. Fewer messages; the bits, and how many
+/// sweeps are needed, depend on the partition.
 enum class RankMode { exact, relaxed };
 
 struct RankOptions {
