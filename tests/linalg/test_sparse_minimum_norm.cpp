@@ -319,6 +319,33 @@ TEST_CASE("rows with large coefficients over those before are told from independ
   CHECK(solver.rank() == qr.rank());
 }
 
+TEST_CASE("the row that closes a loop is redundant, however long it is") {
+  // Points in a line; the last row gives the distance between the ends once more, as the sum of
+  // all.
+  for (const int n : {10, 100, 1000, 10000}) {
+    INFO(n << " points");
+    SparseCase c;
+    for (int i = 0; i < n; ++i) {
+      const int first = i + 1 < n ? i : 0, second = i + 1 < n ? i + 1 : n - 1;
+      c.columns.insert(c.columns.end(), {first, second});
+      c.values.insert(c.values.end(), {double(first - second), double(second - first)});
+      c.starts.push_back(2 * (i + 1));
+    }
+    c.dense.D = Eigen::VectorXd::Ones(n);
+    SparseMinimumNorm solver = factored_net(c);
+    REQUIRE(solver.rank() == n - 1);
+    Eigen::VectorXd b = times(c, Eigen::VectorXd::LinSpaced(n, -1.0, 2.0).cwiseAbs2());
+    solve(solver, b);
+    CHECK(solver.residual() < 1e-12);
+    CHECK(solver.inconsistency(n - 1) < 1e-9);
+    const int row = solver.pivot(n - 1);
+    b[row] += 0.25 * solver.row_norm(row);
+    solve(solver, b);
+    // Short by eps / s^2, s the least singular value, pi / n.
+    CHECK(solver.inconsistency(n - 1) == Approx(0.25).epsilon(1e-4));
+  }
+}
+
 TEST_CASE("every direction of a net, however thin: at most the least norm, and no residual grows") {
   const SparseCase c = net(8, 1.5);
   const RowMajor A = dense_rows(c);
