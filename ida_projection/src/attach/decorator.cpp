@@ -246,9 +246,10 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 // What an iteration before the move adds the move then takes back, too: a solution less. Only where
 // nothing answers to moves: it would be left out.
 bool Projection::Impl::polishes_first() {
+  if (!movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))
+    return false;  // few rows never do
   const bool silent = metric_choice_.calm() || !hears_answers();
-  return silent && !raised_order_.raised() && wants_polish(0.0) &&
-         movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing()));
+  return silent && !raised_order_.raised() && wants_polish(0.0);
 }
 
 Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance) {
