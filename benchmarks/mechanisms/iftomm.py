@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The IFToMM benchmark's mechanisms (A01 to A05): error, energy and processor time over tolerances, as a table of
-benchmarks/README.md. SPDX-License-Identifier: BSD-3-Clause
+"""The IFToMM benchmark's mechanisms (A01 to A05) and a rope ladder: error, energy and processor time over tolerances,
+as a table of benchmarks/README.md. SPDX-License-Identifier: BSD-3-Clause
 
     python3 benchmarks/mechanisms/iftomm.py TETHER [--tolerances 1e-4,1e-6,1e-8] [--rods 1,10,100] [--repeats 3]
 
@@ -45,6 +45,7 @@ MECHANISMS = [
     ('A05 governor, 10 s', 'governor', 10,
      [(5, 'position', 'slider', [0, 0, 0.535563103722], 1.0), (10, 'position', 'slider', [0, 0, 0.619622917061], 1.0),
       (10, 'angular_velocity', 'slider', [0, 0, 5.548203622655], 5.548)]),
+    ('rope ladder, 0.1 s', 'ladder', 0.1, [(0.1, 'position', 'rung 100', [9.995776966326, 0.15, -0.04905], 1.0)]),
 ]
 
 

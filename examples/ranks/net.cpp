@@ -190,26 +190,32 @@ int main(int argc, char** argv) {
     MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
     return most;
   };
-  double most_apart = apart(spread);
+  std::vector<double> apart_of{apart(spread)};
   bool good = plain.flag >= 0 && spread.flag >= 0 && alone.flag >= 0 && spread.drift < 1e-10;
   for (const auto& [name, end] : others) {
-    most_apart = std::max(most_apart, apart(end));
+    apart_of.push_back(apart(end));
     good = good && end.flag >= 0 && end.drift < 1e-10;
   }
   if (rank == 0) {
     std::printf(
-        "%d ranks, %d x %d balls, %.2g s   steps   lengths off by   seconds   projection's part\n",
+        "%d ranks, %d x %d balls, %.2g s   steps   lengths off by   seconds   projection's part   "
+        "from one rank's positions\n",
         ranks, n, n, seconds);
     const auto print = [](const char* name, const End& end) {
-      std::printf("%-29s %5ld %16.1e %9.2f %18.0f%%   flag %d\n", name, end.steps, end.drift,
+      std::printf("%-29s %5ld %16.1e %9.2f %18.0f%%   flag %d", name, end.steps, end.drift,
                   end.seconds, 100.0 * end.projecting / end.seconds, end.flag);
     };
     print("plain IDA", plain);
-    print("projected", spread);
+    std::printf("\n");
     print("projected, one rank", alone);
-    for (const auto& [name, end] : others) print(name, end);
-    std::printf("positions on %d ranks and on one are %.1e apart\n", ranks, most_apart);
+    std::printf("\n");
+    print("projected", spread);
+    std::printf("   %.1e m\n", apart_of.front());
+    for (std::size_t k = 0; k < others.size(); ++k) {
+      print(others[k].first, others[k].second);
+      std::printf("   %.1e m\n", apart_of[k + 1]);
+    }
   }
   MPI_Finalize();
-  return good && most_apart < 1e2 * kTolerance ? 0 : 1;
+  return good && *std::max_element(apart_of.begin(), apart_of.end()) < 1e2 * kTolerance ? 0 : 1;
 }
