@@ -51,10 +51,11 @@ else()
     PATH_SUFFIXES include DOC "Directory that holds ida/ida.h")
   find_library(TETHER_SUNDIALS_IDA_LIBRARY sundials_ida HINTS ${SUNDIALS_DIR} ${SUNDIALS_ROOT} ENV SUNDIALS_ROOT
     PATH_SUFFIXES lib lib64 DOC "libsundials_ida, for the tests and examples")
+  # The others beside it: those of another SUNDIALS do not fit.
   get_filename_component(_tether_sundials_lib "${TETHER_SUNDIALS_IDA_LIBRARY}" DIRECTORY)
-  find_library(TETHER_SUNDIALS_IDAS_LIBRARY sundials_idas HINTS ${_tether_sundials_lib})
-  find_library(TETHER_SUNDIALS_CORE_LIBRARY sundials_core HINTS ${_tether_sundials_lib})
-  find_library(TETHER_SUNDIALS_KLU_LIBRARY sundials_sunlinsolklu HINTS ${_tether_sundials_lib})
+  find_library(TETHER_SUNDIALS_IDAS_LIBRARY sundials_idas PATHS ${_tether_sundials_lib} NO_DEFAULT_PATH)
+  find_library(TETHER_SUNDIALS_CORE_LIBRARY sundials_core PATHS ${_tether_sundials_lib} NO_DEFAULT_PATH)
+  find_library(TETHER_SUNDIALS_KLU_LIBRARY sundials_sunlinsolklu PATHS ${_tether_sundials_lib} NO_DEFAULT_PATH)
   mark_as_advanced(TETHER_SUNDIALS_INCLUDE_DIR TETHER_SUNDIALS_IDA_LIBRARY TETHER_SUNDIALS_IDAS_LIBRARY
     TETHER_SUNDIALS_CORE_LIBRARY TETHER_SUNDIALS_KLU_LIBRARY)
   if(TETHER_SUNDIALS_INCLUDE_DIR)
