@@ -5,35 +5,23 @@
 #include <random>
 #include <tether/contact.hpp>
 
+#include "cone_problems.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::contact;
+using namespace tether::contact::cone_problems;
 using Catch::Contains;
-using Eigen::MatrixXd;
 using Eigen::Vector3d;
-using Eigen::VectorXd;
 
 namespace {
 
-ConeSolution tight(const ConeProblem& p) {
-  Options o;
-  o.law = Law::coulomb;
-  o.tolerance = 1e-13;
-  return ConeSolver(o).solve(p);
-}
-
-struct ConeData {
-  MatrixXd A;
-  VectorXd b;
-  std::vector<Cone> cones;
-  ConeProblem problem() const { return ConeProblem::dense(A, b, cones); }
-};
+ConeSolution tight(const ConeProblem& p) { return solve(p, 1e-13); }
 
 // One of each, with free rows between them that depend on each other where `copies`.
-ConeData random_problem(unsigned seed, bool copies) {
+Data random_problem(unsigned seed, bool copies) {
   std::mt19937 g(seed);
   std::normal_distribution<double> normal;
-  ConeData out;
+  Data out;
   out.cones = {Cone::free(2),
                Cone::with_rolling(0.5, 0.3),
                Cone::bounded(0.2),
@@ -106,7 +94,7 @@ TEST_CASE("cone derivative: one block of each against differences, and its trans
   int regular = 0, regimes[3] = {0, 0, 0};
   for (unsigned seed = 0; seed < 40; ++seed) {
     CAPTURE(seed);
-    const ConeData d = random_problem(seed, seed % 2 == 1);
+    const Data d = random_problem(seed, seed % 2 == 1);
     const ConeProblem p = d.problem();
     const ConeSolution s = tight(p);
     REQUIRE(s.error < 1e-12);
@@ -139,7 +127,7 @@ TEST_CASE("cone derivative: one block of each against differences, and its trans
     for (int r = 0; r < n; ++r)
       for (int c = 0; c < n; ++c) v.A.push_back({r, c, dA(r, c)});
     const auto moved = [&](double h) {
-      ConeData e = d;
+      Data e = d;
       const VectorXd R = (1 + h * at.array()).matrix();
       e.A = R.asDiagonal() * d.A * R.asDiagonal();
       e.b += h * v.b;
