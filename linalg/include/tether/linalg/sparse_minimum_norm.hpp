@@ -57,8 +57,8 @@ class SparseMinimumNorm {
 
   /// eps = rank_tolerance^2, at least 1e-13, which rounding of A A^T needs. Coefficients c of a row
   /// over those before it make eps |c|^2 of a dependent one's d_k; they are looked at where d_k is
-  /// below `thin` (0 to 1). False if C D has an entry that is not finite; the factors are then
-  /// unusable.
+  /// below `thin` (0 to 1), first over the nearest rows alone, then of all by eight random vectors.
+  /// False if C D has an entry that is not finite; the factors are then unusable.
   bool factor(double rank_tolerance = 1e-6, double thin = 1e-6);
   /// dy (n entries) from the kept factors; g has m entries in the units of the rows. Stops at
   /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() is the value reached.
