@@ -1,37 +1,30 @@
 // Tether: what becomes of moves to which stiff components answer. SPDX-License-Identifier:
 // BSD-3-Clause
-#include <variant>
-
 #include "attach/impl.hpp"
 
 namespace tether::ida_projection {
 
-namespace {
-
-constexpr int kManyRows = 128;  // above, sparse ones have factors of their own
-
-}  // namespace
-
 // Is the metric free, and can answers to moves be had?
 bool Projection::Impl::hears_answers() const {
-  const Mover& mover = *movers_.used;
   return wanted_metric_ == Metric::automatic && options_.group.empty() &&
-         options_.metric == Metric::local_correction && &mover == movers_.own.get() &&
-         mover.may_use_levels() && polish_.hears_answers();
+         options_.metric == Metric::local_correction && movers_.used == movers_.own.get() &&
+         polish_.hears_answers();
+}
+
+bool Projection::Impl::asks_for_metric() const {
+  return movers_.used->may_use_levels() && hears_answers();
 }
 
 // What all unknowns of a long chain have to share, such as its way along, the sum over their own
 // scales makes dear, and those that have changed most, beside the pin, then repair it alone.
 void Projection::Impl::start_by_levels() {
-  const bool many = std::holds_alternative<SparseJacobian>(constraints_.jacobian) &&
-                    constraints_.total_count() > kManyRows;
-  if (many && hears_answers() && movers_.used->use_levels(true)) metric_choice_.start_by_levels();
+  if (hears_answers() && movers_.used->begin_by_levels()) metric_choice_.start_by_levels();
 }
 
 // Moves to which stiff components answer excite them, and scales made of what they then do make
 // the next moves worse. True: they answer to the best move there is.
 bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
-  if (move.status != Status::success || !hears_answers()) return false;
+  if (move.status != Status::success || !asks_for_metric()) return false;
   if (!variables_.any() && MetricChoice::suspects(move.length) &&
       movers_.used->has_forces_in_rows() && metric_choice_.may_try())
     look_for_shorter_move(candidate, move);

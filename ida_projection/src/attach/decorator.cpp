@@ -248,7 +248,7 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 bool Projection::Impl::polishes_first() {
   if (!movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))
     return false;  // few rows never do
-  const bool silent = metric_choice_.calm() || !hears_answers();
+  const bool silent = metric_choice_.calm() || !asks_for_metric();
   return silent && !raised_order_.raised() && wants_polish(0.0);
 }
 

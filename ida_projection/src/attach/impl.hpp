@@ -107,6 +107,7 @@ class Projection::Impl {
   bool polishes_first();
   void start_by_levels();
   bool hears_answers() const;
+  bool asks_for_metric() const;
   Status polish(const Candidate& candidate, double cj, double tolerance);
   void account(const Move& move, const StepData& step, bool sampled);
   void note(const Move& move, const StepData& step);

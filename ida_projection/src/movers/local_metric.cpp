@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
 #include "rows/row_blocks.hpp"
 #include "rows/sparse_rows.hpp"
@@ -22,6 +21,7 @@ void LocalMetric::reset() {
   std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
   levels_.clear();
   levels_of_rates_.clear();
+  levels_limited_ = false;
 }
 
 // s <- max(0.8 s, |correction|)
@@ -52,8 +52,8 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
   if (!local) return;
   if (!group().empty()) use_groups(at, d, a);
   // Few rows get levels where stiff components have answered, long after a start.
-  const bool from_start = std::is_same_v<Block, SparseRows::Block> && by_levels();
-  if ((group().empty() || from_start) && !levels_of_rates_.empty()) limit(at, d);
+  const bool limited = by_levels() ? levels_limited_ : options_.group.empty();
+  if (limited && !levels_of_rates_.empty()) limit(at, d);
 }
 
 template <class Block>

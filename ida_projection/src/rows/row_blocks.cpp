@@ -103,10 +103,10 @@ Status RowBlocks::structure(Evaluator& evaluator, double t, const std::vector<do
   return Status::success;
 }
 
-RowPattern RowBlocks::pattern() const {
+RowPattern RowBlocks::pattern(const std::vector<int>& of_rows) const {
   RowPattern rows;
   rows.n = n_;
-  for (int i = 0; i < m_; ++i) {
+  for (const int i : of_rows) {
     for (int j = 0; j < n_; ++j)
       if (fills(i, j)) rows.columns.push_back(j);
     rows.starts.push_back(static_cast<int>(rows.columns.size()));

@@ -220,8 +220,8 @@ class RowBlocks {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
-  /// After structure(): which entries of C can differ from zero.
-  RowPattern pattern() const;
+  /// After structure(): which entries of these rows of C can differ from zero.
+  RowPattern pattern(const std::vector<int>& of_rows) const;
   /// Where none is algebraic, unknowns of level `first` and above (row_levels.hpp) take the place
   /// of algebraic ones. False: nothing has changed, they are not as many as their rows.
   bool split_by_level(const std::vector<int>& levels, int first);
@@ -253,6 +253,7 @@ class RowBlocks {
       solve_both(g);
   }
   void solve_roughly(const std::vector<double>& g) { solve(g); }
+  void solve_closely(const std::vector<double>& g) { solve(g); }
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   /// Are these few rows over adjacent columns, none of them for algebraic variables?
   bool few() const { return few_; }

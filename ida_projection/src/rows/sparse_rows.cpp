@@ -92,10 +92,10 @@ Status SparseRows::structure(Evaluator& evaluator, double t, const std::vector<d
   return Status::success;
 }
 
-RowPattern SparseRows::pattern() const {
+RowPattern SparseRows::pattern(const std::vector<int>& of_rows) const {
   RowPattern rows;
   rows.n = n_;
-  for (int i = 0; i < m_; ++i) {
+  for (const int i : of_rows) {
     const StoredRows::Row& row = C_.rows[at(i)];
     for (int e = row.begin; e < row.end; ++e)
       if (C_.entry_fills[at(e)]) rows.columns.push_back(C_.columns[at(e)]);

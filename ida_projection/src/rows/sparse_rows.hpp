@@ -67,7 +67,7 @@ class SparseRows {
   Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
-  RowPattern pattern() const;
+  RowPattern pattern(const std::vector<int>& of_rows) const;
   bool split_by_level(const std::vector<int>& levels, int first);
   void join_levels();
   bool split_levels() const { return kinds_.by_level(); }
@@ -82,6 +82,9 @@ class SparseRows {
   void solve(const std::vector<double>& g) { solve(g, kSolved); }
   /// One step with the regularised factors, where the next solve takes the rest.
   void solve_roughly(const std::vector<double>& g) { solve(g, 1.0); }
+  void solve_closely(const std::vector<double>& g) {
+    solve(g, linalg::SparseMinimumNorm::kTolerance);
+  }
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
   double terms(int i, const double* y) const;

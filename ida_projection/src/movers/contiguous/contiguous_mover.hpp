@@ -86,6 +86,11 @@ class ContiguousMover final : public Mover {
     rows_.factors.there = false;
     return true;
   }
+  bool begin_by_levels() override {
+    if (rows_.count() <= kManyForLevels || !use_levels(true)) return false;
+    rows_.metric.limit_levels();
+    return true;
+  }
   bool has_forces_in_rows() override { return rows_.has_third_level(); }
   bool solve_at(const Candidate& candidate, double* dy) override;
   bool fatal() const override { return rows_.evaluator.fatal(); }

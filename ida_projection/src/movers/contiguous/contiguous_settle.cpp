@@ -95,6 +95,11 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate, double previ
     }
     // Almost parallel rows magnify rounding: moves would follow it without end.
     if (k > 0 && part > kHalving && rows_.rounding_only()) return Status::success;
+    // One solution leaves most of what rows ask for that nearly depend on the others.
+    if (k > 0 && part > kHalving && kept_.age == 0) {
+      length = rows_.solve_closely();
+      part = 0.0;
+    }
     rows_.apply(1.0, candidate.correction_entries);
     // The first of two moves may have been left less of than what remains then would be.
     const double leaves = k > 0 ? part : std::max(part, kept_.rate());

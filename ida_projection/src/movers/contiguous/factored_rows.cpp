@@ -20,58 +20,42 @@ constexpr double kAlike = 0.05;    // of a sum of squares
 
 template <class Rows>
 Status FactoredRows<Rows>::structure(const Candidate& candidate, const double* id) {
-  factors.there = false;
+  factors.there = levels_known_ = false;
   const Status status = blocks.structure(evaluator, candidate.t, at.y, at.WT(), options_.hold, id);
   if (status != Status::success) message_ = blocks.message;
   return status;
 }
 
-// Level of each unknown; empty: there is one only. `zeros`: entries that are 0 now count, too.
+// Level of each unknown in rows that are measured in tolerances; empty: there is one only. Not by
+// the entries that are zero now: at rest those of positions in rows of velocities are.
 template <class Rows>
-std::vector<int> FactoredRows<Rows>::levels(bool zeros) {
-  std::vector<int> starts = {0}, columns;
-  for (const int i : blocks.d.rows) {
-    blocks.visit_row(i, [&](int j, double entry) {
-      if (zeros || entry != 0.0) columns.push_back(j);
-    });
-    starts.push_back(static_cast<int>(columns.size()));
-  }
-  std::vector<int> levels = levels_of_columns(starts, columns, unknowns());
-  if (*std::max_element(levels.begin(), levels.end()) < 1) levels.clear();
-  return levels;
-}
-
-template <class Rows>
-bool FactoredRows<Rows>::find_levels() {
-  std::vector<int> found = levels(false);
-  if (found.empty()) return false;
-  metric.use_levels(std::move(found));
-  return true;
-}
-
-// By the pattern of sparse rows, which shows all at once; else by the entries that are not zero
-// now, which at rest do not.
-template <class Rows>
-const std::vector<int>& FactoredRows<Rows>::all_levels() {
-  if (!Rows::kThinRows && found_levels_.empty()) found_levels_ = levels(true);
-  if (Rows::kThinRows || found_levels_.empty()) found_levels_ = levels(false);
+const std::vector<int>& FactoredRows<Rows>::levels() {
+  if (levels_known_) return found_levels_;
+  const RowPattern pattern = blocks.pattern(blocks.d.rows);
+  found_levels_ = levels_of_columns(pattern.starts, pattern.columns, pattern.n);
+  if (*std::max_element(found_levels_.begin(), found_levels_.end()) < 1) found_levels_.clear();
+  levels_known_ = true;
   return found_levels_;
 }
 
 template <class Rows>
+bool FactoredRows<Rows>::find_levels() {
+  if (levels().empty()) return false;
+  metric.use_levels(levels());
+  return true;
+}
+
+template <class Rows>
 bool FactoredRows<Rows>::has_third_level() {
-  if (third_level_ || third_level_looks_ >= kLevelLooks) return third_level_;
-  ++third_level_looks_;
-  const std::vector<int>& found = all_levels();
-  third_level_ = std::any_of(found.begin(), found.end(), [](int level) { return level >= 2; });
-  return third_level_;
+  const auto third = [](int level) { return level >= kLeastOfForces; };
+  return levels_split() || std::any_of(levels().begin(), levels().end(), third);
 }
 
 template <class Rows>
 void FactoredRows<Rows>::split_forces(const AreForces& are_forces) {
   forget_forces();
   if (count() <= kFewForLevels) return;
-  const RowPattern pattern = blocks.pattern();
+  const RowPattern pattern = blocks.pattern(blocks.d.rows);
   const std::vector<int> levels = levels_of_columns(pattern.starts, pattern.columns, pattern.n);
   const int highest = *std::max_element(levels.begin(), levels.end());
   RowChain chain;
@@ -87,14 +71,13 @@ template <class Rows>
 void FactoredRows<Rows>::split_levels() {
   if (levels_with_forces_.empty() || !blocks.split_by_level(levels_with_forces_, level_of_forces_))
     return;
-  factors.there = factors.lasting = false;
-  third_level_ = true;
+  factors.there = factors.lasting = levels_known_ = false;
 }
 
 template <class Rows>
 void FactoredRows<Rows>::join_levels() {
   blocks.join_levels();
-  factors.there = factors.lasting = false;
+  factors.there = factors.lasting = levels_known_ = false;
 }
 
 template <class Rows>
@@ -103,7 +86,7 @@ void FactoredRows<Rows>::look_for_rates() {
   const bool early = factored_ <= kEarly && rate_looks_ < kLevelLooks;
   if (!wanted || metric.by_rates() || !early) return;
   ++rate_looks_;
-  const std::vector<int>& found = all_levels();
+  const std::vector<int>& found = levels();
   if (found.empty() || !first_are_rates_of_zeroth(found)) return;
   metric.use_rates(found);
   set_metric(true);
@@ -126,8 +109,9 @@ bool FactoredRows<Rows>::first_are_rates_of_zeroth(const std::vector<int>& level
   }
   for (const int i : blocks.d.rows) {
     int level = -1;
-    blocks.visit_row(
-        i, [&](int j, double) { level = std::max(level, levels[static_cast<std::size_t>(j)]); });
+    blocks.visit_row(i, [&](int j, double entry) {
+      if (entry != 0.0) level = std::max(level, levels[static_cast<std::size_t>(j)]);
+    });
     more_rows += level == 0 ? 1 : level == 1 ? -1 : 0;
   }
   return more == 0 && more_rows == 0 && values > 0.0 && std::abs(rates - values) <= kAlike * values;
@@ -142,7 +126,7 @@ Status FactoredRows<Rows>::rows(double t, double* g) {
   if (status == Status::success && blocks.outgrown()) {
     blocks.rearrange();
     if (levels_split() && blocks.a.rows.size() != blocks.a.columns.size()) blocks.join_levels();
-    factors.there = factors.lasting = false;
+    factors.there = factors.lasting = levels_known_ = false;
     set_metric(true);
     status = blocks.evaluate(evaluator, t, at.y.data(), WT);
   }

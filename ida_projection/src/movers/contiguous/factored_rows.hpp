@@ -15,8 +15,8 @@
 
 namespace tether::ida_projection {
 
-constexpr int kFewForLevels = 16;  // rows
-constexpr double kSafe = 0.25;     // of Options::tolerance, where old factors tell what is left
+constexpr int kFewForLevels = 16, kManyForLevels = 128;  // rows
+constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
 
 /// What the factors at hand are good for.
 struct FactorState {
@@ -64,10 +64,9 @@ class FactoredRows {
     else
       metric.look(at);
   }
-  /// One scale for each level of the columns from now on, from the entries of C. False: there is
-  /// one level only.
+  /// One scale for each level of the columns from now on. False: there is one level only.
   bool find_levels();
-  /// Are there unknowns of level 2? Looked for until some are found, 16 times.
+  /// Are there unknowns of level 2?
   bool has_third_level();
   /// No variable being algebraic: where rows are many, those with forces, if `are_forces` says that
   /// there are some, are solved for these alone from now on.
@@ -91,7 +90,16 @@ class FactoredRows {
   Status factor(double t);
   /// The move for g by the factors at hand; returns its WRMS length in the error norm. Algebraic
   /// columns do not count there: they follow the others, and out of the error test.
-  double solve();
+  double solve() {
+    blocks.solve(g_);
+    return length_of_solution();
+  }
+  /// The same with as many steps as the factors need for rows that they cannot tell from dependent
+  /// ones.
+  double solve_closely() {
+    blocks.solve_closely(g_);
+    return length_of_solution();
+  }
   /// f(block) for the blocks whose move is measured in tolerances.
   template <class Visit>
   void visit_counted(Visit f) {
@@ -132,9 +140,8 @@ class FactoredRows {
     metric.reset();
     if constexpr (Rows::kThinRows) blocks.trust.reset();
     usual_ = 0.0;
-    factored_ = rate_looks_ = third_level_looks_ = 0;
-    third_level_ = false;
-    found_levels_.clear();
+    factored_ = rate_looks_ = 0;
+    levels_known_ = false;
     forget_forces();
   }
   void forget_forces() {
@@ -143,6 +150,7 @@ class FactoredRows {
   }
 
  private:
+  double length_of_solution();
   bool only_rounding(std::size_t i) const;
   using Block = typename Rows::Block;
 
@@ -157,8 +165,7 @@ class FactoredRows {
   int unknowns() const { return static_cast<int>(at.y.size()); }
   Status rows(double t, double* g);
   bool decide();
-  std::vector<int> levels(bool zeros);
-  const std::vector<int>& all_levels();
+  const std::vector<int>& levels();
   void look_for_rates();
   bool first_are_rates_of_zeroth(const std::vector<int>& levels);
   double left_of_dropped();
@@ -171,9 +178,9 @@ class FactoredRows {
   double inverse_n_;
   std::vector<double> g_;
   bool rows_known_ = false;  // C belongs to the present y
-  int factored_ = 0, rate_looks_ = 0, third_level_looks_ = 0;
-  bool third_level_ = false;
+  int factored_ = 0, rate_looks_ = 0;
   std::vector<int> found_levels_;
+  bool levels_known_ = false;            // they are those of the rows as they are arranged
   std::vector<int> levels_with_forces_;  // empty: no forces are known
   int level_of_forces_ = 0;
   double usual_ = 0.0;    // left_of_dropped() after the moves, with factors.decided
@@ -182,9 +189,8 @@ class FactoredRows {
 };
 
 template <class Rows>
-double FactoredRows<Rows>::solve() {
+double FactoredRows<Rows>::length_of_solution() {
   ++statistics_.iterations;
-  blocks.solve(g_);
   double sum = 0.0;
   visit_counted([&](const Block& block) {
     const double* dy = block.dy.data();
