@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <tether/linalg/shortest_turn.hpp>
 
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
@@ -89,7 +90,7 @@ TEST_CASE("stepping: spheres and cylinders on a slope roll or slide, with the su
     int body;
     if (cylinder) {
       // A capsule, its axis across the slope, with the inertia of a cylinder about that axis.
-      const Quaterniond q = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), fall.axis);
+      const Quaterniond q = tether::linalg::shortest_turn(Vector3d::UnitZ(), fall.axis);
       body = scene.bodies.add(1, Vector3d(0.1, 0.1, part * R * R).asDiagonal().toDenseMatrix(),
                               R * fall.up, q);
       scene.surfaces.push_back({body, tc::Shape::capsule(R, 0.5), 0});

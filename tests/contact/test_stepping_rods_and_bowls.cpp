@@ -4,6 +4,7 @@
 #include <array>
 #include <functional>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/shortest_turn.hpp>
 
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
@@ -45,7 +46,7 @@ Vector3d impulse(const tc::Stepper& s) {
 // 0, is put there before each step.
 void put_plane(tc::Stepper& s, const Vector3d& on, const Vector3d& normal) {
   s.bodies().position[0] = on;
-  s.bodies().orientation[0] = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal);
+  s.bodies().orientation[0] = tether::linalg::shortest_turn(Vector3d::UnitZ(), normal);
 }
 
 struct Swing {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <string>
+#include <tether/linalg/shortest_turn.hpp>
 #include <tether/scene/engine.hpp>
 
 namespace mechanisms {
@@ -27,7 +28,7 @@ inline Body rod(const std::string& name, const Vector3d& a, const Vector3d& b, d
   const double across = mass * (b - a).squaredNorm() / 12;
   body.inertia = Vector3d(thin * mass, across, across).asDiagonal();
   body.position = (a + b) / 2;
-  body.orientation = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), b - a);
+  body.orientation = tether::linalg::shortest_turn(Vector3d::UnitX(), b - a);
   return body;
 }
 
@@ -215,7 +216,7 @@ inline Scene governor(double tolerance) {
     arm.inertia += Vector3d(0, shift, shift).asDiagonal().toDenseMatrix();
     arm.mass = m + ball;
     arm.position = pivot + centre * along;
-    arm.orientation = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), along);
+    arm.orientation = tether::linalg::shortest_turn(Vector3d::UnitX(), along);
     arm.angular_velocity = {0, 0, spin};
     arm.velocity = arm.angular_velocity.cross(arm.position);
     const int index = static_cast<int>(s.bodies.size());

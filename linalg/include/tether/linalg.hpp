@@ -12,6 +12,7 @@
 #include <tether/linalg/minimum_norm.hpp>
 #include <tether/linalg/pi.hpp>
 #include <tether/linalg/pivoted_qr.hpp>
+#include <tether/linalg/shortest_turn.hpp>
 #include <tether/linalg/singular_values.hpp>
 #include <tether/linalg/small_lu.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>

@@ -65,9 +65,11 @@ Eigen::MatrixXd mass_matrix_of(const Scene& scene, const Robot& robot, bool free
     const Body& body = scene.bodies[static_cast<std::size_t>(b)];
     if (body.fixed) continue;
     const Eigen::Matrix3d R = body.orientation.toRotationMatrix();
-    M += body.mass * v.middleRows(3 * b, 3).transpose() * v.middleRows(3 * b, 3);
-    M += w.middleRows(3 * b, 3).transpose() * (R * body.inertia * R.transpose()) *
-         w.middleRows(3 * b, 3);
+    const Eigen::MatrixXd speeds = v.middleRows(3 * b, 3), rates = w.middleRows(3 * b, 3);
+    const Eigen::MatrixXd momenta = body.mass * speeds,
+                          spins = R * body.inertia * R.transpose() * rates;
+    M += speeds.transpose() * momenta;
+    M += rates.transpose() * spins;
   }
   return M;
 }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <tether/linalg/shortest_turn.hpp>
 
 #include "geometry/mass.hpp"
 #include "import/robot/geometry.hpp"
@@ -85,7 +86,7 @@ Eigen::Isometry3d read_place(Tag& tag, const std::string& type, const Settings& 
   size.resize(1);
   if (type == "box" || type == "ellipsoid") size.push_back(size[0]);
   size.push_back((to - from).stableNorm() / 2);
-  return placed(Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), to - from), (from + to) / 2);
+  return placed(linalg::shortest_turn(Vector3d::UnitZ(), to - from), (from + to) / 2);
 }
 
 Touch read_touch(Tag& tag, bool& touches) {

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <tether/linalg/shortest_turn.hpp>
+
 namespace tether::scene::import::mjcf {
 
 namespace {
@@ -161,8 +163,7 @@ Quaterniond read_orientation(Tag& tag, const Settings& settings) {
     }
     tag.wrong("xyaxes", "must be two directions that are not parallel");
   } else if (tag.has("zaxis")) {
-    return Quaterniond::FromTwoVectors(Vector3d::UnitZ(),
-                                       tag.direction("zaxis", Vector3d::UnitZ()));
+    return linalg::shortest_turn(Vector3d::UnitZ(), tag.direction("zaxis", Vector3d::UnitZ()));
   }
   return Quaterniond::Identity();
 }
