@@ -8,7 +8,6 @@
 
 #include "body_passes/given_problem.hpp"
 #include "body_passes/island_sweeps.hpp"
-#include "body_sweeps/far_contacts.hpp"
 #include "body_sweeps/impulse_memory.hpp"
 #include "body_sweeps/workers.hpp"
 #include "graph/contact_graph.hpp"
@@ -54,18 +53,12 @@ struct BodySolver::Implementation {
   detail::IslandSweeps sweeps;                // impulses and velocities of this solve
   std::vector<IslandResult> results;          // of each island
   detail::Workers workers;                    // threads
-  BodySolution* out = nullptr;                // the caller's, or of a part of the contacts
-  detail::FarContacts far;                    // those of large islands that are not swept at first
-  std::vector<PointContact> near;             // the others
-  BodySolution found;                         // of these
+  BodySolution* out = nullptr;                // the caller's
   detail::SweepPartners* partners = nullptr;  // other processes: RankedSolver
 
   // A solve, from body_solver.cpp on.
   void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
   void find_starts();
-  void solve_all(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
-  void solve_near(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
-  void merge(const std::vector<RigidBody>& b);
   void solve_graph();  // given, starts and graph are known
   void solve_islands(int threads);
   bool here(int k) const { return !partners || partners->here(k); }
