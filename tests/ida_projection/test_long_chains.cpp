@@ -126,9 +126,9 @@ class LongChain {
 /// IDA on a chain, with a band matrix by IDA's differences.
 class BandHost : public Host {
  public:
-  BandHost(const LongChain& chain, const Problem& problem, double tolerance)
-      : Host(problem, tolerance),
-        matrix_(SUNBandMatrix(problem.size, kWidth, kWidth, context)),
+  BandHost(const LongChain& chain, const Problem& of_chain, double tolerance)
+      : Host(of_chain, tolerance),
+        matrix_(SUNBandMatrix(of_chain.size, kWidth, kWidth, context)),
         solver_(SUNLinSol_Band(y, matrix_, context)) {
     REQUIRE(IDASetLinearSolver(ida, solver_, matrix_) == 0);
     attach(chain.rows());
