@@ -2,7 +2,7 @@
 # alias and install rules. No global flags: a project that adds Tether as a subdirectory keeps its own.
 # SPDX-License-Identifier: BSD-3-Clause
 #
-#   tether_warnings(<target>)    warnings and instrumentation of the project, and the compiler's memory
+#   tether_compile_options(<target>)    warnings and instrumentation of the project, and the compiler's memory
 #   tether_executable(<target> SOURCES ... LIBRARIES ...)
 #   tether_library(<name>)       target tether_<name>, alias tether::<name>
 #   tether_by_folders(<target>)  with TETHER_UNITY_BUILD: the sources of a folder compile as one
@@ -15,7 +15,7 @@ if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES AND PROJECT_IS_TOP_LEV
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
 
-function(tether_warnings target)
+function(tether_compile_options target)
   target_compile_options(${target} PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow>
     $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${TETHER_WARNINGS_AS_ERRORS}>>:-Werror>
@@ -41,7 +41,7 @@ function(tether_executable target)
   target_link_libraries(${target} PRIVATE ${arg_LIBRARIES})
   target_compile_features(${target} PRIVATE cxx_std_17)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
-  tether_warnings(${target})
+  tether_compile_options(${target})
 endfunction()
 
 # The sources of a folder compile as one: names in unnamed namespaces differ within a folder.
@@ -86,7 +86,7 @@ function(tether_library name)
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   # Installed shared libraries find each other in their own folder.
   set_target_properties(tether_${name} PROPERTIES INSTALL_RPATH $<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>)
-  tether_warnings(tether_${name})
+  tether_compile_options(tether_${name})
   tether_by_folders(tether_${name})
   tether_keep_private(tether_${name})
   set_property(GLOBAL APPEND PROPERTY TETHER_LIBRARIES ${name})
