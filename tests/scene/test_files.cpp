@@ -92,6 +92,7 @@ TEST_CASE("every field of a scene is read") {
   CHECK(t.stepping->impact_threshold == 0.03);
   CHECK(t.stepping->acceptance == 10);
   CHECK(t.stepping->max_halvings == 2);
+  CHECK(t.stepping->max_sweeps == 500);
   CHECK(t.stepping->accuracy == 1e-3);
   CHECK(t.stepping->on_failure == OnFailure::warn);
   CHECK(t.stepping->threads == 2);

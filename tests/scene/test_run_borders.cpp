@@ -59,6 +59,20 @@ class Still : public Engine {
   std::vector<ContactState> contacts_;
 };
 
+// Four balls as a pyramid, the heaviest of 300 kg; more: of [stepping].
+std::string pyramid(const std::string& more) {
+  std::string text = "[scene]\nend = 0.05\ngravity = [0, 0, -9.81]\n[stepping]\nstep = 5e-3\n" +
+                     more +
+                     "[[pair]]\nbetween = [\"a\", \"a\"]\nfriction = 0.3\n"
+                     "[[body]]\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n";
+  for (const char* each :
+       {"mass = 1\nposition = [0, 0, 0.1]", "mass = 1\nposition = [0.2, 0, 0.1]",
+        "mass = 300\nposition = [0.1, 0.173, 0.1]",
+        "mass = 70\nposition = [0.1, 0.0577, 0.263]\nvelocity = [0.01, 0.03, 0]"})
+    text += fmt::format("[[body]]\nshape = \"sphere\"\nradius = 0.1\nmaterial = \"a\"\n{}\n", each);
+  return text;
+}
+
 }  // namespace
 
 TEST_CASE("a motion that leaves the range of numbers is a failure, never a success") {
@@ -100,17 +114,8 @@ TEST_CASE("a rotation that steps do not resolve is a warning") {
 
 TEST_CASE("a contact problem that is used above what the scene accepts is a warning") {
   const auto warnings = [](const char* tolerance, const char* acceptance) {
-    std::string text = fmt::format(
-        "[scene]\nend = 0.05\ngravity = [0, 0, -9.81]\n[stepping]\nstep = 5e-3\nmax_halvings = 1\n"
-        "tolerance = {}\nacceptance = {}\n[[pair]]\nbetween = [\"a\", \"a\"]\nfriction = 0.3\n"
-        "[[body]]\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n",
-        tolerance, acceptance);
-    for (const char* each :
-         {"mass = 1\nposition = [0, 0, 0.1]", "mass = 1\nposition = [0.2, 0, 0.1]",
-          "mass = 300\nposition = [0.1, 0.173, 0.1]",
-          "mass = 70\nposition = [0.1, 0.0577, 0.263]\nvelocity = [0.01, 0.03, 0]"})
-      text +=
-          fmt::format("[[body]]\nshape = \"sphere\"\nradius = 0.1\nmaterial = \"a\"\n{}\n", each);
+    const std::string text = pyramid(
+        fmt::format("max_halvings = 1\ntolerance = {}\nacceptance = {}\n", tolerance, acceptance));
     return run(parse_scene(text, "pyramid.toml")).warnings;
   };
   const auto beyond = warnings("1e-15", "1.5");  // below rounding
@@ -118,6 +123,15 @@ TEST_CASE("a contact problem that is used above what the scene accepts is a warn
   CHECK_THAT(beyond[0],
              Catch::Contains("above the 1.5e-15") && Catch::Contains("stepping.acceptance"));
   CHECK(warnings("1e-15", "1e5").empty());
+}
+
+TEST_CASE("sweeps of a contact problem end where the scene says") {
+  const auto counts = [](const char* more) {
+    return run(parse_scene(pyramid(more), "pyramid.toml")).counts;
+  };
+  const Counts few = counts("max_sweeps = 3\n"), many = counts("");
+  CHECK(few.sweeps <= 3 * few.contact_problems);
+  CHECK(many.sweeps > 3 * many.contact_problems);
 }
 
 TEST_CASE("what is no number is never met") {

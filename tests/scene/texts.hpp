@@ -149,6 +149,7 @@ restitution_threshold = 0.02
 impact_threshold = 0.03
 acceptance = 10
 max_halvings = 2
+max_sweeps = 500
 accuracy = 1e-3
 on_failure = "warn"
 threads = 2

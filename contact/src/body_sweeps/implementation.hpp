@@ -8,6 +8,7 @@
 
 #include "body_passes/given_problem.hpp"
 #include "body_passes/island_sweeps.hpp"
+#include "body_sweeps/far_contacts.hpp"
 #include "body_sweeps/impulse_memory.hpp"
 #include "body_sweeps/workers.hpp"
 #include "graph/contact_graph.hpp"
@@ -46,19 +47,24 @@ struct BodySolver::Implementation {
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
   BodyOptions options;
-  detail::GivenProblem given;                 // the caller's bodies and contacts
-  detail::ContactGraph graph;                 // their islands
-  detail::ImpulseHistory memory;              // impulses of earlier solves
-  std::vector<const Vector3d*> starts;        // of each contact, in the memory; empty: none
+  detail::GivenProblem given;     // the caller's bodies and contacts
+  detail::ContactGraph graph;     // their islands
+  detail::ImpulseHistory memory;  // impulses of earlier solves
+  // Of each contact, in the memory; empty: none. Where some are far, of those that are solved next.
+  std::vector<const Vector3d*> starts, all_starts;
   detail::IslandSweeps sweeps;                // impulses and velocities of this solve
   std::vector<IslandResult> results;          // of each island
   detail::Workers workers;                    // threads
-  BodySolution* out = nullptr;                // the caller's
+  BodySolution* out = nullptr;                // the caller's, or of a part of the contacts
+  detail::FarContacts far;                    // those of large islands that are not swept at first
+  std::vector<PointContact> near;             // the others
+  BodySolution found;                         // of these
   detail::SweepPartners* partners = nullptr;  // other processes: RankedSolver
 
   // A solve, from body_solver.cpp on.
   void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
   void find_starts();
+  void solve_all(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
   void solve_graph();  // given, starts and graph are known
   void solve_islands(int threads);
   bool here(int k) const { return !partners || partners->here(k); }
@@ -66,6 +72,14 @@ struct BodySolver::Implementation {
   void together(int k, Team& team);
   void alone(int k, Worker& worker);
   void report();
+
+  // near_contacts_first.cpp: where some are far.
+  void solve_near(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
+  void solve_group(const std::vector<RigidBody>& b, const std::vector<PointContact>& c,
+                   bool some_far);
+  void solve_next(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, bool again);
+  void take_motion(const std::vector<RigidBody>& b);
+  void take_judgement(int sweeps);
 
   // block_gauss_seidel.cpp
   void iterate(int k, Team& team);

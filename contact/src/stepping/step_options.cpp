@@ -40,6 +40,7 @@ BodyOptions contact_options(const SteppingOptions& o) {
   if (o.acceptance > 1) {
     b.enough = std::min(accepted_residual(o), std::max(kEnough, o.tolerance));
   }
+  b.leave_out_far = true;
   b.threads = o.threads;
   b.team = o.team;
   return b;

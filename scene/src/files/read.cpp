@@ -92,6 +92,7 @@ void read_engine(Fields& root, Reader& r) {
   o.acceptance = in.number("acceptance", o.acceptance, {1, 1e12, false, "a number from 1 to 1e12"},
                            "of the tolerance");
   o.max_halvings = in.count("max_halvings", o.max_halvings, 0, 30);
+  o.max_sweeps = in.count("max_sweeps", o.max_sweeps, 1, 1000000000);
   o.on_failure = in.word("on_failure", o.on_failure);
   o.threads = in.count("threads", o.threads, 1, 1024);
   in.finish();

@@ -117,6 +117,7 @@ void write_stepping(const SteppingOptions& o, Writer& out) {
   out.field("sleep", o.sleep, "of sqrt(gravity * size); 0: none sleeps");
   out.field("acceptance", o.acceptance, "of the tolerance");
   out.field("max_halvings", o.max_halvings, "of a step");
+  out.field("max_sweeps", o.max_sweeps, "of an island");
   out.raw("on_failure", toml_word(o.on_failure));
   out.field("threads", o.threads);
 }
