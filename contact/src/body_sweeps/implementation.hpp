@@ -79,7 +79,7 @@ struct BodySolver::Implementation {
                    bool some_far);
   void solve_next(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, bool again);
   void take_motion(const std::vector<RigidBody>& b);
-  void take_judgement(int sweeps);
+  void take_judgement(int swept);
 
   // block_gauss_seidel.cpp
   void iterate(int k, Team& team);

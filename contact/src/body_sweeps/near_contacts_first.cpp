@@ -63,18 +63,18 @@ void BodySolver::Implementation::solve_group(const std::vector<RigidBody>& b,
                                              const std::vector<PointContact>& c, bool some_far) {
   const MaxSweeps most(options.max_sweeps);
   const int look = std::max(1, most.before / 4);
-  int sweeps = 0;
+  int swept = 0;
   bool looks = some_far, again = false, closed = true;
   while (closed || (looks && found.status != Status::solved)) {
     looks = some_far && closed;
-    most.now = looks ? look : std::max(look, most.before - sweeps);
+    most.now = looks ? look : std::max(look, most.before - swept);
     solve_next(b, c, again);
     take_motion(b);
-    sweeps += found.sweeps;
+    swept += found.sweeps;
     closed = far.take_in(c, *out);
     again = true;
   }
-  take_judgement(sweeps);
+  take_judgement(swept);
 }
 
 // again: from what has been found; what has been taken in starts from zero.
@@ -107,12 +107,12 @@ void BodySolver::Implementation::take_motion(const std::vector<RigidBody>& b) {
   }
 }
 
-// Of the last solve of a group, which replaces those before it; sweeps: of all of them.
-void BodySolver::Implementation::take_judgement(int sweeps) {
+// Of the last solve of a group, which replaces those before it; swept: how often in all of them.
+void BodySolver::Implementation::take_judgement(int swept) {
   BodySolution& o = *out;
   o.status = worse(o.status, found.status);
   o.error = found.error != found.error ? found.error : std::max(o.error, found.error);
-  o.sweeps = std::max(o.sweeps, sweeps);
+  o.sweeps = std::max(o.sweeps, swept);
   o.colours = std::max(o.colours, found.colours);
   o.islands += found.islands;
   o.assembled_islands += found.assembled_islands;
