@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstring>
+#include <string>
 #include <tether/contact.hpp>
 #include <vector>
 
@@ -129,6 +130,20 @@ TEST_CASE(
     late += s.status == Status::solved && s.sweeps > sweeps / 4;
   }
   CHECK(late > 0);
+}
+
+TEST_CASE("far contacts: a contact that is refused is named as in the caller's list") {
+  random::Packing p = falling(10, 0.2);
+  PointContact c;  // behind the far ones, of a body that cannot move along the normal
+  c.first = 500;
+  c.r1 = {0, 0, -0.5};
+  p.bodies[500].inverse_mass = 0;
+  p.contacts.push_back(c);
+  const std::string name = "contact " + std::to_string(p.contacts.size() - 1) + ":";
+  BodySolver solver(options(1));
+  CHECK_THROWS_WITH(solver.solve(p.bodies, p.contacts), Catch::Contains(name));
+  p.bodies[500].inverse_mass = p.bodies[499].inverse_mass;
+  CHECK(solver.solve(p.bodies, p.contacts).status == Status::solved);
 }
 
 TEST_CASE("far contacts: a solve that is taken back leaves the start of the one before") {

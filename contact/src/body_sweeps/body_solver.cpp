@@ -84,14 +84,16 @@ void BodySolver::Implementation::alone(int k, Worker& worker) {
 void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
                                        const std::vector<PointContact>& c, BodySolution& o) {
   out = &o;
+  read(b, c);
+  o.far = 0;
+  if (!options.leave_out_far || !far.leave_out(given, starts) || !solve_near(b, c)) solve_all(b, c);
+  if (options.warm_start) memory.keep(c, o.impulses);
+}
+
+void BodySolver::Implementation::read(const std::vector<RigidBody>& b,
+                                      const std::vector<PointContact>& c) {
   given.read(b, c, options.law);
   find_starts();
-  o.far = 0;
-  if (options.leave_out_far && far.leave_out(given, starts))
-    solve_near(b, c);
-  else
-    solve_all(b, c);
-  if (options.warm_start) memory.keep(c, o.impulses);
 }
 
 void BodySolver::Implementation::solve_all(const std::vector<RigidBody>& b,

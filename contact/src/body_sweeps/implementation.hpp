@@ -63,6 +63,7 @@ struct BodySolver::Implementation {
 
   // A solve, from body_solver.cpp on.
   void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
+  void read(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
   void find_starts();
   void solve_all(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
   void solve_graph();  // given, starts and graph are known
@@ -74,7 +75,7 @@ struct BodySolver::Implementation {
   void report();
 
   // near_contacts_first.cpp: where some are far.
-  void solve_near(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
+  bool solve_near(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
   void solve_group(const std::vector<RigidBody>& b, const std::vector<PointContact>& c,
                    bool some_far);
   void solve_next(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, bool again);

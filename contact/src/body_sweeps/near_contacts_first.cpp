@@ -1,6 +1,7 @@
 // Tether: solves without contacts that are far open, and then with those that close after all.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <stdexcept>
 #include <tether/contact/ranks.hpp>
 
 #include "body_sweeps/implementation.hpp"
@@ -43,18 +44,28 @@ struct MaxSweeps {
 
 }  // namespace
 
-void BodySolver::Implementation::solve_near(const std::vector<RigidBody>& b,
+// False where a contact was refused, which is numbered among those that were solved: all are to be.
+bool BodySolver::Implementation::solve_near(const std::vector<RigidBody>& b,
                                             const std::vector<PointContact>& c) {
+  BodySolution* const all = out;
   clear(b, c.size(), *out);
   all_starts.swap(starts);
-  for (int group = 0; group < far.groups(); ++group) {
-    far.begin(group);
-    if (!far.next().empty()) solve_group(b, c, group > 0);
+  try {
+    for (int group = 0; group < far.groups(); ++group) {
+      far.begin(group);
+      if (!far.next().empty()) solve_group(b, c, group > 0);
+    }
+  } catch (const std::invalid_argument&) {
+    if (options.team) throw;  // the other processes do not go on
+    out = all;
+    read(b, c);
+    return false;
   }
   out->far = far.count();
   out->bytes += far.bytes() + near.capacity() * sizeof(near[0]) +
                 all_starts.capacity() * sizeof(all_starts[0]);
   std::sort(out->replaced.begin(), out->replaced.end());
+  return true;
 }
 
 // Until none closes that is left out. Which do shows long before their island is solved: a look at
