@@ -132,6 +132,21 @@ TEST_CASE(
   CHECK(late > 0);
 }
 
+// Before, an error that is no number was taken for 0.
+TEST_CASE(
+    "bodies: what leaves the range of doubles is unsolved, with an error that meets no bound") {
+  random::Packing p = falling(10, 0.2);
+  p.bodies[500].velocity[1] = 1e300;
+  for (const bool leaves_out : {false, true}) {
+    BodyOptions o = options(1);
+    o.leave_out_far = leaves_out;
+    o.max_sweeps = 50;
+    const BodySolution s = BodySolver(o).solve(p.bodies, p.contacts);
+    CHECK(s.status != Status::solved);
+    CHECK_FALSE(s.error <= 1e300);
+  }
+}
+
 TEST_CASE("far contacts: a contact that is refused is named as in the caller's list") {
   random::Packing p = falling(10, 0.2);
   PointContact c;  // behind the far ones, of a body that cannot move along the normal

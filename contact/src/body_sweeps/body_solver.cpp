@@ -50,6 +50,7 @@ void check(const BodyOptions& o) {
 }  // namespace
 
 Status worse(Status a, Status b) { return severity(b) > severity(a) ? b : a; }
+double worse(double a, double b) { return b != b || b > a ? b : a; }
 
 // A large island by all threads, or by all processes; islands to be assembled are left to alone().
 void BodySolver::Implementation::together(int k, Team& team) {
@@ -180,7 +181,7 @@ void BodySolver::Implementation::report() {
   for (std::size_t k = 0; k < results.size(); ++k) {
     const IslandResult& r = results[k];
     if (!here(static_cast<int>(k)) && !shared(static_cast<int>(k))) continue;
-    out->error = std::max(out->error, r.error);
+    out->error = worse(out->error, r.error);
     out->sweeps = std::max(out->sweeps, r.sweeps);
     out->colours =
         std::max(out->colours, graph.islands[k].colour_end - graph.islands[k].colour_begin);

@@ -122,7 +122,7 @@ void BodySolver::Implementation::take_motion(const std::vector<RigidBody>& b) {
 void BodySolver::Implementation::take_judgement(int swept) {
   BodySolution& o = *out;
   o.status = worse(o.status, found.status);
-  o.error = found.error != found.error ? found.error : std::max(o.error, found.error);
+  o.error = worse(o.error, found.error);
   o.sweeps = std::max(o.sweeps, swept);
   o.colours = std::max(o.colours, found.colours);
   o.islands += found.islands;

@@ -234,8 +234,7 @@ void RankTeam::Implementation::unpack(const std::vector<RigidBody>& bodies, Body
     out.islands = number();
     out.assembled_islands += number();
     out.failed_islands += number();
-    const double error = *from++;
-    out.error = error != error ? error : std::max(out.error, error);
+    out.error = worse(out.error, *from++);
     const auto get = [&](Vector3d& v) {
       v = Eigen::Map<const Vector3d>(from);
       from += 3;

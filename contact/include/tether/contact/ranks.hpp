@@ -78,8 +78,9 @@ struct RankIslands {
   int all = 0, shared = 0, assembled = 0, failed = 0;
 };
 
-/// Of two parts of a solve, the status of both.
+/// Of two parts of a solve, the status of both, and the error of both: NaN where one is.
 Status worse(Status a, Status b);
+double worse(double a, double b);
 
 /// The part of one rank of BodySolver. All ranks plan the whole graph of contacts alike, so that it
 /// needs no messages; bodies and contacts themselves are where they are used.
