@@ -154,40 +154,17 @@ TEST_CASE("stepping engine: a state that presses bodies which are not there is r
   CHECK_THROWS_WITH(restored_with(first, -1), Catch::Contains("contacts of no bodies"));
 }
 
-TEST_CASE("stepping engine: states of the format before are read, others refused by name") {
-  const Scene scene = balls_on_floor();
-  const auto a = make_stepping_engine(scene), b = make_stepping_engine(scene);
+TEST_CASE("stepping engine: a state of another format is refused by name") {
+  const auto engine = make_stepping_engine(balls_on_floor());
   std::stringstream saved;
-  a->save(saved);
+  engine->save(saved);
   std::string state = saved.str();
   REQUIRE(state[7] == '7');
-  // Format 6 lacked what is left for cuts at the end. Format 5 lacked bodies, contacts and
-  // neighbours asleep at the end. Format 4 lacked the joints' drift at the end. Format 3 lacked the
-  // four lengths at the end that control the parts of a step; format 2 had a fourth warm start
-  // behind steps and the other three, too. All are empty at the start.
-  const std::size_t head = 8 + 3 * 8 + scene.bodies.size() * 13 * 8;
-  std::string sixth = state.substr(0, state.size() - 8);
-  sixth[7] = '6';
-  std::string fifth = sixth.substr(0, sixth.size() - 3 * 8);
-  fifth[7] = '5';
-  std::string fourth = fifth.substr(0, fifth.size() - 8);
-  fourth[7] = '4';
-  std::string third = fourth.substr(0, fourth.size() - 4 * 8);
-  third[7] = '3';
-  std::string second = third;
-  second[7] = '2';
-  second.insert(head + 4 * 8, 8, '\0');
-  a->advance(0.3);
-  for (const std::string& before : {sixth, fifth, fourth, third, second}) {
-    const auto c = make_stepping_engine(scene);
-    std::istringstream old(before);
-    c->restore(old);
-    c->advance(0.3);
-    check_same_bits(*a, *c);
+  for (const char other : {'6', '9'}) {
+    state[7] = other;
+    std::istringstream in(state);
+    CHECK_THROWS_WITH(engine->restore(in), Catch::Contains(std::string("format ") + other));
   }
-  state[7] = '9';
-  std::istringstream unknown(state);
-  CHECK_THROWS_WITH(b->restore(unknown), Catch::Contains("format 9"));
 }
 
 TEST_CASE("stepping engine: springs, dampers, loads and drag") {

@@ -27,7 +27,6 @@ constexpr const char* kDamaged = "the saved state is damaged";
 constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '5'};
 // The same of a scene far from the origin: that of the engine comes first.
 constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '5'};
-constexpr char kWithoutAxes = '3', kWithoutLifted = '4';
 
 DriverOptions driver_options(const Scene& scene, double time_unit) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -346,9 +345,6 @@ void EventEngine::restore(std::istream& in, Restore how) {
     get_bodies(in, bodies);
     in.read(magic, sizeof magic);
   }
-  char& format = magic[sizeof magic - 1];
-  const bool axes = format != kWithoutAxes, lifted = axes && format != kWithoutLifted;
-  if (!lifted) format = kMagic[sizeof magic - 1];
   const bool from_far = in && std::equal(magic, magic + sizeof magic, kFarMagic);
   if (!in || !(from_far || std::equal(magic, magic + sizeof magic, kMagic)))
     throw std::runtime_error("this is not a state of the event engine");
@@ -375,7 +371,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
   VectorXd saved(now_.size());
   binary::get_array(in, m.y, saved);
   for (std::uint64_t i = 0; i < contacts; ++i) {
-    std::int32_t mode = 0, directions = 0, count = 0;
+    std::int32_t mode = 0, directions = 0, count = 0, axis = 0, lifted = 0;
     binary::get(in, mode, directions);
     ContactMode& each = m.modes.emplace_back();
     each.mode = static_cast<Mode>(mode);
@@ -387,12 +383,11 @@ void EventEngine::restore(std::istream& in, Restore how) {
     binary::get(in, m.levels.emplace_back());
     Bounces& b = m.bounces.emplace_back();
     for (int k = 0; k < 3; ++k) binary::get(in, b.time[k], b.speed[k]);
-    binary::get(in, count);
+    binary::get(in, count, axis, lifted);
+    if (lifted != 0 && lifted != 1) throw std::runtime_error(kDamaged);
     b.count = count;
-    if (axes) m.axes.push_back(binary::get<std::int32_t>(in));
-    const std::int32_t up = lifted ? binary::get<std::int32_t>(in) : 0;
-    if (up != 0 && up != 1) throw std::runtime_error(kDamaged);
-    m.lifted.push_back(up == 1);
+    m.axes.push_back(axis);
+    m.lifted.push_back(lifted == 1);
   }
   for (int i = 0; i < model_->contacts(); ++i)
     if (const int by = model_->law(i).held_by;

@@ -21,7 +21,6 @@ namespace tether::scene {
 namespace {
 
 constexpr char kHandedOver[8] = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '2'};
-constexpr char kHandedOverOnce[8] = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '1'};
 constexpr std::uint64_t kLongestWhy = 100000, kMostClosed = 100000;
 constexpr const char* kUnsound = "the saved state is damaged";
 
@@ -146,7 +145,7 @@ class EventsThenSteps final : public Engine {
   void give_back();
   bool may_give_back() const;
   void put_hand_overs(std::ostream& out) const;
-  void get_hand_over(std::istream& in, bool once);
+  void get_hand_over(std::istream& in);
   void get_hand_overs(std::istream& in);
   bool are_sound() const;
 
@@ -257,14 +256,12 @@ void EventsThenSteps::save(std::ostream& out) const {
   now().save(out);
 }
 
-void EventsThenSteps::get_hand_over(std::istream& in, bool once) {
+void EventsThenSteps::get_hand_over(std::istream& in) {
   HandOver& each = hand_overs_.emplace_back();
   each_number(each.before, [&](long& n) { n = static_cast<long>(binary::get<std::int64_t>(in)); });
   std::uint64_t length = 0;
   double back = -1;
-  binary::get(in, each.time);
-  if (!once) binary::get(in, back, each.lost);
-  binary::get(in, length);
+  binary::get(in, each.time, back, each.lost, length);
   if (length > kLongestWhy || !std::isfinite(each.time) || !std::isfinite(each.lost) ||
       !std::isfinite(back))
     throw std::runtime_error(kUnsound);
@@ -278,7 +275,7 @@ void EventsThenSteps::get_hand_overs(std::istream& in) {
   if (count == 0 || count > kMostHandOvers) throw std::runtime_error(kUnsound);
   for (std::uint64_t k = 0; k < count; ++k) {
     if (k > 0 && !hand_overs_.back().back) throw std::runtime_error(kUnsound);
-    get_hand_over(in, false);
+    get_hand_over(in);
   }
   std::uint64_t closed = 0;
   binary::get(in, energy_, calm_, enough_, closed);
@@ -315,23 +312,18 @@ void EventsThenSteps::restore(std::istream& in, Restore how) {
   closed_.clear();
   steps_.reset();
   steps_before_ = Counts();
-  const bool once = std::equal(magic, magic + sizeof magic, kHandedOverOnce);
-  const bool ever = once || std::equal(magic, magic + sizeof magic, kHandedOver);
+  const bool ever = std::equal(magic, magic + sizeof magic, kHandedOver);
   begin_events(event::Begin::later);
   if (!content || !ever) {
     content = std::istringstream(all);
     events_->restore(content, how);
   } else {
-    if (once)
-      get_hand_over(content, true);
-    else
-      get_hand_overs(content);
+    get_hand_overs(content);
     if (hand_overs_.back().back) {
       events_->restore(content, how);
     } else {
       begin_steps();
       steps_->restore(content, how);
-      if (once) energy_ = energy_of(*steps_);
     }
     if (!are_sound()) throw std::runtime_error(kUnsound);
   }

@@ -129,14 +129,13 @@ void put_memory(std::ostream& out, const StepperMemory& m) {
   binary::put(out, m.cuts);
 }
 
-StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
+StepperMemory get_memory(std::istream& in, int bodies) {
   StepperMemory m;
   m.steps = static_cast<long>(binary::get<std::int64_t>(in));
   if (m.steps < 0) throw std::runtime_error("the saved state is damaged: it has no time");
   m.contacts = get_warm_start(in);
   m.corrections = get_warm_start(in);
   m.bounces = get_warm_start(in);
-  if (format == MemoryFormat::with_closings) get_warm_start(in);
   for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
     StepperMemory::Spin& spin = m.spins.emplace_back();
     binary::get_array(in, spin.momentum, spin.angular_velocity);
@@ -150,18 +149,14 @@ StepperMemory get_memory(std::istream& in, int bodies, MemoryFormat format) {
   m.status = static_cast<contact::Status>(status);
   if (contact::name(m.status) == std::string_view("?"))
     throw std::runtime_error("the saved state is damaged: no contact problem ends so");
-  if (format < MemoryFormat::without_drift) return m;
   binary::get(in, m.control.next, m.control.last, m.control.error, m.control.length);
   for (const double x : {m.control.next, m.control.last, m.control.error, m.control.length})
     if (!(x >= 0) || !std::isfinite(x))
       throw std::runtime_error("the saved state is damaged: no part of a step is so long");
-  if (format == MemoryFormat::without_drift) return m;
   binary::get(in, m.drift);
   if (!(m.drift >= 0) || !std::isfinite(m.drift))
     throw std::runtime_error("the saved state is damaged: joints are off by no length");
-  if (format == MemoryFormat::without_sleep) return m;
   get_sleep(in, bodies, m.sleep);
-  if (format == MemoryFormat::without_cuts) return m;
   binary::get(in, m.cuts);
   if (!(m.cuts >= 0) || !std::isfinite(m.cuts))
     throw std::runtime_error("the saved state is damaged: steps are cut at no impacts");

@@ -64,12 +64,10 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
   return motion.velocity + motion.angular_velocity.cross(r);
 }
 
-// The last letter is the format, see MemoryFormat.
+// The last letter is the format.
 constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '7'};
 // Of the step, and of the time: that of a boundary up to rounding.
 constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
-constexpr char kWithClosings = '2', kWithoutControl = '3', kWithoutDrift = '4', kWithoutSleep = '5',
-               kWithoutCuts = '6';
 
 Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
   Mapped out = map_scene(scene);
@@ -287,11 +285,10 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
   if (!in || std::memcmp(magic, kMagic, sizeof magic - 1) != 0)
     throw std::runtime_error("this is no saved state of the stepping engine");
   const char format = magic[sizeof magic - 1];
-  if (format != kMagic[sizeof magic - 1] && format != kWithClosings && format != kWithoutControl &&
-      format != kWithoutDrift && format != kWithoutSleep && format != kWithoutCuts)
-    throw std::runtime_error(
-        std::string("the saved state has format ") + format +
-        ", and this version reads 2 to 7: read it with the version that wrote it");
+  if (format != kMagic[sizeof magic - 1])
+    throw std::runtime_error(std::string("the saved state has format ") + format +
+                             ", and this version reads " + kMagic[sizeof magic - 1] +
+                             ": read it with the version that wrote it");
   const bool same = binary::get<std::uint64_t>(in) == fingerprint_;
   if (binary::get<std::uint64_t>(in) != bodies_.size() || (!same && how == Restore::exact))
     throw std::runtime_error("the saved state is of another scene or another step");
@@ -302,14 +299,7 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
     if (!s.is_finite() || !(std::abs(s.orientation.norm() - 1) < 1e-6))
       throw std::runtime_error("the saved state is damaged");
   }
-  const contact::StepperMemory memory =
-      get_memory(in, static_cast<int>(bodies_.size()),
-                 format == kWithClosings     ? MemoryFormat::with_closings
-                 : format == kWithoutControl ? MemoryFormat::without_control
-                 : format == kWithoutDrift   ? MemoryFormat::without_drift
-                 : format == kWithoutSleep   ? MemoryFormat::without_sleep
-                 : format == kWithoutCuts    ? MemoryFormat::without_cuts
-                                             : MemoryFormat::now);
+  const contact::StepperMemory memory = get_memory(in, static_cast<int>(bodies_.size()));
   if (!(std::abs(time) <= kMostSteps * stepper_.options().step))
     throw std::runtime_error("the saved state is damaged: it has no time");
   set_bodies(states);
