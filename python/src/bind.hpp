@@ -41,7 +41,7 @@ inline Array array(const double* values, py::ssize_t n) {
   return a;
 }
 
-/// What has that name as an array of doubles: numpy casts other things, or says nothing of them.
+/// `given` as an array of doubles. Checked here, since numpy would cast other types silently.
 template <class Numbers = Array>
 Numbers numbers(const char* name, const py::object& given) {
   const py::array any = py::array::ensure(given);

@@ -18,7 +18,7 @@ struct ConeDerivative : tc::ConeDerivative {
   int rows;  // of the problem
 };
 
-/// Of an array or a scipy.sparse matrix, which has `rows` rows and `columns` columns.
+/// Entries of an array or a scipy.sparse matrix with `rows` rows and `columns` columns.
 Entries matrix_entries(const char* argument, const py::object& whole, py::ssize_t rows,
                        py::ssize_t columns) {
   const auto check = [&](py::ssize_t r, py::ssize_t c) {

@@ -15,7 +15,7 @@ namespace {
 
 namespace ts = tether::scene;
 
-/// What a run leaves behind, one entry a record and, where it belongs to bodies, a body.
+/// The results of a run: one entry for each record, and for each body where it belongs to bodies.
 struct Film {
   std::vector<std::string> bodies;
   std::vector<double> t, position, orientation, velocity, angular_velocity;

@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+"""Are these documents and sources written by the rules of docs/glossary.md? SPDX-License-Identifier: BSD-3-Clause
+
+    python3 docs/words.py FILE_OR_FOLDER...
+
+Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
+phrase that the glossary replaces. Sources (a folder: all below it): no comment line that begins with Of, What or Where.
+"""
+import pathlib
+import re
+import sys
+
+LONGEST_SENTENCE, LONGEST_PARAGRAPH, MOST_TERMS = 35, 120, 15
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+GLOSSARY = ROOT / "docs" / "glossary.md"
+SOURCES = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".m"}
+BLOCK = re.compile(r"^```.*?^```[ \t]*$", re.M | re.S)
+COMMENT = re.compile(r"^\s*(?://+[!<]*|#)\s*(Of|What|Where)\b")
+
+
+def table_column(text, heading, column):
+    """Entries of one column of the table below a heading of the glossary."""
+    part = text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    rows = [line.strip().strip("|").split("|") for line in part.splitlines() if line.startswith("|")]
+    return [row[column].strip() for row in rows[2:]]
+
+
+def paragraphs(text):
+    """(line, words) of each paragraph, list item and heading; tables and blocks are left out."""
+    text = BLOCK.sub(lambda m: "\n" * m.group().count("\n"), text)
+    current, start = [], 0
+    for number, line in enumerate(text.splitlines() + [""], 1):
+        item = re.match(r"\s*(?:[-*+]|\d+\.)\s|#|<|>", line)
+        if current and (item or not line.strip() or line.lstrip().startswith("|")):
+            yield start, " ".join(current)
+            current = []
+        if line.strip() and not line.lstrip().startswith(("|", "<")):
+            if not current:
+                start = number
+            current.append(re.sub(r"^\s*(?:[-*+]|\d+\.|#+|>)\s", "", line).strip())
+
+
+def plain(text):
+    """Text in which a formula, a piece of code and a link count as words of their own."""
+    text = re.sub(r"!\[[^]]*\]\([^)]*\)", "", text)
+    text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text)
+    return re.sub(r"`[^`]*`|\$[^$]*\$", "X", text)
+
+
+def sentences(text):
+    return re.split(r"(?<=[.!?])[)*_]*\s+(?=[*_(\"]*[A-Z0-9])", text)
+
+
+def anchors(path):
+    found = set()
+    for heading in re.findall(r"^#+ (.*)$", BLOCK.sub("", path.read_text()), re.M):
+        heading = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading)
+        found.add(re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", heading.lower().strip())))
+    return found
+
+
+def bad_links(path, text):
+    text = re.sub(r"`[^`\n]*`", "", BLOCK.sub("", text))
+    for target in re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r"(?:src|href)=\"([^\"]+)\"", text):
+        if re.match(r"[a-z]+:", target):
+            continue
+        name, _, anchor = target.partition("#")
+        file = (path.parent / name).resolve() if name else path
+        if not file.exists():
+            yield f"no such file: {target}"
+        elif anchor and file.suffix == ".md" and anchor not in anchors(file):
+            yield f"no such heading: {target}"
+
+
+def check_document(path, replaced):
+    text = path.read_text()
+    for line, paragraph in paragraphs(text):
+        words = plain(paragraph)
+        if len(words.split()) > LONGEST_PARAGRAPH:
+            yield f"{path}:{line}: a paragraph of {len(words.split())} words"
+        for sentence in sentences(words):
+            if len(sentence.split()) > LONGEST_SENTENCE:
+                yield f"{path}:{line}: a sentence of {len(sentence.split())} words: {sentence[:60]}..."
+        for phrase, instead in replaced if path != GLOSSARY else ():
+            if re.search(rf"\b{re.escape(phrase)}\b", words, re.I):
+                yield f"{path}:{line}: say \"{instead}\", not \"{phrase}\""
+    for problem in bad_links(path, text):
+        yield f"{path}: {problem}"
+
+
+def check_source(path):
+    for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
+        if COMMENT.match(line):
+            yield f"{path}:{number}: a comment that begins with {COMMENT.match(line).group(1)}"
+
+
+def main(names):
+    glossary = GLOSSARY.read_text()
+    terms = table_column(glossary, "Terms", 0)
+    replaced = [(phrase.strip(), say)
+                for say, phrases in zip(table_column(glossary, "Say", 0), table_column(glossary, "Say", 1))
+                for phrase in phrases.split(";")]
+    problems = [f"{GLOSSARY}: {len(terms)} terms, {MOST_TERMS} are allowed"] if len(terms) > MOST_TERMS else []
+    count = 0
+    for name in names:
+        path = pathlib.Path(name).resolve()
+        if not path.exists():
+            problems.append(f"{name}: no such file")
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if file.suffix == ".md":
+                problems += check_document(file, replaced)
+            elif file.suffix in SOURCES and file.is_file():
+                problems += check_source(file)
+            else:
+                continue
+            count += 1
+    for problem in problems:
+        print(problem.replace(f"{ROOT}/", ""))
+    print(f"{count} files, {len(problems)} problems")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
