@@ -5,7 +5,7 @@ where its example is built. SPDX-License-Identifier: BSD-3-Clause
     python3 benchmarks/clearance/clearance.py TETHER [--siconos FOLDER]
 
 TETHER: the program. FOLDER: holds `slider_crank`, the example SliderCrankMoreauJeanOSI.cpp of
-siconos-tutorials with its time step and end as arguments (benchmarks/README.md). Prints a table of work and
+siconos-tutorials with its time step and end as arguments (benchmarks/results/clearance.md). Prints a table of work and
 of the largest error of the three angles at the end, rad, against events at 1e-12.
 """
 import argparse

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The IFToMM benchmark's mechanisms (A01 to A05) and a rope ladder: error, energy and processor time over tolerances,
-as a table of benchmarks/README.md. SPDX-License-Identifier: BSD-3-Clause
+as a table of benchmarks/results/iftomm.md. SPDX-License-Identifier: BSD-3-Clause
 
     python3 benchmarks/mechanisms/iftomm.py TETHER [--tolerances 1e-4,1e-6,1e-8] [--rods 1,10,100] [--repeats 3]
 
