@@ -45,7 +45,7 @@ bool at_a_small_price(const Search&, const Rotation& r) { return r.small; }
 
 }  // namespace
 
-// The stages in the order of their turns, each until its budget is spent; README, section 10. All
+// The stages in the order of their turns, each until its budget is spent; method, section 10. All
 // start from the best point, the sweeps from their own.
 const Automatic::Turn Automatic::kRotation[] = {
     // stage, when, budget

@@ -10,7 +10,7 @@
 
 namespace tether::contact::detail {
 
-// The stages of a solve and the order in which they take turns (README, section 10).
+// The stages of a solve and the order in which they take turns (method, section 10).
 class Automatic {
  public:
   // Before a solve; storage is kept. proofs: whether a proof that there is no solution is looked

@@ -10,7 +10,7 @@ Squares sweep(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContac
 Squares sweep(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end);
 Squares sweep(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end);
 
-// Changes nothing; the errors |theta D dx|^2 of the contacts (README, section 6). coupled: theta of
+// Changes nothing; the errors |theta D dx|^2 of the contacts (method, section 3). coupled: theta of
 // each contact.
 Squares test(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end, Coupled);
 Squares test(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end, Coupled);

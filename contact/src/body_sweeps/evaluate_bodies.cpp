@@ -122,7 +122,7 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
     r.dissipation += x.dot(u);
     r.energy_change += 0.5 * x.dot(u + F * before[i]);
-    // Block fixed point (README, section 6).
+    // Block fixed point (method, section 3).
     const double theta = scales.coupled(i);
     const detail::Wide3 share = wide_u / static_cast<detail::Wide>(theta);
     Eigen::Vector3d rhs;

@@ -1,6 +1,6 @@
 // Tether: derivatives of solutions over products of cones. SPDX-License-Identifier: BSD-3-Clause
 //
-// README, section 21. A enters through w = A x - b alone: dA does what -dA x does to b.
+// method, section 8. A enters through w = A x - b alone: dA does what -dA x does to b.
 #include <tether/contact/cone_derivative.hpp>
 
 #include <algorithm>

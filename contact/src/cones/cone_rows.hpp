@@ -37,7 +37,7 @@ constexpr ConeParts parts_of(Cone::Kind kind) {
 Matrix6d diagonal_block(const ConeProblem& problem, int row, int size);
 
 /// What a block needs: the velocity that it has to change on its own, times row_scale()
-/// (README, section 21).
+/// (method, section 8).
 double needed_change(const ConeProblem& problem, int block);
 
 /// Throws std::invalid_argument unless `law` says something of every cone.

@@ -1,6 +1,6 @@
 // Tether: residuals of any answer to a problem over cones. SPDX-License-Identifier: BSD-3-Clause
 //
-// README, section 21. Independent of how the problem is solved: blocks as given.
+// method, section 8. Independent of how the problem is solved: blocks as given.
 #include <algorithm>
 #include <cmath>
 #include <limits>

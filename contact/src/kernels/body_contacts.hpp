@@ -76,7 +76,7 @@ struct Squares {
   double sum = 0, most = 0;
 };
 
-// theta of each contact (README, section 6).
+// theta of each contact (method, section 3).
 using Coupled = const float*;
 
 // v += p / m, w += I^-1 q

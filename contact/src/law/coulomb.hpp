@@ -10,7 +10,7 @@ namespace tether::contact::detail {
 struct LawKernels;
 
 // Sliding: w_t = -lambda x_t, so y_i = h_i / (beta_i + lambda) and the cone gives the secular
-// equation |y| + g.y = k (README, section 4). With p = (beta_0 + lambda)(beta_1 + lambda), z = p y
+// equation |y| + g.y = k (method, eq. 12). With p = (beta_0 + lambda)(beta_1 + lambda), z = p y
 // and w = k p - g.z it is w = |z|; its solutions are counted by f = w - |z|, which is concave up to
 // one point and convex beyond. Above e = 0.8 there may be three, with sticking, and at b_n < 0
 // (jam) two: unless the one found is the only one, all are found and the one nearest to the present

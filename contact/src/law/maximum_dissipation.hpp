@@ -22,8 +22,8 @@ struct LawKernels;
 
 // Sliding minimises the energy on the arc of the conic that sees the unconstrained minimum
 // y* = h / beta. With u at angle phi from u0 = y*/|y*| and t = tan(phi/2), the derivative along
-// the arc is a quartic in t that is negative at the near and positive at the far end (README,
-// section 3). Halley with bisection as safeguard on [0, 1], after reflection (root at phi < 0)
+// the arc is a quartic in t that is negative at the near and positive at the far end (method,
+// eq. 11). Halley with bisection as safeguard on [0, 1], after reflection (root at phi < 0)
 // and inversion (root beyond 90 degrees). No trigonometric function is called.
 struct MaximumDissipation {
   static constexpr Law kLaw = Law::maximum_dissipation;
@@ -93,7 +93,7 @@ struct MaximumDissipation {
   }
 
   // Far out on a hyperbola the angle says little about the radius. There y = c0 + p s + q / s,
-  // s >= 1, with p and q along the asymptotes, and dE/ds is almost linear (README, section 3).
+  // s >= 1, with p and q along the asymptotes, and dE/ds is almost linear (method, eq. 11).
   static Regime near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0, double y1,
                                double* x);
 

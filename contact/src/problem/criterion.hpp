@@ -1,4 +1,4 @@
-// Tether: when a contact problem counts as solved: a criterion without units (README, section 6).
+// Tether: when a contact problem counts as solved: a criterion without units (method, eq. 15).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 

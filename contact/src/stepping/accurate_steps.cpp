@@ -1,6 +1,6 @@
 // Tether: steps in parts that keep an accuracy. SPDX-License-Identifier: BSD-3-Clause
 //
-// README, section 13. Each part is taken whole and in two halves. Where contacts do the same in all
+// method, section 7. Each part is taken whole and in two halves. Where contacts do the same in all
 // three, 2 halves - whole is of order 2 (Deuflhard's extrapolation of the Euler step); else the
 // halves are kept. Lengths by H211b (Soederlind, Digital filters in adaptive time-stepping, 2003).
 #include <algorithm>

@@ -9,7 +9,7 @@
 
 namespace tether::contact::detail {
 
-/// Closes the gaps that inelastic impacts leave, and takes penetrations back (README, section 13).
+/// Closes the gaps that inelastic impacts leave, and takes penetrations back (method, section 7).
 class PositionCorrection {
  public:
   PositionCorrection(const SteppingOptions& options);

@@ -13,7 +13,7 @@
 
 namespace tether::contact::detail {
 
-/// README, section 13. Islands of bodies that press on each other fall asleep when all of them have
+/// method, section 7. Islands of bodies that press on each other fall asleep when all of them have
 /// been slow for a while: they stay where they are, take part in no problem, and their contacts
 /// press as they did last. Bodies that joints hold do not sleep, nor do fixed ones: they are
 /// neighbours, which the contacts of those that sleep go on pressing on. An island wakes as a whole

@@ -56,7 +56,7 @@ struct BodyOptions {
   double max_work = 1e9;  ///< as Options::max_work, for each assembled island
   double enough = 0;      ///< as Options::enough, for each assembled island
   /// Contacts of islands of 6000 and more that `bias` keeps open by far are swept only where they
-  /// close after all (README, section 11): for steps of fast bodies, with all contacts that could
+  /// close after all (guide, section 3): for steps of fast bodies, with all contacts that could
   /// close. RankSolver and contact_mpi sweep all.
   bool leave_out_far = false;
   /// Processes that share the work of each solve, all with the same bodies, contacts and options;

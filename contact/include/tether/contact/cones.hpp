@@ -14,7 +14,7 @@ TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// One factor of the cone K of a ConeProblem: what its rows of the impulse x may be, and what that
-/// asks of their velocities w (README, section 21).
+/// asks of their velocities w (method, section 8).
 struct Cone {
   enum class Kind : std::uint8_t {
     free,         ///< any number of rows, of any sign: w = 0 (joints)
@@ -100,7 +100,7 @@ class ConeProblem {
 };
 
 /// How far impulses are from the law, block by block, without units: the error in velocity of each
-/// row times row_scale(), over the largest that a block of its island needs (README, section 21).
+/// row times row_scale(), over the largest that a block of its island needs (method, section 8).
 struct ConeResiduals {
   double error = Residuals::kNone;  ///< the largest
   int worst = -1;                   ///< the block that has it

@@ -78,7 +78,7 @@ struct SolutionDirection {
 /// of the present regimes: dx = 0 (open), dw = 0 (sticking), and dw_n = 0, |x_t| = mu x_n and the
 /// law's direction of slip (sliding), in scaled units one sparse matrix
 ///
-///     M y = r,   M = P + Q A     (README, section 17)
+///     M y = r,   M = P + Q A     (method, eq. 30)
 ///
 /// that is factored once, each island by itself: complete orthogonal decomposition up to 100
 /// touching contacts, sparse LU beyond; where that is singular the former up to 400, then sparse

@@ -18,13 +18,13 @@ struct Residuals {
   double dissipation = kNone;    ///< sum of x_i . w_i (energy): <= 0 at a solution
   double energy_change = kNone;  ///< 1/2 x'Ax - b'x: kinetic energy gained by the impulses
   /// Largest error in velocity of a contact, over the largest velocity that a contact of its island
-  /// needs (README, section 6); at least what round-off makes of A x - b. Changed by no units.
+  /// needs (method, section 3); at least what round-off makes of A x - b. Changed by no units.
   double fixed_point = kNone;
   double natural_map = kNone;       ///< |x - P_K(x - w - De Saxce term)| / max(|b|, |x|, |w|)
   double natural_map_data = kNone;  ///< the same / |b|
 };
 
-/// The same yardstick for every solver. natural_map is the law's own (README, section 6); for
+/// The same yardstick for every solver. natural_map is the law's own (method, section 3); for
 /// Law::coulomb it is the one that Siconos reports. `impulses` has dimension * contacts entries;
 /// if one of them is not finite, all is NaN.
 Residuals evaluate(const Problem& problem, Law law, const linalg::VectorView& impulses);

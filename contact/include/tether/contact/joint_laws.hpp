@@ -11,7 +11,7 @@ namespace tether::contact {
 /// Laws on a speed s' = sum over bodies of G v of a joint, for one step; the impulse x along it
 /// acts on each body as G' x. They are solved with the contacts, in one problem:
 ///
-///     limit     x >= 0,  s' >= -gap / dt,  complementary (struck: s' >= -e s'-, README section 16)
+///     limit     x >= 0,  s' >= -gap / dt,  complementary (struck: s' >= -e s'-, method, section 8)
 ///     bounded   |x| <= bound dt,  x opposes s' - rate, and is the bound where that is not 0
 ///
 /// Bounded with rate 0 is Coulomb's friction of a joint, with another one a motor of limited force.

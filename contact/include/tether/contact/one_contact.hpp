@@ -10,7 +10,7 @@ TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 /// The law that an impulse x = (x_n, x_t) and the relative velocity after it, w = A x - b, obey.
-/// Derivations: contact/README.md.
+/// Derivations: docs/method/contact.md.
 enum class Law : std::uint8_t {
   /// Preclik and Ruede's MPCC: min 1/2 x'Ax - b'x over x_n >= 0, |x_t| <= mu x_n with
   /// (Ax - b)_n >= 0 complementary to x_n and (Ax)_n >= 0. One solution for every A.

@@ -13,7 +13,7 @@ namespace tether::contact {
 /// hulls.
 ///
 /// Touching faces are found to round-off and without any margin or skin: the separating axis is
-/// chosen among all face normals and edge products (README, section 15), then the face that lies
+/// chosen among all face normals and edge products (detection, 2), then the face that lies
 /// against the reference face is clipped to it. Hulls come from Bullet.
 ///
 /// Normals. A face gives its normal. Crossing edges: their product. Where an edge lies along an

@@ -17,7 +17,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// How the angular velocity of a body without torque changes (README, section 13). Spheres skip it.
+/// How the angular velocity of a body without torque changes (method, section 7). Spheres skip it.
 enum class Gyroscopic : std::uint8_t {
   none,           ///< not at all: keeps energy, never flips
   explicit_step,  ///< w += -dt I^-1 (w x I w)
@@ -30,7 +30,7 @@ inline constexpr std::array<Gyroscopic, 4> kGyroscopics{
 
 const char* name(Gyroscopic gyroscopic);
 
-/// Law of restitution at impacts (README, section 14).
+/// Law of restitution at impacts (method, section 7).
 enum class RestitutionLaw : std::uint8_t {
   /// Normal velocities: w_n+ + e w_n- >= 0 complementary to x_n, together with friction in one
   /// solve.
@@ -77,7 +77,7 @@ struct Meeting {
   double friction = 0;
   double restitution = 0;  ///< 0 .. 1
   /// Moments that a contact holds, over its normal force: about axes in the surface and about the
-  /// normal, m (README, section 19). Only with law = coulomb and restitution_law = newton.
+  /// normal, m (method, section 8). Only with law = coulomb and restitution_law = newton.
   double rolling = 0, torsional = 0;
 };
 
@@ -88,7 +88,7 @@ struct SteppingOptions {
   double step = 1e-3;  ///< dt, s
   /// > 0: each step is taken in parts whose error is at most this, of positions relative to the
   /// size of each body (reach of its surfaces, or radius of gyration), of rotations in rad, and of
-  /// smooth velocities by what they move a body in the part; at most 0.1. See README, section 13.
+  /// smooth velocities by what they move a body in the part; at most 0.1. See method, section 7.
   /// 0: in one.
   double accuracy = 0;
   std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: not evaluated
@@ -96,7 +96,7 @@ struct SteppingOptions {
   /// BodyOptions::tolerance of the contact problems.
   double tolerance = 1e-9;
   /// A contact problem that ends above the tolerance is used, and counted as `accepted`, if its
-  /// residual is at most min(acceptance * tolerance, 1e-2) (README, section 13). Below 1e-6 the
+  /// residual is at most min(acceptance * tolerance, 1e-2) (method, section 7). Below 1e-6 the
   /// solver stops after 3/4 of max_work. 1: nothing above the tolerance is
   /// accepted.
   double acceptance = 1;
@@ -122,13 +122,13 @@ struct SteppingOptions {
   double impact_threshold = 0.01;
   /// Steps are taken up to where a gap closes, the impact, and the rest, and bodies that nothing
   /// but their weight acts upon fall along their parabola: errors go with the step and not with the
-  /// phase of impacts in it (README, section 13). With more than 16 contacts, up to 512, only at
+  /// phase of impacts in it (method, section 7). With more than 16 contacts, up to 512, only at
   /// impacts in islands of at most 16, for a tenth more problems at most. Not where
   /// joints have laws or pairs rolling friction; an accuracy has this of its own.
   bool cut_at_impacts = true;
   /// > 0: islands of bodies that have been slower than this times sqrt(g s) for 5 sqrt(s / g) fall
   /// asleep: they take part in no problem until something touches them, the forces on them change
-  /// or what they lie on moves (README, section 13). Needs gravity; not with an accuracy or rolling
+  /// or what they lie on moves (method, section 7). Needs gravity; not with an accuracy or rolling
   /// friction. 0: none does.
   double sleep = 0;
   /// Points are contacts if their gap is below this part of the size of the smaller shape plus the
@@ -220,7 +220,7 @@ struct StageCost {
   double seconds;
 };
 
-/// Advances a set of bodies by steps of fixed length (README, section 13):
+/// Advances a set of bodies by steps of fixed length (method, section 7):
 ///
 ///     v* = v + dt M^-1 f,   v+ = v* + M^-1 J' x,   x+ = x + dt v+,   q+ = exp(dt w / 2) q
 ///

@@ -7,7 +7,7 @@
 
 namespace tether::contact::detail {
 
-// Stages improve the same best point; none may overwrite it by a worse one (README, section 6).
+// Stages improve the same best point; none may overwrite it by a worse one (method, section 3).
 // All decisions use residuals and operation counts, never the clock.
 struct Search {
   System system;

@@ -14,7 +14,7 @@
 
 namespace tether::contact::detail {
 
-/// README, section 16. A step starts on the joints, G v = rate. With the rows G of its start, joint
+/// method, section 8. A step starts on the joints, G v = rate. With the rows G of its start, joint
 /// impulses make its end meet g = 0 (as SHAKE does): first without contacts, so that contacts solve
 /// for velocities that the joints allow, then for what the contacts have changed. Velocities are
 /// put onto the rows of the end (RATTLE). All of these are impulses along G': linear and angular

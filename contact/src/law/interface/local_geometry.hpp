@@ -13,7 +13,7 @@ namespace tether::contact::detail {
 using namespace linalg;  // blocks, cones, vector code: shared with the projection's side
 
 // Right-hand side in the diagonal frame. The boundary of the friction disc on the plane w_n = 0 is
-// the conic |y| + g.y = k with a focus at the origin (README, section 2).
+// the conic |y| + g.y = k with a focus at the origin (method, eq. 7).
 struct LocalRhs {
   double k, h0, h1;
 };

@@ -88,7 +88,7 @@ inline void wide_rhs(const LocalBlock& L, const Wide* x, const Wide* w, double* 
 // there are only others, far away, a last bit of b further. x at rest within its cone, or its point
 // p on the cone at the same x_n sliding against p_t, |w - D (x - p) - that velocity| + |D (x - p)|.
 // Infinite without friction, for jams, b_n <= 0, under a law (gamma) that has none, and below half
-// of the e up to which contacts have one solution (README, section 4), which is then near.
+// of the e up to which contacts have one solution (method, section 2), which is then near.
 template <class Real>
 TETHER_INLINE Real error_as_it_is(const LocalBlock& L, double mu, const double* gamma,
                                   const Real* x, const Real* w) {

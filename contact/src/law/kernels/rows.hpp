@@ -22,7 +22,7 @@ TETHER_INLINE void row(const View& s, const PackedVector* x, int i, double* w) {
   *reinterpret_cast<v4*>(w) = sum0 + sum1 + sum2;
 }
 
-// Right-hand side of the block problem, residual form: D x_i - w_i (README, section 5).
+// Right-hand side of the block problem, residual form: D x_i - w_i (method, section 4).
 TETHER_INLINE void block_rhs(const View& s, const PackedVector* x, int i, const double* w,
                              double* r) {
   const LocalBlock& L = s.local[i];

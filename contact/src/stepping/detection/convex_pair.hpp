@@ -8,7 +8,7 @@ namespace tether::contact::detail {
 /// Pairs of which one is an ellipsoid or a cylinder, the other any shape with an inside.
 bool is_convex_pair(ShapeKind a, ShapeKind b);
 
-/// Adds all points with a gap below `margin`; normals point from b to a (README, section 15).
+/// Adds all points with a gap below `margin`; normals point from b to a (detection, 3).
 void collide_convex(const Shape& a, const Pose& pose_a, const Shape& b, const Pose& pose_b,
                     double margin, NearPoints& out);
 

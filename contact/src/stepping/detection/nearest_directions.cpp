@@ -1,7 +1,7 @@
 // Tether: the direction in which two convex shapes lie farthest apart. SPDX-License-Identifier:
 // BSD-3-Clause
 //
-// README, section 15. A first direction by the algorithm of Gilbert, Johnson and Keerthi (1988) on
+// detection, 3. A first direction by the algorithm of Gilbert, Johnson and Keerthi (1988) on
 // shapes that are smaller by a part of their thickness, so that touching ones are apart; then
 // Newton's method for the stationary points of s(n) on the sphere, across the lines and faces that
 // hold it.

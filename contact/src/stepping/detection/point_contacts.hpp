@@ -12,7 +12,7 @@ struct Nearest {
   double gap = 0;                                     ///< along it to the given point; < 0: inside
 };
 
-/// Sphere, capsule, box, ellipsoid, cylinder; exact outside and inside. README, section 15.
+/// Sphere, capsule, box, ellipsoid, cylinder; exact outside and inside. detection, 5.
 Nearest nearest_on(const Shape& shape, const Eigen::Vector3d& p);
 
 bool touches_points(ShapeKind kind);  ///< whether nearest_on() treats it

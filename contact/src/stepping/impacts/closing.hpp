@@ -24,7 +24,7 @@ struct Depenetration {
 /// An impact that does not bounce takes all of the approach at once and would leave its gap open.
 /// Positions of its island move as if it only stopped the approach at the surface (bias gap / dt);
 /// what they move more or less than the velocities is no velocity. Penetrations of such islands are
-/// taken back in the same solve. README, section 13.
+/// taken back in the same solve. method, section 7.
 class Closing {
  public:
   Closing(const BodyOptions& options, const Depenetration& depenetration)

@@ -15,13 +15,13 @@ struct Impact {
   double came, comes, restitution;
 };
 
-/// README, section 13. An approach that ends within the step ends at once and as a whole, bias 0:
+/// method, section 7. An approach that ends within the step ends at once and as a whole, bias 0:
 /// with gap / dt, part of it would be left to the next step, and where slip stops or turns round in
 /// the impact the two parts do not add up to the whole, however short the step. Slower approaches
 /// than the threshold keep gap / dt, so that what comes to rest does so at the surface.
 class Impacts {
  public:
-  /// In m/s for a size of 1 m; they go with the root of the size (README, section 14). What may
+  /// In m/s for a size of 1 m; they go with the root of the size (method, section 7). What may
   /// bounce is an impact above the smaller of both.
   Impacts(double threshold, double restitution_threshold)
       : threshold_(threshold), restitution_threshold_(restitution_threshold) {}

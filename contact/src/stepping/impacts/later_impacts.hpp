@@ -13,7 +13,7 @@
 
 namespace tether::contact::detail {
 
-/// README, section 13. A contact that begins to close because of an impact, and is closed before
+/// method, section 7. A contact that begins to close because of an impact, and is closed before
 /// the end of the step, strikes within it: a ball that the first of a row sends on, the other end
 /// of a rod. One solve with bias gap / dt would leave a part of that impact to the next step. So
 /// the island is solved again from the velocities before the impulses, in passes, each with the

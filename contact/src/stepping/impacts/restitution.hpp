@@ -13,7 +13,7 @@ namespace tether::contact::detail {
 /// The same without the impulses of the problem before.
 BodyOptions cold(BodyOptions options);
 
-/// README, section 14. `newton`: contacts that bounce leave with epsilon times the speed they came
+/// method, eq. 27. `newton`: contacts that bounce leave with epsilon times the speed they came
 /// with, in the one solve that friction takes part in. `poisson`: the contact problem without
 /// restitution, impulses x; then epsilon x at the contacts that bounce; then the contact problem
 /// once more, for contacts which that pressed together. In both, what restitution adds to the

@@ -13,7 +13,7 @@
 
 namespace tether::contact::detail {
 
-/// README, section 13. When an approach over this gap ends: gap = came t + more t^2; where it
+/// method, section 7. When an approach over this gap ends: gap = came t + more t^2; where it
 /// leaves, came < 0, needs more > 0.
 double closing_time(double gap, double came, double more);
 

@@ -21,7 +21,7 @@ void add(Packed& to, double factor, const Packed& other) {
 // The solutions of x o u = nu e, A x - b = w(u), nu > 0, are a smooth curve that comes from
 // nu = infinity. Where contacts that stick and slide admit no solution nearby it turns: nu grows
 // for a while, Newton's matrix is singular at the turn, and steps towards smaller nu are blocked.
-// By its arclength in z and log nu nothing happens there (README, section 9).
+// By its arclength in z and log nu nothing happens there (method, section 6).
 struct InteriorPoint::ArclengthPath {
   ArclengthPath(InteriorPoint& of, Search& s) : own(of), search(s), pairs(s.system, of.equations_) {
     newton.resize(at(of.n_));

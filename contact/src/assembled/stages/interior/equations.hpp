@@ -18,7 +18,7 @@ struct ConePair {
 /// to += step along, gaps without cancellation.
 void advance(ConePair& to, const ConePair& along, double step);
 
-/// A x - b = w(u), w = u - s(u) (mu, gamma), for x in K and u in K* (README, section 9); of the
+/// A x - b = w(u), w = u - s(u) (mu, gamma), for x in K and u in K* (method, eq. 21); of the
 /// proximal problem A + tau D, b + tau D anchor where tau > 0.
 class InteriorEquations {
  public:

@@ -7,7 +7,7 @@
 namespace tether::contact::detail {
 
 // Implicit Euler steps 1 / tau of D x' = -F(x): where the contacts that stick and slide admit no
-// solution, x drifts at a constant rate until one of them changes (README, section 9).
+// solution, x drifts at a constant rate until one of them changes (method, section 6).
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
                                  ProximalNewton& newton, bool whole) {
   constexpr int kCorrections = 4, kSteps = 20, kPatience = 700, kSweeps = 3;

@@ -8,7 +8,7 @@ namespace tether::contact::detail {
 /// x and u with x o u = nu e exactly, from any z = x - rho u: x is the smoothed part of z in the
 /// cone and rho u that of -z, eigenvalue by eigenvalue (l + sqrt(l^2 + 4 rho nu)) / 2. A step in z
 /// meets no cone: where a contact slides, sticks or is open x and u follow z almost linearly
-/// however small nu is, and z_t turns both (README, section 9).
+/// however small nu is, and z_t turns both (method, eq. 25).
 class SmoothedPairs {
  public:
   struct Place {

@@ -13,7 +13,7 @@
 
 namespace tether::contact::detail {
 
-/// Where bodies touch a mesh (README, section 20). Keeps its storage between bodies.
+/// Where bodies touch a mesh (detection, 4). Keeps its storage between bodies.
 class MeshContacts {
  public:
   explicit MeshContacts(const Shape& mesh);
