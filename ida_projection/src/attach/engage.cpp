@@ -12,7 +12,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Multipliers of index 2: see README, section 9.
+// Multipliers of index 2: see method, section 7.
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
                  kManyFree = 0.4;
 constexpr long kStart = 16;              // steps

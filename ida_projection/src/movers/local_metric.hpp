@@ -9,7 +9,7 @@
 
 namespace tether::ida_projection {
 
-/// s, the size of the corrector's changes, and D made of it (README, section 3).
+/// s, the size of the corrector's changes, and D made of it (method, eq. 9, 10).
 class LocalMetric {
  public:
   LocalMetric(const Options& options, int size)

@@ -8,7 +8,7 @@ struct AnsweredMove {
   double move = 0.0, answer = 0.0;
 };
 
-/// When to look at what F answers to moves, and when to try the other metric (README, section 3).
+/// When to look at what F answers to moves, and when to try the other metric (method, section 4).
 class MetricChoice {
  public:
   void reset() { *this = MetricChoice(); }

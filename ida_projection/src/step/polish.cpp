@@ -7,7 +7,7 @@
 //     J delta = -F(t, y_N - dy, y'_N) = -F(t, y_N, y'_N) + F_y dy.
 //
 // The first term is the iteration that IDA's convergence test left out; it removes the noise that
-// the history would magnify (README, "Order"). The second one is the answer of the algebraic
+// the history would magnify (method, eq. 12). The second one is the answer of the algebraic
 // variables to the move, -F_a^-1 F_d dy, the step of IDACalcIC's IDA_YA_YDP_INIT. As y' stays where
 // the corrector put it, the iteration does not pull the differential variables back. What of delta
 // leaves the constraints is then taken back with the projection's own factors.

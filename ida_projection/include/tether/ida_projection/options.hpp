@@ -93,7 +93,7 @@ struct Options {
   /// Choose step sizes with Soederlind's filter H211b instead of IDA's rule "keep h until it can be
   /// doubled": end errors and step counts then vary smoothly with the tolerance. Error estimates
   /// are steered to 1 / smoothing_setpoint of what the error test allows (> 0; formulas and limits:
-  /// ida_projection/README.md). Owns IDA's IDASetEta... settings and IDASetMaxStep: give the
+  /// docs/method/projection.md). Owns IDA's IDASetEta... settings and IDASetMaxStep: give the
   /// longest step here (0: none), and IDASetMaxOrd's order, if it was called.
   bool step_smoothing = false;
   /// Begin step_smoothing during the run where IDA's own rule is known to harm: F is not of index 1
@@ -106,8 +106,8 @@ struct Options {
   int maximum_order = 5;
 
   /// Limit the order to 2 where higher orders excite fast oscillations that would otherwise stay
-  /// below the tolerance, as recognised from the differences of y (ida_projection/README.md,
-  /// section 9); not while step sizes are smoothed. Uses IDASetMaxOrd and
+  /// below the tolerance, as recognised from the differences of y (docs/method/projection.md,
+  /// section 8); not while step sizes are smoothed. Uses IDASetMaxOrd and
   /// IDASetEtaFixedStepBounds, and multiplies the error weights in the three steps that lower the
   /// order.
   bool limit_order = true;

@@ -1,7 +1,7 @@
 // Tether: the move onto the constraints on contiguous vectors.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Notation as in ida_projection/README.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w
+// Notation as in docs/method/projection.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w
 // the error weights, s the size of the corrector's changes. The move itself is in
 // contiguous_mover.cpp, its metric in local_metric.hpp, what follows the polish in
 // contiguous_settle.cpp; their common data is here.

@@ -10,7 +10,7 @@
 
 namespace tether::ida_projection {
 
-/// s, the size of the corrector's changes, D made of it (README, section 3), and WT = 1/w. `spare`:
+/// s, the size of the corrector's changes, D made of it (method, eq. 9, 10), and WT = 1/w. `spare`:
 /// a vector whose content may go.
 class VectorMetric {
  public:
