@@ -144,7 +144,7 @@ std::vector<int> elimination_order(const BlockPattern& pattern) {
   return order;
 }
 
-// Of an elimination with these columns of its factor.
+// Operations of an elimination whose factor has columns that start there.
 double count_operations(const std::vector<int>& starts) {
   double operations = 0;
   for (std::size_t k = 0; k + 1 < starts.size(); ++k) {

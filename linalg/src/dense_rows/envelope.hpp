@@ -38,7 +38,7 @@ class Envelope {
 
   int size_ = 0;
   std::ptrdiff_t entries_ = 0;
-  // Of each four rows: the first four columns, and where the first columns of all would be.
+  // For each four rows: their first columns, and where a full row would begin in L_.
   std::vector<int> firsts_;
   std::vector<std::ptrdiff_t> starts_;
   std::vector<double> L_;  // four rows after the other, each column by column

@@ -42,7 +42,7 @@ class KeptRows {
   double times(int i, const double* du) const;
   /// x with A_i = sum_k x_k A_order(k), k < rank, in the sense of least squares.
   void dependence(int i, int rank, double* x) const;
-  /// What these rows leave of A_i, n entries; z: work space, rank entries.
+  /// A_i without its part in the span of these rows, n entries; z: work space, rank entries.
   void remainder(int i, int rank, double* z, double* left) const;
 
  private:

@@ -11,7 +11,7 @@
 
 namespace tether::linalg {
 
-// Of factor_kept(): the square of this sine A A^T gives to 1e-10 of itself.
+// factor_kept(): A A^T determines the square of a larger sine to 1e-10 of itself.
 constexpr double kLeastSine = 1e-3;
 
 struct MinimumNorm::Large {
@@ -20,7 +20,7 @@ struct MinimumNorm::Large {
   Eigen::VectorXd work, rhs;
   std::vector<int> order;  // pivot order
   KeptRows kept;           // of factor_kept() and factor_split()
-  // Where these solve alone: the factor of each row of C D, 1 where it vanishes.
+  // Scale of each row of C D to unit length, 1 where it vanishes; used if kept rows solve alone.
   std::vector<double> to_unit;
   void learn_units(const std::vector<double>& row_norm);
 

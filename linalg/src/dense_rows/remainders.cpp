@@ -43,7 +43,7 @@ void Remainders::factor(double tolerance) {
   }
 }
 
-// What rows from .. to - 1 have of q_k.
+// Subtracts from rows from .. to - 1 their components along q_k.
 void Remainders::take_out(int k, int from, int to) {
   for (int i = from; i < to; ++i) {
     const double share = Q_.row(i).dot(Q_.row(k));

@@ -4,7 +4,7 @@
 
 namespace tether::linalg::small {
 
-/// Where C(i, j) = wide[rows[i] * width + columns[j]] is, and D.
+/// Places of the entries, C(i, j) = wide[rows[i] * width + columns[j]], and the metric D.
 struct Gathered {
   const double* wide;
   int width;

@@ -19,8 +19,8 @@ struct alignas(32) PackedVector {
 };
 using PackedVectors = std::vector<PackedVector>;
 
-/// Of a square matrix of blocks with a symmetric pattern and a diagonal without gaps: block columns
-/// columns[starts[i] .. starts[i + 1]) of block row i, i = 0 .. size - 1.
+/// Pattern of a square matrix of blocks, symmetric and with a full diagonal: block row i,
+/// i = 0 .. size - 1, has the block columns columns[starts[i] .. starts[i + 1]).
 struct BlockPattern {
   int size;
   const int* starts;

@@ -48,7 +48,7 @@ class FilledPlaces {
   void clear(int i, double* c) const {
     for (const int *j = begin(i), *last = end(i); j != last; ++j) c[*j] = 0.0;
   }
-  /// Of the known places of row i, ascending.
+  /// The known places of row i, ascending.
   const int* begin(int i) const { return places_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
   const int* end(int i) const { return begin(i) + counts_[static_cast<std::size_t>(i)]; }
   /// Grows with the places.
@@ -61,7 +61,7 @@ class FilledPlaces {
   int n_ = 0;
   long known_ = 0;
   std::vector<int> places_, counts_;
-  // Of all rows, while they are few.
+  // One list of the places of all rows, while they are few.
   bool list_all();
   std::vector<std::ptrdiff_t> list_;
   long listed_ = 0;

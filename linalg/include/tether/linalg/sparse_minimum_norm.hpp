@@ -78,8 +78,8 @@ class SparseMinimumNorm {
   int dropped() const;
   /// k < rank(): kept rows; k >= rank(): dropped ones.
   int pivot(int k) const;
-  /// Of unit row i the length of what the rows before it in the elimination's order, shrunk by eps,
-  /// leave over: sqrt(d_k - eps). It tells from zero what is longer than sqrt(eps).
+  /// Sine of the angle between row i and the rows before it in the order of elimination,
+  /// sqrt(d_k - eps). Rounding hides values below sqrt(eps).
   double independent_part(int i) const;
   /// |row_i(C D)|; 0 for a row that vanishes.
   double row_norm(int i) const;

@@ -7,9 +7,9 @@
 TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
-/// Of a symmetric matrix, whose lower triangle is read: values ascend, column k of `vectors`, of
-/// length 1, belongs to value k. QR iteration of Eigen, compiled once; where A is not finite it
-/// does not converge.
+/// Eigenvalues of a symmetric matrix, ascending, and unit eigenvectors as columns in that order.
+/// The lower triangle is read. QR iteration of Eigen, compiled once; it does not converge where A
+/// is not finite.
 template <int n>
 struct SymmetricEigen {
   Matrix<n, 1> values;
