@@ -359,7 +359,7 @@ EventKind Driver::slip_ends(int contact) const {
   return model_.law(contact).is_moment() ? EventKind::roll_stop : EventKind::stop;
 }
 
-// Of contacts that share their forces.
+// Records the changes of mode of contacts that share their forces.
 void Driver::record_changes(const std::vector<ContactMode>& before,
                             const std::vector<ContactMode>& after, double lag) {
   for (std::size_t i = 0; i < after.size(); ++i) {

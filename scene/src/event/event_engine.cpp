@@ -115,7 +115,7 @@ class EventEngine : public ResumableEngine {
   void look_at_events();
 
   bool far() const { return !origin_.isZero(0); }
-  /// What is in SI, from the world's origin.
+  /// Moves a place in SI to the origin of the world.
   void to_world(Vector3d& place) const {
     if (far()) place += units_.length * origin_;
   }
@@ -291,7 +291,7 @@ StartState EventEngine::exactness_of(SceneModel& model, const SteppedState& stat
 }
 
 void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
-  // What a model remembers of earlier states is not in a saved one.
+  // A saved state does not hold what a model remembers of earlier states.
   auto model = std::make_unique<SceneModel>(scene_, units_.time, units_.length);
   const VectorXd y = coordinates_of(state.bodies);
   StartState start = exactness_of(*model, state, y);

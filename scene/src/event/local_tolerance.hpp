@@ -33,7 +33,7 @@ inline double graze_tolerance(double tolerance, double speed) {
   return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, speed / kSlow));
 }
 
-// Of a slip that begins at rest with this acceleration.
+// Tolerance of IDA after a slip begins at rest with this acceleration.
 inline double turn_tolerance(double tolerance, double acceleration) {
   return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, acceleration));
 }

@@ -59,7 +59,7 @@ std::string Driver::contradiction() const {
   return text;
 }
 
-// What is left of the velocities of contacts that close: less than their bands.
+// Removes the normal velocities, less than their bands, that contacts have when they close.
 void Driver::settle_velocities() {
   const double energy = model_.energy();
   motion_.settle_velocities(event_time_, y_);

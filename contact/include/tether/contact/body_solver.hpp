@@ -86,11 +86,11 @@ struct BodySolution {
   std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
 };
 
-/// What BodySolver asks of those that it shares its work with; RankTeam has it on RankMessages.
+/// Processes that share the work of a BodySolver; RankTeam implements it on RankMessages.
 class SolverTeam {
  public:
   virtual ~SolverTeam() = default;
-  /// Where bodies are, by index: those near each other are swept by the same process. Optional.
+  /// Positions of bodies, by index: near ones are swept by the same process. Optional.
   virtual void place(const std::vector<Eigen::Vector3d>& positions) = 0;
   /// As BodySolver::solve. starts: impulse to start from of each contact, null: zero; empty: none.
   /// False: not worth messages, each process solves it by itself.

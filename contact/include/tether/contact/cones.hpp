@@ -86,7 +86,7 @@ class ConeProblem {
   linalg::MatrixX dense_matrix() const;
   /// A x - b, sums in long double.
   linalg::VectorX velocities(const linalg::VectorView& impulses) const;
-  /// What a row's velocity is multiplied by to be compared with others: 1/sqrt of the mean of the
+  /// Factor that makes the velocity of a row comparable with others: 1/sqrt of the mean of the
   /// diagonal of A over the rows that belong together (normal and tangents; both rolling moments;
   /// any other row alone). 0 where that is 0.
   const std::vector<double>& row_scale() const { return scale_; }

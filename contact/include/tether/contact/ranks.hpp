@@ -11,8 +11,8 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// What the kinds of contacts depend on, of a body: some bits, which all processes know. Throws
-/// std::invalid_argument, with the number, for what BodySolver refuses.
+/// Properties of a body that decide the kinds of its contacts, as bits that all processes know.
+/// Throws std::invalid_argument, with the number, for a body that BodySolver refuses.
 std::uint8_t rank_traits(std::size_t number, const RigidBody& body);
 
 /// A contact as all processes know it: what the order of sweeping depends on. Bodies by number.
@@ -41,7 +41,7 @@ class RankMessages {
   virtual void exchange(std::vector<With>& with) = 0;
   /// The sum over all ranks, which is exact: at most one gives anything but 0.
   virtual void sum(std::vector<double>& values) = 0;
-  /// What each rank gives, counts[rank] numbers, one after the other, for `root`.
+  /// The numbers of all ranks, counts[rank] of each, one after the other, for `root`.
   virtual void gather(int root, const std::vector<double>& mine, const std::vector<int>& counts,
                       std::vector<double>& all) = 0;
   virtual void broadcast(int root, std::vector<double>& values) = 0;
@@ -62,10 +62,10 @@ struct RankOptions {
   double relaxation = 0.8;  ///< of RankMode::relaxed, in (0, 1]
 };
 
-/// What one sweep over all islands that ranks share, and one look at their residuals, send from
-/// this rank, by the plan; 48 bytes a velocity. exact: bodies go to the rank that sweeps them next,
-/// after each colour. relaxed: once to the rank where their changes are added, and back; looks send
-/// nothing.
+/// Messages that this rank sends by the plan, for one sweep over all shared islands and for one
+/// evaluation of their residuals; 48 bytes a velocity. exact: bodies go to the rank that sweeps
+/// them next, after each colour. relaxed: once to the rank where their changes are added, and back;
+/// residuals send nothing.
 struct RankTraffic {
   long long messages = 0, velocities = 0;
   long long look_messages = 0, look_velocities = 0;
@@ -78,7 +78,7 @@ struct RankIslands {
   int all = 0, shared = 0, assembled = 0, failed = 0;
 };
 
-/// Of two parts of a solve, the status of both, and the error of both: NaN where one is.
+/// Status and error of two parts of a solve together; the error is NaN where one of them is.
 Status worse(Status a, Status b);
 double worse(double a, double b);
 
@@ -98,7 +98,7 @@ class RankSolver {
   /// same on all ranks, in an order which the result depends on.
   void plan(const std::vector<RankContact>& contacts, const std::vector<int>& owner, int ranks,
             int rank);
-  /// What solve() wants: numbers of contacts, in its order.
+  /// Numbers of the contacts that solve() takes, in its order.
   const std::vector<int>& contacts() const;
   /// Numbers of bodies, in its order.
   const std::vector<int>& bodies() const;

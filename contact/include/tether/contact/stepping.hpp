@@ -192,8 +192,8 @@ struct StepperMemory {
   } control;
   double drift = 0;  ///< of the joints, m or rad
   double cuts = 0;   ///< that may still be made where there are many contacts, in problems
-  /// Of a body where any may sleep: how long it has been slow, s; its island, -1: awake; whether it
-  /// has not slept for a part yet; the accelerations that forces gave it last, or sleep holds.
+  /// State of a body where any may sleep: how long it has been slow, s; its island, -1: awake;
+  /// whether it fell asleep in this sub-step; accelerations by forces, as of now or of the sleep.
   struct Rest {
     double slow = 0;
     int island = -1;
@@ -201,7 +201,7 @@ struct StepperMemory {
     Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
     Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();
   };
-  /// What an island that sleeps lies on, as it was then.
+  /// A body that a sleeping island lies on, as it was when the island fell asleep.
   struct Neighbour {
     int body = 0, island = 0;
     Eigen::Vector3d position;

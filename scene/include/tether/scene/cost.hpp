@@ -36,10 +36,10 @@ struct CostRow {
 };
 
 struct CostOptions {
-  /// Of the engine that the plan names, which runs alone then.
+  /// Settings of the engine that the plan names; no other engine runs then.
   std::vector<double> settings;
-  /// Of each method. All empty: ranges for each that the scene can run with; contact: the event
-  /// engine where it has the scene, steps and steps in parts.
+  /// Settings of each method. All empty: a range for each method that can run the scene; with
+  /// contact: events, where that engine has the scene, steps, and steps with an accuracy.
   std::vector<double> tolerances, steps, accuracies;
   /// Tolerance or step of the reference; default 1e-12 (smooth), 1e-11 (events), the finest step
   /// / 4.

@@ -38,11 +38,11 @@ struct ContactState {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< on `first`, N; see Forces
   /// Velocity of `first` against `second` at the point, without its normal part, m/s.
   Eigen::Vector3d slip = Eigen::Vector3d::Zero();
-  /// Of rolling and torsional friction, on `first`, beside that of the force, N m.
+  /// Moment of rolling and torsional friction on `first`, in addition to that of the force, N m.
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
 };
 
-/// What a joint does to its first body (to the second the opposite), world axes.
+/// Force and moment of a joint on its first body (on the second the opposite), world axes.
 struct JointForce {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< N
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< about the joint's point `at`, N m
@@ -68,7 +68,7 @@ struct Forces {
   std::vector<Eigen::Vector3d> contact, contact_moment;
 };
 
-/// What happened to one contact at an instant of the event engine. An instant may have several.
+/// A change of one contact at an instant of the event engine. An instant may have several.
 struct ContactEvent {
   enum class Kind : std::uint8_t {
     impact,     ///< a gap closes with speed
@@ -108,12 +108,12 @@ struct Counts {
   long contact_problems = 0, sweeps = 0, unsolved = 0, error_test_failures = 0;
   long accepted = 0;  ///< contact problems above the tolerance, within what is accepted
   long halved = 0;    ///< steps, or parts of them, taken in two halves
-  /// Of the event engine: times at which something happens, that of a start with impacts among
-  /// them; contacts that hit.
+  /// Event engine: times at which something happens, a start with impacts included; contacts that
+  /// hit.
   long events = 0, impacts = 0;
 };
 
-/// Where a run of events went on in steps.
+/// A change of a run from events to steps.
 struct HandOver {
   double time = 0;  ///< s
   std::string why;
@@ -152,8 +152,8 @@ class Engine {
   /// Since the start, or the state that was restored.
   virtual const std::vector<ContactEvent>& events() const;
   virtual Counts counts() const = 0;
-  /// Where steps have taken over (EventOptions::otherwise), and given back. With any, counts() has
-  /// the work of steps and the number of events.
+  /// Changes to steps (EventOptions::otherwise) and back. If there are any, counts() has the work
+  /// of steps and the number of events.
   virtual const std::vector<HandOver>& hand_overs() const;
   /// Work of the event engine, also of one that steps stand in for.
   virtual Counts counts_of_events() const { return counts(); }

@@ -18,7 +18,7 @@ struct Motion {
   double rate = 0, amplitude = 0, frequency = 0, phase = 0;  // m/s or rad/s; m or rad; Hz; rad
 };
 
-/// Of the angle of a hinge, the way of a slider; 0 at t = 0.
+/// Bounds on the angle of a hinge or the way of a slider, which are 0 at t = 0.
 struct JointLimits {
   double lower = 0, upper = 0;  ///< rad (a turn apart at most), m
   double restitution = 0;       ///< 0 .. 1

@@ -5,7 +5,7 @@
 
 namespace tether::scene {
 
-/// Where in a file something was written; line 0: made by a program; column 0: not known.
+/// Line and column in a file; line 0: made by a program; column 0: not known.
 struct Place {
   std::string file;
   int line = 0, column = 0;

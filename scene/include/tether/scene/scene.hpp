@@ -123,7 +123,7 @@ struct SteppingOptions : contact::SteppingOptions {
   }
 };
 
-/// Where the event engine cannot go on, or cannot move the scene at all.
+/// Choice for a scene that the event engine cannot move, or cannot move on.
 enum class Otherwise : std::uint8_t {
   stop,     ///< the run ends, or is refused
   stepping  ///< the stepping engine takes over there, and says so
@@ -139,7 +139,7 @@ struct EventOptions {
   Otherwise otherwise = Otherwise::stop;
 };
 
-/// What a scene asks for: `automatic` leaves it to the plan.
+/// The engine that a scene asks for; `automatic` leaves it to the plan.
 enum class EngineChoice : std::uint8_t { automatic, smooth, stepping, event };
 
 struct Output {
@@ -193,13 +193,13 @@ constexpr int components(Quantity q) {
   }
 }
 
-/// Of one body, one joint, one spring; the others are of the scene.
+/// A quantity of one body, one joint or one spring; the others belong to the scene.
 constexpr bool is_of_body(Quantity q) { return q <= Quantity::contact_slip; }
 constexpr bool is_of_joint(Quantity q) {
   return q >= Quantity::joint_force && q <= Quantity::joint_drive;
 }
 constexpr bool is_of_spring(Quantity q) { return q == Quantity::spring_force; }
-/// Of Forces, or of the forces and slips of contacts.
+/// A quantity of Forces, or of the forces and slips of contacts.
 constexpr bool is_force(Quantity q) {
   return is_of_joint(q) || is_of_spring(q) || q == Quantity::contact_force ||
          q == Quantity::contact_slip;

@@ -9,7 +9,7 @@
 // Gauss sphere cross); of round bars it points from the second to the first. Lines that are
 // parallel have no such contact: their ends do.
 //
-// Of an edge that lies flush with a face of the other body n is at the end of an arc, on either
+// For an edge that lies flush with a face of the other body, n is at the end of an arc, on either
 // side of it by rounding. Beyond the end the gap still bounds one of the true ones from above, as
 // long as its line goes on over the face: so arcs are longer by kFlush. (A face that turns about
 // the other edge is left by its own border: its corners and other edges touch by then.)
@@ -73,7 +73,7 @@ inline Touch CrossingFeature::look(const Frame<double>& A, const Frame<double>& 
   t.gap = n.dot(d) - first.radius - second.radius;
   t.rate = n1.dot(d) + n.dot(d1);
   t.second = n2.dot(d) + 2 * n1.dot(d1) + n.dot(d2);
-  // Where the first line is nearest to the second one, and how that point moves.
+  // The point of the first line that is nearest to the second one, and its velocity.
   const double k = -d.cross(f.x).dot(c) / square;
   const double k1 =
       (-(d1.cross(f.x) + d.cross(f.x1)).dot(c) - d.cross(f.x).dot(c1) - 2 * k * c.dot(c1)) / square;

@@ -46,15 +46,15 @@ class Model {
 
   virtual int coordinates() const = 0;
   virtual int velocities() const = 0;
-  /// Of each body; what no row connects is solved apart.
+  /// Velocities of each body. Bodies that no row connects are solved apart.
   virtual int velocity_block() const { return velocities(); }
   virtual int coordinate_block() const { return coordinates(); }
   virtual int joint_rows() const = 0;
   virtual int contacts() const = 0;
   virtual int tangents() const = 0;  ///< of a contact: 1 in the plane, 2 in space
   virtual ContactLaw law(int contact) const = 0;
-  /// What tolerances are relative to where values are smaller: of each coordinate, of each velocity
-  /// and of the energy. 1 in units in which these are near 1.
+  /// Sizes of coordinates, velocities and energy: tolerances are relative to them where values are
+  /// smaller. 1 in units in which these are near 1.
   virtual VectorXd sizes() const { return VectorXd::Ones(coordinates() + velocities() + 1); }
 
   virtual double time_unit() const { return 1; }    ///< s, for what users read

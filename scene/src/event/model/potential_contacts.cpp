@@ -65,7 +65,7 @@ class Contacts {
     for (const Round& round : a.rounds) put(RoundOnPlane{round, plane, 0});
   }
 
-  /// Of the first on all of the second but round things.
+  /// Pairs of the round features of the first with all features of the second but round ones.
   void put_rounds(const Outline& a, const Outline& b) {
     for (const Round& round : a.rounds) {
       for (const PlaneFeature& face : b.faces) put(RoundOnPlane{round, face, 0});

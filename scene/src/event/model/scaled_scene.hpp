@@ -39,9 +39,9 @@ inline Scene scaled(const Scene& scene, const smooth::Units& u) {
   return out;
 }
 
-/// Where the engine has its origin, in a scene in its units: 0, but for scenes further away than 30
-/// of their sizes. There positions lose digits that gaps and joints are made of, and tolerances
-/// relative to them mean nothing. Multiples of a power of two: near bodies are moved exactly.
+/// Origin of the engine in a scene in its units: 0 unless the scene is further away than 30 of its
+/// sizes. Positions there would lose digits of gaps and joints, and tolerances relative to them
+/// would mean nothing. A multiple of a power of two, so that near bodies are moved exactly.
 inline Eigen::Vector3d origin_of(const Scene& scene) {
   constexpr double kFarAway = 30;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();

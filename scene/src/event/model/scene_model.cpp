@@ -185,7 +185,7 @@ void SceneModel::look(int contact, ContactLook& out) {
   add_force(bodies, p.second, touch.point, touch.normal, -1, out.normal);
   out.normal_rate = 0;
   out.normal_rest = touch.second;
-  // Where the point sticks, the tangents' own turning does not count.
+  // The turning of the tangents does not matter at a sticking point.
   out.tangents.setZero(2, velocities());
   out.slip_rate.setZero(2);
   out.slip_rest.resize(2);
@@ -279,7 +279,7 @@ bool SceneModel::are_one(int contact, int other, double distance) {
   return square >= 0 && square <= kOtherNormal;
 }
 
-// Of the sine between the normals of contacts of one point; -1: they are of two.
+// Square of the sine between the normals of two contacts at one point; -1: at two points.
 double SceneModel::square_between(int contact, int other, double distance) {
   if (!is_pair(contact) || !is_pair(other)) return -1;
   const FeaturePair &p = pair(contact), &q = pair(other);

@@ -96,7 +96,7 @@ class SceneModel final : public Model {
   bool is_law(int contact) const { return contact >= pairs() && contact < first_moment(); }
   bool is_moment(int contact) const { return contact >= first_moment(); }
   const FeaturePair& pair(int contact) const { return pairs_[at(contact)]; }
-  /// Of a contact that is one of the laws of joints.
+  /// Laws of joints, some of which are contacts.
   const joints::JointLaws& joint_laws() const { return laws_.all(); }
   int joint_law(int contact) const { return laws_.place(contact - pairs()); }
   /// The same, in world axes: the force or moment on the first body.
@@ -106,13 +106,13 @@ class SceneModel final : public Model {
   const smooth::MovingBodies& bodies() const { return bodies_; }
   const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
   double potential() const;
-  /// Of joints, by the multipliers of their rows, and of springs, at the state that is set.
-  /// Adds the force of a closed contact that is a law of a joint to its joint's.
+  /// Adds the force of a closed contact that is a law of a joint to the force of that joint.
   void add_law_force(int contact, const VectorXd& parts, Forces& out) const;
+  /// Forces of joints, by the multipliers of their rows, and of springs, at the state that is set.
   Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
 
  private:
-  /// Of rolling or torsional friction of a pair.
+  /// Rolling or torsional friction of a pair.
   struct Moment {
     int pair;
     bool spin;

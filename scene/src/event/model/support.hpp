@@ -23,8 +23,8 @@ struct Round {
   double size() const { return shape.norm() + radius; }
 };
 
-/// Of a round body whose frame is known, for any direction n of length 1; `_t`: by time where n
-/// stays as it is.
+/// Support function of a round body whose frame is known, for unit directions n; `_t`: its
+/// derivative by time with n fixed.
 class Support {
  public:
   Support(const Frame<double>& f, const Round& of) : L_(f.R * of.shape), radius_(of.radius) {

@@ -9,7 +9,7 @@
 
 namespace tether::scene::event {
 
-/// Of each contact, in the units of the model.
+/// Bands of each contact, in the units of the model.
 struct Bands {
   double part = 0;  ///< the tolerance; of the largest force, and of sizes
   std::vector<double> gaps, approaches, slips;
@@ -20,11 +20,11 @@ struct Bands {
   double slip(int contact) const { return slips[static_cast<std::size_t>(contact)]; }
 };
 
-/// Of approach, in the units of the model: bounces of slower contacts are as high as rounding.
+/// Least band of approach, in the units of the model: slower bounces are as high as rounding.
 constexpr double kLeastSpeed = 1e-7;
 
-/// Of the band of a gap: how far from the border of a face a contact may be by errors of the motion
-/// that is on it.
+/// In bands of its gap: how far beyond the border of its face a contact may be by the error of the
+/// motion.
 constexpr double kBesideBorder = 30;
 
 /// At most 1; a power of 2, so that rounding does not show in it.
@@ -32,9 +32,9 @@ inline double part_of(double length) {
   return length > 0 ? std::min(1.0, std::exp2(std::round(std::log2(length)))) : 1.0;
 }
 
-/// What the tolerance of coordinates and velocities at the state that is set amounts to in the gaps
-/// and velocities of contacts; never more than the tolerance itself. (A sleeve with a play of half
-/// a millimetre turns on its pole: a tolerance of its angle is far less of its gap.)
+/// Changes of gaps and contact velocities that the tolerance of coordinates and velocities amounts
+/// to at the state that is set (method, eq. 4); at most the tolerance itself. (A sleeve with a play
+/// of half a millimetre turns on its pole: a tolerance of its angle is far less of its gap.)
 inline Bands bands_of(Model& model, double tolerance) {
   Bands out;
   out.part = tolerance;

@@ -49,7 +49,7 @@ Held cone_of(const MatrixXd& A, const VectorXd& mu, const Holders& holders, int 
   return out;
 }
 
-/// What is left of the bound, as a velocity, against the slip.
+/// Sticking if the rest of the bound, as a velocity, is at least the slip.
 Regime regime_of(double mobility, double left, double slip) {
   return mobility * left < slip ? Regime::sliding : Regime::sticking;
 }

@@ -71,7 +71,7 @@ void Motion::constraints(double t, const double* y, double* g) {
   if (keeps_energy_) *g = model_.energy() - y[work()] - kept_energy_;
 }
 
-// Of the contacts of the body whose coordinate j is changed in the state that is set.
+// Derivatives of the contacts of the body whose coordinate j is changed in the state set.
 void Motion::differentiate_contacts(int j, double step, const VectorXd& rates, int first_rate,
                                     Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
   const int block = model_.velocity_block(), body = j / model_.coordinate_block();

@@ -24,7 +24,7 @@ class ContactRows {
   int size() const { return block_; }  ///< rows of a contact: n, then its tangents
   bool is_bounded(int k) const;        ///< a law of a joint, see ContactLaw
   bool has_normal(int k) const { return model_.law(contacts_[linalg::at(k)]).has_normal(); }
-  /// Of each contact the place of the one whose normal force it has, -1: its own. Empty: no
+  /// For each contact the place of the one whose normal force bounds it, -1: its own. Empty: no
   /// moments.
   const std::vector<int>& holders() const { return holders_; }
   const MatrixXd& A() const { return A_; }

@@ -23,7 +23,7 @@ constexpr double kSame = 1e-7;     // of the answer's size: the exact one agains
 constexpr double kSolve = 1e-12;
 constexpr double kFarAbove = 1e5;
 constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
-// Of bounds over what accelerations ask of forces, see BoundedLaws.
+// Bounds relative to the forces that accelerations ask for, see BoundedLaws.
 constexpr double kCutBound = 1e3, kMostBound = 1e12;
 constexpr double kNoChange = 3e-9;  // of accelerations or velocities
 
@@ -173,7 +173,7 @@ bool share_as(const std::vector<bool>& open, double no_slip, const MatrixXd& A, 
   return shared.lawful;
 }
 
-/// What is `closed`, or does not open, stays closed where it may.
+/// Keeps contacts closed that are `closed` or do not open, where the law allows it.
 bool settle(const std::vector<bool>& closed, double none, const MatrixXd& A, const VectorXd& b,
             const VectorXd& mu, const Regimes& held, FrictionAnswer& answer) {
   const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
@@ -186,8 +186,8 @@ bool settle(const std::vector<bool>& closed, double none, const MatrixXd& A, con
   return share_as(open, none, A, b, mu, held, answer);
 }
 
-/// Where several answers exist an iteration ends at any of them. Compliant contacts share their
-/// forces in one way: from soft to stiff, the first answer whose regimes hold for stiff ones, too.
+/// An iteration may end at any of several answers. Compliant contacts share their forces in one
+/// way: from soft to stiff, the first answer whose regimes hold for rigid contacts, too.
 bool solve_compliant(const std::vector<bool>& closed, double none, const MatrixXd& A,
                      const VectorXd& b, const VectorXd& all, const VectorXd& mu,
                      const Regimes& held, FrictionAnswer& out) {

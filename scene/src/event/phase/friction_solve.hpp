@@ -22,8 +22,8 @@ FrictionAnswer solve_impact(const MatrixXd& A, const VectorXd& b, const VectorXd
 /// Coulomb's law for accelerations at the state that is set: w = A x - b = (a_n, a_t) where a
 /// contact has no slip, and (a_n, S d + a_t) where it slides along d (else empty), S far above all
 /// accelerations: the force then opposes d, whatever the accelerations are, and A stays symmetric.
-/// Where sliding has no forces (Painleve) the contact sticks, with x of the size of S.
-/// Of contacts that share their forces all stay at rest if the law has any forces for that, else
+/// If sliding has no forces (Painleve) the contact sticks, with x of the size of S.
+/// Contacts that share their forces all stay at rest if the law has any forces for that, else
 /// those that are `closed` stay so: the shortest forces, and then no S in w. `part`: error of the
 /// accelerations.
 struct AccelerationAnswer {

@@ -117,7 +117,7 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   if (rows_ > 0) islands_.choose(R_, C_, model_.velocity_block());
   VectorXd y_rate(size());
   rate(t, y.data(), y_rate.data());
-  // Of what stands still energy is known to rounding only, and says nothing of the state.
+  // The energy of bodies at rest is known to rounding only and does not determine the state.
   keeps_energy_ = rank < nu_ && a_.norm() + u_.norm() > kStill;
 }
 

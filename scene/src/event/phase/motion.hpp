@@ -76,10 +76,10 @@ class Motion {
     return law.is_bounded() ? law.bound : lambda_[normal_row(index(closed))];
   }
   VectorXd friction_force(int closed) const;  ///< by tangents
-  /// Of all rows of joints: redundant ones share.
+  /// Forces of all rows of joints: redundant ones share.
   VectorXd joint_forces();
-  /// Of each closed contact (n, tangents). Those that share their forces have such as Coulomb's law
-  /// allows, which the shortest ones may not be.
+  /// Forces of each closed contact (n, tangents). Contacts that share forces have forces that
+  /// Coulomb's law allows, which the shortest ones may not be.
   std::vector<VectorXd> contact_forces();
   /// Whether the forces of the last rate() hold all rows, and Coulomb's law allows them.
   bool forces_are_lawful() const;
@@ -90,9 +90,9 @@ class Motion {
   VectorXd slip_rate(int closed) const;  ///< at the state of the last rate()
   long evaluations() const { return evaluations_; }
   double work_done() const { return work_done_; }  ///< operations, roughly
-  /// Of the contacts that slide with friction at (t, y), one after the other.
+  /// Slips of the contacts that slide with friction at (t, y), one after the other.
   void slips_with_friction(double t, const double* y, VectorXd& slips);
-  /// Of contacts that slide with friction, at the last state: forces turn within such a change.
+  /// Least slip of a contact with friction at the last state: forces turn within such a change.
   double smallest_slip() const { return smallest_slip_; }
 
   /// The constraints of the phase on y: joints and gaps, their rates, slips of stuck contacts, own

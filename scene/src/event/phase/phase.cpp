@@ -335,7 +335,7 @@ bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd&
     y -= sizes.cwiseProduct(move);
     const double size = 1 + y.cwiseQuotient(sizes).cwiseAbs().maxCoeff();
     const double moved = move.cwiseAbs().maxCoeff();
-    // What is left is the rounding of gaps, of large fixed bodies more than that of coordinates.
+    // The rest is rounding of gaps, which for large fixed bodies exceeds that of coordinates.
     const bool rounding = pass > 0 && moved >= 0.5 * before && moved <= 0.1 * tolerance * size;
     if (moved <= 1e-3 * tolerance * size || rounding) return true;
     before = moved;

@@ -42,9 +42,9 @@ class IndependentRows {
   int rank_ = 0;
 };
 
-/// Of rows (as columns) those that imply all others: each time the one that adds most to those
-/// before it. In the metric of the projection, whose moves they are to determine: by masses a body
-/// that is thin about an axis would count as held about it by rows that hardly turn it.
+/// Chooses rows (given as columns) that imply all others: each time the one that adds most to those
+/// before it. Independence is measured in the metric of the projection. In that of the masses a
+/// body that is thin about an axis would count as held about it by rows that hardly turn it.
 struct RowChoice {
   std::vector<int> rows;  // ascending
   double least = 1;       // what a row added, of its length

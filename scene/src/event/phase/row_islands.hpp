@@ -18,7 +18,7 @@ class RowIslands {
   void factor(const MatrixXd& R, const MatrixXd& MC, const VectorXd& scale);
   /// The shortest x of K x = right, in the sense of least squares.
   VectorXd solve(const VectorXd& right) const;
-  /// Of a factorisation: the cubes of the numbers of rows.
+  /// Work of a factorisation: the sum of the cubes of the numbers of rows.
   double work() const;
 
  private:

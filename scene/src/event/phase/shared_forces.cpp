@@ -160,7 +160,7 @@ class HeldRows {
     }
   }
   bool slides(int i) const { return regimes_.of[at(i)] == Regime::sliding; }
-  /// Of a contact among the closed ones; -1: it is open.
+  /// Place of a contact among the closed ones; -1: it is open.
   int place_of(int i) const {
     const auto found = std::lower_bound(contacts_.begin(), contacts_.end(), i);
     return found != contacts_.end() && *found == i ? static_cast<int>(found - contacts_.begin())

@@ -16,9 +16,9 @@ namespace tether::scene::event {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Of each contact of a problem the one whose normal force it has, as |moment| <= r x_n has: its
-/// own rows are its tangents, x_n of it is zero, and it comes behind its holder. -1: it has its
-/// own. Empty: all have.
+/// For each contact of a problem, the contact whose normal force bounds it, as in |moment| <=
+/// r x_n. Such a contact has tangents only, its x_n is zero, and it comes after its holder. -1: it
+/// has its own normal force. Empty: all have.
 using Holders = std::vector<int>;
 inline bool is_held(const Holders& holders, int contact) {
   return !holders.empty() && holders[static_cast<std::size_t>(contact)] >= 0;

@@ -21,7 +21,7 @@ constexpr int kParts = 32;
 constexpr double kFasterWithin = 2;  // a step, than at its ends
 constexpr double kKnown = 5;         // errors of gaps, in the tolerance of the phase
 constexpr double kUnseen = 5;        // of the band of approach: impacts that may be missed
-// Of accelerations, by the contact library's tolerance and by what stands for a large slip.
+// Errors of accelerations: by the contact library's tolerance, and by the large slip S.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
 /// A zero of f between a and b, where it has other signs; Illinois' rule.
@@ -155,7 +155,7 @@ double Watcher::of_state(Function& f) {
   return 0;
 }
 
-// What is left of a band, of the accelerations, by those of contacts that are to have none.
+// The band of accelerations less the largest acceleration of contacts at rest (method, eq. 9).
 double Watcher::support() {
   if (motion_.forces_are_lawful()) return support_band_ > 0 ? support_band_ : kNoise;
   ContactRows rows(motion_.model(), motion_.closed());
@@ -346,9 +346,9 @@ bool Watcher::dips(Phase& phase, const Function& f) {
   return false;
 }
 
-// Of bodies that come by each other's whole size in a step, as on a long flight, the ends do not
-// tell how often a gap has turned: parts of the step do. f becomes what it is in the part that is
-// looked at then.
+// Bodies may pass each other's whole size in a step, as on a long flight. The ends of the step do
+// not tell how often a gap has turned, so parts of the step are searched; f becomes the function in
+// the part that has the zero.
 bool Watcher::is_hit_between(Phase& phase, Function& f) {
   const double begin = phase.step_begin(), length = phase.step_end() - begin;
   if (f.what != Watch::gap ||
