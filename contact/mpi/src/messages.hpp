@@ -33,7 +33,7 @@ class Messages final : public contact::RankMessages {
   void broadcast(int root, std::vector<double>& values) override;
   [[noreturn]] void give_up(const char* why) override;
 
-  /// What everyone gives, one rank after the other.
+  /// The numbers of all ranks, one after the other.
   template <class Number>
   std::vector<Number> gather_all(const std::vector<Number>& mine, std::vector<int>* ends = nullptr);
   /// Any number of values to each rank; what each sends.

@@ -52,7 +52,7 @@ struct Solver::Implementation {
   detail::Messages messages;
   contact::RankSolver ranks;
   detail::ImpulseDirectory memory;
-  // Of a solve:
+  // Data of a solve:
   WholeProblem whole;
   std::vector<int> local_body, local_contact;  // number -> place in the part, -1
   std::vector<int> given_body, given_contact;  // number -> place in the share, -1
@@ -184,7 +184,7 @@ void Solver::Implementation::return_impulses(const Share& share, Solution& out) 
   std::sort(out.replaced.begin(), out.replaced.end());
 }
 
-// What is about all ranks.
+// Merges the numbers that are about all ranks.
 void Solver::Implementation::merge(Solution& out) {
   struct Own {
     int status, assembled, failed, sweeps, colours, islands, shared;

@@ -11,7 +11,7 @@
 
 namespace tether::contact::detail {
 
-// What the kind of its contacts asks of a body: a sum of these.
+// Properties of a body that decide the kinds of its contacts: a sum of these.
 constexpr std::uint8_t kMoves = 1, kIsotropic = 2, kNeverTurns = 4;
 std::uint8_t body_traits(const RigidBody& body);
 

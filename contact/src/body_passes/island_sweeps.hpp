@@ -13,8 +13,8 @@
 
 namespace tether::contact::detail {
 
-// What a pass over contacts adds up, in squares of velocities: before the first sweep |b|^2 and the
-// largest speed, and the largest needed change itself; later errors.
+// Sums of a pass over contacts, in squares of velocities: before the first sweep |b|^2, the largest
+// speed, and the largest needed change itself; later errors.
 struct PassResult : Squares {
   double speed = 0;
   PassResult() = default;
@@ -46,8 +46,8 @@ class IslandSweeps {
   // x <- x + beta (x - previous x), and the same for the velocities, which follow x linearly.
   // Previous: at the last call.
   void extrapolate(const Island& island, const Team& team, double beta);
-  // Where partners sweep at once: what these and others have changed since the last call, relaxed.
-  // start: nothing has, but the impulses to start from.
+  // Combines the relaxed changes of all partners since the last call, if they sweep at once.
+  // start: only the impulses to start from have changed anything.
   void combine(const Island& island, const Team& team, bool start);
   // No impulses.
   void rest(const Island& island, Team& team);
@@ -77,7 +77,7 @@ class IslandSweeps {
  private:
   template <class Visit>
   void in_chunk(int chunk, const Visit& visit) const;
-  // What a pass does beside its sums.
+  // Effect of a pass, beside its sums.
   enum class Pass { moves_bodies, reads_bodies, local };
   template <class Operation>
   PassResult pass(const Island& island, Team& team, Pass kind, const Operation& operation);

@@ -59,7 +59,7 @@ class MovingBodies {
     std::copy(six, six + 3, s.v);
     std::copy(six + 3, six + 6, s.w);
   }
-  // What has been added since keep().
+  // Change of velocity since keep().
   void change(int slot, double* six) const {
     get(slot, six);
     for (int k = 0; k < 6; ++k) six[k] -= previous_[6 * linalg::at(slot) + linalg::at(k)];
@@ -73,7 +73,7 @@ class MovingBodies {
   void keep(int begin, int end) {
     for (int i = begin; i < end; ++i) get(i, previous_.data() + 6 * linalg::at(i));
   }
-  // Of what has been added since keep(), this part.
+  // Keeps this part of the change since keep().
   void relax(int begin, int end, double part) {
     for (int i = begin; i < end; ++i) {
       double six[6], *previous = previous_.data() + 6 * linalg::at(i);

@@ -28,9 +28,9 @@ class PackedContacts {
   // All that a sweep changes of a contact, as the kernels have it: for another process.
   Eigen::Vector4d state(Kind k, int place) const;
   void set_state(Kind k, int place, const Eigen::Vector4d& s);
-  // Of the contacts from one chunk to the next.
+  // Momentum of the contacts of chunks from .. to.
   void extrapolate(const Chunk& from, const Chunk& to, double beta);
-  // Of what they have changed since the last call this part; 0 the first time: as they are.
+  // Keeps this part of their change since the last call; 0 the first time: leaves them.
   void relax(const Chunk& from, const Chunk& to, double part);
 
   // operation(begin, end, width): the contacts of a kind, `width` in each entry, for the kinds that

@@ -14,8 +14,8 @@ struct WholeGraph {
   const std::vector<int>&first, &second;
 };
 
-// What a process does for those that it shares islands with. Called by its first thread, by all
-// processes in the same order.
+// Exchange between processes that share islands. Called by the first thread of each, in the same
+// order.
 class SweepPartners {
  public:
   virtual ~SweepPartners() = default;
@@ -31,7 +31,7 @@ class SweepPartners {
   virtual void after_colour(int colour, MovingBodies& bodies) = 0;
   // Velocities as they are after a sweep, to all that have the body.
   virtual void share(MovingBodies& bodies) = 0;
-  // What all processes have added up; sums: of each chunk here.
+  // The sums of all processes; sums: of each chunk of this process.
   virtual PassResult total(const std::vector<PassResult>& sums) = 0;
 
   // All sweep at once, and what they change is taken times this factor; else colour by colour.

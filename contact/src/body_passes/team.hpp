@@ -9,7 +9,7 @@
 
 namespace tether::contact::detail {
 
-// What a thread needs of its own to pass over contacts.
+// Work space of one thread in a pass over contacts.
 struct PassScratch {
   alignas(64) BodyState nowhere = {};  // see BodyArrays
   // The first contact that was refused, and why: other threads wait at the next barrier, so that it
@@ -32,7 +32,7 @@ struct Team {
   void meet() const {
     if (threads > 1) barrier->wait(patience);
   }
-  // What the first thread does for all.
+  // Work that the first thread does for all.
   template <class Work>
   void once(const Work& work) const {
     if (thread == 0) work();

@@ -38,7 +38,7 @@ void FarContacts::look_at(const GivenProblem& given) {
   }
 }
 
-// What stops one contact may close another one as fast.
+// An impulse that stops one contact may close another one as fast.
 void FarContacts::find_pace() {
   pace_.assign(islands_.size(), 0);
   count_.assign(islands_.size(), 0);

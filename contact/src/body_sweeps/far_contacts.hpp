@@ -22,7 +22,7 @@ class FarContacts {
   // starts: of each contact, or empty. False: none is left out.
   bool leave_out(const GivenProblem& given, const Starts& starts);
   int groups() const { return 1 + static_cast<int>(parted_.size()); }
-  // What is to be solved first is next().
+  // Begins a group; next() then has the contacts to be solved first.
   void begin(int group);
   // Contacts by number, ascending.
   const std::vector<int>& next() const { return next_; }
@@ -42,7 +42,7 @@ class FarContacts {
   void mark(const GivenProblem& given, const Starts& starts);
   bool parted(std::size_t island) const { return count_[island] > islands_[island].contacts / 4; }
   void list_next();
-  // Of the island that is the group.
+  // The island that is the group.
   const Island& island() const {
     return islands_[static_cast<std::size_t>(parted_[static_cast<std::size_t>(group_ - 1)])];
   }

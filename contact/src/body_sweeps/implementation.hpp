@@ -50,7 +50,7 @@ struct BodySolver::Implementation {
   detail::GivenProblem given;     // the caller's bodies and contacts
   detail::ContactGraph graph;     // their islands
   detail::ImpulseHistory memory;  // impulses of earlier solves
-  // Of each contact, in the memory; empty: none. Where some are far, of those that are solved next.
+  // Impulses of each contact in the memory; empty: none. If some are far: of those solved next.
   std::vector<const Vector3d*> starts, all_starts;
   detail::IslandSweeps sweeps;                // impulses and velocities of this solve
   std::vector<IslandResult> results;          // of each island

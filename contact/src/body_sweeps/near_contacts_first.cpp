@@ -118,7 +118,8 @@ void BodySolver::Implementation::take_motion(const std::vector<RigidBody>& b) {
   }
 }
 
-// Of the last solve of a group, which replaces those before it; swept: how often in all of them.
+// Takes the judgement of the last solve of a group, which replaces those before; swept: sweeps of
+// all of them.
 void BodySolver::Implementation::take_judgement(int swept) {
   BodySolution& o = *out;
   o.status = worse(o.status, found.status);

@@ -9,8 +9,8 @@ namespace tether::contact::detail {
 
 // Nesterov's momentum on the sweeps. A sweep is no gradient step, but the same rule serves: where a
 // sweep changes more than the one before, the momentum is dropped and its growth set back by half.
-// Where contacts toggle between stick and slip that happens all the time: as long as it does not
-// get on, a little more change is allowed in every other window.
+// Contacts that toggle between stick and slip cause that again and again. While there is no
+// progress, a little more change is allowed in every other window.
 class Momentum {
  public:
   void start() { on_ = true; }

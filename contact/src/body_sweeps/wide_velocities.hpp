@@ -10,7 +10,8 @@ namespace tether::contact::detail {
 
 using Wide3 = Eigen::Matrix<long double, 3, 1>;
 
-// Of a light body between heavy ones: impulses that nearly cancel (law/exact_error.hpp).
+// Velocities in long sums: impulses on a light body between heavy ones nearly cancel
+// (law/exact_error.hpp).
 class WideVelocities {
  public:
   explicit WideVelocities(const std::vector<RigidBody>& bodies) : bodies_(bodies) {
@@ -24,7 +25,7 @@ class WideVelocities {
     push(c.first, c.r1, p);
     if (c.second >= 0) push(c.second, c.r2, -p);
   }
-  // Of the first body of a contact against the second one, with the bias.
+  // Velocity of the first body of a contact against the second one, with the bias.
   Wide3 relative(const PointContact& c) const {
     Wide3 u = at_point(c.first, c.r1) + c.normal.cast<long double>() * c.bias;
     if (c.second >= 0) u -= at_point(c.second, c.r2);

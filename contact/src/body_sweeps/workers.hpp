@@ -16,7 +16,7 @@ namespace tether::contact::detail {
 // Data of one thread.
 struct Worker {
   PassScratch scratch;
-  // Of an assembled island.
+  // Data of an assembled island.
   std::unique_ptr<Solver> solver;
   Solution solution;
   std::vector<RigidBody> bodies;

@@ -9,10 +9,10 @@ namespace tether::contact::detail {
 void nearest(const Eigen::Vector3d& p, const Eigen::Vector3d& u, const Eigen::Vector3d& q,
              const Eigen::Vector3d& v, Eigen::Vector3d& on_first, Eigen::Vector3d& on_second);
 
-// Of the edges of an axis. tie: points nearer to the axis than this are on it.
+// Points of the two edges of an axis. tie: points nearer to the axis than this are on it.
 void crossing_edges(const Placed& a, const Placed& b, const EdgeAxis& axis, double tie,
                     double margin, NearPoints& out);
-// Of the edges (or corners) farthest in the unit direction m, which points from `a` to `b`.
+// Points of the edges (or corners) farthest in the unit direction m, which points from `a` to `b`.
 void edge_along_edge(const Placed& a, const Placed& b, const Eigen::Vector3d& m, double rounding,
                      double margin, NearPoints& out);
 

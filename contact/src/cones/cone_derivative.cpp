@@ -156,7 +156,7 @@ ConeDirection ConeDerivative::adjoint(const linalg::VectorView& impulses,
   const detail::Embedding& e = parts_->embedding;
   check_entries("impulses", impulses, p.rows(), "one for each row");
   check_entries("velocities", velocities, p.rows(), "one for each row");
-  // Of x and of b, by rows: dw = A dx - db.
+  // Gradients by x and by b, by rows: dw = A dx - db.
   Eigen::VectorXd gx = Eigen::VectorXd::Zero(p.rows()), gb = gx;
   if (impulses.size() > 0) gx = impulses;
   if (velocities.size() > 0) {

@@ -106,7 +106,7 @@ double needed_change(const ConeProblem& problem, int block) {
   if (!(bn > 0)) return 0;
   const Matrix6d D = diagonal_block(problem, first, cone.rows);
   const ConeParts parts = parts_of(cone.kind);
-  // What each part may take away with the normal impulse b_n / A_nn.
+  // Change of velocity that each part may cause with the normal impulse b_n / A_nn.
   const auto part = [&](int from, int count, double length) {
     double bb = 0;
     for (int r = from; r < from + count; ++r) bb += b(r) * b(r);

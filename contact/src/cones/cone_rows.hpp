@@ -36,7 +36,7 @@ constexpr ConeParts parts_of(Cone::Kind kind) {
 /// A of `size` rows from `row`, the rest zero.
 Matrix6d diagonal_block(const ConeProblem& problem, int row, int size);
 
-/// What a block needs: the velocity that it has to change on its own, times row_scale()
+/// Velocity that a block has to change on its own, times row_scale()
 /// (method, section 8).
 double needed_change(const ConeProblem& problem, int block);
 

@@ -14,7 +14,7 @@ using linalg::at;
 
 namespace {
 
-// What least squares leave of free rows, over what the problem needs.
+// Residual of free rows after least squares, over the velocity that the problem needs.
 constexpr double kContradiction = 1e-7;
 // Solves with a tolerance that the residual of the rows asks for, where that of the contacts, whose
 // scale is theirs after elimination, was too loose.

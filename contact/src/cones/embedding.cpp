@@ -14,7 +14,7 @@ namespace {
 
 using linalg::at;
 
-// What elimination leaves of a diagonal entry of 1; rounding of its sums 1e-15.
+// A diagonal entry of 1 after elimination below which it is held; rounding of its sums is 1e-15.
 constexpr double kHeld = 1e-11;
 constexpr double kSlip = 1e-12;  // of what a velocity is the difference of
 

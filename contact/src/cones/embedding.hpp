@@ -19,7 +19,7 @@ namespace tether::contact::detail {
 ///     moments       (own, row, own) and (own, row, row), mu the length; w_n = a (x_n - x_n of the
 ///                   contact), so that x_n is that of the contact: an unsymmetric row
 ///
-/// Of the matrix of these rows the free ones are eliminated: A_cc - A_cf A_ff^-1 A_fc.
+/// Free rows are eliminated from the matrix of these rows: A_cc - A_cf A_ff^-1 A_fc.
 class Embedding {
  public:
   /// `open`: by block, whether its contact is known to be open, so that the normals of its moments
@@ -45,7 +45,7 @@ class Embedding {
   Eigen::VectorXd lift_b(const linalg::VectorView& db) const;
   /// Transposed.
   Eigen::VectorXd lower_b(const linalg::VectorView& db3) const;
-  /// Where the bound of a block enters b, and by which factor; contact -1: nowhere.
+  /// The contact whose b has the bound of a block, and its factor; contact -1: none.
   struct Bound {
     int contact = -1;
     double factor = 0;

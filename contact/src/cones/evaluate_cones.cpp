@@ -110,7 +110,7 @@ ConeResiduals evaluate(const ConeProblem& problem, Law law, const linalg::Vector
       const double scale = s[at(row)];
       rounding = std::max(rounding, detail::kRoundOff * sum * scale);
       if (cone.kind != Cone::Kind::free) continue;
-      // What nothing moves either holds or does not.
+      // A row that nothing moves either holds or does not.
       const double lost = scale > 0 || w[row] == 0 ? std::abs(w[row]) * scale
                                                    : std::numeric_limits<double>::infinity();
       error = std::max(error, lost);

@@ -97,8 +97,8 @@ class DeficientFactors final : public EquationFactors {
       : e_(e), rank_tolerance_(rank_tolerance) {
     deficiency_ = factors(false).dropped();
   }
-  // Where equations contradict each other the factors weigh rows by their lengths: what is outside
-  // of the range goes first, so that both are the pseudoinverse and the one the other's transpose.
+  // The factors weigh contradicting equations by the lengths of rows. The part outside of the range
+  // is removed first, so that both are the pseudoinverse and each is the transpose of the other.
   void solve(PackedVector* y) override {
     constexpr double kConsistent = 1e-10;
     const PackedVectors right(y, y + e_.size());
@@ -130,7 +130,7 @@ class DeficientFactors final : public EquationFactors {
         starts.push_back(static_cast<int>(columns.size()));
       }
     f->resize(3 * n, starts, columns, 0);
-    // Where the next entry of each row goes.
+    // Place of the next entry of each row.
     std::vector<int> next(starts.begin(), starts.end() - 1);
     double* to = f->entries();
     for (int i = 0; i < n; ++i)

@@ -37,7 +37,7 @@ void IslandEquations::multiply_transposed(const PackedVector* y, PackedVector* o
 
 namespace {
 
-// What M^+ M leaves of a direction that no symmetry knows: all of it that M does not see.
+// The part of a direction without symmetry that M^+ M removes: its component in the null space.
 double find_free_direction(IslandEquations& e) {
   constexpr double kGolden = 0.6180339887498949;
   PackedVectors z(e.contacts.size());

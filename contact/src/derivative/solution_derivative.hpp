@@ -10,8 +10,8 @@
 
 namespace tether::contact::detail {
 
-/// What a change of the data does to the equations of each contact, or the gradient with respect
-/// to that.
+/// Change of the equations of each contact by a change of the data, or the gradient with respect to
+/// it.
 struct DataChange {
   Packed shift;                              // of w at fixed impulses: dA x - db
   std::vector<std::array<double, 2>> gamma;  // of gamma = mu c / a

@@ -63,7 +63,7 @@ class Adjacency {
   const int* end(int body) const {
     return all_.data() + start_[static_cast<std::size_t>(body) + 1];
   }
-  // Of each contact in `order`: how many have a moving body in common with it, itself included.
+  // For each contact in `order`: the number of contacts that share a moving body, itself included.
   void coupled(const ContactPairs& pairs, const std::vector<int>& bodies,
                const std::vector<int>& order, std::vector<float>& out);
   std::size_t body_bytes() const { return sizeof(int) * (start_.capacity() + between_.capacity()); }

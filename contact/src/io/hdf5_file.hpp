@@ -53,8 +53,8 @@ constexpr hssize_t kMostEntries = hssize_t{1} << 31;
 constexpr hsize_t kBestCompression =
     1032;  // of deflate; other filters are not expected to do better
 
-// What `set` claims to hold, in entries, once that is known to fit the bytes that the file has for
-// it: a damaged extent must not ask for memory.
+// Number of entries of `set`, checked against the bytes that the file has for it: a damaged extent
+// must not ask for memory.
 template <class T>
 std::size_t believable_count(hid_t file, hid_t set, const std::string& full) {
   Handle space(H5Dget_space(set), H5Sclose);

@@ -107,7 +107,7 @@ struct Coulomb {
   }
 
   // y = z / q scaled onto cone and plane: |y| + g.y = k holds to round-off for every lambda.
-  // Where q cancels, z / p, which is on the cone.
+  // If q cancels: z / p, which is on the cone.
   static TETHER_INLINE Regime slide(const LocalBlock& L, const LocalRhs& r, double bn, double l,
                                     double* x) {
     const double e0 = L.beta[0] + l, e1 = L.beta[1] + l;

@@ -97,7 +97,7 @@ struct MaximumDissipation {
   static Regime near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0, double y1,
                                double* x);
 
-  // Where |B| y* squared leaves the range: in units in which it does not.
+  // Solves in other units, in which |B| y* squared stays in the range of doubles.
   static Regime in_other_units(const LocalBlock& L, double bn, double b0, double b1, double* x,
                                int& evaluations);
 

@@ -30,7 +30,7 @@ struct BodyForm {
   void end_contact() { start.push_back(static_cast<int>(node.size())); }
 };
 
-/// Of some contacts, with the nodes that they have.
+/// The form of some contacts, with the nodes that they have.
 inline std::shared_ptr<const BodyForm> part_of(const BodyForm& whole,
                                                const std::vector<int>& contacts) {
   auto out = std::make_shared<BodyForm>();

@@ -10,8 +10,8 @@
 namespace tether::contact::detail {
 
 constexpr double kRoundOff = 0.5 * std::numeric_limits<double>::epsilon();
-// What double sums and block solutions may make of an error, in units of what the round-off of x
-// alone makes.
+// Error by double sums and block solutions, in units of the error that the round-off of x alone
+// causes.
 constexpr double kSumUnits = 64;
 // Velocities of an island of bodies that are less than this of its largest speed are round-off of
 // the bodies' velocities.

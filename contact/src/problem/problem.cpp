@@ -59,7 +59,7 @@ namespace {
 
 constexpr std::size_t kZero = std::numeric_limits<std::size_t>::max();
 
-/// Where a block goes; kZero: there is none, but the place has to be.
+/// Place of a block; kZero: the block is zero, but the pattern has the place.
 struct Position {
   int row, column;
   std::size_t block;
@@ -67,8 +67,8 @@ struct Position {
   bool is_at(const Position& other) const { return row == other.row && column == other.column; }
 };
 
-/// Of all blocks by row, column and their order, with a place on the other side, which keeps the
-/// pattern symmetric, and on the diagonal.
+/// Places of all blocks by row, column and their order, with their mirror places, which keep the
+/// pattern symmetric, and those of the diagonal.
 std::vector<Position> positions(const std::vector<MatrixBlock>& blocks, int n) {
   std::vector<Position> out;
   out.reserve(2 * blocks.size() + at(n));

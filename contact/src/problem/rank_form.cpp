@@ -12,8 +12,8 @@ using linalg::at;
 using linalg::PackedBlock;
 
 std::shared_ptr<const BodyForm> rank_form(const Problem& problem, int most_rank) {
-  // Of the diagonal entry, what is left of it at the end: A comes with the round-off of the
-  // mechanism's equations.
+  // Rest of a diagonal entry, relative to it, at which the rank is reached: A comes with the
+  // round-off of the mechanism's equations.
   constexpr double kLeft = 1e-12;
   const int contacts = problem.contacts();
   const Index n = 3 * Index{contacts};

@@ -30,7 +30,7 @@ class GatheredIsland {
   std::vector<double> mine_;
 };
 
-// What the root finds, in numbers.
+// Solution of the root, as numbers.
 struct IslandAnswer {
   explicit IslandAnswer(const Island& island)
       : contacts(linalg::at(island.contacts)),

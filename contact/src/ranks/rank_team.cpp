@@ -82,7 +82,7 @@ struct RankTeam::Implementation {
   std::vector<int> owner;  // of the positions, or of the bodies of a solve without
   bool owners_by_place = false;
   long problems = 0, swept = 0;
-  // Of a solve:
+  // Data of a solve:
   std::vector<std::uint8_t> traits;
   std::vector<RankContact> links;
   std::vector<char> moved;  // by a contact
@@ -169,7 +169,7 @@ void RankTeam::Implementation::solve_part() {
       throw std::runtime_error("rank " + std::to_string(r) + " could not solve its contacts");
 }
 
-// What this rank knows, in the order in which unpack() looks for it.
+// Packs the results of this rank in the order of unpack().
 void RankTeam::Implementation::pack() {
   const int me = messages.rank();
   const RankIslands islands = ranks.islands();

@@ -18,7 +18,7 @@ using contact::RankMode;
 /// mode, relaxation, and BodyOptions; threads: of each rank. The same on all ranks.
 using Options = contact::RankOptions;
 
-/// What a rank gives: bodies by numbers, which are 0 .. n - 1 over all ranks, each on one of them.
+/// Data that a rank gives: bodies by number, 0 .. n - 1 over all ranks, each on one of them.
 /// A contact is on the rank that owns its moving body with the smaller number; PointContact::first
 /// and second are numbers of bodies. Contacts are swept in an order that follows from the numbers
 /// of their bodies, contacts of two bodies in the order in which they are given.
@@ -28,7 +28,7 @@ struct Share {
   std::vector<contact::PointContact> contacts;
 };
 
-/// What one rank has sent in a solve.
+/// Messages that one rank has sent in a solve.
 struct Traffic {
   long long messages = 0, bytes = 0;              ///< velocities during sweeps, and residuals
   long long reductions = 0;                       ///< sums over all ranks meanwhile

@@ -83,12 +83,13 @@ inline void wide_rhs(const LocalBlock& L, const Wide* x, const Wide* w, double* 
   for (int c = 0; c < 3; ++c) b[c] = static_cast<double>(f[c] - w[c]);
 }
 
-// What b has to change by for x to stick or slide as it does, wherever the block solution is: where
-// a strongly coupled contact comes to the brink of sliding, or two of its sliding solutions merge,
-// there are only others, far away, a last bit of b further. x at rest within its cone, or its point
-// p on the cone at the same x_n sliding against p_t, |w - D (x - p) - that velocity| + |D (x - p)|.
-// Infinite without friction, for jams, b_n <= 0, under a law (gamma) that has none, and below half
-// of the e up to which contacts have one solution (method, section 2), which is then near.
+// Backward error: the smallest change of b for which x is exact in its regime (method, 3.3). It
+// counts if a strongly coupled contact comes to the brink of sliding, or two of its sliding
+// solutions merge: a last bit of b further, other solutions are far away. |w| for x at rest within
+// its cone; for its point p on the cone at the same x_n, |w - D (x - p) - slip against p_t| +
+// |D (x - p)|. Infinite without friction, for jams, b_n <= 0, under a law (gamma) that has none,
+// and below half of the e up to which contacts have one solution (method, section 2), which is then
+// near.
 template <class Real>
 TETHER_INLINE Real error_as_it_is(const LocalBlock& L, double mu, const double* gamma,
                                   const Real* x, const Real* w) {

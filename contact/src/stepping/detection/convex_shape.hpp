@@ -39,7 +39,7 @@ class ConvexShape {
   /// Unit direction of the line that the surface holds across m, or zero: kinks of h at m. Sets
   /// `face` to the normal of a face against m.
   Eigen::Vector3d line(const Eigen::Vector3d& m, double tolerance, Eigen::Vector3d& face) const;
-  /// What lies against m up to an angle, or up to a height.
+  /// The feature against m, up to an angle or up to a height.
   void flat(const Eigen::Vector3d& m, double height, Flat& out) const;
 
   const Eigen::Vector3d& centre() const { return whole_ ? middle_ : centre_; }

@@ -18,8 +18,8 @@ constexpr double kParallelLines = 0.05;  // sine: lines that touch along each ot
 constexpr double kHigh = 0.1;  // of the thickness: what may lie against a surface
 constexpr double kLow = 1e-6;  // above the lowest point
 
-// What is left of a line or a face over another face, seen along n; cuts share the identity of the
-// edge and of what cuts it.
+// Clips a line or a face to another face, seen along n; cuts have the identities of the edge and of
+// the side that cuts it.
 void clip(const Flat& face, const Vector3d& n, Flat& subject) {
   const double turn = face.normal.dot(n) < 0 ? -1 : 1;
   for (int k = 0; k < face.count && subject.count > 0; ++k) {

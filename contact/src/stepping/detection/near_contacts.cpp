@@ -152,7 +152,7 @@ void NearContacts::place(const BodySet& bodies, double dt) {
   }
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
     centre_[k] = pose_[at(bounded_[k])].position;
-    // What is near a mesh is a matter of the other shape, as with planes.
+    // The size of the other shape decides what is near a mesh, as with planes.
     const double near = mesh_[at(bounded_[k])] < 0 ? near_part_ * reach_[k] : 0;
     ball_[k] = reach_[k] + near + way(bodies, k, dt);
   }
@@ -166,7 +166,7 @@ double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const 
   return dt * (b.velocity.norm() + arm * b.angular_velocity.norm());
 }
 
-// Of surfaces i and j, into near_.
+// Points of surfaces i and j, into near_.
 void NearContacts::find_points(int i, int j, double margin) {
   const Shape &s = surface(i).shape, &t = surface(j).shape;
   const Pose &S = pose_[at(i)], &T = pose_[at(j)];

@@ -32,8 +32,8 @@ struct Simplex {
   std::array<double, 4> weight{};
 };
 
-// Of the plane through the points `used` that point of least norm; false where a weight is not
-// positive or the points have no plane.
+// The point of least norm of the plane through the points `used`; false if a weight is not positive
+// or the points have no plane.
 bool nearest_inside(const Simplex& s, const std::array<int, 4>& used, int count, Vector3d& v,
                     std::array<double, 4>& weight) {
   const Vector3d& p = s.y[at(used[0])];
@@ -167,7 +167,7 @@ Vector3d way_out(const ConvexShape& a, const ConvexShape& b) {
   return best;
 }
 
-// What holds n: against a face of one shape, or across lines of both. Columns of T: where it may
+// Kinks that hold n: a face of one shape, or lines of both. Columns of T: directions in which n may
 // still turn.
 int hold(const ConvexShape& a, const ConvexShape& b, double tolerance, Vector3d& n,
          Eigen::Matrix<double, 3, 2>& T) {

@@ -16,7 +16,7 @@ struct Separation {
 /// s(n) = min over a of n.x - max over b of n.y: the gap along n.
 double separation(const ConvexShape& a, const ConvexShape& b, const Eigen::Vector3d& n);
 
-/// Where it is largest (detection, 3). False: the gap is at least `margin`.
+/// Direction of the largest separation (detection, 3). False: the gap is at least `margin`.
 bool find_separation(const ConvexShape& a, const ConvexShape& b, double margin, Separation& out);
 
 }  // namespace tether::contact::detail

@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-// Of a ball about the point `centre`; `out` where the given point is there.
+// Nearest point of a ball about `centre`; its normal is `out` if the given point is the centre.
 Nearest on_ball(const Vector3d& centre, double radius, const Vector3d& p, const Vector3d& out) {
   const Vector3d d = p - centre;
   const double distance = d.norm();

@@ -5,7 +5,7 @@
 
 namespace tether::contact::detail {
 
-/// Of the surface of a shape, to a point. In the axes of the shape.
+/// Nearest point of the surface of a shape to a point, in the axes of the shape.
 struct Nearest {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, out of the shape

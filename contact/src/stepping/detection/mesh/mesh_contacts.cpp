@@ -21,7 +21,7 @@ constexpr double kSame = 1e-6;     // radian: directions that are the same
 constexpr double kHigh = 0.1;      // of the thickness: what may lie against a face
 constexpr std::size_t kMost = 48;  // corners of what is cut
 
-// What a point belongs to; the same from step to step.
+// Identity of a point by its features; the same from step to step.
 std::uint64_t key_of(std::uint64_t kind, int a, int b) {
   std::uint64_t x = kind;
   for (const int each : {a, b}) {
@@ -166,8 +166,8 @@ bool MeshContacts::separate(const Body& body, const Near& near, bool& face, Near
   return true;
 }
 
-// What of the triangle lies against n, if it is sharp and the surface stays below it: then no other
-// triangle is nearer.
+// The feature of the triangle against n, if it is sharp and the surface stays below it: then no
+// other triangle is nearer.
 bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
                           std::uint64_t& part) const {
   const TriangleMesh::Triangle& t = near.triangle;
@@ -190,8 +190,8 @@ bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
   return n.dot(way) <= kSame * way.norm();
 }
 
-// Where a face or a line of the body lies over a sharp edge or corner of the triangle; its other
-// cuts are in the middle of what the body lies on.
+// Points at which a face or a line of the body lies over a sharp edge or corner of the triangle;
+// its other cuts are inside the surface that the body lies on.
 void MeshContacts::cut_edges(const Body& body, const Near& near, double low, NearPoints& out) {
   const TriangleMesh::Triangle& t = near.triangle;
   const double height = std::min(body.margin - low, kHigh * body.convex.thickness());

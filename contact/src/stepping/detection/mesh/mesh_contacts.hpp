@@ -13,7 +13,7 @@
 
 namespace tether::contact::detail {
 
-/// Where bodies touch a mesh (detection, 4). Keeps its storage between bodies.
+/// Contacts of bodies with a mesh (detection, 4). Keeps its storage between bodies.
 class MeshContacts {
  public:
   explicit MeshContacts(const Shape& mesh);
@@ -25,7 +25,7 @@ class MeshContacts {
 
  private:
   struct Body;  // shape a in the axes of the mesh, about its own origin
-  // What is known of one triangle.
+  // Data of one triangle near a body.
   struct Near {
     const TriangleMesh::Triangle& triangle;
     std::array<Eigen::Vector3d, 3> corner;  // about the origin of the body
