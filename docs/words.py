@@ -4,13 +4,16 @@
     python3 docs/words.py FILE_OR_FOLDER...
 
 Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
-phrase that the glossary replaces. Sources (a folder: all below it): no comment line that begins with Of, What or Where.
+phrase that the glossary replaces, no document above its length. Sources (a folder: all below it): no comment line that begins with Of, What or Where.
 """
 import pathlib
 import re
 import sys
 
 LONGEST_SENTENCE, LONGEST_PARAGRAPH, MOST_TERMS = 35, 120, 15
+# Words of a document, formulas and programs included.
+LENGTHS = {"README.md": 900, "benchmarks/README.md": 1500, "docs/method": 4000, "python/README.md": 2500,
+           "ida_projection/README.md": 2500, "contact/README.md": 2500, "scene/README.md": 2500}
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 GLOSSARY = ROOT / "docs" / "glossary.md"
 SOURCES = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".m"}
@@ -74,6 +77,10 @@ def bad_links(path, text):
 
 def check_document(path, replaced):
     text = path.read_text()
+    name = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else path.name
+    longest = LENGTHS.get(name) or LENGTHS.get(str(pathlib.PurePath(name).parent))
+    if longest and len(text.split()) > longest:
+        yield f"{path}: {len(text.split())} words, {longest} are allowed"
     for line, paragraph in paragraphs(text):
         words = plain(paragraph)
         if len(words.split()) > LONGEST_PARAGRAPH:
