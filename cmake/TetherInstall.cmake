@@ -69,9 +69,37 @@ foreach(library IN ITEMS contact_io contact_collision contact_mpi)
   endif()
 endforeach()
 
+# The standard library of the libraries, which a program must share: standard_library.hpp.in has the numbers.
+string(TOUPPER "CMAKE_CXX_FLAGS_${CMAKE_BUILD_TYPE}" tether_flags)
+separate_arguments(tether_flags UNIX_COMMAND "${CMAKE_CXX_FLAGS} ${${tether_flags}}")
+get_directory_property(tether_definitions COMPILE_DEFINITIONS)
+list(TRANSFORM tether_definitions PREPEND -D)
+file(WRITE ${PROJECT_BINARY_DIR}/package/macros.cpp "#include <cstddef>\n")
+execute_process(COMMAND ${CMAKE_CXX_COMPILER} ${tether_flags} ${tether_definitions} -E -dM
+    ${PROJECT_BINARY_DIR}/package/macros.cpp
+  OUTPUT_VARIABLE tether_macros COMMAND_ERROR_IS_FATAL ANY)
+set(tether_standard_library 0)
+set(tether_standard_library_text "neither libstdc++ nor libc++")
+if(tether_macros MATCHES "#define _LIBCPP_ABI_VERSION ([0-9]+)")
+  math(EXPR tether_standard_library "2000 + ${CMAKE_MATCH_1}")
+  set(tether_standard_library_text "libc++ and _LIBCPP_ABI_VERSION=${CMAKE_MATCH_1}")
+elseif(tether_macros MATCHES "#define _GLIBCXX_USE_CXX11_ABI ([0-9]+)")
+  math(EXPR tether_standard_library "1000 + ${CMAKE_MATCH_1}")
+  set(tether_standard_library_text "_GLIBCXX_USE_CXX11_ABI=${CMAKE_MATCH_1} and without _GLIBCXX_DEBUG")
+  if(tether_macros MATCHES "#define _GLIBCXX_DEBUG[ \n]")
+    math(EXPR tether_standard_library "${tether_standard_library} + 10")
+    string(REPLACE without with tether_standard_library_text "${tether_standard_library_text}")
+  endif()
+endif()
+configure_file(${PROJECT_SOURCE_DIR}/cmake/standard_library.hpp.in
+  ${PROJECT_BINARY_DIR}/package/standard_library.hpp @ONLY)
+tether_components(linalg)
+install(FILES ${PROJECT_BINARY_DIR}/package/standard_library.hpp
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tether COMPONENT ${tether_dev})
+
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/tether-config.cmake.in
   ${PROJECT_BINARY_DIR}/package/tether-config.cmake INSTALL_DESTINATION ${tether_cmake_dir}
-  NO_CHECK_REQUIRED_COMPONENTS_MACRO)
+  PATH_VARS CMAKE_INSTALL_INCLUDEDIR NO_CHECK_REQUIRED_COMPONENTS_MACRO)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/package/tether-config-version.cmake
   COMPATIBILITY SameMinorVersion)
 tether_components(linalg)
@@ -120,17 +148,15 @@ if(TARGET tether_ida_projection)
   # Debian has no sundials.pc, so the include directory is named; the host links its own IDA or IDAS.
   get_target_property(sundials_include tether::sundials_headers INTERFACE_INCLUDE_DIRECTORIES)
   list(TRANSFORM sundials_include PREPEND "-I")
-  # Programs in C link the runtime of C++ with a static library.
-  set(runtime "")
-  if(NOT BUILD_SHARED_LIBS)
-    set(runtime ${CMAKE_CXX_IMPLICIT_LINK_LIBRARIES})
-    list(FILTER runtime INCLUDE REGEX "^(std)?c[+][+]")
-    list(TRANSFORM runtime PREPEND -l)
-  endif()
+  get_property(runtime GLOBAL PROPERTY TETHER_CXX_RUNTIME)
+  list(TRANSFORM runtime PREPEND -l)
   tether_pkg_config(ida_projection "Constraint projection for SUNDIALS IDA and IDAS"
     "tether-linalg = ${PROJECT_VERSION}" CFLAGS ${sundials_include} LIBS ${runtime})
 endif()
 if(TARGET tether_reverse_ida)
+  tether_components(reverse_ida)
+  install(FILES ${PROJECT_SOURCE_DIR}/ida_projection/include/tether/reverse_ida.f90
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tether COMPONENT ${tether_dev})
   set(context "")
   if(NOT BUILD_SHARED_LIBS)
     set(context -lboost_context)

@@ -14,7 +14,7 @@ set -u
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
 cd "$root" || exit 1
 jobs=${JOBS:-$(nproc)}
-rows='gcc clang assertions sanitizers threads scalar native qemu mpi sundials'
+rows='gcc clang assertions sanitizers threads scalar qemu mpi sundials'
 # Fuzzing of files, killing and mutation of the processor take the time of all others.
 left_out='instruction_counts|no_contact_code'
 quick='linalg|builders|bad|criterion|one contact|minimum|projection_(faults|options|consistency|gradients)|stepping:|scene_files|fuzz'
@@ -59,7 +59,6 @@ assertions  assertions of Eigen and of the standard library, all tests
 sanitizers  addresses, leaks, undefined behaviour (tests/sanitize.sh)
 threads     what starts threads under the thread sanitizer (tests/sanitize.sh)
 scalar      contact and scenes without vector instructions
-native      programs with -march=native against libraries without, and other consumers of the package
 qemu        contact on a processor without AVX2 (qemu-user)
 mpi         rows and gradients over processes
 sundials    projection and problems against other SUNDIALS: --sundials DIR
@@ -94,11 +93,6 @@ row_threads() {
 # What runs where there is no AVX2, on any machine.
 row_scalar() {
   build_and_test scalar 'contact:|stepping|scene' -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS=-DTETHER_GROUPS=0
-}
-
-# Programs compiled for the processor at hand against libraries that are not.
-row_native() {
-  build_and_test native 'package' -DCMAKE_BUILD_TYPE=Release
 }
 
 row_qemu() {

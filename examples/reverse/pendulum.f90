@@ -3,67 +3,10 @@
 ! Unknowns x, y, vx, vy and the tension lambda; L = g = m = 1, index 1. IDA asks for F, its Jacobian,
 ! the constraints (length, velocity, energy) and their gradients; no function is given to it. Stops
 ! with 1 if length or energy are not kept over 100 periods.
-module reverse_ida
-  use, intrinsic :: iso_c_binding
+program pendulum
+  use tether_reverse_ida
   implicit none
-  integer(c_int), parameter :: reached = 0, stopped = 1, ask_residual = 2, ask_jacobian = 3, &
-    ask_constraints = 6, ask_constraint_jacobian = 7, linear_jacobian = 1
-
-  ! What the SUNDIALS of this program is: see <tether/ida_projection/sundials_build.h>.
-  type, bind(c) :: sundials_build
-    integer(c_int) :: major, minor, patch, index_bits
-  end type
-
-  interface
-    type(c_ptr) function tether_reverse_new_for(n, t0, y, yp, id, rtol, atol, linear, constraints, &
-        options, host, flag) bind(c)
-      import
-      integer(c_int), value :: n, linear, constraints
-      real(c_double), value :: t0, rtol, atol
-      real(c_double), intent(in) :: y(*), yp(*)
-      type(c_ptr), value :: id, options
-      type(sundials_build), intent(in) :: host
-      integer(c_int), intent(out) :: flag
-    end function
-    subroutine tether_reverse_free(reverse) bind(c)
-      import
-      type(c_ptr), value :: reverse
-    end subroutine
-    integer(c_int) function tether_reverse_solve(reverse, tout, one_step) bind(c)
-      import
-      type(c_ptr), value :: reverse
-      real(c_double), value :: tout
-      integer(c_int), value :: one_step
-    end function
-    integer(c_int) function tether_reverse_go_on(reverse, answer) bind(c)
-      import
-      type(c_ptr), value :: reverse
-      integer(c_int), value :: answer
-    end function
-    real(c_double) function tether_reverse_t(reverse) bind(c)
-      import
-      type(c_ptr), value :: reverse
-    end function
-    real(c_double) function tether_reverse_cj(reverse) bind(c)
-      import
-      type(c_ptr), value :: reverse
-    end function
-    type(c_ptr) function tether_reverse_y(reverse) bind(c)
-      import
-      type(c_ptr), value :: reverse
-    end function
-    type(c_ptr) function tether_reverse_yp(reverse) bind(c)
-      import
-      type(c_ptr), value :: reverse
-    end function
-    type(c_ptr) function tether_reverse_result(reverse) bind(c)
-      import
-      type(c_ptr), value :: reverse
-    end function
-    type(c_ptr) function tether_reverse_ida_mem(reverse) bind(c)
-      import
-      type(c_ptr), value :: reverse
-    end function
+  interface  ! SUNDIALS' own
     integer(c_int) function IDASetMaxNumSteps(ida_mem, steps) bind(c, name="IDASetMaxNumSteps")
       import
       type(c_ptr), value :: ida_mem
@@ -77,14 +20,9 @@ module reverse_ida
       integer(c_int), value :: length
     end function
   end interface
-end module
-
-program pendulum
-  use reverse_ida
-  implicit none
   integer, parameter :: n = 5, m = 3
   real(c_double), parameter :: period = 7.4162987092054876737d0  ! 4 K(1/2)
-  type(sundials_build) :: host
+  type(tether_sundials_build) :: host
   type(c_ptr) :: ida
   integer(c_int) :: ask, flag
   integer :: periods
@@ -96,7 +34,7 @@ program pendulum
 
   flag = SUNDIALSGetVersionNumber(host%major, host%minor, host%patch, label, 32)
   host%index_bits = 64
-  ida = tether_reverse_new_for(n, 0d0, start, slope, c_null_ptr, 1d-6, 1d-6, linear_jacobian, m, &
+  ida = tether_reverse_new_for(n, 0d0, start, slope, c_null_ptr, 1d-6, 1d-6, tether_linear_jacobian, m, &
     c_null_ptr, host, flag)
   if (flag /= 0) stop 1
   flag = IDASetMaxNumSteps(tether_reverse_ida_mem(ida), 1000000_c_long)
@@ -105,10 +43,10 @@ program pendulum
   periods = 1
   do while (periods <= 100)
     ask = tether_reverse_solve(ida, periods * period, 0)
-    do while (ask > stopped)
+    do while (ask > tether_stopped)
       call c_f_pointer(tether_reverse_y(ida), y, [n])
       select case (ask)
-      case (ask_residual)
+      case (tether_ask_residual)
         call c_f_pointer(tether_reverse_yp(ida), yp, [n])
         call c_f_pointer(tether_reverse_result(ida), F, [n])
         F(1) = yp(1) - y(3)
@@ -116,7 +54,7 @@ program pendulum
         F(3) = yp(3) + y(1) * y(5)
         F(4) = yp(4) + y(2) * y(5) + 1
         F(5) = y(3)**2 + y(4)**2 - y(2) - y(5)
-      case (ask_jacobian)
+      case (tether_ask_jacobian)
         call c_f_pointer(tether_reverse_result(ida), J, [n, n])  ! by columns, zero
         cj = tether_reverse_cj(ida)
         J(1, 1) = cj; J(1, 3) = -1
@@ -124,12 +62,12 @@ program pendulum
         J(3, 1) = y(5); J(3, 3) = cj; J(3, 5) = y(1)
         J(4, 2) = y(5); J(4, 4) = cj; J(4, 5) = y(2)
         J(5, 2) = -1; J(5, 3) = 2 * y(3); J(5, 4) = 2 * y(4); J(5, 5) = -1
-      case (ask_constraints)
+      case (tether_ask_constraints)
         call c_f_pointer(tether_reverse_result(ida), F, [m])
         F(1) = (y(1)**2 + y(2)**2 - 1) / 2
         F(2) = y(1) * y(3) + y(2) * y(4)
         F(3) = (y(3)**2 + y(4)**2) / 2 + y(2)
-      case (ask_constraint_jacobian)
+      case (tether_ask_constraint_jacobian)
         call c_f_pointer(tether_reverse_result(ida), C, [n, m])  ! by rows: a gradient a column
         C(1:2, 1) = y(1:2)
         C(1:2, 2) = y(3:4); C(3:4, 2) = y(1:2)
@@ -139,7 +77,7 @@ program pendulum
       end select
       ask = tether_reverse_go_on(ida, 0)
     end do
-    if (ask /= reached) stop 1
+    if (ask /= tether_reached) stop 1
     call c_f_pointer(tether_reverse_y(ida), y, [n])
     length = hypot(y(1), y(2)) - 1
     energy = (y(3)**2 + y(4)**2) / 2 + y(2)

@@ -2,8 +2,8 @@
 # they are position-independent and hide what is not exported, for either kind of library.
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# TETHER_OBJECTS_<library>: the object files, separated by "|". TETHER_OBJECTS_program, _import: those of
-# the program, where that is built. TETHER_COMPILED_HERE: sources, relative to their library, that the
+# TETHER_OBJECTS_<library>: the object files, separated by "|". TETHER_OBJECTS_program, _import, ...: those
+# of programs and modules, where they are built. TETHER_COMPILED_HERE: sources, relative to their library, that the
 # project compiles itself.
 function(tether_take_objects)
   get_property(libraries GLOBAL PROPERTY TETHER_LIBRARIES)
@@ -24,7 +24,7 @@ function(tether_take_objects)
     set_source_files_properties(${objects} TARGET_DIRECTORY tether_${library} PROPERTIES EXTERNAL_OBJECT TRUE)
     set_target_properties(tether_${library} PROPERTIES SOURCES "${objects};${own}" LINKER_LANGUAGE CXX)
   endforeach()
-  foreach(part IN ITEMS program import)
+  foreach(part IN ITEMS program import progress mpi preload)
     if(TARGET tether_${part} AND TETHER_OBJECTS_${part})
       string(REPLACE "|" ";" objects "${TETHER_OBJECTS_${part}}")
       set_source_files_properties(${objects} TARGET_DIRECTORY tether_${part} PROPERTIES EXTERNAL_OBJECT TRUE)

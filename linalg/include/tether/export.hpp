@@ -1,5 +1,10 @@
-// Tether: which symbols the libraries show. SPDX-License-Identifier: BSD-3-Clause
+// Tether: which symbols the libraries show, to whom. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+
+// Part of the installed package only: within one build the options are the same.
+#if __has_include(<tether/standard_library.hpp>)
+#include <tether/standard_library.hpp>
+#endif
 
 /// The libraries are compiled with hidden visibility; the declarations between these two lines of
 /// a public header are visible from outside: functions, and classes with all that belongs to them

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <tether/contact_mpi.hpp>
 
-int main(int argc, char** argv) {
+bool use_contact_mpi() {
   // A ball falls onto the world.
   tether::contact_mpi::Share share;
   share.numbers = {0};
@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   share.bodies[0].inverse_mass = 1;
   share.bodies[0].velocity = {0, 0, -1};
   share.contacts.resize(1);
-  MPI_Init(&argc, &argv);
+  MPI_Init(nullptr, nullptr);
   const std::vector<int> to = tether::contact_mpi::partition(MPI_COMM_WORLD, {0}, {{0, 0, 0}}, {1});
   double speed = 1;
   {
@@ -18,5 +18,5 @@ int main(int argc, char** argv) {
     speed = solver.solve(share).velocities[0].norm();
   }
   MPI_Finalize();
-  return speed < 1e-12 && to[0] == 0 ? 0 : 1;
+  return speed < 1e-12 && to[0] == 0;
 }

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <cstdio>
-#include <tether/scene/files.hpp>
-#include <tether/scene/run.hpp>
+#include <tether/scene.hpp>
 
 namespace ts = tether::scene;
 
@@ -67,4 +66,4 @@ bool refused() {
 
 }  // namespace
 
-int main() { return swings() && falls() && refused() ? 0 : 1; }
+bool use_scene() { return swings() && falls() && refused(); }

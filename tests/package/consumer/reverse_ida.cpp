@@ -5,7 +5,7 @@
 #include <tether/reverse_ida.h>
 #include <tether/reverse_ida.hpp>
 
-int main() {
+bool use_reverse_ida() {
   using tether::reverse_ida::Request;
   tether::reverse_ida::Equations equations;
   equations.y = {1.0};
@@ -18,5 +18,5 @@ int main() {
   }
   const double error = std::abs(ida.y()[0] - std::exp(-1.0));
   std::printf("%s, error %.1e\n", tether::reverse_ida::to_string(request), error);
-  return request == Request::reached && error < 1e-4 && *tether_reverse_last_error() == 0 ? 0 : 1;
+  return request == Request::reached && error < 1e-4 && *tether_reverse_last_error() == 0;
 }

@@ -1,10 +1,10 @@
-// Smallest user of tether::contact_io: a problem written and read again. SPDX-License-Identifier:
-// BSD-3-Clause
+// Smallest user of tether::contact_io: a problem written and read again.
+// SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
-#include <tether/contact.hpp>
 #include <tether/contact/files.hpp>
+#include <tether/contact/solver.hpp>
 
-int main() {
+bool use_contact_io() {
   namespace tc = tether::contact;
   const Eigen::MatrixXd A = 2 * Eigen::MatrixXd::Identity(3, 3);
   const tc::Problem problem =
@@ -14,5 +14,5 @@ int main() {
   const tc::Solution solution = tc::Solver().solve(tc::read_problem(file));
   std::remove(file);
   std::printf("%s; fclib: %s\n", tc::name(solution.status), tc::has_fclib() ? "yes" : "no");
-  return solution.status == tc::Status::solved ? 0 : 1;
+  return solution.status == tc::Status::solved;
 }
