@@ -1,14 +1,17 @@
 // Tether: when and to what the projection is attached. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <memory>
 #include <nvector/nvector_serial.h>
 #include <problems/pendulum.hpp>
 #include <stdexcept>
+#include <string>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "host.hpp"
 #include "linalg/thrown.hpp"
@@ -165,6 +168,106 @@ TEST_CASE("replaced before or during the run: status and statistics say it at on
   }
 }
 
+TEST_CASE("status and statistics change no text that message() returned") {
+  Host host(swing(), 1e-6);
+  host.attach(host.problem.recommended_constraints());
+  SUNNonlinearSolver newton = SUNNonlinSol_Newton(host.y, host.context);
+  REQUIRE(IDASetNonlinearSolver(host.ida, newton) == 0);
+  REQUIRE(host.to(1.0) >= 0);
+  const char* text = host.projection().message().c_str();
+  const std::string before = text;
+  for (const double until : {2.0, 5.0}) {
+    REQUIRE(host.to(until) >= 0);
+    CHECK(host.projection().status() == tp::Status::never_called);
+    host.projection().statistics();
+    CHECK(host.projection().message().c_str() == text);
+  }
+  CHECK(text == before);
+  CHECK(contains(before, "another nonlinear solver"));
+  SUNNonlinSolFree(newton);
+}
+
+TEST_CASE("a Projection that ends before its ida_mem: IDASolve fails, and a new solver cures it") {
+  for (const double until : {0.0, 3.0}) {
+    Host host(swing(), 1e-6);
+    {
+      tp::Options silent;
+      silent.print_fatal = false;
+      tp::Projection local(host.ida, host.problem.recommended_constraints(), silent);
+      if (until > 0.0) REQUIRE(host.to(until) >= 0);
+    }
+    const int flag = host.to(5.0);
+    CHECK(flag == (until > 0.0 ? IDA_NLS_FAIL : IDA_NLS_INIT_FAIL));
+    long iterations = 0;
+    CHECK(IDAGetNumNonlinSolvIters(host.ida, &iterations) == 0);
+    CHECK(IDASetMaxNonlinIters(host.ida, 5) == 0);
+
+    SUNNonlinearSolver newton = SUNNonlinSol_Newton(host.y, host.context);
+    REQUIRE(IDASetNonlinearSolver(host.ida, newton) == 0);
+    REQUIRE(host.restart() == 0);
+    CHECK(host.to(5.0) >= 0);
+    host.attach(host.problem.recommended_constraints());
+    REQUIRE(host.restart() == 0);
+    CHECK(host.finish() >= 0);
+    CHECK(host.projection().status() == tp::Status::success);
+    IDAFree(&host.ida);
+    SUNNonlinSolFree(newton);
+  }
+}
+
+TEST_CASE("a Projection in the place of another one: the first one may end at any time") {
+  Host host(swing(), 1e-6);
+  auto first = std::make_unique<tp::Projection>(host.ida, host.problem.recommended_constraints());
+  host.attach(host.problem.recommended_constraints());
+  first.reset();
+  CHECK(host.finish() >= 0);
+  CHECK(host.projection().status() == tp::Status::success);
+}
+
+TEST_CASE("calls after IDAFree are refused by name") {
+  Host host(swing(), 1e-6);
+  tp::Projection& projection = host.attach(host.problem.recommended_constraints());
+  REQUIRE(host.to(1.0) >= 0);
+  IDAFree(&host.ida);
+  const std::vector<double> before = host.state();
+  const auto refused = [&](const tp::ConsistencyReport& report) {
+    return report.status == tp::Status::misused && contains(report.message, "IDAFree");
+  };
+  CHECK(refused(projection.project(1.0, host.y, host.yp)));
+  CHECK(refused(projection.make_consistent(1.0, host.y, host.yp)));
+  CHECK(refused(projection.project_gradient(1.0, host.y, host.yp)));
+  CHECK(projection.solve(2.0, &host.t, host.y, host.yp, IDA_NORMAL) == IDA_MEM_NULL);
+  CHECK(projection.status() == tp::Status::misused);
+  CHECK(same_bits(host.state(), before));
+}
+
+TEST_CASE("vectors of another length are refused by name, and g does not see them") {
+  Host host(circle(5.0), 1e-6);
+  int least = 2;
+  tp::Constraints rows = on_circle();
+  rows.value = [&least](double, tp::ConstVector y, tp::Vector g) {
+    least = std::min(least, static_cast<int>(y.size()));
+    g[0] = (y.squaredNorm() - 1.0) / 2.0;
+  };
+  tp::Projection& projection = host.attach(rows);
+  for (const sunindextype length : {0, 1, 3}) {
+    N_Vector other = N_VNew_Serial(length, host.context);
+    N_VConst(1.0, other);
+    for (const tp::ConsistencyReport& report :
+         {projection.project(0.0, other), projection.project(0.0, host.y, other),
+          projection.make_consistent(0.0, other, host.yp),
+          projection.make_consistent(0.0, host.y, other),
+          projection.project_gradient(0.0, host.y, other)}) {
+      CHECK(report.status == tp::Status::misused);
+      CHECK(contains(report.message, std::to_string(length) + " entries; y has 2"));
+    }
+    CHECK(projection.solve(1.0, &host.t, other, host.yp, IDA_NORMAL) == IDA_ILL_INPUT);
+    N_VDestroy(other);
+  }
+  CHECK(least == 2);
+  CHECK(host.finish() >= 0);
+}
+
 TEST_CASE("status and statistics after IDAFree: what was last known") {
   Host host(swing(), 1e-6);
   host.attach(host.problem.recommended_constraints());
@@ -234,10 +337,11 @@ TEST_CASE("a Projection can be moved while IDA holds it") {
 }
 
 TEST_CASE("ida_mem that cannot be attached to is refused, and says why") {
-  CHECK(contains(thrown([] { tp::Projection(nullptr, on_circle()); }), "ida_mem is null"));
+  CHECK(
+      contains(thrown([] { const tp::Projection none(nullptr, on_circle()); }), "ida_mem is null"));
   Context context;
   void* fresh = IDACreate(context);
-  CHECK(contains(thrown([&] { tp::Projection(fresh, on_circle()); }), "IDAInit"));
+  CHECK(contains(thrown([&] { const tp::Projection none(fresh, on_circle()); }), "IDAInit"));
   IDAFree(&fresh);
 }
 

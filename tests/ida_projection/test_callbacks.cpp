@@ -4,6 +4,8 @@
 #include <limits>
 #include <nvector/nvector_serial.h>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "host.hpp"
 #include "linalg/thrown.hpp"
@@ -97,6 +99,115 @@ TEST_CASE("an exception does not pass through IDA") {
   }));
   CHECK(odd.flag == IDA_NLS_FAIL);
   CHECK(odd.status == tp::Status::callback_fatal);
+}
+
+TEST_CASE("an exception without text is an exception") {
+  struct Mute : std::exception {
+    const char* what() const noexcept override { return nullptr; }
+  };
+  const Ended end = run(spoilt([](int n, tp::Vector) -> int {
+    if (n >= 30) throw Mute();
+    return 0;
+  }));
+  CHECK(end.flag == IDA_NLS_FAIL);
+  CHECK(end.status == tp::Status::callback_fatal);
+  CHECK(contains(end.message, "what() is null"));
+}
+
+TEST_CASE("rows that write past their count end the run by name") {
+  tp::Constraints too_many = on_circle();
+  too_many.names = {"too many"};
+  too_many.value = [](double, tp::ConstVector y, tp::Vector g) {
+    for (int i = 0; i < 3; ++i) g.data()[i] = (y.squaredNorm() - 1.0) / 2.0;
+  };
+  tp::Constraints by_differences = too_many;
+  by_differences.jacobian = tp::FiniteDifferences();
+  tp::Constraints in_C = on_circle();
+  in_C.names = {"too many"};
+  in_C.jacobian = tp::DenseJacobian([](double, tp::ConstVector y, tp::Matrix C) {
+    for (int k = 0; k < 4; ++k) C.data()[k] = y[k % 2];
+  });
+  tp::Constraints entries = on_circle();
+  entries.names = {"too many"};
+  tp::SparseJacobian sparse{{0, 2}, {0, 1}, {}, {}};
+  sparse.fill = [](double, tp::ConstVector y, tp::Vector values) {
+    for (int k = 0; k < 4; ++k) values.data()[k] = y[k % 2];
+  };
+  entries.jacobian = sparse;
+  for (const tp::Constraints& set : {too_many, by_differences, in_C, entries})
+    for (const tp::Constraints& rows : {set, set + on_circle(), on_circle() + set}) {
+      const Ended end = run(rows);
+      CHECK(end.flag == IDA_NLS_FAIL);
+      CHECK(end.status == tp::Status::callback_fatal);
+      CHECK(contains(end.message, "too many writes past its end: Constraints::count is 1"));
+      CHECK(contains(thrown([&] {
+                       tp::check_jacobian(rows, 0.0, std::vector<double>{1.0, 0.0});
+                     }),
+                     "writes past its end"));
+    }
+}
+
+TEST_CASE("gradients that write past their count end the run by name") {
+  tp::Constraints set;
+  set.count = 1;
+  tp::Gradients gradients;
+  gradients.value = [](double, N_Vector y, double* g) {
+    for (int i = 0; i < 3; ++i) g[i] = (N_VDotProd(y, y) - 1.0) / 2.0;
+  };
+  gradients.fill = [](double, N_Vector y, N_Vector* rows) { N_VScale(1.0, y, rows[0]); };
+  set.jacobian = gradients;
+  const Ended end = run(set);
+  CHECK(end.flag == IDA_NLS_FAIL);
+  CHECK(end.status == tp::Status::callback_fatal);
+  CHECK(contains(end.message, "writes past its end: Constraints::count is 1"));
+}
+
+TEST_CASE("calls of the plugin from its own callbacks are refused by name") {
+  Host host(tether::test::circle(20.0), 1e-6);
+  int calls = 0;
+  std::vector<tp::ConsistencyReport> reports;
+  std::vector<int> flags;
+  tp::Constraints set = on_circle();
+  set.value = [&](double t, tp::ConstVector y, tp::Vector g) {
+    if (++calls == 20) {
+      tp::Projection& projection = host.projection();
+      reports.push_back(projection.make_consistent(t, host.y, host.yp));
+      reports.push_back(projection.project(t, host.y, host.yp));
+      flags.push_back(projection.solve(30.0, &host.t, host.y, host.yp, IDA_NORMAL));
+    }
+    g[0] = (y.squaredNorm() - 1.0) / 2.0;
+  };
+  host.attach(set);
+  CHECK(host.finish() >= 0);
+  REQUIRE(reports.size() == 2);
+  for (const tp::ConsistencyReport& report : reports) {
+    CHECK(report.status == tp::Status::misused);
+    CHECK(contains(report.message, "between the steps"));
+  }
+  CHECK(flags == std::vector<int>{IDA_ILL_INPUT});
+  CHECK(host.projection().status() == tp::Status::success);
+  CHECK(host.error() < 2e-5);
+
+  calls = 17;  // in make_consistent itself
+  reports.clear();
+  CHECK(host.projection().make_consistent(0.0, host.y, host.yp));
+  REQUIRE(reports.size() == 2);
+  CHECK(reports.front().status == tp::Status::misused);
+}
+
+TEST_CASE("IDASolve from a callback of IDASolve ends the run by name") {
+  Host host(tether::test::circle(20.0), 1e-6);
+  int calls = 0, inner = 0;
+  tp::Constraints set = on_circle();
+  set.value = [&](double, tp::ConstVector y, tp::Vector g) {
+    if (++calls == 20) inner = IDASolve(host.ida, 30.0, &host.t, host.y, host.yp, IDA_NORMAL);
+    g[0] = (y.squaredNorm() - 1.0) / 2.0;
+  };
+  tp::Options silent;
+  silent.print_fatal = false;
+  host.attach(set, silent);
+  host.finish();
+  CHECK(inner < 0);
 }
 
 TEST_CASE("a Jacobian that fails or throws") {

@@ -137,6 +137,15 @@ TEST_CASE("make_consistent: ways to y'") {
   }
 }
 
+TEST_CASE("make_consistent: a way to y' that does not exist is refused") {
+  Host host(tether::test::circle(1.0), 1e-6);
+  host.attach(on_circle());
+  tp::Consistency how;
+  how.derivative = static_cast<tp::Consistency::Derivative>(99);
+  CHECK(contains(thrown([&] { host.projection().make_consistent(0.0, host.y, host.yp, how); }),
+                 "derivative = 99"));
+}
+
 TEST_CASE("make_consistent: held components stay") {
   Problem problem = still({1.1, 0.2});
   Host host(problem, 1e-6);

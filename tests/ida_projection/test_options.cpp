@@ -62,6 +62,8 @@ TEST_CASE("bad values: the message names the option and the value") {
   check(refusal_of([](O& o) { o.maximum_order = 6; }), "maximum_order", "6");
   check(refusal_of([](O& o) { o.derive_id_limit = -7; }), "derive_id_limit", "-7");
   check(refusal_of([](O& o) { o.hold = {true, false, false}; }), "hold", "3 entries for 2");
+  check(refusal_of([](O& o) { o.metric = static_cast<tp::Metric>(99); }), "metric", "99");
+  check(refusal_of([](O& o) { o.long_move = static_cast<tp::LongMove>(-1); }), "long_move", "-1");
   check(refusal_of([](O& o) { o.group = {0}; }), "group", "1 entries for 2");
 }
 

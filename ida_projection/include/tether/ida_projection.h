@@ -52,7 +52,8 @@ typedef enum {
   TETHER_SIMULTANEOUS_SENSITIVITIES = -3,
   TETHER_NEVER_CALLED = -4,
   TETHER_INTERNAL_ERROR = -5,
-  TETHER_OUT_OF_MEMORY = -6
+  TETHER_OUT_OF_MEMORY = -6,
+  TETHER_MISUSED = -7
 } tether_status;
 
 /* Text of the last error in this thread; "" if there was none. Valid until the next call. */

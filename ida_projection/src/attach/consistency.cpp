@@ -165,6 +165,10 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
   if (!how.hold.empty() && static_cast<int>(how.hold.size()) != unknowns_.count)
     reject("make_consistent: hold has " + std::to_string(how.hold.size()) + " entries for " +
            std::to_string(unknowns_.count) + " unknowns");
+  if (static_cast<int>(how.derivative) < 0 ||
+      static_cast<int>(how.derivative) > static_cast<int>(Consistency::Derivative::keep))
+    reject("make_consistent: derivative = " + std::to_string(static_cast<int>(how.derivative)) +
+           "; it must be one of Consistency::Derivative");
   if (!movers_.used) return report.status = report_.status = Status::success, report;
 
   int flag = 0;
@@ -253,6 +257,12 @@ void Projection::Impl::current_weights(N_Vector y) {
 
 int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret,
                                         int itask) {
+  const std::string misused = why_misused("solve", {yret, ypret});
+  if (!misused.empty()) {
+    report_.status = Status::misused;
+    report_.message = misused;
+    return lifetime_.over() ? IDA_MEM_NULL : IDA_ILL_INPUT;
+  }
   const int flag = IDASolve(ida_.mem(), tout, tret, yret, ypret, itask);
   if (flag < 0 || !movers_.used) return flag;
   look_for_bypass();
@@ -260,6 +270,7 @@ int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret
   // A step that IDA returns as it is has been projected; what it interpolates has not.
   const Status of_step = report_.status;
   const std::string text = report_.message;
+  const InUse here(in_use_);
   project(*tret, yret, ypret);
   if (report_.status == Status::success) {
     report_.status = of_step;

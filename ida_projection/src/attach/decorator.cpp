@@ -83,6 +83,9 @@ class Projection::Impl::Stopwatch {
 
 int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights, double tolerance,
                             bool call_setup, void* mem) {
+  if (solving_)
+    return finish(Status::misused, "IDASolve was called from a function that IDA is calling");
+  const InUse here(in_use_), solving(solving_);
   ++statistics_.solver_calls;
   polish_.begin();
   if (!run_.initialized)

@@ -1,14 +1,17 @@
 // Tether: the decorator of IDA's nonlinear solver. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/projection.hpp>
 #include <type_traits>
+#include <utility>
 
 #include "host/corrector.hpp"
 #include "host/ida.hpp"
+#include "host/ida_lifetime.hpp"
 #include "host/linear_solver.hpp"
 #include "host/owned_vector.hpp"
 #include "host/sampled_time.hpp"
@@ -58,7 +61,8 @@ class Projection::Impl {
   ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);
 
   const Constraints& constraints() const { return constraints_; }
-  const Report& report();  ///< with what has gone by without the plugin
+  Status status();
+  const std::string& message();  ///< status() and statistics() leave it as it is
   Statistics statistics();
   void reset_statistics();
 
@@ -71,7 +75,35 @@ class Projection::Impl {
   /// The code that IDA gets for an exception, which must not pass through its C functions.
   int caught(Status outcome, const char* text) noexcept;
 
+  /// A call by the host, unless it is one that cannot be answered.
+  template <class Call>
+  ConsistencyReport answer(const char* function, std::initializer_list<N_Vector> vectors,
+                           Call call) {
+    ConsistencyReport report;
+    report.message = why_misused(function, vectors);
+    if (report.message.empty()) {
+      const InUse here(in_use_);
+      return call();
+    }
+    report.status = report_.status = Status::misused;
+    report_.message = report.message;
+    return report;
+  }
+  std::string why_misused(const char* function, std::initializer_list<N_Vector> vectors) const;
+  std::string why_unlike_y(N_Vector v) const;
+
  private:
+  class InUse {
+   public:
+    explicit InUse(bool& flag) : flag_(flag), before_(std::exchange(flag, true)) {}
+    ~InUse() { flag_ = before_; }
+    InUse(const InUse&) = delete;
+    InUse& operator=(const InUse&) = delete;
+
+   private:
+    bool& flag_;
+    bool before_;
+  };
   class Stopwatch;
   struct FreeSolver {
     void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFreeEmpty(solver); }
@@ -201,6 +233,7 @@ class Projection::Impl {
   Options options_;
   Statistics statistics_;
   Ida ida_;
+  IdaLifetime lifetime_;
   Report report_;
   Corrector corrector_;
   AlgebraicVariables variables_;
@@ -220,6 +253,8 @@ class Projection::Impl {
   MetricChoice metric_choice_;
   Run run_;
   Inquiry inquiry_;
+  bool in_use_ = false;   // a call of the plugin is under way
+  bool solving_ = false;  // one of IDA
   Attempts attempts_;
   Tally tally_;
 };

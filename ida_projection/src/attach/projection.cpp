@@ -39,6 +39,8 @@ const char* to_string(Status status) {
       return "never called";
     case Status::out_of_memory:
       return "out of memory";
+    case Status::misused:
+      return "misused";
     case Status::internal_error:
       return "internal error";
   }
@@ -80,7 +82,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),
       watch_{RejectionWatch(constraints_), FirstSteps(constraints_, statistics_),
-             BypassWatch(ida_)},
+             BypassWatch(ida_, lifetime_)},
       wanted_metric_(options_.metric) {
   N_Vector like = vector_of(ida_mem);
   check_running_indices(like);
@@ -128,11 +130,12 @@ void Projection::Impl::attach() {
   require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
   require(SUNNonlinSolSetMaxIters(solver_.get(), corrector_.maximum_iterations()),
           "a number of iterations");
-  if (movers_.used != nullptr)
-    watch_.bypass.begin([this] {
-      std::string ignored;
-      guarded([this] { return look_for_bypass(), 0; }, ignored);
-    });
+  if (movers_.used != nullptr) watch_.bypass.begin();
+  const StepData step = ida_.step();
+  lifetime_.watch(step.y_predicted, step.yp_predicted, [this] {
+    std::string ignored;
+    guarded([this] { return look_for_bypass(), 0; }, ignored);
+  });
   const int flag = IDASetNonlinearSolver(ida_.mem(), solver_.get());
   if (flag != 0)
     reject("IDASetNonlinearSolver returned " + std::to_string(flag) + "; call IDAInit before");
@@ -141,11 +144,41 @@ void Projection::Impl::attach() {
 Projection::Impl::~Impl() {
   std::string ignored;
   guarded([this] { return look_for_bypass(), 0; }, ignored);
+  Operations<Impl>::end(solver_.get(), options_.print_fatal);
+  lifetime_.free_at_end(solver_.release());
 }
 
-const Report& Projection::Impl::report() {
+Status Projection::Impl::status() {
   look_for_bypass();
-  return report_;
+  return watch_.bypass.steps() > 0 ? Status::never_called : report_.told();
+}
+
+const std::string& Projection::Impl::message() {
+  look_for_bypass();
+  return watch_.bypass.steps() > 0 ? watch_.bypass.text() : report_.text();
+}
+
+std::string Projection::Impl::why_misused(const char* function,
+                                          std::initializer_list<N_Vector> vectors) const {
+  const auto name = [&] { return std::string(function) + ": "; };
+  if (lifetime_.over()) return name() + "IDAFree has freed the ida_mem; call it before";
+  if (in_use_)
+    return name() + "called from a function that the plugin is calling; call it between the steps";
+  for (N_Vector v : vectors) {
+    const std::string wrong = v != nullptr ? why_unlike_y(v) : std::string();
+    if (!wrong.empty()) return name() + wrong;
+  }
+  return {};
+}
+
+std::string Projection::Impl::why_unlike_y(N_Vector v) const {
+  const long length = v->ops->nvgetlength != nullptr ? static_cast<long>(N_VGetLength(v)) : 0;
+  if (length != unknowns_.count)
+    return "a vector has " + std::to_string(length) + " entries; y has " +
+           std::to_string(unknowns_.count);
+  if (unknowns_.contiguous && !is_contiguous(v))
+    return "a vector is not contiguous in this process, as those of IDA are";
+  return {};
 }
 
 Statistics Projection::Impl::statistics() {
@@ -176,12 +209,13 @@ Projection& Projection::operator=(Projection&&) noexcept = default;
 
 ConsistencyReport Projection::make_consistent(double t0, N_Vector yy, N_Vector yp,
                                               const Consistency& how) {
-  return impl_->make_consistent(t0, yy, yp, how);
+  return impl_->answer("make_consistent", {yy, yp},
+                       [&] { return impl_->make_consistent(t0, yy, yp, how); });
 }
 void Projection::rows_changed() { impl_->rows_changed(); }
 
 ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
-  return impl_->project(t, yy, yp);
+  return impl_->answer("project", {yy, yp}, [&] { return impl_->project(t, yy, yp); });
 }
 int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask) {
   return impl_->solve_and_project(tout, tret, yret, ypret, itask);
@@ -192,15 +226,17 @@ void Projection::project_sensitivities(Sensitivities sensitivities,
 }
 ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp,
                                                             N_Vector* s, N_Vector* sp) {
-  return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp);
+  return impl_->answer("make_sensitivities_consistent", {yy, yp},
+                       [&] { return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp); });
 }
 ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v) {
-  return impl_->project_gradient(t, yy, v);
+  return impl_->answer("project_gradient", {yy, v},
+                       [&] { return impl_->project_gradient(t, yy, v); });
 }
 Statistics Projection::statistics() const { return impl_->statistics(); }
 void Projection::reset_statistics() { impl_->reset_statistics(); }
-Status Projection::status() const { return impl_->report().told(); }
-const std::string& Projection::message() const { return impl_->report().text(); }
+Status Projection::status() const { return impl_->status(); }
+const std::string& Projection::message() const { return impl_->message(); }
 const Constraints& Projection::constraints() const { return impl_->constraints(); }
 
 }  // namespace tether::ida_projection

@@ -10,9 +10,11 @@ namespace tether::ida_projection {
 void Projection::Impl::project_sensitivities(Sensitivities given,
                                              const tether_idas_functions& idas) {
   if (movers_.used == nullptr) return;  // no constraints
+  const std::string misused = why_misused("project_sensitivities", {});
+  if (!misused.empty()) reject(misused);
   sensitivities_ = std::make_unique<SensitivityCorrector>(
-      SensitivityCorrector::State{constraints_, options_, statistics_, report_, ida_, variables_,
-                                  polish_, movers_.joined, movers_.own, run_.engaged},
+      SensitivityCorrector::State{constraints_, options_, statistics_, report_, ida_, lifetime_,
+                                  variables_, polish_, movers_.joined, movers_.own, run_.engaged},
       std::move(given), idas, ida_.step().y_predicted, unknowns_.contiguous);
 }
 
@@ -26,6 +28,11 @@ ConsistencyReport Projection::Impl::make_sensitivities_consistent(double t0, N_V
     reject("make_sensitivities_consistent: call project_sensitivities before, which knows dg/dp");
   if (yy == nullptr || yp == nullptr || s == nullptr)
     reject("make_sensitivities_consistent: yy, yp and s must not be null");
+  for (int k = 0; k < sensitivities_->count(); ++k)
+    for (N_Vector v : {s[k], sp != nullptr ? sp[k] : s[k]})
+      if (v == nullptr || !why_unlike_y(v).empty())
+        reject("make_sensitivities_consistent: vector " + std::to_string(k) + " of s or sp " +
+               (v == nullptr ? "is null" : "is unlike y: " + why_unlike_y(v)));
   current_weights(yy);
   sensitivities_->make_consistent(t0, yy, yp, unknowns_.weights, s, sp, report);
   report_.status = report.status;

@@ -163,6 +163,13 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
     if (!refusal.empty()) reject(refusal);
   }
 
+  const auto check_kind = [](int value, int last, const char* name) {
+    if (value < 0 || value > last)
+      reject(std::string("options.") + name + " = " + std::to_string(value) + "; it must be 0 .. " +
+             std::to_string(last));
+  };
+  check_kind(static_cast<int>(options.metric), static_cast<int>(Metric::automatic), "metric");
+  check_kind(static_cast<int>(options.long_move), static_cast<int>(LongMove::cap), "long_move");
   require(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0 (tolerances)");
   require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,
           ">= 1");

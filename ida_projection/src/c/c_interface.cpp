@@ -33,6 +33,7 @@ using ip::c::null;
 
 static_assert(int(ip::Status::doubtful) == TETHER_DOUBTFUL &&
               int(ip::Status::out_of_memory) == TETHER_OUT_OF_MEMORY &&
+              int(ip::Status::misused) == TETHER_MISUSED &&
               int(ip::Metric::automatic) == TETHER_METRIC_AUTOMATIC &&
               int(ip::LongMove::cap) == TETHER_LONG_MOVE_CAP);
 
@@ -390,7 +391,12 @@ int tether_get_status(const tether_projection* projection) {
 }
 
 const char* tether_get_message(const tether_projection* projection) {
-  return projection == nullptr ? "" : projection->projection.message().c_str();
+  const char* message = "";
+  guarded([&] {
+    if (projection != nullptr) message = projection->projection.message().c_str();
+    return 0;
+  });
+  return message;
 }
 
 int tether_get_statistic(const tether_projection* projection, const char* name, double* value) {

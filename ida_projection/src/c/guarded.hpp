@@ -14,7 +14,8 @@ namespace tether::ida_projection::c {
 inline thread_local char last_error[2048];
 
 inline int fail(int flag, const char* text) noexcept {
-  std::strncpy(last_error, text, sizeof last_error - 1);
+  std::strncpy(last_error, text != nullptr ? text : "an exception whose what() is null",
+               sizeof last_error - 1);
   return flag;
 }
 

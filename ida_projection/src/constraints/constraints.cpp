@@ -144,6 +144,7 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
     throw std::invalid_argument(
         std::string("check_jacobian: rows are given as ") + kind(constraints) +
         "; it works for DenseJacobian, SparseJacobian and FiniteDifferences");
+  if (y.size() == 0) throw std::invalid_argument("check_jacobian: y has no entries");
   const std::string refusal = wrong_length(constraints, static_cast<long>(y.size()));
   if (!refusal.empty()) throw std::invalid_argument("check_jacobian: " + refusal);
   Statistics counts;

@@ -42,6 +42,21 @@ bool has_rows_without_entries(const Constraints& set) {
 
 }  // namespace
 
+double* GuardedRoom::begin(const double* values, std::ptrdiff_t count, std::ptrdiff_t more) {
+  const auto size = static_cast<std::size_t>(count + std::max(more, kLeast));
+  if (room_.size() < size) room_.resize(size);
+  std::copy(values, values + count, room_.begin());
+  std::fill_n(room_.begin() + count, kLookedAt, kUnwritten);
+  return room_.data();
+}
+
+bool GuardedRoom::end(double* values, std::ptrdiff_t count) const {
+  if (static_cast<std::ptrdiff_t>(room_.size()) < count + kLookedAt) return true;  // no memory
+  std::copy_n(room_.begin(), count, values);
+  const auto behind = room_.begin() + count;
+  return std::all_of(behind, behind + kLookedAt, [](double x) { return x == kUnwritten; });
+}
+
 bool all_finite(const double* a, std::size_t n) {
   return first_not_finite(a, static_cast<long>(n)) < 0;
 }
@@ -85,11 +100,29 @@ void Evaluator::flatten(const Constraints& set) {
   for (const Constraints& part : set.joined) flatten(part);
 }
 
+template <class Fill>
+int Evaluator::write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries,
+                     Fill&& fill) {
+  const std::ptrdiff_t count = part.set->count;
+  const bool look_at_C = C != nullptr && !part.C_looked_at;
+  double* to = nullptr;
+  if (g != nullptr) to = g_room_.begin(g, count, std::max<std::ptrdiff_t>(count, n));
+  const int flag = fill(to, look_at_C ? C_room_.begin(C, entries, entries + n) : C);
+  if (g != nullptr && !g_room_.end(g, count)) overrun_ = true;
+  if (look_at_C && !C_room_.end(C, entries)) overrun_ = true;
+  part.C_looked_at |= look_at_C;
+  return overrun_ ? -1 : flag;
+}
+
 Status Evaluator::checked(int flag, const char* what, const Part& part) {
   if (flag == 0) return Status::success;
-  message_ = std::string(what) + " of " + constraints_.name(part.first_row) +
-             (thrown_.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown_);
+  message_ =
+      std::string(what) + " of " + constraints_.name(part.first_row) +
+      (overrun_ ? " writes past its end: Constraints::count is " + std::to_string(part.set->count)
+       : thrown_.empty() ? " returned " + std::to_string(flag)
+                         : " threw: " + thrown_);
   thrown_.clear();
+  overrun_ = false;
   if (flag < 0) fatal_ = true;
   return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
 }
@@ -103,7 +136,9 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
         int told = 0;
         for (const Part& part : parts_) {
           at = &part;
-          told = part.set->value(t, ConstVector(y, n), Vector(g + part.first_row, part.set->count));
+          told = write(part, n, g + part.first_row, nullptr, 0, [&](double* to, double*) {
+            return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
+          });
           if (told != 0) break;
         }
         return told;
@@ -115,7 +150,9 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
 Status Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
   const int flag = guarded(
       [&] {
-        return part.set->value(t, ConstVector(y, n), Vector(g + part.first_row, part.set->count));
+        return write(part, n, g + part.first_row, nullptr, 0, [&](double* to, double*) {
+          return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
+        });
       },
       thrown_);
   return flag == 0 ? Status::success : checked(flag, "value", part);
@@ -141,11 +178,14 @@ Status Evaluator::dense(const Part& part, double t, const double* y, int n, cons
                         const std::vector<int>& columns, double* C, double* g) {
   const DenseJacobian* given = part.dense;
   const int count = part.set->count;
+  const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(count) * n;
   if (g != nullptr && given != nullptr && given->fill_with_value) {
     const int flag = guarded(
         [&] {
-          return given->fill_with_value(t, ConstVector(y, n), Vector(g + part.first_row, count),
-                                        Matrix(C, count, n));
+          return write(part, n, g + part.first_row, C, size, [&](double* to, double* entries) {
+            return given->fill_with_value(t, ConstVector(y, n), Vector(to, count),
+                                          Matrix(entries, count, n));
+          });
         },
         thrown_);
     return flag == 0 ? Status::success : checked(flag, "value with jacobian", part);
@@ -155,8 +195,13 @@ Status Evaluator::dense(const Part& part, double t, const double* y, int n, cons
     if (status != Status::success) return status;
   }
   if (given == nullptr) return differences(part, t, y, n, scale, columns, C);
-  const int flag =
-      guarded([&] { return given->fill(t, ConstVector(y, n), Matrix(C, count, n)); }, thrown_);
+  const int flag = guarded(
+      [&] {
+        return write(part, n, nullptr, C, size, [&](double*, double* entries) {
+          return given->fill(t, ConstVector(y, n), Matrix(entries, count, n));
+        });
+      },
+      thrown_);
   return flag == 0 ? Status::success : checked(flag, "jacobian", part);
 }
 
@@ -167,9 +212,10 @@ Status Evaluator::sparse(const Part& part, double t, const double* y, int n, dou
   if (g != nullptr && given.fill_with_value) {
     const int flag = guarded(
         [&] {
-          return given.fill_with_value(t, ConstVector(y, n),
-                                       Vector(g + part.first_row, part.set->count),
-                                       Vector(entries, count));
+          return write(part, n, g + part.first_row, entries, count, [&](double* to, double* C) {
+            return given.fill_with_value(t, ConstVector(y, n), Vector(to, part.set->count),
+                                         Vector(C, count));
+          });
         },
         thrown_);
     return flag == 0 ? Status::success : checked(flag, "value with jacobian", part);
@@ -178,8 +224,13 @@ Status Evaluator::sparse(const Part& part, double t, const double* y, int n, dou
     const Status status = value_of(part, t, y, n, g);
     if (status != Status::success) return status;
   }
-  const int flag =
-      guarded([&] { return given.fill(t, ConstVector(y, n), Vector(entries, count)); }, thrown_);
+  const int flag = guarded(
+      [&] {
+        return write(part, n, nullptr, entries, count, [&](double*, double* C) {
+          return given.fill(t, ConstVector(y, n), Vector(C, count));
+        });
+      },
+      thrown_);
   return flag == 0 ? Status::success : checked(flag, "jacobian", part);
 }
 
@@ -215,18 +266,27 @@ Status Evaluator::dense_parts(double t, const double* y, int n, double* C, doubl
         for (const Part& part : parts_) {
           at = &part;
           const int count = part.set->count;
-          const Matrix block(C + static_cast<std::ptrdiff_t>(part.first_row) * n, count, n);
+          const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(count) * n;
+          double* const block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
+          double* const value = g != nullptr ? g + part.first_row : nullptr;
           if (g != nullptr && part.dense->fill_with_value) {
             what = "value with jacobian";
-            told = part.dense->fill_with_value(t, point, Vector(g + part.first_row, count), block);
+            told = write(part, n, value, block, size, [&](double* to, double* entries) {
+              return part.dense->fill_with_value(t, point, Vector(to, count),
+                                                 Matrix(entries, count, n));
+            });
           } else {
             if (g != nullptr) {
               what = "value";
-              told = part.set->value(t, point, Vector(g + part.first_row, count));
+              told = write(part, n, value, nullptr, 0, [&](double* to, double*) {
+                return part.set->value(t, point, Vector(to, count));
+              });
               if (told != 0) break;
             }
             what = "jacobian";
-            told = part.dense->fill(t, point, block);
+            told = write(part, n, nullptr, block, size, [&](double*, double* entries) {
+              return part.dense->fill(t, point, Matrix(entries, count, n));
+            });
           }
           if (told != 0) break;
         }
@@ -277,8 +337,13 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
   const int m = part.set->count;
   const auto evaluate = [&](const double* at, double* g) {
     ++statistics_.value_evaluations;
-    const int flag =
-        guarded([&] { return part.set->value(t, ConstVector(at, n), Vector(g, m)); }, thrown_);
+    const int flag = guarded(
+        [&] {
+          return write(part, n, g, nullptr, 0, [&](double* to, double*) {
+            return part.set->value(t, ConstVector(at, n), Vector(to, m));
+          });
+        },
+        thrown_);
     return checked(flag, "value (differences)", part);
   };
 
@@ -315,7 +380,11 @@ void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
       if (fatal_) return false;
       ++statistics_.value_evaluations;
       const int flag = guarded(
-          [&] { return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(g, m)); },
+          [&] {
+            return write(part, n, g, nullptr, 0, [&](double* to, double*) {
+              return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(to, m));
+            });
+          },
           thrown_);
       return checked(flag, "value", part) == Status::success;
     };

@@ -12,6 +12,12 @@
 
 namespace tether::ida_projection {
 
+/// what() may be null.
+inline const char* text_of(const std::exception& e) noexcept {
+  const char* text = e.what();
+  return text != nullptr ? text : "an exception whose what() is null";
+}
+
 /// Runs a user callback: no exception leaves it. Returns the callback's int; `message` receives
 /// the text of an exception, which counts as fatal.
 template <class Call>
@@ -20,7 +26,7 @@ int guarded(Call&& call, std::string& message) noexcept {
     return call();
   } catch (const std::exception& e) {
     try {
-      message = e.what();
+      message = text_of(e);
     } catch (...) {
     }
     return -1;
@@ -42,6 +48,20 @@ bool has_values(const Constraints& set);
 std::string wrong_length(const Constraints& set, long unknowns);
 
 bool all_finite(const double* a, std::size_t n);
+
+/// Room in which a callback may write more than it should without harm, and is found out.
+class GuardedRoom {
+ public:
+  /// Where to write `count` values, which now are `values`; `more`: how many too many do no harm.
+  double* begin(const double* values, std::ptrdiff_t count, std::ptrdiff_t more);
+  /// Copies them back; false: more were written.
+  bool end(double* values, std::ptrdiff_t count) const;
+
+ private:
+  static constexpr double kUnwritten = 3.0517578125e-300;  // unlikely in g
+  static constexpr std::ptrdiff_t kLeast = 64, kLookedAt = 4;
+  std::vector<double> room_;
+};
 
 /// g and C of a set and of everything joined to it, as one system of m rows.
 class Evaluator {
@@ -77,6 +97,7 @@ class Evaluator {
     int first_row;
     const DenseJacobian* dense = std::get_if<DenseJacobian>(&set->jacobian);
     const SparseJacobian* sparse = std::get_if<SparseJacobian>(&set->jacobian);
+    mutable bool C_looked_at = false;
   };
   const std::vector<Part>& parts() const { return parts_; }
 
@@ -103,6 +124,10 @@ class Evaluator {
   }
   Status not_finite(double t, const double* g);
   Status dense_parts(double t, const double* y, int n, double* C, double* g);
+  /// A callback that writes g, C (`entries` of it) or both, with room behind them for what it
+  /// writes too much, which ends the run. C, whose copy would cost, is looked at the first time.
+  template <class Fill>
+  int write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries, Fill&& fill);
   Status value_of(const Part& part, double t, const double* y, int n, double* g);
   void count(bool with_value);
   Status dense(const Part& part, double t, const double* y, int n, const double* scale,
@@ -115,12 +140,14 @@ class Evaluator {
   const Constraints& constraints_;
   Statistics& statistics_;
   std::vector<Part> parts_;
+  GuardedRoom g_room_, C_room_;
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string message_, thrown_;
   int rows_ = 0;
   bool uses_differences_ = false, gives_both_ = false;
   bool all_dense_ = true;  // each part has a DenseJacobian
   bool fatal_ = false;
+  bool overrun_ = false;
 };
 
 }  // namespace tether::ida_projection

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct Watched {
   N_Vector (*clone)(N_Vector);
   N_Vector (*clone_empty)(N_Vector);
   std::vector<IdaLifetime*> watchers;
+  std::vector<SUNNonlinearSolver> solvers;  // to be freed with it
 
   void restore(N_Vector v) const {
     v->ops->nvdestroy = destroy;
@@ -49,7 +51,7 @@ void IdaLifetime::watch(N_Vector one, N_Vector other, std::function<void()> at_e
     entry->watchers.push_back(this);
   } else {
     const N_Vector_Ops own = one->ops;
-    watched().push_back({one, own->nvdestroy, own->nvclone, own->nvcloneempty, {this}});
+    watched().push_back({one, own->nvdestroy, own->nvclone, own->nvcloneempty, {this}, {}});
     replace(one);
   }
   vector_ = one;
@@ -67,9 +69,21 @@ IdaLifetime::~IdaLifetime() {
   const auto entry = find(vector_);
   auto& watchers = entry->watchers;
   watchers.erase(std::remove(watchers.begin(), watchers.end(), this), watchers.end());
-  if (!watchers.empty()) return;
+  if (!watchers.empty() || !entry->solvers.empty()) return;
   entry->restore(vector_);
   watched().erase(entry);
+}
+
+void IdaLifetime::free_at_end(SUNNonlinearSolver solver) const noexcept {
+  if (over_) {
+    SUNNonlinSolFreeEmpty(solver);
+  } else if (alive()) {
+    const std::lock_guard<std::mutex> lock(guard());
+    try {
+      find(vector_)->solvers.push_back(solver);
+    } catch (const std::bad_alloc&) {  // it stays
+    }
+  }
 }
 
 void IdaLifetime::destroy(N_Vector v) {
@@ -83,7 +97,9 @@ void IdaLifetime::destroy(N_Vector v) {
   for (IdaLifetime* watcher : entry.watchers) {
     watcher->at_end_();
     watcher->vector_ = nullptr;
+    watcher->over_ = true;
   }
+  for (SUNNonlinearSolver solver : entry.solvers) SUNNonlinSolFreeEmpty(solver);
   entry.restore(v);
   entry.destroy(v);
 }

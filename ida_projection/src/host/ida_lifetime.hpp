@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
 
 namespace tether::ida_projection {
@@ -21,6 +22,10 @@ class IdaLifetime {
   void watch(N_Vector one, N_Vector other, std::function<void()> at_end);
   /// Is ida_mem certainly there?
   bool alive() const { return vector_ != nullptr; }
+  /// Was IDAFree certainly called?
+  bool over() const { return over_; }
+  /// Frees `solver`, which IDA may still call, together with IDA; never where nothing is watched.
+  void free_at_end(SUNNonlinearSolver solver) const noexcept;
 
  private:
   static void replace(N_Vector v);
@@ -29,6 +34,7 @@ class IdaLifetime {
   static N_Vector clone_empty(N_Vector v);
 
   N_Vector vector_ = nullptr;  // watched; null: nothing is, or it is gone
+  bool over_ = false;
   std::function<void()> at_end_;
 };
 

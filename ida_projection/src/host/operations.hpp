@@ -2,13 +2,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdio>
 #include <exception>
 #include <new>
 #include <sundials/sundials_config.h>
 #include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/projection.hpp>
 
+#include "constraints/evaluator.hpp"
 #include "host/corrector.hpp"
+#include "watch/report.hpp"
 
 namespace tether::ida_projection {
 
@@ -38,7 +41,34 @@ class Operations {
     return solver;
   }
 
+  /// The owner ends before IDA, which keeps a pointer to the solver: any further step fails by
+  /// name.
+  static void end(SUNNonlinearSolver solver, bool prints) noexcept {
+    solver->content = prints ? solver : nullptr;
+    *solver->ops = _generic_SUNNonlinearSolver_Ops{};  // SUNDIALS takes what is missing for done
+    solver->ops->gettype = [](SUNNonlinearSolver) { return SUNNONLINEARSOLVER_ROOTFIND; };
+    solver->ops->initialize = ended;
+    solver->ops->solve = [](SUNNonlinearSolver s, N_Vector, N_Vector, N_Vector, sunrealtype,
+                            Boolean, void*) { return ended(s); };
+  }
+
  private:
+#if SUNDIALS_VERSION_MAJOR >= 7
+  using Boolean = sunbooleantype;
+#else
+  using Boolean = booleantype;
+#endif
+
+  static int ended(SUNNonlinearSolver solver) {
+    if (solver->content != nullptr)
+      std::fprintf(
+          stderr,
+          "tether: the Projection of this ida_mem has ended, and IDA asks it for a step: "
+          "keep it until IDAFree, or attach another nonlinear solver and call IDAReInit\n");
+    solver->content = nullptr;
+    return kFatal;
+  }
+
   static Owner& self(SUNNonlinearSolver solver) { return *static_cast<Owner*>(solver->content); }
 
   // No exception passes through IDA's C functions. SUNDIALS' solvers are C as well, and what a C++
@@ -51,7 +81,7 @@ class Operations {
     } catch (const std::bad_alloc&) {
       return ours.caught(Status::out_of_memory, "not enough memory for the projection");
     } catch (const std::exception& e) {
-      return ours.caught(Status::callback_fatal, e.what());
+      return ours.caught(Status::callback_fatal, text_of(e));
     } catch (...) {
       return ours.caught(Status::callback_fatal, "a callback threw what is no std::exception");
     }
@@ -68,13 +98,7 @@ class Operations {
         s, [&](Owner& ours) { return SUNNonlinSolSetup(ours.corrector().inner(), y, mem); });
   }
   static int solve(SUNNonlinearSolver s, N_Vector y0, N_Vector ycor, N_Vector w,
-                   sunrealtype tolerance,
-#if SUNDIALS_VERSION_MAJOR >= 7
-                   sunbooleantype call_setup,
-#else
-                   booleantype call_setup,
-#endif
-                   void* mem) {
+                   sunrealtype tolerance, Boolean call_setup, void* mem) {
     return shielded(
         s, [&](Owner& ours) { return ours.solve(y0, ycor, w, tolerance, call_setup != 0, mem); });
   }

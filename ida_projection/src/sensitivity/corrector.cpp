@@ -89,6 +89,11 @@ SensitivityCorrector::SensitivityCorrector(const State& state, Sensitivities giv
            "STAGGERED1");
 }
 
+SensitivityCorrector::~SensitivityCorrector() {
+  Operations<SensitivityCorrector>::end(solver_.get(), state_.options.print_fatal);
+  state_.lifetime.free_at_end(solver_.release());
+}
+
 void SensitivityCorrector::forget_run() {
   engaged_ = false;
   moved_ = nullptr;

@@ -9,6 +9,7 @@
 
 #include "host/corrector.hpp"
 #include "host/ida.hpp"
+#include "host/ida_lifetime.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "movers/vector/vector_metric.hpp"
@@ -37,6 +38,7 @@ class SensitivityCorrector {
     Statistics& statistics;
     Report& report;
     Ida& ida;
+    const IdaLifetime& lifetime;
     AlgebraicVariables& variables;
     Polish& polish;
     JoinedRows& joined;
@@ -47,6 +49,9 @@ class SensitivityCorrector {
   /// `like`: a vector of the state. Throws std::invalid_argument.
   SensitivityCorrector(const State& state, Sensitivities given, const tether_idas_functions& idas,
                        N_Vector like, bool contiguous);
+  ~SensitivityCorrector();
+  SensitivityCorrector(const SensitivityCorrector&) = delete;
+  SensitivityCorrector& operator=(const SensitivityCorrector&) = delete;
 
   /// A new run of the state begins.
   void forget_run();

@@ -4,11 +4,9 @@
 
 namespace tether::ida_projection {
 
-void BypassWatch::begin(std::function<void()> at_end) {
+void BypassWatch::begin() {
   watching_ = true;
   steps_at_attach_ = ida_.steps();
-  const StepData step = ida_.step();
-  lifetime_.watch(step.y_predicted, step.yp_predicted, std::move(at_end));
 }
 
 // After an attempt IDA has accepted at most one step that the plugin has not heard of: IDA's count
@@ -23,17 +21,14 @@ long BypassWatch::steps_without_plugin(long last_steps, bool initialized) const 
   return begun_anew ? steps : steps_unseen_;
 }
 
-void BypassWatch::look(long last_steps, bool initialized, Report& report) {
+void BypassWatch::look(long last_steps, bool initialized, const Report& report) {
   steps_unseen_ = steps_without_plugin(last_steps, initialized);
-  if (steps_unseen_ == 0) return;
-  report.status = Status::never_called;
-  report.message =
-      "IDA took " + std::to_string(steps_unseen_) +
-      " steps without the plugin, which projected none of them: another nonlinear solver was "
-      "attached after it; make the Projection last, or hand that solver over in "
-      "Options::nonlinear_solver";
-  if (!said_) report.say(report.message);
-  said_ = true;
+  if (steps_unseen_ == 0 || !text_.empty()) return;
+  text_ = "IDA took " + std::to_string(steps_unseen_) +
+          " steps without the plugin, which projected none of them: another nonlinear solver was "
+          "attached after it; make the Projection last, or hand that solver over in "
+          "Options::nonlinear_solver";
+  report.say(text_);
 }
 
 }  // namespace tether::ida_projection

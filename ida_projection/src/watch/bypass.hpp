@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
-
 #include "host/ida.hpp"
 #include "host/ida_lifetime.hpp"
 #include "watch/report.hpp"
@@ -13,23 +11,23 @@ namespace tether::ida_projection {
 /// Compares IDA's count of steps with the attempts that the plugin has seen.
 class BypassWatch {
  public:
-  explicit BypassWatch(const Ida& ida) : ida_(ida) {}
+  BypassWatch(const Ida& ida, const IdaLifetime& lifetime) : ida_(ida), lifetime_(lifetime) {}
 
-  /// At attachment; `at_end` is called once more before IDA is freed.
-  void begin(std::function<void()> at_end);
-  /// `last_steps`: accepted before the last attempt; none seen: -1. Status and text once a step
-  /// went by; said once.
-  void look(long last_steps, bool initialized, Report& report);
+  void begin();  ///< at attachment
+  /// `last_steps`: accepted before the last attempt; none seen: -1. Said once.
+  void look(long last_steps, bool initialized, const Report& report);
   long steps() const { return steps_unseen_; }
+  /// What to do about it, once a step went by; it then stays as it is.
+  const std::string& text() const { return text_; }
 
  private:
   long steps_without_plugin(long last_steps, bool initialized) const;
 
   const Ida& ida_;
-  IdaLifetime lifetime_;
+  const IdaLifetime& lifetime_;
   bool watching_ = false;
   long steps_at_attach_ = 0, steps_unseen_ = 0;
-  bool said_ = false;
+  std::string text_;
 };
 
 }  // namespace tether::ida_projection

@@ -37,6 +37,7 @@ enum class Status {
   never_called = -4,  ///< IDA took steps without the plugin: another solver was attached later
   internal_error = -5,
   out_of_memory = -6,  ///< memory ran out inside IDA's call; IDAReInit starts anew
+  misused = -7,        ///< a call that cannot be answered, which changed nothing; message tells why
 };
 
 const char* to_string(Status status);
@@ -80,7 +81,8 @@ struct Consistency {
 
 /// Constraint projection inside IDA: decorates IDA's nonlinear solver, so that every candidate
 /// y = ypred + ycor is moved onto g(t, y) = 0 before IDA tests its error and accepts it
-/// (Hanson and Krogh). The object must live until IDAFree or the last IDASolve, whichever is first.
+/// (Hanson and Krogh). The object must live until IDAFree or the last IDASolve, whichever is first;
+/// IDASolve without it fails (IDA_NLS_FAIL, before the first step IDA_NLS_INIT_FAIL).
 /// A nonlinear solver that the host attaches later replaces it silently. status(), message(),
 /// statistics(), IDAFree and the destructor therefore compare IDA's steps with the calls that the
 /// plugin has had; a difference is printed once to stderr (Options::print_warnings).
@@ -88,13 +90,13 @@ struct Consistency {
 /// One call to add, after IDAInit and before IDACalcIC and the first IDASolve:
 ///
 ///     tether::ida_projection::Projection projection(ida_mem, constraints);
-class Projection {
+class [[nodiscard]] Projection {
  public:
   /// ida_mem: from IDACreate, after IDAInit; tolerances and linear solver may come later.
   /// Throws std::invalid_argument, naming the argument and its value, and std::runtime_error if the
   /// SUNDIALS that runs is not the one that the library was compiled with, std::bad_alloc without
   /// memory; leaves IDA as it was.
-  Projection(void* ida_mem, Constraints constraints, Options options = {})
+  [[nodiscard]] Projection(void* ida_mem, Constraints constraints, Options options = {})
       : Projection(ida_mem, std::move(constraints), std::move(options), TETHER_SUNDIALS_BUILD) {}
   ~Projection();
   Projection(Projection&&) noexcept;

@@ -7,7 +7,6 @@
 #include <numeric>
 #include <tether/linalg/index.hpp>
 
-#include "constraints/evaluator.hpp"
 #include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
@@ -124,10 +123,13 @@ Status DistributedStore::value(double t, N_Vector y) {
     note(guarded(
              [&] {
                return constraints_.value(t, ConstVector(y_.data(), n_ + ghosts_),
-                                         Vector(g_.data(), m_));
+                                         Vector(room_.begin(g_.data(), m_, m_), m_));
              },
              thrown),
          "Constraints::value", thrown);
+  if (m_ > 0 && !room_.end(g_.data(), m_))
+    note(-1, "Constraints::value",
+         "it writes past its end: Constraints::count is " + std::to_string(m_));
   double drift = 0.0;
   for (int i = 0; i < m_ && own_outcome_ == Status::success; ++i) {
     if (!std::isfinite(g_[at(i)])) {

@@ -9,6 +9,7 @@
 #include <tether/linalg/sparse_minimum_norm.hpp>
 #include <vector>
 
+#include "constraints/evaluator.hpp"
 #include "movers/vector/border.hpp"
 #include "movers/vector/rows_report.hpp"
 #include "movers/vector/vector_metric.hpp"
@@ -76,7 +77,8 @@ class DistributedStore {
   Border border_;
   std::vector<int> place_;  // of each entry of the solver: the caller's, whose order is free
   Numbers entries_, y_, D_, v_, dy_;
-  Numbers g_, linear_;                  // g, and C v
+  Numbers g_, linear_;  // g, and C v
+  GuardedRoom room_;
   Numbers terms_, norm_;                // sum_j |C_ij y_j|, |row_i(C WT)|
   OwnedVector signal_, r_, p_, q_, u_;  // signal_: 0 but for the first entry of each process
   Status own_outcome_ = Status::success;

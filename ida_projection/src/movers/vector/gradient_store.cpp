@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "constraints/evaluator.hpp"
 #include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
@@ -22,7 +21,7 @@ GradientStore::GradientStore(const Constraints& constraints, Statistics& statist
 
 // Returns the number of the row after those of the set.
 int GradientStore::flatten(const Constraints& set, int first) {
-  if (set.count > 0) parts_.push_back({&std::get<Gradients>(set.jacobian), first});
+  if (set.count > 0) parts_.push_back({&std::get<Gradients>(set.jacobian), first, set.count});
   first += set.count;
   for (const Constraints& part : set.joined) first = flatten(part, first);
   return first;
@@ -39,8 +38,12 @@ Status GradientStore::value(double t, N_Vector y) {
   ++statistics_.value_evaluations;
   std::string thrown;
   for (const Part& part : parts_) {
-    const int flag =
-        guarded([&] { return part.rows->value(t, y, g_.data() + part.first); }, thrown);
+    double* const g = g_.data() + part.first;
+    double* const to = room_.begin(g, part.count, part.count);
+    const int flag = guarded([&] { return part.rows->value(t, y, to); }, thrown);
+    if (!room_.end(g, part.count))
+      return failed(-1, "Gradients::value",
+                    "it writes past its end: Constraints::count is " + std::to_string(part.count));
     if (flag != 0) return failed(flag, "Gradients::value", thrown);
   }
   for (int i = 0; i < rows_.rows(); ++i)

@@ -7,6 +7,7 @@
 #include <tether/ida_projection/statistics.hpp>
 #include <vector>
 
+#include "constraints/evaluator.hpp"
 #include "movers/vector/rows_report.hpp"
 #include "movers/vector/vector_metric.hpp"
 #include "rows/gradient_rows.hpp"
@@ -46,7 +47,7 @@ class GradientStore {
  private:
   struct Part {
     const Gradients* rows;
-    int first;
+    int first, count;
   };
 
   int flatten(const Constraints& set, int first);
@@ -58,6 +59,7 @@ class GradientStore {
   OwnedVector work_;
   GradientRows rows_;
   std::vector<double> g_;
+  GuardedRoom room_;
   std::vector<double> terms_;  // sum_j |C_ij y_j|
 };
 
