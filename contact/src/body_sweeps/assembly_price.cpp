@@ -77,8 +77,10 @@ double AssemblyPrice::factorisation() {
   return factorisation_;
 }
 
+double AssemblyPrice::sweep(int contacts) { return kBodySweep * contacts; }
+
 double AssemblyPrice::sweeps() {
-  return (kAssembly * blocks_ + kSteps * factorisation()) / (kBodySweep * island_.contacts);
+  return (kAssembly * blocks_ + kSteps * factorisation()) / sweep(island_.contacts);
 }
 
 bool AssemblyPrice::within(double work) {

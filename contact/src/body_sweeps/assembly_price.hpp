@@ -14,6 +14,8 @@ class AssemblyPrice {
   AssemblyPrice(const ContactGraph& graph, const Island& island, const std::vector<int>& first,
                 const std::vector<int>& second);
 
+  // Cost of a sweep over the bodies.
+  static double sweep(int contacts);
   // Cost of a solution by few factorisations, in sweeps over the bodies.
   double sweeps();
   // Whether `work` suffices for the stages of Solver to get anywhere.

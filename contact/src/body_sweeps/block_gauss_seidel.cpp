@@ -42,23 +42,28 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
   return r;
 }
 
-// Sweeps until the island is solved, max_sweeps are reached, or it should be assembled.
+// Sweeps until the island is solved, max_sweeps are reached, or it should be assembled. Sweeps that
+// max_work pays for are made in any case, more as long as they get on.
 void BodySolver::Implementation::iterate(int k, Team& team) {
   const Island& island = graph.islands[at(k)];
-  const bool permitted = island.contacts <= options.max_assembled;
+  const bool again = results[at(k)].assembled;
+  const bool permitted = !again && island.contacts <= options.max_assembled;
   const detail::WholeGraph whole =
       team.partners ? partners->whole() : detail::WholeGraph{graph, given.first(), given.second()};
   detail::AssemblyPrice price(whole.graph, whole.graph.islands[at(k)], whole.first, whole.second);
   const bool at_once = team.partners && partners->relaxed();
-  IslandResult r = start(island, team);
+  IslandResult r = again ? results[at(k)] : start(island, team);
   const double allowed = options.tolerance / r.inverse_scale;
   const double bound = std::max(allowed * allowed, r.floor);
+  const double paid =
+      options.max_work / detail::AssemblyPrice::sweep(whole.graph.islands[at(k)].contacts);
   int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   int failed_tests = 0;
   detail::AtOnce together;
-  detail::Forecast forecast;
+  detail::Forecast forecast(r.sweeps, r.least_change);
   detail::Momentum momentum;
   detail::BestPoint best(options.max_sweeps);
+  if (again) best.want(r.error / r.inverse_scale);
   // Slow even with momentum, and after a fair trial dearer than assembly and solution.
   const auto assembly_is_cheaper = [&](double more) {
     if (!permitted || !momentum.on() || !(more > r.sweeps / kTried)) return false;
@@ -72,9 +77,13 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
       if (together.grows(change.sum)) team.once([&] { partners->grew(); });
     }
     ++r.sweeps;
+    forecast.add(change.sum);
     if (r.sweeps == detail::BestPoint::kFirst && !(permitted && price.within(options.max_work)))
       best.want();
-    const bool last = r.sweeps >= options.max_sweeps;
+    const bool due = forecast.due(r.sweeps);
+    const bool limit = r.sweeps >= options.max_sweeps;
+    const bool last = limit || (due && r.sweeps > paid &&
+                                forecast.in_vain(r.sweeps, change.most, bound, options.max_sweeps));
     // The change by a sweep is close to the residual, which would cost another pass.
     if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
       double residual = sweeps.test(island, team).most;
@@ -90,18 +99,19 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
       save(island, team);
     }
     if (last) {
-      r.status = forecast.no_progress(change.sum) ? Status::cycling : Status::work_limit;
+      r.status = forecast.no_progress() ? Status::cycling : Status::work_limit;
       break;
     }
-    if (forecast.due(r.sweeps)) {
-      const double more = forecast.more(r.sweeps, change.sum, change.most, bound);
+    if (due) {
+      const double more = forecast.more(r.sweeps, change.most, bound);
       if (assembly_is_cheaper(more)) break;
       if (more > kSlow && r.sweeps > detail::Forecast::kFirst && !at_once) momentum.start();
       best.forecast(r.sweeps + more);
-      forecast.made(change.sum);
+      forecast.made();
     }
     if (momentum.on()) sweeps.extrapolate(island, team, momentum.next(change.sum));
   }
+  r.least_change = forecast.least();
   r.assemblable = r.status != Status::solved && permitted && price.within(options.max_work);
   if (team.thread == 0) results[at(k)] = r;
 }

@@ -83,6 +83,19 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
     judge_with_long_sums(k);
 }
 
+// Sweeps that had not come to their end go on where max_work was not enough, from the better point.
+void BodySolver::Implementation::assemble_and_sweep_on(int k, Worker& worker) {
+  const Island& island = graph.islands[at(k)];
+  Team one{0, 1, nullptr, &worker.scratch};
+  const IslandResult& r = results[at(k)];
+  const bool ended = r.status != Status::unsolved;
+  assemble(k, worker);
+  sweeps.unpack(island, one, *out);
+  if (ended || r.status != Status::work_limit || !worker.solution.replaced.empty()) return;
+  iterate(k, one);
+  if (!r.saved) sweeps.unpack(island, one, *out);
+}
+
 // Solved as a Problem, not by the velocities of the bodies: where impulses between heavy bodies act
 // on light ones these are the round-off of their double sums, and found with long ones.
 void BodySolver::Implementation::judge_with_long_sums(int k) {

@@ -78,7 +78,7 @@ void BodySolver::Implementation::alone(int k, Worker& worker) {
     sweeps.load(island, team);
     iterate(k, team);
   }
-  if (r.assemblable) assemble(k, worker);
+  if (r.assemblable) return assemble_and_sweep_on(k, worker);
   if (!r.saved) sweeps.unpack(island, team, *out);
 }
 

@@ -21,6 +21,7 @@ constexpr int kTogether = 1500;
 struct IslandResult {
   Status status = Status::unsolved;
   int sweeps = 0;
+  double least_change = 0;  // squares, by the least of the last half of the sweeps
   double error = 0;
   double inverse_scale = 0;  // 1 / velocity scale
   double floor = 0;          // squares of errors up to here are round-off of the bodies' velocities
@@ -88,6 +89,7 @@ struct BodySolver::Implementation {
   void save(const Island& island, Team& team);
 
   // body_assembly.cpp
+  void assemble_and_sweep_on(int k, Worker& worker);
   void assemble(int k, Worker& worker);
   Problem assembled(const Island& island, Worker& worker, Eigen::VectorXd& x) const;
   void take(const Island& island, Worker& worker);

@@ -69,11 +69,13 @@ bool BodySolver::Implementation::solve_near(const std::vector<RigidBody>& b,
 }
 
 // Until none closes that is left out. Which do shows long before their island is solved: a look at
-// them comes after a quarter of the sweeps, and after as many with those that have been taken in.
+// them comes after kLook sweeps or a quarter of all, and after as many with those that have been
+// taken in.
 void BodySolver::Implementation::solve_group(const std::vector<RigidBody>& b,
                                              const std::vector<PointContact>& c, bool some_far) {
   const MaxSweeps most(options.max_sweeps);
-  const int look = std::max(1, most.before / 4);
+  constexpr int kLook = 250;
+  const int look = std::max(1, std::min(kLook, most.before / 4));
   int swept = 0;
   bool looks = some_far, again = false, closed = true;
   while (closed || (looks && found.status != Status::solved)) {

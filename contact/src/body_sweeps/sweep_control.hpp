@@ -59,7 +59,11 @@ class BestPoint {
   static constexpr int kFirst = 64;  // sweeps before the first look
 
   explicit BestPoint(int max_sweeps) : max_sweeps_(max_sweeps) {}
-  void want() { wanted_ = true; }
+  // residual: of a point that is saved already.
+  void want(double residual = std::numeric_limits<double>::infinity()) {
+    wanted_ = true;
+    residual_ = residual * residual;
+  }
   void forecast(double sweeps) { slow_ = !(sweeps <= max_sweeps_); }
   // change: sum of squares that the last sweep changed.
   bool look(int sweeps, double change) {
@@ -110,30 +114,56 @@ class AtOnce {
 };
 
 // The sweeps that are still needed, forecast after 5, 10, 20, 40, ... sweeps from the convergence
-// since half as many.
+// since half as many. A change is the least in its half: where contacts toggle between stick and
+// slip single sweeps change ten times as much.
 class Forecast {
  public:
   static constexpr int kFirst = 5;
 
-  bool due(int sweeps) const { return sweeps == next_; }
-  // sum, most: squares that the last sweep changed; bound: of the largest one when solved.
-  double more(int sweeps, double sum, double most, double bound) const {
-    const bool known = sum > 0 && std::isfinite(earlier_);
-    const double rate = known ? std::log(sum / earlier_) / (0.5 * sweeps) : 0;
-    return !known     ? 0
-           : rate < 0 ? std::log(bound / most) / rate
-                      : std::numeric_limits<double>::infinity();
+  // sweeps: made before, whose least() change was `least`.
+  Forecast(int sweeps, double least) : next_(kFirst) {
+    if (sweeps == 0) return;
+    next_ = 2 * sweeps;
+    before_ = earlier_ = least;
   }
-  void made(double sum) {
-    earlier_ = sum;
+  // sum: squares that a sweep has changed.
+  void add(double sum) { least_ = std::min(least_, sum); }
+  bool due(int sweeps) const { return sweeps == next_; }
+  // most: square of the largest change by the last sweep; bound: of it when solved.
+  double more(int sweeps, double most, double bound) const {
+    return more(earlier_, 0.5 * sweeps, most, bound);
+  }
+  // When due: the last three quarters of the sweeps forecast more than max_sweeps, or have not
+  // halved the squares that a sweep changes. Heaps that are solved may rest for one doubling.
+  // Before kLeast sweeps loads may not have reached the ends of a large island.
+  bool in_vain(int sweeps, double most, double bound, int max_sweeps) const {
+    constexpr int kLeast = 1000;
+    return sweeps > kLeast && (least_ > 0.5 * before_ ||
+                               sweeps + more(before_, 0.75 * sweeps, most, bound) > max_sweeps);
+  }
+  void made() {
+    before_ = earlier_;
+    earlier_ = least_;
+    least_ = kNone;
     next_ *= 2;
   }
-  // Sweeps no longer change less than at the last forecast.
-  bool no_progress(double sum) const { return sum > 0.998 * earlier_; }
+  // Squares, by the least of the last half of the sweeps, or more.
+  double least() const { return std::min(least_, earlier_); }
+  // Those sweeps change as much as those before.
+  bool no_progress() const { return least() > 0.998 * before_; }
 
  private:
-  double earlier_ = std::numeric_limits<double>::infinity();
-  int next_ = kFirst;
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+
+  // since: the least change `sweeps` ago
+  double more(double since, double sweeps, double most, double bound) const {
+    const bool known = least_ > 0 && std::isfinite(since);
+    const double rate = known ? std::log(least_ / since) / sweeps : 0;
+    return !known ? 0 : rate < 0 ? std::log(bound / most) / rate : kNone;
+  }
+
+  double before_ = kNone, earlier_ = kNone, least_ = kNone;
+  int next_;
 };
 
 }  // namespace tether::contact::detail

@@ -186,8 +186,7 @@ void RankSolver::Implementation::solve(int k, const detail::GatheredIsland& all,
   one.sweeps.for_contacts(island, [&](int contact, detail::Kind kind, int place) {
     one.sweeps.set_state(kind, place, all.states[at(contact)]);
   });
-  one.assemble(k, worker);
-  one.sweeps.unpack(island, team, found);
+  one.assemble_and_sweep_on(k, worker);
   answer.values[0] = static_cast<double>(one.results[at(k)].status);
   answer.values[1] = one.results[at(k)].error;
   for (int i = 0; i < island.contacts; ++i) {
