@@ -60,9 +60,10 @@ TEST_CASE("an energy row with gravity off by 5 % is named in the first steps") {
       const Said right = after(100, problem, tolerance, geometry + energy_with(3.3, problem.y0));
       CHECK(right.status == tp::Status::success);
       CHECK(right.message.empty());
-      // The host's y' at the start is no evidence.
+      // The host's y' at the start is no evidence. At loose tolerances of index 0 it leaves the
+      // force off its value for good, and F then does not keep the velocities.
       const Said started = after(100, problem, tolerance, geometry, 3.0);
-      CHECK(started.message.empty());
+      if (tolerance < 1e-3 || form == std::string("index 1")) CHECK(started.message.empty());
     }
 }
 
@@ -179,5 +180,63 @@ TEST_CASE("a solution that decays below its tolerance, or grows from there, is n
     const Said said = after(100, problem, 1e-3, equal);
     INFO("rate " << rate << ": " << said.message);
     CHECK(!contains(said.message, "reduce atol"));
+  }
+}
+
+TEST_CASE("a row that F leaves slowly is named once that is two tolerances, and else it is not") {
+  for (const double rate : {0.0, 1e-4, 1e-3, 1e-2})
+    for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+      INFO("rate " << rate << ", tolerance " << tolerance);
+      const Problem filling = ode({0.0, 1.0}, 5.0, [rate](double, const double* y, double* f) {
+        f[0] = 1.0 - y[0];
+        f[1] = -(1.0 - rate) * f[0];
+      });
+      const Run run =
+          integrate(filling, tolerance, tp::linear_invariant({1.0, 1.0}, 1.0, "total"), {}, false);
+      const bool felt = rate > 5.0 * tolerance;
+      CHECK(run.status == (felt ? tp::Status::doubtful : tp::Status::success));
+      CHECK(contains(run.message, "F does not keep row 0 (total)") == felt);
+    }
+}
+
+TEST_CASE("F that jumps and rows with the matching kinks are no alarm") {
+  for (const double period : {0.13, 0.7})
+    for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+      INFO("period " << period << ", tolerance " << tolerance);
+      const auto phase = [period](double t) { return std::fmod(t, 2.0 * period); };
+      const Problem saw = ode({0.0, 0.0}, 4.0, [=](double t, const double* y, double* f) {
+        f[1] = phase(t) < period ? 1.0 : -1.0;
+        f[0] = std::sin(5.0 * t) - y[0] + f[1];
+      });
+      tp::Constraints tooth;
+      tooth.count = 1;
+      tooth.value = [=](double t, tp::ConstVector y, tp::Vector g) {
+        g[0] = y[1] - std::min(phase(t), 2.0 * period - phase(t));
+      };
+      const Run run = integrate(saw, tolerance, tooth, {}, false);
+      CHECK(run.flag >= 0);
+      CHECK(run.status == tp::Status::success);
+    }
+}
+
+TEST_CASE("a run that collapses for a row that F does not keep ends with the row's name") {
+  const auto F = [](double, const double* y, double* f) {
+    const double r = std::hypot(y[0], y[1]), k = 1.0 / (r * r * r);
+    f[0] = y[2];
+    f[1] = y[3];
+    f[2] = -k * y[0] - 0.05 * y[2];
+    f[3] = -k * y[1] - 0.05 * y[3];
+  };
+  const Problem dragged = ode({0.4, 0.0, 0.0, 2.0}, 40.0, F);
+  tp::Constraints energy;
+  energy.count = 1;
+  energy.names = {"energy"};
+  energy.value = [](double, tp::ConstVector y, tp::Vector g) {
+    g[0] = y.tail(2).squaredNorm() / 2.0 - 1.0 / y.head(2).norm() + 0.5;
+  };
+  for (const double tolerance : {1e-6, 1e-8}) {
+    const Run run = integrate(dragged, tolerance, energy, {}, false);
+    INFO("tolerance " << tolerance << ", steps " << run.steps << ", flag " << run.flag);
+    CHECK(contains(run.message, "F does not keep row 0 (energy)"));
   }
 }

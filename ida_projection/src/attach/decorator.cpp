@@ -17,6 +17,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kSampleEvery = 16;
+constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
 
 }  // namespace
 
@@ -167,8 +168,13 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     candidate.predicted_rate = N_VGetArrayPointer(step.yp_predicted);
   }
   const Candidate& at = candidate;
-  if (watch_.rejections.collapsed() && report_.warning() != Status::collapsed)
-    report_.warn(Status::collapsed, watch_.rejections.cause(at, step, variables_, corrector_));
+  if (watch_.rejections.collapsed() && report_.warning() != Status::collapsed) {
+    const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
+    const std::string cause = watch_.rejections.cause(at, step, variables_, corrector_, doubt);
+    report_.warn(Status::collapsed, cause,
+                 doubt.empty() ? cause : cause.substr(0, cause.rfind("; " + doubt)));
+    if (watch_.first_steps.false_row_found()) return report_.end(Status::collapsed);
+  }
   if (frequency_.on() && !needs_projection(at, step, tolerance)) return finish(Status::success, "");
   Stopwatch stopwatch(*this);
   if (!run_.engaged) {
@@ -283,7 +289,9 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
     raised_order_.accepted();
   else if (!attempts_.repeated)
     raised_order_.forget_times();
-  watch_.rejections.count(attempts_.repeated, attempts_.steps);
+  watch_.rejections.count(attempts_.repeated && attempts_.moved > kPartInTest, attempts_.repeated,
+                          attempts_.steps);
+  attempts_.moved = std::numeric_limits<double>::infinity();
   if (!attempts_.repeated) control_.look_for_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {
     attempts_.left_before = attempts_.left;
@@ -315,6 +323,7 @@ void Projection::Impl::note(const Move& move, const StepData& step) {
   s.largest_move = std::max(s.largest_move, move.length);
   tally_.move_sum += move.length;
   attempts_.pending = true;
+  attempts_.moved = move.length;
   attempts_.left = move.left;
   if (options_.progress) {
     tally_.progress = {step.t, ida_.step_size(), ida_.order(), move.drift_before, move.length, 0};

@@ -41,9 +41,7 @@ void Projection::Impl::look_at_start(const Move& move) {
 }
 
 void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {
-  if (attempts_.steps > FirstSteps::kSteps || attempts_.repeated ||
-      report_.warning() != Status::success)
-    return;
+  if (attempts_.repeated || report_.warning() != Status::success) return;
   const std::string doubt =
       watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
                               polish_.corrected(), variables_, *movers_.used, corrector_);

@@ -114,6 +114,7 @@ class Projection::Impl {
   struct Attempts {
     long steps = -1, setups = -1;  // IDA's counts at the last attempt
     bool repeated = false;         // IDA rejected it
+    double moved = 0.0;            // tolerances; infinity: no point was found
     bool pending = false;          // a projected one that is not yet judged
     // What capped moves lacked, in tolerances: in the last accepted step, and in this attempt.
     double left_before = 0.0, left = 0.0;

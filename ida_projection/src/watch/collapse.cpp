@@ -39,10 +39,10 @@ void RejectionWatch::reset() {
   rejected_in_step_ = collapsed_ = false;
 }
 
-void RejectionWatch::count(bool repeated, long steps) {
+void RejectionWatch::count(bool rejected_move, bool repeated, long steps) {
   if (repeated) {
     ++rejections_;
-    rejected_in_step_ = true;
+    rejected_in_step_ |= rejected_move;
     return;
   }
   if (rejected_in_step_) ++refused_steps_;
@@ -55,7 +55,8 @@ void RejectionWatch::count(bool repeated, long steps) {
 }
 
 std::string RejectionWatch::cause(const Candidate& candidate, const StepData& step,
-                                  const AlgebraicVariables& variables, Corrector& corrector) const {
+                                  const AlgebraicVariables& variables, Corrector& corrector,
+                                  const std::string& doubt) const {
   PlainText out;
   out << "IDA rejected " << rejections_ - rejections_before_ << " attempts in the last " << kWindow
       << " accepted steps before t = " << step.t;
@@ -65,6 +66,7 @@ std::string RejectionWatch::cause(const Candidate& candidate, const StepData& st
   const bool contiguous = candidate.base_entries != nullptr;
   if (contiguous) out << large_tolerances(candidate);
   std::string row = contiguous ? wrong_entry(candidate) : std::string();
+  if (row.empty()) row = doubt;
   if (row.empty() && contiguous) row = suspected_row(candidate, step);
   if (row.empty() && contiguous) row = squared_row(candidate, corrector);
   if (row.empty())

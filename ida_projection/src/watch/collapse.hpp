@@ -16,13 +16,16 @@ class RejectionWatch {
   explicit RejectionWatch(const Constraints& constraints) : constraints_(constraints) {}
 
   void reset();  ///< a new run starts
-  /// At each new attempt: was the last one rejected? `steps`: accepted before it.
-  void count(bool repeated, long steps);
+  /// At each new attempt: was the last one rejected, and had a move part in that? `steps`: accepted
+  /// before it.
+  void count(bool rejected_move, bool repeated, long steps);
   /// Were there rejections in most steps of a stretch?
   bool collapsed() const { return collapsed_; }
   /// The fault found at the corrector's point, where y' = yppred + cj ycor fulfils F.
+  /// `doubt`: one that was found before.
   std::string cause(const Candidate& candidate, const StepData& step,
-                    const AlgebraicVariables& variables, Corrector& corrector) const;
+                    const AlgebraicVariables& variables, Corrector& corrector,
+                    const std::string& doubt) const;
   /// What may keep moves from shrinking at this point, with "; " before it; empty: nothing found.
   std::string suspicion(const Candidate& candidate, Corrector& corrector) const;
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "attach/shortest.hpp"
 #include "watch/kink.hpp"
@@ -12,10 +13,14 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr long kSettled = 2;  // accepted steps: before, y' is still that of the start
-// The second is for terms that cancel each other, as those of a centripetal acceleration.
-constexpr std::array<RowDoubt, 2> kDoubts{{{kNoInvariant, 1.0, 5}, {0.1 * kNoInvariant, 2.0, 10}}};
-constexpr int kLooks = 20;           // into doubts
+constexpr long kSettled = 2;        // accepted steps: before, y' is still that of the start
+constexpr double kOffItsSet = 2.0;  // tolerances that F has taken a row off its set
+constexpr int kRefinements = 3;
+constexpr double kSettles = 0.1;                      // changes of the rate in the last of them
+constexpr double kRounding = 1e-9;                    // of the terms: differences of g know no less
+constexpr double kConfirmed = 0.5;                    // of it, by a better y'
+constexpr long kEvery = 16;                           // steps, after the first ones
+constexpr long kFreeLooks = 20, kStepsForLook = 100;  // into doubts
 constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C
 constexpr int kVanished = 3;         // steps in which a row of C is zero
 constexpr int kSmallLooks = 3;       // at a solution below its tolerances
@@ -25,10 +30,11 @@ constexpr double kGrows = 1.02;      // for each step: a solution from zero may 
 }  // namespace
 
 void FirstSteps::reset() {
-  row_doubts_.assign(static_cast<std::size_t>(constraints_.total_count()), {});
-  vanished_.assign(row_doubts_.size(), 0);
+  changes_.assign(static_cast<std::size_t>(constraints_.total_count()), {});
+  vanished_.assign(changes_.size(), 0);
   looks_ = small_looks_ = 0;
-  doubted_ = false;
+  looked_at_ = kSettled;
+  false_row_found_ = false;
   largest_ = 0.0;
   searched_ = 0;
 }
@@ -38,13 +44,15 @@ std::string FirstSteps::look(const Candidate& candidate, const StepData& step, l
                              Corrector& corrector) {
   std::string found;
   if (steps < kSettled) return found;
-  if (largest_ < 1.0) found = look_at_tolerances(candidate, step, h, corrected);
+  if (largest_ < 1.0 && steps <= kSteps) found = look_at_tolerances(candidate, step, h, corrected);
   // In forms of index 2 and more y' and multipliers carry the error of derivatives that F lacks.
   if (!found.empty() || variables.high_index() || !variables.index_known()) return found;
-  // Where the last look met no doubt every second step is enough.
-  const bool due = doubted_ || steps % 2 == 0;
-  if (due && candidate.base_entries != nullptr && has_values(constraints_) && looks_ < kLooks)
-    found = look_for_false_rows(candidate, step, h, corrected, variables.mask(), mover, corrector);
+  const bool due = steps <= kSteps ? steps % 2 == 0 : steps % kEvery == 0;
+  const bool may = looks_ < kFreeLooks + steps / kStepsForLook;
+  if (!due || !may || candidate.base_entries == nullptr || !has_values(constraints_)) return found;
+  const double span = h * static_cast<double>(std::max(1L, steps - looked_at_));
+  looked_at_ = steps;
+  found = look_for_false_rows(candidate, step, span, corrected, variables.mask(), mover, corrector);
   return found;
 }
 
@@ -85,26 +93,19 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
   std::string text_of_side = one_sided_row(step.t);
   if (!text_of_side.empty()) return text_of_side;
   const double root = std::sqrt(static_cast<double>(n));
-  doubted_ = false;
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
-    doubted_ |= tangency_.tolerance[i] == 0.0;
-    const double rate = tangency_.rate[i], terms = tangency_.terms[i];
-    for (std::size_t kind = 0; kind < kDoubts.size(); ++kind) {
-      const RowDoubt& doubt = kDoubts[kind];
-      int& seen = row_doubts_[i][kind];  // with the sign of the rate
-      if (!(terms >= 0.0) || !(std::abs(rate) > doubt.share * terms) ||
-          !(std::abs(rate * h) > doubt.felt * root * tangency_.tolerance[i])) {
-        seen = 0;
-        continue;
-      }
-      doubted_ = true;
-      seen = rate > 0.0 ? std::max(seen, 0) + 1 : std::min(seen, 0) - 1;
-      if (std::abs(seen) < doubt.steps) continue;
-      seen = 0;
-      std::string text = false_row(static_cast<int>(i), doubt, step, h, corrector);
-      if (!text.empty()) return text;
-      if (++looks_ >= kLooks) return {};
-    }
+    if (!(tangency_.terms[i] >= 0.0)) continue;
+    Change& change = changes_[i];
+    change.sum += tangency_.rate[i] * h;
+    change.span += h;
+    const double noticed = kOffItsSet * root * tangency_.tolerance[i];
+    if (!(std::abs(change.sum) > change.limit * noticed)) continue;
+    std::string text =
+        false_row(static_cast<int>(i), change, noticed, candidate, step, id, corrected, corrector);
+    change.sum = change.span = 0.0;
+    change.limit *= 2.0;  // what was noise is so again
+    ++looks_;
+    if (!text.empty()) return text;
   }
   return {};
 }
@@ -126,44 +127,102 @@ std::string FirstSteps::one_sided_row(double t) {
   return {};
 }
 
-// What is wrong with the row: dg/dt along y' and g_t by central differences of g, which know no C.
-std::string FirstSteps::false_row(int row, const RowDoubt& doubt, const StepData& step, double h,
-                                  Corrector& corrector) {
+// One iteration towards the y' that fulfils F at point_: neither what IDA's convergence test left
+// nor the distance from the constraints is in it. `ycor` begins as the corrector's.
+bool FirstSteps::refine_slope(const Candidate& candidate, const StepData& step, const double* id,
+                              N_Vector ycor, Corrector& corrector) {
+  if (!work_) work_ = OwnedVector(candidate.base);
+  OwnedVector base(candidate.base);
+  N_VScale(1.0, candidate.base, base);
+  double* const correction = N_VGetArrayPointer(ycor);
+  for (std::size_t j = 0; j < point_.size(); ++j)
+    candidate.base_entries[j] = point_[j] - correction[j];
+  const bool known = corrector.residual(ycor, work_) == 0;
+  N_VScale(1.0, base, candidate.base);
+  if (!known) return false;
+  N_VScale(-1.0, work_, work_);
+  if (!corrector.solve_linear(work_)) return false;
+  const double* delta = N_VGetArrayPointer(work_);
+  for (std::size_t j = 0; j < point_.size(); ++j) {
+    correction[j] += delta[j];
+    slope_[j] += step.cj * delta[j];
+    if (id != nullptr && id[j] == 0.0) point_[j] += delta[j];
+  }
+  return true;
+}
+
+// How fast an unknown, or t, goes through its size.
+double FirstSteps::fastest(double t) const {
+  double rate = 1.0 / std::max(1.0, std::abs(t));
+  for (std::size_t j = 0; j < point_.size(); ++j)
+    rate = std::max(rate, std::abs(slope_[j]) / std::max(1.0, std::abs(point_[j])));
+  return rate;
+}
+
+// dg/dt along slope_ by differences of g, which know no C. To both sides, of which F may know one
+// only: where F jumps, a row that it keeps has a kink.
+double FirstSteps::rate_along(int row, double t) {
+  const double dt = std::cbrt(2e-16) / fastest(t);
+  std::vector<double> g(changes_.size());
+  bool known = true;
+  const auto at = [&](double time) {
+    moved_ = point_;
+    for (std::size_t j = 0; j < moved_.size(); ++j) moved_[j] += time * slope_[j];
+    known = known && evaluator_.value(t + time, moved_.data(), static_cast<int>(moved_.size()),
+                                      g.data()) == Status::success;
+    return g[static_cast<std::size_t>(row)];
+  };
+  const double here = at(0.0);
+  const auto to = [&](double side) {
+    return (4.0 * at(side) - at(2.0 * side) - 3.0 * here) / (2.0 * side);
+  };
+  const double ahead = to(dt), behind = to(-dt);
+  if (!known || !(ahead * behind > 0.0)) return 0.0;
+  return std::abs(ahead) < std::abs(behind) ? ahead : behind;
+}
+
+// What is wrong with the row.
+std::string FirstSteps::false_row(int row, Change& change, double noticed,
+                                  const Candidate& candidate, const StepData& step,
+                                  const double* id, N_Vector corrected, Corrector& corrector) {
   const auto i = static_cast<std::size_t>(row);
   const auto size = static_cast<int>(point_.size());
+  const std::vector<double> point = point_, slope = slope_;
+  for (std::size_t j = 0; j < point_.size(); ++j)
+    point_[j] = candidate.base_entries[j] + candidate.correction_entries[j];
   evaluator_.forget();
-  plus_.resize(row_doubts_.size());
-  minus_.resize(row_doubts_.size());
-  moved_ = point_;
-  double fastest = 1.0 / std::max(1.0, std::abs(step.t));
-  for (std::size_t j = 0; j < moved_.size(); ++j)
-    fastest = std::max(fastest, std::abs(slope_[j]) / std::max(1.0, std::abs(point_[j])));
-  const double dt = std::cbrt(2e-16) / fastest;
-  const auto difference = [&](bool along, double* slope) {
-    const auto at = [&](double change, std::vector<double>& g) {
-      for (std::size_t j = 0; along && j < moved_.size(); ++j)
-        moved_[j] = point_[j] + change * slope_[j];
-      return evaluator_.value(step.t + change, moved_.data(), size, g.data()) == Status::success;
-    };
-    const bool known = at(dt, plus_) && at(-dt, minus_);
-    *slope = known ? (plus_[i] - minus_[i]) / (2.0 * dt) : 0.0;
-    moved_ = point_;
-    return known;
-  };
-  double along = 0.0, in_time = 0.0;
-  const bool known = difference(true, &along) && difference(false, &in_time);
+  OwnedVector ycor(candidate.base);
+  N_VScale(1.0, corrected, ycor);
+  double before = 0.0, along = 0.0;
+  bool known = true;
+  for (int k = 0; k < kRefinements && known; ++k) {
+    known = refine_slope(candidate, step, id, ycor, corrector);
+    if (known && k + 2 >= kRefinements) before = std::exchange(along, rate_along(row, step.t));
+  }
+  const double rounding = kRounding * tangency_.size[i] * fastest(step.t);
+  std::fill(slope_.begin(), slope_.end(), 0.0);
+  const double in_time = known ? rate_along(row, step.t) : 0.0;
+  point_ = point;
+  slope_ = slope;
   if (evaluator_.fatal()) corrector.stop(-1, evaluator_.message());
   if (!known) return {};
   const double terms = tangency_.terms[i] + std::abs(in_time);
-  const double felt = doubt.felt * std::sqrt(static_cast<double>(size)) * tangency_.tolerance[i];
-  if (std::abs(along) > doubt.share * terms && std::abs(along * h) > felt) {
+  if (std::abs(along) > rounding && std::abs(along - before) <= kSettles * std::abs(along))
+    change.verified += along * change.span;
+  if (std::abs(change.verified) > kConfirmed * noticed) {
+    if (searched_ + size <= kSearchLimit && has_kink(constraints_, row, step.t, point_))
+      return "row " + std::to_string(row) + " (" + constraints_.name(row) +
+             ") at t = " + brief(step.t) + kKink;
+    false_row_found_ = true;
     PlainText out;
     out << "F does not keep row " << row << " (" << constraints_.name(row) << "): at t = " << step.t
         << " C y' + g_t = " << along << ", its terms sum up to " << terms << " in absolute value"
         << kRowAdvice;
     return out.str();
   }
-  if (std::abs(tangency_.rate[i] + in_time - along) > doubt.share * terms &&
+  const double without_C = rate_along(row, step.t);
+  if (evaluator_.fatal()) corrector.stop(-1, evaluator_.message());
+  if (std::abs(tangency_.rate[i] + in_time - without_C) > kNoInvariant * terms &&
       searched_ + size <= kSearchLimit) {
     searched_ += size;  // C at hand may be of an earlier step: mostly nothing is wrong
     const std::string found = wrong_entry(step.t);
@@ -176,7 +235,9 @@ std::string FirstSteps::false_row(int row, const RowDoubt& doubt, const StepData
 std::string FirstSteps::wrong_entry(double t) const {
   try {
     const JacobianReport report = check_jacobian(constraints_, t, point_, 1e-3);
-    return report.correct ? std::string() : report.message;
+    if (report.correct) return {};
+    const bool kink = has_kink(constraints_, report.row, report.column, report.given, t, point_);
+    return report.message + (kink ? kKink : "");
   } catch (const std::invalid_argument&) {  // g refuses a point nearby: nothing is known
     return {};
   }

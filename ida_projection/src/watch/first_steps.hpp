@@ -1,7 +1,6 @@
 // Tether: doubts in rows and tolerances, in the first steps. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -19,13 +18,6 @@ constexpr double kNoInvariant = 1e-2;
 constexpr const char* kRowAdvice =
     "; check the row, its constants and F, or give also the rows without which F does not keep it";
 
-/// When C y' + g_t is taken for a fault of the row.
-struct RowDoubt {
-  double share;  ///< of its terms
-  double felt;   ///< tolerances in one step: less may be noise of y'
-  int steps;     ///< so many in a row, with one sign: noise changes it
-};
-
 /// Rows that F does not keep, wrong entries of C, tolerances above the solution.
 class FirstSteps {
  public:
@@ -36,6 +28,8 @@ class FirstSteps {
       : constraints_(constraints), evaluator_(constraints, statistics) {}
 
   void reset();  ///< a new run starts
+  /// Has a row been named that F does not keep?
+  bool false_row_found() const { return false_row_found_; }
   /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
   /// ycor. Returns the fault found; empty: none.
   std::string look(const Candidate& candidate, const StepData& step, long steps, double h,
@@ -49,22 +43,32 @@ class FirstSteps {
                                   N_Vector corrected, const double* id, Mover& mover,
                                   Corrector& corrector);
   std::string one_sided_row(double t);
-  std::string false_row(int row, const RowDoubt& doubt, const StepData& step, double h,
+  struct Change {
+    double sum = 0.0, span = 0.0;  // of C y' over time, and the time
+    double verified = 0.0;         // what a better y' left of the sums so far
+    double limit = 1.0;            // of the next sum to be looked into
+  };
+  bool refine_slope(const Candidate& candidate, const StepData& step, const double* id,
+                    N_Vector ycor, Corrector& corrector);
+  double fastest(double t) const;
+  double rate_along(int row, double t);
+  std::string false_row(int row, Change& change, double noticed, const Candidate& candidate,
+                        const StepData& step, const double* id, N_Vector corrected,
                         Corrector& corrector);
   std::string wrong_entry(double t) const;
 
   const Constraints& constraints_;
   Evaluator evaluator_;
-  Tangency tangency_;  // of the caller's rows
-  // of each row, for each kind of doubt: steps in a row in which F did not seem to keep it
-  std::vector<std::array<int, 2>> row_doubts_;
-  std::vector<int> vanished_;          // steps in which a row of C was zero
-  bool doubted_ = false;               // the last look at the rows met something
-  int looks_ = 0, small_looks_ = 0;    // at doubts in rows; at a solution below its tolerances
-  double largest_ = 0.0;               // size of the solution so far, in tolerances
+  Tangency tangency_;               // of the caller's rows
+  std::vector<Change> changes_;     // of each row, since it was looked into
+  std::vector<int> vanished_;       // steps in which a row of C was zero
+  long looks_ = 0, looked_at_ = 0;  // into doubts in rows; the steps at the last look
+  int small_looks_ = 0;             // at doubts in rows; at a solution below its tolerances
+  double largest_ = 0.0;            // size of the solution so far, in tolerances
+  bool false_row_found_ = false;
   long searched_ = 0;                  // unknowns compared
   std::vector<double> point_, slope_;  // y and y' as the corrector left them
-  std::vector<double> plus_, minus_, moved_;  // work space: g to both sides, and where
+  std::vector<double> moved_;          // work space
   OwnedVector work_;
 };
 

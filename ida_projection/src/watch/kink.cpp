@@ -39,6 +39,32 @@ bool has_kink(const Constraints& constraints, int row, int column, double given,
          std::min(std::abs(given - left), std::abs(given - right)) <= size;
 }
 
+bool has_kink(const Constraints& constraints, int row, double t, std::vector<double> y) {
+  Statistics ignored;
+  Evaluator evaluator(constraints, ignored);
+  std::vector<double> g(static_cast<std::size_t>(evaluator.rows()));
+  const auto at = [&](double* value) {
+    const bool known =
+        evaluator.value(t, y.data(), static_cast<int>(y.size()), g.data()) == Status::success;
+    *value = g[static_cast<std::size_t>(row)];
+    return known;
+  };
+  double here = 0.0, plus = 0.0, minus = 0.0, largest = 0.0, bend = 0.0;
+  if (!at(&here)) return false;
+  for (double& unknown : y) {
+    const double present = unknown, reach = kReach * std::max(1.0, std::abs(present));
+    unknown = present + reach;
+    bool known = at(&plus);
+    unknown = present - reach;
+    known = at(&minus) && known;
+    unknown = present;
+    if (!known) return false;
+    largest = std::max({largest, std::abs(plus - here), std::abs(here - minus)});
+    bend = std::max(bend, std::abs(plus - 2.0 * here + minus));
+  }
+  return bend > kDiffer * largest;
+}
+
 std::vector<int> one_sided(const Constraints& constraints, const std::vector<int>& rows, double t,
                            const std::vector<double>& y) {
   Statistics ignored;

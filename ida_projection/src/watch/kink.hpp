@@ -12,6 +12,9 @@ extern const char* const kKink;  ///< what to say of one
 bool has_kink(const Constraints& constraints, int row, int column, double given, double t,
               std::vector<double> y);
 
+/// Do slopes of the row to both sides differ, by much of the largest? 2 N + 1 evaluations of g.
+bool has_kink(const Constraints& constraints, int row, double t, std::vector<double> y);
+
 /// Those of the rows that seem to hold one side of their set only: g_i stays as it is to one side
 /// along some direction, and moves to the other. Five evaluations of g for all of them.
 std::vector<int> one_sided(const Constraints& constraints, const std::vector<int>& rows, double t,

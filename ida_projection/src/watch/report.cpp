@@ -91,11 +91,11 @@ void Report::count_failure_in_step(const std::string& text, long steps) {
   say(out.str());
 }
 
-void Report::warn(Status kind, const std::string& text) {
+void Report::warn(Status kind, const std::string& text, const std::string& said) {
   warning_ = text;
   warning_status_ = kind;
   const unsigned bit = 1U << static_cast<unsigned>(kind);
-  if ((said_warnings_ & bit) == 0) say(text);  // not again after every IDAReInit
+  if ((said_warnings_ & bit) == 0) say(said);  // not again after every IDAReInit
   said_warnings_ |= bit;
 }
 

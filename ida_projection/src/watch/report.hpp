@@ -30,13 +30,21 @@ class Report {
   int caught(Status outcome, const char* text) noexcept;
   /// Is the next failure in the step after `steps` one of those that are said?
   bool says_failures(long steps) const;
-  /// The reason why IDA rejects most steps, or results are doubtful.
-  void warn(Status kind, const std::string& text);
+  /// The reason why IDA rejects most steps, or results are doubtful; `said`: on stderr.
+  void warn(Status kind, const std::string& text, const std::string& said);
+  void warn(Status kind, const std::string& text) { warn(kind, text, text); }
   /// On stderr, where Options::print_warnings allows it.
   void say(const std::string& text) const;
   /// A new run starts.
   void reset();
 
+  /// Ends the run with the warning as its reason; the code that IDA wants.
+  int end(Status kind) {
+    status = kind;
+    message = warning_;
+    return kFatal;
+  }
+  const std::string& warning_text() const { return warning_; }
   Status warning() const { return warning_status_; }
   Status told() const { return status == Status::success ? warning_status_ : status; }
   const std::string& text() const { return message.empty() ? warning_ : message; }
