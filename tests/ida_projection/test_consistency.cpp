@@ -347,3 +347,52 @@ TEST_CASE("solve: what IDASolve returns, on the constraints, in every mode") {
     CHECK(on_constraints(stop));
   }
 }
+
+TEST_CASE("make_consistent: a stop time that was reached, or lies behind, is no hindrance") {
+  for (const double stop : {0.3, 0.1}) {
+    Host host(tether::test::circle(5.0), 1e-6);
+    host.attach(on_circle());
+    REQUIRE(IDASetStopTime(host.ida, 0.3) == 0);
+    REQUIRE(host.to(0.3) >= 0);
+    REQUIRE(IDAReInit(host.ida, 0.3, host.y, host.yp) == 0);
+    REQUIRE(IDASetStopTime(host.ida, stop) == 0);
+    host.data()[0] *= 1.001;
+    const tp::ConsistencyReport report = host.projection().make_consistent(0.3, host.y, host.yp);
+    INFO(report.message);
+    CHECK(report);
+    REQUIRE(IDASetStopTime(host.ida, 0.6) == 0);
+    CHECK(host.to(0.6) >= 0);
+    CHECK(host.t == Approx(0.6));
+  }
+}
+
+TEST_CASE("make_consistent: a row that repeats F moves algebraic variables only") {
+  // d' = w, w' = 1 - I cos d, 0 = I - k tan d; k jumps, and I with it.
+  for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+    const double k = 0.7;
+    const auto energy = [k](double d, double w) { return w * w / 2.0 - d - k * std::cos(d); };
+    Problem problem =
+        ode({0.4, 0.3, 2.0 * std::tan(0.4)}, 1.0, [](double, const double*, double*) {});
+    problem.residual = [k](double, const double* y, const double* yp, double* r) {
+      r[0] = yp[0] - y[1];
+      r[1] = yp[1] - 1.0 + y[2] * std::cos(y[0]);
+      r[2] = std::cos(y[0]) * (y[2] * std::cos(y[0]) - k * std::sin(y[0]));
+    };
+    problem.jacobian = nullptr;
+    Host host(problem, tolerance);
+    const double value = energy(0.4, 0.3);
+    tp::Constraints rows;
+    rows.count = 2;
+    rows.value = [=](double, tp::ConstVector y, tp::Vector g) {
+      g[0] = energy(y[0], y[1]) - value;
+      g[1] = y[2] * std::cos(y[0]) - k * std::sin(y[0]);
+    };
+    host.attach(rows);
+    const tp::ConsistencyReport report = host.projection().make_consistent(0.0, host.y, host.yp);
+    INFO("tolerance " << tolerance << ": " << report.message);
+    CHECK(report);
+    CHECK(std::abs(host.data()[0] - 0.4) < 0.1 * tolerance);
+    CHECK(std::abs(host.data()[1] - 0.3) < 0.1 * tolerance);
+    CHECK(host.data()[2] == Approx(k * std::tan(0.4)));
+  }
+}

@@ -58,11 +58,23 @@ bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
   OwnedVector y(yy), ydot(yp);
   N_VScale(1.0, yy, y);
   N_VScale(1.0, yp, ydot);
-  inquiry_.probe = Probe::asked;
-  sunrealtype reached = t0;
   const double tiny = 1e-8 * std::max(1.0, std::abs(t0));
-  IDASolve(ida_.mem(), t0 + tiny, &reached, y, ydot, IDA_ONE_STEP);
-  return std::exchange(inquiry_.probe, Probe::none) == Probe::answered;
+  bool answered = false;
+  const auto answers = [&](double tout) {
+    sunrealtype reached = t0;
+    inquiry_.probe = Probe::asked;
+    const int flag = IDASolve(ida_.mem(), tout, &reached, y, ydot, IDA_ONE_STEP);
+    answered = std::exchange(inquiry_.probe, Probe::none) == Probe::answered;
+    return answered || flag != IDA_ILL_INPUT;
+  };
+  // A stop time may lie on the other side, or here: IDA keeps one that it has reached.
+  if (!answers(t0 + tiny) && !answers(t0 - tiny)) {
+    IDASetStopTime(ida_.mem(), t0 + 2.0 * tiny);
+    answers(t0 + tiny);
+    IDAReInit(ida_.mem(), t0, yy, yp);
+    IDASetStopTime(ida_.mem(), t0);
+  }
+  return answered;
 }
 
 // y' and the algebraic variables consistent with F; the reason of a failure, or nothing.
@@ -99,12 +111,13 @@ std::string Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector yd
 // y onto the constraints, algebraic variables only where rows fix them, or F does. False: IDA could
 // not be started there.
 bool Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                                     ConsistencyReport* report) {
+                                     ConsistencyReport* report, bool* jointly) {
   JointStart joint{t0, y, how.hold, {}};
   inquiry_.joint_start = &joint;
   const bool answered = IDAReInit(ida_.mem(), t0, y, ydot) == 0 && probe(t0, y, ydot);
   inquiry_.joint_start = nullptr;
   if (!answered) return false;
+  if (jointly != nullptr) *jointly = joint.report.status != Status::unused;
   if (joint.report.status == Status::success)
     *report = joint.report;
   else if (!corrector_.stopped())
@@ -127,7 +140,23 @@ bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const 
   for (int round = 0; round < kRounds; ++round) {
     N_VScale(1.0, y, before);
     ConsistencyReport again;
-    if (!project_start(t0, y, ydot, how, &again)) {
+    bool jointly = false;
+    bool begun = project_start(t0, y, ydot, how, &again, round == 0 ? &jointly : nullptr);
+    // Far from what F asks of algebraic variables, rows that repeat F are conditions of their own:
+    // these variables move first.
+    if (begun && jointly && how.hold.empty() && options_.hold.empty()) {
+      OwnedVector near(y), slope(ydot);
+      N_VScale(1.0, before, near);
+      N_VScale(1.0, ydot, slope);
+      Status ignored = Status::success;
+      if (find_derivative(t0, near, slope, how, &ignored).empty()) {
+        N_VScale(1.0, near, y);
+        N_VScale(1.0, slope, ydot);
+        again = {};
+        begun = project_start(t0, y, ydot, how, &again, nullptr);
+      }
+    }
+    if (!begun) {
       if (run_.broken) return fail(report_.status, std::string(report_.message));
       return fail(Status::internal_error,
                   "IDA could not be started at the given values; set tolerances and the linear "

@@ -92,8 +92,8 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (!run_.initialized)
     return finish(
         Status::late_attach,
-        "the Projection was made after IDA had been initialised, so IDA never handed its linear "
-        "solver over; make it before IDACalcIC and the first IDASolve, or call IDAReInit");
+        "the Projection was made after IDACalcIC or the first IDASolve, so IDA never handed its "
+        "linear solver over; make it between IDAInit and these, or call IDAReInit");
 
   if (run_.broken) return kFatal;  // status and message are those of the exception
 

@@ -186,7 +186,7 @@ class Projection::Impl {
   std::string find_derivative(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
                               Status* failure);
   bool project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                     ConsistencyReport* report);
+                     ConsistencyReport* report, bool* jointly);
   bool settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
                     ConsistencyReport* report);
   void current_weights(N_Vector y);
