@@ -358,3 +358,24 @@ TEST_CASE("bad input: the same words in a host whose numbers have a comma") {
   const tether::test::CommaLocale here;
   CHECK(said() == plain);
 }
+
+TEST_CASE("bad input: enumerations out of range, and vectors that are too short for a problem") {
+  Options o;
+  o.method = static_cast<Method>(99);
+  CHECK_THROWS_AS(Solver(o), std::invalid_argument);
+  o = Options();
+  o.measure = static_cast<Measure>(99);
+  CHECK_THROWS_AS(Solver(o), std::invalid_argument);
+  o = Options();
+  o.law = static_cast<Law>(99);
+  CHECK_THROWS_AS(Solver(o), std::invalid_argument);
+  BodyOptions b;
+  b.law = static_cast<Law>(99);
+  CHECK_THROWS_AS(BodySolver(b), std::invalid_argument);
+  const Problem p = Problem::dense(Eigen::MatrixXd::Identity(6, 6), Eigen::VectorXd::Ones(6),
+                                   Eigen::VectorXd::Ones(2));
+  tether::linalg::VectorX x;
+  CHECK_THROWS_AS(p.rescaled({}, {}), std::invalid_argument);
+  CHECK_THROWS_AS(p.rescaled({0, 0}, {0}), std::invalid_argument);
+  CHECK_THROWS_AS(p.unpack({}, x), std::invalid_argument);
+}

@@ -10,6 +10,7 @@
 #include "assembled/island_solves.hpp"
 #include "assembled/solver_words.hpp"
 #include "assembled/stages/convex_relaxation.hpp"
+#include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
@@ -21,6 +22,11 @@ namespace {
 
 void check(const Options& o) {
   using detail::require;
+  static_cast<void>(detail::traits(o.law));  // refuses what is no law
+  require(o.method <= Method::convex_relaxation, "method", static_cast<double>(o.method),
+          "is none of those of tether::contact::Method");
+  require(o.measure <= Measure::fixed_point, "measure", static_cast<double>(o.measure),
+          "is none of those of tether::contact::Measure");
   require(o.tolerance > 0 && std::isfinite(o.tolerance), "tolerance", o.tolerance,
           "must be finite and > 0");
   require(o.relaxation > 0 && o.relaxation < 2, "relaxation", o.relaxation,

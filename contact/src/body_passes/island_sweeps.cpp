@@ -134,6 +134,7 @@ PassResult IslandSweeps::pack_contact(int contact, Kind k, int place, const Vect
   result.sum = bb;
   result.most = needed_change(bn, std::sqrt(std::max(0.0, bb - bn * bn)), c.mu, slip);
   result.speed = speed_before(s, c.bias);
+  if (!p.isZero(0)) result.started = speed_by(s, p);
   return result;
 }
 
@@ -209,6 +210,18 @@ void IslandSweeps::rest(const Island& island, Team& team) {
   });
   load(island, team);
   team.meet();
+}
+
+void IslandSweeps::refresh(const Island& island, Team& team) {
+  load(island, team);
+  team.meet();
+  pass(island, team, Pass::moves_bodies, [&](int chunk) {
+    in_chunk(chunk, [&](int contact, Kind k, int place) {
+      add_impulse(contact, k, place, impulse(k, place));
+    });
+    return PassResult();
+  });
+  extrapolate(island, team, 0);  // what momentum starts from
 }
 
 void IslandSweeps::unpack_contact(int contact, Kind k, int place, BodySolution& out) const {

@@ -14,15 +14,17 @@
 namespace tether::contact::detail {
 
 // Sums of a pass over contacts, in squares of velocities: before the first sweep |b|^2, the largest
-// speed, and the largest needed change itself; later errors.
+// speed, the largest one that an impulse to start from has made, and the largest needed change
+// itself; later errors.
 struct PassResult : Squares {
-  double speed = 0;
+  double speed = 0, started = 0;
   PassResult() = default;
   PassResult(const Squares& s) : Squares(s) {}
   void add(const PassResult& r) {
     sum += r.sum;
     most = most > r.most ? most : r.most;
     speed = speed > r.speed ? speed : r.speed;
+    started = started > r.started ? started : r.started;
   }
 };
 
@@ -39,6 +41,8 @@ class IslandSweeps {
   // Contacts with the impulses to start from, cut off at their friction cones; null or empty: zero.
   // Returns |b|^2, the largest needed change and speed.
   PassResult pack(const Island& island, Team& team, const std::vector<const Vector3d*>& start);
+  // Velocities anew from the present impulses, without the round-off of larger ones before.
+  void refresh(const Island& island, Team& team);
   // One sweep of block Gauss-Seidel; what it changed.
   PassResult sweep(const Island& island, Team& team);
   // Errors of the present impulses; changes nothing.

@@ -13,7 +13,8 @@ namespace {
 
 // More sweeps forecast than kSlow: momentum is used. More than assembly and solution are predicted
 // to cost, after sweeps for kTried of that: assembled.
-constexpr int kFew = 64;  // see BodyOptions::min_sweeps
+constexpr int kFew = 64;        // see BodyOptions::min_sweeps
+constexpr double kShare = 0.1;  // of the tolerance, that round-off of the start may be
 constexpr double kSlow = 15, kTried = 0.25;
 
 }  // namespace
@@ -34,6 +35,8 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
   if (at_once) sweeps.combine(island, team, true);
   r.inverse_scale = detail::inverse_scale(b.most, b.sum);
   r.floor = detail::round_off(b.speed);
+  r.stale = !at_once && detail::round_off(b.started) * r.inverse_scale * r.inverse_scale >
+                            kShare * kShare * options.tolerance * options.tolerance;
   // b = 0: no impulses; those of the last solve are dropped.
   if (b.sum == 0 && b.most == 0) {
     sweeps.rest(island, team);
@@ -87,6 +90,11 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
     // The change by a sweep is close to the residual, which would cost another pass.
     if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
       double residual = sweeps.test(island, team).most;
+      if (r.stale && (last || residual <= bound)) {
+        sweeps.refresh(island, team);
+        r.stale = false;
+        residual = sweeps.test(island, team).most;
+      }
       r.saved = last && !best.last_is_best(residual);
       if (r.saved) residual = best.residual();
       r.error = r.relative(residual);

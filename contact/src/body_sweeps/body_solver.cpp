@@ -9,6 +9,7 @@
 
 #include "body_passes/body_kernels.hpp"
 #include "body_sweeps/implementation.hpp"
+#include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
@@ -37,6 +38,7 @@ int severity(Status s) {
 
 void check(const BodyOptions& o) {
   using detail::require;
+  static_cast<void>(detail::traits(o.law));  // refuses what is no law
   require(o.tolerance > 0 && std::isfinite(o.tolerance), "tolerance", o.tolerance,
           "must be finite and > 0");
   require(o.max_sweeps >= 1, "max_sweeps", o.max_sweeps, "must be >= 1");

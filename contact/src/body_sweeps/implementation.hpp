@@ -28,6 +28,7 @@ struct IslandResult {
   double relative(double square) const {
     return square <= floor ? 0 : std::sqrt(square) * inverse_scale;
   }
+  bool stale = false;        // velocities hold round-off of much larger impulses to start from
   bool assemblable = false;  // unsolved, and a Problem of it is allowed and affordable
   bool assembled = false;
   bool saved = false;  // an earlier point was the best and is unpacked already

@@ -68,6 +68,15 @@ inline double speed_before(const Side& s, double bias) {
                    s.second->angular_velocity.cross(s.r2).squaredNorm()});
 }
 
+// Square of the largest of the velocities that an impulse gives to the two sides of the contact.
+inline double speed_by(const Side& s, const Vector3d& p) {
+  const auto most = [&p](const RigidBody& b, const Vector3d& r) {
+    return std::max((b.inverse_mass * p).squaredNorm(),
+                    (b.inverse_inertia * r.cross(p)).cross(r).squaredNorm());
+  };
+  return s.second ? std::max(most(*s.first, s.r1), most(*s.second, s.r2)) : most(*s.first, s.r1);
+}
+
 // Diagonal block of A in world axes.
 inline Matrix3d diagonal_block(const Side& s) {
   const Matrix3d X = skew(s.r1);

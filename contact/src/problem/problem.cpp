@@ -196,6 +196,12 @@ void Problem::set_ids(std::vector<std::uint64_t> ids) {
 }
 
 Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const {
+  const std::size_t islands =
+      islands_.empty() ? 0 : at(*std::max_element(islands_.begin(), islands_.end()) + 1);
+  for (const auto& [name, list] : {std::pair("mass", &mass), std::pair("speed", &speed)})
+    if (list->size() < islands)
+      detail::refuse_size(name, static_cast<Eigen::Index>(list->size()),
+                          static_cast<Eigen::Index>(islands), "one for each island");
   Problem out = *this;
   out.body_form_.reset();  // of other units
   for (int i = 0; i < contacts(); ++i) {
@@ -277,6 +283,8 @@ std::vector<PackedVector> Problem::pack(const linalg::VectorView& x) const {
 
 void Problem::unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const {
   const int n = contacts(), d = dimension_;
+  if (x.size() != at(n))
+    detail::refuse_size("x", static_cast<Eigen::Index>(x.size()), n, "one for each contact");
   out.resize(d * n);
   for (int i = 0; i < n; ++i)
     for (int r = 0; r < d; ++r) out[d * i + r] = x[at(i)].v[r];

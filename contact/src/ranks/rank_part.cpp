@@ -82,20 +82,22 @@ void RankPart::collect(MovingBodies& bodies) {
 // In the order of the chunks of the whole, as one process adds them.
 PassResult RankPart::total(const std::vector<PassResult>& sums) {
   const Island &all = plan_.whole.islands[at(island_)], &mine = plan_.part.islands[at(island_)];
-  sums_.assign(3 * at(all.chunk_end - all.chunk_begin), 0);
+  sums_.assign(4 * at(all.chunk_end - all.chunk_begin), 0);
   for (int c = mine.chunk_begin; c < mine.chunk_end; ++c) {
-    double* three = sums_.data() + 3 * at(plan_.chunk_of[at(c)] - all.chunk_begin);
-    three[0] = sums[at(c)].sum;
-    three[1] = sums[at(c)].most;
-    three[2] = sums[at(c)].speed;
+    double* four = sums_.data() + 4 * at(plan_.chunk_of[at(c)] - all.chunk_begin);
+    four[0] = sums[at(c)].sum;
+    four[1] = sums[at(c)].most;
+    four[2] = sums[at(c)].speed;
+    four[3] = sums[at(c)].started;
   }
   messages_->sum(sums_);
   PassResult total;
-  for (std::size_t c = 0; c < sums_.size(); c += 3) {
+  for (std::size_t c = 0; c < sums_.size(); c += 4) {
     PassResult r;
     r.sum = sums_[c];
     r.most = sums_[c + 1];
     r.speed = sums_[c + 2];
+    r.started = sums_[c + 3];
     total.add(r);
   }
   return total;
