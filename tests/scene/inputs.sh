@@ -1,6 +1,7 @@
 #!/bin/sh
 # No command writes over what it reads, whatever the name: the file itself, a second name of it, a name that is only
-# used on the way, a mesh that the scene reads. Nor over a file that it was not asked to write.
+# used on the way, a mesh that the scene reads. Nor over a file that Tether did not write, unless it is forced; and what
+# it writes is run by no other program.
 # SPDX-License-Identifier: BSD-3-Clause
 #
 #   sh tests/scene/inputs.sh PROGRAM ROBOT
@@ -87,10 +88,88 @@ for name in x.svg x.state f.pvd; do
   [ "$(cksum <s.toml)" = "$before" ] || { echo "a second name $name.new: the scene is lost"; wrong=1; make; }
   rm -rf out && mkdir out
 done
-mkdir out/f && mkfifo out/f/bodies_000000.vtp && ln s.toml out/f/bodies_000001.vtp
+mkdir out/f && mkfifo out/f/bodies_000000.vtp
 timeout -s KILL 60 "$program" run s.toml --quiet --end 0.1 --every 0.05 --output out --vtk f.pvd >said 2>&1 ||
   { [ $? -eq 1 ] || { echo "a pipe among the frames"; cat said; wrong=1; }; }
-grep -q '\[\[body\]\]' s.toml || { echo "a second name among the frames: the scene is lost"; wrong=1; }
+rm -rf out && mkdir -p out/f && ln s.toml out/f/bodies_000001.vtp
+refused s.toml run s.toml --quiet --end 0.1 --every 0.05 --output out --vtk f.pvd
+rm -rf out && mkdir -p out/f
+
+# Files of somebody else stay, under each name of an output, by the scene and by the command line; those of Tether are
+# replaced as often as one likes, by those of the same kind and of others.
+cat >ball.toml <<'END'
+[scene]
+end = 0.1
+gravity = [0, 0, -9.81]
+engine = "event"
+[output]
+csv = "b.csv"
+vtk = "b.pvd"
+svg = "b.svg"
+state = "b.state"
+every = 0.05
+forces = true
+[[body]]
+name = "floor"
+fixed = true
+shape = "plane"
+material = "m"
+[[body]]
+name = "ball"
+shape = "sphere"
+radius = 0.1
+mass = 1
+position = [0, 0, 0.12]
+material = "m"
+[[pair]]
+between = ["m", "m"]
+END
+own="run ball.toml --quiet --html b.html"
+again() {
+  "$program" "$@" >said 2>&1 || [ $? -eq 1 ] || { echo "$* a second time: $(cat said)"; wrong=1; }
+}
+again $own
+again $own
+again run ball.toml --quiet --restart b.state --end 0.2
+for name in b.csv b.events.csv b.contacts.csv b.pvd b.svg b.state b.html b/bodies_000001.vtp b.svg.new b.csv.lock; do
+  [ -f $name ] && mv $name kept
+  echo 'what: ; touch PWNED' >$name
+  refused $name $own
+  [ $name = b.csv.lock ] || again $own --force
+  rm -f $name
+done
+again $own
+: >b.csv
+again $own
+for option in csv svg html; do
+  echo mine >c.$option
+  refused c.$option cost s.toml --tolerances 1e-3 --reference 1e-4 --$option c.$option
+  again cost s.toml --tolerances 1e-3 --reference 1e-4 --$option c.$option --force
+  again cost s.toml --tolerances 1e-3 --reference 1e-4 --$option c.$option
+done
+echo mine >d.csv
+refused d.csv sweep s.toml --quiet --vary smooth.tolerance=1e-3 --out d.csv
+again sweep s.toml --quiet --vary smooth.tolerance=1e-3 --out d.csv --force
+again sweep s.toml --quiet --vary smooth.tolerance=1e-3 --out d.csv
+echo 'time_s,x,y' >e.csv
+refused e.csv run s.toml --quiet --csv e.csv
+
+# Names that make and shells would obey are refused before anything is written.
+mkdir hostile
+for line in 'csv = "GNUmakefile"' 'csv = "Makefile"' 'csv = ".bashrc"' 'state = ".envrc"' 'svg = ".git/hooks/x.svg"' \
+  'csv = "a/.b/c.csv"' 'vtk = "makefile"'; do
+  sed "s,^csv = .*,$line," ball.toml | grep -v '^\(vtk\|svg\|state\) = "b' >hostile/scene.toml
+  refused hostile/scene.toml run hostile/scene.toml --quiet --output hostile
+done
+for name in '$(shell touch PWNED)' '`touch PWNED`' 'a;touch PWNED' 'x!=touch PWNED'; do
+  sed "s,^name = \"ball\",name = \"$name\"," ball.toml >hostile/scene.toml
+  refused hostile/scene.toml run hostile/scene.toml --quiet --output hostile
+done
+[ "$(ls -A hostile)" = scene.toml ] || { echo "written: $(ls -A hostile)"; wrong=1; }
+if command -v make >/dev/null; then
+  (make; cd hostile && make) >/dev/null 2>&1
+  [ ! -e PWNED ] && [ ! -e hostile/PWNED ] || { echo "make runs what a scene has written"; wrong=1; }
+fi
 
 [ $wrong -eq 0 ] && echo "$tried commands leave what they read"
 exit $wrong

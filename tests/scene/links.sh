@@ -66,11 +66,11 @@ done
 # A pipe in the folder, which a scene names: neither opened nor waited for.
 engine=stepping
 for kind in csv svg state; do
-  rm -rf "$work/here" && mkdir "$work/here" && cd "$work/here" && mkfifo a
-  printf '[scene]\nend = 0.1\n[output]\n%s = "a"\n[[body]]\nshape = "sphere"\nradius = 1\nmass = 1\n' $kind >scene.toml
+  rm -rf "$work/here" && mkdir "$work/here" && cd "$work/here" && mkfifo a.$kind
+  printf '[scene]\nend = 0.1\n[output]\n%s = "a.%s"\n[[body]]\nshape = "sphere"\nradius = 1\nmass = 1\n' $kind $kind >scene.toml
   code=0
   timeout -s KILL 60 "$program" run scene.toml --quiet >"$work/said" 2>&1 || code=$?
-  [ $code -eq 2 ] && [ -p a ] || { echo "$kind = a pipe: exit code $code"; wrong=1; }
+  [ $code -eq 2 ] && [ -p a.$kind ] || { echo "$kind = a pipe: exit code $code"; wrong=1; }
 done
 [ $wrong -eq 0 ] && echo "nothing outside the folder is written"
 exit $wrong

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <string>
 #include <tether/scene/files.hpp>
+#include <utility>
+#include <vector>
 
 #include "support/catch.hpp"
 #include "support/growth.hpp"
@@ -24,19 +26,85 @@ std::string sphere(const std::string& more) {
 
 }  // namespace
 
-TEST_CASE("names of outputs stay in the folder of the output") {
-  for (const char* key : {"csv", "vtk", "svg", "state"}) {
-    const auto with = [&](const std::string& name) {
-      return parse_scene(sphere("[output]\n") + key + " = '" + name + "'\n", "names.toml");
+TEST_CASE("names of outputs stay in the folder of the output, with the ending of their kind") {
+  for (const auto& [key, ending] : {std::pair<std::string, std::string>{"csv", ".csv"},
+                                    {"vtk", ".pvd"},
+                                    {"svg", ".svg"},
+                                    {"state", ".state"}}) {
+    const auto with = [key = key](const std::string& name) {
+      INFO(key << " = " << name);
+      return parse_scene(sphere("[output]\n") + key + " = \"" + name + "\"\n", "names.toml");
     };
-    for (const char* good : {"a.csv", "results/run 1/a.csv", "a..b", "./x.svg", "Ergebnis_%d.csv"})
-      CHECK_NOTHROW(with(good));
+    for (const char* good :
+         {"a", "results/run 1/a", "a..b", "./x", "Ergebnis_%d", "x.csv", "m\u00fc"})
+      CHECK_NOTHROW(with(good + ending));
     for (const char* bad :
-         {"| touch pwned", "/etc/passwd", "../a.csv", "a/../../b", "x/..", ".", "a/", "/dev/null",
-          "a|b", "`touch x`", "$(x)", "-o", "~/a", "a;b", "a\\b"})
-      CHECK_THROWS_AS(with(bad), SceneError);
-    CHECK_THROWS_AS(with(std::string(5000, 'a')), SceneError);
+         {"| touch pwned", "/etc/passwd", "../a",     "a/../../b", "x/../y", "a|b",
+          "`touch x`",     "$(x)",        "-o",       "~/a",       "a;b",    "a\\\\b",
+          "a/-o",          "a/~b",        "a/ b",     "a'b",       "a(b)",   "(a",
+          "a&b",           ".bashrc",     ".a",       "./.a",      "a/.b",   ".git/hooks/a",
+          "a/.git/b",      "a\uff04b",    "a\uff1bb", ""})
+      CHECK_THROWS_AS(with(bad + ending), SceneError);
+    for (const char* other : {"GNUmakefile", "Makefile", "makefile", "thesis.tex", "a.sh", "a.svg2",
+                              "a.csv.py", "a.state.", "a.CSV", "a/", ".", "conftest.py"})
+      CHECK_THROWS_WITH(with(other), Catch::Contains("ends in " + ending));
+    for (const char* other : {"a.csv", "a.pvd", "a.svg", "a.state"})
+      if (other != "a" + ending) CHECK_THROWS_AS(with(other), SceneError);
+    CHECK_THROWS_AS(with(std::string(5000, 'a') + ending), SceneError);
   }
+}
+
+TEST_CASE("names hold nothing that a shell or make obeys, in no width") {
+  const auto named = [](const std::string& name) { return "name = \"" + name + "\"\n"; };
+  const auto all_with = [&](const std::string& name) {
+    return std::vector<std::string>{
+        sphere(named(name)), sphere("material = \"" + name + "\"\n"),
+        sphere(named("a") + "[[joint]]\n" + named(name) +
+               "kind = \"ball\"\nbodies = [\"a\", \"world\"]\nat = [0, 0, 0]\n"),
+        sphere(named("a") + "[[spring]]\n" + named(name) +
+               "bodies = [\"a\", \"world\"]\nat = [[0, 0, 0], [0, 0, 1]]\nstiffness = 1\n")};
+  };
+  for (const std::string& text : all_with("K\u00f6rper 1.2: a=b+c-d@e [x] {y} #3 50% \u4e00_"))
+    CHECK_NOTHROW(parse_scene(text, "names.toml"));
+  for (const char* bad : {"$(shell touch PWNED)",
+                          "`touch PWNED`",
+                          "a$b",
+                          "a;b",
+                          "a & b",
+                          "a|b",
+                          "a<b",
+                          "a>b",
+                          "a(b",
+                          "a)b",
+                          "a\\\\b",
+                          "a!=b",
+                          "a*",
+                          "a?",
+                          "a'b",
+                          "a;=1+1",
+                          " =1+1",
+                          "\u00a0=1+1",
+                          "\u3000a",
+                          "\uff1d1+1",
+                          "\uff0b1",
+                          "\uff0d1",
+                          "\uff20a",
+                          "\u22121",
+                          "\ufe661+1",
+                          "a\uff1b=1+1",
+                          "\uff04(x)",
+                          "a\uff08b\uff09",
+                          "a\uff40b",
+                          "\u200b=1",
+                          "\ufeff=1",
+                          "a\uff0cb"})
+    for (const std::string& text : all_with(bad)) {
+      INFO(text);
+      CHECK_THROWS_WITH(parse_scene(text, "names.toml"), Catch::Contains("none of ; $"));
+    }
+  // A title stands in no table.
+  CHECK_NOTHROW(
+      parse_scene("[scene]\nname = \"Newton's cradle (five balls)\"\n" + sphere(""), "t"));
 }
 
 TEST_CASE("depth without end is refused before it is parsed, with its place") {

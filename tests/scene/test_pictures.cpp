@@ -191,7 +191,7 @@ name = "a < b & c"
 end = 0.2
 gravity = [0, 0, -9.81]
 [[body]]
-name = "bob < & >"
+name = "bob 1"
 mass = 1
 inertia = [1, 1, 1]
 position = [1, 0, 0]
@@ -206,7 +206,7 @@ shape = "plane"
 fixed = true
 [[joint]]
 kind = "distance"
-bodies = ["bob < & >", "world"]
+bodies = ["bob 1", "world"]
 at = [[1, 0, 0], [0, 0, 0]]
 [[spring]]
 bodies = ["bob 2", "world"]
@@ -239,6 +239,7 @@ TEST_CASE("every shipped scene stands in the README of the examples, and they ar
 
 TEST_CASE("texts of a scene stay texts in its picture") {
   Scene scene = parse_scene(kMechanism, "picture.toml");
+  scene.bodies[0].name = "bob < & >";  // no file has such a name
   scene.output.svg = (folder("pictures") / "a.svg").string();
   run(scene);
   const std::vector<Text> texts = texts_of(content(scene.output.svg));

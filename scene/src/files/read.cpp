@@ -103,10 +103,10 @@ void read_engine(Fields& root, Reader& r) {
 void read_output(Fields& root, Reader& r) {
   Fields in = r.fields(root.table("output"), "output");
   Output& o = r.scene.output;
-  o.csv = in.file_name("csv");
-  o.vtk = in.file_name("vtk");
-  o.svg = in.file_name("svg");
-  o.state = in.file_name("state");
+  o.csv = in.output_name("csv", ".csv");
+  o.vtk = in.output_name("vtk", ".pvd");
+  o.svg = in.output_name("svg", ".svg");
+  o.state = in.output_name("state", ".state");
   o.every = in.number("every", o.every, kNotNegative, "s; 0: end / 1000");
   o.checkpoint = in.number("checkpoint", o.checkpoint, kNotNegative, "s; 0: only at the end");
   o.forces = in.flag("forces", o.forces);
@@ -130,7 +130,7 @@ int named(Fields& in, Reader& r, const char* kind, const Names& all) {
     in.missing(kind, fmt::format("the name of a {}", kind));
     return -1;
   }
-  const std::string name = in.text(kind, "");
+  const std::string name = in.name(kind, "");
   if (const auto found = all.find(name); found != all.end()) return found->second;
   in.wrong(kind, fmt::format("no such {}{}", kind, r.hint_of(name, all)));
   return -1;

@@ -218,7 +218,7 @@ void read_mass(Fields& in, Body& body) {
 Body read_body(Fields& in, Reader& r) {
   Body body;
   body.place = in.place();
-  body.name = in.text("name", in.path());
+  body.name = in.name("name", in.path());
   if (in.has("name")) in.rename(fmt::format("body \"{}\"", body.name));
   body.fixed = in.flag("fixed", false);
   body.shapes = read_shapes(in, r);
@@ -227,7 +227,7 @@ Body read_body(Fields& in, Reader& r) {
   body.orientation = read_orientation(in, r);
   body.velocity = in.vector("velocity", Vector3d::Zero(), kAny, "m/s");
   body.angular_velocity = in.vector("angular_velocity", Vector3d::Zero(), kAny, "rad/s");
-  body.material = in.text("material", "");
+  body.material = in.name("material", "");
   return body;
 }
 

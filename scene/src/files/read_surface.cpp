@@ -57,7 +57,7 @@ bool read_beside(Fields& in, Reader& r, const std::string& name, std::string& te
 // What `parse(name, text)` makes of the file that is named; false: it is missing or wrong.
 template <class Parse>
 bool from_file(Fields& in, Reader& r, const Parse& parse) {
-  const std::string name = in.file_name("file", "the scene");
+  const std::string name = in.input_name("file");
   std::string text;
   if (name.empty() || !read_beside(in, r, name, text)) return false;
   try {

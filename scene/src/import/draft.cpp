@@ -160,7 +160,7 @@ class Drafting {
         if (used.insert(each.name).second) continue;
         const std::string stem = each.name;
         int& k = last.emplace(stem, 1).first->second;
-        do each.name = fmt::format("{} ({})", stem, ++k);
+        do each.name = fmt::format("{} {}", stem, ++k);
         while (names.count(each.name) > 0 || !used.insert(each.name).second);
       }
     };

@@ -7,8 +7,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
 
@@ -26,10 +26,15 @@ bool is_there(const std::string& name, int descriptor) {
          open_file.st_ino == named.st_ino && open_file.st_dev == named.st_dev;
 }
 
-std::string owner(int descriptor) {
+/// What a run has written into its lock, the number of its process, or what somebody else did.
+std::string content(int descriptor) {
   char text[16] = {};
   const ssize_t count = pread(descriptor, text, sizeof text - 1, 0);
-  return count > 0 ? fmt::format(" (process {})", std::strtol(text, nullptr, 10)) : "";
+  return {text, static_cast<std::size_t>(std::max<ssize_t>(count, 0))};
+}
+
+bool is_lock(const std::string& text) {
+  return text.find_first_not_of("0123456789\n") == std::string::npos && text.size() < 15;
 }
 
 }  // namespace
@@ -45,17 +50,22 @@ void OutputLock::take(const std::string& file) {
     if (descriptor < 0) return;  // whoever writes the file says why that cannot be
     if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
       const bool busy = errno == EWOULDBLOCK;
-      const std::string by = busy ? owner(descriptor) : "";
+      const std::string owner = busy ? content(descriptor) : "";
       close(descriptor);
       if (!busy) return;
       throw std::runtime_error(fmt::format(
           "{} is being written by another run{}: wait for it, or give this one other files "
           "(--output DIR)",
-          file, by));
+          file, owner.empty() ? "" : " (process " + owner.substr(0, owner.find('\n')) + ")"));
     }
     if (!is_there(name, descriptor)) {
       close(descriptor);
       continue;
+    }
+    if (!is_lock(content(descriptor))) {
+      close(descriptor);
+      throw std::runtime_error(name +
+                               " is there and is no lock of a run: it stays, and nothing is run");
     }
     const std::string self = fmt::format("{}\n", getpid());
     if (ftruncate(descriptor, 0) != 0 || write(descriptor, self.data(), self.size()) < 0) {

@@ -8,6 +8,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "own_files.hpp"
+
 namespace tether::scene {
 
 namespace fs = std::filesystem;
@@ -123,6 +125,16 @@ std::vector<std::string> all_names(const Output& o) {
   }
   if (!o.vtk.empty()) all.push_back(film_folder(o.vtk));
   return all;
+}
+
+void check_replaceable(const Output& o) {
+  for (const std::string& each : all_names(o))
+    if (o.vtk.empty() || each != film_folder(o.vtk)) check_replaceable(each);
+  if (o.vtk.empty()) return;
+  std::error_code error;
+  for (const fs::directory_entry& each : fs::directory_iterator(film_folder(o.vtk), error))
+    if (const fs::path end = each.path().extension(); end == ".vtp" || end == ".pvtp")
+      check_replaceable(each.path().string());
 }
 
 }  // namespace tether::scene

@@ -35,4 +35,7 @@ std::vector<std::string> names(const Output& output);
 /// Those, the other tables and the folder of frames, whether the run will write them or not.
 std::vector<std::string> all_names(const Output& output);
 
+/// check_replaceable() of all of these and of the frames that are there.
+void check_replaceable(const Output& output);
+
 }  // namespace tether::scene

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "output/own_files.hpp"
+
 namespace tether::scene::picture {
 
 namespace {
@@ -175,12 +177,12 @@ bool Canvas::text(const std::string& text, const std::vector<Spot>& places, cons
 
 std::string Canvas::svg(const std::string& title) const {
   return fmt::format(
-             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg "
+             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{3}<svg "
              "xmlns=\"http://www.w3.org/2000/svg\" "
              "width=\"{0:g}\" height=\"{1:g}\" viewBox=\"0 0 {0:g} {1:g}\" "
              "font-family=\"Helvetica, Arial, sans-serif\">\n<title>{2}</title>\n"
              "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"#ffffff\"/>\n",
-             whole_.right, whole_.bottom, escaped(title)) +
+             whole_.right, whole_.bottom, escaped(title), kMarkup) +
          (hatched_ ? kHatch : "") + drawn_ +
          "<g stroke=\"#ffffff\" stroke-width=\"3\" stroke-linejoin=\"round\" "
          "paint-order=\"stroke\">\n" +

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include <fmt/format.h>
 
+#include "output/own_files.hpp"
 #include "record/number_at.hpp"
 #include "record/table_recorder.hpp"
 
@@ -13,15 +14,10 @@ namespace {
 class ContactRecorder : public TableRecorder {
  public:
   ContactRecorder(const Scene& scene, const std::string& file, const Resume& resume)
-      : TableRecorder(
-            scene,
-            LongTable(
-                file,
-                "time_s,first,second,x_m,y_m,z_m,normal_x,normal_y,normal_z,gap_m,normal_force_N,"
-                "fx_N,fy_N,fz_N,slip_x_m_per_s,slip_y_m_per_s,slip_z_m_per_s\n",
-                resume.restarted, [time = resume.time](const std::string& row) {
-                  return number_at(row, 0) <= time;
-                })) {}
+      : TableRecorder(scene, LongTable(file, kContactsHead, resume.restarted,
+                                       [time = resume.time](const std::string& row) {
+                                         return number_at(row, 0) <= time;
+                                       })) {}
 
   void record(const Engine& engine, const Diagnostics&) override {
     std::string rows;

@@ -8,6 +8,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "effects/list.hpp"
+#include "output/own_files.hpp"
 #include "output/row_file.hpp"
 #include "record/number_at.hpp"
 #include "recorder.hpp"
@@ -74,9 +75,7 @@ class CsvRecorder : public Recorder {
 
  private:
   std::string header(const Scene& scene) const {
-    std::string text =
-        "time_s,kinetic_energy_J,potential_energy_J,energy_J,energy_change_J,momentum_x,momentum_y,"
-        "momentum_z,angular_momentum_x,angular_momentum_y,angular_momentum_z,drift";
+    std::string text = kRecordsHead;
     if (tells_steps_) text += ",in_steps";
     for (const mechanics::Column& column : columns_) text += "," + column.name;
     for (const std::size_t i : moving_)

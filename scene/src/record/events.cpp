@@ -1,6 +1,7 @@
 // Tether: the events of a run as a table. SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "output/own_files.hpp"
 #include "record/number_at.hpp"
 #include "record/table_recorder.hpp"
 
@@ -13,17 +14,13 @@ class EventRecorder : public TableRecorder {
   // Rows of events that were found before the state was saved stay. A `rest` lies ahead of when it
   // was found.
   EventRecorder(const Scene& scene, const std::string& file, const Resume& resume, double now)
-      : TableRecorder(
-            scene,
-            LongTable(
-                file,
-                "time_s,kind,first,second,normal_speed_before_m_per_s,normal_speed_after_m_per_s,"
-                "energy_lost_J,impulse_x_N_s,impulse_y_N_s,impulse_z_N_s,joint\n",
-                resume.restarted, [now, left = resume.events](const std::string& row) mutable {
-                  const bool before =
-                      !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
-                  return before && left-- > 0;
-                })) {}
+      : TableRecorder(scene, LongTable(file, kEventsHead, resume.restarted,
+                                       [now, left = resume.events](const std::string& row) mutable {
+                                         const bool before =
+                                             !(number_at(row, 0) > now) ||
+                                             row.find(",rest,") != std::string::npos;
+                                         return before && left-- > 0;
+                                       })) {}
 
   void record(const Engine& engine, const Diagnostics&) override { put_found(engine); }
   void keep(const Engine& engine) override {

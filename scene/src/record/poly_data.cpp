@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "output/own_files.hpp"
 #include "output/whole_file.hpp"
 
 namespace tether::scene {
@@ -23,9 +24,9 @@ std::string declaration(const char* name, int components) {
 
 std::string begin(const char* type) {
   return fmt::format(
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"{}\" version=\"1.0\" "
+      "<?xml version=\"1.0\"?>\n{}<VTKFile type=\"{}\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n",
-      type);
+      kMarkup, type);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "geometry/mesh.hpp"
 #include "output/output_names.hpp"
+#include "output/own_files.hpp"
 #include "output/whole_file.hpp"
 #include "record/number_at.hpp"
 #include "record/poly_data.hpp"
@@ -92,10 +93,10 @@ class VtkRecorder : public Recorder {
 
   void write_film() {
     if (among_.rank != 0) return;
-    write_whole(file_,
-                "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
-                "byte_order=\"LittleEndian\">\n<Collection>\n" +
-                    sets_ + "</Collection>\n</VTKFile>\n");
+    write_whole(file_, std::string("<?xml version=\"1.0\"?>\n") + kMarkup +
+                           "<VTKFile type=\"Collection\" version=\"1.0\" "
+                           "byte_order=\"LittleEndian\">\n<Collection>\n" +
+                           sets_ + "</Collection>\n</VTKFile>\n");
   }
 
   static double extent(const Scene& scene) {

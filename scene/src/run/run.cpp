@@ -80,6 +80,7 @@ class Run {
     std::vector<std::string> inputs = inputs_of(scene);
     if (o.state != options.restart) inputs.push_back(options.restart);
     check_names(o, inputs);
+    if (options.among.rank == 0 && !options.force) check_replaceable(o);
     if (options.among.rank == 0)
       for (const std::string& each : names(o)) lock_.take(each);
     if (!o.state.empty()) check_writable(o.state);

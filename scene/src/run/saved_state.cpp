@@ -14,13 +14,14 @@
 #include <tether/scene/plan.hpp>
 
 #include "output/binary.hpp"
+#include "output/own_files.hpp"
 #include "output/whole_file.hpp"
 
 namespace tether::scene {
 
 namespace {
 
-const std::string kFormat = "tether state ";
+const std::string kFormat = kStateHead;
 const std::string kThis = kFormat + "4 " TETHER_VERSION "\n";
 
 // CRC-32 of IEEE 802.3 (polynomial 0x04c11db7, bits reversed): finds every damage of up to 32 bits

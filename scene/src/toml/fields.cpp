@@ -110,35 +110,59 @@ bool Fields::flag(std::string_view key, bool otherwise) {
 }
 
 std::string Fields::text(std::string_view key, const std::string& otherwise) {
+  return text(key, otherwise, is_plain, kPlain);
+}
+
+std::string Fields::name(std::string_view key, const std::string& otherwise) {
+  return text(key, otherwise, is_name, kName);
+}
+
+std::string Fields::text(std::string_view key, const std::string& otherwise,
+                         bool (*is_good)(std::string_view), const char* good) {
   const Entry* found = entry(key);
   if (found == nullptr) return otherwise;
   if (found->value.kind() != Value::Kind::text) {
     wrong(*found, found->value, "must be a text in quotes");
     return otherwise;
   }
-  const std::string& text = found->value.text();
-  if (!is_plain(text)) {
-    wrong(*found, found->value, kPlain);
-    return otherwise;
-  }
-  return text;
+  if (is_good(found->value.text())) return found->value.text();
+  wrong(*found, found->value, good);
+  return otherwise;
 }
 
-// A scene from an untrusted source must not write elsewhere: no way out of the folder, no pipe of
-// a program that takes names for commands.
-std::string Fields::file_name(std::string_view key, std::string_view what) {
-  const std::string name = text(key, "");
-  if (name.empty()) return "";
-  const std::filesystem::path path(name);
+// A scene from an untrusted source must not write elsewhere, nor what other programs look for by
+// its name: files that begin with a dot, or have no ending, are settings and programs.
+std::string Fields::output_name(std::string_view key, std::string_view ending) {
+  const std::string file = name(key, "");
+  const std::filesystem::path path(file);
+  bool hidden = false;
+  for (const auto& part : path) hidden = hidden || (part != "." && part.string()[0] == '.');
+  if (file.empty() || (!hidden && path.extension() == ending)) return inside(key, file, "output");
+  wrong(key, fmt::format("must be the name of a file that ends in {}, in the folder of the output: "
+                         "no part of it begins with a dot",
+                         ending));
+  return "";
+}
+
+std::string Fields::input_name(std::string_view key) { return inside(key, text(key, ""), "scene"); }
+
+// No way out of the folder, no pipe of a program that takes names for commands.
+std::string Fields::inside(std::string_view key, const std::string& file, const char* whose) {
+  if (file.empty()) return "";
+  const std::filesystem::path path(file);
   const bool out = path.is_absolute() || std::find(path.begin(), path.end(), "..") != path.end();
-  const bool odd = name.find_first_of("|<>\\*?:`$;&!") != std::string::npos || name[0] == '-' ||
-                   name[0] == '~' || name[0] == ' ' || name.back() == ' ';
-  if (!out && !odd && path.has_filename() && path.filename() != "." && name.size() < 200)
-    return name;
-  wrong(key,
-        out ? fmt::format("must stay in the folder of {}: a relative name without \"..\"", what)
-            : "must be the name of a file, of less than 200 characters, without | < > \\ * ? : ` "
-              "$ ; & ! and not beginning with - or ~ or a blank");
+  bool odd = file.find_first_of("|<>\\*?:`$;&!") != std::string::npos || file.size() >= 200;
+  for (const auto& part : path) {
+    const std::string name = part.string();
+    odd = odd || name.empty() || std::string_view("-~ ").find(name[0]) != std::string_view::npos ||
+          name.back() == ' ';
+  }
+  if (!out && !odd && path.has_filename() && path.filename() != ".") return file;
+  wrong(
+      key,
+      out ? fmt::format("must stay in the folder of the {}: a relative name without \"..\"", whose)
+          : "must be the name of a file, of less than 200 characters, without | < > \\ * ? : ` "
+            "$ ; & !, no part of which begins with - or ~ or a blank");
   return "";
 }
 

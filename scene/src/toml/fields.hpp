@@ -34,10 +34,13 @@ class Fields {
   double number(std::string_view key, double otherwise, const Range& range, std::string_view unit);
   int count(std::string_view key, int otherwise, int low, int high);
   bool flag(std::string_view key, bool otherwise);
-  std::string text(std::string_view key, const std::string& otherwise);
-  /// The name of a file inside the folder of the output (or of `what` else); empty if absent or
+  std::string text(std::string_view key, const std::string& otherwise);  ///< is_plain
+  std::string name(std::string_view key, const std::string& otherwise);  ///< is_name
+  /// The name of an output inside its folder, with the ending of its kind; empty if absent or
   /// wrong.
-  std::string file_name(std::string_view key, std::string_view what = "the output");
+  std::string output_name(std::string_view key, std::string_view ending);
+  /// The name of a file to read, inside the folder of the scene; empty if absent or wrong.
+  std::string input_name(std::string_view key);
   Eigen::Vector3d vector(std::string_view key, const Eigen::Vector3d& otherwise, const Range& range,
                          std::string_view unit);
   /// A direction of any length but zero; returned with length one.
@@ -89,6 +92,9 @@ class Fields {
   std::string field(std::string_view key) const;
 
  private:
+  std::string text(std::string_view key, const std::string& otherwise,
+                   bool (*is_good)(std::string_view), const char* good);
+  std::string inside(std::string_view key, const std::string& file, const char* whose);
   void wrong(const Entry& entry, const Value& value, std::string allowed);
   const Entry* entry(std::string_view key);
 

@@ -21,6 +21,42 @@ std::string files::printable(std::string_view text) {
   return out;
 }
 
+namespace {
+
+/// Signs of ASCII for their full-width forms (U+FF01 to U+FF5E) and the minus sign (U+2212), a
+/// question mark for small forms (U+FE50 to U+FE6F), blanks for what shows as one or as nothing
+/// (U+00A0, U+2000 to U+200F, U+202F, U+205F to U+2064, U+3000, U+FEFF).
+std::string in_ascii(std::string_view text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = [&](std::size_t k) {
+      return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0u;
+    };
+    const unsigned lead = byte(0) << 8 | byte(1), last = byte(2);
+    char sign = 0;
+    if (lead == 0xefbc && last > 0x80 && last <= 0xbf) sign = static_cast<char>(last - 0x60);
+    if (lead == 0xefbd && last >= 0x80 && last < 0x9f) sign = static_cast<char>(last - 0x20);
+    if (lead == 0xefb9 && last >= 0x90 && last < 0xb0) sign = '?';
+    if (lead == 0xe288 && last == 0x92) sign = '-';
+    if ((lead == 0xe280 && (last < 0x90 || last == 0xaf)) ||
+        (lead == 0xe281 && last >= 0x9f && last <= 0xa4) || (lead == 0xe380 && last == 0x80) ||
+        (lead == 0xefbb && last == 0xbf))
+      sign = ' ';
+    out += lead == 0xc2a0 ? ' ' : sign != 0 ? sign : text[i];
+    i += lead == 0xc2a0 ? 1 : sign != 0 ? 2 : 0;
+  }
+  return out;
+}
+
+}  // namespace
+
+bool files::is_name(std::string_view text) {
+  const std::string read = in_ascii(text);
+  return is_plain(text) && is_plain(read) &&
+         read.find_first_of(";$`()&|<>\\!*?'") == std::string::npos &&
+         (read.empty() || read[0] != ' ');
+}
+
 bool files::is_plain(std::string_view text) {
   return text.size() <= kLongestPlain && text.find_first_of("\",") == std::string_view::npos &&
          printable(text) == text &&

@@ -10,7 +10,7 @@ int Reader::body(Fields& in, std::string_view key) const {
     in.missing(key, "the name of a body");
     return 0;
   }
-  const std::string name = in.text(key, "");
+  const std::string name = in.name(key, "");
   const auto found = bodies.find(name);
   if (found != bodies.end()) return found->second;
   in.wrong(key, "no such body" + hint_of(name, scene.bodies));
@@ -39,7 +39,7 @@ void Reader::two_bodies(Fields& in, int& first, int& second) const {
 }
 
 std::string read_name(Fields& in, const std::string& kind) {
-  const std::string name = in.text("name", in.path());
+  const std::string name = in.name("name", in.path());
   if (in.has("name")) in.rename(fmt::format("{} \"{}\"", kind, name));
   return name;
 }

@@ -24,13 +24,19 @@ class Report {
 /// `text` with a question mark for all that a terminal obeys instead of showing it: control
 /// characters of ASCII and Unicode, and marks that turn the direction of what follows.
 std::string printable(std::string_view text);
-/// What names and words of a scene may be: they end up in tables, XML and messages. No comma, quote
-/// or control character, no beginning that makes spreadsheets compute: = + - @; and not endless.
+/// What a text of a scene may be that is only shown: no comma, quote or control character, no
+/// beginning that makes spreadsheets compute, and not endless.
 bool is_plain(std::string_view text);
 constexpr std::size_t kLongestPlain = 1000;  // bytes
 constexpr const char* kPlain =
     "must hold no comma, quote or control character, not begin with = + - @, and have at most 1000 "
     "bytes";
+/// What a name may be: names stand in tables and names of files, which shells, make and
+/// spreadsheets may read. Full-width and small forms count as the signs that they look like.
+bool is_name(std::string_view text);
+constexpr const char* kName =
+    "must hold no comma, quote or control character and none of ; $ ` ( ) & | < > \\ ! * ?, also "
+    "in other widths, not begin with = + - @ or a blank, and have at most 1000 bytes";
 
 /// Throws a SceneError of one problem.
 [[noreturn]] void refuse(const Place& place, std::string why);

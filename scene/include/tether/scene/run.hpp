@@ -40,8 +40,10 @@ struct Processes {
 };
 
 struct RunOptions {
-  std::string restart;                        ///< a saved state to go on from; empty: from t = 0
-  bool force = false;                         ///< the state may be of another scene or version
+  std::string restart;  ///< a saved state to go on from; empty: from t = 0
+  /// The state may be of another scene or version, and files that Tether did not write are
+  /// replaced.
+  bool force = false;
   std::function<void(double time)> progress;  ///< called at each record
   std::vector<double> stops;                  ///< further times at which `record` is called, s
   std::function<void(const Engine&)> record;  ///< called at each record and stop
@@ -79,8 +81,9 @@ constexpr double kMostSteps = 1e9;    ///< of the stepping engine in a run: end 
 constexpr double kMostRecords = 1e7;  ///< end / every, end / checkpoint
 
 /// Runs the scene to its end and writes what Scene::output names. Throws std::invalid_argument for
-/// times out of range, names that collide and a scene that no engine has, std::runtime_error for
-/// files, also those that another run writes at the time; a run that cannot go on is a result.
+/// times out of range, names that collide, files that Tether did not write and a scene that no
+/// engine has, std::runtime_error for files, also those that another run writes at the time; a run
+/// that cannot go on is a result.
 ///
 /// With its state saved, a run is continued bit by bit: RunOptions::restart leaves the rows, frames
 /// and states that a run in one piece would have left.

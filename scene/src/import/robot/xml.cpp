@@ -166,10 +166,6 @@ std::string name_or_line(const Node& node) {
 
 bool is(const Node& node, std::string_view name) { return node.Name() == name; }
 
-bool is_name(std::string_view name) {
-  return !name.empty() && files::is_plain(name) && name.find('\'') == std::string_view::npos;
-}
-
 std::string shown(const std::string& text) {
   Problem problem;  // whose message goes to terminals
   problem.allowed = text;
@@ -195,7 +191,8 @@ std::string Tag::name(std::string_view key, std::string_view allowed) {
     missing(key, std::string(allowed));
     return "";
   }
-  if (!is_name(found)) wrong(key, std::string("must be a name without quotes: ") + files::kPlain);
+  if (*found == '\0' || !files::is_name(found))
+    wrong(key, std::string("must be a name: it ") + files::kName);
   return found;
 }
 

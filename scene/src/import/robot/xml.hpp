@@ -51,8 +51,6 @@ std::string path(const Node& node);
 /// The attribute `name`, or "line 12" of an element without one.
 std::string name_or_line(const Node& node);
 bool is(const Node& node, std::string_view name);
-/// What scenes take as a name (files::is_plain), without the other quote.
-bool is_name(std::string_view name);
 
 /// Without what a terminal obeys in place of showing it.
 std::string shown(const std::string& text);

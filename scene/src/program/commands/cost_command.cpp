@@ -10,6 +10,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "output/output_names.hpp"
+#include "output/own_files.hpp"
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
@@ -24,6 +25,7 @@ struct CostArguments {
   std::string file, csv, svg, html;
   std::vector<std::string> tolerances, steps, accuracies;
   std::optional<double> reference, wanted;
+  bool force = false;
 };
 
 void print_row(const Scene& scene, const CostTable& table, const CostRow& row) {
@@ -51,9 +53,7 @@ void print(const Scene& scene, const CostTable& table) {
 }
 
 std::string table_text(const CostTable& table) {
-  std::string out =
-      "method,setting,error,seconds,steps,contact_problems,drift,penetration_m,expectations_met,"
-      "status\n";
+  std::string out = kCostHead;
   for (const CostRow& row : table.rows)
     out += fmt::format("{},{:g},{:.4e},{:.4e},{},{},{:.3e},{:.3e},{},{}\n", name(row.method),
                        row.setting, row.error, row.seconds, row.steps, row.contact_problems,
@@ -83,7 +83,10 @@ void check_files(const Scene& scene, const CostArguments& arguments) {
   others.insert(others.end(), {arguments.csv, arguments.svg});
   if (!arguments.html.empty()) check_page_name(arguments.html, others);
   for (const std::string& file : {arguments.csv, arguments.svg, arguments.html})
-    if (!file.empty()) check_writable(file);
+    if (!file.empty()) {
+      if (!arguments.force) check_replaceable(file);
+      check_writable(file);
+    }
 }
 
 int run_cost(const CostArguments& arguments) {
@@ -165,6 +168,7 @@ void add_cost_command(CLI::App& app, int* status) {
   command->add_option("--html", a->html,
                       "Page of error against time whose points tell the command that repeats them");
   command->add_option("--svg", a->svg, "Picture of error against time");
+  command->add_flag("--force", a->force, "Replace files that Tether did not write");
   command->footer(
       "The error is the largest distance (m) or angle (rad) of a body from the reference at 400 "
       "equal\n"

@@ -12,6 +12,7 @@
 #include <tether/scene/run.hpp>
 
 #include "output/output_names.hpp"
+#include "output/own_files.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
 #include "program/process/standard_output_file.hpp"
@@ -110,6 +111,7 @@ int run_scene(const RunArguments& arguments, Ranks* ranks) {
   catch_signals();
   StandardOutputFile standard_output(scene.output, html);
   std::optional<Player> player;
+  if (!html.empty() && !arguments.force) check_replaceable(html);
   if (!html.empty()) player.emplace(scene, html);
   tether::Progress bar(1);
   RunOptions options;
@@ -202,8 +204,8 @@ void add_run_command(CLI::App& app, int* status) {
           "(said in the summary; exit code as of a run of steps)")
       ->check(CLI::IsMember({"stop", "stepping"}));
   command->add_flag("--force", a->force,
-                    "With --restart: the state may be of another scene; positions and velocities "
-                    "are taken over, bits are not the same");
+                    "Replace files that Tether did not write; with --restart: the state may be of "
+                    "another scene, of which positions and velocities are taken over, not bits");
   command->add_flag("--quiet", a->quiet, "No progress bar");
   command->add_flag(
       "--strict", a->strict,

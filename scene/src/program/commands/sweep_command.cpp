@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "output/output_names.hpp"
+#include "output/own_files.hpp"
 #include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
@@ -32,7 +33,7 @@ struct SweepArguments {
   std::string file, out = "-";
   std::vector<std::string> vary;
   int jobs = 0;
-  bool quiet = false;
+  bool quiet = false, force = false;
 };
 
 /// All combinations, the last range being the fastest.
@@ -56,9 +57,7 @@ std::vector<std::vector<Setting>> combinations(const std::vector<VariedNumber>& 
 std::string header(const Scene& scene, const std::vector<VariedNumber>& varied) {
   std::string text;
   for (const VariedNumber& each : varied) text += table_field(each.path) + ',';
-  text +=
-      "status,met,expectations,time_s,start_energy_J,end_energy_J,lowest_change_J,largest_change_J,"
-      "drift,penetration_m,residual,contacts,steps,contact_problems,unsolved,seconds";
+  text += kSweepHead;
   for (std::size_t k = 0; k < scene.expect.size(); ++k) {
     const Expect& e = scene.expect[k];
     const std::string of =
@@ -145,6 +144,7 @@ int sweep(const SweepArguments& arguments) {
     std::vector<std::string> inputs = plain.surface_files;
     if (arguments.file != "-") inputs.push_back(arguments.file);
     check_names(table, inputs);
+    if (!arguments.force) check_replaceable(arguments.out);
     check_writable(arguments.out);
   }
   StandardOutput output(arguments.out);
@@ -202,6 +202,7 @@ void add_sweep_command(CLI::App& app, int* status) {
       ->capture_default_str();
   command->add_option("--jobs", a->jobs, "Runs at a time [as many as there are processors]")
       ->check(CLI::Range(1, 1024));
+  command->add_flag("--force", a->force, "Replace a table that Tether did not write");
   command->add_flag("--quiet", a->quiet, "No progress bar");
   command->footer(
       "Rows are in the order of the values, whichever run ends first. A run that fails, or whose "
