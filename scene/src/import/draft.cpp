@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <tether/scene/plan.hpp>
 
 #include "toml/report.hpp"
 
@@ -17,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t kMostMaterials = 16;
+constexpr std::size_t kMostMaterials = 32;
 
 std::string clean_title(const std::string& name) {
   std::string title = files::printable(name);
@@ -31,13 +32,8 @@ class Drafting {
  public:
   Drafting(const Model& model, const std::vector<Part>& parts, const ImportOptions& options,
            Remarks& remarks)
-      : model_(model),
-        parts_(parts),
-        options_(options),
-        remarks_(remarks),
-        has_ground_(options.ground || std::any_of(parts.begin(), parts.end(), [](const Part& part) {
-                      return part.fixed() && part.scenery && part.touch;
-                    })) {}
+      : model_(model), parts_(parts), options_(options), remarks_(remarks) {}
+
   Draft take() {
     draft_.scene.name = clean_title(model_.name);
     draft_.scene.end = options_.end;
@@ -51,7 +47,7 @@ class Drafting {
       const int on = part.parent < 0 ? -1 : body_of_[static_cast<std::size_t>(part.parent)];
       add_joints(part, body_of_[k], on, options_, draft_, remarks_);
     }
-    add_pairs();
+    add_contacts();
     make_unique();
     const Scene& scene = draft_.scene;
     const bool laws = std::any_of(scene.joints.begin(), scene.joints.end(), [](const Joint& each) {
@@ -70,9 +66,6 @@ class Drafting {
     body.fixed = true;
     body.position.z() = *options_.ground;
     body.shapes.emplace_back().kind = ShapeKind::plane;
-    Touch touch;
-    touch.type = touch.affinity = std::numeric_limits<unsigned>::max();
-    body.material = material(touch, still_, "ground");
     draft_.scene.bodies.push_back(std::move(body));
     draft_.body_comments.emplace_back("--ground");
   }
@@ -95,12 +88,6 @@ class Drafting {
       shape.position -= part.centre;
       shape.orientation.normalize();
     }
-    // The base of a URDF is part of the robot, which does not touch itself.
-    const bool touches =
-        has_ground_ && part.touch && !part.shapes.empty() && (!part.fixed() || model_.base_is_said);
-    if (touches)
-      body.material = part.fixed() ? material(*part.touch, still_, "ground")
-                                   : material(*part.touch, moving_, "robot");
     std::string comment = fmt::format("line {}", part.line);
     if (part.links.size() > 1) {
       comment += ", with";
@@ -111,43 +98,136 @@ class Drafting {
     draft_.body_comments.push_back(std::move(comment));
     return static_cast<int>(draft_.scene.bodies.size()) - 1;
   }
-  using Materials = std::map<Touch, std::string>;
-  std::string material(Touch touch, Materials& of, const char* stem) {
+  using BodyPair = std::pair<int, int>;  // the smaller one first
+  struct Material {
+    std::string name;
+    bool still;
+    std::vector<int> bodies;
+  };
+  using Materials = std::map<Touch, Material>;
+
+  /// Bodies that pass through each other because a joint connects them.
+  std::set<BodyPair> joined() const {
+    std::set<BodyPair> out;
+    for (const Joint& joint : draft_.scene.joints)
+      if (joint_rows(joint) >= 3 && joint.second >= 0)
+        out.insert(std::minmax(joint.first, joint.second));
+    return out;
+  }
+  /// Those that the file excludes, and neighbours in its tree, where no joint does so.
+  std::set<BodyPair> apart(const std::set<BodyPair>& joined) const {
+    std::map<std::string, int> named;
+    for (std::size_t k = 0; k < parts_.size(); ++k)
+      for (const std::string& link : parts_[k].links)
+        if (!parts_[k].scenery) named.emplace(link, body_of_[k]);
+    std::set<BodyPair> out;
+    const auto add = [&](int a, int b) {
+      const BodyPair pair = std::minmax(a, b);
+      if (a >= 0 && b >= 0 && a != b && joined.count(pair) == 0) out.insert(pair);
+    };
+    for (const auto& [first, second] : model_.excluded) {
+      const auto a = named.find(first), b = named.find(second);
+      if (a != named.end() && b != named.end())
+        add(a->second, b->second);
+      else
+        remarks_.add("<exclude> of the world, or of a body that is not there",
+                     first + " and " + second);
+    }
+    for (std::size_t k = 0; k < parts_.size(); ++k)
+      if (parts_[k].parent >= 0)
+        add(body_of_[k], body_of_[static_cast<std::size_t>(parts_[k].parent)]);
+    return out;
+  }
+
+  /// Bodies that touch alike have one material; those that pass through single others have their
+  /// own.
+  void add_contacts() {
+    const std::set<BodyPair> joined = this->joined();
+    std::set<BodyPair> apart;
+    std::set<int> own;
+    if (model_.touches_itself) apart = this->apart(joined);
+    for (const auto& [a, b] : apart) own.insert({a, b});
+    const bool touches_itself = model_.touches_itself && own.size() < kMostMaterials;
+
+    Materials moving, still;
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      const Part& part = parts_[k];
+      // The base of a URDF is part of the robot, which does not touch itself.
+      if (body_of_[k] < 0 || !part.touch || part.shapes.empty() ||
+          (part.fixed() && !model_.base_is_said))
+        continue;
+      Touch touch = *part.touch;
+      if (touches_itself && own.count(body_of_[k]) > 0) touch.own = body_of_[k];
+      add_to(part.fixed() ? still : moving, touch, body_of_[k]);
+    }
+    if (options_.ground) {
+      Touch touch;
+      touch.type = touch.affinity = std::numeric_limits<unsigned>::max();
+      add_to(still, touch, 0);
+    }
+    // How many pairs of bodies of two materials are not joined.
+    std::map<int, const std::string*> material_of;
+    for (const Materials* of : {&moving, &still})
+      for (const auto& [touch, material] : *of)
+        for (const int body : material.bodies) material_of[body] = &material.name;
+    std::map<std::pair<std::string, std::string>, long> joints;
+    for (const auto& [a, b] : joined)
+      if (material_of.count(a) > 0 && material_of.count(b) > 0)
+        ++joints[std::minmax(*material_of[a], *material_of[b])];
+    const auto add = [&](const Materials::value_type& a, const Materials::value_type& b) {
+      const auto first = static_cast<long>(a.second.bodies.size()),
+                 second = static_cast<long>(b.second.bodies.size());
+      const long all = &a == &b ? first * (first - 1) / 2 : first * second;
+      const bool can_meet = all > joints[std::minmax(a.second.name, b.second.name)] &&
+                            (b.second.still || touches_itself) &&
+                            apart.count(std::minmax(a.first.own, b.first.own)) == 0;
+      draft_.scene.pairs.push_back(pair_of(a, b, can_meet));
+    };
+    for (auto a = moving.begin(); a != moving.end(); ++a) {
+      for (const auto& b : still) add(*a, b);
+      for (auto b = a; b != moving.end(); ++b) add(*a, *b);
+    }
+    const std::vector<Pair>& pairs = draft_.scene.pairs;
+    if (std::none_of(pairs.begin(), pairs.end(), [](const Pair& pair) { return pair.touch; }))
+      return draft_.scene.pairs.clear();
+    for (const auto& [body, name] : material_of)
+      draft_.scene.bodies[static_cast<std::size_t>(body)].material = *name;
+    if (!touches_itself)
+      remarks_.add("contacts of the robot with itself (touch = false in a [[pair]])");
+  }
+  void add_to(Materials& of, Touch touch, int body) {
     // Materials differ by what is asked of them only.
     if (options_.friction) {
       touch.friction = *options_.friction;
       touch.tangential = true;
     }
-    if (of.size() >= kMostMaterials && of.count(touch) == 0) {
-      remarks_.add("kinds of contact beyond the first sixteen have the rule of the first");
-      return of.begin()->second;
+    const bool still = draft_.scene.bodies[static_cast<std::size_t>(body)].fixed;
+    auto found = of.find(touch);
+    if (found == of.end() && of.size() >= kMostMaterials) {
+      remarks_.add(fmt::format("kinds of contact beyond the first {} have the rule of the first",
+                               kMostMaterials));
+      found = of.begin();
     }
-    const std::string next =
-        of.empty() ? std::string(stem) : fmt::format("{} {}", stem, of.size() + 1);
-    return of.emplace(touch, next).first->second;
+    if (found == of.end()) {
+      const char* const stem = still ? "ground" : "robot";
+      const std::string name =
+          of.empty() ? std::string(stem) : fmt::format("{} {}", stem, of.size() + 1);
+      found = of.emplace(touch, Material{name, still, {}}).first;
+    }
+    found->second.bodies.push_back(body);
   }
-  void add_pairs() {
-    for (auto a = moving_.begin(); a != moving_.end(); ++a) {
-      for (const auto& [ground, name] : still_) {
-        Pair pair;
-        pair.first = a->second;
-        pair.second = name;
-        const Touch& robot = a->first;
-        pair.touch = (robot.type & ground.affinity) != 0 || (ground.type & robot.affinity) != 0;
-        if (pair.touch && (robot.tangential || ground.tangential))
-          pair.friction = std::max(robot.friction, ground.friction);
-        draft_.scene.pairs.push_back(std::move(pair));
-      }
-      for (auto b = a; b != moving_.end(); ++b) {
-        Pair pair;
-        pair.first = a->second;
-        pair.second = b->second;
-        pair.touch = false;
-        draft_.scene.pairs.push_back(std::move(pair));
-      }
-    }
-    if (!moving_.empty())
-      remarks_.add("contacts of the robot with itself (touch = false in a [[pair]])");
+  /// By MuJoCo's rules.
+  static Pair pair_of(const Materials::value_type& a, const Materials::value_type& b,
+                      bool can_meet) {
+    const Touch &first = a.first, &second = b.first;
+    Pair pair;
+    pair.first = a.second.name;
+    pair.second = b.second.name;
+    pair.touch =
+        can_meet && ((first.type & second.affinity) != 0 || (second.type & first.affinity) != 0);
+    if (pair.touch && (first.tangential || second.tangential))
+      pair.friction = std::max(first.friction, second.friction);
+    return pair;
   }
   /// Names that the file uses for two things, which a scene tells apart.
   void make_unique() {
@@ -173,10 +253,8 @@ class Drafting {
   const std::vector<Part>& parts_;
   const ImportOptions& options_;
   Remarks& remarks_;
-  bool has_ground_;  // anything that a robot could touch
   Draft draft_;
   std::vector<int> body_of_;  // of each part
-  Materials moving_, still_;
 };
 
 }  // namespace

@@ -107,7 +107,10 @@ std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
           start.weld = start.weld * motion;
         }
       }
-      if (options.held.count(joint.name) == 0) start.joints.push_back(std::move(placed));
+      const bool has_no_range = options.joint_laws && has_coordinate(joint) && joint.limits &&
+                                joint.limits->first == joint.limits->second;
+      if (options.held.count(joint.name) == 0 && !has_no_range)
+        start.joints.push_back(std::move(placed));
     }
     start.pose = pose;
     out.push_back(std::move(start));

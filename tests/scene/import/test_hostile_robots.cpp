@@ -39,6 +39,17 @@ using Catch::Matchers::Contains;
 
 }  // namespace
 
+TEST_CASE("an element of a robot file has at most 100 attributes, at once") {
+  const auto robot = [](int attributes) {
+    return "<robot name='r'\n" + times(attributes - 1, " a", "='<>'") + "><!-- " +
+           times(200, " b", "='1'") + " --><link name='a'>" + kMass + "</link></robot>";
+  };
+  CHECK_THAT(refusal(robot(100)), !Contains("attributes"));
+  CHECK_THAT(refusal(robot(101)), Contains("robot.xml:1: ") && Contains("at most 100 attributes"));
+  // The parser compares each attribute with all others: a minute for these.
+  CHECK_THAT(refusal(robot(200000)), Contains("at most 100 attributes"));
+}
+
 TEST_CASE("a robot file has at most 64 MiB") {
   const std::string robot =
       "<mujoco><worldbody><body name='b'><freejoint/><geom size='1'/></body>"

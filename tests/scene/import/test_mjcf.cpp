@@ -1,4 +1,5 @@
 // Tests: robots of MJCF files as scenes. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <tether/linalg/pi.hpp>
 #include <tether/scene/run.hpp>
@@ -138,8 +139,132 @@ TEST_CASE("MJCF: a ball falls on the floor of its world, with MuJoCo's rule of f
   CHECK(mjcf_scene(
             world("<geom type='plane' size='1 1 1' contype='2' conaffinity='2'/><body><freejoint/>"
                   "<geom size='.1'/></body>"))
-            .pairs[0]
-            .touch == false);
+            .pairs.empty());
+}
+
+TEST_CASE("MJCF: the outermost class of defaults has any name, and holds without one") {
+  const std::string link = "<body name='b'><joint axis='0 1 0'/><geom size='0.05 0.3'/></body>";
+  const double capsule = 2000 * kPi * 0.05 * 0.05 * (0.6 + 4.0 / 3 * 0.05);
+  for (const std::string name : {"class='robot'", "class='main'", ""}) {
+    INFO(name);
+    const Scene scene =
+        mjcf_scene(world(link, "<default " + name +
+                                   "><geom type='capsule' size='0.25 0.4' density='2000'/><joint "
+                                   "damping='0' limited='true' range='-10 10'/></default>"));
+    CHECK(scene.bodies[0].shapes[0].kind == ShapeKind::capsule);
+    CHECK(scene.bodies[0].mass == Approx(capsule).epsilon(1e-13));
+    CHECK(scene.joints[0].limits->upper == Approx(kPi / 18).epsilon(1e-14));
+  }
+  // By its name, by none, and below it.
+  const Scene scene = mjcf_scene(
+      world("<body name='a'><freejoint/><geom class='robot' size='1'/></body>"
+            "<body name='b'><freejoint/><geom size='1'/></body>"
+            "<body name='c'><freejoint/><geom class='light' size='1'/></body>",
+            "<default class='robot'><geom type='sphere' density='3000'/><default class='light'>"
+            "<geom density='300'/></default></default>"));
+  const double volume = 4 * kPi / 3;
+  CHECK(scene.bodies[0].mass == Approx(3000 * volume));
+  CHECK(scene.bodies[1].mass == Approx(3000 * volume));
+  CHECK(scene.bodies[2].mass == Approx(300 * volume));
+}
+
+TEST_CASE("MJCF: free objects touch each other, by contype and conaffinity") {
+  const auto ball = [](const std::string& name, double z, const std::string& more = "") {
+    return "<body name='" + name + "' pos='0 0 " + std::to_string(z) +
+           "'><freejoint/><geom size='.1' mass='1' " + more + "/></body>";
+  };
+  const std::string floor = "<geom type='plane' size='5 5 .1'/>";
+  ImportOptions options;
+  options.end = 0.5;
+  const auto height = [&](const std::string& low, const std::string& high) {
+    Scene scene =
+        mjcf_scene(world(floor + ball("low", 0.1, low) + ball("high", 0.3, high)), options);
+    Expect expect;
+    expect.time = 0.5;
+    expect.quantity = Quantity::position;
+    expect.body = 2;
+    expect.at_least = 0;
+    scene.expect = {expect};
+    return run(scene).judgements[0].value[2];
+  };
+  CHECK(height("", "") == Approx(0.3).margin(1e-4));
+  CHECK(height("", "contype='2' conaffinity='1'") == Approx(0.3).margin(1e-4));
+  CHECK(height("contype='3'", "contype='4' conaffinity='2'") == Approx(0.3).margin(1e-4));
+  // Types that meet each other, and neither the floor: both fall, and nothing holds the upper one.
+  CHECK(height("contype='2' conaffinity='2'", "contype='2' conaffinity='2'") < 0);
+  CHECK_FALSE(said(world(floor + ball("low", 0.1) + ball("high", 0.3)), "with itself"));
+  // Without any floor: two balls meet in the middle.
+  const Scene free = mjcf_scene(world(ball("low", 0.1) + ball("high", 0.3)));
+  REQUIRE(free.pairs.size() == 1);
+  CHECK(free.pairs[0].touch);
+  CHECK(free.pairs[0].friction == 1);
+}
+
+TEST_CASE("MJCF: neighbours in a tree pass through each other, others touch") {
+  const std::string geom = "<geom type='capsule' size='.1' fromto='0 0 0 0 0 1'/>";
+  const auto chain = [&](int links, const std::string& joints = "<joint axis='0 1 0'/>") {
+    std::string text, ends;
+    for (int k = 0; k < links; ++k, ends += "</body>")
+      text += "<body name='l" + std::to_string(k) + "' pos='0 0 1'>" + joints + geom;
+    return text + ends;
+  };
+  CHECK(mjcf_scene(world(chain(2))).pairs.empty());
+  const Scene three = mjcf_scene(world(chain(3)));
+  REQUIRE(three.pairs.size() == 1);
+  CHECK(three.pairs[0].touch);
+  const auto touches = [](const Scene& scene, const std::string& a, const std::string& b) {
+    const auto material = [&](const std::string& name) {
+      for (const Body& each : scene.bodies)
+        if (each.name == name) return each.material;
+      return std::string("none");
+    };
+    for (const Pair& pair : scene.pairs)
+      if (std::minmax(pair.first, pair.second) == std::minmax(material(a), material(b)))
+        return pair.touch;
+    return false;
+  };
+  // Two joints in a row: a small body stands between the neighbours.
+  const std::string two = "<joint axis='0 1 0'/><joint axis='0 1 0' pos='0 0 .5'/>";
+  const Scene small =
+      mjcf_scene(world(chain(3, two) + "<body name='ball'><freejoint/>" + geom + "</body>"));
+  CHECK_FALSE(touches(small, "l0", "l1"));
+  CHECK_FALSE(touches(small, "l1", "l2"));
+  CHECK(touches(small, "l0", "l2"));
+  CHECK(touches(small, "l1", "ball"));
+  // What the file excludes.
+  const std::string excluded = "<contact><exclude body1='l2' body2='l0'/></contact>";
+  CHECK(mjcf_scene(world(chain(3), excluded)).pairs.empty());
+  const Scene four = mjcf_scene(world(chain(4), excluded));
+  CHECK_FALSE(touches(four, "l0", "l2"));
+  CHECK(touches(four, "l0", "l3"));
+  CHECK(touches(four, "l1", "l3"));
+}
+
+TEST_CASE("MJCF: the edges of a box between two points stand as MuJoCo turns them") {
+  const Eigen::Vector3d from(0.1, -0.2, 0.3), to(0.4, 0.5, 0.1), axis = (from - to).normalized();
+  const Scene scene =
+      mjcf_scene(world("<body name='b'><freejoint/><geom type='box' size='.05' "
+                       "fromto='0.1 -0.2 0.3 0.4 0.5 0.1'/></body>"));
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ(), across = z.cross(axis);
+  const Eigen::Matrix3d wanted(
+      Eigen::AngleAxisd(std::atan2(across.norm(), axis.z()), across.normalized()));
+  const Body& body = scene.bodies[0];
+  const Eigen::Matrix3d found(body.orientation * body.shapes[0].orientation);
+  CHECK((found - wanted).norm() < 1e-14);
+  CHECK((body.shapes[0].size - Eigen::Vector3d(0.1, 0.1, (from - to).norm())).norm() < 1e-14);
+  CHECK((body.position - (from + to) / 2).norm() < 1e-14);
+}
+
+TEST_CASE("MJCF: balanceinertia replaces the moments that no body has by their mean") {
+  const std::string body =
+      "<body name='b'><freejoint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 3'/></body>"
+      "<body name='c'><freejoint/><inertial mass='1' pos='0 0 0' diaginertia='1 2 3'/></body>";
+  CHECK(mjcf_refusal(world(body)).find("no body has this") != std::string::npos);
+  const std::string balance = "<compiler balanceinertia='true'/>";
+  const Scene scene = mjcf_scene(world(body, balance));
+  CHECK((scene.bodies[0].inertia - 5.0 / 3 * Eigen::Matrix3d::Identity()).norm() < 1e-14);
+  CHECK(scene.bodies[1].inertia(1, 1) == 2);
+  CHECK(said(world(body, balance), "mean (balanceinertia): b"));
 }
 
 TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with its line") {

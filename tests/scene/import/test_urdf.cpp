@@ -223,6 +223,35 @@ TEST_CASE("a joint whose zero lies beyond its limits starts at the nearest one")
   CHECK(says(made.remarks, "nearest limit"));
 }
 
+TEST_CASE("a joint whose limits are equal is fixed there; 0 and 0 are none, as in MuJoCo") {
+  const auto robot = [](const std::string& type, const std::string& limit) {
+    std::string text = two_links(type, limit);
+    const std::string base = "<link name='a'/>", link = "<link name='b'>";
+    const std::size_t mass = text.find(link) + link.size();
+    const std::string with_mass =
+        "<link name='a'>" + text.substr(mass, text.find("</link>") - mass) + "</link>";
+    return text.replace(text.find(base), base.size(), with_mass);
+  };
+  for (const char* type : {"revolute", "prismatic"}) {
+    const std::string fixed = robot(type, "<limit lower='0.5' upper='0.5'/>");
+    ImportOptions options;
+    options.base = import::Base::free;
+    CHECK(scene_of(fixed, options).joints.empty());
+    CHECK(scene_of(fixed, options).bodies.size() == 1);
+    CHECK(says(import_robot(fixed, "robot.urdf", options).remarks,
+               "equal, which are fixed there: j"));
+    options.joint_laws = false;
+    CHECK(scene_of(fixed, options).joints.size() == 1);
+    options.joint_laws = true;
+    for (const char* none : {"<limit/>", "<limit lower='0' upper='0'/>"}) {
+      const std::string free = robot(type, none);
+      REQUIRE(scene_of(free, options).joints.size() == 1);
+      CHECK_FALSE(scene_of(free, options).joints.front().limits);
+      CHECK(says(import_robot(free, "robot.urdf", options).remarks, "move freely"));
+    }
+  }
+}
+
 TEST_CASE("links without mass: two hinges that cross are a universal joint, three are a ball") {
   const std::string hinge =
       "<joint name='{0}' type='continuous'><parent link='{1}'/><child "

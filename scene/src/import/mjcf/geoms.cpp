@@ -72,7 +72,8 @@ Solid read_solid(Tag& tag, const std::string& type, const std::vector<double>& s
   return {};
 }
 
-/// Ends of the axis in place of size, position and orientation.
+/// Ends of the axis in place of size, position and orientation. As in MuJoCo the z axis of the geom
+/// points from the second to the first of them, which turns the edges of boxes.
 Eigen::Isometry3d read_place(Tag& tag, const std::string& type, const Settings& settings,
                              std::vector<double>& size) {
   const std::vector<double> ends = tag.numbers("fromto", 6, 6);
@@ -86,7 +87,7 @@ Eigen::Isometry3d read_place(Tag& tag, const std::string& type, const Settings& 
   size.resize(1);
   if (type == "box" || type == "ellipsoid") size.push_back(size[0]);
   size.push_back((to - from).stableNorm() / 2);
-  return placed(linalg::shortest_turn(Vector3d::UnitZ(), to - from), (from + to) / 2);
+  return placed(linalg::shortest_turn(Vector3d::UnitZ(), from - to), (from + to) / 2);
 }
 
 Touch read_touch(Tag& tag, bool& touches) {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <set>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 #include "geoms.hpp"
 #include "import/robot/geometry.hpp"
@@ -213,6 +214,27 @@ void Reader::geom(const Node& node, int of, const std::string& class_name) {
   out.touch->affinity |= geom.touch.affinity;
 }
 
+/// All three principal moments become their mean where one exceeds the sum of the others.
+void balance_inertia(Model& model) {
+  for (Link& link : model.links) {
+    if (!link.inertia.allFinite()) continue;
+    const Vector3d moment = linalg::symmetric_eigenvalues(link.inertia);  // ascending
+    if (!(moment[0] + moment[1] < moment[2])) continue;
+    link.inertia = link.inertia.trace() / 3 * Matrix3d::Identity();
+    model.remarks.add("inertias that no body has, replaced by their mean (balanceinertia)",
+                      link.name);
+  }
+}
+
+/// Pairs of bodies that pass through each other, of <contact>.
+void read_excluded(const Node& node, Model& model, Problems& problems) {
+  Tag tag(node, problems);
+  for (const char* key : {"body1", "body2"})
+    if (!tag.has(key)) tag.missing(key, "the name of a body");
+  model.excluded.emplace_back(tag.text("body1"), tag.text("body2"));
+  tag.finish(model.remarks, {"name"});
+}
+
 void set_total_mass(double total, Model& model) {
   double sum = 0;
   for (const Link& link : model.links) sum += link.mass;
@@ -229,6 +251,7 @@ Model read_mjcf(const Node& root, Problems& problems) {
   Model model;
   Tag tag(root, problems);
   model.format = "MJCF";
+  model.touches_itself = true;
   model.name = tag.text("model");
   const Settings settings = mjcf::read_settings(root, model, problems);
   Reader reader(model, settings, problems);
@@ -244,11 +267,15 @@ Model read_mjcf(const Node& root, Problems& problems) {
     } else if (!is(*each, "compiler") && !is(*each, "option") && !is(*each, "default")) {
       for (const Node* part = each->FirstChildElement(); part != nullptr;
            part = part->NextSiblingElement())
-        model.remarks.add(fmt::format("<{}> in <{}>", part->Name(), each->Name()),
-                          part->Attribute("name") != nullptr ? name_or_line(*part) : "");
+        if (is(*each, "contact") && is(*part, "exclude"))
+          read_excluded(*part, model, problems);
+        else
+          model.remarks.add(fmt::format("<{}> in <{}>", part->Name(), each->Name()),
+                            part->Attribute("name") != nullptr ? name_or_line(*part) : "");
     }
   }
   if (!has_world) problems.add(root.GetLineNum(), "mujoco: worldbody", "", "is missing");
+  if (settings.balance_inertia && problems.clean()) balance_inertia(model);
   set_total_mass(settings.total_mass, model);
   return model;
 }

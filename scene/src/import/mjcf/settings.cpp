@@ -39,7 +39,7 @@ void read_compiler(const Node& node, Settings& out, Problems& problems, Remarks&
   }
   for (const char* key : {"boundmass", "boundinertia"})
     if (tag.number(key, 0) > 0) remarks.add(fmt::format("compiler {}", key));
-  if (tag.flag("balanceinertia", false)) remarks.add("compiler balanceinertia (--mend does it)");
+  out.balance_inertia = tag.flag("balanceinertia", out.balance_inertia);
   tag.finish(remarks, {"meshdir", "texturedir", "assetdir", "convexhull", "discardvisual",
                        "usethread", "strippath", "alignfree", "fusestatic"});
 }
@@ -65,18 +65,22 @@ std::size_t size_of(const std::map<std::string, Attributes>& elements) {
   return size;
 }
 
-/// A class has what it says, and what it does not say of the one around it.
-void read_class(const Node& node, const std::string& around, Settings& out, Problems& problems,
+/// A class has what it says, and what it does not say of the one around it. The outermost one may
+/// have any name, and holds for elements without a class in either case.
+void read_class(const Node& node, const std::string* around, Settings& out, Problems& problems,
                 Remarks& remarks) {
   Tag tag(node, problems);
-  const bool outermost = around.empty();
-  const std::string name = tag.text("class", outermost ? "main" : "");
+  std::string name = tag.text("class", around == nullptr ? "main" : "");
   if (name.empty()) tag.missing("class", "a class inside another one has a name");
   tag.finish(remarks);
+  if (around == nullptr) {
+    out.outermost.insert(name);
+    name.clear();
+  }
   auto& own = out.classes[name];
-  if (!outermost && name != around) {
+  if (around != nullptr && name != *around) {
     if (out.copied > kMostInClasses) return;  // said
-    const auto& outer = out.classes[around];
+    const auto& outer = out.classes[*around];
     out.copied += size_of(outer);  // a few lines may copy what many others say
     if (out.copied > kMostInClasses)
       return problems.add(node.GetLineNum(), path(node), "",
@@ -97,7 +101,7 @@ void read_class(const Node& node, const std::string& around, Settings& out, Prob
   }
   for (const Node* each = node.FirstChildElement("default"); each != nullptr;
        each = each->NextSiblingElement("default"))
-    read_class(*each, name, out, problems, remarks);
+    read_class(*each, &name, out, problems, remarks);
 }
 
 Quaterniond from_euler(const Vector3d& angles, const std::string& sequence) {
@@ -116,9 +120,11 @@ Quaterniond from_euler(const Vector3d& angles, const std::string& sequence) {
 
 const Attributes* Settings::defaults(const Node& node, const std::string& name,
                                      Problems& problems) const {
-  const auto found = classes.find(name.empty() ? "main" : name);
+  auto found = classes.find(name);
+  const bool is_outermost = name.empty() || outermost.count(name) > 0;
+  if (found == classes.end() && is_outermost) found = classes.find("");
   if (found == classes.end()) {
-    if (!name.empty())
+    if (!is_outermost)
       problems.add(node.GetLineNum(), path(node) + ": class", "\"" + name + "\"",
                    "no <default> has this class");
     return nullptr;
@@ -134,7 +140,7 @@ Settings read_settings(const Node& root, Model& model, Problems& problems) {
        each = each->NextSiblingElement()) {
     if (is(*each, "compiler")) read_compiler(*each, out, problems, model.remarks);
     if (is(*each, "option")) read_option(*each, model, problems);
-    if (is(*each, "default")) read_class(*each, "", out, problems, model.remarks);
+    if (is(*each, "default")) read_class(*each, nullptr, out, problems, model.remarks);
   }
   return out;
 }

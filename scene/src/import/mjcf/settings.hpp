@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <tether/linalg/pi.hpp>
 
@@ -19,12 +20,14 @@ struct Settings {
   InertiaFrom inertia = InertiaFrom::as_said;
   double total_mass = 0;                ///< kg; 0: as it comes
   int least_group = 0, most_group = 5;  ///< of geoms that have mass
+  bool balance_inertia = false;         ///< inertias that no body has are replaced by their mean
   // <default>
+  std::set<std::string> outermost{"main"};  ///< names of the class of elements without one, ""
   std::map<std::string, std::map<std::string, Attributes>, std::less<>> classes;  ///< by element
   std::size_t copied = 0;  ///< attributes that classes have from those around them
 
   double angle(double x) const { return degrees ? x * (linalg::kPi / 180) : x; }
-  /// Attributes of `element` in a class ("": main). Reports a class that is not there.
+  /// Attributes of `element` in a class ("": the outermost). Reports a class that is not there.
   const Attributes* defaults(const Node& node, const std::string& name, Problems& problems) const;
 };
 

@@ -39,9 +39,10 @@ struct Touch {
   double friction = 0;
   bool tangential = true;  ///< false: without friction, unless the other one has it
   unsigned type = 1, affinity = 1;
+  int own = -1;  ///< a number of a link that passes through some others
   bool operator<(const Touch& o) const {
-    return std::tie(friction, tangential, type, affinity) <
-           std::tie(o.friction, o.tangential, o.type, o.affinity);
+    return std::tie(friction, tangential, type, affinity, own) <
+           std::tie(o.friction, o.tangential, o.type, o.affinity, o.own);
   }
 };
 
@@ -63,8 +64,10 @@ struct Model {
   std::string name, format;
   std::vector<Link> links;  ///< parents before children
   std::optional<Eigen::Vector3d> gravity;
-  double step = 0;           ///< s; 0: not said
-  bool base_is_said = true;  ///< false: whether the base is fixed is up to who uses the file
+  double step = 0;              ///< s; 0: not said
+  bool base_is_said = true;     ///< false: whether the base is fixed is up to who uses the file
+  bool touches_itself = false;  ///< moving links touch each other, but for neighbours in the tree
+  std::vector<std::pair<std::string, std::string>> excluded;  ///< names of links that do not
   Remarks remarks;
 };
 

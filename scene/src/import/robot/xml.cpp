@@ -17,6 +17,8 @@ namespace {
 
 constexpr std::size_t kMostShown = 20, kLongestShown = 60;
 constexpr std::size_t kLargestText = std::size_t{64} << 20;
+constexpr int kMostAttributes =
+    100;  // of an element; MJCF has 40. The parser compares each with all
 constexpr std::size_t kLongestName = 200;  // bytes; names stand in names and remarks made of them
 
 /// The length of the UTF-8 sequence at the start of `text`; 0: it is none.
@@ -76,6 +78,35 @@ std::string shortened(std::string_view text) {
   return fmt::format("\"{}...\"", text.substr(0, end));
 }
 
+/// The place of the first element with more than kMostAttributes; npos: none has.
+std::size_t crowded(std::string_view text) {
+  for (std::size_t at = text.find('<'); at != std::string_view::npos; at = text.find('<', at)) {
+    const std::string_view rest = text.substr(at);
+    const auto behind = [&](std::string_view end) {
+      const std::size_t found = rest.find(end);
+      return found == std::string_view::npos ? text.size() : at + found + end.size();
+    };
+    if (rest.substr(0, 4) == "<!--" || rest.substr(0, 9) == "<![CDATA[" ||
+        rest.substr(0, 2) == "<?") {
+      at = behind(rest[1] == '?' ? "?>" : rest[2] == '-' ? "-->" : "]]>");
+      continue;
+    }
+    char quote = 0;
+    int count = 0;
+    std::size_t k = at + 1;
+    for (; k < text.size() && (quote != 0 || text[k] != '>'); ++k) {
+      if (quote != 0) {
+        if (text[k] == quote) quote = 0;
+      } else if (text[k] == '"' || text[k] == '\'') {
+        quote = text[k];
+        if (++count > kMostAttributes) return at;
+      }
+    }
+    at = k;
+  }
+  return std::string_view::npos;
+}
+
 /// What tinyxml2 takes and XML does not, and names without end.
 class Inspection : public tinyxml2::XMLVisitor {
  public:
@@ -127,10 +158,19 @@ void Problems::finish() {
 }
 
 Document::Document(std::string_view text, Problems& problems) {
+  const auto line_of = [&](std::size_t place) {
+    const auto begin = text.begin();
+    return 1 +
+           static_cast<int>(std::count(begin, begin + static_cast<std::ptrdiff_t>(place), '\n'));
+  };
   if (text.size() > kLargestText) problems.add(1, "", "", "must be a file of at most 64 MiB");
   if (const long bad = problems.clean() ? bad_byte(text) : -1; bad >= 0)
-    problems.add(1 + static_cast<int>(std::count(text.begin(), text.begin() + bad, '\n')), "", "",
+    problems.add(line_of(static_cast<std::size_t>(bad)), "", "",
                  "is not UTF-8: an XML file in another encoding, or no XML at all");
+  problems.finish();
+  if (const std::size_t at = crowded(text); at != std::string_view::npos)
+    problems.add(line_of(at), "", "",
+                 fmt::format("an element has at most {} attributes", kMostAttributes));
   problems.finish();
   if (xml_.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     std::string why = tinyxml2::XMLDocument::ErrorIDToName(xml_.ErrorID());

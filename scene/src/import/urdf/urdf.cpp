@@ -176,9 +176,12 @@ void read_limit(const Node& node, bool has_range, LinkJoint& joint, Problems& pr
   tag.finish(remarks);
   if (!has_range) return;
   if (lower > upper) return tag.wrong("lower", "must be at most upper");
-  if (!given || lower == upper)
-    return remarks.add("limits without a range between them, so these joints move freely",
+  // Programs write 0 and 0 where they know no limits.
+  if (!given || (lower == 0 && upper == 0))
+    return remarks.add("limits 0 and 0, so these joints move freely (--hold NAME fixes one)",
                        joint.name);
+  if (lower == upper)
+    remarks.add("joints whose limits are equal, which are fixed there", joint.name);
   joint.limits = {lower, upper};
 }
 
