@@ -63,30 +63,26 @@ grep -q 'was waited for' "$work/said" || die "not said why"
 cat "$work/piped" >"$work/never_written" &
 "$program" run "$scene" --quiet --end 0.2 --restart "$work/never_written" >"$work/said" 2>&1 || [ $? -eq 1 ] ||
   die "a state through a pipe"
-# A run that waits for a reader of its table, and cannot end by itself: two signals within a second leave it alone
-# (a machine with other work may hand them over later, or before the program listens: in one of three tries), one
-# more than a second later ends it.
-mkfifo "$work/never_read"
-signal=INT
-for try in 1 2 3; do
-  "$program" run "$scene" --quiet --csv "$work/never_read" >"$work/said" 2>&1 &
+# A run that waits for a reader of one of its files: before its first step, at its end, and where the signal came before.
+for option in csv svg html; do
+  mkfifo "$work/unread.$option"
+  "$program" run "$scene" --quiet --end 0.05 --$option "$work/unread.$option" >"$work/said" 2>&1 &
   child=$!
   sleep 1
-  kill -s INT "$child"
-  sleep 0.2
-  kill -s INT "$child" 2>/dev/null || true
-  sleep 1.3
-  ! kill -0 "$child" 2>/dev/null || break
-  [ "$try" -lt 3 ] || die "two signals at once end a run that waits"
-  wait "$child" || true
+  kill -s TERM "$child" || die "$option: a run does not wait for a reader: $(cat "$work/said")"
+  left=50
+  while kill -0 "$child" 2>/dev/null && [ $left -gt 0 ]; do
+    left=$((left - 1))
+    sleep 0.2
+  done
+  [ $left -gt 0 ] || { kill -s KILL "$child"; die "$option: a run that waits for a reader does not hear"; }
+  code=0
+  wait "$child" || code=$?
+  [ "$code" -eq 143 ] || die "$option: waiting for a reader: exit code $code"
+  cat "$work/unread.$option" >"$work/read" &
+  "$program" run "$scene" --quiet --end 0.05 --$option "$work/unread.$option" >"$work/said" 2>&1 || [ $? -eq 1 ] ||
+    die "$option: a pipe: $(cat "$work/said")"
+  wait
+  [ -s "$work/read" ] || die "$option: nothing came through a pipe"
 done
-left=20  # the first ones may have come before the program listened
-while kill -s INT "$child" 2>/dev/null; do
-  left=$((left - 1))
-  [ $left -gt 0 ] || { kill -s KILL "$child"; die "later signals are not heard"; }
-  sleep 1.1
-done
-code=0
-wait "$child" || code=$?
-[ "$code" -eq 130 ] || die "the later signal: exit code $code"
 echo "interrupted runs leave whole files"

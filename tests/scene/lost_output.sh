@@ -69,6 +69,11 @@ done
 # Closed descriptors: no file of the run gets their number.
 "$program" run "$scene" --end 0.5 --output "$work/pipe" --csv d.csv --state d.state <&- >&- 2>&-
 cmp "$work/pipe/d.csv" "$work/pipe/c.csv" || { echo "text was written into a table"; wrong=1; }
+# An output that goes nowhere is no success.
+for option in csv svg html state; do
+  "$program" run "$scene" --end 0.1 --quiet --$option - >&- 2>"$work/said"; wanted 2 $? "--$option - to a closed output"
+  grep -q 'standard output' "$work/said" || { echo "not said: $(cat "$work/said")"; wrong=1; }
+done
 
 # Memory that ends: said as that. Two thousand balls in one place touch in two million contacts. (A sanitizer needs more
 # addresses than the limit leaves.)

@@ -341,7 +341,7 @@ TEST_CASE("materials that can meet need a pair; nothing is mixed") {
     REQUIRE(e.problems().size() == 2);  // ice-steel, ice-wood; one body of ice does not meet itself
     CHECK(contains(e.what(), "\"ice\" and \"steel\""));
     CHECK(contains(e.what(), "\"ice\" and \"wood\""));
-    CHECK(e.problems()[0].place.line == 45);
+    CHECK(e.problems()[0].place.line == 46);
   }
   // Fixed bodies never meet.
   CHECK_NOTHROW(parse_scene(kTouching + "\n[[body]]\nfixed = true\nname = \"wall\"\nshape = "

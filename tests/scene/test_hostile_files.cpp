@@ -107,6 +107,26 @@ TEST_CASE("names hold nothing that a shell or make obeys, in no width") {
       parse_scene("[scene]\nname = \"Newton's cradle (five balls)\"\n" + sphere(""), "t"));
 }
 
+TEST_CASE("friction that impulses cannot be divided or multiplied by is refused") {
+  const auto with = [](const std::string& key, const std::string& value) {
+    return parse_scene(sphere("material = \"a\"\n[[pair]]\nbetween = [\"a\", \"a\"]\n" + key +
+                              " = " + value + "\n"),
+                       "friction.toml");
+  };
+  for (const char* key : {"friction", "rolling", "torsional"}) {
+    for (const char* good : {"0", "1e-150", "1e-20", "0.3", "1e20", "1e150"})
+      CHECK_NOTHROW(with(key, good));
+    for (const char* bad : {"5e-324", "1e-310", "3e-308", "1e-200", "1e200", "1.7e308", "-1"})
+      CHECK_THROWS_WITH(with(key, bad), Catch::Contains(key));
+  }
+}
+
+TEST_CASE("as many threads as contact problems take") {
+  CHECK_NOTHROW(parse_scene("[stepping]\nthreads = 256\n" + sphere(""), "threads.toml"));
+  CHECK_THROWS_WITH(parse_scene("[stepping]\nthreads = 257\n" + sphere(""), "threads.toml"),
+                    Catch::Contains("from 1 to 256"));
+}
+
 TEST_CASE("depth without end is refused before it is parsed, with its place") {
   const auto refused = [](const std::string& text) {
     INFO(text.substr(0, 60));

@@ -120,3 +120,55 @@ TEST_CASE("what no engine has is refused by name") {
         std::string::npos);
   CHECK(refusal(kTouching + "[[invariant]]\nkind = \"energy\"\nproject = false\n").empty());
 }
+
+TEST_CASE(
+    "bodies that begin inside each other are named, the deepest first, and not those that rest") {
+  const auto ball = [](const char* name, double z, const char* material = "a") {
+    return std::string("[[body]]\nname = \"") + name +
+           "\"\nshape = \"sphere\"\nradius = 0.5\nmass = 1\nmaterial = \"" + material +
+           "\"\nposition = [0, 0, " + std::to_string(z) + "]\n";
+  };
+  const auto found = [](const std::string& text) {
+    return overlaps_at_start(parse_scene(text, "start.toml"));
+  };
+  const std::string floor =
+      "[[body]]\nname = \"floor\"\nfixed = true\nshape = \"plane\"\nmaterial = \"b\"\n";
+  const std::string pairs =
+      "[[pair]]\nbetween = [\"a\", \"b\"]\n[[pair]]\nbetween = [\"a\", \"a\"]\n";
+  for (const std::string engine : {"stepping", "event"}) {
+    const std::string head = "[scene]\ngravity = [0, 0, -9.81]\nengine = \"" + engine + "\"\n";
+    CHECK(found(head + floor + ball("low", 0.5) + ball("high", 1.5) + pairs).empty());
+    CHECK(found(head + floor + ball("low", 0.4999) + ball("high", 1.5) + pairs).empty());
+    const Names deep = found(head + floor + ball("low", 0.44) + ball("high", 1.34) + pairs);
+    REQUIRE(deep.size() == 2);
+    CHECK(deep[0].find("\"low\" begins 0.1 m inside \"high\"") == 0);
+    CHECK(deep[1].find("\"low\" begins 0.06 m inside \"floor\"") == 0);
+    // What a joint connects, and what does not touch, may.
+    CHECK(found(head + ball("low", 0.4) + ball("high", 1) + floor + pairs +
+                "[[joint]]\nkind = \"hinge\"\nbodies = [\"low\", \"high\"]\nat = [0, 0, 1]\n"
+                "axis = [1, 0, 0]\n")
+              .size() == 1);
+    CHECK(found(head + floor + ball("low", 0.44) +
+                "[[pair]]\nbetween = [\"a\", \"b\"]\ntouch = false\n")
+              .empty());
+  }
+  std::string many = floor + pairs;
+  for (int k = 0; k < 9; ++k) many += ball(std::to_string(k).c_str(), 0.3);
+  CHECK(found(many).size() == 6);
+  CHECK(found(many).back().find("40 more pairs") == 0);  // 9 on the floor, 36 of balls
+}
+
+TEST_CASE("bodies with shapes that nothing can touch are named where a scene has contacts") {
+  const auto found = [](const std::string& text) {
+    return bodies_out_of_touch(parse_scene(text, "touch.toml"));
+  };
+  const std::string bare = "[[body]]\nname = \"bare\"\nshape = \"sphere\"\nradius = 1\nmass = 1\n";
+  CHECK(found(bare).empty());
+  CHECK(found(kSphere + kFloor + kPair).empty());
+  CHECK(found(kSphere + kFloor + kPair + bare) == Names{"bare"});
+  CHECK(found(kSphere + kFloor + kPair + "touch = false\n") == Names{"body 1", "body 2"});
+  // One body of a material that only meets itself.
+  CHECK(found(kSphere + "[[pair]]\nbetween = [\"a\", \"a\"]\n") == Names{"body 1"});
+  CHECK(found(kSphere + kSphere + "[[pair]]\nbetween = [\"a\", \"a\"]\n").empty());
+  CHECK(found(kSphere + kFloor + kFloor + kPair).empty());
+}

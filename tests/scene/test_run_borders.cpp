@@ -185,6 +185,48 @@ TEST_CASE("steps longer than the time between records leave no row twice") {
   CHECK(rows(file) == 5);
 }
 
+TEST_CASE("a step that is longer than the run is taken once") {
+  for (const double step : {1.0, 1e6, 1e12, 1e100, 1e300}) {
+    INFO(step);
+    Scene scene = parse_scene(falling(""), "long.toml");
+    scene.gravity.reset();
+    scene.bodies[0].velocity.x() = 1e-3;
+    scene.stepping->step = step;
+    const RunResult result = run(scene);
+    CHECK(result.failure.empty());
+    CHECK(result.counts.steps == 1);
+    CHECK(result.time == step);
+  }
+}
+
+TEST_CASE("a restart of a run that is over judges it as that run did") {
+  const fs::path path = folder("over");
+  for (const double within : {1e-3, 1e-9}) {
+    Scene scene = parse_scene(
+        falling("[[expect]]\nquantity = \"position\"\nbody = \"b0\"\nvalue = [0, 0, -0.0495]\n"
+                "within = " +
+                fmt::format("{}", within) + "\n"),
+        "over.toml");
+    scene.output.state = (path / "a.state").string();
+    const RunResult first = run(scene);
+    RunOptions options;
+    options.restart = scene.output.state;
+    int looks = 0;
+    options.record = [&](const Engine& engine) { looks += engine.time() == first.time; };
+    const RunResult again = run(scene, options);
+    CHECK(again.failure.empty());
+    CHECK(again.met() == first.met());
+    CHECK(first.met() == (within == 1e-3));
+    REQUIRE(again.judgements.size() == 1);
+    CHECK(again.judgements[0].judged);
+    CHECK(again.judgements[0].value == first.judgements[0].value);
+    CHECK(again.summary.end_energy == first.summary.end_energy);
+    CHECK(looks == 1);
+    scene.end = 0.05;  // behind which the state lies
+    CHECK_THROWS_WITH(run(scene, options), Catch::Contains("nothing is left to run"));
+  }
+}
+
 TEST_CASE("the table of many bodies has the first of them, and says so") {
   Scene scene = parse_scene(falling("", 230), "many.toml");
   scene.end = 2e-3;

@@ -16,7 +16,7 @@ namespace {
 class FrictionEffect : public Effect {
  public:
   void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
-    pair.friction = in.number("friction", pair.friction, files::kNotNegative, "");
+    pair.friction = read_coefficient(in, "friction", pair.friction, "");
   }
   void write_pair(const Pair& pair, files::Writer& out) const override {
     if (pair.touch) out.field("friction", pair.friction);

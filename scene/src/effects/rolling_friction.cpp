@@ -16,8 +16,8 @@ namespace {
 class RollingFrictionEffect : public Effect {
  public:
   void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
-    pair.rolling = in.number("rolling", pair.rolling, files::kNotNegative, "m");
-    pair.torsional = in.number("torsional", pair.torsional, files::kNotNegative, "m");
+    pair.rolling = read_coefficient(in, "rolling", pair.rolling, "m");
+    pair.torsional = read_coefficient(in, "torsional", pair.torsional, "m");
   }
   void write_pair(const Pair& pair, files::Writer& out) const override {
     if (pair.rolling > 0) out.field("rolling", pair.rolling, "m");

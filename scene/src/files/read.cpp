@@ -94,7 +94,7 @@ void read_engine(Fields& root, Reader& r) {
   o.max_halvings = in.count("max_halvings", o.max_halvings, 0, 30);
   o.max_sweeps = in.count("max_sweeps", o.max_sweeps, 1, 1000000000);
   o.on_failure = in.word("on_failure", o.on_failure);
-  o.threads = in.count("threads", o.threads, 1, 1024);
+  o.threads = in.count("threads", o.threads, 1, 256);
   in.finish();
   r.scene.stepping = o;
   if (smooth != nullptr) root.wrong("stepping", "a scene has [smooth] or [stepping], not both");

@@ -22,8 +22,7 @@ constexpr std::size_t kWaiting = 4096;  // bytes; who watches a table sees it gr
 
 RowFile::RowFile(std::string file, std::size_t kept) : file_(std::move(file)), size_(kept) {
   make_folder_of(file_);
-  const int fresh = kept > 0 ? 0 : O_TRUNC;
-  descriptor_ = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | fresh, 0666);
+  descriptor_ = open_to_write(file_, O_CREAT | (kept > 0 ? 0 : O_TRUNC));
   if (descriptor_ < 0) fail();
   const auto end = static_cast<off_t>(kept);
   if (kept > 0 && (ftruncate(descriptor_, end) != 0 || lseek(descriptor_, end, SEEK_SET) != end)) {

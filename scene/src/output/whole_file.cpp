@@ -3,11 +3,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <stdexcept>
 
@@ -72,6 +74,24 @@ void sync_folder_of(const std::string& file) {
 
 }  // namespace
 
+int open_to_write(const std::string& file, int flags) {
+  struct stat there {};
+  const bool is_pipe = stat(file.c_str(), &there) == 0 && S_ISFIFO(there.st_mode);
+  if (!is_pipe) return open(file.c_str(), O_WRONLY | O_CLOEXEC | flags, 0666);
+  for (;;) {
+    const int descriptor = open(file.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK);
+    if (descriptor >= 0) {
+      fcntl(descriptor, F_SETFL, 0);  // writes wait
+      return descriptor;
+    }
+    if (errno != ENXIO) return -1;
+    // A sleep ends by every signal that is handled; open() would go on.
+    constexpr timespec kLook{0, 20000000};
+    if (nanosleep(&kLook, nullptr) != 0)
+      throw Interrupted("interrupted while a reader of " + file + " was waited for");
+  }
+}
+
 void make_folder_of(const std::string& file) {
   const fs::path folder = fs::path(file).parent_path();
   if (folder.empty()) return;
@@ -102,7 +122,7 @@ void write_whole(const std::string& file, std::string_view content) {
   std::error_code error;
   const fs::file_status there = fs::status(file, error);
   if (fs::exists(there) && !fs::is_regular_file(there))
-    write_all(Open{open(file.c_str(), O_WRONLY | O_CLOEXEC)}, file, content, false);
+    write_all(Open{open_to_write(file, 0)}, file, content, false);
   else
     write_whole_regular(file, content);
 }

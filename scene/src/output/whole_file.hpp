@@ -1,10 +1,20 @@
 // Tether: files that are whole or absent. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
 namespace tether::scene {
+
+/// Somebody does not want to wait for the other end of a pipe.
+struct Interrupted : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// open(2) with O_WRONLY and these flags. A pipe without a reader is waited for until a signal
+/// comes that somebody handles: Interrupted.
+int open_to_write(const std::string& file, int flags);
 
 /// Makes the folder of a file. Throws std::runtime_error.
 void make_folder_of(const std::string& file);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <ctime>
 #include <string>
+#include <tether/scene/plan.hpp>
 #include <tether/scene/words.hpp>
 #include <vector>
 
@@ -136,6 +137,18 @@ void print_summary(const Scene& scene, const RunResult& r) {
   for (const std::string& warning : r.warnings)
     fmt::print("  WARNING      {}\n", on_terminal(warning));
   if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, on_terminal(r.failure));
+}
+
+void print_start(const Scene& scene) {
+  for (const std::string& each : overlaps_at_start(scene))
+    fmt::print("WARNING   {}\n", on_terminal(each));
+  constexpr std::size_t kTold = 20;
+  const std::vector<std::string> names = bodies_out_of_touch(scene);
+  if (names.empty()) return;
+  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kTold, names.size()));
+  fmt::print("note      nothing can touch {}{}: no [[pair]] lets something meet their material\n",
+             fmt::join(names.begin(), end, ", "),
+             names.size() > kTold ? fmt::format(" and {} more", names.size() - kTold) : "");
 }
 
 void print_times(const RunResult& r, double wall) {

@@ -7,6 +7,8 @@
 
 #include "commands.hpp"
 #include "contact_command.hpp"
+#include "output/whole_file.hpp"
+#include "program/process/signals.hpp"
 #include "program/process/standard_streams.hpp"
 #include "program/terminal_text.hpp"
 
@@ -48,6 +50,9 @@ int main(int argc, char** argv) {
     std::cout << out.str() << std::flush;
     std::cerr << on_terminal(error.str());
     return flushed(code == 0 ? kGood : kWrong);
+  } catch (const Interrupted& e) {
+    complain(e);
+    return kSignal + caught_signal();
   } catch (const std::bad_alloc&) {
     std::cerr
         << "tether: the memory has ended: what is asked for is too large for this machine, or "

@@ -8,6 +8,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "effects/list.hpp"
+#include "output/output_names.hpp"
 #include "output/own_files.hpp"
 #include "output/row_file.hpp"
 #include "record/number_at.hpp"
@@ -89,9 +90,10 @@ class CsvRecorder : public Recorder {
   /// Bytes of the rows of an earlier run that are kept, so that a run in two parts leaves the table
   /// of one; 0: there is no such table.
   std::size_t length_up_to(double time, const std::string& first) {
+    lacks_rows_ = true;
+    if (is_device(file_)) return 0;
     std::ifstream in(file_, std::ios::binary);
     std::string line;
-    lacks_rows_ = true;
     if (!std::getline(in, line) || line + '\n' != first) return 0;
     std::size_t length = first.size();
     while (std::getline(in, line) && !in.eof()) {  // a row without its end is cut

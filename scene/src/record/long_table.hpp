@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "output/output_names.hpp"
 #include "output/row_file.hpp"
 
 namespace tether::scene {
@@ -19,8 +20,8 @@ class LongTable {
     std::size_t kept = 0;
     std::string line;
     std::ifstream in;
-    if (restarted) in.open(file, std::ios::binary);
-    if (restarted && std::getline(in, line) && line + '\n' == head) {
+    if (restarted && !is_device(file)) in.open(file, std::ios::binary);
+    if (in.is_open() && std::getline(in, line) && line + '\n' == head) {
       kept = head.size();
       while (std::getline(in, line) && !in.eof() && keep(line)) kept += line.size() + 1;
     }

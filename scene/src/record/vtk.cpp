@@ -226,6 +226,7 @@ class VtkRecorder : public Recorder {
 
   /// Takes over the frames of an earlier run, so that both make one film.
   void keep_up_to(double time) {
+    if (is_device(file_)) return;
     std::ifstream in(file_, std::ios::binary);
     std::string line;
     while (std::getline(in, line)) {

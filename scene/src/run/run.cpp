@@ -75,6 +75,7 @@ class Run {
       : scene_(checked(scene)),
         options_(options),
         judge_(scene),
+        overlaps_(options.restart.empty() ? overlaps_at_start(scene) : std::vector<std::string>()),
         engine_(engine_of(scene, options.team)) {
     const Output& o = scene.output;
     std::vector<std::string> inputs = inputs_of(scene);
@@ -108,6 +109,7 @@ class Run {
   RunResult go() {
     try {
       if (!resume_.restarted) stop(at_start());
+      if (is_over_ && options_.record) options_.record(*engine_);
       for (const Event& event : schedule(scene_, options_.stops)) {
         if (event.time <= done_ || same_time(event.time, done_)) continue;
         move(event.time);
@@ -243,6 +245,7 @@ class Run {
     result_.costs = engine_->costs();
     result_.judgements = judge_.judgements();
     for (const auto& recorder : recorders_) recorder->finish(result_.written, result_.remarks);
+    result_.warnings = overlaps_;
     if (saved_) result_.written.push_back(scene_.output.state);
     // Beyond a radian a step the midpoint rule of rotations is no longer near the motion.
     if (fastest_turn_ > 1)
@@ -315,10 +318,13 @@ class Run {
     resume_.restarted = true;
     resume_.time = last_record_;
     recorded_ = true;
-    if (done_ >= scene_.end)
+    is_over_ = same_time(done_, scene_.end);  // what it came to is judged once more
+    if (done_ > scene_.end && !is_over_)
       throw std::runtime_error(fmt::format(
           "{} was saved at {} s, but the scene ends at {} s: nothing is left to run (--end)", file,
           done_, scene_.end));
+    if (is_over_)
+      result_.remarks.push_back(fmt::format("{} is of the end: nothing was left to run", file));
   }
 
   const Stopwatch watch_;
@@ -326,6 +332,7 @@ class Run {
   const RunOptions& options_;
   OutputLock lock_;
   Judge judge_;
+  const std::vector<std::string> overlaps_;
   std::unique_ptr<Engine> engine_;
   RunResult result_;
   Resume resume_;
@@ -334,7 +341,7 @@ class Run {
   std::optional<double> looked_at_;  // the time that they are of
   std::uint64_t scene_hash_ = 0;
   double done_ = -1;  // the last event
-  bool recorded_ = false, saved_ = false;
+  bool recorded_ = false, saved_ = false, is_over_ = false;
   double last_record_ = 0;
   std::optional<double> step_;  // of the stepping engine
   double fastest_turn_ = 0;     // rad in a step

@@ -29,11 +29,6 @@ struct SavedState {
   bool same = true;  ///< scene and version
 };
 
-/// Somebody does not want to wait for a state that comes through a pipe.
-struct Interrupted : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
 /// Throws std::runtime_error, naming the fault, on anything that write_state did not write, and on
 /// a state of another scene or version unless `any_scene`; Interrupted where the file is a pipe and
 /// `interrupted` says so before its writer has ended.

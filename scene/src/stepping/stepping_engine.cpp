@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <istream>
@@ -113,7 +114,7 @@ void SteppingEngine::add_forces(const Scene& scene) {
 }
 
 void SteppingEngine::advance(double t) {
-  const double slack = kSameBoundary * stepper_.options().step;
+  const double slack = kSameBoundary * std::min(stepper_.options().step, t);
   bool moved = false;
   for (; time() < t - slack && !interrupted(); moved = true) take_step();
   if (moved) read_bodies();

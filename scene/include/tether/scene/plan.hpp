@@ -44,6 +44,12 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan);
 /// The engine that the plan names. Throws std::invalid_argument.
 std::unique_ptr<Engine> make_engine(const Scene& scene);
 
+/// Bodies that begin inside each other by more than a hundredth of the smaller one's size, the
+/// deepest first, one line each.
+std::vector<std::string> overlaps_at_start(const Scene& scene);
+/// Names of bodies with shapes that no other body can touch, though the scene has contacts.
+std::vector<std::string> bodies_out_of_touch(const Scene& scene);
+
 /// Rows of a joint on positions and orientations.
 int joint_rows(const Joint& joint);
 

@@ -72,7 +72,8 @@ struct RunResult {
   std::vector<Judgement> judgements;  ///< one for each Scene::expect
   std::vector<std::string> written;   ///< files
   std::vector<std::string> remarks;   ///< data that the files do not contain
-  std::vector<std::string> warnings;  ///< why the motion is not to be trusted; empty: nothing seen
+  std::vector<std::string>
+      warnings;  ///< why the motion is not to be trusted, or the start was not meant
 
   bool met() const;  ///< every expectation that counts was judged and holds
 };

@@ -6,6 +6,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "program/commands.hpp"
+#include "program/report_run.hpp"
 #include "program/scene_text.hpp"
 #include "program/terminal_text.hpp"
 
@@ -32,6 +33,8 @@ int check(const CheckArguments& arguments) {
     try {
       const Scene scene = read_scene_argument(file);
       const Plan plan = make_plan(scene);
+      if (!arguments.print) print_start(scene);
+      make_engine(scene);  // which refuses what a run would
       if (arguments.print)
         fmt::print("{}", write_scene(with_options(scene, plan.engine)));
       else

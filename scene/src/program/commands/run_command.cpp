@@ -21,7 +21,6 @@
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
 #include "program/terminal_text.hpp"
-#include "run/saved_state.hpp"
 
 namespace tether::scene {
 
@@ -163,12 +162,7 @@ int run_scene(const RunArguments& arguments, Ranks* ranks) {
 /// By all processes that mpirun has started, by the one that there is otherwise.
 int run_together(const RunArguments& arguments) {
   const std::unique_ptr<Ranks> ranks = join_ranks();
-  if (!ranks) try {
-      return run_scene(arguments, nullptr);
-    } catch (const Interrupted& e) {
-      fmt::print(stderr, "tether: {}\n", on_terminal(e.what()));
-      return kSignal + caught_signal();
-    }
+  if (!ranks) return run_scene(arguments, nullptr);
   int status = kWrong;
   std::string why;
   try {

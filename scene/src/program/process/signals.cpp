@@ -1,6 +1,8 @@
 // Tether: Ctrl-C and its kind. SPDX-License-Identifier: BSD-3-Clause
 #include "signals.hpp"
 
+#include <unistd.h>
+
 #include <csignal>
 #include <ctime>
 #include <initializer_list>
@@ -21,6 +23,7 @@ extern "C" void note(int signal) {
   if (caught == 0) {
     first = now;
     caught = signal;
+    alarm(1);
     return;
   }
   const double seconds = std::difftime(now.tv_sec, first.tv_sec) +
@@ -29,6 +32,9 @@ extern "C" void note(int signal) {
   std::signal(signal, SIG_DFL);
   raise(signal);
 }
+
+// Whoever begins to wait in a sleep after the signal (open_to_write) hears of it within a second.
+extern "C" void remind(int) { alarm(1); }
 
 }  // namespace
 
@@ -45,6 +51,8 @@ void catch_signals() {
     if (signal == SIGHUP && before.sa_handler == SIG_IGN) continue;
     sigaction(signal, &action, nullptr);
   }
+  action.sa_handler = remind;
+  sigaction(SIGALRM, &action, nullptr);
 }
 
 int caught_signal() { return caught; }

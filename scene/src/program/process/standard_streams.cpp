@@ -21,7 +21,7 @@ namespace tether::scene {
 void guard_standard_streams() {
   for (int descriptor = 0; descriptor <= 2; ++descriptor)
     if (fcntl(descriptor, F_GETFD) < 0 && errno == EBADF)
-      if (open("/dev/null", O_RDWR) < 0) return;
+      if (open("/dev/null", descriptor == 1 ? O_RDONLY : O_RDWR) < 0) return;
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
 }

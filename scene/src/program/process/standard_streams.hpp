@@ -7,8 +7,9 @@
 namespace tether::scene {
 
 /// Descriptors 0 to 2 that are closed become /dev/null, so that no file of a run gets their number
-/// and what is printed. A pipe that is closed and a limit of file sizes become errors of the write
-/// in place of signals: a run whose reader has left still ends with whole files.
+/// and what is printed; the standard output so that a write to it is an error. A pipe that is
+/// closed and a limit of file sizes become errors of the write in place of signals: a run whose
+/// reader has left still ends with whole files.
 void guard_standard_streams();
 
 /// The standard output while a file called "-" is written there: all other text goes to the
