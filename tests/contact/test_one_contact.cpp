@@ -237,3 +237,21 @@ TEST_CASE("waLBerla's case: b_n > 0 while the unconstrained normal impulse is ne
                           2000) == nullptr);
   }
 }
+
+// A grazing contact whose two tangents yield by 1e6 to 1.
+TEST_CASE("one contact: a slip along very different tangents is found to round-off") {
+  Matrix3d A;
+  A << 0.27174634389719821, 0.26977126231934284, -0.00018346246674967736,  //
+      0.26977126231934284, 1.30430747962033, 0.00030291632224983491,       //
+      -0.00018346246674967736, 0.00030291632224983491, 3.8546642340108574e-07;
+  const Vector3d b(1.7804478488988186e-53, -1.3066759270983948, 0.00023290633919364199);
+  Options o;
+  o.law = Law::coulomb;
+  o.tolerance = 1e-12;
+  const Problem p = Problem::dense(A, b, Eigen::VectorXd::Constant(1, 0.99978667686509826));
+  const Solution s = Solver(o).solve(p);
+  CHECK(s.status == Status::solved);
+  const double error = evaluate(p, o.law, s.impulses).fixed_point;
+  INFO(1e12 * error << " tolerances");
+  CHECK(error <= 1e-12);
+}
