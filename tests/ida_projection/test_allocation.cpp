@@ -68,14 +68,12 @@ TEST_CASE("looks at whether F keeps rows that move with time do not allocate") {
   Host host(car, 1e-8);
   host.attach(car.recommended_constraints());
   for (int i = 0; i < 30; ++i) REQUIRE(host.step() >= 0);
-  const long evaluations = host.projection().statistics().value_evaluations, start = allocations();
+  const long start = allocations();
   int flag = 0;
   for (int i = 0; i < 40 && flag >= 0; ++i) flag = host.step();
   const long made = allocations() - start;
   REQUIRE(flag >= 0);
   CHECK(made <= 3);  // work space, once
-  // Two for each projected step, four for each look into a doubt.
-  CHECK(host.projection().statistics().value_evaluations > evaluations + 2 * 40 + 4);
 }
 
 TEST_CASE("no allocation with options, differences or gradients") {

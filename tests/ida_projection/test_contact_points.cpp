@@ -154,7 +154,8 @@ TEST_CASE("rows written in algebraic copies of the positions alone") {
           integrate(problem, tolerance, sparse ? as_sparse(copies, 7) : copies, {}, false);
       INFO(run.message);
       REQUIRE(run.flag >= 0);
-      CHECK(static_cast<double>(run.steps) <= 1.1 * static_cast<double>(direct.steps));
+      // The copies are outputs, so that IDA's error test sees positions twice, a thousandfold.
+      CHECK(static_cast<double>(run.steps) <= 1.5 * static_cast<double>(direct.steps));
       CHECK(run.error <= 10.0 * direct.error);
       CHECK(std::abs(std::hypot(run.y[0], run.y[1]) - 1.0) <= 10.0 * tolerance);
     }

@@ -335,13 +335,14 @@ TEST_CASE("vectors without an array, or without operations, are refused by name"
   N_Vector yp = make_vector(Kind::custom, problem.yp0, context);
   void* ida = IDACreate(context);
   REQUIRE(IDAInit(ida, residual, 0.0, y, yp) == 0);
-  CHECK(contains(thrown([&] { tp::Projection(ida, on_circle()); }), "Gradients"));
+  CHECK(contains(thrown([&] { const tp::Projection made(ida, on_circle()); }), "Gradients"));
   IDAFree(&ida);
 
   y->ops->nvdotprod = nullptr;
   ida = IDACreate(context);
   REQUIRE(IDAInit(ida, residual, 0.0, y, yp) == 0);
-  CHECK(contains(thrown([&] { tp::Projection(ida, as_gradients(on_circle(), 2)); }), "N_VDotProd"));
+  CHECK(contains(thrown([&] { const tp::Projection made(ida, as_gradients(on_circle(), 2)); }),
+                 "N_VDotProd"));
   IDAFree(&ida);
   N_VDestroy(y);
   N_VDestroy(yp);

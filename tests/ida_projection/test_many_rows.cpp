@@ -127,7 +127,8 @@ TEST_CASE("many redundant rows: factors of an earlier step raise no doubt about 
   const Run run = integrate(problem, 1e-6, as_sparse(Many::distances(), problem.size), {}, false);
   REQUIRE(run.flag >= 0);
   CHECK(run.statistics.factorizations <= run.statistics.projections / 2);
-  CHECK(run.statistics.value_evaluations <= run.statistics.iterations + 20);
+  // Twenty looks at whether F keeps a row, of twelve evaluations each, and a few more.
+  CHECK(run.statistics.value_evaluations <= run.statistics.iterations + 20 * 12 + 20);
   CHECK(run.message.empty());
 }
 

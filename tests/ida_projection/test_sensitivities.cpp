@@ -693,7 +693,8 @@ TEST_CASE("projected sensitivities: rows on algebraic variables that F determine
     CHECK(run.host().projection().statistics().sensitivity_projections > 100);
     CHECK(run.drift < 1e-12);
     CHECK(run.error(exact, 3) < 1e-6);
-    CHECK(run.host().steps() < 0.7 * plain.steps);
+    // u is an output: IDA's error test sees it, as without the rows.
+    CHECK(run.host().steps() < 1.05 * plain.steps);
   }
 }
 

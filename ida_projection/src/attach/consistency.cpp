@@ -143,17 +143,25 @@ bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const 
     bool jointly = false;
     bool begun = project_start(t0, y, ydot, how, &again, round == 0 ? &jointly : nullptr);
     // Far from what F asks of algebraic variables, rows that repeat F are conditions of their own:
-    // these variables move first.
-    if (begun && jointly && how.hold.empty() && options_.hold.empty()) {
+    // these variables move first where that moves the others less.
+    const N_Vector id = variables_.id();
+    if (begun && jointly && id != nullptr && how.hold.empty() && options_.hold.empty()) {
+      const auto moved = [&](N_Vector from, N_Vector to) {
+        OwnedVector way(to);
+        N_VLinearSum(1.0, to, -1.0, from, way);
+        return N_VWrmsNormMask(way, unknowns_.weights, id);
+      };
       OwnedVector near(y), slope(ydot);
       N_VScale(1.0, before, near);
       N_VScale(1.0, ydot, slope);
       Status ignored = Status::success;
-      if (find_derivative(t0, near, slope, how, &ignored).empty()) {
+      ConsistencyReport other;
+      if (find_derivative(t0, near, slope, how, &ignored).empty() &&
+          project_start(t0, near, slope, how, &other, nullptr) &&
+          moved(before, near) < 0.5 * moved(before, y)) {
         N_VScale(1.0, near, y);
         N_VScale(1.0, slope, ydot);
-        again = {};
-        begun = project_start(t0, y, ydot, how, &again, nullptr);
+        again = other;
       }
     }
     if (!begun) {

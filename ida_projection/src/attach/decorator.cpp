@@ -34,7 +34,8 @@ int Projection::Impl::initialize() {
     return kFatal;
   }
   run_.initialized = true;
-  run_.engaged = run_.suppressed = false;
+  run_.engaged = false;
+  test_all_again();
   run_.start = OwnedVector();
   run_.undetermined.clear();
   run_.linear_solver = LinearSolverKind();
@@ -44,7 +45,7 @@ int Projection::Impl::initialize() {
   report_.reset();
   watch_.rejections.reset();
   watch_.first_steps.reset();
-  variables_.forget_index();
+  variables_.begin_run();
   movers_.joined.forget();
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) movers_.used->reset();
@@ -122,7 +123,7 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
   const int flag = correct_and_move(candidate, tolerance, call_setup);
   if (flag != 0) return flag;
   const long steps = movers_.used != nullptr ? attempts_.steps : ida_.steps();
-  control_.control(candidate, steps, run_.engaged, run_.suppressed ? variables_.id() : nullptr);
+  control_.control(candidate, steps, run_.engaged, run_.suppressed ? variables_.tested() : nullptr);
   return 0;
 }
 

@@ -61,7 +61,7 @@ std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vect
 int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
   ++statistics_.corrector_failures;
   report_.status = Status::corrector_failed;
-  if (flag > 0 && run_.engaged) control_.corrector_failed();
+  if (flag > 0) control_.corrector_failed(run_.engaged);
   polish_.corrector_failed();
   if (variables_.high_index())
     report_.message =

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <utility>
 
 #include "attach/impl.hpp"
 #include "fast/quicken.hpp"
@@ -47,9 +48,22 @@ void Projection::Impl::derive_id(const Candidate& candidate) {
 }
 
 void Projection::Impl::leave_out_of_error_test() {
-  IDASetId(ida_.mem(), variables_.id());
+  const N_Vector tested = variables_.tested();
+  if (!options_.suppress_algebraic || tested == nullptr) return;
+  IDASetId(ida_.mem(), tested);
   IDASetSuppressAlg(ida_.mem(), 1);
   run_.suppressed = true;
+  statistics_.untested =
+      std::lround(static_cast<double>(N_VGetLength(tested)) - N_VDotProd(tested, tested));
+}
+
+// As the run began. Who gives Options::id may have called IDASetSuppressAlg as well, which IDA
+// does not tell: that stays.
+void Projection::Impl::test_all_again() {
+  if (std::exchange(run_.suppressed, false) && options_.id == nullptr) {
+    IDASetSuppressAlg(ida_.mem(), 0);
+    IDASetId(ida_.mem(), variables_.vector());
+  }
 }
 
 // IDA raises the order with each step of a start until a first error test fails, and from there on
@@ -125,13 +139,13 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done)
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.
 Status Projection::Impl::engage(const Candidate& candidate) {
   if (!variables_.known()) derive_id(candidate);
-  if (variables_.any() && options_.suppress_algebraic) leave_out_of_error_test();
   const double cj = ida_.step().cj;
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
   if (options_.smooth_where_needed)
     variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();
+  leave_out_of_error_test();
   const bool given = options_.id != nullptr;
   const std::string doubts = given ? variables_.doubts(candidate, corrector_, cj) : std::string();
   if (!doubts.empty()) report_.warn(Status::doubtful, doubts);

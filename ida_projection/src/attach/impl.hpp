@@ -151,6 +151,7 @@ class Projection::Impl {
   bool rows_of_field() const;
   void derive_id(const Candidate& candidate);
   void leave_out_of_error_test();
+  void test_all_again();
   void look_for_multipliers(const Candidate& candidate);
   Status engage_if_index_is_high(const Candidate& candidate);
   Care care_of_high_index(const Candidate& candidate) const;
@@ -211,7 +212,7 @@ class Projection::Impl {
   struct Run {
     bool initialized = false;
     bool broken = false;      // an exception left things half done: the run cannot go on
-    bool suppressed = false;  // algebraic variables are out of the error test
+    bool suppressed = false;  // IDASetId and IDASetSuppressAlg are this plugin's
     bool engaged = false;     // the policy acts from the first move that was needed
     LinearSolverKind linear_solver;
     OwnedVector start;         // its first y, of contiguous vectors

@@ -1,6 +1,7 @@
 // Tether: which variables are algebraic. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -29,20 +30,24 @@ class AlgebraicVariables {
   /// The vector itself, also where all are differential.
   N_Vector vector() const { return id_; }
 
-  /// Looks at F once in a run.
+  /// Finds out the index of F at the first call; it is a property of F, which later runs share.
   /// `usual`: evaluations of F that a Jacobian takes in this run, see index.cpp.
   void look_at_index(const Candidate& candidate, Corrector& corrector, double cj, long usual);
   void note_index_as_low() { index_known_ = true; }
   bool index_known() const { return index_known_; }
-  bool high_index() const { return high_index_; }  ///< F is not of index 1 in its own variables
+  /// F is not of index 1 in its own variables.
+  bool high_index() const { return index_known_ && found_.high; }
   /// Algebraic variables of index 2 or more.
-  const std::vector<int>& undetermined() const { return undetermined_; }
-  void forget_index();  ///< a new run starts
+  const std::vector<int>& undetermined() const { return found_.undetermined; }
+  /// 1 for variables that IDA's error test has to see: the differential ones, and outputs, which
+  /// nothing else controls; 0 for the other algebraic ones. Null: none is algebraic.
+  N_Vector tested() const { return tested_ ? static_cast<N_Vector>(tested_) : id(); }
+  void begin_run() { index_known_ = false; }
 
   /// Of an id vector that the caller gave, after look_at_index(): variables that it calls algebraic
   /// although F contains their derivatives, or differential although F does not. Empty: none is
-  /// known. Four evaluations of F, more where there are some.
-  std::string doubts(const Candidate& candidate, Corrector& corrector, double cj) const;
+  /// known. Four evaluations of F at the first call, more where there are some.
+  const std::string& doubts(const Candidate& candidate, Corrector& corrector, double cj);
 
   /// The equations of F that notice no change of y', bit for bit.
   std::vector<char> derivative_free_equations(const Candidate& candidate, Corrector& corrector,
@@ -56,14 +61,23 @@ class AlgebraicVariables {
   // index.cpp
   bool exceeds_one(const Candidate& candidate, Corrector& corrector, double cj, long usual);
   bool has_rows_of_zeros(const Candidate& candidate, Corrector& corrector, double cj);
+  void find_outputs(const Eigen::MatrixXd& slopes);
+
+  struct Found {
+    bool known = false, high = false;
+    std::vector<int> undetermined, outputs;
+    std::vector<int> without_derivative;  // differential ones whose y' is nowhere in F
+    bool judged_id = false;
+    std::string doubts;
+  };
 
   const Options& options_;
   Statistics& statistics_;
   OwnedVector id_;
   bool any_ = false, all_ = false;
-  bool high_index_ = false, index_known_ = false;
-  std::vector<int> undetermined_;
-  std::vector<int> without_derivative_;  // differential ones whose y' look_at_index() found nowhere
+  bool index_known_ = false;  // in this run
+  Found found_;
+  OwnedVector tested_;  // null: as id
 };
 
 }  // namespace tether::ida_projection

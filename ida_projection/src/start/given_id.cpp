@@ -24,17 +24,19 @@ std::string list(const std::vector<int>& variables) {
 
 }  // namespace
 
-std::string AlgebraicVariables::doubts(const Candidate& candidate, Corrector& corrector,
-                                       double cj) const {
-  if (candidate.base_entries == nullptr) return {};
-  std::string text;
+const std::string& AlgebraicVariables::doubts(const Candidate& candidate, Corrector& corrector,
+                                              double cj) {
+  if (found_.judged_id || candidate.base_entries == nullptr) return found_.doubts;
+  found_.judged_id = true;
+  std::string& text = found_.doubts;
   std::vector<int> moving = with_derivative(candidate, corrector, cj);
   if (!moving.empty())
     text = "the id vector calls " + list(moving) +
            " algebraic, but F contains the derivative: 1 stands for differential variables, 0 for "
            "algebraic ones (Options::id)";
-  if (!without_derivative_.empty())
-    text += (text.empty() ? "the id vector calls " : "; it calls ") + list(without_derivative_) +
+  if (!found_.without_derivative.empty())
+    text += (text.empty() ? "the id vector calls " : "; it calls ") +
+            list(found_.without_derivative) +
             " differential, but F does not contain the derivative: 0 stands for algebraic "
             "variables (Options::id)";
   return text;

@@ -51,12 +51,41 @@ bool AlgebraicVariables::has_rows_of_zeros(const Candidate& candidate, Corrector
       zero[i] = zero[i] && N_VGetArrayPointer(base)[i] == N_VGetArrayPointer(other)[i];
   }
   const auto zeros = std::count(zero.begin(), zero.end(), 1);
-  undetermined_.clear();
   if (!known || !answered || zeros == 0) return false;
   for (std::size_t j = 0; j < n; ++j)
-    if (mask()[j] == 0.0) undetermined_.push_back(static_cast<int>(j));
-  if (static_cast<std::size_t>(zeros) != undetermined_.size()) undetermined_.clear();
+    if (mask()[j] == 0.0) found_.undetermined.push_back(static_cast<int>(j));
+  if (static_cast<std::size_t>(zeros) != found_.undetermined.size()) found_.undetermined.clear();
   return true;
+}
+
+// The differential variables do not depend on an output, so that their error test says nothing
+// about it: no equation with y' contains it, nor an equation that shares an unknown with what such
+// an equation contains. `slopes`: F_y'_j of differential and F_y_j of algebraic columns.
+void AlgebraicVariables::find_outputs(const Eigen::MatrixXd& slopes) {
+  const Eigen::Index n = slopes.cols();
+  const double* id = mask();
+  std::vector<char> acts(static_cast<std::size_t>(n), 0), known(acts);  // columns, rows
+  const auto contains = [&](Eigen::Index i, bool differential, bool acting) {
+    for (Eigen::Index j = 0; j < n; ++j)
+      if ((id[j] != 0.0) == differential && slopes(i, j) != 0.0 &&
+          (!acting || acts[static_cast<std::size_t>(j)] != 0))
+        return true;
+    return false;
+  };
+  for (bool more = true; more;) {
+    more = false;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      char& row = known[static_cast<std::size_t>(i)];
+      if (row != 0 || !(contains(i, true, false) || contains(i, false, true))) continue;
+      row = 1;
+      more = true;
+      for (Eigen::Index j = 0; j < n; ++j)
+        if (id[j] == 0.0 && slopes(i, j) != 0.0) acts[static_cast<std::size_t>(j)] = 1;
+    }
+  }
+  for (Eigen::Index j = 0; j < n; ++j)
+    if (id[j] == 0.0 && acts[static_cast<std::size_t>(j)] == 0)
+      found_.outputs.push_back(static_cast<int>(j));
 }
 
 // F determines y'_d and y_a, its index is 1 at most, where the matrix of F_y'_j (j differential)
@@ -64,7 +93,7 @@ bool AlgebraicVariables::has_rows_of_zeros(const Candidate& candidate, Corrector
 // (index 2 and 3), and where combinations of differential variables are algebraic. The columns are
 // differences of IDA's own residual callback, F(t, ypred + ycor, yppred + cj ycor), with ypred
 // shifted by -ycor (and put back bit for bit) where only y' is to feel ycor. Algebraic variables
-// that the matrix leaves free carry rounding divided by the step: undetermined_.
+// that the matrix leaves free carry rounding divided by the step: they are undetermined.
 bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corrector, double cj,
                                      long usual) {
   if (candidate.base_entries == nullptr) return false;
@@ -88,7 +117,6 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
   };
 
   bool known = true;
-  without_derivative_.clear();
   Eigen::MatrixXd slopes(size, size);
   for (int j = 0; j < size && known; ++j) {
     const bool differential = id == nullptr || id[j] != 0.0;
@@ -104,27 +132,27 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
     e[j] = 0.0;
     predicted[j] = original[j];
     for (int i = 0; i < size; ++i) slopes(i, j) = (after[i] - before[i]) / change;
-    if (differential && known && slopes.col(j).isZero(0.0)) without_derivative_.push_back(j);
+    if (differential && known && slopes.col(j).isZero(0.0)) found_.without_derivative.push_back(j);
   }
   N_VScale(1.0, saved, candidate.base);
+  if (known && id != nullptr) find_outputs(slopes);
   const std::vector<char> left =
       known ? undetermined_columns(std::move(slopes), true) : std::vector<char>();
-  undetermined_.clear();
   for (int j = 0; id != nullptr && j < static_cast<int>(left.size()); ++j)
-    if (left[static_cast<std::size_t>(j)] && id[j] == 0.0) undetermined_.push_back(j);
+    if (left[static_cast<std::size_t>(j)] && id[j] == 0.0) found_.undetermined.push_back(j);
   return !left.empty();
 }
 
 void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& corrector, double cj,
                                        long usual) {
-  if (!index_known_) high_index_ = exceeds_one(candidate, corrector, cj, usual);
   index_known_ = true;
-}
-
-void AlgebraicVariables::forget_index() {
-  high_index_ = index_known_ = false;
-  undetermined_.clear();
-  without_derivative_.clear();
+  if (found_.known) return;
+  found_.known = true;
+  found_.high = exceeds_one(candidate, corrector, cj, usual);
+  if (!any_ || found_.outputs.empty()) return;
+  tested_ = OwnedVector(static_cast<N_Vector>(id_));
+  N_VScale(1.0, id_, tested_);
+  for (const int j : found_.outputs) N_VGetArrayPointer(tested_)[j] = 1.0;
 }
 
 }  // namespace tether::ida_projection

@@ -26,6 +26,7 @@ void StepControl::reset() {
   refused_size_.reset();
   refused_in_row_ = 0;
   last_error_failures_ = 0;
+  corrector_has_failed_ = false;
 }
 
 // IDA computes its weights anew for a new step, but not for another attempt at the same one.
@@ -60,7 +61,9 @@ void StepControl::control(const Candidate& candidate, long steps, bool engaged,
   if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
 }
 
-void StepControl::corrector_failed() {
+void StepControl::corrector_failed(bool engaged) {
+  corrector_has_failed_ = true;
+  if (!engaged) return;
   smoother_.refuse(std::abs(ida_.step_size()));
   if (!smoother_.on() && !order_limit_.lowering()) refused_size_.refuse(std::abs(ida_.step_size()));
 }
@@ -102,7 +105,7 @@ bool StepControl::struggling() const {
 bool StepControl::in_trouble(long steps) const {
   if (!options_.suppress_algebraic) return false;
   const long failures = ida_.error_test_failures();
-  return statistics_.corrector_failures > 0 || (failures > 1 && kOftenRefused * failures > steps);
+  return corrector_has_failed_ || (failures > 1 && kOftenRefused * failures > steps);
 }
 
 void StepControl::begin_smoothing(const Care& care) {

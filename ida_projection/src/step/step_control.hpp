@@ -31,7 +31,7 @@ class StepControl {
   void control(const Candidate& candidate, long steps, bool engaged, N_Vector differential);
   double weights_factor() const { return weights_factor_; }
   /// The corrector failed in a way that a smaller step may cure.
-  void corrector_failed();
+  void corrector_failed(bool engaged);
 
   bool smoothing() const { return smoother_.on(); }
   /// Errors are steered to a part of what smoothing asks for.
@@ -56,7 +56,8 @@ class StepControl {
   RefusedSize refused_size_;
   OwnedVector kept_slope_, slope_;  // y' of a step and of the next one, for the order
   double weights_factor_ = 1.0;     // by which IDA's weights were multiplied in the last solve
-  int refused_in_row_ = 0;          // accepted steps that needed more than one attempt
+  bool corrector_has_failed_ = false;
+  int refused_in_row_ = 0;  // accepted steps that needed more than one attempt
   long last_error_failures_ = 0;
 };
 

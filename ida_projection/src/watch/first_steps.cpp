@@ -75,14 +75,23 @@ std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const Ste
   return out.str();
 }
 
+// All that a look takes, so that none allocates.
+void FirstSteps::allocate(const Candidate& candidate) {
+  const auto n = static_cast<std::size_t>(N_VGetLength(candidate.base));
+  for (std::vector<double>* each : {&point_, &slope_, &moved_, &kept_point_, &kept_slope_})
+    each->resize(n);
+  values_.resize(changes_.size());
+  for (OwnedVector* each : {&work_, &base_, &ycor_})
+    if (!*each) *each = OwnedVector(candidate.base);
+}
+
 // C y' + g_t = 0 at the corrector's point, where y' fulfils F. C y' costs a product with the C at
 // hand; only where a row stands out is g evaluated.
 std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const StepData& step,
                                             double h, N_Vector corrected, const double* id,
                                             Mover& mover, Corrector& corrector) {
   const auto n = static_cast<std::size_t>(N_VGetLength(candidate.base));
-  point_.resize(n);
-  slope_.resize(n);
+  if (point_.size() != n) allocate(candidate);
   const double* predicted = N_VGetArrayPointer(step.yp_predicted);
   const double* ycor = N_VGetArrayPointer(corrected);
   for (std::size_t j = 0; j < n; ++j) {
@@ -131,14 +140,12 @@ std::string FirstSteps::one_sided_row(double t) {
 // nor the distance from the constraints is in it. `ycor` begins as the corrector's.
 bool FirstSteps::refine_slope(const Candidate& candidate, const StepData& step, const double* id,
                               N_Vector ycor, Corrector& corrector) {
-  if (!work_) work_ = OwnedVector(candidate.base);
-  OwnedVector base(candidate.base);
-  N_VScale(1.0, candidate.base, base);
+  N_VScale(1.0, candidate.base, base_);
   double* const correction = N_VGetArrayPointer(ycor);
   for (std::size_t j = 0; j < point_.size(); ++j)
     candidate.base_entries[j] = point_[j] - correction[j];
   const bool known = corrector.residual(ycor, work_) == 0;
-  N_VScale(1.0, base, candidate.base);
+  N_VScale(1.0, base_, candidate.base);
   if (!known) return false;
   N_VScale(-1.0, work_, work_);
   if (!corrector.solve_linear(work_)) return false;
@@ -163,14 +170,13 @@ double FirstSteps::fastest(double t) const {
 // only: where F jumps, a row that it keeps has a kink.
 double FirstSteps::rate_along(int row, double t) {
   const double dt = std::cbrt(2e-16) / fastest(t);
-  std::vector<double> g(changes_.size());
   bool known = true;
   const auto at = [&](double time) {
     moved_ = point_;
     for (std::size_t j = 0; j < moved_.size(); ++j) moved_[j] += time * slope_[j];
     known = known && evaluator_.value(t + time, moved_.data(), static_cast<int>(moved_.size()),
-                                      g.data()) == Status::success;
-    return g[static_cast<std::size_t>(row)];
+                                      values_.data()) == Status::success;
+    return values_[static_cast<std::size_t>(row)];
   };
   const double here = at(0.0);
   const auto to = [&](double side) {
@@ -187,23 +193,23 @@ std::string FirstSteps::false_row(int row, Change& change, double noticed,
                                   const double* id, N_Vector corrected, Corrector& corrector) {
   const auto i = static_cast<std::size_t>(row);
   const auto size = static_cast<int>(point_.size());
-  const std::vector<double> point = point_, slope = slope_;
+  kept_point_ = point_;
+  kept_slope_ = slope_;
   for (std::size_t j = 0; j < point_.size(); ++j)
     point_[j] = candidate.base_entries[j] + candidate.correction_entries[j];
   evaluator_.forget();
-  OwnedVector ycor(candidate.base);
-  N_VScale(1.0, corrected, ycor);
+  N_VScale(1.0, corrected, ycor_);
   double before = 0.0, along = 0.0;
   bool known = true;
   for (int k = 0; k < kRefinements && known; ++k) {
-    known = refine_slope(candidate, step, id, ycor, corrector);
+    known = refine_slope(candidate, step, id, ycor_, corrector);
     if (known && k + 2 >= kRefinements) before = std::exchange(along, rate_along(row, step.t));
   }
   const double rounding = kRounding * tangency_.size[i] * fastest(step.t);
   std::fill(slope_.begin(), slope_.end(), 0.0);
   const double in_time = known ? rate_along(row, step.t) : 0.0;
-  point_ = point;
-  slope_ = slope;
+  point_ = kept_point_;
+  slope_ = kept_slope_;
   if (evaluator_.fatal()) corrector.stop(-1, evaluator_.message());
   if (!known) return {};
   const double terms = tangency_.terms[i] + std::abs(in_time);

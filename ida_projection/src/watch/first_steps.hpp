@@ -42,6 +42,7 @@ class FirstSteps {
   std::string look_for_false_rows(const Candidate& candidate, const StepData& step, double h,
                                   N_Vector corrected, const double* id, Mover& mover,
                                   Corrector& corrector);
+  void allocate(const Candidate& candidate);
   std::string one_sided_row(double t);
   struct Change {
     double sum = 0.0, span = 0.0;  // of C y' over time, and the time
@@ -68,8 +69,8 @@ class FirstSteps {
   bool false_row_found_ = false;
   long searched_ = 0;                  // unknowns compared
   std::vector<double> point_, slope_;  // y and y' as the corrector left them
-  std::vector<double> moved_;          // work space
-  OwnedVector work_;
+  std::vector<double> moved_, kept_point_, kept_slope_, values_;  // work space
+  OwnedVector work_, base_, ycor_;
 };
 
 }  // namespace tether::ida_projection

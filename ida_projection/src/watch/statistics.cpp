@@ -41,6 +41,7 @@ std::vector<Entry> entries(const Statistics& s) {
       count("refreshes of algebraic variables", "refreshes", s.refreshes),
       count("evaluations of F by the plugin", "residual_evaluations", s.residual_evaluations),
       count("factorizations with dropped rows", "rank_drops", s.rank_drops),
+      count("algebraic variables out of the error test", "untested", s.untested),
       count("step smoothing begun", "smoothing_begun", s.smoothing_begun),
       count("order limited", "order_limited", s.order_limited),
       count("moves as stiff components have them", "stiff_moves", s.stiff_moves),

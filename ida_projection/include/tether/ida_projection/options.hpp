@@ -77,7 +77,12 @@ struct Options {
   N_Vector id = nullptr;
   int derive_id_limit = 2000;
 
-  /// Keep algebraic variables out of IDA's error test (IDASetId and IDASetSuppressAlg).
+  /// Keep algebraic variables that the differential ones depend on, as multipliers, out of IDA's
+  /// error test: that of the differential ones controls what they do. Statistics::untested counts
+  /// them. Their values between steps have no tolerance; false keeps it. Outputs, on which no
+  /// differential variable depends, stay in the test (serial vectors; up to the size that
+  /// smooth_where_needed looks at). By IDASetId and IDASetSuppressAlg; IDAReInit takes them back
+  /// where `id` is derived.
   bool suppress_algebraic = true;
 
   /// After a move, the algebraic variables follow by one Newton iteration on F at the moved point

@@ -1,0 +1,118 @@
+// Tether: algebraic variables on which nothing depends, and runs that repeat.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <problems/car_axis.hpp>
+#include <problems/pendulum.hpp>
+
+#include "host.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::test;
+using tether::problems::car_axis;
+using tether::problems::pendulum;
+
+namespace {
+
+// b' = 1, 0 = b - 1 + H - OH, 0 = K - H OH: acid and base, whose other root is H = -1 at the end.
+Problem titration() {
+  constexpr double kProduct = 1e-6;
+  Problem p;
+  p.name = "titration";
+  p.form = "index 1";
+  p.size = 3;
+  p.t_end = 2.0;
+  const double H = (1 + std::sqrt(1 + 4 * kProduct)) / 2, slope = -1 / (1 + kProduct / (H * H));
+  p.y0 = {0.0, H, kProduct / H};
+  p.yp0 = {1.0, slope, -kProduct / (H * H) * slope};
+  p.id = {1.0, 0.0, 0.0};
+  p.residual = [](double, const double* y, const double* yp, double* r) {
+    r[0] = yp[0] - 1.0;
+    r[1] = y[0] - 1.0 + y[1] - y[2];
+    r[2] = kProduct - y[1] * y[2];
+  };
+  p.reference = {2.0, kProduct / H, H};
+  p.error_components = 3;
+  p.atol_scale = {1.0, 1e-3, 1e-3};
+  return p;
+}
+
+// A point turns once on a circle; z = sin(2 pi w t) is read.
+Problem fast_output(double w) {
+  const double turn = 8 * std::atan(1.0);
+  Problem p;
+  p.name = "fast output";
+  p.form = "index 1";
+  p.size = 3;
+  p.t_end = 1.0;
+  p.y0 = {1.0, 0.0, 0.0};
+  p.yp0 = {0.0, -turn, turn * w};
+  p.id = {1.0, 1.0, 0.0};
+  p.residual = [=](double t, const double* y, const double* yp, double* r) {
+    r[0] = yp[0] - turn * y[1];
+    r[1] = yp[1] + turn * y[0];
+    r[2] = y[2] - std::sin(turn * w * t);
+  };
+  p.reference = {1.0, 0.0, 0.0};
+  p.error_components = 2;
+  return p;
+}
+
+}  // namespace
+
+TEST_CASE("outputs: acid and base end at the root that they began at, at any tolerance") {
+  const tp::Constraints rows = row(
+      "base", [](double t, const double* y) { return y[0] - t; },
+      [](double, const double*, double* C) { C[0] = 1.0; });
+  const Problem problem = titration();
+  for (int k = 0; k < 40; ++k) {
+    const double tolerance = std::pow(10.0, -3 - 7.0 * k / 39);
+    const Run run = integrate(problem, tolerance, rows, {}, false);
+    CAPTURE(tolerance);
+    REQUIRE(run.flag >= 0);
+    CHECK(std::abs(run.y[1] - problem.reference[1]) < 1e-7);
+    CHECK(run.statistics.untested == 0);
+  }
+}
+
+TEST_CASE("outputs: values between steps are right to the tolerance, as plain IDA's") {
+  for (const double w : {10.0, 100.0})
+    for (const double tolerance : {1e-4, 1e-6}) {
+      double worst[2] = {0.0, 0.0};
+      for (const bool projects : {false, true}) {
+        Host host(fast_output(w), tolerance);
+        if (projects) host.attach(on_circle());
+        for (int i = 1; i <= 200; ++i) {
+          const double t = i / 200.0;
+          REQUIRE(host.to(t) >= 0);
+          const double z = std::sin(8 * std::atan(1.0) * w * t);
+          worst[projects] = std::max(worst[projects], std::abs(host.data()[2] - z));
+        }
+      }
+      CAPTURE(w, tolerance);
+      CHECK(worst[1] <= 1.5 * worst[0]);
+      CHECK(worst[1] < 10 * tolerance);
+    }
+}
+
+TEST_CASE("runs repeat: IDAReInit gives the first run to the bit, in every form") {
+  for (const char* form : {"index 1", "index 2", "GGL", "index 0"})
+    for (const double tolerance : {1e-4, 1e-6, 1e-7, 1e-8})
+      for (const bool car : {false, true}) {
+        if (car && form == std::string("index 0")) continue;
+        const Problem problem = car ? car_axis(form) : pendulum(1.0, 1.0, 10.0, form);
+        Host host(problem, tolerance);
+        host.attach(problem.recommended_constraints());
+        CAPTURE(problem.name, form, tolerance);
+        REQUIRE(host.finish() >= 0);
+        const std::vector<double> first = host.state();
+        const long steps = host.steps();
+        const long asked = host.projection().statistics().residual_evaluations;
+        host.projection().reset_statistics();
+        REQUIRE(host.restart() == 0);
+        REQUIRE(host.finish() >= 0);
+        CHECK(host.steps() == steps);
+        CHECK(host.state() == first);
+        // What F is like has been asked once.
+        CHECK(host.projection().statistics().residual_evaluations <= asked);
+      }
+}
