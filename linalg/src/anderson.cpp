@@ -50,7 +50,7 @@ void Anderson::step(const PackedVector* g, const PackedVector* f, PackedVector* 
   primed_ = true;
   if (count_ == 0) return;
 
-  // Normalised columns, 1e-11 on the diagonal, Cholesky; pivots below 1e-13 are dropped.
+  // Normalised columns and 1e-11 on the diagonal: pivots of Cholesky's factors are above 1e-11.
   double scale[kMaxDepth], R[kMaxDepth][kMaxDepth], y[kMaxDepth];
   bool keep[kMaxDepth];
   for (int k = 0; k < count_; ++k) {
@@ -65,7 +65,7 @@ void Anderson::step(const PackedVector* g, const PackedVector* f, PackedVector* 
       if (j < k) {
         R[k][j] = keep[j] ? sum / R[j][j] : 0;
       } else {
-        keep[k] = scale[k] > 0 && sum > 1e-13;
+        keep[k] = scale[k] > 0 && sum > 0;
         R[k][k] = keep[k] ? std::sqrt(sum) : 1;
       }
     }

@@ -40,6 +40,29 @@ TEST_CASE("maximum dissipation is the least energy in every class") {
   }
 }
 
+TEST_CASE("maximum dissipation: a singular block whose b leaves its range has the least energy") {
+  // B = diag(1, 0): along y_1 the energy falls without end, up to the border of the cone.
+  Matrix3d A;
+  A << 1, 0.3, 0.2, 0.3, 1.09, 0.06, 0.2, 0.06, 0.04;
+  for (const double h1 : {1e-3, 0.1, -0.7, 4.0})
+    for (const double h0 : {0.0, 0.2, -1.5}) {
+      const double mu = 0.6;
+      const Vector3d b(1, h0 + 0.3, h1 + 0.2);
+      const auto energy = [&](double y0, double y1) { return 0.5 * y0 * y0 - h0 * y0 - h1 * y1; };
+      double least = 0;
+      for (int k = 0; k < 100000; ++k) {
+        const double phi = k * 6.283185307179586e-5, u0 = std::cos(phi), u1 = std::sin(phi);
+        const double r = mu / (1 + mu * (0.3 * u0 + 0.2 * u1));
+        least = std::min(least, energy(r * u0, r * u1));
+      }
+      const OneContact s = solve_one(Law::maximum_dissipation, A, b, mu);
+      CAPTURE(h0, h1);
+      CHECK(s.regime == Regime::sliding);
+      CHECK(std::abs((A * s.impulse - b)[0]) < 1e-14);
+      CHECK(energy(s.impulse[1], s.impulse[2]) == Approx(least).margin(1e-9));
+    }
+}
+
 TEST_CASE("coulomb: friction opposes slip, cone and plane hold") {
   for (const std::string& kind : random::classes()) {
     random::Generator generator(11);

@@ -126,6 +126,22 @@ TEST_CASE("stepping: the law of Poisson, by name, gives slip back as well") {
   CHECK(std::string(tc::name(s.options().restitution_law)) == "poisson");
 }
 
+TEST_CASE("stepping: two free balls share an impact by either law, Newton's and Poisson's") {
+  for (const auto law : {tc::RestitutionLaw::newton, tc::RestitutionLaw::poisson}) {
+    Scene scene(1e-3);
+    scene.options.gravity.reset();
+    scene.options.restitution_law = law;
+    scene.friction(0, 0.5);
+    scene.sphere(0.1, 1, {-0.1505, 0, 0}, {1, 0, 0});
+    scene.sphere(0.1, 3, {0.1505, 0, 0}, {-1, 0, 0});
+    tc::Stepper s = scene.stepper();
+    for (int k = 0; k < 200; ++k) s.step();
+    // Momentum -2 kg m/s; an approach of 2 m/s parts with 1 m/s.
+    CHECK(s.bodies().motion[0].velocity.x() == Approx(-1.25).epsilon(1e-9));
+    CHECK(s.bodies().motion[1].velocity.x() == Approx(-0.25).epsilon(1e-9));
+  }
+}
+
 TEST_CASE("stepping: boxes that strike with restitution and friction never gain energy") {
   // Newton's law does gain some by itself where friction and normal impulse are coupled.
   std::mt19937 generator(17);

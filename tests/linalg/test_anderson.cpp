@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/anderson.hpp>
+#include <tether/linalg/block3.hpp>
+#include <vector>
 
 #include "support/catch.hpp"
 
@@ -49,6 +51,21 @@ TEST_CASE("Anderson: a linear map with k rates is solved after k + 1 steps") {
   CHECK(four.error(6, 4) > 1e-4);
   const Diagonal diverges{{{2.0, -3.0, 2.0}, {-3.0, 2.0, -3.0}}};
   CHECK(diverges.error(3, 3) < 1e-7);
+}
+
+// Odd and even numbers of blocks: sums take eight numbers at a time, and what is left.
+TEST_CASE("Anderson: sums over packed vectors have all of their blocks") {
+  for (int blocks = 1; blocks <= 5; ++blocks) {
+    std::vector<PackedVector> p(static_cast<std::size_t>(blocks)), q(p.size());
+    double sum = 0;
+    for (int k = 0; k < blocks; ++k)
+      for (int c = 0; c < 3; ++c) {
+        p[static_cast<std::size_t>(k)].v[c] = 1 + 3 * k + c;
+        q[static_cast<std::size_t>(k)].v[c] = 2;
+        sum += 2.0 * (1 + 3 * k + c);
+      }
+    CHECK(tether::linalg::dot(p.data()->v, q.data()->v, 4 * blocks) == sum);
+  }
 }
 
 // Differences of a map that is at rest are zero, and one that has ended repeats them.

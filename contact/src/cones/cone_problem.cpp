@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 
 #include "cones/cone_rows.hpp"
@@ -240,27 +241,19 @@ ConeProblem ConeProblem::saddle(const std::vector<MatrixEntry>& M,
   check_entries("M", M, n, n);
   check_entries("J", J, m, n);
   // Parts of M that hang together, numbered by their first column.
-  std::vector<int> parent(at(n));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
-    return i;
-  };
+  linalg::DisjointSets parts(n);
   for (const MatrixEntry& e : M)
-    if (e.value != 0) {
-      const int a = root(e.row), b = root(e.column);
-      parent[at(std::max(a, b))] = std::min(a, b);
-    }
+    if (e.value != 0) parts.join(e.row, e.column);
   std::vector<int> place(at(n)), size(at(n), 0), row_place(at(m), -1);
-  for (int i = 0; i < n; ++i) place[at(i)] = size[at(root(i))]++;
+  for (int i = 0; i < n; ++i) place[at(i)] = size[at(parts.root(i))]++;
   std::vector<std::vector<Eigen::Triplet<double>>> mass(at(n));
   std::vector<std::vector<MatrixEntry>> rows(at(n));
   std::vector<std::vector<int>> members(at(n));
-  for (int i = 0; i < n; ++i) members[at(root(i))].push_back(i);
+  for (int i = 0; i < n; ++i) members[at(parts.root(i))].push_back(i);
   for (const MatrixEntry& e : M)
     if (e.value != 0)
-      mass[at(root(e.row))].emplace_back(place[at(e.row)], place[at(e.column)], e.value);
-  for (const MatrixEntry& e : J) rows[at(root(e.column))].push_back(e);
+      mass[at(parts.root(e.row))].emplace_back(place[at(e.row)], place[at(e.column)], e.value);
+  for (const MatrixEntry& e : J) rows[at(parts.root(e.column))].push_back(e);
 
   std::vector<MatrixEntry> A;
   Eigen::VectorXd b = -bias;

@@ -3,7 +3,7 @@
 
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
@@ -31,25 +31,21 @@ FreeRows::FreeRows(const ConeProblem& problem) : place_(at(problem.rows()), -1) 
   const auto n = static_cast<int>(rows_.size());
   std::vector<Eigen::Triplet<double>> own, down, up;
   scale_.resize(n);
-  std::vector<int> parent(at(n));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
-    return i;
-  };
+  linalg::DisjointSets joined(n);
   for (int i = 0; i < n; ++i) scale_[i] = problem.row_scale()[at(rows_[at(i)])];
   for (const MatrixEntry& e : problem.entries()) {
     const int r = place_[at(e.row)], c = place_[at(e.column)];
     if (r >= 0 && c >= 0) {
       own.emplace_back(r, c, scale_[r] * e.value * scale_[c]);
-      if (e.value != 0) parent[at(std::max(root(r), root(c)))] = std::min(root(r), root(c));
+      if (e.value != 0) joined.join(r, c);
     } else if (c >= 0) {
       down.emplace_back(e.row, c, e.value);
     } else if (r >= 0) {
       up.emplace_back(r, e.column, e.value);
     }
   }
-  for (int i = 0; i < n; ++i) part_.push_back(root(i) == i ? parts_++ : part_[at(root(i))]);
+  for (int i = 0; i < n; ++i)
+    part_.push_back(joined.root(i) == i ? parts_++ : part_[at(joined.root(i))]);
   A_.resize(n, n);
   A_.setFromTriplets(own.begin(), own.end());
   coupling_.resize(problem.rows(), n);

@@ -18,28 +18,18 @@ constexpr int kMasked = 63;
 
 }  // namespace
 
-int IslandFinder::root(int b) {
-  while (parent_[at(b)] != b) b = parent_[at(b)] = parent_[at(parent_[at(b)])];
-  return b;
-}
-
 void IslandFinder::find(int bodies, const ContactPairs& pairs, std::vector<Island>& islands,
                         std::vector<int>& sorted, std::vector<int>& island_of_contact) {
   const std::vector<int>&first = *pairs.first, &second = *pairs.second;
   const std::size_t n = first.size();
-  parent_.resize(at(bodies));
-  for (int b = 0; b < bodies; ++b) parent_[at(b)] = b;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (second[i] < 0) continue;
-    const int a = root(first[i]), b = root(second[i]);
-    // The smaller index wins: the result depends on nothing else.
-    (a < b ? parent_[at(b)] : parent_[at(a)]) = std::min(a, b);
-  }
+  sets_.reset(bodies);
+  for (std::size_t i = 0; i < n; ++i)
+    if (second[i] >= 0) sets_.join(first[i], second[i]);
   island_of_.assign(at(bodies), -1);
   island_of_contact.resize(n);
   islands.clear();
   for (std::size_t i = 0; i < n; ++i) {
-    int& island = island_of_[at(root(first[i]))];
+    int& island = island_of_[at(sets_.root(first[i]))];
     if (island < 0) {
       island = static_cast<int>(islands.size());
       islands.push_back({});
@@ -60,7 +50,7 @@ void IslandFinder::find(int bodies, const ContactPairs& pairs, std::vector<Islan
 }
 
 std::size_t IslandFinder::body_bytes() const {
-  return sizeof(int) * (parent_.capacity() + island_of_.capacity());
+  return sets_.bytes() + sizeof(int) * island_of_.capacity();
 }
 
 void Adjacency::build(int bodies, const ContactPairs& pairs) {

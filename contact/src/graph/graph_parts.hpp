@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <vector>
 
 namespace tether::contact::detail {
@@ -39,7 +40,7 @@ struct ContactPairs {
   int size() const { return static_cast<int>(first->size()); }
 };
 
-// Connected components by union-find.
+// Connected components.
 class IslandFinder {
  public:
   // Counts and places of the islands; contacts sorted by island; the island of each contact.
@@ -48,9 +49,7 @@ class IslandFinder {
   std::size_t body_bytes() const;
 
  private:
-  int root(int b);
-
-  std::vector<int> parent_;     // body -> union-find parent
+  linalg::DisjointSets sets_;   // of bodies
   std::vector<int> island_of_;  // body (root) -> island
 };
 

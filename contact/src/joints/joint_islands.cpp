@@ -2,7 +2,6 @@
 #include "joints/joint_islands.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
@@ -60,26 +59,21 @@ void StepJointIslands::solve_others(BodySolver& others, const std::vector<RigidB
 // Islands of moving bodies, connected by contacts and mechanisms.
 void StepJointIslands::find_islands(const std::vector<PointContact>& contacts) {
   const int n = mechanisms_.bodies();
-  parent_.resize(at(n));
-  std::iota(parent_.begin(), parent_.end(), 0);
-  const auto root = [&](int i) {
-    while (parent_[at(i)] != i) i = parent_[at(i)] = parent_[at(parent_[at(i)])];
-    return i;
-  };
+  sets_.reset(n);
   const auto moves = [&](int body) { return body >= 0 && mechanisms_.moves(body); };
   for (int m = 0; m < mechanisms_.count(); ++m)
     for (const int body : mechanisms_[m].bodies())
-      parent_[at(root(body))] = root(mechanisms_[m].bodies().front());
+      sets_.join(body, mechanisms_[m].bodies().front());
   for (const PointContact& c : contacts)
-    if (moves(c.first) && moves(c.second)) parent_[at(root(c.first))] = root(c.second);
+    if (moves(c.first) && moves(c.second)) sets_.join(c.first, c.second);
   has_joints_.assign(at(n), 0);
   for (int m = 0; m < mechanisms_.count(); ++m)
-    has_joints_[at(root(mechanisms_[m].bodies().front()))] = 1;
+    has_joints_[at(sets_.root(mechanisms_[m].bodies().front()))] = 1;
   jointed_.clear();
   rest_.clear();
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const int body = moves(contacts[k].first) ? contacts[k].first : contacts[k].second;
-    const bool joints = moves(body) && has_joints_[at(root(body))];
+    const bool joints = moves(body) && has_joints_[at(sets_.root(body))];
     (joints ? jointed_ : rest_).push_back(static_cast<int>(k));
   }
 }
@@ -167,9 +161,7 @@ void StepJointIslands::merge(const std::vector<RigidBody>& bodies,
   out.angular_velocities = solution_.angular_velocities;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const int body = static_cast<int>(i);
-    int root = body;
-    while (parent_[at(root)] != root) root = parent_[at(root)];
-    if (!mechanisms_.moves(body) || !has_joints_[at(root)]) continue;
+    if (!mechanisms_.moves(body) || !has_joints_[at(sets_.root(body))]) continue;
     out.velocities[i] = v_[i].head<3>();
     out.angular_velocities[i] = v_[i].tail<3>();
   }

@@ -1,6 +1,7 @@
 // Tether: islands of contacts and joints in a step. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/linalg/disjoint_sets.hpp>
 #include <vector>
 
 #include "body_sweeps/impulse_memory.hpp"
@@ -61,7 +62,7 @@ class StepJointIslands final : public JointIslands {
   bool warm_;
   JointedContacts solver_;
   JointedContacts::Result result_;
-  std::vector<int> parent_;
+  linalg::DisjointSets sets_;
   std::vector<char> has_joints_;     // of the root of an island
   std::vector<int> jointed_, rest_;  // contacts
   std::vector<PointContact> points_;

@@ -49,25 +49,20 @@ int JointedContacts::node_of(const Mechanisms& mechanisms, int body) const {
 void JointedContacts::find_islands(const Mechanisms& mechanisms,
                                    const std::vector<ContactRows>& contacts) {
   const int n = static_cast<int>(contacts.size());
-  std::vector<int>& parent = parent_;
-  parent.resize(at(mechanisms.count() + mechanisms.bodies()));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
-    return i;
-  };
+  const int nodes = mechanisms.count() + mechanisms.bodies();
+  sets_.reset(nodes);
   const auto moving = [&](int body) { return body >= 0 && mechanisms.moves(body); };
   const auto any = [&](const ContactRows& c) {
     return node_of(mechanisms, moving(c.first) ? c.first : c.second);
   };
   for (const ContactRows& c : contacts)
     if (moving(c.first) && moving(c.second))
-      parent[at(root(node_of(mechanisms, c.first)))] = root(node_of(mechanisms, c.second));
+      sets_.join(node_of(mechanisms, c.first), node_of(mechanisms, c.second));
   order_.resize(contacts.size());
   std::iota(order_.begin(), order_.end(), 0);
-  first_of_.assign(parent.size(), n);
-  for (int i = n - 1; i >= 0; --i) first_of_[at(root(any(contacts[at(i)])))] = i;
-  const auto island = [&](int i) { return first_of_[at(root(any(contacts[at(i)])))]; };
+  first_of_.assign(at(nodes), n);
+  for (int i = n - 1; i >= 0; --i) first_of_[at(sets_.root(any(contacts[at(i)])))] = i;
+  const auto island = [&](int i) { return first_of_[at(sets_.root(any(contacts[at(i)])))]; };
   std::sort(order_.begin(), order_.end(), [&](int i, int j) {
     const int a = island(i), b = island(j);
     return a != b ? a < b : i < j;

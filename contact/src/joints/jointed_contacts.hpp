@@ -2,6 +2,7 @@
 #pragma once
 
 #include <tether/contact/joints.hpp>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <vector>
 
 #include "joints/mechanisms.hpp"
@@ -58,7 +59,8 @@ class JointedContacts {
 
   Solver solver_;
   Result result_;
-  std::vector<int> parent_, first_of_, order_, island_start_;  // contacts island by island
+  linalg::DisjointSets sets_;                         // of mechanisms and single bodies
+  std::vector<int> first_of_, order_, island_start_;  // contacts island by island
   // Of the present island: its contacts, those of them that are solved (places in members_), the
   // sides of all, and A, and its diagonal without joints (normals, and sums of
   // both tangents).

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 
 #include "problem/inverse_mass_root.hpp"
@@ -47,12 +47,7 @@ void Mechanisms::analyse(const std::vector<RigidBody>& bodies, const JointRows& 
   moves_.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) moves_[i] = bodies[i].moves();
   pattern_.clear();
-  std::vector<int> parent(bodies.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
-    return i;
-  };
+  linalg::DisjointSets joined(n);
   std::vector<int> any(at(joints.count()), -1);  // a moving body of each row
   for (int row = 0; row < joints.count(); ++row) {
     pattern_.push_back(joints.compliance(row) > 0 ? -2 : -1);
@@ -63,7 +58,7 @@ void Mechanisms::analyse(const std::vector<RigidBody>& bodies, const JointRows& 
                                     std::to_string(n));
       pattern_.push_back(t->body);
       if (!moves_[at(t->body)]) continue;
-      if (any[at(row)] >= 0) parent[at(root(t->body))] = root(any[at(row)]);
+      if (any[at(row)] >= 0) joined.join(t->body, any[at(row)]);
       any[at(row)] = t->body;
     }
   }
@@ -75,7 +70,7 @@ void Mechanisms::analyse(const std::vector<RigidBody>& bodies, const JointRows& 
     if (any[at(row)] < 0)
       throw std::invalid_argument("joint " + std::to_string(joints.joint(row)) + ": row " +
                                   std::to_string(row) + " is on no body that moves");
-    int& m = number[at(root(any[at(row)]))];
+    int& m = number[at(joined.root(any[at(row)]))];
     if (m < 0) {
       m = static_cast<int>(rows.size());
       rows.emplace_back();
@@ -84,7 +79,7 @@ void Mechanisms::analyse(const std::vector<RigidBody>& bodies, const JointRows& 
     rows[at(m)].push_back(row);
   }
   for (int i = 0; i < n; ++i) {
-    const int m = number[at(root(i))];
+    const int m = number[at(joined.root(i))];
     if (m < 0 || !moves_[at(i)]) continue;
     mechanism_[at(i)] = m;
     place_[at(i)] = static_cast<int>(members[at(m)].size());

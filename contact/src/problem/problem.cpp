@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 #include <tuple>
 
@@ -31,25 +32,20 @@ int dimension_of(const linalg::VectorView& b, const linalg::VectorView& mu) {
 std::vector<int> find_islands(int n, const std::vector<int>& row_start,
                               const std::vector<int>& columns,
                               const std::vector<PackedBlock>& blocks) {
-  std::vector<int> parent(at(n));
-  for (int i = 0; i < n; ++i) parent[at(i)] = i;
-  const auto root = [&](int i) {
-    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
-    return i;
-  };
+  linalg::DisjointSets sets(n);
   for (int i = 0; i < n; ++i) {
     for (int k = row_start[at(i)]; k < row_start[at(i + 1)]; ++k) {
-      const int p = root(i), q = root(columns[at(k)]);
-      if (p == q) continue;
+      if (sets.root(i) == sets.root(columns[at(k)])) continue;
       bool joined = false;
       for (double v : blocks[at(k)].column) joined = joined || v != 0;
-      if (joined) parent[at(std::max(p, q))] = std::min(p, q);
+      if (joined) sets.join(i, columns[at(k)]);
     }
   }
   // A root precedes the contacts of its island.
   int count = 0;
   std::vector<int> island(at(n));
-  for (int i = 0; i < n; ++i) island[at(i)] = root(i) == i ? count++ : island[at(root(i))];
+  for (int i = 0; i < n; ++i)
+    island[at(i)] = sets.root(i) == i ? count++ : island[at(sets.root(i))];
   return island;
 }
 

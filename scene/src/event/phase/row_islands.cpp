@@ -2,7 +2,7 @@
 #include "row_islands.hpp"
 
 #include <cmath>
-#include <numeric>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 
 namespace tether::scene::event {
@@ -18,25 +18,21 @@ using linalg::at;
 void RowIslands::choose(const MatrixXd& R, const MatrixXd& C, int block) {
   block_ = block;
   const int rows = static_cast<int>(R.rows()), bodies = static_cast<int>(R.cols()) / block;
-  std::vector<int> parent(at(bodies)), first(at(rows), -1);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
-    return i;
-  };
+  std::vector<int> first(at(rows), -1);
+  linalg::DisjointSets sets(bodies);
   for (int i = 0; i < rows; ++i)
     for (int b = 0; b < bodies; ++b) {
       if (R.row(i).segment(block * b, block).isZero(0) &&
           C.col(i).segment(block * b, block).isZero(0))
         continue;
       if (first[at(i)] < 0) first[at(i)] = b;
-      parent[at(root(b))] = root(first[at(i)]);
+      sets.join(b, first[at(i)]);
     }
   islands_.clear();
   std::vector<int> island_of(at(bodies), -1);
   for (int i = 0; i < rows; ++i) {
     if (first[at(i)] < 0) continue;  // nothing moves it, and it moves nothing
-    int& k = island_of[at(root(first[at(i)]))];
+    int& k = island_of[at(sets.root(first[at(i)]))];
     if (k < 0) {
       k = static_cast<int>(islands_.size());
       islands_.push_back({{}, {}, linalg::LeastSquares(kIslandRank)});
@@ -44,7 +40,7 @@ void RowIslands::choose(const MatrixXd& R, const MatrixXd& C, int block) {
     islands_[at(k)].rows.push_back(i);
   }
   for (int b = 0; b < bodies; ++b)
-    if (const int k = island_of[at(root(b))]; k >= 0) islands_[at(k)].bodies.push_back(b);
+    if (const int k = island_of[at(sets.root(b))]; k >= 0) islands_[at(k)].bodies.push_back(b);
 }
 
 void RowIslands::take(const Island& island, const MatrixXd& R, const MatrixXd& MC) {

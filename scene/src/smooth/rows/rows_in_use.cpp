@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/singular_values.hpp>
 
 #include "sizes.hpp"
@@ -70,13 +71,10 @@ RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
 // Bodies as nodes, all that do not move as one, joints as edges: a forest. From its leaves inwards
 // each joint has rows of full rank on a body that no other joint left acts on.
 bool RowsInUse::independent_by_structure() const {
-  std::vector<int> parent(at(bodies_.count()) + 1);  // the last: all that do not move
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto tree_of = [&](int body) {
+  linalg::DisjointSets trees(bodies_.count() + 1);  // the last: all that do not move
+  const auto node = [&](int body) {
     const int slot = bodies_.all().inertia[at(body)].slot;
-    int i = slot < 0 ? bodies_.count() : slot;
-    while (parent[at(i)] != i) i = parent[at(i)] = parent[at(parent[at(i)])];
-    return i;
+    return slot < 0 ? bodies_.count() : slot;
   };
   std::vector<char> seen;
   bool forest = true;
@@ -84,9 +82,8 @@ bool RowsInUse::independent_by_structure() const {
     if (row.joint >= static_cast<int>(seen.size())) seen.resize(at(row.joint) + 1, 0);
     if (seen[at(row.joint)]) return;
     seen[at(row.joint)] = 1;
-    const int a = tree_of(row.first), b = tree_of(row.second);
-    forest = forest && a != b;
-    parent[at(a)] = b;
+    const bool apart = trees.join(node(row.first), node(row.second));
+    forest = forest && apart;
   });
   return forest;
 }
