@@ -118,11 +118,11 @@ TEST_CASE("a contact problem that is used above what the scene accepts is a warn
         fmt::format("max_halvings = 1\ntolerance = {}\nacceptance = {}\n", tolerance, acceptance));
     return run(parse_scene(text, "pyramid.toml")).warnings;
   };
-  const auto beyond = warnings("1e-15", "1.5");  // below rounding
+  const auto beyond = warnings("1e-17", "1.5");  // below rounding
   REQUIRE(beyond.size() == 1);
   CHECK_THAT(beyond[0],
-             Catch::Contains("above the 1.5e-15") && Catch::Contains("stepping.acceptance"));
-  CHECK(warnings("1e-15", "1e5").empty());
+             Catch::Contains("above the 1.5e-17") && Catch::Contains("stepping.acceptance"));
+  CHECK(warnings("1e-17", "1e7").empty());
 }
 
 TEST_CASE("sweeps of a contact problem end where the scene says") {

@@ -35,8 +35,10 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
   if (at_once) sweeps.combine(island, team, true);
   r.inverse_scale = detail::inverse_scale(b.most, b.sum);
   r.floor = detail::round_off(b.speed);
-  r.stale = !at_once && detail::round_off(b.started) * r.inverse_scale * r.inverse_scale >
-                            kShare * kShare * options.tolerance * options.tolerance;
+  const double started =
+      detail::round_off(b.started);  // of a square; nothing needs a change: 0 / 0
+  r.stale =
+      !at_once && started > 0 && std::sqrt(started) * r.inverse_scale > kShare * options.tolerance;
   // b = 0: no impulses; those of the last solve are dropped.
   if (b.sum == 0 && b.most == 0) {
     sweeps.rest(island, team);

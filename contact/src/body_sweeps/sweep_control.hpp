@@ -157,9 +157,9 @@ class Forecast {
 
   // since: the least change `sweeps` ago
   double more(double since, double sweeps, double most, double bound) const {
-    const bool known = least_ > 0 && std::isfinite(since);
-    const double rate = known ? std::log(least_ / since) / sweeps : 0;
-    return !known ? 0 : rate < 0 ? std::log(bound / most) / rate : kNone;
+    const bool known = least_ > 0 && since > 0 && most > 0 && bound > 0 && std::isfinite(since);
+    const double rate = known ? (std::log(least_) - std::log(since)) / sweeps : 0;
+    return !known ? 0 : rate < 0 ? (std::log(bound) - std::log(most)) / rate : kNone;
   }
 
   double before_ = kNone, earlier_ = kNone, least_ = kNone;
