@@ -24,7 +24,6 @@ struct PlanArguments {
 int plan(const PlanArguments& arguments) {
   const Scene scene = read_scene_argument(arguments.file);
   std::cout << make_plan(scene) << std::flush;
-  print_start(scene);
   if (!arguments.run) return kGood;
   Scene silent = scene;
   silent.output = Output{};
