@@ -305,7 +305,7 @@ TEST_CASE("stepping: nothing is allocated in steady state") {
   Scene scene = heap(5, 0.3, 0.2);
   scene.options.max_assembled = 0;
   tc::Stepper s = scene.stepper();
-  run(s, 3);  // the best point of sweeps that go on is kept for the first time before
+  run(s, 2);
   const long before = tether::test::allocations();
   for (int k = 0; k < 100; ++k) s.step();
   CHECK(tether::test::allocations() == before);

@@ -173,7 +173,10 @@ void ChunkColours::colour(const Clusters& clusters, const ContactPairs& pairs, c
 void ContactsByKind::sort(const int* begin, const int* end, const ContactPairs& pairs,
                           const std::vector<Kind>& kind, bool in_fours,
                           std::vector<std::uint64_t>& used) {
-  for (std::vector<int>& list : lists_) list.clear();
+  for (std::vector<int>& list : lists_) {
+    list.clear();
+    list.reserve(at(kMost));  // once: which kind has how many changes from step to step
+  }
   if (in_fours && end - begin >= 4) {
     group(begin, end, pairs, kind, used);
     return;

@@ -68,13 +68,15 @@ inline double speed_before(const Side& s, double bias) {
                    s.second->angular_velocity.cross(s.r2).squaredNorm()});
 }
 
-// Square of the largest of the velocities that an impulse gives to the two sides of the contact.
+// Square of a bound on the speed that an impulse gives to either side of the contact: the mobility
+// of a body at r has norm 1/m + |r|^2 tr(I^-1) at most.
 inline double speed_by(const Side& s, const Vector3d& p) {
-  const auto most = [&p](const RigidBody& b, const Vector3d& r) {
-    return std::max((b.inverse_mass * p).squaredNorm(),
-                    (b.inverse_inertia * r.cross(p)).cross(r).squaredNorm());
+  const auto mobility = [](const RigidBody& b, const Vector3d& r) {
+    return b.inverse_mass + r.squaredNorm() * b.inverse_inertia.trace();
   };
-  return s.second ? std::max(most(*s.first, s.r1), most(*s.second, s.r2)) : most(*s.first, s.r1);
+  const double first = mobility(*s.first, s.r1);
+  const double most = s.second ? std::max(first, mobility(*s.second, s.r2)) : first;
+  return most * most * p.squaredNorm();
 }
 
 // Diagonal block of A in world axes.
