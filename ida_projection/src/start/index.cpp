@@ -135,6 +135,7 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
     if (differential && known && slopes.col(j).isZero(0.0)) found_.without_derivative.push_back(j);
   }
   N_VScale(1.0, saved, candidate.base);
+  found_.known = known;  // else the next run asks again
   if (known && id != nullptr) find_outputs(slopes);
   const std::vector<char> left =
       known ? undetermined_columns(std::move(slopes), true) : std::vector<char>();
@@ -148,6 +149,7 @@ void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& co
   index_known_ = true;
   if (found_.known) return;
   found_.known = true;
+  found_.without_derivative.clear();
   found_.high = exceeds_one(candidate, corrector, cj, usual);
   if (!any_ || found_.outputs.empty()) return;
   tested_ = OwnedVector(static_cast<N_Vector>(id_));

@@ -82,7 +82,8 @@ struct Options {
   /// them. Their values between steps have no tolerance; false keeps it. Outputs, on which no
   /// differential variable depends, stay in the test (serial vectors; up to the size that
   /// smooth_where_needed looks at). By IDASetId and IDASetSuppressAlg; IDAReInit takes them back
-  /// where `id` is derived.
+  /// where `id` is derived. Where F has several roots, what has left the test may end at another
+  /// one than plain IDA's: false for such systems.
   bool suppress_algebraic = true;
 
   /// After a move, the algebraic variables follow by one Newton iteration on F at the moved point
