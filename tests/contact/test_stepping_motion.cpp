@@ -429,3 +429,23 @@ TEST_CASE("stepping: misuse is refused") {
   CHECK_THROWS_AS(bodies.add(0, Matrix3d::Identity(), Vector3d::Zero()), std::invalid_argument);
   CHECK_THROWS_AS(bodies.add(1, Matrix3d::Zero(), Vector3d::Zero()), std::invalid_argument);
 }
+
+TEST_CASE("stepping: a turning box that is lifted out of the ground keeps its energy") {
+  Scene scene;
+  scene.options.gravity.reset();
+  scene.friction(0);
+  scene.ground();
+  const Quaterniond turned(AngleAxisd(radians(30), Vector3d(1, 1, 0).normalized()));
+  const int box = scene.box({0.6, 0.2, 0.1}, 1, {0, 0, 0.1}, turned);
+  tc::RigidBody& motion = scene.bodies.motion[static_cast<std::size_t>(box)];
+  motion.velocity = {0, 0, 1};
+  motion.angular_velocity = {4, 2, 7};
+  tc::Stepper s = scene.stepper();
+  const double energy = tc::kinetic_energy(s.bodies());
+  s.step();
+  const double deepest = s.penetration();
+  CHECK(deepest > 0.02);
+  for (int k = 0; k < 10; ++k) s.step();
+  CHECK(s.penetration() < 0.9 * deepest);
+  CHECK(std::abs(tc::kinetic_energy(s.bodies()) - energy) < 1e-13 * energy);
+}

@@ -243,3 +243,18 @@ TEST_CASE("sleep: what it does not go with is refused by name") {
   scene.meetings[0].rolling = 0.01;
   CHECK_THROWS_WITH(stepper(scene), Contains("sleep does not go with rolling"));
 }
+
+TEST_CASE("sleep: a load of 2e-4 of the weight wakes a stack that has slept for a while") {
+  Scene scene = stacks(1, 1e-3);
+  scene.ground();
+  for (const double push : {0.0, 2e-4 * kMass * kGravity}) {
+    tc::Stepper s = stepper(scene);
+    s.add_force("push", [=](tc::BodySet& b, double t, double dt) {
+      if (t >= 3) b.motion[2].velocity.x() += dt * push / kMass;
+    });
+    run(s, 2.9);
+    CHECK(s.asleep() == 3);
+    run(s, 0.2);
+    CHECK(s.asleep() == (push > 0 ? 0 : 3));
+  }
+}

@@ -193,3 +193,27 @@ TEST_CASE("joints and contact: a chain of 100 links falls on the floor and comes
   CHECK(drift < 1e-10);
   CHECK(engine->counts().unsolved == 0);
 }
+
+TEST_CASE("joints in steps: a mass on damped springs rests where the springs balance its weight") {
+  Scene s = stepping(1e-2, {0, 0, -kGravity});
+  s.end = 30;
+  Body mass = ball("mass", {0, 0, 0}, 6, 1);
+  add(s, mass);
+  for (const double x : {-1.0, 1.0}) {
+    Spring spring;
+    spring.first = 0;
+    spring.second = kWorld;
+    spring.at = {0, 0, 0};
+    spring.at_second = {0, x, 1};
+    spring.stiffness = 500;
+    spring.damping = 60;
+    s.springs.push_back(spring);
+  }
+  const auto steps = make_engine(s);
+  steps->advance(s.end);
+  const Vector3d at = steps->bodies()[0].position;
+  // Sum of the tensions, k (l - l0) (1 - z) / l each, against m g.
+  const double length = std::hypot(1.0, 1 - at.z()), rest = std::sqrt(2.0);
+  const double lift = 2 * 500 * (length - rest) * (1 - at.z()) / length;
+  CHECK(lift == Approx(6 * kGravity).epsilon(1e-9));
+}

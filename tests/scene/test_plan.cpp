@@ -51,16 +51,17 @@ const std::string kBall =
 TEST_CASE("the plan lists exactly the effects that the scene names") {
   CHECK(effects(kSphere).empty());
   CHECK(effects(kGravity + kSphere) == Names{"gravity"});
-  CHECK(effects(kSphere + kFloor + kPair) == Names{"contact"});
-  CHECK(effects(kSphere + kFloor + kPair + "friction = 0.1\n") == Names{"contact", "friction"});
+  CHECK(effects(kSphere + kFloor + kPair) == Names{"contact", "impacts"});
+  CHECK(effects(kSphere + kFloor + kPair + "friction = 0.1\n") ==
+        Names{"contact", "friction", "impacts"});
   CHECK(effects(kSphere + kFloor + kPair + "restitution = 0.1\n") ==
-        Names{"contact", "restitution"});
+        Names{"contact", "impacts", "restitution"});
   CHECK(effects(kSphere + kFloor + kPair + "rolling = 1e-3\n") ==
-        Names{"contact", "rolling friction"});
+        Names{"contact", "impacts", "rolling friction"});
   CHECK(effects(kSphere + kFloor + kPair + "torsional = 1e-3\n") ==
-        Names{"contact", "torsional friction"});
+        Names{"contact", "impacts", "torsional friction"});
   CHECK(effects("[stepping]\nlaw = \"frictionless\"\n" + kSphere + kFloor + kPair +
-                "friction = 0.1\n") == Names{"contact"});
+                "friction = 0.1\n") == Names{"contact", "impacts"});
   CHECK(effects(with(kSphere, "mass = 1", "mass = 1\ninertia = [1, 2, 2]")) ==
         Names{"gyroscopic term"});
   CHECK(effects("[stepping]\ngyroscopic = \"none\"\n" +
@@ -83,7 +84,7 @@ TEST_CASE("the plan lists exactly the effects that the scene names") {
   CHECK(effects(kJointed) == Names{"gravity", "gyroscopic term", "joints", "prescribed motion",
                                    "springs", "dampers", "drag", "loads", "invariants"});
   CHECK(effects(kTouching) ==
-        Names{"gravity", "contact", "friction", "restitution", "gyroscopic term"});
+        Names{"gravity", "contact", "friction", "impacts", "restitution", "gyroscopic term"});
 }
 
 TEST_CASE("the plan chooses the engine and counts") {

@@ -104,13 +104,12 @@ void StepJointIslands::solve_jointed(const std::vector<RigidBody>& bodies,
 void StepJointIslands::add_laws() {
   law_of_.clear();
   own_.clear();
-  if (use_ == LawUse::none || laws_.laws.count() == 0) return;
+  if (!laws_.any(use_)) return;
   own_.assign(contacts_.size(), Vector3d::Zero());
-  const bool place = use_ == LawUse::limits;
   for (int k = 0; k < laws_.laws.count(); ++k) {
     if (!laws_.in(use_, k)) continue;
     law_of_.push_back(k);
-    contacts_.push_back(laws_.contact(k, place, v_, mechanisms_, own_.emplace_back()));
+    contacts_.push_back(laws_.contact(k, use_, v_, mechanisms_, own_.emplace_back()));
     const auto row = static_cast<Eigen::Index>(x_.size());
     x_.conservativeResize(row + 3);
     x_.segment<3>(row) = laws_.start(k, warm_ ? memory_.find(laws_.id(k)) : nullptr);
@@ -118,9 +117,10 @@ void StepJointIslands::add_laws() {
 }
 
 void StepJointIslands::take_laws() {
-  if (use_ != LawUse::all) return;
+  if (use_ != LawUse::all && use_ != LawUse::plastic) return;
+  std::vector<double>& impulses = use_ == LawUse::all ? laws_.impulses : laws_.plastic;
   for (std::size_t l = 0; l < law_of_.size(); ++l)
-    laws_.impulses[at(law_of_[l])] = laws_.impulse(law_of_[l], law_impulse(l));
+    impulses[at(law_of_[l])] = laws_.impulse(law_of_[l], law_impulse(l));
 }
 
 // Their normals start from what the contact starts from.
@@ -191,8 +191,8 @@ void StepJointIslands::merge(const std::vector<RigidBody>& bodies,
 void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& bodies,
                              const std::vector<PointContact>& contacts, BodySolution& out) {
   find_islands(contacts);
-  const bool laws = use_ != LawUse::none && laws_.laws.count() > 0;
-  if (jointed_.empty() && !laws) {
+  if (jointed_.empty() && !laws_.any(use_)) {
+    law_of_.clear();
     solve_others(others, bodies, contacts, out);
     moments_.clear();
     take_moments(contacts);

@@ -31,31 +31,39 @@ int LawRows::moving_along(int law) const {
   return t->G.head<3>().isZero(0) ? -1 : t->body;
 }
 
+int LawRows::moving(int law, const Mechanisms& mechanisms) const {
+  const JointRows::Term* t = laws.rows().begin(law);
+  return mechanisms.moves(t->body) ? t->body : t[1].body;
+}
+
 // Strikes: what closes within the step, and faster than forces bring it there in one. The whole
 // impact is now, as that of a contact; a slower approach closes the gap first.
-void LawRows::prepare(const std::vector<Vector6d>& v, double dt) {
+void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanisms& mechanisms) {
   dt_ = dt;
   strikes.clear();
   impulses.assign(at(laws.count()), 0);
+  plastic.assign(at(laws.count()), 0);
   bias_.assign(at(laws.count()), 0);
+  plastic_bias_.assign(at(laws.count()), 0);
   for (int k = 0; k < laws.count(); ++k) {
     const JointLaws::Law& law = laws[k];
     if (!law.limit) {
-      bias_[at(k)] = -law.rate;
+      bias_[at(k)] = plastic_bias_[at(k)] = -law.rate;
       continue;
     }
     const double came = -speed(k, coming_), comes = -speed(k, v);
     const bool hits = comes * dt > law.gap && came > std::max(0.0, comes - came);
-    if (hits) strikes.push_back({law.gap, came, comes, moving_along(k)});
+    if (hits)
+      strikes.push_back(
+          {law.gap, came, comes, moving_along(k), moving(k, mechanisms), law.restitution});
     // A body that turns throws what is at its limit beyond it, and against it, in every step.
     const double beyond = kTakenBack * std::min(law.gap, 0.0) / dt;
-    bias_[at(k)] = hits           ? std::min(-law.restitution * came, beyond)
-                   : law.gap >= 0 ? law.gap / dt
-                                  : beyond;
+    plastic_bias_[at(k)] = hits || law.gap < 0 ? beyond : law.gap / dt;
+    bias_[at(k)] = hits ? std::min(-law.restitution * came, beyond) : plastic_bias_[at(k)];
   }
 }
 
-ContactRows LawRows::contact(int law, bool place, const std::vector<Vector6d>& v,
+ContactRows LawRows::contact(int law, LawUse use, const std::vector<Vector6d>& v,
                              const Mechanisms& mechanisms, Eigen::Vector3d& own) const {
   const JointLaws::Law& each = laws[law];
   const int row = each.limit ? 0 : 1;
@@ -68,7 +76,9 @@ ContactRows LawRows::contact(int law, bool place, const std::vector<Vector6d>& v
   }
   own.setConstant(mobility);
   own[row] = 0;
-  out.bias[row] = place ? std::max(each.gap, 0.0) / dt_ : bias_[at(law)];
+  out.bias[row] = use == LawUse::limits    ? std::max(each.gap, 0.0) / dt_
+                  : use == LawUse::plastic ? plastic_bias_[at(law)]
+                                           : bias_[at(law)];
   if (each.limit) return out;
   // N presses as fast as the row itself moves, so that a large bound does not make the other
   // velocities of the problem small beside it.

@@ -19,21 +19,26 @@ class LawRows {
   /// Start of a part of a step: the speeds that bodies come with, before its forces.
   void remember(const std::vector<Vector6d>& v) { coming_ = v; }
   /// Afterwards: the laws at its start, and the velocities that its forces leave.
-  void prepare(const std::vector<Vector6d>& v, double dt);
+  void prepare(const std::vector<Vector6d>& v, double dt, const Mechanisms& mechanisms);
+  /// A body of the law that moves.
+  int moving(int law, const Mechanisms& mechanisms) const;
 
   JointLaws laws;
   std::vector<double> impulses;  ///< of the last problem of the step's velocities, by law
+  std::vector<double> plastic;   ///< of the last one without restitution
+  bool active = true;            ///< false: no problem includes them
 
   std::vector<Strike> strikes;  ///< of limits, in this part
 
   bool in(LawUse use, int law) const {
-    return use == LawUse::all || use == LawUse::closing ||
+    return use == LawUse::all || use == LawUse::plastic || use == LawUse::closing ||
            (use == LawUse::limits && laws[law].limit);
   }
+  bool any(LawUse use) const { return active && use != LawUse::none && laws.count() > 0; }
   std::uint64_t id(int law) const { return kFirstId + static_cast<std::uint64_t>(law); }
-  /// The contact of a law, and its own mobility in the directions that no body moves in. `place`:
-  /// the problem moves positions, from rest.
-  ContactRows contact(int law, bool place, const std::vector<Vector6d>& v,
+  /// The contact of a law, and its own mobility in the directions that no body moves in. Problems
+  /// of limits move positions, from rest.
+  ContactRows contact(int law, LawUse use, const std::vector<Vector6d>& v,
                       const Mechanisms& mechanisms, Eigen::Vector3d& own) const;
   /// Its impulse in the contact frame, and back.
   Eigen::Vector3d start(int law, const Eigen::Vector3d* last) const;
@@ -48,7 +53,7 @@ class LawRows {
   double speed(int law, const std::vector<Vector6d>& v) const;
 
   std::vector<Vector6d> coming_;
-  std::vector<double> bias_;
+  std::vector<double> bias_, plastic_bias_;
   double dt_ = 0;
 };
 

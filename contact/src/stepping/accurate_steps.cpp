@@ -8,7 +8,6 @@
 #include <limits>
 #include <tether/linalg/index.hpp>
 
-#include "rolling/rolling_part.hpp"
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
@@ -125,7 +124,7 @@ void Stepper::Implementation::list_laws(double length, std::vector<Active>& list
 
 // Moments that their bound holds, and others.
 void Stepper::Implementation::list_moments(std::vector<Active>& list) const {
-  const std::vector<Vector3d>& moments = joints ? joints->moments() : rolling->moments();
+  const std::vector<Vector3d>& moments = contacts.moments;
   for (std::size_t k = 0; k < std::min(moments.size(), contacts.points.size()); ++k) {
     const PointContact& c = contacts.points[k];
     const double normal = c.normal.dot(contacts.impulses[k]);

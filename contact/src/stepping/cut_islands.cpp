@@ -24,6 +24,10 @@ void append(const StepContacts& from, StepContacts& to) {
   to.points.insert(to.points.end(), from.points.begin(), from.points.end());
   to.gaps.insert(to.gaps.end(), from.gaps.begin(), from.gaps.end());
   to.impulses.insert(to.impulses.end(), from.impulses.begin(), from.impulses.end());
+  if (from.moments.empty() && to.moments.empty()) return;
+  to.moments.resize(to.points.size() - from.points.size(), Eigen::Vector3d::Zero());
+  to.moments.insert(to.moments.end(), from.moments.begin(), from.moments.end());
+  to.moments.resize(to.points.size(), Eigen::Vector3d::Zero());
 }
 
 }  // namespace
@@ -47,6 +51,7 @@ void Stepper::Implementation::set_active(std::vector<char> active) {
   part.joints_active = !joints || part.active.empty();
   for (const int i : motion.moving())
     part.joints_active = part.joints_active || (joints->holds(i) && takes_part(i));
+  if (joints) joints->set_active(part.joints_active);
 }
 
 // Contacts of bodies that do not take part. Islands were apart when they were chosen: bodies that

@@ -5,10 +5,9 @@
 
 namespace tether::contact {
 
-// Laws of joints and rolling friction, whose moments go with the contacts of one problem, stay in
-// whole steps; parts that keep an accuracy are cut where that asks for it.
+// Parts that keep an accuracy are cut where that asks for it.
 bool Stepper::Implementation::may_cut() const {
-  return part.cuts_left > 0 && (restitution || !impacts->list().empty()) && !has_laws() && !rolling;
+  return part.cuts_left > 0 && (restitution || !impacts->list().empty());
 }
 
 // Impacts; and, where anything bounces, contacts that are slow at the start of the part, or that
@@ -39,7 +38,7 @@ void Stepper::Implementation::look_for_cut() {
     if (a.more(part.dt) > 0 && impacts->is_impact(*near, c, a.speed(contacts.gaps[k], part.dt)))
       approaches.push_back(a);
   }
-  part.cut = cuts->choose(approaches, part.dt, bodies, contacts);
+  part.cut = cuts->choose(approaches, part.dt, *near, bodies, contacts);
 }
 
 // No contact closes by the velocities that bodies have: there is nothing to solve.
@@ -70,22 +69,53 @@ Stepper::Implementation::Struck Stepper::Implementation::strike() {
   if (sleeping) sleeping->leave_out(contacts);
   leave_out_passive();
   contacts.impulses.assign(contacts.points.size(), Eigen::Vector3d::Zero());
+  contacts.moments.clear();
   if (!cuts->gather(*near, bodies, options.step, *impacts, contacts)) return Struck::nothing;
-  if (restitution) choose_bounces();
+  const bool in_turn = options.simultaneous_impacts == SimultaneousImpacts::in_turn;
+  if (in_turn) before_turns = bodies.motion;
+  if (!(in_turn ? take_impacts_in_turn() : take_impact())) return Struck::unsolved;
+  if (joints && part.joints_active)
+    joints->take_impact(in_turn ? before_turns : impacts->coming(), bodies, contacts);
+  return Struck::impact;
+}
+
+// Of the contacts, which touch. False: it is not solved, and nothing has changed.
+bool Stepper::Implementation::take_impact() {
+  if (bounces_at_once) bounces_at_once->choose(*impacts, *impacts, {}, bodies, contacts);
   const BodySolution& s = cuts->solve(bodies.motion, contacts);
   ++counts.contact_problems;
   counts.sweeps += s.sweeps;
   counts.assembled_islands += s.assembled_islands;
-  if (s.status != Status::solved && !(s.error <= accepted_residual(options)))
-    return Struck::unsolved;
+  if (s.status != Status::solved && !(s.error <= accepted_residual(options))) return false;
   for (const int i : motion.moving()) {
     bodies.motion[at(i)].velocity = s.velocities[at(i)];
     bodies.motion[at(i)].angular_velocity = s.angular_velocities[at(i)];
   }
   contacts.impulses = s.impulses;
-  if (restitution) rebound();
-  if (joints && part.joints_active) joints->take_impact(impacts->coming(), bodies, contacts);
-  return Struck::impact;
+  if (bounces_at_once) counts.bounces += bounces_at_once->apply(bodies, contacts);
+  return true;
+}
+
+// Contacts that approach strike alone; those that this makes approach are next. What is left after
+// very many turns, as where bodies rattle between two others, strikes together.
+bool Stepper::Implementation::take_impacts_in_turn() {
+  constexpr int kMostTurns = 2000;
+  const StepContacts touching = contacts;
+  StepContacts sum;
+  for (int turn = 0; turn <= kMostTurns; ++turn) {
+    contacts = touching;
+    impacts->remember(bodies);
+    impacts->choose(*near, bodies, options.step, contacts);
+    if (impacts->list().empty()) break;
+    if (turn < kMostTurns) impacts->keep_only_impacts(contacts);
+    if (!take_impact()) {
+      if (turn == 0) return false;
+      break;
+    }
+    detail::add_impulses(contacts, sum);
+  }
+  contacts = sum;
+  return true;
 }
 
 void Stepper::Implementation::take_of_cut(double time, double dt, double length, int halvings) {

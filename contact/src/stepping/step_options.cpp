@@ -26,6 +26,9 @@ void check(const SteppingOptions& o) {
   demand(o.sleep >= 0 && std::isfinite(o.sleep), "sleep must be >= 0 and finite");
   demand(!(o.sleep > 0) || (o.gravity && o.gravity->norm() > 0), "sleep needs gravity");
   demand(!(o.sleep > 0) || o.accuracy == 0, "sleep does not go with an accuracy");
+  demand(o.simultaneous_impacts == SimultaneousImpacts::together ||
+             (o.cut_at_impacts && o.accuracy == 0),
+         "simultaneous_impacts = in_turn needs cut_at_impacts and no accuracy");
   demand(o.near_part >= 0, "near_part must be >= 0");
 }
 
@@ -109,6 +112,10 @@ const char* name(Gyroscopic gyroscopic) {
 
 const char* name(RestitutionLaw law) {
   return law == RestitutionLaw::newton ? "newton" : "poisson";
+}
+
+const char* name(SimultaneousImpacts impacts) {
+  return impacts == SimultaneousImpacts::together ? "together" : "in_turn";
 }
 
 double accepted_residual(const SteppingOptions& o) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "rolling/rolling_part.hpp"
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {
@@ -46,7 +47,9 @@ void Stepper::Implementation::make_stages() {
     if (positions) add_stage("penetration", &I::take_penetrations_back);
     if (joints) add_stage("joints", &I::put_back_joints);
   } else if (solver) {
+    if (restitution) add_stage("joints", &I::choose_bounces);
     add_stage("joints", &I::solve_contacts);
+    if (restitution) add_stage("joints", &I::rebound);
   }
   add_stage("motion", &I::move);
   if (falls()) add_stage("gravity", &I::fall);
@@ -143,8 +146,10 @@ void Stepper::Implementation::solve_problem() {
 void Stepper::Implementation::solve_contacts() {
   contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
   std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
+  contacts.moments.clear();
   part.failed = false;
-  if ((contacts.points.empty() && !has_laws()) || (part.of_cut && nothing_presses())) {
+  const bool laws = joints && joints->has_laws() && part.joints_active;
+  if ((contacts.points.empty() && !laws) || (part.of_cut && !laws && nothing_presses())) {
     solver->forget();
     return;
   }
@@ -162,10 +167,11 @@ void Stepper::Implementation::solve_contacts() {
     bodies.motion[at(i)].angular_velocity = solution.angular_velocities[at(i)];
   }
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
+  if (rolling) contacts.moments = joints ? joints->moments() : rolling->moments();
 }
 
 void Stepper::Implementation::take_later_impacts() {
-  if (impacts->list().empty() || has_laws()) return;
+  if (impacts->list().empty()) return;
   const detail::LaterImpacts::Counts taken =
       later->take(*near, *impacts, part.dt, bodies, contacts);
   counts.contact_problems += taken.problems;
@@ -188,8 +194,7 @@ void Stepper::Implementation::leave_out_joined() {
 
 void Stepper::Implementation::move_joints() {
   if (!part.joints_active || joints->move(bodies, part.start, part.dt, contacts)) return;
-  outcome.succeeded = false;
-  if (outcome.status == Status::solved) outcome.status = Status::stalled;
+  outcome.succeeded = outcome.joints_met = false;
 }
 
 }  // namespace tether::contact

@@ -21,34 +21,43 @@ void Stepper::Implementation::make_solvers() {
     impacts = std::make_unique<detail::Impacts>(
         detail::threshold_speed(options.impact_threshold, options),
         detail::threshold_speed(options.restitution_threshold, options));
+  const bool laws = joints && joints->has_laws();
+  if ((near && near->any_restitution()) || laws)
+    restitution = std::make_unique<detail::Restitution>(options.restitution_law, o);
   if (!near) return give_islands(*joints);
   later = std::make_unique<detail::LaterImpacts>(
       detail::threshold_speed(options.impact_threshold, options),
       detail::threshold_speed(options.restitution_threshold, options), o);
   if (options.cut_at_impacts && !(options.accuracy > 0))
     cuts = std::make_unique<detail::StepCuts>(o);
-  if (near->any_restitution()) {
-    restitution = std::make_unique<detail::Restitution>(options.restitution_law, o);
-    later->add_restitution(options.restitution_law, o);
-  }
+  if (near->any_restitution()) later->add_restitution(options.restitution_law, o);
+  if (near->any_restitution() && cuts)
+    bounces_at_once = std::make_unique<detail::Restitution>(options.restitution_law, o);
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
     positions = std::make_unique<detail::PositionCorrection>(options);
   }
-  if (joints) give_islands(*joints);
-  if (near->any_rolling()) {
-    rolling = std::make_unique<detail::RollingPart>(*near);
+  if (near->any_rolling()) rolling = std::make_unique<detail::RollingPart>(*near);
+  if (joints && rolling) joints->set_rolling(*near, *rolling);
+  if (joints)
+    give_islands(*joints);
+  else if (rolling)
     give_islands(*rolling);
-  }
+  if (!laws) return;
+  later->set_laws(*joints);
+  const bool together = options.simultaneous_impacts == SimultaneousImpacts::together;
+  if (cuts && together) cuts->set_laws(*joints);
 }
 
 void Stepper::Implementation::give_islands(detail::IslandMaker& maker) {
   const BodyOptions o = detail::contact_options(options);
   solver->set_joints(maker.make_islands(o, detail::LawUse::all));
+  if (restitution) restitution->set_joints(maker, o, detail::LawUse::plastic);
+  if (restitution && joints && joints->has_laws()) restitution->set_laws(*joints);
   if (!near) return;
-  if (restitution) restitution->set_joints(maker, o);
   if (positions) positions->set_joints(maker, options);
   later->set_joints(maker, o);
   if (cuts) cuts->set_joints(maker, o);
+  if (bounces_at_once) bounces_at_once->set_joints(maker, o, detail::LawUse::none);
 }
 
 // Refuses by name what it does not go with.
@@ -122,15 +131,13 @@ const BodySet& Stepper::bodies() const { return implementation_->bodies; }
 BodySet& Stepper::bodies() { return implementation_->bodies; }
 const StepContacts& Stepper::contacts() const { return implementation_->contacts; }
 const std::vector<Eigen::Vector3d>& Stepper::contact_moments() const {
-  static const std::vector<Eigen::Vector3d> none;
-  const Implementation& s = *implementation_;
-  if (!s.rolling) return none;
-  return s.joints ? s.joints->moments() : s.rolling->moments();
+  return implementation_->contacts.moments;
 }
 double Stepper::penetration() const { return implementation_->outcome.deepest; }
 double Stepper::residual() const { return implementation_->outcome.residual; }
 Status Stepper::status() const { return implementation_->outcome.status; }
 bool Stepper::succeeded() const { return implementation_->outcome.succeeded; }
+bool Stepper::joints_met() const { return implementation_->outcome.joints_met; }
 double Stepper::joint_drift() const {
   return implementation_->joints ? implementation_->joints->drift() : 0;
 }

@@ -56,7 +56,7 @@ struct PartControl {
 /// How the contact problems of a step have ended, the worst of its parts.
 struct Outcome {
   Status status = Status::solved;
-  bool succeeded = true;
+  bool succeeded = true, joints_met = true;
   double residual = 0, deepest = 0;
 };
 
@@ -96,6 +96,7 @@ struct Stepper::Implementation {
   std::unique_ptr<detail::StepSolver> solver;
   std::unique_ptr<detail::Impacts> impacts;
   std::unique_ptr<detail::Restitution> restitution;
+  std::unique_ptr<detail::Restitution> bounces_at_once;  // of impacts that a step is cut at
   std::unique_ptr<detail::LaterImpacts> later;
   std::unique_ptr<detail::StepCuts> cuts;  // only where asked for
   std::vector<detail::Approach> approaches;
@@ -121,7 +122,8 @@ struct Stepper::Implementation {
     detail::Judgement before;
   } part;
   detail::Outcome outcome;
-  detail::PartControl parts;  // only with an accuracy
+  std::vector<RigidBody> before_turns;  // before impacts in turn
+  detail::PartControl parts;            // only with an accuracy
   StepCounts counts;
   double late = 0;  // how much later than its boundary the next step begins, s
 
@@ -166,6 +168,8 @@ struct Stepper::Implementation {
   void leave_out_striking();
   enum class Struck : std::uint8_t { nothing, impact, unsolved };
   Struck strike();
+  bool take_impact();
+  bool take_impacts_in_turn();
   detail::PartMark mark() const;
   void go_back(const detail::PartMark& m);
   bool takes_part(int body) const { return part.active.empty() || part.active[at(body)] != 0; }
@@ -198,13 +202,13 @@ struct Stepper::Implementation {
   void find_contacts();
   void set_gaps();
   void choose_impacts();
-  void choose_bounces() { restitution->choose(*impacts, *impacts, bodies, contacts); }
-  void solve_contacts();
-  bool has_laws() const { return joints && joints->has_laws(); }
-  // A motor may give what energy is held against: with laws of joints the one solve stands.
-  void rebound() {
-    if (!has_laws()) counts.bounces += restitution->apply(bodies, contacts);
+  void choose_bounces() {
+    const bool laws = joints && part.joints_active;
+    restitution->choose(*impacts, *impacts,
+                        laws ? joints->strikes() : std::vector<detail::Strike>(), bodies, contacts);
   }
+  void solve_contacts();
+  void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
   void take_later_impacts();
   void meet_others();
   void close_gaps() { positions->close_gaps(*impacts, part.dt, contacts, motion.moving(), bodies); }

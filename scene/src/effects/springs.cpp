@@ -163,15 +163,20 @@ class SpringForces : public Force {
           scene.file, scene.springs[i].place.line, scene.springs[i].name, dt, most));
     }
   }
-  // One after the other, so that each damper sees the velocities that the others leave.
+  // A damper sees the velocities at the end of the last step, which vanish at rest, whatever holds
+  // the body; what the forces of this step add, contacts and joints may take away. One after the
+  // other: each sees what the other dampers leave.
   void step(SteppedBodies& stepped, double dt) const override {
-    const Bodies& bodies = stepped.bodies();
+    const Bodies& bodies = stepped.before_forces();
     for (const Item& each : items_) {
       const Frame<double>&A = bodies.frames[at(each.first)], &B = bodies.frames[at(each.second)];
       if (!(Span<double>(each, A, B).d.squaredNorm() > 0)) continue;  // no direction
-      const auto [a, b] = pair_of<double>(each, {A, B}, true);
+      const auto [a, b] = pair_of<double>(each, {A, B}, false);
+      const auto [with_a, with_b] = pair_of<double>(each, {A, B}, true);
       stepped.push(each.first, dt, a.force, a.torque);
       stepped.push(each.second, dt, b.force, b.torque);
+      stepped.damp(each.first, dt, with_a.force - a.force, with_a.torque - a.torque);
+      stepped.damp(each.second, dt, with_b.force - b.force, with_b.torque - b.torque);
     }
   }
 

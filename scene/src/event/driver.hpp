@@ -24,6 +24,7 @@ namespace tether::scene::event {
 struct DriverOptions {
   double tolerance = 1e-6;  ///< of the motion, in the units of the model
   double max_step = 0;      ///< s; 0: free
+  bool in_turn = false;     ///< contact::SimultaneousImpacts
   long max_events = 1000000;
   long max_steps = 100000000;  ///< of IDA
   double end = 0;              ///< of the run, s; 0: unknown, and storms are not bounded

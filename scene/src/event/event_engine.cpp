@@ -33,6 +33,7 @@ DriverOptions driver_options(const Scene& scene, double time_unit) {
   DriverOptions out;
   out.tolerance = o.tolerance;
   out.max_step = effects::longest_step(scene, o.max_step);
+  out.in_turn = scene.simultaneous_impacts == contact::SimultaneousImpacts::in_turn;
   out.max_events = o.max_events;
   out.max_steps = o.max_steps;
   out.end = scene.end / time_unit;

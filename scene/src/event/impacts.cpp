@@ -23,8 +23,8 @@ using linalg::at;
 
 }  // namespace
 
-// Contacts that are closed, and open ones that close. What moves apart takes no part: it may be
-// struck later.
+// Contacts that close and, where impacts at one instant are together, those that touch: with a
+// force between them or without. What moves apart takes no part: it may be struck later.
 std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
   std::vector<int> out;
   bool any = false;
@@ -35,11 +35,11 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
     // Which of two corners is first may be a matter of the error of their gaps. What bounces
     // before its time would miss the way to there.
     const double unknown = model_.law(i).restitution > 0 ? 0 : kUnknownGap * bands().gap(i);
-    const bool now = i == first || gap <= std::max(-rate * options_.tolerance, unknown);
     const bool open = motion_.modes()[at(i)].mode == Mode::open;
-    const bool hits =
-        rate < -band && now && !(open && i != first && motion_.passes_border(event_time_, y_, i));
-    const bool rests = !open && std::abs(rate) <= band;
+    const bool now = i == first || !open || gap <= std::max(-rate * options_.tolerance, unknown);
+    const bool passes = open && i != first && motion_.passes_border(event_time_, y_, i);
+    const bool hits = rate < -band && now && !passes;
+    const bool rests = std::abs(rate) <= band && !passes && !options_.in_turn;
     if (hits || rests) out.push_back(i);
     any = any || hits;
   }

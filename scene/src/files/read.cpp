@@ -22,6 +22,7 @@ void read_scene_table(Fields& root, Reader& r) {
   r.scene.end = in.number("end", r.scene.end, kPositive, "s");
   for (const effects::Effect* each : effects::all()) each->read_scene(in, r.scene);
   r.scene.engine = in.word("engine", r.scene.engine);
+  r.scene.simultaneous_impacts = in.word("simultaneous_impacts", r.scene.simultaneous_impacts);
   in.finish();
 }
 
@@ -79,6 +80,11 @@ void read_engine(Fields& root, Reader& r) {
   o.impact_threshold =
       in.number("impact_threshold", o.impact_threshold, kNotNegative, "of sqrt(gravity * size)");
   o.cut_at_impacts = in.flag("cut_at_impacts", o.cut_at_impacts);
+  if (r.scene.simultaneous_impacts == contact::SimultaneousImpacts::in_turn &&
+      (o.accuracy > 0 || !o.cut_at_impacts))
+    in.wrong(o.accuracy > 0 ? "accuracy" : "cut_at_impacts",
+             "simultaneous_impacts = \"in_turn\" needs steps that are cut at impacts, without an "
+             "accuracy");
   o.sleep = in.number("sleep", o.sleep, kNotNegative, "of sqrt(gravity * size); 0: none sleeps");
   if (o.sleep > 0 && o.accuracy > 0)
     in.wrong("sleep", "goes with fixed steps: leave out accuracy, or sleep");

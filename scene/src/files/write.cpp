@@ -166,6 +166,7 @@ std::string write_scene(const Scene& scene) {
   out.field("name", scene.name);
   out.field("end", scene.end, "s");
   out.raw("engine", toml_word(scene.engine));
+  out.raw("simultaneous_impacts", toml_word(scene.simultaneous_impacts));
   for (const effects::Effect* each : effects::all()) each->write_scene(scene, out);
   if (scene.smooth) write_smooth(*scene.smooth, out);
   if (scene.stepping) write_stepping(*scene.stepping, out);

@@ -15,6 +15,26 @@ SteppedBodies::SteppedBodies(const Scene& scene) : bodies_(placed_bodies(scene))
     bodies_.inertia[b] = {bodies_.moving++, body.mass, body.inertia, body.inertia.inverse()};
   }
   loads_.resize(at(bodies_.moving));
+  before_ = bodies_;
+}
+
+void SteppedBodies::begin(const contact::BodySet& set, const Vector3d& weight) {
+  for (int b = 0; b < set.size(); ++b) {
+    if (!bodies_.moves(b)) continue;
+    Frame<double>& f = before_.frames[at(b)];
+    f.x = set.position[at(b)];
+    f.R = set.orientation[at(b)].toRotationMatrix();
+    f.v = set.motion[at(b)].velocity - weight;
+    f.W = set.motion[at(b)].angular_velocity;
+  }
+}
+
+void SteppedBodies::damp(int body, double dt, const Vector3d& force, const Vector3d& torque) {
+  push(body, dt, force, torque);
+  if (!bodies_.moves(body)) return;
+  Frame<double>& f = before_.frames[at(body)];
+  f.v += dt * motion(body).inverse_mass * force;
+  f.W += dt * (motion(body).inverse_inertia * torque);
 }
 
 void SteppedBodies::read(contact::BodySet& set) {

@@ -21,6 +21,12 @@ class SteppedBodies {
     bodies_.time = time;
     bodies_.span = span;
   }
+  /// Before the first force of a step, to whose velocities its weight has added `weight`.
+  void begin(const contact::BodySet& set, const Vector3d& weight);
+  /// The bodies with the velocities at the start of the step and what damp() has changed since.
+  const Bodies& before_forces() const { return before_; }
+  void damp(int body, double dt, const Vector3d& force, const Vector3d& torque);
+
   /// Takes over positions and velocities; later calls change `set`.
   void read(contact::BodySet& set);
   /// Both, for what changes nothing.
@@ -38,7 +44,7 @@ class SteppedBodies {
 
  private:
   contact::BodySet* set_ = nullptr;
-  Bodies bodies_;
+  Bodies bodies_, before_;
   std::vector<Load6> loads_;
 };
 

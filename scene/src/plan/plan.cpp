@@ -176,6 +176,12 @@ std::string others(const Plan& plan) {
 
 }  // namespace
 
+std::string simultaneous_impacts_text(const Scene& scene) {
+  return scene.simultaneous_impacts == contact::SimultaneousImpacts::together
+             ? "those at one instant together: Newton's law for all that touch, in one problem"
+             : "those at one instant in turn: what approaches, then what this makes approach";
+}
+
 int joint_rows(const Joint& joint) { return joints::row_count(joint); }
 
 Plan make_plan(const Scene& scene) {

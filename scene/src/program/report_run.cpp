@@ -117,7 +117,8 @@ void print_work(const Scene& scene, const Summary& s, const Counts& c) {
         c.steps, c.residual_evaluations, c.jacobian_evaluations, c.projections,
         c.error_test_failures);
   } else {
-    fmt::print("  work         {} steps\n", c.steps);
+    fmt::print("  work         {} steps{}\n", c.steps,
+               c.halved > 0 ? fmt::format(", {} of them or of their parts halved", c.halved) : "");
   }
 }
 
@@ -134,6 +135,8 @@ void print_summary(const Scene& scene, const RunResult& r) {
   if (r.engine == "event") print_events(s, r.counts_of_events);
   print_hand_overs(scene, r);
   if (r.engine != "event" || !r.hand_overs.empty()) print_work(scene, s, c);
+  if (r.engine != "smooth" && c.contact_problems + r.counts_of_events.contact_problems > 0)
+    fmt::print("  impacts      {}\n", simultaneous_impacts_text(scene));
   for (const std::string& warning : r.warnings)
     fmt::print("  WARNING      {}\n", on_terminal(warning));
   if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, on_terminal(r.failure));

@@ -62,6 +62,7 @@ Mapped map_scene(const Scene& scene) {
 
   out.options = scene.stepping.value_or(SteppingOptions{});
   out.options.gravity.reset();
+  out.options.simultaneous_impacts = scene.simultaneous_impacts;
   for (const effects::Effect* each : effects::all()) each->configure(scene, out.options);
   return out;
 }

@@ -100,16 +100,20 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
 // Explicit forces first: implicit ones need the velocities that they leave.
 void SteppingEngine::add_forces(const Scene& scene) {
   using Stepping = mechanics::Force::Stepping;
+  const Vector3d gravity = scene.gravity.value_or(Vector3d::Zero());
+  bool first = true;
   for (const Stepping wanted : {Stepping::explicit_, Stepping::implicit})
     for (const auto& force : forces_) {
       if (force->stepping() != wanted) continue;
       force->check_step(scene, stepped_.bodies(), stepper_.options().step);
-      stepper_.add_force(force->name(), [this, force = force.get()](contact::BodySet& bodies,
-                                                                    double t, double dt) {
+      stepper_.add_force(force->name(), [this, force = force.get(), gravity, first](
+                                            contact::BodySet& bodies, double t, double dt) {
+        if (first) stepped_.begin(bodies, dt * gravity);
         stepped_.set_time(t, dt);
         stepped_.read(bodies);
         force->step(stepped_, dt);
       });
+      first = false;
     }
 }
 
@@ -143,12 +147,21 @@ void SteppingEngine::report_failure() const {
           "t = {:g} s: the motion has left the range of numbers, about 1e-150 to 1e150 in SI "
           "units, or a step is far too long for it",
           time()));
+  if (!stepper_.joints_met())
+    throw SimulationError(fmt::format(
+        "t = {:g} s: the joints are not met at the end of the step, off by up to {:g} m or rad: "
+        "bodies turn too far in it; reduce stepping.step, or set "
+        "on_failure = \"warn\"",
+        time(), stepper_.joint_drift()));
+  const std::size_t contacts = stepper_.contacts().points.size();
   std::string text = fmt::format(
-      "t = {:g} s: the contact problem ({} contacts) was not solved: {} at a residual of {:g}, "
-      "wanted {:g}, also in parts of {:g} s; raise stepping.tolerance or stepping.max_halvings, "
-      "reduce stepping.step, or set on_failure = \"warn\"",
-      time(), stepper_.contacts().points.size(), contact::name(stepper_.status()),
-      stepper_.residual(), stepper_.options().tolerance,
+      "t = {:g} s: the problem of {} was not solved: {} at a residual of {:g}, wanted {:g}, also "
+      "in parts of {:g} s; raise stepping.tolerance or stepping.max_halvings, reduce "
+      "stepping.step, or set on_failure = \"warn\"",
+      time(),
+      contacts == 0 ? std::string("the limits, motors and friction of joints")
+                    : fmt::format("{} contact{}", contacts, contacts == 1 ? "" : "s"),
+      contact::name(stepper_.status()), stepper_.residual(), stepper_.options().tolerance,
       std::ldexp(stepper_.options().step, -stepper_.options().max_halvings));
   if (stepper_.status() == contact::Status::infeasible)
     text +=

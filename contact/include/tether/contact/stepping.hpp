@@ -44,6 +44,17 @@ inline constexpr std::array<RestitutionLaw, 2> kRestitutionLaws{RestitutionLaw::
 
 const char* name(RestitutionLaw law);
 
+/// Says what contacts that touch do in an impact of others of their island.
+enum class SimultaneousImpacts : std::uint8_t {
+  together,  ///< all of them take part: Newton's law for all in one problem
+  in_turn    ///< those that approach strike alone, then those that this makes approach, and so on
+};
+
+inline constexpr std::array<SimultaneousImpacts, 2> kSimultaneousImpacts{
+    SimultaneousImpacts::together, SimultaneousImpacts::in_turn};
+
+const char* name(SimultaneousImpacts impacts);
+
 /// Bodies as contiguous data; index i everywhere is body i. World axes but for `inertia`.
 struct BodySet {
   std::vector<Eigen::Vector3d> position;        ///< of the centre of mass, m
@@ -79,6 +90,7 @@ struct Meeting {
   /// Moments that a contact holds, over its normal force: about axes in the surface and about the
   /// normal, m (method, section 8). Only with law = coulomb and restitution_law = newton.
   double rolling = 0, torsional = 0;
+  bool rolls() const { return rolling > 0 || torsional > 0; }
 };
 
 /// Velocities changed by forces during a step of length dt that starts at `time`.
@@ -123,9 +135,11 @@ struct SteppingOptions {
   /// Steps are taken up to where a gap closes, the impact, and the rest, and bodies that nothing
   /// but their weight acts upon fall along their parabola: errors go with the step and not with the
   /// phase of impacts in it (method, section 7). With more than 16 contacts, up to 512, only at
-  /// impacts in islands of at most 16, for a tenth more problems at most. Not where
-  /// joints have laws or pairs rolling friction; an accuracy has this of its own.
+  /// impacts in islands of at most 16, for a tenth more problems at most. Islands in which joints
+  /// have laws or pairs rolling friction are not cut; an accuracy has this of its own.
   bool cut_at_impacts = true;
+  /// in_turn: only with cut_at_impacts, without an accuracy, and in islands that are cut.
+  SimultaneousImpacts simultaneous_impacts = SimultaneousImpacts::together;
   /// > 0: islands of bodies that have been slower than this times sqrt(g s) for 5 sqrt(s / g) fall
   /// asleep: they take part in no problem until something touches them, the forces on them change
   /// or what they lie on moves (method, section 7). Needs gravity; not with an accuracy or rolling
@@ -153,6 +167,9 @@ struct StepContacts {
   std::vector<PointContact> points;       ///< id: see contact_id
   std::vector<double> gaps;               ///< m, at the start of the step
   std::vector<Eigen::Vector3d> impulses;  ///< on `first`, world axes, N s
+  /// Moments of impulse on `first` by rolling and torsional friction, world axes, N m s; empty
+  /// unless a meeting names either.
+  std::vector<Eigen::Vector3d> moments;
 };
 
 /// Identity of a contact: surfaces (ascending) and feature.
@@ -263,8 +280,11 @@ class Stepper {
   double residual() const;     ///< of its contact problem, the largest of its parts
   /// Status of the last step's contact problem, the worst of its parts; solved without contacts.
   Status status() const;
-  /// True if the contact problems of all parts of the last step were solved or accepted.
+  /// True if the contact problems of all parts of the last step were solved or accepted, and its
+  /// end meets the joints.
   bool succeeded() const;
+  /// False: the end of the last step does not meet the joints.
+  bool joints_met() const;
   /// Largest |g| of a joint's rows at the end of the last step, m or rad; 0 without joints.
   double joint_drift() const;
   /// Impulses of the joints in the last part of the last step, one for each row, N s or N m s: see

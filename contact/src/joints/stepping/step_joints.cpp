@@ -121,7 +121,8 @@ void StepJoints::check_rows(double t) {
 
 void StepJoints::check_laws(const BodySet& bodies) {
   const JointRows& rows = laws_.laws.rows();
-  if (laws_in_step_ < 0) laws_in_step_ = rows.count();
+  const bool first = laws_in_step_ < 0;
+  if (first) laws_in_step_ = rows.count();
   if (rows.count() != laws_in_step_)
     throw std::invalid_argument("joints: " + std::to_string(rows.count()) + " laws instead of " +
                                 std::to_string(laws_in_step_) +
@@ -133,6 +134,12 @@ void StepJoints::check_laws(const BodySet& bodies) {
         throw std::invalid_argument(equations_->name(rows.joint(law)) + ": law " +
                                     std::to_string(law) + " is on body " +
                                     std::to_string(term->body) + ", which no joint holds");
+  if (!first) return;
+  std::vector<char> has_law(at(mechanisms_.count()), 0);
+  for (int law = 0; law < rows.count(); ++law)
+    has_law[at(mechanisms_.mechanism_of(laws_.moving(law, mechanisms_)))] = 1;
+  for (const int body : held_)
+    if (has_law[at(mechanisms_.mechanism_of(body))] != 0) under_laws_.push_back(body);
 }
 
 void StepJoints::FactoredAt::set(const BodySet& bodies, double t) {
@@ -333,7 +340,7 @@ void StepJoints::predict(BodySet& bodies, double t, double dt) {
   laws_.laws.clear();
   equations_->add_laws(bodies, t, laws_.laws);
   check_laws(bodies);
-  laws_.prepare(v_, dt);
+  laws_.prepare(v_, dt, mechanisms_);
 }
 
 void StepJoints::put_back(BodySet& bodies, double t) {
@@ -388,11 +395,36 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
   mechanisms_.impulses(impulses_.data());
 }
 
+void StepJoints::add_bounded(bool plastic, const BodySet& bodies,
+                             std::vector<RigidBody>& change) const {
+  const JointRows& rows = laws_.laws.rows();
+  for (int k = 0; k < rows.count(); ++k) {
+    if (laws_.laws[k].limit) continue;
+    const double x = (plastic ? laws_.plastic : laws_.impulses)[at(k)];
+    for (const JointRows::Term* t = rows.begin(k); t != rows.end(k); ++t) {
+      const RigidBody& body = bodies.motion[at(t->body)];
+      change[at(t->body)].velocity += x * body.inverse_mass * t->G.head<3>();
+      change[at(t->body)].angular_velocity += x * (body.inverse_inertia * t->G.tail<3>());
+    }
+  }
+}
+
+void StepJoints::scale_restitution(const std::function<double(int)>& scale) {
+  for (int k = 0; k < laws_.laws.count(); ++k) {
+    const double s = scale(laws_.moving(k, mechanisms_));
+    if (s < 1)
+      laws_.impulses[at(k)] =
+          laws_.plastic[at(k)] + s * (laws_.impulses[at(k)] - laws_.plastic[at(k)]);
+  }
+}
+
+// Laws take no part in impacts.
 void StepJoints::take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
                              const StepContacts& contacts) {
   take_velocities(bodies);
   store(bodies);
   for (const int i : held_) start_[at(i)] << before[at(i)].velocity, before[at(i)].angular_velocity;
+  std::fill(laws_.impulses.begin(), laws_.impulses.end(), 0.0);
   find_impulses(bodies, contacts);
 }
 

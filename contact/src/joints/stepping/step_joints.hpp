@@ -31,6 +31,7 @@ class StepJoints final : public JointPart {
   void set_rolling(const NearContacts& near, RollingPart& rolling) override {
     near_ = &near;
     rolling_ = &rolling;
+    first_islands_ = true;
   }
   const std::vector<Eigen::Vector3d>& moments() const override { return moments_; }
 
@@ -47,6 +48,11 @@ class StepJoints final : public JointPart {
   bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) override;
 
   bool has_laws() const override { return has_laws_; }
+  const std::vector<int>& under_laws() const override { return under_laws_; }
+  void set_active(bool active) override { laws_.active = active; }
+  void add_bounded(bool plastic, const BodySet& bodies,
+                   std::vector<RigidBody>& change) const override;
+  void scale_restitution(const std::function<double(int)>& scale) override;
   void list_laws(std::vector<LawState>& out) const override;
   const std::vector<Strike>& strikes() const override { return laws_.strikes; }
   const std::vector<double>& law_impulses() const override { return laws_.impulses; }
@@ -58,13 +64,18 @@ class StepJoints final : public JointPart {
   const std::vector<double>& impulses() const override { return impulses_; }
   void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
                    const StepContacts& contacts) override;
-  void begin_sum() override { sum_.assign(impulses_.size(), 0); }
+  void begin_sum() override {
+    sum_.assign(impulses_.size(), 0);
+    law_sum_.assign(laws_.impulses.size(), 0);
+  }
   void add_to_sum() override {
     for (std::size_t row = 0; row < sum_.size(); ++row) sum_[row] += impulses_[row];
+    for (std::size_t k = 0; k < law_sum_.size(); ++k) law_sum_[k] += laws_.impulses[k];
   }
   void give_sum() override {
     add_to_sum();
     impulses_ = sum_;
+    laws_.impulses = law_sum_;
   }
 
  private:
@@ -128,7 +139,8 @@ class StepJoints final : public JointPart {
   std::vector<std::pair<int, int>> links_, joined_;
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
   RowVectors row_;
-  std::vector<double> impulses_, sum_;
+  std::vector<double> impulses_, sum_, law_sum_;
+  std::vector<int> under_laws_;
   std::vector<Place> place_;  // of held_, at the start of the step
   FactoredAt factored_;
   double drift_ = 0;

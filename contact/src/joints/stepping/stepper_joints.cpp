@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rolling/rolling_part.hpp"
 #include "step_joints.hpp"
 #include "stepping/stepper_parts.hpp"
 
@@ -28,14 +27,7 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
       std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
   s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
   if (s.sleeping) s.sleeping->set_joints(*s.joints);
-  if (s.rolling) {
-    s.rolling = std::make_unique<detail::RollingPart>(*s.near);
-    s.joints->set_rolling(*s.near, *s.rolling);
-  }
-  if (s.solver)
-    s.give_islands(*s.joints);
-  else if (s.joints->has_laws())
-    s.make_solvers();
+  if (s.solver || s.joints->has_laws()) s.make_solvers();
   s.stages.clear();
   s.make_stages();
 }

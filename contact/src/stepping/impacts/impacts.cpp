@@ -22,6 +22,17 @@ void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
   if (!list_.empty()) free_ = bodies.motion;
 }
 
+void Impacts::keep_only_impacts(StepContacts& contacts) {
+  for (std::size_t k = 0; k < list_.size(); ++k) {
+    const auto from = static_cast<std::size_t>(list_[k].contact);  // ascending
+    contacts.points[k] = contacts.points[from];
+    contacts.gaps[k] = contacts.gaps[from];
+    list_[k].contact = static_cast<int>(k);
+  }
+  contacts.points.resize(list_.size());
+  contacts.gaps.resize(list_.size());
+}
+
 double Impacts::least_speed(const NearContacts& near, const PointContact& c) const {
   return threshold_ * std::sqrt(near.size(c));
 }

@@ -33,6 +33,8 @@ class Impacts {
   /// After the contacts are found.
   void choose(const NearContacts& near, const BodySet& bodies, double dt, StepContacts& contacts);
   const std::vector<Impact>& list() const { return list_; }
+  /// Leaves nothing but these.
+  void keep_only_impacts(StepContacts& contacts);
   /// Velocities with the forces of the step, before impulses; where there are impacts.
   const std::vector<RigidBody>& free() const { return free_; }
   /// An impact that the first ones have caused.

@@ -46,6 +46,7 @@ bool LaterImpacts::find_islands(const NearContacts& near, const Impacts& impacts
   marked_.assign(bodies.motion.size(), 0);
   for (const Impact& i : impacts.list())
     if (size_[root(at(i.contact))] <= kMostContacts) marked_[root(at(i.contact))] = 1;
+  if (laws_ != nullptr) islands_.mark(laws_->under_laws(), marked_, 0);
   any = false;
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
     if (marked_[root(k)] == 0 || !later(k)) continue;
@@ -58,16 +59,20 @@ bool LaterImpacts::find_islands(const NearContacts& near, const Impacts& impacts
 // From the velocities before the impulses.
 void LaterImpacts::start(const NearContacts& near, const Impacts& impacts, double dt,
                          BodySet& bodies, StepContacts& contacts) {
-  constexpr double kPart = 1e-6;  // of the fastest impact: slower approaches are rounding
-  double fastest = 0;
-  for (const Impact& i : impacts.list()) fastest = std::max(fastest, i.comes);
+  // Of the island's fastest impact: slower approaches are rounding.
+  constexpr double kPart = 1e-6;
+  fastest_.assign(bodies.motion.size(), 0);
+  for (const Impact& i : impacts.list()) {
+    double& fastest = fastest_[at(islands_.root(bodies, contacts.points[at(i.contact)]))];
+    fastest = std::max(fastest, i.comes);
+  }
   members_.clear();
   taken_.clear();
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
     const PointContact& c = contacts.points[k];
     const int root = islands_.root(bodies, c);
     if (marked_[at(root)] != 2) continue;
-    const double least = std::max(impacts.least_speed(near, c), kPart * fastest);
+    const double least = std::max(impacts.least_speed(near, c), kPart * fastest_[at(root)]);
     members_.push_back(
         {static_cast<int>(k), root, least, contacts.gaps[k], 0, contacts.gaps[k] <= dt * least});
     contacts.impulses[k].setZero();
@@ -131,7 +136,7 @@ void LaterImpacts::pass_time(const StepContacts& contacts) {
 bool LaterImpacts::solve_pass(const NearContacts& near, const Impacts& impacts, double dt,
                               BodySet& bodies, StepContacts& contacts, Counts& counts) {
   pass_impacts_.choose(near, bodies, dt, part_);
-  if (restitution_) restitution_->choose(pass_impacts_, impacts, bodies, part_);
+  if (restitution_) restitution_->choose(pass_impacts_, impacts, {}, bodies, part_);
   solver_.solve(bodies.motion, part_.points, solution_);
   ++counts.problems;
   counts.sweeps += solution_.sweeps;

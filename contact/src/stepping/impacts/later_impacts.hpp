@@ -36,9 +36,12 @@ class LaterImpacts {
   /// After the above.
   void set_joints(IslandMaker& joints, const BodyOptions& options) {
     solver_.set_joints(joints.make_islands(options, LawUse::none));
-    if (restitution_) restitution_->set_joints(joints, options);
+    if (restitution_) restitution_->set_joints(joints, options, LawUse::none);
     islands_.set_links(joints.links());
   }
+
+  /// Not in islands of mechanisms with laws, whose impulses are those of one problem.
+  void set_laws(const JointPart& joints) { laws_ = &joints; }
 
   /// After the solve and what bounces in it. Changes velocities and impulses, and adds to
   /// `impacts`, where there are later ones whose problems are all solved.
@@ -69,6 +72,7 @@ class LaterImpacts {
 
   void keep_energy(const Impacts& impacts, BodySet& bodies, StepContacts& contacts);
 
+  const JointPart* laws_ = nullptr;
   MovingIslands islands_;
   std::vector<char> marked_;     // islands, by their root
   std::vector<int> size_;        // of each island, contacts
@@ -81,6 +85,7 @@ class LaterImpacts {
   std::vector<Impact> taken_;
   std::vector<RigidBody> first_, force_;
   std::vector<double> gain_, kinetic_;  // of islands, J
+  std::vector<double> fastest_;         // of their impacts, m/s
   std::vector<Eigen::Vector3d> first_impulses_;
   std::unique_ptr<Restitution> restitution_;
   StepSolver solver_;

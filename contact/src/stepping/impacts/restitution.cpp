@@ -16,6 +16,8 @@ namespace {
 
 using linalg::at;
 
+constexpr double kRounding = 1e-14;  // of the kinetic energy of what changes
+
 void push(RigidBody& body, const Vector3d& r, const Vector3d& p) {
   body.velocity += body.inverse_mass * p;
   body.angular_velocity += body.inverse_inertia * r.cross(p);
@@ -31,10 +33,14 @@ BodyOptions cold(BodyOptions options) {
 Restitution::Restitution(RestitutionLaw law, const BodyOptions& options)
     : law_(law), solver_(cold(options)) {}
 
-void Restitution::choose(const Impacts& chosen, const Impacts& forces, const BodySet& bodies,
+void Restitution::choose(const Impacts& chosen, const Impacts& forces,
+                         const std::vector<Strike>& limits, const BodySet& bodies,
                          StepContacts& contacts) {
   bounces_.clear();
   biased_.clear();
+  limits_.clear();
+  for (const Strike& s : limits)
+    if (s.restitution > 0) limits_.push_back(s.moves);
   for (const Impact& i : chosen.list()) {
     if (i.restitution == 0) continue;
     PointContact& c = contacts.points[at(i.contact)];
@@ -45,62 +51,83 @@ void Restitution::choose(const Impacts& chosen, const Impacts& forces, const Bod
     c.bias = -speed;
     biased_.push_back(i.contact);
   }
-  if (bounces_.empty()) return;
+  if (bounces_.empty() && limits_.empty()) return;
   before_ = bodies.motion;
   came_ = chosen.coming();
-  add_of_forces(forces, force_);
+  if (!forces.list().empty()) return add_of_forces(forces, force_);
+  force_ = before_;  // limits of joints are all that is struck
+  for (std::size_t i = 0; i < force_.size(); ++i) {
+    force_[i].velocity -= came_[i].velocity;
+    force_[i].angular_velocity -= came_[i].angular_velocity;
+  }
 }
 
-// What an island gains in the step as a function of the scale s of `change_`, from `now`: kinetic
-// energy against `came_` less the work of the forces, which is their impulse times the velocities
-// that bodies move with (in a later pass of a step: less the work that they would do without it).
-// constant + linear s + square s^2. Without restitution it is at most 0:
-// -|M^-1 (f dt + J'x)|^2 / 2 in the metric of the masses, and what friction takes.
-void Restitution::sum_energies(const BodySet& bodies, const std::vector<RigidBody>& now) {
-  const std::size_t n = now.size();
-  constant_.assign(n, 0);
-  linear_.assign(n, 0);
-  square_.assign(n, 0);
+// By motors and friction of joints, whose impulses count as forces of the step.
+void Restitution::add_laws(bool plastic, const BodySet& bodies,
+                           std::vector<RigidBody>& forces) const {
+  forces.resize(bodies.motion.size());
+  for (RigidBody& each : forces) {
+    each.velocity.setZero();
+    each.angular_velocity.setZero();
+  }
+  if (laws_ != nullptr) laws_->add_bounded(plastic, bodies, forces);
+}
+
+// What an island gains in the step as a function of the scale s of `change_`, from the velocities
+// in `bodies`: kinetic energy against `came_` less the work of the forces, which is their impulse
+// times the velocities that bodies move with (in a later pass of a step: less the work that they
+// would do without it), where motors change theirs with s, too. constant + linear s + square s^2.
+// Without restitution it is at most 0: -|M^-1 (f dt + J'x)|^2 / 2 in the metric of the masses, and
+// what friction takes.
+void Restitution::sum_energies(const BodySet& bodies) {
+  const std::size_t n = bodies.motion.size();
+  for (std::vector<double>* sum : {&constant_, &linear_, &square_, &kinetic_}) sum->assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    const double m = bodies.mass[i];
-    if (m == 0) continue;
-    const auto spin_of = [&](const Vector3d& w) {
-      return spin(bodies.inertia[i], bodies.orientation[i], w);
-    };
-    const RigidBody &is = now[i], &was = came_[i], &d = change_[i], &f = force_[i];
+    if (bodies.mass[i] == 0) continue;
+    const RigidBody &is = bodies.motion[i], &was = came_[i], &d = change_[i], &f = force_[i];
     const std::size_t r = at(islands_.root(static_cast<int>(i)));
     RigidBody counted = f;  // in earlier passes
     counted.velocity -= before_[i].velocity - was.velocity;
     counted.angular_velocity -= before_[i].angular_velocity - was.angular_velocity;
-    constant_[r] += kinetic_gain(bodies, i, is, was) - work(bodies, i, f, is) +
-                    work(bodies, i, counted, before_[i]);
-    const Vector3d L = spin_of(d.angular_velocity);
-    linear_[r] += m * (is.velocity - f.velocity).dot(d.velocity) +
-                  (is.angular_velocity - f.angular_velocity).dot(L);
-    square_[r] += 0.5 * (m * d.velocity.squaredNorm() + d.angular_velocity.dot(L));
+    constant_[r] += kinetic_gain(bodies, i, is, was) - work(bodies, i, f, is) -
+                    work(bodies, i, driven_[i], is) + work(bodies, i, counted, before_[i]);
+    linear_[r] += work(bodies, i, is, d) - work(bodies, i, f, d) - work(bodies, i, driven_[i], d) -
+                  work(bodies, i, driven_change_[i], is);
+    const double kinetic = 0.5 * work(bodies, i, d, d);
+    square_[r] += kinetic - work(bodies, i, driven_change_[i], d);
+    kinetic_[r] += kinetic;
   }
 }
 
-// Does an island gain energy in the step?
-bool Restitution::gains_energy(const BodySet& bodies) {
+// Marks the islands that bounce and gain energy in the step; false: none does.
+bool Restitution::gains_energy(const BodySet& bodies, const StepContacts& contacts) {
   change_ = bodies.motion;
   for (std::size_t i = 0; i < change_.size(); ++i) {
     change_[i].velocity -= before_[i].velocity;
     change_[i].angular_velocity -= before_[i].angular_velocity;
   }
-  sum_energies(bodies, bodies.motion);
-  for (std::size_t i = 0; i < change_.size(); ++i)
-    if (constant_[i] > 1e-14 * square_[i]) return true;
-  return false;
+  add_laws(false, bodies, driven_);
+  driven_change_ = driven_;
+  sum_energies(bodies);
+  gains_.assign(change_.size(), 0);
+  islands_.mark(limits_, gains_);
+  for (const Bounce& b : bounces_)
+    gains_[at(islands_.root(bodies, contacts.points[at(b.contact)]))] = 1;
+  bool any = false;
+  for (std::size_t i = 0; i < gains_.size(); ++i) {
+    gains_[i] = gains_[i] != 0 && constant_[i] > kRounding * kinetic_[i];
+    any = any || gains_[i] != 0;
+  }
+  return any;
 }
 
 // The largest s <= 1 that leaves no island with more energy than before; at s = 0 none has.
 void Restitution::limit_energy(const BodySet& bodies) {
-  sum_energies(bodies, bodies.motion);
+  sum_energies(bodies);
   scale_.assign(constant_.size(), 1);
   for (std::size_t i = 0; i < scale_.size(); ++i) {
     const double a = square_[i], b = linear_[i], c = std::min(constant_[i], 0.0);
-    if (!(a > 0) || a + b + c <= 1e-14 * a) continue;
+    if (!(kinetic_[i] > 0) || a + b + c <= kRounding * kinetic_[i]) continue;
     const double root_of = std::sqrt(b * b - 4 * a * c);
     const double s = b > 0 ? -2 * c / (b + root_of) : (root_of - b) / (2 * a);
     scale_[i] = std::clamp(s, 0.0, 1.0);
@@ -128,38 +155,56 @@ void Restitution::add_impulses_again(BodySet& bodies, StepContacts& contacts) {
     added_[at(b.contact)] += b.part * contacts.impulses[at(b.contact)];
 }
 
-// From the solution with restitution to the one without it, in `bodies` and `contacts`, and the
-// difference in `change_` and `added_`.
+// Of islands that gain energy: from the solution with restitution to the one without it, in
+// `bodies` and `contacts`, and the difference in `change_` and `added_`.
 void Restitution::solve_without(BodySet& bodies, StepContacts& contacts) {
-  for (const int k : biased_) contacts.points[at(k)].bias = 0;
-  change_ = bodies.motion;
-  added_ = contacts.impulses;
-  solver_.solve(before_, contacts.points, solution_);
-  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
-    if (bodies.mass[i] == 0) continue;
-    bodies.motion[i].velocity = solution_.velocities[i];
-    bodies.motion[i].angular_velocity = solution_.angular_velocities[i];
-    change_[i].velocity -= solution_.velocities[i];
-    change_[i].angular_velocity -= solution_.angular_velocities[i];
+  for (const int k : biased_)
+    if (gains(islands_.root(bodies, contacts.points[at(k)]))) contacts.points[at(k)].bias = 0;
+  points_.clear();
+  contact_.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    if (!gains(islands_.root(bodies, contacts.points[k]))) continue;
+    points_.push_back(contacts.points[k]);
+    contact_.push_back(k);
   }
-  for (std::size_t k = 0; k < added_.size(); ++k) {
-    contacts.impulses[k] = solution_.impulses[k];
-    added_[k] -= solution_.impulses[k];
+  solver_.solve(before_, points_, solution_);
+  change_.resize(bodies.motion.size());
+  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
+    RigidBody &b = bodies.motion[i], &d = change_[i];
+    const bool changes = bodies.mass[i] > 0 && gains(static_cast<int>(i));
+    const Vector3d v = changes ? solution_.velocities[i] : b.velocity;
+    const Vector3d w = changes ? solution_.angular_velocities[i] : b.angular_velocity;
+    d.velocity = b.velocity - v;
+    d.angular_velocity = b.angular_velocity - w;
+    b.velocity = v;
+    b.angular_velocity = w;
+  }
+  added_.assign(contacts.impulses.size(), Vector3d::Zero());
+  for (std::size_t j = 0; j < contact_.size(); ++j) {
+    Vector3d& x = contacts.impulses[contact_[j]];
+    added_[contact_[j]] = x - solution_.impulses[j];
+    x = solution_.impulses[j];
+  }
+  add_laws(true, bodies, driven_);
+  for (std::size_t i = 0; i < driven_.size(); ++i) {
+    driven_change_[i].velocity -= driven_[i].velocity;
+    driven_change_[i].angular_velocity -= driven_[i].angular_velocity;
   }
 }
 
 // Both ends obey the contacts and the cones; so does everything between them.
 void Restitution::add_change(BodySet& bodies, StepContacts& contacts) {
+  const auto scale = [&](int body) { return scale_[at(islands_.root(body))]; };
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
     if (bodies.mass[i] == 0) continue;
-    const double s = scale_[at(islands_.root(static_cast<int>(i)))];
+    const double s = scale(static_cast<int>(i));
     bodies.motion[i].velocity += s * change_[i].velocity;
     bodies.motion[i].angular_velocity += s * change_[i].angular_velocity;
   }
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    const double s = scale_[at(islands_.root(bodies, contacts.points[k]))];
-    contacts.impulses[k] += s * added_[k];
-  }
+  for (std::size_t k = 0; k < contacts.points.size(); ++k)
+    contacts.impulses[k] += scale(islands_.root(bodies, contacts.points[k])) * added_[k];
+  if (laws_ != nullptr)
+    laws_->scale_restitution([&](int body) { return gains(body) ? scale(body) : 1; });
 }
 
 int Restitution::apply(BodySet& bodies, StepContacts& contacts) {
@@ -167,12 +212,14 @@ int Restitution::apply(BodySet& bodies, StepContacts& contacts) {
       std::remove_if(bounces_.begin(), bounces_.end(),
                      [&](const Bounce& b) { return contacts.impulses[at(b.contact)].isZero(0); }),
       bounces_.end());
-  if (bounces_.empty()) return 0;
+  if (bounces_.empty() && limits_.empty()) return 0;
   islands_.join(bodies, contacts);
   if (law_ == RestitutionLaw::poisson) {
     add_impulses_again(bodies, contacts);
+    add_laws(false, bodies, driven_);
+    driven_change_ = driven_;
   } else {
-    if (!gains_energy(bodies)) return static_cast<int>(bounces_.size());
+    if (!gains_energy(bodies, contacts)) return static_cast<int>(bounces_.size());
     solve_without(bodies, contacts);
   }
   limit_energy(bodies);

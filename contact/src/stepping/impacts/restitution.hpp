@@ -18,20 +18,24 @@ BodyOptions cold(BodyOptions options);
 /// restitution, impulses x; then epsilon x at the contacts that bounce; then the contact problem
 /// once more, for contacts which that pressed together. In both, what restitution adds to the
 /// solution without it is scaled down where an island of bodies would end the step with more energy
-/// than it began it with and the forces of the step add on the way that the new velocities go.
+/// than it began it with and its forces, motors among them, add on the way that the new velocities
+/// go. Limits of joints bounce as contacts do.
 class Restitution {
  public:
   Restitution(RestitutionLaw law, const BodyOptions& options);
 
-  void set_joints(IslandMaker& joints, const BodyOptions& options) {
-    solver_.set_joints(joints.make_islands(options, LawUse::none));
+  void set_joints(IslandMaker& joints, const BodyOptions& options, LawUse laws) {
+    solver_.set_joints(joints.make_islands(options, laws));
     islands_.set_links(joints.links());
   }
+  /// Problems include the laws of joints.
+  void set_laws(JointPart& joints) { laws_ = &joints; }
 
   /// After the impacts are chosen: those that bounce. `chosen` has the velocities that bodies came
-  /// with; `forces` those before and after the forces of the step.
-  void choose(const Impacts& chosen, const Impacts& forces, const BodySet& bodies,
-              StepContacts& contacts);
+  /// with; `forces` those before and after the forces of the step; `limits` are the limits of
+  /// joints that are struck.
+  void choose(const Impacts& chosen, const Impacts& forces, const std::vector<Strike>& limits,
+              const BodySet& bodies, StepContacts& contacts);
   /// After the solve. Changes velocities and impulses; returns the number of bounces.
   int apply(BodySet& bodies, StepContacts& contacts);
 
@@ -45,8 +49,10 @@ class Restitution {
     double speed;  // given back, m/s
     double part;   // of the impulse
   };
-  void sum_energies(const BodySet& bodies, const std::vector<RigidBody>& now);
-  bool gains_energy(const BodySet& bodies);
+  void add_laws(bool plastic, const BodySet& bodies, std::vector<RigidBody>& forces) const;
+  void sum_energies(const BodySet& bodies);
+  bool gains_energy(const BodySet& bodies, const StepContacts& contacts);
+  bool gains(int body) { return gains_[static_cast<std::size_t>(islands_.root(body))] != 0; }
   void add_impulses_again(BodySet& bodies, StepContacts& contacts);
   void solve_without(BodySet& bodies, StepContacts& contacts);
   void limit_energy(const BodySet& bodies);
@@ -55,12 +61,18 @@ class Restitution {
   RestitutionLaw law_;
   std::vector<Bounce> bounces_;  // those that press, once the problem is solved
   std::vector<int> biased_;      // contacts
+  std::vector<int> limits_;      // bodies of joints whose limits bounce
+  JointPart* laws_ = nullptr;
   // Velocities before the impulses, those that energy is compared with, what the forces of the step
-  // add; what restitution adds to velocities without it, and to impulses.
-  std::vector<RigidBody> before_, came_, force_, change_;
+  // add; what restitution adds to velocities without it, to those by motors, and to impulses.
+  std::vector<RigidBody> before_, came_, force_, change_, driven_, driven_change_;
   std::vector<Eigen::Vector3d> added_;
   MovingIslands islands_;
-  std::vector<double> constant_, linear_, square_, scale_;  // of each island; see limit_energy
+  std::vector<char> gains_;  // islands
+  // Of each island, see sum_energies.
+  std::vector<double> constant_, linear_, square_, kinetic_, scale_;
+  std::vector<PointContact> points_;  // of those that gain, and which contacts they are
+  std::vector<std::size_t> contact_;
   StepSolver solver_;
   BodySolution solution_;
 };

@@ -44,13 +44,15 @@ void add_impulses(const StepContacts& part, StepContacts& sum) {
     if (part.impulses[k].isZero(0)) continue;
     std::size_t j = 0;
     while (j < sum.points.size() && sum.points[j].id != part.points[k].id) ++j;
-    if (j < sum.points.size()) {
-      sum.impulses[j] += part.impulses[k];
-      continue;
+    if (j == sum.points.size()) {
+      sum.points.push_back(part.points[k]);
+      sum.gaps.push_back(part.gaps[k]);
+      sum.impulses.emplace_back(Eigen::Vector3d::Zero());
     }
-    sum.points.push_back(part.points[k]);
-    sum.gaps.push_back(part.gaps[k]);
-    sum.impulses.push_back(part.impulses[k]);
+    sum.impulses[j] += part.impulses[k];
+    if (k >= part.moments.size()) continue;
+    sum.moments.resize(sum.points.size(), Eigen::Vector3d::Zero());
+    sum.moments[j] += part.moments[k];
   }
 }
 
@@ -63,17 +65,26 @@ void StepCuts::remember(const WarmStart& solved) {
   std::sort(pressing_.begin(), pressing_.end());
 }
 
-void StepCuts::find_islands(const BodySet& bodies, const StepContacts& contacts) {
+void StepCuts::find_islands(const NearContacts& near, const BodySet& bodies,
+                            const StepContacts& contacts) {
   islands_.join(bodies, contacts);
+  whole_.assign(bodies.motion.size(), 0);
+  if (laws_ != nullptr) islands_.mark(laws_->under_laws(), whole_);
   size_.assign(bodies.motion.size(), 0);
-  for (const PointContact& c : contacts.points) ++size_[at(islands_.root(bodies, c))];
+  const bool rolling = near.any_rolling();
+  for (const PointContact& c : contacts.points) {
+    const std::size_t root = at(islands_.root(bodies, c));
+    ++size_[root];
+    if (rolling && near.meeting(c).rolls()) whole_[root] = 1;
+  }
 }
 
-bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const BodySet& bodies,
-                      const StepContacts& contacts) {
+bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const NearContacts& near,
+                      const BodySet& bodies, const StepContacts& contacts) {
   striking_.clear();
+  if (impacts.empty()) return false;
   const bool many = contacts.points.size() > kMostContacts;
-  if (many && !impacts.empty()) find_islands(bodies, contacts);
+  find_islands(near, bodies, contacts);
   time_.clear();
   time_.reserve(impacts.capacity());
   striking_.reserve(impacts.capacity());
@@ -82,8 +93,9 @@ bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const Bod
     const double speeds =
         speed(bodies.motion[at(c.first)], c.r1) + speed(bodies.motion[at(c.second)], c.r2);
     const double gap = contacts.gaps[at(i.contact)], then = i.speed(gap, dt);
+    const std::size_t root = at(islands_.root(bodies, c));
     const bool cuts = then > kPresses * (i.comes - i.came) && then > kRounding * speeds &&
-                      (!many || size_[at(islands_.root(bodies, c))] <= kMostContacts);
+                      whole_[root] == 0 && (!many || size_[root] <= kMostContacts);
     time_.push_back(cuts ? i.time(gap, dt) : std::numeric_limits<double>::infinity());
   }
   when_ = std::numeric_limits<double>::infinity();
@@ -137,13 +149,14 @@ double StepCuts::left(NearContacts& near, const BodySet& bodies, double dt) {
 }
 
 bool StepCuts::gather(const NearContacts& near, const BodySet& bodies, double step,
-                      Impacts& impacts, StepContacts& contacts) const {
+                      Impacts& impacts, StepContacts& contacts) {
+  find_islands(near, bodies, contacts);
   std::size_t kept = 0;
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
     PointContact c = contacts.points[k];
-    if (contacts.gaps[k] > step * impacts.least_speed(near, c) && !has(pressing_, c.id) &&
-        !has(striking_, c.id))
-      continue;
+    if (whole_[at(islands_.root(bodies, c))] != 0) continue;
+    const double touches = std::max(step * impacts.least_speed(near, c), kTouches * near.size(c));
+    if (contacts.gaps[k] > touches && !has(pressing_, c.id) && !has(striking_, c.id)) continue;
     c.bias = 0;
     contacts.points[kept] = c;
     contacts.gaps[kept++] = contacts.gaps[k];

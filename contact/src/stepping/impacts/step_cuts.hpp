@@ -52,6 +52,10 @@ class StepCuts {
     solver_.set_joints(joints.make_islands(options, LawUse::none));
     islands_.set_links(joints.links());
   }
+  /// Islands of these bodies are not cut, nor are those with rolling friction: laws of joints, and
+  /// moments of contacts, act over a time. (Impacts in turn leave what a limit takes to the part
+  /// after them: they need no laws.)
+  void set_laws(const JointPart& joints) { laws_ = &joints; }
   /// Of each step.
   void earn() { kept_ = std::min(kept_ + kShare, kMostKept); }
   double kept() const { return kept_; }
@@ -64,8 +68,8 @@ class StepCuts {
     return contacts <= kMostContacts || (contacts <= kMostInScene && kept_ >= kPrice);
   }
   /// Where it may: false where none of the impacts is on the way.
-  bool choose(const std::vector<Approach>& impacts, double dt, const BodySet& bodies,
-              const StepContacts& contacts);
+  bool choose(const std::vector<Approach>& impacts, double dt, const NearContacts& near,
+              const BodySet& bodies, const StepContacts& contacts);
   /// Marks the bodies of the islands that are to strike. `falls`: bodies that nothing but contacts
   /// connects to others. False: no other body moves among those that are `active` (empty: all).
   bool find_striking(const BodySet& bodies, const StepContacts& contacts,
@@ -80,7 +84,7 @@ class StepCuts {
   /// At the impact: leaves contacts that touch, with those that strike among `impacts`. Those that
   /// have pressed touch, and gaps that the slowest impact closes in a step. False: none strikes.
   bool gather(const NearContacts& near, const BodySet& bodies, double step, Impacts& impacts,
-              StepContacts& contacts) const;
+              StepContacts& contacts);
 
   const BodySolution& solve(const std::vector<RigidBody>& motion, const StepContacts& contacts) {
     solver_.solve(motion, contacts.points, solution_);
@@ -88,12 +92,13 @@ class StepCuts {
   }
 
  private:
-  void find_islands(const BodySet& bodies, const StepContacts& contacts);
+  void find_islands(const NearContacts& near, const BodySet& bodies, const StepContacts& contacts);
 
   double when_ = 0, kept_ = kFirst;
+  const JointPart* laws_ = nullptr;
   MovingIslands islands_;
   std::vector<std::size_t> size_;                   // of islands, by their root: contacts
-  std::vector<char> marked_;                        // islands, by their root
+  std::vector<char> marked_, whole_;                // islands, by their root
   std::vector<std::uint64_t> pressing_, striking_;  // identities, sorted
   std::vector<double> time_;                        // of impacts
   StepContacts found_;

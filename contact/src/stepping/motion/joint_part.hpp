@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <tether/contact/stepping.hpp>
 #include <utility>
@@ -12,15 +13,18 @@ namespace tether::contact::detail {
 class NearContacts;
 class RollingPart;
 
-/// Laws of joints (JointLaws) in a problem: of the step's velocities, of what closes its gaps
-/// (whose impulses are none of the step), of positions, that leaves them out.
-enum class LawUse { all, closing, limits, none };
+/// Which laws of joints (JointLaws) a problem includes: velocities: all; velocities without
+/// restitution: all, and limits do not bounce; closing of gaps: all, their impulses are discarded;
+/// correction of positions: limits; impacts: none.
+enum class LawUse { all, plastic, closing, limits, none };
 
 /// A limit of a joint that is struck within a part of a step.
 struct Strike {
   double gap;          ///< m or rad, at the start of the part
   double came, comes;  ///< approach before and with the forces of the part, > 0
   int body;            ///< one that moves along; -1: the coordinate is an angle
+  int moves;           ///< a body of the law that moves
+  double restitution;  ///< of the limit
 };
 
 /// What a law of a joint has done in a part of a step.
@@ -67,9 +71,20 @@ class JointPart : public IslandMaker {
   virtual void begin(BodySet& bodies, double t) = 0;
   virtual void predict(BodySet& bodies, double t, double dt) = 0;
   virtual void put_back(BodySet& bodies, double t) = 0;
+  /// To the end of the step. False: it does not meet the joints.
   virtual bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) = 0;
   /// Whether there are laws; then contact problems are solved without contacts, too.
   virtual bool has_laws() const = 0;
+  /// Bodies of mechanisms that have laws.
+  virtual const std::vector<int>& under_laws() const = 0;
+  /// Whether problems include the laws: not while the bodies of joints wait.
+  virtual void set_active(bool active) = 0;
+  /// Velocities that motors and friction of joints have added in the last problem of velocities,
+  /// `plastic`: without restitution, before joints pass them on.
+  virtual void add_bounded(bool plastic, const BodySet& bodies,
+                           std::vector<RigidBody>& change) const = 0;
+  /// Impulses of laws on body i are those without restitution and scale(i) of what it adds.
+  virtual void scale_restitution(const std::function<double(int)>& scale) = 0;
   virtual void list_laws(std::vector<LawState>& out) const = 0;
   virtual const std::vector<Strike>& strikes() const = 0;
   virtual const std::vector<double>& law_impulses() const = 0;

@@ -19,6 +19,10 @@ class MovingIslands {
     for (const PointContact& c : contacts.points)
       if (moves(bodies, c.first) && moves(bodies, c.second)) sets_.join(c.first, c.second);
   }
+  /// After join(): marks the roots of these bodies.
+  void mark(const std::vector<int>& bodies, std::vector<char>& marks, char mark = 1) {
+    for (const int i : bodies) marks[static_cast<std::size_t>(root(i))] = mark;
+  }
   int root(int body) { return sets_.root(body); }
   /// Island of a contact's bodies, one of which moves.
   int root(const BodySet& bodies, const PointContact& c) {

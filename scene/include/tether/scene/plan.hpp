@@ -49,6 +49,8 @@ std::unique_ptr<Engine> make_engine(const Scene& scene);
 std::vector<std::string> overlaps_at_start(const Scene& scene);
 /// Names of bodies with shapes that no other body can touch, though the scene has contacts.
 std::vector<std::string> bodies_out_of_touch(const Scene& scene);
+/// Says what contacts that touch do in impacts of others, in words of the plan.
+std::string simultaneous_impacts_text(const Scene& scene);
 
 /// Rows of a joint on positions and orientations.
 int joint_rows(const Joint& joint);

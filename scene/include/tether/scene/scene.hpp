@@ -234,6 +234,8 @@ struct Scene {
   std::vector<CentralGravity> central_gravity;
   std::vector<Invariant> invariants;
   EngineChoice engine = EngineChoice::automatic;
+  /// Holds for both engines with contacts.
+  contact::SimultaneousImpacts simultaneous_impacts = contact::SimultaneousImpacts::together;
   std::optional<SmoothOptions> smooth;  ///< at most one of the three is given, but steps may
   std::optional<SteppingOptions>
       stepping;                       ///< be what events go on with (EventOptions::otherwise);

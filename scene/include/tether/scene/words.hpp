@@ -38,6 +38,12 @@ struct Words<RestitutionLaw> {
   inline static const auto list = named<RestitutionLaw>(contact::kRestitutionLaws);
 };
 
+template <>
+struct Words<contact::SimultaneousImpacts> {
+  inline static const auto list =
+      named<contact::SimultaneousImpacts>(contact::kSimultaneousImpacts);
+};
+
 /// Every friction law of the contact library can be named in a scene.
 template <>
 struct Words<contact::Law> {
