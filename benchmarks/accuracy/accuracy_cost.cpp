@@ -24,7 +24,7 @@ struct Arguments {
   int count = 15, repeats = 3;
   double seconds = 2.0;
   std::vector<std::string> problems, skip, peers;
-  bool no_watch = false, no_reach = false, list = false, work = false, raise_order = false;
+  bool no_watch = false, no_reach = false, list = false, work = false;
 };
 
 void read(int argc, char** argv, CLI::App& app, Arguments& a) {
@@ -46,7 +46,6 @@ void read(int argc, char** argv, CLI::App& app, Arguments& a) {
   app.add_flag("--no-reach", a.no_reach,
                "Only these tolerances, even where end errors do not "
                "cover 1e-3 to 1e-9");
-  app.add_flag("--raise-order", a.raise_order, "Tether with Options::raise_order");
   app.add_flag("--work", a.work, "Also print the work of every code and form near tolerance 1e-6");
   app.add_flag("--list", a.list, "Print problems, forms and codes, and stop");
   app.parse(argc, argv);
@@ -64,8 +63,8 @@ std::pair<double, double> range(const std::string& text) {
   return {loose, tight};
 }
 
-Codes wanted_codes(const std::vector<std::string>& names, bool raised) {
-  Codes wanted, all = all_codes(raised);
+Codes wanted_codes(const std::vector<std::string>& names) {
+  Codes wanted, all = all_codes();
   std::string known = "none";
   for (const auto& code : all)
     if (is_peer(code->name()) && base_name(code->name()) == code->name())
@@ -179,7 +178,7 @@ int run(const Arguments& arguments) {
     return 0;
   }
   const std::vector<Case> cases = catalogue(arguments.problems, arguments.skip);
-  const Codes codes = wanted_codes(arguments.peers, arguments.raise_order);
+  const Codes codes = wanted_codes(arguments.peers);
   check_writable(arguments);
   std::vector<std::string> peers;
   Json versions = Json::object();

@@ -47,8 +47,7 @@ using Codes = std::vector<std::unique_ptr<Code>>;
 
 /// Ours and plain IDA: "IDA" (algebraic variables in the error test), "IDA suppressed", "Tether",
 /// "Tether smooth"; with fast vectors and factors "IDA fast", "IDA fast suppressed", "Tether fast".
-/// `raised`: ours with Options::raise_order.
-void add_ida_codes(Codes& codes, bool raised = false);
+void add_ida_codes(Codes& codes);
 
 /// "RADAU5", "DASPK", "DASPK suppressed" from r-cran-desolve, opened at run time.
 void add_desolve_codes(Codes& codes);
@@ -61,7 +60,7 @@ void add_cvode_code(Codes& codes);
 void add_cpodes_code(Codes& codes);
 
 /// Every code, the missing ones too.
-Codes all_codes(bool raised = false);
+Codes all_codes();
 
 /// The code without what is said about its variant: "IDA suppressed" is one way to run "IDA".
 inline std::string base_name(const std::string& code) {

@@ -4,9 +4,9 @@
 
 namespace tether::bench {
 
-Codes all_codes(bool raised) {
+Codes all_codes() {
   Codes codes;
-  add_ida_codes(codes, raised);
+  add_ida_codes(codes);
   add_desolve_codes(codes);
 #ifdef TETHER_HAVE_CVODE
   add_cvode_code(codes);

@@ -13,8 +13,7 @@ enum class Variant { tested, suppressed, projected, smooth };
 
 class IdaCode : public Code {
  public:
-  IdaCode(Variant variant, bool fast, bool raised)
-      : variant_(variant), fast_(fast), raised_(raised) {}
+  IdaCode(Variant variant, bool fast) : variant_(variant), fast_(fast) {}
 
   std::string name() const override {
     const std::string fast = fast_ ? " fast" : "";
@@ -53,7 +52,6 @@ class IdaCode : public Code {
     settings.suppress = variant_ == Variant::suppressed;
     if (variant_ == Variant::projected || variant_ == Variant::smooth) {
       settings.constraints = problem.recommended_constraints();
-      settings.options.raise_order = raised_;
       settings.options.step_smoothing = variant_ == Variant::smooth;
       settings.options.print_fatal = false;
       settings.options.print_warnings = false;
@@ -65,17 +63,17 @@ class IdaCode : public Code {
 
  private:
   Variant variant_;
-  bool fast_, raised_;
+  bool fast_;
 };
 
 }  // namespace
 
-void add_ida_codes(Codes& codes, bool raised) {
+void add_ida_codes(Codes& codes) {
   for (const Variant variant :
        {Variant::tested, Variant::suppressed, Variant::projected, Variant::smooth})
-    codes.push_back(std::make_unique<IdaCode>(variant, false, raised));
+    codes.push_back(std::make_unique<IdaCode>(variant, false));
   for (const Variant variant : {Variant::tested, Variant::suppressed, Variant::projected})
-    codes.push_back(std::make_unique<IdaCode>(variant, true, raised));
+    codes.push_back(std::make_unique<IdaCode>(variant, true));
 }
 
 }  // namespace tether::bench

@@ -147,7 +147,6 @@ TEST_CASE("C interface: the defaults are those of Options, and what is set is us
   const tp::Options defaults;
   CHECK(options.metric == static_cast<int>(defaults.metric));
   CHECK(options.tolerance == defaults.tolerance);
-  CHECK(options.frequency == defaults.frequency);
   CHECK(options.smoothing_setpoint == defaults.smoothing_setpoint);
   CHECK(options.hold == nullptr);
 
@@ -186,7 +185,6 @@ TEST_CASE("C interface: every field of the options is handed on") {
   o.metric = TETHER_METRIC_LOCAL_CORRECTION;
   o.tolerance = 0.125;
   o.maximum_iterations = defaults.maximum_iterations + 1;
-  o.frequency = defaults.frequency + 2;
   o.largest_move = 0.375;
   o.long_move = TETHER_LONG_MOVE_CAP;
   o.id = host.y;
@@ -206,12 +204,10 @@ TEST_CASE("C interface: every field of the options is handed on") {
   o.print_fatal = !defaults.print_fatal;
   o.print_warnings = !defaults.print_warnings;
   o.progress_interval = defaults.progress_interval + 5;
-  o.raise_order = !defaults.raise_order;
   const tp::Options cpp = tp::options_of(&o, 3);
   CHECK(cpp.metric == tp::Metric::local_correction);
   CHECK(cpp.tolerance == 0.125);
   CHECK(cpp.maximum_iterations == o.maximum_iterations);
-  CHECK(cpp.frequency == o.frequency);
   CHECK(cpp.largest_move == 0.375);
   CHECK(cpp.long_move == tp::LongMove::cap);
   CHECK(cpp.id == host.y);
@@ -231,7 +227,6 @@ TEST_CASE("C interface: every field of the options is handed on") {
   CHECK(cpp.print_fatal != defaults.print_fatal);
   CHECK(cpp.print_warnings != defaults.print_warnings);
   CHECK(cpp.progress_interval == o.progress_interval);
-  CHECK(cpp.raise_order != defaults.raise_order);
 }
 
 TEST_CASE("C interface: a structure of an older header keeps the defaults of what it lacks") {

@@ -120,11 +120,8 @@ tp::Constraints as_distributed(tp::Constraints rows, int n) {
 std::vector<Case> cases() {
   std::vector<Case> all;
   const Problem index1 = pendulum(1.0, 1.0, 3.0, "index 1");
-  const Problem index0 = pendulum(1.0, 1.0, 3.0, "index 0");
   const Problem ggl = pendulum(1.0, 1.0, 3.0, "GGL");
   const Problem wheel = wheel_on_rail("index 1", true, 0.5);
-  tp::Options between;
-  between.frequency = 5;
   tp::Constraints differences = index1.recommended_constraints();
   differences.jacobian = tp::FiniteDifferences{};
   for (tp::Constraints& part : differences.joined) part.jacobian = tp::FiniteDifferences{};
@@ -134,7 +131,6 @@ std::vector<Case> cases() {
   const tp::Constraints all_rows = index1.recommended_constraints();
   all.push_back({"gradients", index1, gradients_of(all_rows, 5), {}, 1.0});
   all.push_back({"distributed", index1, as_distributed(as_sparse(all_rows, 5), 5), {}, 1.0});
-  all.push_back({"frequency", index0, index0.recommended_constraints(), between, 3.0});
   all.push_back({"GGL", ggl, ggl.select({"position", "velocity"}), {}, 0.5});
   all.push_back({"joined equations", wheel, wheel.select({"gap", "rate", "energy"}), {}, 0.2});
   return all;

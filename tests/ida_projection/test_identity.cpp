@@ -79,7 +79,6 @@ TEST_CASE("g identically zero, with a gradient that is not") {
   }
   tp::Options options;
   options.metric = tp::Metric::error_weights;
-  options.frequency = 1;
   compare(pendulum(1.0, 1.0, 20.0, "index 0"), 1e-6, nothing(), options);
 }
 

@@ -49,8 +49,6 @@ TEST_CASE("bad values: the message names the option and the value") {
   check(refusal_of([](O& o) { o.tolerance = 0.0; }), "tolerance", "= 0;");
   check(refusal_of([](O& o) { o.tolerance = kNaN; }), "tolerance", "nan");
   check(refusal_of([](O& o) { o.maximum_iterations = 0; }), "maximum_iterations", "0");
-  check(refusal_of([](O& o) { o.frequency = 0; }), "frequency", "0");
-  check(refusal_of([](O& o) { o.frequency = -5; }), "frequency", "-5");
   check(refusal_of([](O& o) { o.largest_move = 0.0; }), "largest_move", "= 0;");
   check(refusal_of([](O& o) { o.largest_move = 0.001; }), "largest_move", "0.001");
   check(refusal_of([](O& o) { o.largest_move = kNaN; }), "largest_move", "nan");

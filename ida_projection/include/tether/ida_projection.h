@@ -128,7 +128,6 @@ typedef struct {
   int metric;  /* TETHER_METRIC_... */
   sunrealtype tolerance;
   int maximum_iterations;
-  int frequency;
   sunrealtype largest_move;
   int long_move; /* TETHER_LONG_MOVE_... */
   N_Vector id;
@@ -146,7 +145,6 @@ typedef struct {
   tether_progress_fn progress; /* or null */
   void* progress_data;
   int progress_interval;
-  int raise_order;
 } tether_options;
 
 /* The defaults: tether_options options; tether_options_init(&options, sizeof options); */

@@ -29,7 +29,7 @@ bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
       movers_.used->has_forces_in_rows() && metric_choice_.may_try())
     look_for_shorter_move(candidate, move);
   if (move.status != Status::success || !metric_choice_.due()) return false;
-  AnsweredMove at{move.length, polish_.answer(candidate, candidate.cj)};
+  AnsweredMove at{move.length, polish_.answer(candidate)};
   if (at.answer < 0.0) return false;
   // So they do in index 0, where F keeps them by a derivative of theirs.
   if (metric_choice_.stiff(at) && !variables_.any() && movers_.used->has_forces_in_rows()) {
@@ -75,7 +75,7 @@ AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
   }
   const Move other = move_by_levels(candidate, !by_levels);
   const bool moved = other.status == Status::success && !other.capped;
-  const AnsweredMove its{other.length, moved ? polish_.answer(candidate, candidate.cj) : -1.0};
+  const AnsweredMove its{other.length, moved ? polish_.answer(candidate) : -1.0};
   if (its.answer >= 0.0 && metric_choice_.prefers(its, present)) {
     move = other;
     control_.expect_oscillations();

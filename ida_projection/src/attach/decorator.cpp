@@ -51,8 +51,6 @@ int Projection::Impl::initialize() {
   if (movers_.used != nullptr) movers_.used->reset();
   if (sensitivities_) sensitivities_->forget_run();
   control_.reset();
-  raised_order_.reset();
-  frequency_.reset();
   metric_choice_.reset();
   return corrector_.initialize();
 }
@@ -162,7 +160,6 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   const StepData step = ida_.step();
   account_for_previous_attempt(step);
   candidate.t = step.t;
-  raised_order_.begin(step.t, step.yp_predicted);
   if (unknowns_.contiguous) {
     candidate.h = std::abs(ida_.step_size());
     candidate.cj = step.cj;
@@ -176,7 +173,6 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
                  doubt.empty() ? cause : cause.substr(0, cause.rfind("; " + doubt)));
     if (watch_.first_steps.false_row_found()) return report_.end(Status::collapsed);
   }
-  if (frequency_.on() && !needs_projection(at, step, tolerance)) return finish(Status::success, "");
   Stopwatch stopwatch(*this);
   if (!run_.engaged) {
     bool done = false;
@@ -210,21 +206,9 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
-// Not while steps are smoothed: in the forms of index 2 that begin it by themselves errors of some
-// mechanisms grow.
-void Projection::Impl::raise_order(const Candidate& candidate, double cj) {
-  const bool may = options_.raise_order && options_.extra_iterations > 0 && !frequency_.on() &&
-                   !attempts_.repeated && !control_.smoothing() && polish_.possible();
-  if (may)
-    raised_order_.raise(candidate, ida_.order(), cj, wants_polish(0.0), variables_.id());
-  else
-    raised_order_.leave();
-}
-
 // `fresh`: of IDA's factors there are no better ones.
 Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
                                        bool fresh) {
-  raise_order(candidate, cj);
   polish_.keep(candidate);
   const bool first = polishes_first() && polish_.add_newton_step(candidate, cj, tolerance);
   if (first && !fresh && !polish_.corrector_was_right()) return {Status::success};
@@ -259,7 +243,7 @@ bool Projection::Impl::polishes_first() {
   if (!movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))
     return false;  // few rows never do
   const bool silent = metric_choice_.calm() || !asks_for_metric();
-  return silent && !raised_order_.raised() && wants_polish(0.0);
+  return silent && wants_polish(0.0);
 }
 
 Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance) {
@@ -286,10 +270,6 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (setups != attempts_.setups) polish_.note_setup(step.cj);
   attempts_.setups = setups;
   attempts_.repeated = steps == attempts_.steps;
-  if (attempts_.steps >= 0 && steps == attempts_.steps + 1)
-    raised_order_.accepted();
-  else if (!attempts_.repeated)
-    raised_order_.forget_times();
   watch_.rejections.count(attempts_.repeated && attempts_.moved > kPartInTest, attempts_.repeated,
                           attempts_.steps);
   attempts_.moved = std::numeric_limits<double>::infinity();
@@ -312,14 +292,7 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
   ++(move.looked ? s.skipped : s.projections);
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
-  if (frequency_.on()) frequency_.projected(move.length, std::abs(ida_.step_size()));
-  note(move, step);
   if (sampled) s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
-}
-
-// Counts of a successful move, full or not.
-void Projection::Impl::note(const Move& move, const StepData& step) {
-  Statistics& s = statistics_;
   s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
   s.largest_move = std::max(s.largest_move, move.length);
   tally_.move_sum += move.length;

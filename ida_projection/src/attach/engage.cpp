@@ -118,7 +118,6 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
 // Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
 int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done) {
   const Move first = movers_.used->measure(candidate);
-  if (frequency_.on()) frequency_.projected(first.length, std::abs(ida_.step_size()));
   done = true;
   if (first.status != Status::success) {
     const int code = finish(first.status, movers_.used->message());

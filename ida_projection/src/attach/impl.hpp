@@ -20,10 +20,8 @@
 #include "start/algebraic.hpp"
 #include "start/joined_rows.hpp"
 #include "start/point.hpp"
-#include "step/frequency.hpp"
 #include "step/metric_choice.hpp"
 #include "step/polish.hpp"
-#include "step/raised_order.hpp"
 #include "step/step_control.hpp"
 #include "step/stiff_move.hpp"
 #include "watch/bypass.hpp"
@@ -135,7 +133,6 @@ class Projection::Impl {
   void account_for_previous_attempt(const StepData& step);
   Move move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
   void judge_capped(Move& move);
-  void raise_order(const Candidate& candidate, double cj);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   bool polishes_first();
   void start_by_levels();
@@ -143,7 +140,6 @@ class Projection::Impl {
   bool asks_for_metric() const;
   Status polish(const Candidate& candidate, double cj, double tolerance);
   void account(const Move& move, const StepData& step, bool sampled);
-  void note(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
 
   // engage.cpp
@@ -166,11 +162,6 @@ class Projection::Impl {
   void keep_point_before(const Candidate& candidate, OwnedVector& y);
   std::string undetermined_at(const Candidate& candidate, N_Vector y);
   int corrector_failed(const Candidate& candidate, int flag);
-
-  // between.cpp
-  bool needs_projection(const Candidate& candidate, const StepData& step, double tolerance);
-  bool leave_alone(const Candidate& candidate, const StepData& step, double tolerance);
-  bool follow(const Candidate& candidate, const StepData& step, double tolerance);
 
   // choose_metric.cpp
   bool choose_metric(const Candidate& candidate, Move& move);
@@ -239,11 +230,9 @@ class Projection::Impl {
   Report report_;
   Corrector corrector_;
   AlgebraicVariables variables_;
-  RaisedOrder raised_order_;
   Polish polish_;
   StepControl control_;
   StiffMove stiff_move_;
-  FrequencyPolicy frequency_;
   Movers movers_;
   PointProjection point_;
   Watches watch_;

@@ -78,7 +78,6 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       polish_(options_, statistics_, corrector_, variables_),
       control_(ida_, options_, statistics_),
       stiff_move_(variables_),
-      frequency_(options_.frequency),
       movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),
       watch_{RejectionWatch(constraints_), FirstSteps(constraints_, statistics_),
@@ -94,11 +93,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) {
     polish_.allocate(like, unknowns_.contiguous);
-    if (options_.raise_order) {
-      raised_order_.allocate(like, unknowns_.contiguous);
-      polish_.expect_raised_order(raised_order_);
-    }
-    if (options_.frequency == 1) polish_.may_foretell();
+    polish_.may_foretell();
     unknowns_.weights = OwnedVector(like);
     if (options_.id != nullptr) {
       variables_.set(options_.id);
@@ -185,7 +180,7 @@ Statistics Projection::Impl::statistics() {
   look_for_bypass();
   Statistics s = statistics_;
   s.steps_without_plugin = watch_.bypass.steps();
-  const long moved = s.projections + s.chord_projections - s.failures();
+  const long moved = s.projections - s.failures();
   s.mean_move = moved > 0 ? tally_.move_sum / static_cast<double>(moved) : 0.0;
   s.seconds = tally_.timed.total(tally_.attempts);
   return s;

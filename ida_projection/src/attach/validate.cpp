@@ -173,7 +173,6 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   require(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0 (tolerances)");
   require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,
           ">= 1");
-  require(options.frequency >= 1, "frequency", options.frequency, ">= 1 (every n-th step)");
   require(
       options.largest_move >= 0.1, "largest_move", options.largest_move,
       ">= 0.1 (tolerances): the drift of a single good step is as long, and shorter limits make "

@@ -255,7 +255,6 @@ int tether_options_init(tether_options* options, size_t size) {
     o.metric = static_cast<int>(defaults.metric);
     o.tolerance = defaults.tolerance;
     o.maximum_iterations = defaults.maximum_iterations;
-    o.frequency = defaults.frequency;
     o.largest_move = defaults.largest_move;
     o.long_move = static_cast<int>(defaults.long_move);
     o.derive_id_limit = defaults.derive_id_limit;
@@ -271,7 +270,6 @@ int tether_options_init(tether_options* options, size_t size) {
     o.print_fatal = defaults.print_fatal;
     o.print_warnings = defaults.print_warnings;
     o.progress_interval = defaults.progress_interval;
-    o.raise_order = defaults.raise_order;
     std::memcpy(options, &o, size);
     return 0;
   });

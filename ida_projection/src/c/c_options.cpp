@@ -32,7 +32,6 @@ Options options_of(const tether_options* given, long unknowns) {
   options.metric = static_cast<Metric>(o.metric);
   options.tolerance = o.tolerance;
   options.maximum_iterations = o.maximum_iterations;
-  options.frequency = o.frequency;
   options.largest_move = o.largest_move;
   options.long_move = static_cast<LongMove>(o.long_move);
   options.id = o.id;
@@ -58,7 +57,6 @@ Options options_of(const tether_options* given, long unknowns) {
       call(p.t, p.step, p.order, p.drift, p.move, p.steps, data);
     };
   options.progress_interval = o.progress_interval;
-  options.raise_order = o.raise_order != 0;
   return options;
 }
 

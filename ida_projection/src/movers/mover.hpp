@@ -46,12 +46,6 @@ class Mover {
   /// Moves the candidate: correction <- correction - dy.
   virtual Move move(const Candidate& candidate) = 0;
 
-  /// Are there factors of an earlier step that may serve the next candidate, too?
-  virtual bool may_follow() { return false; }
-  /// The move with them. Another status than success: they left too much (factor_wear.hpp); then
-  /// the correction has to be put back. `again`: the correction was changed after such a move.
-  virtual Move follow(const Candidate&, bool /*again*/) { return {}; }
-
   /// Rank of the factors for solve_with_factors(); -1: there are none.
   virtual int rank_of_factors() const { return -1; }
   /// The caller's rows are others than those of the factors at hand.

@@ -69,45 +69,16 @@ void Polish::keep(const Candidate& candidate) {
     N_VScale(1.0, candidate.correction, corrected_);
 }
 
-// F at the corrector's y and y'. Of y the raised order may have taken something.
-int Polish::residual(double cj, N_Vector into) {
-  if (!raised()) return corrector_.residual(corrected_, into);
-  raised_order_->shift_rate(cj);
-  const int flag = corrector_.residual(corrected_, into);
-  raised_order_->restore_rate();
-  return flag;
-}
-
-// How F answers to what was taken and to the move: one F and one solution more, now and then.
-void Polish::listen(const Candidate& candidate) {
-  if (!noise_) noise_ = OwnedVector(candidate.correction);
-  noise_known_ = false;
-  N_VLinearSum(1.0, corrected_, 1.0, raised_order_->taken(), work_);
-  if (corrector_.residual(work_, noise_) != 0) return;
-  ++statistics_.residual_evaluations;
-  N_VLinearSum(1.0, work_, -1.0, candidate.correction, work_);
-  const double changed = differential_length(candidate, work_);
-  N_VScale(-1.0, noise_, noise_);
-  if (!corrector_.solve_linear(noise_)) return;
-  N_VLinearSum(1.0, delta_, -1.0, noise_, work_);
-  raised_order_->heard(differential_length(candidate, work_), changed);
-}
-
-// Stiff components give back what the raised order has taken of them.
-bool Polish::is_short(const Candidate& candidate, double length, double limit) const {
-  return length <= limit || (raised() && length <= limit + raised_order_->length(candidate));
-}
-
 // F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N) through IDA's own callback, which adds ycor to
 // IDA's ypred and yppred: ypred is shifted by -dy for the call and put back bit for bit.
-bool Polish::newton_step_at_moved_point(const Candidate& candidate, double cj) {
+bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
   if (contiguous_) {
     double* base = candidate.base_entries;
     for (int j = 0; j < size_; ++j) {
       work_entries_[j] = base[j];
       base[j] += candidate.correction_entries[j] - corrected_entries_[j];
     }
-    const bool evaluated = residual(cj, delta_) == 0;
+    const bool evaluated = corrector_.residual(corrected_, delta_) == 0;
     for (int j = 0; j < size_; ++j) {
       base[j] = work_entries_[j];
       delta_entries_[j] = -delta_entries_[j];
@@ -117,23 +88,23 @@ bool Polish::newton_step_at_moved_point(const Candidate& candidate, double cj) {
   N_VScale(1.0, candidate.base, work_);
   N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
   N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
-  const bool evaluated = residual(cj, delta_) == 0;
+  const bool evaluated = corrector_.residual(corrected_, delta_) == 0;
   N_VScale(1.0, work_, candidate.base);
   N_VScale(-1.0, delta_, delta_);
   return evaluated && corrector_.solve_linear(delta_);
 }
 
-double Polish::answer(const Candidate& candidate, double cj) {
+double Polish::answer(const Candidate& candidate) {
   if (!noise_) noise_ = OwnedVector(candidate.correction);
   if (!noise_known_) {
-    if (residual(cj, noise_) != 0) return -1.0;
+    if (corrector_.residual(corrected_, noise_) != 0) return -1.0;
     ++statistics_.residual_evaluations;
     N_VScale(-1.0, noise_, noise_);
     if (!corrector_.solve_linear(noise_)) return -1.0;
     noise_known_ = true;
   }
   step_known_ = false;
-  if (!newton_step_at_moved_point(candidate, cj)) return -1.0;
+  if (!newton_step_at_moved_point(candidate)) return -1.0;
   ++statistics_.residual_evaluations;
   step_known_ = true;
   N_VLinearSum(1.0, delta_, -1.0, noise_, work_);
@@ -142,11 +113,10 @@ double Polish::answer(const Candidate& candidate, double cj) {
 }
 
 bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  const bool listens = raised() && !step_known_ && raised_order_->listens();
-  if (may_foretell_ && !listens && foretell(candidate, cj, tolerance)) return true;
+  if (may_foretell_ && foretell(candidate, cj, tolerance)) return true;
   const bool asked = step_known_;
   if (!asked) {
-    if (!newton_step_at_moved_point(candidate, cj)) return false;
+    if (!newton_step_at_moved_point(candidate)) return false;
     ++statistics_.residual_evaluations;
   }
   step_known_ = false;
@@ -155,11 +125,9 @@ bool Polish::add_newton_step(const Candidate& candidate, double cj, double toler
   const double algebraic = algebraic_factor(cj);
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
   const double length = differential_length(candidate, delta_);
-  corrector_was_right_ = is_short(candidate, length, kMisled * tolerance);
-  if (listens) listen(candidate);
+  corrector_was_right_ = length <= kMisled * tolerance;
   if (!asked) look_at_pattern(candidate, cj);
-  const bool differential =
-      options_.extra_iterations > 0 && is_short(candidate, length, 10.0 * tolerance);
+  const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (variables_.any() && algebraic > 0.0) ++statistics_.refreshes;

@@ -7,7 +7,6 @@
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
 #include "step/foretold.hpp"
-#include "step/raised_order.hpp"
 
 namespace tether::ida_projection {
 
@@ -29,7 +28,6 @@ class Polish {
   void corrector_failed() { foretold_.doubt(); }
   /// Corrections are those of one vector, each of them polished.
   void may_foretell() { may_foretell_ = true; }
-  void expect_raised_order(RaisedOrder& raised) { raised_order_ = &raised; }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
   /// For the iteration of sensitivities, which has the same linear solver.
   void follow(const Polish& other) {
@@ -37,7 +35,6 @@ class Polish {
     iterative_ = other.iterative_;
   }
 
-  bool possible() const { return corrector_.solves() && !iterative_; }
   /// Is an iteration worth its price after a move of this length? `smoothing`: steps are smoothed.
   bool wanted(double length, bool smoothing) const;
   /// Longer moves want an answer of the algebraic variables; infinity where there are none.
@@ -46,7 +43,7 @@ class Polish {
   bool hears_answers() const { return contiguous_ && corrector_.solves() && !iterative_; }
   /// After a move: the length of F's answer to it, -J^-1 F_y dy, over the differential variables
   /// in tolerances; -1: F or the linear solver fails.
-  double answer(const Candidate& candidate, double cj);
+  double answer(const Candidate& candidate);
   /// That answer, until the next one; work space otherwise.
   const double* answer_entries() const { return work_entries_; }
   /// Is it that of the candidate as it is now?
@@ -82,11 +79,7 @@ class Polish {
   long iterations() const { return iterations_; }  ///< in this solve()
 
  private:
-  bool raised() const { return raised_order_ != nullptr && raised_order_->raised(); }
-  bool is_short(const Candidate& candidate, double length, double limit) const;
-  int residual(double cj, N_Vector into);
-  void listen(const Candidate& candidate);
-  bool newton_step_at_moved_point(const Candidate& candidate, double cj);
+  bool newton_step_at_moved_point(const Candidate& candidate);
   bool foretell(const Candidate& candidate, double cj, double tolerance);
   void look_at_pattern(const Candidate& candidate, double cj);
   double differential_length(const Candidate& candidate, N_Vector v);
@@ -96,7 +89,6 @@ class Polish {
   Statistics& statistics_;
   Corrector& corrector_;
   const AlgebraicVariables& variables_;
-  RaisedOrder* raised_order_ = nullptr;
   bool contiguous_ = false;
   int size_ = 0;
   OwnedVector delta_, corrected_, work_, noise_;

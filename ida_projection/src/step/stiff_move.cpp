@@ -46,7 +46,7 @@ double StiffMove::dot(const Vector& a, const Vector& b) const {
 bool StiffMove::answer(const Candidate& candidate, Polish& polish, const Vector& p, Vector& z) {
   const double* corrected = N_VGetArrayPointer(polish.corrected());
   for (std::size_t j = 0; j < p.size(); ++j) candidate.correction_entries[j] = corrected[j] - p[j];
-  if (polish.answer(candidate, candidate.cj) < 0.0) return false;
+  if (polish.answer(candidate) < 0.0) return false;
   const double* answer = polish.answer_entries();
   for (std::size_t j = 0; j < p.size(); ++j) z[j] = p[j] - answer[j];
   return true;

@@ -27,8 +27,6 @@ std::vector<Entry> entries(const Statistics& s) {
       count("steps of IDA without the plugin", "steps_without_plugin", s.steps_without_plugin),
       count("projections", "projections", s.projections),
       count("already on the constraints", "skipped", s.skipped),
-      count("left alone", "left_alone", s.left_alone),
-      count("projections with old factors", "chord_projections", s.chord_projections),
       count("Newton moves", "iterations", s.iterations),
       count("evaluations of g", "value_evaluations", s.value_evaluations),
       count("evaluations of C", "jacobian_evaluations", s.jacobian_evaluations),

@@ -56,14 +56,6 @@ struct Options {
   /// Newton moves at most in one step; >= 1.
   int maximum_iterations = 5;
 
-  /// n >= 1: accepted steps n, 2n, 3n, ... are projected with C evaluated and factorised anew. Any
-  /// other step is not projected while its predicted drift is below 0.003 tolerances, and otherwise
-  /// moved with the existing factors, to 0.02 tolerances; it is projected in full if these factors
-  /// no longer converge well or would move it astray, while the step size grows, and after steps
-  /// that IDA rejected. Saves up to two thirds of the evaluations and factorisations of C; the
-  /// number of steps stays that of frequency 1.
-  int frequency = 1;
-
   /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in
   /// tolerances; >= 0.1.
   double largest_move = 10.0;
@@ -117,12 +109,6 @@ struct Options {
   /// IDASetEtaFixedStepBounds, and multiplies the error weights in the three steps that lower the
   /// order.
   bool limit_order = true;
-
-  /// At orders 3 to 5 take the leading term of the formula's own error out of each step, while F is
-  /// not stiff (ida_projection/README.md, section 9.3): smaller errors at the same tolerance and
-  /// number of steps. For forms of index 0 and 1, with a direct linear solver,
-  /// extra_iterations 1 and frequency 1, while step sizes are not smoothed; else without effect.
-  bool raise_order = false;
 
   /// Components that a move must not change: true = held. Empty, or one entry for each unknown
   /// (serial vectors). For other vectors use `hold_vector`: 1 free, 0 held.

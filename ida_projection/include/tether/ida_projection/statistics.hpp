@@ -14,8 +14,6 @@ struct Statistics {
   long steps_without_plugin = 0;  ///< IDA took them with another nonlinear solver, see never_called
   long projections = 0;           ///< steps (attempts) that were projected
   long skipped = 0;               ///< attempts already on the constraints, nothing moved
-  long left_alone = 0;            ///< attempts not looked at (Options::frequency)
-  long chord_projections = 0;     ///< moved with factors of an earlier step (Options::frequency)
   long iterations = 0;            ///< Newton moves, and solutions for what rounding asks for
   long value_evaluations = 0;     ///< g
   long jacobian_evaluations = 0;  ///< C, however formed

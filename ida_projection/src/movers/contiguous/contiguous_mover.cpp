@@ -122,7 +122,7 @@ bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
 // keeps by itself between the steps that need them.
 template <class Rows>
 bool ContiguousMover<Rows>::still_nothing(const Candidate& candidate, Move& result) {
-  if (nothing_in_row_ < kQuiet || options_.frequency > 1) return false;
+  if (nothing_in_row_ < kQuiet) return false;
   result.status = rows_.value(candidate.t);
   if (result.status != Status::success) return true;
   result.looked = still_ = plainly_nothing();
@@ -148,7 +148,6 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;
   leave_rounding_out();
-  if (options_.frequency > 1) keep_old_move(candidate.t);
   firm_only_ = start_known_ = false;
   looks_ = 0;
   if (quick_move(candidate, result)) return result;
@@ -183,10 +182,9 @@ bool ContiguousMover<Rows>::quick_move(const Candidate& candidate, Move& result)
     result = newton(candidate, drift);
     return false;
   }
-  renewed(candidate.t);
+  kept_ = {kUnknownSlope, 0};
   monitor_.start();
-  if (options_.frequency > 1 || !(length <= options_.largest_move) ||
-      !monitor_.plainly_done(length)) {
+  if (!(length <= options_.largest_move) || !monitor_.plainly_done(length)) {
     result = newton(candidate, drift, &length);
     return false;
   }
@@ -277,7 +275,6 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
 
     if (result.moves == 1) {
       result.length = move_length_ = length;
-      if (options_.frequency > 1) compare_with_old_move();
       double limit = 0.0;
       if (!std::isfinite(length) || too_long(length, limit)) {
         if (options_.long_move == LongMove::reject || !std::isfinite(length)) {

@@ -43,11 +43,6 @@ class ContiguousMover final : public Mover {
 
   Move measure(const Candidate& candidate) override;
   Move move(const Candidate& candidate) override;
-  // Which of the thin rows count was judged at another point.
-  bool may_follow() override {
-    return rows_.factors.there && !rows_.factors.thin && wear_.usable();
-  }
-  Move follow(const Candidate& candidate, bool again) override;
   int rank_of_factors() const override {
     const FactorState& at_hand = rows_.factors;
     const bool serve = at_hand.there && !at_hand.thin && !at_hand.partial && !at_hand.foreign;
@@ -113,8 +108,6 @@ class ContiguousMover final : public Mover {
     rows_.reset();
     monitor_.reset();
     staleness_.reset();
-    wear_ = FactorWear();
-    misdirection_ = Misdirection();
     nothing_in_row_ = 0;
     still_ = looked_at_all_ = false;
     move_length_ = 0.0;
@@ -130,13 +123,8 @@ class ContiguousMover final : public Mover {
   Status take_rest(const Candidate& candidate, double reach);
   Status factor(double t) {
     const Status status = rows_.factor(t);
-    if (status == Status::success) renewed(t);
+    if (status == Status::success) kept_ = {kUnknownSlope, 0};
     return status;
-  }
-  void renewed(double t) {
-    kept_ = {kUnknownSlope, 0};
-    wear_.renewed();
-    misdirection_.renewed(t);
   }
   // In the first steps IDA chooses the order by errors that are as short as moves which answer the
   // rounding of many rows: these would keep a run at order 1 until h is long. Later on a dead point
@@ -150,9 +138,6 @@ class ContiguousMover final : public Mover {
   bool plainly_nothing();
   bool still_nothing(const Candidate& candidate, Move& result);
   bool must_learn(double length) const;
-  double in_metric(const std::vector<double>* other);
-  void keep_old_move(double t);
-  void compare_with_old_move();
   void restart(const Candidate& candidate);
   bool quick_move(const Candidate& candidate, Move& result);
   Move newton(const Candidate& candidate, double drift_before, const double* first = nullptr);
@@ -180,10 +165,7 @@ class ContiguousMover final : public Mover {
   int nothing_in_row_ = 0;  // moves that were none
   bool still_ = false;      // the last candidate was only looked at
   Staleness staleness_;
-  FactorWear wear_;  // for follow(), as is what comes next
-  Misdirection misdirection_;
   std::vector<double> elsewhere_;  // work space of solve_at()
-  std::vector<double> old_move_;   // with the factors that move() found; empty: unknown
 };
 
 }  // namespace tether::ida_projection

@@ -45,7 +45,6 @@ class VectorMover final : public Mover {
         work_(like),
         metric_(options, like),
         rows_(constraints, statistics, like) {
-    if (options.frequency > 1) old_move_ = OwnedVector(like);
     free_all();
     reset();
   }
@@ -60,7 +59,6 @@ class VectorMover final : public Mover {
     metric_.reset();
     monitor_.reset();
     wear_ = FactorWear();
-    misdirection_ = Misdirection();
     factored_ = false;
   }
 
@@ -114,19 +112,6 @@ class VectorMover final : public Mover {
     return result;
   }
 
-  bool may_follow() override { return factored_ && wear_.usable(); }
-  Move follow(const Candidate& candidate, bool again) override {
-    if (again)
-      N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
-    else
-      load(candidate);
-    if (!again) misdirection_.look(candidate.t);
-    const auto allows = [&] { return again || misdirection_.allows(in_metric(dy_, candidate)); };
-    return chord_moves(candidate, allows, misdirection_.far(),
-                       1e2 * kEpsilon * N_VWrmsNorm(y_, candidate.weights), options_.largest_move,
-                       kMayFollowLeave);
-  }
-
   // A short move by factors of an earlier step leaves a part of itself that their age tells; where
   // that is too much Newton's method goes on from where it ends.
   Move move(const Candidate& candidate) override {
@@ -134,8 +119,7 @@ class VectorMover final : public Mover {
     Move result;
     if (factors_last() && wear_.usable()) {
       load(candidate);
-      const auto any = [] { return true; };
-      result = chord_moves(candidate, any, false, 0.0, kShort, kSafe * options_.tolerance);
+      result = chord_moves(candidate, kShort, kSafe * options_.tolerance);
       if (result.status == Status::success || fatal_) return result;
     }
     const double moved = result.length;
@@ -149,14 +133,32 @@ class VectorMover final : public Mover {
   // back with the factors of the step alone.
   bool factors_last() const { return no_settle_ && !metric_.local() && factored_ && rows_.whole(); }
 
-  // After load(): moves with the factors at hand.
-  template <class Allows>
-  Move chord_moves(const Candidate& candidate, Allows allows, bool far, double floor,
-                   double longest, double may_be_left) {
-    return move_with_old_factors(
-        wear_, [&] { return value(candidate.t); }, [&] { return solve(candidate.weights); },
-        [&] { apply(candidate); }, [&] { return drift(); }, allows, far, floor, longest,
-        may_be_left);
+  // After load(): moves with the factors at hand, none of them longer than `longest`. Another
+  // status than success: they leave more than `may_be_left`.
+  Move chord_moves(const Candidate& candidate, double longest, double may_be_left) {
+    constexpr int kMostMoves = 3;
+    Move result;
+    double previous = 0.0;
+    while (result.moves < kMostMoves && value(candidate.t) == Status::success) {
+      const double length = solve(candidate.weights);
+      if (!(length <= longest)) break;
+      if (result.moves == 0) {
+        result.length = length;
+        result.drift_before = drift();
+      } else {
+        wear_.looked(length / previous);
+      }
+      apply(candidate);
+      ++result.moves;
+      const bool look = result.moves == 1 && wear_.must_look(length, may_be_left);
+      if (length <= 0.0 || (!look && wear_.rate() * length <= may_be_left)) {
+        result.status = Status::success;
+        break;
+      }
+      if (wear_.rate() > FactorWear::kWornOut) break;
+      previous = length;
+    }
+    return result;
   }
 
   // The whole move dy.
@@ -169,7 +171,6 @@ class VectorMover final : public Mover {
     Move result;
     load(candidate);
     if ((result.status = value(candidate.t)) != Status::success) return result;
-    const bool compare = keep_old_move(candidate);
     metric_.set(candidate, dy_);
     result.drift_before = result.drift_after = drift();
     monitor_.start();
@@ -182,7 +183,6 @@ class VectorMover final : public Mover {
       const double length = solve(candidate.weights);
       if (++result.moves == 1) {
         result.length = length;
-        if (compare) compare_with_old_move(candidate);
         const double limit =
             length <= options_.largest_move
                 ? options_.largest_move
@@ -224,28 +224,6 @@ class VectorMover final : public Mover {
     return result;
   }
 
-  // rms of v_i / D_i; in tolerances where vectors cannot tell which D_i are 0.
-  double in_metric(N_Vector v, const Candidate& candidate) {
-    if (v->ops->nvinvtest == nullptr) return N_VWrmsNorm(v, candidate.weights);
-    N_VConst(0.0, work_);
-    (void)N_VInvTest(metric_.D(), work_);
-    return N_VWrmsNorm(v, work_);
-  }
-
-  // With the factors of an earlier candidate, in their metric: how far do they go astray?
-  bool keep_old_move(const Candidate& candidate) {
-    misdirection_.look(candidate.t);
-    if (options_.frequency == 1 || !factored_) return false;
-    solve(candidate.weights);
-    --statistics_.iterations;
-    N_VScale(1.0, dy_, old_move_);
-    return true;
-  }
-  void compare_with_old_move(const Candidate& candidate) {
-    N_VLinearSum(1.0, dy_, -1.0, old_move_, old_move_);
-    misdirection_.measured(in_metric(old_move_, candidate), in_metric(dy_, candidate));
-  }
-
   void free_all() {
     holds_algebraic_ = false;
     metric_.free_all();
@@ -279,7 +257,6 @@ class VectorMover final : public Mover {
     if ((status = told(rows_.factor(metric_, terms_at))) != Status::success) return status;
     factored_ = true;
     wear_.renewed();
-    misdirection_.renewed(candidate.t);
     return Status::success;
   }
 
@@ -305,9 +282,7 @@ class VectorMover final : public Mover {
   OwnedVector y_, dy_, work_;
   VectorMetric metric_;
   Rows rows_;
-  FactorWear wear_;  // for follow(), as is what comes next
-  Misdirection misdirection_;
-  OwnedVector old_move_;
+  FactorWear wear_;
   bool factored_ = false;
   bool no_settle_ = false;
   N_Vector id_ = nullptr;         // the caller's of set_algebraic()
