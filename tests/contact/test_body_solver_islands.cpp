@@ -399,6 +399,18 @@ TEST_CASE("sweeps that get on are not left for an assembly that is dearer") {
   }
 }
 
+TEST_CASE("max_sweeps do not force an assembly that is dearer than the sweeps left") {
+  const random::RigidAssembly a = box_on_spheres(400, 0);
+  BodyOptions o;
+  o.max_sweeps = 1000;
+  const BodySolution s = BodySolver(o).solve(a.bodies, a.contacts);
+  INFO(name(s.status) << " " << s.error << ", " << s.sweeps);
+  CHECK(s.status == Status::solved);
+  CHECK(s.assembled_islands == 0);
+  CHECK(s.sweeps > 1000);
+  CHECK(s.sweeps < 1500);
+}
+
 TEST_CASE("what rests for hundreds of sweeps and is solved later is not called cycling") {
   const random::Packing p = random::packing(9, true, 2);
   BodyOptions o;

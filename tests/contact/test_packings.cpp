@@ -397,7 +397,8 @@ TEST_CASE("packings: bodies that sweeps leave unsolved are assembled, 1200 conta
     const BodySolution s = BodySolver(o).solve(p.bodies, p.contacts);
     INFO((spheres ? "spheres" : "bodies") << ": " << name(s.status) << " " << s.error);
     CHECK(s.status == Status::solved);
-    CHECK(s.assembled_islands == 1);
+    // Sweeps solve the spheres for half the price of the assembled problem.
+    CHECK(s.assembled_islands == (spheres ? 0 : 1));
     CHECK(evaluate(p.bodies, p.contacts, o.law, s.impulses).fixed_point <= 1e-6);
     o.max_assembled = 1000;
     CHECK(BodySolver(o).solve(p.bodies, p.contacts).assembled_islands == 0);

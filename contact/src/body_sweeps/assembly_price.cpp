@@ -8,8 +8,9 @@
 namespace tether::contact::detail {
 namespace {
 
-// Measured on stacks, lattices and packings of 8 to 7600 contacts (ns).
-constexpr double kBodySweep = 50;     // a contact
+// Measured on stacks, lattices, heaps and packings (ns).
+constexpr double kInFours = 22;       // a contact and sweep
+constexpr double kAlone = 48;         // the same of one that is in no group of four
 constexpr double kAssembly = 250;     // a block
 constexpr double kSteps = 10;         // factorisations from sticking to a solution, mostly
 constexpr double kMostSteps = 20;     // of a run of interior points
@@ -40,6 +41,12 @@ AssemblyPrice::AssemblyPrice(const ContactGraph& graph, const Island& island,
     : graph_(graph), island_(island), first_(first), second_(second) {
   for (int place = 0; place < island.contacts; ++place)
     blocks_ += static_cast<double>(graph.coupled[at(island.contact_begin + place)]);
+  const Chunk &from = graph.chunks[at(island.chunk_begin)],
+              &to = graph.chunks[at(island.chunk_end)];
+  int in_fours = 0;
+  for (const Kind kind : {Kind::general4, Kind::sphere4})
+    in_fours += to.begin[static_cast<int>(kind)] - from.begin[static_cast<int>(kind)];
+  sweep_ = kInFours * in_fours + kAlone * (island.contacts - in_fours);
 }
 
 // 4 ns for each product of blocks, and what is linear (InteriorPoint::cost, BodyNewton::cost).
@@ -77,11 +84,7 @@ double AssemblyPrice::factorisation() {
   return factorisation_;
 }
 
-double AssemblyPrice::sweep(int contacts) { return kBodySweep * contacts; }
-
-double AssemblyPrice::sweeps() {
-  return (kAssembly * blocks_ + kSteps * factorisation()) / sweep(island_.contacts);
-}
+double AssemblyPrice::sweeps() { return (kAssembly * blocks_ + kSteps * factorisation()) / sweep_; }
 
 bool AssemblyPrice::within(double work) {
   const double left = work - kAssembly * blocks_;

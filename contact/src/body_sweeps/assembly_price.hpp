@@ -15,7 +15,7 @@ class AssemblyPrice {
                 const std::vector<int>& second);
 
   // Cost of a sweep over the bodies.
-  static double sweep(int contacts);
+  double sweep() const { return sweep_; }
   // Cost of a solution by few factorisations, in sweeps over the bodies.
   double sweeps();
   // Whether `work` suffices for the stages of Solver to get anywhere.
@@ -27,7 +27,7 @@ class AssemblyPrice {
   const ContactGraph& graph_;
   const Island& island_;
   const std::vector<int>&first_, &second_;
-  double blocks_ = 0, factorisation_ = -1;
+  double sweep_ = 0, blocks_ = 0, factorisation_ = -1;
 };
 
 }  // namespace tether::contact::detail

@@ -11,11 +11,13 @@ namespace tether::contact {
 
 namespace {
 
-// More sweeps forecast than kSlow: momentum is used. More than assembly and solution are predicted
-// to cost, after sweeps for kTried of that: assembled.
+constexpr double kSlow = 15;  // sweeps forecast, from which on they have momentum
+// An assembled problem is tried after sweeps for kTried of its price, where they are forecast to
+// cost kDearer times that, with work for kRuns of it; later with what leaves it kShareOfSweeps of
+// the work of all sweeps, if that is as much as before.
+constexpr double kTried = 0.15, kDearer = 1.25, kRuns = 2, kShareOfSweeps = 0.5;
 constexpr int kFew = 64;        // see BodyOptions::min_sweeps
 constexpr double kShare = 0.1;  // of the tolerance, that round-off of the start may be
-constexpr double kSlow = 15, kTried = 0.25;
 
 }  // namespace
 
@@ -47,33 +49,46 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
   return r;
 }
 
-// Sweeps until the island is solved, max_sweeps are reached, or it should be assembled. Sweeps that
-// max_work pays for are made in any case, more as long as they get on.
+// Sweeps until the island is solved or an assembled problem is forecast to cost less. Sweeps that
+// max_work pays for are made in any case, more as long as they get on; max_sweeps end them where
+// they are not cheaper than what would follow.
 void BodySolver::Implementation::iterate(int k, Team& team) {
   const Island& island = graph.islands[at(k)];
   const bool again = results[at(k)].assembled;
-  const bool permitted = !again && island.contacts <= options.max_assembled;
   const detail::WholeGraph whole =
       team.partners ? partners->whole() : detail::WholeGraph{graph, given.first(), given.second()};
   detail::AssemblyPrice price(whole.graph, whole.graph.islands[at(k)], whole.first, whole.second);
+  const auto permitted = [&] {
+    return island.contacts <= options.max_assembled && price.within(options.max_work);
+  };
   const bool at_once = team.partners && partners->relaxed();
   IslandResult r = again ? results[at(k)] : start(island, team);
   const double allowed = options.tolerance / r.inverse_scale;
   const double bound = std::max(allowed * allowed, r.floor);
-  const double paid =
-      options.max_work / detail::AssemblyPrice::sweep(whole.graph.islands[at(k)].contacts);
+  const double paid = options.max_work / price.sweep();
   int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   int failed_tests = 0;
+  double more_before = 0;  // forecast when it was last due
   detail::AtOnce together;
   detail::Forecast forecast(r.sweeps, r.least_change);
   detail::Momentum momentum;
   detail::BestPoint best(options.max_sweeps);
+  r.status = Status::unsolved;
+  r.assembly = 0;
   if (again) best.want(r.error / r.inverse_scale);
-  // Slow even with momentum, and after a fair trial dearer than assembly and solution.
-  const auto assembly_is_cheaper = [&](double more) {
-    if (!permitted || !momentum.on() || !(more > r.sweeps / kTried)) return false;
-    const double assembly = price.sweeps();
-    return r.sweeps > kTried * assembly && more > assembly && price.within(options.max_work);
+  // Work for an assembled problem where sweeps are forecast to cost more, else 0.
+  const auto assembly = [&](double more) -> double {
+    if (!momentum.on() || !permitted()) return 0;
+    const double once = price.sweeps(), spent = r.spent / price.sweep();
+    const double work = std::max(kRuns * once, kShareOfSweeps * r.sweeps - spent);
+    if (r.sweeps < kTried * once || more < kDearer * once || work < spent) return 0;
+    return std::min(options.max_work, work * price.sweep());
+  };
+  // The user's limit, beyond which sweeps go on that cost less than the assembly would.
+  const auto limited = [&](double most) {
+    if (r.sweeps < options.max_sweeps) return false;
+    if (r.sweeps <= detail::Forecast::kFirst || !permitted()) return true;
+    return r.sweeps + forecast.more(r.sweeps, most, bound) > options.max_sweeps + price.sweeps();
   };
   for (;;) {
     const PassResult change = sweeps.sweep(island, team);
@@ -83,21 +98,20 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
     }
     ++r.sweeps;
     forecast.add(change.sum);
-    if (r.sweeps == detail::BestPoint::kFirst && !(permitted && price.within(options.max_work)))
-      best.want();
+    if (r.sweeps == detail::BestPoint::kFirst && !permitted()) best.want();
     const bool due = forecast.due(r.sweeps);
-    const bool limit = r.sweeps >= options.max_sweeps;
-    const bool last = limit || (due && r.sweeps > paid &&
-                                forecast.in_vain(r.sweeps, change.most, bound, options.max_sweeps));
+    r.ended = limited(change.most) ||
+              (due && r.sweeps > paid &&
+               forecast.in_vain(r.sweeps, change.most, bound, options.max_sweeps));
     // The change by a sweep is close to the residual, which would cost another pass.
-    if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || last) {
+    if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || r.ended) {
       double residual = sweeps.test(island, team).most;
-      if (r.stale && (last || residual <= bound)) {
+      if (r.stale && (r.ended || residual <= bound)) {
         sweeps.refresh(island, team);
         r.stale = false;
         residual = sweeps.test(island, team).most;
       }
-      r.saved = last && !best.last_is_best(residual);
+      r.saved = r.ended && !best.last_is_best(residual);
       if (r.saved) residual = best.residual();
       r.error = r.relative(residual);
       if (residual <= bound) {
@@ -108,13 +122,16 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
     } else if (best.look(r.sweeps, change.most) && best.improved(sweeps.test(island, team).most)) {
       save(island, team);
     }
-    if (last) {
+    if (r.ended) {
       r.status = forecast.no_progress() ? Status::cycling : Status::work_limit;
+      if (permitted()) r.assembly = options.max_work;
       break;
     }
     if (due) {
       const double more = forecast.more(r.sweeps, change.most, bound);
-      if (assembly_is_cheaper(more)) break;
+      r.assembly = assembly(std::min(more, more_before));
+      if (r.assembly > 0) break;
+      more_before = more;
       if (more > kSlow && r.sweeps > detail::Forecast::kFirst && !at_once) momentum.start();
       best.forecast(r.sweeps + more);
       forecast.made();
@@ -122,7 +139,6 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
     if (momentum.on()) sweeps.extrapolate(island, team, momentum.next(change.sum));
   }
   r.least_change = forecast.least();
-  r.assemblable = r.status != Status::solved && permitted && price.within(options.max_work);
   if (team.thread == 0) results[at(k)] = r;
 }
 

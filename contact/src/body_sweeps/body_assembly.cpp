@@ -12,13 +12,13 @@ using Eigen::Vector3d;
 
 namespace {
 
-Options solver_options(const BodyOptions& options) {
+Options solver_options(const BodyOptions& options, double work) {
   Options o;
   o.law = options.law;
   o.measure = Measure::fixed_point;
   o.tolerance = 0.9 * options.tolerance;  // the two forms round differently
   o.strict = options.strict;
-  o.max_work = options.max_work;
+  o.max_work = work;
   o.enough = options.enough;
   return o;
 }
@@ -69,8 +69,9 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
   r.assembled = true;
   Eigen::VectorXd x;
   const Problem problem = assembled(island, worker, x);
-  worker.solver = std::make_unique<Solver>(solver_options(options));
+  worker.solver = std::make_unique<Solver>(solver_options(options, r.assembly));
   worker.solution = worker.solver->solve(problem, x);
+  r.spent += r.assembly;
   r.status = worker.solution.status;
   r.error = worker.solution.error;
   take(island, worker);
@@ -83,16 +84,19 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
     judge_with_long_sums(k);
 }
 
-// Sweeps that had not come to their end go on where max_work was not enough, from the better point.
+// Sweeps that had not come to their end go on from where the assembled problem is left unsolved.
 void BodySolver::Implementation::assemble_and_sweep_on(int k, Worker& worker) {
   const Island& island = graph.islands[at(k)];
   Team one{0, 1, nullptr, &worker.scratch};
   const IslandResult& r = results[at(k)];
-  const bool ended = r.status != Status::unsolved;
-  assemble(k, worker);
-  sweeps.unpack(island, one, *out);
-  if (ended || r.status != Status::work_limit || !worker.solution.replaced.empty()) return;
-  iterate(k, one);
+  while (r.assembly > 0) {
+    assemble(k, worker);
+    sweeps.unpack(island, one, *out);
+    if (r.ended || r.status == Status::solved || r.status == Status::infeasible ||
+        !worker.solution.replaced.empty())
+      return;
+    iterate(k, one);
+  }
   if (!r.saved) sweeps.unpack(island, one, *out);
 }
 

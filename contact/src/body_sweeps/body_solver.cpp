@@ -69,7 +69,7 @@ void BodySolver::Implementation::together(int k, Team& team) {
   }
   team.meet();
   const IslandResult& r = results[at(k)];
-  if (!r.assemblable && !r.saved) sweeps.unpack(island, team, *out);
+  if (!(r.assembly > 0) && !r.saved) sweeps.unpack(island, team, *out);
 }
 
 void BodySolver::Implementation::alone(int k, Worker& worker) {
@@ -80,7 +80,7 @@ void BodySolver::Implementation::alone(int k, Worker& worker) {
     sweeps.load(island, team);
     iterate(k, team);
   }
-  if (r.assemblable) return assemble_and_sweep_on(k, worker);
+  if (r.assembly > 0) return assemble_and_sweep_on(k, worker);
   if (!r.saved) sweeps.unpack(island, team, *out);
 }
 
@@ -160,7 +160,7 @@ void BodySolver::Implementation::solve_islands(int threads) {
     try {
       for (int k = next.fetch_add(kBatch); k < islands; k = next.fetch_add(kBatch)) {
         for (int i = k; i < std::min(k + kBatch, islands); ++i) {
-          if (here(i) && !shared(i) && (!large(i) || results[at(i)].assemblable)) alone(i, worker);
+          if (here(i) && !shared(i) && (!large(i) || results[at(i)].assembly > 0)) alone(i, worker);
         }
       }
     } catch (...) {

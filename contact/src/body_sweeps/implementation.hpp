@@ -28,8 +28,11 @@ struct IslandResult {
   double relative(double square) const {
     return square <= floor ? 0 : std::sqrt(square) * inverse_scale;
   }
-  bool stale = false;        // velocities hold round-off of much larger impulses to start from
-  bool assemblable = false;  // unsolved, and a Problem of it is allowed and affordable
+  bool stale = false;  // velocities hold round-off of much larger impulses to start from
+  // Work that a Problem of it may take: sweeps are forecast to need more, or have ended. 0: none.
+  double assembly = 0;
+  double spent = 0;    // work of assemblies so far
+  bool ended = false;  // sweeps do not get on, or may not
   bool assembled = false;
   bool saved = false;  // an earlier point was the best and is unpacked already
 };

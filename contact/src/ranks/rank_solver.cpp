@@ -138,7 +138,7 @@ void RankSolver::Implementation::finish(bool failed) {
   for (double f : failures)
     if (f != 0) return;
   for (int k = 0; k < static_cast<int>(plan.shared.size()); ++k)
-    if (plan.shared[at(k)] && engine.results[at(k)].assemblable && !assemble(k)) return;
+    if (plan.shared[at(k)] && engine.results[at(k)].assembly > 0 && !assemble(k)) return;
 }
 
 // On the rank that has the first chunk. False: it could not, and throws.

@@ -36,8 +36,9 @@ struct BodyOptions {
   /// Wanted Residuals::fixed_point of each contact: the error of its velocity over the largest
   /// velocity that a contact of its island needs.
   double tolerance = 1e-6;
-  /// Sweeps over one island, at most. They end before where `max_work` is spent and they no longer
-  /// get on. An island that needs more and is not assembled ends with the best iterate found.
+  /// Sweeps over one island, at most; more only where they are forecast to cost less than the
+  /// assembled problem. They end before where `max_work` is spent and they no longer get on. An
+  /// island that needs more and is not assembled ends with the best iterate found.
   int max_sweeps = 200000;
   /// Sweeps before an island of more than 64 contacts may be called solved. The tolerance is
   /// relative to the whole island, so a single contact of many may be off by far more than its
@@ -48,9 +49,10 @@ struct BodyOptions {
   bool warm_start = true;  ///< contacts with an id start from their impulse of the previous solve
   /// Largest number of contacts of an island that may be assembled and given to Solver, whose
   /// stages also solve stacks, large mass ratios and high friction. That happens where the work
-  /// predicted from the contact graph is less than the work of the remaining sweeps, or sweeps have
-  /// ended, and max_work allows it. Bounds the memory: 1.3 kB a contact in a packing, 20 to 30 kB
-  /// with a factorisation. 0: never.
+  /// predicted from the contact graph is less than that of the remaining sweeps, or sweeps have
+  /// ended, and max_work allows it. An attempt has a share of the work of the sweeps, which go on
+  /// where it fails. Bounds the memory: 1.3 kB a contact in a packing, 20 to 30 kB with a
+  /// factorisation. 0: never.
   int max_assembled = 100000;
   bool strict = false;    ///< as Options::strict, for assembled islands
   double max_work = 1e9;  ///< as Options::max_work, for each assembled island; and see max_sweeps
