@@ -1,4 +1,4 @@
-// Bodies with joints at one instant, for the tests of JointSolver. SPDX-License-Identifier:
+// Bodies with joints at one instant, solved by what steps use. SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 
@@ -6,6 +6,9 @@
 #include <tether/contact/joints.hpp>
 #include <tether/linalg/index.hpp>
 #include <vector>
+
+#include "joints/jointed_contacts.hpp"
+#include "joints/mechanisms.hpp"
 
 namespace jointed_bodies {
 
@@ -19,6 +22,14 @@ constexpr int kWorld = -1;
 
 inline double radians(double degrees) { return degrees * 3.14159265358979323846 / 180; }
 using tether::linalg::at;
+
+struct JointSolution {
+  tc::detail::JointedContacts::Result contacts;
+  double joint_error = 0;
+  tether::linalg::VectorX impulses, joint_impulses;  // contact frame; by row
+  std::vector<Vector6d> velocities;
+  std::vector<int> contradicting;
+};
 
 /// Bodies, rows and contacts in world axes. Each joint gets the next number.
 struct Mechanism {
@@ -51,9 +62,8 @@ struct Mechanism {
     return static_cast<int>(bodies.size()) - 1;
   }
   /// Velocity of the point p of `first` against `second` along u.
-  void along(int first, int second, const Vector3d& p, const Vector3d& u, double rate = 0,
-             double compliance = 0) {
-    rows.add(joints, rate, compliance);
+  void along(int first, int second, const Vector3d& p, const Vector3d& u, double rate = 0) {
+    rows.add(joints, rate);
     for (const int b : {first, second}) {
       if (b < 0) continue;
       Vector6d G;
@@ -98,14 +108,25 @@ struct Mechanism {
     for (tc::RigidBody& b : bodies)
       if (b.moves()) b.velocity += dt * gravity;
   }
-  tc::JointSolution solve(tc::Options options = coulomb()) const {
-    return tc::JointSolver(options).solve(bodies, rows, contacts);
-  }
-  static tc::Options coulomb() {
+  /// As a step does: velocities onto the joints, then impulses of the contacts.
+  JointSolution solve() const {
     tc::Options options;
     options.law = tc::Law::coulomb;
     options.tolerance = 1e-12;
-    return options;
+    JointSolution out;
+    tc::detail::Mechanisms mechanisms;
+    mechanisms.update(bodies, rows);
+    for (const tc::RigidBody& body : bodies) out.velocities.push_back(body.velocities());
+    mechanisms.satisfy(rows, out.velocities);
+    out.contradicting = mechanisms.contradicting();
+    out.impulses.setZero(3 * static_cast<Eigen::Index>(contacts.size()));
+    out.contacts = tc::detail::JointedContacts(options).solve(mechanisms, contacts, {},
+                                                              out.velocities, out.impulses);
+    mechanisms.satisfy(rows, out.velocities);  // removes rounding errors
+    out.joint_error = mechanisms.error(rows, out.velocities);
+    out.joint_impulses.setZero(rows.count());
+    mechanisms.impulses(out.joint_impulses.data());
+    return out;
   }
   double energy(const std::vector<Vector6d>& v) const {
     double sum = 0;

@@ -348,12 +348,12 @@ TEST_CASE("bad input: the same words in a host whose numbers have a comma") {
     JointRows rows;
     JointLaws laws;
     return refused_problem([](Good& p) { p.mu[0] = -0.125; }) + "\n" +
-           refusal([&] { rows.add(12345, 0, -0.5); }) + "\n" +
+           refusal([&] { rows.add(12345, INFINITY); }) + "\n" +
            refusal([&] { laws.add_bounded(2, 0, -0.25); });
   };
   const std::string plain = said();
   for (const char* part :
-       {"mu = -0.125", "joint 12345: compliance = -0.5:", "joint 2: bound = -0.25:"})
+       {"mu = -0.125", "joint 12345: rate = inf:", "joint 2: bound = -0.25:"})
     CHECK_THAT(plain, Contains(part));
   const tether::test::CommaLocale here;
   CHECK(said() == plain);

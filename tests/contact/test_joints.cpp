@@ -1,5 +1,6 @@
 // Joints and contacts in one solve. SPDX-License-Identifier: BSD-3-Clause
 #include <cstdlib>
+#include <tether/contact/evaluate.hpp>
 #include <tether/linalg/pivoted_qr.hpp>
 
 #include "jointed_bodies.hpp"
@@ -24,7 +25,7 @@ struct Cart : Mechanism {
 };
 
 // Along the slope: across it the axles hold the wheels against each other as they like.
-double friction(const tc::JointSolution& s, int contact) {
+double friction(const JointSolution& s, int contact) {
   return std::abs((tc::tangent_frame(Vector3d::UnitZ()).bottomRows<2>().transpose() *
                    s.impulses.segment<2>(3 * contact + 1))[0]);
 }
@@ -56,8 +57,8 @@ struct Parallelogram : Mechanism {
 TEST_CASE("joints: a cart on four hinged discs rolls down a slope, or slips") {
   const double slope = radians(10), limit = 0.0220408725886;
   const Cart rolls(10, 0.5);
-  const tc::JointSolution s = rolls.solve();
-  CHECK(s.status == tc::Status::solved);
+  const JointSolution s = rolls.solve();
+  CHECK(s.contacts.status == tc::Status::solved);
   CHECK(s.joint_error < 1e-13);
   for (const Vector6d& v : s.velocities) CHECK(v[0] == Approx(1.490552545048513).epsilon(1e-12));
   for (int k = 0; k < 4; ++k) CHECK(friction(s, k) == Approx(0.7452762725242567).epsilon(1e-10));
@@ -67,8 +68,8 @@ TEST_CASE("joints: a cart on four hinged discs rolls down a slope, or slips") {
 
   // The rear wheels carry more: they grip for longer than the front ones.
   CHECK(Cart(10, 10 * limit).solve().velocities[0][0] == Approx(1.490552545048513).epsilon(1e-10));
-  const tc::JointSolution slips = Cart(10, limit / 10).solve();
-  CHECK(slips.status == tc::Status::solved);
+  const JointSolution slips = Cart(10, limit / 10).solve();
+  CHECK(slips.contacts.status == tc::Status::solved);
   CHECK(slips.velocities[0][0] ==
         Approx(kGravity * (std::sin(slope) - limit / 10 * std::cos(slope))).epsilon(1e-10));
 }
@@ -85,9 +86,9 @@ TEST_CASE("joints: a hinged rod on a belt, trailing and leading, up to where it 
       const int ground = m.fixed({belt, 0, 0});
       m.touch(rod, ground, tip, Vector3d::UnitZ(), mu);
       m.fall(1e-3);
-      const tc::JointSolution s = m.solve();
+      const JointSolution s = m.solve();
       INFO(degrees << " degrees, belt " << belt);
-      CHECK(s.status == tc::Status::solved);
+      CHECK(s.contacts.status == tc::Status::solved);
       const double wanted = kGravity / 2 / (1 + belt * mu * std::tan(a));
       CHECK(s.impulses[0] / 1e-3 == Approx(wanted).epsilon(1e-11));
       if (degrees == 30)
@@ -95,9 +96,9 @@ TEST_CASE("joints: a hinged rod on a belt, trailing and leading, up to where it 
       // mu tan > 1: nothing holds the tip without driving it in.
       if (degrees == 60 && belt < 0) {
         m.contacts[0].mu = 0.6;
-        CHECK(m.solve().status != tc::Status::solved);
+        CHECK(m.solve().contacts.status != tc::Status::solved);
         m.contacts[0].mu = 0.57;
-        CHECK(m.solve().status == tc::Status::solved);
+        CHECK(m.solve().contacts.status == tc::Status::solved);
       }
     }
   }
@@ -114,9 +115,9 @@ TEST_CASE("joints: a step ladder stands on friction of half the cotangent") {
       m.touch(p, kWorld, left, Vector3d::UnitZ(), mu);
       m.touch(q, kWorld, right, Vector3d::UnitZ(), mu);
       m.fall(1);
-      const tc::JointSolution s = m.solve();
+      const JointSolution s = m.solve();
       INFO(degrees << " degrees, " << part << " of the limit");
-      CHECK(s.status == tc::Status::solved);
+      CHECK(s.contacts.status == tc::Status::solved);
       const double speed = s.velocities[0].norm() + s.velocities[1].norm();
       CHECK((part > 1 ? speed < 1e-9 : speed > 1e-5));
       CHECK(s.impulses[0] == Approx(part > 1 ? kGravity : s.impulses[3]).epsilon(1e-9));
@@ -129,8 +130,8 @@ TEST_CASE("joints: an elastic impact takes (1 - e^2) w_n^2 / (2 J P J') through 
     for (const double e : {0.0, 0.5, 1.0}) {
       Parallelogram m(copies, 0);
       m.contacts[0].bias[0] = -e;  // w_n+ = e, approach 1
-      const tc::JointSolution s = m.solve();
-      CHECK(s.status == tc::Status::solved);
+      const JointSolution s = m.solve();
+      CHECK(s.contacts.status == tc::Status::solved);
       // One degree of freedom: reduced mass 2 + 3/3 kg at the coupler.
       const double before = m.energy(s.velocities) + (1 - e * e) * 3.0 / 2;
       std::vector<Vector6d> came;
@@ -146,9 +147,9 @@ TEST_CASE(
     "joints: ten copies of every joint give the same answer, and a tenth of the impulse each") {
   Parallelogram one(1, 0.4), ten(10, 0.4);
   for (Mechanism* m : {static_cast<Mechanism*>(&one), static_cast<Mechanism*>(&ten)}) m->fall(0.3);
-  const tc::JointSolution a = one.solve(), b = ten.solve();
-  REQUIRE(a.status == tc::Status::solved);
-  REQUIRE(b.status == tc::Status::solved);
+  const JointSolution a = one.solve(), b = ten.solve();
+  REQUIRE(a.contacts.status == tc::Status::solved);
+  REQUIRE(b.contacts.status == tc::Status::solved);
   CHECK((a.impulses - b.impulses).norm() < 1e-11 * a.impulses.norm());
   for (std::size_t i = 0; i < a.velocities.size(); ++i)
     CHECK((a.velocities[i] - b.velocities[i]).norm() < 1e-11);
@@ -168,10 +169,8 @@ TEST_CASE("joints: contradicting rates are named, other joints keep theirs") {
   m.drive(b, kWorld, Vector3d::UnitX(), 3);  // joint 0: alone
   m.drive(a, kWorld, Vector3d::UnitX(), 1);  // joints 1 and 2
   m.drive(a, kWorld, Vector3d::UnitX(), 2);
-  const tc::JointSolution s = m.solve();
-  CHECK(s.status == tc::Status::infeasible);
+  const JointSolution s = m.solve();
   CHECK(s.contradicting == std::vector<int>{1, 2});
-  CHECK(s.advice.find("joints 1, 2 contradict") != std::string::npos);
   CHECK(s.velocities[1][0] == Approx(3));
   CHECK(s.velocities[0][0] == Approx(1.5));  // least squares
   // The same rate twice contradicts nothing.
@@ -179,7 +178,7 @@ TEST_CASE("joints: contradicting rates are named, other joints keep theirs") {
   same.body(1, Matrix3d::Identity(), {0, 0, 0});
   same.drive(0, kWorld, Vector3d::UnitX(), 2);
   same.drive(0, kWorld, Vector3d::UnitX(), 2);
-  CHECK(same.solve().status == tc::Status::solved);
+  CHECK(same.solve().contradicting.empty());
 }
 
 TEST_CASE("joints: contacts whose normal velocity the joints hold are left out, or named") {
@@ -191,10 +190,10 @@ TEST_CASE("joints: contacts whose normal velocity the joints hold are left out, 
     m.touch(driven, kWorld, {0, 0, 0}, Vector3d::UnitZ(), 0.5);
     m.touch(free, kWorld, {3, 0, 0}, Vector3d::UnitZ(), 0.5);
     m.fall(1);
-    const tc::JointSolution s = m.solve();
+    const JointSolution s = m.solve();
     INFO("rate " << rate);
-    CHECK(s.blocked == (rate < 0 ? std::vector<int>{0} : std::vector<int>{}));
-    CHECK(s.status == (rate < 0 ? tc::Status::infeasible : tc::Status::solved));
+    CHECK(s.contacts.blocked == (rate < 0 ? std::vector<int>{0} : std::vector<int>{}));
+    CHECK(s.contacts.status == (rate < 0 ? tc::Status::infeasible : tc::Status::solved));
     CHECK(s.velocities[0][2] == Approx(rate));
     CHECK(s.impulses.head<3>().norm() == 0);
     CHECK(s.impulses[3] == Approx(kGravity));
@@ -208,26 +207,11 @@ TEST_CASE("joints: a driven plate drags what lies on it, and pays for it") {
   m.drive(plate, kWorld, Vector3d::UnitX(), 5);
   m.touch(block, plate, {0, 0, 0.1}, Vector3d::UnitZ(), 0.3);
   m.fall(1);
-  const tc::JointSolution s = m.solve();
-  CHECK(s.status == tc::Status::solved);
+  const JointSolution s = m.solve();
+  CHECK(s.contacts.status == tc::Status::solved);
   CHECK(s.velocities[0][0] == Approx(5));
   CHECK(s.velocities[1][0] == Approx(0.3 * kGravity));  // slides
   CHECK(std::abs(s.joint_impulses[0]) == Approx(4 * 5 + 0.3 * 2 * kGravity));
-}
-
-TEST_CASE("joints: compliance gives a row the velocity of its impulse") {
-  // m v = m v0 + x, v + c x = rate.
-  for (const double c : {1e-8, 0.1, 1e3}) {
-    Mechanism m;
-    const int a = m.body(2, Matrix3d::Identity(), {0, 0, 0});
-    m.bodies[0].velocity[0] = 1;
-    m.along(a, kWorld, {0, 0, 0}, Vector3d::UnitX(), 0.25, c);
-    const tc::JointSolution s = m.solve();
-    const double x = (0.25 - 1) / (c + 0.5);
-    CHECK(s.joint_impulses[0] == Approx(x).epsilon(1e-12));
-    CHECK(s.velocities[0][0] == Approx(1 + x / 2).epsilon(1e-12));
-    CHECK(s.joint_error < 1e-13);
-  }
 }
 
 TEST_CASE("joints: random mechanisms, against dense elimination") {
@@ -249,7 +233,7 @@ TEST_CASE("joints: random mechanisms, against dense elimination") {
     for (int i = 0; i < n; ++i)
       m.touch(i, i % 2 ? i - 1 : kWorld, m.centre[at(i)] + random(), random().normalized(),
               0.2 * i);
-    const tc::JointSolution s = m.solve();
+    const JointSolution s = m.solve();
 
     const int rows = m.rows.count(), contacts = static_cast<int>(m.contacts.size());
     Eigen::MatrixXd G = Eigen::MatrixXd::Zero(rows, 6 * n),
@@ -281,8 +265,8 @@ TEST_CASE("joints: random mechanisms, against dense elimination") {
     const Eigen::MatrixXd A = J * P * J.transpose();
     const tc::Problem problem = tc::Problem::dense((A + A.transpose()) / 2, -J * start, mu);
     const tc::Residuals r = tc::evaluate(problem, tc::Law::coulomb, s.impulses);
-    INFO("trial " << trial << ", " << s.advice << ", rank " << pivots.rank());
-    CHECK((s.status == tc::Status::solved || s.status == tc::Status::round_off));
+    INFO("trial " << trial << ", rank " << pivots.rank());
+    CHECK((s.contacts.status == tc::Status::solved || s.contacts.status == tc::Status::round_off));
     CHECK(r.signorini < 1e-9);
     CHECK(r.cone < 1e-9);
     CHECK(r.alignment < 1e-9);
@@ -301,7 +285,6 @@ TEST_CASE("joints: bad rows are refused by name") {
   m.body(1, Matrix3d::Identity(), {0, 0, 0});
   CHECK_THROWS_AS(m.rows.on(0, Vector6d::Ones()), std::invalid_argument);
   CHECK_THROWS_AS(m.rows.add(3, std::nan("")), std::invalid_argument);
-  CHECK_THROWS_AS(m.rows.add(3, 0, -1), std::invalid_argument);
   m.rows.add(3);
   CHECK_THROWS_AS(m.rows.on(0, Vector6d::Constant(INFINITY)), std::invalid_argument);
   CHECK_THROWS_WITH(m.solve(), "joint 3: row 0 is on no body that moves");

@@ -13,20 +13,15 @@ void JointRows::clear() {
   start_.resize(1);
   joint_.clear();
   rate_.clear();
-  compliance_.clear();
   terms_.clear();
 }
 
-void JointRows::add(int joint, double rate, double compliance) {
-  const std::string where = "joint " + std::to_string(joint) + ": ";
+void JointRows::add(int joint, double rate) {
   if (!std::isfinite(rate))
-    throw std::invalid_argument(where + "rate = " + detail::shown(rate) + ": must be finite");
-  if (!(compliance >= 0) || !std::isfinite(compliance))
-    throw std::invalid_argument(where + "compliance = " + detail::shown(compliance) +
-                                ": must be >= 0 and finite");
+    throw std::invalid_argument("joint " + std::to_string(joint) +
+                                ": rate = " + detail::shown(rate) + ": must be finite");
   joint_.push_back(joint);
   rate_.push_back(rate);
-  compliance_.push_back(compliance);
   start_.push_back(start_.back());
 }
 

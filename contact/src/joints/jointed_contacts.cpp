@@ -230,10 +230,8 @@ void JointedContacts::solve_kept(const std::vector<ContactRows>& contacts,
   const Solution solution = solver_.solve(problem, start);
   result_.counts.add(solution.counts);
   if (!(solution.error <= result_.error)) result_.error = solution.error;
-  if (solution.status != Status::solved && result_.status != Status::infeasible) {
+  if (solution.status != Status::solved && result_.status != Status::infeasible)
     result_.status = solution.status;
-    result_.advice = solution.advice;
-  }
   for (Eigen::Index i = 0; i < n; ++i)
     x.segment<3>(3 * members_[at(kept_[static_cast<std::size_t>(i)])]) =
         solution.impulses.segment<3>(3 * i);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <tether/contact/joints.hpp>
+#include <tether/contact/solver.hpp>
 #include <tether/linalg/disjoint_sets.hpp>
 #include <vector>
 
@@ -9,7 +10,13 @@
 
 namespace tether::contact::detail {
 
-/// Solves the contacts of one island after the other as problems A = J P J', see JointSolver.
+/// Solves the contacts of one island after the other. The joints are eliminated by the sparse
+/// factors of G M^-1 G' (linalg::SparseMinimumNorm), so that contacts see
+///
+///     A = J P J',   P = M^-1 - M^-1 G' (G M^-1 G')^+ G M^-1
+///
+/// A contact whose normal velocity the joints hold (A_nn = 0) has no impulse: it is left out where
+/// it does not approach, else named in Result::blocked. A is dense over the contacts of an island.
 class JointedContacts {
  public:
   explicit JointedContacts(const Options& options);
@@ -21,7 +28,6 @@ class JointedContacts {
     int islands = 0;
     std::vector<int> blocked;  ///< ascending
     Counts counts;
-    std::string advice;
   };
   /// Changes velocities that the joints already allow, v, by impulses that keep them so, and adds
   /// what the joints do to the pulls. x (3 each, contact frame): where to start from, and the

@@ -2,7 +2,6 @@
 #include "joints/mechanism.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <tether/linalg/index.hpp>
 #include <utility>
 
@@ -33,7 +32,6 @@ Mechanism::Mechanism(std::vector<int> bodies, std::vector<int> rows, const Joint
       const auto found = std::lower_bound(once.begin(), once.end(), p);
       first_.push_back(begin + 6 * static_cast<int>(found - once.begin()));
     }
-    if (joints.compliance(row) > 0) columns_.push_back(entries_++);
     starts_.push_back(static_cast<int>(columns_.size()));
   }
   values_.resize(columns_.size());
@@ -53,8 +51,6 @@ bool Mechanism::factor(const JointRows& joints, const std::vector<Matrix6d>& C) 
       double* to = values_.data() + first_[term++];
       for (int c = 0; c < 6; ++c) to[c] += t->G.dot(root.col(c));
     }
-    if (joints.compliance(row) > 0)
-      values_[at(starts_[k + 1] - 1)] = std::sqrt(joints.compliance(row));
   }
   std::copy(values_.begin(), values_.end(), factor_.entries());
   std::fill_n(factor_.metric(), entries_, 1.0);

@@ -8,10 +8,9 @@
 namespace tether::contact::detail {
 
 /// One connected set of moving bodies and the rows on them. Velocities are scaled here, u = C^-1 v
-/// with C C' the inverse mass of each body, so that |u|^2 / 2 is the kinetic energy; a row with
-/// compliance c has one more entry, sqrt(c) times its impulse, and becomes rigid by it:
+/// with C C' the inverse mass of each body, so that |u|^2 / 2 is the kinetic energy:
 ///
-///     E u = rate,   E = (G C, sqrt(c)),   P~ = 1 - E' (E E')^+ E
+///     E u = rate,   E = G C,   P~ = 1 - E' (E E')^+ E
 ///
 /// Rows change u by the least amount (linalg::SparseMinimumNorm).
 class Mechanism {

@@ -35,7 +35,7 @@ bool Mechanisms::is_same(const std::vector<RigidBody>& bodies, const JointRows& 
   for (int row = 0; row < joints.count(); ++row) {
     const auto terms = joints.end(row) - joints.begin(row);
     if (k + 1 + at(static_cast<int>(terms)) > pattern_.size()) return false;
-    if (pattern_[k++] != (joints.compliance(row) > 0 ? -2 : -1)) return false;
+    if (pattern_[k++] != -1) return false;
     for (const JointRows::Term* t = joints.begin(row); t != joints.end(row); ++t)
       if (pattern_[k++] != t->body) return false;
   }
@@ -50,7 +50,7 @@ void Mechanisms::analyse(const std::vector<RigidBody>& bodies, const JointRows& 
   linalg::DisjointSets joined(n);
   std::vector<int> any(at(joints.count()), -1);  // a moving body of each row
   for (int row = 0; row < joints.count(); ++row) {
-    pattern_.push_back(joints.compliance(row) > 0 ? -2 : -1);
+    pattern_.push_back(-1);
     for (const JointRows::Term* t = joints.begin(row); t != joints.end(row); ++t) {
       if (t->body >= n)
         throw std::invalid_argument("joint " + std::to_string(joints.joint(row)) +
@@ -127,11 +127,10 @@ void Mechanisms::add(int m, const double* u, std::vector<Vector6d>& v) const {
         root_[at(bodies[k])] * Eigen::Map<const Eigen::Matrix<double, 6, 1>>(u + 6 * k);
 }
 
-// b_ = rate - G v - compliance x of the rows of mechanism m; returns the largest speed that they
+// b_ = rate - G v of the rows of mechanism m; returns the largest speed that they
 // see, in the units of u, in which a row has length 1.
 double Mechanisms::defect(int m, const JointRows& joints, const std::vector<Vector6d>& v) {
   const Mechanism& mechanism = *list_[at(m)];
-  int compliant = 6 * static_cast<int>(mechanism.bodies().size());
   double most = 0;
   for (std::size_t k = 0; k < mechanism.rows().size(); ++k) {
     const int row = mechanism.rows()[k];
@@ -140,8 +139,6 @@ double Mechanisms::defect(int m, const JointRows& joints, const std::vector<Vect
       sum -= t->G.dot(v[at(t->body)]);
       speed += t->G.cwiseAbs().dot(v[at(t->body)].cwiseAbs());
     }
-    if (const double c = joints.compliance(row); c > 0)
-      sum -= std::sqrt(c) * pulls_[at(m)][at(compliant++)];
     b_[k] = sum;
     const double norm = mechanism.row_norm(static_cast<int>(k));
     if (norm > 0) most = std::max(most, speed / norm);

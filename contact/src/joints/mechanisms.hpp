@@ -31,12 +31,12 @@ class Mechanisms {
   /// numbers.
   std::vector<double>& pull(int m) { return pulls_[static_cast<std::size_t>(m)]; }
   void clear_pulls();
-  /// v changes by the least that makes all rows hold, Gv + compliance x = rate; x what the pulls
-  /// so far say.
+  /// v changes by the least that makes all rows hold, G v = rate.
   void satisfy(const JointRows& joints, std::vector<Vector6d>& v);
   /// Joints (ascending) with rows that cannot all hold, in the last satisfy().
   const std::vector<int>& contradicting() const { return contradicting_; }
-  /// JointSolution::joint_error of these velocities.
+  /// Largest |G v - rate| of a row over the largest speed in the rows of its mechanism, the sum of
+  /// |G| |v| and |rate|. 0 without rows.
   double error(const JointRows& joints, const std::vector<Vector6d>& v);
   /// The impulses that make the pulls, by row.
   void impulses(double* x);

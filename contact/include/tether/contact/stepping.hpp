@@ -287,8 +287,9 @@ class Stepper {
   bool joints_met() const;
   /// Largest |g| of a joint's rows at the end of the last step, m or rad; 0 without joints.
   double joint_drift() const;
-  /// Impulses of the joints in the last part of the last step, one for each row, N s or N m s: see
-  /// JointSolution::joint_impulses.
+  /// Impulses of the joints in the last part of the last step, one for each row, N s or N m s.
+  /// Dependent rows get those of least norm, each row measured by |G C| with C C' the inverse mass:
+  /// equal rows get equal shares.
   const std::vector<double>& joint_impulses() const;
   /// Those of the laws of joints, as JointEquations::add_laws has added them.
   const std::vector<double>& law_impulses() const;

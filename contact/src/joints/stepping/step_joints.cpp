@@ -54,10 +54,6 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
   }
   std::multiset<std::pair<int, int>> pairs;
   for (int row = 0; row < rows_.count(); ++row) {
-    if (rows_.compliance(row) > 0)
-      throw std::invalid_argument(equations_->name(rows_.joint(row)) +
-                                  ": rows with compliance are for JointSolver; in steps it is a "
-                                  "spring's force");
     if (rows_.end(row) - rows_.begin(row) != 2) continue;
     pairs.insert(std::minmax(rows_.begin(row)->body, rows_.begin(row)[1].body));
   }
