@@ -35,9 +35,9 @@ int main(int argc, char** argv) {
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t k = 0; k < 2; ++k) {
       Options o;
-      o.bodies.tolerance = 1e-300;
-      o.bodies.max_assembled = 0;
-      o.bodies.max_sweeps = sweeps[k];
+      o.tolerance = 1e-300;
+      o.max_assembled = 0;
+      o.max_sweeps = sweeps[k];
       Solver solver(MPI_COMM_WORLD, o);
       MPI_Barrier(MPI_COMM_WORLD);
       const double begin = MPI_Wtime();

@@ -1,7 +1,7 @@
 // Tether: a heap of spheres over MPI ranks, the same bits for any number of them.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// mpiexec -n 4 example_ranks_heap --spheres 10000 --steps 500 [--relaxed] [--pictures heap]
+// mpiexec -n 4 example_ranks_heap --spheres 10000 --steps 500 [--pictures heap]
 //
 // Spheres fall into a box. Each rank owns those that Zoltan gives it, has copies of others near by,
 // finds the contacts whose sphere with the smaller number it owns, and moves its own. Every 20
@@ -34,7 +34,6 @@ struct Sphere {
 
 struct Settings {
   int spheres = 10000, steps = 500;
-  bool relaxed = false;
   std::string pictures;
 };
 
@@ -50,12 +49,10 @@ Settings settings(int argc, char** argv) {
       s.spheres = std::stoi(value());
     } else if (word == "--steps") {
       s.steps = std::stoi(value());
-    } else if (word == "--relaxed") {
-      s.relaxed = true;
     } else if (word == "--pictures") {
       s.pictures = value();
     } else {
-      throw std::invalid_argument(word + ": there are --spheres, --steps, --relaxed, --pictures");
+      throw std::invalid_argument(word + ": there are --spheres, --steps, --pictures");
     }
   }
   if (s.spheres < 1) throw std::invalid_argument("--spheres must be >= 1");
@@ -65,7 +62,7 @@ Settings settings(int argc, char** argv) {
 // Spheres of this rank, and the box around them all.
 class Heap {
  public:
-  Heap(MPI_Comm comm, const Settings& s) : comm_(comm), solver_(comm, options(s)) {
+  Heap(MPI_Comm comm, const Settings& s) : comm_(comm), solver_(comm, options()) {
     MPI_Comm_size(comm, &ranks_);
     MPI_Comm_rank(comm, &rank_);
     const int side = std::max(2, static_cast<int>(std::cbrt(s.spheres / 2.0)));
@@ -114,13 +111,12 @@ class Heap {
   void write(const std::string& name) const;
 
  private:
-  static tcm::Options options(const Settings& s) {
+  static tcm::Options options() {
     tcm::Options o;
-    o.mode = s.relaxed ? tcm::RankMode::relaxed : tcm::RankMode::exact;
-    o.bodies.law = tc::Law::coulomb;
-    o.bodies.tolerance = 1e-4;
-    o.bodies.max_sweeps = 60;
-    o.bodies.max_assembled = 0;
+    o.law = tc::Law::coulomb;
+    o.tolerance = 1e-4;
+    o.max_sweeps = 60;
+    o.max_assembled = 0;
     return o;
   }
   static std::vector<double> packed(const std::vector<Sphere>& spheres) {

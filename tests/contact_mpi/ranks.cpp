@@ -101,11 +101,11 @@ void check_traffic(const Solution& s) {
 void same_bits_as_one_process(int side) {
   for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
     Options o;
-    o.bodies.law = law;
-    o.bodies.max_sweeps = law == Law::coulomb ? 100 : 25;
-    o.bodies.max_assembled = 0;
+    o.law = law;
+    o.max_sweeps = law == Law::coulomb ? 100 : 25;
+    o.max_assembled = 0;
     Packing p = mixed(side, 7);
-    BodySolver one(o.bodies);
+    BodySolver one(o);
     Solver solver(MPI_COMM_WORLD, o);
     // Bodies change their ranks between solves; impulses are found all the same.
     for (int solve = 0; solve < 2; ++solve) {
@@ -124,12 +124,12 @@ void same_bits_as_one_process(int side) {
 
 void same_bits_with_threads(int side) {
   Options o;
-  o.bodies.max_sweeps = 20;
-  o.bodies.max_assembled = 0;
+  o.max_sweeps = 20;
+  o.max_assembled = 0;
   const Packing p = mixed(side, 11);
-  BodySolver one(o.bodies);
+  BodySolver one(o);
   const BodySolution expected = alone(one, p);
-  o.bodies.threads = 2;
+  o.threads = 2;
   const Shares shares = share_of(p, slabs(p.bodies.size()), rank);
   CHECK(same(expected, Solver(MPI_COMM_WORLD, o).solve(shares.share), shares));
 }
@@ -140,10 +140,10 @@ void islands_of_several_ranks_are_assembled() {
   for (PointContact& c : p.contacts) c.mu = 0.7;
   sort_contacts(p);
   Options o;
-  o.bodies.tolerance = 1e-7;
-  o.bodies.max_sweeps = 20;
-  o.bodies.max_work = 1e8;
-  BodySolver one(o.bodies);
+  o.tolerance = 1e-7;
+  o.max_sweeps = 20;
+  o.max_work = 1e8;
+  BodySolver one(o);
   const BodySolution expected = alone(one, p);
   CHECK(expected.assembled_islands == 1);
   const Shares shares = share_of(p, anywhere(p.bodies.size(), 1), rank);
@@ -167,7 +167,7 @@ void islands_of_one_rank_need_no_sweep_messages() {
   }
   sort_contacts(p);
   const Options o;
-  BodySolver one(o.bodies);
+  BodySolver one(o);
   const BodySolution expected = alone(one, p);
   const Shares shares = share_of(p, anywhere(p.bodies.size(), 2), rank);
   const Solution s = Solver(MPI_COMM_WORLD, o).solve(shares.share);
@@ -175,52 +175,6 @@ void islands_of_one_rank_need_no_sweep_messages() {
   CHECK(expected.status == Status::solved);
   CHECK(s.islands == 40 && s.shared_islands == 0);
   CHECK(s.traffic.messages == 0 && s.traffic.bytes == 0);
-}
-
-// Judged by what does not know of ranks.
-void relaxed_sweeps_solve_the_same_problem(const Packing& p, const std::vector<int>& owner) {
-  Options o;
-  o.mode = RankMode::relaxed;
-  o.bodies.tolerance = 1e-2;
-  o.bodies.max_assembled = 0;
-  o.bodies.law = Law::coulomb;
-  const Shares shares = share_of(p, owner, rank);
-  const Solution s = Solver(MPI_COMM_WORLD, o).solve(shares.share);
-  CHECK(s.status == Status::solved);
-  check_traffic(s);
-  std::vector<double> impulses(3 * p.contacts.size(), 0), velocities(3 * p.bodies.size(), 0);
-  for (std::size_t k = 0; k < shares.contacts.size(); ++k)
-    for (int i = 0; i < 3; ++i) impulses[3 * at(shares.contacts[k]) + at(i)] = s.impulses[k][i];
-  for (std::size_t k = 0; k < shares.share.numbers.size(); ++k)
-    for (int i = 0; i < 3; ++i)
-      velocities[3 * at(shares.share.numbers[k]) + at(i)] = s.velocities[k][i];
-  for (auto* list : {&impulses, &velocities})
-    MPI_Allreduce(MPI_IN_PLACE, list->data(), static_cast<int>(list->size()), MPI_DOUBLE, MPI_SUM,
-                  MPI_COMM_WORLD);
-  if (rank != 0) return;
-  std::vector<Eigen::Vector3d> x(p.contacts.size());
-  for (std::size_t k = 0; k < x.size(); ++k)
-    x[k] = Eigen::Map<Eigen::Vector3d>(impulses.data() + 3 * k);
-  const double error = evaluate(p.bodies, p.contacts, o.bodies.law, x).fixed_point;
-  CHECK(error <= 1.01e-2 && std::abs(error - s.error) <= 1e-2 * error);
-  std::vector<Eigen::Vector3d> v(p.bodies.size());
-  for (std::size_t b = 0; b < v.size(); ++b) v[b] = p.bodies[b].velocity;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    const PointContact& c = p.contacts[k];
-    v[at(c.first)] += p.bodies[at(c.first)].inverse_mass * x[k];
-    if (c.second >= 0) v[at(c.second)] -= p.bodies[at(c.second)].inverse_mass * x[k];
-  }
-  for (std::size_t b = 0; b < v.size(); ++b)
-    CHECK((v[b] - Eigen::Map<Eigen::Vector3d>(velocities.data() + 3 * b)).norm() < 1e-12);
-}
-
-void relaxed_sweeps_solve_the_same_problem(int side) {
-  const Packing round = mixed(side, 13);
-  relaxed_sweeps_solve_the_same_problem(round, slabs(round.bodies.size()));
-  // Bodies that up to all ranks move: 0.8 of what they do to them lets errors grow.
-  Packing shaped = tether::contact::random::packing(std::max(side, 14), false, 13);
-  sort_contacts(shaped);
-  relaxed_sweeps_solve_the_same_problem(shaped, anywhere(shaped.bodies.size(), 4));
 }
 
 void few_bodies() {
@@ -294,10 +248,10 @@ void bad_input_is_refused_by_all() {
   CHECK(same(alone(one, good), solver.solve(shares.share), shares));
   // Options, too.
   Options o;
-  if (rank == last) o.bodies.tolerance = -1;
+  if (rank == last) o.tolerance = -1;
   CHECK(contains(thrown<std::invalid_argument>([&] { Solver(MPI_COMM_WORLD, o); }),
                  "rank " + std::to_string(last) + ": tolerance = -1"));
-  o.bodies.tolerance = rank == last ? 1e-3 : 1e-4;
+  o.tolerance = rank == last ? 1e-3 : 1e-4;
   if (ranks > 1) {
     CHECK(contains(thrown<std::invalid_argument>([&] { Solver(MPI_COMM_WORLD, o); }),
                    "tolerance is 0.000100 on one rank and 0.001000 on another"));
@@ -367,7 +321,6 @@ int main(int argc, char** argv) {
     same_bits_with_threads(side);
     islands_of_several_ranks_are_assembled();
     islands_of_one_rank_need_no_sweep_messages();
-    relaxed_sweeps_solve_the_same_problem(side);
     few_bodies();
     bad_input_is_refused_by_all();
     bodies_are_spread_by_weight();

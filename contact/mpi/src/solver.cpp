@@ -108,7 +108,7 @@ void Solver::Implementation::bring_contacts(const Share& share,
   part.contacts.resize(ranks.contacts().size());
   part.starts.resize(starts.empty() ? 0 : part.contacts.size());
   // The ranks of an empty share have no starts, while others have some.
-  if (ranks.options().bodies.warm_start) part.starts.resize(part.contacts.size());
+  if (ranks.options().warm_start) part.starts.resize(part.contacts.size());
   delivery.run(
       [&](int c, double* out) {
         const int i = given_contact[at(c)];
@@ -216,14 +216,14 @@ void Solver::Implementation::merge(Solution& out) {
 
 void Solver::Implementation::solve(const Share& share, Solution& out) {
   messages.traffic = {};
-  whole = detail::whole_problem(messages, share, ranks.options().bodies.law);
+  whole = detail::whole_problem(messages, share, ranks.options().law);
   const std::size_t bodies = whole.owner.size(), contacts = whole.contacts.size();
   ranks.plan(whole.contacts, whole.owner, messages.size(), messages.rank());
   invert(ranks.bodies(), bodies, local_body);
   invert(ranks.contacts(), contacts, local_contact);
   invert(share.numbers, bodies, given_body);
   invert(whole.mine, contacts, given_contact);
-  const bool warm = ranks.options().bodies.warm_start;
+  const bool warm = ranks.options().warm_start;
   std::vector<Vector3d> starts;
   out.warm_started = 0;
   if (warm) starts = memory.find(messages, share.contacts, out.warm_started);

@@ -55,8 +55,7 @@ PassResult IslandSweeps::pass(const Island& island, Team& team, Pass kind,
                               const Operation& operation) {
   std::vector<PassResult>& sums = sums_[++team.passes & 1];
   SweepPartners* partners = kind == Pass::local ? nullptr : team.partners;
-  if (partners && kind == Pass::reads_bodies && !partners->relaxed())
-    team.once([&] { partners->share(bodies_); });
+  if (partners && kind == Pass::reads_bodies) team.once([&] { partners->share(bodies_); });
   for (int k = island.colour_begin; k < island.colour_end; ++k) {
     const int first = graph_->colours[at(k)], last = graph_->colours[at(k + 1)];
     const int begin = cut(first, last, team.thread, team.threads);
@@ -110,8 +109,6 @@ void IslandSweeps::load(const Island& island, const Team& team) {
   const int begin = island.body_begin, end = island.body_end;
   for (int s = team.from(begin, end); s < team.to(begin, end); ++s)
     bodies_.load(s, given_->bodies()[at(graph_->body[at(s)])]);
-  if (team.partners && team.partners->relaxed())
-    bodies_.keep(team.from(begin, end), team.to(begin, end));
 }
 
 // Returns |b|^2, the needed change and the speeds of which b is the difference.
@@ -184,21 +181,6 @@ void IslandSweeps::extrapolate(const Island& island, const Team& team, double be
   });
   bodies_.extrapolate(team.from(island.body_begin, island.body_end),
                       team.to(island.body_begin, island.body_end), beta);
-  team.meet();
-}
-
-void IslandSweeps::combine(const Island& island, const Team& team, bool start) {
-  const double part = start ? 1 : team.partners->relaxation();
-  const int begin = team.from(island.body_begin, island.body_end);
-  const int end = team.to(island.body_begin, island.body_end);
-  team.once([&] { team.partners->collect(bodies_); });
-  own_chunks(island, team, [&](int from, int to) {
-    contacts_.relax(graph_->chunks[at(from)], graph_->chunks[at(to)], start ? 0 : part);
-  });
-  if (!start) bodies_.relax(begin, end, part);
-  team.meet();
-  team.once([&] { team.partners->share(bodies_); });
-  bodies_.keep(begin, end);
   team.meet();
 }
 

@@ -50,9 +50,6 @@ class IslandSweeps {
   // x <- x + beta (x - previous x), and the same for the velocities, which follow x linearly.
   // Previous: at the last call.
   void extrapolate(const Island& island, const Team& team, double beta);
-  // Combines the relaxed changes of all partners since the last call, if they sweep at once.
-  // start: only the impulses to start from have changed anything.
-  void combine(const Island& island, const Team& team, bool start);
   // No impulses.
   void rest(const Island& island, Team& team);
   // Impulses, regimes and velocities to the caller.

@@ -59,29 +59,6 @@ class MovingBodies {
     std::copy(six, six + 3, s.v);
     std::copy(six + 3, six + 6, s.w);
   }
-  // Change of velocity since keep().
-  void change(int slot, double* six) const {
-    get(slot, six);
-    for (int k = 0; k < 6; ++k) six[k] -= previous_[6 * linalg::at(slot) + linalg::at(k)];
-  }
-  void add(int slot, const double* six) {
-    double sum[6];
-    get(slot, sum);
-    for (int k = 0; k < 6; ++k) sum[k] += six[k];
-    set(slot, sum);
-  }
-  void keep(int begin, int end) {
-    for (int i = begin; i < end; ++i) get(i, previous_.data() + 6 * linalg::at(i));
-  }
-  // Keeps this part of the change since keep().
-  void relax(int begin, int end, double part) {
-    for (int i = begin; i < end; ++i) {
-      double six[6], *previous = previous_.data() + 6 * linalg::at(i);
-      change(i, six);
-      for (int k = 0; k < 6; ++k) six[k] = previous[k] + part * six[k];
-      set(i, six);
-    }
-  }
   void extrapolate(int begin, int end, double beta) {
     for (int i = begin; i < end; ++i) {
       double* previous = previous_.data() + 6 * linalg::at(i);

@@ -220,21 +220,6 @@ void PackedContacts::extrapolate(const Chunk& from, const Chunk& to, double beta
   });
 }
 
-void PackedContacts::relax(const Chunk& from, const Chunk& to, double part) {
-  double* previous = previous_.data() + 3 * at(from.place);
-  for_kinds(from, to, [&](auto* begin, auto* end, int) {
-    for (auto* entry = begin; entry < end; ++entry) {
-      double* x = impulses(*entry);
-      constexpr int n = kImpulses<std::remove_reference_t<decltype(*entry)>>;
-      for (int k = 0; k < n; ++k) {
-        if (part > 0) x[k] = previous[k] + part * (x[k] - previous[k]);
-        previous[k] = x[k];
-      }
-      previous += n;
-    }
-  });
-}
-
 std::size_t PackedContacts::bytes() const {
   const auto sum = [](const auto&... list) { return (... + (list.capacity() * sizeof(list[0]))); };
   return sum(general4_, spheres4_, general_, spheres_, smooth_, previous_);

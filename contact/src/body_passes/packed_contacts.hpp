@@ -30,8 +30,6 @@ class PackedContacts {
   void set_state(Kind k, int place, const Eigen::Vector4d& s);
   // Momentum of the contacts of chunks from .. to.
   void extrapolate(const Chunk& from, const Chunk& to, double beta);
-  // Keeps this part of their change since the last call; 0 the first time: leaves them.
-  void relax(const Chunk& from, const Chunk& to, double part);
 
   // operation(begin, end, width): the contacts of a kind, `width` in each entry, for the kinds that
   // a chunk has, in their order.

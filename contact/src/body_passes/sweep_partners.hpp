@@ -34,14 +34,6 @@ class SweepPartners {
   // The sums of all processes; sums: of each chunk of this process.
   virtual PassResult total(const std::vector<PassResult>& sums) = 0;
 
-  // All sweep at once, and what they change is taken times this factor; else colour by colour.
-  virtual bool relaxed() const = 0;
-  virtual double relaxation() const = 0;
-  // Sweeps change more and more: a factor from now on with which they cannot.
-  virtual void grew() = 0;
-  // The changes of velocities since MovingBodies::keep by others, added at one place for each body.
-  virtual void collect(MovingBodies& bodies) = 0;
-
   // After all islands: those to be assembled are brought together and solved. failed: this process
   // is about to throw.
   virtual void finish(bool failed) = 0;

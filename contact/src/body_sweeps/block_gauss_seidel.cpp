@@ -33,19 +33,13 @@ void BodySolver::Implementation::save(const Island& island, Team& team) {
 detail::IslandResult BodySolver::Implementation::start(const Island& island, Team& team) {
   IslandResult r;
   const PassResult b = sweeps.pack(island, team, starts);
-  const bool at_once = team.partners && team.partners->relaxed();
-  if (at_once) sweeps.combine(island, team, true);
   r.inverse_scale = detail::inverse_scale(b.most, b.sum);
   r.floor = detail::round_off(b.speed);
   const double started =
       detail::round_off(b.started);  // of a square; nothing needs a change: 0 / 0
-  r.stale =
-      !at_once && started > 0 && std::sqrt(started) * r.inverse_scale > kShare * options.tolerance;
+  r.stale = started > 0 && std::sqrt(started) * r.inverse_scale > kShare * options.tolerance;
   // b = 0: no impulses; those of the last solve are dropped.
-  if (b.sum == 0 && b.most == 0) {
-    sweeps.rest(island, team);
-    if (at_once) sweeps.combine(island, team, true);
-  }
+  if (b.sum == 0 && b.most == 0) sweeps.rest(island, team);
   return r;
 }
 
@@ -61,7 +55,6 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
   const auto permitted = [&] {
     return island.contacts <= options.max_assembled && price.within(options.max_work);
   };
-  const bool at_once = team.partners && partners->relaxed();
   IslandResult r = again ? results[at(k)] : start(island, team);
   const double allowed = options.tolerance / r.inverse_scale;
   const double bound = std::max(allowed * allowed, r.floor);
@@ -69,7 +62,6 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
   int next_test = island.contacts > kFew ? options.min_sweeps : 0;
   int failed_tests = 0;
   double more_before = 0;  // forecast when it was last due
-  detail::AtOnce together;
   detail::Forecast forecast(r.sweeps, r.least_change);
   detail::Momentum momentum;
   detail::BestPoint best(options.max_sweeps);
@@ -92,10 +84,6 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
   };
   for (;;) {
     const PassResult change = sweeps.sweep(island, team);
-    if (at_once) {
-      sweeps.combine(island, team, false);
-      if (together.grows(change.sum)) team.once([&] { partners->grew(); });
-    }
     ++r.sweeps;
     forecast.add(change.sum);
     if (r.sweeps == detail::BestPoint::kFirst && !permitted()) best.want();
@@ -132,7 +120,7 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
       r.assembly = assembly(std::min(more, more_before));
       if (r.assembly > 0) break;
       more_before = more;
-      if (more > kSlow && r.sweeps > detail::Forecast::kFirst && !at_once) momentum.start();
+      if (more > kSlow && r.sweeps > detail::Forecast::kFirst) momentum.start();
       best.forecast(r.sweeps + more);
       forecast.made();
     }

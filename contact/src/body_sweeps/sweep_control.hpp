@@ -96,23 +96,6 @@ class BestPoint {
   double change_ = kNone, last_ = kNone, residual_ = kNone;
 };
 
-// Do sweeps of several ranks at once drive each other, or go in circles?
-class AtOnce {
- public:
-  // change: sum of squares that the last sweep changed.
-  bool grows(double change) {
-    ++since_least_;
-    if (change < least_) least_ = change, since_least_ = 0;
-    return change > kGrown * least_ || since_least_ > kNothing;
-  }
-
- private:
-  static constexpr double kGrown = 2;
-  static constexpr int kNothing = 30;  // sweeps
-  double least_ = std::numeric_limits<double>::infinity();
-  int since_least_ = 0;
-};
-
 // The sweeps that are still needed, forecast after 5, 10, 20, 40, ... sweeps from the convergence
 // since half as many. A change is the least in its half: where contacts toggle between stick and
 // slip single sweeps change ten times as much.

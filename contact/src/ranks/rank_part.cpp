@@ -18,19 +18,12 @@ RankPart::With RankPart::buffers(const RankExchanges& exchanges) {
   return out;
 }
 
-void RankPart::start(RankMessages& messages, const RankOptions& options) {
+void RankPart::start(RankMessages& messages) {
   messages_ = &messages;
-  relaxed_ = options.mode == RankMode::relaxed;
-  relaxation_.assign(plan_.most_ranks.size(), options.relaxation);
   after_.clear();
   share_.clear();
-  collect_.clear();
   for (const RankExchanges& e : plan_.after) after_.push_back(buffers(e));
-  for (const RankExchanges& e : plan_.share) {
-    share_.push_back(buffers(e));
-    collect_.push_back(share_.back());
-    for (RankMessages::With& with : collect_.back()) std::swap(with.out, with.in);
-  }
+  for (const RankExchanges& e : plan_.share) share_.push_back(buffers(e));
 }
 
 void RankPart::pass_on(const RankExchanges& exchanges, With& with, MovingBodies& bodies) {
@@ -52,31 +45,6 @@ void RankPart::after_colour(int colour, MovingBodies& bodies) {
 
 void RankPart::share(MovingBodies& bodies) {
   pass_on(plan_.share[at(island_)], share_[at(island_)], bodies);
-}
-
-// Each rank's change alone lowers the energy of its bodies. The energy of a body is convex, so that
-// the sum of what k ranks do to it, taken times at most 1 / k, lowers it, too; from 2 / k on it can
-// grow for ever.
-void RankPart::grew() {
-  constexpr double kTogether = 1.8;
-  double& part = relaxation_[at(island_)];
-  part = std::min(part, kTogether / plan_.most_ranks[at(island_)]);
-}
-
-// In the order of ranks.
-void RankPart::collect(MovingBodies& bodies) {
-  const RankExchanges& exchanges = plan_.share[at(island_)];
-  With& with = collect_[at(island_)];
-  if (with.empty()) return;
-  for (std::size_t k = 0; k < with.size(); ++k) {
-    double* out = with[k].out.data();
-    for (int slot : exchanges[k].receive) bodies.change(slot, out), out += 6;
-  }
-  messages_->exchange(with);
-  for (std::size_t k = 0; k < with.size(); ++k) {
-    const double* in = with[k].in.data();
-    for (int slot : exchanges[k].send) bodies.add(slot, in), in += 6;
-  }
 }
 
 // In the order of the chunks of the whole, as one process adds them.

@@ -13,7 +13,7 @@ class RankPart : public SweepPartners {
  public:
   explicit RankPart(const RankPlan& plan) : plan_(plan) {}
   // Before a solve.
-  void start(RankMessages& messages, const RankOptions& options);
+  void start(RankMessages& messages);
 
   bool here(int island) const override { return plan_.here[linalg::at(island)] != 0; }
   bool shared(int island) const override { return plan_.shared[linalg::at(island)] != 0; }
@@ -24,10 +24,6 @@ class RankPart : public SweepPartners {
   void share(MovingBodies& bodies) override;
   PassResult total(const std::vector<PassResult>& sums) override;
 
-  bool relaxed() const override { return relaxed_; }
-  double relaxation() const override { return relaxation_[linalg::at(island_)]; }
-  void grew() override;
-  void collect(MovingBodies& bodies) override;
   void give_up(const char* why) override { messages_->give_up(why); }
 
  protected:
@@ -40,10 +36,8 @@ class RankPart : public SweepPartners {
 
   const RankPlan& plan_;
   RankMessages* messages_ = nullptr;
-  bool relaxed_ = false;
-  std::vector<double> relaxation_;  // of the islands
   int island_ = 0;
-  std::vector<With> after_, share_, collect_;  // by colour, by island
+  std::vector<With> after_, share_;  // by colour, by island
   std::vector<double> sums_;
 };
 

@@ -108,7 +108,7 @@ void RankPlan::for_bodies(int chunk, const Visit& visit) const {
 }
 
 void RankPlan::build(const std::vector<RankContact>& links, const std::vector<int>& owner,
-                     int ranks_, int rank_, bool relaxed) {
+                     int ranks_, int rank_) {
   ranks = ranks_;
   rank = rank_;
   const int bodies_of_all = static_cast<int>(owner.size());
@@ -126,10 +126,9 @@ void RankPlan::build(const std::vector<RankContact>& links, const std::vector<in
   home = owner;
   after.assign(part.colours.size(), {});
   share.assign(whole.islands.size(), {});
-  most_ranks.assign(whole.islands.size(), 1);
   last_rank_.assign(at(bodies_of_all), -1);
   last_colour_.assign(at(bodies_of_all), -1);
-  for (int k = 0; k < static_cast<int>(whole.islands.size()); ++k) exchanges(k, relaxed);
+  for (int k = 0; k < static_cast<int>(whole.islands.size()); ++k) exchanges(k);
 }
 
 // Contacts of the places begin .. end by the rank that owns them.
@@ -219,7 +218,7 @@ void RankPlan::select(const std::vector<RankContact>& links, int bodies_of_all) 
 }
 
 // The same loop on all ranks, so that both sides of an exchange have its bodies in the same order.
-void RankPlan::exchanges(int k, bool relaxed) {
+void RankPlan::exchanges(int k) {
   const Island &all = whole.islands[at(k)], &mine = part.islands[at(k)];
   const int colours = all.colour_end - all.colour_begin;
   if (!shared[at(k)]) {
@@ -231,7 +230,7 @@ void RankPlan::exchanges(int k, bool relaxed) {
   std::vector<std::pair<int, int>> others;  // body and a rank that is not its home
   const auto pass_on = [&](int b, int to) {
     const int from = last_rank_[at(b)];
-    if (relaxed || from == to) return;
+    if (from == to) return;
     if (from == rank) lists[at(last_colour_[at(b)])].send(to, slot_[at(b)]);
     if (to == rank) lists[at(last_colour_[at(b)])].receive(from, slot_[at(b)]);
   };
@@ -258,11 +257,7 @@ void RankPlan::exchanges(int k, bool relaxed) {
   std::sort(others.begin(), others.end());
   others.erase(std::unique(others.begin(), others.end()), others.end());
   ExchangeLists to_all;
-  int body = -1, ranks_of_body = 1;
   for (const auto& [b, to] : others) {
-    ranks_of_body = b == body ? ranks_of_body + 1 : 2;
-    body = b;
-    most_ranks[at(k)] = std::max(most_ranks[at(k)], ranks_of_body);
     if (home[at(b)] == rank) to_all.send(to, slot_[at(b)]);
     if (to == rank) to_all.receive(home[at(b)], slot_[at(b)]);
   }

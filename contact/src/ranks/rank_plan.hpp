@@ -28,7 +28,7 @@ using RankExchanges = std::vector<RankExchange>;  // ascending ranks
 class RankPlan {
  public:
   void build(const std::vector<RankContact>& contacts, const std::vector<int>& owner, int ranks,
-             int rank, bool relaxed);
+             int rank);
 
   ContactGraph whole, part;
   std::vector<int> first, second;  // of all contacts
@@ -41,7 +41,6 @@ class RankPlan {
 
   std::vector<RankExchanges> after;  // each colour of `part`
   std::vector<RankExchanges> share;  // of each island: from home to others
-  std::vector<int> most_ranks;       // of each island: that move one body of it
   int ranks = 1, rank = 0;
 
  private:
@@ -49,7 +48,7 @@ class RankPlan {
   std::vector<int> owned(int begin, int end, const std::vector<int>& owner) const;
   void balance(int begin, int end, const std::vector<int>& owner);
   void select(const std::vector<RankContact>& links, int bodies);
-  void exchanges(int island, bool relaxed);
+  void exchanges(int island);
   int count(int chunk) const;
   template <class Visit>
   void for_bodies(int chunk, const Visit& visit) const;

@@ -23,26 +23,22 @@ struct RankSolver::Implementation final : detail::RankPart {
   void take(int island, const detail::IslandAnswer& answer);
   void refuse_sizes(std::size_t bodies, std::size_t contacts, std::size_t starts) const;
 
-  RankOptions options;
   detail::RankPlan plan;
   BodySolver solver;  // of the part
   BodySolver::Implementation& engine = *solver.implementation_;
   std::vector<int> replaced;  // contacts here, of shared islands
 };
 
-RankSolver::RankSolver(const RankOptions& options) : implementation_(new Implementation) {
+RankSolver::RankSolver(const BodyOptions& options) : implementation_(new Implementation) {
   set_options(options);
 }
 RankSolver::~RankSolver() = default;
 RankSolver::RankSolver(RankSolver&&) noexcept = default;
 RankSolver& RankSolver::operator=(RankSolver&&) noexcept = default;
 
-const RankOptions& RankSolver::options() const { return implementation_->options; }
-void RankSolver::set_options(const RankOptions& options) {
-  detail::require(options.relaxation > 0 && options.relaxation <= 1, "relaxation",
-                  options.relaxation, "must lie in (0, 1]");
-  implementation_->solver.set_options(options.bodies);
-  implementation_->options = options;
+const BodyOptions& RankSolver::options() const { return implementation_->solver.options(); }
+void RankSolver::set_options(const BodyOptions& options) {
+  implementation_->solver.set_options(options);
 }
 
 const std::vector<int>& RankSolver::contacts() const { return implementation_->plan.contacts; }
@@ -54,13 +50,11 @@ const std::vector<int>& RankSolver::body_ranks() const { return implementation_-
 
 void RankSolver::plan(const std::vector<RankContact>& contacts, const std::vector<int>& owner,
                       int ranks, int rank) {
-  implementation_->plan.build(contacts, owner, ranks, rank,
-                              implementation_->options.mode == RankMode::relaxed);
+  implementation_->plan.build(contacts, owner, ranks, rank);
 }
 
 RankTraffic RankSolver::traffic() const {
   const detail::RankPlan& plan = implementation_->plan;
-  const bool relaxed = implementation_->options.mode == RankMode::relaxed;
   RankTraffic out;
   const auto add = [](const std::vector<int>& slots, long long& messages, long long& velocities) {
     messages += !slots.empty();
@@ -69,14 +63,8 @@ RankTraffic RankSolver::traffic() const {
   for (const detail::RankExchanges& colour : plan.after)
     for (const detail::RankExchange& e : colour) add(e.send, out.messages, out.velocities);
   for (std::size_t k = 0; k < plan.share.size(); ++k) {
-    for (const detail::RankExchange& e : plan.share[k]) {
-      if (!relaxed) {
-        add(e.send, out.look_messages, out.look_velocities);
-        continue;
-      }
-      add(e.send, out.messages, out.velocities);
-      add(e.receive, out.messages, out.velocities);
-    }
+    for (const detail::RankExchange& e : plan.share[k])
+      add(e.send, out.look_messages, out.look_velocities);
     const detail::Island& island = plan.whole.islands[k];
     if (plan.shared[k]) out.sums += 3 * (island.chunk_end - island.chunk_begin);
   }
@@ -118,11 +106,11 @@ void RankSolver::solve(const std::vector<RigidBody>& bodies,
   own.refuse_sizes(bodies.size(), contacts.size(), starts.size());
   BodySolver::Implementation& engine = own.engine;
   engine.out = &solution;
-  engine.given.read(bodies, contacts, own.options.bodies.law);
+  engine.given.read(bodies, contacts, options().law);
   engine.starts.clear();
   for (const Eigen::Vector3d& p : starts) engine.starts.push_back(&p);
   engine.graph = own.plan.part;
-  own.start(messages, own.options);
+  own.start(messages);
   own.replaced.clear();
   engine.partners = &own;
   engine.solve_graph();
@@ -166,7 +154,8 @@ bool RankSolver::Implementation::assemble(int k) {
 // As one process would, from where the sweeps are.
 void RankSolver::Implementation::solve(int k, const detail::GatheredIsland& all,
                                        detail::IslandAnswer& answer) const {
-  BodySolver solver_of_all(options.bodies);
+  const BodyOptions& options = solver.options();
+  BodySolver solver_of_all(options);
   BodySolver::Implementation& one = *solver_of_all.implementation_;
   BodySolution found;
   found.impulses.resize(all.contacts.size());
@@ -174,10 +163,10 @@ void RankSolver::Implementation::solve(int k, const detail::GatheredIsland& all,
   found.velocities.resize(all.bodies.size());
   found.angular_velocities.resize(all.bodies.size());
   one.out = &found;
-  one.given.read(all.bodies, all.contacts, options.bodies.law);
+  one.given.read(all.bodies, all.contacts, options.law);
   one.graph = all.graph;
   one.results = engine.results;
-  one.sweeps.start(one.given, one.graph, options.bodies.law);
+  one.sweeps.start(one.given, one.graph, options.law);
   const detail::Island& island = one.graph.islands[at(k)];
   detail::Worker worker;
   detail::Team team{0, 1, nullptr, &worker.scratch};

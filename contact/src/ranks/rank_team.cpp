@@ -115,10 +115,9 @@ void RankTeam::Implementation::find_owners(int bodies) {
 void RankTeam::Implementation::plan(const std::vector<RigidBody>& bodies,
                                     const std::vector<PointContact>& contacts,
                                     const BodyOptions& options) {
-  RankOptions of_ranks;
-  of_ranks.bodies = options;
-  of_ranks.bodies.team = nullptr;
-  of_ranks.bodies.warm_start = false;
+  BodyOptions of_ranks = options;
+  of_ranks.team = nullptr;
+  of_ranks.warm_start = false;
   ranks.set_options(of_ranks);
   traits.resize(bodies.size());
   for (std::size_t k = 0; k < bodies.size(); ++k) traits[k] = rank_traits(k, bodies[k]);

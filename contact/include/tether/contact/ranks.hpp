@@ -49,23 +49,9 @@ class RankMessages {
   [[noreturn]] virtual void give_up(const char* why) = 0;
 };
 
-/// exact: colour by colour, in the order of BodySolver and with its bits, for any number of ranks.
-/// relaxed: all ranks sweep at once; their changes of a body's velocity are added, and the sum (and
-/// that of the impulses) taken times `relaxation`; where that drives an island on, or in circles,
-/// times 1.8 / k at most, k ranks moving one of its bodies. Fewer messages; the bits, and how many
-/// sweeps are needed, depend on the partition.
-enum class RankMode { exact, relaxed };
-
-struct RankOptions {
-  BodyOptions bodies;  ///< warm_start is not used: `starts` says it
-  RankMode mode = RankMode::exact;
-  double relaxation = 0.8;  ///< of RankMode::relaxed, in (0, 1]
-};
-
 /// Messages that this rank sends by the plan, for one sweep over all shared islands and for one
-/// evaluation of their residuals; 48 bytes a velocity. exact: bodies go to the rank that sweeps
-/// them next, after each colour. relaxed: once to the rank where their changes are added, and back;
-/// residuals send nothing.
+/// evaluation of their residuals; 48 bytes a velocity. Bodies go to the rank that sweeps them next,
+/// after each colour.
 struct RankTraffic {
   long long messages = 0, velocities = 0;
   long long look_messages = 0, look_velocities = 0;
@@ -82,17 +68,19 @@ struct RankIslands {
 Status worse(Status a, Status b);
 double worse(double a, double b);
 
-/// The part of one rank of BodySolver. All ranks plan the whole graph of contacts alike, so that it
+/// The part of one rank of BodySolver: contacts are swept colour by colour, in its order and with
+/// its bits, for any number of ranks. All ranks plan the whole graph of contacts alike, so that it
 /// needs no messages; bodies and contacts themselves are where they are used.
 class RankSolver {
  public:
-  explicit RankSolver(const RankOptions& options);  ///< throws std::invalid_argument
+  /// warm_start is not used: `starts` says it. Throws std::invalid_argument.
+  explicit RankSolver(const BodyOptions& options);
   ~RankSolver();
   RankSolver(RankSolver&&) noexcept;
   RankSolver& operator=(RankSolver&&) noexcept;
 
-  const RankOptions& options() const;
-  void set_options(const RankOptions& options);  ///< throws std::invalid_argument
+  const BodyOptions& options() const;
+  void set_options(const BodyOptions& options);  ///< throws std::invalid_argument
 
   /// The order of sweeping, and who sweeps what. owner: rank of each body. The contacts are the
   /// same on all ranks, in an order which the result depends on.
@@ -123,7 +111,7 @@ class RankSolver {
 };
 
 /// Processes that all have the same bodies and contacts, as a team for BodyOptions::team and
-/// SteppingOptions::team: each sweeps the contacts of its part of the bodies (RankMode::exact), and
+/// SteppingOptions::team: each sweeps the contacts of its part of the bodies, and
 /// all know the whole result then. Bits are those of one process. Every process makes the same
 /// calls; what one cannot do all throw.
 class RankTeam final : public SolverTeam {

@@ -13,10 +13,8 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact_mpi {
 
-using contact::RankMode;
-
-/// mode, relaxation, and BodyOptions; threads: of each rank. The same on all ranks.
-using Options = contact::RankOptions;
+/// threads: of each rank. The same on all ranks.
+using Options = contact::BodyOptions;
 
 /// Data that a rank gives: bodies by number, 0 .. n - 1 over all ranks, each on one of them.
 /// A contact is on the rank that owns its moving body with the smaller number; PointContact::first
@@ -52,7 +50,7 @@ struct Solution {
   int swept_contacts = 0;     ///< by this rank
 };
 
-/// contact::BodySolver over ranks. RankMode::exact: with contacts in the order of (smaller number
+/// contact::BodySolver over ranks: with contacts in the order of (smaller number
 /// of a moving body, the other number, -1 for the world), BodySolver gives the same bits.
 ///
 /// All member functions, the constructor too, are called by all ranks of `comm` together. What one
