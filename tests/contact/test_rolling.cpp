@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <random>
-#include <tether/contact/rolling.hpp>
 
+#include "rolling/rolling_cones.hpp"
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
 
@@ -11,9 +11,11 @@ namespace {
 
 using namespace stepping_scenes;
 
-tc::RollingContact contact_at(int first, int second, const Vector3d& r1, const Vector3d& r2,
-                              const Vector3d& n, double mu, double rolling, double torsional) {
-  tc::RollingContact c;
+using tc::detail::RollingContact;
+
+RollingContact contact_at(int first, int second, const Vector3d& r1, const Vector3d& r2,
+                          const Vector3d& n, double mu, double rolling, double torsional) {
+  RollingContact c;
   c.point.first = first;
   c.point.second = second;
   c.point.r1 = r1;
@@ -23,6 +25,14 @@ tc::RollingContact contact_at(int first, int second, const Vector3d& r1, const V
   c.rolling = rolling;
   c.torsional = torsional;
   return c;
+}
+
+tc::ConeSolution solve(const std::vector<tc::RigidBody>& bodies, double tolerance,
+                       std::vector<RollingContact>& contacts) {
+  tc::Options options;
+  options.law = tc::Law::coulomb;
+  options.tolerance = tolerance;
+  return tc::detail::solve_rolling(bodies, options, contacts);
 }
 
 // A ball of the scene's default rolling on z = 0 towards +x.
@@ -55,7 +65,6 @@ TEST_CASE("rolling: one block is solved to round-off for any body, arm and bound
   int touching = 0;
   double worst = 0;
   for (int k = 0; k < 2000; ++k) {
-    tc::RollingProblem p;
     tc::RigidBody body;
     body.inverse_mass = std::pow(10, u(g));
     const Vector3d moments = Vector3d(1 + part(g), 1 + part(g), 1 + part(g)) * 3;
@@ -64,22 +73,22 @@ TEST_CASE("rolling: one block is solved to round-off for any body, arm and bound
                            q.toRotationMatrix().transpose() * body.inverse_mass;
     body.velocity = any() + Vector3d(0, 0, -1);
     body.angular_velocity = any();
-    p.bodies = {body};
     const double kinds = part(g);
-    p.contacts = {contact_at(0, -1, 0.5 * any(), Vector3d::Zero(), Vector3d::UnitZ(), 0.6 * part(g),
-                             kinds < 0.2 ? 0 : 0.3 * part(g), kinds > 0.8 ? 0 : 0.3 * part(g))};
-    const tc::RollingSolution s = tc::solve(p, 1e-13, 30);
+    std::vector<RollingContact> contacts = {
+        contact_at(0, -1, 0.5 * any(), Vector3d::Zero(), Vector3d::UnitZ(), 0.6 * part(g),
+                   kinds < 0.2 ? 0 : 0.3 * part(g), kinds > 0.8 ? 0 : 0.3 * part(g))};
+    const tc::ConeSolution s = solve({body}, 1e-13, contacts);
     INFO("problem " << k);
-    worst = std::max(worst, tc::rolling_residual(p, s.impulses, s.moments));
-    const double n = s.impulses[0].z();
+    worst = std::max(worst, s.error);
+    const RollingContact& c = contacts[0];
+    const Vector3d x = c.impulse, y = c.moment;
+    const double n = x.z();
     touching += n > 0;
     // Bounds, and parts that oppose their velocity where they are reached.
-    const Vector3d x = s.impulses[0], y = s.moments[0];
-    const tc::RollingContact& c = p.contacts[0];
     CHECK(x.head<2>().norm() <= c.point.mu * n * (1 + 1e-12));
     CHECK(y.head<2>().norm() <= c.rolling * n * (1 + 1e-12));
     CHECK(std::abs(y.z()) <= c.torsional * n * (1 + 1e-12));
-    const Vector3d w = s.velocities[0].tail<3>();
+    const Vector3d w = body.angular_velocity + body.inverse_inertia * (c.point.r1.cross(x) + y);
     CHECK(y.head<2>().dot(w.head<2>()) ==
           Approx(-c.rolling * n * w.head<2>().norm()).margin(1e-10));
     CHECK(y.z() * w.z() == Approx(-c.torsional * n * std::abs(w.z())).margin(1e-10));
@@ -144,7 +153,8 @@ TEST_CASE("rolling: a ball on a slope starts to roll where tan(angle) > c/r") {
 TEST_CASE("rolling: without any length the answers are those of the ordinary solver") {
   std::mt19937 g(7);
   std::uniform_real_distribution<double> u(-1, 1);
-  tc::RollingProblem p;
+  std::vector<tc::RigidBody> bodies;
+  std::vector<RollingContact> contacts;
   std::vector<tc::PointContact> points;
   for (int k = 0; k < 5; ++k) {
     tc::RigidBody body;
@@ -152,21 +162,17 @@ TEST_CASE("rolling: without any length the answers are those of the ordinary sol
     body.inverse_inertia = 10 * Matrix3d::Identity();
     body.velocity = Vector3d(u(g), u(g), -1);
     body.angular_velocity = Vector3d(u(g), u(g), u(g));
-    p.bodies.push_back(body);
-    p.contacts.push_back(
+    bodies.push_back(body);
+    contacts.push_back(
         contact_at(k, k - 1, {0, 0, -0.5}, {0, 0, k > 0 ? 0.5 : 0}, Vector3d::UnitZ(), 0.4, 0, 0));
-    points.push_back(p.contacts.back().point);
+    points.push_back(contacts.back().point);
   }
-  const tc::RollingSolution s = tc::solve(p, 1e-12, 2000);
-  CHECK(s.status == tc::Status::solved);
+  CHECK(solve(bodies, 1e-12, contacts).status == tc::Status::solved);
   tc::BodyOptions options;
   options.law = tc::Law::coulomb;
   options.tolerance = 1e-12;
-  const tc::BodySolution t = tc::BodySolver(options).solve(p.bodies, points);
-  for (std::size_t k = 0; k < 5; ++k) {
-    CHECK((s.impulses[k] - t.impulses[k]).norm() < 1e-9);
-    CHECK((s.velocities[k].head<3>() - t.velocities[k]).norm() < 1e-9);
-  }
+  const tc::BodySolution t = tc::BodySolver(options).solve(bodies, points);
+  for (std::size_t k = 0; k < 5; ++k) CHECK((contacts[k].impulse - t.impulses[k]).norm() < 1e-9);
 }
 
 TEST_CASE("rolling: a heap never gains energy and comes to rest") {
@@ -192,6 +198,50 @@ TEST_CASE("rolling: a heap never gains energy and comes to rest") {
   CHECK(tc::kinetic_energy(s.bodies()) < 1e-10);
 }
 
+TEST_CASE(
+    "rolling: a heap takes a few times the sweeps of the same heap without, from step to step") {
+  long sweeps[2];
+  for (const bool rolls : {false, true}) {
+    Scene scene(2e-3);
+    const double c = rolls ? 0.002 : 0;
+    scene.meetings = {{0, 0, 0.5, 0, c, c}, {0, 1, 0.5, 0, c, c}};
+    scene.ground();
+    scene.options.tolerance = 1e-6;
+    std::mt19937 g(1);
+    std::uniform_real_distribution<double> u(-5e-3, 5e-3);
+    for (int k = 0; k < 64; ++k)
+      scene.sphere(0.05, 1,
+                   {0.101 * (k % 4) + u(g), 0.101 * (k / 4 % 4) + u(g), 0.05 + 0.095 * (k / 16)});
+    tc::Stepper s = scene.stepper();
+    for (int k = 0; k < 60; ++k) s.step();
+    CHECK(s.contacts().points.size() > 100);
+    CHECK(s.counts().accepted + s.counts().unsolved == 0);
+    sweeps[rolls] = s.counts().sweeps;
+  }
+  CHECK(sweeps[1] < 5 * sweeps[0]);
+}
+
+TEST_CASE("rolling: a stepper that is given the memory of another goes on by its bits") {
+  Scene scene(2e-3);
+  scene.meetings = {{0, 0, 0.5, 0, 0.002, 0.001}, {0, 1, 0.5, 0, 0.002, 0.001}};
+  scene.ground();
+  scene.options.tolerance = 1e-6;
+  for (int k = 0; k < 9; ++k)
+    scene.sphere(0.1, 1, {0.19 * (k % 3) + 0.01 * k, 0.2 * (k / 3), 0.1 + 0.05 * (k % 2)});
+  tc::Stepper whole = scene.stepper(), part = scene.stepper();
+  run(whole, 0.1);
+  part.bodies() = whole.bodies();
+  part.set_memory(whole.memory());
+  for (int k = 0; k < 10; ++k) {
+    whole.step();
+    part.step();
+  }
+  REQUIRE(whole.contact_moments().size() > 9);
+  for (std::size_t i = 0; i < whole.contact_moments().size(); ++i)
+    CHECK(whole.contact_moments()[i] == part.contact_moments()[i]);
+  for (int i = 0; i < whole.bodies().size(); ++i) CHECK(velocity(whole, i) == velocity(part, i));
+}
+
 TEST_CASE("rolling: what it does not go with is refused by name") {
   Scene scene(1e-3);
   scene.meetings = {{0, 1, 0.5, 0, 0.01, 0}};
@@ -207,14 +257,14 @@ TEST_CASE("rolling: what it does not go with is refused by name") {
   CHECK_THROWS_WITH(scene.stepper(), Catch::Contains("rolling"));
 }
 
-TEST_CASE("rolling: contacts on which sweeps cycle are solved together") {
-  // Five spheres, each touching half of the others, and the floor: a fifth of them cycled, at up to
-  // 2e-2.
+TEST_CASE("rolling: contacts on which sweeps of their six rows cycle are solved") {
+  // Five spheres, each touching half of the others, and the floor.
   for (unsigned seed = 0; seed < 60; ++seed) {
     CAPTURE(seed);
     std::mt19937 g(seed);
     std::uniform_real_distribution<double> u(-1, 1);
-    tc::RollingProblem p;
+    std::vector<tc::RigidBody> bodies;
+    std::vector<RollingContact> contacts;
     std::vector<Vector3d> at;
     for (int k = 0; k < 5; ++k) {
       at.emplace_back(u(g), u(g), 1 + 0.9 * u(g));
@@ -223,7 +273,7 @@ TEST_CASE("rolling: contacts on which sweeps cycle are solved together") {
       b.inverse_inertia = Eigen::Matrix3d::Identity() * 2.5 * b.inverse_mass / 0.01;
       b.velocity = Vector3d(u(g), u(g), u(g) - 1);
       b.angular_velocity = 10 * Vector3d(u(g), u(g), u(g));
-      p.bodies.push_back(b);
+      bodies.push_back(b);
     }
     for (int i = 0; i < 5; ++i)
       for (int j = -1; j < i; ++j) {
@@ -233,11 +283,9 @@ TEST_CASE("rolling: contacts on which sweeps cycle are solved together") {
                                  : Vector3d((at[a] - at[static_cast<std::size_t>(j)]).normalized());
         const double mu = 0.3 + 0.7 * std::abs(u(g)), c = 0.02 * std::abs(u(g)),
                      d = 0.02 * std::abs(u(g));
-        p.contacts.push_back(
+        contacts.push_back(
             contact_at(i, j, -0.1 * n, j < 0 ? Vector3d::Zero() : Vector3d(0.1 * n), n, mu, c, d));
       }
-    const tc::RollingSolution s = tc::solve(p, 1e-9, 1000);
-    CHECK(s.status == tc::Status::solved);
-    CHECK(tc::rolling_residual(p, s.impulses, s.moments) <= 1e-9);
+    CHECK(solve(bodies, 1e-9, contacts).status == tc::Status::solved);
   }
 }

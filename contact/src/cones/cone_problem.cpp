@@ -50,13 +50,15 @@ void check(int k, const Cone& cone) {
 
 void check_entries(const char* matrix, const std::vector<MatrixEntry>& entries, Eigen::Index rows,
                    Eigen::Index columns) {
+  const auto place = [&](const MatrixEntry& e) {
+    return std::string(matrix) + "(" + std::to_string(e.row) + ", " + std::to_string(e.column) +
+           ")";
+  };
   for (const MatrixEntry& e : entries) {
-    const std::string place =
-        std::string(matrix) + "(" + std::to_string(e.row) + ", " + std::to_string(e.column) + ")";
     if (e.row < 0 || e.row >= rows || e.column < 0 || e.column >= columns)
-      fail(place + " is outside of a matrix of " + std::to_string(rows) + " x " +
+      fail(place(e) + " is outside of a matrix of " + std::to_string(rows) + " x " +
            std::to_string(columns));
-    if (!std::isfinite(e.value)) detail::refuse(place, e.value, "must be finite");
+    if (!std::isfinite(e.value)) detail::refuse(place(e), e.value, "must be finite");
   }
 }
 

@@ -39,13 +39,31 @@ void StepJointIslands::set_options(const BodyOptions& options) {
   if (rolling_) rolling_->set_options(options);
 }
 
-void StepJointIslands::set_rolling(const NearContacts& near, std::unique_ptr<JointIslands> others,
-                                   const std::vector<Vector3d>* moments_of_others,
+void StepJointIslands::scale_warm_start(double factor) {
+  memory_.scale(factor);
+  if (rolling_) rolling_->scale_warm_start(factor);
+}
+
+void StepJointIslands::take_back() {
+  memory_.take_back();
+  if (rolling_) rolling_->take_back();
+}
+
+void StepJointIslands::forget() {
+  memory_.forget();
+  if (rolling_) rolling_->forget();
+}
+
+void StepJointIslands::set_warm_start(const WarmStart& start) {
+  memory_.set(start);
+  if (rolling_) rolling_->set_warm_start(start);
+}
+
+void StepJointIslands::set_rolling(const NearContacts& near, std::unique_ptr<RollingIslands> others,
                                    std::vector<Vector3d>* moments) {
   near_ = &near;
   rolling_ = std::move(others);
-  moments_of_rest_ = moments_of_others;
-  told_ = moments;
+  if (moments != nullptr) told_ = moments;
 }
 
 void StepJointIslands::solve_others(BodySolver& others, const std::vector<RigidBody>& bodies,
@@ -127,7 +145,7 @@ void StepJointIslands::take_laws() {
 void StepJointIslands::add_moments(const std::vector<PointContact>& contacts) {
   moments_.clear();
   normal_of_.clear();
-  if (near_ == nullptr || law_ == Law::frictionless) return;
+  if (near_ == nullptr) return;
   for (std::size_t k = 0; k < jointed_.size(); ++k) {
     const PointContact& p = contacts[at(jointed_[k])];
     const Meeting& m = near_->meeting(p);
@@ -138,7 +156,8 @@ void StepJointIslands::add_moments(const std::vector<PointContact>& contacts) {
   for (int k = 0; k < moments_.count(); ++k) {
     own_.push_back(moments_.own(k));
     normal_of_.push_back(moments_.main(k));
-    const Vector3d* last = warm_ ? memory_.find(moments_.id(k)) : nullptr;
+    const std::uint64_t id = contacts[at(jointed_[at(moments_.main(k))])].id;
+    const Vector3d* last = warm_ ? memory_.find(moment_id(id)) : nullptr;
     const auto row = static_cast<Eigen::Index>(x_.size());
     x_.conservativeResize(row + 3);
     const double normal = std::max(0.0, x_[3 * static_cast<Eigen::Index>(moments_.main(k))]);
@@ -147,10 +166,9 @@ void StepJointIslands::add_moments(const std::vector<PointContact>& contacts) {
 }
 
 void StepJointIslands::take_moments(const std::vector<PointContact>& contacts) {
-  if (told_ == nullptr) return;
+  if (near_ == nullptr) return;
   told_->assign(contacts.size(), Vector3d::Zero());
-  for (std::size_t k = 0; k < rest_.size() && k < moments_of_rest_->size(); ++k)
-    (*told_)[at(rest_[k])] = (*moments_of_rest_)[k];
+  for (std::size_t k = 0; k < rest_.size(); ++k) (*told_)[at(rest_[k])] = rolling_->moments()[k];
   for (int k = 0; k < moments_.count(); ++k)
     (*told_)[at(jointed_[at(moments_.main(k))])] += moment(k);
 }
@@ -196,7 +214,7 @@ void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& b
     solve_others(others, bodies, contacts, out);
     moments_.clear();
     take_moments(contacts);
-    return remember(contacts, out);
+    return remember(others, contacts, out);
   }
   points_.clear();
   for (const int k : rest_) points_.push_back(contacts[at(k)]);
@@ -204,19 +222,22 @@ void StepJointIslands::solve(BodySolver& others, const std::vector<RigidBody>& b
   solve_jointed(bodies, contacts);
   take_moments(contacts);
   merge(bodies, contacts, out);
-  remember(contacts, out);
-  memory_.get(start_);
-  others.set_warm_start(start_);
+  remember(others, contacts, out);
 }
 
 // All contacts, here and in the other solver: the next time they may be in islands of the other
 // kind, and a run that goes on from a saved state finds the same.
-void StepJointIslands::remember(const std::vector<PointContact>& contacts,
+void StepJointIslands::remember(BodySolver& others, const std::vector<PointContact>& contacts,
                                 const BodySolution& out) {
   memory_.keep(contacts, out.impulses);
   for (std::size_t l = 0; l < law_of_.size(); ++l)
     memory_.add(laws_.id(law_of_[l]), law_impulse(l));
-  for (int k = 0; k < moments_.count(); ++k) memory_.add(moments_.id(k), moment(k));
+  if (near_ != nullptr)
+    for (std::size_t k = 0; k < contacts.size(); ++k)
+      if (!(*told_)[k].isZero(0)) memory_.add(moment_id(contacts[k].id), (*told_)[k]);
+  memory_.get(start_);
+  others.set_warm_start(start_);
+  if (rolling_) rolling_->set_warm_start(start_);
 }
 
 }  // namespace tether::contact::detail

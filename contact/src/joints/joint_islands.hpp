@@ -4,13 +4,11 @@
 #include <tether/linalg/disjoint_sets.hpp>
 #include <vector>
 
-#include "body_sweeps/impulse_memory.hpp"
 #include "joints/jointed_contacts.hpp"
 #include "joints/law_rows.hpp"
 #include "joints/mechanisms.hpp"
 #include "joints/moment_rows.hpp"
-#include "stepping/detection/near_contacts.hpp"
-#include "stepping/motion/joint_part.hpp"
+#include "rolling/rolling_part.hpp"
 
 namespace tether::contact::detail {
 
@@ -21,23 +19,23 @@ class StepJointIslands final : public JointIslands {
   StepJointIslands(Mechanisms& mechanisms, LawRows& laws, LawUse use, const BodyOptions& options);
   /// Contacts of meetings with such lengths hold moments, told to `moments` (of all contacts of a
   /// solve, world axes, N m s; null: nobody). `others`: the islands without joints, and theirs.
-  void set_rolling(const NearContacts& near, std::unique_ptr<JointIslands> others,
-                   const std::vector<Eigen::Vector3d>* moments_of_others,
+  void set_rolling(const NearContacts& near, std::unique_ptr<RollingIslands> others,
                    std::vector<Eigen::Vector3d>* moments);
 
   void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
              const std::vector<PointContact>& contacts, BodySolution& out) override;
   void set_options(const BodyOptions& options) override;
-  void scale_warm_start(double factor) override { memory_.scale(factor); }
-  void take_back() override { memory_.take_back(); }
-  void forget() override { memory_.forget(); }
-  void set_warm_start(const WarmStart& start) override { memory_.set(start); }
+  void scale_warm_start(double factor) override;
+  void take_back() override;
+  void forget() override;
+  void set_warm_start(const WarmStart& start) override;
 
  private:
   void find_islands(const std::vector<PointContact>& contacts);
   void solve_jointed(const std::vector<RigidBody>& bodies,
                      const std::vector<PointContact>& contacts);
-  void remember(const std::vector<PointContact>& contacts, const BodySolution& out);
+  void remember(BodySolver& others, const std::vector<PointContact>& contacts,
+                const BodySolution& out);
   void merge(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& out);
 
@@ -72,9 +70,8 @@ class StepJointIslands final : public JointIslands {
   std::vector<Eigen::Vector3d> own_;   // mobilities of contacts_; empty: none has any
   // Only where a meeting names rolling or torsional friction.
   const NearContacts* near_ = nullptr;
-  std::unique_ptr<JointIslands> rolling_;
-  const std::vector<Eigen::Vector3d>* moments_of_rest_ = nullptr;
-  std::vector<Eigen::Vector3d>* told_ = nullptr;
+  std::unique_ptr<RollingIslands> rolling_;
+  std::vector<Eigen::Vector3d> own_moments_, *told_ = &own_moments_;
   MomentRows moments_;
   std::vector<int> normal_of_;
   std::vector<Vector6d> v_;

@@ -8,13 +8,6 @@ namespace tether::contact::detail {
 
 using Eigen::Vector3d;
 
-namespace {
-
-// Contacts have no bits so high (contact_id), laws of joints the next one.
-constexpr std::uint64_t kRolling = std::uint64_t{1} << 62, kTorsional = std::uint64_t{1} << 61;
-
-}  // namespace
-
 void MomentRows::add(const PointContact& contact, double rolling, double torsional, int main,
                      const Mechanisms& mechanisms, std::vector<ContactRows>& rows) {
   if (!(rolling > 0 || torsional > 0)) return;
@@ -31,13 +24,12 @@ void MomentRows::add(const PointContact& contact, double rolling, double torsion
   const Eigen::Matrix3d frame = tangent_frame(contact.normal);
   // At which moments move as much as forces do.
   const double length = std::sqrt(moved / turned);
-  const auto put = [&](double bound, std::uint64_t mark, const Vector3d& first,
-                       const Vector3d& second) {
+  const auto put = [&](double bound, const Vector3d& first, const Vector3d& second) {
     ContactRows row;
     row.first = of.first;
     row.second = of.second;
     row.mu = bound / length;
-    Row each{main, mark | contact.id, length, second.isZero(0) ? moved : 0, {}};
+    Row each{main, length, second.isZero(0) ? moved : 0, {}};
     each.axes.row(0) = first.transpose();
     each.axes.row(1) = second.transpose();
     row.J1.bottomRightCorner<2, 3>() = length * each.axes;
@@ -45,8 +37,8 @@ void MomentRows::add(const PointContact& contact, double rolling, double torsion
     rows.push_back(row);
     rows_.push_back(each);
   };
-  if (rolling > 0) put(rolling, kRolling, frame.row(1).transpose(), frame.row(2).transpose());
-  if (torsional > 0) put(torsional, kTorsional, frame.row(0).transpose(), Vector3d::Zero());
+  if (rolling > 0) put(rolling, frame.row(1).transpose(), frame.row(2).transpose());
+  if (torsional > 0) put(torsional, frame.row(0).transpose(), Vector3d::Zero());
 }
 
 Vector3d MomentRows::start(int k, double normal, const Vector3d& moment) const {

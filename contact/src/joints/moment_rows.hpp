@@ -2,7 +2,6 @@
 // BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <tether/contact/bodies.hpp>
 #include <tether/contact/body_solver.hpp>
 #include <vector>
@@ -28,13 +27,10 @@ class MomentRows {
   Eigen::Vector3d start(int k, double normal, const Eigen::Vector3d& moment) const;
   /// On `first`, in world axes, of its impulse in the contact frame.
   Eigen::Vector3d moment(int k, const Eigen::Vector3d& x) const;
-  /// Of the moment about the normal, or of those across it.
-  std::uint64_t id(int k) const { return rows_[at(k)].id; }
 
  private:
   struct Row {
     int main;
-    std::uint64_t id;
     double length, unused;             // m; mobility of the direction that no body moves in
     Eigen::Matrix<double, 2, 3> axes;  // of the two tangents
   };

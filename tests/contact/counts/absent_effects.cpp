@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "body_passes/body_kernels.hpp"
-#include "rolling/rolling_sweeps.hpp"
+#include "rolling/rolling_cones.hpp"
 #include "stepping/impacts/restitution.hpp"
 #include "stepping/motion/rotation.hpp"
 
@@ -41,17 +41,10 @@ Squares test(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction")
 Squares sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
 Squares test(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
 
-void RollingSweeps::begin(const std::vector<RigidBody>&, const std::vector<RollingContact>&) {
+ConeSolution solve_rolling(const std::vector<RigidBody>&, const Options&,
+                           std::vector<RollingContact>&) {
   absent("rolling friction");
 }
-void RollingSweeps::solve(double, int, int) { absent("rolling friction"); }
-void RollingSweeps::set(int, const Eigen::Vector3d&, const Eigen::Vector3d&) {
-  absent("rolling friction");
-}
-double RollingSweeps::residual() const { absent("rolling friction"); }
-Eigen::Vector3d RollingSweeps::impulse(int) const { absent("rolling friction"); }
-Eigen::Vector3d RollingSweeps::moment(int) const { absent("rolling friction"); }
-Regime RollingSweeps::regime(int) const { absent("rolling friction"); }
 
 Restitution::Restitution(RestitutionLaw, const BodyOptions&) { absent("restitution"); }
 void Restitution::choose(const Impacts&, const Impacts&, const BodySet&, StepContacts&) {

@@ -71,8 +71,7 @@ std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& option
   auto out = std::make_unique<StepJointIslands>(mechanisms_, laws_, laws, options);
   if (rolling_ == nullptr || laws == LawUse::limits) return out;
   // The first are those of a step's velocities (RollingPart).
-  std::unique_ptr<JointIslands> others = rolling_->make_islands(options, laws);
-  out->set_rolling(*near_, std::move(others), &rolling_->moments(),
+  out->set_rolling(*near_, rolling_->make(options, laws),
                    std::exchange(first_islands_, false) ? &moments_ : nullptr);
   return out;
 }
