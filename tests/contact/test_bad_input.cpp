@@ -352,8 +352,7 @@ TEST_CASE("bad input: the same words in a host whose numbers have a comma") {
            refusal([&] { laws.add_bounded(2, 0, -0.25); });
   };
   const std::string plain = said();
-  for (const char* part :
-       {"mu = -0.125", "joint 12345: rate = inf:", "joint 2: bound = -0.25:"})
+  for (const char* part : {"mu = -0.125", "joint 12345: rate = inf:", "joint 2: bound = -0.25:"})
     CHECK_THAT(plain, Contains(part));
   const tether::test::CommaLocale here;
   CHECK(said() == plain);

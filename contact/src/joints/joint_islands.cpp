@@ -8,22 +8,7 @@ namespace tether::contact::detail {
 
 using Eigen::Vector3d;
 
-namespace {
-
 using linalg::at;
-
-Options solver_options(const BodyOptions& o) {
-  Options out;
-  out.law = o.law;
-  out.measure = Measure::fixed_point;
-  out.tolerance = o.tolerance;
-  out.strict = o.strict;
-  out.max_work = o.max_work;
-  out.enough = o.enough;
-  return out;
-}
-
-}  // namespace
 
 StepJointIslands::StepJointIslands(Mechanisms& mechanisms, LawRows& laws, LawUse use,
                                    const BodyOptions& options)

@@ -9,18 +9,16 @@ namespace tether::contact::detail {
 using Eigen::Vector3d;
 using linalg::at;
 
-namespace {
-
-Options solver_options(const BodyOptions& o) {
+Options solver_options(const BodyOptions& options) {
   Options out;
-  out.law = o.law;
-  out.tolerance = o.tolerance;
-  out.max_work = o.max_work;
-  out.enough = o.enough;
+  out.law = options.law;
+  out.measure = Measure::fixed_point;
+  out.tolerance = options.tolerance;
+  out.strict = options.strict;
+  out.max_work = options.max_work;
+  out.enough = options.enough;
   return out;
 }
-
-}  // namespace
 
 RollingIslands::RollingIslands(const NearContacts& near, const BodyOptions& options,
                                std::vector<Vector3d>* moments)

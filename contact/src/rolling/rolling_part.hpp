@@ -18,6 +18,9 @@ constexpr std::uint64_t moment_id(std::uint64_t contact) {
   return contact | std::uint64_t{1} << 62;
 }
 
+/// The same for a problem that is assembled.
+Options solver_options(const BodyOptions& options);
+
 /// Islands in which a meeting names rolling or torsional friction are solved with it.
 class RollingIslands final : public JointIslands {
  public:
