@@ -47,7 +47,8 @@ ConeSolution solve_rolling(const std::vector<RigidBody>&, const Options&,
 }
 
 Restitution::Restitution(RestitutionLaw, const BodyOptions&) { absent("restitution"); }
-void Restitution::choose(const Impacts&, const Impacts&, const BodySet&, StepContacts&) {
+void Restitution::choose(const Impacts&, const Impacts&, const std::vector<Strike>&, const BodySet&,
+                         StepContacts&) {
   absent("restitution");
 }
 int Restitution::apply(BodySet&, StepContacts&) { absent("restitution"); }
