@@ -2,7 +2,6 @@
 #pragma once
 
 #include "assembled/local_solves.hpp"
-#include "assembled/soft_start.hpp"
 #include "assembled/stages/accelerated_sweeps.hpp"
 #include "assembled/stages/admm.hpp"
 #include "assembled/stages/interior/interior_point.hpp"
@@ -18,7 +17,7 @@ class Automatic {
   void reset(int contacts, const Options& options, bool proofs = true);
   // From the point where one sweep has not done, which search.best holds.
   Status run(Search& search);
-  // A part of a larger problem, from `start`: the stages once, without replacements of the law.
+  // A part of a larger problem, from `start`: the stages without replacements of the law.
   Status run_part(Search& search, const Packed& start);
   // Symptoms of the failed iteration.
   Status give_up(Search& search);
@@ -33,60 +32,63 @@ class Automatic {
   ProximalNewton newton;
   InteriorPoint interior;
 
-  struct Rotation;
-  struct Turn;
-
  private:
-  static const Turn kRotation[], kFewBodies[];
-  Status rotate(Search& search, bool last);
-  Status replace_and_rotate(Search& search);
-  Status rotate_from_soft(Search& search, Status status);
-  template <int N>
-  Status take_turns(Search& search, Rotation& r, const Turn (&turns)[N]);
+  // Where a solve stands.
+  struct Round {
+    bool first = true;            // the first one
+    bool regular = true;          // no strongly coupled contact: the slip is differentiable
+    bool by_bodies = false;       // equations of few bodies in place of those of many contacts
+    bool dear = false;            // a factorisation costs many sweeps
+    double swept = 0;             // error that the sweeps of this round have left
+    double halved = 0;            // error when it was last halved
+    int idle = 0, most_idle = 0;  // rounds that have not halved it
+  };
+  // A row of the table: who has a turn when, with which budget (of its own unit). unsolved: the
+  // next row has its turn; anything else ends the solve.
+  struct Turn {
+    Status (Automatic::*stage)(Search& search, Round& r, int budget);
+    bool (*admitted)(const Round& r);
+    int budget;
+  };
+  static const Turn kTurns[];
+  static bool always(const Round&) { return true; }
+  static bool first_and_regular(const Round& r) { return r.first && r.regular; }
+  static bool regular_and_dear(const Round& r) { return r.regular && r.dear; }
+  static bool first_regular_and_cheap(const Round& r) { return r.first && r.regular && !r.dear; }
+  static bool first_cheap_contacts(const Round& r) {
+    return first_regular_and_cheap(r) && !r.by_bodies;
+  }
+
+  Status rotate(Search& search, int most_idle);
   bool replace_contacts(Search& search, double eccentricity, bool only_unconverged);
 
-  // Rows of the tables, with their budgets.
-  Status sweep_while_cheap(Search& search, Rotation& r, int factorisations);
-  bool sweep_before_look(Search& search);
-  Status sweep_few_bodies(Search& search, Rotation& r, int factorisations);
-  Status paths_from_sweeps(Search& search, Rotation& r, int paths);
-  Status sticking_point(Search& search, Rotation& r, int);
-  Status interior_points(Search& search, Rotation& r, int steps);
-  Status interior_points_near(Search& search, Rotation& r, int steps);
-  Status interior_points_at_best(Search& search, Rotation& r, int steps);
-  Status directions(Search& search, Rotation& r, int iterations);
-  Status proximal_newton(Search& search, Rotation& r, int problems);
-  Status shifted_path(Search& search, Rotation& r, int steps);
-  Status proximal_path(Search& search, Rotation& r, int problems);
-  Status proximal_path_at_best(Search& search, Rotation& r, int problems);
-  Status arclength_path(Search& search, Rotation& r, int factorisations);
-  Status arclength_path_of_most(Search& search, Rotation& r, int factorisations);
-  Status coupling_path(Search& search, Rotation& r, int factorisations);
-  Status rescue(Search& search, Rotation& r, int problems);
-  Status round_off(Search& search, Rotation& r, int steps);
-  Status no_solution(Search& search, Rotation& r, int);
-  Status end_of_work(Search& search, Rotation& r, int);
-  Status end_of_round(Search& search, Rotation& r, int);
-  Status patience(Search& search, Rotation& r, int);
+  // Rows of the table.
+  Status sweep(Search& search, Round& r, int factorisations);
+  Status proximal_path(Search& search, Round& r, int problems);
+  Status interior_points(Search& search, Round& r, int steps);
+  Status arclength_path(Search& search, Round& r, int factorisations);
+  Status proximal_path_at_best(Search& search, Round& r, int problems);
+  Status round_off(Search& search, Round& r, int steps);
+  Status no_solution(Search& search, Round& r, int);
+  Status proximal_newton(Search& search, Round& r, int problems);
+  Status end_of_work(Search& search, Round& r, int);
+  Status end_of_round(Search& search, Round& r, int);
 
-  bool sweep_first(Search& search, const Rotation& r);
-  bool sweep_and_solve_parts(Search& search, double until);
+  bool order_after_sweeps(Search& search);
+  void sweep_and_solve_parts(Search& search, double until);
   void newton_from_sweeps(Search& search);
-  void sweep_beside_parts(Search& search, AcceleratedSweeps::Leave leave);
-  bool mostly_sticks(Search& search);
-  bool infeasible(Search& search);
-  bool at_round_off(Search& search, int steps);
   void solve_parts_of_end(Search& search);
   void follow_to_the_end(Search& search);
+  void proximal_path_from_small(Search& search);
+  bool infeasible(Search& search);
+  bool at_round_off(Search& search, int steps);
 
   Options options_;
   LocalSolves parts_, end_parts_;
-  SoftStart soft_;
   Packed x_, z_, pressed_;
   int contacts_ = 0;
   bool ready_ = false, proofs_ = true, looked_for_proof_ = false;
   double sweep_work_ = 0;  // of the accelerated sweeps
-  double held_work_ = 0;   // of parts that are solved again between sweeps
 };
 
 }  // namespace tether::contact::detail

@@ -32,8 +32,6 @@ void LocalSolves::reset(int contacts) {
   solved_ = false;
   error_.resize(at(n_));
   place_.resize(at(n_));
-  held_.assign(at(n_), 0);
-  held_count_ = 0;
 }
 
 // False: there is nothing to solve.
@@ -105,10 +103,8 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
   return false;
 }
 
-// near: x is so near to a solution that Newton's method may find it at once.
-bool LocalSolves::solve_part(Search& search, int part, double budget, bool near, Packed& x) {
+bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x) {
   constexpr double kGain = 1e-3, kEnough = 0.3;  // of the error, of the tolerance
-  constexpr int kProblems = 2;
   const System& system = search.system;
   const Problem& p = system.problem();
   const int first = start_[at(part)], m = start_[at(part + 1)] - first;
@@ -154,41 +150,12 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, bool near,
   local.system.share_as(system, contacts);
   local.system.to_own_units(start.data());
   part_->automatic.reset(m, options, false);
-  if (near) {
-    local.test(start.data(), Method::gauss_seidel);
-    part_->automatic.prepare(local);
-    if (!local.solved()) part_->automatic.newton.run(local, start.data(), kProblems);
-    start = local.best;
-  }
-  const bool solved = local.solved() || part_->automatic.run_part(local, start) == Status::solved;
+  const bool solved = part_->automatic.run_part(local, start) == Status::solved;
   search.counts.add(local.counts);
   if (!solved) return false;
   local.system.to_given_units(local.best.data());
   for (int r = 0; r < m; ++r) x[at(contacts[r])] = local.best[at(r)];
   return true;
-}
-
-void LocalSolves::hold(int part, bool held) {
-  for (int k = start_[at(part)]; k < start_[at(part + 1)]; ++k) {
-    char& now = held_[at(list_[at(k)])];
-    held_count_ += held - now;
-    now = held;
-  }
-}
-
-bool LocalSolves::run_held(Search& search, Packed& x, double budget) {
-  if (!find_errors(search, x)) return false;
-  for (int i = 0; i < n_; ++i) place_[at(i)] = held_[at(i)] ? kReached : kOutside;
-  list_.clear();
-  start_.assign(1, 0);
-  for (int i = 0; i < n_; ++i) add_part(search.system.problem(), i, n_);
-  bool any = false;
-  for (int part = 0; part + 1 < static_cast<int>(start_.size()) && !search.exhausted(); ++part) {
-    const bool solved = solve_part(search, part, budget, true, x);
-    if (!solved) hold(part, false);
-    any = any || solved;
-  }
-  return any;
 }
 
 bool LocalSolves::run(Search& search, Packed& x, double budget) {
@@ -203,10 +170,7 @@ bool LocalSolves::run(Search& search, Packed& x, double budget) {
   if (!part_) part_ = std::make_unique<Part>();
   bool any = false;
   for (int part = 0; part + 1 < static_cast<int>(start_.size()) && !search.exhausted(); ++part) {
-    if (solve_part(search, part, budget, false, x)) {
-      hold(part, true);
-      any = true;
-    }
+    if (solve_part(search, part, budget, x)) any = true;
   }
   if (!any) layers_ = layers_ > 1 ? layers_ - 1 : 2;
   solved_ = any;

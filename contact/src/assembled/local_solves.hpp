@@ -20,28 +20,20 @@ class LocalSolves {
   // One round, at most `budget` of work for each part. True: x has changed; it may be worse at
   // first, as what has moved disturbs the others.
   bool run(Search& search, Packed& x, double budget);
-  // The parts that run() has solved so far, again, and those that touch as one; what cannot be
-  // solved is forgotten. Where sweeps move away from a solution, what others change comes back
-  // hundredfold within a hundred of them, unless such parts follow meanwhile.
-  bool run_held(Search& search, Packed& x, double budget);
-  bool holds() const { return held_count_ > 0; }
 
  private:
   struct Part;  // a Search and its stages
   bool find_errors(Search& search, const Packed& x);
   bool find_parts(Search& search, const Packed& x);
   void add_part(const Problem& p, int seed, int largest);
-  bool solve_part(Search& search, int part, double budget, bool near, Packed& x);
-  void hold(int part, bool held);
+  bool solve_part(Search& search, int part, double budget, Packed& x);
 
   int n_ = 0, layers_ = 1;
   int refused_ = 0;      // rounds that found too many contacts with errors of one size
-  int held_count_ = 0;   // contacts of parts that are held
   bool solved_ = false;  // a part, in the last round
   double most_ = 0;      // the largest error, as a velocity relative to its island's scale
   std::vector<double> error_;
   std::vector<int> list_, start_, place_;  // contacts part by part; place of a contact in its part
-  std::vector<char> held_;
   std::unique_ptr<Part> part_;
 };
 

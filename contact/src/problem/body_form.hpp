@@ -12,7 +12,7 @@ namespace tether::contact::detail {
 
 /// A = H H' in blocks of three columns, the nodes. H = J C, C C' the inverse mass of each body:
 /// nodes 2 k and 2 k + 1 are the linear and angular velocity of body k, and a contact has those of
-/// its one or two bodies that move. Or any other factor, see rank_form().
+/// its one or two bodies that move.
 struct BodyForm {
   int nodes = 0;
   std::vector<int> start{0}, node;             // of contact i: start[i] <= k < start[i + 1]

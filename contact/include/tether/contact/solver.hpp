@@ -21,7 +21,7 @@ enum class Measure : std::uint8_t {
 };
 
 enum class Method : std::uint8_t {
-  automatic,         ///< sweeps, Anderson, ADMM, interior points and proximal Newton in rotation
+  automatic,         ///< sweeps, proximal paths, interior points, proximal Newton in rounds
   gauss_seidel,      ///< plain sweeps
   sor,               ///< x <- clip((1 - omega) x + omega sweep)
   jacobi,            ///< all blocks from the old x, damped

@@ -58,6 +58,15 @@ double Search::errors(const PackedVector* x, double* each) {
   return *std::max_element(each, each + system.size());
 }
 
+bool Search::confirmed() {
+  if (!solved()) return false;
+  system.forget_slips();
+  const Packed found = best;
+  best_error = std::numeric_limits<double>::infinity();
+  test(found.data(), Method::interior_point);
+  return solved();
+}
+
 bool Search::explained_by_round_off() {
   const double rounding = system.rounding(best.data());
   hidden_ = kSumUnits * rounding;

@@ -32,6 +32,8 @@ struct Search {
   // changes, or with long sums near_round_off() what is judged. Returns the largest.
   double errors(const PackedVector* x, double* each);
   bool solved() const { return best_error <= options.tolerance; }
+  // Whether it is solved for one who does not know where slips were found last, as evaluate().
+  bool confirmed();
   bool exhausted() const {
     return counts.work > work_end ||
            (best_error <= options.enough && counts.work > 0.75 * options.max_work);

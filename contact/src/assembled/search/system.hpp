@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <tether/contact/solver.hpp>
@@ -64,6 +65,8 @@ class System {
   double weight(int i) const { return weight_[at(i)]; }
   const std::vector<double>& weights() const { return weight_; }
   double lambda(int i) const { return lambda_[at(i)]; }
+  // Slips are searched for anew.
+  void forget_slips() { std::fill(lambda_.begin(), lambda_.end(), -1); }
 
   // One Gauss-Seidel sweep on x in place, contacts in the given order.
   void sweep(PackedVector* x, const Proximal& proximal = {});

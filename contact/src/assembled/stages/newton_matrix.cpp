@@ -5,21 +5,11 @@
 #include <algorithm>
 #include <vector>
 
-#include "problem/rank_form.hpp"
-
 namespace tether::contact::detail {
 namespace {
 
 constexpr double kClearly = 0.5;      // of the price by contacts: the digits cost refinements
 constexpr double kOrderBodies = 500;  // ns a contact
-// Of an A that is full for the most part: fewer contacts cost little by contacts, and a rank of a
-// third of the rows pays.
-constexpr int kFewest = 24;
-bool may_have_small_rank(const Problem& p) {
-  const auto n = static_cast<std::size_t>(p.contacts());
-  return p.contacts() >= kFewest && 2 * p.blocks().size() >= n * n;
-}
-int most_rank(const Problem& p) { return p.contacts(); }
 
 }  // namespace
 
@@ -64,28 +54,10 @@ double NewtonMatrix::cost_by_width(const Search& search) const {
   return 4 * kOfBand * operations;
 }
 
-double NewtonMatrix::look_cost(const Search& search) const {
-  constexpr double kOperation = 0.5;  // ns
-  const Problem& p = search.system.problem();
-  if (ordered_ || looked_ || p.body_form() != nullptr || !may_have_small_rank(p)) return 0;
-  return kOperation * 3 * p.contacts() * most_rank(p) * most_rank(p);
-}
-
-const BodyForm* NewtonMatrix::form(Search& search) {
-  const Problem& p = search.system.problem();
-  const double cost = look_cost(search);
-  if (cost > 0) {
-    search.counts.work += cost;
-    rank_form_ = rank_form(p, most_rank(p));
-    looked_ = true;
-  }
-  return rank_form_ ? rank_form_.get() : p.body_form();
-}
-
 bool NewtonMatrix::order_by_bodies(Search& search) {
   if (ordered_) return by_bodies_;
   constexpr int kMany = 2;  // contacts for each node
-  const BodyForm* given = form(search);
+  const BodyForm* given = search.system.problem().body_form();
   if (given == nullptr || given->contacts() < kMany * given->nodes) return false;
   bodies_.order(*given);
   if (!(bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * cost(search))) return false;
@@ -111,7 +83,7 @@ void NewtonMatrix::order(Search& search) {
 // Four contacts a body cost a quarter in equations of bodies, 2.8 as much as in those of contacts.
 void NewtonMatrix::take_bodies_if_cheaper(Search& search) {
   constexpr int kSome = 3;  // contacts for two nodes
-  const BodyForm* given = form(search);
+  const BodyForm* given = search.system.problem().body_form();
   if (given == nullptr || 2 * given->contacts() < kSome * given->nodes) return;
   const double by_contacts = cost(search);
   search.counts.work += kOrderBodies * search.system.size();

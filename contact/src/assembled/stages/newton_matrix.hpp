@@ -16,10 +16,7 @@ class NewtonMatrix {
   /// What a step costs besides its factorisation: sweeps, and ns for each contact.
   NewtonMatrix(double sweeps, double per_contact) : sweeps_(sweeps), per_contact_(per_contact) {}
 
-  void reset() {
-    ordered_ = by_bodies_ = looked_ = false;
-    rank_form_.reset();
-  }
+  void reset() { ordered_ = by_bodies_ = false; }
   bool ordered() const { return ordered_; }
   bool by_bodies() const { return by_bodies_; }
   /// Estimated ns of a step; by a guess of the fill before the matrix is ordered.
@@ -28,10 +25,8 @@ class NewtonMatrix {
   double cost_by_width(const Search& search) const;
 
   /// True, and ordered, where bodies have so many contacts that a guess of the fill by contacts
-  /// decides for equations of bodies; also where A is full and of small rank.
+  /// decides for equations of bodies.
   bool order_by_bodies(Search& search);
-  /// Estimated ns of the look at the rank that it takes; 0: none.
-  double look_cost(const Search& search) const;
   /// Estimated ns of order().
   double order_cost(const Search& search) const;
   /// By what costs less, with the fill of both known.
@@ -49,11 +44,9 @@ class NewtonMatrix {
 
  private:
   void take_bodies_if_cheaper(Search& search);
-  const BodyForm* form(Search& search);
 
   double sweeps_, per_contact_;
-  bool ordered_ = false, by_bodies_ = false, looked_ = false;
-  std::shared_ptr<const BodyForm> rank_form_;  // where the problem has none
+  bool ordered_ = false, by_bodies_ = false;
   linalg::BlockLu lu_;
   BodyNewton bodies_;
 };

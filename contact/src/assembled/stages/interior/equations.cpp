@@ -14,7 +14,6 @@ void InteriorEquations::reset(int contacts) {
   for (Packed* p : {&anchor_, &r_, &z_, &w_}) p->resize(at(n_));
   flat_.resize(at(n_));
   tau_ = 0;
-  coupling_ = 1;
   exact_ = false;
 }
 
@@ -56,23 +55,10 @@ void InteriorEquations::evaluate(const System& system, const ConePair& point) {
     }
     double gamma[2];
     system.gamma(i, gamma);
-    const double s = coupling_ * slip_of(u);
+    const double s = slip_of(u);
     r[0] = w[0] / p.local(i).mu - (u[0] - s);
     r[1] = w[1] - (u[1] - s * gamma[0]);
     r[2] = w[2] - (u[2] - s * gamma[1]);
-  }
-}
-
-void InteriorEquations::add_coupling_rate(const System& system, const ConePair& point) {
-  for (int i = 0; i < n_; ++i) {
-    if (flat_[at(i)]) continue;
-    double gamma[2];
-    system.gamma(i, gamma);
-    const double s = slip_of(point.u[at(i)].v);
-    double* r = r_[at(i)].v;
-    r[0] += s;
-    r[1] += s * gamma[0];
-    r[2] += s * gamma[1];
   }
 }
 
@@ -109,15 +95,6 @@ double InteriorEquations::complementarity(const ConePair& point) const {
   return sum / n_;
 }
 
-double InteriorEquations::left_over(const ConePair& point) const {
-  double sum = 0;
-  for (int i = 0; i < n_; ++i) {
-    const double* r = r_[at(i)].v;
-    sum += std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) * point.x[at(i)].v[0];
-  }
-  return sum / n_;
-}
-
 void advance(ConePair& to, const ConePair& along, double step) {
   for (auto [point, change] : {std::pair(&to.x, &along.x), std::pair(&to.u, &along.u)}) {
     for (std::size_t i = 0; i < point->size(); ++i) {
@@ -133,19 +110,6 @@ void advance(ConePair& to, const ConePair& along, double step) {
       x[0] = after + x[3];
     }
   }
-}
-
-double InteriorEquations::longest_step(const ConePair& point, const ConePair& along) const {
-  double t = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < n_; ++i)
-    for (auto [x, d] : {std::pair(point.x[at(i)].v, along.x[at(i)].v),
-                        std::pair(point.u[at(i)].v, along.u[at(i)].v)}) {
-      if (!flat_[at(i)])
-        t = std::min(t, longest(x, determinant(x), d));
-      else if (d[0] < 0)
-        t = std::min(t, -x[0] / d[0]);
-    }
-  return t;
 }
 
 }  // namespace tether::contact::detail

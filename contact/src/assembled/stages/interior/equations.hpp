@@ -33,9 +33,6 @@ class InteriorEquations {
   /// 0: the problem itself.
   void set_tau(double tau) { tau_ = tau; }
   double tau() const { return tau_; }
-  /// theta: the problem with theta s(u) in place of s(u). 1: the law; 0: the convex problem.
-  void set_coupling(double theta) { coupling_ = theta; }
-  double coupling() const { return coupling_; }
   /// Velocities by long sums.
   void set_exact(bool exact) { exact_ = exact; }
 
@@ -47,20 +44,14 @@ class InteriorEquations {
   double natural_map(const System& system) const;
   /// The same at other impulses, which take their place.
   double natural_map(const System& system, const PackedVector* impulses);
-  /// The residual's derivative by theta is added to it.
-  void add_coupling_rate(const System& system, const ConePair& point);
   /// x.u / contacts, which falls to 0 on the way.
   double complementarity(const ConePair& point) const;
-  /// |x| |r| / contacts: the part of it that a residual stands for.
-  double left_over(const ConePair& point) const;
-  /// The step along a direction at which the point reaches a cone.
-  double longest_step(const ConePair& point, const ConePair& along) const;
 
  private:
   void velocities(const System& system);
 
   int n_ = 0;
-  double tau_ = 0, coupling_ = 1;
+  double tau_ = 0;
   bool exact_ = false;
   std::vector<char> flat_;
   Packed anchor_, r_, z_, w_;

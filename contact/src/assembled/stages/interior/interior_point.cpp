@@ -21,16 +21,16 @@ void InteriorPoint::reset(int contacts) {
   swept_.resize(at(n_));
 }
 
-// Predictor and corrector (Mehrotra) at the point whose matrix is factored, towards x.u >= least;
-// last: the length that the step before could have had. The one that this step can have.
-double InteriorPoint::aim(const System& system, double mean, double last, double least) {
+// Predictor and corrector (Mehrotra) at the point whose matrix is factored; last: the length that
+// the step before could have had. The one that this step can have.
+double InteriorPoint::aim(const System& system, double mean, double last) {
   newton_.direction(system, equations_, 0, false);
   const double affine = std::min(1.0, newton_.longest_step(equations_));
   newton_.keep_predictor();
   // A blocked step leaves products x.u of different size behind.
   const double centre = last < 0.5 ? kCentreAfterBlocked : kLeastCentre;
   const double nu = std::max(centre, std::pow(1 - affine, 3)) * mean;
-  newton_.direction(system, equations_, std::max(nu, least), true);
+  newton_.direction(system, equations_, nu, true);
   return newton_.longest_step(equations_);
 }
 
@@ -52,7 +52,7 @@ double InteriorPoint::follow(Search& search, int most, double target) {
   for (int iteration = 0; iteration < most; ++iteration) {
     const double mean = equations_.complementarity(point_);
     if (!newton_.factor(search, equations_, point_)) break;
-    const double longest = last = aim(system, mean, last, 0);
+    const double longest = last = aim(system, mean, last);
     if (!(longest > 1e-8)) break;
     newton_.adapt_shift(longest);
     // Close to the cone only with nearly full steps: blocked ones would spoil the centring.

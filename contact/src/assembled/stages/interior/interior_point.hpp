@@ -15,29 +15,24 @@ class InteriorPoint {
   void reset(int contacts);
   // Tests the point where everything sticks, which run() starts from: one factorisation.
   void stick(Search& search);
+  // The size of impulses over that of those by which everything sticks; 0: none are known.
+  double size_over_sticking(Search& search, const PackedVector* x);
   // From the point where everything sticks; at most `most` steps. The result is search.best.
   void run(Search& search, int most);
-  // From the last point of a run.
+  // From the last point of a run, and that point.
   void go_on(Search& search, int most) { follow(search, most, 0); }
+  const Packed& impulses() const { return equations_.impulses(); }
   // From near x.
   void run_near(Search& search, const PackedVector* x, int most);
   // Proximal point iteration from x, at most `most` problems A + tau D, b + tau D x, which a small
   // tau D makes solvable where the path of the problem itself ends. Each is solved by a few steps
   // of `newton` from the point to which the last step leads or, where that fails, along its own
-  // path. whole: where one cannot be solved a larger tau is tried, and so on, else it ends there.
+  // path. whole: where one cannot be solved a larger tau is tried, else it ends there.
   void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton,
-                    bool whole = true);
-  // From near x, the matrix shifted as far as steps along its null space ask for: where the path of
-  // the problem ends, without the problems of run_proximal(). At most `most` factorisations.
-  void run_shifted(Search& search, const PackedVector* x, int most);
-  // From the convex problem to the law, at most `most` factorisations: in theta s(u) the path of
-  // theta from 0 to 1 at constant x.u, then run().
-  void run_coupling(Search& search, int most);
+                    bool whole = false);
   // The path of run() by its arclength, through the turns where its steps are blocked; `newton`
   // finishes. At most `most` factorisations.
   void run_arclength(Search& search, int most, ProximalNewton& newton);
-  // Of the last point of a run.
-  const Packed& impulses() const { return equations_.impulses(); }
   // Orders the matrix, so that cost() knows its fill.
   void order(Search& search);
   // Estimated ns of one step; by a guess of the fill before order().
@@ -51,13 +46,9 @@ class InteriorPoint {
   // True, and ordered, where bodies have so many contacts that equations of bodies take the place
   // of those of contacts.
   bool order_bodies(Search& search);
-  // Estimated ns of the look at the rank that it takes; 0: none.
-  double look_cost(const Search& search) const { return newton_.matrix().look_cost(search); }
 
  private:
-  struct CouplingPath;
   struct ArclengthPath;
-  struct Progress;
   bool start(Search& search);
   bool start_near(Search& search, const PackedVector* start, double near);
   bool start_proximal(Search& search, double tau, double near);
@@ -66,10 +57,8 @@ class InteriorPoint {
   // Steps until nothing is gained or, for a proximal problem, until its natural map is <= target;
   // returns that map.
   double follow(Search& search, int most, double target);
-  double aim(const System& system, double mean, double last, double least);
+  double aim(const System& system, double mean, double last);
   double test_point(Search& search);
-  bool centred(const System& system, double nu) const;
-  bool centre(Search& search, double nu);
   void evaluate_with_digits(Search& search);
 
   int n_ = 0;

@@ -64,8 +64,7 @@ bool InteriorNewton::scale(const System& system, const InteriorEquations& equati
     if (!s.set(point.x[at(i)].v, u)) return false;
     double gamma[2];
     system.gamma(i, gamma);
-    const double slip = slip_of(u), theta = equations.coupling();
-    const double c = theta * kSmooth, d = theta * (1 - kSmooth);
+    const double slip = slip_of(u), c = kSmooth, d = 1 - kSmooth;
     const double gradient[3] = {c * u[0] / slip, d * u[1] / slip, d * u[2] / slip};
     const double column[3] = {1, gamma[0], gamma[1]};
     const double f = 1 / (1 - dot3(gradient, column));

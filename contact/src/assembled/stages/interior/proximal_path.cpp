@@ -12,7 +12,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
                                  ProximalNewton& newton, bool whole) {
   constexpr int kCorrections = 4, kSteps = 20, kPatience = 700, kSweeps = 3;
   constexpr double kFirst = 1e-2, kLeast = 1e-9, kMost = 1;  // tau, for ordinary loads
-  constexpr double kLightest = 1e6;
+  constexpr double kLightest = 1e6, kNear = 1e-4;
   System& system = search.system;
   Packed rate(at(n_)), point(at(n_));  // rate: tau (x_k+1 - x_k)
   equations_.set_anchor(x);
@@ -21,7 +21,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
   // by its size at the rate of what is left tau has to be as much smaller.
   const double lighter = std::min(kLightest, std::max(1.0, system.load(x) / kOrdinaryLoad));
   const double least = kLeast / lighter;
-  double tau = kFirst / lighter, near = 1e-4;
+  double tau = kFirst / lighter;
   double reference = search.best_error;
   int gain = 0;
   bool drifting = false;
@@ -38,7 +38,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       // iteration is no better, with more steps each.
       equations_.set_tau(0);
       const double before = equations_.natural_map(system, anchor.data());
-      if (!start_proximal(search, tau, near)) break;
+      if (!start_proximal(search, tau, kNear)) break;
       found = follow(search, kSteps, 0.5 * before) <= 0.8 * before;
       equations_.set_tau(0);
       search.test(equations_.impulses().data(), Method::interior_point);
@@ -46,8 +46,6 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       if (found) {
         point = equations_.impulses();
         newton.correct(search, tau, anchor.data(), point, kCorrections);
-      } else {
-        near = near < 5e-5 ? 1e-3 : near > 5e-4 ? 1e-4 : 1e-5;  // another way to the same point
       }
     }
     if (search.best_error < 0.97 * reference) {
