@@ -278,3 +278,25 @@ TEST_CASE("one contact: a slip along very different tangents is found to round-o
   INFO(1e11 * error << " tolerances");
   CHECK(error <= 1e-11);
 }
+
+// mu / a is beyond the range of doubles, mu c / a is not: a body that approaches was "solved" at
+// rest.
+TEST_CASE("one contact: friction over a small A is not lost to overflow") {
+  Matrix3d A = Matrix3d::Identity();
+  A(0, 1) = A(1, 0) = 0.4;
+  const Vector3d b(1, 0.2, 0.1);
+  for (double size : {1e-307, 1e-300, 1.0}) {
+    for (double mu : {1.5, 1e2, 1e150, 1e300}) {
+      for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
+        Options o;
+        o.law = law;
+        o.max_work = 1e8;
+        const Problem p = Problem::dense(size * A, b, Eigen::VectorXd::Constant(1, mu));
+        const Solution s = Solver(o).solve(p);
+        INFO(name(law) << ", A " << size << ", mu " << mu << ": " << name(s.status));
+        CHECK(s.status == Status::solved);
+        CHECK(s.velocities.norm() < 1e-9);
+      }
+    }
+  }
+}

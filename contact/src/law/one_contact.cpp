@@ -67,8 +67,11 @@ LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {
   T[0] = cc * beta[0] + ss * beta[1] + c[0] * (c[0] * inv_a);
   T[1] = cs * (beta[0] - beta[1]) + c[0] * (c[1] * inv_a);
   T[2] = ss * beta[0] + cc * beta[1] + c[1] * (c[1] * inv_a);
-  g[0] = mu * inv_a * (cosine * c[0] + sine * c[1]);
-  g[1] = mu * inv_a * (cosine * c[1] - sine * c[0]);
+  // mu / a may overflow where g does not.
+  const double steep = mu * inv_a;
+  const auto times = [&](double v) { return std::isfinite(steep) ? steep * v : mu * (inv_a * v); };
+  g[0] = times(cosine * c[0] + sine * c[1]);
+  g[1] = times(cosine * c[1] - sine * c[0]);
   e = std::sqrt(g[0] * g[0] + g[1] * g[1]);
   // Kantorovich: the angle between y and E y, E = diag(1 / (beta + lambda)), has at least this
   // cosine.
