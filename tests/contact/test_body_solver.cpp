@@ -11,9 +11,23 @@
 
 using namespace tether::contact;
 
+namespace {
+
+// In the surfaces.
+void add_slips(random::Packing& p) {
+  random::Generator g(2);
+  for (PointContact& c : p.contacts) {
+    const Eigen::Vector3d s(g.uniform(-0.1, 0.1), g.uniform(-0.1, 0.1), g.uniform(-0.1, 0.1));
+    c.slip = s - c.normal.dot(s) * c.normal;
+  }
+}
+
+}  // namespace
+
 TEST_CASE("body form and Delassus form judge alike") {
   for (bool spheres : {true, false}) {
-    const random::Packing p = random::packing(3, spheres);
+    random::Packing p = random::packing(3, spheres);
+    add_slips(p);
     const Problem problem = delassus(p.bodies, to_contacts(p.contacts));
     for (Law law : {Law::coulomb, Law::maximum_dissipation, Law::frictionless}) {
       const BodySolution s = run(p, law, 1);
@@ -40,6 +54,7 @@ TEST_CASE("evaluate of bodies is evaluate of the Delassus problem") {
   random::Generator g(5);
   for (bool spheres : {true, false}) {
     random::Packing p = random::packing(3, spheres);
+    add_slips(p);
     for (PointContact& c : p.contacts) {
       c.bias = g.uniform(-0.1, 0.1);
       c.mu = g.uniform(0, 1) < 0.3 ? 0 : g.uniform(0, 1);

@@ -165,6 +165,70 @@ TEST_CASE("scene: free rotation keeps energy and momentum for 100 s, turns over 
   CHECK(middle / fine == Approx(4).epsilon(0.15));
 }
 
+namespace {
+
+// A cube at this distance from the axis of a table that turns by 1.5 rad/s, and moves with it.
+std::string turntable(const std::string& table, double at) {
+  return "[scene]\nend = 10\ngravity = [0, 0, -9.81]\n" + table +
+         "[[body]]\nname = \"cube\"\nshape = \"box\"\nsize = [0.05, 0.05, 0.05]\nmass = 0.1\n"
+         "position = " +
+         vector({at, 0, 0.025}) + "\nvelocity = " + vector({0, 1.5 * at, 0}) +
+         "\nangular_velocity = [0, 0, 1.5]\nmaterial = \"cube\"\n"
+         "[[pair]]\nbetween = [\"table\", \"cube\"]\nfriction = 0.3\n";
+}
+const std::string kTable =
+    "[[body]]\nname = \"table\"\nshape = \"cylinder\"\nradius = 1\nlength = 0.1\nmass = 10\n"
+    "position = [0, 0, -0.05]\nangular_velocity = [0, 0, 1.5]\nmaterial = \"table\"\n";
+
+}  // namespace
+
+TEST_CASE("scene: what a turning table carries keeps its place to 1e-4 of its radius a turn") {
+  const std::string hinge =
+      "[[joint]]\nkind = \"hinge\"\nbodies = [\"table\", \"world\"]\nat = [0, 0, 0]\n"
+      "axis = [0, 0, 1]\nmotion = { rate_rad = 1.5 }\n";
+  // On a smooth floor it turns about what it carries, too: a little.
+  const std::string free =
+      "[[body]]\nname = \"floor\"\nshape = \"plane\"\nfixed = true\nposition = [0, 0, -0.1]\n"
+      "material = \"ice\"\n[[pair]]\nbetween = [\"ice\", \"table\"]\nfriction = 0\n"
+      "[[pair]]\nbetween = [\"ice\", \"cube\"]\nfriction = 0\n";
+  for (const std::string& table : {kTable + hinge, kTable + free}) {
+    const Scene scene = parse_scene(turntable(table, 0.4), "turntable.toml");
+    const auto engine = make_engine(scene);
+    const auto arm = [&] {
+      const BodyState &t = engine->bodies()[0], &c = engine->bodies().back();
+      return Vector3d(t.orientation.conjugate() * (c.position - t.position));
+    };
+    const Vector3d before = arm();
+    engine->advance(scene.end);
+    CHECK((arm() - before).norm() < 1e-4 * 0.4 * (1.5 * scene.end / (2 * kPi)));
+  }
+}
+
+TEST_CASE("scene: a disc that rolls about its resting centre keeps its energy and its tilt") {
+  const Scene scene = parse_scene(
+      "[scene]\nend = 2\ngravity = [0, 0, -9.81]\n"
+      "[[body]]\nshape = \"plane\"\nfixed = true\nmaterial = \"floor\"\n"
+      "[[body]]\nshape = \"cylinder\"\nradius = 0.04\nlength = 0.01\nmass = 0.1\n"
+      "position = [0, 0, 0.018379268836956293]\norientation = { axis = [0, 1, 0], deg = 20 }\n"
+      "angular_velocity = [16.645939336661293, 0, -8.52733067495695]\nmaterial = \"disc\"\n"
+      "[[pair]]\nbetween = [\"floor\", \"disc\"]\nfriction = 0.8\n",
+      "disc.toml");
+  const auto engine = make_engine(scene);
+  const auto energy = [&] {
+    const Diagnostics d = engine->diagnostics();
+    return d.kinetic_energy + d.potential_energy;
+  };
+  const double before = energy();
+  for (int k = 1; k <= 200; ++k) {
+    engine->advance(k * 1e-2);
+    CHECK(std::abs(energy() - before) < 1e-2 * before);
+    const BodyState& b = engine->bodies()[1];
+    CHECK(b.position.head<2>().norm() < 1e-3);
+    const double tilt = std::acos(std::abs((b.orientation * Vector3d::UnitZ()).z()));
+    CHECK(std::abs(tilt - 20 * kPi / 180) < 0.01);
+  }
+}
+
 TEST_CASE("scene: the shipped woodpecker comes down in steps as it does in events") {
   // Heights of the sleeve at 0.15 s and 0.3 s by events; tolerances 1e-9 and 1e-10 agree to 1e-10.
   struct Case {

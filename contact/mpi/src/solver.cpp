@@ -101,7 +101,7 @@ void Solver::Implementation::bring_bodies(const Share& share) {
 // A contact goes from who has given it to who sweeps it.
 void Solver::Implementation::bring_contacts(const Share& share,
                                             const std::vector<Vector3d>& starts) {
-  Delivery delivery(messages, 16);
+  Delivery delivery(messages, 19);
   const std::vector<int>& sweeper = ranks.contact_ranks();
   for (std::size_t c = 0; c < sweeper.size(); ++c)
     delivery.add(static_cast<int>(c), whole.giver[c], sweeper[c]);
@@ -117,7 +117,8 @@ void Solver::Implementation::bring_contacts(const Share& share,
         out[1] = k.second;
         out[2] = k.mu;
         out[3] = k.bias;
-        put(out + 4, k.r1, k.r2, k.normal, starts.empty() ? Vector3d(0, 0, 0) : starts[at(i)]);
+        put(out + 4, k.r1, k.r2, k.normal, k.slip,
+            starts.empty() ? Vector3d(0, 0, 0) : starts[at(i)]);
       },
       [&](int c, const double* in) {
         const int i = local_contact[at(c)];
@@ -127,7 +128,7 @@ void Solver::Implementation::bring_contacts(const Share& share,
         k.mu = in[2];
         k.bias = in[3];
         Vector3d start;
-        get(in + 4, k.r1, k.r2, k.normal, start);
+        get(in + 4, k.r1, k.r2, k.normal, k.slip, start);
         if (!part.starts.empty()) part.starts[at(i)] = start;
       });
 }

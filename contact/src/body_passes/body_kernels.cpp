@@ -22,7 +22,7 @@ TETHER_INLINE Squares pass(const BodyArrays& s, SphereContact* begin, SphereCont
     double w[3], u[3];
     for (int k = 0; k < 3; ++k) w[k] = c.s1 * A.w[k] - c.s2 * B.w[k];
     cross(w, c.n, u);
-    for (int k = 0; k < 3; ++k) u[k] += A.v[k] - B.v[k];
+    for (int k = 0; k < 3; ++k) u[k] += A.v[k] - B.v[k] + c.slip[k];
     const double un = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2];  // without bias
     const double share = kTest ? 1.0 / coupled[it - begin] : 1;
     const double inv_a = share * c.inv_a, inv_t = share * c.inv_t;

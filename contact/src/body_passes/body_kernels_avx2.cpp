@@ -24,13 +24,14 @@ TETHER_AVX2 Squares pass(const BodyArrays& s, SphereGroup* begin, SphereGroup* e
     find(s, c, A, B);
     read(A);
     read(B);
-    const Vector n = load(c.n), p = load(c.p);
+    const Vector n = load(c.n), p = load(c.p), slip = load(c.slip);
     const v4 s1 = load(c.s1), s2 = load(c.s2);
     const v4 share = kTest ? all(1) / widen(coupled + 4 * (it - begin)) : all(1);
     const v4 inv_a = share * load(c.inv_a), inv_t = share * load(c.inv_t);
     const Vector w = {s1 * A.w.x - s2 * B.w.x, s1 * A.w.y - s2 * B.w.y, s1 * A.w.z - s2 * B.w.z};
     const Vector wn = cross(w, n);
-    const Vector u = {wn.x + (A.v.x - B.v.x), wn.y + (A.v.y - B.v.y), wn.z + (A.v.z - B.v.z)};
+    const Vector u = {wn.x + (A.v.x - B.v.x) + slip.x, wn.y + (A.v.y - B.v.y) + slip.y,
+                      wn.z + (A.v.z - B.v.z) + slip.z};
     const v4 un = dot(u, n), pn = dot(p, n), xn = most(pn - (un + load(c.bias)) * inv_a, zero);
     const Vector t = {p.x - pn * n.x - (u.x - un * n.x) * inv_t,
                       p.y - pn * n.y - (u.y - un * n.y) * inv_t,

@@ -119,7 +119,7 @@ PassResult IslandSweeps::pack_contact(int contact, Kind k, int place, const Vect
   const int second = given_->second()[at(contact)];
   const int b = second >= 0 ? graph_->slot[at(second)] : given_->fixed_second(contact);
   const Vector3d before = velocity_before(s, c.bias);
-  const double slip = contacts_.pack(k, place, s, c.mu, c.bias, a, b);
+  const double slip = contacts_.pack(k, place, s, c, a, b);
   Vector3d p = Vector3d::Zero();
   if (start) p = on_cone(s.sign * *start, s.n, k == Kind::smooth ? 0 : c.mu);
   if (p.isZero(0))

@@ -35,7 +35,7 @@ Contact from_lane(const Group& g, int lane) {
 }
 
 // The blocks; what is not set is zero.
-SphereContact packed_sphere(const Side& s, double mu, double& slip) {
+SphereContact packed_sphere(const Side& s, const PointContact& c, double& slip) {
   const double mass = s.first->inverse_mass + (s.second ? s.second->inverse_mass : 0);
   const double s1 = s.n.dot(s.r1), s2 = s.n.dot(s.r2);
   double t = mass + s1 * s1 * s.first->inverse_inertia(0, 0);
@@ -48,7 +48,8 @@ SphereContact packed_sphere(const Side& s, double mu, double& slip) {
   p.s2 = s2;
   p.inv_a = 1 / mass;
   p.inv_t = 1 / t;
-  p.mu = mu;
+  p.mu = c.mu;
+  store(s.sign * c.slip, p.slip);
   return p;
 }
 
@@ -66,9 +67,9 @@ SmoothContact packed_smooth(const Side& s) {
   return p;
 }
 
-GeneralContact packed_general(const Side& s, double mu, double& slip) {
+GeneralContact packed_general(const Side& s, const PointContact& c, double& slip) {
   const Matrix3d F = tangent_frame(s.n);
-  const LocalBlock L(F * diagonal_block(s) * F.transpose(), mu);
+  const LocalBlock L(F * diagonal_block(s) * F.transpose(), c.mu);
   // Tangents turned by V, in which the tangential block is diagonal.
   const Vector3d t = L.cosine * F.row(1) + L.sine * F.row(2);
   slip = 0.5 * (L.T[0] + L.T[2]) * L.inv_a;
@@ -84,6 +85,8 @@ GeneralContact packed_general(const Side& s, double mu, double& slip) {
   p.c[1] = L.cosine * L.c[1] - L.sine * L.c[0];
   p.beta[0] = L.beta[0];
   p.beta[1] = L.beta[1];
+  p.slip[0] = s.sign * c.slip.dot(t);
+  p.slip[1] = s.sign * c.slip.dot(s.n.cross(t));
   p.lambda = -1;
   return p;
 }
@@ -116,26 +119,26 @@ void PackedContacts::resize(const Chunk& end, std::size_t contacts) {
   previous_.resize(3 * contacts);
 }
 
-double PackedContacts::pack(Kind k, int place, const Side& side, double mu, double bias, int a,
+double PackedContacts::pack(Kind k, int place, const Side& side, const PointContact& c, int a,
                             int b) {
   double slip = 0;
   const auto between = [&](auto&& p) -> auto& {
     p.first = a;
     p.second = b;
-    p.bias = bias;
+    p.bias = c.bias;
     return p;
   };
   switch (k) {
     case Kind::sphere:
     case Kind::sphere4:
-      put(between(packed_sphere(side, mu, slip)), k, place);
+      put(between(packed_sphere(side, c, slip)), k, place);
       break;
     case Kind::smooth:
       smooth_[at(place)] = between(packed_smooth(side));
       break;
     case Kind::general:
     case Kind::general4:
-      put(between(packed_general(side, mu, slip)), k, place);
+      put(between(packed_general(side, c, slip)), k, place);
       break;
   }
   return slip;

@@ -20,7 +20,7 @@ class PackedContacts {
   // The block of a contact between the bodies a and b of the kernels, impulse zero. Returns T/a of
   // the tangents that friction moves, 0 without friction. Throws std::invalid_argument if the
   // bodies cannot move along the normal.
-  double pack(Kind k, int place, const Side& side, double mu, double bias, int a, int b);
+  double pack(Kind k, int place, const Side& side, const PointContact& c, int a, int b);
 
   // World axes, on the body `a`.
   Vector3d impulse(Kind k, int place) const;

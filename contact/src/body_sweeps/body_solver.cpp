@@ -244,7 +244,8 @@ std::vector<ContactRows> to_contacts(const std::vector<PointContact>& contacts) 
   std::vector<ContactRows> out;
   for (const PointContact& c : contacts) {
     out.push_back(ContactRows::at_point(c.first, c.second, c.r1, c.r2, c.normal, c.mu));
-    out.back().bias[0] = c.bias;
+    out.back().bias = tangent_frame(c.normal) * c.slip;
+    out.back().bias[0] += c.bias;
   }
   return out;
 }

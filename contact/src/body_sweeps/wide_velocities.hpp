@@ -27,7 +27,8 @@ class WideVelocities {
   }
   // Velocity of the first body of a contact against the second one, with the bias.
   Wide3 relative(const PointContact& c) const {
-    Wide3 u = at_point(c.first, c.r1) + c.normal.cast<long double>() * c.bias;
+    Wide3 u = at_point(c.first, c.r1) + c.normal.cast<long double>() * c.bias +
+              c.slip.cast<long double>();
     if (c.second >= 0) u -= at_point(c.second, c.r2);
     return u;
   }

@@ -11,21 +11,30 @@ namespace {
 
 constexpr double kRank = 1e-6;  // of rows in their own scale
 
-}  // namespace
-
-bool hold_all(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::VectorXd& b,
-              const Eigen::VectorXd& mu, double tolerance, Eigen::VectorXd& x) {
-  const double enough = 0.1 * tolerance * b.cwiseAbs().maxCoeff();
+Eigen::VectorXd scales(const Eigen::Ref<const Eigen::MatrixXd>& A) {
   Eigen::VectorXd scale = A.diagonal();
   for (double& s : scale) s = s > 0 ? 1 / std::sqrt(s) : 0;
-  const Eigen::Index n = mu.size();
+  return scale;
+}
+
+}  // namespace
+
+bool share_loads(const Eigen::Ref<const Eigen::MatrixXd>& A) {
+  const Eigen::Index n = A.rows() / 3;
+  const Eigen::VectorXd scale = scales(A);
   Eigen::MatrixXd normals(n, n);
   for (Eigen::Index j = 0; j < n; ++j)
     for (Eigen::Index i = 0; i < n; ++i)
       normals(i, j) = scale[3 * i] * A(3 * i, 3 * j) * scale[3 * j];
   linalg::PivotedQr of_normals(kRank);
   of_normals.factor(normals);
-  if (of_normals.rank() == n) return false;
+  return of_normals.rank() < n;
+}
+
+bool hold_all(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::VectorXd& b,
+              const Eigen::VectorXd& mu, double tolerance, Eigen::VectorXd& x) {
+  const double enough = 0.1 * tolerance * b.cwiseAbs().maxCoeff();
+  const Eigen::VectorXd scale = scales(A);
   linalg::LeastSquares factor(kRank);
   factor.factor(scale.asDiagonal() * A * scale.asDiagonal());
   const Eigen::VectorXd held =

@@ -5,12 +5,14 @@
 
 namespace tether::contact::detail {
 
-/// Where contacts share their forces in more than one way (four wheels of a cart), an iteration may
-/// end at any lawful split, and once it has left that of the steps before it stays with the other:
-/// wheels without load need not roll. So the least x, each row in its own scale, that leaves
-/// w = A x - b = 0 is looked at first: it hangs on nothing but A and b. Sets x to that and returns
-/// true where normals depend on each other and Coulomb's law allows it. (Slips that do so, in a
-/// chain that lies on the floor, would hold all by stress along it: it left its rest.)
+/// Whether contacts share their forces in more than one way, as four wheels of a cart do: an
+/// iteration may end at any lawful split, and once it has left that of the steps before it stays
+/// with the other. (Slips that depend on each other, in a chain that lies on the floor, do not
+/// count: held by stress along it, it left its rest.)
+bool share_loads(const Eigen::Ref<const Eigen::MatrixXd>& A);
+
+/// The least x, each row in its own scale, that leaves w = A x - b = 0: it hangs on nothing but A
+/// and b. Sets x to that and returns true where Coulomb's law allows it.
 bool hold_all(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::VectorXd& b,
               const Eigen::VectorXd& mu, double tolerance, Eigen::VectorXd& x);
 

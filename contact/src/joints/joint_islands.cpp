@@ -94,7 +94,8 @@ void StepJointIslands::solve_jointed(const std::vector<RigidBody>& bodies,
     const double mu = law_ == Law::frictionless ? 0 : p.mu;
     const auto row = 3 * static_cast<Eigen::Index>(contacts_.size());
     contacts_.push_back(ContactRows::at_point(p.first, p.second, p.r1, p.r2, p.normal, mu));
-    contacts_.back().bias[0] = p.bias;
+    contacts_.back().bias = tangent_frame(p.normal) * p.slip;
+    contacts_.back().bias[0] += p.bias;
     if (const Vector3d* last = warm_ ? memory_.find(p.id) : nullptr)
       x_.segment<3>(row) = tangent_frame(p.normal) * *last;
   }

@@ -17,6 +17,7 @@ namespace {
 // A_nn over that without joints; both are squares of lengths, the one left by rounding 1e-14.
 constexpr double kHeld = 1e-14;
 constexpr Eigen::Index kFew = 20;  // contacts whose dense factors cost little beside their solve
+constexpr double kSoft = 1e-5;     // compliance of a support over what moves there without joints
 constexpr double kSlip = 1e-12;    // of the speeds that a slip is the difference of
 
 using linalg::at;
@@ -223,10 +224,22 @@ void JointedContacts::solve_kept(const std::vector<ContactRows>& contacts,
     mu[i] = c.mu;
     start.segment<3>(3 * i) = x.segment<3>(3 * contact);
   }
-  const Problem problem = Problem::dense(A_.topLeftCorner(3 * n, 3 * n), b, mu);
+  const auto A = A_.topLeftCorner(3 * n, 3 * n);
+  const Problem problem = Problem::dense(A, b, mu);
   const double tolerance = solver_.options().tolerance;
-  if (n <= kFew && !(evaluate(problem, solver_.options().law, start).fixed_point <= tolerance))
-    hold_all(A_.topLeftCorner(3 * n, 3 * n), b, mu, tolerance, start);
+  if (n <= kFew && !(evaluate(problem, solver_.options().law, start).fixed_point <= tolerance) &&
+      share_loads(A) && !hold_all(A, b, mu, tolerance, start)) {
+    // Contacts that slide share their loads as soft supports of one kind would.
+    Eigen::MatrixXd soft = A;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const int place = kept_[static_cast<std::size_t>(i)];
+      const double slip = slip_alone_[place] / 2;
+      soft.diagonal().segment<3>(3 * i) += kSoft * Eigen::Vector3d(alone_[place], slip, slip);
+    }
+    const Solution shared = solver_.solve(Problem::dense(soft, b, mu), start);
+    result_.counts.add(shared.counts);
+    if (shared.status == Status::solved) start = shared.impulses;
+  }
   const Solution solution = solver_.solve(problem, start);
   result_.counts.add(solution.counts);
   if (!(solution.error <= result_.error)) result_.error = solution.error;

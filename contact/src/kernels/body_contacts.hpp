@@ -32,14 +32,14 @@ struct GeneralContact {
   int first, second;
   double n[3], t[3], r1[3], r2[3];
   double a, inv_a, mu, c[2], beta[2];
-  double bias, x[3], lambda;
+  double bias, slip[2], x[3], lambda;
 };
-static_assert(sizeof(GeneralContact) == 200, "memory for a contact is a promise (README)");
+static_assert(sizeof(GeneralContact) == 216, "memory for a contact is a promise (README)");
 
 // Spheres: r1 = s1 n, r2 = s2 n, no coupling. Impulse p in world axes.
 struct SphereContact {
   int first, second;
-  double n[3], s1, s2, inv_a, inv_t, mu, bias, p[3];
+  double n[3], s1, s2, inv_a, inv_t, mu, bias, slip[3], p[3];
 };
 
 // No friction: one equation. q = r x n; weight = |D e_n|.
@@ -52,12 +52,12 @@ struct SmoothContact {
 struct alignas(32) GeneralGroup {
   int first[4], second[4];
   double n[3][4], t[3][4], r1[3][4], r2[3][4];
-  double a[4], inv_a[4], mu[4], c[2][4], beta[2][4], bias[4];
+  double a[4], inv_a[4], mu[4], c[2][4], beta[2][4], bias[4], slip[2][4];
   double x[3][4], lambda[4];
 };
 struct alignas(32) SphereGroup {
   int first[4], second[4];
-  double n[3][4], s1[4], s2[4], inv_a[4], inv_t[4], mu[4], bias[4], p[3][4];
+  double n[3][4], s1[4], s2[4], inv_a[4], inv_t[4], mu[4], bias[4], slip[3][4], p[3][4];
 };
 static_assert(sizeof(GeneralGroup) == 4 * sizeof(GeneralContact) &&
                   sizeof(SphereGroup) == 4 * sizeof(SphereContact),

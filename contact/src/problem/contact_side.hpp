@@ -24,29 +24,24 @@ struct Side {
   const RigidBody* first;
   const RigidBody* second;
   Vector3d r1, r2, n;
-  Vector3d fixed;  // velocity of the partner at the contact if it does not move
+  Vector3d fixed;  // velocity of the partner at the contact if it does not move, less the slip
   double sign;     // of the caller's impulse
 };
 
 inline Side side(const std::vector<RigidBody>& bodies, const PointContact& c, bool turned) {
-  Side s{&bodies[static_cast<std::size_t>(c.first)],
-         nullptr,
-         c.r1,
-         c.r2,
-         c.normal,
-         Vector3d::Zero(),
-         1};
+  Side s{&bodies[static_cast<std::size_t>(c.first)], nullptr, c.r1, c.r2, c.normal, -c.slip, 1};
   const RigidBody* other = c.second < 0 ? nullptr : &bodies[static_cast<std::size_t>(c.second)];
   if (turned) {
     std::swap(s.first, other);
     s.r1.swap(s.r2);
     s.n = -s.n;
+    s.fixed = c.slip;
     s.sign = -1;
   }
   if (other && other->moves()) {
     s.second = other;
   } else if (other) {
-    s.fixed = other->velocity + other->angular_velocity.cross(s.r2);
+    s.fixed += other->velocity + other->angular_velocity.cross(s.r2);
   }
   return s;
 }

@@ -67,6 +67,7 @@ void check(std::size_t i, const PointContact& c, int count) {
   if (!c.r2.allFinite()) require_finite("r2", c.r2, where());
   if (!(c.mu >= 0) || !std::isfinite(c.mu)) refuse(where() + "mu", c.mu, "must be finite and >= 0");
   if (!std::isfinite(c.bias)) refuse(where() + "bias", c.bias, "must be finite");
+  if (!c.slip.allFinite()) require_finite("slip", c.slip, where());
   if (!(std::abs(c.normal.squaredNorm() - 1) < 2e-6))
     refuse(where() + "length of normal", c.normal.norm(), "must be 1 (to 1e-6)");
 }

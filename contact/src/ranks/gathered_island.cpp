@@ -10,9 +10,9 @@ using linalg::at;
 
 namespace {
 
-// Numbers of a contact: its number, bodies, geometry, mu, bias, state; of a body: its number, mass,
-// inertia, velocities.
-constexpr std::size_t kContact = 18, kBody = 17;
+// Numbers of a contact: its number, bodies, geometry, mu, bias, slip, state; of a body: its number,
+// mass, inertia, velocities.
+constexpr std::size_t kContact = 21, kBody = 17;
 
 class Writer {
  public:
@@ -78,6 +78,7 @@ void GatheredIsland::pack(const RankPlan& plan, int k, const GivenProblem& given
     out.all(c.normal);
     out.number(c.mu);
     out.number(c.bias);
+    out.all(c.slip);
     out.all(sweeps.state(kind, place));
   });
   const auto bodies_here = std::count(used.begin(), used.end(), 1);
@@ -121,6 +122,7 @@ void GatheredIsland::unpack(const RankPlan& plan, int k, const std::vector<doubl
       in.all(c.normal);
       c.mu = in.number();
       c.bias = in.number();
+      in.all(c.slip);
       in.all(states[at(place)]);
     }
     std::size_t count = static_cast<std::size_t>(*next++);

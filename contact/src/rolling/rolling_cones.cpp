@@ -59,8 +59,8 @@ ConeProblem rolling_problem(const std::vector<RigidBody>& bodies,
     const PointContact& p = c.point;
     cones.push_back(cone_of(c));
     const Rows axes = axes_of(c, cones.back());
-    Eigen::VectorXd w = Eigen::VectorXd::Zero(axes.rows());
-    w[0] = p.bias;
+    Eigen::VectorXd w = axes.leftCols<3>() * p.slip;
+    w[0] += p.bias;
     const auto add = [&](int body, const Vector3d& r, double sign) {
       if (body < 0) return;
       const Rows J = rows_at(axes, r, sign);

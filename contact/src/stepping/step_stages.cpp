@@ -137,7 +137,7 @@ void Stepper::Implementation::choose_impacts() {
 }
 
 void Stepper::Implementation::solve_problem() {
-  solver->solve(bodies.motion, contacts.points, solution);
+  solver->solve(bodies.motion, turned, solution);
   ++counts.contact_problems;
   counts.sweeps += solution.sweeps;
   counts.assembled_islands += solution.assembled_islands;
@@ -153,6 +153,10 @@ void Stepper::Implementation::solve_contacts() {
     solver->forget();
     return;
   }
+  turned.reserve(contacts.points.capacity());
+  turned = contacts.points;
+  if (near)
+    mid_step.turn(*near, *impacts, bodies, joints.get(), options.gyroscopic, part.dt, turned);
   solve_problem();
   if (shortest() && solution.status != Status::solved &&
       !(solution.error <= std::max(accepted_residual(options), detail::kGood))) {

@@ -14,6 +14,7 @@
 #include "stepping/impacts/step_cuts.hpp"
 #include "stepping/motion/free_motion.hpp"
 #include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/mid_step.hpp"
 #include "stepping/motion/rotation.hpp"
 #include "stepping/position_correction.hpp"
 #include "stepping/sleeping.hpp"
@@ -103,6 +104,8 @@ struct Stepper::Implementation {
   std::unique_ptr<detail::PositionCorrection> positions;  // only with error reduction
   std::unique_ptr<detail::Sleeping> sleeping;             // only where bodies may sleep
   StepContacts contacts;
+  detail::MidStep mid_step;
+  std::vector<PointContact> turned;  // contacts as of the middle of the step
   BodySolution solution;
   std::unique_ptr<detail::JointPart> joints;     // only where they have been added
   std::unique_ptr<detail::RollingPart> rolling;  // only where a meeting names it

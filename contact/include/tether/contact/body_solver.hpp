@@ -27,6 +27,8 @@ struct PointContact {
   /// Identity from one solve to the next (with `first` and `second` in the same order), unique
   /// within a solve; kNoId: never warm-started.
   std::uint64_t id = kNoId;
+  /// Added to the relative velocity, in the surface, world axes.
+  Eigen::Vector3d slip = Eigen::Vector3d::Zero();
 };
 
 class SolverTeam;

@@ -327,10 +327,12 @@ void StepJoints::predict(BodySet& bodies, double t, double dt) {
   take_velocities(bodies);
   start_ = v_;
   mechanisms_.satisfy(rows_, v_);
+  bend_ = v_;
   store(bodies);
   meet(bodies, t, dt);
   restore(bodies);
   give_velocities(bodies);
+  for (const int i : held_) bend_[at(i)] = v_[at(i)] - bend_[at(i)];
   if (!has_laws_) return;
   laws_.laws.clear();
   equations_->add_laws(bodies, t, laws_.laws);

@@ -41,6 +41,7 @@ class StepJoints final : public JointPart {
   void begin(BodySet& bodies, double t) override;
   /// Before the contacts are solved: velocities that meet the joints at the end of the step.
   void predict(BodySet& bodies, double t, double dt) override;
+  const std::vector<Vector6d>& bend() const override { return bend_; }
   /// Where something has moved the bodies since begin(): the least move back onto the joints.
   void put_back(BodySet& bodies, double t) override;
   /// Moves the bodies of the mechanisms to the end of the step. False: it does not meet the joints
@@ -138,6 +139,7 @@ class StepJoints final : public JointPart {
   std::vector<char> round_;          // of them: of inertia 1
   std::vector<std::pair<int, int>> links_, joined_;
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
+  std::vector<Vector6d> bend_;
   RowVectors row_;
   std::vector<double> impulses_, sum_, law_sum_;
   std::vector<int> under_laws_;

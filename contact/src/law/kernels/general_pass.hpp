@@ -27,8 +27,8 @@ TETHER_INLINE Squares pass(const BodyArrays& s, GeneralContact* begin, GeneralCo
     double o[3];
     cross(c.n, c.t, o);
     double w0 = u[0] * c.n[0] + u[1] * c.n[1] + u[2] * c.n[2] + c.bias;
-    double w1 = u[0] * c.t[0] + u[1] * c.t[1] + u[2] * c.t[2];
-    double w2 = u[0] * o[0] + u[1] * o[1] + u[2] * o[2];
+    double w1 = u[0] * c.t[0] + u[1] * c.t[1] + u[2] * c.t[2] + c.slip[0];
+    double w2 = u[0] * o[0] + u[1] * o[1] + u[2] * o[2] + c.slip[1];
     const double share = kTest ? 1.0 / coupled[it - begin] : 1;
     w0 *= share;
     w1 *= share;

@@ -58,8 +58,8 @@ TETHER_AVX2 Squares pass(const BodyArrays& s, GeneralGroup* begin, GeneralGroup*
     const Vector u = {A.v.x - B.v.x + a1.x - a2.x, A.v.y - B.v.y + a1.y - a2.y,
                       A.v.z - B.v.z + a1.z - a2.z};
     const v4 share = kTest ? all(1) / widen(coupled + 4 * (it - begin)) : all(1);
-    const v4 w0 = share * (dot(u, n) + load(c.bias)), w1 = share * dot(u, t),
-             w2 = share * dot(u, o);
+    const v4 w0 = share * (dot(u, n) + load(c.bias)), w1 = share * (dot(u, t) + load(c.slip[0])),
+             w2 = share * (dot(u, o) + load(c.slip[1]));
     LaneBlocks L;
     L.a = load(c.a);
     L.inv_a = load(c.inv_a);

@@ -141,7 +141,7 @@ bool NearContacts::any_rolling() const {
                      [](const Meeting& m) { return m.rolling > 0 || m.torsional > 0; });
 }
 
-void NearContacts::place(const BodySet& bodies, double dt) {
+void NearContacts::set_poses(const BodySet& bodies) {
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
     const Surface& s = surfaces_[k];
     const linalg::Quaternion& q = bodies.orientation[at(s.body)];
@@ -150,6 +150,10 @@ void NearContacts::place(const BodySet& bodies, double dt) {
     if (s.shape.kind != ShapeKind::sphere)
       pose_[k].rotation = (q * s.shape.orientation).toRotationMatrix();
   }
+}
+
+void NearContacts::place(const BodySet& bodies, double dt) {
+  set_poses(bodies);
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
     centre_[k] = pose_[at(bounded_[k])].position;
     // The size of the other shape decides what is near a mesh, as with planes.
@@ -191,6 +195,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   double margin = ball_[at(a)] - reach_[at(a)];
   if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
   find_points(i, j, margin);
+  if (near_.count > 0) found_.emplace_back(a, b);
   // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
   // would change their common angular momentum.
   const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;
@@ -232,7 +237,26 @@ void NearContacts::find(const BodySet& bodies, double dt, StepContacts& out) {
   out.points.clear();
   out.gaps.clear();
   place(bodies, dt);
+  found_.clear();
   pairs(bodies, out, [](int, int) { return true; });
+}
+
+void NearContacts::follow(const BodySet& bodies, std::vector<PointContact>& points) {
+  const auto turns = [&](int k) {
+    return !bodies.motion[at(surface(k).body)].angular_velocity.isZero(0);
+  };
+  poses_ = pose_;
+  set_poses(bodies);
+  more_.points.clear();
+  more_.gaps.clear();
+  followed_.clear();
+  followed_.swap(found_);
+  for (const auto& [a, b] : followed_)
+    if (turns(bounded_[at(a)]) || turns(b < 0 ? planes_[at(~b)] : bounded_[at(b)]))
+      pair(bodies, a, b, more_);
+  found_.swap(followed_);
+  pose_.swap(poses_);
+  points.swap(more_.points);
 }
 
 bool NearContacts::find_more(const BodySet& bodies, double dt, StepContacts& out) {

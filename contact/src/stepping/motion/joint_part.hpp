@@ -70,6 +70,9 @@ class JointPart : public IslandMaker {
 
   virtual void begin(BodySet& bodies, double t) = 0;
   virtual void predict(BodySet& bodies, double t, double dt) = 0;
+  /// Of bodies that joints hold: what predict() has added for the joints to be met at the end of
+  /// the step, beyond velocities that meet them at its start.
+  virtual const std::vector<Vector6d>& bend() const = 0;
   virtual void put_back(BodySet& bodies, double t) = 0;
   /// To the end of the step. False: it does not meet the joints.
   virtual bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) = 0;

@@ -1,0 +1,36 @@
+// Tether: contacts in the middle of a step. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/stepping.hpp>
+#include <utility>
+#include <vector>
+
+#include "stepping/detection/near_contacts.hpp"
+#include "stepping/impacts/impacts.hpp"
+#include "stepping/motion/joint_part.hpp"
+
+namespace tether::contact::detail {
+
+/// A step moves bodies by one velocity v. Bodies that stick or roll and turn keep to their way in
+/// order 2 where contacts hold in the middle of the step,
+///
+///     J(t + dt/2) v(t + dt/2) = J(t) v + d,
+///
+/// with d as free motion has it, from the velocities at the start; joints have added to theirs
+/// what turns the bodies that they hold. Impulses act along J(t)', so that the step is symmetric in
+/// time, as SHAKE is: energy has no drift of order 1. Bodies that do not turn have d = 0.
+class MidStep {
+ public:
+  /// Adds d to the contacts, but for the impacts, which are at the start.
+  void turn(NearContacts& near, const Impacts& impacts, const BodySet& bodies,
+            const JointPart* joints, Gyroscopic gyroscopic, double dt,
+            std::vector<PointContact>& contacts);
+
+ private:
+  BodySet then_;
+  std::vector<RigidBody> motion_;
+  std::vector<PointContact> found_;
+  std::vector<std::pair<std::uint64_t, std::size_t>> place_;  // in found_, by identity
+};
+
+}  // namespace tether::contact::detail
