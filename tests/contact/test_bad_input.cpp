@@ -283,6 +283,7 @@ TEST_CASE("bad input: body form") {
     CHECK_THAT(refused([&](B& b, C&) { b[1].angular_velocity[2] = bad; }),
                Contains("body 1: angular_velocity(2) = "));
     CHECK_THAT(refused([&](B&, C& c) { c[0].r1[0] = bad; }), Contains("contact 0: r1(0) = "));
+    CHECK_THAT(refused([](B&, C& c) { c[0].r1[0] = 1e200; }), Contains("contact 0: square of r1"));
     CHECK_THAT(refused([&](B&, C& c) { c[0].r2[2] = bad; }), Contains("contact 0: r2(2) = "));
     CHECK_THAT(refused([&](B&, C& c) { c[0].mu = bad; }), Contains("contact 0: mu = "));
     CHECK_THAT(refused([&](B&, C& c) { c[0].bias = bad; }), Contains("contact 0: bias = "));

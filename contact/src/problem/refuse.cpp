@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace tether::contact::detail {
 
@@ -65,6 +66,10 @@ void check(std::size_t i, const PointContact& c, int count) {
   }
   if (!c.r1.allFinite()) require_finite("r1", c.r1, where());
   if (!c.r2.allFinite()) require_finite("r2", c.r2, where());
+  // A holds the squares of the lever arms.
+  for (const auto& [name, r] : {std::pair("r1", &c.r1), std::pair("r2", &c.r2)})
+    if (!std::isfinite(r->squaredNorm()))
+      refuse(where() + "square of " + name, r->squaredNorm(), "must be finite");
   if (!(c.mu >= 0) || !std::isfinite(c.mu)) refuse(where() + "mu", c.mu, "must be finite and >= 0");
   if (!std::isfinite(c.bias)) refuse(where() + "bias", c.bias, "must be finite");
   if (!c.slip.allFinite()) require_finite("slip", c.slip, where());
