@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <problems/car_axis.hpp>
+#include <problems/governor.hpp>
 #include <problems/pendulum.hpp>
 
 #include "host.hpp"
@@ -33,6 +34,24 @@ Problem titration() {
   p.reference = {2.0, kProduct / H, H};
   p.error_components = 3;
   p.atol_scale = {1.0, 1e-3, 1e-3};
+  return p;
+}
+
+// The same with c' = -rate c H, so that c depends on H.
+Problem titration_with_decay(double rate) {
+  Problem p = titration();
+  const auto acid = p.residual;
+  p.name = "titration with decay";
+  p.size = 4;
+  p.y0.push_back(1.0);
+  p.yp0.push_back(-rate * p.y0[1]);
+  p.id.push_back(1.0);
+  p.residual = [=](double t, const double* y, const double* yp, double* r) {
+    acid(t, y, yp, r);
+    r[3] = yp[3] + rate * y[3] * y[1];
+  };
+  p.reference.push_back(0.0);
+  p.atol_scale.push_back(1.0);
   return p;
 }
 
@@ -70,6 +89,35 @@ TEST_CASE("outputs: acid and base end at the root that they began at, at any tol
     CAPTURE(tolerance);
     REQUIRE(run.flag >= 0);
     CHECK(std::abs(run.y[1] - problem.reference[1]) < 1e-7);
+    CHECK(run.statistics.untested == 0);
+  }
+}
+
+TEST_CASE("coupled algebraic variables: acid and base keep their root at any tolerance") {
+  const tp::Constraints rows = row(
+      "base", [](double t, const double* y) { return y[0] - t; },
+      [](double, const double*, double* C) { C[0] = 1.0; });
+  for (const double rate : {0.01, 0.1, 1.0}) {
+    const Problem problem = titration_with_decay(rate);
+    for (int k = 0; k < 40; ++k) {
+      const double tolerance = std::pow(10.0, -3 - 7.0 * k / 39);
+      const Run run = integrate(problem, tolerance, rows, {}, false);
+      CAPTURE(rate, tolerance);
+      REQUIRE(run.flag >= 0);
+      CHECK(std::abs(run.y[1] - problem.reference[1]) < 1e-7);
+      CHECK(run.statistics.untested == 0);
+    }
+  }
+}
+
+TEST_CASE("coupled algebraic variables: those that answer to moves do not limit the step") {
+  const Problem problem = tether::problems::governor(0.3, "index 1 w");
+  for (const double tolerance : {1e-4, 1e-6}) {
+    const Run run = integrate(problem, tolerance, problem.recommended_constraints(), {}, false);
+    CAPTURE(tolerance, run.steps);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.steps < 600);
+    CHECK(run.error < 10 * tolerance);
     CHECK(run.statistics.untested == 0);
   }
 }

@@ -121,7 +121,10 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
   const int flag = correct_and_move(candidate, tolerance, call_setup);
   if (flag != 0) return flag;
   const long steps = movers_.used != nullptr ? attempts_.steps : ida_.steps();
-  control_.control(candidate, steps, run_.engaged, run_.suppressed ? variables_.tested() : nullptr);
+  if (run_.suppressed) control_.widen_test(candidate, polish_, attempts_.moved, steps);
+  const bool suppressed = run_.suppressed;
+  control_.control(candidate, steps, run_.engaged, suppressed ? variables_.tested() : nullptr,
+                   suppressed ? variables_.id() : nullptr);
   return 0;
 }
 

@@ -48,10 +48,12 @@ void Projection::Impl::derive_id(const Candidate& candidate) {
 }
 
 void Projection::Impl::leave_out_of_error_test() {
+  variables_.choose_tested();
   const N_Vector tested = variables_.tested();
   if (!options_.suppress_algebraic || tested == nullptr) return;
   IDASetId(ida_.mem(), tested);
   IDASetSuppressAlg(ida_.mem(), 1);
+  control_.test_algebraic(variables_.coupled());
   run_.suppressed = true;
   statistics_.untested =
       std::lround(static_cast<double>(N_VGetLength(tested)) - N_VDotProd(tested, tested));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <utility>
 
 #include "attach/shortest.hpp"
 #include "host/operations.hpp"
@@ -98,7 +99,7 @@ void SensitivityCorrector::forget_run() {
   engaged_ = false;
   moved_ = nullptr;
   setups_ = 0;
-  steps_ = -1;
+  steps_ = saved_steps_ = -1;
   for (VectorMetric& metric : metrics_) {
     metric.reset();
     metric.free_all();
@@ -139,6 +140,7 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
                                 double tolerance, bool call_setup, void* mem) {
   const std::string reason = set_up(predicted);
   if (!reason.empty()) return finish(Status::internal_error, reason);
+  restore_weights(weights);
   polish_->begin();
   corrector_->begin(mem);
   static const std::vector<int> none;
@@ -163,7 +165,28 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
     status = move_and_polish(candidate, step, tolerance);
   }
   if (corrector_->stopped()) return corrector_->stop_flag();
-  return finish(status, message_);
+  flag = finish(status, message_);
+  if (flag == 0) leave_out_of_error_test(weights);
+  return flag;
+}
+
+// Derivatives of coupled algebraic variables, which the state's test widens.
+void SensitivityCorrector::leave_out_of_error_test(N_Vector weights) {
+  saved_steps_ = state_.ida.steps();
+  saved_weights_.clear();
+  for (int k = 0; k < count(); ++k)
+    for (const int j : state_.variables.coupled())
+      saved_weights_.push_back(std::exchange(N_VGetArrayPointer(vectors_of(weights)[k])[j], 0.0));
+}
+
+// IDAS computes them anew for a new step only.
+void SensitivityCorrector::restore_weights(N_Vector weights) {
+  std::size_t i = 0;
+  const bool same = state_.ida.steps() == saved_steps_;
+  for (int k = 0; same && k < count(); ++k)
+    for (const int j : state_.variables.coupled())
+      if (i < saved_weights_.size())
+        N_VGetArrayPointer(vectors_of(weights)[k])[j] = saved_weights_[i++];
 }
 
 // The rows, the variables and the metric that move the state.

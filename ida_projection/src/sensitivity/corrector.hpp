@@ -92,6 +92,8 @@ class SensitivityCorrector {
   Status product(N_Vector s);
   Status derivative(int k, double t, N_Vector y);
   void add_terms(int k);
+  void leave_out_of_error_test(N_Vector weights);
+  void restore_weights(N_Vector weights);
   int finish(Status status, const std::string& text);
 
   State state_;
@@ -119,6 +121,8 @@ class SensitivityCorrector {
   OwnedVector id_;
   bool checked_ = false, engaged_ = false;
   long setups_ = 0, steps_ = -1;
+  std::vector<double> saved_weights_;  // of coupled variables, in the last attempt
+  long saved_steps_ = -1;              // accepted before it
 };
 
 }  // namespace tether::ida_projection

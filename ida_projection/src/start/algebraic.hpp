@@ -39,9 +39,13 @@ class AlgebraicVariables {
   bool high_index() const { return index_known_ && found_.high; }
   /// Algebraic variables of index 2 or more.
   const std::vector<int>& undetermined() const { return found_.undetermined; }
-  /// 1 for variables that IDA's error test has to see: the differential ones, and outputs, which
-  /// nothing else controls; 0 for the other algebraic ones. Null: none is algebraic.
+  /// Outputs, on which no differential variable depends, and the others of index 1.
+  void choose_tested();
+  /// 1 for variables that IDA's error test sees: differential ones and those chosen. Null: none is
+  /// algebraic.
   N_Vector tested() const { return tested_ ? static_cast<N_Vector>(tested_) : id(); }
+  /// The tested ones that are not outputs.
+  const std::vector<int>& coupled() const { return coupled_; }
   void begin_run() { index_known_ = false; }
 
   /// Of an id vector that the caller gave, after look_at_index(): variables that it calls algebraic
@@ -78,6 +82,7 @@ class AlgebraicVariables {
   bool index_known_ = false;  // in this run
   Found found_;
   OwnedVector tested_;  // null: as id
+  std::vector<int> coupled_;
 };
 
 }  // namespace tether::ida_projection

@@ -36,6 +36,8 @@ void Polish::allocate(N_Vector like, bool contiguous) {
   delta_ = OwnedVector(like);
   corrected_ = OwnedVector(like);
   work_ = OwnedVector(like);
+  noise_ = OwnedVector(like);
+  residual_ = OwnedVector(like);
   if (!contiguous) return;
   size_ = static_cast<int>(N_VGetLength(like));
   delta_entries_ = N_VGetArrayPointer(delta_);
@@ -94,15 +96,18 @@ bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
   return evaluated && corrector_.solve_linear(delta_);
 }
 
+// -J^-1 F at the corrector's point.
+bool Polish::know_noise() {
+  if (noise_known_) return true;
+  if (corrector_.residual(corrected_, noise_) != 0) return false;
+  ++statistics_.residual_evaluations;
+  N_VScale(-1.0, noise_, noise_);
+  noise_known_ = corrector_.solve_linear(noise_);
+  return noise_known_;
+}
+
 double Polish::answer(const Candidate& candidate) {
-  if (!noise_) noise_ = OwnedVector(candidate.correction);
-  if (!noise_known_) {
-    if (corrector_.residual(corrected_, noise_) != 0) return -1.0;
-    ++statistics_.residual_evaluations;
-    N_VScale(-1.0, noise_, noise_);
-    if (!corrector_.solve_linear(noise_)) return -1.0;
-    noise_known_ = true;
-  }
+  if (!know_noise()) return -1.0;
   step_known_ = false;
   if (!newton_step_at_moved_point(candidate)) return -1.0;
   ++statistics_.residual_evaluations;
@@ -110,6 +115,16 @@ double Polish::answer(const Candidate& candidate) {
   N_VLinearSum(1.0, delta_, -1.0, noise_, work_);
   const double length = differential_length(candidate, work_);
   return std::isfinite(length) ? length : -1.0;
+}
+
+// Differences for sensitivities begin at the residual that IDA keeps.
+const double* Polish::response(const StepData& step) {
+  N_VScale(1.0, step.residual, residual_);
+  const bool known = know_noise();
+  N_VScale(1.0, residual_, step.residual);
+  if (!known) return nullptr;
+  N_VLinearSum(1.0, delta_, -algebraic_factor(step.cj), noise_, work_);
+  return work_entries_;
 }
 
 bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {

@@ -71,6 +71,9 @@ class Polish {
     N_VScale(1.0, corrected_, candidate.correction);
   }
 
+  /// After add_newton_step(): the part of delta() in algebraic variables by which F answers to the
+  /// move (N entries); null: F or the linear solver fails. One evaluation of F.
+  const double* response(const StepData& step);
   N_Vector delta() const { return delta_; }          ///< of add_newton_step()
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor
   /// Was the correction as small as IDA's convergence test predicted?
@@ -79,6 +82,7 @@ class Polish {
   long iterations() const { return iterations_; }  ///< in this solve()
 
  private:
+  bool know_noise();
   bool newton_step_at_moved_point(const Candidate& candidate);
   bool foretell(const Candidate& candidate, double cj, double tolerance);
   void look_at_pattern(const Candidate& candidate, double cj);
@@ -91,7 +95,7 @@ class Polish {
   const AlgebraicVariables& variables_;
   bool contiguous_ = false;
   int size_ = 0;
-  OwnedVector delta_, corrected_, work_, noise_;
+  OwnedVector delta_, corrected_, work_, noise_, residual_;
   bool noise_known_ = false;  // -J^-1 F at corrected_
   bool step_known_ = false;   // delta_ is that of the present moved point
   double *delta_entries_ = nullptr, *corrected_entries_ = nullptr, *work_entries_ = nullptr;

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "step/polish.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
@@ -11,10 +13,9 @@ constexpr int kTrapped = 10;      // steps in a row with failed error tests
 constexpr int kRefused = 3;       // failed error tests in one step
 constexpr int kOftenRefused = 4;  // steps for each failed error test, of the run so far
 
-// In the norm of IDA's error test.
-double error_norm(N_Vector v, N_Vector weights, N_Vector differential) {
-  return differential != nullptr ? N_VWrmsNormMask(v, weights, differential)
-                                 : N_VWrmsNorm(v, weights);
+// In the norm of IDA's error test, where `mask` has the variables that it sees.
+double error_norm(N_Vector v, N_Vector weights, N_Vector mask) {
+  return mask != nullptr ? N_VWrmsNormMask(v, weights, mask) : N_VWrmsNorm(v, weights);
 }
 
 }  // namespace
@@ -24,6 +25,7 @@ void StepControl::reset() {
   smoother_.reset();
   order_limit_.reset();
   refused_size_.reset();
+  algebraic_test_.begin({});
   refused_in_row_ = 0;
   last_error_failures_ = 0;
   corrector_has_failed_ = false;
@@ -31,18 +33,26 @@ void StepControl::reset() {
 
 // IDA computes its weights anew for a new step, but not for another attempt at the same one.
 void StepControl::restore_weights(N_Vector weights, long last_steps) {
-  if (weights_factor_ == 1.0) return;
-  if (ida_.steps() == last_steps) N_VScale(1.0 / weights_factor_, weights, weights);
+  const long steps = ida_.steps();
+  if (weights_factor_ != 1.0 && steps == last_steps)
+    N_VScale(1.0 / weights_factor_, weights, weights);
   weights_factor_ = 1.0;
+  algebraic_test_.restore(weights, steps);
+}
+
+void StepControl::widen_test(const Candidate& candidate, Polish& polish, double move, long steps) {
+  if (!algebraic_test_.acts() || !std::isfinite(move)) return;
+  const int order = ida_.order();
+  const bool asks = polish.iterations() > 0 && algebraic_test_.limits_step(candidate, move, order);
+  const double* response = asks ? polish.response(ida_.step()) : nullptr;
+  algebraic_test_.widen(candidate, response, move, order, steps);
 }
 
 // |ycor| decides the next step size, and what it is beside the second difference the order.
-void StepControl::control(const Candidate& candidate, long steps, bool engaged,
+void StepControl::control(const Candidate& candidate, long steps, bool engaged, N_Vector tested,
                           N_Vector differential) {
   if (!engaged && !smoother_.on()) return;
-  const auto norm = [&] {
-    return error_norm(candidate.correction, candidate.weights, differential);
-  };
+  const auto norm = [&] { return error_norm(candidate.correction, candidate.weights, tested); };
   if (smoother_.on()) {
     order_limit_.end();
     refused_size_.forget();

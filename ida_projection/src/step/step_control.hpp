@@ -4,11 +4,14 @@
 #include "host/ida.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
+#include "step/algebraic_test.hpp"
 #include "step/order_limit.hpp"
 #include "step/refused_size.hpp"
 #include "step/step_smoothing.hpp"
 
 namespace tether::ida_projection {
+
+class Polish;
 
 /// Smooth step sizes, the limit of the order, and the rejections by which IDA asks for them.
 class StepControl {
@@ -26,9 +29,14 @@ class StepControl {
   /// At the begin of a solve: restores the weights that the last one changed in the same step.
   void restore_weights(N_Vector weights, long last_steps);
   /// At the end of a successful one, `steps` accepted before it. `engaged`: the projection acts,
-  /// and the candidate's time is known; `differential`: the variables of IDA's error test (null:
-  /// all).
-  void control(const Candidate& candidate, long steps, bool engaged, N_Vector differential);
+  /// and the candidate's time is known; `tested`: the variables of IDA's error test,
+  /// `differential`: those whose oscillations count (null: all).
+  void control(const Candidate& candidate, long steps, bool engaged, N_Vector tested,
+               N_Vector differential);
+  /// IDA's error test sees these algebraic variables, widened by the noise of moves.
+  void test_algebraic(const std::vector<int>& variables) { algebraic_test_.begin(variables); }
+  /// Before control(); see AlgebraicTest.
+  void widen_test(const Candidate& candidate, Polish& polish, double move, long steps);
   double weights_factor() const { return weights_factor_; }
   /// The corrector failed in a way that a smaller step may cure.
   void corrector_failed(bool engaged);
@@ -54,6 +62,7 @@ class StepControl {
   StepSmoother smoother_;
   OrderLimit order_limit_;
   RefusedSize refused_size_;
+  AlgebraicTest algebraic_test_;
   OwnedVector kept_slope_, slope_;  // y' of a step and of the next one, for the order
   double weights_factor_ = 1.0;     // by which IDA's weights were multiplied in the last solve
   bool corrector_has_failed_ = false;

@@ -69,13 +69,12 @@ struct Options {
   N_Vector id = nullptr;
   int derive_id_limit = 2000;
 
-  /// Keep algebraic variables that the differential ones depend on, as multipliers, out of IDA's
-  /// error test: that of the differential ones controls what they do. Statistics::untested counts
-  /// them. Their values between steps have no tolerance; false keeps it. Outputs, on which no
-  /// differential variable depends, stay in the test (serial vectors; up to the size that
-  /// smooth_where_needed looks at). By IDASetId and IDASetSuppressAlg; IDAReInit takes them back
-  /// where `id` is derived. Where F has several roots, what has left the test may end at another
-  /// one than plain IDA's: false for such systems.
+  /// Keep algebraic variables of index 2 or more, as multipliers, out of IDA's error test: that of
+  /// the differential ones controls what they do. Statistics::untested counts them. Their values
+  /// between steps have no tolerance; false keeps it. Variables of index 1 stay in the test; the
+  /// tolerance of those that differential variables depend on grows by what moves change them by
+  /// (IDAGetErrWeights shows it). On other than serial vectors all algebraic variables leave it. By
+  /// IDASetId and IDASetSuppressAlg; IDAReInit takes them back where `id` is derived.
   bool suppress_algebraic = true;
 
   /// After a move, the algebraic variables follow by one Newton iteration on F at the moved point

@@ -1,0 +1,77 @@
+// Tether: IDA's error test of algebraic variables. SPDX-License-Identifier: BSD-3-Clause
+//
+// The test protects a run where F has several roots: no other variable sees that y_a jumps from
+// one to the other. But y_a = y_a(t, y_d) answers to a move by dy with S dy, S = dy_a/dy_d. The
+// polish leaves a part of that answer, which differs from step to step, and where S is large it
+// exceeds the tolerance at every step size. ycor is a difference of order k + 1 of the history: of
+// independent errors of size r it contains r sqrt(C(2k+2, k+1)), and the test multiplies it by
+// about 1/(k+1). The tolerance grows by a multiple of that. Where y_a does not answer to the move
+// it stays as it is, however far the step leads.
+#include "step/algebraic_test.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tether::ida_projection {
+
+namespace {
+
+// Of what independent errors contribute. Three times less or more keeps the steps of forms of index
+// 1 and the roots of titrations; from ten thousand on some of these end at another root.
+constexpr double kOfNoise = 1e3;
+constexpr double kMemory = 0.9;  // per step: S changes slowly
+
+double noise_in_test(int order) {
+  double binomial = 1.0;
+  for (int i = 1; i <= order + 1; ++i) binomial *= (order + 1.0 + i) / i;
+  return std::sqrt(binomial) / (order + 1);
+}
+
+}  // namespace
+
+void AlgebraicTest::begin(const std::vector<int>& variables) {
+  variables_.clear();
+  for (const int j : variables) variables_.push_back({j, 0.0, 0.0});
+  steps_ = -1;
+}
+
+// Rounding makes independent errors, too.
+double AlgebraicTest::widened(const Candidate& candidate, const Variable& v, double move,
+                              int order) {
+  const double y = candidate.base_entries[v.index], weight = candidate.weight_entries[v.index];
+  const double error = v.response * move + std::numeric_limits<double>::epsilon() * std::abs(y);
+  return weight / (1.0 + weight * kOfNoise * noise_in_test(order) * error);
+}
+
+// IDA doubles h where twice the error is at most 2^-(k+1).
+bool AlgebraicTest::limits_step(const Candidate& candidate, double move, int order) const {
+  double sum = 0.0;
+  for (const Variable& v : variables_) {
+    const double error = candidate.correction_entries[v.index] * widened(candidate, v, move, order);
+    sum += error * error;
+  }
+  const double error = std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights)));
+  return error / (order + 1) > std::ldexp(1.0, -(order + 2));
+}
+
+void AlgebraicTest::widen(const Candidate& candidate, const double* response, double move,
+                          int order, long steps) {
+  const double memory = steps != steps_ ? kMemory : 1.0;
+  steps_ = steps;
+  double* weights = N_VGetArrayPointer(candidate.weights);
+  for (Variable& v : variables_) {
+    v.response *= memory;
+    if (response != nullptr && move > 0.0)
+      v.response = std::max(v.response, std::abs(response[v.index]) / move);
+    v.weight = weights[v.index];
+    weights[v.index] = widened(candidate, v, move, order);
+  }
+}
+
+void AlgebraicTest::restore(N_Vector weights, long steps) const {
+  if (steps != steps_) return;
+  for (const Variable& v : variables_) N_VGetArrayPointer(weights)[v.index] = v.weight;
+}
+
+}  // namespace tether::ida_projection
