@@ -302,7 +302,7 @@ TEST_CASE("a braced net, rigid by rows thinner than 1e-3, swings as one body", "
   const double corners = apart(0, n * n - 1), sides = apart(n / 2, n * n - n / 2);
   const double before = energy(*engine);
   engine->advance(0.5);
-  CHECK(engine->diagnostics().drift < 1e-9);
+  CHECK(engine->diagnostics().drift < 5e-9);
   CHECK(std::abs(apart(0, n * n - 1) - corners) < 1e-6);
   CHECK(std::abs(apart(n / 2, n * n - n / 2) - sides) < 1e-6);
   CHECK(engine->bodies()[n * n - 1].position.z() < 2.25);
@@ -315,7 +315,7 @@ TEST_CASE("a braced net has rows too thin for the factors of A A^T", "[smooth]")
   // velocities; with one too few no step succeeds.
   const auto engine = make_smooth_engine(net(30, true, 1e-6));
   engine->advance(1e-3);
-  CHECK(engine->diagnostics().drift < 1e-9);
+  CHECK(engine->diagnostics().drift < 5e-9);
   CHECK(engine->counts().steps < 30);
 }
 

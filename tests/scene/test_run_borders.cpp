@@ -59,16 +59,19 @@ class Still : public Engine {
   std::vector<ContactState> contacts_;
 };
 
-// Four balls as a pyramid, the heaviest of 300 kg; more: of [stepping].
-std::string pyramid(const std::string& more) {
+// Four balls as a pyramid, one of them of 300 kg or `heavy`; more: of [stepping].
+std::string pyramid(const std::string& more, const char* heavy = "300",
+                    const char* friction = "0.3") {
   std::string text = "[scene]\nend = 0.05\ngravity = [0, 0, -9.81]\n[stepping]\nstep = 5e-3\n" +
-                     more +
-                     "[[pair]]\nbetween = [\"a\", \"a\"]\nfriction = 0.3\n"
+                     more + "[[pair]]\nbetween = [\"a\", \"a\"]\nfriction = " + friction +
+                     "\n"
                      "[[body]]\nshape = \"plane\"\nfixed = true\nmaterial = \"a\"\n";
-  for (const char* each :
-       {"mass = 1\nposition = [0, 0, 0.1]", "mass = 1\nposition = [0.2, 0, 0.1]",
-        "mass = 300\nposition = [0.1, 0.173, 0.1]",
-        "mass = 70\nposition = [0.1, 0.0577, 0.263]\nvelocity = [0.01, 0.03, 0]"})
+  for (const std::string& each :
+       {std::string("mass = 1\nposition = [0, 0, 0.1]"),
+        std::string("mass = 1\nposition = [0.2, 0, 0.1]"),
+        std::string("mass = ") + heavy + "\nposition = [0.1, 0.173, 0.1]",
+        std::string(
+            "mass = 70\nposition = [0.1, 0.0577, 0.263]\nvelocity = [0.0131, 0.0373, 0.1]")})
     text += fmt::format("[[body]]\nshape = \"sphere\"\nradius = 0.1\nmaterial = \"a\"\n{}\n", each);
   return text;
 }
@@ -115,7 +118,8 @@ TEST_CASE("a rotation that steps do not resolve is a warning") {
 TEST_CASE("a contact problem that is used above what the scene accepts is a warning") {
   const auto warnings = [](const char* tolerance, const char* acceptance) {
     const std::string text = pyramid(
-        fmt::format("max_halvings = 1\ntolerance = {}\nacceptance = {}\n", tolerance, acceptance));
+        fmt::format("max_halvings = 1\ntolerance = {}\nacceptance = {}\n", tolerance, acceptance),
+        "1e4", "0.7");
     return run(parse_scene(text, "pyramid.toml")).warnings;
   };
   const auto beyond = warnings("1e-17", "1.5");  // below rounding

@@ -163,6 +163,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   const StepData step = ida_.step();
   account_for_previous_attempt(step);
   candidate.t = step.t;
+  look_at_first_test();
   if (unknowns_.contiguous) {
     candidate.h = std::abs(ida_.step_size());
     candidate.cj = step.cj;

@@ -16,6 +16,7 @@ namespace {
 // Multipliers of index 2: see method, section 7.
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
                  kManyFree = 0.4;
+constexpr long kFirstTests = 3;          // failed ones in the first step; IDA gives up after ten
 constexpr long kStart = 16;              // steps
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
@@ -47,8 +48,8 @@ void Projection::Impl::derive_id(const Candidate& candidate) {
                      ") and stay in the error test; give IDA's id vector in Options::id";
 }
 
-void Projection::Impl::leave_out_of_error_test() {
-  variables_.choose_tested();
+void Projection::Impl::leave_out_of_error_test(bool all) {
+  variables_.choose_tested(!all);
   const N_Vector tested = variables_.tested();
   if (!options_.suppress_algebraic || tested == nullptr) return;
   IDASetId(ida_.mem(), tested);
@@ -57,6 +58,13 @@ void Projection::Impl::leave_out_of_error_test() {
   run_.suppressed = true;
   statistics_.untested =
       std::lround(static_cast<double>(N_VGetLength(tested)) - N_VDotProd(tested, tested));
+}
+
+// A host that never tested algebraic variables, by IDASetSuppressAlg, may start off their
+// equations: they then fail the test of the first step at every size.
+void Projection::Impl::look_at_first_test() {
+  if (attempts_.steps != 0 || !run_.suppressed || variables_.coupled().empty()) return;
+  if (ida_.error_test_failures() >= kFirstTests) leave_out_of_error_test(true);
 }
 
 // As the run began. Who gives Options::id may have called IDASetSuppressAlg as well, which IDA

@@ -39,8 +39,9 @@ class AlgebraicVariables {
   bool high_index() const { return index_known_ && found_.high; }
   /// Algebraic variables of index 2 or more.
   const std::vector<int>& undetermined() const { return found_.undetermined; }
-  /// Outputs, on which no differential variable depends, and the others of index 1.
-  void choose_tested();
+  /// Outputs, on which no differential variable depends, and, where `coupled` is true, the others
+  /// of index 1.
+  void choose_tested(bool coupled);
   /// 1 for variables that IDA's error test sees: differential ones and those chosen. Null: none is
   /// algebraic.
   N_Vector tested() const { return tested_ ? static_cast<N_Vector>(tested_) : id(); }

@@ -256,6 +256,7 @@ void NearContacts::follow(const BodySet& bodies, std::vector<PointContact>& poin
       pair(bodies, a, b, more_);
   found_.swap(followed_);
   pose_.swap(poses_);
+  for (std::size_t k = 0; k < more_.points.size(); ++k) more_.points[k].bias = more_.gaps[k];
   points.swap(more_.points);
 }
 

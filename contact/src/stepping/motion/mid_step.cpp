@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <tether/linalg/index.hpp>
 
+#include "problem/refuse.hpp"
 #include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {
@@ -58,7 +59,10 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
     if (bodies.mass[i] > 0) move(i, gyroscopic, dt / 2, then_);
   near.follow(then_, found_);
   place_.clear();
-  for (std::size_t k = 0; k < found_.size(); ++k) place_.emplace_back(found_[k].id, k);
+  for (std::size_t k = 0; k < found_.size(); ++k) {
+    check(k, found_[k], static_cast<int>(motion_.size()));
+    place_.emplace_back(found_[k].id, k);
+  }
   std::sort(place_.begin(), place_.end());
   std::size_t impact = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {
