@@ -190,7 +190,7 @@ TEST_CASE("callbacks of steps: what is wrong at the k-th call is refused by name
   };
   for (const Case& c :
        {Case{&Spoilers::force, Fault::not_a_number, "velocity(0) = nan"},
-        Case{&Spoilers::collide, Fault::not_a_number, "bias = nan"},
+        Case{&Spoilers::collide, Fault::not_a_number, "gap = nan"},
         Case{&Spoilers::rows, Fault::not_a_number, "rate = nan"},
         Case{&Spoilers::rows, Fault::other_count, "400 rows instead of 3"},
         Case{&Spoilers::rows, Fault::other_body, "is on other bodies than at first"},

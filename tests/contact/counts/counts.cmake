@@ -49,9 +49,9 @@ if(NOT ran MATCHES "sweep_smooth")
   message(SEND_ERROR "the scene has no contacts; nothing is shown")
 endif()
 
-# One problem a step, and a second one for positions where gaps close or bodies are deep and in the middle of the step:
-# 208.5 million.
-if(most GREATER 210000000)
+# One problem a step, and a second one for positions where gaps close or bodies are deep: 177.7 million. Spheres without
+# friction turn by rounding only, so nothing is looked for in the middle of the step.
+if(most GREATER 179000000)
   message(SEND_ERROR "settling costs ${most} instructions")
 endif()
 

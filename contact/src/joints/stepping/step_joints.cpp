@@ -297,12 +297,8 @@ void StepJoints::advance_bodies(BodySet& bodies, double dt) const {
     bodies.position[i] = place_[k].position + dt * v_[i].head<3>();
     linalg::Quaternion q = place_[k].orientation;
     Vector3d w = v_[i].tail<3>();
-    if (!round_[k] && gyroscopic_ == Gyroscopic::momentum) {
-      FreeSpin spin;
-      turn_with_momentum(bodies.inertia[i], bodies.inverse_inertia[i], dt, q, w, spin);
-    } else if (!w.isZero(0)) {
-      q = (exponential(dt * w) * q).normalized();
-    }
+    turn_freely(bodies.inertia[i], bodies.inverse_inertia[i],
+                !round_[k] && gyroscopic_ == Gyroscopic::momentum, dt, q, w);
     bodies.orientation[i] = q;
     bodies.motion[i].angular_velocity = w;
   }

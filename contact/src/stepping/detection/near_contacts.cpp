@@ -8,6 +8,7 @@
 #include <tether/linalg/index.hpp>
 #include <utility>
 
+#include "problem/refuse.hpp"
 #include "stepping/detection/collide.hpp"
 
 namespace tether::contact::detail {
@@ -20,12 +21,18 @@ using linalg::at;
 
 bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; }
 
+// As contact_id has them.
+int first_surface(const PointContact& c) { return static_cast<int>(c.id >> 40); }
+int second_surface(const PointContact& c) { return static_cast<int>(c.id >> 16 & 0xffffff); }
+
 }  // namespace
 
+Vector3d relative_velocity(const RigidBody& a, const RigidBody& b, const PointContact& c) {
+  return a.velocity + a.angular_velocity.cross(c.r1) - b.velocity - b.angular_velocity.cross(c.r2);
+}
+
 double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& c) {
-  const RigidBody &a = motion[at(c.first)], &b = motion[at(c.second)];
-  return c.normal.dot(a.velocity + a.angular_velocity.cross(c.r1) - b.velocity -
-                      b.angular_velocity.cross(c.r2));
+  return c.normal.dot(relative_velocity(motion[at(c.first)], motion[at(c.second)], c));
 }
 
 NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
@@ -51,6 +58,7 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
       throw std::invalid_argument(where + "a " + name(s.shape.kind) + " belongs to a fixed body");
     mesh_.push_back(mesh ? static_cast<int>(meshes_.size()) : -1);
     if (mesh) meshes_.emplace_back(s.shape);
+    index_.push_back(plane ? ~static_cast<int>(planes_.size()) : static_cast<int>(bounded_.size()));
     (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
     material_.push_back(meetings_.row(s.material));
   }
@@ -122,13 +130,11 @@ int NearContacts::meeting_of(int a, int b) const {
 }
 
 const Meeting& NearContacts::meeting(const PointContact& c) const {
-  const int a = static_cast<int>(c.id >> 40), b = static_cast<int>(c.id >> 16 & 0xffffff);
-  return meetings_[meeting_of(a, b)];
+  return meetings_[meeting_of(first_surface(c), second_surface(c))];
 }
 
 double NearContacts::size(const PointContact& c) const {
-  return std::min(size_[at(static_cast<int>(c.id >> 40))],
-                  size_[at(static_cast<int>(c.id >> 16 & 0xffffff))]);
+  return std::min(size_[at(first_surface(c))], size_[at(second_surface(c))]);
 }
 
 bool NearContacts::any_restitution() const {
@@ -141,19 +147,18 @@ bool NearContacts::any_rolling() const {
                      [](const Meeting& m) { return m.rolling > 0 || m.torsional > 0; });
 }
 
-void NearContacts::set_poses(const BodySet& bodies) {
-  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
-    const Surface& s = surfaces_[k];
-    const linalg::Quaternion& q = bodies.orientation[at(s.body)];
-    pose_[k].position = bodies.position[at(s.body)];
-    if (!s.shape.position.isZero(0)) pose_[k].position += q * s.shape.position;
-    if (s.shape.kind != ShapeKind::sphere)
-      pose_[k].rotation = (q * s.shape.orientation).toRotationMatrix();
-  }
+void NearContacts::set_pose(const BodySet& bodies, int surface) {
+  const Surface& s = surfaces_[at(surface)];
+  Pose& pose = pose_[at(surface)];
+  const linalg::Quaternion& q = bodies.orientation[at(s.body)];
+  pose.position = bodies.position[at(s.body)];
+  if (!s.shape.position.isZero(0)) pose.position += q * s.shape.position;
+  if (s.shape.kind != ShapeKind::sphere)
+    pose.rotation = (q * s.shape.orientation).toRotationMatrix();
 }
 
 void NearContacts::place(const BodySet& bodies, double dt) {
-  set_poses(bodies);
+  for (int k = 0; k < static_cast<int>(surfaces_.size()); ++k) set_pose(bodies, k);
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
     centre_[k] = pose_[at(bounded_[k])].position;
     // The size of the other shape decides what is near a mesh, as with planes.
@@ -195,12 +200,15 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   double margin = ball_[at(a)] - reach_[at(a)];
   if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
   find_points(i, j, margin);
-  if (near_.count > 0) found_.emplace_back(a, b);
   // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
   // would change their common angular momentum.
   const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;
   for (int k = 0; k < near_.count; ++k) {
     const NearPoint& p = near_.point[k];
+    if (!std::isfinite(p.gap))
+      refuse(
+          std::string("contact of ") + name(s.shape.kind) + " and " + name(t.shape.kind) + ": gap",
+          p.gap, "must be finite");
     const Vector3d half = part * (p.on_second - p.on_first);
     PointContact c;
     c.first = s.body;
@@ -237,27 +245,19 @@ void NearContacts::find(const BodySet& bodies, double dt, StepContacts& out) {
   out.points.clear();
   out.gaps.clear();
   place(bodies, dt);
-  found_.clear();
   pairs(bodies, out, [](int, int) { return true; });
 }
 
-void NearContacts::follow(const BodySet& bodies, std::vector<PointContact>& points) {
-  const auto turns = [&](int k) {
-    return !bodies.motion[at(surface(k).body)].angular_velocity.isZero(0);
-  };
-  poses_ = pose_;
-  set_poses(bodies);
-  more_.points.clear();
-  more_.gaps.clear();
-  followed_.clear();
-  followed_.swap(found_);
-  for (const auto& [a, b] : followed_)
-    if (turns(bounded_[at(a)]) || turns(b < 0 ? planes_[at(~b)] : bounded_[at(b)]))
-      pair(bodies, a, b, more_);
-  found_.swap(followed_);
-  pose_.swap(poses_);
-  for (std::size_t k = 0; k < more_.points.size(); ++k) more_.points[k].bias = more_.gaps[k];
-  points.swap(more_.points);
+void NearContacts::follow(const BodySet& bodies, const PointContact& c, StepContacts& out) {
+  out.points.clear();
+  out.gaps.clear();
+  const int i = first_surface(c), j = second_surface(c);
+  const Pose first = pose_[at(i)], second = pose_[at(j)];
+  set_pose(bodies, i);
+  set_pose(bodies, j);
+  pair(bodies, index_[at(i)], index_[at(j)], out);
+  pose_[at(i)] = first;
+  pose_[at(j)] = second;
 }
 
 bool NearContacts::find_more(const BodySet& bodies, double dt, StepContacts& out) {

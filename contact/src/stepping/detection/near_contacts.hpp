@@ -11,6 +11,9 @@
 
 namespace tether::contact::detail {
 
+/// Velocity of a at the contact against that of b.
+Eigen::Vector3d relative_velocity(const RigidBody& a, const RigidBody& b,
+                                  const PointContact& contact);
 /// Normal velocity of separation.
 double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& contact);
 
@@ -29,9 +32,9 @@ class NearContacts {
   /// near_part of their size. False: none.
   bool find_more(const BodySet& bodies, double dt, StepContacts& out);
 
-  /// Points of the pairs of bodies that find() and find_more() have found points of, where the
-  /// bodies are now; of those that turn.
-  void follow(const BodySet& bodies, std::vector<PointContact>& points);
+  /// After find(), which has found the contact: all points of its two surfaces where their bodies
+  /// are now.
+  void follow(const BodySet& bodies, const PointContact& contact, StepContacts& out);
 
   /// Bodies that stay where they are, of each body: they meet only what moves.
   void set_resting(const std::vector<char>& resting);
@@ -47,7 +50,7 @@ class NearContacts {
   void find_foreign(const BodySet& bodies);
   int meeting_of(int a, int b) const;
   void place(const BodySet& bodies, double dt);
-  void set_poses(const BodySet& bodies);
+  void set_pose(const BodySet& bodies, int surface);
   double way(const BodySet& bodies, std::size_t k, double dt) const;
   template <class Use>
   void pairs(const BodySet& bodies, StepContacts& out, const Use& use);
@@ -64,8 +67,9 @@ class NearContacts {
   std::vector<int> mesh_;
   Broadphase broadphase_;
   std::vector<int> planes_, bounded_;  // surfaces
+  std::vector<int> index_;             // of each surface: k in bounded_, or ~k in planes_
   // For each surface: its pose; for each bounded one: reach with and without what it may move.
-  std::vector<Pose> pose_, poses_;
+  std::vector<Pose> pose_;
   std::vector<char> centred_;  // a sphere about the centre of its body
   std::vector<double> size_;   // of each surface: its reach, infinite for planes
   std::vector<double> reach_;
@@ -73,8 +77,7 @@ class NearContacts {
   std::vector<double> ball_;
   std::vector<char> still_, fixed_, faster_;
   StepContacts more_;
-  std::vector<std::pair<int, int>> found_, followed_;  // as of pair()
-  std::vector<std::uint64_t> known_;                   // identities of contacts
+  std::vector<std::uint64_t> known_;  // identities of contacts
   NearPoints near_;
 };
 

@@ -1,10 +1,9 @@
 // Tether: contacts in the middle of a step. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping/motion/mid_step.hpp"
 
-#include <algorithm>
+#include <limits>
 #include <tether/linalg/index.hpp>
 
-#include "problem/refuse.hpp"
 #include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {
@@ -15,55 +14,60 @@ namespace {
 
 using linalg::at;
 
-Vector3d relative_velocity(const std::vector<RigidBody>& motion, const PointContact& c) {
-  const RigidBody &a = motion[at(c.first)], &b = motion[at(c.second)];
-  return a.velocity + a.angular_velocity.cross(c.r1) - b.velocity - b.angular_velocity.cross(c.r2);
-}
-
-// By half a step, as the step itself moves it.
-void move(std::size_t i, Gyroscopic gyroscopic, double half, BodySet& bodies) {
-  RigidBody& b = bodies.motion[i];
-  linalg::Quaternion& q = bodies.orientation[i];
-  bodies.position[i] += half * b.velocity;
-  if (b.angular_velocity.isZero(0)) return;
-  if (gyroscopic == Gyroscopic::momentum && !is_isotropic(bodies.inertia[i])) {
-    FreeSpin spin;
-    turn_with_momentum(bodies.inertia[i], bodies.inverse_inertia[i], half, q, b.angular_velocity,
-                       spin);
-  } else {
-    q = (exponential(half * b.angular_velocity) * q).normalized();
-  }
+// By more than the rounding of an orientation.
+bool turns(const RigidBody& b, double time) {
+  return time * b.angular_velocity.lpNorm<Eigen::Infinity>() >
+         std::numeric_limits<double>::epsilon();
 }
 
 }  // namespace
 
+// By half a step, as the step itself moves it.
+void MidStep::move(int body, const RigidBody& before, const BodySet& bodies, Gyroscopic gyroscopic,
+                   double half) {
+  const std::size_t i = at(body);
+  if (moved_[i] != 0) return;
+  moved_[i] = 1;
+  RigidBody& b = then_.motion[i];
+  b = before;
+  then_.position[i] = bodies.position[i];
+  then_.orientation[i] = bodies.orientation[i];
+  if (!(bodies.mass[i] > 0)) return;
+  then_.position[i] += half * b.velocity;
+  turn_freely(bodies.inertia[i], bodies.inverse_inertia[i],
+              gyroscopic == Gyroscopic::momentum && !is_isotropic(bodies.inertia[i]), half,
+              then_.orientation[i], b.angular_velocity);
+}
+
+// Points of two surfaces keep their order.
+const PointContact* MidStep::find(std::uint64_t id) {
+  const std::vector<PointContact>& points = found_.points;
+  for (std::size_t k = 0; k < points.size(); ++k, ++next_) {
+    if (next_ >= points.size()) next_ = 0;
+    if (points[next_].id == id) return &points[next_++];
+  }
+  return nullptr;
+}
+
 void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bodies,
                    const JointPart* joints, Gyroscopic gyroscopic, double dt,
                    std::vector<PointContact>& contacts) {
-  motion_ = impacts.coming();
-  bool any = false;
+  const std::size_t count = bodies.motion.size();
   const auto held = [&](int body) { return joints != nullptr && joints->holds(body); };
+  const auto before = [&](int body) -> const RigidBody& {
+    return held(body) ? bodies.motion[at(body)] : impacts.coming()[at(body)];
+  };
   const auto bend = [&](int body, const Vector3d& r) -> Vector3d {
     if (!held(body)) return Vector3d::Zero();
     const Vector6d& v = joints->bend()[at(body)];
     return v.head<3>() + v.tail<3>().cross(r);
   };
-  for (std::size_t i = 0; i < motion_.size(); ++i) {
-    if (held(static_cast<int>(i))) motion_[i] = bodies.motion[i];
-    any = any || !motion_[i].angular_velocity.isZero(0);
-  }
-  if (contacts.empty() || !any) return;
-  then_ = bodies;
-  then_.motion = motion_;
-  for (std::size_t i = 0; i < motion_.size(); ++i)
-    if (bodies.mass[i] > 0) move(i, gyroscopic, dt / 2, then_);
-  near.follow(then_, found_);
-  place_.clear();
-  for (std::size_t k = 0; k < found_.size(); ++k) {
-    check(k, found_[k], static_cast<int>(motion_.size()));
-    place_.emplace_back(found_[k].id, k);
-  }
-  std::sort(place_.begin(), place_.end());
+  then_.mass = bodies.mass;
+  then_.position.resize(count);
+  then_.orientation.resize(count);
+  then_.motion.resize(count);
+  moved_.assign(count, 0);
+  std::uint64_t followed = ~std::uint64_t{0};  // surfaces
   std::size_t impact = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     if (impact < impacts.list().size() && at(impacts.list()[impact].contact) == k) {
@@ -71,17 +75,26 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
       continue;
     }
     PointContact& now = contacts[k];
-    const auto place =
-        std::lower_bound(place_.begin(), place_.end(), std::make_pair(now.id, std::size_t{0}));
-    if (place == place_.end() || place->first != now.id) continue;
-    const PointContact& then = found_[place->second];
-    const Vector3d u = relative_velocity(motion_, now), v = relative_velocity(then_.motion, then);
+    const RigidBody &a = before(now.first), &b = before(now.second);
+    if (!turns(a, dt / 2) && !turns(b, dt / 2)) continue;
+    if (now.id >> 16 != followed) {
+      followed = now.id >> 16;
+      move(now.first, a, bodies, gyroscopic, dt / 2);
+      move(now.second, b, bodies, gyroscopic, dt / 2);
+      near.follow(then_, now, found_);
+      next_ = 0;
+    }
+    const PointContact* then = find(now.id);
+    if (then == nullptr) continue;
+    const Vector3d u = relative_velocity(a, b, now);
+    const Vector3d v =
+        relative_velocity(then_.motion[at(now.first)], then_.motion[at(now.second)], *then);
     // In the middle joints are met to O(dt^2), at the start exactly by the velocities that have not
     // been bent: where bodies that they connect rest on more contacts than they need, differences
     // would choose who carries the load.
     now.bias += held(now.first) || held(now.second)
                     ? now.normal.dot(bend(now.second, now.r2) - bend(now.first, now.r1))
-                    : then.normal.dot(v) - now.normal.dot(u);
+                    : then->normal.dot(v) - now.normal.dot(u);
     now.slip = v - u - now.normal.dot(v - u) * now.normal;
   }
 }

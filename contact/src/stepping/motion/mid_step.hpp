@@ -1,8 +1,8 @@
 // Tether: contacts in the middle of a step. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <tether/contact/stepping.hpp>
-#include <utility>
 #include <vector>
 
 #include "stepping/detection/near_contacts.hpp"
@@ -18,7 +18,8 @@ namespace tether::contact::detail {
 ///
 /// with d as free motion has it, from the velocities at the start; joints have added to theirs
 /// what turns the bodies that they hold. Impulses act along J(t)', so that the step is symmetric in
-/// time, as SHAKE is: energy has no drift of order 1. Bodies that do not turn have d = 0.
+/// time, as SHAKE is: energy has no drift of order 1. d is 0 where neither body turns by more than
+/// its orientation is rounded.
 class MidStep {
  public:
   /// Adds d to the contacts, but for the impacts, which are at the start.
@@ -27,10 +28,14 @@ class MidStep {
             std::vector<PointContact>& contacts);
 
  private:
-  BodySet then_;
-  std::vector<RigidBody> motion_;
-  std::vector<PointContact> found_;
-  std::vector<std::pair<std::uint64_t, std::size_t>> place_;  // in found_, by identity
+  void move(int body, const RigidBody& before, const BodySet& bodies, Gyroscopic gyroscopic,
+            double half);
+  const PointContact* find(std::uint64_t id);
+
+  BodySet then_;  // bodies that have been moved, without inertias
+  std::vector<char> moved_;
+  StepContacts found_;    // points of two surfaces in the middle of the step
+  std::size_t next_ = 0;  // of them: where find() begins
 };
 
 }  // namespace tether::contact::detail

@@ -39,5 +39,17 @@ struct FreeSpin {
 /// W + W1, so (W1 - W).I (W1 + W) = 0: the energy is kept, too, whatever dt.
 void turn_with_momentum(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse_inertia,
                         double dt, linalg::Quaternion& q, Eigen::Vector3d& w, FreeSpin& free);
+/// By dt, with its angular momentum kept or its angular velocity. Inline: who never turns a body
+/// that is not round links nothing of the former.
+inline void turn_freely(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse_inertia,
+                        bool keeps_momentum, double dt, linalg::Quaternion& q, Eigen::Vector3d& w) {
+  if (w.isZero(0)) return;
+  if (!keeps_momentum) {
+    q = (exponential(dt * w) * q).normalized();
+    return;
+  }
+  FreeSpin spin;
+  turn_with_momentum(inertia, inverse_inertia, dt, q, w, spin);
+}
 
 }  // namespace tether::contact::detail
