@@ -118,6 +118,7 @@ TEST_CASE("coupled algebraic variables: those that answer to moves do not limit 
     REQUIRE(run.flag >= 0);
     CHECK(run.steps < 600);
     CHECK(run.error < 10 * tolerance);
+    CHECK(run.statistics.untested == 0);
   }
 }
 

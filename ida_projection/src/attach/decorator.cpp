@@ -121,8 +121,8 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
   const int flag = correct_and_move(candidate, tolerance, call_setup);
   if (flag != 0) return flag;
   const long steps = movers_.used != nullptr ? attempts_.steps : ida_.steps();
-  if (run_.suppressed) control_.widen_test(candidate, polish_, attempts_.moved, steps);
   const bool suppressed = run_.suppressed;
+  if (suppressed) control_.widen_test(candidate, polish_, attempts_.moved, steps);
   control_.control(candidate, steps, run_.engaged, suppressed ? variables_.tested() : nullptr,
                    suppressed ? variables_.id() : nullptr);
   return 0;
@@ -163,7 +163,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   const StepData step = ida_.step();
   account_for_previous_attempt(step);
   candidate.t = step.t;
-  look_at_first_test();
+  if (control_.starts_off_equations(attempts_.steps)) leave_out_of_error_test(false);
   if (unknowns_.contiguous) {
     candidate.h = std::abs(ida_.step_size());
     candidate.cj = step.cj;

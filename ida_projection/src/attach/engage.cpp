@@ -16,7 +16,6 @@ namespace {
 // Multipliers of index 2: see method, section 7.
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
                  kManyFree = 0.4;
-constexpr long kFirstTests = 3;          // failed ones in the first step; IDA gives up after ten
 constexpr long kStart = 16;              // steps
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
@@ -48,8 +47,8 @@ void Projection::Impl::derive_id(const Candidate& candidate) {
                      ") and stay in the error test; give IDA's id vector in Options::id";
 }
 
-void Projection::Impl::leave_out_of_error_test(bool all) {
-  variables_.choose_tested(!all);
+void Projection::Impl::leave_out_of_error_test(bool coupled) {
+  variables_.choose_tested(coupled);
   const N_Vector tested = variables_.tested();
   if (!options_.suppress_algebraic || tested == nullptr) return;
   IDASetId(ida_.mem(), tested);
@@ -58,13 +57,6 @@ void Projection::Impl::leave_out_of_error_test(bool all) {
   run_.suppressed = true;
   statistics_.untested =
       std::lround(static_cast<double>(N_VGetLength(tested)) - N_VDotProd(tested, tested));
-}
-
-// A host that never tested algebraic variables, by IDASetSuppressAlg, may start off their
-// equations: they then fail the test of the first step at every size.
-void Projection::Impl::look_at_first_test() {
-  if (attempts_.steps != 0 || !run_.suppressed || variables_.coupled().empty()) return;
-  if (ida_.error_test_failures() >= kFirstTests) leave_out_of_error_test(true);
 }
 
 // As the run began. Who gives Options::id may have called IDASetSuppressAlg as well, which IDA
@@ -88,7 +80,7 @@ void Projection::Impl::look_for_multipliers(const Candidate& candidate) {
   const double cj = ida_.step().cj;
   if (!variables_.known()) derive_id(candidate);
   variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
-  if (variables_.high_index() && variables_.any()) leave_out_of_error_test();
+  if (variables_.high_index() && variables_.any()) leave_out_of_error_test(true);
 }
 
 // Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
@@ -154,7 +146,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();
-  leave_out_of_error_test();
+  leave_out_of_error_test(true);
   const bool given = options_.id != nullptr;
   const std::string doubts = given ? variables_.doubts(candidate, corrector_, cj) : std::string();
   if (!doubts.empty()) report_.warn(Status::doubtful, doubts);

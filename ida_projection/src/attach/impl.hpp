@@ -146,8 +146,7 @@ class Projection::Impl {
   void look_at_linear_solver();
   bool rows_of_field() const;
   void derive_id(const Candidate& candidate);
-  void leave_out_of_error_test(bool all = false);
-  void look_at_first_test();
+  void leave_out_of_error_test(bool coupled);  ///< `coupled`: those of index 1 stay
   void test_all_again();
   void look_for_multipliers(const Candidate& candidate);
   Status engage_if_index_is_high(const Candidate& candidate);

@@ -21,6 +21,7 @@ namespace {
 // 1 and the roots of titrations; from ten thousand on some of these end at another root.
 constexpr double kOfNoise = 1e3;
 constexpr double kMemory = 0.9;  // per step: S changes slowly
+constexpr double kStays = 0.5;   // of the error; a shorter step lowers it as h, to 1/16 at least
 
 double noise_in_test(int order) {
   double binomial = 1.0;
@@ -37,41 +38,48 @@ void AlgebraicTest::begin(const std::vector<int>& variables) {
 }
 
 // Rounding makes independent errors, too.
-double AlgebraicTest::widened(const Candidate& candidate, const Variable& v, double move,
-                              int order) {
-  const double y = candidate.base_entries[v.index], weight = candidate.weight_entries[v.index];
-  const double error = v.response * move + std::numeric_limits<double>::epsilon() * std::abs(y);
-  return weight / (1.0 + weight * kOfNoise * noise_in_test(order) * error);
+double AlgebraicTest::widened(const Variable& v, double weight, double y) const {
+  const double error = v.response * move_ + std::numeric_limits<double>::epsilon() * std::abs(y);
+  return weight / (1.0 + weight * noise_ * error);
+}
+
+void AlgebraicTest::look(const Candidate& candidate, double move, int order, long steps) {
+  if (steps != steps_)
+    for (Variable& v : variables_) v.response *= kMemory;
+  order_ = order;
+  move_ = move;
+  noise_ = kOfNoise * noise_in_test(order);
+  double sum = 0.0;
+  for (const Variable& v : variables_) {
+    const double weight =
+        widened(v, candidate.weight_entries[v.index], candidate.base_entries[v.index]);
+    const double error = candidate.correction_entries[v.index] * weight;
+    sum += error * error;
+  }
+  error_ = std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights))) / (order + 1);
+  if (steps_ < 0) first_error_ = error_;
+  steps_ = steps;
 }
 
 // IDA doubles h where twice the error is at most 2^-(k+1).
-bool AlgebraicTest::limits_step(const Candidate& candidate, double move, int order) const {
-  double sum = 0.0;
-  for (const Variable& v : variables_) {
-    const double error = candidate.correction_entries[v.index] * widened(candidate, v, move, order);
-    sum += error * error;
-  }
-  const double error = std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights)));
-  return error / (order + 1) > std::ldexp(1.0, -(order + 2));
-}
+bool AlgebraicTest::limit_step() const { return error_ > std::ldexp(1.0, -(order_ + 2)); }
 
-void AlgebraicTest::widen(const Candidate& candidate, const double* response, double move,
-                          int order, long steps) {
-  const double memory = steps != steps_ ? kMemory : 1.0;
-  steps_ = steps;
+bool AlgebraicTest::stay() const { return error_ > kStays * first_error_; }
+
+void AlgebraicTest::widen(const Candidate& candidate, const double* response) {
   double* weights = N_VGetArrayPointer(candidate.weights);
   for (Variable& v : variables_) {
-    v.response *= memory;
-    if (response != nullptr && move > 0.0)
-      v.response = std::max(v.response, std::abs(response[v.index]) / move);
+    if (response != nullptr && move_ > 0.0)
+      v.response = std::max(v.response, std::abs(response[v.index]) / move_);
     v.weight = weights[v.index];
-    weights[v.index] = widened(candidate, v, move, order);
+    weights[v.index] = widened(v, v.weight, candidate.base_entries[v.index]);
   }
 }
 
 void AlgebraicTest::restore(N_Vector weights, long steps) const {
-  if (steps != steps_) return;
-  for (const Variable& v : variables_) N_VGetArrayPointer(weights)[v.index] = v.weight;
+  if (steps != steps_ || variables_.empty()) return;
+  double* entries = N_VGetArrayPointer(weights);
+  for (const Variable& v : variables_) entries[v.index] = v.weight;
 }
 
 }  // namespace tether::ida_projection

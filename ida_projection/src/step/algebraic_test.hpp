@@ -13,12 +13,14 @@ class AlgebraicTest {
  public:
   void begin(const std::vector<int>& variables);
   bool acts() const { return !variables_.empty(); }
-  /// Would they alone keep IDA from a step of twice the size after a move of this length?
-  bool limits_step(const Candidate& candidate, double move, int order) const;
-  /// Lowers the weights of an attempt at the given order. `steps`: accepted before it; `response`:
-  /// change of y by which F answers to the move (null: not asked).
-  void widen(const Candidate& candidate, const double* response, double move, int order,
-             long steps);
+  /// A new attempt, `steps` accepted before it: its order, and the length of its move.
+  void look(const Candidate& candidate, double move, int order, long steps);
+  /// Do these variables keep IDA from a step of twice the size?
+  bool limit_step() const;
+  /// In the first step: has their error stayed where it was, though IDA has shortened the step?
+  bool stay() const;
+  /// Lowers the weights. `response`: change of y by which F answers to the move (null: not asked).
+  void widen(const Candidate& candidate, const double* response);
   /// The weights before widen(): IDA computes them anew for a new step only.
   void restore(N_Vector weights, long steps) const;
 
@@ -28,10 +30,14 @@ class AlgebraicTest {
     double weight;    // IDA's, of the last attempt's step
     double response;  // to a move by one tolerance, largest of the latest steps
   };
-  static double widened(const Candidate& candidate, const Variable& v, double move, int order);
+  double widened(const Variable& v, double weight, double y) const;
 
   std::vector<Variable> variables_;
-  long steps_ = -1;  // those of the last attempt
+  // Of the last attempt.
+  long steps_ = -1;
+  int order_ = 1;
+  double move_ = 0.0, noise_ = 0.0;
+  double error_ = 0.0, first_error_ = 0.0;  // as IDA's test sees them; of the first attempt
 };
 
 }  // namespace tether::ida_projection

@@ -42,10 +42,9 @@ void StepControl::restore_weights(N_Vector weights, long last_steps) {
 
 void StepControl::widen_test(const Candidate& candidate, Polish& polish, double move, long steps) {
   if (!algebraic_test_.acts() || !std::isfinite(move)) return;
-  const int order = ida_.order();
-  const bool asks = polish.iterations() > 0 && algebraic_test_.limits_step(candidate, move, order);
-  const double* response = asks ? polish.response(ida_.step()) : nullptr;
-  algebraic_test_.widen(candidate, response, move, order, steps);
+  algebraic_test_.look(candidate, move, ida_.order(), steps);
+  const bool asks = polish.iterations() > 0 && algebraic_test_.limit_step();
+  algebraic_test_.widen(candidate, asks ? polish.response(ida_.step()) : nullptr);
 }
 
 // |ycor| decides the next step size, and what it is beside the second difference the order.
@@ -110,6 +109,13 @@ bool StepControl::struggling() const {
   if (!options_.suppress_algebraic) return false;
   return refused_in_row_ >= kTrapped ||
          ida_.error_test_failures() - last_error_failures_ >= kRefused;
+}
+
+// A host that never tested algebraic variables, by IDASetSuppressAlg, may start off their
+// equations.
+bool StepControl::starts_off_equations(long steps) const {
+  return steps == 0 && algebraic_test_.acts() && ida_.error_test_failures() >= kRefused &&
+         algebraic_test_.stay();
 }
 
 bool StepControl::in_trouble(long steps) const {

@@ -37,6 +37,8 @@ class StepControl {
   void test_algebraic(const std::vector<int>& variables) { algebraic_test_.begin(variables); }
   /// Before control(); see AlgebraicTest.
   void widen_test(const Candidate& candidate, Polish& polish, double move, long steps);
+  /// In the first step: do they fail the test at every step size?
+  bool starts_off_equations(long steps) const;
   double weights_factor() const { return weights_factor_; }
   /// The corrector failed in a way that a smaller step may cure.
   void corrector_failed(bool engaged);
