@@ -41,3 +41,11 @@ TEST_CASE("differences: where y passes zero the increment is a tolerance, not ro
       entry(1e-13, 1e-8, 1.0, [](const tp::ConstVector& at) { return std::sin(at[0]) + 1.0; });
   CHECK(slope == Approx(1.0).margin(1e-6));
 }
+
+TEST_CASE("differences: at tolerances below the root of rounding the increment stays above it") {
+  for (const double tolerance : {1e-10, 1e-12, 1e-14}) {
+    const double slope =
+        entry(0.0, tolerance, 3.0, [](const tp::ConstVector& at) { return std::sin(at[0]) + 1.0; });
+    CHECK(slope == Approx(1.0).margin(1e-7));
+  }
+}

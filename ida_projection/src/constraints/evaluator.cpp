@@ -348,14 +348,19 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
   };
 
   const double kRootEpsilon = std::sqrt(std::numeric_limits<double>::epsilon());
-  double largest = 0.0;
-  for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(y[j]));
+  double largest = 0.0, relative = 0.0;  // relative: 1 / rtol, where a y_j is far above its atol
+  for (int j = 0; j < n; ++j) {
+    largest = std::max(largest, std::abs(y[j]));
+    if (scale[j] > 0.0) relative = std::max(relative, std::abs(y[j]) / scale[j]);
+  }
   y_shifted_.assign(y, y + n);
   Status status = evaluate(y, g_base_.data());
   for (std::size_t k = 0; k < columns.size() && status == Status::success; ++k) {
     const auto j = static_cast<std::size_t>(columns[k]);
-    // About one tolerance: less would drown in the rounding of g where y_j passes zero.
-    double increment = std::max(kRootEpsilon * std::abs(y[j]), std::min(scale[j], 1e-4 * largest));
+    // About one tolerance, or the root of rounding of atol / rtol: less would drown in the rounding
+    // of g where y_j passes zero.
+    const double least = scale[j] * std::max(1.0, kRootEpsilon * relative);
+    double increment = std::max(kRootEpsilon * std::abs(y[j]), std::min(least, 1e-4 * largest));
     if (increment == 0.0) increment = kRootEpsilon;
     y_shifted_[j] = y[j] + increment;
     increment = y_shifted_[j] - y[j];  // the increment after rounding
