@@ -142,6 +142,20 @@ TEST_CASE("outputs: values between steps are right to the tolerance, as plain ID
     }
 }
 
+TEST_CASE("outputs: a row that moves nothing but an output is named, and does no harm") {
+  const double w = 10.0, turn = 8 * std::atan(1.0);
+  const tp::Constraints output = row(
+      "output", [=](double t, const double* y) { return y[2] - std::sin(turn * w * t); },
+      [](double, const double*, double* C) { C[2] = 1.0; });
+  const Run with = integrate(fast_output(w), 1e-6, on_circle() + output, {}, false);
+  const Run without = integrate(fast_output(w), 1e-6, on_circle(), {}, false);
+  REQUIRE(with.flag >= 0);
+  CHECK(with.status == tp::Status::success);
+  CHECK(with.message.find("row 1 (output)") != std::string::npos);
+  CHECK(with.error < 1.5 * without.error);
+  CHECK(without.message.empty());
+}
+
 TEST_CASE("runs repeat: IDAReInit gives the first run to the bit, in every form") {
   for (const char* form : {"index 1", "index 2", "GGL", "index 0"})
     for (const double tolerance : {1e-4, 1e-6, 1e-7, 1e-8})

@@ -170,12 +170,13 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     candidate.predicted_rate = N_VGetArrayPointer(step.yp_predicted);
   }
   const Candidate& at = candidate;
-  if (watch_.rejections.collapsed() && report_.warning() != Status::collapsed) {
+  const bool false_row = watch_.first_steps.false_row_found();
+  if (watch_.rejections.collapsed(false_row) && report_.warning() != Status::collapsed) {
     const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
     const std::string cause = watch_.rejections.cause(at, step, variables_, corrector_, doubt);
     report_.warn(Status::collapsed, cause,
                  doubt.empty() ? cause : cause.substr(0, cause.rfind("; " + doubt)));
-    if (watch_.first_steps.false_row_found()) return report_.end(Status::collapsed);
+    if (false_row) return report_.end(Status::collapsed);
   }
   Stopwatch stopwatch(*this);
   if (!run_.engaged) {
@@ -274,8 +275,7 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (setups != attempts_.setups) polish_.note_setup(step.cj);
   attempts_.setups = setups;
   attempts_.repeated = steps == attempts_.steps;
-  watch_.rejections.count(attempts_.repeated && attempts_.moved > kPartInTest, attempts_.repeated,
-                          attempts_.steps);
+  watch_.rejections.count(attempts_.moved > kPartInTest, attempts_.repeated, attempts_.steps);
   attempts_.moved = std::numeric_limits<double>::infinity();
   if (!attempts_.repeated) control_.look_for_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {

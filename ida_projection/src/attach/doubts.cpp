@@ -46,6 +46,7 @@ void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepDat
       watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
                               polish_.corrected(), variables_, *movers_.used, corrector_);
   if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
+  if (report_.advice.empty()) report_.advice = watch_.first_steps.idle_row();
 }
 
 // y before this step; of a later one, up to its curvature.

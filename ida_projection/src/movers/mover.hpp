@@ -19,7 +19,7 @@ namespace tether::ida_projection {
 struct Tangency {
   std::vector<double> rate;       ///< sum_j C_ij y'_j
   std::vector<double> terms;      ///< sum_j |C_ij y'_j|; < 0: the row contains algebraic variables
-  std::vector<double> size;       ///< sum_j |C_ij| max(1, |y_j|)
+  std::vector<double> size;       ///< sum_j |C_ij| max(1, |y_j|), of differential y_j
   std::vector<double> tolerance;  ///< |row_i(C WT)|, a move of one tolerance
 };
 

@@ -35,16 +35,17 @@ std::string large_tolerances(const Candidate& candidate) {
 }  // namespace
 
 void RejectionWatch::reset() {
-  rejections_ = rejections_before_ = window_begin_ = refused_steps_ = 0;
+  moved_in_row_ = rejections_ = rejections_before_ = window_begin_ = refused_steps_ = 0;
   rejected_in_step_ = collapsed_ = false;
 }
 
-void RejectionWatch::count(bool rejected_move, bool repeated, long steps) {
+void RejectionWatch::count(bool moved, bool repeated, long steps) {
   if (repeated) {
     ++rejections_;
-    rejected_in_step_ |= rejected_move;
+    rejected_in_step_ |= moved;
     return;
   }
+  moved_in_row_ = moved ? moved_in_row_ + 1 : 0;
   if (rejected_in_step_) ++refused_steps_;
   rejected_in_step_ = false;
   if (steps < window_begin_ + kWindow) return;
@@ -58,8 +59,12 @@ std::string RejectionWatch::cause(const Candidate& candidate, const StepData& st
                                   const AlgebraicVariables& variables, Corrector& corrector,
                                   const std::string& doubt) const {
   PlainText out;
-  out << "IDA rejected " << rejections_ - rejections_before_ << " attempts in the last " << kWindow
-      << " accepted steps before t = " << step.t;
+  if (collapsed_)
+    out << "IDA rejected " << rejections_ - rejections_before_ << " attempts in the last "
+        << kWindow << " accepted steps before t = " << step.t;
+  else
+    out << "each of the last " << moved_in_row_ << " steps before t = " << step.t
+        << " was moved by about what the error test allows";
   if (variables.all())
     out << "; the id vector calls every variable algebraic: differential ones have to be 1 "
            "(Options::id)";

@@ -16,11 +16,14 @@ class RejectionWatch {
   explicit RejectionWatch(const Constraints& constraints) : constraints_(constraints) {}
 
   void reset();  ///< a new run starts
-  /// At each new attempt: was the last one rejected, and had a move part in that? `steps`: accepted
-  /// before it.
-  void count(bool rejected_move, bool repeated, long steps);
-  /// Were there rejections in most steps of a stretch?
-  bool collapsed() const { return collapsed_; }
+  /// At each new attempt: was the last one rejected, and was its move long enough to fail the error
+  /// test? `steps`: accepted before it.
+  void count(bool moved, bool repeated, long steps);
+  /// Were there rejections in most steps of a stretch, or such moves in every step of a longer one,
+  /// by rows of which one is known to be false?
+  bool collapsed(bool false_row) const {
+    return collapsed_ || (false_row && moved_in_row_ >= kMostMoved);
+  }
   /// The fault found at the corrector's point, where y' = yppred + cj ycor fulfils F.
   /// `doubt`: one that was found before.
   std::string cause(const Candidate& candidate, const StepData& step,
@@ -34,7 +37,10 @@ class RejectionWatch {
   std::string suspected_row(const Candidate& candidate, const StepData& step) const;
   std::string squared_row(const Candidate& candidate, Corrector& corrector) const;
 
+  static constexpr long kMostMoved = 1000;  // accepted steps; order and h have settled by then
+
   const Constraints& constraints_;
+  long moved_in_row_ = 0;
   long rejections_ = 0, rejections_before_ = 0;  // attempts that IDA repeated
   long window_begin_ = 0;                        // accepted steps when they were last looked at
   long refused_steps_ = 0;                       // of these, steps with a rejection

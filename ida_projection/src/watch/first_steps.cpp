@@ -35,6 +35,7 @@ void FirstSteps::reset() {
   looks_ = small_looks_ = 0;
   looked_at_ = kSettled;
   false_row_found_ = false;
+  idle_row_.clear();
   largest_ = 0.0;
   searched_ = 0;
 }
@@ -103,6 +104,10 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
   if (!text_of_side.empty()) return text_of_side;
   const double root = std::sqrt(static_cast<double>(n));
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
+    if (tangency_.terms[i] < 0.0 && tangency_.size[i] == 0.0 && idle_row_.empty())
+      idle_row_ = "row " + std::to_string(i) + " (" + constraints_.name(static_cast<int>(i)) +
+                  ") has algebraic variables only, which F determines by itself: it moves nothing "
+                  "else and may be left out";
     if (!(tangency_.terms[i] >= 0.0)) continue;
     Change& change = changes_[i];
     change.sum += tangency_.rate[i] * h;

@@ -30,6 +30,8 @@ class FirstSteps {
   void reset();  ///< a new run starts
   /// Has a row been named that F does not keep?
   bool false_row_found() const { return false_row_found_; }
+  /// Names a row that moves nothing but algebraic variables that F determines; empty: none.
+  const std::string& idle_row() const { return idle_row_; }
   /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
   /// ycor. Returns the fault found; empty: none.
   std::string look(const Candidate& candidate, const StepData& step, long steps, double h,
@@ -67,6 +69,7 @@ class FirstSteps {
   int small_looks_ = 0;             // at doubts in rows; at a solution below its tolerances
   double largest_ = 0.0;            // size of the solution so far, in tolerances
   bool false_row_found_ = false;
+  std::string idle_row_;
   long searched_ = 0;                  // unknowns compared
   std::vector<double> point_, slope_;  // y and y' as the corrector left them
   std::vector<double> moved_, kept_point_, kept_slope_, values_;  // work space

@@ -23,10 +23,11 @@ bool ContiguousMover<Rows>::tangency(const std::vector<double>& yp, const double
     bool algebraic = false;
     rows_.blocks.visit_row(static_cast<int>(i), [&](int j, double c) {
       const auto k = static_cast<std::size_t>(j);
-      algebraic = algebraic || (c != 0.0 && id != nullptr && id[j] == 0.0);
+      const bool differential = id == nullptr || id[j] != 0.0;
+      algebraic = algebraic || (c != 0.0 && !differential);
       rate += c * yp[k];
       terms += std::abs(c * yp[k]);
-      size += std::abs(c) * std::max(1.0, std::abs(rows_.at.y[k]));
+      if (differential) size += std::abs(c) * std::max(1.0, std::abs(rows_.at.y[k]));
       const double moved = w[k] > 0.0 ? c / w[k] : 0.0;
       square += moved * moved;
     });
