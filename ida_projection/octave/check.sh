@@ -32,3 +32,8 @@ endfor
 exit (failed);
 END
 octave-cli --no-history --norc -q "$work/all_tests.m"
+
+# Who asks for no constraints hears nothing.
+said=$(octave-cli --no-history --norc -q --eval \
+  "addpath ('$work'); [t, y] = ode15s (@(t, y) -y, [0, 1], 1); [t, y] = ode15i (@(t, y, v) v + y, [0, 1], 1, -1);" 2>&1)
+[ -z "$said" ] || { echo "without constraints: $said"; exit 1; }

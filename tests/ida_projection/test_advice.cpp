@@ -175,6 +175,25 @@ TEST_CASE("an id vector that takes some variables for the other kind is named") 
   }
 }
 
+TEST_CASE("F of index 3 is named where its run fails, forms of index 1 and 2 are not") {
+  for (const bool third : {true, false})
+    for (const double tolerance : {1e-6, 1e-8}) {
+      Problem problem = pendulum(1.7, 3.3, 10.0, "index 2");
+      if (third) {
+        const auto residual = problem.residual;
+        problem.residual = [residual](double t, const double* y, const double* yp, double* r) {
+          residual(t, y, yp, r);
+          r[4] = y[0] * y[0] + y[1] * y[1] - 1.7 * 1.7;
+        };
+        problem.jacobian = nullptr;
+      }
+      const Ended end = run(problem, tolerance, problem.recommended_constraints(), 20000);
+      INFO("tolerance " << tolerance << ": " << end.flag << " " << end.message);
+      CHECK(contains(end.message, "F is of index 3") == third);
+      CHECK((end.status == tp::Status::success) != third);
+    }
+}
+
 TEST_CASE("a squared row, whose gradient vanishes on the set, is suspected by name") {
   const tp::Constraints square = length_through(
       "square", [](double u) { return u * u; }, [](double u) { return 2.0 * u; });

@@ -137,6 +137,17 @@ TEST_CASE("check_jacobian: a missing entry, a sign, NaN and misuse") {
   CHECK(contains(thrown([&] { tp::check_jacobian(rows(1), 0.0, kState, -1.0); }), "tolerance"));
 }
 
+TEST_CASE("check_jacobian: rows without a Jacobian pass, close to a pole as well") {
+  tp::Constraints pole = rows(1);
+  pole.value = [](double, tp::ConstVector y, tp::Vector g) { g[0] = 1.0 / (y[0] - 4e-4); };
+  pole.jacobian = tp::FiniteDifferences{};
+  const std::vector<double> beside = {0.0, 0.0, 0.0, 0.0, 0.0};
+  CHECK(tp::check_jacobian(pole, 0.0, beside).correct);
+  CHECK(tp::check_jacobian(rows(3) + pole, 0.0, beside).correct);
+  pole.jacobian = tp::DenseJacobian([](double, tp::ConstVector, tp::Matrix C) { C(0, 0) = 1.0; });
+  CHECK(tp::check_jacobian(rows(3) + pole, 0.0, beside).row == 3);
+}
+
 TEST_CASE("builders: values and gradients") {
   const auto agrees = [](const tp::Constraints& set) {
     const tp::JacobianReport report = tp::check_jacobian(set, 0.0, kState);

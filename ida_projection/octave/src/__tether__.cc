@@ -37,14 +37,6 @@ void find(void* object, const char* name, Function& function) {
   if (!function) error("tether: %s has no %s", TETHER_PRELOAD, name);
 }
 
-void load() {
-  void* object = dlopen(TETHER_PRELOAD, RTLD_LAZY | RTLD_GLOBAL);
-  if (!object) error("tether: %s", dlerror());
-  find(object, "tether_preload_ask", library.ask);
-  find(object, "tether_preload_project_output", library.project_output);
-  find(object, "tether_add_rows", library.add_rows);
-}
-
 /// f(t, y) as rows x columns; what Octave throws stays here and becomes the error of the run.
 int call(Run& run, const octave_value& f, double t, const double* y, octave_idx_type rows,
          octave_idx_type columns, NDArray& result) {
@@ -100,6 +92,15 @@ int add_constraints(void* ida, N_Vector y, tether_constraints* constraints, teth
                           run.C.isempty() ? nullptr : jacobian, &run);
 }
 
+void load() {
+  void* object = dlopen(TETHER_PRELOAD, RTLD_LAZY | RTLD_GLOBAL);
+  if (!object) error("tether: %s", dlerror());
+  find(object, "tether_preload_ask", library.ask);
+  find(object, "tether_preload_project_output", library.project_output);
+  find(object, "tether_add_rows", library.add_rows);
+  library.ask(add_constraints);  // in sessions without constraints, too: nothing else is asked then
+}
+
 Run& current() {
   if (runs.empty()) error("__tether__: no run has begun");
   return *runs.back();
@@ -120,7 +121,6 @@ DEFUN_DLD(__tether__, args, ,
     run->C = args(2);
     run->count = args(3).idx_type_value();
     runs.push_back(std::move(run));
-    library.ask(add_constraints);
   } else if (command == "end") {
     if (!runs.empty()) runs.pop_back();
   } else if (command == "error") {

@@ -310,6 +310,9 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
 
 int Projection::Impl::finish(Status outcome, const std::string& text) {
   const bool stopped = outcome == Status::callback_fatal && corrector_.stopped();
+  const std::string index =
+      outcome != Status::success && !stopped ? too_high_index() : std::string();
+  if (!index.empty()) return report_.finish(outcome, text + "; " + index, attempts_.steps);
   return report_.finish(outcome, stopped ? corrector_.stop_text() : text, attempts_.steps);
 }
 

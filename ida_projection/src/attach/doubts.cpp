@@ -59,6 +59,14 @@ std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vect
   return undetermined_multipliers(candidate, y, variables_, corrector_, constraints_, statistics_);
 }
 
+// Empty: it is not. Close to a dead point the multipliers are what is to be named.
+std::string Projection::Impl::too_high_index() const {
+  if (variables_.index() <= 2 || !run_.undetermined.empty()) return {};
+  return "F is of index " + std::to_string(variables_.index()) +
+         ", and IDA integrates forms of index 2 at most: put the derivatives of equations without "
+         "y' in their place, and give these equations as rows";
+}
+
 int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
   ++statistics_.corrector_failures;
   report_.status = Status::corrector_failed;
@@ -70,6 +78,8 @@ int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
         "the step, which may not allow this tolerance: try a larger one, or a form of index 1 or 0";
   if (variables_.high_index() && !run_.undetermined.empty())
     report_.message += "; " + run_.undetermined;
+  const std::string index = too_high_index();
+  if (!index.empty()) report_.message = "IDA's corrector failed; " + index;
   if (flag > 0 && unknowns_.contiguous && corrector_.failures_in_row() == kNameAfter) {
     Candidate before = candidate;
     before.t = ida_.step().t;

@@ -157,6 +157,8 @@ Status Projection::Impl::engage(const Candidate& candidate) {
       run_.undetermined = "the motion from the start is not determined: there " + found;
       report_.warn(Status::doubtful, run_.undetermined);
     }
+    const std::string index = too_high_index();
+    if (!index.empty()) report_.warn(Status::doubtful, index);
   }
   movers_.joined.join(candidate, cj);
   movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();

@@ -161,6 +161,7 @@ class Projection::Impl {
   void look_for_doubts(const Candidate& candidate, const StepData& step);
   void keep_point_before(const Candidate& candidate, OwnedVector& y);
   std::string undetermined_at(const Candidate& candidate, N_Vector y);
+  std::string too_high_index() const;
   int corrector_failed(const Candidate& candidate, int flag);
 
   // choose_metric.cpp

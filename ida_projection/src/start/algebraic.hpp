@@ -37,6 +37,8 @@ class AlgebraicVariables {
   bool index_known() const { return index_known_; }
   /// F is not of index 1 in its own variables.
   bool high_index() const { return index_known_ && found_.high; }
+  /// The index of F where it is 2 or more and could be found out; else 0.
+  int index() const { return index_known_ ? found_.index : 0; }
   /// Algebraic variables of index 2 or more.
   const std::vector<int>& undetermined() const { return found_.undetermined; }
   /// Outputs, on which no differential variable depends, and, where `coupled` is true, the others
@@ -65,11 +67,14 @@ class AlgebraicVariables {
 
   // index.cpp
   bool exceeds_one(const Candidate& candidate, Corrector& corrector, double cj, long usual);
+  int index_above_one(const Candidate& candidate, Corrector& corrector, double cj,
+                      Eigen::MatrixXd slopes);
   bool has_rows_of_zeros(const Candidate& candidate, Corrector& corrector, double cj);
   void find_outputs(const Eigen::MatrixXd& slopes);
 
   struct Found {
     bool known = false, high = false;
+    int index = 0;
     std::vector<int> undetermined, outputs;
     std::vector<int> without_derivative;  // differential ones whose y' is nowhere in F
     bool judged_id = false;

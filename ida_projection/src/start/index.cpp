@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "start/algebraic.hpp"
+#include "start/differential_index.hpp"
 #include "start/undetermined_columns.hpp"
 
 namespace tether::ida_projection {
@@ -88,6 +89,37 @@ void AlgebraicVariables::find_outputs(const Eigen::MatrixXd& slopes) {
       found_.outputs.push_back(static_cast<int>(j));
 }
 
+// `slopes` as exceeds_one() has found them; the index needs F_y of the differential columns as
+// well.
+int AlgebraicVariables::index_above_one(const Candidate& candidate, Corrector& corrector, double cj,
+                                        Eigen::MatrixXd slopes) {
+  const Eigen::Index n = slopes.rows();
+  OwnedVector none(candidate.base), before(candidate.base), after(candidate.base);
+  N_VConst(0.0, none);
+  const auto residual = [&](N_Vector into) {
+    ++statistics_.residual_evaluations;
+    return corrector.residual(none, into) == 0;
+  };
+  const Eigen::Map<const Eigen::VectorXd> low(N_VGetArrayPointer(before), n),
+      high(N_VGetArrayPointer(after), n);
+  Eigen::MatrixXd E = Eigen::MatrixXd::Zero(n, n);
+  bool known = residual(before);
+  for (Eigen::Index j = 0; j < n && known; ++j) {
+    double& y = candidate.base_entries[j];
+    const double present = y, unit = std::max(1.0, std::abs(present)), change = kIncrement * unit;
+    if (mask()[j] != 0.0) {
+      E.col(j) = slopes.col(j) / cj;
+      y = present + change;
+      known = residual(after);
+      y = present;
+      slopes.col(j) = (high - low) / change;
+    }
+    E.col(j) *= unit;
+    slopes.col(j) *= unit;
+  }
+  return known ? differential_index(std::move(E), std::move(slopes)) : 0;
+}
+
 // F determines y'_d and y_a, its index is 1 at most, where the matrix of F_y'_j (j differential)
 // and F_y_j (j algebraic) is regular. It is singular for multipliers of position or velocity rows
 // (index 2 and 3), and where combinations of differential variables are algebraic. The columns are
@@ -137,8 +169,9 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
   N_VScale(1.0, saved, candidate.base);
   found_.known = known;  // else the next run asks again
   if (known && id != nullptr) find_outputs(slopes);
-  const std::vector<char> left =
-      known ? undetermined_columns(std::move(slopes), true) : std::vector<char>();
+  const std::vector<char> left = known ? undetermined_columns(slopes, true) : std::vector<char>();
+  if (!left.empty() && id != nullptr && size <= kLargestSize)
+    found_.index = index_above_one(candidate, corrector, cj, std::move(slopes));
   for (int j = 0; id != nullptr && j < static_cast<int>(left.size()); ++j)
     if (left[static_cast<std::size_t>(j)] && id[j] == 0.0) found_.undetermined.push_back(j);
   return !left.empty();
@@ -150,6 +183,7 @@ void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& co
   if (found_.known) return;
   found_.known = true;
   found_.without_derivative.clear();
+  found_.index = 0;
   found_.high = exceeds_one(candidate, corrector, cj, usual);
 }
 
