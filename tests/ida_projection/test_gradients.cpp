@@ -312,14 +312,18 @@ TEST_CASE("gradients on custom vectors, direct solver: polished as on serial one
     const End custom = run_with_direct_solver(Kind::custom, problem, 1e-6, rows);
     REQUIRE(serial.flag >= 0);
     CHECK(custom.statistics.extra_iterations > custom.steps / 4);
-    // On custom vectors algebraic variables are not in the error test.
-    const bool algebraic = form == std::string("index 1");
-    CHECK(std::abs(custom.statistics.extra_iterations - serial.statistics.extra_iterations) <=
-          (algebraic ? 8 : 0));
-    CHECK(std::abs(custom.steps - serial.steps) <= (algebraic ? 3 : 0));
     CHECK(custom.shifted + serial.shifted == 0);
+    if (form == std::string("index 0")) {
+      CHECK(custom.statistics.extra_iterations == serial.statistics.extra_iterations);
+      CHECK(custom.steps == serial.steps);
+    }
+    // Which algebraic variables answer to moves is known of serial vectors only: on others the test
+    // of all is IDA's own, at shorter steps.
+    CHECK(custom.steps <= 1.25 * serial.steps);
+    CHECK(custom.statistics.untested == 0);
     for (std::size_t i = 0; i < serial.y.size(); ++i)
-      CHECK(std::abs(custom.y[i] - serial.y[i]) <= (algebraic ? 2e-7 : 1e-8));
+      CHECK(std::abs(custom.y[i] - problem.reference[i]) <=
+            2.0 * std::abs(serial.y[i] - problem.reference[i]) + 1e-5);
   }
 }
 

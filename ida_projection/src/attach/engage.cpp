@@ -48,9 +48,8 @@ void Projection::Impl::derive_id(const Candidate& candidate) {
 }
 
 void Projection::Impl::leave_out_of_error_test(bool coupled) {
-  variables_.choose_tested(coupled);
+  if (!options_.suppress_algebraic || !variables_.choose_tested(coupled)) return;
   const N_Vector tested = variables_.tested();
-  if (!options_.suppress_algebraic || tested == nullptr) return;
   IDASetId(ida_.mem(), tested);
   IDASetSuppressAlg(ida_.mem(), 1);
   control_.test_algebraic(variables_.coupled());
@@ -73,7 +72,7 @@ void Projection::Impl::test_all_again() {
 // the first steps.
 void Projection::Impl::look_for_multipliers(const Candidate& candidate) {
   const bool may = !run_.engaged && !variables_.index_known() && options_.suppress_algebraic &&
-                   options_.smooth_where_needed && candidate.base_entries != nullptr;
+                   candidate.base_entries != nullptr;
   if (!may || ida_.steps() >= kStart || ida_.error_test_failures() > 0) return;
   // IDA multiplies that by less than 1.
   if (!(N_VWrmsNorm(candidate.correction, candidate.weights) > 1.0)) return;
@@ -142,7 +141,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   if (!variables_.known()) derive_id(candidate);
   const double cj = ida_.step().cj;
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
-  if (options_.smooth_where_needed)
+  if (options_.smooth_where_needed || (options_.suppress_algebraic && variables_.any()))
     variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();

@@ -42,8 +42,8 @@ class AlgebraicVariables {
   /// Algebraic variables of index 2 or more.
   const std::vector<int>& undetermined() const { return found_.undetermined; }
   /// Outputs, on which no differential variable depends, and, where `coupled` is true, the others
-  /// of index 1.
-  void choose_tested(bool coupled);
+  /// of index 1. False: none is algebraic, or F could not be asked.
+  bool choose_tested(bool coupled);
   /// 1 for variables that IDA's error test sees: differential ones and those chosen. Null: none is
   /// algebraic.
   N_Vector tested() const { return tested_ ? static_cast<N_Vector>(tested_) : id(); }

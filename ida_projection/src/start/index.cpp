@@ -188,14 +188,14 @@ void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& co
 }
 
 // Coupled ones are not tested where F is of higher index and does not tell which it leaves free.
-void AlgebraicVariables::choose_tested(bool coupled) {
+bool AlgebraicVariables::choose_tested(bool coupled) {
   coupled_.clear();
-  if (!any_ || !found_.known || !is_contiguous(id_)) return;
+  if (!any_ || !found_.known || !is_contiguous(id_)) return false;
   tested_ = OwnedVector(static_cast<N_Vector>(id_));
   N_VScale(1.0, id_, tested_);
   double* tested = N_VGetArrayPointer(tested_);
   for (const int j : found_.outputs) tested[j] = 1.0;
-  if (!coupled || (found_.high && found_.undetermined.empty())) return;
+  if (!coupled || (found_.high && found_.undetermined.empty())) return true;
   std::vector<char> free(static_cast<std::size_t>(N_VGetLength(id_)), 0);
   for (const int j : found_.undetermined) free[static_cast<std::size_t>(j)] = 1;
   for (std::size_t j = 0; j < free.size(); ++j) {
@@ -203,6 +203,7 @@ void AlgebraicVariables::choose_tested(bool coupled) {
     coupled_.push_back(static_cast<int>(j));
     tested[j] = 1.0;
   }
+  return true;
 }
 
 }  // namespace tether::ida_projection

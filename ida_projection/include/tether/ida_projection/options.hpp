@@ -73,8 +73,9 @@ struct Options {
   /// the differential ones controls what they do. Statistics::untested counts them. Their values
   /// between steps have no tolerance; false keeps it. Variables of index 1 stay in the test; the
   /// tolerance of those that differential variables depend on grows by what moves change them by
-  /// (IDAGetErrWeights shows it). On other than serial vectors all algebraic variables leave it. By
-  /// IDASetId and IDASetSuppressAlg; IDAReInit takes them back where `id` is derived.
+  /// (IDAGetErrWeights shows it). By IDASetId and IDASetSuppressAlg; IDAReInit takes them back
+  /// where `id` is derived. On other than serial vectors F cannot be asked which are which: call
+  /// IDASetSuppressAlg for forms of index 2 there.
   bool suppress_algebraic = true;
 
   /// After a move, the algebraic variables follow by one Newton iteration on F at the moved point
