@@ -42,16 +42,15 @@ class Table {
       : file_(file.empty() ? nullptr : std::fopen(file.c_str(), "w")) {
     if (!file.empty() && !file_) throw std::runtime_error("cannot write " + file);
     if (file_)
-      std::fprintf(
-          file_.get(),
-          "problem,contacts,law,tolerance,measure,solver,status,sweeps,admm,factorisations,"
-          "replaced,ms,error,natural_map,natural_map_data,fixed_point,ratio\n");
+      std::fprintf(file_.get(),
+                   "problem,contacts,law,tolerance,measure,solver,status,sweeps,factorisations,"
+                   "replaced,ms,error,natural_map,natural_map_data,fixed_point,ratio\n");
   }
   void add(const std::string& label, const Problem& problem, Law law, double tolerance,
            const SiconosRun& run, bool good, const Residuals& r) const {
     if (!file_) return;
     std::fprintf(file_.get(),
-                 "%s,%d,%s,%g,natural_map,siconos_%s,%s,%d,0,0,0,%.6g,%.3e,%.3e,%.3e,%.3e,\n",
+                 "%s,%d,%s,%g,natural_map,siconos_%s,%s,%d,0,0,%.6g,%.3e,%.3e,%.3e,%.3e,\n",
                  label.c_str(), problem.contacts(), name(law), tolerance, run.solver.c_str(),
                  good ? "solved" : "failed", run.iterations, run.milliseconds, run.error,
                  r.natural_map, r.natural_map_data, r.fixed_point);
@@ -59,11 +58,11 @@ class Table {
   void add(const std::string& label, const Problem& problem, const Options& o, const Solution& s,
            double ms, const Residuals& r, double ratio) const {
     if (!file_) return;
-    std::fprintf(file_.get(), "%s,%d,%s,%g,%s,%s,%s,%d,%d,%d,%zu,%.6g,%.3e,%.3e,%.3e,%.3e,%.4g\n",
+    std::fprintf(file_.get(), "%s,%d,%s,%g,%s,%s,%s,%d,%d,%zu,%.6g,%.3e,%.3e,%.3e,%.3e,%.4g\n",
                  label.c_str(), problem.contacts(), name(o.law), o.tolerance, name(o.measure),
-                 name(o.method), name(s.status), s.counts.sweeps, s.counts.admm_iterations,
-                 s.counts.factorisations, s.replaced.size(), ms, s.error, r.natural_map,
-                 r.natural_map_data, r.fixed_point, ratio);
+                 name(o.method), name(s.status), s.counts.sweeps, s.counts.factorisations,
+                 s.replaced.size(), ms, s.error, r.natural_map, r.natural_map_data, r.fixed_point,
+                 ratio);
     std::fflush(file_.get());
   }
 
@@ -119,10 +118,10 @@ void run_method(const std::string& label, const Problem& problem, const Options&
       totals.slower += std::max(ms, best.ms) > 0.05 && ratio > 1.2;
     }
   }
-  std::printf("%-44s %4d %-7g %-16s %-15s %-10s %10.5f ms  error %.2e  %d/%d/%d  replaced %zu",
+  std::printf("%-44s %4d %-7g %-16s %-15s %-10s %10.5f ms  error %.2e  %d/%d  replaced %zu",
               label.c_str(), problem.contacts(), options.tolerance, name(options.measure),
               name(options.method), name(s.status), ms, s.error, s.counts.sweeps,
-              s.counts.admm_iterations, s.counts.factorisations, s.replaced.size());
+              s.counts.factorisations, s.replaced.size());
   if (compared)
     std::printf("  best Siconos %s %.5f ms, ratio %.3f", best.solver.c_str(), best.ms, ratio);
   std::printf("\n");
@@ -169,8 +168,7 @@ void run_problem(const Settings& settings, const std::string& file, double toler
   if (settings.law == Law::maximum_dissipation) measures = {Measure::fixed_point};
   std::vector<Method> methods{Method::automatic};
   if (settings.methods)
-    methods = {Method::automatic, Method::gauss_seidel, Method::anderson, Method::admm,
-               Method::proximal_newton};
+    methods = {Method::automatic, Method::gauss_seidel, Method::anderson, Method::proximal_newton};
   Best best;
   if (settings.siconos && settings.law == Law::coulomb && problem.dimension() == 3)
     best = best_siconos(settings, label, problem, tolerance, table);

@@ -34,9 +34,8 @@ struct Run {
 };
 
 // sor is Gauss-Seidel unless its factor is tuned; convex_relaxation solves another problem.
-const Method kMethods[] = {Method::automatic,     Method::gauss_seidel, Method::jacobi,
-                           Method::anderson,      Method::admm,         Method::proximal_newton,
-                           Method::interior_point};
+const Method kMethods[] = {Method::automatic, Method::gauss_seidel,    Method::jacobi,
+                           Method::anderson,  Method::proximal_newton, Method::interior_point};
 const char* const kBest = "best of Siconos";
 
 // The same yardstick for everybody: the natural map over max(|b|, |x|, |w|) under `coulomb`, which

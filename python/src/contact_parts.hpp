@@ -13,9 +13,9 @@ namespace tether::python {
 namespace tc = tether::contact;
 
 inline constexpr std::array kMethods = {
-    tc::Method::automatic,       tc::Method::gauss_seidel,   tc::Method::sor,
-    tc::Method::jacobi,          tc::Method::anderson,       tc::Method::admm,
-    tc::Method::proximal_newton, tc::Method::interior_point, tc::Method::convex_relaxation};
+    tc::Method::automatic,      tc::Method::gauss_seidel,     tc::Method::sor,
+    tc::Method::jacobi,         tc::Method::anderson,         tc::Method::proximal_newton,
+    tc::Method::interior_point, tc::Method::convex_relaxation};
 
 using View = Eigen::Map<const Eigen::VectorXd>;
 

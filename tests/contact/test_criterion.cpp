@@ -312,7 +312,7 @@ TEST_CASE("criterion: a body between closing walls is infeasible, with the proof
       const Problem p = a.problem();
       for (Law law : kLaws) {
         for (Method method : {Method::automatic, Method::gauss_seidel, Method::anderson,
-                              Method::admm, Method::proximal_newton, Method::interior_point}) {
+                              Method::proximal_newton, Method::interior_point}) {
           if (method != Method::automatic && (mass != 1.0 || mu != 0.4)) continue;
           for (double tolerance : {1e-3, 1e-9}) {
             Options o = options_of(law, tolerance, method);

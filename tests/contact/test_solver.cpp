@@ -33,7 +33,7 @@ TEST_CASE("every method reaches the same velocities of a small stack") {
     const Solution reference = Solver(with(law, 1e-11)).solve(p);
     REQUIRE(reference.status == Status::solved);
     for (Method method : {Method::gauss_seidel, Method::sor, Method::jacobi, Method::anderson,
-                          Method::admm, Method::proximal_newton, Method::interior_point}) {
+                          Method::proximal_newton, Method::interior_point}) {
       Options o = with(law, 1e-9, method);
       if (method == Method::sor) o.relaxation = 1.3;
       const Solution s = Solver(o).solve(p);

@@ -57,15 +57,3 @@ TEST_CASE("wedged: impulses that grow until they are round-off are no end") {
     CHECK(s.counts.work < 2e8);
   }
 }
-
-TEST_CASE("softened problems have the same contacts, which yield") {
-  const Problem p = four_bodies(1), q = p.softened(0.25);
-  Eigen::MatrixXd expected = p.dense_matrix();
-  for (int i = 0; i < p.contacts(); ++i) expected.block<3, 3>(3 * i, 3 * i) *= 1.25;
-  CHECK((q.dense_matrix() - expected).norm() == 0);
-  CHECK(q.b() == p.b());
-  for (int i = 0; i < p.contacts(); ++i) {
-    CHECK(q.mu(i) == p.mu(i));
-    CHECK(q.local(i).a == Approx(1.25 * p.local(i).a).epsilon(1e-14));
-  }
-}

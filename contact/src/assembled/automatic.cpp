@@ -50,7 +50,6 @@ void Automatic::prepare(Search& search) {
   if (ready_) return;
   sweeps.reset(contacts_, options_.anderson_depth);
   newton.reset(contacts_);
-  admm.reset(contacts_);
   interior.reset(contacts_);
   parts_.reset(contacts_);
   sweep_work_ = search.counts.work;

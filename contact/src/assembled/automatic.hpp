@@ -3,7 +3,6 @@
 
 #include "assembled/local_solves.hpp"
 #include "assembled/stages/accelerated_sweeps.hpp"
-#include "assembled/stages/admm.hpp"
 #include "assembled/stages/interior/interior_point.hpp"
 #include "assembled/stages/proximal_newton.hpp"
 
@@ -28,7 +27,6 @@ class Automatic {
   // Started on their own by the other methods, after prepare().
   void prepare(Search& search);
   AcceleratedSweeps sweeps;
-  Admm admm;
   ProximalNewton newton;
   InteriorPoint interior;
 

@@ -51,6 +51,8 @@ struct Solver::Implementation {
   std::unordered_map<std::uint64_t, PackedVector> memory;
 
   void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
+  void begin(const Problem& problem, const linalg::VectorView* start);
+  Status run();
   Status automatic();
   Status plain();
   void to_given_units(Status& status);
@@ -177,8 +179,8 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   out.advice = detail::advice(status, options);
 }
 
-void Solver::Implementation::solve(const Problem& problem, const linalg::VectorView* start,
-                                   Solution& out) {
+// x becomes where the solve starts.
+void Solver::Implementation::begin(const Problem& problem, const linalg::VectorView* start) {
   const std::size_t n = static_cast<std::size_t>(problem.contacts());
   search.reset(problem, options,
                options.measure == Measure::automatic ? Measure::fixed_point : options.measure);
@@ -209,37 +211,26 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
       detail::clip_cone(problem.locals()[i].mu, x[i].v);
     }
   }
-  Status status = Status::unsolved;
+}
+
+Status Solver::Implementation::run() {
   switch (options.method) {
     case Method::automatic:
-      status = automatic();
-      break;
+      return automatic();
     case Method::gauss_seidel:
     case Method::sor:
     case Method::jacobi:
-      status = plain();
-      break;
+      return plain();
     case Method::anderson: {
       search.test(x.data(), Method::anderson);
-      if (search.solved()) {
-        status = Status::solved;
-        break;
-      }
+      if (search.solved()) return Status::solved;
       stages.prepare(search);
       stages.sweeps.start(x.data());
       detail::AcceleratedSweeps::Leave leave;
       leave.most_sweeps = options.max_sweeps;
       stages.sweeps.run(search, leave);
-      status = search.solved() ? Status::solved : stages.give_up(search);
       break;
     }
-    case Method::admm:
-      search.test(x.data(), Method::admm);
-      stages.prepare(search);
-      stages.admm.start(search, x.data());
-      if (!search.solved()) stages.admm.run(search, options.max_sweeps, true, false);
-      status = search.solved() ? Status::solved : stages.give_up(search);
-      break;
     case Method::proximal_newton:
       search.test(x.data(), Method::gauss_seidel);
       stages.prepare(search);
@@ -247,25 +238,30 @@ void Solver::Implementation::solve(const Problem& problem, const linalg::VectorV
       search.count_sweep();
       search.test(x.data(), Method::gauss_seidel);
       if (!search.solved()) stages.newton.run(search, x.data(), 60);
-      status = search.solved() ? Status::solved : stages.give_up(search);
       break;
     case Method::interior_point:
       search.test(x.data(), Method::interior_point);
       stages.prepare(search);
       if (!search.solved()) stages.interior.run(search, options.max_sweeps);
-      status = search.solved() ? Status::solved : stages.give_up(search);
       break;
     case Method::convex_relaxation: {
       const bool done = detail::solve_convex_relaxation(search, x);
       search.test(x.data(), Method::convex_relaxation);
-      status = search.solved() ? Status::solved : done ? Status::relaxed : Status::work_limit;
-      break;
+      return search.solved() ? Status::solved : done ? Status::relaxed : Status::work_limit;
     }
   }
+  return search.solved() ? Status::solved : stages.give_up(search);
+}
+
+void Solver::Implementation::solve(const Problem& problem, const linalg::VectorView* start,
+                                   Solution& out) {
+  begin(problem, start);
+  Status status = run();
   to_given_units(status);
   if (options.warm_start) {
     memory.clear();
-    for (std::size_t i = 0; i < n; ++i) memory[problem.id(static_cast<int>(i))] = search.best[i];
+    for (std::size_t i = 0; i < x.size(); ++i)
+      memory[problem.id(static_cast<int>(i))] = search.best[i];
   }
   finish(problem, status, out);
 }

@@ -31,8 +31,6 @@ const char* name(Method method) {
       return "jacobi";
     case Method::anderson:
       return "anderson";
-    case Method::admm:
-      return "admm";
     case Method::proximal_newton:
       return "proximal_newton";
     case Method::interior_point:

@@ -211,18 +211,6 @@ Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& 
   return out;
 }
 
-Problem Problem::softened(double share) const {
-  Problem out = *this;
-  out.body_form_.reset();  // which only has what bodies give
-  for (int i = 0; i < contacts(); ++i)
-    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k) {
-      if (columns_[at(k)] != i) continue;
-      for (double& v : out.blocks_[at(k)].column) v *= 1 + share;
-      out.local_[at(i)] = LocalBlock((1 + share) * local_[at(i)].matrix(), local_[at(i)].mu);
-    }
-  return out;
-}
-
 Problem Problem::part(const std::vector<int>& contacts) const {
   for (std::size_t r = 0; r < contacts.size(); ++r)
     if (contacts[r] <= (r > 0 ? contacts[r - 1] : -1) || at(contacts[r]) >= local_.size())

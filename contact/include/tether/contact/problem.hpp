@@ -65,8 +65,6 @@ class Problem {
   const std::vector<PackedVector>& packed_b() const { return packed_b_; }
   /// The same in other units, exactly: in island k, A times 2^mass[k] and b times 2^speed[k].
   Problem rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const;
-  /// The same with diagonal blocks times 1 + share: contacts that yield, however A hangs together.
-  Problem softened(double share) const;
   /// Some contacts alone. std::invalid_argument where they do not ascend within the problem.
   Problem part(const std::vector<int>& contacts) const;
   /// Island of each contact: contacts with a block that is not zero between them share one.

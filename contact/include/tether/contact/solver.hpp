@@ -26,7 +26,6 @@ enum class Method : std::uint8_t {
   sor,               ///< x <- clip((1 - omega) x + omega sweep)
   jacobi,            ///< all blocks from the old x, damped
   anderson,          ///< Gauss-Seidel with safeguarded Anderson acceleration
-  admm,              ///< alternating directions only
   proximal_newton,   ///< one sweep, then proximal semismooth Newton only
   interior_point,    ///< interior points of the exact cones only
   convex_relaxation  ///< min 1/2 x'Ax - b'x over the cones: never chosen by `automatic`
@@ -70,18 +69,16 @@ struct Options {
 
 struct HistoryEntry {
   Method stage = Method::automatic;
-  int iteration = 0;  ///< sweeps, ADMM iterations or factorisations so far
+  int iteration = 0;  ///< sweeps or factorisations so far
   double error = 0;   ///< best measure so far
 };
 
 struct Counts {
-  int sweeps = 0, admm_iterations = 0, factorisations = 0, interior_steps = 0, tests = 0,
-      newton_phases = 0;
+  int sweeps = 0, factorisations = 0, interior_steps = 0, tests = 0, newton_phases = 0;
   double work = 0;  ///< estimated nanoseconds
 
   void add(const Counts& other) {
     sweeps += other.sweeps;
-    admm_iterations += other.admm_iterations;
     factorisations += other.factorisations;
     interior_steps += other.interior_steps;
     tests += other.tests;

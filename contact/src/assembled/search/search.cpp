@@ -94,10 +94,8 @@ double Search::test(const PackedVector* x, Method stage) {
     std::copy(x, x + best.size(), best.begin());
   }
   if (options.history) {
-    const int iteration = stage == Method::admm ? counts.admm_iterations
-                          : stage == Method::proximal_newton || stage == Method::interior_point
-                              ? counts.factorisations
-                              : counts.sweeps;
+    const bool factorises = stage == Method::proximal_newton || stage == Method::interior_point;
+    const int iteration = factorises ? counts.factorisations : counts.sweeps;
     history.push_back({stage, iteration, best_error});
   }
   return error;

@@ -66,17 +66,15 @@ Status run_cones(const ContactArguments& arguments, const std::string& file,
   const double energy_change = 0.5 * s.impulses.dot(s.velocities - problem.b());
   if (arguments.csv) {
     // The other measures are of contacts of one kind: empty.
-    std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%d,,,,,%.3e,%.3e,%.3e,,\n", table_field(file).c_str(),
+    std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,,,,,%.3e,%.3e,%.3e,,\n", table_field(file).c_str(),
                 blocks, name(o.law), name(o.method), o.tolerance, name(s.status), s.error,
-                s.counts.sweeps, s.counts.admm_iterations, s.counts.factorisations, dissipation,
-                energy_change, s.error);
+                s.counts.sweeps, s.counts.factorisations, dissipation, energy_change, s.error);
     return s.status;
   }
   std::printf("%s: %d cones of %d rows, %s\n", on_terminal(file).c_str(), blocks, problem.rows(),
               name(o.law));
-  std::printf("  %s, error %.3e; %d sweeps, %d ADMM iterations, %d factorisations\n",
-              name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
-              s.counts.factorisations);
+  std::printf("  %s, error %.3e; %d sweeps, %d factorisations\n", name(s.status), s.error,
+              s.counts.sweeps, s.counts.factorisations);
   std::printf("  energy change %.9e\n", energy_change);
   if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
   return s.status;
@@ -98,7 +96,7 @@ int run(const ContactArguments& arguments) {
   int status = 0;
   if (arguments.csv) {
     std::printf(
-        "file,contacts,law,method,tolerance,status,error,sweeps,admm,factorisations,replaced,"
+        "file,contacts,law,method,tolerance,status,error,sweeps,factorisations,replaced,"
         "signorini,cone,"
         "alignment,dissipation,energy_change,fixed_point,natural_map,natural_map_data\n");
   }
@@ -118,21 +116,19 @@ int run(const ContactArguments& arguments) {
       const Residuals r = evaluate(problem, o.law, s.impulses);
       if (s.status != Status::solved && status == 0) status = 1;
       if (arguments.csv) {
-        std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e\n",
+        std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e\n",
                     table_field(file).c_str(), problem.contacts(), name(o.law), name(o.method),
-                    o.tolerance, name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
-                    s.counts.factorisations, s.replaced.size(), r.signorini, r.cone, r.alignment,
-                    r.dissipation, r.energy_change, r.fixed_point, r.natural_map,
-                    r.natural_map_data);
+                    o.tolerance, name(s.status), s.error, s.counts.sweeps, s.counts.factorisations,
+                    s.replaced.size(), r.signorini, r.cone, r.alignment, r.dissipation,
+                    r.energy_change, r.fixed_point, r.natural_map, r.natural_map_data);
         continue;
       }
       int count[3] = {0, 0, 0};
       for (Regime regime : s.regimes) ++count[static_cast<int>(regime)];
       std::printf("%s: %d contacts, %s\n", on_terminal(file).c_str(), problem.contacts(),
                   name(o.law));
-      std::printf("  %s, error %.3e; %d sweeps, %d ADMM iterations, %d factorisations\n",
-                  name(s.status), s.error, s.counts.sweeps, s.counts.admm_iterations,
-                  s.counts.factorisations);
+      std::printf("  %s, error %.3e; %d sweeps, %d factorisations\n", name(s.status), s.error,
+                  s.counts.sweeps, s.counts.factorisations);
       std::printf("  separating %d, sticking %d, sliding %d\n", count[0], count[1], count[2]);
       std::printf(
           "  fixed point %.3e, natural map %.3e, over data %.3e, Signorini %.3e, cone %.3e, "
