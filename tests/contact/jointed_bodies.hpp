@@ -7,7 +7,7 @@
 #include <tether/linalg/index.hpp>
 #include <vector>
 
-#include "joints/jointed_contacts.hpp"
+#include "joints/body_cones.hpp"
 #include "joints/mechanisms.hpp"
 
 namespace jointed_bodies {
@@ -24,7 +24,7 @@ inline double radians(double degrees) { return degrees * 3.14159265358979323846 
 using tether::linalg::at;
 
 struct JointSolution {
-  tc::detail::JointedContacts::Result contacts;
+  tc::detail::BodyCones::Result contacts;
   double joint_error = 0;
   tether::linalg::VectorX impulses, joint_impulses;  // contact frame; by row
   std::vector<Vector6d> velocities;
@@ -120,8 +120,17 @@ struct Mechanism {
     mechanisms.satisfy(rows, out.velocities);
     out.contradicting = mechanisms.contradicting();
     out.impulses.setZero(3 * static_cast<Eigen::Index>(contacts.size()));
-    out.contacts = tc::detail::JointedContacts(options).solve(mechanisms, contacts, {},
-                                                              out.velocities, out.impulses);
+    std::vector<tc::detail::BodyCone> cones;
+    for (const tc::ContactRows& c : contacts) {
+      tc::detail::BodyCone& to = cones.emplace_back(tc::Cone::friction(c.mu));
+      to.first = c.first;
+      to.second = c.second;
+      to.J1 = c.J1;
+      to.J2 = c.J2;
+      to.bias = c.bias;
+    }
+    out.contacts =
+        tc::detail::BodyCones(options).solve(mechanisms, cones, out.velocities, out.impulses);
     mechanisms.satisfy(rows, out.velocities);  // removes rounding errors
     out.joint_error = mechanisms.error(rows, out.velocities);
     out.joint_impulses.setZero(rows.count());

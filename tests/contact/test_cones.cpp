@@ -313,3 +313,19 @@ TEST_CASE("cones: bad blocks are refused by name") {
       ConeSolver().solve(ConeProblem::dense(A, b, {Cone::friction(1)}), VectorXd::Ones(2)),
       Contains("start has 2 entries"));
 }
+
+TEST_CASE("cones: where nothing approaches there are no impulses, however small those of a start") {
+  for (const double last : {1e-175, -1e-30, 5.0}) {
+    const MatrixXd A = 0.5 * MatrixXd::Identity(4, 4);
+    const Eigen::Vector4d b(0, 0, 0, 2), start(last, 0, 0, last);
+    const ConeProblem problem =
+        ConeProblem::dense(A, b, {Cone::bounded(10), Cone::free(2), Cone::nonnegative()});
+    Options options;
+    options.law = Law::coulomb;
+    const ConeSolution s = ConeSolver(options).solve(problem, start);
+    CAPTURE(last);
+    CHECK(s.status == Status::solved);
+    CHECK(s.impulses[0] == Approx(0).margin(1e-300));
+    CHECK(s.impulses[3] == Approx(4).epsilon(1e-12));
+  }
+}

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <random>
 
-#include "rolling/rolling_cones.hpp"
+#include "joints/body_cones.hpp"
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
 
@@ -11,7 +11,11 @@ namespace {
 
 using namespace stepping_scenes;
 
-using tc::detail::RollingContact;
+struct RollingContact {
+  tc::PointContact point;
+  double rolling = 0, torsional = 0;
+  Vector3d impulse = Vector3d::Zero(), moment = Vector3d::Zero();  // on `first`, world axes
+};
 
 RollingContact contact_at(int first, int second, const Vector3d& r1, const Vector3d& r2,
                           const Vector3d& n, double mu, double rolling, double torsional) {
@@ -27,12 +31,33 @@ RollingContact contact_at(int first, int second, const Vector3d& r1, const Vecto
   return c;
 }
 
-tc::ConeSolution solve(const std::vector<tc::RigidBody>& bodies, double tolerance,
-                       std::vector<RollingContact>& contacts) {
+tc::detail::BodyCones::Result solve(const std::vector<tc::RigidBody>& bodies, double tolerance,
+                                    std::vector<RollingContact>& contacts) {
   tc::Options options;
   options.law = tc::Law::coulomb;
   options.tolerance = tolerance;
-  return tc::detail::solve_rolling(bodies, options, contacts);
+  tc::detail::Mechanisms none;
+  none.update(bodies, {});
+  std::vector<tc::Vector6d> v;
+  for (const tc::RigidBody& body : bodies) v.push_back(body.velocities());
+  std::vector<tc::detail::BodyCone> cones;
+  Eigen::Index rows = 0;
+  for (const RollingContact& c : contacts) {
+    cones.push_back(tc::detail::contact_cone(c.point, c.rolling, c.torsional));
+    rows += cones.back().cone.rows;
+  }
+  tether::linalg::VectorX x = Eigen::VectorXd::Zero(rows);
+  const tc::detail::BodyCones::Result out = tc::detail::BodyCones(options).solve(none, cones, v, x);
+  rows = 0;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const tc::detail::BodyCone& c = cones[k];
+    const int moments = c.cone.rows - 3;
+    contacts[k].impulse = c.J1.topLeftCorner(3, 3).transpose() * x.segment<3>(rows);
+    contacts[k].moment =
+        c.J1.bottomRightCorner(moments, 3).transpose() * x.segment(rows + 3, moments);
+    rows += c.cone.rows;
+  }
+  return out;
 }
 
 // A ball of the scene's default rolling on z = 0 towards +x.
@@ -77,7 +102,7 @@ TEST_CASE("rolling: one block is solved to round-off for any body, arm and bound
     std::vector<RollingContact> contacts = {
         contact_at(0, -1, 0.5 * any(), Vector3d::Zero(), Vector3d::UnitZ(), 0.6 * part(g),
                    kinds < 0.2 ? 0 : 0.3 * part(g), kinds > 0.8 ? 0 : 0.3 * part(g))};
-    const tc::ConeSolution s = solve({body}, 1e-13, contacts);
+    const tc::detail::BodyCones::Result s = solve({body}, 1e-13, contacts);
     INFO("problem " << k);
     worst = std::max(worst, s.error);
     const RollingContact& c = contacts[0];

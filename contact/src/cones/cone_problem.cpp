@@ -91,6 +91,19 @@ Matrix6d diagonal_block(const ConeProblem& problem, int row, int size) {
   return D;
 }
 
+std::vector<int> islands(const ConeProblem& problem) {
+  const int n = static_cast<int>(problem.cones().size());
+  std::vector<int> block_of(at(problem.rows())), out(at(n));
+  for (int k = 0; k < n; ++k)
+    for (int r = 0; r < problem.cones()[at(k)].rows; ++r)
+      block_of[at(problem.first_row(k) + r)] = k;
+  linalg::DisjointSets sets(n);
+  for (const MatrixEntry& e : problem.entries())
+    if (e.value != 0) sets.join(block_of[at(e.row)], block_of[at(e.column)]);
+  for (int k = 0; k < n; ++k) out[at(k)] = sets.root(k);
+  return out;
+}
+
 double needed_change(const ConeProblem& problem, int block) {
   const Cone& cone = problem.cones()[at(block)];
   const int first = problem.first_row(block);

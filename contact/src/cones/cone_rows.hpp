@@ -33,8 +33,30 @@ constexpr ConeParts parts_of(Cone::Kind kind) {
   }
 }
 
+/// f(first row, rows) of each part of a cone whose length has a bound: slip, moments, a motor.
+template <class F>
+void each_part(Cone::Kind kind, const F& f) {
+  const ConeParts parts = parts_of(kind);
+  if (kind == Cone::Kind::bounded) f(0, 1);
+  if (parts.tangents > 0) f(1, parts.tangents);
+  if (parts.spin >= 0) f(parts.spin, 1);
+  if (parts.rolling >= 0) f(parts.rolling, 2);
+}
+
+/// The bound of that part at a normal impulse.
+inline double bound_of(const Cone& cone, int from, double normal) {
+  const ConeParts parts = parts_of(cone.kind);
+  return from == 0               ? cone.bound
+         : from == parts.spin    ? cone.torsional * normal
+         : from == parts.rolling ? cone.rolling * normal
+                                 : cone.mu * normal;
+}
+
 /// A of `size` rows from `row`, the rest zero.
 Matrix6d diagonal_block(const ConeProblem& problem, int row, int size);
+
+/// By block: the first block of its island, which entries of A that are not zero connect.
+std::vector<int> islands(const ConeProblem& problem);
 
 /// Velocity that a block has to change on its own, times row_scale()
 /// (method, section 8).

@@ -22,8 +22,20 @@ constexpr int kTries = 3;
 
 Options for_contacts(Options options) {
   options.measure = Measure::automatic;
-  options.strict = true;
   return options;
+}
+
+// Islands in which nothing approaches have no impulses, however small those are that a start has.
+Eigen::VectorXd without_idle(const ConeProblem& problem, Eigen::VectorXd x) {
+  const std::vector<int> island = detail::islands(problem);
+  std::vector<char> needs(island.size(), 0);
+  const int n = static_cast<int>(island.size());
+  for (int k = 0; k < n; ++k)
+    if (detail::needed_change(problem, k) > 0) needs[at(island[at(k)])] = 1;
+  for (int k = 0; k < n; ++k)
+    if (needs[at(island[at(k)])] == 0)
+      x.segment(problem.first_row(k), problem.cones()[at(k)].rows).setZero();
+  return x;
 }
 
 }  // namespace
@@ -80,12 +92,14 @@ ConeSolution ConeSolver::Implementation::solve(const ConeProblem& problem,
       out.impulses = embedding.complete(Eigen::VectorXd::Zero(problem.rows()), problem.b());
     }
     judge(problem, embedding, out);
+    if (!found.replaced.empty()) out.error = found.error;
     if (out.error <= options.tolerance || found.status != Status::solved || tries == kTries ||
         contacts.contacts() == 0 || !out.contradicting.empty())
       break;
     tolerance *= std::max(0.01, 0.5 * options.tolerance / out.error);
-    from = found.impulses;
+    from = embedding.lift(without_idle(problem, out.impulses));
   }
+  for (int contact : found.replaced) out.replaced.push_back(embedding.block_of(contact));
   out.blocked = embedding.blocked();
   out.status = found.status;
   out.advice = found.advice;

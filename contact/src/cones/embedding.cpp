@@ -147,11 +147,7 @@ void Embedding::clear_held(const ConeProblem& problem) {
   for (std::size_t k = 0; k < problem.cones().size(); ++k) {
     const Cone& cone = problem.cones()[k];
     const int first = problem.first_row(static_cast<int>(k));
-    const ConeParts parts = parts_of(cone.kind);
-    if (cone.kind == Cone::Kind::bounded) clear(first, 1);
-    if (parts.tangents > 0) clear(first + 1, parts.tangents);
-    if (parts.spin >= 0) clear(first + parts.spin, 1);
-    if (parts.rolling >= 0) clear(first + parts.rolling, 2);
+    each_part(cone.kind, [&](int from, int count) { clear(first + from, count); });
   }
   if (!any) return;
   Eigen::SparseMatrix<double, Eigen::RowMajor> q(problem.rows(), problem.rows());

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <tether/contact/cones.hpp>
-#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 
 #include "cones/cone_rows.hpp"
@@ -65,23 +64,19 @@ double block_error(const ConeProblem& problem, Law law, int k, const Vector6d& x
 // By block: 1 / what the neediest block of its island needs.
 std::vector<double> inverse_scales(const ConeProblem& problem) {
   const int n = static_cast<int>(problem.cones().size());
-  std::vector<int> block_of(at(problem.rows()));
-  for (int k = 0; k < n; ++k)
-    for (int r = 0; r < problem.cones()[at(k)].rows; ++r)
-      block_of[at(problem.first_row(k) + r)] = k;
-  linalg::DisjointSets islands(n);
-  for (const MatrixEntry& e : problem.entries())
-    if (e.value != 0) islands.join(block_of[at(e.row)], block_of[at(e.column)]);
+  const std::vector<int> island = detail::islands(problem);
   std::vector<double> needed(at(n), 0), square(at(n), 0), out(at(n));
-  for (int k = 0; k < n; ++k)
-    needed[at(islands.root(k))] =
-        std::max(needed[at(islands.root(k))], detail::needed_change(problem, k));
-  for (int r = 0; r < problem.rows(); ++r) {
-    const double b = problem.row_scale()[at(r)] * problem.b()[r];
-    square[at(islands.root(block_of[at(r)]))] += b * b;
+  for (int k = 0; k < n; ++k) {
+    double& most = needed[at(island[at(k)])];
+    most = std::max(most, detail::needed_change(problem, k));
+    for (int r = problem.first_row(k); r < problem.first_row(k) + problem.cones()[at(k)].rows;
+         ++r) {
+      const double b = problem.row_scale()[at(r)] * problem.b()[r];
+      square[at(island[at(k)])] += b * b;
+    }
   }
   for (int k = 0; k < n; ++k)
-    out[at(k)] = detail::inverse_scale(needed[at(islands.root(k))], square[at(islands.root(k))]);
+    out[at(k)] = detail::inverse_scale(needed[at(island[at(k)])], square[at(island[at(k)])]);
   return out;
 }
 

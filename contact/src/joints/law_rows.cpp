@@ -63,37 +63,23 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
   }
 }
 
-ContactRows LawRows::contact(int law, LawUse use, const std::vector<Vector6d>& v,
-                             const Mechanisms& mechanisms, Eigen::Vector3d& own) const {
+BodyCone LawRows::cone(int law, LawUse use) const {
   const JointLaws::Law& each = laws[law];
-  const int row = each.limit ? 0 : 1;
-  ContactRows out;
-  double mobility = 0;
+  BodyCone out(each.limit ? Cone::nonnegative() : Cone::bounded(each.bound * dt_));
   for (const JointRows::Term* t = laws.rows().begin(law); t != laws.rows().end(law); ++t) {
-    (t == laws.rows().begin(law) ? out.first : out.second) = t->body;
-    (t == laws.rows().begin(law) ? out.J1 : out.J2).row(row) = t->G.transpose();
-    mobility += (mechanisms.root(t->body).transpose() * t->G).squaredNorm();
+    const bool first = t == laws.rows().begin(law);
+    (first ? out.first : out.second) = t->body;
+    (first ? out.J1 : out.J2).row(0) = t->G.transpose();
   }
-  own.setConstant(mobility);
-  own[row] = 0;
-  out.bias[row] = use == LawUse::limits    ? std::max(each.gap, 0.0) / dt_
-                  : use == LawUse::plastic ? plastic_bias_[at(law)]
-                                           : bias_[at(law)];
-  if (each.limit) return out;
-  // N presses as fast as the row itself moves, so that a large bound does not make the other
-  // velocities of the problem small beside it.
-  const double N = each.bound * dt_, fast = std::abs(speed(law, v) - each.rate);
-  if (N > 0 && fast > 0) own[0] = std::min(mobility, fast / N);
-  out.bias[0] = -own[0] * N;
-  out.mu = 1;
+  out.bias[0] = use == LawUse::limits    ? std::max(each.gap, 0.0) / dt_
+                : use == LawUse::plastic ? plastic_bias_[at(law)]
+                                         : bias_[at(law)];
   return out;
 }
 
-Eigen::Vector3d LawRows::start(int law, const Eigen::Vector3d* last) const {
-  Eigen::Vector3d x = last != nullptr ? *last : Eigen::Vector3d::Zero();
-  if (laws[law].limit) return {x[0], 0, 0};
-  const double N = laws[law].bound * dt_;
-  return {N, std::clamp(x[1], -N, N), 0};
+double LawRows::start(int law, const Eigen::Vector3d* last) const {
+  const double x = last != nullptr ? (*last)[0] : 0, N = laws[law].bound * dt_;
+  return laws[law].limit ? x : std::clamp(x, -N, N);
 }
 
 LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {

@@ -6,14 +6,12 @@
 #include <tether/contact/joint_laws.hpp>
 #include <vector>
 
-#include "joints/mechanisms.hpp"
+#include "joints/body_cones.hpp"
 #include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
 
-/// A row of one dimension is a contact in two directions of its own, which no body moves in
-/// (README, section 16): for a limit both tangents, without friction; for a bounded law the normal,
-/// in which its own mobility a is pressed with a N, so that x_n = N = bound dt and |x_t| <= N.
+/// A limit is the cone x >= 0, a bounded law |x| <= bound dt.
 class LawRows {
  public:
   /// Start of a part of a step: the speeds that bodies come with, before its forces.
@@ -36,13 +34,10 @@ class LawRows {
   }
   bool any(LawUse use) const { return active && use != LawUse::none && laws.count() > 0; }
   std::uint64_t id(int law) const { return kFirstId + static_cast<std::uint64_t>(law); }
-  /// The contact of a law, and its own mobility in the directions that no body moves in. Problems
-  /// of limits move positions, from rest.
-  ContactRows contact(int law, LawUse use, const std::vector<Vector6d>& v,
-                      const Mechanisms& mechanisms, Eigen::Vector3d& own) const;
-  /// Its impulse in the contact frame, and back.
-  Eigen::Vector3d start(int law, const Eigen::Vector3d* last) const;
-  double impulse(int law, const Eigen::Vector3d& x) const { return laws[law].limit ? x[0] : x[1]; }
+  /// Problems of limits move positions, from rest.
+  BodyCone cone(int law, LawUse use) const;
+  /// From the impulse of the last step; null: there is none.
+  double start(int law, const Eigen::Vector3d* last) const;
   /// v: at the end of the part.
   LawState state(int law, const std::vector<Vector6d>& v) const;
 

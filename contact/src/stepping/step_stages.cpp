@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "rolling/rolling_part.hpp"
+#include "joints/cone_islands.hpp"
 #include "stepping/stepper_parts.hpp"
 
 namespace tether::contact {

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "joints/cone_islands.hpp"
 #include "problem/refuse.hpp"
-#include "rolling/rolling_part.hpp"
 #include "stepping/detection/collide.hpp"
 #include "stepping/stepper_parts.hpp"
 
@@ -37,7 +37,7 @@ void Stepper::Implementation::make_solvers() {
     positions = std::make_unique<detail::PositionCorrection>(options);
   }
   if (near->any_rolling()) rolling = std::make_unique<detail::RollingPart>(*near);
-  if (joints && rolling) joints->set_rolling(*near, *rolling);
+  if (joints && rolling) joints->set_rolling(*near);
   if (joints)
     give_islands(*joints);
   else if (rolling)

@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "body_passes/body_kernels.hpp"
-#include "rolling/rolling_cones.hpp"
+#include "joints/cone_islands.hpp"
 #include "stepping/impacts/restitution.hpp"
 #include "stepping/motion/rotation.hpp"
 
@@ -41,8 +41,7 @@ Squares test(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction")
 Squares sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
 Squares test(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
 
-ConeSolution solve_rolling(const std::vector<RigidBody>&, const Options&,
-                           std::vector<RollingContact>&) {
+std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions&, LawUse) {
   absent("rolling friction");
 }
 

@@ -117,6 +117,7 @@ struct ConeSolution {
   linalg::VectorX impulses, velocities;  ///< x and w = A x - b, by row
   ConeResiduals residuals;
   double error = Residuals::kNone;  ///< residuals.error: what was compared with the tolerance
+  std::vector<int> replaced;        ///< blocks, as Solution::replaced: those it is not true of
   /// Free rows that nothing satisfies together (status infeasible); the impulses are those of least
   /// squares then, nearly.
   std::vector<int> contradicting;
@@ -133,7 +134,7 @@ struct ConeSolution {
 /// cones. Keeps nothing but what Options::warm_start asks for.
 class ConeSolver {
  public:
-  /// `measure` and `strict` are not used. Throws std::invalid_argument on illegal values.
+  /// `measure` is not used. Throws std::invalid_argument on illegal values.
   explicit ConeSolver(const Options& options = {});
   ~ConeSolver();
   ConeSolver(ConeSolver&&) noexcept;

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <tether/linalg/index.hpp>
 
-#include "joints/joint_islands.hpp"
+#include "joints/cone_islands.hpp"
 #include "problem/refuse.hpp"
 #include "stepping/motion/rotation.hpp"
 
@@ -67,13 +67,12 @@ bool StepJoints::are_joined(int first, int second) const {
                             std::pair<int, int>(std::minmax(first, second)));
 }
 
+// As RollingPart::make_islands.
 std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& options, LawUse laws) {
-  auto out = std::make_unique<StepJointIslands>(mechanisms_, laws_, laws, options);
-  if (rolling_ == nullptr || laws == LawUse::limits) return out;
-  // The first are those of a step's velocities (RollingPart).
-  out->set_rolling(*near_, rolling_->make(options, laws),
-                   std::exchange(first_islands_, false) ? &moments_ : nullptr);
-  return out;
+  const bool rolls = near_ != nullptr && laws != LawUse::limits;
+  return std::make_unique<ConeIslands>(
+      mechanisms_, &laws_, laws, options, rolls ? near_ : nullptr,
+      rolls && std::exchange(first_islands_, false) ? &moments_ : nullptr);
 }
 
 void StepJoints::list_laws(std::vector<LawState>& out) const {

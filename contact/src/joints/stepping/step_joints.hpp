@@ -8,8 +8,6 @@
 #include <vector>
 
 #include "joints/law_rows.hpp"
-#include "joints/mechanisms.hpp"
-#include "rolling/rolling_part.hpp"
 #include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
@@ -28,9 +26,8 @@ class StepJoints final : public JointPart {
   const std::vector<std::pair<int, int>>& links() const override { return links_; }
   bool are_joined(int first, int second) const override;
   std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
-  void set_rolling(const NearContacts& near, RollingPart& rolling) override {
+  void set_rolling(const NearContacts& near) override {
     near_ = &near;
-    rolling_ = &rolling;
     first_islands_ = true;
   }
   const std::vector<Eigen::Vector3d>& moments() const override { return moments_; }
@@ -129,7 +126,6 @@ class StepJoints final : public JointPart {
   bool has_laws_;
   LawRows laws_;
   const NearContacts* near_ = nullptr;  // only where a meeting names rolling friction
-  RollingPart* rolling_ = nullptr;
   bool first_islands_ = true;
   std::vector<Eigen::Vector3d> moments_;  // of contacts, in the last problem of velocities
   JointRows rows_;

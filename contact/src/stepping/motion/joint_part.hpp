@@ -11,7 +11,6 @@
 namespace tether::contact::detail {
 
 class NearContacts;
-class RollingPart;
 
 /// Which laws of joints (JointLaws) a problem includes: velocities: all; velocities without
 /// restitution: all, and limits do not bounce; closing of gaps: all, their impulses are discarded;
@@ -36,8 +35,7 @@ struct LawState {
   int body = -1;                  ///< as of Strike
 };
 
-/// Contact problems of islands with joints. Abstract, as JointPart: who adds no joints to a Stepper
-/// links nothing of them.
+/// Contact problems of islands with joints or rolling friction (ConeIslands).
 class JointIslands {
  public:
   virtual ~JointIslands() = default;
@@ -103,7 +101,7 @@ class JointPart : public IslandMaker {
   virtual void add_to_sum() = 0;
   virtual void give_sum() = 0;
   /// Rolling and torsional friction of contacts, before islands are made.
-  virtual void set_rolling(const NearContacts& near, RollingPart& rolling) = 0;
+  virtual void set_rolling(const NearContacts& near) = 0;
   virtual const std::vector<Eigen::Vector3d>& moments() const = 0;  ///< as of RollingPart
 };
 

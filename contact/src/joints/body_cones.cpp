@@ -1,0 +1,302 @@
+// Tether: contacts, limits, motors and moments of bodies as a product of cones.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "joints/body_cones.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tether/linalg/index.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
+
+#include "cones/cone_rows.hpp"
+#include "joints/held_start.hpp"
+
+namespace tether::contact::detail {
+
+namespace {
+
+// A_nn over that without joints; both are squares of lengths, the one left by rounding 1e-14.
+constexpr double kHeld = 1e-14;
+constexpr std::size_t kFew = 20;  // cones whose dense factors cost little beside their solve
+constexpr double kSoft = 1e-5;    // compliance of a support over what moves there without joints
+constexpr double kSlip = 1e-12;   // of the speeds that a slip is the difference of
+
+using linalg::at;
+
+BodyCone::Column speeds(const BodyCone& c, const std::vector<Vector6d>& v) {
+  BodyCone::Column w = c.bias;
+  if (c.first >= 0) w += c.J1 * v[at(c.first)];
+  if (c.second >= 0) w += c.J2 * v[at(c.second)];
+  return w;
+}
+
+// Upper bound of the sum of its terms, row by row.
+BodyCone::Column largest_speeds(const BodyCone& c, const std::vector<Vector6d>& v) {
+  BodyCone::Column w = c.bias.cwiseAbs();
+  if (c.first >= 0) w += c.J1.cwiseAbs() * v[at(c.first)].cwiseAbs();
+  if (c.second >= 0) w += c.J2.cwiseAbs() * v[at(c.second)].cwiseAbs();
+  return w;
+}
+
+}  // namespace
+
+BodyCone contact_cone(const PointContact& p, double rolling, double torsional) {
+  const bool rolls = rolling > 0, spins = torsional > 0;
+  BodyCone out(rolls && spins ? Cone::with_rolling(p.mu, rolling, torsional)
+               : rolls        ? Cone::with_rolling(p.mu, rolling)
+               : spins        ? Cone::with_torsional(p.mu, torsional)
+                              : Cone::friction(p.mu));
+  const ContactRows point = ContactRows::at_point(p.first, p.second, p.r1, p.r2, p.normal, p.mu);
+  const Eigen::Matrix3d frame = tangent_frame(p.normal);
+  const ConeParts parts = parts_of(out.cone.kind);
+  out.first = p.first;
+  out.second = p.second;
+  out.J1.topRows<3>() = point.J1;
+  out.J2.topRows<3>() = point.J2;
+  if (spins) out.J1.block<1, 3>(parts.spin, 3) = frame.row(0);
+  if (rolls) out.J1.block<2, 3>(parts.rolling, 3) = frame.bottomRows<2>();
+  const Eigen::Index moments = out.cone.rows - 3;
+  if (p.second >= 0) out.J2.bottomRows(moments) = -out.J1.bottomRows(moments);
+  out.bias.head<3>() = frame * p.slip;
+  out.bias[0] += p.bias;
+  return out;
+}
+
+void BodyCones::find_islands(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
+  const int n = static_cast<int>(cones.size()), nodes = mechanisms.count() + mechanisms.bodies();
+  sets_.reset(nodes);
+  const auto moving = [&](int body) { return body >= 0 && mechanisms.moves(body); };
+  for (const BodyCone& c : cones)
+    if (moving(c.first) && moving(c.second))
+      sets_.join(node_of(mechanisms, c.first), node_of(mechanisms, c.second));
+  const auto root = [&](int i) {
+    const BodyCone& c = cones[at(i)];
+    return sets_.root(node_of(mechanisms, moving(c.first) ? c.first : c.second));
+  };
+  first_of_.assign(at(nodes), n);
+  for (int i = n - 1; i >= 0; --i) first_of_[at(root(i))] = i;
+  const auto island = [&](int i) { return first_of_[at(root(i))]; };
+  order_.resize(cones.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](int i, int j) { return island(i) < island(j); });
+  start_.clear();
+  for (int k = 0; k < n; ++k)
+    if (k == 0 || island(order_[at(k)]) != island(order_[at(k - 1)])) start_.push_back(k);
+  start_.push_back(n);
+}
+
+// By node, then by cone.
+void BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
+  sides_.clear();
+  alone_.clear();
+  for (std::size_t l = 0; l < members_.size(); ++l) {
+    const BodyCone& c = cones[at(members_[l])];
+    alone_.emplace_back(BodyCone::Column::Zero(c.cone.rows));
+    for (const int body : {c.first, c.second}) {
+      if (body < 0 || !mechanisms.moves(body)) continue;
+      const BodyCone::Rows H = (body == c.first ? c.J1 : c.J2) * mechanisms.root(body);
+      sides_.push_back({static_cast<int>(l), body, node_of(mechanisms, body), H});
+      alone_.back() += H.rowwise().squaredNorm();
+    }
+  }
+  std::stable_sort(sides_.begin(), sides_.end(),
+                   [](const Side& a, const Side& b) { return a.node < b.node; });
+  jointed_ = !sides_.empty() && sides_.front().node < mechanisms.count();
+}
+
+// The cones that touch one mechanism, sides begin .. end: column by column what the mechanism
+// answers.
+void BodyCones::add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end) {
+  Mechanism& mechanism = mechanisms[sides_[begin].node];
+  for (std::size_t p = begin; p < end;) {
+    const int j = sides_[p].place;
+    answer_.setZero(mechanism.entries(), sides_[p].H.rows());
+    for (; p < end && sides_[p].place == j; ++p)
+      answer_.middleRows(6 * mechanisms.place_of(sides_[p].body), 6) += sides_[p].H.transpose();
+    for (Eigen::Index k = 0; k < answer_.cols(); ++k) mechanism.project(answer_.col(k).data());
+    // Squares: never negative, and small where the joints hold a direction.
+    A_.push_back({j, j, answer_.transpose() * answer_});
+    for (std::size_t q = p; q < end; ++q)
+      A_.push_back({sides_[q].place, j,
+                    sides_[q].H * answer_.middleRows(6 * mechanisms.place_of(sides_[q].body), 6)});
+  }
+}
+
+void BodyCones::assemble(Mechanisms& mechanisms) {
+  A_.clear();
+  for (std::size_t begin = 0, end = 0; begin < sides_.size(); begin = end) {
+    while (end < sides_.size() && sides_[end].node == sides_[begin].node) ++end;
+    if (sides_[begin].node < mechanisms.count()) {
+      add_mechanism(mechanisms, begin, end);
+      continue;
+    }
+    for (std::size_t p = begin; p < end; ++p)
+      for (std::size_t q = p; q < end; ++q)
+        A_.push_back({sides_[q].place, sides_[p].place, sides_[q].H * sides_[p].H.transpose()});
+  }
+}
+
+// Contacts whose normal velocity no impulse changes, and directions of slip and of moments that the
+// joints hold: what rounding leaves of them in A would be divided by what it leaves of them on the
+// diagonal.
+void BodyCones::leave_out_held(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v) {
+  kept_.assign(members_.size(), 1);
+  held_.clear();
+  if (!jointed_) return;
+  std::vector<Block> own(members_.size()), clear(members_.size());
+  for (std::size_t l = 0; l < own.size(); ++l) own[l].setZero(alone_[l].size(), alone_[l].size());
+  for (const Entry& e : A_)
+    if (e.row == e.column) own[at(e.row)] += e.value;
+  for (std::size_t l = 0; l < own.size(); ++l) {
+    const BodyCone& c = cones[at(members_[l])];
+    each_part(c.cone.kind, [&](int from, int count) {
+      const double alone = alone_[l].segment(from, count).sum();
+      linalg::Matrix<2, 2> T = alone * linalg::Matrix<2, 2>::Identity();
+      T.topLeftCorner(count, count) = own[l].block(from, from, count, count);
+      const linalg::SymmetricEigen<2> eigen = linalg::symmetric_eigen(T);
+      for (int k = 0; k < 2; ++k)
+        if (!(eigen.values[k] > kHeld * alone))
+          held_.push_back({static_cast<int>(l), from, count, eigen.vectors.col(k)});
+    });
+    if (!is_contact(c.cone.kind) || own[l](0, 0) > kHeld * alone_[l][0]) continue;
+    kept_[l] = 0;
+    const double w = speeds(c, v)[0], scale = largest_speeds(c, v)[0];
+    if (w >= -options_.tolerance * scale) continue;
+    result_.blocked.push_back(members_[l]);
+    result_.status = Status::infeasible;
+    result_.error = std::max(result_.error, -w / scale);
+  }
+  for (const Held& h : held_) {
+    Block& Q = clear[at(h.place)];
+    const Eigen::Index n = alone_[at(h.place)].size();
+    if (Q.size() == 0) Q.setIdentity(n, n);
+    const auto d = h.direction.head(h.count);
+    Q.block(h.from, h.from, h.count, h.count) -= d * d.transpose();
+  }
+  for (Entry& e : A_) {
+    if (clear[at(e.row)].size() > 0) e.value = (clear[at(e.row)] * e.value).eval();
+    if (clear[at(e.column)].size() > 0) e.value = (e.value * clear[at(e.column)]).eval();
+  }
+}
+
+// b of a cone; where joints hold a direction, what rounding leaves there is no slip.
+Eigen::VectorXd BodyCones::approach(int place, const BodyCone& c,
+                                    const std::vector<Vector6d>& v) const {
+  BodyCone::Column w = speeds(c, v);
+  for (const Held& h : held_) {
+    if (h.place != place) continue;
+    const auto d = h.direction.head(h.count);
+    const double slip = d.dot(w.segment(h.from, h.count));
+    if (std::abs(slip) <= kSlip * largest_speeds(c, v).segment(h.from, h.count).sum())
+      w.segment(h.from, h.count) -= slip * d;
+  }
+  return -w;
+}
+
+void BodyCones::solve_island(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v,
+                             linalg::VectorX& x) {
+  std::vector<Cone> kept;
+  std::vector<int> row(members_.size(), -1);
+  linalg::VectorX b(x.size()), start(x.size()), soft(x.size());
+  Eigen::Index n = 0;
+  for (std::size_t l = 0; l < members_.size(); ++l) {
+    const int cone = members_[l];
+    const BodyCone& c = cones[at(cone)];
+    const Eigen::Index rows = c.cone.rows;
+    if (kept_[l] == 0) {
+      x.segment(row_[at(cone)], rows).setZero();
+      continue;
+    }
+    row[l] = static_cast<int>(n);
+    kept.push_back(c.cone);
+    b.segment(n, rows) = approach(static_cast<int>(l), c, v);
+    start.segment(n, rows) = x.segment(row_[at(cone)], rows);
+    soft.segment(n, rows) = kSoft * alone_[l];
+    each_part(c.cone.kind, [&](int from, int count) {
+      soft.segment(n + from, count).setConstant(soft.segment(n + from, count).mean());
+    });
+    n += rows;
+  }
+  if (n == 0) return;
+  b.conservativeResize(n);
+  start.conservativeResize(n);
+  soft.conservativeResize(n);
+  std::vector<MatrixEntry> A;
+  for (const Entry& e : A_) {
+    const int r0 = row[at(e.row)], c0 = row[at(e.column)];
+    if (r0 < 0 || c0 < 0) continue;
+    for (int r = 0; r < e.value.rows(); ++r)
+      for (int c = 0; c < e.value.cols(); ++c) {
+        A.push_back({r0 + r, c0 + c, e.value(r, c)});
+        if (r0 != c0) A.push_back({c0 + c, r0 + r, e.value(r, c)});
+      }
+  }
+  const ConeProblem problem = ConeProblem::sparse(A, b, kept);
+  if (jointed_ && kept.size() <= kFew &&
+      !(evaluate(problem, options_.law, start).error <= options_.tolerance) &&
+      share_loads(problem) && !hold_all(problem, options_.tolerance, start)) {
+    // Contacts that slide share their loads as soft supports of one kind would.
+    const ConeSolution shared =
+        solver_.solve(ConeProblem::sparse(A, b, std::move(kept), soft), start);
+    if (shared.status == Status::solved) start = shared.impulses;
+  }
+  const ConeSolution solution = solver_.solve(problem, start);
+  result_.sweeps = std::max(result_.sweeps, solution.counts.sweeps);
+  if (!(solution.error <= result_.error)) result_.error = solution.error;
+  if (solution.status != Status::solved) {
+    ++result_.failed;
+    if (result_.status != Status::infeasible) result_.status = solution.status;
+  }
+  for (std::size_t l = 0; l < members_.size(); ++l)
+    if (const Eigen::Index rows = alone_[l].size(); row[l] >= 0)
+      x.segment(row_[at(members_[l])], rows) = solution.impulses.segment(row[l], rows);
+}
+
+void BodyCones::apply(Mechanisms& mechanisms, const linalg::VectorX& x, std::vector<Vector6d>& v) {
+  for (std::size_t begin = 0, end = 0; begin < sides_.size(); begin = end) {
+    while (end < sides_.size() && sides_[end].node == sides_[begin].node) ++end;
+    const int node = sides_[begin].node;
+    const auto impulse = [&](const Side& s) {
+      return Eigen::Matrix<double, 6, 1>(s.H.transpose() *
+                                         x.segment(row_[at(members_[at(s.place)])], s.H.rows()));
+    };
+    if (node >= mechanisms.count()) {
+      for (std::size_t p = begin; p < end; ++p)
+        v[at(sides_[p].body)] += mechanisms.root(sides_[p].body) * impulse(sides_[p]);
+      continue;
+    }
+    Mechanism& mechanism = mechanisms[node];
+    Eigen::Map<Eigen::VectorXd> pull(mechanisms.pull(node).data(), mechanism.entries());
+    answer_.setZero(mechanism.entries(), 1);
+    for (std::size_t p = begin; p < end; ++p)
+      answer_.middleRows(6 * mechanisms.place_of(sides_[p].body), 6) += impulse(sides_[p]);
+    pull -= answer_.col(0);
+    mechanism.project(answer_.data());
+    pull += answer_.col(0);
+    mechanisms.add(node, answer_.data(), v);
+  }
+}
+
+const BodyCones::Result& BodyCones::solve(Mechanisms& mechanisms,
+                                          const std::vector<BodyCone>& cones,
+                                          std::vector<Vector6d>& v, linalg::VectorX& x) {
+  result_ = {};
+  if (cones.empty()) return result_;
+  row_.assign(1, 0);
+  for (const BodyCone& c : cones) row_.push_back(row_.back() + c.cone.rows);
+  find_islands(mechanisms, cones);
+  for (std::size_t k = 0; k + 1 < start_.size(); ++k) {
+    members_.assign(order_.begin() + start_[k], order_.begin() + start_[k + 1]);
+    collect_sides(mechanisms, cones);
+    assemble(mechanisms);
+    leave_out_held(cones, v);
+    solve_island(cones, v, x);
+    apply(mechanisms, x, v);
+    ++result_.islands;
+  }
+  std::sort(result_.blocked.begin(), result_.blocked.end());
+  return result_;
+}
+
+}  // namespace tether::contact::detail

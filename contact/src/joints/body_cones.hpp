@@ -1,0 +1,110 @@
+// Tether: contacts, limits, motors and moments of bodies as a product of cones.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <tether/contact/body_solver.hpp>
+#include <tether/contact/cones.hpp>
+#include <tether/linalg/disjoint_sets.hpp>
+#include <vector>
+
+#include "joints/mechanisms.hpp"
+
+namespace tether::contact::detail {
+
+/// One factor of the product, by its rows on two bodies: w = J1 v1 + J2 v2 + bias.
+struct BodyCone {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 6, 6>;
+  using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
+
+  explicit BodyCone(const Cone& of)
+      : cone(of), J1(Rows::Zero(of.rows, 6)), J2(J1), bias(Column::Zero(of.rows)) {}
+
+  Cone cone;
+  int first = -1, second = -1;  ///< -1: the fixed world
+  Rows J1, J2;
+  Column bias;
+};
+
+/// A contact that may hold moments beside its force: |moment_t| <= rolling x_n about axes in the
+/// surface, |moment_n| <= torsional x_n about the normal. Rows in its frame: the relative velocity
+/// at the point, and the relative angular velocities about the axes of its moments.
+BodyCone contact_cone(const PointContact& contact, double rolling = 0, double torsional = 0);
+
+/// Solves cones of bodies island by island. Joints are eliminated by the sparse factors of
+/// G M^-1 G' (linalg::SparseMinimumNorm), so that cones see
+///
+///     A = J P J',   P = M^-1 - M^-1 G' (G M^-1 G')^+ G M^-1
+///
+/// A contact whose normal velocity the joints hold (A_nn = 0) has no impulse: it is left out where
+/// it does not approach, else named in Result::blocked. A is dense over the contacts of a
+/// mechanism.
+class BodyCones {
+ public:
+  explicit BodyCones(const Options& options) { set_options(options); }
+  void set_options(const Options& options) {
+    options_ = options;
+    solver_ = ConeSolver(options);
+  }
+
+  struct Result {
+    Status status = Status::solved;
+    double error = 0;
+    int islands = 0, failed = 0;
+    int sweeps = 0;            ///< the most of any island
+    std::vector<int> blocked;  ///< ascending
+  };
+  /// Changes velocities that the joints already allow, v, by impulses that keep them so, and adds
+  /// what the joints do to the pulls. x, cone by cone: where to start from, and the impulses found.
+  const Result& solve(Mechanisms& mechanisms, const std::vector<BodyCone>& cones,
+                      std::vector<Vector6d>& v, linalg::VectorX& x);
+
+ private:
+  using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+  /// One body of a cone that moves, and the cone's rows on its u. node: its mechanism, or, after
+  /// all of them, the body itself. place: in members_.
+  struct Side {
+    int place, body, node;
+    BodyCone::Rows H;
+  };
+  struct Entry {  // of A, by place, row >= column
+    int row, column;
+    Block value;
+  };
+  /// A direction of slip or of a moment that the joints hold.
+  struct Held {
+    int place, from, count;
+    Eigen::Vector2d direction;
+  };
+  int node_of(const Mechanisms& mechanisms, int body) const {
+    const int m = mechanisms.mechanism_of(body);
+    return m >= 0 ? m : mechanisms.count() + body;
+  }
+  void find_islands(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
+  void collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
+  void assemble(Mechanisms& mechanisms);
+  void add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end);
+  void leave_out_held(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v);
+  Eigen::VectorXd approach(int place, const BodyCone& cone, const std::vector<Vector6d>& v) const;
+  void solve_island(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v,
+                    linalg::VectorX& x);
+  void apply(Mechanisms& mechanisms, const linalg::VectorX& x, std::vector<Vector6d>& v);
+
+  Options options_;
+  ConeSolver solver_;
+  Result result_;
+  linalg::DisjointSets sets_;                  // of mechanisms and single bodies
+  std::vector<int> row_;                       // of each cone: its first row in x
+  std::vector<int> first_of_, order_, start_;  // cones island by island
+  // Of the present island: its cones, those of them that are solved, the sides of all, whether a
+  // mechanism is among these, A, and by cone and row its diagonal without joints.
+  std::vector<int> members_;
+  std::vector<char> kept_;
+  std::vector<Side> sides_;
+  bool jointed_ = false;
+  std::vector<Entry> A_;
+  std::vector<BodyCone::Column> alone_;
+  std::vector<Held> held_;
+  Eigen::MatrixXd answer_;
+};
+
+}  // namespace tether::contact::detail
