@@ -219,24 +219,6 @@ TEST_CASE("choice of the metric: the other one is taken where it halves the move
   CHECK_FALSE(choice.by_levels());
 }
 
-TEST_CASE(
-    "choice of the metric: long moves are tried in the other one, which has to be far shorter") {
-  MetricChoice choice;
-  CHECK_FALSE(MetricChoice::suspects(1.0));
-  CHECK(MetricChoice::suspects(1.1));
-  int tried = 0;
-  for (int move = 0; move < 100; ++move) {
-    if (!choice.may_try()) continue;
-    ++tried;
-    CHECK_FALSE(choice.prefers_shorter(0.3, 1.2));
-    choice.found_none();
-  }
-  CHECK(tried == 6);  // moves 1, 3, 7, 15, 31, 63
-  CHECK_FALSE(choice.by_levels());
-  CHECK(choice.prefers_shorter(0.2, 1.2));
-  CHECK(choice.by_levels());
-}
-
 TEST_CASE("scales: positions of many rows move at most h times as far as velocities") {
   // Corrections alone would have the points slide along by what their rates are wrong.
   CHECK(slide(20, 1e-4) <= 1e-8);

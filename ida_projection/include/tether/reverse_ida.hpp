@@ -49,7 +49,7 @@ struct Equations {
   int constraints = 0;              ///< m; 0: plain IDA
   std::vector<std::string> names;   ///< of the rows of g, for messages; m or none
   bool constraint_jacobian = true;  ///< false: dg/dy by differences of g
-  /// Of the projection; `id` above goes before its id, and what ends the run is not printed but in
+  /// Options of the projection; `id` above goes before its id. The reason why a run ends is only in
   /// ReverseIda::message().
   ida_projection::Options options = {};
 };

@@ -15,20 +15,11 @@ bool Projection::Impl::asks_for_metric() const {
   return movers_.used->may_use_levels() && hears_answers();
 }
 
-// What all unknowns of a long chain have to share, such as its way along, the sum over their own
-// scales makes dear, and those that have changed most, beside the pin, then repair it alone.
-void Projection::Impl::start_by_levels() {
-  if (hears_answers() && movers_.used->begin_by_levels()) metric_choice_.start_by_levels();
-}
-
 // Moves to which stiff components answer excite them, and scales made of what they then do make
 // the next moves worse. True: they answer to the best move there is.
 bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
   if (move.status != Status::success || !asks_for_metric()) return false;
-  if (!variables_.any() && MetricChoice::suspects(move.length) &&
-      movers_.used->has_forces_in_rows() && metric_choice_.may_try())
-    look_for_shorter_move(candidate, move);
-  if (move.status != Status::success || !metric_choice_.due()) return false;
+  if (!metric_choice_.due()) return false;
   AnsweredMove at{move.length, polish_.answer(candidate)};
   if (at.answer < 0.0) return false;
   // So they do in index 0, where F keeps them by a derivative of theirs.
@@ -48,22 +39,6 @@ Move Projection::Impl::move_by_levels(const Candidate& candidate, bool by_levels
   movers_.used->use_levels(by_levels);
   polish_.restore(candidate);
   return movers_.used->move(candidate);
-}
-
-// With forces in rows, where all that F contains of their derivatives answers, answers do not tell.
-// There lengths do: scales of a start's corrections can make of a drift of next to nothing moves of
-// some tolerances, which those that follow are scaled by.
-void Projection::Impl::look_for_shorter_move(const Candidate& candidate, Move& move) {
-  const bool by_levels = metric_choice_.by_levels();
-  if (!movers_.used->use_levels(!by_levels)) return metric_choice_.found_none();
-  const Move other = move_by_levels(candidate, !by_levels);
-  const bool moved = other.status == Status::success && !other.capped;
-  if (moved && metric_choice_.prefers_shorter(other.length, move.length)) {
-    move = other;
-    return;
-  }
-  metric_choice_.found_none();
-  move = move_by_levels(candidate, by_levels);
 }
 
 AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,

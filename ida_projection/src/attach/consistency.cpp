@@ -253,7 +253,8 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
   current_weights(yy);
   OwnedVector y(yy);
   N_VScale(1.0, yy, y);
-  // What IDA interpolates is near its step, whose factors are at hand. y' asks for those of C here.
+  // An interpolated point is near IDA's step, whose factors are at hand. y' asks for those of C
+  // here.
   const bool followed = yp == nullptr && movers_.used == movers_.own.get() &&
                         point_.follow(t, y, unknowns_.weights, *movers_.used, report);
   if (!followed) point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);

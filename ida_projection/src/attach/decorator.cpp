@@ -242,7 +242,7 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
   return move;
 }
 
-// What an iteration before the move adds the move then takes back, too: a solution less. Only where
+// The move takes back as well what an iteration before it has added: a solution less. Only where
 // nothing answers to moves: it would be left out.
 bool Projection::Impl::polishes_first() {
   if (!movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))

@@ -171,7 +171,6 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     if (corrector_.stopped()) return Status::callback_fatal;
   }
   run_.engaged = structured == Status::success;  // else the next attempt looks again
-  if (run_.engaged) start_by_levels();
   return structured;
 }
 

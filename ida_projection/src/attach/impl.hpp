@@ -114,7 +114,8 @@ class Projection::Impl {
     bool repeated = false;         // IDA rejected it
     double moved = 0.0;            // tolerances; infinity: no point was found
     bool pending = false;          // a projected one that is not yet judged
-    // What capped moves lacked, in tolerances: in the last accepted step, and in this attempt.
+    // Lengths that capped moves lacked, in tolerances: in the last accepted step, and in this
+    // attempt.
     double left_before = 0.0, left = 0.0;
     std::string capped_message;
     long suspected = -1;      // the step whose failures were looked into
@@ -135,7 +136,6 @@ class Projection::Impl {
   void judge_capped(Move& move);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   bool polishes_first();
-  void start_by_levels();
   bool hears_answers() const;
   bool asks_for_metric() const;
   Status polish(const Candidate& candidate, double cj, double tolerance);
@@ -167,7 +167,6 @@ class Projection::Impl {
   // choose_metric.cpp
   bool choose_metric(const Candidate& candidate, Move& move);
   Move move_by_levels(const Candidate& candidate, bool by_levels);
-  void look_for_shorter_move(const Candidate& candidate, Move& move);
   AnsweredMove try_other_metric(const Candidate& candidate, const AnsweredMove& present,
                                 Move& move);
   Status settle_stiff_move(const Candidate& candidate, double cj, double tolerance);
@@ -214,7 +213,7 @@ class Projection::Impl {
     Probe probe = Probe::none;
     JointStart* joint_start = nullptr;
   };
-  // What the caller is told of the moves.
+  // The caller is told this of the moves.
   struct Tally {
     double move_sum = 0.0;
     long attempts = 0;  // since moves began

@@ -13,7 +13,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Of DistributedRows other processes may have some.
+// Other processes may have some DistributedRows.
 bool empty(const Constraints& set) {
   return set.count == 0 && set.joined.empty() &&
          !std::holds_alternative<DistributedRows>(set.jacobian);

@@ -52,7 +52,7 @@ bool all_finite(const double* a, std::size_t n);
 /// Room in which a callback may write more than it should without harm, and is found out.
 class GuardedRoom {
  public:
-  /// Where to write `count` values, which now are `values`; `more`: how many too many do no harm.
+  /// Place for `count` values, which now are `values`; `more`: how many too many do no harm.
   double* begin(const double* values, std::ptrdiff_t count, std::ptrdiff_t more);
   /// Copies them back; false: more were written.
   bool end(double* values, std::ptrdiff_t count) const;

@@ -1,7 +1,7 @@
 // Tether: operations on serial vectors with the bits of SUNDIALS' own.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// What may differ from SUNDIALS' loops is the order between elements, never within one: an
+// The order between elements may differ from SUNDIALS' loops, never within one: an
 // element's products and sums stand as there, and sums over elements run from the first to the
 // last. Cases that round alike are one case here: 1 x and -1 x are exact.
 #pragma once

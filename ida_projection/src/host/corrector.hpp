@@ -41,7 +41,7 @@ class Corrector {
   /// or more, whose rounding, divided by the step, fails it, and nothing but they depends on them.
   int correct(const Candidate& candidate, double tolerance, bool call_setup,
               const std::vector<int>& rounding);
-  /// Where the variables that are 0 here move, when these that are 1 have converged, IDA's
+  /// If the variables that are 0 here move, when these that are 1 have converged, IDA's
   /// convergence test has to wait, not to fail. Null: there are none.
   void expect_followers(N_Vector differential);
   /// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be

@@ -61,7 +61,7 @@ class Staleness {
     measured_ = std::max(measured_, reach);
     staleness_ = std::max({staleness_, 0.0, left / (reach * move)});
   }
-  /// What a move of this length leaves.
+  /// The part that a move of this length leaves.
   double left(double reach, double length) const { return 4.0 * staleness_ * reach * length; }
 
  private:

@@ -21,7 +21,6 @@ void LocalMetric::reset() {
   std::fill(trial_scale_.begin(), trial_scale_.end(), 0.0);
   levels_.clear();
   levels_of_rates_.clear();
-  levels_limited_ = false;
 }
 
 // s <- max(0.8 s, |correction|)
@@ -51,9 +50,7 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
   }
   if (!local) return;
   if (!group().empty()) use_groups(at, d, a);
-  // Few rows get levels where stiff components have answered, long after a start.
-  const bool limited = by_levels() ? levels_limited_ : options_.group.empty();
-  if (limited && !levels_of_rates_.empty()) limit(at, d);
+  if (group().empty() && !levels_of_rates_.empty()) limit(at, d);
 }
 
 template <class Block>

@@ -34,8 +34,6 @@ class LocalMetric {
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
   bool by_levels() const { return !levels_.empty(); }
   void forget_levels() { levels_.clear(); }
-  /// Scales of levels obey use_rates(), too.
-  void limit_levels() { levels_limited_ = true; }
   /// Unknowns of level 1 are the rates of those of level 0: scales obey that from now on, see
   /// limit().
   void use_rates(std::vector<int> levels) { levels_of_rates_ = std::move(levels); }
@@ -54,7 +52,6 @@ class LocalMetric {
   const Options& options_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
   std::vector<int> levels_, levels_of_rates_;
-  bool levels_limited_ = false;
   std::vector<double> group_sum_;
   std::vector<int> group_members_;
 };

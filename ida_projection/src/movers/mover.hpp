@@ -86,9 +86,6 @@ class Mover {
   /// One scale for all unknowns of a level (row_levels.hpp) in the local metric, from the next move
   /// on, or each its own again. False: nothing changes, there are too few rows or levels.
   virtual bool use_levels(bool) { return false; }
-  /// use_levels(true) from the first move of a run on, where rows are many; scales of positions are
-  /// limited as those of unknowns by themselves are.
-  virtual bool begin_by_levels() { return false; }
   /// May answers to moves ask for use_levels()?
   virtual bool may_use_levels() const { return false; }
 

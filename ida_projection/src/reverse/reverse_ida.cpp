@@ -368,7 +368,7 @@ class ReverseIda::Implementation {
   std::unique_ptr<void, FreeIda> mem_;
   std::optional<tp::Projection> projection_;
 
-  // What the caller is asked, where, and what he answers; or that nothing is open.
+  // The question to the caller, its place, and the answer; or nothing is open.
   struct Question {
     Request request = Request::reached;
     double t = 0.0, cj = 0.0;

@@ -17,7 +17,7 @@ using linalg::at;
 
 }  // namespace
 
-// Of the groups that wait, each that shares no row with those before it in the set.
+// Returns of the groups that wait each that shares no row with those before it in the set.
 void ColumnSearch::take_set() {
   set_.clear();
   rest_.clear();

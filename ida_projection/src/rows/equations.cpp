@@ -99,7 +99,7 @@ Dense select(const Dense& from, const std::vector<int>& rows, const std::vector<
   return out;
 }
 
-// What the orthonormal rows collected so far leave of a row; twice is enough.
+// The part of a row that the orthonormal rows so far leave; twice is enough.
 class Span {
  public:
   Eigen::VectorXd rest(Eigen::VectorXd row) const {

@@ -62,7 +62,7 @@ void GradientRows::orthogonalise() {
     std::swap(pivot_[at(best)], pivot_[at(k)]);
     const int p = pivot_[at(k)];
     if (left_[at(p)] == 0.0) break;
-    // Where the rows before it have taken most of the pivot: once more against them.
+    // A second time, if the rows before it have taken most of the pivot.
     for (int i = 0; left_[at(p)] < kReorthogonalise && i < k; ++i) {
       N_Vector q = gradients_[at(pivot_[at(i)])];
       const double r = N_VDotProd(q, gradients_[at(p)]);

@@ -29,7 +29,7 @@ struct KindsOfUnknowns {
     by_level_ = false;
     without.assign(static_cast<std::size_t>(rows), 0);
   }
-  /// Where none is algebraic: unknowns from this level on are taken for such, whatever their part
+  /// If none is algebraic: unknowns from this level on are taken for such, whatever their part
   /// in a row. False: there are none.
   bool begin_by_level(const std::vector<int>& levels, int first) {
     id_.assign(levels.size(), 1.0);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFewPlaces = 4.0;  // times as many entries as places are worth their lists
 
-// Of C's entries; without a branch for each, as next to always none is.
+// Looks at all entries of C without a branch for each, as next to always none is.
 bool any_not_zero(const double* C, const std::vector<std::size_t>& entries) {
   std::uint64_t bits = 0;
   for (const std::size_t e : entries) {

@@ -197,7 +197,7 @@ std::vector<double> some_tolerances_away(std::vector<double> y, const std::vecto
 /// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
 /// differential columns ("d"); then rows that contain algebraic variables ("B") are solved for
 /// these columns ("a") alone, so that no position or velocity is bent to repair a multiplier.
-/// Where no variable is algebraic, B is empty and this is one minimum-norm solve. C is dense.
+/// If no variable is algebraic, B is empty and this is one minimum-norm solve. C is dense.
 class RowBlocks {
  public:
   using Block = BlockOf<linalg::MinimumNorm>;
@@ -222,7 +222,7 @@ class RowBlocks {
   bool structured() const { return structured_; }
   /// After structure(): which entries of these rows of C can differ from zero.
   RowPattern pattern(const std::vector<int>& of_rows) const;
-  /// Where none is algebraic, unknowns of level `first` and above (row_levels.hpp) take the place
+  /// If none is algebraic, unknowns of level `first` and above (row_levels.hpp) take the place
   /// of algebraic ones. False: nothing has changed, they are not as many as their rows.
   bool split_by_level(const std::vector<int>& levels, int first);
   /// Back to one block.

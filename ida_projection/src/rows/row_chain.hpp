@@ -19,7 +19,7 @@ struct RowPattern {
 /// velocities like forces. F tells, see start/forces.hpp.
 struct RowChain {
   std::vector<int> forces, velocities, positions;
-  /// Of some rows with forces, and of some rows of velocities: those of their own.
+  /// Unknowns that only one row with forces, or one row of velocities, contains.
   std::vector<std::vector<int>> forces_of_rows, velocities_of_rows;
 };
 

@@ -16,7 +16,7 @@ namespace tether::ida_projection {
 ///
 ///     |R_kk| >= 2 kappa |dy| .
 ///
-/// Where every row is firm this costs one comparison.
+/// This costs one comparison where every row is firm.
 class RowTrust {
  public:
   static constexpr double kThin = 1e-3;
@@ -25,7 +25,7 @@ class RowTrust {
 
   static bool has_thin_rows(const Solver& solver) { return solver.least_square() < kThin * kThin; }
   static int firm_rows(const Solver& solver) { return rows_from(solver, kThin); }
-  /// Of thin rows only `trusted` count now: will that be so in the next steps, whatever their
+  /// Only `trusted` of the thin rows count now: will that be so in the next steps, whatever their
   /// moves are? Only where all thin rows are left out, and none is independent enough to count
   /// whenever moves are short.
   static bool lasting(const Solver& solver, int firm, int trusted) {

@@ -11,7 +11,7 @@ namespace tether::ida_projection {
 
 /// C with rows that keep a sparse pattern and rows of n entries.
 struct StoredRows {
-  /// Where row i of C is: entries begin .. end - 1, or full row `full` >= 0.
+  /// Row i of C: entries begin .. end - 1, or full row `full` >= 0.
   struct Row {
     int begin = 0, end = 0, full = -1;
   };

@@ -27,8 +27,8 @@ namespace tether::ida_projection {
 /// a metric D as for its move. As for the state, one Newton iteration follows, and is taken back
 /// onto the rows: it removes what IDAS' convergence test left and lets algebraic variables answer.
 ///
-/// Of few rows, factors cost so little that each sensitivity has a metric of its own, from the size
-/// of its own corrections: errors are 1.2 to 2.4 times smaller than in that of the state.
+/// Few rows have factors that cost so little that each sensitivity has a metric of its own, from
+/// the size of its own corrections: errors are 1.2 to 2.4 times smaller than in that of the state.
 class SensitivityCorrector {
  public:
   /// The half of the plugin that moves the state.
@@ -60,7 +60,7 @@ class SensitivityCorrector {
   void make_consistent(double t, N_Vector y, N_Vector yp, N_Vector weights, N_Vector* s,
                        N_Vector* sp, ConsistencyReport& report);
 
-  // What IDAS calls, see host/operations.hpp.
+  // IDAS calls these, see host/operations.hpp.
   int initialize() { return corrector_->initialize(); }
   int solve(N_Vector predicted, N_Vector correction, N_Vector weights, double tolerance,
             bool call_setup, void* mem);

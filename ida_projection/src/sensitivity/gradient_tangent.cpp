@@ -71,7 +71,7 @@ class GradientTangent final : public TangentRows {
     int first;
   };
 
-  // Where no row does, algebraic components do not move.
+  // Algebraic components do not move where no row contains them.
   bool contain_algebraic(N_Vector id) {
     for (N_Vector row : C_) {
       N_VProd(id, row, work_);

@@ -11,7 +11,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Of the parameter's scale: the rounding of g over it, and its fourth power, are both 1e-12.
+// A part of the parameter's scale: rounding of g over it, and its fourth power, both are 1e-12.
 constexpr double kIncrement = 1e-3;
 
 // A parameter of the host, put back whatever happens.

@@ -19,7 +19,7 @@ class ParameterDerivative {
   Status evaluate(double t, N_Vector y, int parameter, std::size_t rows, const Values& value,
                   std::vector<double>& g_p);
   const Sensitivities& given() const { return given_; }
-  /// What failed; empty where it was g itself.
+  /// The call that failed; empty where it was g itself.
   const std::string& message() const { return message_; }
 
  private:

@@ -51,7 +51,7 @@ class AlgebraicVariables {
   const std::vector<int>& coupled() const { return coupled_; }
   void begin_run() { index_known_ = false; }
 
-  /// Of an id vector that the caller gave, after look_at_index(): variables that it calls algebraic
+  /// Doubts in the caller's id vector, after look_at_index(): variables that it calls algebraic
   /// although F contains their derivatives, or differential although F does not. Empty: none is
   /// known. Four evaluations of F at the first call, more where there are some.
   const std::string& doubts(const Candidate& candidate, Corrector& corrector, double cj);

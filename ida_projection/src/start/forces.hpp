@@ -8,8 +8,8 @@
 
 namespace tether::ida_projection {
 
-/// Where F determines the rates of positions it contains velocities and no forces; where it
-/// determines those of velocities, forces. Each of the chain's groups is asked by itself. Some 20
+/// Equations of F for the rates of positions contain velocities and no forces, those for the rates
+/// of velocities contain forces. Each of the chain's groups is asked by itself. Some 20
 /// evaluations of F near the candidate, on contiguous vectors; its equations for the forces' own
 /// rates, which may contain anything, do not count.
 bool are_forces(const RowChain& chain, const Candidate& candidate, Corrector& corrector, double cj,

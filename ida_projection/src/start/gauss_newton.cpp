@@ -17,7 +17,7 @@ namespace {
 constexpr int kMaximumIterations = 60;
 constexpr double kSmallestDamping = 1.0 / 1024.0;
 constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off
-// Of follow(): steps by factors of another point.
+// Most steps of follow() by factors of another point.
 constexpr int kSimplifiedSteps = 14;
 constexpr double kNear = 1.0, kShrinks = 0.25;
 constexpr double kFollowed = 1e-12;  // tolerances: no last step makes more of it, as above
@@ -242,7 +242,7 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
   if (report.status == Status::success) y0 = y;
 }
 
-// What the last step leaves is known from how it has shrunk.
+// The rate at which steps shrink tells how much the last one leaves.
 template <class Rows>
 bool GaussNewtonOn<Rows>::follow(double t, std::vector<double>& y0, const std::vector<double>& WT,
                                  Mover& near, ConsistencyReport& report) {

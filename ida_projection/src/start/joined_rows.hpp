@@ -31,7 +31,7 @@ class JoinedRows {
   void restore_ida() { (void)corrector_.residual(present_.correction, f_); }
   /// Moves the rows and the equations; null: the caller's rows move alone.
   Mover* mover() const { return mover_.get(); }
-  /// What that one moves.
+  /// The unknowns that it moves.
   const Constraints& constraints() const { return joined_; }
   /// 1 where a variable moves with the rest, 0 where it follows; null: all move.
   N_Vector moved_id() const { return moved_id_ ? moved_id_ : variables_.id(); }

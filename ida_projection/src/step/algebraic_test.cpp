@@ -17,8 +17,9 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Of what independent errors contribute. Three times less or more keeps the steps of forms of index
-// 1 and the roots of titrations; from ten thousand on some of these end at another root.
+// A multiple of the contribution of independent errors. Three times less or more keeps the steps of
+// forms of index 1 and the roots of titrations; from ten thousand on some of these end at another
+// root.
 constexpr double kOfNoise = 1e3;
 constexpr double kMemory = 0.9;  // per step: S changes slowly
 constexpr double kStays = 0.5;   // of the error; a shorter step lowers it as h, to 1/16 at least

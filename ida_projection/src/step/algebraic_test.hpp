@@ -33,7 +33,7 @@ class AlgebraicTest {
   double widened(const Variable& v, double weight, double y) const;
 
   std::vector<Variable> variables_;
-  // Of the last attempt.
+  // The last attempt:
   long steps_ = -1;
   int order_ = 1;
   double move_ = 0.0, noise_ = 0.0;

@@ -34,7 +34,7 @@ Lengths lengths(const double* w, const double* ycor, double factor, const double
 
 }  // namespace
 
-// Of ycor in delta.
+// The share of ycor in delta.
 double Foretold::share_of(N_Vector weights, N_Vector ycor, N_Vector delta) {
   N_VProd(ycor, weights, work_);
   const double square = N_VDotProd(work_, work_);

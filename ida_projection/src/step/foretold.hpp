@@ -5,8 +5,8 @@
 
 namespace tether::ida_projection {
 
-/// What one more Newton iteration adds to a correction, from what earlier ones have added; in forms
-/// without algebraic variables. See foretold.cpp.
+/// Foretells what one more Newton iteration adds to a correction, from what earlier ones have
+/// added; in forms without algebraic variables. See foretold.cpp.
 class Foretold {
  public:
   /// Before the others; once.

@@ -9,11 +9,9 @@ namespace {
 
 constexpr int kFirstLooks = 16;  // in a row: a start excites what is stiff
 constexpr int kSeldom = 8, kLongestWait = 64;
-constexpr double kPart = 0.1;     // of a move: so much is answered by what is not stiff
-constexpr double kHarm = 1e-4;    // tolerances: a shorter answer does none
-constexpr double kBetter = 0.5;   // of the length
-constexpr double kSuspect = 1.0;  // tolerances: IDA's own changes are not much longer
-constexpr double kShorter = 0.2;  // of the length
+constexpr double kPart = 0.1;    // of a move: so much is answered by what is not stiff
+constexpr double kHarm = 1e-4;   // tolerances: a shorter answer does none
+constexpr double kBetter = 0.5;  // of the length
 
 }  // namespace
 
@@ -48,14 +46,6 @@ bool MetricChoice::prefers(const AnsweredMove& other, const AnsweredMove& presen
   }
   found_none();
   return false;
-}
-
-bool MetricChoice::suspects(double length) { return length > kSuspect; }
-
-bool MetricChoice::prefers_shorter(double other, double present) {
-  if (!(other <= kShorter * present)) return false;
-  by_levels_ = !by_levels_;
-  return true;
 }
 
 void MetricChoice::found_none() {

@@ -22,17 +22,12 @@ class MetricChoice {
   bool doubts(const AnsweredMove& at);
   /// After that trial: is the other one taken from now on?
   bool prefers(const AnsweredMove& other, const AnsweredMove& present);
-  /// Is a move of this length, in tolerances, so long that another one may well be shorter?
-  static bool suspects(double length);
-  /// Is it time to try that?
+  /// Is it time to try the other metric?
   bool may_try() { return wait_ == 0 || --wait_ == 0; }
-  /// After that trial, `other` and `present` being lengths: is the other one taken from now on?
-  bool prefers_shorter(double other, double present);
   /// Nothing will be done about the answers: look again later.
   void pause();
   /// There is no other one, or its move failed.
   void found_none();
-  void start_by_levels() { by_levels_ = true; }
   bool by_levels() const { return by_levels_; }  ///< the present one
 
  private:
@@ -40,7 +35,7 @@ class MetricChoice {
   bool by_levels_ = false, calm_ = false;
   int looks_ = 0;               // that found nothing
   int pause_ = 0;               // moves until the next look
-  int wait_ = 0;                // stiff answers, or long moves, until the next trial
+  int wait_ = 0;                // stiff answers until the next trial
   int next_wait_ = kFirstWait;  // after one that changed nothing
 };
 

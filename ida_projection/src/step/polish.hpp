@@ -48,7 +48,7 @@ class Polish {
   const double* answer_entries() const { return work_entries_; }
   /// Is it that of the candidate as it is now?
   bool answer_known() const { return step_known_; }
-  /// What follows is not the move that answer() was asked for last.
+  /// The next move is not the one that answer() was asked for last.
   void forget_answer() { step_known_ = false; }
   /// After a move that the answers are part of: the next add_newton_step() does without them.
   void leave_answers_out() {

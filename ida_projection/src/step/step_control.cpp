@@ -24,7 +24,6 @@ void StepControl::reset() {
   weights_factor_ = 1.0;
   smoother_.reset();
   order_limit_.reset();
-  refused_size_.reset();
   algebraic_test_.begin({});
   refused_in_row_ = 0;
   last_error_failures_ = 0;
@@ -54,18 +53,12 @@ void StepControl::control(const Candidate& candidate, long steps, bool engaged, 
   const auto norm = [&] { return error_norm(candidate.correction, candidate.weights, tested); };
   if (smoother_.on()) {
     order_limit_.end();
-    refused_size_.forget();
     weights_factor_ = smoother_.control(steps, norm());
   } else {
     compare_slopes(candidate, steps, differential);
     weights_factor_ =
         order_limit_.control(steps, candidate.t, order_limit_.lowering() ? norm() : 0.0);
     statistics_.order_limited = order_limit_.begun();
-    // Both set the same bounds.
-    if (order_limit_.lowering())
-      refused_size_.forget();
-    else
-      refused_size_.control(steps, std::abs(ida_.step_size()), ida_.order());
   }
   if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
 }
@@ -74,7 +67,6 @@ void StepControl::corrector_failed(bool engaged) {
   corrector_has_failed_ = true;
   if (!engaged) return;
   smoother_.refuse(std::abs(ida_.step_size()));
-  if (!smoother_.on() && !order_limit_.lowering()) refused_size_.refuse(std::abs(ida_.step_size()));
 }
 
 // y' of two steps in a row, now and then, for the order.

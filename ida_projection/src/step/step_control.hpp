@@ -6,7 +6,6 @@
 #include "movers/mover.hpp"
 #include "step/algebraic_test.hpp"
 #include "step/order_limit.hpp"
-#include "step/refused_size.hpp"
 #include "step/step_smoothing.hpp"
 
 namespace tether::ida_projection {
@@ -21,8 +20,7 @@ class StepControl {
         options_(options),
         statistics_(statistics),
         smoother_(ida.mem(), options),
-        order_limit_(ida.mem(), options),
-        refused_size_(ida.mem()) {}
+        order_limit_(ida.mem(), options) {}
 
   void reset();  ///< a new run starts
 
@@ -63,7 +61,6 @@ class StepControl {
   Statistics& statistics_;
   StepSmoother smoother_;
   OrderLimit order_limit_;
-  RefusedSize refused_size_;
   AlgebraicTest algebraic_test_;
   OwnedVector kept_slope_, slope_;  // y' of a step and of the next one, for the order
   double weights_factor_ = 1.0;     // by which IDA's weights were multiplied in the last solve

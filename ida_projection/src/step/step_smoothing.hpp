@@ -6,7 +6,7 @@
 
 namespace tether::ida_projection {
 
-/// Of steps, as a bound of IDASetEtaFixedStepBounds that is never reached: keep h.
+/// A bound of IDASetEtaFixedStepBounds that no ratio of steps reaches: keep h.
 constexpr double kAnyRatio = 1e30;
 
 /// Factors of Options::smoothing_setpoint: at the largest order, and what is left of it at least
@@ -25,7 +25,7 @@ struct Care {
 /// largest order only; below it the step is held for k + 2 steps and then changed once, by the
 /// geometric mean of c over them. A rejected step or a new order starts the filter anew.
 ///
-/// Where it has begun by itself h is doubled at once as long as the error of the double would be
+/// If it has begun by itself h is doubled at once as long as the error of the double would be
 /// half of what is steered for or less: k + 2 steps for each doubling are many after a failure in
 /// the start. Sizes that were refused are approached by the filter.
 class StepSmoother {

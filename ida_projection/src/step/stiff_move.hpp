@@ -23,7 +23,7 @@ class StiffMove {
   bool make(const Candidate& candidate, double cj, Polish& polish, Mover& mover, bool any_length);
   /// After make(): may M be made of old factors?
   bool trusted() const { return trusted_; }
-  /// What that has changed in ycor after mover.move().
+  /// The change of ycor by that, after mover.move().
   N_Vector change() const { return change_; }
 
  private:

@@ -17,7 +17,7 @@ class BypassWatch {
   /// `last_steps`: accepted before the last attempt; none seen: -1. Said once.
   void look(long last_steps, bool initialized, const Report& report);
   long steps() const { return steps_unseen_; }
-  /// What to do about it, once a step went by; it then stays as it is.
+  /// Advice, once a step went by; it then stays as it is.
   const std::string& text() const { return text_; }
 
  private:

@@ -29,7 +29,7 @@ class RejectionWatch {
   std::string cause(const Candidate& candidate, const StepData& step,
                     const AlgebraicVariables& variables, Corrector& corrector,
                     const std::string& doubt) const;
-  /// What may keep moves from shrinking at this point, with "; " before it; empty: nothing found.
+  /// A reason why moves do not shrink at this point, with "; " before it; empty: nothing found.
   std::string suspicion(const Candidate& candidate, Corrector& corrector) const;
 
  private:

@@ -68,7 +68,7 @@ std::vector<std::string> free_variables(const Candidate& candidate, N_Vector at,
   return names;
 }
 
-// Of their entries in tolerances.
+// Entries count in tolerances.
 std::vector<std::string> dependent_rows(const Candidate& candidate, N_Vector at,
                                         const Constraints& constraints) {
   if (!has_values(constraints)) return {};

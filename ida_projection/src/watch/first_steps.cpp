@@ -192,7 +192,7 @@ double FirstSteps::rate_along(int row, double t) {
   return std::abs(ahead) < std::abs(behind) ? ahead : behind;
 }
 
-// What is wrong with the row.
+// Returns the fault of the row.
 std::string FirstSteps::false_row(int row, Change& change, double noticed,
                                   const Candidate& candidate, const StepData& step,
                                   const double* id, N_Vector corrected, Corrector& corrector) {

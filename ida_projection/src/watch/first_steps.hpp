@@ -12,9 +12,9 @@
 
 namespace tether::ida_projection {
 
-/// Of the terms of C y': what their sum may be at an invariant; the corrector knows y' better.
+/// The sum of the terms of C y' may be this part of them at an invariant: y' is known better.
 constexpr double kNoInvariant = 1e-2;
-/// What to do about a row that F does not keep, at the end of a message.
+/// Advice about a row that F does not keep, at the end of a message.
 constexpr const char* kRowAdvice =
     "; check the row, its constants and F, or give also the rows without which F does not keep it";
 

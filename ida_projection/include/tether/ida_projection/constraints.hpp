@@ -157,7 +157,7 @@ struct Constraints {
 /// rods of each); a UserProjection joins nothing: std::invalid_argument otherwise.
 Constraints operator+(Constraints a, const Constraints& b);
 
-/// What check_jacobian found.
+/// The result of check_jacobian.
 struct JacobianReport {
   bool correct = true;
   double worst = 0.0;     ///< largest relative difference |C - C_difference| / (column scale)

@@ -38,7 +38,7 @@ struct Rows {
   std::function<void(double t, int row, const VectorType& y, VectorType& gradient)> gradient;
 };
 
-/// What solve_dae did.
+/// The work of solve_dae.
 struct Run {
   unsigned int steps = 0;          ///< what IDA::solve_dae returns
   unsigned int attached = 0;       ///< projections: 1, and one more for each restart

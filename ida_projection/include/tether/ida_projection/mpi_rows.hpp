@@ -33,7 +33,7 @@ class GhostExchange {
     MPI_Comm_rank(comm_, &rank);
     first_ = first[static_cast<std::size_t>(rank)];
 
-    // What this rank wants of each, and then what each wants of this one.
+    // The wishes of this rank to each, and then of each to this one.
     const auto n = static_cast<std::size_t>(ranks);
     std::vector<std::vector<long long>> wanted(n);
     std::vector<std::vector<int>> places(n);

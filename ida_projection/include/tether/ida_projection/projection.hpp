@@ -116,7 +116,7 @@ class [[nodiscard]] Projection {
   /// of g alone; steps are the same with and without.
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp = nullptr);
 
-  /// Of a host whose Constraints give other rows from here on: project() then does without factors
+  /// The host's Constraints give other rows from here on: project() then does without factors
   /// of those before, which serve points between steps where yp is null.
   void rows_changed();
 

@@ -87,7 +87,6 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   if (!takes_rest_) rows_.factors.lasting = false;
   if ((result.status = factor(candidate.t)) != Status::success) return result;
   if (rows_.rounding_only()) return result;
-  firm_only_ = false;
   result.length = first_solve();
   // That there is nothing to do the rows that an earlier look has kept tell as well.
   const bool nothing = result.length <= kNothing && rows_.dropped_follow();
@@ -130,7 +129,7 @@ bool ContiguousMover<Rows>::still_nothing(const Candidate& candidate, Move& resu
   result.drift_before = result.drift_after = rows_.drift();
   rows_.set_metric(false);
   move_length_ = 0.0;
-  reused_ = firm_only_ = false;
+  reused_ = false;
   return true;
 }
 
@@ -148,14 +147,13 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;
   leave_rounding_out();
-  firm_only_ = start_known_ = false;
+  start_known_ = false;
   looks_ = 0;
   if (quick_move(candidate, result)) return result;
   const bool nothing = result.status == Status::success && result.length <= kNothing;
   nothing_in_row_ = nothing && !keeps_factors() ? nothing_in_row_ + 1 : 0;
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
-  if (broken && start_known_) result = newton_with_firm_rows(candidate, result);
   if (broken || result.moves > kQuick) rows_.blocks.look_again_soon();
   // Kept factors are in use only while dropped rows ask for less than that.
   if (rows_.blocks.dropped_rows() && result.status == Status::success && !result.capped &&
@@ -203,26 +201,6 @@ void ContiguousMover<Rows>::restart(const Candidate& candidate) {
   rows_.at.restart(candidate);
 }
 
-// Where rows are nearly parallel they magnify the rounding of g beyond any tolerance. Such a row
-// cannot be followed, nor need it be, if without it the others lead to a point where rounding
-// explains every g: only then does this count.
-template <class Rows>
-Move ContiguousMover<Rows>::newton_with_firm_rows(const Candidate& candidate, const Move& failed) {
-  const std::string reason = message_;
-  restart(candidate);
-  Move result = failed;
-  if ((result.status = rows_.value_with_rows(candidate.t)) != Status::success) return result;
-  firm_only_ = true;
-  result = newton(candidate, failed.drift_before);
-  if (result.status == Status::success && !result.capped) {
-    if ((result.status = rows_.value(candidate.t)) != Status::success) return result;
-    result.drift_after = rows_.drift();
-    if (rows_.rounding_only()) return result;
-  }
-  message_ = reason;
-  return failed;
-}
-
 // Newton's method from rows_.at.y, with g_ known there. `first`: the length of the first move is
 // known, too, from fresh factors of independent rows.
 template <class Rows>
@@ -238,12 +216,12 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   const bool was_reused = reused_;
   if (Rows::kThinRows && was_reused)
     std::copy(correction, correction + start_.size(), start_.begin());
-  bool tried = firm_only_;
+  bool tried = false;
   for (;;) {
     if (!have_factors) {
       if ((result.status = factor(candidate.t)) != Status::success) return result;
       have_factors = fresh = true;
-      if (!firm_only_ && (result.moves == 0 || was_reused)) {
+      if (result.moves == 0 || was_reused) {
         start_known_ = rows_.factors.thin;
         if (rows_.factors.thin && !was_reused)
           std::copy(correction, correction + start_.size(), start_.begin());

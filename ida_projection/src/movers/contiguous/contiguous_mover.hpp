@@ -14,7 +14,7 @@
 namespace tether::ida_projection {
 
 constexpr double kLargestFloor = 0.1;  // tolerances
-// What a move leaves where nothing is known yet.
+// A move leaves this part where nothing is known yet.
 constexpr double kUnknownSlope = 0.03;
 constexpr double kLong = 1.0;          // tolerances: such a move is made with fresh factors
 constexpr double kNothing = 1e-8;      // tolerances: as good as no move
@@ -81,11 +81,6 @@ class ContiguousMover final : public Mover {
     rows_.factors.there = false;
     return true;
   }
-  bool begin_by_levels() override {
-    if (rows_.count() <= kManyForLevels || !use_levels(true)) return false;
-    rows_.metric.limit_levels();
-    return true;
-  }
   bool has_forces_in_rows() override { return rows_.has_third_level(); }
   bool solve_at(const Candidate& candidate, double* dy) override;
   bool fatal() const override { return rows_.evaluator.fatal(); }
@@ -98,7 +93,7 @@ class ContiguousMover final : public Mover {
   }
   Status finish(const Candidate& candidate, bool polished) override {
     if (still_) return Status::success;
-    // Where a move costs little beside the step, what Newton's method left is taken, too.
+    // Newton's method goes on where a move costs little beside the step.
     if (takes_rest_) return take_rest(candidate, move_length_);
     if (!keeps_factors()) return Status::success;
     const bool unseen = move_length_ > kSafe * options_.tolerance || !rows_.dropped_follow();
@@ -133,7 +128,7 @@ class ContiguousMover final : public Mover {
     begins_ = begins_ && move_length_ <= kBarelyMoved;
     if (keeps_factors_ && begins_) rows_.leave_rounding_out();
   }
-  double first_solve() { return rows_.first_solve(firm_only_); }
+  double first_solve() { return rows_.first_solve(); }
   bool contradicts();
   bool plainly_nothing();
   bool still_nothing(const Candidate& candidate, Move& result);
@@ -141,7 +136,6 @@ class ContiguousMover final : public Mover {
   void restart(const Candidate& candidate);
   bool quick_move(const Candidate& candidate, Move& result);
   Move newton(const Candidate& candidate, double drift_before, const double* first = nullptr);
-  Move newton_with_firm_rows(const Candidate& candidate, const Move& failed);
   bool too_long(double length, double& limit) const;
 
   const Options& options_;
@@ -151,13 +145,12 @@ class ContiguousMover final : public Mover {
   int levels_joined_next_ = kLevelsJoined;
   bool keeps_factors_;         // over several steps
   bool takes_rest_;            // what Newton's method leaves
-  bool firm_only_ = false;     // this attempt does without thin rows
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;
   bool looked_at_all_ = false;  // the rows are arranged as if all variables were differential
   double move_length_ = 0.0;    // of the last first move, in tolerances
   bool begins_ = true;          // none was longer than kBarelyMoved
-  // Of the last move, which the factors at hand made; < 0: others did.
+  // Length of the last move, if the factors at hand made it; < 0: others did.
   double by_present_factors_ = -1.0;
   bool reused_ = false;     // factors of an earlier step are in use for this one
   SlopeOfFactors kept_;     // these

@@ -7,7 +7,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Where a move costs little beside the factors so much of Options::tolerance is left.
+// This part of Options::tolerance is left where a move costs little beside the factors.
 constexpr double kCheapRest = 1e-4;
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
@@ -53,7 +53,7 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
     }
     rows_.apply(1.0, candidate.correction_entries);
     if (still_ && kept_.age > 0) break;  // by next to nothing, which says nothing about its rate
-    // Where moves are cheap only what is seen on this candidate counts.
+    // Only what is seen on this candidate counts where moves are cheap.
     const double expected = takes_rest_ ? length * (k > 0 ? length / previous : kUnknownSlope)
                                         : staleness_.left(reach, length);
     const bool enough_done = (k > 0 || takes_rest_ || !measure) && expected <= enough;

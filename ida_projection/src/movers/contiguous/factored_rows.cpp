@@ -216,33 +216,29 @@ bool FactoredRows<Rows>::decide() {
 }
 
 template <class Rows>
-double FactoredRows<Rows>::first_solve([[maybe_unused]] bool firm_only) {
+double FactoredRows<Rows>::first_solve() {
   const double length = solve();
   if constexpr (Rows::kThinRows) {
     if (!factors.thin) return length;
     linalg::MinimumNorm& solver = blocks.counted().solver;
     const int all = solver.rank();
-    if (!firm_only && blocks.trust.trusted_rows(solver, length) == all) return length;
+    if (blocks.trust.trusted_rows(solver, length) == all) return length;
     const bool whole = !blocks.dropped_rows();
     // Nothing magnifies the right-hand side of the firm rows.
     const int firm = RowTrust::firm_rows(solver);
     solver.use_rank(firm);
     const double firm_length = solve();
     --statistics_.iterations;
-    factors.partial = firm < all;
-    if (!firm_only) {
-      solver.use_rank(all);
-      const int trusted = blocks.trust.trusted_rows(solver, firm_length);
-      solver.use_rank(trusted);
-      factors.lasting = RowTrust::lasting(solver, firm, trusted);
-      factors.partial = trusted < all;
-      if (trusted > firm) {
-        --statistics_.iterations;
-        if (whole && trusted < all) ++statistics_.rank_drops;
-        return solve();
-      }
+    solver.use_rank(all);
+    const int trusted = blocks.trust.trusted_rows(solver, firm_length);
+    solver.use_rank(trusted);
+    factors.lasting = RowTrust::lasting(solver, firm, trusted);
+    factors.partial = trusted < all;
+    if (whole && trusted < all) ++statistics_.rank_drops;
+    if (trusted > firm) {
+      --statistics_.iterations;
+      return solve();
     }
-    if (whole) ++statistics_.rank_drops;
     return firm_length;
   }
   return length;

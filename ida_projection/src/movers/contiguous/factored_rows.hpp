@@ -15,10 +15,10 @@
 
 namespace tether::ida_projection {
 
-constexpr int kFewForLevels = 16, kManyForLevels = 128;  // rows
-constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
+constexpr int kFewForLevels = 16;  // rows
+constexpr double kSafe = 0.25;     // of Options::tolerance, where old factors tell what is left
 
-/// What the factors at hand are good for.
+/// The uses of the factors at hand.
 struct FactorState {
   bool there = false;    ///< of this candidate or of an earlier one
   bool thin = false;     ///< the last factor() found rows that need RowTrust
@@ -56,7 +56,7 @@ class FactoredRows {
 
   int count() const { return static_cast<int>(g_.size()); }
   int reported() const { return reported_; }
-  /// Of a sum of squares over some of the N columns.
+  /// Norm for a sum of squares over some of the N columns.
   double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
   void set_metric(bool for_factors) {
     if (for_factors)
@@ -113,9 +113,8 @@ class FactoredRows {
     --statistics_.iterations;
     return solve();
   }
-  /// The first solve() after factor(): decides which of the thin rows take part until the next one,
-  /// none of them if `firm_only`.
-  double first_solve(bool firm_only);
+  /// The first solve() after factor(): decides which of the thin rows take part until the next one.
+  double first_solve();
   /// The same with set_metric() and factor() before it, of few rows that are known to be
   /// independent: in one pass. `solved` is false where they are not; then nothing is done that
   /// these would not do again.

@@ -30,7 +30,7 @@ Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
     theta_ = 0.0;
   previous_ = length;
 
-  // What is left is at most about length * ratio, and no more than length while ratio <= 1/2.
+  // The rest is at most about length * ratio, and no more than length while ratio <= 1/2.
   if (ratio <= 0.5) {
     if (length * ratio <= options_->tolerance) return Verdict::done;
     return last ? Verdict::failed : Verdict::go_on;

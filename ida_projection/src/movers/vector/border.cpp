@@ -8,7 +8,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Of a full row: what solutions with C leave of one that depends on it is less.
+// A part of a full row: solutions with C leave less of one that depends on it.
 constexpr double kDependent = 1e-5;
 
 double norm(N_Vector v) { return std::sqrt(N_VDotProd(v, v)); }

@@ -235,7 +235,7 @@ class VectorMover final : public Mover {
     metric_.look(candidate, work_, dy_);
   }
 
-  // What the rows say where they do not succeed.
+  // The rows' own message where they do not succeed.
   Status told(Status status) {
     if (status == Status::success) return status;
     message_ = rows_.report.text;
