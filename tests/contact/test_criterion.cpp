@@ -459,3 +459,33 @@ TEST_CASE("criterion: bodies at one speed, and bodies that slide past at a high 
   const std::vector<Vector3d> none(4, Vector3d::Zero());
   CHECK(evaluate(s.bodies, s.contacts, o.law, none).fixed_point > 0.5);
 }
+
+// A rod hinged above a belt that runs against it: sticking or sliding, friction presses it on.
+TEST_CASE(
+    "criterion: a jam by friction is no progress in all interfaces, a rod below it is solved") {
+  RigidBody rod;
+  rod.inverse_inertia(1, 1) = 1;
+  PointContact tip;
+  tip.first = 0;
+  tip.r1 = {1, 0, -1};
+  tip.bias = -0.1;
+  for (const double mu : {0.5, 0.99, 1.01, 1.5, 3.0})
+    for (const double belt : {-1.0, 1.0})
+      for (const Law law : {Law::coulomb, Law::maximum_dissipation}) {
+        tip.mu = mu;
+        tip.slip = {belt, 0, 0};
+        const Status expected = belt > 0 && mu > 1 ? Status::cycling : Status::solved;
+        INFO("mu " << mu << ", belt " << belt << ", " << name(law));
+        const Options o = options_of(law, 1e-6);
+        const Problem p = delassus({rod}, to_contacts({tip}));
+        CHECK(Solver(o).solve(p).status == expected);
+        const ConeProblem cones = ConeProblem::dense(p.dense_matrix(), p.b(), {Cone::friction(mu)});
+        CHECK(ConeSolver(o).solve(cones).status == expected);
+        for (const int assembled : {0, BodyOptions().max_assembled}) {
+          BodyOptions bodies;
+          bodies.law = law;
+          bodies.max_assembled = assembled;
+          CHECK(BodySolver(bodies).solve({rod}, {tip}).status == expected);
+        }
+      }
+}

@@ -74,7 +74,6 @@ class Automatic {
 
   bool order_after_sweeps(Search& search);
   void sweep_and_solve_parts(Search& search, double until);
-  void newton_from_sweeps(Search& search);
   void solve_parts_of_end(Search& search);
   void follow_to_the_end(Search& search);
   void proximal_path_from_small(Search& search);

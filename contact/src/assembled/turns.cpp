@@ -35,26 +35,14 @@ bool Automatic::order_after_sweeps(Search& search) {
   return true;
 }
 
-// Near enough to a solution a few steps reach it, wherever the sweeps would go from here.
-void Automatic::newton_from_sweeps(Search& search) {
-  constexpr double kShare = 0.06;  // of the work before
-  constexpr int kSteps = 3, kProblems = 2;
-  const double budget = kShare * search.counts.work, end = search.work_end;
-  if (budget < kSteps * newton.cost(search)) return;
-  search.work_end = std::min(end, search.counts.work + budget);
-  newton.run(search, sweeps.point(), kProblems);
-  search.work_end = end;
-}
-
 // Sweeps in turn with solves of the parts where they do not settle, until so much work is done. A
 // round that does not halve the error, once the sweeps have spread it, is followed by more sweeps:
 // those that need no help are soon left alone.
 void Automatic::sweep_and_solve_parts(Search& search, double until) {
   constexpr double kShare = 0.5, kCheap = 0.1, kPartShare = 0.1;      // of the work before
   constexpr double kBetween = 50, kMostBetween = 400, kGrowth = 1.4;  // sweeps
-  constexpr double kLater = 1.5;                                      // times the work before
   const double begin = search.counts.work;
-  double in_parts = 0, halved = search.best_error, between = kBetween, newton_from = begin;
+  double in_parts = 0, halved = search.best_error, between = kBetween;
   while (!search.solved() && !search.exhausted() && search.counts.work < until) {
     AcceleratedSweeps::Leave leave;
     leave.partly = true;
@@ -76,11 +64,6 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
     in_parts += search.counts.work - before;
     if (!changed || in_parts > kCheap * (before - begin))
       between = std::min(kMostBetween, kGrowth * between);
-    if (search.counts.work > newton_from) {
-      newton_from_sweeps(search);
-      newton_from = kLater * search.counts.work;
-      if (search.solved()) return;
-    }
     if (!changed) continue;
     search.test(x_.data(), Method::anderson);
     sweeps.replace(x_.data());
@@ -172,20 +155,8 @@ void Automatic::follow_to_the_end(Search& search) {
   }
 }
 
-// Where the work does not reach to the end of the path Newton steps come nearer with the last
-// quarter of it than the path does.
 Status Automatic::arclength_path(Search& search, Round&, int factorisations) {
-  constexpr double kShare = 0.75;  // of the work that is left
-  constexpr int kProblems = 12;
-  const double end = search.work_end, enough = search.options.enough;
-  search.work_end = search.counts.work + kShare * (end - search.counts.work);
   interior.run_arclength(search, factorisations, newton);
-  const bool cut = search.exhausted();
-  search.work_end = end;
-  if (!cut || search.solved()) return Status::unsolved;
-  search.options.enough = 0;
-  newton.run(search, search.best.data(), kProblems);
-  search.options.enough = enough;
   return Status::unsolved;
 }
 

@@ -84,18 +84,24 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
     judge_with_long_sums(k);
 }
 
-// Sweeps that had not come to their end go on from where the assembled problem is left unsolved.
+// Sweeps that had not come to their end go on from where the assembled problem is left unsolved;
+// where contacts are replaced, which they do not know, the problem goes on with all of the work.
 void BodySolver::Implementation::assemble_and_sweep_on(int k, Worker& worker) {
   const Island& island = graph.islands[at(k)];
   Team one{0, 1, nullptr, &worker.scratch};
-  const IslandResult& r = results[at(k)];
+  IslandResult& r = results[at(k)];
   while (r.assembly > 0) {
     assemble(k, worker);
     sweeps.unpack(island, one, *out);
-    if (r.ended || r.status == Status::solved || r.status == Status::infeasible ||
-        !worker.solution.replaced.empty())
+    const bool replaced = !worker.solution.replaced.empty();
+    if (r.ended || r.status == Status::solved || r.status == Status::infeasible) return;
+    if (!replaced) {
+      iterate(k, one);
+    } else if (r.status == Status::work_limit && r.assembly < options.max_work) {
+      r.assembly = options.max_work;
+    } else {
       return;
-    iterate(k, one);
+    }
   }
   if (!r.saved) sweeps.unpack(island, one, *out);
 }

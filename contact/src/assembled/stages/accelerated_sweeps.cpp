@@ -45,14 +45,6 @@ void AcceleratedSweeps::replace(const PackedVector* x) {
   later_ = {sweeps_, 0};
 }
 
-void AcceleratedSweeps::amend(Search& search, const Packed& x) {
-  swept_ = g_;
-  g_ = x;
-  momentum_.rest_where_changed(g_, swept_);
-  anderson_.clear();
-  carry_on(search, f_now_, true);
-}
-
 // x_n > 0 and the cone: 0 separated, 1 sticking, 2 sliding. Counts what is not as in the last
 // sweep.
 int AcceleratedSweeps::toggles(const System& system) {
@@ -171,7 +163,7 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
         f2 += f * f;
       }
     }
-    const double f = f_now_ = std::sqrt(f2);
+    const double f = std::sqrt(f2);
     if (sweep >= next_test || last_error * f < kForeseen * search.options.tolerance * last_f) {
       last_error = search.test(g_.data(), Method::anderson);
       last_f = f;
@@ -187,10 +179,7 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
       then = nearest;
       look_at += look_at - begin;
     }
-    // Near the tolerance sweeps get more time: their rate is irregular, other stages have a fixed
-    // cost.
-    const double patience = last_error < 30 * search.options.tolerance ? 3 : 1;
-    if (leave.price > 0 && search.counts.work - begin >= patience * leave.least_work) {
+    if (leave.price > 0 && search.counts.work - begin >= leave.least_work) {
       const double left = forecast(sweep, f, std::log(search.options.tolerance / last_error));
       // What is spent already counts as well: at the price of the other stages only a sure end is
       // waited for.

@@ -13,8 +13,6 @@ class AcceleratedSweeps {
   void reset(int contacts, int depth);
   void start(const PackedVector* x);    // next iterate; forgets the rates of others
   void replace(const PackedVector* x);  // next iterate, near the last one
-  void amend(Search& search,
-             const Packed& x);  // after a sweep to some of x; momentum is kept there
   const PackedVector* point() const { return g_.data(); }
 
   struct Leave {            // conditions under which the stage gives way; work in estimated ns
@@ -46,7 +44,6 @@ class AcceleratedSweeps {
   // f: weighted change of a sweep.
   bool accelerate_ = false, eager_ = false;
   int sweeps_ = 0, quiet_ = 0, slow_ = 0, quiet_asked_ = kLeastQuiet, window_end_ = 0;
-  double f_now_ = 0;  // of the last sweep
   double least_f_ = 0, begun_f_ = 0, window_f_ = 0;
   double recent_[kRecent] = {};
   struct Mark {

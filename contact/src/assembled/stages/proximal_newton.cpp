@@ -23,13 +23,12 @@ TETHER_INLINE void multiply(const double* P, const double* B, double scale, doub
 
 void ProximalNewton::reset(int contacts) {
   n_ = contacts;
-  for (Packed* p : {&x_, &z_, &dx_, &trial_, &trial_z_, &swept_, &swept_z_, &anchor_, &f_, &saved_,
-                    &start_, &rest_, &moved_})
+  for (Packed* p :
+       {&x_, &z_, &dx_, &trial_, &trial_z_, &swept_, &swept_z_, &anchor_, &rest_, &moved_})
     p->resize(at(n_));
   regimes_.resize(at(n_));
   derivatives_.resize(at(n_));
   active_.resize(at(n_));
-  anderson_.reset(n_, kDepth);
   matrix_.reset();
 }
 
@@ -153,7 +152,6 @@ int ProximalNewton::inner(Search& search, double tau) {
   double res = residual(search, x_, z_, proximal, true);
   const double target = 0.1 * res;
   if (res == 0) return 1;
-  std::copy(x_.begin(), x_.end(), start_.begin());
   for (int iteration = 1; iteration <= 12; ++iteration) {
     if (!direction(search, tau)) return -1;
     bool accepted = false;
@@ -178,27 +176,7 @@ int ProximalNewton::inner(Search& search, double tau) {
         break;
       }
     }
-    if (!accepted) {
-      // Watchdog: a few full steps, each followed by a sweep, may cross a kink.
-      std::copy(x_.begin(), x_.end(), saved_.begin());
-      for (int step = 0; step < 4 && !accepted; ++step) {
-        if (step > 0) {
-          residual(search, x_, z_, proximal, true);
-          if (!direction(search, tau)) break;
-        }
-        for (int i = 0; i < n_; ++i) {
-          for (int c = 0; c < 3; ++c) x_[at(i)].v[c] += dx_[at(i)].v[c];
-        }
-        search.system.sweep(x_.data(), proximal);
-        search.count_sweep();
-        accepted = residual(search, x_, trial_z_, proximal, false) < 0.9 * res;
-        if (search.exhausted()) break;
-      }
-      if (!accepted) {
-        std::copy(saved_.begin(), saved_.end(), x_.begin());
-        return -1;
-      }
-    }
+    if (!accepted) return -1;
     res = residual(search, x_, z_, proximal, true);
     // x may be outside of the cone by round-off; the block solutions z never are.
     search.test(z_.data(), Method::proximal_newton);
@@ -242,12 +220,9 @@ int ProximalNewton::correct(Search& search, double tau, const PackedVector* anch
 void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
   ++search.counts.newton_phases;
   std::copy(x, x + n_, x_.begin());
-  const auto& locals = search.system.problem().locals();
   double tau = 1e-4, tau_failed = 0;
-  double least_step = std::numeric_limits<double>::infinity();
   double reference = search.best_error;
   int since_gain = 0, failures = 0;
-  anderson_.clear();
   for (int outer = 0; outer < most; ++outer) {
     std::copy(x_.begin(), x_.end(), anchor_.begin());
     const int steps = inner(search, tau);
@@ -262,7 +237,6 @@ void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
       tau_failed = tau;
       tau = std::min(5 * tau, 10.0);
       std::copy(anchor_.begin(), anchor_.end(), x_.begin());
-      anderson_.clear();
       if (++failures >= 4) return;
       continue;
     }
@@ -274,25 +248,6 @@ void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
     }
     tau_failed *= 0.8;
     tau = std::max({tau, 2.5 * tau_failed, 1e-12});
-    double f2 = 0;
-    for (int i = 0; i < n_; ++i) {
-      const double weight = search.system.weight(i);
-      for (int c = 0; c < 3; ++c) {
-        const double f = weight * (x_[at(i)].v[c] - anchor_[at(i)].v[c]);
-        f_[at(i)].v[c] = f;
-        f2 += f * f;
-      }
-    }
-    const double f = std::sqrt(f2);
-    if (f > 2 * least_step) {
-      anderson_.clear();
-      least_step = f;
-      continue;
-    }
-    least_step = std::min(least_step, f);
-    std::copy(x_.begin(), x_.end(), trial_.begin());
-    anderson_.step(trial_.data(), f_.data(), x_.data());
-    for (int i = 0; i < n_; ++i) clip_cone(locals[at(i)].mu, x_[at(i)].v);
   }
 }
 

@@ -4,18 +4,15 @@
 
 #include "assembled/search/search.hpp"
 #include "assembled/stages/newton_matrix.hpp"
-#include <tether/linalg/anderson.hpp>
 
 namespace tether::contact::detail {
 
-// Outer: x^{k+1} = solution of the problem with A + tau D and b + tau D x^k (D: diagonal blocks),
-// accelerated. Inner: Newton on F = x - Phi(D x - w), whose matrix I + Phi' (A - D) is regular by
+// Outer: x^{k+1} = solution of the problem with A + tau D and b + tau D x^k (D: diagonal blocks).
+// Inner: Newton on F = x - Phi(D x - w), whose matrix I + Phi' (A - D) is regular by
 // the proximal term although A is not (method, eq. 17). It is factorised by contacts, those that
 // part left out, or by bodies where these have so many contacts that it costs less.
 class ProximalNewton {
  public:
-  static constexpr int kDepth = 6;
-
   void reset(int contacts);
   // From x; at most `most` outer steps. The result is search.best.
   void run(Search& search, const PackedVector* x, int most);
@@ -41,9 +38,7 @@ class ProximalNewton {
 
   int n_ = 0;
   NewtonMatrix matrix_{3.5, 0};
-  Anderson anderson_;
-  Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_, f_, saved_, start_, rest_,
-      moved_;
+  Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_, rest_, moved_;
   std::vector<Regime> regimes_;
   std::vector<LocalDerivative> derivatives_;
   std::vector<char> active_;
