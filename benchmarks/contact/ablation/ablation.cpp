@@ -61,6 +61,55 @@ Assembly tower(Generator& g) {
   return out;
 }
 
+// Flat boxes on each other, every other one a million times as heavy, all in motion.
+Assembly unlike_tower(Generator& g) {
+  Assembly out;
+  const int n = static_cast<int>(size(g, 20, 120)), heavy = g.uniform(0, 1) < 0.5;
+  const double mu = g.uniform(0.2, 0.9), speed = size(g, 1e-4, 0.03);
+  const Vector3d half(size(g, 0.15, 1), size(g, 0.3, 1), size(g, 0.2, 0.6));
+  for (int k = 0; k < n; ++k) {
+    out.bodies.push_back(body(g, (k + heavy) % 2 ? 1e6 : 1, half, speed));
+    const Vector3d shift(g.uniform(-0.1, 0.1), g.uniform(-0.1, 0.1), 0);
+    for (double x : {-0.9, 0.9})
+      for (double y : {-0.9, 0.9})
+        out.touch(k, k - 1, half.cwiseProduct(Vector3d(x, y, -1)),
+                  half.cwiseProduct(Vector3d(x, y, 1) + shift), {0, 0, 1}, mu);
+  }
+  return out;
+}
+
+// Bricks in bond, which meet their neighbours at many points.
+Assembly wall(Generator& g) {
+  Assembly out;
+  const int rows = 3 + static_cast<int>(g.uniform(0, 6));
+  const double length = 0.4, side = 0.2, mu = g.uniform(0.2, 0.9), push = size(g, 1e-3, 1);
+  std::vector<Vector3d> at;
+  for (int i = 0; i < rows * rows; ++i) {
+    const int row = i / rows, column = i % rows;
+    out.bodies.push_back(body(g, 32, {0.5 * length, 0.5 * side, 0.5 * side}, push));
+    const Vector3d p(length * (column + 0.5 * (row % 2)), 0, side * (row + 0.5));
+    at.push_back(p);
+    const auto meet = [&](int j, const Vector3d& point, const Vector3d& normal) {
+      const Vector3d other = j < 0 ? Vector3d::Zero() : at[static_cast<std::size_t>(j)];
+      out.touch(i, j, point - p, point - other, normal, mu);
+    };
+    const double left = p.x() - 0.5 * length, foot = p.z() - 0.5 * side;
+    for (double y : {-0.5 * side, 0.5 * side}) {
+      if (column > 0)
+        for (double z : {foot, foot + side}) meet(i - 1, {left, y, z}, Vector3d::UnitX());
+      if (row == 0)
+        for (double x : {left, left + length}) meet(-1, {x, y, foot}, Vector3d::UnitZ());
+      for (int j = (row - 1) * rows; row > 0 && j < row * rows; ++j) {
+        const double below = at[static_cast<std::size_t>(j)].x() - 0.5 * length;
+        const double from = std::max(left, below), to = std::min(left, below) + length;
+        if (to - from > 1e-9)
+          for (double x : {from, to}) meet(j, {x, y, foot}, Vector3d::UnitZ());
+      }
+    }
+  }
+  return out;
+}
+
 // Discs on each other that touch at many points of their rims.
 Assembly discs(Generator& g) {
   Assembly out;
@@ -131,6 +180,33 @@ Assembly packing(Generator& g) {
   return out;
 }
 
+// A jittered face-centred lattice of bodies of unlike sizes, those that overlap in contact.
+Assembly close_packing(Generator& g) {
+  Assembly out;
+  const int side = 2 + static_cast<int>(g.uniform(0, 3));
+  const double mu = g.uniform(0.2, 1.1), off = g.uniform(0, 1) < 0.5 ? 0 : 0.1;
+  std::vector<Vector3d> centre;
+  std::vector<double> radius;
+  for (int z = 0; z < 2 * side; ++z)
+    for (int y = 0; y < 2 * side; ++y)
+      for (int x = (y + z) % 2; x < 2 * side; x += 2) {
+        centre.emplace_back(Vector3d(x, y, z) / std::sqrt(2) + 0.03 * g.vector());
+        radius.push_back(0.5 * g.uniform(0.95, 1.1));
+        out.bodies.push_back(body(g, size(g, 0.5, 2), Vector3d::Constant(0.4), 0.2));
+        const int i = static_cast<int>(centre.size()) - 1;
+        const Vector3d& p = centre.back();
+        if (z == 0) out.touch(i, -1, {0, 0, -radius.back()}, p, {0, 0, 1}, mu);
+        for (int j = 0; j < i; ++j) {
+          const Vector3d d = p - centre[static_cast<std::size_t>(j)], side_step = off * g.vector();
+          const double r = radius[static_cast<std::size_t>(j)];
+          if (d.norm() > r + radius.back()) continue;
+          out.touch(i, j, -radius.back() * d.normalized() + side_step,
+                    r * d.normalized() + side_step, d, mu);
+        }
+      }
+  return out;
+}
+
 // Points anywhere on few bodies of any shape, whose normals may wedge them.
 Assembly tangle(Generator& g, int bodies, int contacts, double masses, double steep) {
   Assembly out;
@@ -162,10 +238,13 @@ struct Group {
 
 const Group kGroups[] = {
     {"towers", 16, tower},
+    {"unlike towers", 12, unlike_tower},
+    {"walls", 8, wall},
     {"discs", 12, discs},
     {"arches", 16, arch},
     {"plates", 8, plate},
     {"packings", 12, packing},
+    {"close packings", 8, close_packing},
     {"tangles", 20, [](Generator& g) { return tangle(g, 8, 30, 0.5, 0.5); }},
     {"wedged", 20, [](Generator& g) { return tangle(g, 4, 15, 2, 0); }},
     {"few", 120,

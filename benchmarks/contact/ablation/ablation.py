@@ -20,7 +20,9 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(HERE)))
 TREE = os.path.join(ROOT, "build", "ablation")
 PROGRAM = os.path.join(TREE, "build", "release", "benchmarks", "contact", "ablation", "contact_ablation")
 SWITCH = """#include <cstdlib>
-#define TETHER_ABLATION_OFF(k) (std::getenv("TETHER_OFF") != nullptr && std::atoi(std::getenv("TETHER_OFF")) == (k))
+#include <cstring>
+#define TETHER_ABLATION_OFF(k) \\
+  (std::getenv("TETHER_OFF") != nullptr && std::strstr(std::getenv("TETHER_OFF"), "," #k ",") != nullptr)
 """
 
 
@@ -66,7 +68,7 @@ def solve(k):
     for seed in args.seeds.split(","):
         folders = args.folders if seed == args.seeds.split(",")[0] else []
         lines = subprocess.check_output([PROGRAM, "--seed", seed, *folders], text=True,
-                                        env={**os.environ, "TETHER_OFF": str(k)}).splitlines()
+                                        env={**os.environ, "TETHER_OFF": f",{k},"}).splitlines()
         for r in csv.DictReader(lines):
             out[seed, r["group"], r["problem"], r["law"], r["tolerance"]] = r["status"], float(r["work"])
     return out
