@@ -2,8 +2,6 @@
 # the package config. SPDX-License-Identifier: BSD-3-Clause
 #
 #   tether_find_hdf5()     tether::hdf5, for contact_io
-#   tether_find_bullet()   tether::bullet, Bullet's LinearMath in double precision, for
-#                          contact_collision
 #   tether_find_zoltan()   MPI::MPI_CXX and tether::zoltan, for contact_mpi; TETHER_ZOLTAN_MISSING
 #                          says what is not there
 # Where one is not found, there is no target. Functions, because FindHDF5 changes variables of its caller.
@@ -16,20 +14,6 @@ function(tether_find_hdf5)
       target_include_directories(tether::hdf5 SYSTEM INTERFACE ${HDF5_C_INCLUDE_DIRS})
       target_link_libraries(tether::hdf5 INTERFACE ${HDF5_C_LIBRARIES})
       target_compile_definitions(tether::hdf5 INTERFACE ${HDF5_C_DEFINITIONS})
-    endif()
-  endif()
-endfunction()
-
-function(tether_find_bullet)
-  if(NOT TARGET tether::bullet)
-    find_path(TETHER_BULLET_INCLUDE_DIR LinearMath/btConvexHullComputer.h PATH_SUFFIXES bullet)
-    find_library(TETHER_BULLET_LINEAR_MATH LinearMath-float64)
-    mark_as_advanced(TETHER_BULLET_INCLUDE_DIR TETHER_BULLET_LINEAR_MATH)
-    if(TETHER_BULLET_INCLUDE_DIR AND TETHER_BULLET_LINEAR_MATH)
-      add_library(tether::bullet INTERFACE IMPORTED GLOBAL)
-      target_include_directories(tether::bullet SYSTEM INTERFACE ${TETHER_BULLET_INCLUDE_DIR})
-      target_link_libraries(tether::bullet INTERFACE ${TETHER_BULLET_LINEAR_MATH})
-      target_compile_definitions(tether::bullet INTERFACE BT_USE_DOUBLE_PRECISION)
     endif()
   endif()
 endfunction()

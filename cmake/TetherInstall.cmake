@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # Components: linalg (with the package files that all need), ida_projection, reverse_ida (on it),
-# contact, contact_io, contact_collision and contact_mpi (on contact), scene (on all of these but
+# contact, contact_io and contact_mpi (on contact), scene (on all of these but
 # reverse_ida, contact_io and contact_mpi). Each library builds alone
 # (TETHER_BUILD_*) and installs alone on top of those that it stands on:
 #
@@ -54,14 +54,11 @@ endif()
 
 # What the config has to find and include.
 set(tether_needs_scene ida_projection contact)
-if(TARGET tether_contact_collision)
-  list(APPEND tether_needs_scene contact_collision)
-endif()
 set(tether_has_hdf5 FALSE)
 if(TARGET tether::hdf5)
   set(tether_has_hdf5 TRUE)
 endif()
-foreach(library IN ITEMS contact_io contact_collision contact_mpi)
+foreach(library IN ITEMS contact_io contact_mpi)
   if(TARGET tether_${library})
     tether_components(${library})
     install(FILES ${CMAKE_CURRENT_LIST_DIR}/TetherExternal.cmake
@@ -166,15 +163,11 @@ if(TARGET tether_reverse_ida)
 endif()
 # A static library leaves its own libraries to the program.
 set(hdf5_libs "")
-set(bullet_libs "")
 set(scene_libs "")
 if(NOT BUILD_SHARED_LIBS)
   if(TARGET tether::hdf5)
     get_target_property(hdf5_libs tether::hdf5 INTERFACE_LINK_LIBRARIES)
     list(TRANSFORM hdf5_libs REPLACE "^([^/-].*)$" "-l\\1")
-  endif()
-  if(TARGET tether::bullet)
-    get_target_property(bullet_libs tether::bullet INTERFACE_LINK_LIBRARIES)
   endif()
   set(scene_libs -lfmt -ltomlplusplus)
   if(TARGET tether::sundials_klu)
@@ -184,8 +177,6 @@ if(NOT BUILD_SHARED_LIBS)
 endif()
 tether_pkg_config(contact_io "Contact problems in files" "tether-contact = ${PROJECT_VERSION}"
   LIBS ${hdf5_libs})
-tether_pkg_config(contact_collision "Collision of polyhedra" "tether-contact = ${PROJECT_VERSION}"
-  LIBS ${bullet_libs})
 if(TARGET tether_contact_mpi)
   get_target_property(mpi_include MPI::MPI_CXX INTERFACE_INCLUDE_DIRECTORIES)
   get_target_property(mpi_libs MPI::MPI_CXX INTERFACE_LINK_LIBRARIES)
@@ -199,8 +190,5 @@ if(TARGET tether_contact_mpi)
     CFLAGS ${mpi_include} LIBS ${zoltan_libs} ${mpi_libs})
 endif()
 set(scene_requires "tether-ida-projection = ${PROJECT_VERSION}, tether-contact = ${PROJECT_VERSION}")
-if(TARGET tether_contact_collision)
-  string(APPEND scene_requires ", tether-contact-collision = ${PROJECT_VERSION}")
-endif()
 tether_pkg_config(scene "Rigid bodies in motion, from scene files" "${scene_requires}"
   LIBS ${scene_libs})

@@ -59,9 +59,7 @@ struct Scene {
     surfaces.push_back({i, tc::Shape::box(size), 0});
     return i;
   }
-  tc::Stepper stepper(std::unique_ptr<tc::PairCollision> polyhedra = nullptr) const {
-    return tc::Stepper(bodies, surfaces, meetings, options, std::move(polyhedra));
-  }
+  tc::Stepper stepper() const { return tc::Stepper(bodies, surfaces, meetings, options); }
 };
 
 inline void run(tc::Stepper& s, double seconds) {

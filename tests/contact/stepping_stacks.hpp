@@ -3,16 +3,11 @@
 
 #include <algorithm>
 #include <limits>
-#include <tether/contact/polyhedra.hpp>
 
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
 
 namespace stepping_scenes {
-
-inline tc::Stepper with_polyhedra(const Scene& scene) {
-  return scene.stepper(tc::make_polyhedra());
-}
 
 // Ten cubes of 1 m, the top one of another mass.
 inline Scene stack(double dt, double top_mass, double mu = 0.5, int n = 10) {
@@ -117,7 +112,7 @@ inline double largest_speed(const tc::Stepper& s) {
 // A structure that stands has no velocity after one step, one that falls takes up a good part of
 // what gravity adds: ten orders lie between them.
 inline bool stands(const Scene& scene) {
-  tc::Stepper s = with_polyhedra(scene);
+  tc::Stepper s = scene.stepper();
   s.step();
   CHECK(s.status() == tc::Status::solved);
   return largest_speed(s) < 1e-7 * kGravity * scene.options.step;

@@ -18,14 +18,14 @@ TEST_CASE("stepping: masonry arch stands and falls within 1.5 percent of its lea
   const bool arcs = GENERATE(true, false);
   {
     const Scene scene = arch(1e-3, c.n, 1.015 * c.least, 10, arcs);
-    tc::Stepper s = with_polyhedra(scene);
+    tc::Stepper s = scene.stepper();
     run(s, 1);
     CHECK(largest_move(s, scene.bodies) < 1e-9);
   }
   {
     Scene scene = arch(1e-3, c.n, 0.985 * c.least, 10, arcs);
     scene.options.tolerance = 1e-6;
-    tc::Stepper s = with_polyhedra(scene);
+    tc::Stepper s = scene.stepper();
     run(s, 0.3);
     CHECK(largest_move(s, scene.bodies) > 3e-3);
   }
@@ -72,12 +72,12 @@ TEST_CASE("stepping: an arch of 20 stones between chords slips at the friction o
 TEST_CASE(
     "stepping: an arch of 20 stones at mu = 0.7 stands for 10 s at t/R = 0.12, falls at 0.1") {
   const Scene thick = arch(1e-2, 20, 0.12, 0.7, false);
-  tc::Stepper s = with_polyhedra(thick);
+  tc::Stepper s = thick.stepper();
   run(s, 10);
   CHECK(largest_move(s, thick.bodies) < 1e-9);
   Scene thin = arch(1e-2, 20, 0.1, 0.7, false);
   thin.options.tolerance = 1e-6;
-  tc::Stepper t = with_polyhedra(thin);
+  tc::Stepper t = thin.stepper();
   run(t, 0.6);
   CHECK(largest_move(t, thin.bodies) > 1e-2);
 }

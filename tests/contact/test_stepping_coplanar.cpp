@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <random>
-#include <tether/contact/polyhedra.hpp>
 
+#include "stepping/detection/polyhedra/polyhedra.hpp"
 #include "stepping_stacks.hpp"
 #include "support/catch.hpp"
 
@@ -121,11 +121,11 @@ void compare(const Prism& lower, const Prism& upper, const Lay& lay, const Quate
   const Quaterniond own(AngleAxisd(lay.yaw, Vector3d::UnitZ()));
   const tc::Pose A{scale * Vector3d(1, -2, 0.5), turn.toRotationMatrix()};
   const tc::Pose B{A.position + turn * at, (turn * own).toRotationMatrix()};
-  const auto collision = tc::make_polyhedra();
-  collision->add(0, a.shape());
-  collision->add(1, b.shape());
+  const tc::Shape first = a.shape(), second = b.shape();
   tc::NearPoints near;
-  collision->collide(0, A, 1, B, 1e-3 * scale, near);
+  tc::detail::PolyhedraContacts().collide(first, tc::detail::make_polyhedron(first), A, second,
+                                          tc::detail::make_polyhedron(second), B, 1e-3 * scale,
+                                          near);
 
   const Matrix3r to_a = A.rotation.cast<Real>().inverse();
   const auto flat = [&](const Vector3d& p) -> Vector2r {
@@ -214,7 +214,7 @@ TEST_CASE("polyhedra: flush faces, edges and corners have points on both bodies 
 TEST_CASE("stepping: a box whose middle is beyond the edge of the table falls at every yaw") {
   const double dt = 1e-3;
   const auto run_of = [&](double y, double yaw, const Quaterniond& turn) {
-    tc::Stepper s = with_polyhedra(overhang(dt, 0.6, y, yaw, turn));
+    tc::Stepper s = overhang(dt, 0.6, y, yaw, turn).stepper();
     run(s, 0.3);
     return s.bodies();
   };
@@ -238,7 +238,7 @@ TEST_CASE("stepping: a box whose middle is beyond the edge of the table falls at
   }
   // With its middle above the table it stays, and by right angles as well.
   for (const double yaw : {0.0, 1e-9, kPi / 2, kPi / 2 + 1e-9, -kPi / 2 - 1e-12}) {
-    tc::Stepper s = with_polyhedra(overhang(dt, 0.45, 1.98e-8, yaw, straight));
+    tc::Stepper s = overhang(dt, 0.45, 1.98e-8, yaw, straight).stepper();
     run(s, 0.3);
     CHECK((position(s, 1) - Vector3d(0.45, 1.98e-8, 0.1)).norm() < 1e-9);
   }
@@ -259,7 +259,7 @@ TEST_CASE("stepping: a row of dominoes stays in its plane and never gains energy
       scene.box({t, 0.5, h}, 1, turn * Vector3d(0.65 * k, 0, h / 2), turn);
     scene.bodies.motion[1].angular_velocity = turn * Vector3d(0, w0, 0);
     scene.bodies.motion[1].velocity = turn * Vector3d(w0 * h / 2, 0, w0 * t / 2);
-    tc::Stepper s = with_polyhedra(scene);
+    tc::Stepper s = scene.stepper();
     double aside = 0, gained = 0, deepest = 0, last = tc::kinetic_energy(s.bodies());
     const auto energy = [&] {
       double sum = tc::kinetic_energy(s.bodies());

@@ -403,11 +403,6 @@ TEST_CASE("stepping: only what is asked for is a stage") {
 }
 
 TEST_CASE("stepping: misuse is refused") {
-  Scene scene;
-  scene.friction(0.5);
-  scene.box(Vector3d::Ones(), 1, Vector3d::Zero());
-  scene.box(Vector3d::Ones(), 1, Vector3d(3, 0, 0));
-  CHECK_THROWS_WITH(scene.stepper(), Catch::Contains("box and box") && Catch::Contains("Bullet"));
   const auto bad = [](auto change) {
     Scene s;
     s.friction(0.5);

@@ -2,7 +2,6 @@
 // motion against closed forms. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <random>
-#include <tether/contact/polyhedra.hpp>
 
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
@@ -58,7 +57,7 @@ Found touch(const Shape& shape, const Vector3d& p, const Vector3d& where, const 
   const int i = scene.bodies.add(1, Matrix3d::Identity(), at - own * arm, own);
   scene.surfaces.push_back({i, Shape::touching_points({arm}), 0});
   if (!shape_first) add_shape();
-  tc::Stepper s = scene.stepper(tc::make_polyhedra());
+  tc::Stepper s = scene.stepper();
   s.step();
   return {s.contacts(), at};
 }
@@ -153,7 +152,7 @@ TEST_CASE("points: feet slide on a box, on a hull and on a plane as far, and sto
          Shape::touching_points(
              {{0.2, 0.1, -0.1}, {-0.2, 0.1, -0.1}, {0.2, -0.1, -0.1}, {-0.2, -0.1, -0.1}}),
          0});
-    tc::Stepper s = scene.stepper(tc::make_polyhedra());
+    tc::Stepper s = scene.stepper();
     run(s, 1);
     CHECK(velocity(s, table).norm() < 1e-12);
     ways.push_back((turned.conjugate() * position(s, table)).x() + 1);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <numeric>
-#include <tether/contact/polyhedra.hpp>
 
+#include "stepping/detection/polyhedra/polyhedra.hpp"
 #include "stepping_stacks.hpp"
 #include "support/catch.hpp"
 
@@ -24,11 +24,11 @@ double carried(const tc::Stepper& s, double height) {
 
 tc::NearPoints points_of(const tc::Shape& a, const tc::Pose& A, const tc::Shape& b,
                          const tc::Pose& B, double margin = 0.01) {
-  const auto collision = tc::make_polyhedra();
-  collision->add(0, a);
-  collision->add(1, b);
+  tc::detail::Polyhedron of_a, of_b;
+  if (tc::detail::is_polyhedron(a.kind)) of_a = tc::detail::make_polyhedron(a);
+  if (tc::detail::is_polyhedron(b.kind)) of_b = tc::detail::make_polyhedron(b);
   tc::NearPoints out;
-  collision->collide(0, A, 1, B, margin, out);
+  tc::detail::PolyhedraContacts().collide(a, of_a, A, b, of_b, B, margin, out);
   return out;
 }
 
@@ -110,7 +110,7 @@ TEST_CASE("stepping: ten boxes, top mass 1 to 10000, neither sink nor drift in 1
   const double dt = GENERATE(1e-2, 1e-3);
   if (top > 1000 && dt < 1e-2) return;  // the longer step is the harder one, and takes a tenth
   const Scene scene = stack(dt, top);
-  tc::Stepper s = with_polyhedra(scene);
+  tc::Stepper s = scene.stepper();
   double lost = 0, drift = 0;
   const long n = std::lround(10 / dt);
   for (long k = 0; k < n; ++k) {
@@ -136,7 +136,7 @@ TEST_CASE("stepping: card house of 15 stands at mu = 0.25 and falls at 0.22") {
     const double dt = 1e-2;
     const Scene scene = card_house(dt, 0.25);
     REQUIRE(scene.bodies.size() == 16);
-    tc::Stepper s = with_polyhedra(scene);
+    tc::Stepper s = scene.stepper();
     s.step();
     CHECK(largest_speed(s) < 1e-7 * kGravity * dt);
     run(s, 10 - dt);
@@ -145,14 +145,14 @@ TEST_CASE("stepping: card house of 15 stands at mu = 0.25 and falls at 0.22") {
   }
   {
     const Scene scene = card_house(1e-3, 0.25);
-    tc::Stepper s = with_polyhedra(scene);
+    tc::Stepper s = scene.stepper();
     run(s, 10);
     CHECK(largest_move(s, scene.bodies) < 1e-7);
   }
   {
     Scene scene = card_house(1e-2, 0.22);
     scene.options.tolerance = 1e-7;  // falling cards: exact answers are not needed
-    tc::Stepper s = with_polyhedra(scene);
+    tc::Stepper s = scene.stepper();
     run(s, 1);
     CHECK(position(s, 15).z() < scene.bodies.position[15].z() - 0.1);
   }
@@ -161,7 +161,7 @@ TEST_CASE("stepping: card house of 15 stands at mu = 0.25 and falls at 0.22") {
 TEST_CASE("stepping: the limit of the card house lies at mu = 0.2376") {
   for (const double part : {-0.01, 0.01}) {
     const double dt = 1e-2;
-    tc::Stepper s = with_polyhedra(card_house(dt, 0.2376138 * (1 + part)));
+    tc::Stepper s = card_house(dt, 0.2376138 * (1 + part)).stepper();
     s.step();
     CHECK((largest_speed(s) < 1e-7 * kGravity * dt) == (part > 0));
   }
@@ -187,7 +187,7 @@ TEST_CASE("stepping: a stack does not depend on the order of its boxes nor on it
     for (int level = 0; level < n; ++level)
       plain.box(Vector3d::Ones(), 1 + level,
                 Vector3d(0.01 * level, 0, level + 0.5 + 0.05 * (level + 1)));
-    tc::Stepper a = with_polyhedra(scene), b = with_polyhedra(plain);
+    tc::Stepper a = scene.stepper(), b = plain.stepper();
     run(a, 0.5);
     run(b, 0.5);
     double difference = 0;
@@ -242,7 +242,7 @@ TEST_CASE("polyhedra: beside two edges that cross, what may close meanwhile is a
         scene.box(size, 1, Vector3d(0.11 * std::cos(7 * k), 0.08 * std::sin(7 * k), 0.107), q);
     const Vector3d w(20 * std::sin(3 * k), 20 * std::cos(5 * k), 0);
     scene.bodies.motion[static_cast<std::size_t>(box)].angular_velocity = w;
-    tc::Stepper s = with_polyhedra(scene);
+    tc::Stepper s = scene.stepper();
     s.step();
     const double before = s.penetration();
     if (s.contacts().points.size() > 0 && before == 0) ++crossing;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <memory>
 #include <tether/contact/joints.hpp>
-#include <tether/contact/polyhedra.hpp>
 
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
@@ -27,7 +26,7 @@ Scene stacks(int count, double sleep, double lift = 0) {
   return scene;
 }
 
-tc::Stepper stepper(const Scene& scene) { return scene.stepper(tc::make_polyhedra()); }
+tc::Stepper stepper(const Scene& scene) { return scene.stepper(); }
 
 // Sum of the vertical impulses on and by a body.
 double pressed(const tc::Stepper& s, int body) {

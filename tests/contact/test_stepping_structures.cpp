@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
-#include <tether/contact/polyhedra.hpp>
 #include <tether/linalg/index.hpp>
 
 #include "stepping_stacks.hpp"
@@ -28,7 +27,7 @@ double train(double height, double thickness, double gap, double dt) {
   const Vector3d w(0, 1.5 * std::sqrt(kGravity / height), 0);
   scene.bodies.motion[1].angular_velocity = w;
   scene.bodies.motion[1].velocity = w.cross(Vector3d(-thickness / 2, 0, height / 2));
-  tc::Stepper s = with_polyhedra(scene);
+  tc::Stepper s = scene.stepper();
   std::array<double, 2> passed = {0, 0};
   std::array<double, 2> turned = {0, 0};
   const double mark = 0.02;
@@ -65,11 +64,11 @@ TEST_CASE("stepping: two leaning cards stand for mu > tan(lean)/2 - t/(2 L)") {
     CHECK_FALSE(stands(card_house(1e-2, limit * 0.99, 1, lean)));
   }
   const Scene scene = card_house(1e-3, 0.5, 1, 25);
-  tc::Stepper s = with_polyhedra(scene);
+  tc::Stepper s = scene.stepper();
   run(s, 2);
   CHECK(largest_move(s, scene.bodies) < 1e-9);
   const Scene slippery = card_house(1e-3, 0.22, 1, 25);
-  tc::Stepper t = with_polyhedra(slippery);
+  tc::Stepper t = slippery.stepper();
   run(t, 1);
   CHECK(largest_move(t, slippery.bodies) > 1e-3);
 }
@@ -91,7 +90,7 @@ TEST_CASE("stepping: an icy wedge between two walls presses with m g / (2 sin(ha
   const int wedge =
       scene.bodies.add(2, Matrix3d::Identity() * 0.1, {0, 0, 2.0 / 3 * l * std::cos(half)});
   scene.surfaces.push_back({wedge, tc::Shape::convex(corners), 0});
-  tc::Stepper s = with_polyhedra(scene);
+  tc::Stepper s = scene.stepper();
   run(s, 1);
   CHECK(largest_move(s, scene.bodies) < 1e-9);
   double left = 0, right = 0;
@@ -123,7 +122,7 @@ Scene wall(double dt) {
 
 // 676 contacts. What one step leaves above the tolerance would be gaps and slips in the next ones.
 TEST_CASE("stepping: a wall stands, every problem solved") {
-  tc::Stepper s = with_polyhedra(wall(2e-3));
+  tc::Stepper s = wall(2e-3).stepper();
   run(s, 0.02);
   CHECK(s.counts().accepted == 0);
   CHECK(s.counts().halved == 0);
@@ -133,7 +132,7 @@ TEST_CASE("stepping: a wall stands, every problem solved") {
 TEST_CASE("stepping: a wall is hit, no problem above what is accepted") {
   Scene scene = wall(2e-3);
   const int ball = scene.sphere(0.2, 261, {1.6, -0.31, 0.8}, {0, 8, 0});
-  tc::Stepper s = with_polyhedra(scene);
+  tc::Stepper s = scene.stepper();
   run(s, 0.008);
   CHECK(velocity(s, ball).y() < 7);
   CHECK(s.counts().unsolved == 0);

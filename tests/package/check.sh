@@ -38,7 +38,7 @@ stands_on() {
   case $1 in
     reverse_ida) echo ida_projection ;;
     contact_*) echo contact ;;
-    scene) echo ida_projection contact contact_collision ;;
+    scene) echo ida_projection contact ;;
   esac
 }
 

@@ -97,7 +97,6 @@ TEST_CASE("scene: at 0.9 tan 30 a block yawed by 45 degrees slides 6.132476 m in
     }
 }
 
-#if defined(TETHER_HAVE_COLLISION)
 TEST_CASE("scene: ten boxes, the top one up to 1000 times as heavy, stand for 10 s") {
   const double step = GENERATE(1e-3, 1e-2);
   const double top = GENERATE(1.0, 100.0, 1000.0);
@@ -126,7 +125,6 @@ TEST_CASE("scene: ten boxes, the top one up to 1000 times as heavy, stand for 10
   CHECK(drift < 1e-8);
   CHECK(engine->counts().unsolved == 0);
 }
-#endif
 
 TEST_CASE("scene: free rotation keeps energy and momentum for 100 s, turns over in order 2") {
   const double exact[2] = {10.377304882335, 10.377304882335 + 20.7546097646692};

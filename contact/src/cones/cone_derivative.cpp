@@ -30,12 +30,6 @@ std::vector<char> open_blocks(const ConeProblem& problem, const linalg::VectorVi
   return out;
 }
 
-void check_entries(const char* argument, const linalg::VectorView& v, Eigen::Index needed,
-                   const char* why) {
-  if (v.size() != 0 && v.size() != needed) detail::refuse_size(argument, v.size(), needed, why);
-  detail::require_finite(argument, v);
-}
-
 const ConeProblem& checked(const ConeProblem& problem, const linalg::VectorView& impulses,
                            const DerivativeOptions& options) {
   const ConeResiduals residuals = evaluate(problem, Law::coulomb, impulses);
@@ -106,15 +100,15 @@ ConeDerivative& ConeDerivative::operator=(ConeDerivative&&) noexcept = default;
 
 const DerivativeReport& ConeDerivative::report() const { return parts_->report; }
 
-ConeSolutionDirection ConeDerivative::forward(const ConeDirection& direction) const {
+SolutionDirection ConeDerivative::forward(const ConeDirection& direction) const {
   const ConeProblem& p = parts_->problem;
   const detail::Embedding& e = parts_->embedding;
   const auto blocks = static_cast<Eigen::Index>(p.cones().size());
-  check_entries("b", direction.b, p.rows(), "one for each row");
-  check_entries("mu", direction.mu, blocks, "one for each block");
-  check_entries("rolling", direction.rolling, blocks, "one for each block");
-  check_entries("torsional", direction.torsional, blocks, "one for each block");
-  check_entries("bound", direction.bound, blocks, "one for each block");
+  detail::check_entries("b", direction.b, p.rows(), "one for each row");
+  detail::check_entries("mu", direction.mu, blocks, "one for each block");
+  detail::check_entries("rolling", direction.rolling, blocks, "one for each block");
+  detail::check_entries("torsional", direction.torsional, blocks, "one for each block");
+  detail::check_entries("bound", direction.bound, blocks, "one for each block");
   Eigen::VectorXd db = -parts_->shift(direction);
   if (direction.b.size() > 0) db += direction.b;
   ProblemDirection of_contacts;
@@ -136,7 +130,7 @@ ConeSolutionDirection ConeDerivative::forward(const ConeDirection& direction) co
   }
   of_contacts.b = b;
   of_contacts.mu = mu;
-  ConeSolutionDirection out;
+  SolutionDirection out;
   Eigen::VectorXd x = Eigen::VectorXd::Zero(p.rows());
   if (e.contacts().contacts() > 0) {
     const SolutionDirection found = parts_->contacts.forward(of_contacts);
@@ -154,8 +148,8 @@ ConeDirection ConeDerivative::adjoint(const linalg::VectorView& impulses,
                                       const linalg::VectorView& velocities) const {
   const ConeProblem& p = parts_->problem;
   const detail::Embedding& e = parts_->embedding;
-  check_entries("impulses", impulses, p.rows(), "one for each row");
-  check_entries("velocities", velocities, p.rows(), "one for each row");
+  detail::check_entries("impulses", impulses, p.rows(), "one for each row");
+  detail::check_entries("velocities", velocities, p.rows(), "one for each row");
   // Gradients by x and by b, by rows: dw = A dx - db.
   Eigen::VectorXd gx = Eigen::VectorXd::Zero(p.rows()), gb = gx;
   if (impulses.size() > 0) gx = impulses;
@@ -166,14 +160,9 @@ ConeDirection ConeDerivative::adjoint(const linalg::VectorView& impulses,
   // x_f = A_ff^+ (b_f - A_fc x_c)
   const detail::FreeRows& f = e.free_rows();
   if (!f.empty()) {
-    Eigen::VectorXd gf(static_cast<Eigen::Index>(f.rows().size()));
-    for (std::size_t i = 0; i < f.rows().size(); ++i)
-      gf[static_cast<Eigen::Index>(i)] = gx[f.rows()[i]];
-    const Eigen::VectorXd y = f.solve(gf);
-    for (std::size_t i = 0; i < f.rows().size(); ++i) {
-      gb[f.rows()[i]] += y[static_cast<Eigen::Index>(i)];
-      gx[f.rows()[i]] = 0;
-    }
+    const Eigen::VectorXd y = f.solve(f.of(gx));
+    f.put(f.of(gb) + y, gb);
+    f.put(Eigen::VectorXd::Zero(y.size()), gx);
     gx -= f.back().transpose() * y;
   }
   const auto blocks = static_cast<Eigen::Index>(p.cones().size());

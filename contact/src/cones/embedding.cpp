@@ -51,10 +51,7 @@ void Embedding::eliminate(const ConeProblem& problem) {
       entries.emplace_back(e.row, e.column, scale_[e.row] * e.value * scale_[e.column]);
   b_ = problem.b();
   if (!free_.empty()) {
-    Eigen::VectorXd bf(static_cast<Eigen::Index>(free_.rows().size()));
-    for (std::size_t i = 0; i < free_.rows().size(); ++i)
-      bf[static_cast<Eigen::Index>(i)] = problem.b()[free_.rows()[i]];
-    b_ -= free_.to_cones(free_.solve(bf));
+    b_ -= free_.to_cones(free_.solve(free_.of(b_)));
     // Rows that see a part of the free ones; columns of different parts are solved together, each
     // of length 1.
     std::vector<std::vector<int>> seeing(at(free_.part_count()));
@@ -254,17 +251,17 @@ void Embedding::assemble(const ConeProblem& problem, const std::vector<char>& op
     }
     if (!used[2]) value(2, i, 2) = 1;
   }
+  std::vector<Eigen::Triplet<double>> scales;
+  for (int i = 0; i < n; ++i)
+    for (int r : rows[at(i)]) scales.emplace_back(3 * i + places_[at(r)].component, r, scale_[r]);
+  raise_.resize(3 * n, problem.rows());
+  raise_.setFromTriplets(scales.begin(), scales.end());
   contacts_ =
       Problem::sparse(3, std::move(blocks), b, Eigen::Map<const Eigen::VectorXd>(mu_.data(), n));
 }
 
 Eigen::VectorXd Embedding::lift(const linalg::VectorView& impulses) const {
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(3 * contacts_.contacts());
-  for (std::size_t r = 0; r < places_.size(); ++r) {
-    const auto row = static_cast<Eigen::Index>(r);
-    if (places_[r].contact >= 0)
-      x[3 * places_[r].contact + places_[r].component] = impulses[row] / scale_[row];
-  }
+  Eigen::VectorXd x = raise(impulses.cwiseQuotient(scale_.cwiseAbs2()));
   for (std::size_t k = 0; k < bounds_.size(); ++k) {
     if (const int i = bounds_[k].contact; i >= 0)
       x[3 * i] = contacts_.b()[3 * i] / contacts_.local(i).a;
@@ -274,56 +271,21 @@ Eigen::VectorXd Embedding::lift(const linalg::VectorView& impulses) const {
   return x;
 }
 
-Eigen::VectorXd Embedding::lower(const linalg::VectorView& contacts) const {
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(scale_.size());
-  for (std::size_t r = 0; r < places_.size(); ++r) {
-    const auto row = static_cast<Eigen::Index>(r);
-    if (places_[r].contact >= 0)
-      x[row] = scale_[row] * contacts[3 * places_[r].contact + places_[r].component];
-  }
-  return x;
-}
-
 Eigen::VectorXd Embedding::complete(const Eigen::VectorXd& cones,
                                     const linalg::VectorView& g) const {
   Eigen::VectorXd x = cones;
-  if (free_.empty()) return x;
-  Eigen::VectorXd right = -free_.from_cones(cones);
-  for (std::size_t i = 0; i < free_.rows().size(); ++i)
-    right[static_cast<Eigen::Index>(i)] += g[free_.rows()[i]];
-  const Eigen::VectorXd y = free_.solve(right);
-  for (std::size_t i = 0; i < free_.rows().size(); ++i)
-    x[free_.rows()[i]] = y[static_cast<Eigen::Index>(i)];
+  if (!free_.empty()) free_.put(free_.solve(free_.of(g) - free_.from_cones(cones)), x);
   return x;
 }
 
-Eigen::VectorXd Embedding::raise(const linalg::VectorView& gradient) const {
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(3 * contacts_.contacts());
-  for (std::size_t r = 0; r < places_.size(); ++r) {
-    const auto row = static_cast<Eigen::Index>(r);
-    if (places_[r].contact >= 0)
-      out[3 * places_[r].contact + places_[r].component] = scale_[row] * gradient[row];
-  }
-  return out;
-}
-
 Eigen::VectorXd Embedding::lift_b(const linalg::VectorView& db) const {
-  Eigen::VectorXd b = db;
-  if (!free_.empty()) {
-    Eigen::VectorXd bf(static_cast<Eigen::Index>(free_.rows().size()));
-    for (std::size_t i = 0; i < free_.rows().size(); ++i)
-      bf[static_cast<Eigen::Index>(i)] = db[free_.rows()[i]];
-    b -= free_.to_cones(free_.solve(bf));
-  }
-  return raise(b);
+  if (free_.empty()) return raise(db);
+  return raise(db - free_.to_cones(free_.solve(free_.of(db))));
 }
 
 Eigen::VectorXd Embedding::lower_b(const linalg::VectorView& db3) const {
   Eigen::VectorXd g = lower(db3);
-  if (free_.empty()) return g;
-  const Eigen::VectorXd y = free_.solve(free_.coupling().transpose() * g);
-  for (std::size_t i = 0; i < free_.rows().size(); ++i)
-    g[free_.rows()[i]] = -y[static_cast<Eigen::Index>(i)];
+  if (!free_.empty()) free_.put(-free_.solve(free_.coupling().transpose() * g), g);
   return g;
 }
 

@@ -34,10 +34,12 @@ class Embedding {
   int main_contact(int block) const { return main_[static_cast<std::size_t>(block)]; }
 
   Eigen::VectorXd lift(const linalg::VectorView& impulses) const;
-  /// Transposed lower(): a gradient by row as one by component of the contacts.
-  Eigen::VectorXd raise(const linalg::VectorView& gradient) const;
   /// By row; free rows zero.
-  Eigen::VectorXd lower(const linalg::VectorView& contacts) const;
+  Eigen::VectorXd lower(const linalg::VectorView& contacts) const {
+    return raise_.transpose() * contacts;
+  }
+  /// Transposed: a gradient by row as one by component of the contacts.
+  Eigen::VectorXd raise(const linalg::VectorView& gradient) const { return raise_ * gradient; }
   /// All of x: free rows answer to those of the cones, A_ff x_f = g_f - A_fc x_c.
   Eigen::VectorXd complete(const Eigen::VectorXd& cones, const linalg::VectorView& g) const;
 
@@ -70,7 +72,8 @@ class Embedding {
   FreeRows free_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> A_;  // of the cones' rows, scaled, eliminated
   Eigen::VectorXd b_, scale_;
-  std::vector<Place> places_;  // by row
+  Eigen::SparseMatrix<double> raise_;  // rows to components, in units of scale_
+  std::vector<Place> places_;          // by row
   std::vector<int> block_of_, main_, blocked_, row_of_;
   std::vector<Bound> bounds_;
   std::vector<Moments> moments_;

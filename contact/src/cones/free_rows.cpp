@@ -59,6 +59,16 @@ FreeRows::FreeRows(const ConeProblem& problem) : place_(at(problem.rows()), -1) 
   factor_.compute(raised);
 }
 
+Eigen::VectorXd FreeRows::of(const linalg::VectorView& v) const {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(rows_.size()));
+  for (std::size_t i = 0; i < rows_.size(); ++i) out[static_cast<Eigen::Index>(i)] = v[rows_[i]];
+  return out;
+}
+
+void FreeRows::put(const Eigen::VectorXd& free, Eigen::VectorXd& v) const {
+  for (std::size_t i = 0; i < rows_.size(); ++i) v[rows_[i]] = free[static_cast<Eigen::Index>(i)];
+}
+
 Eigen::MatrixXd FreeRows::solve(const Eigen::MatrixXd& G) const {
   Eigen::MatrixXd X(G.rows(), G.cols());
   for (Eigen::Index k = 0; k < G.cols(); ++k) {

@@ -20,6 +20,9 @@ class FreeRows {
   const std::vector<int>& rows() const { return rows_; }                      ///< of the problem
   int place(int row) const { return place_[static_cast<std::size_t>(row)]; }  ///< -1: not free
   bool empty() const { return rows_.empty(); }
+  /// The free rows of v, by place; and back, into v.
+  Eigen::VectorXd of(const linalg::VectorView& v) const;
+  void put(const Eigen::VectorXd& free, Eigen::VectorXd& v) const;
   /// Columns of G, free rows of it, by place.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& G) const;
   /// The same times A_cf, c the rows that are not free: rows of the problem, zero at free ones.

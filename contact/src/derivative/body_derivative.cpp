@@ -123,9 +123,7 @@ BodyDirection BodyDerivative::adjoint(const linalg::VectorView& impulses,
   const detail::BodyDerivativeParts& s = *parts_;
   const Problem& p = s.solution.problem();
   const std::size_t n = s.contacts.size(), count = s.bodies.size();
-  if (impulses.size() != 0 && impulses.size() != p.b().size())
-    detail::refuse_size("impulses", impulses.size(), p.b().size(), "3 for each contact");
-  detail::require_finite("impulses", impulses);
+  detail::check_entries("impulses", impulses, p.b().size(), "3 for each contact");
   if (!velocities.empty() && velocities.size() != count)
     detail::refuse_size("velocities", static_cast<Eigen::Index>(velocities.size()),
                         static_cast<Eigen::Index>(count), "one for each body");

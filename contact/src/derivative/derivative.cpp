@@ -36,13 +36,6 @@ double DataChange::mu_gradient(int i, const LocalBlock& L) const {
 
 namespace {
 
-// An argument of `needed` entries, or none.
-void check_entries(const char* argument, const linalg::VectorView& v, Eigen::Index needed,
-                   const char* why) {
-  if (v.size() != 0 && v.size() != needed) refuse_size(argument, v.size(), needed, why);
-  require_finite(argument, v);
-}
-
 void check_place(std::size_t k, const MatrixBlock& block, int contacts) {
   const std::string where = "A, block " + std::to_string(k) + ": ";
   for (int i : {block.row, block.column}) {

@@ -25,6 +25,13 @@ inline void require(bool holds, const char* argument, double value, const char* 
 void require_finite(const char* argument, const Eigen::Ref<const Eigen::MatrixXd>& values,
                     const std::string& where = {});
 
+// An argument of `needed` entries, or none.
+inline void check_entries(const char* argument, const Eigen::Ref<const Eigen::VectorXd>& v,
+                          Eigen::Index needed, const char* why) {
+  if (v.size() != 0 && v.size() != needed) refuse_size(argument, v.size(), needed, why);
+  require_finite(argument, v);
+}
+
 // Symmetric to 1e-8 and without eigenvalues below -1e-8 of the trace; names the entry or the
 // eigenvalue that is not. where() comes before the argument.
 template <class Derived, class Where>

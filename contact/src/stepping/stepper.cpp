@@ -84,7 +84,7 @@ static std::vector<double> sizes(const BodySet& bodies, const std::vector<Surfac
 }
 
 Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
-                 const SteppingOptions& options, std::unique_ptr<PairCollision> polyhedra)
+                 const SteppingOptions& options)
     : implementation_(std::make_unique<Implementation>()) {
   detail::check(options);
   Implementation& s = *implementation_;
@@ -94,9 +94,8 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
   std::vector<double> size;
   if (options.sleep > 0) size = sizes(s.bodies, surfaces);
   if (!meetings.empty() && !surfaces.empty()) {
-    s.near = std::make_unique<detail::NearContacts>(s.bodies, std::move(surfaces),
-                                                    std::move(meetings), options.law,
-                                                    options.near_part, std::move(polyhedra));
+    s.near = std::make_unique<detail::NearContacts>(
+        s.bodies, std::move(surfaces), std::move(meetings), options.law, options.near_part);
     if (s.near->any_rolling()) check_rolling(options);
     s.make_solvers();
     if (options.sleep > 0) {

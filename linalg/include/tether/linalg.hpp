@@ -6,6 +6,7 @@
 #include <tether/linalg/block3.hpp>
 #include <tether/linalg/block_lu.hpp>
 #include <tether/linalg/cone_scaling.hpp>
+#include <tether/linalg/convex_hull.hpp>
 #include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/friction_cone.hpp>
 #include <tether/linalg/index.hpp>

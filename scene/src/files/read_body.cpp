@@ -5,7 +5,6 @@
 #include <cmath>
 #include <tether/linalg/symmetric_eigen.hpp>
 
-#include "geometry/hull.hpp"
 #include "geometry/mass.hpp"
 #include "read.hpp"
 #include "read_surface.hpp"
@@ -171,17 +170,6 @@ void read_mass(Fields& in, Body& body) {
   if (!from_shapes) return;
 
   const char* const advice = by_density ? "density" : "inertia";
-  for (const Shape& shape : body.shapes)
-    if (shape.kind == ShapeKind::convex && shape.points.size() > kMostHullPoints) {
-      if (by_density)
-        in.wrong("density", fmt::format("a convex shape of more than {} points needs mass and "
-                                        "inertia",
-                                        kMostHullPoints));
-      else
-        in.missing("inertia", fmt::format("a convex shape of more than {} points has no default",
-                                          kMostHullPoints));
-      return;
-    }
   const MassProperties solid = mass_properties(body.shapes);
   if (!(solid.volume > 0) || !std::isfinite(solid.volume)) {
     const std::string why = body.shapes.empty() ? "there is no shape to take it from"

@@ -4,9 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/convex_hull.hpp>
 #include <tether/linalg/pi.hpp>
-
-#include "hull.hpp"
 
 namespace tether::scene {
 
@@ -85,7 +84,7 @@ MassProperties convex(const std::vector<Vector3d>& points) {
   for (Vector3d& each : p) each /= size;  // nothing below overflows
 
   Moments sum;
-  for (const std::vector<std::size_t>& face : hull_faces(p))
+  for (const std::vector<std::size_t>& face : linalg::hull_faces(p))
     for (std::size_t m = 1; m + 1 < face.size(); ++m)
       sum.add(p[face[0]], p[face[m]], p[face[m + 1]]);
   if (!(sum.volume > 1e-12)) return {};

@@ -14,8 +14,7 @@ struct MassProperties {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
 };
 
-/// A plane and points have none, and none is found for a convex shape of more than kMostHullPoints
-/// points (hull.hpp).
+/// A plane, points and a mesh have none.
 MassProperties mass_properties(const Shape& shape);
 /// Of shapes that do not overlap, in the axes of their body.
 MassProperties mass_properties(const std::vector<Shape>& shapes);

@@ -4,9 +4,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numeric>
+#include <tether/linalg/convex_hull.hpp>
 #include <tether/linalg/pi.hpp>
-
-#include "hull.hpp"
 
 namespace tether::scene {
 
@@ -87,7 +86,7 @@ Mesh plane(const Vector3d& normal, double half) {
 }
 
 Mesh points(const std::vector<Vector3d>& all) {
-  Mesh m{all, hull_faces(all), {}};
+  Mesh m{all, linalg::hull_faces(all), {}};
   if (!m.faces.empty()) return m;
   m.single.resize(all.size());
   std::iota(m.single.begin(), m.single.end(), std::size_t{0});

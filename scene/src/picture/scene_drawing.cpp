@@ -9,10 +9,10 @@
 #include <cstdlib>
 #include <limits>
 #include <map>
+#include <tether/linalg/convex_hull.hpp>
 #include <utility>
 
 #include "axes.hpp"
-#include "geometry/hull.hpp"
 #include "geometry/mesh.hpp"
 
 namespace tether::scene::picture {
@@ -110,7 +110,7 @@ class Drawing {
         draw_surface(m, points, R, colour);
         continue;
       }
-      const std::vector<Vector2d> outline = pixels(points, hull_corners(points));
+      const std::vector<Vector2d> outline = pixels(points, linalg::hull_corners(points));
       if (!filled) {
         canvas_.polygon(outline, "", {"#c8c8c8", 0.8, ""});
         continue;
@@ -134,7 +134,7 @@ class Drawing {
   void draw_surface(const Mesh& m, const std::vector<Vector2d>& points, const Matrix3d& R,
                     const char* colour) {
     if (m.faces.size() > kMostTriangles)
-      return canvas_.polygon(pixels(points, hull_corners(points)), "", {colour, 0.8, ""});
+      return canvas_.polygon(pixels(points, linalg::hull_corners(points)), "", {colour, 0.8, ""});
     std::vector<std::pair<double, std::size_t>> order;
     for (std::size_t f = 0; f < m.faces.size(); ++f) {
       const Vector3d middle =

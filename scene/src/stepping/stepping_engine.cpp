@@ -17,28 +17,15 @@
 #include "output/saved_bodies.hpp"
 #include "saved_memory.hpp"
 
-#if defined(TETHER_HAVE_COLLISION)
-#include <tether/contact/polyhedra.hpp>
-#endif
-
 namespace tether::scene::stepping {
 
 using Eigen::Vector3d;
 
 namespace {
 
-std::unique_ptr<contact::PairCollision> polyhedra(const Scene& scene) {
-#if defined(TETHER_HAVE_COLLISION)
-  if (!scene.pairs.empty()) return contact::make_polyhedra();
-#else
-  (void)scene;
-#endif
-  return nullptr;
-}
-
-contact::Stepper make_stepper(const Scene& scene, Mapped mapped) {
+contact::Stepper make_stepper(Mapped mapped) {
   return contact::Stepper(std::move(mapped.bodies), std::move(mapped.surfaces),
-                          std::move(mapped.meetings), mapped.options, polyhedra(scene));
+                          std::move(mapped.meetings), mapped.options);
 }
 
 // FNV-1a over what a state cannot do without: the same bodies and step. Whether the rest of the
@@ -85,7 +72,7 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
     : stepped_(scene),
       forces_(effects::make_forces(scene, stepped_.bodies())),
       on_failure_(scene.stepping.value_or(SteppingOptions{}).on_failure),
-      stepper_(make_stepper(scene, std::move(mapped))),
+      stepper_(make_stepper(std::move(mapped))),
       fingerprint_(fingerprint(scene, stepper_.options().step)),
       bodies_(scene.bodies.size()) {
   if (!scene.joints.empty()) {

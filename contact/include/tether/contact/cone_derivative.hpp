@@ -22,10 +22,7 @@ struct ConeDirection {
   linalg::VectorX mu, rolling, torsional, bound;  ///< by block; of blocks that have none: ignored
 };
 
-struct ConeSolutionDirection {
-  linalg::VectorX impulses, velocities;  ///< dx and dw = A dx + dA x - db, by row
-  double residual = 0;                   ///< as SolutionDirection::residual
-};
+using ConeSolutionDirection = SolutionDirection;  ///< by row
 
 /// J v and J' v of the solution x, w of a ConeProblem under Law::coulomb: those of the contacts
 /// that stand for its cones (Derivative, whose factors they use), and of the free rows by theirs.
@@ -43,7 +40,7 @@ class ConeDerivative {
 
   /// Throws std::invalid_argument on sizes that do not match, entries outside of the matrix and
   /// values that are not finite.
-  ConeSolutionDirection forward(const ConeDirection& direction) const;
+  SolutionDirection forward(const ConeDirection& direction) const;
   /// The gradient of impulses.x + velocities.w for given rows; empty: 0.
   ConeDirection adjoint(const linalg::VectorView& impulses,
                         const linalg::VectorView& velocities = linalg::VectorX()) const;

@@ -86,18 +86,5 @@ struct NearPoints {
   }
 };
 
-/// Collision of shapes that the contact library does not treat by itself (box or convex against
-/// box, convex, capsule; sphere against convex): see polyhedra.hpp of contact_collision.
-class PairCollision {
- public:
-  virtual ~PairCollision() = default;
-  virtual bool serves(ShapeKind first, ShapeKind second) const = 0;
-  /// Called once for each surface that may take part in such a pair, ascending.
-  virtual void add(int surface, const Shape& shape) = 0;
-  /// All points with a gap below `margin`.
-  virtual void collide(int first, const Pose& first_pose, int second, const Pose& second_pose,
-                       double margin, NearPoints& out) = 0;
-};
-
 }  // namespace tether::contact
 TETHER_EXPORT_END

@@ -251,9 +251,9 @@ struct StageCost {
 class Stepper {
  public:
   /// Throws std::invalid_argument on indices that do not exist, values outside their range, planes
-  /// on bodies that move, and pairs of shapes without a collision routine (`polyhedra` absent).
+  /// on bodies that move, and pairs of shapes that cannot touch.
   Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
-          const SteppingOptions& options, std::unique_ptr<PairCollision> polyhedra = nullptr);
+          const SteppingOptions& options);
   ~Stepper();
   Stepper(Stepper&&) noexcept;
   Stepper& operator=(Stepper&&) noexcept;

@@ -282,14 +282,10 @@ void collide_plane(const Shape& a, const Pose& A, const Vector3d& P, const Vecto
   }
 }
 
-bool has_own_collision(ShapeKind a, ShapeKind b) {
+bool has_collision(ShapeKind a, ShapeKind b) {
   if (rank(a) > rank(b)) std::swap(a, b);
   if (b == ShapeKind::mesh) return rank(a) <= rank(ShapeKind::convex);  // by MeshContacts
-  if (b == ShapeKind::plane) return a != ShapeKind::plane;
-  if (is_convex_pair(a, b)) return true;
-  if (b == ShapeKind::points) return a == ShapeKind::points || touches_points(a);
-  if (a == ShapeKind::sphere) return rank(b) <= rank(ShapeKind::box);
-  return a == ShapeKind::capsule && b == ShapeKind::capsule;
+  return b != ShapeKind::plane || a != ShapeKind::plane;
 }
 
 void collide(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,

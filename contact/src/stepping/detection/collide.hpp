@@ -5,10 +5,11 @@
 
 namespace tether::contact::detail {
 
-/// Pairs of shapes that collide() treats, in either order.
-bool has_own_collision(ShapeKind a, ShapeKind b);
+/// Whether two shapes can touch each other.
+bool has_collision(ShapeKind a, ShapeKind b);
 
-/// Adds all points with a gap below `margin`; normals point from b to a.
+/// Adds all points with a gap below `margin`, of shapes that are no mesh and do not
+/// meet_as_polyhedra(); normals point from b to a.
 void collide(const Shape& a, const Pose& pose_a, const Shape& b, const Pose& pose_b, double margin,
              NearPoints& out);
 

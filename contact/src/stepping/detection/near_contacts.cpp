@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/index.hpp>
@@ -36,13 +37,11 @@ double normal_velocity(const std::vector<RigidBody>& motion, const PointContact&
 }
 
 NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
-                           std::vector<Meeting> meetings, Law law, double near_part,
-                           std::unique_ptr<PairCollision> polyhedra)
+                           std::vector<Meeting> meetings, Law law, double near_part)
     : surfaces_(std::move(surfaces)),
       meetings_(std::move(meetings)),
       law_(law),
-      near_part_(near_part),
-      polyhedra_(std::move(polyhedra)) {
+      near_part_(near_part) {
   if (surfaces_.size() >= (1u << 24))
     throw std::invalid_argument("more than 16777215 surfaces");  // contact_id has 24 bits
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
@@ -60,9 +59,8 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     if (mesh) meshes_.emplace_back(s.shape);
     index_.push_back(plane ? ~static_cast<int>(planes_.size()) : static_cast<int>(bounded_.size()));
     (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
-    material_.push_back(meetings_.row(s.material));
   }
-  find_foreign(bodies);
+  find_polyhedra(bodies);
 
   pose_.resize(surfaces_.size());
   for (const Surface& s : surfaces_) {
@@ -86,18 +84,17 @@ void NearContacts::set_resting(const std::vector<char>& resting) {
     still_[k] = fixed_[k] != 0 || resting[at(surface(bounded_[k]).body)] != 0;
 }
 
-// Who meets whom by material and kind: refuses pairs that nobody serves, and hands the surfaces of
-// those to `polyhedra` that are not served here.
-void NearContacts::find_foreign(const BodySet& bodies) {
+// Who meets whom by material and kind: refuses pairs that nobody serves, and makes the polyhedra
+// that pairs need.
+void NearContacts::find_polyhedra(const BodySet& bodies) {
   struct Kind {
     ShapeKind kind;
-    bool moves, foreign;
+    bool moves, polyhedra;
     std::vector<int> surfaces;
   };
-  std::vector<std::vector<Kind>> kinds(at(meetings_.rows()));
+  std::map<int, std::vector<Kind>> kinds;  // by material
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
-    if (material_[k] < 0) continue;
-    std::vector<Kind>& list = kinds[at(material_[k])];
+    std::vector<Kind>& list = kinds[surfaces_[k].material];
     const Surface& s = surfaces_[k];
     auto found = std::find_if(list.begin(), list.end(),
                               [&](const Kind& a) { return a.kind == s.shape.kind; });
@@ -106,27 +103,26 @@ void NearContacts::find_foreign(const BodySet& bodies) {
     found->surfaces.push_back(static_cast<int>(k));
   }
   const auto meet = [&](Kind& a, Kind& b) {
-    if (!(a.moves || b.moves) || has_own_collision(a.kind, b.kind)) return;
+    if (!(a.moves || b.moves)) return;
     if (&a == &b && a.surfaces.size() < 2) return;  // one body alone meets nobody of its own kind
-    if (!polyhedra_ || !polyhedra_->serves(a.kind, b.kind))
-      throw std::invalid_argument(
-          std::string("contact of ") + name(a.kind) + " and " + name(b.kind) +
-          (polyhedra_ ? " is not supported"
-                      : " needs the collision of polyhedra (target tether_contact_collision, "
-                        "built where Bullet is installed: Debian libbullet-dev)"));
-    a.foreign = b.foreign = true;
+    if (!has_collision(a.kind, b.kind))
+      throw std::invalid_argument(std::string("contact of ") + name(a.kind) + " and " +
+                                  name(b.kind) + " is not supported");
+    for (Kind* each : {&a, &b})
+      each->polyhedra = each->polyhedra || meet_as_polyhedra(a.kind, b.kind);
   };
   for (const Meeting& m : meetings_.list())
-    for (Kind& a : kinds[at(meetings_.row(m.first))])
-      for (Kind& b : kinds[at(meetings_.row(m.second))]) a.moves ? meet(a, b) : meet(b, a);
-  for (const std::vector<Kind>& list : kinds)
+    for (Kind& a : kinds[m.first])
+      for (Kind& b : kinds[m.second]) a.moves ? meet(a, b) : meet(b, a);
+  polyhedron_.resize(surfaces_.size());
+  for (const auto& [material, list] : kinds)
     for (const Kind& each : list)
-      if (each.foreign)
-        for (const int k : each.surfaces) polyhedra_->add(k, surface(k).shape);
+      if (each.polyhedra && is_polyhedron(each.kind))
+        for (const int k : each.surfaces) polyhedron_[at(k)] = make_polyhedron(surface(k).shape);
 }
 
 int NearContacts::meeting_of(int a, int b) const {
-  return meetings_.find(material_[at(a)], material_[at(b)]);
+  return meetings_.find(surface(a).material, surface(b).material);
 }
 
 const Meeting& NearContacts::meeting(const PointContact& c) const {
@@ -185,8 +181,9 @@ void NearContacts::find_points(int i, int j, double margin) {
     meshes_[at(mesh_[at(i)])].collide(t, T, S, margin, near_);
     return turn(near_, 0);
   }
-  if (has_own_collision(s.kind, t.kind)) return collide(s, S, t, T, margin, near_);
-  polyhedra_->collide(i, S, j, T, margin, near_);
+  if (meet_as_polyhedra(s.kind, t.kind))
+    return polyhedra_.collide(s, polyhedron_[at(i)], S, t, polyhedron_[at(j)], T, margin, near_);
+  collide(s, S, t, T, margin, near_);
 }
 
 void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) {

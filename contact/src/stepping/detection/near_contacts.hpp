@@ -8,6 +8,7 @@
 #include "stepping/detection/broadphase.hpp"
 #include "stepping/detection/meetings.hpp"
 #include "stepping/detection/mesh/mesh_contacts.hpp"
+#include "stepping/detection/polyhedra/polyhedra.hpp"
 
 namespace tether::contact::detail {
 
@@ -22,7 +23,7 @@ class NearContacts {
  public:
   /// Throws std::invalid_argument; see Stepper.
   NearContacts(const BodySet& bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
-               Law law, double near_part, std::unique_ptr<PairCollision> polyhedra);
+               Law law, double near_part);
 
   /// Fills points and gaps.
   void find(const BodySet& bodies, double dt, StepContacts& out);
@@ -47,7 +48,7 @@ class NearContacts {
   bool any_rolling() const;
 
  private:
-  void find_foreign(const BodySet& bodies);
+  void find_polyhedra(const BodySet& bodies);
   int meeting_of(int a, int b) const;
   void place(const BodySet& bodies, double dt);
   void set_pose(const BodySet& bodies, int surface);
@@ -59,11 +60,11 @@ class NearContacts {
 
   std::vector<Surface> surfaces_;
   Meetings meetings_;
-  std::vector<int> material_;  // of each surface: its row in meetings_
   Law law_;
   double near_part_;
-  std::unique_ptr<PairCollision> polyhedra_;
-  std::vector<MeshContacts> meshes_;  // and of each surface its index there, or -1
+  PolyhedraContacts polyhedra_;
+  std::vector<Polyhedron> polyhedron_;  // of each surface; empty: none is needed
+  std::vector<MeshContacts> meshes_;    // and of each surface its index there, or -1
   std::vector<int> mesh_;
   Broadphase broadphase_;
   std::vector<int> planes_, bounded_;  // surfaces

@@ -99,11 +99,6 @@ Nearest on_ellipsoid(const Vector3d& a, const Vector3d& p) {
 
 }  // namespace
 
-bool touches_points(ShapeKind kind) {
-  return kind == ShapeKind::sphere || kind == ShapeKind::capsule || kind == ShapeKind::box ||
-         kind == ShapeKind::ellipsoid || kind == ShapeKind::cylinder;
-}
-
 Nearest nearest_on(const Shape& s, const Vector3d& p) {
   switch (s.kind) {
     case ShapeKind::sphere:

@@ -15,8 +15,6 @@ struct Nearest {
 /// Sphere, capsule, box, ellipsoid, cylinder; exact outside and inside. detection, 5.
 Nearest nearest_on(const Shape& shape, const Eigen::Vector3d& p);
 
-bool touches_points(ShapeKind kind);  ///< whether nearest_on() treats it
-
 /// Touching points, each by itself, against another shape; normals point to the points.
 void collide_points(const Shape& points, const Pose& pose, const Shape& shape,
                     const Pose& shape_pose, double margin, NearPoints& out);

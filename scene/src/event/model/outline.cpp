@@ -3,8 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <map>
-
-#include "geometry/hull.hpp"
+#include <tether/linalg/convex_hull.hpp>
 
 namespace tether::scene::event {
 
@@ -42,7 +41,7 @@ PlaneFeature face_between(const std::vector<Vector3d>& corners) {
 void add_polyhedron(const std::vector<Vector3d>& points, Outline& out) {
   const std::size_t first_knob = out.knobs.size() - points.size();
   std::map<std::pair<std::size_t, std::size_t>, Segment> edges;
-  for (const std::vector<std::size_t>& face : hull_faces(points)) {
+  for (const std::vector<std::size_t>& face : linalg::hull_faces(points)) {
     std::vector<Vector3d> corners;
     for (const std::size_t k : face) corners.push_back(points[k]);
     out.faces.push_back(face_between(corners));

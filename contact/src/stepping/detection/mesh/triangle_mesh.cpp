@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 #include <tuple>
 #include <utility>
@@ -108,17 +109,9 @@ void TriangleMesh::join_edges() {
 }
 
 void TriangleMesh::find_patches(const std::vector<std::array<int, 2>>& flat) {
-  std::vector<int> root(triangles_.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int t) {
-    while (root[at(t)] != t) t = root[at(t)] = root[at(root[at(t)])];
-    return t;
-  };
-  for (const std::array<int, 2>& each : flat) {
-    const int s = find(each[0]), t = find(each[1]);
-    root[at(std::max(s, t))] = std::min(s, t);
-  }
-  for (int t = 0; t < size(); ++t) triangles_[at(t)].patch = find(t);
+  linalg::DisjointSets sets(size());
+  for (const std::array<int, 2>& each : flat) sets.join(each[0], each[1]);
+  for (int t = 0; t < size(); ++t) triangles_[at(t)].patch = sets.root(t);
 }
 
 void TriangleMesh::mark_corners() {

@@ -10,7 +10,7 @@ namespace tether::contact::detail {
 
 // Part of the smaller thickness: numbers that differ by rounding only, of which the first is taken
 // in every attitude.
-constexpr double kRounding = 1e-12;
+constexpr double kEqual = 1e-12;
 
 struct Polyhedron {
   struct Face {

@@ -1,5 +1,5 @@
 // Tether: edges of polyhedra that touch. SPDX-License-Identifier: BSD-3-Clause
-#include "collision/edge_contacts.hpp"
+#include "stepping/detection/polyhedra/edge_contacts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -56,7 +56,7 @@ Polyhedron::Edge farthest(const Placed& a, const Vector3d& m, double rounding) {
     if (e.from != v && e.to != v) continue;
     const Vector3d u = a.vertex(e.to) - a.vertex(e.from);
     const double s = std::abs(m.dot(u)) / u.norm();
-    if (s >= slope - kRounding) continue;
+    if (s >= slope - kEqual) continue;
     slope = s;
     best = e;
   }

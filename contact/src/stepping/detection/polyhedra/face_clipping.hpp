@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "collision/separating_axes.hpp"
+#include "stepping/detection/polyhedra/separating_axes.hpp"
 
 namespace tether::contact::detail {
 

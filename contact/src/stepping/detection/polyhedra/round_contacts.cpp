@@ -1,10 +1,10 @@
 // Tether: balls, capsules and points on polyhedra. SPDX-License-Identifier: BSD-3-Clause
-#include "collision/round_contacts.hpp"
+#include "stepping/detection/polyhedra/round_contacts.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "collision/edge_contacts.hpp"
+#include "stepping/detection/polyhedra/edge_contacts.hpp"
 
 namespace tether::contact::detail {
 
@@ -46,7 +46,7 @@ double nearest_point(const Placed& b, const Vector3d& c, Vector3d& point, Vector
     }
   }
   // On the surface to rounding the difference has no direction.
-  if (least > kRounding * b.now.size) normal = (c - point) / least;
+  if (least > kEqual * b.now.size) normal = (c - point) / least;
   return least;
 }
 

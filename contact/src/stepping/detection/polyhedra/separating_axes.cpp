@@ -1,6 +1,6 @@
 // Tether: the axes along which two polyhedra lie farthest apart. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "collision/separating_axes.hpp"
+#include "stepping/detection/polyhedra/separating_axes.hpp"
 
 #include <algorithm>
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "collision/polyhedron.hpp"
+#include "stepping/detection/polyhedra/polyhedron.hpp"
 
 namespace tether::contact::detail {
 

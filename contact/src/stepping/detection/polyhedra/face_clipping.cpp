@@ -1,5 +1,5 @@
 // Tether: points of a polyhedron over a face of another. SPDX-License-Identifier: BSD-3-Clause
-#include "collision/face_clipping.hpp"
+#include "stepping/detection/polyhedra/face_clipping.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -34,7 +34,7 @@ int FaceClipper::lowest_face(const Placed& other, const Vector3d& n, double same
                      [&](int v) { return height_[at(v)] <= lowest + same; }))
       continue;
     const double c = other.face(f).normal.dot(n);
-    if (best >= 0 && !(c < cosine - kRounding)) continue;
+    if (best >= 0 && !(c < cosine - kEqual)) continue;
     best = f;
     cosine = c;
   }

@@ -1,13 +1,12 @@
 // Tether: convex polyhedra. SPDX-License-Identifier: BSD-3-Clause
-#include "collision/polyhedron.hpp"
-
-#include <LinearMath/btConvexHullComputer.h>
+#include "stepping/detection/polyhedra/polyhedron.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <stdexcept>
+#include <tether/linalg/convex_hull.hpp>
 #include <utility>
 
 namespace tether::contact::detail {
@@ -65,75 +64,20 @@ Polyhedron box(const Vector3d& size) {
   return p;
 }
 
-// Bullet's hull works on a grid of integers: only which points span it is taken from there. Faces
-// are put together from its triangles with the points as given, largest triangles first.
 Polyhedron hull(const std::vector<Vector3d>& points) {
-  const auto flat = [] { return std::invalid_argument("convex: the points lie in a plane"); };
-  btConvexHullComputer computer;
-  computer.compute(points[0].data(), sizeof(Vector3d), static_cast<int>(points.size()), 0, 0);
-
   Polyhedron p;
-  for (int k = 0; k < computer.vertices.size(); ++k)
-    p.vertices.push_back(points[at(computer.original_vertex_index[k])]);
-  Vector3d low = p.vertices[0], high = low;
-  for (const Vector3d& v : p.vertices) {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
-  const double extent = (high - low).norm(), thin = 1e-7 * extent;
-
-  struct Triangle {
-    int a, b, c;
-    Vector3d twice_area;
-  };
-  std::vector<Triangle> triangles;
-  for (int f = 0; f < computer.faces.size(); ++f) {
-    const btConvexHullComputer::Edge* first = &computer.edges[computer.faces[f]];
-    const btConvexHullComputer::Edge* e = first->getNextEdgeOfFace();
-    for (; e->getTargetVertex() != first->getSourceVertex(); e = e->getNextEdgeOfFace()) {
-      const int a = first->getSourceVertex(), b = e->getSourceVertex(), c = e->getTargetVertex();
-      triangles.push_back({a, b, c, newell(p.vertices, {a, b, c})});
-    }
-  }
-  Vector3d centre = Vector3d::Zero();
-  for (const Vector3d& v : p.vertices) centre += v / static_cast<double>(p.vertices.size());
-  std::sort(triangles.begin(), triangles.end(), [](const Triangle& s, const Triangle& t) {
-    return s.twice_area.squaredNorm() > t.twice_area.squaredNorm();
-  });
-  for (const Triangle& t : triangles) {
-    if (!(t.twice_area.norm() > thin * thin)) continue;
-    Vector3d n = t.twice_area.normalized();
-    double offset = n.dot(p.vertices[at(t.a)]);
-    if (n.dot(centre) > offset) {
-      n = -n;
-      offset = -offset;
-    }
-    const bool known = std::any_of(p.faces.begin(), p.faces.end(), [&](const Polyhedron::Face& f) {
-      const auto has = [&](int v) {
-        return std::find(f.loop.begin(), f.loop.end(), v) != f.loop.end();
-      };
-      return has(t.a) && has(t.b) && has(t.c);
-    });
-    if (known) continue;
+  std::map<std::size_t, int> number;  // of the points that are corners
+  for (const std::vector<std::size_t>& corners : linalg::hull_faces(points)) {
     Polyhedron::Face face;
-    for (int v = 0; v < static_cast<int>(p.vertices.size()); ++v)
-      if (std::abs(n.dot(p.vertices[at(v)]) - offset) < thin) face.loop.push_back(v);
-    // Around the middle of the face, counterclockwise.
-    Vector3d middle = Vector3d::Zero();
-    for (const int v : face.loop)
-      middle += p.vertices[at(v)] / static_cast<double>(face.loop.size());
-    const Vector3d x = (p.vertices[at(face.loop[0])] - middle).normalized(), y = n.cross(x);
-    const auto angle = [&](int v) {
-      const Vector3d d = p.vertices[at(v)] - middle;
-      return std::atan2(y.dot(d), x.dot(d));
-    };
-    std::sort(face.loop.begin(), face.loop.end(),
-              [&](int a, int b) { return angle(a) < angle(b); });
+    for (const std::size_t k : corners) {
+      const auto [place, fresh] = number.emplace(k, static_cast<int>(p.vertices.size()));
+      if (fresh) p.vertices.push_back(points[k]);
+      face.loop.push_back(place->second);
+    }
     p.faces.push_back(face);
   }
-  if (p.faces.size() < 4) throw flat();
+  if (p.faces.empty()) throw std::invalid_argument("convex: the points lie in a plane");
   finish(p);
-  if (!(p.size > thin)) throw flat();
   return p;
 }
 

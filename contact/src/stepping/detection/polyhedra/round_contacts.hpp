@@ -1,7 +1,7 @@
 // Tether: balls, capsules and points on polyhedra. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "collision/separating_axes.hpp"
+#include "stepping/detection/polyhedra/separating_axes.hpp"
 
 namespace tether::contact::detail {
 
