@@ -68,6 +68,19 @@ struct detail::ConeDerivativeParts {
                                : contact >= 0 ? of_contacts[at(contact)]
                                               : Regime::separating);
     }
+    const auto add = [&](linalg::VectorX ConeDirection::*of, int block, int contact, double factor,
+                         bool is_bound = false) {
+      if (contact >= 0) parameters.push_back({of, block, contact, factor, is_bound});
+    };
+    for (int k = 0; k < static_cast<int>(problem.cones().size()); ++k) {
+      const Embedding::Moments& m = embedding.moments_of(k);
+      const Embedding::Bound bound = embedding.bound_of(k);
+      add(&ConeDirection::bound, k, bound.contact, bound.factor, true);
+      if (parts_of(problem.cones()[at(k)].kind).tangents > 0)
+        add(&ConeDirection::mu, k, embedding.main_contact(k), 1);
+      add(&ConeDirection::torsional, k, m.spin, m.spin_factor);
+      add(&ConeDirection::rolling, k, m.rolling, m.rolling_factor);
+    }
     for (Kink& kink : report.kinks) kink.contact = embedding.block_of(kink.contact);
     for (int& contact : report.not_unique) contact = embedding.block_of(contact);
   }
@@ -85,18 +98,21 @@ struct detail::ConeDerivativeParts {
     return out;
   }
 
+  /// A number of a block is that of a contact that stands for it, times a factor: mu, or b.
+  struct Parameter {
+    linalg::VectorX ConeDirection::*of;
+    int block, contact;
+    double factor;
+    bool is_bound;
+  };
+
   ConeProblem problem;
   Eigen::VectorXd impulses;
   Embedding embedding;
   Derivative contacts;
   DerivativeReport report;
+  std::vector<Parameter> parameters;
 };
-
-ConeDerivative::ConeDerivative(std::unique_ptr<detail::ConeDerivativeParts> parts)
-    : parts_(std::move(parts)) {}
-ConeDerivative::~ConeDerivative() = default;
-ConeDerivative::ConeDerivative(ConeDerivative&&) noexcept = default;
-ConeDerivative& ConeDerivative::operator=(ConeDerivative&&) noexcept = default;
 
 const DerivativeReport& ConeDerivative::report() const { return parts_->report; }
 
@@ -113,21 +129,9 @@ SolutionDirection ConeDerivative::forward(const ConeDirection& direction) const 
   if (direction.b.size() > 0) db += direction.b;
   ProblemDirection of_contacts;
   Eigen::VectorXd b = e.lift_b(db), mu = Eigen::VectorXd::Zero(e.contacts().contacts());
-  for (int k = 0; k < static_cast<int>(blocks); ++k) {
-    const int contact = e.main_contact(k);
-    if (contact < 0) continue;
-    const detail::Embedding::Moments& m = e.moments_of(k);
-    const detail::Embedding::Bound bound = e.bound_of(k);
-    if (bound.contact >= 0) {
-      if (direction.bound.size() > 0) b[3 * bound.contact] += bound.factor * direction.bound[k];
-      continue;
-    }
-    if (direction.mu.size() > 0) mu[contact] = direction.mu[k];
-    if (m.spin >= 0 && direction.torsional.size() > 0)
-      mu[m.spin] = m.spin_factor * direction.torsional[k];
-    if (m.rolling >= 0 && direction.rolling.size() > 0)
-      mu[m.rolling] = m.rolling_factor * direction.rolling[k];
-  }
+  for (const auto& each : parts_->parameters)
+    if (const linalg::VectorX& change = direction.*each.of; change.size() > 0)
+      (each.is_bound ? b[3 * each.contact] : mu[each.contact]) += each.factor * change[each.block];
   of_contacts.b = b;
   of_contacts.mu = mu;
   SolutionDirection out;
@@ -172,19 +176,9 @@ ConeDirection ConeDerivative::adjoint(const linalg::VectorView& impulses,
   if (e.contacts().contacts() > 0) {
     const ProblemDirection g = parts_->contacts.adjoint(e.raise(gx));
     gb += e.lower_b(g.b);
-    for (int k = 0; k < static_cast<int>(blocks); ++k) {
-      const int contact = e.main_contact(k);
-      if (contact < 0) continue;
-      const detail::Embedding::Moments& m = e.moments_of(k);
-      const detail::Embedding::Bound bound = e.bound_of(k);
-      if (bound.contact >= 0) {
-        out.bound[k] = bound.factor * g.b[3 * bound.contact];
-        continue;
-      }
-      if (p.cones()[at(k)].kind != Cone::Kind::nonnegative) out.mu[k] = g.mu[contact];
-      if (m.spin >= 0) out.torsional[k] = m.spin_factor * g.mu[m.spin];
-      if (m.rolling >= 0) out.rolling[k] = m.rolling_factor * g.mu[m.rolling];
-    }
+    for (const auto& each : parts_->parameters)
+      (out.*each.of)[each.block] =
+          each.factor * (each.is_bound ? g.b[3 * each.contact] : g.mu[each.contact]);
   }
   out.b = gb;
   for (const MatrixEntry& a : p.entries())

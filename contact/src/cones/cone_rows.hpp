@@ -28,9 +28,12 @@ constexpr ConeParts parts_of(Cone::Kind kind) {
       return {2, -1, 3};
     case Cone::Kind::rolling_torsional:
       return {2, 3, 4};
-    default:
-      return {};
+    case Cone::Kind::free:
+    case Cone::Kind::nonnegative:
+    case Cone::Kind::bounded:
+      break;
   }
+  return {};
 }
 
 /// f(first row, rows) of each part of a cone whose length has a bound: slip, moments, a motor.

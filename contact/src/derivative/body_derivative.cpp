@@ -77,12 +77,6 @@ void detail::BodyDerivativeParts::check(const BodyDirection& direction) const {
   require_finite("mu", direction.mu);
 }
 
-BodyDerivative::BodyDerivative(std::unique_ptr<detail::BodyDerivativeParts> parts)
-    : parts_(std::move(parts)) {}
-BodyDerivative::~BodyDerivative() = default;
-BodyDerivative::BodyDerivative(BodyDerivative&&) noexcept = default;
-BodyDerivative& BodyDerivative::operator=(BodyDerivative&&) noexcept = default;
-
 const DerivativeReport& BodyDerivative::report() const { return parts_->solution.report(); }
 const linalg::VectorX& BodyDerivative::impulses() const { return parts_->solution.impulses(); }
 

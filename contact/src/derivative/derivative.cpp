@@ -60,12 +60,6 @@ const char* name(DerivativeStatus status) {
   return "?";
 }
 
-Derivative::Derivative(std::unique_ptr<detail::SolutionDerivative> implementation)
-    : implementation_(std::move(implementation)) {}
-Derivative::~Derivative() = default;
-Derivative::Derivative(Derivative&&) noexcept = default;
-Derivative& Derivative::operator=(Derivative&&) noexcept = default;
-
 const DerivativeReport& Derivative::report() const { return implementation_->report(); }
 const linalg::VectorX& Derivative::impulses() const { return implementation_->impulses(); }
 

@@ -6,6 +6,7 @@
 #include <tether/contact/body_solver.hpp>
 #include <tether/contact/derivative.hpp>
 #include <tether/export.hpp>
+#include <utility>
 #include <vector>
 
 TETHER_EXPORT_BEGIN
@@ -37,10 +38,6 @@ struct ImpactDirection {
 /// where impulses are not unique: see DerivativeReport. Not for use by two threads at once.
 class BodyDerivative {
  public:
-  ~BodyDerivative();
-  BodyDerivative(BodyDerivative&&) noexcept;
-  BodyDerivative& operator=(BodyDerivative&&) noexcept;
-
   const DerivativeReport& report() const;
   const linalg::VectorX& impulses() const;  ///< the solution itself, in the frames of the contacts
 
@@ -54,8 +51,9 @@ class BodyDerivative {
  private:
   friend BodyDerivative derivative(const std::vector<RigidBody>&, const std::vector<ContactRows>&,
                                    Law, const linalg::VectorView&, const DerivativeOptions&);
-  explicit BodyDerivative(std::unique_ptr<detail::BodyDerivativeParts> parts);
-  std::unique_ptr<detail::BodyDerivativeParts> parts_;
+  explicit BodyDerivative(std::shared_ptr<const detail::BodyDerivativeParts> parts)
+      : parts_(std::move(parts)) {}
+  std::shared_ptr<const detail::BodyDerivativeParts> parts_;
 };
 
 /// At `impulses`, 3 for each contact in its frame, a solution of delassus(bodies, contacts) under

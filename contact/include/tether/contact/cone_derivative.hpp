@@ -5,6 +5,7 @@
 #include <tether/contact/cones.hpp>
 #include <tether/contact/derivative.hpp>
 #include <tether/export.hpp>
+#include <utility>
 #include <vector>
 
 TETHER_EXPORT_BEGIN
@@ -29,10 +30,6 @@ using ConeSolutionDirection = SolutionDirection;  ///< by row
 /// Not for use by two threads at once.
 class ConeDerivative {
  public:
-  ~ConeDerivative();
-  ConeDerivative(ConeDerivative&&) noexcept;
-  ConeDerivative& operator=(ConeDerivative&&) noexcept;
-
   /// Contacts in it are blocks of the problem (`regimes`: one for each, of free ones sticking, of
   /// bounded ones sticking or sliding); a block with moments may stand in a list several times.
   /// unknowns and rank count components of the contacts that stand for the cones.
@@ -48,8 +45,9 @@ class ConeDerivative {
  private:
   friend ConeDerivative derivative(const ConeProblem&, const linalg::VectorView&,
                                    const DerivativeOptions&);
-  explicit ConeDerivative(std::unique_ptr<detail::ConeDerivativeParts> parts);
-  std::unique_ptr<detail::ConeDerivativeParts> parts_;
+  explicit ConeDerivative(std::shared_ptr<const detail::ConeDerivativeParts> parts)
+      : parts_(std::move(parts)) {}
+  std::shared_ptr<const detail::ConeDerivativeParts> parts_;
 };
 
 /// At `impulses`, a solution of `problem` under Law::coulomb within options.tolerance: otherwise,

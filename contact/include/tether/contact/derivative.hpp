@@ -6,6 +6,7 @@
 #include <tether/contact/problem.hpp>
 #include <tether/contact/solver.hpp>
 #include <tether/export.hpp>
+#include <utility>
 #include <vector>
 
 TETHER_EXPORT_BEGIN
@@ -85,10 +86,6 @@ struct SolutionDirection {
 /// minimum-norm factors (of M' apart, once adjoint() asks). Not for use by two threads at once.
 class Derivative {
  public:
-  ~Derivative();
-  Derivative(Derivative&&) noexcept;
-  Derivative& operator=(Derivative&&) noexcept;
-
   const DerivativeReport& report() const;
   const linalg::VectorX& impulses() const;  ///< the solution itself
 
@@ -104,8 +101,9 @@ class Derivative {
  private:
   friend Derivative derivative(const Problem&, Law, const linalg::VectorView&,
                                const DerivativeOptions&);
-  explicit Derivative(std::unique_ptr<detail::SolutionDerivative> implementation);
-  std::unique_ptr<detail::SolutionDerivative> implementation_;
+  explicit Derivative(std::shared_ptr<const detail::SolutionDerivative> implementation)
+      : implementation_(std::move(implementation)) {}
+  std::shared_ptr<const detail::SolutionDerivative> implementation_;
 };
 
 /// Factors the equations at `impulses`, a solution of `problem` under `law`. Throws

@@ -60,7 +60,9 @@ ConvexShape::ConvexShape(const Shape& s, const Pose& pose, const Vector3d& origi
       thickness_ = half_.minCoeff();
       break;
     }
-    default:
+    case ShapeKind::plane:
+    case ShapeKind::points:
+    case ShapeKind::mesh:
       break;
   }
   size_ = std::max(half_.maxCoeff(), round_);
@@ -120,7 +122,10 @@ Vector3d ConvexShape::farthest(const Vector3d& direction, double less) const {
       if (!whole_) x = middle_ + part * (x - middle_);
       break;
     }
-    default:
+    case ShapeKind::sphere:
+    case ShapeKind::plane:
+    case ShapeKind::points:
+    case ShapeKind::mesh:
       break;
   }
   return centre_ + rotation_ * x;

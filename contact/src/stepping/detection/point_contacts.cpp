@@ -113,7 +113,10 @@ Nearest nearest_on(const Shape& s, const Vector3d& p) {
       return on_ellipsoid(s.size, p);
     case ShapeKind::cylinder:
       return on_cylinder(s.radius, 0.5 * s.length, p);
-    default:
+    case ShapeKind::plane:
+    case ShapeKind::convex:
+    case ShapeKind::points:
+    case ShapeKind::mesh:
       break;
   }
   Nearest nothing;
