@@ -116,6 +116,13 @@ void Mechanisms::update(const std::vector<RigidBody>& bodies, const JointRows& j
                                   "be finite");
 }
 
+double Mechanisms::pull_norm() const {
+  double sum = 0;
+  for (const std::vector<double>& each : pulls_)
+    for (const double u : each) sum += u * u;
+  return std::sqrt(sum);
+}
+
 void Mechanisms::clear_pulls() {
   for (std::vector<double>& each : pulls_) std::fill(each.begin(), each.end(), 0.0);
 }

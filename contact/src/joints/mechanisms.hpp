@@ -30,6 +30,7 @@ class Mechanisms {
   /// What the rows have changed of u of mechanism m since clear_pulls(): Mechanism::entries()
   /// numbers.
   std::vector<double>& pull(int m) { return pulls_[static_cast<std::size_t>(m)]; }
+  double pull_norm() const;
   void clear_pulls();
   /// v changes by the least that makes all rows hold, G v = rate.
   void satisfy(const JointRows& joints, std::vector<Vector6d>& v);

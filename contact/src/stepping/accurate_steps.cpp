@@ -72,7 +72,7 @@ void Stepper::Implementation::advance_part(double time, double length) {
   if (solver && parts.control.length > 0)
     solver->scale_warm_start(std::min(2.0, length / parts.control.length));
   parts.control.length = length;
-  advance(time, length, options.max_halvings);
+  advance(whole(time, length));
 }
 
 // What contacts have done in the part just taken.

@@ -76,13 +76,12 @@ void Stepper::Implementation::leave_out_passive() {
 
 // The same length of those that nothing has struck, whole; islands that strike later are cut there.
 void Stepper::Implementation::take_others(const detail::PartMark& start,
-                                          const std::vector<char>& striking, double time,
-                                          double length, int halvings) {
+                                          const std::vector<char>& striking, detail::SubStep s) {
   const detail::PartMark end = mark();
   const StepContacts struck = std::move(contacts);
   contacts = {};
   go_back(start);
-  advance(time, length, halvings);
+  advance(s);
   for (const int i : motion.moving()) {
     if (striking[at(i)] == 0) continue;
     bodies.position[at(i)] = end.bodies.position[at(i)];
@@ -102,17 +101,17 @@ void Stepper::Implementation::take_others(const detail::PartMark& start,
 }
 
 // Bodies that the islands that strike do not touch move as in a step without cuts.
-void Stepper::Implementation::take_cut(double time, double length, int halvings) {
+void Stepper::Implementation::take_cut(detail::SubStep s) {
   std::vector<char> striking;
   if (!part.may_split || !cuts->find_striking(bodies, contacts, motion.moving(), motion.falling(),
                                               part.active, striking))
-    return take_striking(time, length, halvings);
+    return take_striking(s);
   const detail::PartMark start = mark();
   const std::vector<char> active = part.active;
   const int cuts_left = part.cuts_left;
   const bool of_cut = part.of_cut;
   set_active(striking);
-  take_striking(time, length, halvings);
+  take_striking(s);
   if (part.met) return;
   std::vector<char> others(striking.size(), 0);
   for (const int i : motion.moving())
@@ -120,12 +119,12 @@ void Stepper::Implementation::take_cut(double time, double length, int halvings)
   set_active(std::move(others));
   part.cuts_left = cuts_left;
   part.of_cut = of_cut;
-  take_others(start, striking, time, length, halvings);
+  take_others(start, striking, s);
   set_active(active);
 }
 
-void Stepper::Implementation::advance_cut(double time, double length, int halvings) {
-  if (part.in_cut) return take_cut(time, length, halvings);
+void Stepper::Implementation::advance_cut(detail::SubStep s) {
+  if (part.in_cut) return take_cut(s);
   const int cuts_left = part.cuts_left;
   const detail::PartMark start = mark();
   const detail::Judgement before = judged();
@@ -136,7 +135,7 @@ void Stepper::Implementation::advance_cut(double time, double length, int halvin
     if (joints) joints->begin_sum();
   };
   begin(!sleeping);
-  take_cut(time, length, halvings);
+  take_cut(s);
   if (part.met) {  // what that has cost of what cuts may cost is spent
     go_back(start);
     set_judged(before);
@@ -144,12 +143,11 @@ void Stepper::Implementation::advance_cut(double time, double length, int halvin
     part.cuts_left = cuts_left;
     part.of_cut = false;
     begin(false);
-    advance(time, length, halvings);
+    advance(s);
   }
   part.in_cut = part.of_cut = false;
   if (joints) joints->give_sum();
-  part.start = time;
-  part.dt = length;
+  part.now = s;
 }
 
 }  // namespace tether::contact

@@ -18,7 +18,7 @@ void Stepper::Implementation::look_for_cut() {
   approaches.clear();
   approaches.reserve(contacts.points.capacity());  // no more often than contacts do
   const auto fall = [&](const PointContact& c) {
-    const double apart = options.gravity ? part.dt * c.normal.dot(*options.gravity) : 0;
+    const double apart = options.gravity ? part.now.length * c.normal.dot(*options.gravity) : 0;
     return (motion.falls(c.second) ? apart : 0) - (motion.falls(c.first) ? apart : 0);
   };
   const std::vector<detail::Impact>& chosen = impacts->list();
@@ -32,13 +32,14 @@ void Stepper::Implementation::look_for_cut() {
     }
     const PointContact& c = contacts.points[k];
     const double comes = -detail::normal_velocity(bodies.motion, c);
-    if (!(comes * part.dt > contacts.gaps[k])) continue;
+    if (!(comes * part.now.length > contacts.gaps[k])) continue;
     const detail::Approach a{static_cast<int>(k), -detail::normal_velocity(impacts->coming(), c),
                              comes, fall(c)};
-    if (a.more(part.dt) > 0 && impacts->is_impact(*near, c, a.speed(contacts.gaps[k], part.dt)))
+    if (a.more(part.now.length) > 0 &&
+        impacts->is_impact(*near, c, a.speed(contacts.gaps[k], part.now.length)))
       approaches.push_back(a);
   }
-  part.cut = cuts->choose(approaches, part.dt, *near, bodies, contacts);
+  part.cut = cuts->choose(approaches, part.now.length, *near, bodies, contacts);
 }
 
 // No contact closes by the velocities that bodies have: there is nothing to solve.
@@ -64,7 +65,7 @@ void Stepper::Implementation::leave_out_striking() {
 // The impact, at the places where bodies are. Unsolved: the part that follows takes it as one that
 // is not cut does.
 Stepper::Implementation::Struck Stepper::Implementation::strike() {
-  near->find(bodies, part.dt, contacts);
+  near->find(bodies, part.now.length, contacts);
   if (joints) leave_out_joined();
   if (sleeping) sleeping->leave_out(contacts);
   leave_out_passive();
@@ -118,37 +119,38 @@ bool Stepper::Implementation::take_impacts_in_turn() {
   return true;
 }
 
-void Stepper::Implementation::take_of_cut(double time, double dt, double length, int halvings) {
+// Of a part of this length.
+void Stepper::Implementation::take_of_cut(detail::SubStep s, double length) {
   part.of_cut = true;
-  solver->scale_warm_start(dt / length);
-  advance(time, dt, halvings);
-  solver->scale_warm_start(length / dt);
+  solver->scale_warm_start(s.length / length);
+  advance(s);
+  solver->scale_warm_start(length / s.length);
 }
 
 // The part up to the impact; once more where bodies that turn were off the surface by then. Returns
 // its length.
-double Stepper::Implementation::approach(double time, double length, int halvings) {
+double Stepper::Implementation::approach(detail::SubStep s) {
   const WarmStart start = solver->warm_start();
   const detail::Judgement before = judged();
   remember_part(parts.before);
   part.before_impact = true;
   part.cuts_left = 0;
   double when = cuts->when();
-  take_of_cut(time, when, length, halvings);
-  const double then = std::min(when + cuts->left(*near, bodies, length), length);
+  take_of_cut(s.over(s.start, when), s.length);
+  const double then = std::min(when + cuts->left(*near, bodies, s.length), s.length);
   if (then > 0 && then != when) {
     restore_part(parts.before);
     set_judged(before);
     solver->set_warm_start(start);
     when = then;
-    take_of_cut(time, when, length, halvings);
+    take_of_cut(s.over(s.start, when), s.length);
   }
   part.before_impact = false;
   return when;
 }
 
 // Up to the impact, the impact, and the rest; `contacts` has the impulses of all.
-void Stepper::Implementation::take_striking(double time, double length, int halvings) {
+void Stepper::Implementation::take_striking(detail::SubStep s) {
   const int cuts_left = part.cuts_left;
   StepContacts sum;
   const auto add_to_sum = [&] {
@@ -156,19 +158,18 @@ void Stepper::Implementation::take_striking(double time, double length, int halv
     if (joints && part.joints_active) joints->add_to_sum();
   };
   cuts->remember(solver->warm_start());
-  double rest = length;
+  double rest = s.length;
   if (cuts->when() > 0) {
-    rest -= approach(time, length, halvings);
+    rest -= approach(s);
     if (!(rest > 0)) return;
     add_to_sum();
     cuts->remember(solver->warm_start());
   }
-  part.start = time + (length - rest);
-  part.dt = rest;
+  part.now = s.over(s.start + (s.length - rest), rest);
   const Struck struck = strike();
   if (struck == Struck::impact) add_to_sum();
   part.cuts_left = struck == Struck::unsolved ? 0 : cuts_left - 1;
-  take_of_cut(part.start, rest, length, halvings);
+  take_of_cut(part.now, s.length);
   detail::add_impulses(sum, contacts);
 }
 

@@ -8,6 +8,7 @@ namespace tether::contact {
 
 void Stepper::Implementation::step() {
   outcome = {};
+  part.unmeetable = false;
   const double start = static_cast<double>(counts.steps) * options.step + late;
   const double length = options.step - late;
   if (options.accuracy > 0)
@@ -15,7 +16,7 @@ void Stepper::Implementation::step() {
   else {
     part.cuts_left = cuts ? detail::StepCuts::kMost : 0;
     if (cuts) cuts->earn();
-    advance(start, length, options.max_halvings);
+    advance(whole(start, length));
   }
   if (!is_finite()) {
     outcome.succeeded = false;
@@ -34,38 +35,70 @@ bool Stepper::Implementation::is_finite() const {
   return true;
 }
 
-void Stepper::Implementation::advance(double time, double length, int halvings) {
-  part.start = time;
-  part.dt = length;
-  part.may_halve = halvings > 0;
-  if (run_stages(time)) return;
+namespace {
+
+// w dt of what joints hold: an explicit step is stable below 2, and its iterations for the joints
+// contract by (w dt)^2.
+constexpr double kResolved = 1;
+// w^2 goes with the ratio of load and link, and with the shock where a slack chain snaps taut: each
+// halving allows four times as much.
+constexpr int kJointHalvings = 20;
+
+}  // namespace
+
+detail::SubStep Stepper::Implementation::whole(double start, double length) const {
+  return {start, length, options.max_halvings, kJointHalvings};
+}
+
+void Stepper::Implementation::advance(detail::SubStep s) {
+  part.now = s;
+  if (joints && part.joints_active && s.joint_halvings > 0 && !resolves_joints()) {
+    --s.joint_halvings;
+    return take_halves(s);
+  }
+  if (run_stages()) return;
   // Nothing has moved yet.
   bodies.motion = impacts->coming();
-  if (part.cut) return advance_cut(time, length, halvings);
-  if (part.again) return advance(time, length, halvings);
-  solver->take_back();
-  solver->scale_warm_start(0.5);
+  if (part.cut) return advance_cut(s);
+  if (part.again) return advance(s);
+  if (part.unmet) {
+    --s.joint_halvings;
+  } else {
+    solver->take_back();
+    --s.halvings;
+  }
+  take_halves(s);
+}
+
+bool Stepper::Implementation::resolves_joints() const {
+  return joints->vibration().frequency * part.now.length <= kResolved;
+}
+
+void Stepper::Implementation::take_halves(const detail::SubStep& s) {
+  const double half = s.length / 2;
+  if (solver) solver->scale_warm_start(0.5);
   ++counts.halved;
-  advance(time, length / 2, halvings - 1);
-  advance(time + length / 2, length / 2, halvings - 1);
-  solver->scale_warm_start(2);
+  advance(s.over(s.start, half));
+  advance(s.over(s.start + half, half));
+  if (solver) solver->scale_warm_start(2);
 }
 
 // false: the contact problem failed, and the step is to be taken in halves; or it is
 // to be cut, or taken anew with what it has woken.
-bool Stepper::Implementation::run_stages(double time) {
+bool Stepper::Implementation::run_stages() {
   using Clock = std::chrono::steady_clock;
   Clock::time_point start = Clock::now();
-  part.failed = part.cut = part.again = false;
+  part.failed = part.unmet = part.cut = part.again = false;
   for (Stage& stage : stages) {
     if (stage.method)
       (this->*stage.method)();
     else
-      force[at(stage.force)](bodies, time, part.dt);
+      force[at(stage.force)](bodies, part.now.start, part.now.length);
     const Clock::time_point end = Clock::now();
     stage.seconds += std::chrono::duration<double>(end - start).count();
     start = end;
-    if (part.cut || part.again || (part.failed && part.may_halve)) return false;
+    if (part.cut || part.again || part.unmet || (part.failed && part.now.halvings > 0))
+      return false;
   }
   return true;
 }
@@ -74,7 +107,7 @@ bool Stepper::Implementation::run_stages(double time) {
 // does not hang on the length of the step. Who accepts nothing gets the shorter steps even so.
 bool Stepper::Implementation::shortest() const {
   const bool impact = options.acceptance > 1 && !impacts->list().empty();
-  return options.max_halvings > 0 && (!part.may_halve || impact);
+  return options.max_halvings > 0 && (part.now.halvings == 0 || impact);
 }
 
 detail::Judgement Stepper::Implementation::judged() const {
@@ -94,7 +127,7 @@ void Stepper::Implementation::judge() {
   const double last = options.acceptance > 1 ? detail::kLast : detail::kGood;
   const double most = std::max(accepted_residual(options), shortest() ? last : 0.0);
   part.failed = !solved && !(solution.error <= most);
-  if (part.failed && part.may_halve) return;
+  if (part.failed && part.now.halvings > 0) return;
   counts.accepted += !solved && !part.failed;
   counts.unsolved += part.failed;
   if (!solved) outcome.status = solution.status;

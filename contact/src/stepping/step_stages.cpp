@@ -20,8 +20,8 @@ void Stepper::Implementation::make_stages() {
   using I = Implementation;
   motion.list(bodies, joints.get(), options.gyroscopic);
   if (joints) add_stage("joints", &I::begin_joints);
-  const char* impact = restitution ? "restitution" : "collision";
-  if (solver) add_stage(impact, &I::remember_velocities);
+  const char* impact = restitution ? "restitution" : solver ? "collision" : "joints";
+  if (impacts) add_stage(impact, &I::remember_velocities);
   if (options.gravity) add_stage("gravity", &I::apply_gravity);
   if (falls()) add_stage("gravity", &I::remember_weight);
   after_forces = stages.size();
@@ -66,9 +66,9 @@ void Stepper::Implementation::make_stages() {
 
 void Stepper::Implementation::find_contacts() {
   if (options.team) options.team->place(bodies.position);
-  near->find(bodies, part.dt, contacts);
+  near->find(bodies, part.now.length, contacts);
   if (joints) leave_out_joined();
-  if (sleeping && sleeping->wake_touched(*near, bodies, *impacts, part.dt, contacts)) {
+  if (sleeping && sleeping->wake_touched(*near, bodies, *impacts, part.now.length, contacts)) {
     part.again = true;
     return;
   }
@@ -88,7 +88,7 @@ void Stepper::Implementation::set_gaps() {
     PointContact& c = contacts.points[k];
     const double size = c.r1.lpNorm<1>() + bodies.position[at(c.first)].lpNorm<1>();
     const double open = std::min(gap, 2 * (gap - kClosed * size));
-    c.bias = open > 0 ? open / part.dt : 0;
+    c.bias = open > 0 ? open / part.now.length : 0;
   }
 }
 
@@ -97,7 +97,7 @@ void Stepper::Implementation::set_gaps() {
 void Stepper::Implementation::meet_others() {
   for (int again = 0; again < 3 && !part.failed; ++again) {
     const std::size_t before = contacts.points.size();
-    if (!near->find_more(bodies, part.dt, contacts)) return;
+    if (!near->find_more(bodies, part.now.length, contacts)) return;
     if (joints) leave_out_joined();
     if (sleeping) sleeping->leave_out(contacts);
     leave_out_passive();
@@ -109,17 +109,17 @@ void Stepper::Implementation::meet_others() {
     choose_impacts();
     if (restitution) choose_bounces();
     solve_contacts();
-    if (part.failed && part.may_halve) return;
+    if (part.failed && part.now.halvings > 0) return;
     if (restitution) rebound();
     take_later_impacts();
   }
 }
 
 void Stepper::Implementation::hold_sleepers() {
-  sleeping->hold(impacts->coming(), part.dt, bodies);
+  sleeping->hold(impacts->coming(), part.now.length, bodies);
   if (!sleeping->take_changed()) return;
   near->set_resting(sleeping->asleep());
-  const WarmStart woken = sleeping->take_woken(part.dt);
+  const WarmStart woken = sleeping->take_woken(part.now.length);
   if (woken.ids.empty()) return;
   WarmStart start = solver->warm_start();
   start.ids.insert(start.ids.end(), woken.ids.begin(), woken.ids.end());
@@ -128,12 +128,13 @@ void Stepper::Implementation::hold_sleepers() {
 }
 
 void Stepper::Implementation::end_sleep() {
-  if (!part.failed && part.of_cut == false) sleeping->fall_asleep(part.dt, bodies, contacts);
-  sleeping->end(part.dt, bodies, contacts);
+  if (!part.failed && part.of_cut == false)
+    sleeping->fall_asleep(part.now.length, bodies, contacts);
+  sleeping->end(part.now.length, bodies, contacts);
 }
 
 void Stepper::Implementation::choose_impacts() {
-  impacts->choose(*near, bodies, part.dt, contacts);
+  impacts->choose(*near, bodies, part.now.length, contacts);
 }
 
 void Stepper::Implementation::solve_problem() {
@@ -156,7 +157,8 @@ void Stepper::Implementation::solve_contacts() {
   turned.reserve(contacts.points.capacity());
   turned = contacts.points;
   if (near)
-    mid_step.turn(*near, *impacts, bodies, joints.get(), options.gyroscopic, part.dt, turned);
+    mid_step.turn(*near, *impacts, bodies, joints.get(), options.gyroscopic, part.now.length,
+                  turned);
   solve_problem();
   if (shortest() && solution.status != Status::solved &&
       !(solution.error <= std::max(accepted_residual(options), detail::kGood))) {
@@ -165,7 +167,7 @@ void Stepper::Implementation::solve_contacts() {
     solver->set_options(detail::contact_options(options));
   }
   judge();
-  if (part.failed && part.may_halve) return;
+  if (part.failed && part.now.halvings > 0) return;
   for (const int i : motion.moving()) {
     bodies.motion[at(i)].velocity = solution.velocities[at(i)];
     bodies.motion[at(i)].angular_velocity = solution.angular_velocities[at(i)];
@@ -177,7 +179,7 @@ void Stepper::Implementation::solve_contacts() {
 void Stepper::Implementation::take_later_impacts() {
   if (impacts->list().empty()) return;
   const detail::LaterImpacts::Counts taken =
-      later->take(*near, *impacts, part.dt, bodies, contacts);
+      later->take(*near, *impacts, part.now.length, bodies, contacts);
   counts.contact_problems += taken.problems;
   counts.sweeps += taken.sweeps;
   counts.bounces += taken.bounces;
@@ -196,8 +198,17 @@ void Stepper::Implementation::leave_out_joined() {
   contacts.gaps.resize(kept);
 }
 
+// In parts, where their equations have no solution near the start of the iteration.
+void Stepper::Implementation::predict_joints() {
+  if (!part.joints_active) return;
+  if (joints->predict(bodies, part.now.start, part.now.length) && resolves_joints()) return;
+  part.unmet = part.now.joint_halvings > 0 && !part.unmeetable;
+  part.unmeetable = !part.unmet;
+}
+
 void Stepper::Implementation::move_joints() {
-  if (!part.joints_active || joints->move(bodies, part.start, part.dt, contacts)) return;
+  if (!part.joints_active || joints->move(bodies, part.now.start, part.now.length, contacts))
+    return;
   outcome.succeeded = outcome.joints_met = false;
 }
 

@@ -17,10 +17,7 @@ namespace tether::contact {
 void Stepper::Implementation::make_solvers() {
   const BodyOptions o = detail::contact_options(options);
   solver = std::make_unique<detail::StepSolver>(o);
-  if (!impacts)
-    impacts = std::make_unique<detail::Impacts>(
-        detail::threshold_speed(options.impact_threshold, options),
-        detail::threshold_speed(options.restitution_threshold, options));
+  make_impacts();
   const bool laws = joints && joints->has_laws();
   if ((near && near->any_restitution()) || laws)
     restitution = std::make_unique<detail::Restitution>(options.restitution_law, o);
@@ -46,6 +43,13 @@ void Stepper::Implementation::make_solvers() {
   later->set_laws(*joints);
   const bool together = options.simultaneous_impacts == SimultaneousImpacts::together;
   if (cuts && together) cuts->set_laws(*joints);
+}
+
+void Stepper::Implementation::make_impacts() {
+  if (!impacts)
+    impacts = std::make_unique<detail::Impacts>(
+        detail::threshold_speed(options.impact_threshold, options),
+        detail::threshold_speed(options.restitution_threshold, options));
 }
 
 void Stepper::Implementation::give_islands(detail::IslandMaker& maker) {
@@ -148,7 +152,7 @@ const std::vector<double>& Stepper::law_impulses() const {
   static const std::vector<double> none;
   return implementation_->joints ? implementation_->joints->law_impulses() : none;
 }
-double Stepper::last_part() const { return implementation_->part.dt; }
+double Stepper::last_part() const { return implementation_->part.now.length; }
 int Stepper::asleep() const {
   return implementation_->sleeping ? implementation_->sleeping->count() : 0;
 }
@@ -184,6 +188,7 @@ StepperMemory Stepper::memory() const {
   m.status = s.outcome.status;
   m.control = s.parts.control;
   m.drift = joint_drift();
+  if (s.joints) m.vibration = s.joints->vibration();
   if (s.cuts) m.cuts = s.cuts->kept();
   if (s.sleeping) m.sleep = s.sleeping->memory();
   return m;
@@ -212,7 +217,12 @@ void Stepper::set_memory(const StepperMemory& m) {
   s.outcome.status = m.status;
   s.parts.control = m.control;
   if (s.cuts) s.cuts->set_kept(std::clamp(m.cuts, 0.0, detail::StepCuts::kMostKept));
-  if (s.joints) s.joints->set_drift(m.drift);
+  if (s.joints) {
+    if (!m.vibration.mode.empty() && m.vibration.mode.size() != s.bodies.position.size())
+      throw std::invalid_argument("stepping: a memory of the joints of other bodies");
+    s.joints->set_drift(m.drift);
+    s.joints->set_vibration(m.vibration);
+  }
   if (!s.sleeping) return;
   if (m.sleep.bodies.empty())
     s.sleeping->wake_everybody();
@@ -228,6 +238,7 @@ void Stepper::start_anew(long steps, double late) {
   s.counts.steps = steps;
   s.late = late;
   s.parts.control = {};
+  if (s.joints) s.joints->set_vibration({});
   s.motion.spins().assign(s.motion.spins().size(), {});
   s.motion.turn_inertias(s.bodies);
   if (s.solver) s.make_solvers();  // nothing of the past is left

@@ -26,6 +26,15 @@ namespace detail {
 
 class RollingPart;
 
+/// A part of a step, and how often it may still be halved: where its contact problem is not solved,
+/// and where its joints cannot be met.
+struct SubStep {
+  double start = 0, length = 0;
+  int halvings = 0, joint_halvings = 0;
+
+  SubStep over(double from, double time) const { return {from, time, halvings, joint_halvings}; }
+};
+
 /// Bodies, at the start of a part of a step or at its end.
 struct PartState {
   std::vector<Eigen::Vector3d> position;
@@ -92,7 +101,7 @@ struct Stepper::Implementation {
   std::vector<Force> force;
   detail::FreeMotion motion;
 
-  // Only with meetings; the solver and impacts also with laws of joints.
+  // Only with meetings; impacts also with joints, the solver with laws of these.
   std::unique_ptr<detail::NearContacts> near;
   std::unique_ptr<detail::StepSolver> solver;
   std::unique_ptr<detail::Impacts> impacts;
@@ -110,11 +119,12 @@ struct Stepper::Implementation {
   std::unique_ptr<detail::JointPart> joints;     // only where they have been added
   std::unique_ptr<detail::RollingPart> rolling;  // only where a meeting names it
 
-  // The part of the step that is taken, from its start over dt.
+  // The part of the step that is taken.
   struct Part {
-    double start = 0, dt = 0;
-    bool may_halve = false, failed = false;
-    int cuts_left = 0;  // that it may be taken in parts for
+    detail::SubStep now;
+    bool failed = false;
+    bool unmet = false, unmeetable = false;  // joints; however short the part
+    int cuts_left = 0;                       // that it may be taken in parts for
     bool cut = false, of_cut = false, before_impact = false;
     bool in_cut = false;                  // of a step that is being cut
     std::vector<char> active;             // bodies that take part; empty: all
@@ -139,8 +149,11 @@ struct Stepper::Implementation {
   void give_islands(detail::IslandMaker& maker);
   void step();
   bool is_finite() const;
-  void advance(double time, double length, int halvings);
-  bool run_stages(double time);
+  detail::SubStep whole(double start, double length) const;
+  void advance(detail::SubStep s);
+  void take_halves(const detail::SubStep& s);
+  bool resolves_joints() const;
+  bool run_stages();
   void solve_problem();
   bool shortest() const;
   void remember_part(detail::PartState& p) const;
@@ -178,27 +191,26 @@ struct Stepper::Implementation {
   bool takes_part(int body) const { return part.active.empty() || part.active[at(body)] != 0; }
   void set_active(std::vector<char> active);
   void leave_out_passive();
-  void take_of_cut(double time, double dt, double length, int halvings);
-  double approach(double time, double length, int halvings);
-  void take_striking(double time, double length, int halvings);
-  void take_others(const detail::PartMark& start, const std::vector<char>& striking, double time,
-                   double length, int halvings);
-  void take_cut(double time, double length, int halvings);
-  void advance_cut(double time, double length, int halvings);
+  void take_of_cut(detail::SubStep s, double length);
+  double approach(detail::SubStep s);
+  void take_striking(detail::SubStep s);
+  void take_others(const detail::PartMark& start, const std::vector<char>& striking,
+                   detail::SubStep s);
+  void take_cut(detail::SubStep s);
+  void advance_cut(detail::SubStep s);
 
   void judge();
   detail::Judgement judged() const;
   void set_judged(const detail::Judgement& b);
 
+  void make_impacts();
   void remember_velocities() { impacts->remember(bodies); }
   void begin_joints() {
-    if (part.joints_active) joints->begin(bodies, part.start);
+    if (part.joints_active) joints->begin(bodies, part.now.start);
   }
-  void predict_joints() {
-    if (part.joints_active) joints->predict(bodies, part.start, part.dt);
-  }
+  void predict_joints();
   void put_back_joints() {
-    if (part.joints_active) joints->put_back(bodies, part.start);
+    if (part.joints_active) joints->put_back(bodies, part.now.start);
   }
   void leave_out_joined();
   void move_joints();
@@ -214,22 +226,24 @@ struct Stepper::Implementation {
   void rebound() { counts.bounces += restitution->apply(bodies, contacts); }
   void take_later_impacts();
   void meet_others();
-  void close_gaps() { positions->close_gaps(*impacts, part.dt, contacts, motion.moving(), bodies); }
-  void take_penetrations_back() {
-    positions->take_back(outcome.deepest, detail::negligible_depth(options, part.dt), part.dt,
-                         contacts, motion.moving(), bodies);
+  void close_gaps() {
+    positions->close_gaps(*impacts, part.now.length, contacts, motion.moving(), bodies);
   }
-  void apply_gravity() { motion.accelerate(part.dt * *options.gravity, bodies); }
-  void gyrate_explicit() { motion.gyrate_explicit(part.dt, bodies); }
-  void gyrate_implicit() { motion.gyrate_implicit(part.dt, bodies); }
-  void move() { motion.move(part.dt, bodies); }
+  void take_penetrations_back() {
+    positions->take_back(outcome.deepest, detail::negligible_depth(options, part.now.length),
+                         part.now.length, contacts, motion.moving(), bodies);
+  }
+  void apply_gravity() { motion.accelerate(part.now.length * *options.gravity, bodies); }
+  void gyrate_explicit() { motion.gyrate_explicit(part.now.length, bodies); }
+  void gyrate_implicit() { motion.gyrate_implicit(part.now.length, bodies); }
+  void move() { motion.move(part.now.length, bodies); }
   bool falls() const { return options.gravity && cuts; }
   void remember_weight() { motion.remember_weight(bodies); }
   void find_falling() { motion.find_falling(bodies); }
-  void fall() { motion.fall(*options.gravity, part.dt, contacts, bodies); }
-  void turn_round() { motion.turn_round(part.dt, bodies); }
-  void turn_plain() { motion.turn_plain(part.dt, bodies); }
-  void turn_keeping_momentum() { motion.turn_keeping_momentum(part.dt, bodies); }
+  void fall() { motion.fall(*options.gravity, part.now.length, contacts, bodies); }
+  void turn_round() { motion.turn_round(part.now.length, bodies); }
+  void turn_plain() { motion.turn_plain(part.now.length, bodies); }
+  void turn_keeping_momentum() { motion.turn_keeping_momentum(part.now.length, bodies); }
 };
 
 }  // namespace tether::contact

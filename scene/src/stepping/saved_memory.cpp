@@ -110,6 +110,18 @@ void get_sleep(std::istream& in, int bodies, StepperMemory::Sleep& sleep) {
   }
 }
 
+// As get_sleep.
+void get_vibration(std::istream& in, StepperMemory::Vibration& vibration) {
+  binary::get(in, vibration.frequency, vibration.acceleration);
+  for (const double x : {vibration.frequency, vibration.acceleration})
+    if (!(x >= 0) || !std::isfinite(x))
+      throw std::runtime_error("the saved state is damaged: joints vibrate at no frequency");
+  for (auto left = binary::get<std::uint64_t>(in); left > 0; --left) {
+    binary::get_array(in, vibration.mode.emplace_back());
+    demand_finite(vibration.mode.back());
+  }
+}
+
 }  // namespace
 
 void put_memory(std::ostream& out, const StepperMemory& m) {
@@ -125,6 +137,9 @@ void put_memory(std::ostream& out, const StepperMemory& m) {
   put(out, m.last);
   binary::put(out, m.penetration, m.residual, static_cast<std::int32_t>(m.status));
   binary::put(out, m.control.next, m.control.last, m.control.error, m.control.length, m.drift);
+  binary::put(out, m.vibration.frequency, m.vibration.acceleration,
+              static_cast<std::uint64_t>(m.vibration.mode.size()));
+  for (const contact::Vector6d& v : m.vibration.mode) binary::put_array(out, v);
   put(out, m.sleep);
   binary::put(out, m.cuts);
 }
@@ -156,6 +171,7 @@ StepperMemory get_memory(std::istream& in, int bodies) {
   binary::get(in, m.drift);
   if (!(m.drift >= 0) || !std::isfinite(m.drift))
     throw std::runtime_error("the saved state is damaged: joints are off by no length");
+  get_vibration(in, m.vibration);
   get_sleep(in, bodies, m.sleep);
   binary::get(in, m.cuts);
   if (!(m.cuts >= 0) || !std::isfinite(m.cuts))

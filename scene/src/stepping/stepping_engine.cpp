@@ -53,7 +53,7 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 }
 
 // The last letter is the format.
-constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '7'};
+constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '8'};
 // Of the step, and of the time: that of a boundary up to rounding.
 constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
 
@@ -136,8 +136,8 @@ void SteppingEngine::report_failure() const {
           time()));
   if (!stepper_.joints_met())
     throw SimulationError(fmt::format(
-        "t = {:g} s: the joints are not met at the end of the step, off by up to {:g} m or rad: "
-        "bodies turn too far in it; reduce stepping.step, or set "
+        "t = {:g} s: the joints are not met at the end of the step, off by up to {:g} m or rad, "
+        "also in its parts: bodies turn too far in them; reduce stepping.step, or set "
         "on_failure = \"warn\"",
         time(), stepper_.joint_drift()));
   const std::size_t contacts = stepper_.contacts().points.size();

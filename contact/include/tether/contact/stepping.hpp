@@ -208,7 +208,14 @@ struct StepperMemory {
     double next = 0, last = 0, error = 0, length = 0;
   } control;
   double drift = 0;  ///< of the joints, m or rad
-  double cuts = 0;   ///< that may still be made where there are many contacts, in problems
+  /// Fastest vibration of bodies across the forces of their joints: w, 1/s, and its velocities, of
+  /// all bodies; none: of no step yet. It goes with the root of the acceleration by joints, in the
+  /// norm of the kinetic energy, N^(1/2) m^(-1/2).
+  struct Vibration {
+    double frequency = 0, acceleration = 0;
+    std::vector<Vector6d> mode;
+  } vibration;
+  double cuts = 0;  ///< that may still be made where there are many contacts, in problems
   /// State of a body where any may sleep: how long it has been slow, s; its island, -1: awake;
   /// whether it fell asleep in this sub-step; accelerations by forces, as of now or of the sleep.
   struct Rest {

@@ -318,21 +318,29 @@ bool StepJoints::meet(BodySet& bodies, double t, double dt) {
   }
 }
 
-void StepJoints::predict(BodySet& bodies, double t, double dt) {
+bool StepJoints::predict(BodySet& bodies, double t, double dt) {
   take_velocities(bodies);
   start_ = v_;
   mechanisms_.satisfy(rows_, v_);
   bend_ = v_;
   store(bodies);
-  meet(bodies, t, dt);
+  const bool met = meet(bodies, t, dt);
   restore(bodies);
   give_velocities(bodies);
-  for (const int i : held_) bend_[at(i)] = v_[at(i)] - bend_[at(i)];
-  if (!has_laws_) return;
+  double sum = 0;
+  for (const int i : held_) {
+    bend_[at(i)] = v_[at(i)] - bend_[at(i)];
+    const Vector6d dv = v_[at(i)] - start_[at(i)];
+    sum += bodies.mass[at(i)] * dv.head<3>().squaredNorm() +
+           dv.tail<3>().dot(spin(bodies.inertia[at(i)], bodies.orientation[at(i)], dv.tail<3>()));
+  }
+  frequency_.follow(std::sqrt(sum) / dt);
+  if (!has_laws_) return met;
   laws_.laws.clear();
   equations_->add_laws(bodies, t, laws_.laws);
   check_laws(bodies);
   laws_.prepare(v_, dt, mechanisms_);
+  return met;
 }
 
 void StepJoints::put_back(BodySet& bodies, double t) {
@@ -425,6 +433,7 @@ bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& 
   store(bodies);
   bool met = meet(bodies, t, dt);
   find_impulses(bodies, contacts);
+  const double acceleration = mechanisms_.pull_norm() / dt;
   for (std::size_t k = 0; k < held_.size(); ++k) {
     const std::size_t i = at(held_[k]);
     bodies.motion[i].velocity = v_[i].head<3>();
@@ -444,6 +453,7 @@ bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& 
   drift_ = 0;
   for (const double g : row_.g)
     if (!(std::abs(g) <= drift_)) drift_ = std::isnan(drift_) ? drift_ : std::abs(g);
+  frequency_.update(*equations_, rows_, impulses_, acceleration, t + dt, dt, mechanisms_, bodies);
   return met && std::isfinite(drift_);
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "joint_frequency.hpp"
 #include "joints/law_rows.hpp"
 #include "stepping/motion/joint_part.hpp"
 
@@ -36,8 +37,9 @@ class StepJoints final : public JointPart {
   /// put back onto the joints by the least move, and their velocities. Throws std::invalid_argument
   /// on joints that contradict each other.
   void begin(BodySet& bodies, double t) override;
-  /// Before the contacts are solved: velocities that meet the joints at the end of the step.
-  void predict(BodySet& bodies, double t, double dt) override;
+  /// Before the contacts are solved: velocities that meet the joints at the end of the step. False:
+  /// these have not been found, as where the step is too long.
+  bool predict(BodySet& bodies, double t, double dt) override;
   const std::vector<Vector6d>& bend() const override { return bend_; }
   /// Where something has moved the bodies since begin(): the least move back onto the joints.
   void put_back(BodySet& bodies, double t) override;
@@ -58,6 +60,8 @@ class StepJoints final : public JointPart {
   /// Largest |g| at the end of the last step, m or rad.
   double drift() const override { return drift_; }
   void set_drift(double drift) override { drift_ = drift; }
+  const StepperMemory::Vibration& vibration() const override { return frequency_.memory(); }
+  void set_vibration(const StepperMemory::Vibration& v) override { frequency_.set_memory(v); }
   /// Impulses of the last step, by row.
   const std::vector<double>& impulses() const override { return impulses_; }
   void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
@@ -141,6 +145,7 @@ class StepJoints final : public JointPart {
   std::vector<int> under_laws_;
   std::vector<Place> place_;  // of held_, at the start of the step
   FactoredAt factored_;
+  JointFrequency frequency_;
   double drift_ = 0;
   double left_ = 0;  // of the last least_move(): what no move takes back, in its metric
 };

@@ -25,6 +25,7 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
         "Stepper::add_joints: limits, motors and friction of joints need restitution_law = newton");
   s.joints =
       std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
+  s.make_impacts();
   s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
   if (s.sleeping) s.sleeping->set_joints(*s.joints);
   if (s.solver || s.joints->has_laws()) s.make_solvers();

@@ -67,7 +67,8 @@ class JointPart : public IslandMaker {
   virtual bool are_joined(int first, int second) const = 0;
 
   virtual void begin(BodySet& bodies, double t) = 0;
-  virtual void predict(BodySet& bodies, double t, double dt) = 0;
+  /// False: the step is too long for them.
+  virtual bool predict(BodySet& bodies, double t, double dt) = 0;
   /// Of bodies that joints hold: what predict() has added for the joints to be met at the end of
   /// the step, beyond velocities that meet them at its start.
   virtual const std::vector<Vector6d>& bend() const = 0;
@@ -91,6 +92,9 @@ class JointPart : public IslandMaker {
   virtual const std::vector<double>& law_impulses() const = 0;
   virtual double drift() const = 0;
   virtual void set_drift(double drift) = 0;
+  /// Which steps have to resolve.
+  virtual const StepperMemory::Vibration& vibration() const = 0;
+  virtual void set_vibration(const StepperMemory::Vibration& vibration) = 0;
   virtual const std::vector<double>& impulses() const = 0;
   /// An impact has changed the velocities where the bodies are: impulses() are those that it takes.
   virtual void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,

@@ -1,0 +1,130 @@
+// Tether: how fast bodies vibrate across the forces of their joints. SPDX-License-Identifier:
+// BSD-3-Clause
+#include "joint_frequency.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tether/linalg/index.hpp>
+
+#include "stepping/motion/rotation.hpp"
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+
+namespace {
+
+using linalg::at;
+
+constexpr double kDifference = 1e-5;  // rad, and in parts of the size of what joints hold
+constexpr double kGrows = 1.05;       // w^2 in an iteration: goes on
+constexpr int kMostIterations = 10;   // in a step
+
+// Numbers of no pattern that modes could be orthogonal to: multiples of the golden ratio, modulo 1.
+Vector6d any_direction(int body) {
+  Vector6d out;
+  for (int k = 0; k < 6; ++k) {
+    const double x = 0.6180339887498949 * (6 * body + k + 1);
+    out[k] = x - std::floor(x) - 0.5;
+  }
+  return out;
+}
+
+// Radius of gyration about the common centre of mass.
+double size_of_all(const Mechanisms& mechanisms, const BodySet& bodies) {
+  double mass = 0, square = 0;
+  Vector3d centre = Vector3d::Zero();
+  for (int i = 0; i < bodies.size(); ++i) {
+    if (mechanisms.mechanism_of(i) < 0) continue;
+    mass += bodies.mass[at(i)];
+    centre += bodies.mass[at(i)] * bodies.position[at(i)];
+  }
+  centre /= mass;
+  for (int i = 0; i < bodies.size(); ++i)
+    if (mechanisms.mechanism_of(i) >= 0)
+      square += bodies.mass[at(i)] * (bodies.position[at(i)] - centre).squaredNorm() +
+                bodies.inertia[at(i)].trace();
+  return std::sqrt(square / mass);
+}
+
+}  // namespace
+
+// Along the mode; returns the factor of this.
+double JointFrequency::displace(const Mechanisms& mechanisms, BodySet& bodies) {
+  const double size = size_of_all(mechanisms, bodies);
+  double most = 0;
+  for (const Vector6d& v : memory_.mode)
+    most = std::max({most, v.head<3>().norm() / size, v.tail<3>().norm()});
+  const double factor = kDifference / most;
+  for (std::size_t i = 0; i < memory_.mode.size(); ++i) {
+    const Vector6d move = factor * memory_.mode[i];
+    if (move.isZero(0)) continue;
+    bodies.position[i] += move.head<3>();
+    bodies.orientation[i] = (exponential(move.tail<3>()) * bodies.orientation[i]).normalized();
+  }
+  return factor;
+}
+
+double JointFrequency::iterate(JointEquations& equations, const JointRows& rows,
+                               const std::vector<double>& impulses, double t, double dt,
+                               Mechanisms& mechanisms, BodySet& bodies) {
+  const double factor = displace(mechanisms, bodies);
+  displaced_.clear();
+  equations.add_rows(bodies, t, displaced_);
+  bodies.position = position_;
+  bodies.orientation = orientation_;
+  pull_.assign(bodies.position.size(), Vector6d::Zero());
+  for (int row = 0; row < std::min(rows.count(), displaced_.count()); ++row) {
+    const JointRows::Term* then = displaced_.begin(row);
+    for (const JointRows::Term* now = rows.begin(row);
+         now != rows.end(row) && then != displaced_.end(row); ++now, ++then)
+      pull_[at(now->body)] += impulses[at(row)] / (dt * factor) * (then->G - now->G);
+  }
+  double most = 0;
+  for (int m = 0; m < mechanisms.count(); ++m) {
+    const std::vector<int>& list = mechanisms[m].bodies();
+    u_.resize(at(mechanisms[m].entries()));
+    for (std::size_t k = 0; k < list.size(); ++k)
+      Eigen::Map<Vector6d, Eigen::Unaligned>(u_.data() + 6 * k) =
+          mechanisms.root(list[k]).transpose() * pull_[at(list[k])];
+    mechanisms[m].project(u_.data());
+    double square = 0;
+    for (const double x : u_) square += x * x;
+    const double norm = std::sqrt(square);
+    if (!(norm > 0) || !std::isfinite(norm)) continue;
+    most = std::max(most, norm);
+    for (double& x : u_) x /= norm;
+    for (const int body : list) memory_.mode[at(body)].setZero();
+    mechanisms.add(m, u_.data(), memory_.mode);
+  }
+  return most;
+}
+
+void JointFrequency::update(JointEquations& equations, const JointRows& rows,
+                            const std::vector<double>& impulses, double acceleration, double t,
+                            double dt, Mechanisms& mechanisms, BodySet& bodies) {
+  memory_.acceleration = acceleration;
+  position_ = bodies.position;
+  orientation_ = bodies.orientation;
+  if (memory_.mode.empty()) {
+    memory_.mode.assign(bodies.position.size(), Vector6d::Zero());
+    for (int i = 0; i < bodies.size(); ++i)
+      if (mechanisms.mechanism_of(i) >= 0)
+        memory_.mode[at(i)] = mechanisms.root(i) * any_direction(i);
+  }
+  double square = memory_.frequency * memory_.frequency;
+  for (int k = 0; k < kMostIterations; ++k) {
+    const double last = square;
+    square = iterate(equations, rows, impulses, t, dt, mechanisms, bodies);
+    if (!(square > kGrows * last)) break;
+  }
+  memory_.frequency = std::sqrt(square);
+}
+
+void JointFrequency::follow(double acceleration) {
+  if (!(memory_.acceleration > 0)) return;
+  memory_.frequency *= std::sqrt(acceleration / memory_.acceleration);
+  memory_.acceleration = acceleration;
+}
+
+}  // namespace tether::contact::detail

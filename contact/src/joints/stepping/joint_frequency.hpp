@@ -1,0 +1,43 @@
+// Tether: how fast bodies vibrate across the forces of their joints. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <tether/contact/joint_equations.hpp>
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "joints/mechanisms.hpp"
+
+namespace tether::contact::detail {
+
+/// Joint forces F that turn with the bodies act as springs across their direction: a link of mass m
+/// and length l that carries a load vibrates with w^2 = F / (m l). Impulses along the rows of the
+/// start of a step hold this for w dt < 2 only, as of any explicit step. The largest w^2 is that of
+/// P M^-1 d(G' F)/dx, with P the projection onto velocities that the joints allow: by the power
+/// method with differences of the rows, which goes on from step to step.
+class JointFrequency {
+ public:
+  /// At the end of a step of length dt, with the factors of its rows and their impulses.
+  void update(JointEquations& equations, const JointRows& rows, const std::vector<double>& impulses,
+              double acceleration, double t, double dt, Mechanisms& mechanisms, BodySet& bodies);
+  /// By what joints add in the step that begins.
+  void follow(double acceleration);
+
+  const StepperMemory::Vibration& memory() const { return memory_; }
+  void set_memory(const StepperMemory::Vibration& memory) { memory_ = memory; }
+
+ private:
+  double iterate(JointEquations& equations, const JointRows& rows,
+                 const std::vector<double>& impulses, double t, double dt, Mechanisms& mechanisms,
+                 BodySet& bodies);
+  double displace(const Mechanisms& mechanisms, BodySet& bodies);
+
+  StepperMemory::Vibration memory_;
+  std::vector<Eigen::Vector3d> position_;
+  std::vector<linalg::Quaternion> orientation_;
+  std::vector<Vector6d> pull_;
+  std::vector<double> u_;
+  JointRows displaced_;
+};
+
+}  // namespace tether::contact::detail
