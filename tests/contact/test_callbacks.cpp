@@ -1,5 +1,5 @@
-// Tether: forces, joints and collision routines of the caller that throw, or whose values are
-// wrong, at their k-th call in steps. SPDX-License-Identifier: BSD-3-Clause
+// Tether: forces and joints of the caller that throw, or whose values are wrong, at their k-th call
+// in steps. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -29,7 +29,7 @@ struct Spoiler {
 };
 
 struct Spoilers {
-  Spoiler force, values, rows, laws, collide;
+  Spoiler force, values, rows, laws;
   enum class Fault {
     throws,
     not_a_number,
@@ -89,26 +89,6 @@ class Hung : public tc::JointEquations {
   Vector3d arm_, pivot_;
 };
 
-// Boxes as spheres of 0.2 m.
-class Boxes : public tc::PairCollision {
- public:
-  explicit Boxes(Spoilers& spoil) : spoil_(spoil) {}
-  bool serves(tc::ShapeKind a, tc::ShapeKind b) const override {
-    return a == tc::ShapeKind::box && b == tc::ShapeKind::box;
-  }
-  void add(int, const tc::Shape&) override {}
-  void collide(int, const tc::Pose& a, int, const tc::Pose& b, double,
-               tc::NearPoints& out) override {
-    const bool now = spoil_.collide.now();
-    if (now) spoil_.raise();
-    const Vector3d d = a.position - b.position, n = d.normalized();
-    out.add(a.position - 0.1 * n, b.position + 0.1 * n, n, now ? kNan : d.norm() - 0.2, 0);
-  }
-
- private:
-  Spoilers& spoil_;
-};
-
 constexpr int kSteps = 12;
 
 tc::Stepper make(Spoilers& spoil, double accuracy) {
@@ -121,7 +101,7 @@ tc::Stepper make(Spoilers& spoil, double accuracy) {
   scene.box({0.2, 0.2, 0.2}, 1, {2, 0, 0.1});
   scene.box({0.2, 0.2, 0.2}, 1, {2.02, 0, 0.301});
   const int rod = scene.box({0.1, 0.2, 0.3}, 1, {5, 0, 1});
-  tc::Stepper stepper = scene.stepper(std::make_unique<Boxes>(spoil));
+  tc::Stepper stepper = scene.stepper();
   const Vector3d arm(0.2, 0, 0.1);
   stepper.add_joints(std::make_unique<Hung>(spoil, rod, 1, arm, Vector3d(Vector3d(5, 0, 1) + arm)));
   stepper.add_force("wind", [&spoil](tc::BodySet& bodies, double, double dt) {
@@ -149,8 +129,8 @@ TEST_CASE("callbacks of steps: an exception at the k-th call comes through, and 
     tc::Stepper whole = make(counted, accuracy);
     for (int k = 0; k < kSteps; ++k) whole.step();
     REQUIRE(whole.succeeded());
-    for (Spoiler Spoilers::*which : {&Spoilers::force, &Spoilers::values, &Spoilers::rows,
-                                     &Spoilers::laws, &Spoilers::collide}) {
+    for (Spoiler Spoilers::*which :
+         {&Spoilers::force, &Spoilers::values, &Spoilers::rows, &Spoilers::laws}) {
       const int calls = (counted.*which).calls;
       REQUIRE(calls >= kSteps);
       for (int k = 1; k <= calls; k += std::max(1, calls / 20)) {
@@ -190,7 +170,6 @@ TEST_CASE("callbacks of steps: what is wrong at the k-th call is refused by name
   };
   for (const Case& c :
        {Case{&Spoilers::force, Fault::not_a_number, "velocity(0) = nan"},
-        Case{&Spoilers::collide, Fault::not_a_number, "gap = nan"},
         Case{&Spoilers::rows, Fault::not_a_number, "rate = nan"},
         Case{&Spoilers::rows, Fault::other_count, "400 rows instead of 3"},
         Case{&Spoilers::rows, Fault::other_body, "is on other bodies than at first"},
