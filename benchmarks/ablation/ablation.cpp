@@ -1,13 +1,17 @@
 // Tether: steps, evaluations of F and end errors over all problems, as CSV.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// ablation > before.csv; change something; ablation > after.csv; compare.py before.csv after.csv
+// ablation [--without MECHANISM] [PROBLEM...]; ablation --mechanisms lists them. Those that are no
+// options can be switched off in builds with TETHER_ABLATION.
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <functional>
 #include <problems/link_chain.hpp>
 
+#include "ablation/others.hpp"
 #include "accuracy/catalogue.hpp"
+#include "host/mechanisms.hpp"
 #include "projection/run.hpp"
 
 using namespace tether;
@@ -18,35 +22,70 @@ constexpr double kTolerances[] = {1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7
 constexpr double kLongestSeconds = 20.0;
 constexpr int kMiddling = 12, kLarge = 100;  // unknowns
 
+using ida_projection::Options;
+
+struct Switch {
+  const char* name;
+  void (*off)(Options&);
+};
+constexpr Switch kOptions[] = {
+    {"local metric", [](Options& o) { o.metric = ida_projection::Metric::error_weights; }},
+    {"polish",
+     [](Options& o) {
+       o.extra_iterations = 0;
+       o.refresh_algebraic = false;
+     }},
+    {"smoothing in index 2", [](Options& o) { o.smooth_where_needed = false; }},
+    {"limit of the order", [](Options& o) { o.limit_order = false; }},
+    {"multipliers out of the error test", [](Options& o) { o.suppress_algebraic = false; }}};
+
 const char* size_class(int unknowns) {
   return unknowns >= kLarge ? "big" : unknowns > kMiddling ? "mid" : "small";
 }
 
-void run(const std::string& name, const problems::Problem& problem, double tolerance) {
+void run(const std::string& name, const problems::Problem& problem, double tolerance,
+         const Options& options, const char* group) {
   bench::Settings settings;
   settings.constraints =
       problem.sparse_constraints ? *problem.sparse_constraints : problem.recommended_constraints();
-  settings.options.print_fatal = settings.options.print_warnings = false;
+  settings.options = options;
   settings.limits.cpu_seconds = kLongestSeconds;
   const bench::Run result = bench::integrate(problem, tolerance, settings);
-  fmt::print("{},{},{:.0e},{},{},{},{:.6e},{}\n", name, problem.form, tolerance,
-             size_class(problem.size), result.steps, result.residuals, result.error,
-             result.failed ? 1 : 0);
+  fmt::print("{},{},{:.0e},{},{},{},{:.6e},{}\n", name, problem.form, tolerance, group,
+             result.steps, result.residuals, result.error, result.failed ? 1 : 0);
   std::fflush(stdout);
+}
+
+void list() {
+  for (const Switch& option : kOptions) fmt::print("{}\n", option.name);
+#ifdef TETHER_ABLATION
+  for (const char* name : ida_projection::kMechanismNames) fmt::print("{}\n", name);
+#endif
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> only(argv + 1, argv + argc);
+  std::vector<std::string> only(argv + 1, argv + argc);
+  if (!only.empty() && only[0] == "--mechanisms") return list(), 0;
+  Options options;
+  options.print_fatal = options.print_warnings = false;
+  if (only.size() > 1 && only[0] == "--without") {
+    setenv("TETHER_WITHOUT", only[1].c_str(), 1);
+    for (const Switch& option : kOptions)
+      if (only[1] == option.name) option.off(options);
+    only.erase(only.begin(), only.begin() + 2);
+  }
   fmt::print("problem,form,tolerance,class,steps,F,error,failed\n");
   for (const bench::Case& which : bench::catalogue(only, {"long pendulum"}))
     for (const problems::Problem& form : which.forms)
       for (const double tolerance : kTolerances)
-        if (form.index <= 2) run(which.name, form, tolerance);
+        if (form.index <= 2) run(which.name, form, tolerance, options, size_class(form.size));
   if (!only.empty()) return 0;
   for (const int links : {20, 50, 200})
     for (const double tolerance : {1e-4, 1e-6})
       run(fmt::format("chain of {}", links), problems::link_chain(links, links < 100 ? 0.5 : 0.2),
-          tolerance);
+          tolerance, options, "big");
+  for (const problems::Problem& other : bench::others())
+    for (const double tolerance : kTolerances) run(other.name, other, tolerance, options, "others");
 }

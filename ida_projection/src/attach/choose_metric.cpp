@@ -1,6 +1,7 @@
 // Tether: what becomes of moves to which stiff components answer. SPDX-License-Identifier:
 // BSD-3-Clause
 #include "attach/impl.hpp"
+#include "host/mechanisms.hpp"
 
 namespace tether::ida_projection {
 
@@ -18,7 +19,8 @@ bool Projection::Impl::asks_for_metric() const {
 // Moves to which stiff components answer excite them, and scales made of what they then do make
 // the next moves worse. True: they answer to the best move there is.
 bool Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
-  if (move.status != Status::success || !asks_for_metric()) return false;
+  if (!in_use(Mechanism::other_metric) || move.status != Status::success || !asks_for_metric())
+    return false;
   if (!metric_choice_.due()) return false;
   AnsweredMove at{move.length, polish_.answer(candidate)};
   if (at.answer < 0.0) return false;
@@ -53,7 +55,7 @@ AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
   const AnsweredMove its{other.length, moved ? polish_.answer(candidate) : -1.0};
   if (its.answer >= 0.0 && metric_choice_.prefers(its, present)) {
     move = other;
-    control_.expect_oscillations();
+    if (in_use(Mechanism::expected_oscillations)) control_.expect_oscillations();
     return its;
   }
   if (its.answer < 0.0) metric_choice_.found_none();

@@ -11,6 +11,7 @@
 
 #include "attach/impl.hpp"
 #include "attach/shortest.hpp"
+#include "host/mechanisms.hpp"
 
 namespace tether::ida_projection {
 
@@ -122,7 +123,8 @@ int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_
   if (flag != 0) return flag;
   const long steps = movers_.used != nullptr ? attempts_.steps : ida_.steps();
   const bool suppressed = run_.suppressed;
-  if (suppressed) control_.widen_test(candidate, polish_, attempts_.moved, steps);
+  if (in_use(Mechanism::widened_tolerance) && suppressed)
+    control_.widen_test(candidate, polish_, attempts_.moved, steps);
   control_.control(candidate, steps, run_.engaged, suppressed ? variables_.tested() : nullptr,
                    suppressed ? variables_.id() : nullptr);
   return 0;
@@ -137,10 +139,12 @@ int Projection::Impl::caught(Status outcome, const char* text) noexcept {
 int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup) {
   static const std::vector<int> none;
   const bool may_leave_out = run_.engaged && options_.suppress_algebraic;
-  corrector_.expect_followers(may_leave_out && !variables_.high_index() ? variables_.id()
-                                                                        : nullptr);
-  return corrector_.correct(candidate, tolerance, call_setup,
-                            may_leave_out ? variables_.undetermined() : none);
+  corrector_.expect_followers(
+      in_use(Mechanism::followers) && may_leave_out && !variables_.high_index() ? variables_.id()
+                                                                                : nullptr);
+  return corrector_.correct(
+      candidate, tolerance, call_setup,
+      may_leave_out && in_use(Mechanism::free_multipliers) ? variables_.undetermined() : none);
 }
 
 int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup) {
@@ -150,7 +154,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   }
   const bool may_be_high = !variables_.index_known() || variables_.high_index();
   if (movers_.used != nullptr && !run_.engaged && may_be_high &&
-      control_.in_trouble(attempts_.steps)) {
+      in_use(Mechanism::index_in_trouble) && control_.in_trouble(attempts_.steps)) {
     const Status engaged = engage_if_index_is_high(candidate);
     if (engaged != Status::success) return finish(engaged, movers_.used->message());
   }
@@ -190,7 +194,8 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
 
   const bool fresh = call_setup || !corrector_.has_setup();
   Move move = move_and_polish(at, step.cj, tolerance, fresh);
-  if (move.status == Status::success && !polish_.corrector_was_right() && !fresh) {
+  if (move.status == Status::success && in_use(Mechanism::repeated_correction) &&
+      !polish_.corrector_was_right() && !fresh) {
     // Old factors fooled IDA's convergence test, or serve no stiff move: correct again, with fresh
     // ones.
     ++statistics_.corrections_repeated;
@@ -216,7 +221,8 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
                                        bool fresh) {
   polish_.keep(candidate);
   const bool first = polishes_first() && polish_.add_newton_step(candidate, cj, tolerance);
-  if (first && !fresh && !polish_.corrector_was_right()) return {Status::success};
+  if (in_use(Mechanism::repeated_correction) && first && !fresh && !polish_.corrector_was_right())
+    return {Status::success};
   if (first) polish_.keep(candidate);
   Move move = movers_.used->move(candidate);
   if (move.capped) {
@@ -225,8 +231,8 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
   }
   const bool stiff = choose_metric(candidate, move);
   if (move.status != Status::success) return move;
-  const bool made =
-      stiff && stiff_move_.make(candidate, cj, polish_, *movers_.used, !attempts_.repeated);
+  const bool made = stiff && in_use(Mechanism::stiff_moves) &&
+                    stiff_move_.make(candidate, cj, polish_, *movers_.used, !attempts_.repeated);
   if (stiff && !fresh && !stiff_move_.trusted()) {
     polish_.doubt_corrector();
     return move;
@@ -245,7 +251,8 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 // The move takes back as well what an iteration before it has added: a solution less. Only where
 // nothing answers to moves: it would be left out.
 bool Projection::Impl::polishes_first() {
-  if (!movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))
+  if (!in_use(Mechanism::polish_first) ||
+      !movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))
     return false;  // few rows never do
   const bool silent = metric_choice_.calm() || !asks_for_metric();
   return silent && wants_polish(0.0);

@@ -4,6 +4,7 @@
 
 #include "attach/impl.hpp"
 #include "attach/shortest.hpp"
+#include "host/mechanisms.hpp"
 #include "watch/dead_point.hpp"
 
 namespace tether::ida_projection {
@@ -42,6 +43,7 @@ void Projection::Impl::look_at_start(const Move& move) {
 
 void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {
   if (attempts_.repeated || report_.warning() != Status::success) return;
+  if (!in_use(Mechanism::false_row_watch)) return;
   const std::string doubt =
       watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
                               polish_.corrected(), variables_, *movers_.used, corrector_);

@@ -7,6 +7,7 @@
 
 #include "attach/impl.hpp"
 #include "fast/quicken.hpp"
+#include "host/mechanisms.hpp"
 #include "start/forces.hpp"
 
 namespace tether::ida_projection {
@@ -71,8 +72,8 @@ void Projection::Impl::test_all_again() {
 // only after k + 2 steps of one size. Multipliers of index 2, which are rounding over h, fail it in
 // the first steps.
 void Projection::Impl::look_for_multipliers(const Candidate& candidate) {
-  const bool may = !run_.engaged && !variables_.index_known() && options_.suppress_algebraic &&
-                   candidate.base_entries != nullptr;
+  const bool may = in_use(Mechanism::early_index) && !run_.engaged && !variables_.index_known() &&
+                   options_.suppress_algebraic && candidate.base_entries != nullptr;
   if (!may || ida_.steps() >= kStart || ida_.error_test_failures() > 0) return;
   // IDA multiplies that by less than 1.
   if (!(N_VWrmsNorm(candidate.correction, candidate.weights) > 1.0)) return;
@@ -98,7 +99,7 @@ Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
 Care Projection::Impl::care_of_high_index(const Candidate& candidate) const {
   const N_Vector id = variables_.id();
   const Care usual{kAsideFromTest, kAsideFromTest};
-  if (variables_.undetermined().empty()) return usual;
+  if (!in_use(Mechanism::care) || variables_.undetermined().empty()) return usual;
   const double differential = N_VDotProd(id, id);
   if (constraints_.total_count() > (1.0 - kManyFree) * differential) return usual;
   const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
@@ -159,12 +160,12 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     const std::string index = too_high_index();
     if (!index.empty()) report_.warn(Status::doubtful, index);
   }
-  movers_.joined.join(candidate, cj);
+  if (in_use(Mechanism::joined_equations)) movers_.joined.join(candidate, cj);
   movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;
   const N_Vector moved = movers_.joined.moved_id();
   const Status structured = movers_.used->set_algebraic(candidate, moved);
-  if (structured == Status::success && moved == nullptr) {
+  if (in_use(Mechanism::forces_apart) && structured == Status::success && moved == nullptr) {
     movers_.used->split_forces([&](const RowChain& chain) {
       return are_forces(chain, candidate, corrector_, cj, statistics_);
     });

@@ -15,6 +15,7 @@
 // Krylov methods solve to a tolerance that suits IDA's own test: delta would be noise as long as
 // what it is to remove.
 #include "step/polish.hpp"
+#include "host/mechanisms.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -128,7 +129,8 @@ const double* Polish::response(const StepData& step) {
 }
 
 bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  if (may_foretell_ && foretell(candidate, cj, tolerance)) return true;
+  if (in_use(Mechanism::foretold_polish) && may_foretell_ && foretell(candidate, cj, tolerance))
+    return true;
   const bool asked = step_known_;
   if (!asked) {
     if (!newton_step_at_moved_point(candidate)) return false;

@@ -3,6 +3,7 @@
 #include "contiguous_mover.hpp"
 
 #include "attach/shortest.hpp"
+#include "host/mechanisms.hpp"
 
 namespace tether::ida_projection {
 
@@ -34,7 +35,7 @@ template <class Rows>
 void ContiguousMover<Rows>::doubt_levels(Status status) {
   const bool failed = status == Status::not_converged || status == Status::move_too_long ||
                       status == Status::inconsistent;
-  if (!failed || !rows_.levels_split()) return;
+  if (!in_use(Mechanism::joined_levels) || !failed || !rows_.levels_split()) return;
   rows_.join_levels();
   levels_joined_ = levels_joined_next_;
   levels_joined_next_ = std::min(2 * levels_joined_next_, 1 << 20);
@@ -59,6 +60,7 @@ bool ContiguousMover<Rows>::contradicts() {
 // make of it is far below the length at which moves begin.
 template <class Rows>
 bool ContiguousMover<Rows>::plainly_nothing() {
+  if (!in_use(Mechanism::looks)) return false;
   const FactorState& factors = rows_.factors;
   if (!factors.there || factors.thin || rows_.blocks.dropped_rows() || looks_ >= kLooks)
     return false;
@@ -121,7 +123,7 @@ bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
 // keeps by itself between the steps that need them.
 template <class Rows>
 bool ContiguousMover<Rows>::still_nothing(const Candidate& candidate, Move& result) {
-  if (nothing_in_row_ < kQuiet) return false;
+  if (!in_use(Mechanism::looks) || nothing_in_row_ < kQuiet) return false;
   result.status = rows_.value(candidate.t);
   if (result.status != Status::success) return true;
   result.looked = still_ = plainly_nothing();
@@ -171,7 +173,7 @@ bool ContiguousMover<Rows>::quick_move(const Candidate& candidate, Move& result)
   result.drift_before = result.drift_after = drift;
   bool solved = false;
   double length = 0.0;
-  if (!reused_) {
+  if (in_use(Mechanism::one_pass_move) && !reused_) {
     result.status = rows_.quick_solve(candidate.t, solved, length);
     if (result.status != Status::success) return true;
   }

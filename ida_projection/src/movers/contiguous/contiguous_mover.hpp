@@ -8,6 +8,7 @@
 #pragma once
 
 #include "factored_rows.hpp"
+#include "host/mechanisms.hpp"
 #include "movers/factor_wear.hpp"
 #include "movers/mover.hpp"
 
@@ -113,7 +114,9 @@ class ContiguousMover final : public Mover {
 
  private:
   void doubt_levels(Status status);
-  bool keeps_factors() const { return keeps_factors_ && rows_.factors.lasting; }
+  bool keeps_factors() const {
+    return in_use(Mechanism::kept_factors) && keeps_factors_ && rows_.factors.lasting;
+  }
   Status take_back(const Candidate& candidate, double previous);
   Status take_rest(const Candidate& candidate, double reach);
   Status factor(double t) {
@@ -126,7 +129,8 @@ class ContiguousMover final : public Mover {
   // is passed by what such moves are of rows that are about to depend on each other.
   void leave_rounding_out() {
     begins_ = begins_ && move_length_ <= kBarelyMoved;
-    if (keeps_factors_ && begins_) rows_.leave_rounding_out();
+    if (in_use(Mechanism::rounding_left_out) && keeps_factors_ && begins_)
+      rows_.leave_rounding_out();
   }
   double first_solve() { return rows_.first_solve(); }
   bool contradicts();

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "attach/shortest.hpp"
+#include "host/mechanisms.hpp"
 #include "rows/row_levels.hpp"
 
 namespace tether::ida_projection {
@@ -82,7 +83,8 @@ void FactoredRows<Rows>::join_levels() {
 
 template <class Rows>
 void FactoredRows<Rows>::look_for_rates() {
-  const bool wanted = options_.metric == Metric::local_correction && at.knows_rates();
+  const bool wanted = in_use(Mechanism::rate_limit) &&
+                      options_.metric == Metric::local_correction && at.knows_rates();
   const bool early = factored_ <= kEarly && rate_looks_ < kLevelLooks;
   if (!wanted || metric.by_rates() || !early) return;
   ++rate_looks_;
@@ -150,7 +152,8 @@ Status FactoredRows<Rows>::factor(double t) {
   }
   rows_known_ = false;
   factored_ = std::min(factored_ + 1, kEarly + 1);
-  const bool known = Rows::kKeepsRank && factors.lasting && factors.there;
+  const bool known =
+      in_use(Mechanism::kept_rank) && Rows::kKeepsRank && factors.lasting && factors.there;
   factors.there = false;
   weighed_ = false;
   most_d_ = -1.0;
@@ -209,7 +212,8 @@ bool FactoredRows<Rows>::decide() {
     if (!blocks.factor()) return false;
   }
   if (blocks.dropped_rows()) ++statistics_.rank_drops;
-  if constexpr (Rows::kThinRows) factors.thin = RowTrust::has_thin_rows(blocks.counted().solver);
+  if constexpr (Rows::kThinRows)
+    factors.thin = in_use(Mechanism::row_trust) && RowTrust::has_thin_rows(blocks.counted().solver);
   factors.lasting = !factors.thin;
   factors.decided = true;
   return true;

@@ -1,0 +1,13 @@
+// Tether: problems that no mechanism was made for. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <problems/problem.hpp>
+#include <vector>
+
+namespace tether::bench {
+
+/// Outputs of an arm, a titration, three bodies, a top in rotation matrices and a Toda lattice;
+/// rows without a Jacobian. References are runs of plain IDA at 1e-12.
+std::vector<problems::Problem> others();
+
+}  // namespace tether::bench

@@ -1,0 +1,79 @@
+// Tether: the mechanisms beyond the published method, by name. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#ifdef TETHER_ABLATION
+#include <cstdlib>
+#include <cstring>
+#endif
+
+namespace tether::ida_projection {
+
+/// Each has its row in benchmarks/results/ablation.md: what a run loses without it. Options switch
+/// the others: metric, polish, smoothing, limit of the order, index and suppression.
+enum class Mechanism {
+  repeated_correction,    ///< where old factors fooled IDA's convergence test
+  polish_first,           ///< of many rows: before the move
+  foretold_polish,        ///< from earlier ones, without an evaluation of F
+  followers,              ///< IDA's test waits for algebraic variables that follow
+  free_multipliers,       ///< those of index 2 are left out of IDA's convergence test
+  widened_tolerance,      ///< of algebraic variables that respond to moves
+  early_index,            ///< F is asked for its index at the first long correction
+  index_in_trouble,       ///< F is asked for its index where error tests fail
+  care,                   ///< smaller errors in index 2, by tolerance and order
+  row_trust,              ///< thin rows count only as far as C can be trusted
+  kept_rank,              ///< which rows are independent is found out now and then
+  kept_factors,           ///< factors of many sparse rows serve several steps
+  one_pass_move,          ///< few independent rows are factored and solved in one pass
+  looks,                  ///< rows that need no move are only evaluated
+  rounding_left_out,      ///< of g, in a start with many rows
+  rate_limit,             ///< scales of positions are at most h times those of velocities
+  other_metric,           ///< one scale for each level, where stiff components respond to moves
+  stiff_moves,            ///< moves by what F makes of them, where that is not enough
+  expected_oscillations,  ///< the order is limited after that
+  forces_apart,           ///< rows with forces are solved for these, once the others have moved
+  joined_levels,          ///< not where such a move has failed
+  joined_equations,       ///< of F, to rows that contain their algebraic variables
+  false_row_watch,        ///< rows that F does not keep are named
+  count
+};
+
+inline constexpr const char* kMechanismNames[] = {"repeated correction",
+                                                  "polish first",
+                                                  "foretold polish",
+                                                  "followers",
+                                                  "free multipliers",
+                                                  "widened tolerance",
+                                                  "early index",
+                                                  "index in trouble",
+                                                  "care",
+                                                  "row trust",
+                                                  "kept rank",
+                                                  "kept factors",
+                                                  "one-pass move",
+                                                  "looks",
+                                                  "rounding left out",
+                                                  "rate limit",
+                                                  "other metric",
+                                                  "stiff moves",
+                                                  "expected oscillations",
+                                                  "forces apart",
+                                                  "joined levels",
+                                                  "joined equations",
+                                                  "false-row watch"};
+static_assert(sizeof kMechanismNames / sizeof *kMechanismNames ==
+              static_cast<std::size_t>(Mechanism::count));
+
+#ifdef TETHER_ABLATION
+/// The environment variable TETHER_WITHOUT names one that is not.
+inline bool in_use(Mechanism mechanism) {
+  static const char* const without = std::getenv("TETHER_WITHOUT");
+  return without == nullptr ||
+         std::strcmp(without, kMechanismNames[static_cast<std::size_t>(mechanism)]) != 0;
+}
+#else
+constexpr bool in_use(Mechanism) { return true; }
+#endif
+
+}  // namespace tether::ida_projection
