@@ -1,14 +1,7 @@
-// Tether: which forces a scene asks for, and their sums. SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
+// Tether: sums of forces. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/scene/engine.hpp>
 
 namespace tether::scene {
-
-bool asks_for_forces(const Scene& scene) {
-  return scene.output.forces ||
-         std::any_of(scene.expect.begin(), scene.expect.end(),
-                     [](const Expect& each) { return is_force(each.quantity); });
-}
 
 Forces Engine::forces() const {
   throw SimulationError(std::string("the ") + name() + " engine does not tell forces");

@@ -257,7 +257,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const Scene scene = scene_of(data[0] % std::size(kScenes));
   const std::string content(reinterpret_cast<const char*>(data) + 1, size - 1);
-  write_state(state_file().path(), hash_of_motion(scene), content);
+  write_state(state_file().path(), hash_of_motion(scene, make_plan(scene)), content);
   RunOptions options;
   options.restart = state_file().path();
   bool finite = true;
@@ -295,7 +295,7 @@ std::vector<std::string> own_corpus() {
     scene.output.state = state_file().path();
     run(scene);
     out.push_back(std::string(1, static_cast<char>(k)) +
-                  content_of(scene.output.state, hash_of_motion(scene)));
+                  content_of(scene.output.state, hash_of_motion(scene, make_plan(scene))));
   }
   return out;
 }

@@ -56,7 +56,7 @@ void check_wanted(const std::string& text, const ClosedForm& truth, std::size_t 
     if (row == nullptr) continue;
     ++named;
     Scene chosen = costs::with_setting(scene, row->method, row->setting);
-    chosen.output.every = row->method == Method::steps ? row->setting : scene.end / 1999;
+    chosen.output.every = row->method == CostMethod::steps ? row->setting : scene.end / 1999;
     const double error = true_error(chosen, truth);
     INFO("wanted " << wanted << ": " << name(row->method) << " " << row->setting << ", said "
                    << row->error << ", true " << error);
@@ -64,7 +64,7 @@ void check_wanted(const std::string& text, const ClosedForm& truth, std::size_t 
   }
   CHECK(named >= least);
   for (const CostRow& row : table.rows) {
-    if (row.method != Method::steps || !row.failure.empty()) continue;
+    if (row.method != CostMethod::steps || !row.failure.empty()) continue;
     const double error =
         true_error(scene.stepping ? scene : costs::with_setting(scene, row.method, row.setting),
                    row.setting, truth);
@@ -197,8 +197,8 @@ TEST_CASE("cost compares what the scene's law allows, and says why not") {
       "\"a\"]\nrestitution = 0.5\n";
   const CostTable all = cost(parse_scene("[scene]\n" + kHead + ball, "test"), few);
   REQUIRE(all.rows.size() == 3);
-  CHECK(all.rows[0].method == Method::events);
-  CHECK(all.rows[2].method == Method::steps);
+  CHECK(all.rows[0].method == CostMethod::events);
+  CHECK(all.rows[2].method == CostMethod::steps);
   CHECK(all.reference.find("events") != std::string::npos);
   const CostTable other = cost(
       parse_scene("[scene]\n" + kHead + "restitution_law = \"poisson\"\n" + ball, "test"), few);

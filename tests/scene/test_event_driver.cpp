@@ -152,7 +152,7 @@ TEST_CASE("event: a contact of a state slides in a direction, or the state is re
   const auto engine = make_engine(scene);
   engine->advance(0.1);  // the contact is open, and has no direction
   const std::string state = saved(*engine);
-  const std::size_t contact = state.size() - (2 * 4 + 7 * 8 + 3 * 4);
+  const std::size_t contact = state.size() - (2 * 4 + 7 * 8 + 2 * 4 + 1);
   for (const std::int32_t mode : {2, 3, -1}) {
     std::istringstream in(with(state, contact, mode));
     CHECK_THROWS_WITH(make_engine(scene)->restore(in), Catch::Contains("damaged"));
@@ -215,9 +215,9 @@ TEST_CASE("event: a state of another format is refused by name") {
   const auto engine = make_engine(scene);
   engine->advance(0.3);
   std::string state = saved(*engine);
-  const std::size_t format = state.find("event  5");
+  const std::size_t format = state.find("event  6");
   REQUIRE(format != std::string::npos);
-  for (const char other : {'4', '6'}) {
+  for (const char other : {'5', '7'}) {
     state[format + 7] = other;
     std::istringstream in(state);
     CHECK_THROWS_WITH(engine->restore(in), Catch::Contains("not a state of the event engine"));

@@ -4,7 +4,7 @@
 
 #include "event/resumable.hpp"
 #include "event_runs.hpp"
-#include "record/recorder.hpp"
+#include "record/formats.hpp"
 #include "run_files.hpp"
 
 using namespace event_runs;
@@ -254,18 +254,21 @@ TEST_CASE("hand-over: a state with times or counts that no run has is refused") 
 TEST_CASE("hand-over: tables say when steps had the run, and when events went on") {
   Scene scene = box_and_ball(1e-3);
   const std::filesystem::path folder = tether::test::folder("hand_over_tables");
-  const std::string csv = (folder / "a.csv").string(), events = (folder / "b.csv").string();
+  const std::string csv = (folder / "a.csv").string(), events = (folder / "a.events.csv").string();
   const auto engine = engine_that_gives_up(scene, {0.24});
   {
-    const auto states = make_csv_recorder(scene, csv, energy(*engine), {});
-    const auto table = make_event_recorder(scene, events, {}, 0);
+    const Plan plan = make_plan(scene);
+    const Resume from_start;
+    const Processes alone;
+    formats::Recorders recorders;
+    formats::all().front()->add_recorders(  // csv
+        csv, {scene, plan, from_start, alone, energy(*engine), 0}, recorders);
     for (const double t : {0.1, 0.25, 1.5}) {
       engine->advance(t);
-      for (Recorder* each : {states.get(), table.get()})
-        each->record(*engine, engine->diagnostics());
+      for (const auto& each : recorders) each->record(*engine, engine->diagnostics());
     }
     std::vector<std::string> written, remarks;
-    for (Recorder* each : {states.get(), table.get()}) each->finish(written, remarks);
+    for (const auto& each : recorders) each->finish(written, remarks);
   }
   const std::string rows = tether::test::content(events);
   CHECK(rows.find(",hand_over,,,") < rows.find(",resume,,,"));

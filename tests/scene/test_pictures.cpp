@@ -68,7 +68,7 @@ bool has(const std::vector<Text>& texts, const std::string& words) {
   return false;
 }
 
-CostRow row(Method method, double setting, double error, double seconds) {
+CostRow row(CostMethod method, double setting, double error, double seconds) {
   CostRow out;
   out.method = method;
   out.setting = setting;
@@ -90,9 +90,9 @@ TEST_CASE("texts of a picture of costs are apart wherever its points lie") {
     double factor = 1;
     for (int k = 0; k < 6; ++k, factor *= 0.1) {
       const double errors = std::pow(factor, spread), times = std::pow(factor, -0.5 * spread);
-      table.rows.push_back(row(Method::events, 1e-3 * factor, 1e-3 * errors, 1e-3 * times));
-      table.rows.push_back(row(Method::steps, 1e-3 / (k + 1), 2e-3 * errors, 1.1e-3 * times));
-      table.rows.push_back(row(Method::accuracy, 1e-2 * factor, 1e-3 * errors, 1e-3 * times));
+      table.rows.push_back(row(CostMethod::events, 1e-3 * factor, 1e-3 * errors, 1e-3 * times));
+      table.rows.push_back(row(CostMethod::steps, 1e-3 / (k + 1), 2e-3 * errors, 1.1e-3 * times));
+      table.rows.push_back(row(CostMethod::accuracy, 1e-2 * factor, 1e-3 * errors, 1e-3 * times));
     }
     INFO("spread " << spread);
     const std::vector<Text> texts = texts_of(cost_picture(scene, table, 1e-4));
@@ -114,7 +114,7 @@ TEST_CASE("a picture of costs takes any name and any table") {
   scene.name = "a < b & \"c\" </svg> \xff\xc3\x28\xed\xa0\x80\x01 \xc3\xa9";
   CostTable table;
   CHECK(has(texts_of(cost_picture(scene, table)), "no run got through"));
-  table.rows.push_back(row(Method::smooth, 1e-6, 0, 0));
+  table.rows.push_back(row(CostMethod::smooth, 1e-6, 0, 0));
   const std::vector<Text> texts = texts_of(cost_picture(scene, table));
   CHECK(texts.front().words.find("a < b & \"c\" </svg> ") == 0);
   CHECK(texts.front().words.find("\xc3\xa9: what") != std::string::npos);
@@ -135,7 +135,8 @@ TEST_CASE("a picture of numbers at the ends of their range comes to its end") {
     for (const double most : {5e-324, 1.0, 1e300, 1e308}) {
       CAPTURE(least, most);
       CostTable table;
-      table.rows = {row(Method::steps, 1e-3, least, least), row(Method::steps, 1e-4, most, most)};
+      table.rows = {row(CostMethod::steps, 1e-3, least, least),
+                    row(CostMethod::steps, 1e-4, most, most)};
       CHECK(has(texts_of(cost_picture(scene, table)), "largest error / m, rad"));
       for (const bool logarithmic : {false, true}) {
         const picture::Range range = picture::range_of({least, -most, most}, logarithmic);

@@ -17,14 +17,14 @@ namespace {
 using namespace costs;
 
 struct Setting {
-  Method method;
+  CostMethod method;
   double value;
 };
 
-Method method_of(EngineKind engine) {
-  return engine == EngineKind::smooth  ? Method::smooth
-         : engine == EngineKind::event ? Method::events
-                                       : Method::steps;
+CostMethod method_of(EngineKind engine) {
+  return engine == EngineKind::smooth  ? CostMethod::smooth
+         : engine == EngineKind::event ? CostMethod::events
+                                       : CostMethod::steps;
 }
 
 /// Why the event engine does not move the same problem; empty: it does.
@@ -40,16 +40,16 @@ std::string no_events(const Scene& scene, const Plan& plan) {
   return {};
 }
 
-std::vector<double> default_settings(const Scene& scene, Method method) {
+std::vector<double> default_settings(const Scene& scene, CostMethod method) {
   const double step = step_of(scene);
   switch (method) {
-    case Method::smooth:
+    case CostMethod::smooth:
       return {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
-    case Method::events:
+    case CostMethod::events:
       return {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
-    case Method::accuracy:
+    case CostMethod::accuracy:
       return {1e-2, 1e-3, 1e-4, 1e-5};
-    case Method::steps:
+    case CostMethod::steps:
       break;
   }
   return {8 * step, 4 * step, 2 * step, step, step / 2, step / 4};
@@ -58,33 +58,33 @@ std::vector<double> default_settings(const Scene& scene, Method method) {
 std::vector<Setting> settings_of(const Scene& scene, const Plan& plan, bool events,
                                  const CostOptions& options) {
   std::vector<Setting> out;
-  const auto add = [&](Method method, std::vector<double> values) {
+  const auto add = [&](CostMethod method, std::vector<double> values) {
     std::sort(values.begin(), values.end(), std::greater<>());
     for (const double each : values) {
       if (!(each > 0) || !std::isfinite(each))
         throw std::invalid_argument(
             fmt::format("a tolerance or time step must be > 0, not {}", each));
-      if (method == Method::steps && !(scene.end / each <= kMostSteps))
+      if (method == CostMethod::steps && !(scene.end / each <= kMostSteps))
         throw std::invalid_argument(
             fmt::format("time step {}: end / step must be at most {:g}, the end is {} s", each,
                         kMostSteps, scene.end));
       out.push_back({method, each});
     }
   };
-  const Method planned = method_of(plan.engine);
+  const CostMethod planned = method_of(plan.engine);
   const bool all =
       options.tolerances.empty() && options.steps.empty() && options.accuracies.empty();
   if (!options.settings.empty()) {
     add(planned, options.settings);
-  } else if (planned == Method::smooth) {
+  } else if (planned == CostMethod::smooth) {
     add(planned, all ? default_settings(scene, planned) : options.tolerances);
   } else {
-    const auto take = [&](Method method, const std::vector<double>& values) {
+    const auto take = [&](CostMethod method, const std::vector<double>& values) {
       add(method, all ? default_settings(scene, method) : values);
     };
-    if (events) take(Method::events, options.tolerances);
-    take(Method::steps, options.steps);
-    if (plan.pairs > 0) take(Method::accuracy, options.accuracies);
+    if (events) take(CostMethod::events, options.tolerances);
+    take(CostMethod::steps, options.steps);
+    if (plan.pairs > 0) take(CostMethod::accuracy, options.accuracies);
   }
   return out;
 }
@@ -108,8 +108,9 @@ Reference reference_of(const Scene& scene, const Plan& plan, bool events, double
 
 // Where steps end there is a state to compare; what impacts leave there may last a few steps only.
 std::vector<double> times_of(const Scene& scene, Setting setting, const CostOptions& options) {
-  if (setting.method == Method::steps) return step_ends(scene, setting.value, options.samples);
-  if (setting.method == Method::accuracy) return step_ends(scene, step_of(scene), options.samples);
+  if (setting.method == CostMethod::steps) return step_ends(scene, setting.value, options.samples);
+  if (setting.method == CostMethod::accuracy)
+    return step_ends(scene, step_of(scene), options.samples);
   return equal_times(scene.end, options.samples);
 }
 
@@ -146,24 +147,24 @@ CostRow measure_row(const Scene& scene, Setting setting, const std::vector<doubl
 
 }  // namespace
 
-const char* name(Method method) {
+const char* name(CostMethod method) {
   switch (method) {
-    case Method::smooth:
+    case CostMethod::smooth:
       return "smooth";
-    case Method::events:
+    case CostMethod::events:
       return "events";
-    case Method::steps:
+    case CostMethod::steps:
       return "steps";
-    case Method::accuracy:
+    case CostMethod::accuracy:
       return "accuracy";
   }
   return "?";
 }
 
-const char* setting_name(Method method) {
-  return method == Method::steps      ? "step / s"
-         : method == Method::accuracy ? "accuracy"
-                                      : "tolerance";
+const char* setting_name(CostMethod method) {
+  return method == CostMethod::steps      ? "step / s"
+         : method == CostMethod::accuracy ? "accuracy"
+                                          : "tolerance";
 }
 
 const CostRow* CostTable::cheapest(double wanted) const {
@@ -186,7 +187,7 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
   const std::vector<Setting> settings = settings_of(scene, plan, events, options);
   double finest_step = step_of(scene) / 4;
   for (const Setting& each : settings)  // the last one of them is the finest
-    if (each.method == Method::steps) finest_step = each.value;
+    if (each.method == CostMethod::steps) finest_step = each.value;
   int done = 0;
   const auto tell = [&](const std::string& what) {
     if (options.progress) options.progress(what, done++, 1 + static_cast<int>(settings.size()));
@@ -208,7 +209,7 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
       table.reference_setting = options.reference.value_or(finest_step / 4);
     for (const Setting& each : settings) {
       tell(fmt::format("{} {:g}", name(each.method), each.value));
-      const bool any = each.method == Method::events;
+      const bool any = each.method == CostMethod::events;
       table.rows.push_back(measure_row(with_setting(scene, each.method, each.value), each,
                                        any ? times.own : times_of(scene, each, options), options,
                                        reference));

@@ -14,10 +14,10 @@ namespace {
 
 using namespace player;
 
-const char* option_of(Method method) {
-  return method == Method::steps      ? "--time-steps"
-         : method == Method::accuracy ? "--accuracies"
-                                      : "--tolerances";
+const char* option_of(CostMethod method) {
+  return method == CostMethod::steps      ? "--time-steps"
+         : method == CostMethod::accuracy ? "--accuracies"
+                                          : "--tolerances";
 }
 
 /// One word of a command line.

@@ -20,15 +20,15 @@ constexpr double kLeast = 1e-17;  // an error of zero has no logarithm
 constexpr std::array<const char*, 4> kMethodColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
 
 /// Shapes tell methods apart where colours do not.
-void draw_mark(Canvas& canvas, Method method, const Vector2d& p) {
+void draw_mark(Canvas& canvas, CostMethod method, const Vector2d& p) {
   constexpr double r = 4;
   const std::string colour = kMethodColours[static_cast<std::size_t>(method)];
   const Pen edge{"#ffffff", 0.8, ""};
-  if (method == Method::steps)
+  if (method == CostMethod::steps)
     canvas.polygon(
         {p + Vector2d(-r, -r), p + Vector2d(r, -r), p + Vector2d(r, r), p + Vector2d(-r, r)},
         colour, edge);
-  else if (method == Method::accuracy)
+  else if (method == CostMethod::accuracy)
     canvas.polygon({p + Vector2d(0, -1.3 * r), p + Vector2d(1.2 * r, r), p + Vector2d(-1.2 * r, r)},
                    colour, edge);
   else

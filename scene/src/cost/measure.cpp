@@ -116,11 +116,11 @@ double step_of(const Scene& scene) {
   return scene.stepping ? scene.stepping->step : std::min(SteppingOptions{}.step, 1e-3 * scene.end);
 }
 
-Scene with_setting(const Scene& scene, Method method, double setting) {
+Scene with_setting(const Scene& scene, CostMethod method, double setting) {
   Scene out = scene;
   out.output = Output{};
   out.output.every = out.end;  // records cost time
-  if (method == Method::smooth) {
+  if (method == CostMethod::smooth) {
     out.smooth = scene.smooth.value_or(SmoothOptions{});
     out.smooth->tolerance = setting;
     return out;
@@ -128,7 +128,7 @@ Scene with_setting(const Scene& scene, Method method, double setting) {
   out.engine = EngineChoice::automatic;
   out.event.reset();
   out.stepping.reset();
-  if (method == Method::events) {
+  if (method == CostMethod::events) {
     out.event = scene.event.value_or(EventOptions{});
     out.event->otherwise = Otherwise::stop;
     out.event->tolerance = setting;
@@ -137,8 +137,8 @@ Scene with_setting(const Scene& scene, Method method, double setting) {
     return out;
   }
   out.stepping = scene.stepping.value_or(SteppingOptions{});
-  out.stepping->step = method == Method::steps ? setting : step_of(scene);
-  out.stepping->accuracy = method == Method::steps ? 0 : setting;
+  out.stepping->step = method == CostMethod::steps ? setting : step_of(scene);
+  out.stepping->accuracy = method == CostMethod::steps ? 0 : setting;
   return out;
 }
 

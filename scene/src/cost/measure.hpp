@@ -41,7 +41,7 @@ constexpr int kMostPoses = 50000;
 std::vector<double> merged(const std::vector<double>& a, const std::vector<double>& b);
 
 /// The scene with one setting, and nothing written.
-Scene with_setting(const Scene& scene, Method method, double setting);
+Scene with_setting(const Scene& scene, CostMethod method, double setting);
 
 /// Of a scene without [stepping]: a thousandth of the time, at most the default.
 double step_of(const Scene& scene);

@@ -14,7 +14,7 @@ constexpr int kReferenceSteps = 20000;  // between two stops; then it is given u
 
 /// Plain IDA in the form that differentiates everything, which drifts least at tight tolerances.
 Scene plain(const Scene& scene, double tolerance) {
-  Scene out = with_setting(scene, Method::smooth, tolerance);
+  Scene out = with_setting(scene, CostMethod::smooth, tolerance);
   out.smooth->projection = false;
   out.smooth->formulation = Formulation::index0;
   for (Invariant& each : out.invariants) each.project = false;
@@ -23,7 +23,7 @@ Scene plain(const Scene& scene, double tolerance) {
 }
 
 Scene projected(const Scene& scene, double tolerance) {
-  Scene out = with_setting(scene, Method::smooth, tolerance);
+  Scene out = with_setting(scene, CostMethod::smooth, tolerance);
   out.smooth->max_steps = std::min(out.smooth->max_steps, kReferenceSteps);
   return out;
 }
@@ -99,7 +99,7 @@ Reference stepping_reference(const Scene& scene, double step, const Times& times
   std::vector<Samples> runs;
   for (int k = 0; k < kRuns; ++k) {
     const double h = step * (1 << k);
-    Scene each = with_setting(scene, Method::steps, h);
+    Scene each = with_setting(scene, CostMethod::steps, h);
     if (k > 0) each.stepping->on_failure = OnFailure::warn;
     const Measured m = measure_once(each, times.all, options);
     if (!m.result.failure.empty())
@@ -135,9 +135,9 @@ std::optional<Reference> event_reference(const Scene& scene, double tolerance, c
   constexpr int kTries = 3;
   for (int k = 0; k < kTries; ++k, tolerance *= 10) {
     const Measured tight =
-        measure_once(with_setting(scene, Method::events, tolerance), times.all, options);
+        measure_once(with_setting(scene, CostMethod::events, tolerance), times.all, options);
     const Measured loose =
-        measure_once(with_setting(scene, Method::events, 10 * tolerance), times.all, options);
+        measure_once(with_setting(scene, CostMethod::events, 10 * tolerance), times.all, options);
     if (!tight.result.failure.empty() || !loose.result.failure.empty()) continue;
     Reference out;
     out.samples = tight.samples;

@@ -103,9 +103,7 @@ class CentralGravityEffect : public Effect {
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const std::size_t count = scene.central_gravity.size();
-    if (count > 0)
-      lines.push_back(
-          {"central gravity", fmt::format("{} centre{}", count, count == 1 ? "" : "s")});
+    if (count > 0) lines.push_back({"central gravity", counted(count, "centre")});
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
     each(scene, [&](double distance, double) { length.take(distance); });

@@ -50,9 +50,8 @@ class ContactEffect : public Effect {
     std::size_t triangles = 0;
     for (const Body& body : scene.bodies)
       for (const Shape& shape : body.shapes) triangles += shape.triangles.size();
-    std::string detail = fmt::format("{} pair{} of materials", count, count == 1 ? "" : "s");
-    if (triangles > 0)
-      detail += fmt::format(", {} triangle{}", triangles, triangles == 1 ? "" : "s");
+    std::string detail = counted(count, "pair") + " of materials";
+    if (triangles > 0) detail += ", " + counted(triangles, "triangle");
     lines.push_back({"contact", detail});
   }
   void add_columns(const Scene& scene, std::vector<Column>& columns) const override {

@@ -199,8 +199,8 @@ class LoadEffect : public Effect {
     if (count > 0)
       lines.push_back(
           {"loads",
-           fmt::format("{} load{}{}", count, count == 1 ? "" : "s",
-                       in_time > 0 ? fmt::format(", {} of them change with time", in_time) : "")});
+           counted(count, "load") +
+               (in_time > 0 ? fmt::format(", {} of them change with time", in_time) : "")});
   }
   void take_rates(const Scene& scene, double length, double mass, Largest& rate) const override {
     for (const Load& load : scene.loads) {

@@ -274,10 +274,8 @@ class SpringEffect : public Effect {
       springs += pulls(each);
       dampers += damps(each);
     }
-    if (springs > 0)
-      lines.push_back({"springs", fmt::format("{} spring{}", springs, springs == 1 ? "" : "s")});
-    if (dampers > 0)
-      lines.push_back({"dampers", fmt::format("{} damper{}", dampers, dampers == 1 ? "" : "s")});
+    if (springs > 0) lines.push_back({"springs", counted(springs, "spring")});
+    if (dampers > 0) lines.push_back({"dampers", counted(dampers, "damper")});
   }
   void add_columns(const Scene& scene, std::vector<Column>& columns) const override {
     if (!scene.output.forces) return;
@@ -287,13 +285,9 @@ class SpringEffect : public Effect {
            [i](const Diagnostics&, const Forces& f) { return f.springs[i].tension; }});
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
-    const auto arm = [&](int body, const Vector3d& point) {
-      if (body < 0 || scene.bodies[at(body)].fixed) return;
-      length.take((point - scene.bodies[at(body)].position).norm());
-    };
     for (const Spring& spring : scene.springs) {
-      arm(spring.first, spring.at);
-      arm(spring.second, spring.at_second);
+      take_arm(scene, spring.first, spring.at, length);
+      take_arm(scene, spring.second, spring.at_second, length);
       length.take((spring.at - spring.at_second).norm());
     }
   }

@@ -10,6 +10,7 @@
 #include <tether/scene/engine.hpp>
 
 #include "local_tolerance.hpp"
+#include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {
 
@@ -58,7 +59,6 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   if (!move_onto_constraints(motion_, local_, t, y_))
     throw std::invalid_argument("the start of the scene contradicts its joints or contacts");
   model_.set(t, y_.data(), y_.data() + motion_.coordinates());
-  first_energy_ = model_.energy() + lost_;
   motion_.choose(t, y_, modes);
   begin_phase();
 }
@@ -155,7 +155,7 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
       continue;
     }
     phase_->step();
-    if (counts_.phases.steps + phase_->counts().steps > options_.max_steps)
+    if (counts_.steps + phase_->counts().steps > options_.max_steps)
       fail(fmt::format("max_steps = {} steps are taken", options_.max_steps));
     check_pace(t);
     next_ = watcher_.look(*phase_);
@@ -193,7 +193,7 @@ bool Driver::arrive(double t) {
 
 bool Driver::Memory::is_sound() const {
   bool sound = y.allFinite() && time >= 0;
-  for (const double x : {time, kept_energy, lost, first_energy}) sound = sound && std::isfinite(x);
+  for (const double x : {time, kept_energy}) sound = sound && std::isfinite(x);
   for (const ContactMode& each : modes) sound = sound && each.direction.allFinite();
   for (const double level : levels) sound = sound && std::isfinite(level);
   for (const int axis : axes) sound = sound && axis >= 0 && axis <= 2;
@@ -249,9 +249,17 @@ void Driver::anchor() {
 Driver::Memory Driver::memory() const {
   std::vector<int> axes;
   for (int i = 0; i < model_.contacts(); ++i) axes.push_back(model_.axis(i));
-  return {event_time_,  motion_.kept_energy(), lost_,          first_energy_, y_,
-          modes_,       motion_.levels(),      bounces_,       axes,          lifted_,
-          at_one_time_, counts_.events,        counts_.impacts};
+  return {event_time_,
+          motion_.kept_energy(),
+          y_,
+          modes_,
+          motion_.levels(),
+          bounces_,
+          axes,
+          lifted_,
+          at_one_time_,
+          counts_.events,
+          counts_.impacts};
 }
 
 Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
@@ -264,8 +272,6 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
       event_time_(memory.time),
       y_(memory.y),
       bounces_(memory.bounces),
-      lost_(memory.lost),
-      first_energy_(memory.first_energy),
       at_one_time_(memory.at_one_time),
       lifted_(memory.lifted) {
   counts_.events = memory.events;
@@ -297,7 +303,7 @@ VectorXd Driver::state_with_forces() {
   return y;
 }
 
-// The direction in which a contact slides, for the moment when its slip vanishes.
+// The direction in which a contact slides, for the instant when its slip vanishes.
 void Driver::turn_slips() {
   for (std::size_t k = 0; k < motion_.closed().size(); ++k) {
     const int i = motion_.closed()[k];
@@ -381,16 +387,10 @@ void Driver::fail(const std::string& what) const {
                   model_.time_unit() * time_, what));
 }
 
-DriverCounts Driver::counts() const {
-  DriverCounts all = counts_;
-  if (phase_) all.phases.add(phase_->counts());
-  all.evaluations = motion_.evaluations();
+Counts Driver::counts() const {
+  Counts all = counts_;
+  if (phase_) add_work(all, phase_->counts());
   return all;
-}
-
-double Driver::ledger_error() {
-  const VectorXd y = state();
-  return model_.energy() - y[motion_.work()] + lost_ - first_energy_;
 }
 
 }  // namespace tether::scene::event

@@ -32,20 +32,12 @@ struct DriverOptions {
   double storm = 2e11;
 };
 
-struct DriverCounts {
-  PhaseCounts phases;
-  long evaluations = 0;  ///< of the accelerations, for whatever they were needed
-  long contact_problems = 0;
-  /// Times at which something happens, that of a start with impacts among them; contacts that hit.
-  long events = 0, impacts = 0;
-};
-
 /// How exact the state is that a driver begins with.
 struct StartState {
   /// Contacts with gaps and normal speeds up to these are closed there, and moved to be so: of
   /// steps. 0: those that are within their bands.
   double gap = 0, speed = 0;
-  DriverCounts so_far;
+  Counts so_far;
 };
 
 /// Contacts that are closed at the state that is set: see StartState. Nothing: others overlap.
@@ -79,14 +71,9 @@ class Driver {
   /// The same, and the motion has the accelerations and forces there.
   VectorXd state_with_forces();
   const std::vector<EventRecord>& events() const { return events_; }
-  DriverCounts counts() const;
+  Counts counts() const;
   const Motion& motion() const { return motion_; }
   Motion& motion() { return motion_; }
-  /// Energy that events took so far, J.
-  double lost() const { return lost_; }
-  /// Energy less work and losses since the start, less that of the start: the energy that is
-  /// unaccounted for.
-  double ledger_error();
 
  private:
   const Bands& bands() const { return motion_.bands(); }
@@ -146,8 +133,7 @@ class Driver {
   std::optional<Zero> next_;
   std::vector<Bounces> bounces_;
   std::vector<EventRecord> events_;
-  double lost_ = 0, first_energy_ = 0;
-  DriverCounts counts_;
+  Counts counts_;
   struct {
     long steps = 0;
     double way = 0;  // s
@@ -171,7 +157,7 @@ struct Driver::Impact {
 
 /// All that a phase depends on. IDA's history is not in it: a phase is repeated from its start.
 struct Driver::Memory {
-  double time = 0, kept_energy = 0, lost = 0, first_energy = 0;
+  double time = 0, kept_energy = 0;
   VectorXd y;
   std::vector<ContactMode> modes;
   std::vector<double> levels;  ///< gaps of closed contacts

@@ -24,9 +24,7 @@ using namespace event;
 using mechanics::at;
 
 constexpr const char* kDamaged = "the saved state is damaged";
-constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '5'};
-// The same of a scene far from the origin: that of the engine comes first.
-constexpr char kFarMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', 'f', '5'};
+constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '6'};
 
 DriverOptions driver_options(const Scene& scene, double time_unit) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -84,19 +82,7 @@ class EventEngine : public ResumableEngine {
   Forces forces() const override;
   const std::vector<ContactEvent>& events() const override { return events_; }
 
-  Counts counts() const override {
-    const DriverCounts c = driver_->counts();
-    Counts out;
-    out.steps = c.phases.steps;
-    out.residual_evaluations = c.phases.residuals;
-    out.jacobian_evaluations = c.phases.jacobians;
-    out.projections = c.phases.projections;
-    out.error_test_failures = c.phases.error_test_failures;
-    out.contact_problems = c.contact_problems;
-    out.events = c.events;
-    out.impacts = c.impacts;
-    return out;
-  }
+  Counts counts() const override { return driver_->counts(); }
   std::vector<EffectCost> costs() const override { return {}; }
 
   void save(std::ostream& out) const override;
@@ -296,15 +282,7 @@ void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
   auto model = std::make_unique<SceneModel>(scene_, units_.time, units_.length);
   const VectorXd y = coordinates_of(state.bodies);
   StartState start = exactness_of(*model, state, y);
-  start.so_far.events = so_far.events;
-  start.so_far.impacts = so_far.impacts;
-  start.so_far.contact_problems = so_far.contact_problems;
-  PhaseCounts& phases = start.so_far.phases;
-  phases.steps = so_far.steps;
-  phases.residuals = so_far.residual_evaluations;
-  phases.jacobians = so_far.jacobian_evaluations;
-  phases.projections = so_far.projections;
-  phases.error_test_failures = so_far.error_test_failures;
+  start.so_far = so_far;
   driver_ = std::make_unique<Driver>(*model, options_, state.time / units_.time, y, start);
   model_ = std::move(model);
   events_.clear();
@@ -314,27 +292,18 @@ void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
 void EventEngine::save(std::ostream& out) const {
   const Driver::Memory m = driver_->memory();
   put_bodies(out, time(), bodies_);
-  if (far()) {
-    out.write(kFarMagic, sizeof kFarMagic);
-    for (const double x : origin_) binary::put(out, x);
-  } else {
-    out.write(kMagic, sizeof kMagic);
-  }
+  out.write(kMagic, sizeof kMagic);
   binary::put(out, static_cast<std::uint64_t>(m.y.size()),
               static_cast<std::uint64_t>(m.modes.size()), units_.length, units_.time, units_.mass,
-              m.time, driver_->time(), m.kept_energy, m.lost, m.first_energy,
-              static_cast<std::int64_t>(m.at_one_time), static_cast<std::int64_t>(m.events),
-              static_cast<std::int64_t>(m.impacts));
-  binary::put_array(out, m.y, now_);
+              m.time, driver_->time(), m.kept_energy, m.at_one_time, m.events, m.impacts);
+  binary::put_array(out, origin_, m.y, now_);
   for (std::size_t i = 0; i < m.modes.size(); ++i) {
     binary::put(out, static_cast<std::int32_t>(m.modes[i].mode),
                 static_cast<std::int32_t>(m.modes[i].direction.size()));
-    for (const double x : m.modes[i].direction) binary::put(out, x);
-    binary::put(out, m.levels[i]);
+    binary::put_array(out, m.modes[i].direction);
     const Bounces& b = m.bounces[i];
     for (int k = 0; k < 3; ++k) binary::put(out, b.time[k], b.speed[k]);
-    binary::put(out, static_cast<std::int32_t>(b.count), static_cast<std::int32_t>(m.axes[i]),
-                static_cast<std::int32_t>(m.lifted[i]));
+    binary::put(out, m.levels[i], b.count, m.axes[i], bool{m.lifted[i]});
   }
 }
 
@@ -346,33 +315,26 @@ void EventEngine::restore(std::istream& in, Restore how) {
     get_bodies(in, bodies);
     in.read(magic, sizeof magic);
   }
-  const bool from_far = in && std::equal(magic, magic + sizeof magic, kFarMagic);
-  if (!in || !(from_far || std::equal(magic, magic + sizeof magic, kMagic)))
+  if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
     throw std::runtime_error("this is not a state of the event engine");
-  Vector3d origin = Vector3d::Zero();
-  if (from_far)
-    for (double& x : origin) binary::get(in, x);
-  if (origin != origin_)
-    throw std::runtime_error("the saved state is of another scene: somewhere else");
   std::uint64_t size = 0, contacts = 0;
   smooth::Units units;
   Driver::Memory m;
   double reached = 0;
-  std::int64_t at_one_time = 0, events = 0, impacts = 0;
   binary::get(in, size, contacts, units.length, units.time, units.mass, m.time, reached,
-              m.kept_energy, m.lost, m.first_energy, at_one_time, events, impacts);
+              m.kept_energy, m.at_one_time, m.events, m.impacts);
   if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass ||
       size != static_cast<std::uint64_t>(now_.size()) ||
       contacts != static_cast<std::uint64_t>(model_->contacts()))
     throw std::runtime_error("the saved state is of another scene: of another size");
-  m.at_one_time = static_cast<long>(at_one_time);
-  m.events = static_cast<long>(events);
-  m.impacts = static_cast<long>(impacts);
   m.y.resize(now_.size());
   VectorXd saved(now_.size());
-  binary::get_array(in, m.y, saved);
+  Vector3d origin;
+  binary::get_array(in, origin, m.y, saved);
+  if (origin != origin_)
+    throw std::runtime_error("the saved state is of another scene: somewhere else");
   for (std::uint64_t i = 0; i < contacts; ++i) {
-    std::int32_t mode = 0, directions = 0, count = 0, axis = 0, lifted = 0;
+    std::int32_t mode = 0, directions = 0;
     binary::get(in, mode, directions);
     ContactMode& each = m.modes.emplace_back();
     each.mode = static_cast<Mode>(mode);
@@ -380,15 +342,12 @@ void EventEngine::restore(std::istream& in, Restore how) {
     if (mode < 0 || mode > 2 || (directions != model_->tangents() && (slides || directions != 0)))
       throw std::runtime_error(kDamaged);
     each.direction.resize(directions);
-    for (double& x : each.direction) binary::get(in, x);
-    binary::get(in, m.levels.emplace_back());
+    binary::get_array(in, each.direction);
     Bounces& b = m.bounces.emplace_back();
     for (int k = 0; k < 3; ++k) binary::get(in, b.time[k], b.speed[k]);
-    binary::get(in, count, axis, lifted);
-    if (lifted != 0 && lifted != 1) throw std::runtime_error(kDamaged);
-    b.count = count;
-    m.axes.push_back(axis);
-    m.lifted.push_back(lifted == 1);
+    bool lifted = false;
+    binary::get(in, m.levels.emplace_back(), b.count, m.axes.emplace_back(), lifted);
+    m.lifted.push_back(lifted);
   }
   for (int i = 0; i < model_->contacts(); ++i)
     if (const int by = model_->law(i).held_by;

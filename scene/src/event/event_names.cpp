@@ -1,35 +1,19 @@
 // Tether: kinds of events in words. SPDX-License-Identifier: BSD-3-Clause
 #include <tether/scene/engine.hpp>
+#include <utility>
 
 namespace tether::scene {
 
 const char* name(ContactEvent::Kind kind) {
-  switch (kind) {
-    case ContactEvent::Kind::impact:
-      return "impact";
-    case ContactEvent::Kind::touch:
-      return "touch";
-    case ContactEvent::Kind::lift:
-      return "lift";
-    case ContactEvent::Kind::slip:
-      return "slip";
-    case ContactEvent::Kind::stop:
-      return "stop";
-    case ContactEvent::Kind::rest:
-      return "rest";
-    case ContactEvent::Kind::jam:
-      return "jam";
-    case ContactEvent::Kind::border:
-      return "border";
-    case ContactEvent::Kind::hand_over:
-      return "hand_over";
-    case ContactEvent::Kind::resume:
-      return "resume";
-    case ContactEvent::Kind::roll:
-      return "roll";
-    case ContactEvent::Kind::roll_stop:
-      return "roll_stop";
-  }
+  using Kind = ContactEvent::Kind;
+  for (const auto& [each, word] :
+       {std::pair(Kind::impact, "impact"), std::pair(Kind::touch, "touch"),
+        std::pair(Kind::lift, "lift"), std::pair(Kind::slip, "slip"), std::pair(Kind::stop, "stop"),
+        std::pair(Kind::rest, "rest"), std::pair(Kind::jam, "jam"),
+        std::pair(Kind::border, "border"), std::pair(Kind::hand_over, "hand_over"),
+        std::pair(Kind::resume, "resume"), std::pair(Kind::roll, "roll"),
+        std::pair(Kind::roll_stop, "roll_stop")})
+    if (each == kind) return word;
   return "?";
 }
 

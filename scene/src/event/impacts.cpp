@@ -131,9 +131,7 @@ double Driver::change_velocities(const VectorXd& change) {
   const double energy = model_.energy();
   y_.segment(motion_.coordinates(), motion_.velocities()) += change;
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-  const double lost = energy - model_.energy();
-  lost_ += lost;
-  return lost;
+  return energy - model_.energy();
 }
 
 void Driver::tell_impacts(const std::vector<int>& touching, const Impact& impact,

@@ -7,6 +7,7 @@
 
 #include "driver.hpp"
 #include "local_tolerance.hpp"
+#include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {
 
@@ -64,7 +65,6 @@ void Driver::settle_velocities() {
   const double energy = model_.energy();
   motion_.settle_velocities(event_time_, y_);
   const double lost = energy - model_.energy();
-  lost_ += lost;
   if (!events_.empty() && events_.back().time == event_time_) events_.back().lost += lost;
 }
 
@@ -87,7 +87,7 @@ void Driver::start_phase(double most) {
     if (leaving[at(i)]) local = std::min(local, flight_tolerance(options_.tolerance, rate));
   }
   local = std::min(local, turn_tolerance(options_.tolerance, slowest_turn()));
-  if (phase_) counts_.phases.add(phase_->counts());
+  if (phase_) add_work(counts_, phase_->counts());
   phase_.reset();
   const double first = longest_first_step(leaving);
   kink_ = model_.next_kink(event_time_);

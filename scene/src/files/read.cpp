@@ -8,6 +8,8 @@
 #include <tether/scene/files.hpp>
 
 #include "effects/list.hpp"
+#include "read_stream.hpp"
+#include "record/formats.hpp"
 #include "repeat.hpp"
 #include "toml/document.hpp"
 #include "toml/reader.hpp"
@@ -109,10 +111,8 @@ void read_engine(Fields& root, Reader& r) {
 void read_output(Fields& root, Reader& r) {
   Fields in = r.fields(root.table("output"), "output");
   Output& o = r.scene.output;
-  o.csv = in.output_name("csv", ".csv");
-  o.vtk = in.output_name("vtk", ".pvd");
-  o.svg = in.output_name("svg", ".svg");
-  o.state = in.output_name("state", ".state");
+  for (const formats::Format* each : formats::all())
+    o.*each->file = in.output_name(each->name, each->extension);
   o.every = in.number("every", o.every, kNotNegative, "s; 0: end / 1000");
   o.checkpoint = in.number("checkpoint", o.checkpoint, kNotNegative, "s; 0: only at the end");
   o.forces = in.flag("forces", o.forces);
@@ -237,13 +237,7 @@ Scene parse_scene(std::string_view text, const std::string& name) {
 Scene read_scene(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) files::refuse({path, 0, 0}, "cannot be opened");
-  // By blocks: reading a folder, or a file that is truncated meanwhile, fails without a throw.
-  std::string text;
-  std::vector<char> block(std::size_t{1} << 16);
-  while (in && text.size() <= kLargestFile) {
-    in.read(block.data(), static_cast<std::streamsize>(block.size()));
-    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
-  }
+  const std::string text = files::read_stream(in, kLargestFile);
   if (in.bad()) files::refuse({path, 0, 0}, "cannot be read");
   return parse_scene(text, path);
 }

@@ -9,6 +9,7 @@
 #include <tether/linalg/index.hpp>
 
 #include "geometry/surface_files.hpp"
+#include "read_stream.hpp"
 
 namespace tether::scene::files {
 
@@ -40,11 +41,7 @@ bool read_beside(Fields& in, Reader& r, const std::string& name, std::string& te
     return false;
   }
   std::ifstream stream(file, std::ios::binary);
-  std::vector<char> block(std::size_t{1} << 16);
-  while (stream && text.size() <= kLargestFile) {
-    stream.read(block.data(), static_cast<std::streamsize>(block.size()));
-    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
-  }
+  text = read_stream(stream, kLargestFile);
   r.surface_bytes += text.size();
   r.surface_files.insert(file.string());
   if (stream.bad() || !stream.eof() || text.size() > kLargestFile) {

@@ -7,6 +7,7 @@
 #include <tether/scene/words.hpp>
 
 #include "effects/list.hpp"
+#include "record/formats.hpp"
 #include "toml/writer.hpp"
 
 namespace tether::scene {
@@ -133,10 +134,7 @@ void write_event(const EventOptions& o, Writer& out) {
 
 void write_output(const Output& o, Writer& out) {
   out.table("output");
-  out.field("csv", o.csv);
-  out.field("vtk", o.vtk);
-  out.field("svg", o.svg);
-  out.field("state", o.state);
+  for (const formats::Format* each : formats::all()) out.field(each->name, o.*each->file);
   out.field("every", o.every, "s; 0: end / 1000");
   out.field("checkpoint", o.checkpoint, "s; 0: only at the end");
   out.field("forces", o.forces);

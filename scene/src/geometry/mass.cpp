@@ -25,16 +25,10 @@ MassProperties sphere(double r) {
   return {volume, Vector3d::Zero(), 0.4 * volume * r * r * Matrix3d::Identity()};
 }
 
-MassProperties box(const Vector3d& a) {
-  const double volume = a.prod();
-  const Vector3d s = a.cwiseProduct(a) / 12;
-  return {volume, Vector3d::Zero(),
-          volume * Vector3d(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal()};
-}
-
-MassProperties ellipsoid(const Vector3d& half_axes) {
-  const double volume = 4.0 / 3.0 * kPi * half_axes.prod();
-  const Vector3d s = half_axes.cwiseProduct(half_axes) / 5;
+// A box of these edges, an ellipsoid of these half axes: the mean square of a coordinate is a part
+// of that of its length.
+MassProperties along_axes(double volume, const Vector3d& lengths, double part) {
+  const Vector3d s = lengths.cwiseProduct(lengths) / part;
   return {volume, Vector3d::Zero(),
           volume * Vector3d(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal()};
 }
@@ -107,13 +101,13 @@ MassProperties mass_properties(const Shape& shape) {
       out = sphere(shape.radius);
       break;
     case ShapeKind::box:
-      out = box(shape.size);
+      out = along_axes(shape.size.prod(), shape.size, 12);
       break;
     case ShapeKind::capsule:
       out = capsule(shape.radius, shape.length);
       break;
     case ShapeKind::ellipsoid:
-      out = ellipsoid(shape.size);
+      out = along_axes(4.0 / 3.0 * kPi * shape.size.prod(), shape.size, 5);
       break;
     case ShapeKind::cylinder:
       out = cylinder(shape.radius, shape.length);

@@ -37,10 +37,7 @@ void weld(const Link& link, const Isometry3d& place, Part& part) {
   }
   if (!link.touch) return;
   if (!part.touch) part.touch = link.touch;
-  part.touch->friction = std::max(part.touch->friction, link.touch->friction);
-  part.touch->tangential = part.touch->tangential || link.touch->tangential;
-  part.touch->type |= link.touch->type;
-  part.touch->affinity |= link.touch->affinity;
+  part.touch->join(*link.touch);
 }
 
 std::vector<Part> welded(const Model& model, const std::vector<LinkStart>& starts) {

@@ -63,4 +63,20 @@ class JointType {
   }
 };
 
+/// A joint of a point and a direction in common.
+class AxisJoint : public JointType {
+ public:
+  void read(files::Fields& in, Joint& joint) const override {
+    read_point(in, joint);
+    read_axis(in, joint);
+  }
+  void write(const Joint& joint, files::Writer& out) const override {
+    out.field("at", joint.at, "m");
+    out.field("axis", joint.axis);
+  }
+  void check(const Joint& joint, const std::string& name) const override {
+    check_axis(joint.axis, name);
+  }
+};
+
 }  // namespace tether::scene::joints

@@ -91,14 +91,10 @@ class JointEffect : public Effect {
     }
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
-    const auto arm = [&](int body, const Vector3d& point) {
-      if (body < 0 || scene.bodies[at(body)].fixed) return;
-      length.take((point - scene.bodies[at(body)].position).norm());
-    };
     for (const Joint& joint : scene.joints) {
       const JointType& type = joints::type(joint.kind);
-      arm(joint.first, joint.at);
-      arm(joint.second, type.point_on_second(joint));
+      take_arm(scene, joint.first, joint.at, length);
+      take_arm(scene, joint.second, type.point_on_second(joint), length);
       type.take_lengths(joint, length);
     }
   }

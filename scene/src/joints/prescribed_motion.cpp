@@ -61,9 +61,7 @@ class PrescribedMotion : public Effect {
  public:
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), is_driven);
-    if (count > 0)
-      lines.push_back(
-          {"prescribed motion", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
+    if (count > 0) lines.push_back({"prescribed motion", counted(count, "joint")});
   }
   void check(const Scene& scene, files::Report& report) const override {
     for (const Joint& joint : scene.joints)

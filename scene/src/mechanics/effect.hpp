@@ -2,6 +2,8 @@
 // BSD-3-Clause
 #pragma once
 
+#include <fmt/format.h>
+
 #include <functional>
 #include <memory>
 #include <string>
@@ -44,6 +46,18 @@ struct JointLawList {
     on(sign);
   }
 };
+
+/// "1 joint", "2 joints".
+template <class Integer>
+std::string counted(Integer count, const char* one) {
+  return fmt::format("{} {}{}", count, one, count == 1 ? "" : "s");
+}
+
+/// From the centre of a moving body to a point, m.
+inline void take_arm(const Scene& scene, int body, const Vector3d& point, Largest& length) {
+  if (body < 0 || scene.bodies[at(body)].fixed) return;
+  length.take((point - scene.bodies[at(body)].position).norm());
+}
 
 /// A column of the table of a run. The forces are empty unless the output of the scene has them.
 struct Column {

@@ -13,7 +13,7 @@ namespace tether::scene {
 class RowFile {
  public:
   /// Makes its folder. The first `kept` bytes of a file that is there stay and are safe at every
-  /// moment; 0: it is a new one. Throws std::runtime_error, as all of these.
+  /// instant; 0: it is a new one. Throws std::runtime_error, as all of these.
   RowFile(std::string file, std::size_t kept);
   ~RowFile();
   RowFile(const RowFile&) = delete;

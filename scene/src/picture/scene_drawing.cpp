@@ -142,29 +142,26 @@ class Drawing {
       order.emplace_back(view_.eye().row(2).dot(R * middle), f);
     }
     std::sort(order.begin(), order.end());
-    for (const auto& [depth, f] : order) {
-      const std::vector<std::size_t>& face = m.faces[f];
-      const Vector3d normal =
-          (R * (m.points[face[1]] - m.points[face[0]]).cross(m.points[face[2]] - m.points[face[0]]))
-              .normalized();
-      const double towards = view_.eye().row(2).dot(normal), up = view_.eye().row(1).dot(normal);
-      if (towards > -1e-6)
-        canvas_.polygon(pixels(points, face), shade(colour, 0.55 + 0.2 * towards - 0.15 * up),
-                        {colour, 0.4, ""});
-    }
+    for (const auto& [depth, f] : order) draw_face(m, m.faces[f], points, R, -1e-6, colour, 0.4);
   }
 
   void draw_faces(const Mesh& m, const std::vector<Vector2d>& points, const Matrix3d& R,
                   const char* colour) {
-    for (const std::vector<std::size_t>& face : m.faces) {
-      const Vector3d normal =
-          (R * (m.points[face[1]] - m.points[face[0]]).cross(m.points[face[2]] - m.points[face[0]]))
-              .normalized();
-      const double towards = view_.eye().row(2).dot(normal), up = view_.eye().row(1).dot(normal);
-      if (towards > 1e-9)
-        canvas_.polygon(pixels(points, face), shade(colour, 0.55 + 0.2 * towards - 0.15 * up),
-                        {colour, 0.8, ""});
-    }
+    for (const std::vector<std::size_t>& face : m.faces)
+      draw_face(m, face, points, R, 1e-9, colour, 0.8);
+  }
+
+  /// Where it faces the eye by more than `least`.
+  void draw_face(const Mesh& m, const std::vector<std::size_t>& face,
+                 const std::vector<Vector2d>& points, const Matrix3d& R, double least,
+                 const char* colour, double width) {
+    const Vector3d normal =
+        (R * (m.points[face[1]] - m.points[face[0]]).cross(m.points[face[2]] - m.points[face[0]]))
+            .normalized();
+    const double towards = view_.eye().row(2).dot(normal), up = view_.eye().row(1).dot(normal);
+    if (towards > least)
+      canvas_.polygon(pixels(points, face), shade(colour, 0.55 + 0.2 * towards - 0.15 * up),
+                      {colour, width, ""});
   }
 
   /// Seen along its surface a plane is a line, hatched where the ground is; from elsewhere a pale

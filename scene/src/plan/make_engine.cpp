@@ -7,8 +7,8 @@ bool goes_on_in_steps(const Scene& scene) {
   return scene.event.value_or(EventOptions{}).otherwise == Otherwise::stepping;
 }
 
-std::unique_ptr<Engine> make_engine(const Scene& scene) {
-  switch (make_plan(scene).engine) {
+std::unique_ptr<Engine> make_engine(const Scene& scene, const Plan& plan) {
+  switch (plan.engine) {
     case EngineKind::smooth:
       return make_smooth_engine(scene);
     case EngineKind::stepping:
@@ -18,6 +18,10 @@ std::unique_ptr<Engine> make_engine(const Scene& scene) {
                                      : make_event_engine(scene);
   }
   return nullptr;
+}
+
+std::unique_ptr<Engine> make_engine(const Scene& scene) {
+  return make_engine(scene, make_plan(scene));
 }
 
 }  // namespace tether::scene

@@ -17,11 +17,9 @@ namespace tether::scene {
 
 namespace {
 
-constexpr const char* kNothingTouches = "nothing touches";
+using mechanics::counted;
 
-std::string number(int n, const char* one) {
-  return fmt::format("{} {}{}", n, one, n == 1 ? "" : "s");
-}
+constexpr const char* kNothingTouches = "nothing touches";
 
 // Pairs of bodies, at least one of them moving, whose materials meet.
 long contact_pairs(const Scene& scene) {
@@ -216,17 +214,17 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan) {
                      plan.why);
   out << others(plan);
   out << fmt::format("bodies    {}, {} of them moving; {}\n", plan.bodies, plan.moving,
-                     number(plan.shapes, "shape"));
+                     counted(plan.shapes, "shape"));
   if (smooth)
     out << fmt::format("unknowns  {}{}, with {} and {}\n", plan.rows > 0 ? "up to " : "",
-                       plan.unknowns, number(plan.rows, "row") + " of joints",
-                       number(plan.invariants, "invariant") + " kept")
+                       plan.unknowns, counted(plan.rows, "row") + " of joints",
+                       counted(plan.invariants, "invariant") + " kept")
         << "matrices  " << smooth_matrices(plan) << "\n";
   else
     out << fmt::format("unknowns  {}{}{}; {} of bodies can touch\n", plan.unknowns,
                        event ? "" : " velocities",
-                       plan.rows > 0 ? ", with " + number(plan.rows, "row") + " of joints" : "",
-                       plan.pairs == 1 ? "1 pair" : fmt::format("{} pairs", plan.pairs));
+                       plan.rows > 0 ? ", with " + counted(plan.rows, "row") + " of joints" : "",
+                       counted(plan.pairs, "pair"));
   out << "effects   " << (plan.effects.empty() ? "none: bodies move freely\n" : "");
   const char* indent = "";
   for (const Effect& each : plan.effects) {

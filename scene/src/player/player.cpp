@@ -12,6 +12,7 @@
 #include "output/whole_file.hpp"
 #include "page_parts.hpp"
 #include "page_text.hpp"
+#include "record/formats.hpp"
 #include "scene_data.hpp"
 
 namespace tether::scene {
@@ -37,7 +38,7 @@ class Player::Implementation {
         moving_(moving_bodies(scene)),
         view_(view_of(scene)),
         film_(moving_, view_) {
-    std::vector<std::string> others = names(scene.output);
+    std::vector<std::string> others = formats::names(scene.output);
     for (const std::string& each : inputs_of(scene)) others.push_back(each);
     check_page_name(file, others);
     make_folder_of(file);

@@ -11,6 +11,8 @@
 #include <iostream>
 #include <optional>
 
+#include "files/read_stream.hpp"
+
 namespace tether::scene {
 
 namespace {
@@ -18,15 +20,7 @@ namespace {
 constexpr std::size_t kLargest = std::size_t{256} << 20;  // beyond it parse_scene refuses
 constexpr int kMostValues = 100000;
 
-std::string all_of(std::istream& in) {
-  std::string text;
-  std::vector<char> block(std::size_t{1} << 16);
-  while (in && text.size() <= kLargest) {
-    in.read(block.data(), static_cast<std::streamsize>(block.size()));
-    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
-  }
-  return text;
-}
+std::string all_of(std::istream& in) { return files::read_stream(in, kLargest); }
 
 std::optional<double> number(const std::string& text) {
   double value = 0;

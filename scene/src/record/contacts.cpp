@@ -13,11 +13,11 @@ namespace {
 /// One row for each contact of each record.
 class ContactRecorder : public TableRecorder {
  public:
-  ContactRecorder(const Scene& scene, const std::string& file, const Resume& resume)
-      : TableRecorder(scene, LongTable(file, kContactsHead, resume.restarted,
-                                       [time = resume.time](const std::string& row) {
-                                         return number_at(row, 0) <= time;
-                                       })) {}
+  ContactRecorder(const std::string& file, const formats::Beginning& run)
+      : TableRecorder(run.scene, LongTable(file, kContactsHead, run.resume.restarted,
+                                           [time = run.resume.time](const std::string& row) {
+                                             return number_at(row, 0) <= time;
+                                           })) {}
 
   void record(const Engine& engine, const Diagnostics&) override {
     std::string rows;
@@ -37,9 +37,9 @@ class ContactRecorder : public TableRecorder {
 
 }  // namespace
 
-std::unique_ptr<Recorder> make_contact_recorder(const Scene& scene, const std::string& file,
-                                                const Resume& resume) {
-  return std::make_unique<ContactRecorder>(scene, file, resume);
+std::unique_ptr<Recorder> make_contact_recorder(const std::string& file,
+                                                const formats::Beginning& run) {
+  return std::make_unique<ContactRecorder>(file, run);
 }
 
 }  // namespace tether::scene

@@ -2,17 +2,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
+#include <filesystem>
 #include <iterator>
 #include <optional>
-#include <tether/scene/plan.hpp>
 
 #include "effects/list.hpp"
 #include "output/output_names.hpp"
 #include "output/own_files.hpp"
-#include "output/row_file.hpp"
+#include "record/formats.hpp"
 #include "record/number_at.hpp"
-#include "recorder.hpp"
+#include "record/table_recorder.hpp"
 
 namespace tether::scene {
 
@@ -23,19 +22,25 @@ constexpr std::size_t kMostBodies = 200;
 
 class CsvRecorder : public Recorder {
  public:
-  CsvRecorder(const Scene& scene, const std::string& file, double start_energy,
-              const Resume& resume)
-      : file_(file), start_energy_(start_energy), forces_(scene.output.forces) {
-    tells_steps_ = make_plan(scene).then_steps > 0;
+  CsvRecorder(const std::string& file, const formats::Beginning& run)
+      : file_(file),
+        start_energy_(run.start_energy),
+        forces_(run.scene.output.forces),
+        tells_steps_(run.plan.then_steps > 0) {
+    const Scene& scene = run.scene;
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       if (!scene.bodies[i].fixed) moving_.push_back(i);
     bodies_ = moving_.size();
     moving_.resize(std::min(bodies_, kMostBodies));
     for (const effects::Effect* each : effects::all()) each->add_columns(scene, columns_);
     const std::string first = header(scene);
-    const std::size_t kept = resume.restarted ? length_up_to(resume.time, first) : 0;
-    out_.emplace(file, kept);
-    if (kept == 0) out_->put(first);
+    lacks_rows_ = run.resume.restarted;
+    out_.emplace(file, first, run.resume.restarted, [&](const std::string& row) {
+      const double at = number_at(row, 0);
+      if (!(at <= run.resume.time)) return false;
+      lacks_rows_ = at != run.resume.time;
+      return true;
+    });
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {
@@ -87,39 +92,48 @@ class CsvRecorder : public Recorder {
     return text + '\n';
   }
 
-  /// Bytes of the rows of an earlier run that are kept, so that a run in two parts leaves the table
-  /// of one; 0: there is no such table.
-  std::size_t length_up_to(double time, const std::string& first) {
-    lacks_rows_ = true;
-    if (is_device(file_)) return 0;
-    std::ifstream in(file_, std::ios::binary);
-    std::string line;
-    if (!std::getline(in, line) || line + '\n' != first) return 0;
-    std::size_t length = first.size();
-    while (std::getline(in, line) && !in.eof()) {  // a row without its end is cut
-      const double at = number_at(line, 0);
-      if (!(at <= time)) break;
-      lacks_rows_ = at != time;
-      length += line.size() + 1;
-    }
-    return length;
-  }
-
   std::string file_, line_;
   double start_energy_;
-  bool forces_, tells_steps_ = false;
+  bool forces_, tells_steps_;
   std::vector<std::size_t> moving_;  // those in the table
   std::size_t bodies_ = 0;           // that move
   std::vector<mechanics::Column> columns_;
   bool lacks_rows_ = false;
-  std::optional<RowFile> out_;
+  std::optional<LongTable> out_;
 };
+
+std::string events_of(const std::string& csv) {
+  return std::filesystem::path(csv).replace_extension(".events.csv").string();
+}
+std::string contacts_of(const std::string& csv) {
+  return std::filesystem::path(csv).replace_extension(".contacts.csv").string();
+}
+
+void add_tables(const std::string& csv, const formats::Beginning& run, formats::Recorders& out) {
+  out.push_back(std::make_unique<CsvRecorder>(csv, run));
+  if (run.plan.engine == EngineKind::event) out.push_back(make_event_recorder(events_of(csv), run));
+  if (run.scene.output.forces && !run.scene.pairs.empty())
+    out.push_back(make_contact_recorder(contacts_of(csv), run));
+}
 
 }  // namespace
 
-std::unique_ptr<Recorder> make_csv_recorder(const Scene& scene, const std::string& file,
-                                            double start_energy, const Resume& resume) {
-  return std::make_unique<CsvRecorder>(scene, file, start_energy, resume);
+namespace formats {
+
+const Format& csv_format() {
+  static const Format format{"csv",
+                             ".csv",
+                             "Table: energies, momenta, errors, states of the bodies",
+                             &Output::csv,
+                             add_tables,
+                             [](const std::string& csv, bool forces) {
+                               std::vector<std::string> files = {events_of(csv)};
+                               if (forces) files.push_back(contacts_of(csv));
+                               return files;
+                             }};
+  return format;
 }
+
+}  // namespace formats
 
 }  // namespace tether::scene

@@ -13,14 +13,15 @@ class EventRecorder : public TableRecorder {
  public:
   // Rows of events that were found before the state was saved stay. A `rest` lies ahead of when it
   // was found.
-  EventRecorder(const Scene& scene, const std::string& file, const Resume& resume, double now)
-      : TableRecorder(scene, LongTable(file, kEventsHead, resume.restarted,
-                                       [now, left = resume.events](const std::string& row) mutable {
-                                         const bool before =
-                                             !(number_at(row, 0) > now) ||
-                                             row.find(",rest,") != std::string::npos;
-                                         return before && left-- > 0;
-                                       })) {}
+  EventRecorder(const std::string& file, const formats::Beginning& run)
+      : TableRecorder(
+            run.scene,
+            LongTable(file, kEventsHead, run.resume.restarted,
+                      [now = run.now, left = run.resume.events](const std::string& row) mutable {
+                        const bool before =
+                            !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
+                        return before && left-- > 0;
+                      })) {}
 
   void record(const Engine& engine, const Diagnostics&) override { put_found(engine); }
   void keep(const Engine& engine) override {
@@ -44,9 +45,9 @@ class EventRecorder : public TableRecorder {
 
 }  // namespace
 
-std::unique_ptr<Recorder> make_event_recorder(const Scene& scene, const std::string& file,
-                                              const Resume& resume, double now) {
-  return std::make_unique<EventRecorder>(scene, file, resume, now);
+std::unique_ptr<Recorder> make_event_recorder(const std::string& file,
+                                              const formats::Beginning& run) {
+  return std::make_unique<EventRecorder>(file, run);
 }
 
 }  // namespace tether::scene

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <tether/scene/run.hpp>
 #include <vector>
@@ -26,18 +25,5 @@ class Recorder {
   /// The run is over; says which files there are and what went wrong.
   virtual void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) = 0;
 };
-
-/// Each may throw std::runtime_error where the file cannot be written.
-std::unique_ptr<Recorder> make_csv_recorder(const Scene& scene, const std::string& file,
-                                            double start_energy, const Resume& resume);
-/// `now`: the time of the engine.
-std::unique_ptr<Recorder> make_event_recorder(const Scene& scene, const std::string& file,
-                                              const Resume& resume, double now);
-std::unique_ptr<Recorder> make_contact_recorder(const Scene& scene, const std::string& file,
-                                                const Resume& resume);
-std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::string& file,
-                                            const Resume& resume, const Processes& among);
-std::unique_ptr<Recorder> make_picture_recorder(const Scene& scene, const std::string& file,
-                                                double start_energy);
 
 }  // namespace tether::scene

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "record/formats.hpp"
 #include "record/long_table.hpp"
-#include "recorder.hpp"
 
 namespace tether::scene {
 
@@ -33,5 +33,10 @@ class TableRecorder : public Recorder {
  private:
   const Scene& scene_;
 };
+
+std::unique_ptr<Recorder> make_event_recorder(const std::string& file,
+                                              const formats::Beginning& run);
+std::unique_ptr<Recorder> make_contact_recorder(const std::string& file,
+                                                const formats::Beginning& run);
 
 }  // namespace tether::scene

@@ -12,9 +12,9 @@
 #include "output/output_names.hpp"
 #include "output/own_files.hpp"
 #include "output/whole_file.hpp"
+#include "record/formats.hpp"
 #include "record/number_at.hpp"
 #include "record/poly_data.hpp"
-#include "recorder.hpp"
 
 namespace tether::scene {
 
@@ -30,15 +30,22 @@ void put(std::vector<float>& out, const Vector3d& v) {
   for (int i = 0; i < 3; ++i) out.push_back(static_cast<float>(v[i]));
 }
 
+std::string film_of(const std::string& vtk) {
+  return std::filesystem::path(vtk).replace_extension(".pvd").string();
+}
+std::string frames_of(const std::string& vtk) {
+  return std::filesystem::path(vtk).replace_extension("").string();
+}
+
 class VtkRecorder : public Recorder {
  public:
-  VtkRecorder(const Scene& scene, const std::string& file, const Resume& resume,
-              const Processes& among)
-      : file_(film_file(file)),
-        folder_(film_folder(file)),
-        forces_(scene.output.forces),
-        among_(among) {
-    if (resume.restarted) keep_up_to(resume.time);
+  VtkRecorder(const std::string& file, const formats::Beginning& run)
+      : file_(film_of(file)),
+        folder_(frames_of(file)),
+        forces_(run.scene.output.forces),
+        among_(run.among) {
+    const Scene& scene = run.scene;
+    if (run.resume.restarted) keep_up_to(run.resume.time);
     make_folder_of(folder_ + "/x");
     if (among_.rank == 0) check_writable(file_);
     std::size_t surfaces = 0;
@@ -250,11 +257,30 @@ class VtkRecorder : public Recorder {
   std::vector<std::vector<Part>> meshes_;
 };
 
+void add_film(const std::string& vtk, const formats::Beginning& run, formats::Recorders& out) {
+  out.push_back(std::make_unique<VtkRecorder>(vtk, run));
+}
+
 }  // namespace
 
-std::unique_ptr<Recorder> make_vtk_recorder(const Scene& scene, const std::string& file,
-                                            const Resume& resume, const Processes& among) {
-  return std::make_unique<VtkRecorder>(scene, file, resume, among);
+namespace formats {
+
+const Format& vtk_format() {
+  static const Format format{
+      "vtk",
+      ".pvd",
+      "Film for ParaView (.pvd, with a folder of .vtp)",
+      &Output::vtk,
+      add_film,
+      [](const std::string& vtk, bool) { return std::vector<std::string>{frames_of(vtk)}; },
+      film_of,
+      [](const std::string& path) {
+        const auto end = std::filesystem::path(path).extension();
+        return end == ".vtp" || end == ".pvtp";
+      }};
+  return format;
 }
+
+}  // namespace formats
 
 }  // namespace tether::scene

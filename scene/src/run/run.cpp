@@ -14,7 +14,7 @@
 #include "output/output_lock.hpp"
 #include "output/output_names.hpp"
 #include "output/whole_file.hpp"
-#include "record/recorder.hpp"
+#include "record/formats.hpp"
 #include "saved_state.hpp"
 #include "schedule.hpp"
 #include "stepping/stepping_engine.hpp"
@@ -38,8 +38,8 @@ class Stopwatch {
   double wall_ = seconds(CLOCK_MONOTONIC), processor_ = seconds(CLOCK_PROCESS_CPUTIME_ID);
 };
 
-/// Checks values that a command line or a caller may have put over those of the scene.
-const Scene& checked(const Scene& scene) {
+/// The plan, behind checks of values that a caller may have put over those of the scene.
+Plan checked_plan(const Scene& scene) {
   const auto demand = [](bool holds, const char* what, double value, const std::string& range) {
     if (!holds) throw std::invalid_argument(fmt::format("{} = {}: {}", what, value, range));
   };
@@ -49,17 +49,16 @@ const Scene& checked(const Scene& scene) {
        {std::pair("every", scene.output.every), std::pair("checkpoint", scene.output.checkpoint)})
     demand(value == 0 || (value > 0 && scene.end / value <= kMostRecords), what, value,
            fmt::format("must be > 0, s, and end / it at most {:g}", kMostRecords));
-  const Plan plan = make_plan(scene);
-  if (plan.engine != EngineKind::stepping && !(plan.then_steps > 0)) return scene;
+  Plan plan = make_plan(scene);
+  if (plan.engine != EngineKind::stepping && !(plan.then_steps > 0)) return plan;
   const double step = scene.stepping.value_or(SteppingOptions{}).step;
   demand(scene.end / step <= kMostSteps, "step", step,
          fmt::format("end / step must be at most {:g}", kMostSteps));
-  return scene;
+  return plan;
 }
 
-std::unique_ptr<Engine> engine_of(const Scene& scene, contact::SolverTeam* team) {
-  if (!team) return make_engine(scene);
-  const Plan plan = make_plan(scene);
+std::unique_ptr<Engine> engine_of(const Scene& scene, const Plan& plan, contact::SolverTeam* team) {
+  if (!team) return make_engine(scene, plan);
   if (plan.engine == EngineKind::stepping)
     return std::make_unique<stepping::SteppingEngine>(scene, team);
   throw std::invalid_argument(fmt::format(
@@ -72,38 +71,34 @@ std::unique_ptr<Engine> engine_of(const Scene& scene, contact::SolverTeam* team)
 class Run {
  public:
   Run(const Scene& scene, const RunOptions& options)
-      : scene_(checked(scene)),
+      : scene_(scene),
+        plan_(checked_plan(scene)),
         options_(options),
         judge_(scene),
         overlaps_(options.restart.empty() ? overlaps_at_start(scene) : std::vector<std::string>()),
-        engine_(engine_of(scene, options.team)) {
+        engine_(engine_of(scene, plan_, options.team)) {
     const Output& o = scene.output;
     std::vector<std::string> inputs = inputs_of(scene);
     if (o.state != options.restart) inputs.push_back(options.restart);
-    check_names(o, inputs);
-    if (options.among.rank == 0 && !options.force) check_replaceable(o);
+    formats::check_names(o, inputs);
+    if (options.among.rank == 0 && !options.force) formats::check_replaceable(o);
     if (options.among.rank == 0)
-      for (const std::string& each : names(o)) lock_.take(each);
+      for (const std::string& each : formats::names(o)) lock_.take(each);
     if (!o.state.empty()) check_writable(o.state);
-    if (!o.state.empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene);
+    if (!o.state.empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene, plan_);
     result_.engine = engine_->name();
-    if (make_plan(scene).engine == EngineKind::stepping)
+    if (plan_.engine == EngineKind::stepping)
       step_ = scene.stepping.value_or(SteppingOptions{}).step;
     if (options.restart.empty())
       start();
     else
       restore(options.restart);
     engine_->stop_when(options.interrupted);
-    if (!o.csv.empty())
-      recorders_.push_back(make_csv_recorder(scene, o.csv, summary().start_energy, resume_));
-    if (!o.csv.empty() && make_plan(scene).engine == EngineKind::event)
-      recorders_.push_back(make_event_recorder(scene, event_file(o.csv), resume_, engine_->time()));
-    if (!o.csv.empty() && o.forces && !scene.pairs.empty())
-      recorders_.push_back(make_contact_recorder(scene, contact_file(o.csv), resume_));
-    if (!o.vtk.empty())
-      recorders_.push_back(make_vtk_recorder(scene, o.vtk, resume_, options.among));
-    if (!o.svg.empty())
-      recorders_.push_back(make_picture_recorder(scene, o.svg, summary().start_energy));
+    const formats::Beginning beginning{
+        scene, plan_, resume_, options.among, summary().start_energy, engine_->time()};
+    for (const formats::Format* each : formats::all())
+      if (const std::string& file = o.*each->file; !file.empty() && each->add_recorders)
+        each->add_recorders(file, beginning, recorders_);
   }
 
   RunResult go() {
@@ -134,7 +129,7 @@ class Run {
  private:
   // Where events cannot go on, steps can.
   void hand_over() {
-    if (make_plan(scene_).engine != EngineKind::event || engine_->in_steps()) return;
+    if (plan_.engine != EngineKind::event || engine_->in_steps()) return;
     if (scene_.output.state.empty()) {
       result_.remarks.emplace_back(
           "with [event] otherwise = \"stepping\" (--otherwise stepping) the run goes on in steps "
@@ -329,6 +324,7 @@ class Run {
 
   const Stopwatch watch_;
   const Scene& scene_;
+  const Plan plan_;
   const RunOptions& options_;
   OutputLock lock_;
   Judge judge_;

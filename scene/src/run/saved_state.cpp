@@ -76,21 +76,20 @@ std::string all_of(const std::string& file, const std::function<bool()>& interru
 
 }  // namespace
 
-std::uint64_t hash_of_motion(const Scene& scene) {
+std::uint64_t hash_of_motion(const Scene& scene, const Plan& plan) {
   Scene moving = scene;
   moving.name.clear();
   moving.end = 1;
   moving.output = Output{};
   moving.expect.clear();
-  const EngineKind engine = make_plan(scene).engine;
   moving.engine = EngineChoice::automatic;
-  if (engine == EngineKind::event) {
+  if (plan.engine == EngineKind::event) {
     if (!moving.event) moving.event.emplace();
     moving.event->max_steps = EventOptions{}.max_steps;
     moving.event->max_events = EventOptions{}.max_events;
     moving.event->otherwise = Otherwise::stop;
     if (moving.stepping) moving.stepping->threads = 1;
-  } else if (engine == EngineKind::smooth) {
+  } else if (plan.engine == EngineKind::smooth) {
     if (!moving.smooth) moving.smooth.emplace();
     moving.smooth->max_steps = SmoothOptions{}.max_steps;
   } else {

@@ -13,13 +13,14 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <tether/scene/plan.hpp>
 #include <tether/scene/scene.hpp>
 
 namespace tether::scene {
 
 /// Of bodies, effects and options; not of the scene's name, end, output and expectations, nor of
 /// what only says when to give up.
-std::uint64_t hash_of_motion(const Scene& scene);
+std::uint64_t hash_of_motion(const Scene& scene, const Plan& plan);
 
 /// Whole, and lasting after a loss of power. Throws std::runtime_error.
 void write_state(const std::string& file, std::uint64_t scene, const std::string& content);

@@ -99,12 +99,7 @@ class SmoothEngine : public Engine {
 
   Counts counts() const override {
     Counts sum = before_;
-    const Counts now = integrator_->counts();
-    sum.steps += now.steps;
-    sum.residual_evaluations += now.residual_evaluations;
-    sum.jacobian_evaluations += now.jacobian_evaluations;
-    sum.projections += now.projections;
-    sum.error_test_failures += now.error_test_failures;
+    add_work(sum, integrator_->counts());
     return sum;
   }
 

@@ -3,11 +3,11 @@
 #include "integrator.hpp"
 
 #include <fmt/format.h>
-#include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_spgmr.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tether::scene::smooth {
 
@@ -33,11 +33,6 @@ constexpr double kNewtonRounding = 2e-13;  // no less of it
 // Of velocities across the joints, times pivot^2; see weights().
 constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3, kSmallestPivotIndex2 = 1e-3;
 
-// The first step's error is an eighth of what IDA allows, and nothing moves by more than this part.
-constexpr double kFirstError = 0.125, kFirstMove = 1e-2;
-constexpr double kFirstAtRest = 1e-3;  // s
-constexpr double kLook = 1e-5;         // the part of a move over which y'' is looked at
-
 // Steps from one anchor to the next, see SmoothEngine; not close to a dead point, where y' and the
 // multipliers are badly known.
 constexpr long kAnchor = 5000;
@@ -49,110 +44,56 @@ double now() {
 
 }  // namespace
 
-Integrator::Vectors::Vectors(const System& system, const Eigen::VectorXd& start,
-                             const Eigen::VectorXd& rate, double tolerance, SUNContext context) {
-  const int N = system.size();
-  y = ida_projection::fast_vector(N_VNew_Serial(N, context));
-  yp = N_VClone(y);
-  id = N_VClone(y);
-  atol = N_VClone(y);
-  for (int i = 0; i < N; ++i) {
-    N_VGetArrayPointer(y)[i] = start[i];
-    N_VGetArrayPointer(yp)[i] = rate[i];
-    N_VGetArrayPointer(id)[i] = system.id(i);
-    N_VGetArrayPointer(atol)[i] = system.absolute_tolerance(i, tolerance);
-  }
-}
-
-Integrator::Vectors::~Vectors() {
-  for (N_Vector v : {y, yp, id, atol}) N_VDestroy(v);
-}
-
 Integrator::Integrator(System& system, const SmoothOptions& options, double t,
                        const Eigen::VectorXd& y, const Eigen::VectorXd& yp, For purpose)
     : system_(system),
       options_(options),
       t_(t),
       tolerance_(local_tolerance(options)),
-      vectors_(system, y, yp, tolerance_, context_),
+      absolute_(system.size()),
       spent_(system.effect_names().size()) {
-  ida_ = IDACreate(context_);
-  context_.keep_messages_of(ida_);
-  IDAInit(ida_, residual, t, vectors_.y, vectors_.yp);
-  IDASetUserData(ida_, this);
-  system.choose_rows(t, y.data(), tolerance_);
-  IDAWFtolerances(ida_, weights);
-  IDASetMaxNumSteps(ida_, -1);  // counted in step_past
-  if (options.max_step > 0) IDASetMaxStep(ida_, options.max_step);
-  IDASetInitStep(ida_, first_step(t, y, yp));
-  if (purpose == For::motion) {
-    matrix_.emplace(system, t, vectors_.y, vectors_.yp, context_);
-    IDASetLinearSolver(ida_, matrix_->solver(), matrix_->matrix());
-    IDASetJacFn(ida_, jacobian);
-  } else {  // IDA wants a solver to begin with; this one has no matrix
-    unused_ = SUNLinSol_SPGMR(vectors_.y, SUN_PREC_NONE, 1, context_);
-    IDASetLinearSolver(ida_, unused_, nullptr);
+  Eigen::VectorXd id(system.size());
+  for (int i = 0; i < system.size(); ++i) {
+    id[i] = system.id(i);
+    absolute_[i] = system.absolute_tolerance(i, tolerance_);
   }
-  IDASetId(ida_, vectors_.id);
+  session_.emplace(context_, IdaSession::Start{t, y, yp, id}, residual, weights, this,
+                   options.max_step);
+  system.choose_rows(t, y.data(), tolerance_);
+  // id is 1 where a component has a rate.
+  const FirstStep first{tolerance_, std::numeric_limits<double>::infinity(), id,
+                        [&](double at, Eigen::VectorXd& ahead, Eigen::VectorXd& rate) {
+                          system_.complete(at, ahead, rate);
+                        }};
+  session_->set_first_step(first(t, y, yp));
+  if (purpose == For::motion) {
+    matrix_.emplace(system, t, session_->y(), session_->yp(), context_);
+    session_->use(matrix_->solver(), matrix_->matrix(), jacobian);
+  } else {  // IDA wants a solver to begin with; this one has no matrix
+    unused_.reset(SUNLinSol_SPGMR(session_->y(), SUN_PREC_NONE, 1, context_));
+    session_->use(unused_.get(), nullptr, nullptr);
+  }
   // Multipliers are derived quantities in every form: IDA judges the motion.
-  IDASetSuppressAlg(ida_, 1);
+  session_->check(IDASetSuppressAlg(session_->ida(), 1), "IDASetSuppressAlg");
   const bool index2 = options.formulation == Formulation::stabilised_index2;
-  IDASetNonlinConvCoef(ida_,
-                       index2 ? std::max(kNewtonIndex2, kNewtonRounding / tolerance_) : kNewton);
+  session_->set_newton(index2 ? std::max(kNewtonIndex2, kNewtonRounding / tolerance_) : kNewton);
   if (options.projection) {
     ida_projection::Options projection;
-    projection.id = vectors_.id;
     // Close to dead points F answers to any move, without being stiff: no other metric is to be
     // tried.
     projection.metric = ida_projection::Metric::local_correction;
-    projection.print_fatal = false;
-    projection.print_warnings = false;
-    // Behind a dead point rows come back, and weights narrow, with errors of earlier steps: no
-    // smaller step makes that move shorter. It is part of what IDA's error test judges.
-    projection.long_move = ida_projection::LongMove::cap;
     // Errors then follow the tolerance; by IDA's own rule one tolerance in ten ends twenty times
     // worse than its neighbours where dead points magnify errors.
     projection.step_smoothing = true;
-    projection.maximum_step = options.max_step;
     // Without its refresh the noise of index 1's multipliers grows until Newton fails. Those of
     // index 2 scale with cj, as IDA's own factor does: the refresh with old factors makes errors at
     // tight tolerances up to thirty times larger.
     projection.refresh_algebraic = options.formulation == Formulation::index1;
     projection.progress = [this](const ida_projection::Progress&) {
-      if (system_.look_at_rows()) projection_->rows_changed();
+      if (system_.look_at_rows()) session_->projection()->rows_changed();
     };
-    projection_.emplace(ida_, system.constraints(), projection);
+    session_->project(system.constraints(), projection);
   }
-}
-
-Integrator::~Integrator() {
-  IDAFree(&ida_);
-  projection_.reset();
-  if (unused_ != nullptr) SUNLinSolFree(unused_);
-}
-
-// IDA begins with half a tolerance / |y'|, at tight tolerances 1e-12 s. There the multipliers of
-// index 2, changes of velocity / h, are rounding, and Newton fails at every smaller step. At order
-// 1 IDA's estimate of the error is h^2 |y''| / 4. Never IDA's own: that depends on the time asked
-// for.
-double Integrator::first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const {
-  double speed = 0;
-  for (int i = 0; i < system_.size(); ++i)
-    if (system_.id(i) != 0.0) speed = std::max(speed, std::abs(yp[i]) / (1.0 + std::abs(y[i])));
-  if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
-  const double look = kLook / speed;
-  Eigen::VectorXd ahead = y + look * yp, rate;
-  system_.complete(t + look, ahead, rate);
-  double sum = 0;
-  for (int i = 0; i < system_.size(); ++i) {
-    if (system_.id(i) == 0.0) continue;
-    const double change = (rate[i] - yp[i]) / (tolerance_ * (1.0 + std::abs(y[i])));
-    sum += change * change;
-  }
-  const double curvature = std::sqrt(sum / system_.size()) / look;
-  if (!std::isfinite(curvature)) return 0.5 * tolerance_ / speed;
-  const double longest = kFirstMove / speed;
-  return curvature > 0 ? std::min(longest, std::sqrt(4.0 * kFirstError / curvature)) : longest;
 }
 
 int Integrator::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
@@ -177,7 +118,7 @@ int Integrator::weights(N_Vector y, N_Vector weights, void* self) {
   const double smallest = index2 ? kSmallestPivotIndex2 : kSmallestPivot;
   const double pivot = std::max(me.system_.weakest_pivot(), smallest);
   const double widen = std::max(1.0, kNoise / (pivot * pivot * me.tolerance_));
-  const double *values = N_VGetArrayPointer(y), *atol = N_VGetArrayPointer(me.vectors_.atol);
+  const double *values = N_VGetArrayPointer(y), *atol = me.absolute_.data();
   double* out = N_VGetArrayPointer(weights);
   for (int i = 0; i < me.system_.size(); ++i)
     out[i] = 1.0 / (widen * (me.tolerance_ * std::abs(values[i]) + atol[i]));
@@ -196,7 +137,7 @@ int Integrator::jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector,
 ida_projection::ConsistencyReport Integrator::make_consistent(double t) {
   ida_projection::Consistency how;
   how.derivative = ida_projection::Consistency::Derivative::keep;  // System::complete knows it
-  return projection_->make_consistent(t, vectors_.y, vectors_.yp, how);
+  return session_->projection()->make_consistent(t, session_->y(), session_->yp(), how);
 }
 
 // Step by step up to t. IDA's own way to an output time takes the same steps.
@@ -209,8 +150,9 @@ int Integrator::step_past(double t, long& steps_left, const std::function<bool()
     }
     const long before = steps();
     const double kink = system_.next_kink(step_end());
-    if (std::isfinite(kink)) IDASetStopTime(ida_, kink);  // no step passes over one
-    const int flag = IDASolve(ida_, t, &t_, vectors_.y, vectors_.yp, IDA_ONE_STEP);
+    if (std::isfinite(kink))  // no step passes over one
+      session_->check(IDASetStopTime(session_->ida(), kink), "IDASetStopTime");
+    const int flag = session_->solve(t, t_, IDA_ONE_STEP);
     if (flag < 0) return flag;
     steps_left -= steps() - before;
   }
@@ -220,17 +162,17 @@ int Integrator::step_past(double t, long& steps_left, const std::function<bool()
 bool Integrator::advance(double t, long& steps_left, const std::function<bool()>& interrupted) {
   if (t - t_ <= 1e-13 * std::abs(t)) return true;
   const double begin = now();
-  context_.message().clear();
   const double from = t_;
   int flag = step_past(t, steps_left, interrupted);
   const double to = std::min(t, step_end());
   if (flag == IDA_SUCCESS && to > from) {
-    flag = IDASolve(ida_, to, &t_, vectors_.y, vectors_.yp, IDA_NORMAL);
+    flag = session_->solve(to, t_, IDA_NORMAL);
     // IDA has nothing to do where its last step has just ended and leaves y as the corrector summed
     // it; who comes from a time within that step reads it from the history, by other roundings.
-    if (flag >= 0 && to == step_end()) IDAGetDky(ida_, to, 0, vectors_.y);
+    if (flag >= 0 && to == step_end()) IDAGetDky(session_->ida(), to, 0, session_->y());
     // Nobody looks at y' between steps.
-    if (projection_ && flag >= 0) projection_->project(t_, vectors_.y, nullptr);
+    if (session_->projection() != nullptr && flag >= 0)
+      session_->projection()->project(t_, session_->y(), nullptr);
   }
   spent_.total += now() - begin;
   if (flag < 0) throw SimulationError(failure(flag));
@@ -239,7 +181,7 @@ bool Integrator::advance(double t, long& steps_left, const std::function<bool()>
 
 long Integrator::steps() const {
   long steps = 0;
-  IDAGetNumSteps(ida_, &steps);
+  IDAGetNumSteps(session_->ida(), &steps);
   return steps;
 }
 
@@ -250,30 +192,27 @@ bool Integrator::anchor_is_due() const {
 double Integrator::step_end() const {
   if (steps() == 0) return t_;
   double end = t_;
-  IDAGetCurrentTime(ida_, &end);
+  IDAGetCurrentTime(session_->ida(), &end);
   return end;
 }
 
 Eigen::VectorXd Integrator::at_step_end() const {
-  Eigen::VectorXd y(system_.size());
-  N_Vector out = N_VMake_Serial(system_.size(), y.data(), context_);
-  IDAGetDky(ida_, step_end(), 0, out);
-  N_VDestroy(out);
+  Eigen::VectorXd y;
+  session_->at(step_end(), y);
   return y;
 }
 
 std::string Integrator::failure(int flag) const {
   double h = 0;
-  IDAGetLastStep(ida_, &h);
-  char* name = IDAGetReturnFlagName(flag);
+  IDAGetLastStep(session_->ida(), &h);
   std::string message =
       fmt::format("the smooth engine stopped at t = {:.6g} s (last step {:.3g} s): {}. ",
-                  system_.units().time * t_, system_.units().time * h, name);
-  std::free(name);
+                  system_.units().time * t_, system_.units().time * h, IdaSession::name(flag));
   if (!context_.message().empty()) message += "IDA: " + context_.message() + " ";
-  if (projection_ && projection_->status() != ida_projection::Status::success &&
-      !projection_->message().empty())
-    message += "Projection: " + projection_->message() + ". ";
+  const ida_projection::Projection* projection = session_->projection();
+  if (projection != nullptr && projection->status() != ida_projection::Status::success &&
+      !projection->message().empty())
+    message += "Projection: " + projection->message() + ". ";
   const std::vector<std::string> joints = system_.dependent_joints(t_, y().data());
   for (std::size_t k = 0; k < joints.size(); ++k) {
     constexpr std::size_t kNamed = 6;
@@ -291,22 +230,13 @@ std::string Integrator::failure(int flag) const {
       "Try a smaller [smooth] tolerance or max_step; look whether the joints let the bodies reach "
       "a position from which they cannot go on, and whether a spring or a motion is too stiff or "
       "too fast.";
-  if (!projection_) message += " With projection = true the joints and invariants are kept.";
+  if (projection == nullptr)
+    message += " With projection = true the joints and invariants are kept.";
   return message;
 }
 
 Eigen::Map<const Eigen::VectorXd> Integrator::y() const {
-  return {N_VGetArrayPointer(vectors_.y), system_.size()};
-}
-
-Counts Integrator::counts() const {
-  Counts c;
-  IDAGetNumSteps(ida_, &c.steps);
-  IDAGetNumResEvals(ida_, &c.residual_evaluations);
-  IDAGetNumJacEvals(ida_, &c.jacobian_evaluations);
-  IDAGetNumErrTestFails(ida_, &c.error_test_failures);
-  if (projection_) c.projections = projection_->statistics().projections;
-  return c;
+  return {N_VGetArrayPointer(session_->y()), system_.size()};
 }
 
 Integrator::Seconds Integrator::seconds() const {
@@ -316,7 +246,8 @@ Integrator::Seconds Integrator::seconds() const {
     for (double& each : s.effects)
       each *= static_cast<double>(spent_.residuals) / static_cast<double>(spent_.timed);
   s.jacobian = spent_.jacobian;
-  if (projection_) s.projection = projection_->statistics().seconds;
+  if (session_->projection() != nullptr)
+    s.projection = session_->projection()->statistics().seconds;
   s.total = spent_.total;
   return s;
 }

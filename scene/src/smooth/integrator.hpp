@@ -3,14 +3,12 @@
 #pragma once
 
 #include <functional>
-#include <ida/ida.h>
-#include <memory>
 #include <optional>
 #include <string>
 #include <tether/ida_projection.hpp>
 
 #include "newton_matrix.hpp"
-#include "sundials/quiet_context.hpp"
+#include "sundials/ida_session.hpp"
 #include "system.hpp"
 
 namespace tether::scene::smooth {
@@ -25,7 +23,6 @@ class Integrator {
   /// `y` and `yp` are consistent up to errors that `make_consistent` repairs.
   Integrator(System& system, const SmoothOptions& options, double t, const Eigen::VectorXd& y,
              const Eigen::VectorXd& yp, For purpose = For::motion);
-  ~Integrator();
   Integrator(const Integrator&) = delete;
   Integrator& operator=(const Integrator&) = delete;
 
@@ -42,7 +39,7 @@ class Integrator {
   double step_end() const;
   Eigen::VectorXd at_step_end() const;
   Eigen::Map<const Eigen::VectorXd> y() const;
-  Counts counts() const;
+  Counts counts() const { return session_->counts(); }
 
   struct Seconds {                // on the clock
     std::vector<double> effects;  ///< as System::effect_names()
@@ -55,18 +52,9 @@ class Integrator {
   static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
                       void* self, N_Vector, N_Vector, N_Vector);
   static int weights(N_Vector y, N_Vector weights, void* self);
-  double first_step(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const;
   int step_past(double t, long& steps_left, const std::function<bool()>& interrupted);
   std::string failure(int flag) const;
 
-  struct Vectors {
-    Vectors(const System& system, const Eigen::VectorXd& start, const Eigen::VectorXd& rate,
-            double tolerance, SUNContext context);
-    ~Vectors();
-    Vectors(const Vectors&) = delete;
-    Vectors& operator=(const Vectors&) = delete;
-    N_Vector y = nullptr, yp = nullptr, id = nullptr, atol = nullptr;
-  };
   struct Spent {  // seconds on the clock; of the effects in `timed` of all residuals
     explicit Spent(std::size_t parts) : effects(parts) {}
     Stopwatch effects;
@@ -78,12 +66,11 @@ class Integrator {
   SmoothOptions options_;
   double t_;
   double tolerance_;  // of a step
+  Eigen::VectorXd absolute_;
   QuietContext context_;
-  Vectors vectors_;
   std::optional<NewtonMatrix> matrix_;
-  SUNLinearSolver unused_ = nullptr;  // in place of its solver
-  void* ida_ = nullptr;
-  std::optional<ida_projection::Projection> projection_;
+  OwnedLinearSolver unused_;  // in place of its solver
+  std::optional<IdaSession> session_;
   Spent spent_;
 };
 

@@ -67,19 +67,15 @@ NewtonMatrix::NewtonMatrix(System& system, double t, N_Vector y, N_Vector yp, SU
   make_dense(y, context);
 }
 
-NewtonMatrix::~NewtonMatrix() {
-  SUNLinSolFree(solver_);
-  SUNMatDestroy(matrix_);
-}
-
 void NewtonMatrix::make_dense(N_Vector y, SUNContext context) {
   const int N = system_.size();
   const auto& places = entries_.places;
   std::vector<int> slots(places.size());
   for (std::size_t k = 0; k < places.size(); ++k) slots[k] = places[k].first + N * places[k].second;
-  matrix_ = SUNDenseMatrix(N, N, context);
-  solver_ = N <= ida_projection::kLargestFastDense ? ida_projection::fast_dense_solver(y, matrix_)
-                                                   : SUNLinSol_Dense(y, matrix_, context);
+  matrix_.reset(SUNDenseMatrix(N, N, context));
+  solver_.reset(N <= ida_projection::kLargestFastDense
+                    ? ida_projection::fast_dense_solver(y, matrix())
+                    : SUNLinSol_Dense(y, matrix(), context));
   entries_.finish(std::move(slots));
 }
 
@@ -89,9 +85,10 @@ void NewtonMatrix::make_sparse(double t, N_Vector y, N_Vector yp, SUNContext con
   writes_.assign(entries_.places.size(), 0);
   look_nearby(t, y, yp);
   arrange();
-  matrix_ = SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context);
-  solver_ = SUNLinSol_KLU(y, matrix_, context);
-  if (!order_.empty()) use_order(solver_, order_);
+  matrix_.reset(
+      SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context));
+  solver_.reset(SUNLinSol_KLU(y, matrix(), context));
+  if (!order_.empty()) use_order(solver(), order_);
   solver_->ops->setup = factor_or_try_smaller_step;
 }
 
@@ -197,7 +194,7 @@ void NewtonMatrix::fill(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix 
     std::copy(row_indices_.begin(), row_indices_.end(), SUNSparseMatrix_IndexValues(J));
     std::copy_n(values_.begin(), row_indices_.size(), SUNSparseMatrix_Data(J));
     if (grows || multiplier_choices_ != system_.multiplier_choices())
-      SUNLinSol_KLUReInit(solver_, J, 0, SUNKLU_REINIT_PARTIAL);  // other pivots
+      SUNLinSol_KLUReInit(solver(), J, 0, SUNKLU_REINIT_PARTIAL);  // other pivots
     multiplier_choices_ = system_.multiplier_choices();
     return;
   }

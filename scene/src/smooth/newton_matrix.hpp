@@ -1,10 +1,7 @@
 // Tether: IDA's matrix of a smooth system and its solver. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <sundials/sundials_linearsolver.h>
-#include <sundials/sundials_matrix.h>
-#include <sundials/sundials_nvector.h>
-
+#include "sundials/ida_session.hpp"
 #include "system.hpp"
 
 namespace tether::scene::smooth {
@@ -17,12 +14,11 @@ class NewtonMatrix {
  public:
   /// Its entries are those of the Jacobian at t, y and y'.
   NewtonMatrix(System& system, double t, N_Vector y, N_Vector yp, SUNContext context);
-  ~NewtonMatrix();
   NewtonMatrix(const NewtonMatrix&) = delete;
   NewtonMatrix& operator=(const NewtonMatrix&) = delete;
 
-  SUNMatrix matrix() const { return matrix_; }
-  SUNLinearSolver solver() const { return solver_; }
+  SUNMatrix matrix() const { return matrix_.get(); }
+  SUNLinearSolver solver() const { return solver_.get(); }
   /// The values at this point into J, a matrix like matrix().
   void fill(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J);
 
@@ -36,8 +32,8 @@ class NewtonMatrix {
   bool grow();
 
   System& system_;
-  SUNMatrix matrix_ = nullptr;
-  SUNLinearSolver solver_ = nullptr;
+  OwnedMatrix matrix_;
+  OwnedLinearSolver solver_;
   Entries entries_;
   // Sparse. Of each call of Entries::add: has it written anything but zero? Those that have not
   // write behind the entries of the pattern.

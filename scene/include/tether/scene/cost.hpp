@@ -15,13 +15,13 @@ namespace tether::scene {
 
 /// An engine and what is set of it: the tolerance of [smooth] or [event], or `step` (s) or
 /// `accuracy` of [stepping].
-enum class Method : std::uint8_t { smooth, events, steps, accuracy };
-const char* name(Method method);          ///< "events"
-const char* setting_name(Method method);  ///< "tolerance"
+enum class CostMethod : std::uint8_t { smooth, events, steps, accuracy };
+const char* name(CostMethod method);          ///< "events"
+const char* setting_name(CostMethod method);  ///< "tolerance"
 
 /// One setting of a scene.
 struct CostRow {
-  Method method = Method::smooth;
+  CostMethod method = CostMethod::smooth;
   double setting = 0;
   /// Bound on the error: the largest distance of a body's centre (m) and angle of its orientation
   /// (rad) from the reference, whichever is larger, over the times below and all bodies, and what

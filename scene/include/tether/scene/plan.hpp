@@ -43,6 +43,8 @@ std::ostream& operator<<(std::ostream& out, const Plan& plan);
 
 /// The engine that the plan names. Throws std::invalid_argument.
 std::unique_ptr<Engine> make_engine(const Scene& scene);
+/// The same, by the plan of the scene.
+std::unique_ptr<Engine> make_engine(const Scene& scene, const Plan& plan);
 
 /// Bodies that begin inside each other by more than a hundredth of the smaller one's size, the
 /// deepest first, one line each.

@@ -15,7 +15,7 @@ class SolverTeam;
 }
 namespace tether::scene {
 
-/// Result of an [[expect]]; for one that holds `throughout`, at its worst moment.
+/// Result of an [[expect]]; for one that holds `throughout`, at its worst instant.
 struct Judgement {
   bool beyond = false;  ///< its time lies after the end (--end): it does not count
   bool judged = false;  ///< the run reached its time

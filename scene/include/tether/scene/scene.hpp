@@ -248,8 +248,5 @@ struct Scene {
 /// Whether steps take over where events cannot go on.
 bool goes_on_in_steps(const Scene& scene);
 
-/// Whether the output or an expectation of a scene is of forces.
-bool asks_for_forces(const Scene& scene);
-
 }  // namespace tether::scene
 TETHER_EXPORT_END

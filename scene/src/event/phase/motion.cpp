@@ -271,7 +271,6 @@ void Motion::prepare(double t, const double* y) {
 }
 
 void Motion::rate(double t, const double* y, double* y_rate) {
-  ++evaluations_;
   prepare(t, y);
   if (rows_ > 0) {
     islands_.factor(R_, MC_, row_scale_);

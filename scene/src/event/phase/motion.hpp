@@ -87,8 +87,7 @@ class Motion {
   std::vector<VectorXd> slides() const;
   const ContactLook& look(int closed) const { return looks_[index(closed)]; }
   VectorXd slip(int closed) const { return slip_of(looks_[index(closed)]); }
-  VectorXd slip_rate(int closed) const;  ///< at the state of the last rate()
-  long evaluations() const { return evaluations_; }
+  VectorXd slip_rate(int closed) const;            ///< at the state of the last rate()
   double work_done() const { return work_done_; }  ///< operations, roughly
   /// Slips of the contacts that slide with friction at (t, y), one after the other.
   void slips_with_friction(double t, const double* y, VectorXd& slips);
@@ -158,7 +157,6 @@ class Motion {
   VectorXd joint_g_, joint_rate_, joint_rest_, row_scale_;
   MatrixXd joint_W_, R_, C_, MC_;
   RowIslands islands_;
-  long evaluations_ = 0;
   double work_done_ = 0;
   double smallest_slip_ = 0;
 };

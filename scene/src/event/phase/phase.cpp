@@ -3,8 +3,6 @@
 #include "phase.hpp"
 
 #include <fmt/format.h>
-#include <ida/ida.h>
-#include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
@@ -12,19 +10,16 @@
 #include <cmath>
 #include <optional>
 #include <string>
-#include <tether/ida_projection.hpp>
 #include <tether/linalg/least_squares.hpp>
 #include <tether/scene/engine.hpp>
 
-#include "sundials/quiet_context.hpp"
+#include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {
 
 namespace {
 
-// The first step's error is an eighth of the error that IDA allows.
-constexpr double kFirstError = 0.125, kFirstMove = 1e-2, kFirstAtRest = 1e-3, kFirstAtMost = 0.1;
-constexpr double kLook = 1e-5;   // the part of a move over which y'' is looked at
+constexpr double kFirstAtMost = 0.1;
 constexpr double kNewton = 0.1;  // Newton's test, of the tolerance
 constexpr double kDifference = 1e-7, kOfSlip = 1e-3;
 constexpr double kTurned = 0.5;  // of a slip, since Newton's matrix was made
@@ -41,9 +36,6 @@ using Flag = booleantype;
 struct Phase::Ida {
   Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
       double longest_first);
-  ~Ida();
-  Ida(const Ida&) = delete;
-  Ida& operator=(const Ida&) = delete;
 
   static int weights(N_Vector y, N_Vector w, void* self);
   double size_of(int i, double value) const { return sizes[i] + std::abs(value); }
@@ -55,18 +47,15 @@ struct Phase::Ida {
   bool has_turned(double t, N_Vector predicted);
   bool may_reuse(double t, N_Vector at);
   void differentiate(double t, const double* from);
-  double first_step(const VectorXd& y0, const VectorXd& rate0) const;
 
   Motion& motion;
   double tolerance, start;
   QuietContext context;
-  N_Vector y = nullptr, yp = nullptr, id = nullptr;
-  SUNMatrix matrix = nullptr;
-  SUNLinearSolver solver = nullptr;
-  SUNNonlinearSolver corrector = nullptr;
+  OwnedMatrix matrix;
+  OwnedLinearSolver solver;
+  OwnedCorrector corrector;
   decltype(SUNNonlinearSolver {} -> ops->solve) iterate = nullptr;  // SUNDIALS' Newton
-  void* memory = nullptr;
-  std::optional<ida_projection::Projection> projection;
+  std::optional<IdaSession> session;
   VectorXd rate, near, near_rate, sizes;
   VectorXd slips, slips_of_matrix;
   MatrixXd slope;  // d(y')/dy at
@@ -83,38 +72,27 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
   near_rate.setZero(N);
   VectorXd rate0(N);
   motion.rate(start, y0.data(), rate0.data());
-  y = ida_projection::fast_vector(N_VNew_Serial(N, context));
-  yp = N_VClone(y);
-  id = N_VClone(y);
-  for (int i = 0; i < N; ++i) {
-    N_VGetArrayPointer(y)[i] = y0[i];
-    N_VGetArrayPointer(yp)[i] = rate0[i];
-    N_VGetArrayPointer(id)[i] = 1;
-  }
-  memory = IDACreate(context);
-  context.keep_messages_of(memory);
-  IDAInit(memory, residual, 0.0, y, yp);
-  IDASetUserData(memory, this);
-  IDAWFtolerances(memory, weights);
-  IDASetMaxNumSteps(memory, -1);
-  if (max_step > 0) IDASetMaxStep(memory, max_step);
-  double first = first_step(y0, rate0);
-  if (longest_first > 0) first = std::min(first, longest_first);
-  IDASetInitStep(memory, first);
-  matrix = SUNDenseMatrix(N, N, context);
-  solver = N <= ida_projection::kLargestFastDense ? ida_projection::fast_dense_solver(y, matrix)
-                                                  : SUNLinSol_Dense(y, matrix, context);
-  IDASetLinearSolver(memory, solver, matrix);
-  IDASetJacFn(memory, jacobian);
-  IDASetId(memory, id);
-  IDASetNonlinConvCoef(memory, kNewton);
-  corrector = SUNNonlinSol_Newton(y, context);
+  const VectorXd id = VectorXd::Ones(N);
+  session.emplace(context, IdaSession::Start{0, y0, rate0, id}, residual, weights, this, max_step);
+  const FirstStep first{tolerance, kFirstAtMost, sizes,
+                        [&](double at, VectorXd& ahead, VectorXd& rate_ahead) {
+                          motion.rate(start + at, ahead.data(), rate_ahead.data());
+                        }};
+  const double h = first(0, y0, rate0);
+  session->set_first_step(longest_first > 0 ? std::min(h, longest_first) : h);
+  matrix.reset(SUNDenseMatrix(N, N, context));
+  solver.reset(N <= ida_projection::kLargestFastDense
+                   ? ida_projection::fast_dense_solver(session->y(), matrix.get())
+                   : SUNLinSol_Dense(session->y(), matrix.get(), context));
+  session->use(solver.get(), matrix.get(), jacobian);
+  session->set_newton(kNewton);
+  corrector.reset(SUNNonlinSol_Newton(session->y(), context));
   iterate = corrector->ops->solve;
   corrector->ops->solve = newton;
   ida_projection::Constraints constraints;
   constraints.count = motion.constraint_count();
   if (constraints.count == 0) {
-    IDASetNonlinearSolver(memory, corrector);
+    session->check(IDASetNonlinearSolver(session->ida(), corrector.get()), "IDASetNonlinearSolver");
     return;
   }
   constraints.value = [this](double t, ida_projection::ConstVector at, ida_projection::Vector g) {
@@ -125,22 +103,8 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
         motion.constraint_gradient(start + t, at.data(), C);
       });
   ida_projection::Options options;
-  options.id = id;
-  options.nonlinear_solver = corrector;
-  options.print_fatal = false;
-  options.print_warnings = false;
-  options.long_move = ida_projection::LongMove::cap;
-  options.maximum_step = max_step;
-  projection.emplace(memory, constraints, options);
-}
-
-Phase::Ida::~Ida() {
-  IDAFree(&memory);
-  projection.reset();
-  SUNNonlinSolFree(corrector);
-  SUNLinSolFree(solver);
-  SUNMatDestroy(matrix);
-  for (N_Vector v : {y, yp, id}) N_VDestroy(v);
+  options.nonlinear_solver = corrector.get();
+  session->project(constraints, options);
 }
 
 int Phase::Ida::weights(N_Vector y, N_Vector w, void* self) {
@@ -231,27 +195,6 @@ int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SU
   return 0;
 }
 
-// At order 1 IDA's estimate of the error is h^2 |y''| / 4.
-double Phase::Ida::first_step(const VectorXd& y0, const VectorXd& rate0) const {
-  double speed = 0;
-  for (int i = 0; i < y0.size(); ++i)
-    speed = std::max(speed, std::abs(rate0[i]) / size_of(i, y0[i]));
-  if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
-  const double look = kLook / speed;
-  const VectorXd ahead = y0 + look * rate0;
-  VectorXd rate_ahead(y0.size());
-  motion.rate(start + look, ahead.data(), rate_ahead.data());
-  double sum = 0;
-  for (int i = 0; i < y0.size(); ++i) {
-    const double change = (rate_ahead[i] - rate0[i]) / (tolerance * size_of(i, y0[i]));
-    sum += change * change;
-  }
-  const double curvature = std::sqrt(sum / static_cast<double>(y0.size())) / look;
-  const double longest = std::min(kFirstMove / speed, kFirstAtMost);
-  if (!std::isfinite(curvature)) return 0.5 * tolerance / speed;
-  return curvature > 0 ? std::min(longest, std::sqrt(4 * kFirstError / curvature)) : longest;
-}
-
 Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
              double longest_first, double length)
     : motion_(motion),
@@ -259,46 +202,33 @@ Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const 
       start_(t),
       length_(length),
       ida_(std::make_unique<Ida>(motion, tolerance, max_step, t, y, longest_first)) {
-  if (std::isfinite(length_)) IDASetStopTime(ida_->memory, length_);
+  if (std::isfinite(length_))
+    ida_->session->check(IDASetStopTime(ida_->session->ida(), length_), "IDASetStopTime");
 }
 
 Phase::~Phase() = default;
 
 void Phase::step() {
   double t = 0;
-  ida_->context.message().clear();
-  const int flag = IDASolve(ida_->memory, end_ + 1, &t, ida_->y, ida_->yp, IDA_ONE_STEP);
+  const int flag = ida_->session->solve(end_ + 1, t, IDA_ONE_STEP);
   if (flag < 0) {
-    char* name = IDAGetReturnFlagName(flag);
     const double unit = motion_.model().time_unit();
     std::string text = fmt::format(
         "the event engine's smooth phase that began at t = {:.9g} s stopped {:.3g} s "
         "later: {}. {}",
-        unit * start_, unit * end_, name, ida_->context.message());
-    std::free(name);
-    if (ida_->projection && !ida_->projection->message().empty())
-      text += " Projection: " + ida_->projection->message();
+        unit * start_, unit * end_, IdaSession::name(flag), ida_->context.message());
+    const ida_projection::Projection* projection = ida_->session->projection();
+    if (projection != nullptr && !projection->message().empty())
+      text += " Projection: " + projection->message();
     throw SimulationError(text + " Try another [event] tolerance.");
   }
   begin_ = end_;
   end_ = t;
 }
 
-void Phase::at(double time, VectorXd& y) const {
-  y.resize(motion_.size());
-  N_Vector out = N_VMake_Serial(motion_.size(), y.data(), ida_->context);
-  IDAGetDky(ida_->memory, time, 0, out);
-  N_VDestroy(out);
-}
+void Phase::at(double time, VectorXd& y) const { ida_->session->at(time, y); }
 
-bool Phase::projected_at(double time, VectorXd& y) {
-  at(time, y);
-  if (!ida_->projection) return true;
-  N_Vector out = N_VMake_Serial(motion_.size(), y.data(), ida_->context);
-  const bool good = static_cast<bool>(ida_->projection->project(time, out));
-  N_VDestroy(out);
-  return good;
-}
+bool Phase::projected_at(double time, VectorXd& y) { return ida_->session->projected_at(time, y); }
 
 bool Phase::has_weak_rows() const {
   VectorXd y;
@@ -306,15 +236,7 @@ bool Phase::has_weak_rows() const {
   return motion_.other_joint_rows_are_better(start_ + end_, y);
 }
 
-PhaseCounts Phase::counts() const {
-  PhaseCounts c;
-  IDAGetNumSteps(ida_->memory, &c.steps);
-  IDAGetNumResEvals(ida_->memory, &c.residuals);
-  IDAGetNumJacEvals(ida_->memory, &c.jacobians);
-  IDAGetNumErrTestFails(ida_->memory, &c.error_test_failures);
-  if (ida_->projection) c.projections = ida_->projection->statistics().projections;
-  return c;
-}
+Counts Phase::counts() const { return ida_->session->counts(); }
 
 // Newton's shortest moves; few, since only what an event left is mended.
 bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd& y) {

@@ -3,23 +3,11 @@
 #pragma once
 
 #include <memory>
+#include <tether/scene/engine.hpp>
 
 #include "motion.hpp"
 
 namespace tether::scene::event {
-
-/// Work of IDA.
-struct PhaseCounts {
-  long steps = 0, residuals = 0, jacobians = 0, projections = 0, error_test_failures = 0;
-
-  void add(const PhaseCounts& more) {
-    steps += more.steps;
-    residuals += more.residuals;
-    jacobians += more.jacobians;
-    projections += more.projections;
-    error_test_failures += more.error_test_failures;
-  }
-};
 
 /// From (t, y) on, with the modes that `motion` has. Its clock starts at 0, so that steps far
 /// shorter than the rounding of t can be taken.
@@ -46,7 +34,7 @@ class Phase {
   bool projected_at(double time, VectorXd& y);
   /// Joints would be better held by other rows than those that were chosen at the start.
   bool has_weak_rows() const;
-  PhaseCounts counts() const;
+  Counts counts() const;  ///< of IDA
 
  private:
   struct Ida;

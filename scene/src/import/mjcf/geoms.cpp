@@ -47,19 +47,13 @@ Solid read_solid(Tag& tag, const std::string& type, const std::vector<double>& s
     shape.radius = size[0];
     return of_shape(shape);
   }
-  if (type == "capsule" && sizes(tag, size, 2)) {
-    shape.kind = ShapeKind::capsule;
-    shape.radius = size[0];
-    shape.length = 2 * size[1];
-    return of_shape(shape);
-  }
   if (type == "box" && sizes(tag, size, 3)) {
     shape.kind = ShapeKind::box;
     shape.size = 2 * Vector3d(size[0], size[1], size[2]);
     return of_shape(shape);
   }
-  if (type == "cylinder" && sizes(tag, size, 2)) {
-    shape.kind = ShapeKind::cylinder;
+  if ((type == "cylinder" || type == "capsule") && sizes(tag, size, 2)) {
+    shape.kind = type == "cylinder" ? ShapeKind::cylinder : ShapeKind::capsule;
     shape.radius = size[0];
     shape.length = 2 * size[1];
     return of_shape(shape);

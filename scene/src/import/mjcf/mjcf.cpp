@@ -208,10 +208,7 @@ void Reader::geom(const Node& node, int of, const std::string& class_name) {
   }
   if (out.touch->friction != geom.touch.friction || out.touch->tangential != geom.touch.tangential)
     model_.remarks.add("bodies whose geoms differ in friction have the largest of it", out.name);
-  out.touch->friction = std::max(out.touch->friction, geom.touch.friction);
-  out.touch->tangential = out.touch->tangential || geom.touch.tangential;
-  out.touch->type |= geom.touch.type;
-  out.touch->affinity |= geom.touch.affinity;
+  out.touch->join(geom.touch);
 }
 
 /// All three principal moments become their mean where one exceeds the sum of the others.

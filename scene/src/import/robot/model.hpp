@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <tether/scene/scene.hpp>
@@ -40,6 +41,14 @@ struct Touch {
   bool tangential = true;  ///< false: without friction, unless the other one has it
   unsigned type = 1, affinity = 1;
   int own = -1;  ///< a number of a link that passes through some others
+
+  /// What touches either.
+  void join(const Touch& o) {
+    friction = std::max(friction, o.friction);
+    tangential = tangential || o.tangential;
+    type |= o.type;
+    affinity |= o.affinity;
+  }
   bool operator<(const Touch& o) const {
     return std::tie(friction, tangential, type, affinity, own) <
            std::tie(o.friction, o.tangential, o.type, o.affinity, o.own);

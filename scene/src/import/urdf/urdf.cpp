@@ -100,13 +100,8 @@ std::optional<Shape> read_geometry(const Node& node, Problems& problems, Remarks
     shape.size = tag.vector("size", Vector3d::Zero());
     least = shape.size.minCoeff();
     if (!(least >= 0)) tag.wrong("size", "must be three numbers > 0");
-  } else if (is(node, "cylinder")) {
-    shape.kind = ShapeKind::cylinder;
-    shape.radius = size_of("radius");
-    shape.length = size_of("length");
-    least = std::min(shape.radius, shape.length);
-  } else if (is(node, "capsule")) {
-    shape.kind = ShapeKind::capsule;
+  } else if (is(node, "cylinder") || is(node, "capsule")) {
+    shape.kind = is(node, "cylinder") ? ShapeKind::cylinder : ShapeKind::capsule;
     shape.radius = size_of("radius");
     shape.length = size_of("length");
     least = std::min(shape.radius, shape.length);

@@ -7,22 +7,11 @@ namespace tether::scene::joints {
 
 namespace {
 
-class Hinge : public JointType {
+class Hinge : public AxisJoint {
  public:
   JointKind kind() const override { return JointKind::hinge; }
   MotionOf motion() const override { return MotionOf::angle; }
   bool is_free() const override { return true; }
-  void read(files::Fields& in, Joint& joint) const override {
-    read_point(in, joint);
-    read_axis(in, joint);
-  }
-  void write(const Joint& joint, files::Writer& out) const override {
-    out.field("at", joint.at, "m");
-    out.field("axis", joint.axis);
-  }
-  void check(const Joint& joint, const std::string& name) const override {
-    check_axis(joint.axis, name);
-  }
   void add_rows(RowBuilder& rows) const override {
     rows.coincide();
     rows.right_angle(rows.z(), rows.x());

@@ -7,20 +7,9 @@ namespace tether::scene::joints {
 
 namespace {
 
-class Planar : public JointType {
+class Planar : public AxisJoint {
  public:
   JointKind kind() const override { return JointKind::planar; }
-  void read(files::Fields& in, Joint& joint) const override {
-    read_point(in, joint);
-    read_axis(in, joint);
-  }
-  void write(const Joint& joint, files::Writer& out) const override {
-    out.field("at", joint.at, "m");
-    out.field("axis", joint.axis);
-  }
-  void check(const Joint& joint, const std::string& name) const override {
-    check_axis(joint.axis, name);
-  }
   void add_rows(RowBuilder& rows) const override {
     rows.right_angle(rows.x(), rows.z());
     rows.right_angle(rows.y(), rows.z());

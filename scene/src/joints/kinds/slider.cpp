@@ -7,7 +7,7 @@ namespace tether::scene::joints {
 
 namespace {
 
-class Slider : public JointType {
+class Slider : public AxisJoint {
  public:
   JointKind kind() const override { return JointKind::slider; }
   MotionOf motion() const override { return MotionOf::length; }
@@ -15,13 +15,6 @@ class Slider : public JointType {
   void read(files::Fields& in, Joint& joint) const override {
     joint.at = in.vector("at", joint.at, files::kAny, "m");
     read_axis(in, joint);
-  }
-  void write(const Joint& joint, files::Writer& out) const override {
-    out.field("at", joint.at, "m");
-    out.field("axis", joint.axis);
-  }
-  void check(const Joint& joint, const std::string& name) const override {
-    check_axis(joint.axis, name);
   }
   void add_rows(RowBuilder& rows) const override {
     rows.same_attitude();

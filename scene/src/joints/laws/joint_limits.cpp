@@ -2,12 +2,10 @@
 //
 // s >= lower, upper >= s, of the angle of a hinge or the way of a slider: impulses that only push
 // away from the limit, s'+ = -e s'- where it is struck.
-#include <algorithm>
 #include <cmath>
 #include <tether/linalg/pi.hpp>
 
-#include "joints/list.hpp"
-#include "mechanics/effect.hpp"
+#include "joints/laws/joint_law_effect.hpp"
 
 namespace tether::scene::effects {
 
@@ -19,8 +17,9 @@ constexpr double kFullTurn = 2 * linalg::kPi;
 
 bool has_limits(const Joint& joint) { return joint.limits.has_value(); }
 
-class JointLimitEffect : public Effect {
+class JointLimitEffect : public JointLawEffect {
  public:
+  JointLimitEffect() : JointLawEffect("joint limits", has_limits) {}
   void read_joint(files::Fields& in, files::Reader&, bool angle, Joint& joint) const override {
     const bool degrees = angle && in.has("limits_deg");
     const char* const key = degrees ? "limits_deg" : angle ? "limits_rad" : "limits";
@@ -52,11 +51,6 @@ class JointLimitEffect : public Effect {
               std::vector<double>{joint.limits->lower, joint.limits->upper});
     out.field("limit_restitution", joint.limits->restitution);
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), has_limits);
-    if (count > 0)
-      lines.push_back({"joint limits", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
-  }
   void convert(Scene& scene, const Units& units) const override {
     for (Joint& joint : scene.joints) {
       if (!joint.limits || joints::is_angle(joint)) continue;
@@ -68,9 +62,6 @@ class JointLimitEffect : public Effect {
     if (!joint.limits) return;
     out.limit(number, value - joint.limits->lower, joint.limits->restitution, 1);
     out.limit(number, joint.limits->upper - value, joint.limits->restitution, -1);
-  }
-  bool has_joint_laws(const Scene& scene) const override {
-    return std::any_of(scene.joints.begin(), scene.joints.end(), has_limits);
   }
 };
 

@@ -2,11 +2,9 @@
 //
 // The force along the coordinate that makes its speed the wanted one, or the largest one towards
 // it.
-#include <algorithm>
 #include <cmath>
 
-#include "joints/list.hpp"
-#include "mechanics/effect.hpp"
+#include "joints/laws/joint_law_effect.hpp"
 
 namespace tether::scene::effects {
 
@@ -16,8 +14,9 @@ namespace {
 
 bool has_motor(const Joint& joint) { return joint.motor.has_value(); }
 
-class JointMotorEffect : public Effect {
+class JointMotorEffect : public JointLawEffect {
  public:
+  JointMotorEffect() : JointLawEffect("motors", has_motor) {}
   void read_joint(files::Fields& in, files::Reader& r, bool angle, Joint& joint) const override {
     const files::Value* table = in.table("motor");
     if (table == nullptr) return;
@@ -36,11 +35,6 @@ class JointMotorEffect : public Effect {
                                  files::toml(joint.motor->rate), angle ? "torque" : "force",
                                  files::toml(joint.motor->bound)));
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), has_motor);
-    if (count > 0)
-      lines.push_back({"motors", fmt::format("{} joint{}", count, count == 1 ? "" : "s")});
-  }
   void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
     for (const Joint& joint : scene.joints)
       if (joint.motor)
@@ -56,9 +50,6 @@ class JointMotorEffect : public Effect {
   }
   void add_laws(const Joint& joint, int number, double, JointLawList& out) const override {
     if (joint.motor) out.bounded(number, joint.motor->rate, joint.motor->bound);
-  }
-  bool has_joint_laws(const Scene& scene) const override {
-    return std::any_of(scene.joints.begin(), scene.joints.end(), has_motor);
   }
 };
 

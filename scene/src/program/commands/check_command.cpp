@@ -34,7 +34,7 @@ int check(const CheckArguments& arguments) {
       const Scene scene = read_scene_argument(file);
       const Plan plan = make_plan(scene);
       if (!arguments.print) print_start(scene);
-      make_engine(scene);  // which refuses what a run would
+      make_engine(scene, plan);  // which refuses what a run would
       if (arguments.print)
         fmt::print("{}", write_scene(with_options(scene, plan.engine)));
       else

@@ -22,9 +22,12 @@ struct ContactArguments {
   bool csv = false;
 };
 
-const std::map<std::string, Law> kLaws = {{"maximum_dissipation", Law::maximum_dissipation},
-                                          {"coulomb", Law::coulomb},
-                                          {"frictionless", Law::frictionless}};
+std::map<std::string, Law> laws_by_name() {
+  std::map<std::string, Law> out;
+  for (const Law each : laws()) out[name(each)] = each;
+  return out;
+}
+
 const std::map<std::string, Measure> kMeasures = {{"automatic", Measure::automatic},
                                                   {"natural_map", Measure::natural_map},
                                                   {"natural_map_data", Measure::natural_map_data},
@@ -32,9 +35,8 @@ const std::map<std::string, Measure> kMeasures = {{"automatic", Measure::automat
 
 std::map<std::string, Method> methods() {
   std::map<std::string, Method> out;
-  for (int k = 0; k <= static_cast<int>(Method::convex_relaxation); ++k) {
+  for (int k = 0; name(static_cast<Method>(k)) != std::string("?"); ++k)
     out[name(static_cast<Method>(k))] = static_cast<Method>(k);
-  }
   return out;
 }
 
@@ -156,7 +158,7 @@ void add_contact_command(CLI::App& app, int* status) {
   CLI::App* command =
       app.add_subcommand("contact", "Solves frictional contact problems (.dat, fclib .hdf5)");
   command->add_option("files", arguments->files, "Problem files")->required();
-  add_choice(*command, "--law", "Friction law", kLaws, arguments->options.law);
+  add_choice(*command, "--law", "Friction law", laws_by_name(), arguments->options.law);
   command->add_option("--tolerance", arguments->options.tolerance, "The measure ends below it")
       ->capture_default_str();
   add_choice(*command, "--method", "Solution method", methods(), arguments->options.method);

@@ -16,6 +16,7 @@
 #include "program/process/signals.hpp"
 #include "program/settings.hpp"
 #include "program/terminal_text.hpp"
+#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -79,7 +80,7 @@ void check_files(const Scene& scene, const CostArguments& arguments) {
   files.csv = arguments.csv;
   files.svg = arguments.svg;
   std::vector<std::string> others = inputs_of(scene);
-  check_names(files, others);
+  formats::check_names(files, others);
   others.insert(others.end(), {arguments.csv, arguments.svg});
   if (!arguments.html.empty()) check_page_name(arguments.html, others);
   for (const std::string& file : {arguments.csv, arguments.svg, arguments.html})

@@ -18,6 +18,7 @@
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
 #include "program/terminal_text.hpp"
+#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -69,7 +70,7 @@ int write_import(const ImportArguments& a) {
   const import::ImportOptions options = options_of(a);
   Output scene;
   scene.state = a.out == "-" ? "" : a.out;
-  check_names(scene, {a.file == "-" ? "" : a.file});
+  formats::check_names(scene, {a.file == "-" ? "" : a.file});
   const SceneText robot = read_text(a.file);
   const import::Imported made = import::import_robot(robot.text, robot.name, options);
   catch_signals();  // the file is whole before they count

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <progress.hpp>
@@ -11,7 +12,6 @@
 #include <tether/scene/player.hpp>
 #include <tether/scene/run.hpp>
 
-#include "output/output_names.hpp"
 #include "output/own_files.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
@@ -21,6 +21,7 @@
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
 #include "program/terminal_text.hpp"
+#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -28,7 +29,8 @@ namespace {
 
 struct RunArguments {
   std::string file, restart, folder, html;
-  std::optional<std::string> csv, vtk, svg, state, otherwise;
+  std::optional<std::string> otherwise;
+  std::map<const formats::Format*, std::string> files;  // as named by options
   std::optional<double> end, every;
   bool force = false, quiet = false, strict = false;
 };
@@ -44,7 +46,7 @@ bool is_loose_link(const std::filesystem::path& path) {
 void stay_inside(const std::string& folder, const Output& o) {
   namespace fs = std::filesystem;
   const fs::path inside = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder));
-  for (const std::string& file : all_names(o)) {
+  for (const std::string& file : formats::all_names(o)) {
     const fs::path whole = fs::weakly_canonical(inside / file),
                    way = whole.lexically_relative(inside);
     std::error_code error;
@@ -62,20 +64,14 @@ void stay_inside(const std::string& folder, const Output& o) {
 void overlay(const RunArguments& arguments, Scene& scene) {
   Output& o = scene.output;
   Output by_scene = o;
-  if (arguments.csv) by_scene.csv.clear();
-  if (arguments.vtk) by_scene.vtk.clear();
-  if (arguments.svg) by_scene.svg.clear();
-  if (arguments.state) by_scene.state.clear();
+  for (const auto& [format, file] : arguments.files) (by_scene.*format->file).clear();
   stay_inside(arguments.folder, by_scene);
-  if (arguments.csv) o.csv = *arguments.csv;
-  if (arguments.vtk) o.vtk = *arguments.vtk;
-  if (arguments.svg) o.svg = *arguments.svg;
-  if (arguments.state) o.state = *arguments.state;
+  for (const auto& [format, file] : arguments.files) o.*format->file = file;
   if (arguments.every) o.every = *arguments.every;
   if (!arguments.folder.empty())
-    for (std::string* file : {&o.csv, &o.vtk, &o.svg, &o.state})
-      if (!file->empty() && *file != "-")
-        *file = (std::filesystem::path(arguments.folder) / *file).string();
+    for (const formats::Format* each : formats::all())
+      if (std::string& file = o.*each->file; !file.empty() && file != "-")
+        file = (std::filesystem::path(arguments.folder) / file).string();
   if (arguments.otherwise) {
     if (scene.engine != EngineChoice::event && !scene.event)
       throw std::invalid_argument(
@@ -92,7 +88,9 @@ void overlay(const RunArguments& arguments, Scene& scene) {
 
 /// Of several processes the first writes all but its share of a film.
 void write_film_alone(Output& o, std::string& html) {
-  for (std::string* file : {&o.csv, &o.svg, &o.state, &html}) file->clear();
+  for (const formats::Format* each : formats::all())
+    if (!each->film) (o.*each->file).clear();
+  html.clear();
 }
 
 /// ranks: processes that make the same run, null: there is one.
@@ -184,11 +182,11 @@ void add_run_command(CLI::App& app, int* status) {
   command->add_option("--restart", a->restart,
                       "Go on from a saved state; the bits are those of a run in one piece");
   command->add_option("--output", a->folder, "Folder of all files written");
-  command->add_option("--csv", a->csv, "Table: energies, momenta, errors, states of the bodies");
-  command->add_option("--vtk", a->vtk, "Film for ParaView (.pvd, with a folder of .vtp)");
-  command->add_option("--svg", a->svg, "Picture: the scene, its energies and errors");
+  for (const formats::Format* each : formats::all())
+    command->add_option_function<std::string>(
+        std::string("--") + each->name,
+        [a = a.get(), each](const std::string& file) { a->files[each] = file; }, each->help);
   command->add_option("--html", a->html, "Page that plays the run in a browser, on its own");
-  command->add_option("--state", a->state, "Saved state: at checkpoints and at the end");
   command->add_option("--every", a->every, "Time between records, s")->check(positive_number());
   command->add_option("--end", a->end, "End of the run, s")->check(positive_number());
   command

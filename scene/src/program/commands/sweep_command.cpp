@@ -22,6 +22,7 @@
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
 #include "program/terminal_text.hpp"
+#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -143,7 +144,7 @@ int sweep(const SweepArguments& arguments) {
     table.csv = arguments.out;
     std::vector<std::string> inputs = plain.surface_files;
     if (arguments.file != "-") inputs.push_back(arguments.file);
-    check_names(table, inputs);
+    formats::check_names(table, inputs);
     if (!arguments.force) check_replaceable(arguments.out);
     check_writable(arguments.out);
   }

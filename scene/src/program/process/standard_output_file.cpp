@@ -9,16 +9,24 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <vector>
+
+#include "record/formats.hpp"
 
 namespace tether::scene {
 
 namespace fs = std::filesystem;
 
 StandardOutputFile::StandardOutputFile(Output& output, std::string& html) {
-  if (output.vtk == "-")
-    throw std::invalid_argument("vtk = \"-\": a film has many files and needs a name");
+  std::vector<std::string*> files = {&html};
+  for (const formats::Format* each : formats::all()) {
+    files.push_back(&(output.*each->file));
+    if (each->film && *files.back() == "-")
+      throw std::invalid_argument(std::string(each->name) +
+                                  " = \"-\": a film has many files and needs a name");
+  }
   std::string* there = nullptr;
-  for (std::string* each : {&output.csv, &output.svg, &html, &output.state}) {
+  for (std::string* each : files) {
     if (*each != "-") continue;
     if (there != nullptr)
       throw std::invalid_argument("only one output can be -, the standard output");

@@ -62,15 +62,15 @@ std::vector<int> elimination_order(int unknowns, int bodies, int width, int coor
   // later one's unknowns.
   std::vector<std::pair<int, int>> when(at(unknowns));
   for (int i = 0; i < unknowns; ++i) {
-    int moment = std::numeric_limits<int>::max();
+    int instant = std::numeric_limits<int>::max();
     if (i < first && i % width < coordinates) {
-      moment = -1;
+      instant = -1;
     } else if (i < first) {
-      moment = time[at(i / width)];
+      instant = time[at(i / width)];
     } else if (const auto [a, b] = ends[at(i - first)]; a >= 0) {
-      moment = std::max(time[at(a)], b >= 0 ? time[at(b)] : 0);
+      instant = std::max(time[at(a)], b >= 0 ? time[at(b)] : 0);
     }
-    when[at(i)] = {moment, i};
+    when[at(i)] = {instant, i};
   }
   std::sort(when.begin(), when.end());
   std::vector<int> order(at(unknowns));

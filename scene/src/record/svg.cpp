@@ -7,7 +7,7 @@
 #include "output/whole_file.hpp"
 #include "picture/axes.hpp"
 #include "picture/scene_drawing.hpp"
-#include "recorder.hpp"
+#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -36,10 +36,10 @@ struct Curve {
 
 class PictureRecorder : public Recorder {
  public:
-  PictureRecorder(const Scene& scene, const std::string& file, double start_energy)
-      : scene_(scene), file_(file), start_energy_(start_energy) {
+  PictureRecorder(const std::string& file, const formats::Beginning& run)
+      : scene_(run.scene), file_(file), start_energy_(run.start_energy) {
     check_writable(file);
-    bodies_ = std::min(scene.bodies.size(), kMostDrawn);
+    bodies_ = std::min(scene_.bodies.size(), kMostDrawn);
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {
@@ -166,11 +166,20 @@ class PictureRecorder : public Recorder {
   bool last_kept_ = true;
 };
 
+void add_picture(const std::string& svg, const formats::Beginning& run, formats::Recorders& out) {
+  out.push_back(std::make_unique<PictureRecorder>(svg, run));
+}
+
 }  // namespace
 
-std::unique_ptr<Recorder> make_picture_recorder(const Scene& scene, const std::string& file,
-                                                double start_energy) {
-  return std::make_unique<PictureRecorder>(scene, file, start_energy);
+namespace formats {
+
+const Format& svg_format() {
+  static const Format format{"svg", ".svg", "Picture: the scene, its energies and errors",
+                             &Output::svg, add_picture};
+  return format;
 }
+
+}  // namespace formats
 
 }  // namespace tether::scene

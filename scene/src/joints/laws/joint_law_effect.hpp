@@ -1,0 +1,30 @@
+// Tether: an effect that is a law of some joints. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+
+#include "joints/list.hpp"
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+class JointLawEffect : public Effect {
+ public:
+  void plan(const Scene& scene, EngineKind,
+            std::vector<mechanics::PlannedEffect>& lines) const override {
+    const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), has_);
+    if (count > 0) lines.push_back({title_, mechanics::counted(count, "joint")});
+  }
+  bool has_joint_laws(const Scene& scene) const override {
+    return std::any_of(scene.joints.begin(), scene.joints.end(), has_);
+  }
+
+ protected:
+  JointLawEffect(const char* title, bool (*has)(const Joint&)) : title_(title), has_(has) {}
+
+ private:
+  const char* title_;
+  bool (*has_)(const Joint&);
+};
+
+}  // namespace tether::scene::effects

@@ -1,0 +1,59 @@
+// Tether: the formats in which a run is recorded. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tether/export.hpp>
+#include <tether/scene/plan.hpp>
+#include <tether/scene/scene.hpp>
+#include <vector>
+
+#include "recorder.hpp"
+
+TETHER_EXPORT_BEGIN
+namespace tether::scene::formats {
+
+/// The present of a run whose recorders begin.
+struct Beginning {
+  const Scene& scene;
+  const Plan& plan;
+  const Resume& resume;
+  const Processes& among;
+  double start_energy, now;  // J, s
+};
+
+using Recorders = std::vector<std::unique_ptr<Recorder>>;
+
+/// One key of [output] and one option of `tether run`: a name `given`, and the files made of it.
+struct Format {
+  const char *name, *extension, *help;
+  std::string Output::*file;
+  /// May throw std::runtime_error where the file cannot be written. Null: the run itself writes it.
+  void (*add_recorders)(const std::string& given, const Beginning&, Recorders&) = nullptr;
+  /// Files and folders besides the main one. `forces`: Output::forces.
+  std::vector<std::string> (*beside)(const std::string& given, bool forces) = nullptr;
+  /// Of a film, of which each process writes its share: the main file, the ending of a frame in a
+  /// folder beside it.
+  std::string (*film)(const std::string& given) = nullptr;
+  bool (*is_frame)(const std::string& path) = nullptr;
+
+  std::string main_file(const Output& o) const { return film ? film(o.*file) : o.*file; }
+  std::vector<std::string> others(const Output& o, bool forces) const {
+    return beside && !(o.*file).empty() ? beside(o.*file, forces) : std::vector<std::string>();
+  }
+};
+
+/// Every format, in the order of CMakeLists.txt beside this file.
+const std::vector<const Format*>& all();
+
+/// Throws std::invalid_argument if two outputs have a name in common, or one that of an input.
+void check_names(const Output& output, const std::vector<std::string>& inputs);
+/// One name for each requested output; its lock covers all files of that output.
+std::vector<std::string> names(const Output& output);
+/// Those and what is beside them, whether the run will write them or not.
+std::vector<std::string> all_names(const Output& output);
+/// check_replaceable() of all of these and of the frames that are there.
+void check_replaceable(const Output& output);
+
+}  // namespace tether::scene::formats
+TETHER_EXPORT_END

@@ -1,0 +1,12 @@
+// Tether: the saved state as an output; the run writes it. SPDX-License-Identifier: BSD-3-Clause
+#include "record/formats.hpp"
+
+namespace tether::scene::formats {
+
+const Format& state_format() {
+  static const Format format{"state", ".state", "Saved state: at checkpoints and at the end",
+                             &Output::state};
+  return format;
+}
+
+}  // namespace tether::scene::formats

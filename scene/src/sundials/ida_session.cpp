@@ -1,0 +1,128 @@
+// Tether: a state in the hands of IDA and the projection. SPDX-License-Identifier: BSD-3-Clause
+#include "ida_session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+#include <stdexcept>
+
+namespace tether::scene {
+
+namespace {
+
+constexpr double kFirstError = 0.125;  // of what IDA allows
+constexpr double kFirstMove = 1e-2;    // the part by which a component moves at most
+constexpr double kFirstAtRest = 1e-3;  // s
+constexpr double kLookAhead = 1e-5;    // the part of a move over which y'' is differenced
+
+}  // namespace
+
+IdaSession::IdaSession(QuietContext& context, const Start& start, IDAResFn residual,
+                       IDAEwtFn weights, void* user, double max_step)
+    : context_(context), max_step_(max_step), ida_(IDACreate(context)) {
+  if (ida_ == nullptr) throw std::bad_alloc();
+  const auto N = start.y.size();
+  y_.reset(ida_projection::fast_vector(N_VNew_Serial(N, context)));
+  for (OwnedVector* each : {&yp_, &id_}) each->reset(N_VClone(y_.get()));
+  const auto fill = [N](const OwnedVector& vector, const Eigen::VectorXd& values) {
+    Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(vector.get()), N) = values;
+  };
+  fill(y_, start.y), fill(yp_, start.yp), fill(id_, start.id);
+  context.keep_messages_of(ida_);
+  check(IDAInit(ida_, residual, start.t, y(), yp()), "IDAInit");
+  check(IDASetUserData(ida_, user), "IDASetUserData");
+  check(IDAWFtolerances(ida_, weights), "IDAWFtolerances");
+  check(IDASetMaxNumSteps(ida_, -1), "IDASetMaxNumSteps");
+  check(IDASetId(ida_, id_.get()), "IDASetId");
+  if (max_step > 0) check(IDASetMaxStep(ida_, max_step), "IDASetMaxStep");
+}
+
+IdaSession::~IdaSession() {
+  IDAFree(&ida_);  // before the projection, which it calls
+}
+
+void IdaSession::check(int flag, const char* call) const {
+  if (flag < 0)
+    throw std::runtime_error(std::string(call) + ": " + name(flag) + ". " + context_.message());
+}
+
+void IdaSession::use(SUNLinearSolver solver, SUNMatrix matrix, IDALsJacFn jacobian) {
+  check(IDASetLinearSolver(ida_, solver, matrix), "IDASetLinearSolver");
+  if (jacobian != nullptr) check(IDASetJacFn(ida_, jacobian), "IDASetJacFn");
+}
+
+void IdaSession::project(const ida_projection::Constraints& constraints,
+                         ida_projection::Options options) {
+  options.id = id_.get();
+  options.print_fatal = false;
+  options.print_warnings = false;
+  // A move that no smaller step makes shorter is part of what IDA's error test judges: rows that
+  // come back behind a dead point, what an event left.
+  options.long_move = ida_projection::LongMove::cap;
+  options.maximum_step = max_step_;
+  projection_.emplace(ida_, constraints, options);
+}
+
+int IdaSession::solve(double to, double& reached, int task) {
+  context_.message().clear();
+  return IDASolve(ida_, to, &reached, y(), yp(), task);
+}
+
+void IdaSession::at(double time, Eigen::VectorXd& out) const {
+  out.resize(N_VGetLength(y()));
+  const OwnedVector vector(N_VMake_Serial(out.size(), out.data(), context_));
+  IDAGetDky(ida_, time, 0, vector.get());
+}
+
+bool IdaSession::projected_at(double time, Eigen::VectorXd& out) {
+  at(time, out);
+  if (!projection_) return true;
+  const OwnedVector vector(N_VMake_Serial(out.size(), out.data(), context_));
+  return static_cast<bool>(projection_->project(time, vector.get()));
+}
+
+std::string IdaSession::name(int flag) {
+  const std::unique_ptr<char, Released<std::free>> text(IDAGetReturnFlagName(flag));
+  return text.get();
+}
+
+Counts IdaSession::counts() const {
+  Counts c;
+  IDAGetNumSteps(ida_, &c.steps);
+  IDAGetNumResEvals(ida_, &c.residual_evaluations);
+  IDAGetNumJacEvals(ida_, &c.jacobian_evaluations);
+  IDAGetNumErrTestFails(ida_, &c.error_test_failures);
+  if (projection_) c.projections = projection_->statistics().projections;
+  return c;
+}
+
+void add_work(Counts& sum, const Counts& more) {
+  sum.steps += more.steps;
+  sum.residual_evaluations += more.residual_evaluations;
+  sum.jacobian_evaluations += more.jacobian_evaluations;
+  sum.projections += more.projections;
+  sum.error_test_failures += more.error_test_failures;
+}
+
+double FirstStep::operator()(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const {
+  double speed = 0;
+  for (Eigen::Index i = 0; i < y.size(); ++i)
+    if (sizes[i] != 0) speed = std::max(speed, std::abs(yp[i]) / (sizes[i] + std::abs(y[i])));
+  if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
+  const double look = kLookAhead / speed;
+  Eigen::VectorXd ahead = y + look * yp, there(y.size());
+  rate(t + look, ahead, there);
+  double sum = 0;
+  for (Eigen::Index i = 0; i < y.size(); ++i) {
+    if (sizes[i] == 0) continue;
+    const double change = (there[i] - yp[i]) / (tolerance * (sizes[i] + std::abs(y[i])));
+    sum += change * change;
+  }
+  const double curvature = std::sqrt(sum / static_cast<double>(y.size())) / look;
+  if (!std::isfinite(curvature)) return 0.5 * tolerance / speed;
+  const double most = std::min(kFirstMove / speed, longest);
+  return curvature > 0 ? std::min(most, std::sqrt(4 * kFirstError / curvature)) : most;
+}
+
+}  // namespace tether::scene

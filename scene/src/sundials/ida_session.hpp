@@ -1,0 +1,98 @@
+// Tether: a state in the hands of IDA and the projection. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ida/ida.h>
+#include <nvector/nvector_serial.h>
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tether/ida_projection.hpp>
+#include <tether/scene/engine.hpp>
+
+#include "quiet_context.hpp"
+
+namespace tether::scene {
+
+template <auto release>
+struct Released {
+  template <class Object>
+  void operator()(Object* object) const {
+    release(object);
+  }
+};
+using OwnedVector = std::unique_ptr<_generic_N_Vector, Released<N_VDestroy>>;
+using OwnedMatrix = std::unique_ptr<_generic_SUNMatrix, Released<SUNMatDestroy>>;
+using OwnedLinearSolver = std::unique_ptr<_generic_SUNLinearSolver, Released<SUNLinSolFree>>;
+using OwnedCorrector = std::unique_ptr<_generic_SUNNonlinearSolver, Released<SUNNonlinSolFree>>;
+
+/// One run of IDA from a point on. The solvers that it is given and the context outlive it.
+class IdaSession {
+ public:
+  struct Start {
+    double t;
+    const Eigen::VectorXd &y, &yp, &id;
+  };
+  /// `user`: what `residual` and `weights` are called with. Steps are counted by the caller.
+  IdaSession(QuietContext& context, const Start& start, IDAResFn residual, IDAEwtFn weights,
+             void* user, double max_step);
+  ~IdaSession();
+  IdaSession(const IdaSession&) = delete;
+  IdaSession& operator=(const IdaSession&) = delete;
+
+  /// Throws std::runtime_error with the name of the call where IDA refuses it.
+  void check(int flag, const char* call) const;
+  void set_first_step(double h) { check(IDASetInitStep(ida_, h), "IDASetInitStep"); }
+  void set_newton(double part_of_tolerance) {
+    check(IDASetNonlinConvCoef(ida_, part_of_tolerance), "IDASetNonlinConvCoef");
+  }
+  void use(SUNLinearSolver solver, SUNMatrix matrix, IDALsJacFn jacobian);
+  /// `options` as the engine wants them; what both engines have in common is set here.
+  void project(const ida_projection::Constraints& constraints, ida_projection::Options options);
+
+  void* ida() const { return ida_; }
+  N_Vector y() const { return y_.get(); }
+  N_Vector yp() const { return yp_.get(); }
+  /// Not before project().
+  ida_projection::Projection* projection() { return projection_ ? &*projection_ : nullptr; }
+  const ida_projection::Projection* projection() const {
+    return projection_ ? &*projection_ : nullptr;
+  }
+
+  int solve(double to, double& reached, int task);
+  /// y at a time of the last step: interpolated.
+  void at(double time, Eigen::VectorXd& y) const;
+  /// The same, moved onto the constraints; false: it could not be.
+  bool projected_at(double time, Eigen::VectorXd& y);
+  /// The name of a flag.
+  static std::string name(int flag);
+  /// IDA's work so far, and the projection's.
+  Counts counts() const;
+
+ private:
+  QuietContext& context_;
+  OwnedVector y_, yp_, id_;
+  double max_step_;
+  void* ida_;
+  std::optional<ida_projection::Projection> projection_;
+};
+
+/// Adds the work of an IdaSession.
+void add_work(Counts& sum, const Counts& more);
+
+/// The first step of a state y with y' = yp, whose error is an eighth of what IDA allows: at order
+/// 1 IDA estimates h^2 |y''| / 4. IDA's own depends on the time asked for, and at tight tolerances
+/// is so short that changes of velocity / h are rounding.
+struct FirstStep {
+  double tolerance;              // of a step
+  double longest;                // s
+  const Eigen::VectorXd& sizes;  // beside |y|; 0 where a component does not count
+  /// y' at a time and a state, which it may complete.
+  std::function<void(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp)> rate;
+
+  double operator()(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const;
+};
+
+}  // namespace tether::scene

@@ -1,0 +1,92 @@
+#!/bin/sh
+# What a new thing touches, as CONTRIBUTING.md says: one of each kind is added to a copy of the sources, compiled, and its
+# files are counted. sh additions.sh <sources> <scratch folder> <compiler> <its arguments, a file> <cmake>
+# SPDX-License-Identifier: BSD-3-Clause
+set -eu
+source=$1 work=$2 cxx=$3 arguments=$4 cmake=$5
+
+fail() {
+  echo "$*" >&2
+  exit 1
+}
+
+fresh() {
+  rm -rf "$work/copy"
+  mkdir -p "$work/copy"
+  cp -R "$source/scene" "$source/contact" "$work/copy"
+  cd "$work/copy"
+}
+
+# like <file> <its copy> <sed script>
+like() {
+  sed "$3" "$1" >"$2"
+  ! cmp -s "$1" "$2" || fail "$1 has another form"
+}
+
+# edit <file> <sed script>
+edit() {
+  cp "$1" "$work/before"
+  sed "$2" "$work/before" >"$1"
+  ! cmp -s "$1" "$work/before" || fail "$1 has another form"
+}
+
+# The list that scene/<folder>/CMakeLists.txt makes of its sources.
+make_list() {
+  {
+    echo 'function(target_sources)'
+    echo 'endfunction()'
+    echo 'function(target_include_directories)'
+    echo 'endfunction()'
+    sed -n '/^function(tether_scene_list/,/^endfunction/p' scene/CMakeLists.txt
+    echo "include(scene/src/$1/CMakeLists.txt)"
+  } >"$work/list.cmake"
+  "$cmake" -P "$work/list.cmake"
+}
+
+# compile <name> <its source> <the list>: as one, since most of the time goes into headers that both have.
+compile() {
+  printf '#include "%s"\n#include "%s"\n' "$2" "$3" >one.cpp
+  "$cxx" -O0 -w -I. -Iscene/src -Iscene/include -Icontact/src -Icontact/include "@$arguments" -c one.cpp -o "$work/one.o"
+  rm one.cpp
+  grep -q "$1" ./*.inc "$3" 2>"$work/none" || fail "the list of $3 has no $1"
+  nm -C "$work/one.o" | grep -q " [^U] .*$1" || fail "$2 has no $1"
+}
+
+# touches <number> <kind>
+touches() {
+  count=$({ diff -rq "$source/scene" scene; diff -rq "$source/contact" contact; } | grep -c .) || true
+  [ "$count" -eq "$1" ] || fail "a new $2 touches $count files: $({ diff -rq "$source/scene" scene; diff -rq "$source/contact" contact; } || true)"
+  grep -q "^| $2 |.*| $1 |$" "$source/CONTRIBUTING.md" || fail "CONTRIBUTING.md does not say that a new $2 touches $1 files"
+}
+
+fresh
+like scene/src/effects/sleep.cpp scene/src/effects/doze.cpp 's/Sleep/Doze/g; s/sleep_effect/doze_effect/'
+edit scene/src/effects/CMakeLists.txt 's/^  sleep.cpp$/&\n  doze.cpp/'
+make_list effects
+compile doze scene/src/effects/doze.cpp scene/src/effects/list.cpp
+touches 2 'effect of scenes'
+
+fresh
+like scene/src/joints/kinds/ball.cpp scene/src/joints/kinds/pivot.cpp 's/Ball/Pivot/g; s/ball_joint/pivot_joint/; s/::ball/::pivot/'
+edit scene/src/joints/CMakeLists.txt 's,kinds/ball.cpp,& kinds/pivot.cpp,'
+edit scene/include/tether/scene/joint.hpp 's/universal, planar }/universal, planar, pivot }/; s/JointKind>, 7>/JointKind>, 8>/
+  s/^    {"planar", .*/&\n    {"pivot", JointKind::pivot},/'
+make_list joints
+compile pivot scene/src/joints/kinds/pivot.cpp scene/src/joints/list.cpp
+touches 3 'joint of scenes'
+
+fresh
+like scene/src/record/svg.cpp scene/src/record/xyz.cpp 's/Svg/Xyz/g; s/svg_format/xyz_format/; s/&Output::svg/\&Output::xyz/; s/"[.]svg"/".xyz"/; s/"svg"/"xyz"/'
+edit scene/src/record/CMakeLists.txt 's/^  svg.cpp$/&\n  xyz.cpp/'
+edit scene/include/tether/scene/scene.hpp 's/csv, vtk, svg, state;/csv, vtk, svg, state, xyz;/'
+make_list record
+compile xyz scene/src/record/xyz.cpp scene/src/record/formats.cpp
+touches 3 'output of runs'
+
+fresh
+like contact/src/law/frictionless.hpp contact/src/law/glue.hpp 's/frictionless/glue/g; s/Frictionless/Glue/g'
+like contact/src/law/frictionless.cpp contact/src/law/glue.cpp 's/frictionless/glue/g; s/Frictionless/Glue/g'
+edit contact/src/law/laws.cpp 's,^#include "law/frictionless.hpp"$,&\n#include "law/glue.hpp",; s/Coulomb, Frictionless>/Coulomb, Frictionless, Glue>/'
+edit contact/include/tether/contact/one_contact.hpp '/^enum class Law /,/};/s/frictionless/frictionless, glue/'
+compile Glue contact/src/law/glue.cpp contact/src/law/laws.cpp
+touches 4 'friction law'
