@@ -99,7 +99,7 @@ with open(args.output, "w", encoding="utf-8") as table:
     solved = sum(status == "solved" for status, _ in base.values())
     table.write("# What each stage and mechanism of the contact solver is worth\n\n"
                 f"- Command: `benchmarks/contact/ablation/ablation.py --seeds {args.seeds} {' '.join(args.folders)}`\n"
-                f"- Commit: {commit}\n\n"
+                f"- Commit: {commit}\n- Machine: any; work is counted, not timed\n\n"
                 f"{len(base)} solves at 1e-3, 1e-6 and 1e-9 under two laws, {solved} of them solved with at most 2e8 of "
                 f"work, {sum(w for _, w in base.values()):.3g} together. Each row: that mechanism alone is off. Work is "
                 "over that of the whole solver, by the library's own count: of all solves, and of those that both solve."
