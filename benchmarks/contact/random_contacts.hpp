@@ -69,7 +69,7 @@ struct Reduced {
   double reference(int points) const;
 };
 
-// What an answer of maximum_dissipation fails, or nullptr.
+// Condition that an answer of maximum_dissipation fails, or nullptr.
 const char* failure(const Contact& p, const Eigen::Vector3d& x, int points);
 
 }  // namespace tether::contact::random

@@ -9,7 +9,7 @@
 
 namespace tether::bench {
 
-/// What one part has to say, in every form.
+/// Results of one part, in every form.
 struct Report {
   std::string text, csv, html;
   Json json = Json::array();                                  ///< of runs

@@ -42,7 +42,7 @@ std::array<int, 3> blocks(int ranks) {
   return out;
 }
 
-// What a rank does in a sweep, colour by colour: contacts, and bodies to and from others.
+// Work of a rank in a sweep, colour by colour: contacts, and bodies to and from others.
 struct Colour {
   int contacts = 0;
   std::map<int, int> to, from;
@@ -142,7 +142,8 @@ int main(int argc, char** argv) {
   const int side = static_cast<int>(std::lround(std::cbrt(std::atof(argv[1]) / 3)));
   const double ns = std::atof(argv[2]);
   const int sweeps = argc > 3 ? std::atoi(argv[3]) : 20;
-  // Of one process: whoever comes first makes it, without simulated time.
+  // All ranks of the one process share the model: whoever comes first makes it, without simulated
+  // time.
   static const Model shared = model(ranks, side);
   const std::vector<Colour>& mine = shared.of[at(rank)];
   tether::contact_mpi::detail::Messages messages(MPI_COMM_WORLD);

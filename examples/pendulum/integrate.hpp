@@ -9,7 +9,7 @@
 
 namespace pendulum {
 
-/// What a run ended with.
+/// Outcome of a run.
 struct Outcome {
   std::string failure;   ///< IDA's name of the failure; empty when the end was reached
   double reached = 0.0;  ///< time of the last accepted step, s

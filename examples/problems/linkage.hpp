@@ -49,7 +49,7 @@ struct Linkage {
     }
   }
 
-  // What pins to the ground contribute to `position`.
+  // Writes what pins to the ground contribute to `position`.
   void position_of_ground(double* r) const {
     int row = 0;
     for (const Pin& pin : pins) {

@@ -167,7 +167,7 @@ class Mechanism {
   }
 
  private:
-  // Where the unknowns of a form stand.
+  // Places of the unknowns of a form.
   struct Layout {
     int index;  // 0 .. 3
     bool with_w, ggl;

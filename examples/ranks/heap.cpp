@@ -91,7 +91,7 @@ class Heap {
   const tcm::Solution& solution() const { return solution_; }
   std::size_t spheres() const { return own_.size(); }
 
-  // Of all positions and velocities in the order of their numbers.
+  // Hash of all positions and velocities in the order of their numbers.
   std::uint64_t hash() const {
     const std::vector<Sphere> all =
         unpacked(tcm::send(comm_, kNumbers, packed(own_), std::vector<int>(own_.size(), 0)));
@@ -174,7 +174,7 @@ class Heap {
     near_ = unpacked(tcm::send(comm_, kNumbers, packed(sent), to));
   }
 
-  // Of the spheres of this rank: with walls, and with those of larger numbers.
+  // Finds the contacts of the spheres of this rank: with walls, and with those of larger numbers.
   void find_contacts() {
     share_.numbers.clear();
     share_.bodies.clear();

@@ -249,7 +249,7 @@ struct Model {
       }
     tp::DistributedRows given = tp::distributed_rows(share.comm, share.unknowns(), starts, columns);
 
-    // Where the rods' p - p_other and v - v_other are, by the entries of the second half.
+    // The entries of the second half say where the rods' p - p_other and v - v_other are.
     const auto read = [rods, starts, local = given.columns](tp::ConstVector all, std::size_t rod) {
       std::array<double, 6> d{};
       int e = starts[rods.size() + rod];

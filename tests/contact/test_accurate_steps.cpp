@@ -29,7 +29,7 @@ constexpr double m_S = 4.5e-3, J_S = 7e-7, m_M = 3e-4, J_M = 5e-9, c = 5.6e-3, l
 constexpr double kPoint = 1e-10, kRadius = 0.01;  // kg, m
 enum Index { y, phi_M, phi_S, bird, beak, top, bottom, pole, kBodies };
 
-// Of the moving bodies: position along x and z as a row times (y, phi_M, phi_S).
+// Position of a moving body along x and z, each as a row times (y, phi_M, phi_S).
 struct Line {
   int body;
   Vector3d x, z;

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// What happens at the call `when`; others are right.
+// Spoils the call `when`; others are right.
 struct Spoiler {
   int when = -1, calls = 0;
   bool now() { return ++calls == when; }

@@ -12,7 +12,7 @@
 namespace tether::contact {
 namespace {
 
-// Of a lattice of spheres, all as fast downwards, which meets the ground: contacts between its
+// A lattice of spheres, all as fast downwards, meets the ground. It has contacts between its
 // layers, gaps of .1 and 25 mm, and across, far open.
 random::Packing falling(double speed, double gap) {
   const int side = 14;

@@ -86,7 +86,7 @@ TEST_CASE("faults: memory that ends in a solve by bodies, with one thread and wi
     options.max_assembled = threads == 1 ? 1000 : 0;
     CHECK(fail_each_allocation([&] { BodySolver(options).solve(stack.bodies, stack.contacts); }) >
           10);
-    // What has thrown solves the next problem.
+    // A solver that has thrown solves the next problem.
     const random::RigidAssembly small = random::rigid_stack(5, 1);
     int ended = 0;
     for (long n = 0; n < 100; n += 7) {

@@ -318,8 +318,8 @@ double solve_moving(const std::vector<MovingCase>& cases, int most_unsolved = 1)
 
 }  // namespace
 
-// Where the path of interior points ends near a solution a few proximal problems lead to it. Three
-// of these took all of the work for 3e-6 to 3e-5.
+// A few proximal problems lead to a solution near which the path of interior points ends. Three of
+// these took all of the work for 3e-6 to 3e-5.
 TEST_CASE("mass ratios: stacks of 1 : 1e6 whose boxes move and spin") {
   CHECK(solve_moving({{200, 1, 49},
                       {200, 1, 54},

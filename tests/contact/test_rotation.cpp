@@ -21,7 +21,7 @@ TEST_CASE("rotation: the exponential has all of its digits, however small the tu
   }
 }
 
-// Where Newton's method for the step does not converge, its halves are taken one after the other.
+// The halves of a step are taken one after the other if Newton's method for it does not converge.
 TEST_CASE("rotation: a step of many radians is its two halves") {
   const Matrix3d inertia = Vector3d(1, 2, 2.5).asDiagonal();
   const Matrix3d inverse = inertia.inverse();

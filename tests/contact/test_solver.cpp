@@ -226,7 +226,7 @@ TEST_CASE("high mass ratios") {
   }
 }
 
-// What an iteration costs must not hang on the last bit: other compilers and processors round
+// The cost of an iteration must not depend on the last bit: other compilers and processors round
 // differently.
 TEST_CASE("high mass ratios: the work of two and of twenty boxes, whatever the rounding") {
   random::Generator g(11);

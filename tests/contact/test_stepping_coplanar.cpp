@@ -19,7 +19,7 @@ using Polygon = std::vector<Vector2r>;
 
 Real cross(const Vector2r& a, const Vector2r& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// Of the convex hull (Andrew's chain).
+// Area of the convex hull (Andrew's chain).
 Real area_of(Polygon p) {
   std::sort(p.begin(), p.end(), [](const Vector2r& a, const Vector2r& b) {
     return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
@@ -147,7 +147,7 @@ void compare(const Prism& lower, const Prism& upper, const Lay& lay, const Quate
   const Real wanted = shared_area(one, other), found = shared.empty() ? 0 : area_of(shared);
   worst.area =
       std::max(worst.area, static_cast<double>(std::abs(found - wanted)) / (scale * scale));
-  // Where they share next to nothing, the sides may be what separates them.
+  // The sides may be what separates polygons that share next to nothing.
   if (wanted < 1e-5 * scale * scale) return;
   worst.empty += near.count < 3;
   for (int k = 0; k < near.count; ++k) {

@@ -1,5 +1,5 @@
-// What must change nothing: the order and attitude of a scene, effects without strength; and piles
-// that must not creep. SPDX-License-Identifier: BSD-3-Clause
+// The order and attitude of a scene and effects without strength must change nothing; piles must
+// not creep. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
 

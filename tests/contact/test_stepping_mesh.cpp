@@ -96,7 +96,8 @@ Vector3d nearest_on_triangle(const Vector3d& x, const std::array<Vector3d, 3>& p
   }
   return inside ? Vector3d(x - n.dot(x - p[0]) * n) : best;
 }
-// Of a box or a sphere; alternating projections onto two convex sets end at their distance.
+// Distance of a box or a sphere from a mesh; alternating projections onto two convex sets end at
+// it.
 double distance(const Shape& shape, const Vector3d& at, const Quaterniond& turned,
                 const Surface& mesh) {
   const Vector3d half = 0.5 * shape.size;

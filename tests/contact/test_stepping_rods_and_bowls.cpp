@@ -297,8 +297,8 @@ TEST_CASE("stepping: the bouncing ball comes to rest at Zeno's time, of order 1"
       if (std::abs(velocity(s, ball).z()) > 1e-9) rest = s.time();
     }
     INFO("dt " << dt << " at rest from " << rest);
-    // What is left of the bounces below the threshold, and the rest of a step. Without cuts some
-    // twelve bounces are two or three steps late each.
+    // Bounces below the threshold are left, and the rest of a step. Without cuts some twelve
+    // bounces are two or three steps late each.
     const double left = 2 * 1e-3 * std::sqrt(kGravity * R) / kGravity / (1 - e);
     CHECK(std::abs(rest - zeno) < (cut ? left + dt : 36 * dt));
     late.push_back(rest - zeno);

@@ -22,7 +22,7 @@
   std::abort();
 }
 
-// What `work` throws, by its text; fails if nothing.
+// Text of the error that `work` throws; fails if it throws nothing.
 template <class Error, class Work>
 std::string thrown(const Work& work) {
   try {

@@ -88,7 +88,7 @@ BodySolution alone(BodySolver& solver, const Packing& p) {
   return out;
 }
 
-// What a rank has sent is what its plan says: to start, for each sweep, for each look.
+// A rank has sent what its plan says: to start, for each sweep, for each look.
 void check_traffic(const Solution& s) {
   if (s.shared_islands != 1) return;
   const long long looks = s.traffic.reductions - s.sweeps - 2;  // the start and the end have one
@@ -203,7 +203,7 @@ void few_bodies() {
   }
 }
 
-// What the last rank gives wrongly is thrown by all, and the solver goes on to serve.
+// Wrong input of the last rank makes all throw, and the solver goes on to serve.
 void bad_input_is_refused_by_all() {
   const Packing good = mixed(3, 1);
   const std::vector<int> owner = slabs(good.bodies.size());

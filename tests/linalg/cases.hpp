@@ -70,7 +70,8 @@ inline double length(const Eigen::VectorXd& a, const Eigen::VectorXd& D) {
   return distance(a, Eigen::VectorXd::Zero(a.size()), D);
 }
 
-/// What the shares of solver.dependence(k) leave of dropped row k, all rows of unit length in D.
+/// Length that the shares of solver.dependence(k) leave of dropped row k, all rows of unit length
+/// in D.
 inline double left_of_dependence(const Case& c, const linalg::MinimumNorm& solver, int k) {
   RowMajor A = c.C * c.D.asDiagonal();
   A = A.rowwise().normalized();

@@ -41,7 +41,7 @@ struct Diagonal {
 }  // namespace
 
 // After one step more than there are rates the residual's polynomial has all of them as its roots.
-// What is left is the 1e-11 on the diagonal of the Gram matrix times its condition.
+// The error that is left is the 1e-11 on the diagonal of the Gram matrix times its condition.
 TEST_CASE("Anderson: a linear map with k rates is solved after k + 1 steps") {
   const Diagonal two{{{0.9, 0.9, 0.9}, {0.5, 0.5, 0.5}}};
   CHECK(two.error(4, 3) < 1e-7);

@@ -26,7 +26,7 @@ TEST_CASE("least squares: the shortest solution, of either kind of deficiency") 
   CHECK(of.rank() == 2);
   const VectorXd x = of.solve(Eigen::Vector3d(1, 2, 3));
   CHECK((x - Eigen::Vector3d(0, 1, 0)).norm() < 1e-14);
-  // What no x reaches: (1, 1, -1) is orthogonal to all columns.
+  // No x reaches (1, 1, -1): it is orthogonal to all columns.
   CHECK(VectorXd(of.solve(Eigen::Vector3d(1, 1, -1))).norm() < 1e-14);
   const MatrixXd X = of.solve_columns(of_rank_two());  // A^+ A: onto the rows of A
   CHECK((X - MatrixXd(Eigen::Vector3d(1, 1, 0).asDiagonal())).norm() < 1e-14);

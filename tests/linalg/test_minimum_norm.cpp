@@ -233,7 +233,7 @@ TEST_CASE("fewer rows than the rank: the solution of these rows alone") {
     CHECK(solver.dropped() == 2);
     const Eigen::VectorXd dy = solve(solver, c.g), expected = oracle(part);
     CHECK(distance(dy, expected, c.D) <= 1e-9 * length(expected, c.D));
-    // What is left of a dropped row, as a distance.
+    // The inconsistency is what is left of a dropped row, as a distance.
     for (int k = kept; k < m; ++k) {
       const int i = solver.pivot(k);
       const double left = std::abs(c.C.row(i).dot(dy) - c.g[i]) / solver.row_norm(i);

@@ -230,7 +230,7 @@ TEST_CASE("redundant sparse and full rows: dropped, explained, the rest still so
     }
     CHECK(rest.norm() < 1e-9);
   }
-  // What contradicts is told as a distance.
+  // A contradiction is told as a distance.
   const int row = solver.pivot(31);
   c.dense.g[row] += 0.25 * solver.row_norm(row);
   solve(solver, c.dense.g);

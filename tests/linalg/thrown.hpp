@@ -6,8 +6,8 @@
 
 namespace tether::test {
 
-/// What std::invalid_argument says that `call` throws; empty if it throws nothing. (Catch2 v2 and
-/// v3 name their string matchers differently.)
+/// Message of the std::invalid_argument that `call` throws; empty if it throws nothing. (Catch2 v2
+/// and v3 name their string matchers differently.)
 template <class Call>
 std::string thrown(Call&& call) {
   try {

@@ -72,7 +72,8 @@ inline void goes_on_with_its_bits(const Scene& scene, double cut, double end) {
     CHECK(second->events()[k].time == first->events()[before + k].time);
 }
 
-/// What energy is left less what impacts took and what the start had, where friction does no work.
+/// Energy that is left, with what impacts took, less that of the start, where friction does no
+/// work.
 inline double ledger(const Engine& engine, double start) {
   double sum = engine.diagnostics().kinetic_energy + engine.diagnostics().potential_energy - start;
   for (const ContactEvent& each : engine.events()) sum += each.lost;

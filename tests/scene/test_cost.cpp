@@ -1,4 +1,4 @@
-// What accuracy costs: errors are bounded from above. SPDX-License-Identifier: BSD-3-Clause
+// The cost of accuracy: errors are bounded from above. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
 #include <functional>

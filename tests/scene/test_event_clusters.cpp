@@ -28,7 +28,7 @@ struct Rod {
     rate = vz - 9.81L * t - arm * spin * std::cos(angle);
     return z + vz * t - 4.905L * t * t - arm * std::sin(angle);
   }
-  /// Where the parabola of the gap, then Newton, have it.
+  /// The next zero of the gap: the parabola of the gap, then Newton, find it.
   Long next(int end) const {
     Long rate = 0;
     const Long here = gap(end, 0, rate), arm = end == 0 ? -0.5L : 0.5L;

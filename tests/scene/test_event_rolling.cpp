@@ -29,7 +29,7 @@ double acceleration(double slope, double c) {
 }
 const BodyState& ball_of(const Engine& engine) { return engine.bodies()[1]; }
 
-/// What the moments took, by the ledger: energy of the start less that of now.
+/// Energy that the moments took, by the ledger: that of the start less that of now.
 double taken(const Engine& engine, double start) {
   return start - engine.diagnostics().kinetic_energy - engine.diagnostics().potential_energy;
 }

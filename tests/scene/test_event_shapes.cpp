@@ -425,7 +425,7 @@ TEST_CASE("event: three dominoes fall, lean on each other and lie as they do at 
       CHECK(domino.velocity.norm() < 1e-6);
     }
     // Phases that end with an impact of less than 2 cm/s are taken twice: a tenth of these steps.
-    // What moves last digits moves the steps by up to 6 %: 2404 to 2557, 2920 to 3018 were seen.
+    // A change of last digits moves the steps by up to 6 %: 2404 to 2557, 2920 to 3018 were seen.
     CHECK(engine->counts().steps < (tolerance < 1e-9 ? 3200 : 2700));
     CHECK(engine->counts().events < 100);
   }

@@ -298,7 +298,7 @@ TEST_CASE("a long file, which is read in pieces, means what it means as a whole"
   CHECK(wrong.place.line == line_of(3000) + 3);
   CHECK(wrong.place.column == 10);
   CHECK(problem(changed(3000, "radius = 1", "radius = ")).place.line == line_of(3000) + 3);
-  // What is wrong only as a whole.
+  // These texts are wrong only as a whole.
   CHECK(contains(problem("[scene]\n" + text + end).message(), "redefine"));
   CHECK(problem("[scene]\n" + text + end).place.line == line_of(kBodies) + 1);
   CHECK(problem("body = [{ fixed = true }]\n" + text).place.line == 3);

@@ -61,7 +61,7 @@ at = [0, 5, 1]
 axis = [0, 0, 1]
 )";
 
-// What the XML of a file says, without the bytes behind it.
+// Content of the XML of a file, without the bytes behind it.
 struct Xml {
   tinyxml2::XMLDocument document;
   std::string text;

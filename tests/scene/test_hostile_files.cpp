@@ -144,7 +144,7 @@ TEST_CASE("depth without end is refused before it is parsed, with its place") {
   }
   CHECK_THROWS_WITH(parse_scene("[scene]\nend = 1\na" + repeated(".a", 99) + " = 1", "deep.toml"),
                     Catch::Contains("deep.toml:3:"));
-  // What only looks deep: numbers, texts, comments, long lists, many tables.
+  // This text only looks deep: numbers, texts, comments, long lists, many tables.
   CHECK_NOTHROW(
       parse_scene("[scene]\nname = '" + repeated(".[{", 99) + "' # " + repeated("a.", 99) + "\n" +
                       sphere("position = [1.5, # [[[\n 2.5,\n 3.5]\n") + repeated(sphere(""), 300),

@@ -1,5 +1,5 @@
-// What joints in steps keep and refuse, and chains that come to rest. SPDX-License-Identifier:
-// BSD-3-Clause
+// Joints in steps: what they keep and refuse, and chains that come to rest.
+// SPDX-License-Identifier: BSD-3-Clause
 #include <sstream>
 #include <tether/scene/files.hpp>
 

@@ -78,7 +78,7 @@ std::string joined(const std::vector<std::string>& parts) {
   return out;
 }
 
-// Of a machine that others use, too: what waits is no hang.
+// Processor time alone counts: others use the machine, too, and waiting is no hang.
 double processor_seconds(std::clock_t start) {
   return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }

@@ -144,7 +144,7 @@ TEST_CASE(
     REQUIRE(deep.size() == 2);
     CHECK(deep[0].find("\"low\" begins 0.1 m inside \"high\"") == 0);
     CHECK(deep[1].find("\"low\" begins 0.06 m inside \"floor\"") == 0);
-    // What a joint connects, and what does not touch, may.
+    // Bodies that a joint connects, and those that do not touch, may be inside of others.
     CHECK(found(head + ball("low", 0.4) + ball("high", 1) + floor + pairs +
                 "[[joint]]\nkind = \"hinge\"\nbodies = [\"low\", \"high\"]\nat = [0, 0, 1]\n"
                 "axis = [1, 0, 0]\n")

@@ -111,8 +111,8 @@ TEST_CASE("a page is one document with the data of its run, and asks the network
   CHECK(page.find("<title>a ball</title>") != std::string::npos);
   CHECK(count(page, "<script") == 5);
   CHECK(count(page, "</script>") == 5);
-  // What the policy does not name falls under its default; scripts and styles are those of the
-  // page.
+  // Sources that the policy does not name fall under its default; scripts and styles are those of
+  // the page.
   CHECK(page.find(
             "content=\"default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
             "base-uri 'none'; form-action 'none'\">") != std::string::npos);

@@ -252,7 +252,7 @@ TEST_CASE("a saved state of another scene is refused unless forced") {
   refused("friction", [](Scene& s) { s.pairs[0].friction = 0.41; });
   refused("shape", [](Scene& s) { s.bodies[1].shapes[0].radius = 0.11; });
   refused("step", [](Scene& s) { s.stepping->step = 1e-3; });
-  // What does not move it: its name, records, expectations, threads.
+  // These do not move it: its name, records, expectations, threads.
   Scene same = scene;
   same.name = "the same";
   same.output.state.clear();

@@ -125,7 +125,7 @@ TEST_CASE("surfaces: files are those beside the scene, and of a size", "[scene]"
              Contains("folder of the scene"));
   CHECK_THAT(folder.refusal(mesh_file("link.obj")), Contains("folder of the scene"));
   CHECK_THAT(folder.refusal(mesh_file("folder.obj")), Contains("no such file"));
-  // What never ends, or never begins.
+  // These files never end, or never begin.
   REQUIRE(mkfifo((folder.path / "scenes" / "pipe.obj").c_str(), 0600) == 0);
   CHECK_THAT(folder.refusal(mesh_file("pipe.obj")), Contains("no such file"));
   fs::create_symlink("/dev/zero", folder.path / "scenes" / "zero.obj");

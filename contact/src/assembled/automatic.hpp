@@ -31,7 +31,7 @@ class Automatic {
   InteriorPoint interior;
 
  private:
-  // Where a solve stands.
+  // State of a solve.
   struct Round {
     bool first = true;            // the first one
     bool regular = true;          // no strongly coupled contact: the slip is differentiable

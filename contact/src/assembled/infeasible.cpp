@@ -84,7 +84,7 @@ bool proves_infeasible(Search& search, Packed& d) {
   options.history = false;
   Search smooth;
   smooth.reset(problem, options, Measure::fixed_point);
-  // Where all work is spent a little more is worth it.
+  // A search that has spent its work may spend a little more: a proof is worth it.
   smooth.work_end = std::max(search.work_end - search.counts.work,
                              std::min(40 * search.sweep_cost * kSteps, kBeyond * options.max_work));
   ProximalNewton newton;

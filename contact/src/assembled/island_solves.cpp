@@ -98,7 +98,7 @@ Status IslandSolves::run(Search& search, Automatic& stages) {
   }
   std::stable_sort(order.begin(), order.end(),
                    [](const Island* p, const Island* q) { return p->size < q->size; });
-  // What its part did not do for may be done by what all have left.
+  // Islands that an equal part of the work did not solve get a second pass with all that is left.
   for (int pass = 0; pass < 2 && !order.empty(); ++pass) {
     for (std::size_t k = 0; k < order.size(); ++k) {
       const double left = search.options.max_work - search.counts.work;
@@ -115,7 +115,7 @@ Status IslandSolves::run(Search& search, Automatic& stages) {
   search.best_error = std::numeric_limits<double>::infinity();
   search.test(x_.data(), Method::interior_point);
   if (search.solved()) return Status::solved;
-  // Of several the one that says most.
+  // The last status of this list that an island has is the one that says most.
   Status out = Status::solved;
   for (Status s : {Status::unsolved, Status::stalled, Status::cycling, Status::round_off,
                    Status::work_limit, Status::infeasible})

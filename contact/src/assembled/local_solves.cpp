@@ -11,7 +11,7 @@ namespace tether::contact::detail {
 
 namespace {
 
-// Of contacts, in place_: not in a part, or not yet.
+// Entries of place_ for contacts that are not in a part, or not yet.
 constexpr int kOutside = -1, kReached = -2;
 
 }  // namespace
@@ -67,8 +67,9 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
   constexpr int kLargest = 300;  // contacts of a part
   const Problem& p = search.system.problem();
   if (!find_errors(search, x)) return false;
-  // Where many contacts have errors of one size solving some of them only disturbs the others. But
-  // where sweeps do not settle for long, parts of them may hold what is unstable by itself.
+  // Solving some contacts only disturbs the others if many have errors of one size. But if sweeps
+  // do not settle for long, a part may be unstable by itself: each refusal lets more contacts count
+  // as few.
   constexpr double kNearLargest = 0.1, kFew = 0.03;
   int many = 0;
   for (double e : error_) many += e > kNearLargest * most_;
@@ -162,7 +163,7 @@ bool LocalSolves::run(Search& search, Packed& x, double budget) {
   constexpr int kMostLayers = 3;
   const double before = most_;
   if (!find_parts(search, x)) return false;
-  // What comes back after it was solved hangs on more of its neighbours.
+  // An error that comes back after its part was solved depends on more neighbours.
   if (solved_ && most_ < 0.5 * before)
     layers_ = 1;
   else if (solved_)

@@ -11,7 +11,7 @@ namespace {
 // Sweeps that a factorisation costs, from which on sweeps go on before stages that take many of
 // them.
 constexpr double kDear = 30;
-// Of the error: more is left by a stage that does not get on near round-off.
+// Part of the error: a stage near round-off that leaves more of it does not get on.
 constexpr double kGain = 0.7;
 
 }  // namespace
@@ -95,8 +95,8 @@ Status Automatic::sweep(Search& search, Round& r, int factorisations) {
   return Status::unsolved;
 }
 
-// Where a solution repels sweeps they pass it by, and proximal problems from where they are may
-// lead to it: where one of these is not solved it was the wrong place, and sweeps go on to another.
+// Sweeps pass by a solution that repels them, and proximal problems from where they are may lead to
+// it. If one of these is not solved it was the wrong place, and sweeps go on to another.
 Status Automatic::proximal_path(Search& search, Round&, int problems) {
   const double end = search.work_end;
   search.work_end = std::min(end, 2 * search.counts.work);
@@ -114,9 +114,9 @@ Status Automatic::interior_points(Search& search, Round& r, int steps) {
   return Status::unsolved;
 }
 
-// Where the path of interior points has ended near a solution a few proximal problems lead to it;
-// one that is not solved says that they do not, but for heavy bodies on light ones, where x has
-// far to go.
+// A few proximal problems lead to a solution near which the path of interior points has ended. One
+// that is not solved says that they do not, but for heavy bodies on light ones, where x has far to
+// go.
 Status Automatic::proximal_path_at_best(Search& search, Round&, int problems) {
   constexpr double kRough = 1e-2;
   constexpr int kMost = 60;
@@ -178,8 +178,9 @@ Status Automatic::no_solution(Search& search, Round&, int) {
   return infeasible(search) ? Status::infeasible : Status::unsolved;
 }
 
-// Where A is singular impulses of contacts wedged against each other may grow along its null space
-// without an end, beside solutions of the size of b: proximal problems from much smaller ones.
+// Impulses of contacts wedged against each other may grow without an end along the null space of a
+// singular A, beside solutions of the size of b. Proximal problems then start from much smaller
+// ones.
 void Automatic::proximal_path_from_small(Search& search) {
   constexpr double kGrown = 10;  // times the impulses by which all stick
   constexpr int kProblems = 60;
@@ -199,7 +200,7 @@ void Automatic::proximal_path_from_small(Search& search) {
 // Whether what is left is what round-off makes of A x - b: its bound explains the error, and steps
 // with long sums gain nothing any more. They end within 1 to 3 units of it on stacks of 100 to 2000
 // boxes of masses 1 : 1e6 to 1 : 1e12.
-// Where steps near the point are stuck far above that, others come from further away.
+// Steps that are stuck near the point, far above that, give way to others from further away.
 bool Automatic::at_round_off(Search& search, int steps) {
   constexpr double kUnits = 4, kNearly = 100;
   while (search.explained_by_round_off() && !search.solved()) {

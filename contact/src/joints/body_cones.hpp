@@ -95,7 +95,7 @@ class BodyCones {
   linalg::DisjointSets sets_;                  // of mechanisms and single bodies
   std::vector<int> row_;                       // of each cone: its first row in x
   std::vector<int> first_of_, order_, start_;  // cones island by island
-  // Of the present island: its cones, those of them that are solved, the sides of all, whether a
+  // The present island: its cones, those of them that are solved, the sides of all, whether a
   // mechanism is among these, A, and by cone and row its diagonal without joints.
   std::vector<int> members_;
   std::vector<char> kept_;

@@ -13,7 +13,7 @@ using linalg::at;
 
 namespace {
 
-// Where warm starts keep the moment of a contact: contacts have no bits so high (contact_id).
+// Warm starts keep the moment of a contact under this: contacts have no bits so high (contact_id).
 constexpr std::uint64_t moment_id(std::uint64_t contact) {
   return contact | std::uint64_t{1} << 62;
 }

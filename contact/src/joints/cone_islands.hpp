@@ -70,7 +70,7 @@ class RollingPart final : public IslandMaker {
 
   const std::vector<std::pair<int, int>>& links() const override { return links_; }
   std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
-  /// Of the last problem of a step's velocities: one for each contact, world axes, N m s.
+  /// Moments in the last problem of a step's velocities: one for each contact, world axes, N m s.
   const std::vector<Eigen::Vector3d>& moments() const { return moments_; }
 
  private:

@@ -15,8 +15,8 @@ namespace tether::contact::detail {
 
 namespace {
 
-// Of the largest speed that the rows of a mechanism see: above what rounding leaves of rows that
-// depend on each other, below any motion that somebody has meant.
+// Part of the largest speed that the rows of a mechanism see: above what rounding leaves of rows
+// that depend on each other, below any motion that somebody has meant.
 constexpr double kContradiction = 1e-7;
 // The squares of smaller speeds vanish, and nothing relative is left: what comes to rest passes
 // there.

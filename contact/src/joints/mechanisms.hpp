@@ -27,7 +27,7 @@ class Mechanisms {
   const Matrix6d& root(int body) const { return root_[static_cast<std::size_t>(body)]; }
   int bodies() const { return static_cast<int>(mechanism_.size()); }
 
-  /// What the rows have changed of u of mechanism m since clear_pulls(): Mechanism::entries()
+  /// Change of u of mechanism m that the rows have made since clear_pulls(): Mechanism::entries()
   /// numbers.
   std::vector<double>& pull(int m) { return pulls_[static_cast<std::size_t>(m)]; }
   double pull_norm() const;

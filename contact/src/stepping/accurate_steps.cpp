@@ -45,7 +45,7 @@ Vector3d slip_of(const std::vector<RigidBody>& motion, const PointContact& c) {
   return v - c.normal.dot(v) * c.normal;
 }
 
-/// Where the line through (ta, a) and (tb, b), b behind a, is zero behind b; infinite: nowhere.
+/// The zero behind b of the line through (ta, a) and (tb, b), b behind a; infinite: there is none.
 double zero_behind(double ta, double a, double tb, double b) {
   if (!(b > 0 && a > b)) return std::numeric_limits<double>::infinity();
   return tb + b * (tb - ta) / (a - b);
@@ -75,7 +75,7 @@ void Stepper::Implementation::advance_part(double time, double length) {
   advance(whole(time, length));
 }
 
-// What contacts have done in the part just taken.
+// Lists what contacts have done in the part just taken.
 void Stepper::Implementation::list_active(double length, std::vector<Active>& list) const {
   list.clear();
   if (joints) list_laws(length, list);
@@ -168,7 +168,8 @@ Stepper::Implementation::Moment Stepper::Implementation::moment(const detail::Im
   return moment(contacts.gaps[at(i.contact)], i.came, i.comes, near->size(c), length);
 }
 
-// Of those that matter. 0: now, within what the accuracy allows. Infinite: there is none.
+// Time of the first impact that matters. 0: now, within what the accuracy allows. Infinite: there
+// is none.
 double Stepper::Implementation::first_impact(double length, double& at_once) const {
   double first = std::numeric_limits<double>::infinity();
   const auto take = [&](const Moment& m) {
@@ -223,8 +224,8 @@ double Stepper::Implementation::first_switch(double length) const {
   return first;
 }
 
-// Of the halves, in the bodies, from the whole part; 1: the accuracy. Relative to the size of each
-// body; velocities, where they are smooth, by what they move it in the part.
+// Difference of the halves, in the bodies, from the whole part; 1: the accuracy. It is relative to
+// the size of each body; velocities, where they are smooth, count by what they move it in the part.
 double Stepper::Implementation::part_error(const PartState& whole, double length,
                                            bool smooth) const {
   double most = 0;

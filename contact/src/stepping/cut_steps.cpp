@@ -80,7 +80,7 @@ Stepper::Implementation::Struck Stepper::Implementation::strike() {
   return Struck::impact;
 }
 
-// Of the contacts, which touch. False: it is not solved, and nothing has changed.
+// Solves the impact of the contacts, which touch. False: it is not solved, and nothing has changed.
 bool Stepper::Implementation::take_impact() {
   if (bounces_at_once) bounces_at_once->choose(*impacts, *impacts, {}, bodies, contacts);
   const BodySolution& s = cuts->solve(bodies.motion, contacts);
@@ -119,7 +119,7 @@ bool Stepper::Implementation::take_impacts_in_turn() {
   return true;
 }
 
-// Of a part of this length.
+// Advances by sub-step s of a part of this length.
 void Stepper::Implementation::take_of_cut(detail::SubStep s, double length) {
   part.of_cut = true;
   solver->scale_warm_start(s.length / length);

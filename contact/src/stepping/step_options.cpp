@@ -81,10 +81,11 @@ double negligible_depth(const SteppingOptions& o, double dt) {
   return o.gravity ? o.tolerance * o.gravity->norm() * dt * dt : 0;
 }
 
-// Of positions only: an error of the approach is so much of its way in the step, and the next step
-// sees it as a gap or a penetration. A few sweeps do; small islands, which are cheap, are solved,
-// so that a stack that lands does not depend on the order of its boxes. So few sweeps leave no time
-// to look which far contacts close: penetrations were up to twice as deep, in no less time.
+// Gaps are closed by positions only: an error of the approach is so much of its way in the step,
+// and the next step sees it as a gap or a penetration. A few sweeps do; small islands, which are
+// cheap, are solved, so that a stack that lands does not depend on the order of its boxes. So few
+// sweeps leave no time to look which far contacts close: penetrations were up to twice as deep, in
+// no less time.
 BodyOptions closing_options(const SteppingOptions& o) {
   BodyOptions b = contact_options(o);
   b.min_sweeps = 0;

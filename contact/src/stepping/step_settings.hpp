@@ -27,7 +27,7 @@ Depenetration depenetration(const SteppingOptions& o);
 double negligible_depth(const SteppingOptions& o, double dt);
 /// Options of the problem that finds the gaps closed by inelastic impacts.
 BodyOptions closing_options(const SteppingOptions& o);
-/// Of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
+/// Speed of a threshold in parts of sqrt(g size): m/s for a size of 1 m.
 double threshold_speed(double threshold, const SteppingOptions& o);
 
 }  // namespace tether::contact::detail

@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-// What rounding makes of gaps in many steps, in parts of the positions.
+// Rounding of gaps in many steps, in parts of the positions.
 constexpr double kClosed = 1e3 * std::numeric_limits<double>::epsilon();
 
 }  // namespace

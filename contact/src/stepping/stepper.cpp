@@ -73,7 +73,7 @@ static void check_rolling(const SteppingOptions& options) {
     throw std::invalid_argument("rolling and torsional friction need restitution_law = newton");
 }
 
-// Of bodies, m: the reach of their surfaces, or the radius of gyration.
+// Sizes of bodies, m: the reach of their surfaces, or the radius of gyration.
 static std::vector<double> sizes(const BodySet& bodies, const std::vector<Surface>& surfaces) {
   std::vector<double> out(bodies.mass.size(), 0);
   for (const Surface& each : surfaces) {

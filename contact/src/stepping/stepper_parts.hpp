@@ -49,7 +49,7 @@ struct PartControl {
     std::uint64_t id;
     int what;  // 1: sticks, 2: slips, 3: an impact; > 3: a moment; laws of joints as contacts
     Eigen::Vector3d slip;  // impulse, or moment, against it
-    // Of a contact: normal force and what is left of the cone, means of the part; its slip
+    // Values of a contact: normal force and what is left of the cone, means of the part; its slip
     // where the part begins, and how fast it is where it ends.
     double force = 0, margin = 0, speed = 0, size = 0;
     Eigen::Vector3d came = Eigen::Vector3d::Zero();
@@ -58,7 +58,7 @@ struct PartControl {
   std::vector<double> radius;  // of bodies
   PartState before, whole;
   std::array<std::vector<Active>, 3> active;
-  // Of the second half of the part before this one, in the same step; its length.
+  // Contacts of the second half of the part before this one, in the same step; its length.
   std::vector<Active> past;
   double past_length = 0;
 };
@@ -76,7 +76,7 @@ struct Judgement {
   long bounces = 0, accepted = 0, unsolved = 0;
 };
 
-/// Where a part begins, or has ended.
+/// State where a part begins, or has ended.
 struct PartMark {
   PartState bodies;
   WarmStart contacts, corrections;

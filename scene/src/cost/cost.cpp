@@ -106,7 +106,7 @@ Reference reference_of(const Scene& scene, const Plan& plan, bool events, double
       scene, own ? finest_step / 4 : options.reference.value_or(finest_step / 4), times, options);
 }
 
-// Where steps end there is a state to compare; what impacts leave there may last a few steps only.
+// Ends of steps have a state to compare; what impacts leave there may last a few steps only.
 std::vector<double> times_of(const Scene& scene, Setting setting, const CostOptions& options) {
   if (setting.method == CostMethod::steps) return step_ends(scene, setting.value, options.samples);
   if (setting.method == CostMethod::accuracy)

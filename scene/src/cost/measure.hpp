@@ -43,7 +43,7 @@ std::vector<double> merged(const std::vector<double>& a, const std::vector<doubl
 /// The scene with one setting, and nothing written.
 Scene with_setting(const Scene& scene, CostMethod method, double setting);
 
-/// Of a scene without [stepping]: a thousandth of the time, at most the default.
+/// Step of a scene without [stepping]: a thousandth of the time, at most the default.
 double step_of(const Scene& scene);
 
 }  // namespace tether::scene::costs

@@ -9,8 +9,8 @@
 
 namespace tether::scene::costs {
 
-/// What is compared with a reference at all times, and the reference with others like it at those
-/// that do not hang on what it is asked for.
+/// Times at which anything is compared with a reference (`all`), and those at which the reference
+/// is compared with others like it (`own`), which do not depend on what it is asked for.
 struct Times {
   std::vector<double> all, own;
 };

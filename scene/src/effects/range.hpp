@@ -13,7 +13,7 @@
 
 namespace tether::scene::effects {
 
-// Of numbers that a motion may have, SI: their quotients by a coefficient are numbers, too.
+// Largest number that a motion may have, SI: quotients of such by a coefficient are numbers, too.
 constexpr double kLargestMotion = 1e150;
 
 /// A coefficient of friction that is 0, or by which impulses can be divided and multiplied.

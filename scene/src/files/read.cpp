@@ -180,7 +180,7 @@ Scene read(Value document, const std::string& name) {
   Fields root(&document, "", name, report);
 
   read_scene_table(root, r);
-  // Of a hundred thousand of them the document need not stand beside what is read.
+  // The document of a hundred thousand bodies need not stand beside what is read.
   Entry* entry = find_entry(document, "body");
   auto* bodies = entry != nullptr ? std::get_if<Value::Items>(&entry->value.held) : nullptr;
   if (bodies != nullptr) r.scene.bodies.reserve(bodies->size());

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLargestFile = std::size_t{64} << 20;
-// Of all bodies together: a file may be named by many, and each reads it.
+// Limits for all bodies together: a file may be named by many, and each reads it.
 constexpr std::size_t kMostBytes = 4 * kLargestFile, kMostOfScene = 10 * kMostTriangles;
 
 // A scene from an untrusted source reads nothing but what lies beside it: no way out of its folder,
@@ -51,7 +51,7 @@ bool read_beside(Fields& in, Reader& r, const std::string& name, std::string& te
   return true;
 }
 
-// What `parse(name, text)` makes of the file that is named; false: it is missing or wrong.
+// Lets `parse(name, text)` read the file that is named; false: it is missing or wrong.
 template <class Parse>
 bool from_file(Fields& in, Reader& r, const Parse& parse) {
   const std::string name = in.input_name("file");

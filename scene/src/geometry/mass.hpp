@@ -7,7 +7,7 @@
 
 namespace tether::scene {
 
-/// Of a uniform solid of density 1: mass = volume, m^3; inertia about the centre, m^5.
+/// Properties of a uniform solid of density 1: mass = volume, m^3; inertia about the centre, m^5.
 struct MassProperties {
   double volume = 0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -16,7 +16,7 @@ struct MassProperties {
 
 /// A plane, points and a mesh have none.
 MassProperties mass_properties(const Shape& shape);
-/// Of shapes that do not overlap, in the axes of their body.
+/// Properties of shapes that do not overlap, in the axes of their body.
 MassProperties mass_properties(const std::vector<Shape>& shapes);
 
 }  // namespace tether::scene

@@ -13,7 +13,7 @@ namespace tether::scene {
 /// More belong to no scene.
 constexpr std::size_t kMostMeshPoints = 100000, kMostTriangles = 200000;
 
-/// What is wrong with a file, by line where it has lines.
+/// An error in a file, by line where it has lines.
 class SurfaceError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

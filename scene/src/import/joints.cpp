@@ -25,7 +25,7 @@ long count(const Chain& chain, MotionKind kind) {
                        [&](const PlacedJoint& each) { return each.law.kind == kind; });
 }
 
-/// Where the axes of two hinges meet.
+/// Point in which the axes of two hinges meet.
 std::optional<Vector3d> crossing(const PlacedJoint& a, const PlacedJoint& b) {
   const Vector3d across = a.axis.cross(b.axis), d = b.at - a.at;
   const double square = across.squaredNorm();

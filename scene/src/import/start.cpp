@@ -67,7 +67,7 @@ Isometry3d moved(const LinkJoint& joint, double way) {
   return Translation3d(joint.at) * AngleAxisd(way, joint.axis) * Translation3d(-joint.at);
 }
 
-/// What --base makes of the joints of a link in the world.
+/// Joints that --base gives a link in the world.
 std::vector<LinkJoint> base_joints(const Link& link, Base base) {
   if (base == Base::as_file || link.scenery) return link.joints;
   if (base == Base::free) {

@@ -25,8 +25,8 @@ class JointType {
   virtual void write(const Joint& joint, files::Writer& out) const {
     out.field("at", joint.at, "m");
   }
-  /// What must hold of a joint that was filled in by hand, beside two bodies that can move against
-  /// each other. Throws std::invalid_argument; `name` for messages.
+  /// Checks what must hold of a joint that was filled in by hand, beside two bodies that can move
+  /// against each other. Throws std::invalid_argument; `name` for messages.
   virtual void check(const Joint&, const std::string& /*name*/) const {}
 
   /// At t = 0, in world axes.
@@ -41,7 +41,7 @@ class JointType {
 
   virtual const Vector3d& point_on_second(const Joint& joint) const { return joint.at; }
   virtual void take_lengths(const Joint&, Largest&) const {}
-  /// Of a joint to the world. Default: torques in all directions.
+  /// Limits the axes of `momenta` by a joint to the world. Default: torques in all directions.
   virtual void limit_axes(const Joint&, Momenta& momenta, const std::string& because) const {
     momenta.axes.none(because);
   }

@@ -55,7 +55,7 @@ inline Eigen::Matrix<double, 3, 4> turn_of_quaternion(const double* q) {
 /// Unknowns of one body.
 constexpr int kBody = 13, kPosition = 0, kQuaternion = 3, kVelocity = 7, kSpin = 10;
 
-/// Where derivatives go: rows of a matrix whose columns are the unknowns.
+/// Writes derivatives into rows of a matrix whose columns are the unknowns.
 class JacobianBlocks {
  public:
   JacobianBlocks(Entries& entries, const std::vector<Eigen::Matrix<double, 3, 4>>& turns,

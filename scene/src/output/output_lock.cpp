@@ -26,7 +26,7 @@ bool is_there(const std::string& name, int descriptor) {
          open_file.st_ino == named.st_ino && open_file.st_dev == named.st_dev;
 }
 
-/// What a run has written into its lock, the number of its process, or what somebody else did.
+/// Text of a lock: the number of its process, which a run has written, or what somebody else did.
 std::string content(int descriptor) {
   char text[16] = {};
   const ssize_t count = pread(descriptor, text, sizeof text - 1, 0);

@@ -54,7 +54,7 @@ void RowFile::flush() {
       const int reason = written == 0 ? ENOSPC : errno;
       waiting_.resize(done);
       size_ += waiting_.rfind('\n') + 1;  // npos + 1 is 0
-      // Of a device or a pipe nothing can be taken back.
+      // Rows cannot be taken back from a device or a pipe.
       if (ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) waiting_.clear();
       close(std::exchange(descriptor_, -1));
       errno = reason;

@@ -22,7 +22,7 @@ class RowFile {
   /// One or more rows, each with its end.
   void put(std::string_view rows);
   void flush();
-  /// What was put outlasts a loss of power.
+  /// Makes what was put outlast a loss of power.
   void keep();
   const std::string& name() const { return file_; }
 

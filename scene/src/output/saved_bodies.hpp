@@ -21,8 +21,8 @@ inline void put_bodies(std::ostream& out, double time, const std::vector<BodySta
     binary::put_array(out, b.position, b.orientation.coeffs(), b.velocity, b.angular_velocity);
 }
 
-/// What put_bodies() wrote after its first letters; returns the time. Throws std::runtime_error on
-/// other numbers of bodies and on what is no motion.
+/// Reads what put_bodies() wrote after its first letters; returns the time. Throws
+/// std::runtime_error on other numbers of bodies and on what is no motion.
 inline double get_bodies(std::istream& in, std::vector<BodyState>& bodies) {
   if (binary::get<std::uint64_t>(in) != bodies.size())
     throw std::runtime_error("the saved state is of another scene: of another size");

@@ -56,8 +56,8 @@ void write_or_remove(const Open& out, const std::string& file, std::string_view 
   }
 }
 
-// What has the name is removed, not written into: it may be a link, a pipe or the second name of
-// another file.
+// A file that has the name is removed, not written into: it may be a link, a pipe or the second
+// name of another file.
 void replace(const std::string& file, std::string_view content, bool lasting) {
   unlink(file.c_str());
   const Open out{open(file.c_str(), kNew, 0666)};
@@ -145,7 +145,7 @@ void check_writable(const std::string& file) {
   const std::string trial = file + ".new";
   {
     const Open out{open(trial.c_str(), kNew, 0666)};
-    // What is there gives way when the file is written, not before.
+    // A file that is there gives way when the new one is written, not before.
     if (out.descriptor < 0 && (errno != EEXIST || fs::is_directory(trial, error))) fail(file);
     if (out.descriptor < 0) return;
   }

@@ -13,13 +13,13 @@ struct Range {
   bool logarithmic = false;  // low > 0 then
 };
 
-/// Of four digits, without zeros that say nothing: 1e-6.
+/// The value in four digits, without zeros that say nothing: 1e-6.
 std::string short_number(double value);
 
 /// A little more than the values; logarithmic: without those that have no logarithm.
 Range range_of(const std::vector<double>& values, bool logarithmic);
 
-/// What a curve is called.
+/// Name and colour of a curve.
 struct Entry {
   std::string name, colour;
 };

@@ -64,7 +64,7 @@ class Canvas {
   void circle(const Vector2d& centre, double radius, const std::string& fill, const Pen& pen);
   /// Lines over a polygon: what is held fast.
   void hatch(const std::vector<Vector2d>& points);
-  /// What is drawn between the two is seen inside of the box only.
+  /// Drawings between the two calls are seen inside of the box only.
   void begin_clip(const Box& box);
   void end_clip();
 

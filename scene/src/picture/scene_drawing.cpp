@@ -151,7 +151,7 @@ class Drawing {
       draw_face(m, face, points, R, 1e-9, colour, 0.8);
   }
 
-  /// Where it faces the eye by more than `least`.
+  /// Draws a face that faces the eye by more than `least`.
   void draw_face(const Mesh& m, const std::vector<std::size_t>& face,
                  const std::vector<Vector2d>& points, const Matrix3d& R, double least,
                  const char* colour, double width) {
@@ -181,7 +181,7 @@ class Drawing {
     const Vector2d out(view_.eye().row(0).dot(normal), -view_.eye().row(1).dot(normal));
     const Vector2d along = 2000 * Vector2d(-out.y(), out.x()).normalized();
     const Vector2d middle = view_.pixel(pose.position + pose.orientation * shape.position);
-    // Where the panel is, also if the plane's own point is far from it.
+    // The line passes the panel, also if the plane's own point is far from it.
     const Vector2d centre((view_.panel().left + view_.panel().right) / 2,
                           (view_.panel().top + view_.panel().bottom) / 2);
     const Vector2d at = centre + (middle - centre).dot(out) * out;
@@ -189,7 +189,7 @@ class Drawing {
     canvas_.line(at - along, at + along, kDark);
   }
 
-  // Where it was on the way; few bodies only, or the picture is a thicket.
+  // Draws each body where it was on the way; few bodies only, or the picture is a thicket.
   void draw_outlines() {
     const std::size_t frames = first_.size() <= 6 ? 6 : 1;
     for (std::size_t f = 0; f < frames; ++f)
@@ -210,7 +210,7 @@ class Drawing {
     return order;
   }
 
-  /// Of a body's centre, without parts drawn already; false: it hardly moved.
+  /// Draws the path of a body's centre, without parts drawn already; false: it hardly moved.
   bool draw_path(std::size_t b) {
     std::map<std::pair<long, long>, std::size_t> visited;  // cells of the picture, and when first
     std::vector<std::vector<Vector2d>> parts(1);
@@ -318,7 +318,7 @@ class Drawing {
     }
   }
 
-  /// What is held by the world.
+  /// Draws the support of a point that the world holds.
   void draw_support(const Vector2d& p, bool bearing) {
     if (bearing) canvas_.polygon({p, p + Vector2d(-7, 11), p + Vector2d(7, 11)}, "#ffffff", kDark);
     const double y = bearing ? 11 : 0;
@@ -344,7 +344,7 @@ class Drawing {
                  canvas_.whole(), {kNames, "#202020"});
   }
 
-  /// Of the bodies that somebody named.
+  /// Draws the names of the bodies that somebody named.
   void draw_names(const std::vector<std::size_t>& order) {
     if (names_many_) return;
     for (const std::size_t b : order) {

@@ -42,7 +42,7 @@ Matrix3d eye_of(const Scene& scene, const std::vector<const Poses*>& motion) {
   return eye;
 }
 
-/// Of the shapes from the centre; below 0: there is a plane.
+/// Reach of the shapes from the centre; below 0: there is a plane.
 double reach_of(const Body& body) {
   double reach = 0;
   for (const Shape& shape : body.shapes) {

@@ -16,13 +16,13 @@ struct Pose {
   Vector3d position;
   Eigen::Quaterniond orientation;
 };
-/// Of the first bodies of a scene.
+/// Poses of the first bodies of a scene.
 using Poses = std::vector<Pose>;
 
 /// The point of a body, or of the world (-1), that was there at t = 0.
 Vector3d carried(const Scene& scene, const Poses& poses, int body, const Vector3d& point);
 
-/// Where the two ends of a joint are: on its first and on its second body.
+/// One of the two ends of a joint: on its first or on its second body.
 Vector3d joint_end(const Scene& scene, const Poses& poses, const Joint& joint, bool second);
 
 /// A panel of the picture and the part of the scene that it shows.

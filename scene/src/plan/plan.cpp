@@ -45,8 +45,8 @@ long contact_pairs(const Scene& scene) {
   return sum;
 }
 
-// Of IDA: position, quaternion and velocities of each body, the work of forces if energy is kept in
-// spite of them, and multipliers as the formulation has them.
+// Unknowns of IDA: position, quaternion and velocities of each body, the work of forces if energy
+// is kept in spite of them, and multipliers as the formulation has them.
 int smooth_unknowns(const Scene& s, const Plan& plan) {
   const bool keeps_energy = std::any_of(
       s.invariants.begin(), s.invariants.end(),

@@ -7,7 +7,7 @@ namespace tether::scene {
 
 /// Energies, errors and work.
 void print_summary(const Scene& scene, const RunResult& result);
-/// What the scene begins with that its author may not have meant.
+/// Warnings of what the scene begins with that its author may not have meant.
 void print_start(const Scene& scene);
 /// Times of the engine and of the whole program: `wall` seconds, reading and output included.
 void print_times(const RunResult& result, double wall);

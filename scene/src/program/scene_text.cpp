@@ -55,7 +55,7 @@ std::vector<double> range(const std::string& word, const std::vector<std::string
   std::vector<double> values;
   for (int k = 0; k <= last; ++k) {
     const double share = static_cast<double>(k) / last;
-    // Of 15 digits, so that 0.1:0.5:9 has 0.15 and not the number beside it.
+    // Values have 15 digits, so that 0.1:0.5:9 has 0.15 and not the number beside it.
     const double value =
         logarithmic ? *from * std::pow(*to / *from, share) : *from * (1 - share) + *to * share;
     values.push_back(number(fmt::format("{:.15g}", value)).value_or(value));

@@ -59,7 +59,7 @@ void Progress::show(Clock::time_point now) {
   }
 }
 
-// Of runs of some seconds: their steps may become dearer, so that it is a guess.
+// Time that is left in runs of some seconds: their steps may become dearer, so that it is a guess.
 std::string Progress::time_left(Clock::time_point now, double share) const {
   const double passed = std::chrono::duration<double>(now - begin_).count();
   if (passed < 3 || share < 0.01 || share >= 1) return "";

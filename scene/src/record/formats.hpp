@@ -32,8 +32,8 @@ struct Format {
   void (*add_recorders)(const std::string& given, const Beginning&, Recorders&) = nullptr;
   /// Files and folders besides the main one. `forces`: Output::forces.
   std::vector<std::string> (*beside)(const std::string& given, bool forces) = nullptr;
-  /// Of a film, of which each process writes its share: the main file, the ending of a frame in a
-  /// folder beside it.
+  /// Names of a film, of which each process writes its share: the main file, the ending of a frame
+  /// in a folder beside it.
   std::string (*film)(const std::string& given) = nullptr;
   bool (*is_frame)(const std::string& path) = nullptr;
 

@@ -78,7 +78,7 @@ class VtkRecorder : public Recorder {
             [&](Range of) { return springs(forces, of); });
     }
     ++number_;
-    // What the film names is there.
+    // All files that the film names are there once the processes have met.
     if (among_.ranks > 1 && among_.meet) among_.meet();
   }
 

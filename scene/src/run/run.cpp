@@ -127,7 +127,7 @@ class Run {
   }
 
  private:
-  // Where events cannot go on, steps can.
+  // Steps can go on where events cannot.
   void hand_over() {
     if (plan_.engine != EngineKind::event || engine_->in_steps()) return;
     if (scene_.output.state.empty()) {
@@ -302,7 +302,7 @@ class Run {
     if (in.peek() != std::char_traits<char>::eof())
       throw std::runtime_error("the saved state " + file + " is longer than this scene needs");
     const double time = engine_->time();
-    // What a run sums up is finite, or it has ended; its last stop lies behind it.
+    // Sums of a run are finite, or it has ended; its last stop lies behind it.
     for (const double x : {s.start_energy, s.end_energy, s.lowest_change, s.largest_change, s.drift,
                            s.penetration, time})
       if (!std::isfinite(x) || std::isnan(s.residual))

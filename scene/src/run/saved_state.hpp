@@ -18,8 +18,8 @@
 
 namespace tether::scene {
 
-/// Of bodies, effects and options; not of the scene's name, end, output and expectations, nor of
-/// what only says when to give up.
+/// Hash of bodies, effects and options; not of the scene's name, end, output and expectations, nor
+/// of what only says when to give up.
 std::uint64_t hash_of_motion(const Scene& scene, const Plan& plan);
 
 /// Whole, and lasting after a loss of power. Throws std::runtime_error.

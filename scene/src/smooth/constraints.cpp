@@ -187,7 +187,7 @@ ida_projection::Constraints System::sparse_constraints() {
   return joints + kept;
 }
 
-// Of rows with different units, in SI.
+// Largest drift of rows with different units, in SI.
 double System::drift(double t, const double* y) {
   Eigen::VectorXd g(constraint_count());
   constraint_values(t, y, g.data());

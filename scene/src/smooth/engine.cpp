@@ -25,7 +25,8 @@ constexpr char kMagic[8] = {'s', 'm', 'o', 'o', 't', 'h', ' ', '2'};
 // Figures of a file are rounded, so a start may be off the joints by this much, relative to the
 // scene's size and speed (at least 1 m, 1 m/s). It is moved onto them.
 constexpr double kStartTolerance = 1e-4;
-// What may be left then; of velocities more, since weak rows near a dead point leave it.
+// Errors that may be left then; velocities may have more, since weak rows near a dead point leave
+// it.
 constexpr double kLeft = 1e-7, kSpeedLeft = 1e-5;
 // Closed to rounding already, of the largest unknown: thin rows magnify it into moves that lead
 // nowhere.

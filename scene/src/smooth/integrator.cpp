@@ -30,7 +30,7 @@ double local_tolerance(const SmoothOptions& options) {
 constexpr double kNewton = 0.1, kNewtonIndex2 = 0.02;
 constexpr double kNewtonRounding = 2e-13;  // no less of it
 
-// Of velocities across the joints, times pivot^2; see weights().
+// Noise of velocities across the joints, times pivot^2; see weights().
 constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3, kSmallestPivotIndex2 = 1e-3;
 
 // Steps from one anchor to the next, see SmoothEngine; not close to a dead point, where y' and the

@@ -17,7 +17,7 @@ namespace tether::scene::smooth {
 /// that it is asked for: they are interpolated.
 class Integrator {
  public:
-  /// What it is made for: without a matrix it can only make a start consistent.
+  /// Purpose of an integrator: without a matrix it can only make a start consistent.
   enum class For { motion, start };
 
   /// `y` and `yp` are consistent up to errors that `make_consistent` repairs.

@@ -112,7 +112,7 @@ Diagnostics System::diagnostics(double t, const double* y) {
   return d;
 }
 
-// Of the state: those among the unknowns are held to no tolerance.
+// Forces follow from the state: those among the unknowns are held to no tolerance.
 scene::Forces System::forces(double t, const double* y, const joints::Reactions& reactions) {
   update(t, y);
   sum_forces(nullptr);

@@ -38,8 +38,8 @@ void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) 
   });
 }
 
-// What a multiplier pulls with is the gradient of its row. JointRows::each goes kind by kind, and
-// rows are numbered joint by joint.
+// A multiplier pulls with the gradient of its row. JointRows::each goes kind by kind, and rows are
+// numbered joint by joint.
 void SteppedJoints::add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) {
   bodies_.read_positions(bodies);
   rows_.set_time(t);

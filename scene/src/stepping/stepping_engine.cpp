@@ -45,7 +45,7 @@ std::uint64_t fingerprint(const Scene& scene, double step) {
   return hash;
 }
 
-// Of the point at r from the centre of a body; -1: the world.
+// Velocity of the point at r from the centre of a body; -1: the world.
 Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
   if (body < 0) return Vector3d::Zero();
   const contact::RigidBody& motion = bodies.motion[static_cast<std::size_t>(body)];
@@ -54,7 +54,7 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 
 // The last letter is the format.
 constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '8'};
-// Of the step, and of the time: that of a boundary up to rounding.
+// Parts of the step, and of the time: a time so near is that of a boundary up to rounding.
 constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
 
 Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
@@ -256,7 +256,7 @@ void SteppingEngine::set_bodies(const std::vector<BodyState>& states) {
   }
 }
 
-// What another engine saved.
+// Goes on from what another engine saved.
 void SteppingEngine::take_over(std::istream& in) {
   std::vector<BodyState> states(bodies_.size());
   const double time = get_bodies(in, states);

@@ -18,7 +18,7 @@ namespace {
 
 Value plain(toml::node& node, int lines_before);
 
-// Where a text cannot be cut its tree would otherwise stand beside its copy as a whole.
+// The tree of a text that cannot be cut would otherwise stand beside its copy as a whole.
 void add_items(toml::array& array, int lines_before, Value::Items& out) {
   for (toml::node& item : array) {
     out.push_back(plain(item, lines_before));
@@ -80,7 +80,7 @@ std::size_t end_of_piece(std::string_view text, std::size_t begin, std::size_t s
   return text.size();
 }
 
-/// What was read so far of a text in pieces.
+/// Tables and values read so far of a text in pieces.
 class Pieces {
  public:
   /// False where the text as a whole may mean something else, or nothing.

@@ -29,7 +29,7 @@ class Value {
   Value();  ///< a table without keys
 
   Kind kind() const { return static_cast<Kind>(held.index()); }
-  /// What a value of another kind does not have is false, 0 or empty.
+  /// A value of another kind gives false, 0 or empty.
   bool boolean() const { return of<bool>(); }
   double number() const { return of<Number>().value; }
   bool whole() const { return of<Number>().whole; }

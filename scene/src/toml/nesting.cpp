@@ -109,7 +109,7 @@ class Scanner {
     while (at_ < text_.size() && text_[at_] != '\n') ++at_;
   }
 
-  // Of one line, or between three quotes of any number of lines; ' knows no escapes.
+  // A string is of one line, or between three quotes of any number of lines; ' knows no escapes.
   void skip_string(char quote) {
     const bool lines = text_.substr(at_, 3) == std::string_view(quote == '"' ? "\"\"\"" : "'''");
     at_ += lines ? 3 : 1;

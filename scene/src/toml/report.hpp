@@ -24,14 +24,14 @@ class Report {
 /// `text` with a question mark for all that a terminal obeys instead of showing it: control
 /// characters of ASCII and Unicode, and marks that turn the direction of what follows.
 std::string printable(std::string_view text);
-/// What a text of a scene may be that is only shown: no comma, quote or control character, no
-/// beginning that makes spreadsheets compute, and not endless.
+/// Whether a text of a scene may be one that is only shown: no comma, quote or control character,
+/// no beginning that makes spreadsheets compute, and not endless.
 bool is_plain(std::string_view text);
 constexpr std::size_t kLongestPlain = 1000;  // bytes
 constexpr const char* kPlain =
     "must hold no comma, quote or control character, not begin with = + - @, and have at most 1000 "
     "bytes";
-/// What a name may be: names stand in tables and names of files, which shells, make and
+/// Whether a text may be a name: names stand in tables and names of files, which shells, make and
 /// spreadsheets may read. Full-width and small forms count as the signs that they look like.
 bool is_name(std::string_view text);
 constexpr const char* kName =

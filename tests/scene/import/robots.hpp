@@ -75,8 +75,8 @@ inline Spatial transform(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
   return X;
 }
 
-/// Of the joints that move, in the order of the table; with a free base, six rows in front of them:
-/// angular and linear velocity of the first link in its own axes.
+/// Mass matrix of the joints that move, in the order of the table; with a free base, six rows in
+/// front of them: angular and linear velocity of the first link in its own axes.
 inline Eigen::MatrixXd mass_matrix(const Robot& robot, const std::vector<double>& q,
                                    bool free_base) {
   const std::size_t count = robot.size();

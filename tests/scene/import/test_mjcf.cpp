@@ -231,7 +231,7 @@ TEST_CASE("MJCF: neighbours in a tree pass through each other, others touch") {
   CHECK_FALSE(touches(small, "l1", "l2"));
   CHECK(touches(small, "l0", "l2"));
   CHECK(touches(small, "l1", "ball"));
-  // What the file excludes.
+  // The file itself excludes pairs.
   const std::string excluded = "<contact><exclude body1='l2' body2='l0'/></contact>";
   CHECK(mjcf_scene(world(chain(3), excluded)).pairs.empty());
   const Scene four = mjcf_scene(world(chain(4), excluded));

@@ -45,8 +45,8 @@ class System {
   // Impulses of the given problem in these units, and back. Exact within the range of doubles.
   void to_own_units(PackedVector* x) const;
   void to_given_units(PackedVector* x) const;
-  // Of impulses and velocities in these units: contact i's times these powers of 2 are those of
-  // the given problem.
+  // Exponents of units: impulses and velocities of contact i in these units, times these powers of
+  // 2, are those of the given problem.
   int impulse_unit(int i) const {
     return in_other_units() ? mass_[at(problem_->islands()[at(i)])] + velocity_unit(i) : 0;
   }
@@ -70,13 +70,14 @@ class System {
 
   // One Gauss-Seidel sweep on x in place, contacts in the given order.
   void sweep(PackedVector* x, const Proximal& proximal = {});
-  // Of the contacts of a list alone, in its order.
+  // The same sweep over the contacts of a list alone, in its order.
   void sweep(PackedVector* x, const std::vector<int>& list);
   // out_i = block solution of contact i with all others as in x (Jacobi). Regimes and, if asked
   // for, derivatives dx/db of each block; returns (sum weight^2 |out - x|^2)^1/2.
   double blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal = {},
                 Regime* regimes = nullptr, LocalDerivative* derivatives = nullptr);
-  // Of each contact, as a velocity over the scale of its island: what a block solution, z, changes.
+  // z are block solutions; change_i is how far z_i is from x_i, as a velocity over the scale of the
+  // island.
   void changes(const PackedVector* x, PackedVector* z, double* change);
   // w = A x - b
   void velocities(const PackedVector* x, PackedVector* w) const;
@@ -92,8 +93,8 @@ class System {
   double exact_fixed_point(const PackedVector* x, double* each = nullptr);
   // The larger one of error and round-off, with long sums where it needs them: what is reported.
   double judged_fixed_point(const PackedVector* x);
-  // What round-off makes of w = A x - b, relative to the velocity scale of the island: the largest
-  // component of u |A| |x|. A residual below it says nothing.
+  // Rounding of w = A x - b, relative to the velocity scale of the island: the largest component of
+  // u |A| |x|. A residual below it says nothing.
   double rounding(const PackedVector* x) const;
   // |A| |x| relative to the velocity scale: 10 to 1000 between bodies of similar masses.
   double load(const PackedVector* x) const { return rounding(x) / kRoundOff; }

@@ -33,7 +33,7 @@ void AcceleratedSweeps::start(const PackedVector* x) {
   later_ = {kRecent / 2, 0};
 }
 
-// What was seen of the rate is the past; when the next test is due is not.
+// The new point makes the measured rate obsolete; the next test remains due when it was.
 void AcceleratedSweeps::replace(const PackedVector* x) {
   std::copy(x, x + n_, x_.begin());
   momentum_.rest();
@@ -181,8 +181,8 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
     }
     if (leave.price > 0 && search.counts.work - begin >= leave.least_work) {
       const double left = forecast(sweep, f, std::log(search.options.tolerance / last_error));
-      // What is spent already counts as well: at the price of the other stages only a sure end is
-      // waited for.
+      // Work that is spent already counts as well: at the price of the other stages only a sure end
+      // is waited for.
       const double allowed =
           std::max(0.1 * leave.price, leave.price - (search.counts.work - begin));
       const bool slow = left * (search.sweep_cost + accelerated_cost) > allowed;

@@ -31,7 +31,7 @@ class BodyNewton {
   /// Blocks of contact i, three columns of four.
   void add(int i, const PackedBlock& D, const PackedBlock& L, const PackedBlock& R);
   bool factor();  // false: singular
-  // Of 1 + H' R D^-1 L H, which has the sign of D + L A R where that of D is positive.
+  // Sign of det(1 + H' R D^-1 L H). It is that of det(D + L A R) where det D is positive.
   int determinant_sign() const { return lu_.determinant_sign(); }
   void solve(PackedVector* y);
 

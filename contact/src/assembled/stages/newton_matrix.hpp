@@ -13,7 +13,7 @@ namespace tether::contact::detail {
 /// step costs. The steps write the values: by_bodies() says where.
 class NewtonMatrix {
  public:
-  /// What a step costs besides its factorisation: sweeps, and ns for each contact.
+  /// Costs of a step besides its factorisation: sweeps, and ns for each contact.
   NewtonMatrix(double sweeps, double per_contact) : sweeps_(sweeps), per_contact_(per_contact) {}
 
   void reset() { ordered_ = by_bodies_ = false; }
@@ -36,7 +36,8 @@ class NewtonMatrix {
 
   linalg::BlockLu& contacts() { return lu_; }
   BodyNewton& bodies() { return bodies_; }
-  /// Of the matrix, or of one with the same sign where its blocks D have a positive determinant.
+  /// Sign of the matrix's determinant, or of one with the same sign where its blocks D have a
+  /// positive determinant.
   int determinant_sign() const {
     return by_bodies_ ? bodies_.determinant_sign() : lu_.determinant_sign();
   }

@@ -192,8 +192,8 @@ double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
   return std::sqrt(square);
 }
 
-// Where rows lose their rank, as those of a closed chain whose links lie on one line, rounding of g
-// asks for moves that do not end.
+// Rounding of g asks for moves that do not end where rows lose their rank, as those of a closed
+// chain whose links lie on one line.
 bool StepJoints::is_rounding(const BodySet& bodies) const {
   double largest = 0;
   for (const int i : held_)

@@ -41,7 +41,7 @@ class StepJoints final : public JointPart {
   /// these have not been found, as where the step is too long.
   bool predict(BodySet& bodies, double t, double dt) override;
   const std::vector<Vector6d>& bend() const override { return bend_; }
-  /// Where something has moved the bodies since begin(): the least move back onto the joints.
+  /// Makes the least move back onto the joints if something has moved the bodies since begin().
   void put_back(BodySet& bodies, double t) override;
   /// Moves the bodies of the mechanisms to the end of the step. False: it does not meet the joints
   /// to round-off.

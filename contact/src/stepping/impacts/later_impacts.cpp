@@ -59,7 +59,7 @@ bool LaterImpacts::find_islands(const NearContacts& near, const Impacts& impacts
 // From the velocities before the impulses.
 void LaterImpacts::start(const NearContacts& near, const Impacts& impacts, double dt,
                          BodySet& bodies, StepContacts& contacts) {
-  // Of the island's fastest impact: slower approaches are rounding.
+  // Part of the speed of the island's fastest impact: slower approaches are rounding.
   constexpr double kPart = 1e-6;
   fastest_.assign(bodies.motion.size(), 0);
   for (const Impact& i : impacts.list()) {

@@ -30,7 +30,7 @@ class LaterImpacts {
 
   /// Thresholds: see Impacts.
   LaterImpacts(double threshold, double restitution_threshold, const BodyOptions& options);
-  /// Where anything bounces.
+  /// Must be called if anything bounces.
   void add_restitution(RestitutionLaw law, const BodyOptions& options);
 
   /// After the above.

@@ -73,12 +73,12 @@ void Restitution::add_laws(bool plastic, const BodySet& bodies,
   if (laws_ != nullptr) laws_->add_bounded(plastic, bodies, forces);
 }
 
-// What an island gains in the step as a function of the scale s of `change_`, from the velocities
-// in `bodies`: kinetic energy against `came_` less the work of the forces, which is their impulse
-// times the velocities that bodies move with (in a later pass of a step: less the work that they
-// would do without it), where motors change theirs with s, too. constant + linear s + square s^2.
-// Without restitution it is at most 0: -|M^-1 (f dt + J'x)|^2 / 2 in the metric of the masses, and
-// what friction takes.
+// An island gains the energy constant + linear s + square s^2 in the step, where s is the scale of
+// `change_` from the velocities in `bodies`. The gain is the kinetic energy less that of `came_`
+// and less the work of the forces. Their work is their impulse, which s changes for motors, times
+// the velocities that bodies move with; a later pass of a step subtracts the work that they would
+// do without it. Without restitution the gain is at most 0: -|M^-1 (f dt + J'x)|^2 / 2 in the
+// metric of the masses, and what friction takes.
 void Restitution::sum_energies(const BodySet& bodies) {
   const std::size_t n = bodies.motion.size();
   for (std::vector<double>* sum : {&constant_, &linear_, &square_, &kinetic_}) sum->assign(n, 0);
@@ -155,8 +155,8 @@ void Restitution::add_impulses_again(BodySet& bodies, StepContacts& contacts) {
     added_[at(b.contact)] += b.part * contacts.impulses[at(b.contact)];
 }
 
-// Of islands that gain energy: from the solution with restitution to the one without it, in
-// `bodies` and `contacts`, and the difference in `change_` and `added_`.
+// Takes islands that gain energy from the solution with restitution to the one without it, in
+// `bodies` and `contacts`; the difference is in `change_` and `added_`.
 void Restitution::solve_without(BodySet& bodies, StepContacts& contacts) {
   for (const int k : biased_)
     if (gains(islands_.root(bodies, contacts.points[at(k)]))) contacts.points[at(k)].bias = 0;

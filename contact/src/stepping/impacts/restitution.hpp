@@ -69,7 +69,7 @@ class Restitution {
   std::vector<Eigen::Vector3d> added_;
   MovingIslands islands_;
   std::vector<char> gains_;  // islands
-  // Of each island, see sum_energies.
+  // One entry for each island, see sum_energies.
   std::vector<double> constant_, linear_, square_, kinetic_, scale_;
   std::vector<PointContact> points_;  // of those that gain, and which contacts they are
   std::vector<std::size_t> contact_;

@@ -15,12 +15,12 @@ namespace {
 using linalg::at;
 
 constexpr double kSameTime = 1e-10;  // of a part
-// What strikes within this part of a step strikes together: the corners of an edge that rounding
-// has turned would else be struck one by one, and turn it.
+// Contacts that strike within this part of a step strike together: the corners of an edge that
+// rounding has turned would else be struck one by one, and turn it.
 constexpr double kTogether = 1e-3;
 constexpr double kTouches = 1e-10;  // of the size: a gap that rounding makes of none
-// Of what forces add to it, and of the speeds of both points: an approach that is none, where the
-// least speed of an impact is 0.
+// An approach is none below these parts of what forces add to it, and of the speeds of both points.
+// They decide where the least speed of an impact is 0.
 constexpr double kPresses = 1e-3, kRounding = 1e-6;
 
 double speed(const RigidBody& b, const Eigen::Vector3d& r) {

@@ -42,8 +42,8 @@ class StepCuts {
   /// As LaterImpacts: of the scene, or, up to the second, of the islands that strike.
   static constexpr std::size_t kMostContacts = 16, kMostInScene = 512;
   static constexpr int kMost = 32;  // in a step; then as without
-  /// Of more than kMostContacts, in problems of a step: what a step may spend on cuts, kept up to
-  /// the second, what there is at the start, and what a cut takes.
+  /// Cuts of more than kMostContacts, in problems of a step: what a step may spend on them, kept up
+  /// to the second, what there is at the start, and what a cut takes.
   static constexpr double kShare = 0.05, kMostKept = 16, kFirst = 3, kPrice = 3;
 
   explicit StepCuts(const BodyOptions& options);
@@ -56,18 +56,19 @@ class StepCuts {
   /// moments of contacts, act over a time. (Impacts in turn leave what a limit takes to the part
   /// after them: they need no laws.)
   void set_laws(const JointPart& joints) { laws_ = &joints; }
-  /// Of each step.
+  /// Adds what a step may spend; called in each step.
   void earn() { kept_ = std::min(kept_ + kShare, kMostKept); }
   double kept() const { return kept_; }
   void set_kept(double kept) { kept_ = kept; }
 
   /// Which contacts have pressed in the part before: of its solve.
   void remember(const WarmStart& solved);
-  /// Of so many contacts.
+  /// Whether a step of so many contacts may be cut.
   bool may_cut(std::size_t contacts) const {
     return contacts <= kMostContacts || (contacts <= kMostInScene && kept_ >= kPrice);
   }
-  /// Where it may: false where none of the impacts is on the way.
+  /// Chooses the impact to cut at in a step that may be cut. False: none of the impacts is on the
+  /// way.
   bool choose(const std::vector<Approach>& impacts, double dt, const NearContacts& near,
               const BodySet& bodies, const StepContacts& contacts);
   /// Marks the bodies of the islands that are to strike. `falls`: bodies that nothing but contacts

@@ -19,9 +19,9 @@ inline double kinetic_gain(const BodySet& bodies, std::size_t i, const RigidBody
                    .dot(now.angular_velocity + came.angular_velocity);
 }
 
-/// Of the forces of a step on body i, that have changed its velocities by those of `change`: their
-/// impulse times the velocities `now` that it moves with. For a weight it is the potential energy
-/// that is lost, exactly.
+/// Work of the forces of a step on body i, which have changed its velocities by those of `change`:
+/// their impulse times the velocities `now` that it moves with. For a weight it is the potential
+/// energy that is lost, exactly.
 inline double work(const BodySet& bodies, std::size_t i, const RigidBody& change,
                    const RigidBody& now) {
   return bodies.mass[i] * change.velocity.dot(now.velocity) +

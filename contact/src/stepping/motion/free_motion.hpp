@@ -44,7 +44,7 @@ class FreeMotion {
   /// To world axes, after orientations were set from outside.
   void turn_inertias(BodySet& bodies) const;
 
-  /// Of the bodies that keep their momentum, in the order of free_long().
+  /// Spins of the bodies that keep their momentum, in the order of free_long().
   std::vector<FreeSpin>& spins() { return spins_; }
   const std::vector<FreeSpin>& spins() const { return spins_; }
   const std::vector<int>& free_long() const { return free_long_; }

@@ -26,7 +26,7 @@ struct Strike {
   double restitution;  ///< of the limit
 };
 
-/// What a law of a joint has done in a part of a step.
+/// Record of what a law of a joint has done in a part of a step.
 struct LawState {
   int side = 0;                   ///< sign of the impulse that its bound allows no more of; else 0
   bool limit = false;             ///< else bounded
@@ -69,8 +69,8 @@ class JointPart : public IslandMaker {
   virtual void begin(BodySet& bodies, double t) = 0;
   /// False: the step is too long for them.
   virtual bool predict(BodySet& bodies, double t, double dt) = 0;
-  /// Of bodies that joints hold: what predict() has added for the joints to be met at the end of
-  /// the step, beyond velocities that meet them at its start.
+  /// Velocities that predict() has added to bodies that joints hold, for the joints to be met at
+  /// the end of the step, beyond velocities that meet them at its start.
   virtual const std::vector<Vector6d>& bend() const = 0;
   virtual void put_back(BodySet& bodies, double t) = 0;
   /// To the end of the step. False: it does not meet the joints.

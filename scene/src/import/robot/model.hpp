@@ -42,7 +42,7 @@ struct Touch {
   unsigned type = 1, affinity = 1;
   int own = -1;  ///< a number of a link that passes through some others
 
-  /// What touches either.
+  /// Touches from now on what touches either.
   void join(const Touch& o) {
     friction = std::max(friction, o.friction);
     tangential = tangential || o.tangential;

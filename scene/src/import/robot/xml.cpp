@@ -107,7 +107,7 @@ std::size_t crowded(std::string_view text) {
   return std::string_view::npos;
 }
 
-/// What tinyxml2 takes and XML does not, and names without end.
+/// Refuses what tinyxml2 takes and XML does not, and names without end.
 class Inspection : public tinyxml2::XMLVisitor {
  public:
   explicit Inspection(Problems& problems) : problems_(problems) {}

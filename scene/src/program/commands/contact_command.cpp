@@ -58,7 +58,7 @@ void add_choice(CLI::App& command, const char* option, const char* what,
       ->default_str(now);
 }
 
-// Of files that hold more than contacts: joints, masses, rolling friction.
+// Solves files that hold more than contacts: joints, masses, rolling friction.
 Status run_cones(const ContactArguments& arguments, const std::string& file,
                  const ConeProblem& problem) {
   const Options& o = arguments.options;
@@ -82,7 +82,7 @@ Status run_cones(const ContactArguments& arguments, const std::string& file,
   return s.status;
 }
 
-// Where a file is no problem of contacts alone; a pipe has been read by then.
+// Reads a file that is no problem of contacts alone; null for a pipe, which has been read by then.
 std::unique_ptr<ConeProblem> as_cones(const std::string& file) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored)) return nullptr;

@@ -74,7 +74,7 @@ void check_settings(const Scene& scene, const CostArguments& arguments) {
                                 "): use --time-steps");
 }
 
-// What would be lost is told before the work.
+// Files that would be lost are told before the work.
 void check_files(const Scene& scene, const CostArguments& arguments) {
   Output files;
   files.csv = arguments.csv;

@@ -86,7 +86,7 @@ void overlay(const RunArguments& arguments, Scene& scene) {
   scene.end = *arguments.end;
 }
 
-/// Of several processes the first writes all but its share of a film.
+/// Leaves a process only its share of a film: the first of several processes writes all else.
 void write_film_alone(Output& o, std::string& html) {
   for (const formats::Format* each : formats::all())
     if (!each->film) (o.*each->file).clear();

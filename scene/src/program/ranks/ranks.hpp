@@ -13,7 +13,7 @@ class Ranks {
  public:
   virtual ~Ranks() = default;
   virtual contact::RankMessages& messages() = 0;
-  /// Of what the processes give.
+  /// Largest of the numbers that the processes give.
   virtual int largest(int number) = 0;
   /// The exit code of all: the largest. why: what has ended this one, empty: nothing has; the first
   /// process that has something to say says it. Where others are still at work a second later,
@@ -21,7 +21,7 @@ class Ranks {
   virtual int finish(int status, const std::string& why) = 0;
 };
 
-/// What the module has as `tether_make_ranks`. version: of the program; null: the module's differs.
+/// Type of the module's `tether_make_ranks`. version: of the program; null: the module's differs.
 using MakeRanks = Ranks*(const char* version);
 
 /// Null unless several processes have been started. Throws std::runtime_error without the module.

@@ -88,7 +88,7 @@ bool RowsInUse::independent_by_structure() const {
   return forest;
 }
 
-// Of the combinations n those that are dead points: n^T gamma(v) != 0 for some of a few velocities.
+// Counts the combinations n that are dead points: n^T gamma(v) != 0 for some of a few velocities.
 int RowsInUse::count_needed_beyond(const Eigen::VectorXd& length, const linalg::PivotedQr& qr) {
   const int m = rows_.count(), r = qr.rank();
   const Eigen::Index dependent = m - r, n = gradient_.G.cols(), freedoms = n - r;

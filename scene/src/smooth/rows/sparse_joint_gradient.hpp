@@ -26,11 +26,12 @@ class SparseJointGradient {
   double independent_part(int i) const { return factors_.independent_part(i); }
   /// After factor(): a row that depends on others, and those that matter in it; none: empty.
   std::vector<int> dependent() const;
-  /// Of least kinetic energy a^T M a / 2: a with G a = right, and lambda with M a = G^T lambda.
+  /// Finds a with G a = right of least kinetic energy a^T M a / 2, and lambda with M a = G^T
+  /// lambda.
   void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda);
   /// Takes from velocities v what the factored rows forbid.
   void release(Eigen::VectorXd& v);
-  /// Of G with each moving body's velocities.
+  /// Product of G with each moving body's velocities.
   void multiply(const Eigen::VectorXd& a, Eigen::VectorXd& rates) const;
   /// Diagonal of G M^-1 G^T; after factor().
   Eigen::VectorXd size_of_rows() const;

@@ -36,8 +36,8 @@ constexpr double kUsual = 0.3, kUnusual = 0.1;  // of the best weakest pivot so 
 // what they must show of a row of unit length.
 constexpr int kProbes = 16, kReleases = 12, kMostRounds = 20;
 constexpr double kReleased = 1e-15, kShown = 1e-10;
-// Of what a velocity may show by error. A row too few changes the motion, and IDA stops (net of
-// 30 x 30 balls: one); one too many leaves a multiplier undetermined, which costs steps.
+// Part of what a velocity may show by error. A row too few changes the motion, and IDA stops (net
+// of 30 x 30 balls: one); one too many leaves a multiplier undetermined, which costs steps.
 constexpr double kDoubt = 0.02;
 
 }  // namespace
