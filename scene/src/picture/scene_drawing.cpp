@@ -181,7 +181,7 @@ class Drawing {
     const Vector2d out(view_.eye().row(0).dot(normal), -view_.eye().row(1).dot(normal));
     const Vector2d along = 2000 * Vector2d(-out.y(), out.x()).normalized();
     const Vector2d middle = view_.pixel(pose.position + pose.orientation * shape.position);
-    // The line passes the panel, also if the plane's own point is far from it.
+    // The plane is drawn where the panel is, also if its own point is far from it.
     const Vector2d centre((view_.panel().left + view_.panel().right) / 2,
                           (view_.panel().top + view_.panel().bottom) / 2);
     const Vector2d at = centre + (middle - centre).dot(out) * out;

@@ -42,7 +42,7 @@ struct Touch {
   unsigned type = 1, affinity = 1;
   int own = -1;  ///< a number of a link that passes through some others
 
-  /// Touches from now on what touches either.
+  /// Makes this touch whatever touches either of the two.
   void join(const Touch& o) {
     friction = std::max(friction, o.friction);
     tangential = tangential || o.tangential;
