@@ -65,19 +65,17 @@ double JointFrequency::displace(const Mechanisms& mechanisms, BodySet& bodies) {
   return factor;
 }
 
-double JointFrequency::iterate(JointEquations& equations, const JointRows& rows,
+double JointFrequency::iterate(const RowsAt& rows_at, const JointRows& rows,
                                const std::vector<double>& impulses, double t, double dt,
                                Mechanisms& mechanisms, BodySet& bodies) {
   const double factor = displace(mechanisms, bodies);
-  displaced_.clear();
-  equations.add_rows(bodies, t, displaced_);
+  rows_at(bodies, t, displaced_);
   bodies.position = position_;
   bodies.orientation = orientation_;
   pull_.assign(bodies.position.size(), Vector6d::Zero());
-  for (int row = 0; row < std::min(rows.count(), displaced_.count()); ++row) {
+  for (int row = 0; row < rows.count(); ++row) {
     const JointRows::Term* then = displaced_.begin(row);
-    for (const JointRows::Term* now = rows.begin(row);
-         now != rows.end(row) && then != displaced_.end(row); ++now, ++then)
+    for (const JointRows::Term* now = rows.begin(row); now != rows.end(row); ++now, ++then)
       pull_[at(now->body)] += impulses[at(row)] / (dt * factor) * (then->G - now->G);
   }
   double most = 0;
@@ -100,7 +98,7 @@ double JointFrequency::iterate(JointEquations& equations, const JointRows& rows,
   return most;
 }
 
-void JointFrequency::update(JointEquations& equations, const JointRows& rows,
+void JointFrequency::update(const RowsAt& rows_at, const JointRows& rows,
                             const std::vector<double>& impulses, double acceleration, double t,
                             double dt, Mechanisms& mechanisms, BodySet& bodies) {
   memory_.acceleration = acceleration;
@@ -115,7 +113,7 @@ void JointFrequency::update(JointEquations& equations, const JointRows& rows,
   double square = memory_.frequency * memory_.frequency;
   for (int k = 0; k < kMostIterations; ++k) {
     const double last = square;
-    square = iterate(equations, rows, impulses, t, dt, mechanisms, bodies);
+    square = iterate(rows_at, rows, impulses, t, dt, mechanisms, bodies);
     if (!(square > kGrows * last)) break;
   }
   memory_.frequency = std::sqrt(square);

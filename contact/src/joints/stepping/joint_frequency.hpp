@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <tether/contact/joint_equations.hpp>
 #include <tether/contact/stepping.hpp>
 #include <vector>
@@ -17,8 +18,11 @@ namespace tether::contact::detail {
 /// method with differences of the rows, which goes on from step to step.
 class JointFrequency {
  public:
+  /// Writes the rows of these bodies at time t, as many and on the same bodies as at first; throws.
+  using RowsAt = std::function<void(const BodySet&, double t, JointRows& out)>;
+
   /// At the end of a step of length dt, with the factors of its rows and their impulses.
-  void update(JointEquations& equations, const JointRows& rows, const std::vector<double>& impulses,
+  void update(const RowsAt& rows_at, const JointRows& rows, const std::vector<double>& impulses,
               double acceleration, double t, double dt, Mechanisms& mechanisms, BodySet& bodies);
   /// By what joints add in the step that begins.
   void follow(double acceleration);
@@ -27,9 +31,8 @@ class JointFrequency {
   void set_memory(const StepperMemory::Vibration& memory) { memory_ = memory; }
 
  private:
-  double iterate(JointEquations& equations, const JointRows& rows,
-                 const std::vector<double>& impulses, double t, double dt, Mechanisms& mechanisms,
-                 BodySet& bodies);
+  double iterate(const RowsAt& rows_at, const JointRows& rows, const std::vector<double>& impulses,
+                 double t, double dt, Mechanisms& mechanisms, BodySet& bodies);
   double displace(const Mechanisms& mechanisms, BodySet& bodies);
 
   StepperMemory::Vibration memory_;

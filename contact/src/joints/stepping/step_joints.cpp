@@ -83,31 +83,31 @@ void StepJoints::list_laws(std::vector<LawState>& out) const {
 // equations may throw.
 void StepJoints::factor(const BodySet& bodies, double t) {
   factored_.clear();
-  rows_.clear();
-  equations_->add_rows(bodies, t, rows_);
-  check_rows(t);
+  rows_at(bodies, t, rows_);
   mechanisms_.update(bodies.motion, rows_);
   factored_.set(bodies, t);
 }
 
 // All storage is as long as the first rows, and on their bodies.
-void StepJoints::check_rows(double t) {
+void StepJoints::rows_at(const BodySet& bodies, double t, JointRows& rows) {
+  rows.clear();
+  equations_->add_rows(bodies, t, rows);
   const auto refuse_other = [t](const std::string& what) {
     throw std::invalid_argument(what + " (JointEquations::add_rows at t = " + shown(t) +
                                 " s): rows and their bodies do not change");
   };
-  if (at(rows_.count()) != row_.g.size())
-    refuse_other("joints: " + std::to_string(rows_.count()) + " rows instead of " +
+  if (at(rows.count()) != row_.g.size())
+    refuse_other("joints: " + std::to_string(rows.count()) + " rows instead of " +
                  std::to_string(row_.g.size()));
   const bool first = bodies_of_rows_.empty();
   std::size_t k = 0;
-  for (int row = 0; row < rows_.count(); ++row) {
-    for (const JointRows::Term* term = rows_.begin(row); term <= rows_.end(row); ++term) {
-      const int body = term < rows_.end(row) ? term->body : -1;
+  for (int row = 0; row < rows.count(); ++row) {
+    for (const JointRows::Term* term = rows.begin(row); term <= rows.end(row); ++term) {
+      const int body = term < rows.end(row) ? term->body : -1;
       if (first)
         bodies_of_rows_.push_back(body);
       else if (k >= bodies_of_rows_.size() || bodies_of_rows_[k++] != body)
-        refuse_other(equations_->name(rows_.joint(row)) + ": row " + std::to_string(row) +
+        refuse_other(equations_->name(rows.joint(row)) + ": row " + std::to_string(row) +
                      " is on other bodies than at first");
     }
   }
@@ -453,7 +453,10 @@ bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& 
   drift_ = 0;
   for (const double g : row_.g)
     if (!(std::abs(g) <= drift_)) drift_ = std::isnan(drift_) ? drift_ : std::abs(g);
-  frequency_.update(*equations_, rows_, impulses_, acceleration, t + dt, dt, mechanisms_, bodies);
+  const auto rows = [this](const BodySet& at, double time, JointRows& out) {
+    rows_at(at, time, out);
+  };
+  frequency_.update(rows, rows_, impulses_, acceleration, t + dt, dt, mechanisms_, bodies);
   return met && std::isfinite(drift_);
 }
 

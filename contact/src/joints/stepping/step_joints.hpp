@@ -107,7 +107,7 @@ class StepJoints final : public JointPart {
   };
   void put_onto(BodySet& bodies, double t);
   void factor(const BodySet& bodies, double t);
-  void check_rows(double t);
+  void rows_at(const BodySet& bodies, double t, JointRows& rows);
   void check_laws(const BodySet& bodies);
   void take_velocities(const BodySet& bodies);
   void give_velocities(BodySet& bodies) const;
