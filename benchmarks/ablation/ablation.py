@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs all problems without each mechanism of the projection and prints a table. SPDX-License-Identifier: BSD-3-Clause
 
-ablation.py [BUILD]: configures and builds the ablation in BUILD (default build/ablation); see benchmarks/results.py."""
+ablation.py [BUILD]: configures and builds the ablation in BUILD (default build/projection_ablation); see benchmarks/results.py."""
 import os
 import pathlib
 import subprocess
@@ -51,4 +51,4 @@ def main(build):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else ROOT / "build" / "ablation")
+    main(sys.argv[1] if len(sys.argv) > 1 else ROOT / "build" / "projection_ablation")

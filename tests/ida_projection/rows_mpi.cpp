@@ -42,7 +42,7 @@ struct Share {
   int unknowns() const { return 2 * (last - first); }
 };
 
-/// Of the rows that this rank gives: first the radii, then the angles to the next point.
+/// The rows that this rank gives: first the radii, then the angles to the next point.
 struct Rows {
   std::vector<int> starts = {0};
   std::vector<long long> columns;

@@ -14,7 +14,7 @@ using namespace tether::problems;
 
 namespace {
 
-/// What the run writes to stderr, read back when it is over.
+/// The run's stderr, read back when it is over.
 class Stderr {
  public:
   Stderr() : file_(std::tmpfile()) {

@@ -140,7 +140,7 @@ TEST_CASE("distributed rows: an energy joined to them") {
     CHECK(std::abs(host.steps() - given.steps) <= 0.05 * static_cast<double>(given.steps));
     CHECK(value(dense, 0.0, host.data(), n).cwiseAbs().maxCoeff() < 1e-7);
 
-    // What depends on the rows is moved by them; another value of it contradicts them.
+    // The rows move what depends on them; another value of it contradicts them.
     tp::Constraints again = gradients_of(chain.dense_rows(), n);
     again.names.assign(static_cast<std::size_t>(again.count), "copy");
     const Run twice = integrate(problem, 1e-5, spread + energy + again, {}, false);

@@ -14,7 +14,7 @@ using namespace tether::problems;
 
 namespace {
 
-/// What is said after so many steps.
+/// The message after so many steps.
 struct Said {
   tp::Status status;
   std::string message;

@@ -79,7 +79,7 @@ int system(N_Vector ycor, N_Vector f, void* mem) {
   return 0;
 }
 
-/// Of the unknowns of this level and above.
+/// Asks about the unknowns of this level and above.
 Asked ask(Model& model, int level) {
   model.rows.n = model.size();
   Asked asked;

@@ -244,7 +244,7 @@ TEST_CASE("rods in index 0: forces that answer to every move are no stiff compon
 TEST_CASE("rods in index 0: forces follow the other unknowns") {
   const Chain chain(60, 0.1, 1e6);
   const Problem problem = chain.problem(0.1);
-  // Where all unknowns share what rows of forces ask for, the first and the last of these runs end
+  // If all unknowns share what rows of forces ask for, the first and the last of these runs end
   // by moves that masses beside the pin make in their place.
   for (const double tolerance : {1e-3, 4e-4, 3.25e-4}) {
     INFO("tolerance " << tolerance);

@@ -172,7 +172,7 @@ double rate_by_nearly_dependent_rows(int points) {
 }  // namespace
 
 TEST_CASE("levels: positions, velocities and accelerations of a chain, whatever stands between") {
-  // Of points 0 .. 3: q = 3 i, v = 3 i + 1, a = 3 i + 2; rods between neighbours, and an energy.
+  // Points 0 .. 3 have q = 3 i, v = 3 i + 1, a = 3 i + 2; rods between neighbours, and an energy.
   Rows rows;
   for (int level = 2; level >= 0; --level)  // the longest first
     for (int i = 0; i < 3; ++i) {

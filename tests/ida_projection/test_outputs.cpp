@@ -174,7 +174,7 @@ TEST_CASE("runs repeat: IDAReInit gives the first run to the bit, in every form"
         REQUIRE(host.finish() >= 0);
         CHECK(host.steps() == steps);
         CHECK(host.state() == first);
-        // What F is like has been asked once.
+        // F has been asked once what it is like.
         CHECK(host.projection().statistics().residual_evaluations <= asked);
       }
 }

@@ -66,7 +66,7 @@ TEST_CASE("how C turns is looked at again: after longer moves, and every 64th ti
   while (!trust.wants_to_learn(0.01) && until < 100) ++until;
   CHECK(until >= 32);
   CHECK(until < 64);
-  // What it learns only ever makes it more careful.
+  // Learning only ever makes it more careful.
   teach(&trust, &solver, 1e-3, 0.01);
   CHECK(trust.trusted_rows(solver, 1e-3) == 2);
   teach(&trust, &solver, 0.0, 0.01);

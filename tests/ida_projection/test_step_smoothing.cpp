@@ -42,7 +42,7 @@ struct Scatter {
   long total_steps = 0;
 };
 
-/// Of log10 error and log10 steps over 25 tolerances from 1e-4 to 1e-8.
+/// The scatter of log10 error and log10 steps over 25 tolerances from 1e-4 to 1e-8.
 Scatter scatter_of(const Problem& problem, bool projected, const tp::Options& options) {
   std::vector<double> tolerance, error, steps;
   Scatter result;

@@ -12,7 +12,7 @@ extern "C" {
 #pragma GCC visibility push(default)
 #endif
 
-/* What a shared object of yours defines, so that libtether_preload attaches constraints to the IDA
+/* A shared object of yours defines this, so that libtether_preload attaches constraints to the IDA
  * of a program that links SUNDIALS dynamically:
  *
  *   LD_PRELOAD=libtether_preload.so TETHER_CONSTRAINTS=./mine.so program
@@ -35,7 +35,7 @@ int tether_preload(void* ida_mem, N_Vector y, tether_constraints* constraints,
  * loaded the library by itself (dlopen with RTLD_LAZY | RTLD_GLOBAL, before what links SUNDIALS).
  */
 
-/* What IDASolve and IDAGetDky return for this IDA is projected, too: interpolated points are off
+/* Projects points that IDASolve and IDAGetDky return for this IDA, too: interpolated points are off
  * the constraints by a part of the tolerance. IDA's own steps are as without. */
 int tether_preload_project_output(void* ida_mem);
 

@@ -241,9 +241,9 @@ int tether_make_sensitivities_consistent(tether_projection* projection, sunrealt
  * part across the constraints. */
 int tether_project_gradient(tether_projection* projection, sunrealtype t, N_Vector yy, N_Vector v);
 
-/* Of the last step or call; TETHER_MEM_NULL for a null pointer. */
+/* The status of the last step or call; TETHER_MEM_NULL for a null pointer. */
 int tether_get_status(const tether_projection* projection);
-/* What to do about it; "" when all is well. Valid until the next call with this projection. */
+/* The message, with advice; "" when all is well. Valid until the next call with this projection. */
 const char* tether_get_message(const tether_projection* projection);
 /* A number of tether::ida_projection::Statistics by the name of its field, e.g. "projections". */
 int tether_get_statistic(const tether_projection* projection, const char* name, double* value);

@@ -55,7 +55,7 @@ int tether_reverse_make_consistent(tether_reverse* reverse);
 /* answer: 0 the result is in place, > 0 it has no value here, < 0 end the run. */
 int tether_reverse_go_on(tether_reverse* reverse, int answer);
 
-/* Where IDA stands, or asks. Pointers that a request has no use for are null. */
+/* The place where IDA stands, or asks. Pointers that a request has no use for are null. */
 double tether_reverse_t(const tether_reverse* reverse);
 double tether_reverse_cj(const tether_reverse* reverse);
 const double* tether_reverse_y(const tether_reverse* reverse);

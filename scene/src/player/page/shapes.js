@@ -1,4 +1,4 @@
-// What is drawn at a time: instances of forms. SPDX-License-Identifier: BSD-3-Clause
+// Everything that is drawn at a time: instances of forms. SPDX-License-Identifier: BSD-3-Clause
 
 // Okabe and Ito: safe for colour-blind readers.
 const kColours = [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233],
