@@ -2,6 +2,7 @@
 """Runs all problems without each mechanism of the projection and prints a table. SPDX-License-Identifier: BSD-3-Clause
 
 ablation.py [BUILD]: configures and builds the ablation in BUILD (default build/projection_ablation); see benchmarks/results.py."""
+import concurrent.futures
 import os
 import pathlib
 import subprocess
@@ -41,8 +42,8 @@ def main(build):
     groups = compare.GROUPS
     print(f"| without | changed | steps {' / '.join(groups)} | F | error | failures | most in steps times error |")
     print("|---|---|---|---|---|---|---|")
-    for name in mechanisms:
-        off = runs(program, "--without", name)
+    pool = concurrent.futures.ThreadPoolExecutor(os.cpu_count())
+    for name, off in zip(mechanisms, pool.map(lambda name: runs(program, "--without", name), mechanisms)):
         changed = sum(any(on[k][c] != off[k][c] for c in ("steps", "F", "error")) for k in on)
         columns = [compare.means(on, off, group)[1] for group in groups]
         cells = [" / ".join(f"{column[c]:.3f}" for column in columns) for c in ("steps", "F", "error")]
