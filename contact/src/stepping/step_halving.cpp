@@ -71,7 +71,8 @@ void Stepper::Implementation::advance(detail::SubStep s) {
 }
 
 bool Stepper::Implementation::resolves_joints() const {
-  return joints->vibration().frequency * part.now.length <= kResolved;
+  const double turn = joints->vibration().frequency * part.now.length;
+  return !(turn > kResolved) || !std::isfinite(turn);  // no step helps where it is no number
 }
 
 void Stepper::Implementation::take_halves(const detail::SubStep& s) {

@@ -49,12 +49,13 @@ double size_of_all(const Mechanisms& mechanisms, const BodySet& bodies) {
 
 }  // namespace
 
-// Along the mode; returns the factor of this.
+// Along the mode; returns the factor of this, 0 where nothing can move.
 double JointFrequency::displace(const Mechanisms& mechanisms, BodySet& bodies) {
   const double size = size_of_all(mechanisms, bodies);
   double most = 0;
   for (const Vector6d& v : memory_.mode)
     most = std::max({most, v.head<3>().norm() / size, v.tail<3>().norm()});
+  if (!(most > 0) || !std::isfinite(most)) return 0;
   const double factor = kDifference / most;
   for (std::size_t i = 0; i < memory_.mode.size(); ++i) {
     const Vector6d move = factor * memory_.mode[i];
@@ -69,9 +70,18 @@ double JointFrequency::iterate(const RowsAt& rows_at, const JointRows& rows,
                                const std::vector<double>& impulses, double t, double dt,
                                Mechanisms& mechanisms, BodySet& bodies) {
   const double factor = displace(mechanisms, bodies);
-  rows_at(bodies, t, displaced_);
-  bodies.position = position_;
-  bodies.orientation = orientation_;
+  if (factor == 0) return 0;
+  const auto put_back = [&] {
+    bodies.position = position_;
+    bodies.orientation = orientation_;
+  };
+  try {
+    rows_at(bodies, t, displaced_);
+  } catch (...) {
+    put_back();
+    throw;
+  }
+  put_back();
   pull_.assign(bodies.position.size(), Vector6d::Zero());
   for (int row = 0; row < rows.count(); ++row) {
     const JointRows::Term* then = displaced_.begin(row);

@@ -81,6 +81,12 @@ class StepJoints final : public JointPart {
   }
 
  private:
+  // Moves in parts of the size of the mechanism, root of mass times square of the distance from the
+  // origin: they end an iteration, and may be left where it does not go on.
+  static constexpr double kNoMove = 1e-14, kMet = 1e-11;
+  static constexpr double kHalving = 0.5;  // a move that is longer does not converge
+  static constexpr int kMoves = 30;
+
   struct Place {
     Eigen::Vector3d position;
     linalg::Quaternion orientation;

@@ -1,0 +1,143 @@
+// Tether: positions that joints allow. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+#include <tether/linalg/index.hpp>
+
+#include "problem/refuse.hpp"
+#include "step_joints.hpp"
+#include "stepping/motion/rotation.hpp"
+
+namespace tether::contact::detail {
+
+using Eigen::Vector3d;
+using linalg::at;
+
+namespace {
+
+constexpr double kRounding = 2e-15;  // of the largest coordinate
+
+double norm(const std::vector<double>& u) {
+  double sum = 0;
+  for (const double x : u) sum += x * x;
+  return std::sqrt(sum);
+}
+
+}  // namespace
+
+double StepJoints::size(const BodySet& bodies) const {
+  double sum = 0;
+  for (const int i : held_)
+    sum +=
+        bodies.mass[at(i)] * bodies.position[at(i)].squaredNorm() + bodies.inertia[at(i)].trace();
+  return std::sqrt(sum);
+}
+
+// change_ becomes the least change of positions, over `dt`, that takes back g at time t; returns
+// its length in the metric of the masses.
+double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
+  equations_->values(bodies, t, row_.g.data());
+  change_.assign(v_.size(), Vector6d::Zero());
+  double square = 0;
+  left_ = 0;
+  for (int m = 0; m < mechanisms_.count(); ++m) {
+    Mechanism& mechanism = mechanisms_[m];
+    for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
+      row_.b[k] = -row_.g[at(mechanism.rows()[k])] / dt;
+    row_.u.resize(at(mechanism.entries()));
+    mechanism.least(row_.b.data(), row_.u.data());
+    mechanisms_.add(m, row_.u.data(), change_);
+    square += std::pow(norm(row_.u) * dt, 2);
+    for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
+      left_ = std::max(left_, std::abs(mechanism.left(static_cast<int>(k))) * dt);
+  }
+  return std::sqrt(square);
+}
+
+// Rounding of g asks for moves that do not end where rows lose their rank, as those of a closed
+// chain whose links lie on one line.
+bool StepJoints::is_rounding(const BodySet& bodies) const {
+  double largest = 0;
+  for (const int i : held_)
+    largest = std::max(largest, bodies.position[at(i)].cwiseAbs().maxCoeff());
+  for (const double g : row_.g)
+    if (!(std::abs(g) <= kRounding * largest)) return false;
+  return true;
+}
+
+// As PositionCorrection: the angular velocity turns with the body.
+void StepJoints::turn_back(BodySet& bodies, int body, const Vector3d& turn) const {
+  if (turn.isZero(0)) return;
+  const linalg::Quaternion by = exponential(turn);
+  linalg::Quaternion& q = bodies.orientation[at(body)];
+  q = (by * q).normalized();
+  Vector3d& w = bodies.motion[at(body)].angular_velocity;
+  w = by * w;
+  bodies.motion[at(body)].inverse_inertia = turned(bodies.inverse_inertia[at(body)], q);
+}
+
+bool StepJoints::project_positions(BodySet& bodies, double t) {
+  const double whole = size(bodies);
+  double before = INFINITY;
+  for (int k = 0; k < kMoves; ++k) {
+    if (k > 0 || factored_.none()) factor(bodies, t);
+    const double move = least_move(bodies, t, 1);
+    if (!std::isfinite(move)) return false;
+    if (move <= kNoMove * whole) break;
+    if (k > 3 && move > kHalving * before)
+      return move + left_ <= kMet * whole || is_rounding(bodies);
+    before = move;
+    for (const int i : held_) {
+      bodies.position[at(i)] += change_[at(i)].head<3>();
+      turn_back(bodies, i, change_[at(i)].tail<3>());
+    }
+  }
+  return left_ <= kMet * whole;
+}
+
+void StepJoints::begin(BodySet& bodies, double t) {
+  put_onto(bodies, t);
+  if (!has_laws_) return;
+  take_velocities(bodies);
+  laws_.remember(v_);
+}
+
+void StepJoints::put_onto(BodySet& bodies, double t) {
+  if (factored_.is(bodies, t)) return;
+  factor(bodies, t);
+  // The result of a step stays the same to the last bit, also in a continued run.
+  if (!(least_move(bodies, t, 1) + left_ <= kMet * size(bodies))) {
+    if (!project_positions(bodies, t)) refuse(bodies, t);
+    factor(bodies, t);
+  }
+  take_velocities(bodies);
+  if (mechanisms_.error(rows_, v_) <= kMet) return;
+  mechanisms_.satisfy(rows_, v_);
+  if (!mechanisms_.contradicting().empty()) refuse_rates();
+  give_velocities(bodies);
+}
+
+// The rows that least squares leave the most of.
+void StepJoints::refuse(const BodySet& bodies, double t) {
+  equations_->values(bodies, t, row_.g.data());
+  double most = 0;
+  for (const double g : row_.g) most = std::max(most, std::abs(g));
+  std::set<std::string> names;
+  for (int row = 0; row < rows_.count(); ++row)
+    if (!(std::abs(row_.g[at(row)]) < 0.1 * most)) names.insert(equations_->name(rows_.joint(row)));
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  throw std::invalid_argument("joints contradict each other at t = " + shown(t) +
+                              " s: no positions near these satisfy " + text + " (off by up to " +
+                              shown(most) + " m or rad)");
+}
+
+void StepJoints::refuse_rates() {
+  std::string text;
+  for (const int joint : mechanisms_.contradicting())
+    text += (text.empty() ? "" : ", ") + equations_->name(joint);
+  throw std::invalid_argument("joints contradict each other: no velocities satisfy " + text);
+}
+
+}  // namespace tether::contact::detail
