@@ -47,11 +47,11 @@ Sample draw(const std::string& kind, Law law, const char* regime) {
 }
 
 struct Cost {
-  double cold = 1e9, warm = 1e9, repeat = 1e9, golden = 0, evaluations = 0;
+  double cold = 1e9, warm = 1e9, repeat = 1e9, evaluations = 0;
   int most = 0;
 };
 
-Cost measure(const Sample& sample, Law law, bool golden) {
+Cost measure(const Sample& sample, Law law) {
   Cost cost;
   const std::size_t n = sample.blocks.size();
   std::vector<LocalState> state(n);
@@ -79,17 +79,6 @@ Cost measure(const Sample& sample, Law law, bool golden) {
     cost.warm = std::min(cost.warm, scale * (t3 - t2));
     cost.repeat = std::min(cost.repeat, scale * (t4 - t3));
   }
-  if (golden) {
-    cost.golden = 1e9;
-    double sink = 0;
-    for (int round = 0; round < 3; ++round) {
-      const double t0 = seconds();
-      for (std::size_t i = 0; i < n; ++i)
-        sink += solve_one_golden_section(sample.blocks[i], sample.b[i]).impulse[0];
-      cost.golden = std::min(cost.golden, 1e9 * (seconds() - t0) / static_cast<double>(n));
-    }
-    if (sink == 1) std::printf(" ");
-  }
   return cost;
 }
 
@@ -104,35 +93,28 @@ int main(int argc, char** argv) {
   app.add_option("--points", points, "Angles of the reference's search")
       ->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
-  std::printf("%-20s %-15s %-10s %6s %6s %6s %8s %6s %5s\n", "law", "class", "regime", "cold",
-              "warm", "repeat", "golden", "evals", "most");
+  std::printf("%-20s %-15s %-10s %6s %6s %6s %6s %5s\n", "law", "class", "regime", "cold", "warm",
+              "repeat", "evals", "most");
   for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
-    std::vector<double> cold, warm, golden;
+    std::vector<double> cold, warm;
     for (const std::string& kind : random::classes()) {
       for (const char* regime : {"sticking", "sliding", "any"}) {
         const Sample sample = draw(kind, law, regime);
         if (sample.blocks.size() < kContacts) continue;
         const bool sliding = std::string(regime) == "sliding";
-        const Cost c = measure(sample, law, law == Law::maximum_dissipation && sliding);
-        std::printf("%-20s %-15s %-10s %6.0f %6.0f %6.0f %8.0f %6.2f %5d\n", name(law),
-                    kind.c_str(), regime, c.cold, c.warm, c.repeat, c.golden, c.evaluations,
-                    c.most);
+        const Cost c = measure(sample, law);
+        std::printf("%-20s %-15s %-10s %6.0f %6.0f %6.0f %6.2f %5d\n", name(law), kind.c_str(),
+                    regime, c.cold, c.warm, c.repeat, c.evaluations, c.most);
         if (sliding && kind != "mu_zero") {
           cold.push_back(c.cold);
           warm.push_back(c.warm);
-          if (c.golden > 0) golden.push_back(c.golden / c.cold);
         }
       }
     }
     std::sort(cold.begin(), cold.end());
     std::sort(warm.begin(), warm.end());
-    std::sort(golden.begin(), golden.end());
-    std::printf("%s, sliding, median over classes: cold %.0f ns, warm %.0f ns", name(law),
+    std::printf("%s, sliding, median over classes: cold %.0f ns, warm %.0f ns\n", name(law),
                 cold[cold.size() / 2], warm[warm.size() / 2]);
-    if (!golden.empty())
-      std::printf(", golden section to 1e-10 takes %.1f times as long (least %.1f)",
-                  golden[golden.size() / 2], golden.front());
-    std::printf("\n");
   }
   if (check > 0) {
     std::printf("%-15s %10s %9s %9s %6s\n", "class", "problems", "failures", "evals", "most");

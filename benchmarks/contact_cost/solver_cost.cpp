@@ -33,9 +33,9 @@ struct Run {
   bool solved = false;
 };
 
-// sor is Gauss-Seidel unless its factor is tuned; convex_relaxation solves another problem.
-const Method kMethods[] = {Method::automatic, Method::gauss_seidel,    Method::jacobi,
-                           Method::anderson,  Method::proximal_newton, Method::interior_point};
+// convex_relaxation solves another problem.
+const Method kMethods[] = {Method::automatic, Method::gauss_seidel, Method::anderson,
+                           Method::proximal_newton, Method::interior_point};
 const char* const kBest = "best of Siconos";
 
 // The same yardstick for everybody: the natural map over max(|b|, |x|, |w|) under `coulomb`, which

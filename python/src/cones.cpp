@@ -1,6 +1,5 @@
 // Tether: contact problems over products of cones for Python. SPDX-License-Identifier: BSD-3-Clause
 #include <optional>
-#include <tether/contact/cone_derivative.hpp>
 #include <tether/contact/cones.hpp>
 #include <tether/contact/files.hpp>
 #include <utility>
@@ -10,42 +9,6 @@
 namespace tether::python {
 
 namespace {
-
-using Entries = std::vector<tc::MatrixEntry>;
-
-struct ConeDerivative : tc::ConeDerivative {
-  ConeDerivative(tc::ConeDerivative&& made, int n) : tc::ConeDerivative(std::move(made)), rows(n) {}
-  int rows;  // of the problem
-};
-
-/// Entries of an array or a scipy.sparse matrix with `rows` rows and `columns` columns.
-Entries matrix_entries(const char* argument, const py::object& whole, py::ssize_t rows,
-                       py::ssize_t columns) {
-  const auto check = [&](py::ssize_t r, py::ssize_t c) {
-    if (r != rows || c != columns)
-      refuse(std::string(argument) + " is " + std::to_string(r) + " x " + std::to_string(c) +
-             ", must be " + std::to_string(rows) + " x " + std::to_string(columns));
-  };
-  Entries out;
-  if (py::hasattr(whole, "tocoo")) {
-    const py::object given = whole.attr("tocoo")();
-    const auto size = given.attr("shape").cast<std::array<py::ssize_t, 2>>();
-    check(size[0], size[1]);
-    const auto i = given.attr("row").cast<py::array_t<int, py::array::forcecast>>();
-    const auto j = given.attr("col").cast<py::array_t<int, py::array::forcecast>>();
-    const auto values = given.attr("data").cast<Array>();
-    out.reserve(static_cast<std::size_t>(values.size()));
-    for (py::ssize_t k = 0; k < values.size(); ++k) out.push_back({i.at(k), j.at(k), values.at(k)});
-    return out;
-  }
-  const auto dense = matrix(argument, whole);
-  check(dense.shape(0), dense.shape(1));
-  const auto value = dense.unchecked<2>();
-  for (py::ssize_t i = 0; i < rows; ++i)
-    for (py::ssize_t j = 0; j < columns; ++j)
-      if (value(i, j) != 0) out.push_back({static_cast<int>(i), static_cast<int>(j), value(i, j)});
-  return out;
-}
 
 tc::ConeProblem make_problem(const py::object& A, const Array& b, std::vector<tc::Cone> cones,
                              const py::object& compliance) {
@@ -95,50 +58,14 @@ tc::ConeSolution solve(const tc::ConeProblem& problem, const std::string& law, d
   return solver.solve(problem, x);
 }
 
-ConeDerivative derivative(const tc::ConeProblem& problem, const Array& impulses, double tolerance,
+tc::Derivative derivative(const tc::ConeProblem& problem, const Array& impulses, double tolerance,
                           double kink) {
   tc::DerivativeOptions options;
   options.tolerance = tolerance;
   options.kink = kink;
   const View x = by_row("impulses", impulses, problem);
   const py::gil_scoped_release others_run;
-  return {tc::derivative(problem, x, options), problem.rows()};
-}
-
-py::tuple forward(const ConeDerivative& d, const py::object& A, const py::object& b,
-                  const py::object& mu, const py::object& rolling, const py::object& torsional,
-                  const py::object& bound) {
-  tc::ConeDirection v;
-  v.b = entries("b", b);
-  v.mu = entries("mu", mu);
-  v.rolling = entries("rolling", rolling);
-  v.torsional = entries("torsional", torsional);
-  v.bound = entries("bound", bound);
-  if (!A.is_none()) v.A = matrix_entries("A", A, d.rows, d.rows);
-  const tc::ConeSolutionDirection found = d.forward(v);
-  return py::make_tuple(Eigen::VectorXd(found.impulses), Eigen::VectorXd(found.velocities),
-                        found.residual);
-}
-
-py::dict adjoint(const ConeDerivative& d, const py::object& impulses,
-                 const py::object& velocities) {
-  using namespace py::literals;
-  const tc::ConeDirection g =
-      d.adjoint(entries("impulses", impulses), entries("velocities", velocities));
-  const auto count = static_cast<py::ssize_t>(g.A.size());
-  py::array_t<int> rows(count), columns(count);
-  Array values(count);
-  for (py::ssize_t k = 0; k < count; ++k) {
-    const tc::MatrixEntry& entry = g.A[static_cast<std::size_t>(k)];
-    rows.mutable_at(k) = entry.row;
-    columns.mutable_at(k) = entry.column;
-    values.mutable_at(k) = entry.value;
-  }
-  return py::dict("b"_a = Eigen::VectorXd(g.b), "mu"_a = Eigen::VectorXd(g.mu),
-                  "rolling"_a = Eigen::VectorXd(g.rolling),
-                  "torsional"_a = Eigen::VectorXd(g.torsional),
-                  "bound"_a = Eigen::VectorXd(g.bound), "rows"_a = rows, "columns"_a = columns,
-                  "values"_a = values);
+  return tc::derivative(problem, x, options);
 }
 
 void bind_cone(py::module_& module) {
@@ -222,7 +149,7 @@ blocks: error in velocity of each cone, over what its island needs; error: the l
 cone that has it.)")
       .def("derivative", &derivative, "impulses"_a, py::kw_only(), "tolerance"_a = 1e-5,
            "kink"_a = 1e-6,
-           R"(The derivative of the solution `impulses` under "coulomb": a ConeDerivative.
+           R"(The derivative of the solution `impulses` under "coulomb": a Derivative.
 
 tolerance: largest error of a solution that is taken; kink: cones nearer to another regime than
 this (relative) are listed. Raises ValueError where the impulses are no solution.)")
@@ -265,34 +192,12 @@ void bind_solution(py::module_& module) {
       });
 }
 
-void bind_derivative(py::module_& module) {
-  using namespace py::literals;
-  py::class_<ConeDerivative> made(module, "ConeDerivative",
-                                  R"(Derivative of the solution of a ConeProblem.
-
-As Derivative; contacts in it are cones. Made by ConeProblem.derivative.)");
-  made.def("forward", &forward, py::kw_only(), "A"_a = py::none(), "b"_a = py::none(),
-           "mu"_a = py::none(), "rolling"_a = py::none(), "torsional"_a = py::none(),
-           "bound"_a = py::none(),
-           R"(J v: (dx, dw, residual) for changes of the data.
-
-A: (n, n) array or scipy.sparse matrix (a change of the compliance is one of its diagonal), b:
-(n,); the others by cone, of cones that have none ignored; None: no change.)")
-      .def("adjoint", &adjoint, "impulses"_a = py::none(), "velocities"_a = py::none(),
-           R"(J' v: the gradient of impulses.x + velocities.w, a dict.
-
-b by row; mu, rolling, torsional and bound by cone; of the entries of A values[k] at rows[k],
-columns[k].)");
-  def_report(made);
-}
-
 }  // namespace
 
 void bind_cones(py::module_& module) {
   bind_cone(module);
   bind_problem(module);
   bind_solution(module);
-  bind_derivative(module);
   using namespace py::literals;
   module.def("read_cones", &tc::read_cones, "path"_a,
              "A ConeProblem from a .dat of Siconos or an fclib file: with joints, rolling friction "

@@ -12,10 +12,9 @@ namespace tether::python {
 
 namespace tc = tether::contact;
 
-inline constexpr std::array kMethods = {
-    tc::Method::automatic,      tc::Method::gauss_seidel,     tc::Method::sor,
-    tc::Method::jacobi,         tc::Method::anderson,         tc::Method::proximal_newton,
-    tc::Method::interior_point, tc::Method::convex_relaxation};
+inline constexpr std::array kMethods = {tc::Method::automatic,      tc::Method::gauss_seidel,
+                                        tc::Method::anderson,       tc::Method::proximal_newton,
+                                        tc::Method::interior_point, tc::Method::convex_relaxation};
 
 using View = Eigen::Map<const Eigen::VectorXd>;
 
@@ -38,36 +37,13 @@ inline Eigen::VectorXd entries(const char* argument, const py::object& value) {
   return vector(argument, value.cast<Array>());
 }
 
-/// Properties of a Derivative or ConeDerivative: its report.
-template <class D>
-void def_report(py::class_<D>& made) {
-  made.def_property_readonly(
-          "status", [](const D& d) { return std::string(name(d.report().status)); },
-          "unique, or minimum_norm: impulses are not unique, the least change is given")
-      .def_property_readonly(
-          "strictly_regular", [](const D& d) { return d.report().strictly_regular; },
-          "every contact is strictly open, sticking or sliding")
-      .def_property_readonly("regimes", [](const D& d) { return words_of(d.report().regimes); })
-      .def_property_readonly(
-          "kinks",
-          [](const D& d) {
-            py::list out;
-            for (const tc::Kink& k : d.report().kinks)
-              out.append(py::make_tuple(k.contact, name(k.branch), name(k.other), k.margin));
-            return out;
-          },
-          "(contact, branch whose derivative is given, other regime, relative margin)")
-      .def_property_readonly("rank", [](const D& d) { return d.report().rank; })
-      .def_property_readonly("unknowns", [](const D& d) { return d.report().unknowns; })
-      .def_property_readonly(
-          "not_unique", [](const D& d) { return d.report().not_unique; },
-          "contacts whose impulses are not determined")
-      .def_property_readonly("velocities_unique",
-                             [](const D& d) { return d.report().velocities_unique; })
-      .def_property_readonly("error", [](const D& d) { return d.report().error; })
-      .def_property_readonly("advice", [](const D& d) { return d.report().advice; });
-}
+using Entries = std::vector<tc::MatrixEntry>;
+
+/// Entries of an array or a scipy.sparse matrix with `rows` rows and `columns` columns.
+Entries matrix_entries(const char* argument, const py::object& whole, py::ssize_t rows,
+                       py::ssize_t columns);
 
 void bind_cones(py::module_& module);
+void bind_derivative(py::module_& module);
 
 }  // namespace tether::python

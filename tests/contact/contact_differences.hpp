@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 #include <string>
 #include <tether/contact.hpp>
@@ -26,25 +27,35 @@ struct Data {
   Problem problem() const { return Problem::dense(A, b, mu); }
 };
 
+// A block of A as its entries.
+inline void add_block(ProblemDirection& to, int row, int column, const Eigen::MatrixXd& block) {
+  for (int r = 0; r < block.rows(); ++r)
+    for (int c = 0; c < block.cols(); ++c) to.A.push_back({row + r, column + c, block(r, c)});
+}
+
+template <class F>
+double over_entries(const ProblemDirection& gradient, const ProblemDirection& v, const F& f) {
+  std::map<std::pair<int, int>, double> by_place;
+  for (const MatrixEntry& g : gradient.A) by_place[{g.row, g.column}] = g.value;
+  double sum = 0;
+  for (const MatrixEntry& of : v.A)
+    if (const auto g = by_place.find({of.row, of.column}); g != by_place.end())
+      sum += f(g->second, of.value);
+  return sum;
+}
+
 inline double product(const ProblemDirection& gradient, const ProblemDirection& v) {
   double sum = 0;
   if (v.b.size() > 0) sum += gradient.b.dot(v.b);
   if (v.mu.size() > 0) sum += gradient.mu.dot(v.mu);
-  for (const MatrixBlock& of : v.A)
-    for (const MatrixBlock& g : gradient.A)
-      if (g.row == of.row && g.column == of.column) sum += g.value.cwiseProduct(of.value).sum();
-  return sum;
+  return sum + over_entries(gradient, v, [](double g, double of) { return g * of; });
 }
 
 inline double sizes(const ProblemDirection& gradient, const ProblemDirection& v) {
   double sum = 0;
   if (v.b.size() > 0) sum += gradient.b.cwiseAbs().dot(v.b.cwiseAbs());
   if (v.mu.size() > 0) sum += gradient.mu.cwiseAbs().dot(v.mu.cwiseAbs());
-  for (const MatrixBlock& of : v.A)
-    for (const MatrixBlock& g : gradient.A)
-      if (g.row == of.row && g.column == of.column)
-        sum += g.value.cwiseAbs().cwiseProduct(of.value.cwiseAbs()).sum();
-  return sum;
+  return sum + over_entries(gradient, v, [](double g, double of) { return std::abs(g * of); });
 }
 
 struct Comparison {
@@ -83,8 +94,7 @@ struct Path {
       for (int k = p.row_start()[static_cast<std::size_t>(i)];
            k < p.row_start()[static_cast<std::size_t>(i + 1)]; ++k) {
         const int j = p.columns()[static_cast<std::size_t>(k)];
-        MatrixBlock& to = tangent.A.emplace_back(MatrixBlock{i, j, Eigen::Matrix3d::Zero()});
-        to.value.topLeftCorner(d, d) = dA.block(d * i, d * j, d, d);
+        add_block(tangent, d * i, d * j, dA.block(d * i, d * j, d, d));
       }
   }
   Problem at(double h) const {

@@ -141,7 +141,7 @@ TEST_CASE("own collection: both formats hold what is written again") {
     const Problem p = read_problem(path);
     const std::string again = "test_collection_again.dat";
     write_dat(p, again);
-    const Problem q = read_dat(again);
+    const Problem q = read_problem(again);
     std::filesystem::remove(again);
     INFO(path);
     CHECK(p.contacts() >= 4);

@@ -47,12 +47,12 @@ Data random_problem(unsigned seed, bool copies) {
 }  // namespace
 
 TEST_CASE("cone derivative: blocks alone have the slopes of their closed forms") {
-  const auto slope = [](const Cone& cone, double b, const ConeDirection& v) {
+  const auto slope = [](const Cone& cone, double b, const ProblemDirection& v) {
     const ConeProblem p =
         ConeProblem::dense(MatrixXd::Constant(1, 1, 2), VectorXd::Constant(1, b), {cone});
     return derivative(p, tight(p).impulses).forward(v).impulses[0];
   };
-  ConeDirection db, da, dN;
+  ProblemDirection db, da, dN;
   db.b = VectorXd::Ones(1);
   da.A = {{0, 0, 1.0}};
   dN.bound = VectorXd::Ones(1);
@@ -78,14 +78,14 @@ TEST_CASE("cone derivative: blocks alone have the slopes of their closed forms")
   const ConeProblem p = ConeProblem::dense(A, b, {Cone::with_rolling(1, 0.1, 0.2)});
   const ConeSolution s = tight(p);
   REQUIRE(s.status == Status::solved);
-  const ConeDerivative D = derivative(p, s.impulses);
+  const Derivative D = derivative(p, s.impulses);
   CHECK(D.report().strictly_regular);
-  ConeDirection v;
+  ProblemDirection v;
   v.rolling = v.torsional = VectorXd::Ones(1);
-  const ConeSolutionDirection dx = D.forward(v);
+  const SolutionDirection dx = D.forward(v);
   CHECK(dx.impulses[3] == Approx(-2).epsilon(1e-10));  // -x_n
   CHECK(dx.impulses.tail(2).norm() == Approx(2).epsilon(1e-10));
-  ConeDirection press;
+  ProblemDirection press;
   press.b = VectorXd::Unit(6, 0);
   CHECK(D.forward(press).impulses[3] == Approx(-0.2).epsilon(1e-10));
 }
@@ -98,7 +98,7 @@ TEST_CASE("cone derivative: one block of each against differences, and its trans
     const ConeProblem p = d.problem();
     const ConeSolution s = tight(p);
     REQUIRE(s.error < 1e-12);
-    const ConeDerivative D = derivative(p, s.impulses);
+    const Derivative D = derivative(p, s.impulses);
     if (!D.report().strictly_regular) continue;
     for (std::size_t k = 0; k < d.cones.size(); ++k)
       ++regimes[static_cast<int>(D.report().regimes[k])];
@@ -108,7 +108,7 @@ TEST_CASE("cone derivative: one block of each against differences, and its trans
       return VectorXd(VectorXd::NullaryExpr(n, [&] { return normal(g); }));
     };
     const int n = p.rows(), blocks = static_cast<int>(d.cones.size());
-    ConeDirection v;
+    ProblemDirection v;
     v.b = any(n);
     v.mu = 0.1 * any(blocks);
     v.rolling = 0.1 * any(blocks);
@@ -140,7 +140,7 @@ TEST_CASE("cone derivative: one block of each against differences, and its trans
       }
       return tight(e.problem());
     };
-    const ConeSolutionDirection dx = D.forward(v);
+    const SolutionDirection dx = D.forward(v);
     CHECK(dx.residual < 1e-8);
     // Central differences with one extrapolation.
     const double h = 1e-4;
@@ -165,7 +165,7 @@ TEST_CASE("cone derivative: one block of each against differences, and its trans
     ++regular;
 
     const VectorXd row = any(n), row_w = any(n);
-    const ConeDirection gradient = D.adjoint(row, row_w);
+    const ProblemDirection gradient = D.adjoint(row, row_w);
     double product = gradient.b.dot(v.b) + gradient.bound.dot(v.bound);
     for (const MatrixEntry& e : gradient.A) product += e.value * dA(e.row, e.column);
     for (int k = 0; k < blocks; ++k) {  // only what a block has
@@ -185,9 +185,9 @@ TEST_CASE("cone derivative: free rows alone are a linear solve, and bad argument
   const Eigen::Matrix2d A = (Eigen::Matrix2d() << 3, 1, 1, 2).finished();
   const Eigen::Vector2d b(1, -2);
   const ConeProblem p = ConeProblem::dense(A, b, {Cone::free(2)});
-  const ConeDerivative D = derivative(p, tight(p).impulses);
+  const Derivative D = derivative(p, tight(p).impulses);
   CHECK(D.report().strictly_regular);
-  ConeDirection v;
+  ProblemDirection v;
   v.b = Eigen::Vector2d(0.5, 1);
   CHECK((D.forward(v).impulses - A.inverse() * v.b).norm() < 1e-13);
   CHECK((D.adjoint(v.b).b - A.inverse() * v.b).norm() < 1e-13);

@@ -32,11 +32,9 @@ TEST_CASE("every method reaches the same velocities of a small stack") {
   for (Law law : {Law::coulomb, Law::maximum_dissipation, Law::frictionless}) {
     const Solution reference = Solver(with(law, 1e-11)).solve(p);
     REQUIRE(reference.status == Status::solved);
-    for (Method method : {Method::gauss_seidel, Method::sor, Method::jacobi, Method::anderson,
-                          Method::proximal_newton, Method::interior_point}) {
-      Options o = with(law, 1e-9, method);
-      if (method == Method::sor) o.relaxation = 1.3;
-      const Solution s = Solver(o).solve(p);
+    for (Method method : {Method::gauss_seidel, Method::anderson, Method::proximal_newton,
+                          Method::interior_point}) {
+      const Solution s = Solver(with(law, 1e-9, method)).solve(p);
       INFO(name(law) << ", " << name(method) << ": " << name(s.status) << " " << s.error);
       CHECK(s.status == Status::solved);
       CHECK((s.velocities - reference.velocities).norm() < 1e-7);

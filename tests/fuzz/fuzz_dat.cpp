@@ -15,11 +15,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static fuzz::MemoryFile file("dat");
   file.write(data, size);
   try {
-    fuzz::solve_read(contact::read_dat(file.path()));
+    fuzz::solve_read(contact::read_problem(file.path()));
   } catch (const std::runtime_error&) {  // the file says why
   }
   try {
-    fuzz::solve_read(contact::read_cones_dat(file.path()));
+    fuzz::solve_read(contact::read_cones(file.path()));
   } catch (const std::runtime_error&) {
   }
   return 0;

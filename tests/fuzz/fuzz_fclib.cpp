@@ -77,11 +77,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   H5Fclose(file);
   try {
-    fuzz::solve_read(contact::read_fclib(place.path()));
+    fuzz::solve_read(contact::read_problem(place.path()));
   } catch (const std::runtime_error&) {  // the file says why
   }
   try {
-    fuzz::solve_read(contact::read_cones_fclib(place.path()));
+    fuzz::solve_read(contact::read_cones(place.path()));
   } catch (const std::runtime_error&) {
   }
   return 0;

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <tether/contact/bodies.hpp>
-#include <tether/contact/body_derivative.hpp>
 #include <tether/contact/body_solver.hpp>
-#include <tether/contact/cone_derivative.hpp>
 #include <tether/contact/cones.hpp>
 #include <tether/contact/derivative.hpp>
 #include <tether/contact/evaluate.hpp>

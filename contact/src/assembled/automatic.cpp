@@ -48,7 +48,7 @@ void Automatic::reset(int contacts, const Options& options, bool proofs) {
 
 void Automatic::prepare(Search& search) {
   if (ready_) return;
-  sweeps.reset(contacts_, options_.anderson_depth);
+  sweeps.reset(contacts_);
   newton.reset(contacts_);
   interior.reset(contacts_);
   parts_.reset(contacts_);

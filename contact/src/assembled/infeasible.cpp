@@ -81,7 +81,6 @@ bool proves_infeasible(Search& search, Packed& d) {
   Options options = search.options;
   options.law = Law::frictionless;
   options.tolerance = std::numeric_limits<double>::min();
-  options.history = false;
   Search smooth;
   smooth.reset(problem, options, Measure::fixed_point);
   // A search that has spent its work may spend a little more: a proof is worth it.

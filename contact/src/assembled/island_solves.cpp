@@ -52,7 +52,6 @@ void IslandSolves::solve(Search& search, Island& island, double budget) {
       search.system.problem().part(std::vector<int>(contacts, contacts + island.size));
   search.counts.work += kBlock * static_cast<double>(problem.blocks().size());
   Options options = search.options;
-  options.history = false;
   options.max_work = budget;
   search_.reset(problem, options, search.measure);
   search_.system.belong_to(search.system, contacts);

@@ -142,7 +142,6 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x)
   if (!b.allFinite()) return false;
   const Problem problem = Problem::sparse(3, std::move(blocks), b, mu);
   Options options = search.options;
-  options.history = false;
   options.tolerance = std::max(kGain * most_, kEnough * search.options.tolerance);
   options.max_work = budget;
   Search& local = part_->search;

@@ -29,15 +29,9 @@ void check(const Options& o) {
           "is none of those of tether::contact::Measure");
   require(o.tolerance > 0 && std::isfinite(o.tolerance), "tolerance", o.tolerance,
           "must be finite and > 0");
-  require(o.relaxation > 0 && o.relaxation < 2, "relaxation", o.relaxation,
-          "must lie between 0 and 2");
-  require(o.method != Method::jacobi || o.relaxation <= 1, "relaxation", o.relaxation,
-          "must lie in (0, 1] for jacobi");
   require(o.max_sweeps >= 1, "max_sweeps", o.max_sweeps, "must be >= 1");
   require(o.max_work > 0, "max_work", o.max_work, "must be > 0");
   require(o.enough >= 0, "enough", o.enough, "must be >= 0");
-  require(o.anderson_depth >= 1 && o.anderson_depth <= detail::Anderson::kMaxDepth,
-          "anderson_depth", o.anderson_depth, "must lie in 1 .. 20");
 }
 
 }  // namespace
@@ -93,40 +87,13 @@ Status Solver::Implementation::automatic() {
   return detail::IslandSolves::serve(search) ? islands.run(search, stages) : stages.run(search);
 }
 
-// gauss_seidel, sor, jacobi
 Status Solver::Implementation::plain() {
-  detail::System& system = search.system;
-  const Problem& problem = system.problem();
-  double damping = 1;
-  if (options.method == Method::jacobi) {
-    // Largest eigenvalue of D^-1 A <= most blocks in a row for A = J M^-1 J'.
-    int most = 1;
-    for (int i = 0; i < system.size(); ++i)
-      most = std::max(most, problem.row_start()[at(i + 1)] - problem.row_start()[at(i)]);
-    damping = options.relaxation * std::min(1.0, 1.8 / most);
-  } else if (options.method == Method::sor) {
-    damping = options.relaxation;
-  }
-  z.resize(x.size());
   search.test(x.data(), options.method);
   int next_test = 1, window = 2000, window_end = 2000;
   double window_error = search.best_error;
   for (int sweep = 1; sweep <= options.max_sweeps && !search.solved(); ++sweep) {
     search.count_sweep();
-    if (options.method == Method::gauss_seidel) {
-      system.sweep(x.data());
-    } else {
-      if (options.method == Method::jacobi) {
-        system.blocks(x.data(), z.data());
-      } else {
-        z = x;
-        system.sweep(z.data());
-      }
-      for (std::size_t i = 0; i < x.size(); ++i) {
-        for (int c = 0; c < 3; ++c) x[i].v[c] += damping * (z[i].v[c] - x[i].v[c]);
-        detail::clip_cone(problem.locals()[i].mu, x[i].v);
-      }
-    }
+    search.system.sweep(x.data());
     if (sweep >= next_test || sweep == options.max_sweeps) {
       search.test(x.data(), options.method);
       next_test = sweep + 1 + sweep / 8;
@@ -153,7 +120,6 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
     out.error = std::min(out.error, system.judged_fixed_point(x.data()));
   }
   out.counts = search.counts;
-  out.history.swap(search.history);
   problem.unpack(search.best, out.impulses);
   if (search.near_round_off())
     detail::exact_velocities(problem, search.best.data(), x.data());
@@ -218,8 +184,6 @@ Status Solver::Implementation::run() {
     case Method::automatic:
       return automatic();
     case Method::gauss_seidel:
-    case Method::sor:
-    case Method::jacobi:
       return plain();
     case Method::anderson: {
       search.test(x.data(), Method::anderson);

@@ -25,10 +25,6 @@ const char* name(Method method) {
       return "automatic";
     case Method::gauss_seidel:
       return "gauss_seidel";
-    case Method::sor:
-      return "sor";
-    case Method::jacobi:
-      return "jacobi";
     case Method::anderson:
       return "anderson";
     case Method::proximal_newton:

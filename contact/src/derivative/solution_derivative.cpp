@@ -9,10 +9,38 @@
 
 namespace tether::contact::detail {
 
+namespace {
+
+// d gamma_t / dA, gamma_t = mu c_t / a, by an entry of the contact's block, of which the symmetric
+// part counts.
+double slope(const LocalBlock& L, int t, int row, int column) {
+  if (row == 0 && column == 0) return -L.mu * (L.inv_a * (L.c[t] * L.inv_a));
+  return std::min(row, column) == 0 && std::max(row, column) == t + 1 ? 0.5 * L.mu * L.inv_a : 0;
+}
+
+}  // namespace
+
+void DataChange::add_friction(int i, const LocalBlock& L, double friction) {
+  mu[at(i)] += friction;
+  for (int t = 0; t < 2; ++t) gamma[at(i)][at(t)] += friction * (L.c[t] * L.inv_a);
+}
+
+void DataChange::add_entry(int i, const LocalBlock& L, int row, int column, double value) {
+  for (int t = 0; t < 2; ++t) gamma[at(i)][at(t)] += slope(L, t, row, column) * value;
+}
+
+double DataChange::mu_gradient(int i, const LocalBlock& L) const {
+  return mu[at(i)] + L.inv_a * (L.c[0] * gamma[at(i)][0] + L.c[1] * gamma[at(i)][1]);
+}
+
+double DataChange::entry_gradient(int i, const LocalBlock& L, int row, int column) const {
+  return slope(L, 0, row, column) * gamma[at(i)][0] + slope(L, 1, row, column) * gamma[at(i)][1];
+}
+
 SolutionDerivative::SolutionDerivative(const Problem& problem, Law law,
                                        const linalg::VectorView& impulses,
                                        const DerivativeOptions& options)
-    : problem_(problem), impulses_(impulses) {
+    : problem_(problem) {
   require(options.tolerance > 0 && std::isfinite(options.tolerance), "tolerance", options.tolerance,
           "must be finite and > 0");
   require(options.kink >= 0 && std::isfinite(options.kink), "kink", options.kink,
@@ -29,11 +57,8 @@ SolutionDerivative::SolutionDerivative(const Problem& problem, Law law,
              (std::string("the law ") + name(law) + " has no replacement").c_str());
     system_.replace(i);
   }
-  own_x_ = x_;
-  system_.to_own_units(own_x_.data());
+  system_.to_own_units(x_.data());
   accept(options);
-  own_w_.resize(own_x_.size());
-  system_.exact_velocities(own_x_.data(), own_w_.data());
   linearise(options);
   collect_islands();
   for (auto& island : islands_) {
@@ -45,8 +70,8 @@ SolutionDerivative::SolutionDerivative(const Problem& problem, Law law,
 }
 
 void SolutionDerivative::accept(const DerivativeOptions& options) {
-  report_.error = system_.measure({0, system_.judged_fixed_point(own_x_.data()), 0, 0, 0},
-                                  Measure::fixed_point);
+  report_.error =
+      system_.measure({0, system_.judged_fixed_point(x_.data()), 0, 0, 0}, Measure::fixed_point);
   if (report_.error <= options.tolerance) return;
   const std::string wanted =
       "must be at most DerivativeOptions::tolerance = " + shown(options.tolerance);
@@ -59,9 +84,11 @@ void SolutionDerivative::linearise(const DerivativeOptions& options) {
   const int n = problem_.contacts();
   const double kink = std::max(options.kink, 10 * report_.error);
   place_.assign(at(n), -1);
+  Packed w(at(n));
+  system_.exact_velocities(x_.data(), w.data());
   for (int i = 0; i < n; ++i) {
     LawTangent t;
-    system_.tangent(i, own_x_[at(i)], own_w_[at(i)], t);
+    system_.tangent(i, x_[at(i)], w[at(i)], t);
     report_.regimes.push_back(t.regime);
     const double margin = t.margin * system_.inverse_scale(i);
     if (!(margin > kink)) report_.kinks.push_back({i, t.regime, t.other, margin});
@@ -208,13 +235,7 @@ void SolutionDerivative::advise() {
 }
 
 SolutionChange SolutionDerivative::forward(const DataChange& change) const {
-  const Problem& p = system_.problem();
-  const int n = problem_.contacts();
-  SolutionChange out{Packed(at(n)), Packed(at(n)), 0};
-  Packed shift(at(n));  // in the units of system_
-  for (int i = 0; i < n; ++i)
-    for (int c = 0; c < 3; ++c)
-      shift[at(i)].v[c] = std::ldexp(change.shift[at(i)].v[c], -system_.velocity_unit(i));
+  SolutionChange out{Packed(at(problem_.contacts())), 0};
   double left = 0, whole = 0;
   for (const auto& island : islands_) {
     Packed y(island->contacts.size()), product(y.size());
@@ -224,7 +245,9 @@ SolutionChange SolutionDerivative::forward(const DataChange& change) const {
       for (int r = 0; r < 3; ++r) {
         double sum = R.friction[r] * change.mu[at(i)];
         for (int c = 0; c < 2; ++c) sum += R.coupling[r][c] * change.gamma[at(i)][at(c)];
-        for (int c = 0; c < 3; ++c) sum += R.Q[r][c] * shift[at(i)].v[c] / system_.weight(i);
+        for (int c = 0; c < 3; ++c)
+          sum += R.Q[r][c] * std::ldexp(change.shift[at(i)].v[c], -system_.velocity_unit(i)) /
+                 system_.weight(i);
         y[at(k)].v[r] = -sum;
       }
     }
@@ -242,40 +265,18 @@ SolutionChange SolutionDerivative::forward(const DataChange& change) const {
     }
   }
   out.residual = whole > 0 ? std::sqrt(left / whole) : 0;
-  for (int i = 0; i < n; ++i) {
-    PackedVector w = shift[at(i)];
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      const double *A = p.blocks()[at(k)].column, *v = out.x[at(p.columns()[at(k)])].v;
-      for (int r = 0; r < 3; ++r) w.v[r] += A[r] * v[0] + A[4 + r] * v[1] + A[8 + r] * v[2];
-    }
-    for (int c = 0; c < 3; ++c) out.w[at(i)].v[c] = std::ldexp(w.v[c], system_.velocity_unit(i));
-  }
   system_.to_given_units(out.x.data());
   return out;
 }
 
-DataChange SolutionDerivative::adjoint(const SolutionChange& rows) const {
-  const Problem& p = system_.problem();
-  const int n = problem_.contacts();
-  DataChange out(at(n));
-  Packed x(at(n));  // gradient with respect to x, the part by way of w included
-  for (int i = 0; i < n; ++i)
-    for (int c = 0; c < 3; ++c) {
-      x[at(i)].v[c] = std::ldexp(rows.x[at(i)].v[c], system_.impulse_unit(i));
-      out.shift[at(i)].v[c] = std::ldexp(rows.w[at(i)].v[c], system_.velocity_unit(i));
-    }
-  for (int i = 0; i < n; ++i)
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      const double *A = p.blocks()[at(k)].column, *w = out.shift[at(i)].v;
-      double* to = x[at(p.columns()[at(k)])].v;
-      for (int c = 0; c < 3; ++c)
-        to[c] += A[4 * c] * w[0] + A[4 * c + 1] * w[1] + A[4 * c + 2] * w[2];
-    }
+DataChange SolutionDerivative::adjoint(const Packed& rows) const {
+  DataChange out(at(problem_.contacts()));
   for (const auto& island : islands_) {
     Packed y(island->contacts.size());
     for (int k = 0; k < island->size(); ++k) {
       const int i = island->contacts[at(k)];
-      for (int c = 0; c < 3; ++c) y[at(k)].v[c] = x[at(i)].v[c] / system_.weight(i);
+      for (int c = 0; c < 3; ++c)
+        y[at(k)].v[c] = std::ldexp(rows[at(i)].v[c], system_.impulse_unit(i)) / system_.weight(i);
     }
     island->factors->solve_transposed(y.data());
     for (int k = 0; k < island->size(); ++k) {
@@ -285,12 +286,12 @@ DataChange SolutionDerivative::adjoint(const SolutionChange& rows) const {
         const double v = y[at(k)].v[r];
         out.mu[at(i)] -= R.friction[r] * v;
         for (int c = 0; c < 2; ++c) out.gamma[at(i)][at(c)] -= R.coupling[r][c] * v;
-        for (int c = 0; c < 3; ++c) out.shift[at(i)].v[c] -= R.Q[r][c] * v / system_.weight(i);
+        for (int c = 0; c < 3; ++c)
+          out.shift[at(i)].v[c] -=
+              std::ldexp(R.Q[r][c] * v / system_.weight(i), -system_.velocity_unit(i));
       }
     }
   }
-  for (int i = 0; i < n; ++i)
-    for (double& v : out.shift[at(i)].v) v = std::ldexp(v, -system_.velocity_unit(i));
   return out;
 }
 

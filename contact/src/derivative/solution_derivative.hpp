@@ -18,16 +18,18 @@ struct DataChange {
   std::vector<double> mu;                    // of mu alone
 
   explicit DataChange(std::size_t contacts) : shift(contacts), gamma(contacts), mu(contacts) {}
-  /// dgamma_i and dmu_i from the change of the contact's own block and of its coefficient.
-  void add(int i, const LocalBlock& L, const Eigen::Matrix3d& block, double friction);
-  /// The transpose: gradients with respect to that block (symmetric) and that coefficient.
-  Eigen::Matrix3d block_gradient(int i, const LocalBlock& L) const;
+  /// dmu_i and dgamma_i from the change of a contact's coefficient, and of an entry of its own
+  /// block.
+  void add_friction(int i, const LocalBlock& L, double friction);
+  void add_entry(int i, const LocalBlock& L, int row, int column, double value);
+  /// The transpose: gradients with respect to that coefficient and that entry.
   double mu_gradient(int i, const LocalBlock& L) const;
+  double entry_gradient(int i, const LocalBlock& L, int row, int column) const;
 };
 
-/// Impulses and velocities, changes or gradients, in the units of the given problem.
+/// The change of the impulses, in the units of the given problem.
 struct SolutionChange {
-  Packed x, w;
+  Packed x;
   double residual = 0;
 };
 
@@ -38,11 +40,10 @@ class TETHER_HIDDEN SolutionDerivative {
 
   const Problem& problem() const { return problem_; }
   const DerivativeReport& report() const { return report_; }
-  const linalg::VectorX& impulses() const { return impulses_; }
-  const Packed& x() const { return x_; }
 
   SolutionChange forward(const DataChange& change) const;
-  DataChange adjoint(const SolutionChange& rows) const;
+  /// The gradient of rows.x.
+  DataChange adjoint(const Packed& rows) const;
 
  private:
   // The law's relation of a touching contact in scaled units: rows of length 1, y = weight dx.
@@ -58,10 +59,8 @@ class TETHER_HIDDEN SolutionDerivative {
   void advise();
 
   Problem problem_;
-  linalg::VectorX impulses_;
-  Packed x_;  // as given
   System system_;
-  Packed own_x_, own_w_;    // in the units of system_
+  Packed x_;                // in the units of system_
   std::vector<int> place_;  // of touching contacts in relations_; -1: open
   std::vector<Relation> relations_;
   std::vector<std::unique_ptr<IslandEquations>> islands_;

@@ -1,104 +1,178 @@
 // Tether: the Siconos .dat format. SPDX-License-Identifier: BSD-3-Clause
-#include <tether/contact/files.hpp>
-
-#include <algorithm>
+//
+// dimension (2, 3; 5: with rolling), number of contacts, a matrix; then
+//   local:  q, mu (, mu_r)         w = M x + q
+//   global: H, q, b, mu (, mu_r)   M v = H x + q, w = H'v + b
 #include <charconv>
 #include <cstdio>
 #include <limits>
-#include <stdexcept>
 
-#include "io/dat_matrix.hpp"
+#include "io/dat_tokens.hpp"
+#include "io/file_problem.hpp"
 
-namespace tether::contact {
-
-using detail::Tokens;
+namespace tether::contact::detail {
 
 namespace {
 
-constexpr long kMostContacts = 10'000'000;
+constexpr long kMost = std::numeric_limits<int>::max();
+// Words that the shortest entry takes, and the white space between them: what is left of the file
+// bounds what it may claim.
+constexpr long kNumber = 2, kTriplet = 8, kColumn = 6;
+
+void claim(Tokens& in, long count, long bytes) {
+  if (count > in.left() / bytes + 1) in.fail("truncated: the file ends in the matrix");
+}
+
+std::vector<MatrixEntry> read_dense(Tokens& in, long rows, long columns) {
+  if (in.integer("matrix rows", 0, kMost) != rows ||
+      in.integer("matrix columns", 0, kMost) != columns)
+    in.fail("matrix sizes do not match");
+  if (rows > 0) claim(in, columns, kNumber * rows);
+  std::vector<MatrixEntry> out;
+  for (long c = 0; c < columns; ++c)
+    for (long r = 0; r < rows; ++r)
+      if (const double v = in.finite("matrix"); v != 0)
+        out.push_back({static_cast<int>(r), static_cast<int>(c), v});
+  return out;
+}
+
+std::vector<MatrixEntry> read_blocks(Tokens& in, long rows, long columns) {
+  const long count = in.integer("number of blocks", 0, kMost);
+  const long sides[2] = {in.integer("block rows", 0, rows),
+                         in.integer("block columns", 0, columns)};
+  claim(in, sides[0] + sides[1] + count, kNumber);
+  std::vector<long> end[2];
+  for (int side = 0; side < 2; ++side) {
+    const char* what = side == 0 ? "row ends" : "column ends";
+    for (long i = 0; i < sides[side]; ++i)
+      end[side].push_back(
+          in.integer(what, i == 0 ? 0 : end[side].back(), side == 0 ? rows : columns));
+    if ((end[side].empty() ? 0 : end[side].back()) != (side == 0 ? rows : columns))
+      in.fail(std::string(what) + " do not end with the matrix");
+  }
+  const long filled1 = in.integer("filled1", 0, sides[0] + 1),
+             filled2 = in.integer("filled2", 0, count);
+  if (filled1 != sides[0] + 1 || filled2 != count)
+    in.fail("filled1 and filled2 do not match the blocks");
+  std::vector<long> start, column;
+  for (long i = 0; i < filled1; ++i)
+    start.push_back(in.integer("row pointers", i == 0 ? 0 : start.back(), count));
+  if (start.front() != 0 || start.back() != count) in.fail("row pointers do not match the blocks");
+  for (long k = 0; k < count; ++k) column.push_back(in.integer("block columns", 0, sides[1] - 1));
+  std::vector<MatrixEntry> out;
+  const auto first = [&](int side, long i) {
+    return i == 0 ? 0 : end[side][static_cast<std::size_t>(i - 1)];
+  };
+  long row = 0;
+  for (long k = 0; k < count; ++k) {
+    while (start[static_cast<std::size_t>(row + 1)] <= k) ++row;
+    if (in.integer("block number", 0, count) != k) in.fail("block numbers do not ascend");
+    const long c0 = column[static_cast<std::size_t>(k)];
+    for (long c = first(1, c0); c < end[1][static_cast<std::size_t>(c0)]; ++c)
+      for (long r = first(0, row); r < end[0][static_cast<std::size_t>(row)]; ++r)
+        out.push_back({static_cast<int>(r), static_cast<int>(c), in.finite("matrix")});
+  }
+  return out;
+}
+
+/// Triplets or compressed columns as CSparse prints them.
+std::vector<MatrixEntry> read_sparse(Tokens& in, long rows, long columns) {
+  constexpr long kTriplets = 1, kColumns = 2;
+  const long origin = in.integer("sparse storage (1: triplets, 2: columns)", kTriplets, kColumns);
+  if (in.line("the sparse matrix").rfind("CSparse", 0) != 0)
+    in.fail("a line that begins with CSparse is expected in the sparse matrix");
+  const std::string head = in.line("the sparse matrix");
+  long m = -1, n = -1, most = -1, count = -1;
+  const char* form = origin == kTriplets ? "triplet: %9ld-by-%9ld, nzmax: %18ld nnz: %18ld"
+                                         : "%9ld-by-%9ld, nzmax: %18ld nnz: %18ld";
+  if (std::sscanf(head.c_str(), form, &m, &n, &most, &count) != 4 || m != rows || n != columns ||
+      count < 0)
+    in.fail("the head of the sparse matrix does not match it");
+  claim(in, count, origin == kTriplets ? kTriplet : kColumn);
+  std::vector<MatrixEntry> out;
+  const auto row = [&] { return static_cast<int>(in.integer("row", 0, rows - 1)); };
+  if (origin == kTriplets) {
+    for (long k = 0; k < count; ++k) {
+      const int r = row(), c = static_cast<int>(in.integer("column", 0, columns - 1));
+      in.expect(':', "the sparse matrix");
+      out.push_back({r, c, in.finite("matrix")});
+    }
+    return out;
+  }
+  long next = 0;
+  for (long c = 0; c < columns; ++c) {
+    long number = -1, from = -1, to = -2;
+    if (std::sscanf(in.line("the sparse matrix").c_str(), "col %9ld : locations %18ld to %18ld",
+                    &number, &from, &to) != 3 ||
+        number != c || from != next || to < from - 1 || to >= count)
+      in.fail("column " + std::to_string(c) + " of the sparse matrix does not follow the last one");
+    for (; next <= to; ++next) {
+      const int r = row();
+      in.expect(':', "the sparse matrix");
+      out.push_back({r, static_cast<int>(c), in.finite("matrix")});
+    }
+  }
+  if (next != count) in.fail("the sparse matrix has fewer entries than it says");
+  return out;
+}
+
+/// Storage type (0 dense, 1 blocks of any sizes, 2 sparse), sizes, and what they say.
+FileMatrix read_matrix(Tokens& in) {
+  const long storage = in.integer("matrix storage type", 0, 2);
+  FileMatrix out;
+  out.rows = in.integer("matrix rows", 0, kMost);
+  out.columns = in.integer("matrix columns", 0, kMost);
+  out.entries = storage == 0   ? read_dense(in, out.rows, out.columns)
+                : storage == 1 ? read_blocks(in, out.rows, out.columns)
+                               : read_sparse(in, out.rows, out.columns);
+  return out;
+}
 
 }  // namespace
 
-Problem read_dat(const std::string& path) {
+FileProblem read_dat(const std::string& path) {
+  constexpr long kMostContacts = 10'000'000;
   Tokens in(path);
-  const int d = static_cast<int>(in.integer("dimension", 2, 3));
-  const int n = static_cast<int>(in.integer("number of contacts", 0, kMostContacts));
-  const long storage = in.integer("matrix storage type", 0, 2);
-  const long rows = in.integer("matrix rows", 0, std::numeric_limits<int>::max());
-  const long columns = in.integer("matrix columns", 0, std::numeric_limits<int>::max());
-  const long size = static_cast<long>(d) * n;
-  if (rows != size || columns != size) {
-    in.fail("the matrix is " + std::to_string(rows) + " x " + std::to_string(columns) + ", " +
-            std::to_string(n) + " contacts of dimension " + std::to_string(d) + " need " +
-            std::to_string(size));
+  FileProblem out;
+  out.dimension = static_cast<int>(in.integer("dimension", 2, 5));
+  if (out.dimension == 4) in.fail("dimension is 4; 2, 3 or 5 is expected");
+  const long n = in.integer("number of contacts", 0, kMostContacts), size = out.dimension * n;
+  out.A = read_matrix(in);
+  const auto need = [&](const char* what, const FileMatrix& M, long rows, long columns) {
+    if (M.rows != rows || M.columns != columns)
+      in.fail(std::string(what) + " is " + std::to_string(M.rows) + " x " +
+              std::to_string(M.columns) + ", must be " + std::to_string(rows) + " x " +
+              std::to_string(columns));
+  };
+  need("the matrix", out.A, out.A.rows, out.A.rows);
+  const long coefficients = out.dimension == 5 ? 2 : 1;
+  // Both begin alike; a global file has a matrix more.
+  out.local = out.A.rows == size && in.words_left() <= size + coefficients * n + 1;
+  if (!out.local) {
+    const FileMatrix H = read_matrix(in);
+    need("H", H, out.A.rows, size);
+    out.J = H.transposed();
   }
-  Eigen::MatrixXd A;
-  std::vector<MatrixBlock> blocks;
-  if (storage == 0) {
-    if (in.integer("matrix rows", 0, rows) != rows ||
-        in.integer("matrix columns", 0, columns) != columns) {
-      in.fail("matrix sizes do not match");
-    }
-    // An entry takes two characters at least; a small file cannot claim a large matrix.
-    if (size > 0 && in.left() / (2 * size) < size - 1)
-      in.fail("truncated: the file ends in the matrix");
-    A.resize(size, size);
-    for (long c = 0; c < size; ++c)
-      for (long r = 0; r < size; ++r) A(r, c) = in.finite("matrix");
-  } else if (storage == 2) {
-    for (const MatrixEntry& e : detail::read_sparse(in, rows, columns)) {
-      blocks.push_back({e.row / d, e.column / d, Eigen::Matrix3d::Zero()});
-      blocks.back().value(e.row % d, e.column % d) = e.value;
-    }
-  } else {
-    const long most = std::numeric_limits<int>::max();
-    const long count = in.integer("number of blocks", 0, most);
-    if (in.integer("block rows", 0, most) != n || in.integer("block columns", 0, most) != n) {
-      in.fail("block rows and columns must equal the number of contacts");
-    }
-    if (count * 2L * (d * d) > in.left()) in.fail("truncated: the file ends in the matrix");
-    for (const char* what : {"row ends", "column ends"}) {
-      for (int i = 0; i < n; ++i) {
-        if (in.integer(what, 0, size) != static_cast<long>(d) * (i + 1)) {
-          in.fail(std::string(what) + ": blocks must have the size of a contact");
-        }
-      }
-    }
-    const long filled1 = in.integer("filled1", 0, n + 1L),
-               filled2 = in.integer("filled2", 0, count);
-    if (filled1 != n + 1L || filled2 != count)
-      in.fail("filled1 and filled2 do not match the blocks");
-    std::vector<long> start;
-    for (long i = 0; i < filled1; ++i) {
-      start.push_back(in.integer("row pointers", i == 0 ? 0 : start.back(), count));
-    }
-    if (start.front() != 0 || start.back() != count)
-      in.fail("row pointers do not match the blocks");
-    std::vector<int> column;
-    for (long k = 0; k < count; ++k)
-      column.push_back(static_cast<int>(in.integer("block columns", 0, n - 1L)));
-    int row = 0;
-    for (long k = 0; k < count; ++k) {
-      while (start[static_cast<std::size_t>(row + 1)] <= k) ++row;
-      if (in.integer("block number", 0, count) != k) in.fail("block numbers do not ascend");
-      MatrixBlock block{row, column[static_cast<std::size_t>(k)], Eigen::Matrix3d::Zero()};
-      for (int c = 0; c < d; ++c)
-        for (int r = 0; r < d; ++r) block.value(r, c) = in.finite("matrix");
-      blocks.push_back(block);
-    }
-  }
-  Eigen::VectorXd b(size), mu(n);
-  for (long i = 0; i < size; ++i) b[i] = -in.finite("q");
-  for (int i = 0; i < n; ++i) mu[i] = in.finite("mu");
+  const long words = (out.local ? 0 : out.A.rows) + size + coefficients * n;
+  if (in.words_left() < words) in.fail("truncated: the file ends in its vectors");
+  const auto vector = [&](const char* what, long count) {
+    linalg::VectorX v(count);
+    for (long i = 0; i < count; ++i) v[i] = in.finite(what);
+    return v;
+  };
+  if (!out.local) out.f = vector("q", out.A.rows);
+  out.q = vector(out.local ? "q" : "b", size);
+  out.mu = vector("mu", n);
+  if (out.dimension == 5) out.rolling = vector("mu_r", n);
   if (!in.empty())
     in.integer("trailing number", std::numeric_limits<int>::min(), std::numeric_limits<int>::max());
   if (!in.empty()) in.fail("oversized: data after the friction coefficients");
-  try {
-    return storage == 0 ? Problem::dense(A, b, mu) : Problem::sparse(d, std::move(blocks), b, mu);
-  } catch (const std::invalid_argument& e) {
-    in.fail(e.what());
-  }
+  return out;
 }
+
+}  // namespace tether::contact::detail
+
+namespace tether::contact {
 
 namespace {
 

@@ -1,46 +1,21 @@
 // Tether: the fclib HDF5 format. SPDX-License-Identifier: BSD-3-Clause
-#include <tether/contact/files.hpp>
+//
+//   fclib_local:          w = W x + V y + q, V'x + R y + s = 0
+//   fclib_global:         M v = H x + G y + f, w = H'v + w_0, G'v + b = 0
+//   fclib_global_rolling: the same, five rows a contact
+#include <limits>
 
-#include <filesystem>
-#include <fstream>
-#include <stdexcept>
-
+#include "io/file_problem.hpp"
 #ifdef TETHER_HAVE_HDF5
 #include "io/hdf5_file.hpp"
 #endif
 
 namespace tether::contact {
 
-namespace {
-
-bool is_hdf5(const std::string& path) {
-  // A pipe can be opened and read once only; HDF5 does not come through one.
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) return false;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path + ": cannot be opened");
-  char head[4] = {};
-  file.read(head, 4);
-  return file && head[0] == '\x89' && head[1] == 'H' && head[2] == 'D' && head[3] == 'F';
-}
-
-}  // namespace
-
-Problem read_problem(const std::string& path) {
-  return is_hdf5(path) ? read_fclib(path) : read_dat(path);
-}
-
-ConeProblem read_cones(const std::string& path) {
-  return is_hdf5(path) ? read_cones_fclib(path) : read_cones_dat(path);
-}
-
 #ifndef TETHER_HAVE_HDF5
 
 bool has_fclib() { return false; }
-Problem read_fclib(const std::string& path) {
-  throw std::runtime_error(path + ": built without HDF5 (install libhdf5-dev)");
-}
-ConeProblem read_cones_fclib(const std::string& path) {
+detail::FileProblem detail::read_fclib(const std::string& path) {
   throw std::runtime_error(path + ": built without HDF5 (install libhdf5-dev)");
 }
 void write_fclib(const Problem&, const std::string& path) {
@@ -51,11 +26,143 @@ void write_fclib(const Problem&, const std::string& path) {
 
 bool has_fclib() { return true; }
 
+using detail::FileMatrix;
+using detail::FileProblem;
 using detail::Handle;
+using detail::has;
 using detail::Native;
 using detail::Quiet;
 using detail::read;
 using detail::read_integer;
+
+namespace {
+
+// A group of a file that is read.
+class Group {
+ public:
+  Group(hid_t file, std::string path, std::string name)
+      : file_(file), path_(std::move(path)), name_(std::move(name)) {}
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw std::runtime_error(path_ + ": /" + name_ + what);
+  }
+  bool has(const std::string& what) const { return detail::has(file_, name_ + what); }
+  int integer(const std::string& what) const { return read_integer(file_, path_, name_ + what); }
+  template <class T>
+  std::vector<T> list(const std::string& what) const {
+    return read<T>(file_, path_, name_ + what);
+  }
+  linalg::VectorX vector(const std::string& what) const {
+    const std::vector<double> v = list<double>("vectors/" + what);
+    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+  }
+  linalg::VectorX vector(const std::string& what, long size) const {
+    linalg::VectorX v = vector(what);
+    if (v.size() != size)
+      fail("vectors/" + what + " has " + std::to_string(v.size()) + " entries, " +
+           std::to_string(size) + " are expected");
+    return v;
+  }
+  FileMatrix matrix(const std::string& what) const;
+  void need(const char* what, const FileMatrix& A, long rows, long columns) const {
+    if (A.rows != rows || A.columns != columns)
+      fail(std::string(what) + " is " + std::to_string(A.rows) + " x " + std::to_string(A.columns) +
+           ", " + std::to_string(rows) + " x " + std::to_string(columns) + " is expected");
+  }
+
+ private:
+  hid_t file_;
+  std::string path_, name_;
+};
+
+FileMatrix Group::matrix(const std::string& what) const {
+  FileMatrix out;
+  out.rows = integer(what + "/m");
+  out.columns = integer(what + "/n");
+  const int nz = integer(what + "/nz");
+  const std::vector<int> p = list<int>(what + "/p"), i = list<int>(what + "/i");
+  const std::vector<double> x = list<double>(what + "/x");
+  if (out.rows < 0 || out.columns < 0 || nz < -2) fail(what + " has sizes that cannot be");
+  const auto put = [&](int row, int column, double value) {
+    if (row < 0 || row >= out.rows || column < 0 || column >= out.columns)
+      fail(what + " has an index outside of the matrix");
+    out.entries.push_back({row, column, value});
+  };
+  const std::size_t most = std::min(i.size(), x.size());
+  if (nz >= 0) {
+    if (static_cast<std::size_t>(nz) > std::min(most, p.size()))
+      fail(what + " has fewer than nz entries");
+    for (std::size_t k = 0; k < static_cast<std::size_t>(nz); ++k) put(i[k], p[k], x[k]);
+    return out;
+  }
+  const std::size_t lines = static_cast<std::size_t>(nz == -1 ? out.columns : out.rows);
+  if (p.size() < lines + 1) fail(what + "/p is too short");
+  for (std::size_t k = 0; k < lines; ++k) {
+    if (p[k] < 0 || p[k] > p[k + 1] || static_cast<std::size_t>(p[k + 1]) > most)
+      fail(what + "/p must ascend from 0 to the number of entries");
+    for (int e = p[k]; e < p[k + 1]; ++e) {
+      const int other = i[static_cast<std::size_t>(e)], self = static_cast<int>(k);
+      const double value = x[static_cast<std::size_t>(e)];
+      nz == -1 ? put(other, self, value) : put(self, other, value);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+FileProblem detail::read_fclib(const std::string& path) {
+  Quiet quiet;
+  Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (file < 0) throw std::runtime_error(path + ": not an HDF5 file, or truncated");
+  const bool rolling = has(file, "fclib_global_rolling");
+  FileProblem out;
+  out.local = !rolling && (has(file, "fclib_local") || !has(file, "fclib_global"));
+  const Group group(file, path,
+                    rolling     ? "fclib_global_rolling/"
+                    : out.local ? "fclib_local/"
+                                : "fclib_global/");
+  const int d = out.dimension = group.integer("spacedim");
+  if (rolling ? d != 5 : d != 2 && d != 3) group.fail("spacedim is " + std::to_string(d));
+  out.mu = group.vector("mu");
+  if (rolling) out.rolling = group.vector("mu_r", out.mu.size());
+  if (out.mu.size() > std::numeric_limits<int>::max() / d) group.fail("vectors/mu is too long");
+  const int rows = d * out.contacts();
+  // Rows of joints follow those of the contacts. Their number may be claimed by few bytes.
+  const auto add_joints = [&](const FileMatrix& of, long joints, const char* vector) {
+    if (joints > std::numeric_limits<int>::max() - rows)
+      group.fail("has " + std::to_string(joints) + " rows of joints, more than there can be");
+    out.joints = static_cast<int>(joints);
+    (out.local ? out.A : out.J).put(of, rows, 0);
+    out.q.conservativeResize(rows + joints);
+    out.q.tail(joints) = group.vector(vector, joints);
+  };
+  if (out.local) {
+    out.A = group.matrix("W");
+    group.need("W", out.A, rows, rows);
+    out.q = group.vector("q", rows);
+    if (!group.has("V")) return out;
+    const FileMatrix V = group.matrix("V"), R = group.matrix("R");
+    group.need("V", V, rows, R.rows);
+    group.need("R", R, R.rows, R.rows);
+    add_joints(V.transposed(), R.rows, "s");
+    out.A.put(V, 0, rows);
+    out.A.put(R, rows, rows);
+    return out;
+  }
+  const FileMatrix H = group.matrix("H");
+  out.A = group.matrix("M");
+  group.need("M", out.A, out.A.rows, out.A.rows);
+  group.need("H", H, out.A.rows, rows);
+  out.J = H.transposed();
+  out.f = group.vector("f", out.A.rows);
+  out.q = group.vector("w", rows);
+  if (!group.has("G")) return out;
+  const FileMatrix G = group.matrix("G");
+  group.need("G", G, out.A.rows, G.columns);
+  add_joints(G.transposed(), G.columns, "b");
+  return out;
+}
 
 namespace {
 
@@ -75,79 +182,6 @@ void write(hid_t file, const std::string& path, const std::string& name, const T
 }
 
 }  // namespace
-
-Problem read_fclib(const std::string& path) {
-  Quiet quiet;
-  Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-  if (file < 0) throw std::runtime_error(path + ": not an HDF5 file, or truncated");
-  const auto fail = [&](const std::string& what) { throw std::runtime_error(path + ": " + what); };
-  const int d = read_integer(file, path, "fclib_local/spacedim");
-  if (d != 2 && d != 3) fail("spacedim is " + std::to_string(d));
-  if (detail::has(file, "fclib_local/V"))
-    fail("/fclib_local/V: has rows of joints, which read_cones() reads");
-  const std::vector<double> q = read<double>(file, path, "fclib_local/vectors/q");
-  const std::vector<double> mu = read<double>(file, path, "fclib_local/vectors/mu");
-  const int m = read_integer(file, path, "fclib_local/W/m"),
-            n = read_integer(file, path, "fclib_local/W/n");
-  const int nz = read_integer(file, path, "fclib_local/W/nz");
-  const std::vector<int> p = read<int>(file, path, "fclib_local/W/p"),
-                         i = read<int>(file, path, "fclib_local/W/i");
-  const std::vector<double> x = read<double>(file, path, "fclib_local/W/x");
-  const std::size_t size = mu.size() * static_cast<std::size_t>(d);
-  if (q.size() != size)
-    fail("q has " + std::to_string(q.size()) + " entries, " + std::to_string(size) +
-         " are expected");
-  if (m < 0 || static_cast<std::size_t>(m) != size || m != n) {
-    fail("W is " + std::to_string(m) + " x " + std::to_string(n) + ", " + std::to_string(size) +
-         " are expected");
-  }
-  if (nz < -2) fail("W/nz is " + std::to_string(nz));
-
-  std::vector<MatrixBlock> blocks;
-  std::vector<int> last(mu.size() * 1, -1);
-  const auto put = [&](int r, int c, double value) {
-    if (r < 0 || r >= m || c < 0 || c >= n) fail("W has an index outside of the matrix");
-    // Neighbouring entries mostly belong to the block that was made last.
-    const int br = r / d, bc = c / d;
-    if (last[static_cast<std::size_t>(br)] < 0 ||
-        blocks[static_cast<std::size_t>(last[static_cast<std::size_t>(br)])].column != bc) {
-      last[static_cast<std::size_t>(br)] = static_cast<int>(blocks.size());
-      blocks.push_back({br, bc, Eigen::Matrix3d::Zero()});
-    }
-    blocks[static_cast<std::size_t>(last[static_cast<std::size_t>(br)])].value(r % d, c % d) +=
-        value;
-  };
-  if (nz >= 0) {
-    const std::size_t count = static_cast<std::size_t>(nz);
-    if (x.size() < count || p.size() < count || i.size() < count)
-      fail("truncated: W has fewer than nz entries");
-    for (std::size_t k = 0; k < count; ++k) put(i[k], p[k], x[k]);
-  } else {
-    if (p.size() < size + 1) fail("truncated: W/p is too short");
-    const std::size_t count = p[size] < 0 ? 0 : static_cast<std::size_t>(p[size]);
-    if (p[size] < 0 || x.size() < count || i.size() < count)
-      fail("truncated: W has fewer entries than W/p says");
-    for (std::size_t k = 0; k < size; ++k) {
-      if (p[k] < 0 || p[k] > p[k + 1] || static_cast<std::size_t>(p[k + 1]) > count) {
-        fail("W/p must ascend from 0 to the number of entries");
-      }
-      for (int e = p[k]; e < p[k + 1]; ++e) {
-        const int other = i[static_cast<std::size_t>(e)], self = static_cast<int>(k);
-        const double value = x[static_cast<std::size_t>(e)];
-        nz == -1 ? put(other, self, value) : put(self, other, value);
-      }
-    }
-  }
-  const Eigen::VectorXd b =
-      -Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size()));
-  const Eigen::VectorXd friction =
-      Eigen::Map<const Eigen::VectorXd>(mu.data(), static_cast<Eigen::Index>(mu.size()));
-  try {
-    return Problem::sparse(d, std::move(blocks), b, friction);
-  } catch (const std::invalid_argument& e) {
-    throw std::runtime_error(path + ": " + e.what());
-  }
-}
 
 void write_fclib(const Problem& problem, const std::string& path) {
   Quiet quiet;

@@ -3,10 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
-#include <string>
-#include <tether/linalg/pi.hpp>
 
 #include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
@@ -119,100 +115,6 @@ OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b
   LocalState state;
   solve_local(law, LocalBlock(A, mu), b, state);
   return {Eigen::Vector3d(state.x[0], state.x[1], state.x[2]), state.regime, state.evaluations};
-}
-
-OneContact solve_one_golden_section(const LocalBlock& L, const Eigen::Vector3d& b,
-                                    double angle_tolerance) {
-  detail::require_finite("b", b);
-  detail::require(angle_tolerance > 0, "angle_tolerance", angle_tolerance, "must be > 0");
-  OneContact out;
-  if (!(b[0] > 0)) return out;
-  double x[3];
-  const detail::LocalRhs r = detail::to_local(L, b[0], b[1], b[2]);
-  const double s0 = L.beta[1] * r.h0, s1 = L.beta[0] * r.h1, length = std::hypot(s0, s1);
-  if (L.mu == 0) {
-    out.impulse << b[0] * L.inv_a, 0, 0;
-    out.regime = Regime::sliding;
-    return out;
-  }
-  if (detail::sticks(L, r, s0, s1, length)) {
-    out.regime = detail::stick(L, r, b[0], x);
-    out.impulse << x[0], x[1], x[2];
-    return out;
-  }
-  const double pi = linalg::kPi;
-  const double center = std::atan2(s1, s0);
-  const double kappa = (r.k * L.beta[0] * L.beta[1] - L.g[0] * s0 - L.g[1] * s1) / length;
-  const double reach = kappa <= -1 ? pi : std::acos(std::min(1.0, kappa));
-  double lo = center - reach, hi = center + reach;
-  if (L.e >= 1) {  // stay between the asymptotes
-    const double d = std::remainder(std::atan2(L.g[1], L.g[0]) - center, 2 * pi);
-    const double open = std::acos(-1 / L.e);
-    lo = std::max(lo, center + d - open);
-    hi = std::min(hi, center + d + open);
-  }
-  const auto radius = [&](double angle) {
-    const double q = 1 + L.g[0] * std::cos(angle) + L.g[1] * std::sin(angle);
-    return q > 0 ? r.k / q : std::numeric_limits<double>::infinity();
-  };
-  const auto energy = [&](double angle) {
-    ++out.evaluations;
-    const double p = radius(angle);
-    if (!std::isfinite(p)) return std::numeric_limits<double>::infinity();
-    const double y0 = p * std::cos(angle), y1 = p * std::sin(angle);
-    return (0.5 * L.beta[0] * y0 - r.h0) * y0 + (0.5 * L.beta[1] * y1 - r.h1) * y1;
-  };
-  const double ratio = 0.6180339887498948482;
-  double left = hi - ratio * (hi - lo), right = lo + ratio * (hi - lo);
-  double at_left = energy(left), at_right = energy(right);
-  while (hi - lo > angle_tolerance && left < right) {
-    if (at_left < at_right) {
-      hi = right;
-      right = left;
-      at_right = at_left;
-      left = hi - ratio * (hi - lo);
-      at_left = energy(left);
-    } else {
-      lo = left;
-      left = right;
-      at_left = at_right;
-      right = lo + ratio * (hi - lo);
-      at_right = energy(right);
-    }
-  }
-  const double angle = at_left < at_right ? left : right, p = radius(angle);
-  detail::from_local(L, p / L.mu, p * std::cos(angle), p * std::sin(angle), x);
-  out.impulse << x[0], x[1], x[2];
-  out.regime = Regime::sliding;
-  return out;
-}
-
-PlanarContact solve_planar(Law law, const linalg::Matrix<2, 2>& A, const linalg::Matrix<2, 1>& b,
-                           double mu) {
-  const double a = A(0, 0), c = 0.5 * (A(0, 1) + A(1, 0));
-  detail::require_finite("A", A);
-  detail::require_finite("b", b);
-  detail::require(a > 0, "A_nn", a, "must be > 0: no body moves along the normal");
-  detail::require(mu >= 0 && std::isfinite(mu), "mu", mu, "must be finite and >= 0");
-  detail::require(A(1, 1) - c * (c / a) >= -1e-8 * A.trace(), "t - c^2/a", A(1, 1) - c * (c / a),
-                  "A must be positive semidefinite");
-  PlanarContact out;
-  if (!(b[0] > 0)) return out;
-  if (!detail::traits(law).friction || mu == 0) {
-    out.impulse << b[0] / a, 0;
-    out.regime = Regime::sliding;
-    return out;
-  }
-  const double B = std::max(A(1, 1) - c * (c / a), 1e-12 * A.trace()), h = b[1] - c * (b[0] / a);
-  // Interval of admissible x_t; a nonpositive denominator is an end at infinity. In the plane both
-  // laws pick the same point of it.
-  const double infinity = std::numeric_limits<double>::infinity();
-  const double lower = a - mu * c > 0 ? -mu * (b[0] / (a - mu * c)) : -infinity;
-  const double upper = a + mu * c > 0 ? mu * (b[0] / (a + mu * c)) : infinity;
-  const double free = h / B, xt = std::clamp(free, lower, upper);
-  out.regime = xt == free ? Regime::sticking : Regime::sliding;
-  out.impulse << (out.regime == Regime::sliding ? std::abs(xt) / mu : (b[0] - c * xt) / a), xt;
-  return out;
 }
 
 }  // namespace tether::contact

@@ -38,11 +38,9 @@ bool problem_and_solution() {
   solver.solve(copy, solution);
   const tc::Solution kept = solution;
   const VectorXd impulses = kept.impulses;
-  const Eigen::Matrix2d planar = Eigen::Matrix2d::Identity();
   return kept.status == tc::Status::solved && kept.velocities.norm() < 1e-8 &&
          (problem.dense_matrix() - A).norm() == 0 && (problem.b() - b).norm() == 0 &&
-         tc::evaluate(problem, tc::Law::coulomb, 1.0 * impulses).cone < 1e-8 &&
-         tc::solve_planar(tc::Law::coulomb, planar, Eigen::Vector2d(1, 0), 0.5).impulse[0] > 0.5;
+         tc::evaluate(problem, tc::Law::coulomb, 1.0 * impulses).cone < 1e-8;
 }
 
 bool bodies() {

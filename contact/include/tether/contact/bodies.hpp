@@ -45,7 +45,6 @@ struct ContactRows {
   static ContactRows at_point(int first, int second, const Eigen::Vector3d& r1,
                               const Eigen::Vector3d& r2, const Eigen::Vector3d& normal, double mu);
 };
-using BodyContact [[deprecated("is called ContactRows")]] = ContactRows;
 
 /// Rows: normal, tangent, tangent (right-handed).
 Eigen::Matrix3d tangent_frame(const Eigen::Vector3d& normal);

@@ -3,8 +3,8 @@
 
 #include <memory>
 #include <string>
-#include <tether/contact/problem.hpp>
-#include <tether/contact/solver.hpp>
+#include <tether/contact/body_solver.hpp>
+#include <tether/contact/cones.hpp>
 #include <tether/export.hpp>
 #include <utility>
 #include <vector>
@@ -13,8 +13,9 @@ TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
 namespace detail {
-class TETHER_HIDDEN SolutionDerivative;
-}
+struct TETHER_HIDDEN DerivativeParts;
+struct TETHER_HIDDEN BodyDerivativeParts;
+}  // namespace detail
 
 struct DerivativeOptions {
   /// Largest Residuals::fixed_point of impulses that count as a solution; > 0. Derivatives have
@@ -60,50 +61,56 @@ struct DerivativeReport {
   std::string advice;               ///< what the above means for the use of the derivative
 };
 
-/// A direction in which the data (A, b, mu) of a problem change, or the gradient of a number with
-/// respect to them. Empty members of a direction: no change.
+/// A direction in which the data of a problem change, or the gradient of a number with respect to
+/// them. Empty members of a direction: no change.
 struct ProblemDirection {
-  std::vector<MatrixBlock> A;  ///< equal positions are summed; gradient: the blocks of the problem
-  linalg::VectorX b;           ///< dimension * contacts entries
-  linalg::VectorX mu;          ///< an entry for each contact
+  /// By row and column, with the compliance; equal places are summed. Gradient: the entries of the
+  /// problem, those of the blocks that a Problem stores.
+  std::vector<MatrixEntry> A;
+  linalg::VectorX b;                              ///< by row
+  linalg::VectorX mu, rolling, torsional, bound;  ///< by contact or cone, of those that have one
 };
 
 struct SolutionDirection {
-  linalg::VectorX impulses, velocities;  ///< dx and dw = A dx + dA x - db
+  linalg::VectorX impulses, velocities;  ///< dx and dw = A dx + dA x - db, by row
   /// |M y - r| / |r| of the equations solved. Not small: the direction leaves the range of a
   /// problem whose rank is deficient, and the solution jumps (one of four legs is lifted).
   double residual = 0;
 };
 
-/// J v and J' v of the solution x(A, b, mu), w(A, b, mu) by implicit differentiation on the branch
-/// of the present regimes: dx = 0 (open), dw = 0 (sticking), and dw_n = 0, |x_t| = mu x_n and the
-/// law's direction of slip (sliding), in scaled units one sparse matrix
+/// J v and J' v of the solution x, w of a problem by implicit differentiation on the branch of the
+/// present regimes: dx = 0 (open), dw = 0 (sticking), and dw_n = 0, |x_t| = mu x_n and the law's
+/// direction of slip (sliding), in scaled units one sparse matrix
 ///
 ///     M y = r,   M = P + Q A     (method, eq. 30)
 ///
 /// that is factored once, each island by itself: complete orthogonal decomposition up to 100
 /// touching contacts, sparse LU beyond; where that is singular the former up to 400, then sparse
-/// minimum-norm factors (of M' apart, once adjoint() asks). Not for use by two threads at once.
+/// minimum-norm factors (of M' apart, once adjoint() asks). Over cones those of the contacts that
+/// stand for them, and of the free rows by theirs. Not for use by two threads at once.
 class Derivative {
  public:
+  /// Over cones, contacts in it are blocks of the problem (`regimes`: one for each, of free ones
+  /// sticking, of bounded ones sticking or sliding), one with moments may stand in a list several
+  /// times; unknowns and rank count components of the contacts that stand for the cones.
   const DerivativeReport& report() const;
   const linalg::VectorX& impulses() const;  ///< the solution itself
 
   /// Change of impulses and velocities for a change of the data. Throws std::invalid_argument on
-  /// sizes that do not match, blocks outside of the matrix and values that are not finite.
+  /// sizes that do not match, entries outside of the matrix and values that are not finite.
   SolutionDirection forward(const ProblemDirection& direction) const;
-  /// The gradient of impulses.x + velocities.w for given rows `impulses` and `velocities`
-  /// (dimension * contacts entries each; empty: 0) with respect to A, b and mu. A: every block of
-  /// the problem, in the order of Problem::blocks().
+  /// The gradient of impulses.x + velocities.w for given rows (empty: 0).
   ProblemDirection adjoint(const linalg::VectorView& impulses,
                            const linalg::VectorView& velocities = linalg::VectorX()) const;
 
  private:
   friend Derivative derivative(const Problem&, Law, const linalg::VectorView&,
                                const DerivativeOptions&);
-  explicit Derivative(std::shared_ptr<const detail::SolutionDerivative> implementation)
-      : implementation_(std::move(implementation)) {}
-  std::shared_ptr<const detail::SolutionDerivative> implementation_;
+  friend Derivative derivative(const ConeProblem&, const linalg::VectorView&,
+                               const DerivativeOptions&);
+  explicit Derivative(std::shared_ptr<const detail::DerivativeParts> parts)
+      : parts_(std::move(parts)) {}
+  std::shared_ptr<const detail::DerivativeParts> parts_;
 };
 
 /// Factors the equations at `impulses`, a solution of `problem` under `law`. Throws
@@ -113,6 +120,61 @@ Derivative derivative(const Problem& problem, Law law, const linalg::VectorView&
 /// The same at the impulses of a Solution, with its replaced contacts.
 Derivative derivative(const Problem& problem, Law law, const Solution& solution,
                       const DerivativeOptions& options = {});
+/// Over cones under Law::coulomb; options.replaced is not used.
+Derivative derivative(const ConeProblem& problem, const linalg::VectorView& impulses,
+                      const DerivativeOptions& options = {});
+
+/// A direction in which bodies and contacts change, or the gradient of a number with respect to
+/// them. The members of each RigidBody are changes, all of the body's own units: inverse_mass is
+/// d(1/m) = -dm/m^2, inverse_inertia d(I^-1) in world axes (symmetric; of a gradient, too),
+/// velocity and angular_velocity those before the impact. Empty members of a direction: no change.
+/// The rows J stay as they are.
+struct BodyDirection {
+  std::vector<RigidBody> bodies;      ///< one for each body
+  std::vector<Eigen::Vector3d> bias;  ///< of each contact, in its frame
+  linalg::VectorX mu;                 ///< of each contact
+};
+
+struct ImpactDirection {
+  linalg::VectorX impulses;          ///< 3 for each contact, in its frame
+  std::vector<Vector6d> velocities;  ///< of each body after the impact: linear, angular
+  double residual = 0;               ///< as SolutionDirection::residual
+};
+
+/// The derivative of the impulses x of a contact problem of bodies and of the velocities after
+/// them, v + M^-1 J'x, with A = J M^-1 J' and b = -(J v + bias). Velocities may be differentiable
+/// where impulses are not unique: see DerivativeReport. Not for use by two threads at once.
+class BodyDerivative {
+ public:
+  const DerivativeReport& report() const;
+  const linalg::VectorX& impulses() const;  ///< the solution itself, in the frames of the contacts
+
+  /// Throws std::invalid_argument on sizes that do not match and values that are not finite.
+  ImpactDirection forward(const BodyDirection& direction) const;
+  /// The gradient of impulses.x + sum of velocities[k].v_k after the impact for given rows. Empty:
+  /// 0. A fixed body has a gradient, too, as far as contacts with bodies that move go.
+  BodyDirection adjoint(const linalg::VectorView& impulses,
+                        const std::vector<Vector6d>& velocities = {}) const;
+
+ private:
+  friend BodyDerivative derivative(const std::vector<RigidBody>&, const std::vector<ContactRows>&,
+                                   Law, const linalg::VectorView&, const DerivativeOptions&);
+  explicit BodyDerivative(std::shared_ptr<const detail::BodyDerivativeParts> parts)
+      : parts_(std::move(parts)) {}
+  std::shared_ptr<const detail::BodyDerivativeParts> parts_;
+};
+
+/// At `impulses`, 3 for each contact in its frame, a solution of delassus(bodies, contacts) under
+/// `law`: otherwise, and on bad values, throws std::invalid_argument.
+BodyDerivative derivative(const std::vector<RigidBody>& bodies,
+                          const std::vector<ContactRows>& contacts, Law law,
+                          const linalg::VectorView& impulses,
+                          const DerivativeOptions& options = {});
+/// At the impulses of a BodySolver, with its replaced contacts: contacts are to_contacts(points),
+/// so that tangents are those of tangent_frame(normal).
+BodyDerivative derivative(const std::vector<RigidBody>& bodies,
+                          const std::vector<PointContact>& points, Law law,
+                          const BodySolution& solution, const DerivativeOptions& options = {});
 
 }  // namespace tether::contact
 TETHER_EXPORT_END

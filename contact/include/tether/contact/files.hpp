@@ -9,24 +9,20 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// Readers throw std::runtime_error with the file and what is wrong with it: missing, truncated,
-/// oversized, not finite, sizes that do not match. Files hold q = -b and W = A.
+/// Readers go by the first bytes of a file and throw std::runtime_error with its name and what is
+/// wrong with it: missing, truncated, oversized, not finite, sizes that do not match. Files hold
+/// q = -b and W = A.
 ///
 /// Siconos .dat: dense (storage 0), block-sparse (1) and sparse (2, as CSparse prints triplets or
-/// columns; six digits).
-Problem read_dat(const std::string& path);
-/// fclib HDF5 (local problems without joints; triplets, compressed columns, compressed rows).
-/// Throws when the library was built without HDF5.
-Problem read_fclib(const std::string& path);
-/// By the first bytes of the file.
+/// columns; six digits). fclib HDF5, where the library was built with HDF5: triplets, compressed
+/// columns, compressed rows.
+///
+/// Local problems of dimension 2 and 3, without joints.
 Problem read_problem(const std::string& path);
-
 /// The same and more: .dat of dimension 5 (with rolling friction) and global ones (M, H); fclib
 /// files with joints (V, R; G), global ones, and global ones with rolling friction. Rows of joints
 /// come last, as one free cone.
-ConeProblem read_cones_dat(const std::string& path);
-ConeProblem read_cones_fclib(const std::string& path);
-ConeProblem read_cones(const std::string& path);  ///< by the first bytes of the file
+ConeProblem read_cones(const std::string& path);
 
 enum class DatStorage { dense, blocks };
 void write_dat(const Problem& problem, const std::string& path,

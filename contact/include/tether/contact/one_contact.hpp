@@ -70,18 +70,5 @@ struct OneContact {
 /// The same, cold, from A, b and mu.
 OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b, double mu);
 
-/// `maximum_dissipation` by golden section on the visible arc, the method of the paper: stops when
-/// the angle is known to `angle_tolerance` (radian); function values limit it to about 1e-8.
-OneContact solve_one_golden_section(const LocalBlock& block, const Eigen::Vector3d& b,
-                                    double angle_tolerance = 1e-10);
-
-/// Planar contact (x_n, x_t), A = [a c; c t]: closed form of each law.
-struct PlanarContact {
-  linalg::Matrix<2, 1> impulse = linalg::Matrix<2, 1>::Zero();
-  Regime regime = Regime::separating;
-};
-PlanarContact solve_planar(Law law, const linalg::Matrix<2, 2>& A, const linalg::Matrix<2, 1>& b,
-                           double mu);
-
 }  // namespace tether::contact
 TETHER_EXPORT_END

@@ -23,8 +23,6 @@ enum class Measure : std::uint8_t {
 enum class Method : std::uint8_t {
   automatic,         ///< sweeps, proximal paths, interior points, proximal Newton in rounds
   gauss_seidel,      ///< plain sweeps
-  sor,               ///< x <- clip((1 - omega) x + omega sweep)
-  jacobi,            ///< all blocks from the old x, damped
   anderson,          ///< Gauss-Seidel with safeguarded Anderson acceleration
   proximal_newton,   ///< one sweep, then proximal semismooth Newton only
   interior_point,    ///< interior points of the exact cones only
@@ -56,21 +54,12 @@ struct Options {
   /// with eccentricity > 0.98 get the Coulomb rule in a second attempt; Solution::replaced lists
   /// them.
   bool strict = false;
-  double relaxation = 1.0;  ///< omega of sor (0 < omega < 2); further damping of jacobi (0, 1]
-  int max_sweeps = 200000;  ///< of the plain methods and anderson
+  int max_sweeps = 200000;  ///< of gauss_seidel and anderson
   double max_work = 1e10;   ///< automatic: estimated nanoseconds, counted from operations
   /// Once 3/4 of max_work are spent, an error of at most this ends the solve, as work_limit:
   /// a hard problem then does not use all of max_work. 0: off.
   double enough = 0;
-  int anderson_depth = 10;  ///< 1 .. 20
   bool warm_start = false;  ///< start from the impulses of the previous solve, found by contact id
-  bool history = false;     ///< record Solution::history
-};
-
-struct HistoryEntry {
-  Method stage = Method::automatic;
-  int iteration = 0;  ///< sweeps or factorisations so far
-  double error = 0;   ///< best measure so far
 };
 
 struct Counts {
@@ -96,7 +85,6 @@ struct Solution {
   /// Status::infeasible: normal impulses d >= 0 (dimension * contacts entries, the largest 1) with
   /// A d = 0 to round-off and b.d > 0, so that d.w = -b.d < 0 whatever the impulses. Else empty.
   std::vector<double> infeasible_direction;
-  std::vector<HistoryEntry> history;
   Counts counts;
   std::string advice;  ///< what to try when it is not solved
 };

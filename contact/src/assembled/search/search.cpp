@@ -16,7 +16,6 @@ void Search::reset(const Problem& problem, const Options& o, Measure m) {
   system.reset(problem, o.law);
   counts = Counts();
   work_end = o.max_work;
-  history.clear();
   best_error = std::numeric_limits<double>::infinity();
   hidden_ = 0;
   const std::size_t n = at(problem.contacts());
@@ -93,11 +92,6 @@ double Search::test(const PackedVector* x, Method stage) {
   if (error < best_error) {
     best_error = error;
     std::copy(x, x + best.size(), best.begin());
-  }
-  if (options.history) {
-    const bool factorises = stage == Method::proximal_newton || stage == Method::interior_point;
-    const int iteration = factorises ? counts.factorisations : counts.sweeps;
-    history.push_back({stage, iteration, best_error});
   }
   return error;
 }

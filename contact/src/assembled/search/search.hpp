@@ -14,7 +14,6 @@ struct Search {
   Options options;
   Measure measure = Measure::natural_map;
   Counts counts;
-  std::vector<HistoryEntry> history;
   Packed best;
   double best_error = std::numeric_limits<double>::infinity();
   double work_end = 0;                   // of the present attempt

@@ -8,14 +8,13 @@
 
 namespace tether::contact::detail {
 
-void AcceleratedSweeps::reset(int contacts, int depth) {
+void AcceleratedSweeps::reset(int contacts) {
   n_ = contacts;
-  depth_ = depth;
   x_.resize(at(n_));
   g_.resize(at(n_));
   f_.resize(at(n_));
   regime_.assign(at(n_), -1);
-  anderson_.reset(n_, depth);
+  anderson_.reset(n_, kDepth);
   partial_.reset(n_);
   momentum_.reset(n_);
 }
@@ -138,7 +137,7 @@ void AcceleratedSweeps::carry_on(Search& search, double f, bool carried) {
 void AcceleratedSweeps::run(Search& search, const Leave& leave) {
   System& system = search.system;
   const bool carried = leave.partly && n_ > kFew;
-  const double accelerated_cost = 0.8 * 4 * n_ * depth_;
+  const double accelerated_cost = 0.8 * 4 * n_ * kDepth;
   const double begin = search.counts.work;
   // A test costs more than a sweep: it may be late by one.
   constexpr double kForeseen = 1.05;

@@ -10,7 +10,7 @@ namespace tether::contact::detail {
 
 class AcceleratedSweeps {
  public:
-  void reset(int contacts, int depth);
+  void reset(int contacts);
   void start(const PackedVector* x);    // next iterate; forgets the rates of others
   void replace(const PackedVector* x);  // next iterate, near the last one
   const PackedVector* point() const { return g_.data(); }
@@ -28,7 +28,7 @@ class AcceleratedSweeps {
 
  private:
   static constexpr int kToggles = 4, kLeastQuiet = 3, kMostQuiet = 320, kWindow = 60, kRecent = 10,
-                       kPersuaded = 40, kFew = 500, kCarriedQuiet = 120;
+                       kPersuaded = 40, kFew = 500, kCarriedQuiet = 120, kDepth = 10;
   static constexpr double kToggledShare = 0.003;
 
   int toggles(const System& system);
@@ -36,7 +36,7 @@ class AcceleratedSweeps {
   void carry_on(Search& search, double f, bool carried);
   double forecast(int sweep, double f, double log_gain) const;
 
-  int n_ = 0, depth_ = 10;
+  int n_ = 0;
   Anderson anderson_;
   PartialSweeps partial_;
   Momentum momentum_;
