@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rows/row_blocks.hpp"
-#include "rows/sparse_rows.hpp"
+#include "rows/split_rows.hpp"
 
 namespace tether::ida_projection {
 
@@ -130,7 +129,7 @@ void LocalMetric::find_group_scales(LoadedCandidate& at) {
   }
 }
 
-template void LocalMetric::fill(LoadedCandidate&, RowBlocks::Block&, RowBlocks::Block&);
+template void LocalMetric::fill(LoadedCandidate&, DenseRows::Block&, DenseRows::Block&);
 template void LocalMetric::fill(LoadedCandidate&, SparseRows::Block&, SparseRows::Block&);
 
 }  // namespace tether::ida_projection

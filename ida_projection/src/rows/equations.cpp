@@ -6,7 +6,7 @@
 #include <cmath>
 #include <tether/linalg/least_squares.hpp>
 
-#include "rows/row_blocks.hpp"
+#include "rows/split_rows.hpp"
 
 namespace tether::ida_projection {
 

@@ -5,8 +5,7 @@
 
 #include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
-#include "rows/row_blocks.hpp"
-#include "rows/sparse_rows.hpp"
+#include "rows/split_rows.hpp"
 #include "sensitivity/tangent_rows.hpp"
 
 namespace tether::ida_projection {
@@ -164,7 +163,7 @@ std::unique_ptr<TangentRows> make_contiguous_tangent(const Constraints& constrai
                                                      int size) {
   if (wants_sparse_factors(constraints, size))
     return std::make_unique<ContiguousTangent<SparseRows>>(constraints, options, statistics, size);
-  return std::make_unique<ContiguousTangent<RowBlocks>>(constraints, options, statistics, size);
+  return std::make_unique<ContiguousTangent<DenseRows>>(constraints, options, statistics, size);
 }
 
 }  // namespace tether::ida_projection

@@ -7,8 +7,7 @@
 
 #include "attach/shortest.hpp"
 #include "rows/rounding.hpp"
-#include "rows/row_blocks.hpp"
-#include "rows/sparse_rows.hpp"
+#include "rows/split_rows.hpp"
 
 namespace tether::ida_projection {
 
@@ -23,7 +22,7 @@ constexpr double kNear = 1.0, kShrinks = 0.25;
 constexpr double kFollowed = 1e-12;  // tolerances: no last step makes more of it, as above
 constexpr double kAside = 10.0;      // what dropped rows may ask for, beside the others
 
-// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
+// `Rows` keeps C and its factors: DenseRows (dense) or SparseRows.
 template <class Rows>
 class GaussNewtonOn final : public GaussNewton {
  public:
@@ -301,7 +300,7 @@ bool GaussNewtonOn<Rows>::tangent(double t, const std::vector<double>& y, double
 std::unique_ptr<GaussNewton> make_gauss_newton(const Constraints& constraints, int size) {
   if (wants_sparse_factors(constraints, size))
     return std::make_unique<GaussNewtonOn<SparseRows>>(constraints, size);
-  return std::make_unique<GaussNewtonOn<RowBlocks>>(constraints, size);
+  return std::make_unique<GaussNewtonOn<DenseRows>>(constraints, size);
 }
 
 }  // namespace tether::ida_projection

@@ -17,7 +17,7 @@ class GaussNewton {
  public:
   virtual ~GaussNewton() = default;
 
-  /// Moves y (N entries) at time t. WT: error weights, all > 0. `id` as in RowBlocks. Fills the
+  /// Moves y (N entries) at time t. WT: error weights, all > 0. `id` as in DenseRows. Fills the
   /// report's status, message, iterations, drift, rank and rows; y changes only on success.
   virtual void project(double t, std::vector<double>& y, const std::vector<double>& WT,
                        const std::vector<bool>& hold, const double* id,

@@ -324,12 +324,12 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
 }
 
 // Called in contiguous_settle.cpp.
-template void ContiguousMover<RowBlocks>::doubt_levels(Status);
+template void ContiguousMover<DenseRows>::doubt_levels(Status);
 template void ContiguousMover<SparseRows>::doubt_levels(Status);
 
 std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
                                         Statistics& statistics, int size, int reported) {
-  return std::make_unique<ContiguousMover<RowBlocks>>(constraints, options, statistics, size,
+  return std::make_unique<ContiguousMover<DenseRows>>(constraints, options, statistics, size,
                                                       reported);
 }
 

@@ -29,7 +29,7 @@ struct SlopeOfFactors {
   double rate() const { return slope * age; }
 };
 
-/// `Rows` keeps C and its factors: RowBlocks (dense) or SparseRows.
+/// `Rows` keeps C and its factors: DenseRows (dense) or SparseRows.
 template <class Rows>
 class ContiguousMover final : public Mover {
  public:

@@ -118,9 +118,9 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate, double previ
   return Status::not_converged;
 }
 
-template Status ContiguousMover<RowBlocks>::settle(const Candidate&, N_Vector);
+template Status ContiguousMover<DenseRows>::settle(const Candidate&, N_Vector);
 template Status ContiguousMover<SparseRows>::settle(const Candidate&, N_Vector);
-template Status ContiguousMover<RowBlocks>::take_back(const Candidate&, double);
+template Status ContiguousMover<DenseRows>::take_back(const Candidate&, double);
 template Status ContiguousMover<SparseRows>::take_back(const Candidate&, double);
 
 }  // namespace tether::ida_projection

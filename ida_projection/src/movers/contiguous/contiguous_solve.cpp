@@ -35,11 +35,11 @@ bool ContiguousMover<Rows>::solve_at(const Candidate& candidate, double* dy) {
   return known;
 }
 
-template bool ContiguousMover<RowBlocks>::solve_with_factors(const std::vector<double>&,
+template bool ContiguousMover<DenseRows>::solve_with_factors(const std::vector<double>&,
                                                              std::vector<double>&);
 template bool ContiguousMover<SparseRows>::solve_with_factors(const std::vector<double>&,
                                                               std::vector<double>&);
-template bool ContiguousMover<RowBlocks>::solve_at(const Candidate&, double*);
+template bool ContiguousMover<DenseRows>::solve_at(const Candidate&, double*);
 template bool ContiguousMover<SparseRows>::solve_at(const Candidate&, double*);
 
 }  // namespace tether::ida_projection

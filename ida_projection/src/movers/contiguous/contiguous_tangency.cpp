@@ -39,7 +39,7 @@ bool ContiguousMover<Rows>::tangency(const std::vector<double>& yp, const double
   return true;
 }
 
-template bool ContiguousMover<RowBlocks>::tangency(const std::vector<double>&, const double*,
+template bool ContiguousMover<DenseRows>::tangency(const std::vector<double>&, const double*,
                                                    Tangency&);
 template bool ContiguousMover<SparseRows>::tangency(const std::vector<double>&, const double*,
                                                     Tangency&);

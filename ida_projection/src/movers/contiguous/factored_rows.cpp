@@ -155,8 +155,6 @@ Status FactoredRows<Rows>::factor(double t) {
   const bool known =
       in_use(Mechanism::kept_rank) && Rows::kKeepsRank && factors.lasting && factors.there;
   factors.there = false;
-  weighed_ = false;
-  most_d_ = -1.0;
   if (known && blocks.factor_kept()) {
     factors.thin = false;
     ++(Rows::many(count()) ? statistics_.refactorizations : statistics_.factorizations);
@@ -185,8 +183,7 @@ Status FactoredRows<Rows>::quick_solve(double t, bool& solved, double& length) {
     const int columns = static_cast<int>(d.columns.size());
     metric.fill_few(at, d.first, columns, d.D());
     if (!blocks.factor_kept_few()) return Status::success;
-    rows_known_ = weighed_ = factors.thin = factors.foreign = false;
-    most_d_ = -1.0;
+    rows_known_ = factors.thin = factors.foreign = false;
     ++statistics_.factorizations;
     ++statistics_.iterations;
     d.solver.solve(g_.data(), d.dy.data());
@@ -262,10 +259,7 @@ Status FactoredRows<Rows>::learn_trust(double t, double length) {
 
 template <class Rows>
 bool FactoredRows<Rows>::contradicts() {
-  if (!blocks.dropped_rows()) return false;
-  if (weighed_ ? blocks.left_of_dropped() <= kContradiction : left_below(kContradiction))
-    return false;
-  if (!blocks.contradict(at.WT())) return false;
+  if (!blocks.dropped_rows() || !blocks.contradict(at.WT())) return false;
   message_ = blocks.contradiction.message;
   return true;
 }
@@ -323,7 +317,7 @@ double FactoredRows<Rows>::rounding_length() {
   return total;
 }
 
-template class FactoredRows<RowBlocks>;
+template class FactoredRows<DenseRows>;
 template class FactoredRows<SparseRows>;
 
 }  // namespace tether::ida_projection

@@ -10,8 +10,7 @@
 #include "movers/loaded_candidate.hpp"
 #include "movers/local_metric.hpp"
 #include "rows/rounding.hpp"
-#include "rows/row_blocks.hpp"
-#include "rows/sparse_rows.hpp"
+#include "rows/split_rows.hpp"
 
 namespace tether::ida_projection {
 
@@ -29,7 +28,7 @@ struct FactorState {
 };
 
 /// A candidate and the rows there: evaluates them, factors C in the metric and solves. It decides
-/// nothing about the sequence of moves. `Rows` keeps C and its factors: RowBlocks or SparseRows.
+/// nothing about the sequence of moves. `Rows` keeps C and its factors: DenseRows or SparseRows.
 template <class Rows>
 class FactoredRows {
  public:
@@ -168,7 +167,6 @@ class FactoredRows {
   void look_for_rates();
   bool first_are_rates_of_zeroth(const std::vector<int>& levels);
   double left_of_dropped();
-  bool left_below(double limit);
 
   const Options& options_;
   Statistics& statistics_;
@@ -182,9 +180,7 @@ class FactoredRows {
   bool levels_known_ = false;            // they are those of the rows as they are arranged
   std::vector<int> levels_with_forces_;  // empty: no forces are known
   int level_of_forces_ = 0;
-  double usual_ = 0.0;    // left_of_dropped() after the moves, with factors.decided
-  bool weighed_ = false;  // the blocks know what a tolerance is for their dropped rows
-  double most_d_ = -1.0, most_a_ = -1.0;  // of D in tolerances, of the blocks; < 0: not known
+  double usual_ = 0.0;  // left_of_dropped() after the moves, with factors.decided
 };
 
 template <class Rows>
@@ -206,30 +202,14 @@ double FactoredRows<Rows>::length_of_solution() {
 template <class Rows>
 double FactoredRows<Rows>::left_of_dropped() {
   if (!blocks.dropped_rows()) return 0.0;
-  if (!weighed_) blocks.weigh_dropped(at.WT());
-  weighed_ = true;
-  const double left = blocks.left_of_dropped();
+  const double left = blocks.left_of_dropped(at.WT());
   if (factors.decided) usual_ = left;
   return left;
-}
-
-// Is left_of_dropped() plainly below the limit? What a tolerance is for each row costs half a
-// solve.
-template <class Rows>
-bool FactoredRows<Rows>::left_below(double limit) {
-  if (weighed_ || !blocks.dropped_rows()) return false;
-  if (most_d_ < 0.0) {
-    most_d_ = most_of_metric(blocks.d, at.WT());
-    most_a_ = most_of_metric(blocks.a, at.WT());
-  }
-  return std::max(most_left_of_dropped(blocks.d, unknowns(), most_d_),
-                  most_left_of_dropped(blocks.a, unknowns(), most_a_)) <= limit;
 }
 
 template <class Rows>
 bool FactoredRows<Rows>::dropped_follow() {
   const double allowed = std::max(kSafe * options_.tolerance, 2.0 * usual_);
-  if (!factors.decided && left_below(allowed)) return true;
   const double left = left_of_dropped();
   if (factors.decided || left <= allowed) return true;
   return left <= 1e2 * kEpsilon * at.size();

@@ -1,0 +1,173 @@
+// Tether: the rows of C split into those for differential and for algebraic variables.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <tether/linalg/minimum_norm.hpp>
+#include <tether/linalg/sparse_minimum_norm.hpp>
+#include <type_traits>
+#include <vector>
+
+#include "rows/block.hpp"
+#include "rows/kinds_of_unknowns.hpp"
+#include "rows/row_trust.hpp"
+#include "rows/stored_rows.hpp"
+
+namespace tether::ida_projection {
+
+/// When to look again which entries of C differences have to visit, that is, which ones g can fill
+/// by now: at the C evaluations number 16, 32, 64, ..., and with the next one after a failure.
+class LookAgain {
+ public:
+  bool due() {
+    if (++evaluations_ < next_) return false;
+    next_ = std::max(kFirst, 2 * evaluations_);
+    return true;
+  }
+  void soon() { next_ = 0; }
+
+ private:
+  static constexpr long kFirst = 16;
+  long evaluations_ = 0, next_ = kFirst;
+};
+
+/// y moved by some tolerances in no special direction: a velocity that happens to be zero at y is
+/// not zero there. WT = 0: unweighted.
+std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT);
+
+/// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
+/// differential columns ("d"); then rows that contain algebraic variables ("B") are solved for
+/// these columns ("a") alone, so that no position or velocity is bent to repair a multiplier.
+/// If no variable is algebraic, B is empty and this is one minimum-norm solve. `Solver`:
+/// linalg::MinimumNorm for full rows, linalg::SparseMinimumNorm for sparse ones and full ones after
+/// them.
+template <class Solver>
+class SplitRows {
+ public:
+  using Block = BlockOf<Solver>;
+  static constexpr bool kDense = std::is_same_v<Solver, linalg::MinimumNorm>;
+  /// Sparse C and its factors cost four solves and more: they serve several steps. Of few rows
+  /// nothing would be gained that makes up for a metric of an earlier step. Dense factors of the
+  /// rows that an earlier step has kept are so cheap that none serve two steps.
+  static bool keeps_factors(int rows) { return !kDense && rows > 64; }
+  /// Dense factors of rows that are known to be independent cost half of an orthogonal
+  /// factorisation, and a tenth where rows are many. Then what Newton's method leaves is cheap to
+  /// take, too.
+  static constexpr bool kKeepsRank = kDense;
+  static bool many(int rows) { return kDense && rows > 16; }
+  /// Dense pivots tell which rows need RowTrust.
+  static constexpr bool kThinRows = kDense;
+
+  SplitRows(const Constraints& constraints, const Evaluator& evaluator, int n);
+
+  Block d, a;
+
+  /// Finds A, B, d and a from the entries that C can fill: those not zero at y or at a point some
+  /// tolerances away, so that a velocity that happens to be zero is not taken for a structural
+  /// zero. `id`: 1 differential, 0 algebraic, null: none algebraic.
+  Status structure(Evaluator& evaluator, double t, const std::vector<double>& y,
+                   const std::vector<double>& WT, const std::vector<bool>& hold, const double* id);
+  bool structured() const { return structured_; }
+  /// After structure(): which entries of these rows of C can differ from zero.
+  RowPattern pattern(const std::vector<int>& of_rows) const { return C_.pattern(of_rows); }
+  /// If none is algebraic, unknowns of level `first` and above (row_levels.hpp) take the place
+  /// of algebraic ones. False: nothing has changed, they are not as many as their rows.
+  bool split_by_level(const std::vector<int>& levels, int first);
+  /// Back to one block.
+  void join_levels();
+  bool split_levels() const { return kinds_.by_level(); }
+  /// Do rows contain variables of both kinds?
+  bool mixed() const { return !kinds_.mixed.empty(); }
+
+  /// C at y; WT: only differences and mixed rows need it. The text of a failure is the evaluator's.
+  /// g: null, or receives the values, too.
+  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
+                  double* g = nullptr);
+  /// Has evaluate() met an entry that structure() took for zero and that belongs to another block
+  /// or to none? Then rearrange(), fill D and evaluate again.
+  bool outgrown() const { return outgrown_; }
+  void rearrange();
+  /// A move failed: perhaps for want of entries that g could not fill before.
+  void look_again_soon() { look_.soon(); }
+  /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
+  bool factor();
+  /// The same with the rows that the last factor() has kept. False: factor() is due.
+  bool factor_kept();
+  /// d.dy and a.dy for the values g, with the C that was factored.
+  void solve(const std::vector<double>& g) { solve_to(g, kSolved); }
+  /// Of sparse rows one step with the regularised factors, where the next solve takes the rest.
+  void solve_roughly(const std::vector<double>& g) { solve_to(g, 1.0); }
+  /// The same as closely as they can be solved.
+  void solve_closely(const std::vector<double>& g) {
+    solve_to(g, linalg::SparseMinimumNorm::kTolerance);
+  }
+  int rank() const { return d.solver.rank() + a.solver.rank(); }
+  /// Are these few rows over adjacent columns, none of them for algebraic variables?
+  bool few() const { return few_; }
+  /// factor_kept() of them.
+  bool factor_kept_few() {
+    if constexpr (kDense)
+      return d.solver.factor_kept(C_.values().data(), n_, d.rows.data(), d.columns.data());
+    return false;
+  }
+  /// The rows whose move is measured in tolerances.
+  Block& counted() { return d.rows.empty() ? a : d; }
+  /// After a move of this length with the C at hand: C at y, where it is time to learn from it.
+  Status learn_trust(Evaluator& evaluator, double t, const double* y, const double* WT,
+                     double length);
+  RowTrust trust;
+  bool dropped_rows() const { return d.solver.dropped() > 0 || a.solver.dropped() > 0; }
+
+  /// sum_j |C_ij y_j| and sum_j C_ij y_j.
+  double terms(int i, const double* y) const;
+  double times(int i, const double* y) const;
+  /// f(column, entry) for the entries of row i.
+  template <class Visit>
+  void visit_row(int i, Visit f) const {
+    C_.visit(i, f);
+  }
+
+  /// After solve(): what dropped rows ask for beyond the kept ones, in tolerances.
+  double left_of_dropped(const std::vector<double>& WT) const;
+  /// The same where that is too much: names the rows.
+  bool contradict(const std::vector<double>& WT);
+
+  Contradiction contradiction;
+  std::string message;
+
+ private:
+  static constexpr double kSolved = 1e-6;  // of g: Newton's next move takes the rest
+
+  Status find_seen(Evaluator& evaluator, double t, const std::vector<double>& y,
+                   const std::vector<double>& WT);
+  void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
+  void split();
+  void watch();
+  void set_up(Block& block, std::vector<int>* gather);
+  bool factor(Block& block, const std::vector<int>& gather);
+  void solve_block(Block& block, double solved);
+  void solve_to(const std::vector<double>& g, double solved);
+  LeftOfDropped most_left(const Block& block, const std::vector<double>& WT) const;
+
+  const Constraints& constraints_;
+  int m_, n_;
+  double rank_tolerance_;
+  StoredRows C_;
+  std::vector<double> C_after_;           // work space of learn_trust()
+  std::vector<int> columns_;              // every column that C can fill and that is free
+  std::vector<int> gather_d_, gather_a_;  // entry of C of each sparse entry of a block
+  std::vector<double> moved_;             // d.dy at its columns, 0 elsewhere; where B exists
+  KindsOfUnknowns kinds_;
+  std::vector<std::size_t> watched_;  // entries that would change the blocks, zero so far
+  LookAgain look_;
+  bool outgrown_ = false;
+  bool structured_ = false;
+  bool few_ = false;
+};
+
+using DenseRows = SplitRows<linalg::MinimumNorm>;
+using SparseRows = SplitRows<linalg::SparseMinimumNorm>;
+extern template class SplitRows<linalg::MinimumNorm>;
+extern template class SplitRows<linalg::SparseMinimumNorm>;
+
+}  // namespace tether::ida_projection
