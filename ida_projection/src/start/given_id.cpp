@@ -1,8 +1,9 @@
 // Tether: does the caller's id vector agree with F? SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 
 #include "start/algebraic.hpp"
+#include "start/nearby_residuals.hpp"
 
 namespace tether::ida_projection {
 
@@ -42,46 +43,26 @@ const std::string& AlgebraicVariables::doubts(const Candidate& candidate, Correc
   return text;
 }
 
-// Those called algebraic whose y' F notices. All of them are changed at once first, in two sizes
-// that vary irregularly, as in derive(), so that those of one equation do not cancel.
+// Those called algebraic whose y' F notices; all of them are changed at once first.
 std::vector<int> AlgebraicVariables::with_derivative(const Candidate& candidate,
                                                      Corrector& corrector, double cj) const {
   if (mask() == nullptr) return {};
   const auto size = static_cast<std::size_t>(N_VGetLength(candidate.base));
-  OwnedVector ycor(candidate.base), before(candidate.base), after(candidate.base),
-      saved(candidate.base);
-  N_VScale(1.0, candidate.base, saved);
-  N_VConst(0.0, ycor);
-  const double* original = N_VGetArrayPointer(saved);
-  double* e = N_VGetArrayPointer(ycor);
-  bool noticed = false;
+  std::vector<int> algebraic;
+  for (std::size_t j = 0; j < size; ++j)
+    if (mask()[j] == 0.0) algebraic.push_back(static_cast<int>(j));
+  std::vector<char> noticed(size, 0);
   for (const double sign : {1.0, -0.37}) {
-    std::vector<double> low(size);
-    for (std::size_t j = 0; j < size; ++j) {
-      const double w = candidate.weight_entries[j];
-      const double change = sign * (1.5 + 0.5 * std::sin(1.0 + 2.3 * static_cast<double>(j))) *
-                            std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(cj));
-      e[j] = mask()[j] == 0.0 ? change : 0.0;
-      low[j] = original[j] - e[j];
-      candidate.base_entries[j] = low[j] + e[j];  // the argument of F in both evaluations
-    }
-    OwnedVector none(candidate.base);
-    N_VConst(0.0, none);
-    bool known = corrector.residual(none, before) == 0;
-    std::copy(low.begin(), low.end(), candidate.base_entries);
-    known = corrector.residual(ycor, after) == 0 && known;
-    statistics_.residual_evaluations += 2;
-    N_VScale(1.0, saved, candidate.base);
-    const double *a = N_VGetArrayPointer(before), *b = N_VGetArrayPointer(after);
-    for (std::size_t i = 0; known && i < size; ++i) noticed |= !(a[i] == b[i]);
+    NearbyResiduals near(candidate, corrector, statistics_,
+                         NearbyResiduals::irregular_changes(candidate, cj, sign));
+    near.notices(algebraic, NearbyResiduals::Of::rates, noticed);
   }
-  if (!noticed) return {};
+  if (std::count(noticed.begin(), noticed.end(), 1) == 0) return {};
   AlgebraicVariables derived(options_, statistics_);
   std::vector<int> moving;
-  const bool found = derived.derive(candidate, corrector, cj).empty();
-  for (std::size_t j = 0; found && j < size; ++j)
-    if (mask()[j] == 0.0 && (derived.mask() == nullptr || derived.mask()[j] != 0.0))
-      moving.push_back(static_cast<int>(j));
+  if (!derived.derive(candidate, corrector, cj).empty()) return moving;
+  std::copy_if(algebraic.begin(), algebraic.end(), std::back_inserter(moving),
+               [&](int j) { return derived.mask() == nullptr || derived.mask()[j] != 0.0; });
   return moving;
 }
 

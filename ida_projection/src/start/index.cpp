@@ -1,9 +1,11 @@
 // Tether: whether F is of index 1 in its own variables. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "start/algebraic.hpp"
 #include "start/differential_index.hpp"
+#include "start/nearby_residuals.hpp"
 #include "start/undetermined_columns.hpp"
 
 namespace tether::ida_projection {
@@ -23,39 +25,21 @@ constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight to
 bool AlgebraicVariables::has_rows_of_zeros(const Candidate& candidate, Corrector& corrector,
                                            double cj) {
   if (!any_ || all_) return false;
-  std::vector<char> zero = derivative_free_equations(candidate, corrector, cj);
-  const std::size_t n = zero.size();
-  OwnedVector none(candidate.base), base(candidate.base), other(candidate.base),
-      saved(candidate.base);
-  N_VScale(1.0, candidate.base, saved);
-  N_VConst(0.0, none);
-  const double* original = N_VGetArrayPointer(saved);
-  const auto residual = [&](N_Vector into) {
-    ++statistics_.residual_evaluations;
-    return corrector.residual(none, into) == 0;
-  };
-  bool known = residual(base), answered = false;
-  for (const double size : {1.0, -1e3}) {
-    for (std::size_t j = 0; j < n; ++j) {
-      if (mask()[j] != 0.0) continue;
-      const double w = candidate.weight_entries[j];
-      const double irregular = 1.5 + 0.5 * std::sin(1.0 + 2.3 * static_cast<double>(j));
-      candidate.base_entries[j] =
-          original[j] +
-          size * irregular * std::max(w > 0.0 ? 1.0 / w : 1.0, kIncrement * std::abs(original[j]));
-    }
-    const bool evaluated = residual(other);
-    N_VScale(1.0, saved, candidate.base);
-    if (!evaluated) continue;  // F refuses these y; the other size decides
-    answered = true;
-    for (std::size_t i = 0; i < n; ++i)
-      zero[i] = zero[i] && N_VGetArrayPointer(base)[i] == N_VGetArrayPointer(other)[i];
+  const std::vector<char> free = derivative_free_equations(candidate, corrector, cj);
+  std::vector<int> algebraic;
+  for (std::size_t j = 0; j < free.size(); ++j)
+    if (mask()[j] == 0.0) algebraic.push_back(static_cast<int>(j));
+  std::vector<char> noticed(free.size(), 0);
+  bool answered = false;
+  for (const double size : {1.0, -1e3}) {  // F may refuse one of them
+    NearbyResiduals near(candidate, corrector, statistics_,
+                         NearbyResiduals::irregular_changes(candidate, cj, size));
+    answered = near.notices(algebraic, NearbyResiduals::Of::values, noticed) || answered;
   }
-  const auto zeros = std::count(zero.begin(), zero.end(), 1);
-  if (!known || !answered || zeros == 0) return false;
-  for (std::size_t j = 0; j < n; ++j)
-    if (mask()[j] == 0.0) found_.undetermined.push_back(static_cast<int>(j));
-  if (static_cast<std::size_t>(zeros) != found_.undetermined.size()) found_.undetermined.clear();
+  std::size_t zeros = 0;
+  for (std::size_t i = 0; i < free.size(); ++i) zeros += free[i] != 0 && noticed[i] == 0;
+  if (!answered || zeros == 0) return false;
+  if (zeros == algebraic.size()) found_.undetermined = algebraic;
   return true;
 }
 
@@ -94,79 +78,52 @@ void AlgebraicVariables::find_outputs(const Eigen::MatrixXd& slopes) {
 int AlgebraicVariables::index_above_one(const Candidate& candidate, Corrector& corrector, double cj,
                                         Eigen::MatrixXd slopes) {
   const Eigen::Index n = slopes.rows();
-  OwnedVector none(candidate.base), before(candidate.base), after(candidate.base);
-  N_VConst(0.0, none);
-  const auto residual = [&](N_Vector into) {
-    ++statistics_.residual_evaluations;
-    return corrector.residual(none, into) == 0;
-  };
-  const Eigen::Map<const Eigen::VectorXd> low(N_VGetArrayPointer(before), n),
-      high(N_VGetArrayPointer(after), n);
+  std::vector<double> unit(static_cast<std::size_t>(n)), change(unit);
+  for (std::size_t j = 0; j < unit.size(); ++j) {
+    unit[j] = std::max(1.0, std::abs(candidate.base_entries[j]));
+    change[j] = kIncrement * unit[j];
+  }
+  NearbyResiduals near(candidate, corrector, statistics_, std::move(change));
   Eigen::MatrixXd E = Eigen::MatrixXd::Zero(n, n);
-  bool known = residual(before);
-  for (Eigen::Index j = 0; j < n && known; ++j) {
-    double& y = candidate.base_entries[j];
-    const double present = y, unit = std::max(1.0, std::abs(present)), change = kIncrement * unit;
+  for (Eigen::Index j = 0; j < n; ++j) {
     if (mask()[j] != 0.0) {
       E.col(j) = slopes.col(j) / cj;
-      y = present + change;
-      known = residual(after);
-      y = present;
-      slopes.col(j) = (high - low) / change;
+      if (!near.slope(static_cast<int>(j), NearbyResiduals::Of::values, slopes.col(j))) return 0;
     }
-    E.col(j) *= unit;
-    slopes.col(j) *= unit;
+    E.col(j) *= unit[static_cast<std::size_t>(j)];
+    slopes.col(j) *= unit[static_cast<std::size_t>(j)];
   }
-  return known ? differential_index(std::move(E), std::move(slopes)) : 0;
+  return differential_index(std::move(E), std::move(slopes));
 }
 
 // F determines y'_d and y_a, its index is 1 at most, where the matrix of F_y'_j (j differential)
 // and F_y_j (j algebraic) is regular. It is singular for multipliers of position or velocity rows
-// (index 2 and 3), and where combinations of differential variables are algebraic. The columns are
-// differences of IDA's own residual callback, F(t, ypred + ycor, yppred + cj ycor), with ypred
-// shifted by -ycor (and put back bit for bit) where only y' is to feel ycor. Algebraic variables
-// that the matrix leaves free carry rounding divided by the step: they are undetermined.
+// (index 2 and 3), and where combinations of differential variables are algebraic. Algebraic
+// variables that the matrix leaves free carry rounding divided by the step: they are undetermined.
 bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corrector, double cj,
                                      long usual) {
   if (candidate.base_entries == nullptr) return false;
   const int size = static_cast<int>(N_VGetLength(candidate.base));
   if (size > (usual >= size ? kLargestDense : kLargestSize))
     return has_rows_of_zeros(candidate, corrector, cj);
-  OwnedVector ycor(candidate.base), base(candidate.base), shifted(candidate.base),
-      saved(candidate.base);
-  N_VConst(0.0, ycor);
-  N_VScale(1.0, candidate.base, saved);
-  double* e = N_VGetArrayPointer(ycor);
-  double* predicted = N_VGetArrayPointer(candidate.base);
-  const double* original = N_VGetArrayPointer(saved);
-  const double* w = N_VGetArrayPointer(candidate.weights);
-  const double* before = N_VGetArrayPointer(base);
-  const double* after = N_VGetArrayPointer(shifted);
   const double* id = mask();
-  const auto residual = [&](N_Vector into) {
-    ++statistics_.residual_evaluations;
-    return corrector.residual(ycor, into) == 0;
-  };
-
-  bool known = true;
+  const auto differential = [id](int j) { return id == nullptr || id[j] != 0.0; };
+  std::vector<double> change(static_cast<std::size_t>(size));
+  for (int j = 0; j < size; ++j) {
+    const double w = candidate.weight_entries[j];
+    change[static_cast<std::size_t>(j)] = std::max(
+        w > 0.0 ? 1.0 / w : 1.0,
+        differential(j) ? 1e-3 / std::abs(cj) : kIncrement * std::abs(candidate.base_entries[j]));
+  }
+  NearbyResiduals near(candidate, corrector, statistics_, std::move(change));
+  bool known = near.known();
   Eigen::MatrixXd slopes(size, size);
   for (int j = 0; j < size && known; ++j) {
-    const bool differential = id == nullptr || id[j] != 0.0;
-    const double tolerance = w[j] > 0.0 ? 1.0 / w[j] : 1.0;
-    const double change = std::max(
-        tolerance, differential ? 1e-3 / std::abs(cj) : kIncrement * std::abs(original[j]));
-    const double low = differential ? original[j] - change : original[j];
-    predicted[j] = differential ? low + change : low;  // F sees this y_j twice, bit for bit
-    known = residual(base);
-    predicted[j] = low;
-    e[j] = change;
-    known = residual(shifted) && known;
-    e[j] = 0.0;
-    predicted[j] = original[j];
-    for (int i = 0; i < size; ++i) slopes(i, j) = (after[i] - before[i]) / change;
-    if (differential && known && slopes.col(j).isZero(0.0)) found_.without_derivative.push_back(j);
+    using Of = NearbyResiduals::Of;
+    known = near.slope(j, differential(j) ? Of::rates : Of::values, slopes.col(j));
+    if (known && differential(j) && slopes.col(j).isZero(0.0))
+      found_.without_derivative.push_back(j);
   }
-  N_VScale(1.0, saved, candidate.base);
   found_.known = known;  // else the next run asks again
   if (known && id != nullptr) find_outputs(slopes);
   const std::vector<char> left = known ? undetermined_columns(slopes, true) : std::vector<char>();

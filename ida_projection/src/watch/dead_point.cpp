@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 #include <vector>
 
 #include "constraints/evaluator.hpp"
+#include "start/nearby_residuals.hpp"
 #include "start/undetermined_columns.hpp"
 
 namespace tether::ida_projection {
@@ -34,32 +36,18 @@ std::vector<std::string> free_variables(const Candidate& candidate, N_Vector at,
   for (std::size_t j = 0; j < size; ++j)
     if (variables.mask()[j] == 0.0) algebraic.push_back(j);
   if (algebraic.size() > kMostVariables) return {};
-  OwnedVector none(candidate.base), before(candidate.base), after(candidate.base),
-      saved(candidate.base);
-  N_VConst(0.0, none);
-  N_VScale(1.0, candidate.base, saved);
-  N_VScale(1.0, at, candidate.base);
-  double* y = candidate.base_entries;
-  const auto residual = [&](N_Vector into) {
-    ++statistics.residual_evaluations;
-    return corrector.residual(none, into) == 0;
-  };
-  bool known = residual(before);
-  const double *low = N_VGetArrayPointer(before), *high = N_VGetArrayPointer(after);
-  Eigen::MatrixXd slopes(size, algebraic.size());
-  for (std::size_t k = 0; k < algebraic.size() && known; ++k) {
-    const std::size_t j = algebraic[k];
-    const double w = candidate.weight_entries[j], present = y[j];
-    const double change =
-        std::max(w > 0.0 ? 1.0 / w : 0.0, kChange * std::max(1.0, std::abs(present)));
-    y[j] += change;
-    known = residual(after);
-    y[j] = present;
-    for (std::size_t i = 0; i < size; ++i)
-      slopes(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-          (high[i] - low[i]) / change;
+  std::vector<double> change(size);
+  for (std::size_t j = 0; j < size; ++j) {
+    const double w = candidate.weight_entries[j];
+    change[j] = std::max(w > 0.0 ? 1.0 / w : 0.0,
+                         kChange * std::max(1.0, std::abs(N_VGetArrayPointer(at)[j])));
   }
-  N_VScale(1.0, saved, candidate.base);
+  NearbyResiduals near(candidate, corrector, statistics, std::move(change), at);
+  bool known = near.known();
+  Eigen::MatrixXd slopes(size, algebraic.size());
+  for (std::size_t k = 0; k < algebraic.size() && known; ++k)
+    known = near.slope(static_cast<int>(algebraic[k]), NearbyResiduals::Of::values,
+                       slopes.col(static_cast<Eigen::Index>(k)));
   std::vector<std::string> names;
   if (!known) return names;
   const std::vector<char> free = undetermined_columns(std::move(slopes), false);

@@ -84,9 +84,13 @@ void GradientStore::sum_terms(N_Vector y) {
 }
 
 Status GradientStore::factor(const VectorMetric& metric, N_Vector terms_at) {
-  ++statistics_.factorizations;
   if (terms_at != nullptr) sum_terms(terms_at);
-  const int bad = rows_.factor(metric.D(), metric.WT());
+  return factor(metric.D(), metric.WT());
+}
+
+Status GradientStore::factor(N_Vector D, N_Vector WT) {
+  ++statistics_.factorizations;
+  const int bad = rows_.factor(D, WT);
   if (bad >= 0) {
     report.text = "the gradient of " + constraints_.name(bad) + " is not finite";
     return Status::not_finite;

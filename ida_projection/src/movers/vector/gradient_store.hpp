@@ -24,6 +24,10 @@ class GradientStore {
   Status value(double t, N_Vector y);
   Status fill(double t, N_Vector y);
   Status factor(const VectorMetric& metric, N_Vector terms_at);
+  /// In the metric D, for tolerances WT.
+  Status factor(N_Vector D, N_Vector WT);
+  /// Until the next factor() only rows that are independent by so much take part.
+  void keep_firm(double least) { rows_.keep_firm(least); }
   void solve(N_Vector D, N_Vector dy) { rows_.solve(g_, D, dy); }
   /// For other values than g.
   void solve(const std::vector<double>& wanted, N_Vector D, N_Vector dy) {
@@ -31,6 +35,7 @@ class GradientStore {
   }
   double left() const { return 0.0; }
   double drift() const;
+  int rows() const { return rows_.rows(); }
   const std::vector<double>& g() const { return g_; }
   /// After fill(), changed by factor().
   std::vector<N_Vector>& gradients() { return rows_.gradients(); }

@@ -1,0 +1,110 @@
+// Tether: what F notices near a candidate. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <tether/ida_projection/statistics.hpp>
+#include <vector>
+
+#include "host/corrector.hpp"
+#include "host/owned_vector.hpp"
+
+namespace tether::ida_projection {
+
+/// F near a point, with y or y' of some components changed, through IDA's own callback, which
+/// evaluates F(t, ypred + ycor, yppred + cj ycor). ypred is replaced for each evaluation and put
+/// back: where only y' is to change, by ycor, y is the same to the last bit. Contiguous vectors.
+class NearbyResiduals {
+ public:
+  enum class Of { values, rates };
+
+  /// y_j changes by change[j], y'_j by cj change[j]; `around`: y, `change` rounding aside. One
+  /// evaluation of F here, and one in each call.
+  NearbyResiduals(const Candidate& candidate, Corrector& corrector, Statistics& statistics,
+                  std::vector<double> change, N_Vector around)
+      : candidate_(candidate),
+        corrector_(corrector),
+        statistics_(statistics),
+        change_(std::move(change)),
+        low_(change_.size()),
+        before_(change_.size()),
+        saved_(candidate.base),
+        ycor_(candidate.base),
+        f_(candidate.base) {
+    const double* y = N_VGetArrayPointer(around);
+    for (std::size_t j = 0; j < low_.size(); ++j) low_[j] = y[j] - change_[j];
+    N_VConst(0.0, ycor_);
+    known_ = evaluate({}, Of::values);
+    const double* f = N_VGetArrayPointer(f_);
+    before_.assign(f, f + before_.size());
+  }
+  NearbyResiduals(const Candidate& candidate, Corrector& corrector, Statistics& statistics,
+                  std::vector<double> change)
+      : NearbyResiduals(candidate, corrector, statistics, std::move(change), candidate.base) {}
+
+  /// Could F be evaluated at the point itself?
+  bool known() const { return known_; }
+  /// Sets noticed[i] to 1 where F_i differs, bit for bit, once all of these components are changed.
+  /// False: F cannot be evaluated there.
+  bool notices(const std::vector<int>& components, Of what, std::vector<char>& noticed) {
+    if (!known_ || !evaluate(components, what)) return false;
+    const double* f = N_VGetArrayPointer(f_);
+    for (std::size_t i = 0; i < before_.size(); ++i) noticed[i] |= !(f[i] == before_[i]);
+    return true;
+  }
+  /// The change of F by that of one component, over change[j].
+  bool slope(int component, Of what, Eigen::Ref<Eigen::VectorXd> slope) {
+    if (!known_ || !evaluate({component}, what)) return false;
+    const auto n = static_cast<Eigen::Index>(before_.size());
+    slope = (Eigen::Map<const Eigen::VectorXd>(N_VGetArrayPointer(f_), n) -
+             Eigen::Map<const Eigen::VectorXd>(before_.data(), n)) /
+            change_[static_cast<std::size_t>(component)];
+    return true;
+  }
+
+  /// Changes of `size` tolerances, as far as y' must feel them, that vary irregularly with j: those
+  /// of one equation do not cancel.
+  static std::vector<double> irregular_changes(const Candidate& candidate, double cj, double size,
+                                               double turn = 2.3);
+
+ private:
+  bool evaluate(const std::vector<int>& components, Of what) {
+    double* const base = candidate_.base_entries;
+    N_VScale(1.0, candidate_.base, saved_);
+    for (std::size_t j = 0; j < low_.size(); ++j) base[j] = low_[j] + change_[j];
+    for (const int i : components) {
+      const auto j = static_cast<std::size_t>(i);
+      if (what == Of::values) {
+        base[j] += change_[j];
+      } else {
+        N_VGetArrayPointer(ycor_)[j] = change_[j];
+        base[j] = low_[j];
+      }
+    }
+    ++statistics_.residual_evaluations;
+    const bool evaluated = corrector_.residual(ycor_, f_) == 0;
+    for (const int j : components) N_VGetArrayPointer(ycor_)[j] = 0.0;
+    N_VScale(1.0, saved_, candidate_.base);
+    return evaluated;
+  }
+
+  const Candidate& candidate_;
+  Corrector& corrector_;
+  Statistics& statistics_;
+  std::vector<double> change_, low_, before_;
+  OwnedVector saved_, ycor_, f_;
+  bool known_ = false;
+};
+
+inline std::vector<double> NearbyResiduals::irregular_changes(const Candidate& candidate, double cj,
+                                                              double size, double turn) {
+  std::vector<double> change(static_cast<std::size_t>(N_VGetLength(candidate.base)));
+  for (std::size_t j = 0; j < change.size(); ++j) {
+    const double w = candidate.weight_entries[j];
+    const double irregular = 1.5 + 0.5 * std::sin(1.0 + turn * static_cast<double>(j));
+    change[j] = size * irregular * std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(cj));
+  }
+  return change;
+}
+
+}  // namespace tether::ida_projection
