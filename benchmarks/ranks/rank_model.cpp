@@ -54,32 +54,41 @@ struct Model {
   std::vector<int> swept;               // contacts of each rank
 };
 
-void lattice(const std::array<int, 3>& ranks, int side, std::vector<RankContact>& contacts,
-             std::vector<int>& owner) {
+struct Lattice {
+  std::vector<int> first, second, owner;
+  std::vector<detail::Kind> kinds;
+  void add(int one, int other) {
+    first.push_back(one);
+    second.push_back(other);
+    kinds.push_back(detail::Kind::sphere);
+  }
+};
+
+Lattice lattice(const std::array<int, 3>& ranks, int side) {
+  Lattice out;
   const int nx = ranks[0] * side, ny = ranks[1] * side, nz = ranks[2] * side;
   const auto body = [&](int x, int y, int z) { return (z * ny + y) * nx + x; };
-  const auto kind = static_cast<std::uint8_t>(detail::Kind::sphere);
   for (int z = 0; z < nz; ++z)
     for (int y = 0; y < ny; ++y)
       for (int x = 0; x < nx; ++x) {
-        owner.push_back((z / side * ranks[1] + y / side) * ranks[0] + x / side);
+        out.owner.push_back((z / side * ranks[1] + y / side) * ranks[0] + x / side);
         const int i = body(x, y, z);
-        if (z == 0) contacts.push_back({i, -1, -1, kind});
-        if (z > 0) contacts.push_back({i, body(x, y, z - 1), -1, kind});
-        if (y > 0) contacts.push_back({i, body(x, y - 1, z), -1, kind});
-        if (x > 0) contacts.push_back({i, body(x - 1, y, z), -1, kind});
+        if (z == 0) out.add(i, -1);
+        if (z > 0) out.add(i, body(x, y, z - 1));
+        if (y > 0) out.add(i, body(x, y - 1, z));
+        if (x > 0) out.add(i, body(x - 1, y, z));
       }
+  return out;
 }
 
 // As RankPlan::exchanges finds them for one rank, for all at once.
 Model model(int ranks, int side) {
-  std::vector<RankContact> contacts;
-  std::vector<int> owner;
-  lattice(blocks(ranks), side, contacts, owner);
+  const Lattice contacts = lattice(blocks(ranks), side);
+  const std::vector<int>& owner = contacts.owner;
   RankPlan plan;
-  plan.build(contacts, owner, ranks, 0, false);
+  plan.build(contacts.first, contacts.second, contacts.kinds, owner, ranks, 0);
   Model out;
-  out.contacts = static_cast<int>(contacts.size());
+  out.contacts = static_cast<int>(contacts.first.size());
   out.chunks = static_cast<int>(plan.whole.chunks.size()) - 1;
   out.swept.assign(at(ranks), 0);
   const detail::Island& island = plan.whole.islands[0];
@@ -98,8 +107,8 @@ Model model(int ranks, int side) {
       out.of[at(by)][at(k - island.colour_begin)].contacts += behind.place - one.place;
       out.swept[at(by)] += behind.place - one.place;
       for (int p = one.place; p < behind.place; ++p)
-        for (int b : {contacts[at(plan.whole.order[at(p)])].first,
-                      contacts[at(plan.whole.order[at(p)])].second}) {
+        for (int b : {contacts.first[at(plan.whole.order[at(p)])],
+                      contacts.second[at(plan.whole.order[at(p)])]}) {
           if (b < 0) continue;
           if (last_rank[at(b)] < 0)
             home[at(b)] = by;
@@ -147,7 +156,6 @@ int main(int argc, char** argv) {
   static const Model shared = model(ranks, side);
   const std::vector<Colour>& mine = shared.of[at(rank)];
   tether::contact_mpi::detail::Messages messages(MPI_COMM_WORLD);
-  messages.sweeping = true;
   std::vector<std::vector<RankMessages::With>> with;
   for (const Colour& colour : mine) {
     std::map<int, RankMessages::With> of;

@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
         "%d ranks, %zu contacts: %.1f us a sweep, %.1f ns a contact; rank 0 sends %lld messages, "
         "%lld bytes\n",
         ranks, p.contacts.size(), 1e6 * sweep, 1e9 * sweep / static_cast<double>(p.contacts.size()),
-        s.plan.messages, 48 * s.plan.velocities);
+        s.traffic.messages / s.sweeps, s.traffic.bytes / s.sweeps);
   MPI_Finalize();
   return 0;
 }

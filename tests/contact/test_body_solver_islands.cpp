@@ -6,7 +6,6 @@
 #include <cstring>
 #include <limits>
 #include <tether/contact.hpp>
-#include <tether/contact/ranks.hpp>
 
 #include "assemblies.hpp"
 #include "body_runs.hpp"
@@ -527,54 +526,5 @@ TEST_CASE("body form: no allocation in steady state") {
     }
     CHECK(tether::test::allocations() == before);
     CHECK(s.warm_started == static_cast<int>(a.contacts.size()));
-  }
-}
-
-TEST_CASE("plans of ranks: each contact is swept by one, evenly, bodies go round who moves them") {
-  const random::Packing p = random::packing(16, false, 4);
-  std::vector<std::uint8_t> traits;
-  for (std::size_t b = 0; b < p.bodies.size(); ++b) traits.push_back(rank_traits(b, p.bodies[b]));
-  std::vector<RankContact> contacts;
-  for (std::size_t i = 0; i < p.contacts.size(); ++i)
-    contacts.push_back(rank_contact(i, p.contacts[i], traits, Law::coulomb));
-  for (int ranks : {1, 2, 5}) {
-    std::vector<int> owner;
-    for (std::size_t b = 0; b < p.bodies.size(); ++b)
-      owner.push_back(static_cast<int>(b * static_cast<std::size_t>(ranks) / p.bodies.size()));
-    std::vector<int> swept(contacts.size(), 0), by(contacts.size(), -1), home, first;
-    long long passed = 0, looked = 0;
-    for (int rank = 0; rank < ranks; ++rank) {
-      RankSolver solver{BodyOptions()};
-      solver.plan(contacts, owner, ranks, rank);
-      passed += solver.traffic().velocities;
-      looked += solver.traffic().look_velocities;
-      home = solver.body_ranks();
-      for (int c : solver.contacts()) {
-        ++swept[static_cast<std::size_t>(c)];
-        by[static_cast<std::size_t>(c)] = rank;
-      }
-      if (rank == 0) first = solver.contact_ranks();
-      CHECK(solver.contact_ranks() == first);  // all plan alike
-      const double share = static_cast<double>(solver.contacts().size() * ranks);
-      CHECK(share <= 1.1 * static_cast<double>(contacts.size()));
-    }
-    CHECK(std::all_of(swept.begin(), swept.end(), [](int n) { return n == 1; }));
-    // Ranks of each body, from who sweeps its contacts.
-    std::vector<std::vector<char>> has(p.bodies.size(),
-                                       std::vector<char>(static_cast<std::size_t>(ranks), 0));
-    for (std::size_t i = 0; i < contacts.size(); ++i)
-      for (int b : {contacts[i].first, contacts[i].second})
-        if (b >= 0) has[static_cast<std::size_t>(b)][static_cast<std::size_t>(by[i])] = 1;
-    long long shared = 0, others = 0;
-    for (std::size_t b = 0; b < has.size(); ++b) {
-      const auto n = std::count(has[b].begin(), has[b].end(), 1);
-      shared += n > 1 ? n : 0;
-      others += n - 1;
-      CHECK(has[b][static_cast<std::size_t>(home[b])]);
-    }
-    CHECK(looked == others);
-    // At least once to each of them, and no more than it has contacts that others sweep.
-    CHECK(passed >= shared);
-    CHECK(passed <= 4 * shared);
   }
 }

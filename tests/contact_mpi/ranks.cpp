@@ -88,14 +88,14 @@ BodySolution alone(BodySolver& solver, const Packing& p) {
   return out;
 }
 
-// A rank has sent what its plan says: to start, for each sweep, for each look.
-void check_traffic(const Solution& s) {
-  if (s.shared_islands != 1) return;
-  const long long looks = s.traffic.reductions - s.sweeps - 2;  // the start and the end have one
-  CHECK(looks >= 1 && looks < s.sweeps);
-  CHECK(s.traffic.messages == s.plan.messages * (s.sweeps + 1) + s.plan.look_messages * looks);
-  CHECK(s.traffic.bytes ==
-        48 * (s.plan.velocities * (s.sweeps + 1) + s.plan.look_velocities * looks));
+// Of a problem of one island: a rank sends velocities alone, one sum ends each pass, and all sweep
+// alike many contacts.
+void check_shares(const Solution& s, std::size_t contacts) {
+  CHECK(s.shared_islands == (ranks > 1 ? 1 : 0));
+  CHECK(s.swept_contacts * ranks <= 1.1 * static_cast<double>(contacts) + 400 * (ranks - 1));
+  if (ranks == 1) return;
+  CHECK(s.traffic.messages >= s.sweeps && s.traffic.bytes % 48 == 0);
+  CHECK(s.traffic.reductions > s.sweeps && s.traffic.reductions < 2 * s.sweeps + 6);
 }
 
 void same_bits_as_one_process(int side) {
@@ -115,8 +115,7 @@ void same_bits_as_one_process(int side) {
       const Solution s = solver.solve(shares.share);
       CHECK(same(expected, s, shares));
       CHECK(s.warm_started == (solve == 0 ? 0 : static_cast<int>(p.contacts.size())));
-      CHECK(s.shared_islands == (ranks > 1 ? 1 : 0));
-      check_traffic(s);
+      check_shares(s, p.contacts.size());
       for (std::size_t k = 0; k < p.contacts.size(); ++k) p.contacts[k].bias = 1e-3;
     }
   }

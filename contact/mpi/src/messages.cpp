@@ -22,9 +22,8 @@ void Messages::exchange(std::vector<With>& with) {
     if (w.out.empty()) continue;
     MPI_Isend(w.out.data(), static_cast<int>(w.out.size()), MPI_DOUBLE, w.rank, kTag, comm_,
               request());
-    const auto bytes = static_cast<long long>(sizeof(double) * w.out.size());
-    ++(sweeping ? traffic.messages : traffic.other_messages);
-    (sweeping ? traffic.bytes : traffic.other_bytes) += bytes;
+    ++traffic.messages;
+    traffic.bytes += static_cast<long long>(sizeof(double) * w.out.size());
   }
   MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
 }
@@ -32,7 +31,7 @@ void Messages::exchange(std::vector<With>& with) {
 void Messages::sum(std::vector<double>& values) {
   MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM,
                 comm_);
-  traffic.reductions += sweeping;
+  ++traffic.reductions;
 }
 
 void Messages::gather(int root, const std::vector<double>& mine, const std::vector<int>& counts,

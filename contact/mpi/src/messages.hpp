@@ -40,8 +40,7 @@ class Messages final : public contact::RankMessages {
   template <class Number>
   std::vector<std::vector<Number>> to_each(const std::vector<std::vector<Number>>& out);
 
-  Traffic traffic;        // since the caller has set it to zero
-  bool sweeping = false;  // what is counted as what
+  Traffic traffic;  // since the caller has set it to zero
 
  private:
   MPI_Comm comm_ = MPI_COMM_NULL;

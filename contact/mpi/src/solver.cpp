@@ -1,262 +1,276 @@
-// Tether: contact::BodySolver over MPI ranks. SPDX-License-Identifier: BSD-3-Clause
+// Tether: contacts over ranks, with the bits of one process. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <exception>
+#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <tether/contact_mpi.hpp>
+#include <utility>
 
-#include "delivery.hpp"
-#include "impulse_directory.hpp"
+#include "messages.hpp"
 
 namespace tether::contact_mpi {
 
-using contact::BodySolution;
 using contact::PointContact;
 using contact::RigidBody;
-using detail::Delivery;
-using detail::WholeProblem;
 using Eigen::Vector3d;
 
 namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+// Numbers of a body and its own; of a contact, with the bits of its identity.
+constexpr std::size_t kBody = 17, kContact = 17;
+
 // Vectors one after the other.
 template <class... Part>
-void put(double* out, const Part&... part) {
-  ((Eigen::Map<Part>(out) = part, out += part.size()), ...);
+void put(std::vector<double>& out, const Part&... part) {
+  (out.insert(out.end(), part.data(), part.data() + part.size()), ...);
 }
 template <class... Part>
 void get(const double* in, Part&... part) {
   ((part = Eigen::Map<const Part>(in), in += part.size()), ...);
 }
 
-// Bodies and contacts of the sweeps of this rank, in its numbering.
-struct Part {
-  std::vector<RigidBody> bodies;
-  std::vector<PointContact> contacts;
-  std::vector<Vector3d> starts;
-};
-
-}  // namespace
-
-struct Solver::Implementation {
-  Implementation(MPI_Comm comm, const Options& options) : messages(comm), ranks(options) {}
-
-  void solve(const Share& share, Solution& out);
-  void bring_bodies(const Share& share);
-  void bring_contacts(const Share& share, const std::vector<Vector3d>& starts);
-  void return_velocities(const Share& share, Solution& out);
-  void return_impulses(const Share& share, Solution& out);
-  void merge(Solution& out);
-
-  detail::Messages messages;
-  contact::RankSolver ranks;
-  detail::ImpulseDirectory memory;
-  // Data of a solve:
-  WholeProblem whole;
-  std::vector<int> local_body, local_contact;  // number -> place in the part, -1
-  std::vector<int> given_body, given_contact;  // number -> place in the share, -1
-  Part part;
-  BodySolution found;
-};
-
-namespace {
-
-void invert(const std::vector<int>& numbers, std::size_t of, std::vector<int>& place) {
-  place.assign(of, -1);
-  for (std::size_t k = 0; k < numbers.size(); ++k) place[at(numbers[k])] = static_cast<int>(k);
-}
-
-}  // namespace
-
-// A body goes from its owner to the ranks that sweep its contacts.
-void Solver::Implementation::bring_bodies(const Share& share) {
-  std::vector<std::pair<int, int>> wanted;  // body, rank
-  const std::vector<int>& sweeper = ranks.contact_ranks();
-  const int me = messages.rank();
-  for (std::size_t c = 0; c < sweeper.size(); ++c) {
-    const contact::RankContact& ends = whole.contacts[c];
-    for (int b : {ends.first, ends.second, ends.fixed})
-      if (b >= 0 && (whole.owner[at(b)] == me || sweeper[c] == me))
-        wanted.emplace_back(b, sweeper[c]);
-  }
-  std::sort(wanted.begin(), wanted.end());
-  wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
-  Delivery delivery(messages, 16);
-  for (const auto& [b, to] : wanted) delivery.add(b, whole.owner[at(b)], to);
-  part.bodies.resize(ranks.bodies().size());
-  delivery.run(
-      [&](int b, double* out) {
-        const RigidBody& body = share.bodies[at(given_body[at(b)])];
-        out[0] = body.inverse_mass;
-        put(out + 1, body.inverse_inertia, body.velocity, body.angular_velocity);
-      },
-      [&](int b, const double* in) {
-        RigidBody& body = part.bodies[at(local_body[at(b)])];
-        body.inverse_mass = in[0];
-        get(in + 1, body.inverse_inertia, body.velocity, body.angular_velocity);
-      });
-}
-
-// A contact goes from who has given it to who sweeps it.
-void Solver::Implementation::bring_contacts(const Share& share,
-                                            const std::vector<Vector3d>& starts) {
-  Delivery delivery(messages, 19);
-  const std::vector<int>& sweeper = ranks.contact_ranks();
-  for (std::size_t c = 0; c < sweeper.size(); ++c)
-    delivery.add(static_cast<int>(c), whole.giver[c], sweeper[c]);
-  part.contacts.resize(ranks.contacts().size());
-  part.starts.resize(starts.empty() ? 0 : part.contacts.size());
-  // The ranks of an empty share have no starts, while others have some.
-  if (ranks.options().warm_start) part.starts.resize(part.contacts.size());
-  delivery.run(
-      [&](int c, double* out) {
-        const int i = given_contact[at(c)];
-        const PointContact& k = share.contacts[at(i)];
-        out[0] = k.first;
-        out[1] = k.second;
-        out[2] = k.mu;
-        out[3] = k.bias;
-        put(out + 4, k.r1, k.r2, k.normal, k.slip,
-            starts.empty() ? Vector3d(0, 0, 0) : starts[at(i)]);
-      },
-      [&](int c, const double* in) {
-        const int i = local_contact[at(c)];
-        PointContact& k = part.contacts[at(i)];
-        k.first = local_body[at(static_cast<int>(in[0]))];
-        k.second = in[1] < 0 ? -1 : local_body[at(static_cast<int>(in[1]))];
-        k.mu = in[2];
-        k.bias = in[3];
-        Vector3d start;
-        get(in + 4, k.r1, k.r2, k.normal, k.slip, start);
-        if (!part.starts.empty()) part.starts[at(i)] = start;
-      });
-}
-
-void Solver::Implementation::return_velocities(const Share& share, Solution& out) {
-  const std::vector<int>& home = ranks.body_ranks();
-  out.velocities.resize(share.bodies.size());
-  out.angular_velocities.resize(share.bodies.size());
-  for (std::size_t k = 0; k < share.bodies.size(); ++k) {
-    out.velocities[k] = share.bodies[k].velocity;
-    out.angular_velocities[k] = share.bodies[k].angular_velocity;
-  }
-  std::vector<char> moved(home.size(), 0);
-  for (const contact::RankContact& c : whole.contacts)
-    for (int b : {c.first, c.second})
-      if (b >= 0) moved[at(b)] = 1;
-  Delivery delivery(messages, 6);
-  for (std::size_t b = 0; b < home.size(); ++b)
-    if (moved[b]) delivery.add(static_cast<int>(b), home[b], whole.owner[b]);
-  delivery.run(
-      [&](int b, double* to) {
-        const std::size_t k = at(local_body[at(b)]);
-        put(to, found.velocities[k], found.angular_velocities[k]);
-      },
-      [&](int b, const double* from) {
-        const std::size_t k = at(given_body[at(b)]);
-        get(from, out.velocities[k], out.angular_velocities[k]);
-      });
-}
-
-void Solver::Implementation::return_impulses(const Share& share, Solution& out) {
-  out.impulses.resize(share.contacts.size());
-  out.regimes.resize(share.contacts.size());
-  out.replaced.clear();
-  std::vector<char> replaced(found.impulses.size(), 0);
-  for (int i : found.replaced) replaced[at(i)] = 1;
-  Delivery delivery(messages, 5);
-  const std::vector<int>& sweeper = ranks.contact_ranks();
-  for (std::size_t c = 0; c < sweeper.size(); ++c)
-    delivery.add(static_cast<int>(c), sweeper[c], whole.giver[c]);
-  delivery.run(
-      [&](int c, double* to) {
-        const std::size_t i = at(local_contact[at(c)]);
-        put(to, found.impulses[i]);
-        to[3] = static_cast<double>(found.regimes[i]);
-        to[4] = replaced[i];
-      },
-      [&](int c, const double* from) {
-        const int i = given_contact[at(c)];
-        get(from, out.impulses[at(i)]);
-        out.regimes[at(i)] = static_cast<contact::Regime>(from[3]);
-        if (from[4] != 0) out.replaced.push_back(i);
-      });
-  std::sort(out.replaced.begin(), out.replaced.end());
-}
-
-// Merges the numbers that are about all ranks.
-void Solver::Implementation::merge(Solution& out) {
-  struct Own {
-    int status, assembled, failed, sweeps, colours, islands, shared;
-    double error;
-  };
-  const contact::RankIslands islands = ranks.islands();
-  const Own own{static_cast<int>(found.status),
-                islands.assembled,
-                islands.failed,
-                found.sweeps,
-                found.colours,
-                islands.all,
-                islands.shared,
-                found.error};
-  out.status = contact::Status::solved;
-  out.error = 0;
-  out.sweeps = out.colours = out.assembled_islands = out.failed_islands = 0;
-  for (const Own& r : messages.gather_all(std::vector<Own>{own})) {
-    out.status = contact::worse(out.status, static_cast<contact::Status>(r.status));
-    out.error = r.error != r.error ? r.error : std::max(out.error, r.error);
-    out.sweeps = std::max(out.sweeps, r.sweeps);
-    out.colours = std::max(out.colours, r.colours);
-    out.assembled_islands += r.assembled;
-    out.failed_islands += r.failed;
-  }
-  out.islands = islands.all;
-  out.shared_islands = islands.shared;
-}
-
-void Solver::Implementation::solve(const Share& share, Solution& out) {
-  messages.traffic = {};
-  whole = detail::whole_problem(messages, share, ranks.options().law);
-  const std::size_t bodies = whole.owner.size(), contacts = whole.contacts.size();
-  ranks.plan(whole.contacts, whole.owner, messages.size(), messages.rank());
-  invert(ranks.bodies(), bodies, local_body);
-  invert(ranks.contacts(), contacts, local_contact);
-  invert(share.numbers, bodies, given_body);
-  invert(whole.mine, contacts, given_contact);
-  const bool warm = ranks.options().warm_start;
-  std::vector<Vector3d> starts;
-  out.warm_started = 0;
-  if (warm) starts = memory.find(messages, share.contacts, out.warm_started);
-  bring_bodies(share);
-  bring_contacts(share, starts);
-  std::exception_ptr failure;
-  messages.sweeping = true;
-  try {
-    ranks.solve(part.bodies, part.contacts, part.starts, messages, found);
-  } catch (...) {
-    failure = std::current_exception();
-  }
-  messages.sweeping = false;
-  agree(messages.comm(), failure);
-  return_velocities(share, out);
-  return_impulses(share, out);
-  merge(out);
-  if (warm) memory.keep(messages, share.contacts, out.impulses);
-  out.plan = ranks.traffic();
-  out.swept_contacts = static_cast<int>(part.contacts.size());
-  out.traffic = messages.traffic;
-}
-
-Solver::Solver(MPI_Comm comm, const Options& options) {
+template <class Work>
+void by_all(MPI_Comm comm, const Work& work) {
   std::exception_ptr failure;
   try {
-    implementation_ = std::make_unique<Implementation>(comm, options);
+    work();
   } catch (...) {
     failure = std::current_exception();
   }
   agree(comm, failure);
-  detail::require_same(implementation_->messages, options);
+}
+
+void require_same(MPI_Comm comm, const Options& b) {
+  const std::vector<std::pair<const char*, double>> options = {{"law", static_cast<double>(b.law)},
+                                                               {"tolerance", b.tolerance},
+                                                               {"max_sweeps", b.max_sweeps},
+                                                               {"min_sweeps", b.min_sweeps},
+                                                               {"warm_start", b.warm_start},
+                                                               {"max_assembled", b.max_assembled},
+                                                               {"strict", b.strict},
+                                                               {"max_work", b.max_work},
+                                                               {"enough", b.enough}};
+  std::vector<double> least, most;
+  for (const auto& [name, value] : options) least.push_back(value);
+  most = least;
+  const int n = static_cast<int>(options.size());
+  MPI_Allreduce(MPI_IN_PLACE, least.data(), n, MPI_DOUBLE, MPI_MIN, comm);
+  MPI_Allreduce(MPI_IN_PLACE, most.data(), n, MPI_DOUBLE, MPI_MAX, comm);
+  for (std::size_t k = 0; k < options.size(); ++k) {
+    if (least[k] == most[k]) continue;
+    throw std::invalid_argument(std::string(options[k].first) + " is " + std::to_string(least[k]) +
+                                " on one rank and " + std::to_string(most[k]) +
+                                " on another: all ranks need the same");
+  }
+}
+
+}  // namespace
+
+struct Solver::Implementation {
+  Implementation(MPI_Comm comm, Options options)
+      : messages(comm), team(messages, 0), solver([&] {
+          options.team = &team;
+          return options;
+        }()) {}
+
+  void solve(const Share& share, Solution& out);
+  void gather_bodies(const Share& share);
+  void place_body(int rank, int number, const double* numbers);
+  void gather_contacts(const Share& share);
+  void check_contacts(const Share& share) const;
+  std::pair<int, int> moving_first(const PointContact& c) const;
+  bool moves(int body) const { return body >= 0 && bodies[at(body)].moves(); }
+  void refuse_by_name(const Share& share) const;
+  void take_results(const Share& share, Solution& out) const;
+
+  detail::Messages messages;
+  contact::RankTeam team;
+  contact::BodySolver solver;
+  // The whole problem, alike on all ranks:
+  std::vector<RigidBody> bodies;
+  std::vector<int> owner;  // of bodies; -1: not yet known
+  std::vector<PointContact> contacts;
+  std::vector<int> own_contacts;  // contact of the share -> number
+  contact::BodySolution found;
+};
+
+// The same on all ranks, and so is what it throws.
+void Solver::Implementation::place_body(int rank, int number, const double* numbers) {
+  const int n = static_cast<int>(bodies.size());
+  if (number < 0 || number >= n)
+    throw std::invalid_argument("rank " + std::to_string(rank) +
+                                ": number of a body = " + std::to_string(number) + ": the " +
+                                std::to_string(n) + " bodies of all ranks have the numbers 0 .. " +
+                                std::to_string(n - 1));
+  if (owner[at(number)] >= 0)
+    throw std::invalid_argument("rank " + std::to_string(rank) + ": body " +
+                                std::to_string(number) + " is on rank " +
+                                std::to_string(owner[at(number)]) + ", too: each is on one rank");
+  owner[at(number)] = rank;
+  RigidBody& body = bodies[at(number)];
+  body.inverse_mass = numbers[0];
+  get(numbers + 1, body.inverse_inertia, body.velocity, body.angular_velocity);
+}
+
+void Solver::Implementation::gather_bodies(const Share& share) {
+  std::vector<double> mine;
+  by_all(messages.comm(), [&] {
+    if (share.numbers.size() != share.bodies.size())
+      throw std::invalid_argument(std::to_string(share.numbers.size()) +
+                                  " numbers of bodies, but " + std::to_string(share.bodies.size()) +
+                                  " bodies");
+  });
+  for (std::size_t k = 0; k < share.bodies.size(); ++k) {
+    const RigidBody& b = share.bodies[k];
+    mine.insert(mine.end(), {static_cast<double>(share.numbers[k]), b.inverse_mass});
+    put(mine, b.inverse_inertia, b.velocity, b.angular_velocity);
+  }
+  std::vector<int> ends;
+  const std::vector<double> all = messages.gather_all(mine, &ends);
+  bodies.assign(all.size() / kBody, {});
+  owner.assign(bodies.size(), -1);
+  int rank = 0;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    while (k * kBody >= at(ends[at(rank)])) ++rank;
+    place_body(rank, static_cast<int>(all[k * kBody]), all.data() + k * kBody + 1);
+  }
+  // evaluate() refuses bodies by their number.
+  by_all(messages.comm(), [&] {
+    std::vector<RigidBody> own(bodies.size());
+    for (std::size_t k = 0; k < share.bodies.size(); ++k)
+      own[at(share.numbers[k])] = share.bodies[k];
+    contact::evaluate(own, {}, solver.options().law, {});
+  });
+}
+
+// The moving body with the smaller number, and the other one.
+std::pair<int, int> Solver::Implementation::moving_first(const PointContact& c) const {
+  if (moves(c.first) && moves(c.second))
+    return {std::min(c.first, c.second), std::max(c.first, c.second)};
+  return moves(c.first) ? std::pair{c.first, c.second} : std::pair{c.second, c.first};
+}
+
+void Solver::Implementation::refuse_by_name(const Share& share) const {
+  contact::evaluate(bodies, share.contacts, solver.options().law,
+                    std::vector<Vector3d>(share.contacts.size(), Vector3d::Zero()));
+}
+
+void Solver::Implementation::check_contacts(const Share& share) const {
+  const int n = static_cast<int>(bodies.size());
+  for (std::size_t i = 0; i < share.contacts.size(); ++i) {
+    const PointContact& c = share.contacts[i];
+    if (c.first < 0 || c.first >= n || c.second >= n || !(moves(c.first) || moves(c.second)))
+      refuse_by_name(share);
+    const int body = moving_first(c).first;
+    if (owner[at(body)] != messages.rank())
+      throw std::invalid_argument("contact " + std::to_string(i) + " belongs to rank " +
+                                  std::to_string(owner[at(body)]) + ", which owns body " +
+                                  std::to_string(body) + ", the first of its bodies that can move");
+  }
+}
+
+// In the order of (smaller number of a moving body, other number); contacts of two bodies are from
+// one rank, in its order.
+void Solver::Implementation::gather_contacts(const Share& share) {
+  by_all(messages.comm(), [&] { check_contacts(share); });
+  std::vector<double> mine;
+  for (const PointContact& c : share.contacts) {
+    double id = 0;
+    std::memcpy(&id, &c.id, sizeof(id));
+    mine.insert(mine.end(),
+                {id, static_cast<double>(c.first), static_cast<double>(c.second), c.mu, c.bias});
+    put(mine, c.r1, c.r2, c.normal, c.slip);
+  }
+  std::vector<int> ends;
+  const std::vector<double> all = messages.gather_all(mine, &ends);
+  std::vector<PointContact> given(all.size() / kContact);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    const double* in = all.data() + i * kContact;
+    PointContact& c = given[i];
+    std::memcpy(&c.id, in, sizeof(c.id));
+    c.first = static_cast<int>(in[1]);
+    c.second = static_cast<int>(in[2]);
+    c.mu = in[3];
+    c.bias = in[4];
+    get(in + 5, c.r1, c.r2, c.normal, c.slip);
+  }
+  std::vector<int> order(given.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int i, int j) {
+    return moving_first(given[at(i)]) < moving_first(given[at(j)]);
+  });
+  const int rank = messages.rank();
+  const int first = (rank > 0 ? ends[at(rank - 1)] : 0) / static_cast<int>(kContact);
+  const int count = static_cast<int>(share.contacts.size());
+  own_contacts.resize(share.contacts.size());
+  contacts.clear();
+  for (const int i : order) {
+    if (i >= first && i < first + count)
+      own_contacts[at(i - first)] = static_cast<int>(contacts.size());
+    contacts.push_back(given[at(i)]);
+  }
+}
+
+void Solver::Implementation::take_results(const Share& share, Solution& out) const {
+  out.status = found.status;
+  out.error = found.error;
+  out.islands = found.islands;
+  out.assembled_islands = found.assembled_islands;
+  out.failed_islands = found.failed_islands;
+  out.sweeps = found.sweeps;
+  out.colours = found.colours;
+  out.warm_started = found.warm_started;
+  out.impulses.clear();
+  out.regimes.clear();
+  out.replaced.clear();
+  out.velocities.clear();
+  out.angular_velocities.clear();
+  for (std::size_t i = 0; i < own_contacts.size(); ++i) {
+    out.impulses.push_back(found.impulses[at(own_contacts[i])]);
+    out.regimes.push_back(found.regimes[at(own_contacts[i])]);
+    if (std::binary_search(found.replaced.begin(), found.replaced.end(), own_contacts[i]))
+      out.replaced.push_back(static_cast<int>(i));
+  }
+  for (const int body : share.numbers) {
+    out.velocities.push_back(found.velocities[at(body)]);
+    out.angular_velocities.push_back(found.angular_velocities[at(body)]);
+  }
+}
+
+void Solver::Implementation::solve(const Share& share, Solution& out) {
+  messages.traffic = {};
+  gather_bodies(share);
+  gather_contacts(share);
+  team.set_owners(owner);
+  const long swept = team.swept_contacts();
+  std::exception_ptr failure;
+  try {
+    solver.solve(bodies, contacts, found);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  int failed = failure != nullptr;
+  MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, messages.comm());
+  if (failed != 0) {
+    by_all(messages.comm(), [&] { refuse_by_name(share); });
+    agree(messages.comm(), failure);
+  }
+  take_results(share, out);
+  const bool alone = messages.size() == 1;
+  out.shared_islands = alone ? 0 : team.shared_islands();
+  out.swept_contacts =
+      static_cast<int>(alone ? static_cast<long>(contacts.size()) : team.swept_contacts() - swept);
+  out.traffic = messages.traffic;
+}
+
+Solver::Solver(MPI_Comm comm, const Options& options) {
+  by_all(comm, [&] { implementation_ = std::make_unique<Implementation>(comm, options); });
+  require_same(implementation_->messages.comm(), options);
 }
 Solver::~Solver() = default;
 Solver::Solver(Solver&&) noexcept = default;
@@ -267,14 +281,12 @@ Solution Solver::solve(const Share& share) {
   solve(share, out);
   return out;
 }
+
 void Solver::solve(const Share& share, Solution& solution) {
   implementation_->solve(share, solution);
 }
-void Solver::scale_warm_start(double factor) {
-  if (!(factor >= 0) || !std::isfinite(factor))
-    throw std::invalid_argument("factor = " + std::to_string(factor) + ": must be finite and >= 0");
-  implementation_->memory.scale(factor);
-}
-void Solver::forget() { implementation_->memory.forget(); }
+
+void Solver::scale_warm_start(double factor) { implementation_->solver.scale_warm_start(factor); }
+void Solver::forget() { implementation_->solver.forget(); }
 
 }  // namespace tether::contact_mpi

@@ -30,7 +30,7 @@ void IslandSweeps::start(const GivenProblem& given, const ContactGraph& graph, L
   given_ = &given;
   graph_ = &graph;
   law_ = law;
-  contacts_.resize(graph.chunks.back(), given.contacts().size());
+  contacts_.resize(graph.chunks.back(), graph.order.size());
   bodies_.resize(graph.body.size());
   for (std::vector<PassResult>& sums : sums_) sums.resize(graph.chunks.size());
 }

@@ -8,12 +8,6 @@ namespace tether::contact::detail {
 
 struct PassResult;
 
-// The whole graph, of which this process has a part; first, second as ContactGraph::build has them.
-struct WholeGraph {
-  const ContactGraph& graph;
-  const std::vector<int>&first, &second;
-};
-
 // Exchange between processes that share islands. Called by the first thread of each, in the same
 // order.
 class SweepPartners {
@@ -23,7 +17,8 @@ class SweepPartners {
   // Islands have the same numbers here and in the whole graph.
   virtual bool here(int island) const = 0;    // some contact of it
   virtual bool shared(int island) const = 0;  // several processes sweep it
-  virtual WholeGraph whole() const = 0;
+  virtual const ContactGraph& whole() const = 0;
+  virtual bool reports(int island) const = 0;  // this process, and no other
   // The calls below are about this island.
   virtual void begin(int island) = 0;
 

@@ -49,9 +49,8 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
 void BodySolver::Implementation::iterate(int k, Team& team) {
   const Island& island = graph.islands[at(k)];
   const bool again = results[at(k)].assembled;
-  const detail::WholeGraph whole =
-      team.partners ? partners->whole() : detail::WholeGraph{graph, given.first(), given.second()};
-  detail::AssemblyPrice price(whole.graph, whole.graph.islands[at(k)], whole.first, whole.second);
+  const detail::ContactGraph& whole = team.partners ? partners->whole() : graph;
+  detail::AssemblyPrice price(whole, whole.islands[at(k)], given.first(), given.second());
   const auto permitted = [&] {
     return island.contacts <= options.max_assembled && price.within(options.max_work);
   };

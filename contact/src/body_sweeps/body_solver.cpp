@@ -182,7 +182,7 @@ void BodySolver::Implementation::report() {
   out->islands = static_cast<int>(results.size());
   for (std::size_t k = 0; k < results.size(); ++k) {
     const IslandResult& r = results[k];
-    if (!here(static_cast<int>(k)) && !shared(static_cast<int>(k))) continue;
+    if (partners && !partners->reports(static_cast<int>(k))) continue;
     out->error = worse(out->error, r.error);
     out->sweeps = std::max(out->sweeps, r.sweeps);
     out->colours =

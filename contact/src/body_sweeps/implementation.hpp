@@ -41,6 +41,10 @@ struct IslandResult {
 
 namespace tether::contact {
 
+// Of two parts of a solve together; the error is NaN where one of them is.
+Status worse(Status a, Status b);
+double worse(double a, double b);
+
 struct BodySolver::Implementation {
   using Island = detail::Island;
   using IslandResult = detail::IslandResult;
@@ -64,7 +68,7 @@ struct BodySolver::Implementation {
   detail::FarContacts far;                    // those of large islands that are not swept at first
   std::vector<PointContact> near;             // the others
   BodySolution found;                         // of these
-  detail::SweepPartners* partners = nullptr;  // other processes: RankedSolver
+  detail::SweepPartners* partners = nullptr;  // other processes: RankTeam
 
   // A solve, from body_solver.cpp on.
   void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);

@@ -40,59 +40,6 @@ class ExchangeLists {
 
 }  // namespace
 
-void select_chunks(const ContactGraph& from, const std::vector<int>& first,
-                   const std::vector<int>& second, const std::vector<char>& wanted,
-                   const ChunkSelection& out) {
-  ContactGraph& part = out.part;
-  part.order.clear();
-  part.coupled.clear();
-  part.chunks.assign(1, {});
-  part.colours.clear();
-  part.islands.clear();
-  out.contacts.clear();
-  out.bodies.clear();
-  out.chunks.clear();
-  std::vector<char> seen(from.slot.size(), 0);
-  const auto take = [&](int c) {
-    const Chunk &one = from.chunks[at(c)], &behind = from.chunks[at(c + 1)];
-    out.chunks.push_back(c);
-    for (int place = one.place; place < behind.place; ++place) {
-      const int contact = from.order[at(place)];
-      part.order.push_back(static_cast<int>(out.contacts.size()));
-      part.coupled.push_back(from.coupled[at(place)]);
-      out.contacts.push_back(contact);
-      for (int b : {first[at(contact)], second[at(contact)]})
-        if (b >= 0) seen[at(b)] = 1;
-    }
-    Chunk next = part.chunks.back();
-    next.place += behind.place - one.place;
-    for (int k = 0; k < kKinds; ++k) next.begin[k] += behind.begin[k] - one.begin[k];
-    part.chunks.push_back(next);
-  };
-  for (const Island& island : from.islands) {
-    Island mine = island;
-    mine.contact_begin = static_cast<int>(part.order.size());
-    mine.body_begin = static_cast<int>(out.bodies.size());
-    mine.chunk_begin = static_cast<int>(part.chunks.size()) - 1;
-    mine.colour_begin = static_cast<int>(part.colours.size());
-    for (int k = island.colour_begin; k < island.colour_end; ++k) {
-      part.colours.push_back(static_cast<int>(part.chunks.size()) - 1);
-      for (int c = from.colours[at(k)]; c < from.colours[at(k + 1)]; ++c)
-        if (wanted[at(c)]) take(c);
-    }
-    mine.chunk_end = static_cast<int>(part.chunks.size()) - 1;
-    mine.colour_end = static_cast<int>(part.colours.size());
-    part.colours.push_back(mine.chunk_end);
-    for (int s = island.body_begin; s < island.body_end; ++s)
-      if (seen[at(from.body[at(s)])]) out.bodies.push_back(from.body[at(s)]);
-    mine.body_end = static_cast<int>(out.bodies.size());
-    part.islands.push_back(mine);
-  }
-  part.body.resize(out.bodies.size());
-  for (std::size_t s = 0; s < part.body.size(); ++s) part.body[s] = static_cast<int>(s);
-  part.slot = part.body;
-}
-
 int RankPlan::count(int chunk) const {
   return whole.chunks[at(chunk + 1)].place - whole.chunks[at(chunk)].place;
 }
@@ -101,33 +48,26 @@ int RankPlan::count(int chunk) const {
 template <class Visit>
 void RankPlan::for_bodies(int chunk, const Visit& visit) const {
   for (int p = whole.chunks[at(chunk)].place; p < whole.chunks[at(chunk + 1)].place; ++p) {
-    const std::size_t contact = at(whole.order[at(p)]);
-    visit(first[contact]);
-    if (second[contact] >= 0) visit(second[contact]);
+    const int contact = whole.order[at(p)];
+    visit(pairs_.one(contact));
+    if (pairs_.other(contact) >= 0) visit(pairs_.other(contact));
   }
 }
 
-void RankPlan::build(const std::vector<RankContact>& links, const std::vector<int>& owner,
-                     int ranks_, int rank_) {
+void RankPlan::build(const std::vector<int>& first, const std::vector<int>& second,
+                     const std::vector<Kind>& kinds, const std::vector<int>& owner, int ranks_,
+                     int rank_) {
   ranks = ranks_;
   rank = rank_;
-  const int bodies_of_all = static_cast<int>(owner.size());
-  std::vector<Kind> kinds;
-  first.clear();
-  second.clear();
-  for (const RankContact& c : links) {
-    first.push_back(c.first);
-    second.push_back(c.second);
-    kinds.push_back(static_cast<Kind>(c.kind));
-  }
-  whole.build(bodies_of_all, first, second, kinds, groups_are_served());
+  pairs_ = {&first, &second};
+  whole.build(static_cast<int>(owner.size()), first, second, kinds, groups_are_served());
   assign(owner);
-  select(links, bodies_of_all);
+  select();
   home = owner;
   after.assign(part.colours.size(), {});
   share.assign(whole.islands.size(), {});
-  last_rank_.assign(at(bodies_of_all), -1);
-  last_colour_.assign(at(bodies_of_all), -1);
+  last_rank_.assign(owner.size(), -1);
+  last_colour_.assign(owner.size(), -1);
   for (int k = 0; k < static_cast<int>(whole.islands.size()); ++k) exchanges(k);
 }
 
@@ -135,15 +75,15 @@ void RankPlan::build(const std::vector<RankContact>& links, const std::vector<in
 std::vector<int> RankPlan::owned(int begin, int end, const std::vector<int>& owner) const {
   std::vector<int> out(at(ranks), 0);
   for (int place = begin; place < end; ++place) {
-    const std::size_t c = at(whole.order[at(place)]);
-    ++out[at(owner[at(second[c] >= 0 ? std::min(first[c], second[c]) : first[c])])];
+    const int c = whole.order[at(place)], one = pairs_.one(c), other = pairs_.other(c);
+    ++out[at(owner[at(other >= 0 ? std::min(one, other) : one)])];
   }
   return out;
 }
 
 void RankPlan::assign(const std::vector<int>& owner) {
   chunk_rank.assign(whole.chunks.size(), 0);
-  contact_rank.assign(first.size(), 0);
+  contact_rank.assign(at(pairs_.size()), 0);
   for (const Island& island : whole.islands) {
     const bool one = island.contacts < kTogether;
     const int all =
@@ -192,28 +132,57 @@ void RankPlan::balance(int begin, int end, const std::vector<int>& owner) {
   }
 }
 
-void RankPlan::select(const std::vector<RankContact>& links, int bodies_of_all) {
-  std::vector<char> wanted(chunk_rank.size());
-  for (std::size_t c = 0; c < wanted.size(); ++c) wanted[c] = chunk_rank[c] == rank;
-  select_chunks(whole, first, second, wanted, {part, contacts, bodies, chunk_of});
-  slot_.assign(at(bodies_of_all), -1);
-  for (std::size_t s = 0; s < bodies.size(); ++s) slot_[at(bodies[s])] = static_cast<int>(s);
-  for (int c : contacts) {
-    const int b = links[at(c)].fixed;
-    if (b < 0 || slot_[at(b)] >= 0) continue;
-    slot_[at(b)] = static_cast<int>(bodies.size());
-    bodies.push_back(b);
-    part.slot.push_back(-1);
+void RankPlan::take_chunk(int c) {
+  const Chunk &one = whole.chunks[at(c)], &behind = whole.chunks[at(c + 1)];
+  chunk_of.push_back(c);
+  for (int place = one.place; place < behind.place; ++place) {
+    part.order.push_back(whole.order[at(place)]);
+    part.coupled.push_back(whole.coupled[at(place)]);
   }
+  for_bodies(c, [&](int b) { part.slot[at(b)] = 0; });  // numbered when all chunks are known
+  Chunk next = part.chunks.back();
+  next.place += behind.place - one.place;
+  for (int k = 0; k < kKinds; ++k) next.begin[k] += behind.begin[k] - one.begin[k];
+  part.chunks.push_back(next);
+}
+
+// The chunks of this rank as a graph of their own; islands keep their numbers and their count of
+// contacts.
+void RankPlan::select() {
+  for (std::vector<int>* list : {&part.order, &part.body, &part.colours, &chunk_of}) list->clear();
+  part.coupled.clear();
+  part.chunks.assign(1, {});
+  part.islands = whole.islands;
+  part.slot.assign(whole.slot.size(), -1);
   shared.clear();
   here.clear();
   for (std::size_t k = 0; k < whole.islands.size(); ++k) {
-    const Island &all = whole.islands[k], &mine = part.islands[k];
-    here.push_back(mine.chunk_begin < mine.chunk_end);
+    const Island& all = whole.islands[k];
+    Island& mine = part.islands[k];
     bool one = true;
     for (int c = all.chunk_begin; c < all.chunk_end; ++c)
       one = one && chunk_rank[at(c)] == chunk_rank[at(all.chunk_begin)];
+    mine.contact_begin = static_cast<int>(part.order.size());
+    mine.body_begin = static_cast<int>(part.body.size());
+    mine.chunk_begin = static_cast<int>(part.chunks.size()) - 1;
+    mine.colour_begin = static_cast<int>(part.colours.size());
+    for (int colour = all.colour_begin; colour < all.colour_end; ++colour) {
+      part.colours.push_back(static_cast<int>(part.chunks.size()) - 1);
+      for (int c = whole.colours[at(colour)]; c < whole.colours[at(colour + 1)]; ++c)
+        if (chunk_rank[at(c)] == rank) take_chunk(c);
+    }
+    mine.chunk_end = static_cast<int>(part.chunks.size()) - 1;
+    mine.colour_end = static_cast<int>(part.colours.size());
+    part.colours.push_back(mine.chunk_end);
+    for (int s = all.body_begin; s < all.body_end; ++s) {
+      const int body = whole.body[at(s)];
+      if (part.slot[at(body)] < 0) continue;
+      part.slot[at(body)] = static_cast<int>(part.body.size());
+      part.body.push_back(body);
+    }
+    mine.body_end = static_cast<int>(part.body.size());
     shared.push_back(!one);
+    here.push_back(mine.chunk_begin < mine.chunk_end);
   }
 }
 
@@ -231,8 +200,8 @@ void RankPlan::exchanges(int k) {
   const auto pass_on = [&](int b, int to) {
     const int from = last_rank_[at(b)];
     if (from == to) return;
-    if (from == rank) lists[at(last_colour_[at(b)])].send(to, slot_[at(b)]);
-    if (to == rank) lists[at(last_colour_[at(b)])].receive(from, slot_[at(b)]);
+    if (from == rank) lists[at(last_colour_[at(b)])].send(to, part.slot[at(b)]);
+    if (to == rank) lists[at(last_colour_[at(b)])].receive(from, part.slot[at(b)]);
   };
   for (int colour = 0; colour < colours; ++colour) {
     const int end = whole.colours[at(all.colour_begin + colour + 1)];
@@ -258,8 +227,8 @@ void RankPlan::exchanges(int k) {
   others.erase(std::unique(others.begin(), others.end()), others.end());
   ExchangeLists to_all;
   for (const auto& [b, to] : others) {
-    if (home[at(b)] == rank) to_all.send(to, slot_[at(b)]);
-    if (to == rank) to_all.receive(home[at(b)], slot_[at(b)]);
+    if (home[at(b)] == rank) to_all.send(to, part.slot[at(b)]);
+    if (to == rank) to_all.receive(home[at(b)], part.slot[at(b)]);
   }
   share[at(k)] = to_all.lists();
 }

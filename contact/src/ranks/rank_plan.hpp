@@ -2,7 +2,6 @@
 // BSD-3-Clause
 #pragma once
 
-#include <tether/contact/ranks.hpp>
 #include <vector>
 
 #include "graph/contact_graph.hpp"
@@ -17,7 +16,8 @@ struct RankExchange {
 };
 using RankExchanges = std::vector<RankExchange>;  // ascending ranks
 
-// The graph of all contacts, made alike by all ranks, and the part of one.
+// The graph of all contacts, made alike by all ranks, and the part of one: its chunks, with the
+// numbers that contacts and bodies have in the whole.
 //
 // A chunk goes to the rank that owns most of its contacts (the owner of the moving body with the
 // smaller number), an island that would not be worth several threads as a whole. Where one rank has
@@ -27,13 +27,11 @@ using RankExchanges = std::vector<RankExchange>;  // ascending ranks
 // that sweeps it first, its home, where its velocity is between sweeps.
 class RankPlan {
  public:
-  void build(const std::vector<RankContact>& contacts, const std::vector<int>& owner, int ranks,
-             int rank);
+  // first, second, kinds: as ContactGraph::build has them. owner: rank of each body.
+  void build(const std::vector<int>& first, const std::vector<int>& second,
+             const std::vector<Kind>& kinds, const std::vector<int>& owner, int ranks, int rank);
 
   ContactGraph whole, part;
-  std::vector<int> first, second;  // of all contacts
-  std::vector<int> contacts;       // place in the lists of this rank -> contact
-  std::vector<int> bodies;         // the same of bodies: those of slots, then those that are fixed
   std::vector<int> contact_rank, home;  // of all contacts, bodies
   std::vector<int> chunk_rank;          // of the chunks of `whole`
   std::vector<int> chunk_of;            // chunk of `part` -> of `whole`
@@ -41,30 +39,22 @@ class RankPlan {
 
   std::vector<RankExchanges> after;  // each colour of `part`
   std::vector<RankExchanges> share;  // of each island: from home to others
+
   int ranks = 1, rank = 0;
 
  private:
   void assign(const std::vector<int>& owner);
   std::vector<int> owned(int begin, int end, const std::vector<int>& owner) const;
   void balance(int begin, int end, const std::vector<int>& owner);
-  void select(const std::vector<RankContact>& links, int bodies);
+  void select();
+  void take_chunk(int chunk);
   void exchanges(int island);
   int count(int chunk) const;
   template <class Visit>
   void for_bodies(int chunk, const Visit& visit) const;
 
-  std::vector<int> slot_;                     // body -> place in `bodies`, -1: none
+  ContactPairs pairs_;
   std::vector<int> last_rank_, last_colour_;  // of bodies, while exchanges are found
 };
-
-// A graph of some chunks of another one; islands keep their numbers and their count of contacts.
-struct ChunkSelection {
-  ContactGraph& part;
-  std::vector<int>&contacts, &bodies, &chunks;  // place in the part -> in the whole
-};
-// wanted: of each chunk of `from`; first, second: of its contacts. Bodies: in the order of slots.
-void select_chunks(const ContactGraph& from, const std::vector<int>& first,
-                   const std::vector<int>& second, const std::vector<char>& wanted,
-                   const ChunkSelection& out);
 
 }  // namespace tether::contact::detail

@@ -3,22 +3,29 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <exception>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <tether/contact/ranks.hpp>
 #include <tether/linalg/index.hpp>
 
-#include "graph/graph_parts.hpp"
+#include "body_sweeps/implementation.hpp"
+#include "ranks/rank_plan.hpp"
 
 namespace tether::contact {
 
+using detail::Island;
+using detail::IslandResult;
+using detail::PassResult;
+using detail::RankExchange;
+using detail::RankExchanges;
 using Eigen::Vector3d;
 using linalg::at;
 
 namespace {
 
 constexpr int kPlaces = 20;  // parts are cut anew at every so many of them
-constexpr int kReport = 7, kOfContact = 5, kOfBody = 6;  // numbers that are gathered
+constexpr int kReport = 6, kOfContact = 5, kOfBody = 6, kOfState = 4;  // numbers that are gathered
 
 // Bodies of a list to ranks first .. first + ranks - 1: in two parts with the work of their ranks,
 // cut across the longest side, and so on. The same on all processes, which is all that is asked.
@@ -61,176 +68,275 @@ class Bisection {
 
 }  // namespace
 
-struct RankTeam::Implementation {
-  Implementation(RankMessages& m, int fewest) : messages(m), smallest(fewest), ranks({}) {}
+// The part of this process in BodySolver's sweeps over the whole problem.
+struct RankTeam::Implementation final : detail::SweepPartners {
+  Implementation(RankMessages& m, int fewest) : messages(m), smallest(fewest) {}
 
-  void plan(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
-            const BodyOptions& options);
-  void find_owners(int bodies);
-  void take_part(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
-                 const std::vector<const Vector3d*>& starts);
-  void solve_part();
-  void pack();
+  bool here(int island) const override { return plan.here[at(island)] != 0; }
+  bool shared(int island) const override { return plan.shared[at(island)] != 0; }
+  bool reports(int island) const override { return root(island) == plan.rank; }
+  const detail::ContactGraph& whole() const override { return plan.whole; }
+  void begin(int island) override { island_now = island; }
+  void after_colour(int colour, detail::MovingBodies& bodies) override {
+    pass_on(plan.after[at(colour)], after[at(colour)], bodies);
+  }
+  void share(detail::MovingBodies& bodies) override {
+    pass_on(plan.share[at(island_now)], between[at(island_now)], bodies);
+  }
+  PassResult total(const std::vector<PassResult>& sums) override;
+  void finish(bool failed) override;
+  void give_up(const char* why) override { messages.give_up(why); }
+
+  using With = std::vector<RankMessages::With>;
+  static With buffers(const RankExchanges& exchanges);
+  void pass_on(const RankExchanges& exchanges, With& with, detail::MovingBodies& bodies);
+  int root(int island) const {
+    return plan.chunk_rank[at(plan.whole.islands[at(island)].chunk_begin)];
+  }
+
+  void find_owners(std::size_t bodies);
+  void make_plan(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts);
+  void solve_part(BodySolution& out);
+  bool any_failed(bool failed);
+  void gather_states(int island, std::vector<Eigen::Vector4d>& states);
+  void assemble(int island, const std::vector<Eigen::Vector4d>& states);
+  void pack(const BodySolution& out);
   void exchange();
-  void unpack(const std::vector<RigidBody>& bodies, BodySolution& out);
+  void unpack(BodySolution& out);
+  bool is_moved(std::size_t body) const { return plan.whole.slot[body] >= 0; }
 
   RankMessages& messages;
   int smallest;
-  RankSolver ranks;
+  detail::RankPlan plan;
+  BodySolver::Implementation engine;
+  std::vector<With> after, between;  // by colour, by island
+  int island_now = 0;
+
   std::vector<Vector3d> positions;
   int places = 0;
-  std::vector<int> owner;  // of the positions, or of the bodies of a solve without
-  bool owners_by_place = false;
+  std::vector<int> owner;  // of bodies: given, of the positions, or of a solve without
+  enum class By { number, place, caller } owned_by = By::number;
   long problems = 0, swept = 0;
+
   // Data of a solve:
-  std::vector<std::uint8_t> traits;
-  std::vector<RankContact> links;
-  std::vector<char> moved;  // by a contact
-  std::vector<int> local;   // body -> place in the part
-  std::vector<RigidBody> part_bodies;
-  std::vector<PointContact> part_contacts;
-  std::vector<Vector3d> part_starts;
-  BodySolution found;
-  std::vector<double> mine, all;
+  detail::Worker worker;
+  std::vector<char> replaced;  // contacts
+  std::vector<double> sums, mine, all;
 };
 
-void RankTeam::Implementation::find_owners(int bodies) {
-  const bool placed = static_cast<int>(positions.size()) == bodies;
-  if (placed && owners_by_place && static_cast<int>(owner.size()) == bodies) return;
-  owner.resize(at(bodies));
-  owners_by_place = placed;
+RankTeam::Implementation::With RankTeam::Implementation::buffers(const RankExchanges& exchanges) {
+  With out;
+  for (const RankExchange& e : exchanges)
+    out.push_back({e.rank, std::vector<double>(6 * e.send.size()),
+                   std::vector<double>(6 * e.receive.size())});
+  return out;
+}
+
+void RankTeam::Implementation::pass_on(const RankExchanges& exchanges, With& with,
+                                       detail::MovingBodies& bodies) {
+  if (with.empty()) return;
+  for (std::size_t k = 0; k < with.size(); ++k) {
+    double* out = with[k].out.data();
+    for (const int slot : exchanges[k].send) bodies.get(slot, out), out += 6;
+  }
+  messages.exchange(with);
+  for (std::size_t k = 0; k < with.size(); ++k) {
+    const double* in = with[k].in.data();
+    for (const int slot : exchanges[k].receive) bodies.set(slot, in), in += 6;
+  }
+}
+
+// In the order of the chunks of the whole, as one process adds them.
+PassResult RankTeam::Implementation::total(const std::vector<PassResult>& of_chunks) {
+  const Island &whole = plan.whole.islands[at(island_now)],
+               &part = plan.part.islands[at(island_now)];
+  sums.assign(4 * at(whole.chunk_end - whole.chunk_begin), 0);
+  for (int c = part.chunk_begin; c < part.chunk_end; ++c) {
+    double* four = sums.data() + 4 * at(plan.chunk_of[at(c)] - whole.chunk_begin);
+    four[0] = of_chunks[at(c)].sum;
+    four[1] = of_chunks[at(c)].most;
+    four[2] = of_chunks[at(c)].speed;
+    four[3] = of_chunks[at(c)].started;
+  }
+  messages.sum(sums);
+  PassResult total;
+  for (std::size_t c = 0; c < sums.size(); c += 4) {
+    PassResult r;
+    r.sum = sums[c];
+    r.most = sums[c + 1];
+    r.speed = sums[c + 2];
+    r.started = sums[c + 3];
+    total.add(r);
+  }
+  return total;
+}
+
+void RankTeam::Implementation::find_owners(std::size_t bodies) {
+  const bool fits = owner.size() == bodies;
+  if (owned_by == By::caller && fits) return;
+  const bool placed = positions.size() == bodies;
+  if (placed && owned_by == By::place && fits) return;
+  owner.resize(bodies);
+  owned_by = placed ? By::place : By::number;
   if (!placed) {
-    for (int k = 0; k < bodies; ++k)
-      owner[at(k)] = static_cast<int>(static_cast<long>(k) * messages.size() / bodies);
+    for (std::size_t k = 0; k < bodies; ++k)
+      owner[k] = static_cast<int>(k * at(messages.size()) / bodies);
     return;
   }
-  std::vector<double> work(at(bodies), 1);
-  for (const RankContact& c : links)
-    ++work[at(c.second < 0 ? c.first : std::min(c.first, c.second))];
-  std::vector<int> order(at(bodies));
-  for (int k = 0; k < bodies; ++k) order[at(k)] = k;
+  std::vector<double> work(bodies, 1);
+  for (std::size_t i = 0; i < engine.given.first().size(); ++i) {
+    const int one = engine.given.first()[i], other = engine.given.second()[i];
+    ++work[at(other < 0 ? one : std::min(one, other))];
+  }
+  std::vector<int> order(bodies);
+  std::iota(order.begin(), order.end(), 0);
   Bisection(positions, work, owner).cut(order.begin(), order.end(), 0, messages.size());
 }
 
-void RankTeam::Implementation::plan(const std::vector<RigidBody>& bodies,
-                                    const std::vector<PointContact>& contacts,
-                                    const BodyOptions& options) {
-  BodyOptions of_ranks = options;
-  of_ranks.team = nullptr;
-  of_ranks.warm_start = false;
-  ranks.set_options(of_ranks);
-  traits.resize(bodies.size());
-  for (std::size_t k = 0; k < bodies.size(); ++k) traits[k] = rank_traits(k, bodies[k]);
-  links.resize(contacts.size());
-  moved.assign(bodies.size(), 0);
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    links[i] = rank_contact(i, contacts[i], traits, options.law);
-    for (const int b : {links[i].first, links[i].second})
-      if (b >= 0) moved[at(b)] = 1;
-  }
-  find_owners(static_cast<int>(bodies.size()));
-  ranks.plan(links, owner, messages.size(), messages.rank());
+// All ranks plan the whole graph of contacts alike, so that it needs no messages.
+void RankTeam::Implementation::make_plan(const std::vector<RigidBody>& bodies,
+                                         const std::vector<PointContact>& contacts) {
+  engine.given.read(bodies, contacts, engine.options.law);
+  find_owners(bodies.size());
+  plan.build(engine.given.first(), engine.given.second(), engine.given.kinds(), owner,
+             messages.size(), messages.rank());
+  after.clear();
+  between.clear();
+  for (const RankExchanges& e : plan.after) after.push_back(buffers(e));
+  for (const RankExchanges& e : plan.share) between.push_back(buffers(e));
 }
 
-void RankTeam::Implementation::take_part(const std::vector<RigidBody>& bodies,
-                                         const std::vector<PointContact>& contacts,
-                                         const std::vector<const Vector3d*>& starts) {
-  local.assign(bodies.size(), -1);
-  part_bodies.clear();
-  for (const int b : ranks.bodies()) {
-    local[at(b)] = static_cast<int>(part_bodies.size());
-    part_bodies.push_back(bodies[at(b)]);
-  }
-  part_contacts.clear();
-  part_starts.clear();
-  for (const int i : ranks.contacts()) {
-    PointContact c = contacts[at(i)];
-    c.first = local[at(c.first)];
-    if (c.second >= 0) c.second = local[at(c.second)];
-    part_contacts.push_back(c);
-    if (!starts.empty()) part_starts.push_back(starts[at(i)] ? *starts[at(i)] : Vector3d(0, 0, 0));
-  }
+bool RankTeam::Implementation::any_failed(bool failed) {
+  std::vector<double> failures(at(messages.size()), 0);
+  failures[at(messages.rank())] = failed;
+  messages.sum(failures);
+  return std::any_of(failures.begin(), failures.end(), [](double f) { return f != 0; });
 }
 
-void RankTeam::Implementation::solve_part() {
+void RankTeam::Implementation::solve_part(BodySolution& out) {
+  engine.out = &out;
+  engine.graph = plan.part;
+  engine.partners = this;
+  worker.replaced.clear();
   std::exception_ptr failure;
   try {
-    ranks.solve(part_bodies, part_contacts, part_starts, messages, found);
+    engine.solve_graph();
   } catch (...) {
     failure = std::current_exception();
   }
-  std::vector<double> failed(at(messages.size()), 0);
-  failed[at(messages.rank())] = failure != nullptr;
-  messages.sum(failed);
+  const bool any = any_failed(failure != nullptr);
   if (failure) std::rethrow_exception(failure);
-  for (std::size_t r = 0; r < failed.size(); ++r)
-    if (failed[r] != 0)
-      throw std::runtime_error("rank " + std::to_string(r) + " could not solve its contacts");
+  if (any) throw std::runtime_error("another rank could not solve its contacts");
+  replaced.assign(engine.given.contacts().size(), 0);
+  for (const std::vector<int>* list : {&out.replaced, &worker.replaced})
+    for (const int i : *list) replaced[at(i)] = 1;
+}
+
+// Shared islands that are to be assembled are left to the rank of their first chunk. A throw on one
+// rank leaves all out of that; solve_part() sees to it that all throw.
+void RankTeam::Implementation::finish(bool failed) {
+  if (any_failed(failed)) return;
+  std::vector<std::pair<int, std::vector<Eigen::Vector4d>>> left;
+  for (int k = 0; k < static_cast<int>(plan.shared.size()); ++k) {
+    if (!shared(k) || !(engine.results[at(k)].assembly > 0)) continue;
+    std::vector<Eigen::Vector4d> states;
+    gather_states(k, states);
+    const Island& island = plan.whole.islands[at(k)];
+    for (int i = 0; i < island.contacts; ++i)
+      plan.contact_rank[at(plan.whole.order[at(island.contact_begin + i)])] = root(k);
+    for (int s = island.body_begin; s < island.body_end; ++s)
+      plan.home[at(plan.whole.body[at(s)])] = root(k);
+    if (reports(k)) left.emplace_back(k, std::move(states));
+  }
+  if (left.empty()) return;
+  engine.graph = plan.whole;
+  engine.sweeps.start(engine.given, engine.graph, engine.options.law);
+  for (const auto& [island, states] : left) assemble(island, states);
+}
+
+// What sweeps have made of the contacts of an island, in the order of its places; on its root.
+void RankTeam::Implementation::gather_states(int k, std::vector<Eigen::Vector4d>& states) {
+  const Island& island = plan.whole.islands[at(k)];
+  std::vector<int> counts(at(plan.ranks), 0);
+  const auto contacts = [&](int chunk) {
+    return plan.whole.chunks[at(chunk + 1)].place - plan.whole.chunks[at(chunk)].place;
+  };
+  for (int c = island.chunk_begin; c < island.chunk_end; ++c)
+    counts[at(plan.chunk_rank[at(c)])] += kOfState * contacts(c);
+  mine.clear();
+  engine.sweeps.for_contacts(plan.part.islands[at(k)], [&](int, detail::Kind kind, int place) {
+    const Eigen::Vector4d s = engine.sweeps.state(kind, place);
+    mine.insert(mine.end(), s.data(), s.data() + kOfState);
+  });
+  messages.gather(root(k), mine, counts, all);
+  if (!reports(k)) return;
+  std::vector<const double*> next;
+  const double* from = all.data();
+  for (const int count : counts) next.push_back(from), from += count;
+  for (int c = island.chunk_begin; c < island.chunk_end; ++c)
+    for (int i = 0; i < contacts(c); ++i, next[at(plan.chunk_rank[at(c)])] += kOfState)
+      states.push_back(Eigen::Map<const Eigen::Vector4d>(next[at(plan.chunk_rank[at(c)])]));
+}
+
+// As one process would, from where the sweeps are.
+void RankTeam::Implementation::assemble(int k, const std::vector<Eigen::Vector4d>& states) {
+  const Island& island = plan.whole.islands[at(k)];
+  detail::Team team{0, 1, nullptr, &worker.scratch};
+  engine.sweeps.load(island, team);
+  engine.sweeps.pack(island, team, {});
+  auto next = states.begin();
+  engine.sweeps.for_contacts(island, [&](int, detail::Kind kind, int place) {
+    engine.sweeps.set_state(kind, place, *next++);
+  });
+  engine.assemble_and_sweep_on(k, worker);
 }
 
 // Packs the results of this rank in the order of unpack().
-void RankTeam::Implementation::pack() {
-  const int me = messages.rank();
-  const RankIslands islands = ranks.islands();
+void RankTeam::Implementation::pack(const BodySolution& out) {
   mine.clear();
-  for (const int number : {static_cast<int>(found.status), found.sweeps, found.colours, islands.all,
-                           islands.assembled, islands.failed})
+  for (const int number : {static_cast<int>(out.status), out.sweeps, out.colours,
+                           out.assembled_islands, out.failed_islands})
     mine.push_back(number);
-  mine.push_back(found.error);
+  mine.push_back(out.error);
   const auto put = [&](const Vector3d& v) { mine.insert(mine.end(), v.data(), v.data() + 3); };
-  std::vector<double> replaced(part_contacts.size(), 0);
-  for (const int i : found.replaced) replaced[at(i)] = 1;
-  std::vector<int> place(links.size(), -1);
-  for (std::size_t k = 0; k < ranks.contacts().size(); ++k)
-    place[at(ranks.contacts()[k])] = static_cast<int>(k);
-  for (std::size_t i = 0; i < links.size(); ++i) {
-    if (ranks.contact_ranks()[i] != me) continue;
-    const std::size_t k = at(place[i]);
-    put(found.impulses[k]);
-    mine.push_back(static_cast<double>(found.regimes[k]));
-    mine.push_back(replaced[k]);
+  for (std::size_t i = 0; i < replaced.size(); ++i) {
+    if (plan.contact_rank[i] != plan.rank) continue;
+    put(out.impulses[i]);
+    mine.push_back(static_cast<double>(out.regimes[i]));
+    mine.push_back(replaced[i]);
   }
-  for (std::size_t b = 0; b < moved.size(); ++b) {
-    if (!moved[b] || ranks.body_ranks()[b] != me) continue;
-    put(found.velocities[at(local[b])]);
-    put(found.angular_velocities[at(local[b])]);
+  for (std::size_t b = 0; b < plan.home.size(); ++b) {
+    if (!is_moved(b) || plan.home[b] != plan.rank) continue;
+    put(out.velocities[b]);
+    put(out.angular_velocities[b]);
   }
 }
 
 // Numbers as they are, not sums: signs of zeros stay.
 void RankTeam::Implementation::exchange() {
   std::vector<int> counts(at(messages.size()), kReport);
-  for (const int r : ranks.contact_ranks()) counts[at(r)] += kOfContact;
-  for (std::size_t b = 0; b < moved.size(); ++b)
-    if (moved[b]) counts[at(ranks.body_ranks()[b])] += kOfBody;
-  std::size_t sum = 0;
-  for (const int count : counts) sum += at(count);
-  all.resize(sum);
+  for (const int r : plan.contact_rank) counts[at(r)] += kOfContact;
+  for (std::size_t b = 0; b < plan.home.size(); ++b)
+    if (is_moved(b)) counts[at(plan.home[b])] += kOfBody;
+  all.resize(at(std::accumulate(counts.begin(), counts.end(), 0)));
   messages.gather(0, mine, counts, all);
   messages.broadcast(0, all);
 }
 
-void RankTeam::Implementation::unpack(const std::vector<RigidBody>& bodies, BodySolution& out) {
+// Bodies that no contact moves have their velocities already.
+void RankTeam::Implementation::unpack(BodySolution& out) {
   out.status = Status::solved;
   out.error = 0;
   out.sweeps = out.colours = out.assembled_islands = out.failed_islands = 0;
   out.replaced.clear();
-  out.impulses.resize(links.size());
-  out.regimes.resize(links.size());
-  out.velocities.resize(bodies.size());
-  out.angular_velocities.resize(bodies.size());
-  out.bytes = found.bytes;
-  out.body_bytes = found.body_bytes;
-  out.spheres = std::none_of(links.begin(), links.end(), [](const RankContact& c) {
-    return c.kind == static_cast<std::uint8_t>(detail::Kind::general);
-  });
+  const std::vector<detail::Kind>& kinds = engine.given.kinds();
+  out.spheres = std::find(kinds.begin(), kinds.end(), detail::Kind::general) == kinds.end();
   const double* from = all.data();
   for (int r = 0; r < messages.size(); ++r) {
     const auto number = [&] { return static_cast<int>(*from++); };
     out.status = worse(out.status, static_cast<Status>(number()));
     out.sweeps = std::max(out.sweeps, number());
     out.colours = std::max(out.colours, number());
-    out.islands = number();
     out.assembled_islands += number();
     out.failed_islands += number();
     out.error = worse(out.error, *from++);
@@ -238,24 +344,19 @@ void RankTeam::Implementation::unpack(const std::vector<RigidBody>& bodies, Body
       v = Eigen::Map<const Vector3d>(from);
       from += 3;
     };
-    for (std::size_t i = 0; i < links.size(); ++i) {
-      if (ranks.contact_ranks()[i] != r) continue;
+    for (std::size_t i = 0; i < replaced.size(); ++i) {
+      if (plan.contact_rank[i] != r) continue;
       get(out.impulses[i]);
       out.regimes[i] = static_cast<Regime>(number());
       if (*from++ != 0) out.replaced.push_back(static_cast<int>(i));
     }
-    for (std::size_t b = 0; b < moved.size(); ++b) {
-      if (!moved[b] || ranks.body_ranks()[b] != r) continue;
+    for (std::size_t b = 0; b < plan.home.size(); ++b) {
+      if (!is_moved(b) || plan.home[b] != r) continue;
       get(out.velocities[b]);
       get(out.angular_velocities[b]);
     }
   }
   std::sort(out.replaced.begin(), out.replaced.end());
-  for (std::size_t b = 0; b < moved.size(); ++b) {
-    if (moved[b]) continue;
-    out.velocities[b] = bodies[b].velocity;
-    out.angular_velocities[b] = bodies[b].angular_velocity;
-  }
 }
 
 RankTeam::RankTeam(RankMessages& messages, int smallest)
@@ -266,7 +367,12 @@ void RankTeam::place(const std::vector<Vector3d>& positions) {
   Implementation& own = *implementation_;
   if (own.places++ % kPlaces != 0 && positions.size() == own.positions.size()) return;
   own.positions = positions;
-  own.owners_by_place = false;
+  own.owned_by = Implementation::By::number;
+}
+
+void RankTeam::set_owners(const std::vector<int>& rank_of_body) {
+  implementation_->owner = rank_of_body;
+  implementation_->owned_by = Implementation::By::caller;
 }
 
 bool RankTeam::solve(const std::vector<RigidBody>& bodies,
@@ -275,18 +381,23 @@ bool RankTeam::solve(const std::vector<RigidBody>& bodies,
                      BodySolution& solution) {
   Implementation& own = *implementation_;
   if (own.messages.size() == 1 || static_cast<int>(contacts.size()) < own.smallest) return false;
-  own.plan(bodies, contacts, options);
-  own.take_part(bodies, contacts, starts);
-  own.solve_part();
-  own.pack();
+  own.engine.options = options;
+  own.engine.starts = starts;
+  own.make_plan(bodies, contacts);
+  own.solve_part(solution);
+  own.pack(solution);
   own.exchange();
-  own.unpack(bodies, solution);
+  own.unpack(solution);
   ++own.problems;
-  own.swept += static_cast<long>(own.part_contacts.size());
+  own.swept += static_cast<long>(own.plan.part.order.size());
   return true;
 }
 
 long RankTeam::problems() const { return implementation_->problems; }
 long RankTeam::swept_contacts() const { return implementation_->swept; }
+int RankTeam::shared_islands() const {
+  const std::vector<char>& shared = implementation_->plan.shared;
+  return static_cast<int>(std::count(shared.begin(), shared.end(), 1));
+}
 
 }  // namespace tether::contact

@@ -61,7 +61,7 @@ struct BodyOptions {
   double enough = 0;      ///< as Options::enough, for each assembled island
   /// Contacts of islands of 6000 and more that `bias` keeps open by far are swept only where they
   /// close after all (guide, section 3): for steps of fast bodies, with all contacts that could
-  /// close. RankSolver and contact_mpi sweep all.
+  /// close.
   bool leave_out_far = false;
   /// Processes that share the work of each solve, all with the same bodies, contacts and options;
   /// null: none. Outlives the solver. See RankTeam.
@@ -90,6 +90,8 @@ struct BodySolution {
   std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
 };
 
+class RankTeam;
+
 /// Processes that share the work of a BodySolver; RankTeam implements it on RankMessages.
 class SolverTeam {
  public:
@@ -104,8 +106,6 @@ class SolverTeam {
                      BodySolution& solution) = 0;
 };
 
-class RankSolver;
-
 /// Solves each island of bodies in contact by itself: Gauss-Seidel on the velocities of the bodies,
 /// and Solver where that converges slowly. The result of an island depends neither on the other
 /// islands nor on the number of threads.
@@ -113,7 +113,7 @@ class RankSolver;
 /// Keep one for a run of time steps: it holds the workspace, the threads and the impulses by id.
 /// Not for use by two threads at once.
 class BodySolver {
-  friend class RankSolver;
+  friend class RankTeam;
 
  public:
   explicit BodySolver(const BodyOptions& options = {});  ///< throws std::invalid_argument

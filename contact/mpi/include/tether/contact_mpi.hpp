@@ -28,8 +28,8 @@ struct Share {
 
 /// Messages that one rank has sent in a solve.
 struct Traffic {
-  long long messages = 0, bytes = 0;              ///< velocities during sweeps, and residuals
-  long long reductions = 0;                       ///< sums over all ranks meanwhile
+  long long messages = 0, bytes = 0;              ///< velocities during sweeps
+  long long reductions = 0;                       ///< sums over all ranks
   long long other_messages = 0, other_bytes = 0;  ///< bodies, contacts and results
 };
 
@@ -46,7 +46,6 @@ struct Solution {
   std::vector<Eigen::Vector3d> velocities, angular_velocities;
   std::vector<int> replaced;  ///< contacts of this rank, as BodySolution::replaced
   Traffic traffic;            ///< of this rank, counted
-  contact::RankTraffic plan;  ///< of this rank, of one sweep and one look at the residual
   int swept_contacts = 0;     ///< by this rank
 };
 
