@@ -9,6 +9,8 @@
 // alternate. Where others use the machine, "chrt -f 10 contact_scale ..." (as root) gives it the
 // cores.
 // --residual: what is reached with at most 100, 300, 1000, 3000 sweeps instead.
+#include <malloc.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -32,6 +34,11 @@ double cpu() {
   timespec t;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+double heap() {
+  const struct mallinfo2 m = mallinfo2();
+  return static_cast<double>(m.uordblks + m.hblkhd);
 }
 
 // FNV over the bits of the velocities.
@@ -90,8 +97,8 @@ int main(int argc, char** argv) {
   if (tolerance > 0) {
     std::printf("bodies   contacts    mu  residual (sweeps) with at most 100, 300, 1000, 3000\n");
   } else {
-    std::printf("%-8s %-19s %8s %3s %4s %6s %7s %6s %6s %6s %8s %s\n", "bodies", "law", "contacts",
-                "thr", "col", "ns", "CPU ns", "setup", "B/con", "B/body", "speed-up", "same bits");
+    std::printf("%-8s %-19s %8s %3s %4s %6s %7s %6s %6s %8s %s\n", "bodies", "law", "contacts",
+                "thr", "col", "ns", "CPU ns", "setup", "B/con", "speed-up", "same bits");
   }
   for (int side : {7, 15, 32, 69}) {
     for (bool spheres : {false, true}) {
@@ -112,6 +119,7 @@ int main(int argc, char** argv) {
         o.law = law;
         o.tolerance = 1e-300;
         o.max_assembled = 0;
+        const double before = heap();
         BodySolver solver[2] = {BodySolver(o), BodySolver(o)};
         const int repeat = rounds > 0  ? rounds
                            : side < 10 ? 40
@@ -132,15 +140,14 @@ int main(int argc, char** argv) {
             timing[t].bits = hash(last);
           }
         }
-        const double scale = 1e9 / (n * 2 * sweeps);
+        const double scale = 1e9 / (n * 2 * sweeps), memory = (heap() - before) / 2;
         for (int t = 0; t < 2; ++t) {
           const double* wall = timing[t].wall;
           const double ns = scale * (wall[1] - wall[0]);
-          std::printf("%-8s %-19s %8.0f %3d %4d %6.1f %7.1f %6.0f %6.0f %6.0f %8.2f %s\n",
+          std::printf("%-8s %-19s %8.0f %3d %4d %6.1f %7.1f %6.0f %6.0f %8.2f %s\n",
                       spheres ? "spheres" : "general", name(law), n, t == 0 ? 1 : many,
                       last.colours, ns, scale * (timing[t].work[1] - timing[t].work[0]),
-                      1e9 * wall[0] / n - (sweeps + 1) * ns, static_cast<double>(last.bytes) / n,
-                      static_cast<double>(last.body_bytes) / static_cast<double>(p.bodies.size()),
+                      1e9 * wall[0] / n - (sweeps + 1) * ns, memory / n,
                       (timing[0].wall[1] - timing[0].wall[0]) / (wall[1] - wall[0]),
                       timing[t].bits == timing[0].bits ? "yes" : "NO");
         }

@@ -88,13 +88,4 @@ void GivenProblem::read_contacts(Law law) {
   }
 }
 
-std::size_t GivenProblem::contact_bytes() const {
-  return sizeof(int) * (first_.capacity() + second_.capacity()) + sizeof(Kind) * kind_.capacity() +
-         exchanged_.capacity();
-}
-std::size_t GivenProblem::body_bytes() const {
-  return traits_.capacity() + sizeof(int) * fixed_slot_.capacity() +
-         sizeof(BodyState) * fixed_.capacity();
-}
-
 }  // namespace tether::contact::detail

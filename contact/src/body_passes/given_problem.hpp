@@ -61,9 +61,6 @@ class GivenProblem {
     return partner < 0 ? -1 : -1 - fixed_slot_[linalg::at(partner)];
   }
 
-  std::size_t contact_bytes() const;
-  std::size_t body_bytes() const;
-
  private:
   void read_bodies();
   void read_contacts(Law law);

@@ -231,8 +231,4 @@ void IslandSweeps::unpack(const Island& island, Team& team, BodySolution& out) {
   }
 }
 
-std::size_t IslandSweeps::contact_bytes() const {
-  return contacts_.bytes() + sizeof(PassResult) * (sums_[0].capacity() + sums_[1].capacity());
-}
-
 }  // namespace tether::contact::detail

@@ -72,8 +72,6 @@ class IslandSweeps {
   }
 
   bool has_general() const { return contacts_.has_general(); }
-  std::size_t contact_bytes() const;
-  std::size_t body_bytes() const { return bodies_.bytes(); }
 
  private:
   template <class Visit>

@@ -73,10 +73,6 @@ class MovingBodies {
     static constexpr BodyInertia kNoInertia = {};
     return {state_.data(), inertia_.data(), fixed, nowhere, &kNoInertia};
   }
-  std::size_t bytes() const {
-    return sizeof(BodyState) * state_.capacity() + sizeof(BodyInertia) * inertia_.capacity() +
-           sizeof(double) * previous_.capacity();
-  }
 
  private:
   std::vector<BodyState> state_;

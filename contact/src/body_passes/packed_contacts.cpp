@@ -223,9 +223,4 @@ void PackedContacts::extrapolate(const Chunk& from, const Chunk& to, double beta
   });
 }
 
-std::size_t PackedContacts::bytes() const {
-  const auto sum = [](const auto&... list) { return (... + (list.capacity() * sizeof(list[0]))); };
-  return sum(general4_, spheres4_, general_, spheres_, smooth_, previous_);
-}
-
 }  // namespace tether::contact::detail

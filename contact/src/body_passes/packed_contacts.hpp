@@ -48,7 +48,6 @@ class PackedContacts {
   }
 
   bool has_general() const { return !(general_.empty() && general4_.empty()); }
-  std::size_t bytes() const;
 
  private:
   GeneralContact general(Kind k, int place) const;

@@ -127,10 +127,6 @@ void BodySolver::Implementation::solve_graph() {
   if (partners) partners->finish(failure != nullptr);
   if (failure) std::rethrow_exception(failure);
   report();
-  o.bytes = graph.contact_bytes() + memory.bytes() + given.contact_bytes() +
-            starts.capacity() * sizeof(starts[0]) + sweeps.contact_bytes() +
-            results.capacity() * sizeof(results[0]);
-  o.body_bytes = graph.body_bytes() + given.body_bytes() + sweeps.body_bytes();
 }
 
 void BodySolver::Implementation::find_starts() {

@@ -133,10 +133,4 @@ bool FarContacts::take_in(const std::vector<PointContact>& contacts, const BodyS
 
 int FarContacts::count() const { return static_cast<int>(std::count(out_.begin(), out_.end(), 1)); }
 
-std::size_t FarContacts::bytes() const {
-  return sizeof(int) *
-             (sorted_.capacity() + island_.capacity() + rest_.capacity() + next_.capacity()) +
-         out_.capacity() + sizeof(double) * (open_.capacity() + far_.capacity());
-}
-
 }  // namespace tether::contact::detail

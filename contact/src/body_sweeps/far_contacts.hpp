@@ -30,7 +30,6 @@ class FarContacts {
   bool take_in(const std::vector<PointContact>& contacts, const BodySolution& solution);
 
   int count() const;  // of contacts that are left out
-  std::size_t bytes() const;
 
  private:
   static constexpr int kLarge = 6000;    // contacts of an island that is worth it

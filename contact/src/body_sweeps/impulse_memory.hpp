@@ -29,11 +29,6 @@ class ImpulseMemory {
   const std::vector<std::uint64_t>& ids() const { return ids_; }
   const std::vector<Eigen::Vector3d>& impulses() const { return impulses_; }
   bool empty() const { return ids_.empty(); }
-  std::size_t bytes() const {
-    return ids_.capacity() * sizeof(ids_[0]) + impulses_.capacity() * sizeof(impulses_[0]) +
-           table_.capacity() * sizeof(table_[0]);
-  }
-
   // Before a run of find().
   void rewind() {
     next_ = 0;
@@ -114,7 +109,6 @@ class ImpulseHistory {
     last_.clear();
     for (std::size_t i = 0; i < start.ids.size(); ++i) last_.add(start.ids[i], start.impulses[i]);
   }
-  std::size_t bytes() const { return last_.bytes(); }
 
  private:
   ImpulseMemory last_, before_;

@@ -19,7 +19,6 @@ void clear(const std::vector<RigidBody>& bodies, std::size_t contacts, BodySolut
   out.islands = out.assembled_islands = out.failed_islands = out.sweeps = out.colours = 0;
   out.replaced.clear();
   out.spheres = true;
-  out.bytes = out.body_bytes = 0;
   out.impulses.resize(contacts);
   std::fill(out.impulses.begin(), out.impulses.end(), Vector3d::Zero());
   out.regimes.resize(contacts);
@@ -62,8 +61,6 @@ bool BodySolver::Implementation::solve_near(const std::vector<RigidBody>& b,
     return false;
   }
   out->far = far.count();
-  out->bytes += far.bytes() + near.capacity() * sizeof(near[0]) +
-                all_starts.capacity() * sizeof(all_starts[0]);
   std::sort(out->replaced.begin(), out->replaced.end());
   return true;
 }
@@ -132,8 +129,6 @@ void BodySolver::Implementation::take_judgement(int swept) {
   o.assembled_islands += found.assembled_islands;
   o.failed_islands += found.failed_islands;
   o.spheres = o.spheres && found.spheres;
-  o.bytes = std::max(o.bytes, found.bytes);
-  o.body_bytes = std::max(o.body_bytes, found.body_bytes);
   for (const int k : found.replaced) o.replaced.push_back(far.next()[at(k)]);
 }
 

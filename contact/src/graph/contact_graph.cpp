@@ -87,15 +87,4 @@ void ContactGraph::append_chunk(const int* begin, const int* end, int place) {
   chunks.push_back(next);
 }
 
-std::size_t ContactGraph::contact_bytes() const {
-  return sizeof(int) * (order.capacity() + sorted_.capacity()) + adjacent_.contact_bytes() +
-         clusters_.contact_bytes() + sizeof(float) * coupled.capacity() +
-         sizeof(Chunk) * chunks.capacity() + sizeof(Island) * islands.capacity();
-}
-
-std::size_t ContactGraph::body_bytes() const {
-  return sizeof(int) * (slot.capacity() + body.capacity()) + finder_.body_bytes() +
-         adjacent_.body_bytes() + clusters_.body_bytes() + sizeof(std::uint64_t) * used_.capacity();
-}
-
 }  // namespace tether::contact::detail

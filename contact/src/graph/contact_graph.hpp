@@ -29,10 +29,6 @@ class ContactGraph {
   std::vector<int> colours;    // first chunk of each colour; one behind the last of each island
   std::vector<Island> islands;
 
-  // Bytes of storage that grow with the contacts, and with the bodies.
-  std::size_t contact_bytes() const;
-  std::size_t body_bytes() const;
-
  private:
   void one_chunk(Island& island);
   void many_chunks(Island& island);

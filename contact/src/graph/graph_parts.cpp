@@ -49,10 +49,6 @@ void IslandFinder::find(int bodies, const ContactPairs& pairs, std::vector<Islan
   for (Island& island : islands) island.contact_begin -= island.contacts;
 }
 
-std::size_t IslandFinder::body_bytes() const {
-  return sets_.bytes() + sizeof(int) * island_of_.capacity();
-}
-
 void Adjacency::build(int bodies, const ContactPairs& pairs) {
   const std::vector<int>&first = *pairs.first, &second = *pairs.second;
   const std::size_t n = first.size();

@@ -46,7 +46,6 @@ class IslandFinder {
   // Counts and places of the islands; contacts sorted by island; the island of each contact.
   void find(int bodies, const ContactPairs& pairs, std::vector<Island>& islands,
             std::vector<int>& sorted, std::vector<int>& island_of_contact);
-  std::size_t body_bytes() const;
 
  private:
   linalg::DisjointSets sets_;   // of bodies
@@ -65,10 +64,6 @@ class Adjacency {
   // For each contact in `order`: the number of contacts that share a moving body, itself included.
   void coupled(const ContactPairs& pairs, const std::vector<int>& bodies,
                const std::vector<int>& order, std::vector<float>& out);
-  std::size_t body_bytes() const { return sizeof(int) * (start_.capacity() + between_.capacity()); }
-  std::size_t contact_bytes() const {
-    return sizeof(int) * all_.capacity() + sizeof(float) * count_.capacity();
-  }
 
  private:
   std::vector<int> start_, all_;
@@ -87,10 +82,6 @@ class Clusters {
   int size() const { return static_cast<int>(start_.size()) - 1; }
   int begin(int cluster) const { return start_[static_cast<std::size_t>(cluster)]; }
   int end(int cluster) const { return begin(cluster + 1); }
-  std::size_t body_bytes() const {
-    return sizeof(int) * (mark_.capacity() + near_.capacity() + far_.capacity());
-  }
-  std::size_t contact_bytes() const { return taken_.capacity(); }
 
  private:
   std::vector<char> taken_;      // contact -> in a cluster

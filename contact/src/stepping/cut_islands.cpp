@@ -58,20 +58,14 @@ void Stepper::Implementation::set_active(std::vector<char> active) {
 // an impact has sent to others must take their step with them.
 void Stepper::Implementation::leave_out_passive() {
   if (part.active.empty()) return;
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+  const auto waits = [&](int i) { return bodies.mass[at(i)] > 0 && !takes_part(i); };
+  const auto moves = [&](int i) { return bodies.mass[at(i)] > 0 && takes_part(i); };
+  detail::keep_contacts(contacts, [&](std::size_t k) {
     const PointContact& c = contacts.points[k];
-    const auto waits = [&](int i) { return bodies.mass[at(i)] > 0 && !takes_part(i); };
-    const auto moves = [&](int i) { return bodies.mass[at(i)] > 0 && takes_part(i); };
-    if (waits(c.first) || waits(c.second)) {
-      part.met = part.met || moves(c.first) || moves(c.second);
-      continue;
-    }
-    contacts.points[kept] = c;
-    contacts.gaps[kept++] = contacts.gaps[k];
-  }
-  contacts.points.resize(kept);
-  contacts.gaps.resize(kept);
+    if (!waits(c.first) && !waits(c.second)) return true;
+    part.met = part.met || moves(c.first) || moves(c.second);
+    return false;
+  });
 }
 
 // The same length of those that nothing has struck, whole; islands that strike later are cut there.

@@ -52,14 +52,8 @@ bool Stepper::Implementation::nothing_presses() const {
 // Before the impact its contacts are left out, so that nothing of it is taken: how far forces of
 // other contacts let them go by then differs from where they touch by the square of the length.
 void Stepper::Implementation::leave_out_striking() {
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    if (cuts->strikes(contacts.points[k])) continue;
-    contacts.points[kept] = contacts.points[k];
-    contacts.gaps[kept++] = contacts.gaps[k];
-  }
-  contacts.points.resize(kept);
-  contacts.gaps.resize(kept);
+  detail::keep_contacts(contacts,
+                        [&](std::size_t k) { return !cuts->strikes(contacts.points[k]); });
 }
 
 // The impact, at the places where bodies are. Unsolved: the part that follows takes it as one that
@@ -88,10 +82,7 @@ bool Stepper::Implementation::take_impact() {
   counts.sweeps += s.sweeps;
   counts.assembled_islands += s.assembled_islands;
   if (s.status != Status::solved && !(s.error <= accepted_residual(options))) return false;
-  for (const int i : motion.moving()) {
-    bodies.motion[at(i)].velocity = s.velocities[at(i)];
-    bodies.motion[at(i)].angular_velocity = s.angular_velocities[at(i)];
-  }
+  detail::take_velocities(s, bodies);
   contacts.impulses = s.impulses;
   if (bounces_at_once) counts.bounces += bounces_at_once->apply(bodies, contacts);
   return true;

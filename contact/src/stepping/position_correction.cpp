@@ -1,9 +1,11 @@
 // Tether: moves of a step that are no velocities. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping/position_correction.hpp"
 
+#include <algorithm>
+#include <tether/linalg/index.hpp>
+
 #include "stepping/motion/rotation.hpp"
 #include "stepping/step_settings.hpp"
-#include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
 
@@ -26,22 +28,71 @@ void shift(BodySet& bodies, int body, double dt, const Vector3d& v, const Vector
 
 }  // namespace
 
-PositionCorrection::PositionCorrection(const SteppingOptions& options)
-    : depenetration_(depenetration(options)),
-      closing_(closing_options(options), depenetration_),
-      solver_(correction_options(options)) {}
+PositionCorrection::PositionCorrection(const SteppingOptions& options, IslandMaker* maker)
+    : error_reduction_(options.error_reduction),
+      max_speed_(options.max_depenetration_speed),
+      islands_(maker),
+      closing_solver_(closing_options(options), maker, LawUse::closing),
+      solver_(correction_options(options), maker, LawUse::limits) {}
 
-void PositionCorrection::set_joints(IslandMaker& joints, const SteppingOptions& options) {
-  solver_.set_joints(joints.make_islands(correction_options(options), LawUse::limits));
-  closing_.set_joints(joints, closing_options(options));
+// Velocity at which a contact may close, or, negative, at which it has to open.
+double PositionCorrection::bias(double gap, double dt) const {
+  return gap > 0 ? gap / dt : std::max(error_reduction_ * gap / dt, -max_speed_);
+}
+
+// Islands where nothing bounces and an impact leaves its gap open. False: there are none.
+bool PositionCorrection::find_closing(const Impacts& impacts, const StepContacts& contacts,
+                                      const BodySet& bodies) {
+  closing_.clear();
+  for (const Impact& i : impacts.list())
+    if (i.restitution == 0 && contacts.gaps[at(i.contact)] > 0) closing_.push_back(i);
+  if (closing_.empty()) return false;
+  islands_.join(bodies, contacts);
+  closing_body_.assign(bodies.motion.size(), 0);
+  const auto mark = [&](int contact) -> char& {
+    return closing_body_[at(islands_.root(bodies, contacts.points[at(contact)]))];
+  };
+  for (const Impact& i : closing_) mark(i.contact) = 1;
+  for (const Impact& i : impacts.list())
+    if (i.restitution > 0) mark(i.contact) = 0;
+  closed_.resize(contacts.points.size());
+  for (std::size_t k = 0; k < closed_.size(); ++k) closed_[k] = mark(static_cast<int>(k));
+  for (std::size_t i = 0; i < closing_body_.size(); ++i)
+    if (bodies.mass[i] > 0)
+      closing_body_[i] = closing_body_[at(islands_.root(static_cast<int>(i)))];
+  return true;
+}
+
+// Impulses start as the first solve has found them, but where a gap is left, which takes its part
+// of the approach.
+void PositionCorrection::solve_closing(const Impacts& impacts, double dt,
+                                       const StepContacts& contacts) {
+  part_.assign(contacts.points.size(), 1);
+  for (const Impact& i : closing_)
+    part_[at(i.contact)] = std::max(0.0, 1 - contacts.gaps[at(i.contact)] / (dt * i.comes));
+  points_.clear();
+  start_.ids.clear();
+  start_.impulses.clear();
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    if (closed_[k] == 0) continue;
+    points_.push_back(contacts.points[k]);
+    points_.back().bias = bias(contacts.gaps[k], dt);
+    start_.ids.push_back(points_.back().id);
+    start_.impulses.push_back(part_[k] * contacts.impulses[k]);
+  }
+  closing_solver_.set_warm_start(start_);
+  closing_solver_.solve(impacts.free(), points_, solution_);
 }
 
 void PositionCorrection::close_gaps(const Impacts& impacts, double dt, const StepContacts& contacts,
                                     const std::vector<int>& moving, BodySet& bodies) {
-  closes_ = closing_.find(impacts, bodies, dt, contacts, closing_move_);
+  closes_ = find_closing(impacts, contacts, bodies);
   if (!closes_) return;
+  solve_closing(impacts, dt, contacts);
   for (const int i : moving)
-    shift(bodies, i, dt, closing_move_[at(i)].velocity, closing_move_[at(i)].angular_velocity);
+    if (closing_body_[at(i)] != 0)
+      shift(bodies, i, dt, solution_.velocities[at(i)] - bodies.motion[at(i)].velocity,
+            solution_.angular_velocities[at(i)] - bodies.motion[at(i)].angular_velocity);
 }
 
 void PositionCorrection::take_back(double deepest, double negligible, double dt,
@@ -51,17 +102,14 @@ void PositionCorrection::take_back(double deepest, double negligible, double dt,
   points_.clear();
   bool corrects = false;
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    if (closes_ && closing_.treats(bodies, contacts.points[k])) continue;
+    if (closes_ && closed_[k] != 0) continue;
     points_.push_back(contacts.points[k]);
-    points_.back().bias = depenetration_.bias(contacts.gaps[k], dt);
+    points_.back().bias = bias(contacts.gaps[k], dt);
     corrects = corrects || contacts.gaps[k] < 0;
   }
   if (!corrects) return;
-  at_rest_.resize(bodies.motion.size());
-  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
-    at_rest_[i].inverse_mass = bodies.motion[i].inverse_mass;
-    at_rest_[i].inverse_inertia = bodies.motion[i].inverse_inertia;
-  }
+  at_rest_ = bodies.motion;
+  for (RigidBody& b : at_rest_) b.set_velocities(Vector6d::Zero());
   solver_.solve(at_rest_, points_, solution_);
   for (const int i : moving)
     shift(bodies, i, dt, solution_.velocities[at(i)], solution_.angular_velocities[at(i)]);

@@ -4,24 +4,26 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
-#include "stepping/impacts/closing.hpp"
+#include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
 
 /// Closes the gaps that inelastic impacts leave, and takes penetrations back (method, section 7).
 class PositionCorrection {
  public:
-  PositionCorrection(const SteppingOptions& options);
+  PositionCorrection(const SteppingOptions& options, IslandMaker* maker);
 
-  void set_joints(IslandMaker& joints, const SteppingOptions& options);
-
-  /// After the solve of velocities.
+  /// After the solve of velocities. An impact that does not bounce takes all of the approach at
+  /// once and would leave its gap open. Positions of its island move as if it only stopped the
+  /// approach at the surface (bias gap / dt); what they move more or less than the velocities is no
+  /// velocity. Penetrations of such islands are taken back in the same solve.
   void close_gaps(const Impacts& impacts, double dt, const StepContacts& contacts,
                   const std::vector<int>& moving, BodySet& bodies);
   /// The least move (in the metric of the masses) that takes penetrations deeper than `negligible`
   /// back; contacts that are open may close by as much as they are open. Islands whose gaps have
-  /// just been closed are left out: that has taken theirs back.
+  /// just been closed are left out.
   void take_back(double deepest, double negligible, double dt, const StepContacts& contacts,
                  const std::vector<int>& moving, BodySet& bodies);
 
@@ -29,11 +31,19 @@ class PositionCorrection {
   void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
 
  private:
-  Depenetration depenetration_;
-  Closing closing_;
+  bool find_closing(const Impacts& impacts, const StepContacts& contacts, const BodySet& bodies);
+  void solve_closing(const Impacts& impacts, double dt, const StepContacts& contacts);
+  double bias(double gap, double dt) const;
+
+  double error_reduction_, max_speed_;
   bool closes_ = false;
-  std::vector<RigidBody> closing_move_;
-  StepSolver solver_;
+  std::vector<Impact> closing_;
+  std::vector<char> closed_;        // contacts of islands whose gaps are closed
+  std::vector<char> closing_body_;  // bodies of these
+  std::vector<double> part_;        // of its impulse that is left to a contact
+  MovingIslands islands_;
+  WarmStart start_;
+  StepSolver closing_solver_, solver_;
   BodySolution solution_;
   std::vector<RigidBody> at_rest_;
   std::vector<PointContact> points_;

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "stepping/step_contacts.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
@@ -16,17 +18,6 @@ constexpr double kWhile = 5;       // times sqrt(size / g)
 constexpr double kSame = 1e-9;     // of the forces: changes that wake
 constexpr double kAtFirst = 1e-3;  // the same where a body has just come to rest, of its weight
 constexpr double kInPlace = 1e-8;  // of its size: what rounding may move a neighbour
-
-void push(RigidBody& body, const Vector3d& r, const Vector3d& p) {
-  body.velocity += body.inverse_mass * p;
-  body.angular_velocity += body.inverse_inertia * r.cross(p);
-}
-
-void keep_only(StepContacts& contacts, std::size_t kept) {
-  contacts.points.resize(kept);
-  contacts.gaps.resize(kept);
-  if (contacts.impulses.size() > kept) contacts.impulses.resize(kept);
-}
 
 }  // namespace
 
@@ -56,18 +47,12 @@ void Sleeping::wake(int island) {
     body_[i].slow = 0;
     --count_;
   }
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < kept_.points.size(); ++k) {
-    if (!sleeps(kept_.points[k])) {
-      woken_.ids.push_back(kept_.points[k].id);
-      woken_.impulses.push_back(kept_.impulses[k]);
-      continue;
-    }
-    kept_.points[kept] = kept_.points[k];
-    kept_.gaps[kept] = kept_.gaps[k];
-    kept_.impulses[kept++] = kept_.impulses[k];
-  }
-  keep_only(kept_, kept);
+  keep_contacts(kept_, [&](std::size_t k) {
+    if (sleeps(kept_.points[k])) return true;
+    woken_.ids.push_back(kept_.points[k].id);
+    woken_.impulses.push_back(kept_.impulses[k]);
+    return false;
+  });
   neighbours_.erase(
       std::remove_if(neighbours_.begin(), neighbours_.end(),
                      [&](const StepperMemory::Neighbour& n) { return n.island == island; }),
@@ -174,13 +159,7 @@ bool Sleeping::wake_touched(const NearContacts& near, const BodySet& bodies, con
 }
 
 void Sleeping::leave_out(StepContacts& contacts) const {
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    if (sleeps(contacts.points[k])) continue;
-    contacts.points[kept] = contacts.points[k];
-    contacts.gaps[kept++] = contacts.gaps[k];
-  }
-  keep_only(contacts, kept);
+  keep_contacts(contacts, [&](std::size_t k) { return !sleeps(contacts.points[k]); });
 }
 
 void Sleeping::end(double dt, BodySet& bodies, StepContacts& contacts) const {

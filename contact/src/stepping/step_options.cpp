@@ -73,10 +73,6 @@ BodyOptions correction_options(const SteppingOptions& o) {
   return b;
 }
 
-Depenetration depenetration(const SteppingOptions& o) {
-  return {o.error_reduction, o.max_depenetration_speed};
-}
-
 double negligible_depth(const SteppingOptions& o, double dt) {
   return o.gravity ? o.tolerance * o.gravity->norm() * dt * dt : 0;
 }

@@ -3,8 +3,6 @@
 
 #include <tether/contact/stepping.hpp>
 
-#include "stepping/impacts/closing.hpp"
-
 namespace tether::contact::detail {
 
 /// Parts of the largest velocity that a contact needs. Where the tolerance is not met a better
@@ -22,7 +20,6 @@ BodyOptions contact_options(const SteppingOptions& o);
 /// Options of contact problems that a shorter step would not make easier.
 BodyOptions patient_options(const SteppingOptions& o);
 BodyOptions correction_options(const SteppingOptions& o);
-Depenetration depenetration(const SteppingOptions& o);
 /// Depth that the residual itself allows in a step: m.
 double negligible_depth(const SteppingOptions& o, double dt);
 /// Options of the problem that finds the gaps closed by inelastic impacts.

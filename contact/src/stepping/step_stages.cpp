@@ -168,10 +168,7 @@ void Stepper::Implementation::solve_contacts() {
   }
   judge();
   if (part.failed && part.now.halvings > 0) return;
-  for (const int i : motion.moving()) {
-    bodies.motion[at(i)].velocity = solution.velocities[at(i)];
-    bodies.motion[at(i)].angular_velocity = solution.angular_velocities[at(i)];
-  }
+  detail::take_velocities(solution, bodies);
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
   if (rolling) contacts.moments = joints ? joints->moments() : rolling->moments();
 }
@@ -187,15 +184,9 @@ void Stepper::Implementation::take_later_impacts() {
 
 // Contacts of bodies that a joint connects.
 void Stepper::Implementation::leave_out_joined() {
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    const PointContact& c = contacts.points[k];
-    if (joints->are_joined(c.first, c.second)) continue;
-    contacts.points[kept] = c;
-    contacts.gaps[kept++] = contacts.gaps[k];
-  }
-  contacts.points.resize(kept);
-  contacts.gaps.resize(kept);
+  detail::keep_contacts(contacts, [&](std::size_t k) {
+    return !joints->are_joined(contacts.points[k].first, contacts.points[k].second);
+  });
 }
 
 // In parts, where their equations have no solution near the start of the iteration.

@@ -13,32 +13,33 @@
 
 namespace tether::contact {
 
-// New ones: nothing of the past is left.
+// New ones: nothing of the past is left. The first solver is that of velocities, whose moments are
+// those of the step.
 void Stepper::Implementation::make_solvers() {
+  using detail::LawUse;
   const BodyOptions o = detail::contact_options(options);
-  solver = std::make_unique<detail::StepSolver>(o);
+  const bool laws = joints && joints->has_laws(), bounces = near && near->any_restitution();
+  if (near && near->any_rolling()) rolling = std::make_unique<detail::RollingPart>(*near);
+  if (joints && rolling) joints->set_rolling(*near);
+  detail::IslandMaker* maker = rolling.get();
+  if (joints) maker = joints.get();
+  const auto new_restitution = [&](LawUse use) {
+    return std::make_unique<detail::Restitution>(options.restitution_law, o, maker, use);
+  };
+  solver = std::make_unique<detail::StepSolver>(o, maker, LawUse::all);
   make_impacts();
-  const bool laws = joints && joints->has_laws();
-  if ((near && near->any_restitution()) || laws)
-    restitution = std::make_unique<detail::Restitution>(options.restitution_law, o);
-  if (!near) return give_islands(*joints);
+  if (bounces || laws) restitution = new_restitution(LawUse::plastic);
+  if (laws) restitution->set_laws(*joints);
+  if (!near) return;
   later = std::make_unique<detail::LaterImpacts>(
       detail::threshold_speed(options.impact_threshold, options),
-      detail::threshold_speed(options.restitution_threshold, options), o);
+      detail::threshold_speed(options.restitution_threshold, options), o, maker,
+      bounces ? new_restitution(LawUse::none) : nullptr);
   if (options.cut_at_impacts && !(options.accuracy > 0))
-    cuts = std::make_unique<detail::StepCuts>(o);
-  if (near->any_restitution()) later->add_restitution(options.restitution_law, o);
-  if (near->any_restitution() && cuts)
-    bounces_at_once = std::make_unique<detail::Restitution>(options.restitution_law, o);
-  if (options.error_reduction > 0 && options.max_depenetration_speed > 0) {
-    positions = std::make_unique<detail::PositionCorrection>(options);
-  }
-  if (near->any_rolling()) rolling = std::make_unique<detail::RollingPart>(*near);
-  if (joints && rolling) joints->set_rolling(*near);
-  if (joints)
-    give_islands(*joints);
-  else if (rolling)
-    give_islands(*rolling);
+    cuts = std::make_unique<detail::StepCuts>(o, maker);
+  if (bounces && cuts) bounces_at_once = new_restitution(LawUse::none);
+  if (options.error_reduction > 0 && options.max_depenetration_speed > 0)
+    positions = std::make_unique<detail::PositionCorrection>(options, maker);
   if (!laws) return;
   later->set_laws(*joints);
   const bool together = options.simultaneous_impacts == SimultaneousImpacts::together;
@@ -50,18 +51,6 @@ void Stepper::Implementation::make_impacts() {
     impacts = std::make_unique<detail::Impacts>(
         detail::threshold_speed(options.impact_threshold, options),
         detail::threshold_speed(options.restitution_threshold, options));
-}
-
-void Stepper::Implementation::give_islands(detail::IslandMaker& maker) {
-  const BodyOptions o = detail::contact_options(options);
-  solver->set_joints(maker.make_islands(o, detail::LawUse::all));
-  if (restitution) restitution->set_joints(maker, o, detail::LawUse::plastic);
-  if (restitution && joints && joints->has_laws()) restitution->set_laws(*joints);
-  if (!near) return;
-  if (positions) positions->set_joints(maker, options);
-  later->set_joints(maker, o);
-  if (cuts) cuts->set_joints(maker, o);
-  if (bounces_at_once) bounces_at_once->set_joints(maker, o, detail::LawUse::none);
 }
 
 // Refuses by name what it does not go with.

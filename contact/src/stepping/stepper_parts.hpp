@@ -18,6 +18,7 @@
 #include "stepping/motion/rotation.hpp"
 #include "stepping/position_correction.hpp"
 #include "stepping/sleeping.hpp"
+#include "stepping/step_contacts.hpp"
 #include "stepping/step_settings.hpp"
 
 namespace tether::contact {
@@ -146,7 +147,6 @@ struct Stepper::Implementation {
   void make_stages();
 
   void make_solvers();
-  void give_islands(detail::IslandMaker& maker);
   void step();
   bool is_finite() const;
   detail::SubStep whole(double start, double length) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <tether/linalg/index.hpp>
+#include <utility>
 
 #include "stepping/impacts/step_energy.hpp"
 
@@ -18,12 +19,12 @@ double bias(double gap, double dt) { return gap > 0 ? gap / dt : 0; }
 }  // namespace
 
 LaterImpacts::LaterImpacts(double threshold, double restitution_threshold,
-                           const BodyOptions& options)
-    : pass_impacts_(threshold, restitution_threshold), solver_(cold(options)) {}
-
-void LaterImpacts::add_restitution(RestitutionLaw law, const BodyOptions& options) {
-  restitution_ = std::make_unique<Restitution>(law, options);
-}
+                           const BodyOptions& options, IslandMaker* maker,
+                           std::unique_ptr<Restitution> restitution)
+    : islands_(maker),
+      pass_impacts_(threshold, restitution_threshold),
+      restitution_(std::move(restitution)),
+      solver_(cold(options), maker, LawUse::none) {}
 
 // Marks the islands where the one solve has stopped a contact at gap / dt that closes only because
 // of an impact, by more than the least speed of an impact. False: there are none.
@@ -141,11 +142,7 @@ bool LaterImpacts::solve_pass(const NearContacts& near, const Impacts& impacts, 
   ++counts.problems;
   counts.sweeps += solution_.sweeps;
   if (solution_.status != Status::solved) return false;
-  for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
-    if (bodies.mass[i] == 0) continue;
-    bodies.motion[i].velocity = solution_.velocities[i];
-    bodies.motion[i].angular_velocity = solution_.angular_velocities[i];
-  }
+  take_velocities(solution_, bodies);
   part_.impulses = solution_.impulses;
   bounces_ = restitution_ ? restitution_->apply(bodies, part_) : 0;
   for (std::size_t k = 0; k < member_.size(); ++k)

@@ -28,18 +28,9 @@ class LaterImpacts {
     int problems = 0, sweeps = 0, bounces = 0;
   };
 
-  /// Thresholds: see Impacts.
-  LaterImpacts(double threshold, double restitution_threshold, const BodyOptions& options);
-  /// Must be called if anything bounces.
-  void add_restitution(RestitutionLaw law, const BodyOptions& options);
-
-  /// After the above.
-  void set_joints(IslandMaker& joints, const BodyOptions& options) {
-    solver_.set_joints(joints.make_islands(options, LawUse::none));
-    if (restitution_) restitution_->set_joints(joints, options, LawUse::none);
-    islands_.set_links(joints.links());
-  }
-
+  /// Thresholds: see Impacts. restitution: null where nothing bounces.
+  LaterImpacts(double threshold, double restitution_threshold, const BodyOptions& options,
+               IslandMaker* maker, std::unique_ptr<Restitution> restitution);
   /// Not in islands of mechanisms with laws, whose impulses are those of one problem.
   void set_laws(const JointPart& joints) { laws_ = &joints; }
 

@@ -18,11 +18,6 @@ using linalg::at;
 
 constexpr double kRounding = 1e-14;  // of the kinetic energy of what changes
 
-void push(RigidBody& body, const Vector3d& r, const Vector3d& p) {
-  body.velocity += body.inverse_mass * p;
-  body.angular_velocity += body.inverse_inertia * r.cross(p);
-}
-
 }  // namespace
 
 BodyOptions cold(BodyOptions options) {
@@ -30,8 +25,9 @@ BodyOptions cold(BodyOptions options) {
   return options;
 }
 
-Restitution::Restitution(RestitutionLaw law, const BodyOptions& options)
-    : law_(law), solver_(cold(options)) {}
+Restitution::Restitution(RestitutionLaw law, const BodyOptions& options, IslandMaker* maker,
+                         LawUse laws)
+    : law_(law), islands_(maker), solver_(cold(options), maker, laws) {}
 
 void Restitution::choose(const Impacts& chosen, const Impacts& forces,
                          const std::vector<Strike>& limits, const BodySet& bodies,
@@ -56,10 +52,7 @@ void Restitution::choose(const Impacts& chosen, const Impacts& forces,
   came_ = chosen.coming();
   if (!forces.list().empty()) return add_of_forces(forces, force_);
   force_ = before_;  // limits of joints are all that is struck
-  for (std::size_t i = 0; i < force_.size(); ++i) {
-    force_[i].velocity -= came_[i].velocity;
-    force_[i].angular_velocity -= came_[i].angular_velocity;
-  }
+  subtract(force_, came_);
 }
 
 // By motors and friction of joints, whose impulses count as forces of the step.
@@ -102,10 +95,7 @@ void Restitution::sum_energies(const BodySet& bodies) {
 // Marks the islands that bounce and gain energy in the step; false: none does.
 bool Restitution::gains_energy(const BodySet& bodies, const StepContacts& contacts) {
   change_ = bodies.motion;
-  for (std::size_t i = 0; i < change_.size(); ++i) {
-    change_[i].velocity -= before_[i].velocity;
-    change_[i].angular_velocity -= before_[i].angular_velocity;
-  }
+  subtract(change_, before_);
   add_laws(false, bodies, driven_);
   driven_change_ = driven_;
   sum_energies(bodies);
@@ -186,10 +176,7 @@ void Restitution::solve_without(BodySet& bodies, StepContacts& contacts) {
     x = solution_.impulses[j];
   }
   add_laws(true, bodies, driven_);
-  for (std::size_t i = 0; i < driven_.size(); ++i) {
-    driven_change_[i].velocity -= driven_[i].velocity;
-    driven_change_[i].angular_velocity -= driven_[i].angular_velocity;
-  }
+  subtract(driven_change_, driven_);
 }
 
 // Both ends obey the contacts and the cones; so does everything between them.

@@ -22,12 +22,8 @@ BodyOptions cold(BodyOptions options);
 /// go. Limits of joints bounce as contacts do.
 class Restitution {
  public:
-  Restitution(RestitutionLaw law, const BodyOptions& options);
+  Restitution(RestitutionLaw law, const BodyOptions& options, IslandMaker* maker, LawUse laws);
 
-  void set_joints(IslandMaker& joints, const BodyOptions& options, LawUse laws) {
-    solver_.set_joints(joints.make_islands(options, laws));
-    islands_.set_links(joints.links());
-  }
   /// Problems include the laws of joints.
   void set_laws(JointPart& joints) { laws_ = &joints; }
 

@@ -7,6 +7,7 @@
 #include <tether/linalg/index.hpp>
 
 #include "stepping/impacts/restitution.hpp"
+#include "stepping/step_contacts.hpp"
 
 namespace tether::contact::detail {
 
@@ -56,7 +57,8 @@ void add_impulses(const StepContacts& part, StepContacts& sum) {
   }
 }
 
-StepCuts::StepCuts(const BodyOptions& options) : solver_(cold(options)) {}
+StepCuts::StepCuts(const BodyOptions& options, IslandMaker* maker)
+    : islands_(maker), solver_(cold(options), maker, LawUse::none) {}
 
 void StepCuts::remember(const WarmStart& solved) {
   pressing_.clear();
@@ -151,18 +153,13 @@ double StepCuts::left(NearContacts& near, const BodySet& bodies, double dt) {
 bool StepCuts::gather(const NearContacts& near, const BodySet& bodies, double step,
                       Impacts& impacts, StepContacts& contacts) {
   find_islands(near, bodies, contacts);
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    PointContact c = contacts.points[k];
-    if (whole_[at(islands_.root(bodies, c))] != 0) continue;
-    const double touches = std::max(step * impacts.least_speed(near, c), kTouches * near.size(c));
-    if (contacts.gaps[k] > touches && !has(pressing_, c.id) && !has(striking_, c.id)) continue;
+  keep_contacts(contacts, [&](std::size_t k) {
+    PointContact& c = contacts.points[k];
     c.bias = 0;
-    contacts.points[kept] = c;
-    contacts.gaps[kept++] = contacts.gaps[k];
-  }
-  contacts.points.resize(kept);
-  contacts.gaps.resize(kept);
+    const double touches = std::max(step * impacts.least_speed(near, c), kTouches * near.size(c));
+    return whole_[at(islands_.root(bodies, c))] == 0 &&
+           (contacts.gaps[k] <= touches || has(pressing_, c.id) || has(striking_, c.id));
+  });
   impacts.remember(bodies);
   impacts.choose(near, bodies, step, contacts);
   return !impacts.list().empty();

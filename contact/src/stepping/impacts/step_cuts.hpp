@@ -46,12 +46,7 @@ class StepCuts {
   /// to the second, what there is at the start, and what a cut takes.
   static constexpr double kShare = 0.05, kMostKept = 16, kFirst = 3, kPrice = 3;
 
-  explicit StepCuts(const BodyOptions& options);
-  /// After the above.
-  void set_joints(IslandMaker& joints, const BodyOptions& options) {
-    solver_.set_joints(joints.make_islands(options, LawUse::none));
-    islands_.set_links(joints.links());
-  }
+  StepCuts(const BodyOptions& options, IslandMaker* maker);
   /// Islands of these bodies are not cut, nor are those with rolling friction: laws of joints, and
   /// moments of contacts, act over a time. (Impacts in turn leave what a limit takes to the part
   /// after them: they need no laws.)

@@ -7,6 +7,7 @@
 
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/rotation.hpp"
+#include "stepping/step_contacts.hpp"
 
 namespace tether::contact::detail {
 
@@ -32,10 +33,7 @@ inline double work(const BodySet& bodies, std::size_t i, const RigidBody& change
 /// Velocities that the forces of a step add.
 inline void add_of_forces(const Impacts& impacts, std::vector<RigidBody>& change) {
   change = impacts.free();
-  for (std::size_t i = 0; i < change.size(); ++i) {
-    change[i].velocity -= impacts.coming()[i].velocity;
-    change[i].angular_velocity -= impacts.coming()[i].angular_velocity;
-  }
+  subtract(change, impacts.coming());
 }
 
 }  // namespace tether::contact::detail

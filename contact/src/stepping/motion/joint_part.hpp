@@ -112,8 +112,10 @@ class JointPart : public IslandMaker {
 /// A BodySolver, and JointIslands where there are joints.
 class StepSolver {
  public:
-  explicit StepSolver(const BodyOptions& options = {}) : solver_(options) {}
-  void set_joints(std::unique_ptr<JointIslands> joints) { joints_ = std::move(joints); }
+  /// maker: null where there are none.
+  StepSolver(const BodyOptions& options, IslandMaker* maker, LawUse laws) : solver_(options) {
+    if (maker != nullptr) joints_ = maker->make_islands(options, laws);
+  }
 
   void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& out) {

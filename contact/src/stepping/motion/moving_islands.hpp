@@ -6,12 +6,16 @@
 #include <utility>
 #include <vector>
 
+#include "stepping/motion/joint_part.hpp"
+
 namespace tether::contact::detail {
 
 /// Sets of moving bodies that contacts and links connect.
 class MovingIslands {
  public:
-  void set_links(std::vector<std::pair<int, int>> links) { links_ = std::move(links); }
+  explicit MovingIslands(const IslandMaker* maker = nullptr) {
+    if (maker != nullptr) links_ = maker->links();
+  }
 
   void join(const BodySet& bodies, const StepContacts& contacts) {
     sets_.reset(bodies.size());

@@ -30,7 +30,6 @@ class DisjointSets {
     parent_[at(std::max(a, b))] = std::min(a, b);
     return a != b;
   }
-  std::size_t bytes() const { return sizeof(int) * parent_.capacity(); }
 
  private:
   std::vector<int> parent_;
