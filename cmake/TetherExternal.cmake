@@ -2,8 +2,7 @@
 # the package config. SPDX-License-Identifier: BSD-3-Clause
 #
 #   tether_find_hdf5()     tether::hdf5, for contact_io
-#   tether_find_zoltan()   MPI::MPI_CXX and tether::zoltan, for contact_mpi; TETHER_ZOLTAN_MISSING
-#                          says what is not there
+#   tether_find_mpi()      MPI::MPI_CXX, for contact_mpi
 # Where one is not found, there is no target. Functions, because FindHDF5 changes variables of its caller.
 
 function(tether_find_hdf5)
@@ -18,26 +17,11 @@ function(tether_find_hdf5)
   endif()
 endfunction()
 
-macro(tether_find_zoltan)
-  set(TETHER_ZOLTAN_MISSING "")
+function(tether_find_mpi)
   if(NOT TARGET MPI::MPI_CXX)
     find_package(MPI QUIET COMPONENTS CXX)
     if(TARGET MPI::MPI_CXX)
       set_target_properties(MPI::MPI_CXX PROPERTIES IMPORTED_GLOBAL TRUE)
     endif()
   endif()
-  if(NOT TARGET MPI::MPI_CXX)
-    set(TETHER_ZOLTAN_MISSING "MPI not found (install libopenmpi-dev; C++ must be enabled)")
-  elseif(NOT TARGET tether::zoltan)
-    find_path(TETHER_ZOLTAN_INCLUDE_DIR zoltan.h PATH_SUFFIXES trilinos)
-    find_library(TETHER_ZOLTAN NAMES trilinos_zoltan zoltan)
-    mark_as_advanced(TETHER_ZOLTAN_INCLUDE_DIR TETHER_ZOLTAN)
-    if(TETHER_ZOLTAN_INCLUDE_DIR AND TETHER_ZOLTAN)
-      add_library(tether::zoltan INTERFACE IMPORTED GLOBAL)
-      target_include_directories(tether::zoltan SYSTEM INTERFACE ${TETHER_ZOLTAN_INCLUDE_DIR})
-      target_link_libraries(tether::zoltan INTERFACE ${TETHER_ZOLTAN} MPI::MPI_CXX)
-    else()
-      set(TETHER_ZOLTAN_MISSING "Zoltan not found (install libtrilinos-zoltan-dev)")
-    endif()
-  endif()
-endmacro()
+endfunction()

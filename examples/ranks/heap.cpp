@@ -3,8 +3,8 @@
 //
 // mpiexec -n 4 example_ranks_heap --spheres 10000 --steps 500 [--pictures heap]
 //
-// Spheres fall into a box. Each rank owns those that Zoltan gives it, has copies of others near by,
-// finds the contacts whose sphere with the smaller number it owns, and moves its own. Every 20
+// Spheres fall into a box. Each rank owns those of its part of the space, has copies of others near
+// by, finds the contacts whose sphere with the smaller number it owns, and moves its own. Every 20
 // steps spheres change their ranks. --pictures: NAME.pvtu joins one piece of each rank.
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -137,7 +137,7 @@ class Heap {
     return out;
   }
 
-  // By Zoltan, the work of a sphere being its contacts.
+  // The work of a sphere is its contacts.
   void spread() {
     std::vector<int> numbers;
     std::vector<Vector3d> centres;

@@ -28,7 +28,7 @@ constexpr int kPlaces = 20;  // parts are cut anew at every so many of them
 constexpr int kReport = 6, kOfContact = 5, kOfBody = 6, kOfState = 4;  // numbers that are gathered
 
 // Bodies of a list to ranks first .. first + ranks - 1: in two parts with the work of their ranks,
-// cut across the longest side, and so on. The same on all processes, which is all that is asked.
+// and so on.
 class Bisection {
  public:
   Bisection(const std::vector<Vector3d>& positions, const std::vector<double>& work,
@@ -67,6 +67,14 @@ class Bisection {
 };
 
 }  // namespace
+
+std::vector<int> bisect(const std::vector<Vector3d>& positions, const std::vector<double>& work,
+                        int parts) {
+  std::vector<int> order(positions.size()), out(positions.size());
+  std::iota(order.begin(), order.end(), 0);
+  Bisection(positions, work, out).cut(order.begin(), order.end(), 0, parts);
+  return out;
+}
 
 // The part of this process in BodySolver's sweeps over the whole problem.
 struct RankTeam::Implementation final : detail::SweepPartners {
@@ -188,9 +196,7 @@ void RankTeam::Implementation::find_owners(std::size_t bodies) {
     const int one = engine.given.first()[i], other = engine.given.second()[i];
     ++work[at(other < 0 ? one : std::min(one, other))];
   }
-  std::vector<int> order(bodies);
-  std::iota(order.begin(), order.end(), 0);
-  Bisection(positions, work, owner).cut(order.begin(), order.end(), 0, messages.size());
+  owner = bisect(positions, work, messages.size());
 }
 
 // All ranks plan the whole graph of contacts alike, so that it needs no messages.

@@ -33,6 +33,11 @@ class RankMessages {
   [[noreturn]] virtual void give_up(const char* why) = 0;
 };
 
+/// The part, 0 .. parts - 1, of each position: recursive bisection across the longest side, with
+/// about the same work in each part. work: of each position, >= 0.
+std::vector<int> bisect(const std::vector<Eigen::Vector3d>& positions,
+                        const std::vector<double>& work, int parts);
+
 /// Processes that all have the same bodies and contacts, as a team for BodyOptions::team and
 /// SteppingOptions::team: each sweeps the contacts of its part of the bodies, colour by colour, and
 /// all know the whole result then. Bits are those of one process. Every process makes the same

@@ -74,8 +74,8 @@ class Solver {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// The rank for each of this rank's bodies, such that weights are spread evenly: Zoltan's recursive
-/// coordinate bisection. weights >= 0, such as 1 + contacts of the body.
+/// The rank for each of this rank's bodies, such that weights are spread evenly: contact::bisect of
+/// all centres. weights >= 0, such as 1 + contacts of the body.
 std::vector<int> partition(MPI_Comm comm, const std::vector<int>& numbers,
                            const std::vector<Eigen::Vector3d>& centres,
                            const std::vector<double>& weights);

@@ -30,7 +30,6 @@ class Tether(CMakePackage):
     depends_on("boost@1.74: +context", when="+reverse")
     depends_on("hdf5", when="+hdf5")
     depends_on("mpi", when="+mpi")
-    depends_on("trilinos +zoltan", when="+mpi")
     with when("+scene"):
         depends_on("fmt")
         depends_on("tomlplusplus")

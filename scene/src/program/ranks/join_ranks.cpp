@@ -51,9 +51,10 @@ std::unique_ptr<Ranks> join_ranks() {
     looked += (looked.empty() ? "" : " or ") + place.string();
   }
   if (file.empty())
-    refuse_ranks(count, fmt::format("there is no {}; it is built where CMake finds MPI and Zoltan "
-                                    "(Debian libopenmpi-dev, libtrilinos-zoltan-dev)",
-                                    looked));
+    refuse_ranks(
+        count,
+        fmt::format("there is no {}; it is built where CMake finds MPI (Debian libopenmpi-dev)",
+                    looked));
   // MPI's own modules look for its symbols.
   void* module = dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL);
   if (!module) refuse_ranks(count, dlerror());
