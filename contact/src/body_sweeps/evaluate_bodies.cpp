@@ -8,12 +8,11 @@
 #include <string>
 
 #include "assembled/search/system.hpp"
+#include "body_passes/given_problem.hpp"
 #include "body_sweeps/wide_velocities.hpp"
 #include "graph/contact_graph.hpp"
 #include "law/kernels/exact_error.hpp"
-#include "problem/contact_side.hpp"
 #include "problem/criterion.hpp"
-#include "problem/refuse.hpp"
 
 namespace tether::contact {
 
@@ -24,20 +23,11 @@ namespace {
 // The islands of BodySolver with their velocity scales.
 class Scales {
  public:
-  Scales(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
-         bool friction, const std::vector<LocalBlock>& blocks) {
+  Scales(const detail::GivenProblem& given, bool friction, const std::vector<LocalBlock>& blocks) {
+    const std::vector<PointContact>& contacts = given.contacts();
     const std::size_t n = contacts.size();
-    std::vector<int> first(n), second(n);
-    std::vector<detail::Side> sides;
-    for (std::size_t i = 0; i < n; ++i) {
-      const PointContact& c = contacts[i];
-      const bool turned = !bodies[at(c.first)].moves();
-      sides.push_back(detail::side(bodies, c, turned));
-      first[i] = turned ? c.second : c.first;
-      second[i] = sides[i].second ? (turned ? c.first : c.second) : -1;
-    }
     detail::ContactGraph graph;
-    graph.build(static_cast<int>(bodies.size()), first, second,
+    graph.build(static_cast<int>(given.bodies().size()), given.first(), given.second(),
                 std::vector<detail::Kind>(n, detail::Kind::general), false);
     island_.resize(n);
     coupled_.resize(n);
@@ -46,16 +36,17 @@ class Scales {
       for (int place = island.contact_begin; place < island.contact_begin + island.contacts;
            ++place) {
         const std::size_t i = at(graph.order[at(place)]);
+        const detail::Side side = given.side(graph.order[at(place)]);
         island_[i] = static_cast<int>(inverse_.size());
         coupled_[i] = static_cast<double>(graph.coupled[at(place)]);
-        const Eigen::Vector3d u = detail::velocity_before(sides[i], contacts[i].bias);
-        const double bn = -u.dot(sides[i].n), square = u.squaredNorm();
+        const Eigen::Vector3d u = detail::velocity_before(side, contacts[i].bias);
+        const double bn = -u.dot(side.n), square = u.squaredNorm();
         const double ratio = 0.5 * (blocks[i].T[0] + blocks[i].T[2]) * blocks[i].inv_a;
         const double bt = std::sqrt(std::max(0.0, square - bn * bn));
         needed =
             std::max(needed, detail::needed_change(bn, bt, friction ? contacts[i].mu : 0, ratio));
         bb += square;
-        speed = std::max(speed, detail::speed_before(sides[i], contacts[i].bias));
+        speed = std::max(speed, detail::speed_before(side, contacts[i].bias));
       }
       inverse_.push_back(detail::inverse_scale(needed, bb));
       floor_.push_back(detail::round_off(speed));
@@ -81,9 +72,8 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
                                 " entries: " + std::to_string(contacts.size()) +
                                 " are needed, one for each contact");
   }
-  const int m = static_cast<int>(bodies.size());
-  for (std::size_t k = 0; k < bodies.size(); ++k) detail::check(k, bodies[k]);
-  for (std::size_t i = 0; i < contacts.size(); ++i) detail::check(i, contacts[i], m);
+  detail::GivenProblem given;
+  given.read(bodies, contacts, law);
   // Nothing can be said of an answer that is not finite.
   for (const Eigen::Vector3d& p : impulses)
     if (!p.allFinite()) return {};
@@ -97,15 +87,12 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
   for (std::size_t i = 0; i < contacts.size(); ++i) velocities.push(contacts[i], impulses[i]);
   std::vector<LocalBlock> blocks;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PointContact& c = contacts[i];
-    if (!bodies[at(c.first)].moves() && (c.second < 0 || !bodies[at(c.second)].moves()))
-      detail::refuse_fixed(i);
-    const Eigen::Matrix3d F = tangent_frame(c.normal);
-    const detail::Side side = detail::side(bodies, c, !bodies[at(c.first)].moves());
-    blocks.emplace_back(F * detail::diagonal_block(side) * F.transpose(), c.mu);
+    const Eigen::Matrix3d F = tangent_frame(contacts[i].normal);
+    const detail::Side side = given.side(static_cast<int>(i));
+    blocks.emplace_back(F * detail::diagonal_block(side) * F.transpose(), contacts[i].mu);
   }
   const detail::LawKernels& rule = detail::kernels(law);
-  const Scales scales(bodies, contacts, rule.friction, blocks);
+  const Scales scales(given, rule.friction, blocks);
   Residuals r;
   r.fixed_point = 0;
   r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;

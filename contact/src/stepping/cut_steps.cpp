@@ -39,7 +39,7 @@ void Stepper::Implementation::look_for_cut() {
         impacts->is_impact(*near, c, a.speed(contacts.gaps[k], part.now.length)))
       approaches.push_back(a);
   }
-  part.cut = cuts->choose(approaches, part.now.length, *near, bodies, contacts);
+  if (cuts->choose(approaches, part.now.length, *near, bodies, contacts)) part.end = Part::End::cut;
 }
 
 // No contact closes by the velocities that bodies have: there is nothing to solve.

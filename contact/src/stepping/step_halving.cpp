@@ -59,9 +59,9 @@ void Stepper::Implementation::advance(detail::SubStep s) {
   if (run_stages()) return;
   // Nothing has moved yet.
   bodies.motion = impacts->coming();
-  if (part.cut) return advance_cut(s);
-  if (part.again) return advance(s);
-  if (part.unmet) {
+  if (part.end == Part::End::cut) return advance_cut(s);
+  if (part.end == Part::End::woken) return advance(s);
+  if (part.end == Part::End::unmet) {
     --s.joint_halvings;
   } else {
     solver->take_back();
@@ -89,7 +89,8 @@ void Stepper::Implementation::take_halves(const detail::SubStep& s) {
 bool Stepper::Implementation::run_stages() {
   using Clock = std::chrono::steady_clock;
   Clock::time_point start = Clock::now();
-  part.failed = part.unmet = part.cut = part.again = false;
+  part.failed = false;
+  part.end = Part::End::none;
   for (Stage& stage : stages) {
     if (stage.method)
       (this->*stage.method)();
@@ -98,8 +99,7 @@ bool Stepper::Implementation::run_stages() {
     const Clock::time_point end = Clock::now();
     stage.seconds += std::chrono::duration<double>(end - start).count();
     start = end;
-    if (part.cut || part.again || part.unmet || (part.failed && part.now.halvings > 0))
-      return false;
+    if (part.end != Part::End::none) return false;
   }
   return true;
 }
@@ -128,7 +128,10 @@ void Stepper::Implementation::judge() {
   const double last = options.acceptance > 1 ? detail::kLast : detail::kGood;
   const double most = std::max(accepted_residual(options), shortest() ? last : 0.0);
   part.failed = !solved && !(solution.error <= most);
-  if (part.failed && part.now.halvings > 0) return;
+  if (part.failed && part.now.halvings > 0) {
+    part.end = Part::End::unsolved;
+    return;
+  }
   counts.accepted += !solved && !part.failed;
   counts.unsolved += part.failed;
   if (!solved) outcome.status = solution.status;

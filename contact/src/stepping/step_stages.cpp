@@ -69,7 +69,7 @@ void Stepper::Implementation::find_contacts() {
   near->find(bodies, part.now.length, contacts);
   if (joints) leave_out_joined();
   if (sleeping && sleeping->wake_touched(*near, bodies, *impacts, part.now.length, contacts)) {
-    part.again = true;
+    part.end = Part::End::woken;
     return;
   }
   leave_out_passive();
@@ -109,7 +109,7 @@ void Stepper::Implementation::meet_others() {
     choose_impacts();
     if (restitution) choose_bounces();
     solve_contacts();
-    if (part.failed && part.now.halvings > 0) return;
+    if (part.end != Part::End::none) return;
     if (restitution) rebound();
     take_later_impacts();
   }
@@ -128,8 +128,7 @@ void Stepper::Implementation::hold_sleepers() {
 }
 
 void Stepper::Implementation::end_sleep() {
-  if (!part.failed && part.of_cut == false)
-    sleeping->fall_asleep(part.now.length, bodies, contacts);
+  if (!part.failed && !part.of_cut) sleeping->fall_asleep(part.now.length, bodies, contacts);
   sleeping->end(part.now.length, bodies, contacts);
 }
 
@@ -167,7 +166,7 @@ void Stepper::Implementation::solve_contacts() {
     solver->set_options(detail::contact_options(options));
   }
   judge();
-  if (part.failed && part.now.halvings > 0) return;
+  if (part.end != Part::End::none) return;
   detail::take_velocities(solution, bodies);
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
   if (rolling) contacts.moments = joints ? joints->moments() : rolling->moments();
@@ -193,8 +192,10 @@ void Stepper::Implementation::leave_out_joined() {
 void Stepper::Implementation::predict_joints() {
   if (!part.joints_active) return;
   if (joints->predict(bodies, part.now.start, part.now.length) && resolves_joints()) return;
-  part.unmet = part.now.joint_halvings > 0 && !part.unmeetable;
-  part.unmeetable = !part.unmet;
+  if (part.now.joint_halvings > 0 && !part.unmeetable)
+    part.end = Part::End::unmet;
+  else
+    part.unmeetable = true;
 }
 
 void Stepper::Implementation::move_joints() {

@@ -123,15 +123,17 @@ struct Stepper::Implementation {
   // The part of the step that is taken.
   struct Part {
     detail::SubStep now;
-    bool failed = false;
-    bool unmet = false, unmeetable = false;  // joints; however short the part
-    int cuts_left = 0;                       // that it may be taken in parts for
-    bool cut = false, of_cut = false, before_impact = false;
+    // Who ends it before its last stage: its problem, its joints, an impact on the way, or a body
+    // that has woken.
+    enum class End : std::uint8_t { none, unsolved, unmet, cut, woken } end = End::none;
+    bool failed = false;      // its problem, though it may be used
+    bool unmeetable = false;  // joints, however short the part
+    int cuts_left = 0;        // that it may be taken in parts for
+    bool of_cut = false, before_impact = false;
     bool in_cut = false;                  // of a step that is being cut
     std::vector<char> active;             // bodies that take part; empty: all
     bool joints_active = true;            // those that joints hold
     bool may_split = false, met = false;  // islands apart; they have met
-    bool again = false;                   // what has woken takes part
     std::vector<RigidBody> free_motion;   // before its problem
     detail::Judgement before;
   } part;

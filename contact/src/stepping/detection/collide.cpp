@@ -16,85 +16,87 @@ namespace tether::contact {
 
 using Eigen::Vector3d;
 
-const char* name(ShapeKind kind) {
-  switch (kind) {
-    case ShapeKind::sphere:
-      return "sphere";
-    case ShapeKind::plane:
-      return "plane";
-    case ShapeKind::box:
-      return "box";
-    case ShapeKind::capsule:
-      return "capsule";
-    case ShapeKind::convex:
-      return "convex";
-    case ShapeKind::points:
-      return "points";
-    case ShapeKind::ellipsoid:
-      return "ellipsoid";
-    case ShapeKind::cylinder:
-      return "cylinder";
-    case ShapeKind::mesh:
-      return "mesh";
-  }
-  return "?";
+namespace {
+
+// By kind. Of two shapes the one of lower rank comes first where their points are found.
+struct KindTraits {
+  const char* name;
+  int rank;
+};
+constexpr std::array<KindTraits, kShapeKinds.size()> kTraits{{{"sphere", 0},
+                                                              {"plane", 7},
+                                                              {"box", 2},
+                                                              {"capsule", 1},
+                                                              {"convex", 5},
+                                                              {"points", 6},
+                                                              {"ellipsoid", 3},
+                                                              {"cylinder", 4},
+                                                              {"mesh", 8}}};
+
+int rank(ShapeKind kind) { return kTraits[static_cast<std::size_t>(kind)].rank; }
+
+Shape shape_of(ShapeKind kind) {
+  Shape s;
+  s.kind = kind;
+  return s;
 }
 
+Shape about_axis(ShapeKind kind, double radius, double length) {
+  Shape s = shape_of(kind);
+  s.radius = radius;
+  s.length = length;
+  return s;
+}
+
+Shape of_size(ShapeKind kind, const Vector3d& size) {
+  Shape s = shape_of(kind);
+  s.size = size;
+  return s;
+}
+
+Shape of_points(ShapeKind kind, std::vector<Vector3d> points) {
+  Shape s = shape_of(kind);
+  s.points = std::move(points);
+  return s;
+}
+
+}  // namespace
+
+const char* name(ShapeKind kind) { return kTraits[static_cast<std::size_t>(kind)].name; }
+
 Shape Shape::sphere(double radius) {
-  Shape s;
-  s.kind = ShapeKind::sphere;
+  Shape s = shape_of(ShapeKind::sphere);
   s.radius = radius;
   return s;
 }
 
 Shape Shape::plane(const Vector3d& normal) {
-  Shape s;
-  s.kind = ShapeKind::plane;
+  Shape s = shape_of(ShapeKind::plane);
   s.normal = normal.normalized();
   return s;
 }
 
-Shape Shape::box(const Vector3d& size) {
-  Shape s;
-  s.kind = ShapeKind::box;
-  s.size = size;
-  return s;
+Shape Shape::box(const Vector3d& size) { return of_size(ShapeKind::box, size); }
+Shape Shape::ellipsoid(const Vector3d& half_axes) {
+  return of_size(ShapeKind::ellipsoid, half_axes);
 }
 
 Shape Shape::capsule(double radius, double length) {
-  Shape s;
-  s.kind = ShapeKind::capsule;
-  s.radius = radius;
-  s.length = length;
-  return s;
+  return about_axis(ShapeKind::capsule, radius, length);
+}
+Shape Shape::cylinder(double radius, double length) {
+  return about_axis(ShapeKind::cylinder, radius, length);
 }
 
 Shape Shape::convex(std::vector<Vector3d> vertices) {
-  Shape s;
-  s.kind = ShapeKind::convex;
-  s.points = std::move(vertices);
-  return s;
+  return of_points(ShapeKind::convex, std::move(vertices));
 }
-
-Shape Shape::ellipsoid(const Vector3d& half_axes) {
-  Shape s;
-  s.kind = ShapeKind::ellipsoid;
-  s.size = half_axes;
-  return s;
-}
-
-Shape Shape::cylinder(double radius, double length) {
-  Shape s;
-  s.kind = ShapeKind::cylinder;
-  s.radius = radius;
-  s.length = length;
-  return s;
+Shape Shape::touching_points(std::vector<Vector3d> points) {
+  return of_points(ShapeKind::points, std::move(points));
 }
 
 Shape Shape::mesh(std::vector<Vector3d> vertices, std::vector<std::array<int, 3>> triangles) {
-  Shape s;
-  s.kind = ShapeKind::mesh;
-  s.points = std::move(vertices);
+  Shape s = of_points(ShapeKind::mesh, std::move(vertices));
   s.triangles = std::move(triangles);
   return s;
 }
@@ -103,8 +105,7 @@ Shape Shape::height_field(const std::vector<double>& heights, int nx, double dx,
   const int ny = nx > 0 ? static_cast<int>(heights.size()) / nx : 0;
   if (nx < 2 || ny < 2 || heights.size() != linalg::at(nx) * linalg::at(ny))
     throw std::invalid_argument("height_field: needs at least 2 x 2 heights, rows of nx");
-  Shape s;
-  s.kind = ShapeKind::mesh;
+  Shape s = shape_of(ShapeKind::mesh);
   for (int k = 0; k < ny; ++k)
     for (int i = 0; i < nx; ++i)
       s.points.emplace_back(i * dx, k * dy, heights[linalg::at(k * nx + i)]);
@@ -114,13 +115,6 @@ Shape Shape::height_field(const std::vector<double>& heights, int nx, double dx,
       s.triangles.push_back({p, p + 1, p + nx + 1});
       s.triangles.push_back({p, p + nx + 1, p + nx});
     }
-  return s;
-}
-
-Shape Shape::touching_points(std::vector<Vector3d> points) {
-  Shape s;
-  s.kind = ShapeKind::points;
-  s.points = std::move(points);
   return s;
 }
 
@@ -198,30 +192,6 @@ void capsule_capsule(const Shape& a, const Pose& A, const Shape& b, const Pose& 
     const Vector3d p = nearest_on_segment(q, s.from, s.to);
     ball_ball(p, a.radius, q, b.radius, margin, 1 + end, out);
   }
-}
-
-int rank(ShapeKind kind) {
-  switch (kind) {
-    case ShapeKind::sphere:
-      return 0;
-    case ShapeKind::capsule:
-      return 1;
-    case ShapeKind::box:
-      return 2;
-    case ShapeKind::ellipsoid:
-      return 3;
-    case ShapeKind::cylinder:
-      return 4;
-    case ShapeKind::convex:
-      return 5;
-    case ShapeKind::points:
-      return 6;
-    case ShapeKind::plane:
-      return 7;
-    case ShapeKind::mesh:
-      return 8;
-  }
-  return 9;
 }
 
 // a of lower rank than b.
