@@ -87,8 +87,8 @@ Stepper::Stepper(BodySet bodies, std::vector<Surface> surfaces, std::vector<Meet
   std::vector<double> size;
   if (options.sleep > 0) size = sizes(s.bodies, surfaces);
   if (!meetings.empty() && !surfaces.empty()) {
-    s.near = std::make_unique<detail::NearContacts>(
-        s.bodies, std::move(surfaces), std::move(meetings), options.law, options.near_part);
+    s.near = std::make_unique<detail::NearContacts>(s.bodies, std::move(surfaces), meetings,
+                                                    options.law, options.near_part);
     if (s.near->any_rolling()) check_rolling(options);
     s.make_solvers();
     if (options.sleep > 0) {

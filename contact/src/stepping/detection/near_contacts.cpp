@@ -3,11 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/index.hpp>
-#include <utility>
 
 #include "problem/refuse.hpp"
 #include "stepping/detection/collide.hpp"
@@ -26,6 +24,15 @@ bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; 
 int first_surface(const PointContact& c) { return static_cast<int>(c.id >> 40); }
 int second_surface(const PointContact& c) { return static_cast<int>(c.id >> 16 & 0xffffff); }
 
+void check(const Meeting& m) {
+  if (m.first < 0 || m.second < 0 || !(m.friction >= 0) || !std::isfinite(m.friction) ||
+      !(m.restitution >= 0 && m.restitution <= 1))
+    throw std::invalid_argument(
+        "meeting: materials must be >= 0, friction >= 0 and finite, restitution 0 .. 1");
+  if (!(m.rolling >= 0 && m.torsional >= 0) || !std::isfinite(m.rolling + m.torsional))
+    throw std::invalid_argument("meeting: rolling and torsional must be >= 0 and finite");
+}
+
 }  // namespace
 
 Vector3d relative_velocity(const RigidBody& a, const RigidBody& b, const PointContact& c) {
@@ -37,11 +44,12 @@ double normal_velocity(const std::vector<RigidBody>& motion, const PointContact&
 }
 
 NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
-                           std::vector<Meeting> meetings, Law law, double near_part)
-    : surfaces_(std::move(surfaces)),
-      meetings_(std::move(meetings)),
-      law_(law),
-      near_part_(near_part) {
+                           const std::vector<Meeting>& meetings, Law law, double near_part)
+    : surfaces_(std::move(surfaces)), law_(law), near_part_(near_part) {
+  for (const Meeting& m : meetings) {
+    check(m);
+    meetings_[std::minmax({m.first, m.second})] = m;  // the last one of a pair counts
+  }
   if (surfaces_.size() >= (1u << 24))
     throw std::invalid_argument("more than 16777215 surfaces");  // contact_id has 24 bits
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
@@ -111,7 +119,7 @@ void NearContacts::find_polyhedra(const BodySet& bodies) {
     for (Kind* each : {&a, &b})
       each->polyhedra = each->polyhedra || meet_as_polyhedra(a.kind, b.kind);
   };
-  for (const Meeting& m : meetings_.list())
+  for (const auto& [materials, m] : meetings_)
     for (Kind& a : kinds[m.first])
       for (Kind& b : kinds[m.second]) a.moves ? meet(a, b) : meet(b, a);
   polyhedron_.resize(surfaces_.size());
@@ -121,12 +129,13 @@ void NearContacts::find_polyhedra(const BodySet& bodies) {
         for (const int k : each.surfaces) polyhedron_[at(k)] = make_polyhedron(surface(k).shape);
 }
 
-int NearContacts::meeting_of(int a, int b) const {
-  return meetings_.find(surface(a).material, surface(b).material);
+const Meeting* NearContacts::meeting_of(int a, int b) const {
+  const auto found = meetings_.find(std::minmax({surface(a).material, surface(b).material}));
+  return found != meetings_.end() ? &found->second : nullptr;
 }
 
 const Meeting& NearContacts::meeting(const PointContact& c) const {
-  return meetings_[meeting_of(first_surface(c), second_surface(c))];
+  return *meeting_of(first_surface(c), second_surface(c));
 }
 
 double NearContacts::size(const PointContact& c) const {
@@ -134,13 +143,13 @@ double NearContacts::size(const PointContact& c) const {
 }
 
 bool NearContacts::any_restitution() const {
-  return std::any_of(meetings_.list().begin(), meetings_.list().end(),
-                     [](const Meeting& m) { return m.restitution > 0; });
+  return std::any_of(meetings_.begin(), meetings_.end(),
+                     [](const auto& m) { return m.second.restitution > 0; });
 }
 
 bool NearContacts::any_rolling() const {
-  return std::any_of(meetings_.list().begin(), meetings_.list().end(),
-                     [](const Meeting& m) { return m.rolling > 0 || m.torsional > 0; });
+  return std::any_of(meetings_.begin(), meetings_.end(),
+                     [](const auto& m) { return m.second.rolls(); });
 }
 
 void NearContacts::set_pose(const BodySet& bodies, int surface) {
@@ -192,8 +201,8 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   const int j = b < 0 ? planes_[at(~b)] : bounded_[at(b)];
   const Surface &s = surface(i), &t = surface(j);
   if (s.body == t.body) return;
-  const int m = meeting_of(i, j);
-  if (m < 0) return;
+  const Meeting* const m = meeting_of(i, j);
+  if (m == nullptr) return;
   double margin = ball_[at(a)] - reach_[at(a)];
   if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
   find_points(i, j, margin);
@@ -216,7 +225,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
     c.r2 = centred_[at(j)] ? Vector3d((t.shape.radius + part * p.gap) * p.normal)
                            : Vector3d(p.on_second - half - bodies.position[at(t.body)]);
     c.normal = p.normal;
-    c.mu = law_ == Law::frictionless ? 0 : meetings_[m].friction;
+    c.mu = law_ == Law::frictionless ? 0 : m->friction;
     c.id = contact_id(i, j, p.feature);
     out.points.push_back(c);
     out.gaps.push_back(p.gap);

@@ -1,12 +1,13 @@
 // Tether: contacts of a set of bodies. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
 #include <memory>
 #include <tether/contact/stepping.hpp>
+#include <utility>
 #include <vector>
 
 #include "stepping/detection/broadphase.hpp"
-#include "stepping/detection/meetings.hpp"
 #include "stepping/detection/mesh/mesh_contacts.hpp"
 #include "stepping/detection/polyhedra/polyhedra.hpp"
 
@@ -22,8 +23,8 @@ double normal_velocity(const std::vector<RigidBody>& motion, const PointContact&
 class NearContacts {
  public:
   /// Throws std::invalid_argument; see Stepper.
-  NearContacts(const BodySet& bodies, std::vector<Surface> surfaces, std::vector<Meeting> meetings,
-               Law law, double near_part);
+  NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
+               const std::vector<Meeting>& meetings, Law law, double near_part);
 
   /// Fills points and gaps.
   void find(const BodySet& bodies, double dt, StepContacts& out);
@@ -49,7 +50,7 @@ class NearContacts {
 
  private:
   void find_polyhedra(const BodySet& bodies);
-  int meeting_of(int a, int b) const;
+  const Meeting* meeting_of(int a, int b) const;  // of surfaces; null: they pass through
   void place(const BodySet& bodies, double dt);
   void set_pose(const BodySet& bodies, int surface);
   double way(const BodySet& bodies, std::size_t k, double dt) const;
@@ -59,7 +60,7 @@ class NearContacts {
   void find_points(int i, int j, double margin);
 
   std::vector<Surface> surfaces_;
-  Meetings meetings_;
+  std::map<std::pair<int, int>, Meeting> meetings_;  // by materials, the lower one first
   Law law_;
   double near_part_;
   PolyhedraContacts polyhedra_;
