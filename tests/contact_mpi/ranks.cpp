@@ -88,7 +88,7 @@ BodySolution alone(BodySolver& solver, const Packing& p) {
   return out;
 }
 
-// Of a problem of one island: a rank sends velocities alone, one sum ends each pass, and all sweep
+// A problem of one island: a rank sends velocities alone, one sum ends each pass, and all sweep
 // alike many contacts.
 void check_shares(const Solution& s, std::size_t contacts) {
   CHECK(s.shared_islands == (ranks > 1 ? 1 : 0));

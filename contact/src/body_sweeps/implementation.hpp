@@ -41,7 +41,7 @@ struct IslandResult {
 
 namespace tether::contact {
 
-// Of two parts of a solve together; the error is NaN where one of them is.
+// Status and error of two parts of a solve together; the error is NaN where one of them is.
 Status worse(Status a, Status b);
 double worse(double a, double b);
 

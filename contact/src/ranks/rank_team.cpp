@@ -260,7 +260,7 @@ void RankTeam::Implementation::finish(bool failed) {
   for (const auto& [island, states] : left) assemble(island, states);
 }
 
-// What sweeps have made of the contacts of an island, in the order of its places; on its root.
+// States of the contacts of an island after its sweeps, in the order of its places; on its root.
 void RankTeam::Implementation::gather_states(int k, std::vector<Eigen::Vector4d>& states) {
   const Island& island = plan.whole.islands[at(k)];
   std::vector<int> counts(at(plan.ranks), 0);

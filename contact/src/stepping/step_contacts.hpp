@@ -29,7 +29,7 @@ inline void push(RigidBody& body, const Eigen::Vector3d& r, const Eigen::Vector3
   body.angular_velocity += body.inverse_inertia * r.cross(p);
 }
 
-/// Of all bodies that move.
+/// Gives all bodies that move the velocities of a solution.
 inline void take_velocities(const BodySolution& from, BodySet& bodies) {
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
     if (bodies.mass[i] == 0) continue;

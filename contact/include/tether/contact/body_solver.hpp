@@ -84,8 +84,8 @@ struct BodySolution {
   int far = 0;                  ///< contacts that were left out: open before and after
   std::vector<int> replaced;    ///< as Solution::replaced
   bool spheres = false;  ///< no contact needed the general block: all spheres or frictionless
-  std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`
-  std::vector<Regime> regimes;            ///< of each contact
+  std::vector<Eigen::Vector3d> impulses;                        ///< world axes, on `first`
+  std::vector<Regime> regimes;                                  ///< of each contact
   std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
 };
 
