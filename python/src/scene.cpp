@@ -58,7 +58,7 @@ struct Film {
 Film run(ts::Scene scene, std::optional<double> end, std::optional<double> every, bool files) {
   if (end) scene.end = *end;
   if (every) scene.output.every = *every;
-  if (!files) scene.output.csv = scene.output.vtk = scene.output.svg = scene.output.state = "";
+  if (!files) scene.output.files.clear();
   Film film;
   for (const ts::Body& body : scene.bodies) film.bodies.push_back(body.name);
   ts::RunOptions options;

@@ -76,12 +76,11 @@ compile pivot scene/src/joints/kinds/pivot.cpp scene/src/joints/list.cpp
 touches 3 'joint of scenes'
 
 fresh
-like scene/src/record/svg.cpp scene/src/record/xyz.cpp 's/Svg/Xyz/g; s/svg_format/xyz_format/; s/&Output::svg/\&Output::xyz/; s/"[.]svg"/".xyz"/; s/"svg"/"xyz"/'
+like scene/src/record/svg.cpp scene/src/record/xyz.cpp 's/Svg/Xyz/g; s/svg_format/xyz_format/; s/"[.]svg"/".xyz"/; s/"svg"/"xyz"/'
 edit scene/src/record/CMakeLists.txt 's/^  svg.cpp$/&\n  xyz.cpp/'
-edit scene/include/tether/scene/scene.hpp 's/csv, vtk, svg, state;/csv, vtk, svg, state, xyz;/'
 make_list record
 compile xyz scene/src/record/xyz.cpp scene/src/record/formats.cpp
-touches 3 'output of runs'
+touches 2 'output of runs'
 
 fresh
 like contact/src/law/frictionless.hpp contact/src/law/glue.hpp 's/frictionless/glue/g; s/Frictionless/Glue/g'

@@ -292,10 +292,10 @@ std::vector<std::string> own_corpus() {
   for (std::size_t k = 0; k < std::size(kScenes); ++k) {
     Scene scene = scene_of(k);
     scene.end = kSaved;
-    scene.output.state = state_file().path();
+    scene.output["state"] = state_file().path();
     run(scene);
     out.push_back(std::string(1, static_cast<char>(k)) +
-                  content_of(scene.output.state, hash_of_motion(scene, make_plan(scene))));
+                  content_of(scene.output["state"], hash_of_motion(scene, make_plan(scene))));
   }
   return out;
 }

@@ -76,7 +76,7 @@ void check_wanted(const std::string& text, const ClosedForm& truth, std::size_t 
 void check_bounds(const std::string& text, const ClosedForm& truth) {
   const Scene scene = parse_scene(text, "cost.toml");
   CostOptions options;
-  options.settings = {8e-3, 4e-3, 2e-3, 1e-3, 7e-4};
+  options.steps = {8e-3, 4e-3, 2e-3, 1e-3, 7e-4};
   const CostTable table = cost(scene, options);
   for (const CostRow& row : table.rows) {
     const double error = true_error(scene, row.setting, truth);

@@ -364,7 +364,7 @@ TEST_CASE("event: the table of events names the joint, and none where bodies tou
   Scene scene = parse_scene("[scene]\nengine = \"event\"\ngravity = [0, 0, -9.81]\nend = 0.5\n" +
                                 kFloor + text + pair(""),
                             "test");
-  scene.output.csv = (folder / "a.csv").string();
+  scene.output["csv"] = (folder / "a.csv").string();
   REQUIRE(tether::scene::run(scene).failure.empty());
   const std::string table = tether::test::content(folder / "a.events.csv");
   CHECK(table.find(",impulse_z_N_s,joint\n") != std::string::npos);

@@ -256,7 +256,7 @@ TEST_CASE("event: where the engine gives up its state is saved, and steps take i
   };
   const std::string state = (tether::test::folder("hand_over") / "ball.state").string();
   Scene events = scene("event");
-  events.output.state = state;
+  events.output["state"] = state;
   events.event.emplace().max_events = 1;
   const RunResult given_up = tether::scene::run(events);
   CHECK(!given_up.failure.empty());
@@ -299,7 +299,7 @@ TEST_CASE("event: with otherwise = \"stepping\" a run goes on in steps, and says
   const std::filesystem::path folder = tether::test::folder("otherwise");
   Scene scene = handed_over();
   CHECK(write_scene(parse_scene(write_scene(scene), "again")) == write_scene(scene));
-  scene.output.csv = (folder / "a.csv").string();
+  scene.output["csv"] = (folder / "a.csv").string();
   const Plan plan = make_plan(scene);
   CHECK(plan.engine == EngineKind::event);
   CHECK(plan.then_steps == 1e-4);

@@ -52,7 +52,7 @@ TEST_CASE("every field of a scene is read") {
   CHECK_FALSE(s.smooth->projection);
   CHECK(s.smooth->max_step == 0.01);
   CHECK(s.smooth->max_steps == 5000);
-  CHECK(s.output.csv == "a.csv");
+  CHECK(s.output["csv"] == "a.csv");
   CHECK(s.output.checkpoint == 0.5);
 
   REQUIRE(s.bodies.size() == 4);

@@ -170,7 +170,7 @@ TEST_CASE("a film of several processes is that of one, in pieces") {
   Scene scene = parse_scene(kScene, "film.toml");
   std::size_t pieces = 0;
   const fs::path one = folder("film_of_one");
-  scene.output.vtk = (one / "f.pvd").string();
+  scene.output["vtk"] = (one / "f.pvd").string();
   CHECK(run(scene).written == std::vector<std::string>{(one / "f.pvd").string()});
   const std::vector<Frame> whole = frames_of(one / "f.pvd", &pieces);
   // Three records: bodies, the joint, and contacts of the last two at least.
@@ -179,7 +179,7 @@ TEST_CASE("a film of several processes is that of one, in pieces") {
   for (const int ranks : {2, 3, 40}) {
     CAPTURE(ranks);
     const fs::path shared = folder("film_of_some");
-    scene.output.vtk = (shared / "f.pvd").string();
+    scene.output["vtk"] = (shared / "f.pvd").string();
     // The first one last: it names what the others have written.
     int met = 0;
     for (int rank = ranks - 1; rank >= 0; --rank) {

@@ -302,10 +302,10 @@ TEST_CASE("tables and films have forces where the scene asks for them, and only 
   s.joints.back().name = "pin";
   const auto table = [&](const std::string& name, bool forces) {
     s.output.forces = forces;
-    s.output.csv = (folder / (name + ".csv")).string();
-    s.output.vtk = (folder / (name + ".pvd")).string();
+    s.output["csv"] = (folder / (name + ".csv")).string();
+    s.output["vtk"] = (folder / (name + ".pvd")).string();
     run(s);
-    return tether::test::content(s.output.csv);
+    return tether::test::content(s.output["csv"]);
   };
   const std::string with = table("with", true), without = table("without", false);
   CHECK(with.find("stays.contact_fz_N") != std::string::npos);
@@ -511,8 +511,8 @@ rest = 1.6076
           std::to_string(0.4 * pull) + "\nwithin = 1e-5\n";
   Scene s = parse_scene(text, "forces.toml");
   const std::filesystem::path folder = tether::test::folder("event_forces");
-  s.output.csv = (folder / "a.csv").string();
-  s.output.vtk = (folder / "a.pvd").string();
+  s.output["csv"] = (folder / "a.csv").string();
+  s.output["vtk"] = (folder / "a.pvd").string();
   const RunResult result = run(s);
   CHECK(result.engine == "event");
   CHECK(result.failure.empty());

@@ -128,9 +128,9 @@ TEST_CASE("a picture of numbers at the ends of their range comes to its end") {
       "[scene]\nend = 0.02\ngravity = [0, 1e150, -9.81]\n[stepping]\nstep = 1e-3\n[[body]]\nshape "
       "= \"sphere\"\nradius = 1\nmass = 1\n",
       "far.toml");
-  scene.output.svg = (folder("pictures") / "far.svg").string();
+  scene.output["svg"] = (folder("pictures") / "far.svg").string();
   CHECK(run(scene).failure == "");
-  CHECK(has(texts_of(content(scene.output.svg)), "energy / J"));
+  CHECK(has(texts_of(content(scene.output["svg"])), "energy / J"));
   for (const double least : {5e-324, 1e-300, 1.0, 1e300})
     for (const double most : {5e-324, 1.0, 1e300, 1e308}) {
       CAPTURE(least, most);
@@ -158,9 +158,9 @@ TEST_CASE("texts of the pictures of all shipped scenes are apart") {
     scene.end *= 0.003;
     scene.expect.clear();
     scene.output = Output{};
-    scene.output.svg = (folder("pictures") / "a.svg").string();
+    scene.output["svg"] = (folder("pictures") / "a.svg").string();
     run(scene);
-    const std::vector<Text> texts = texts_of(content(scene.output.svg));
+    const std::vector<Text> texts = texts_of(content(scene.output["svg"]));
     CHECK(has(texts, "t / s"));
     CHECK(has(texts, "energy / J"));
     CHECK(has(texts, "kinetic"));
@@ -237,9 +237,9 @@ TEST_CASE("every shipped scene stands in the README of the examples, and they ar
 TEST_CASE("texts of a scene stay texts in its picture") {
   Scene scene = parse_scene(kMechanism, "picture.toml");
   scene.bodies[0].name = "bob < & >";  // no file has such a name
-  scene.output.svg = (folder("pictures") / "a.svg").string();
+  scene.output["svg"] = (folder("pictures") / "a.svg").string();
   run(scene);
-  const std::vector<Text> texts = texts_of(content(scene.output.svg));
+  const std::vector<Text> texts = texts_of(content(scene.output["svg"]));
   CHECK(has(texts, "a < b & c"));
   CHECK(has(texts, "bob < & >"));
   CHECK(has(texts, "bob 2"));
@@ -249,24 +249,24 @@ TEST_CASE("texts of a scene stay texts in its picture") {
 
 TEST_CASE("ground is hatched where it is, and what the world holds has a bearing") {
   Scene scene = parse_scene(kMechanism, "picture.toml");
-  scene.output.svg = (folder("pictures") / "a.svg").string();
+  scene.output["svg"] = (folder("pictures") / "a.svg").string();
   run(scene);
   // The ground, the bearing of the rod, the end of the spring.
-  CHECK(count(content(scene.output.svg), "url(#hatch)") == 3);
+  CHECK(count(content(scene.output["svg"]), "url(#hatch)") == 3);
   scene.bodies.pop_back();
   scene.springs.clear();
   run(scene);
-  CHECK(count(content(scene.output.svg), "url(#hatch)") == 1);
+  CHECK(count(content(scene.output["svg"]), "url(#hatch)") == 1);
   scene.joints.clear();
   run(scene);
-  CHECK(count(content(scene.output.svg), "hatch") == 0);
+  CHECK(count(content(scene.output["svg"]), "hatch") == 0);
 }
 
 TEST_CASE("a picture of a run that ends at its start is one") {
   Scene scene = parse_scene(kMechanism, "picture.toml");
-  scene.output.svg = (folder("pictures") / "a.svg").string();
+  scene.output["svg"] = (folder("pictures") / "a.svg").string();
   RunOptions options;
   options.interrupted = [] { return true; };
   run(scene, options);
-  texts_of(content(scene.output.svg));
+  texts_of(content(scene.output["svg"]));
 }

@@ -308,10 +308,10 @@ TEST_CASE(
   const auto path = folder("player_names");
   const std::string page = (path / "a").string();
   for (const char* name : {"a", "./a", "a.new", "b/../a"}) {
-    scene.output.csv = (path / name).string();
+    scene.output["csv"] = (path / name).string();
     CHECK_THROWS_AS(play(scene, page), std::invalid_argument);
   }
-  scene.output.csv.clear();
+  scene.output["csv"].clear();
   scene.file = page;
   CHECK_THROWS_AS(play(scene, page), std::invalid_argument);
   scene.file.clear();

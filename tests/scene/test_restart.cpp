@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 namespace {
 
 void outputs(Scene& scene, const fs::path& folder) {
-  scene.output.csv = (folder / "a.csv").string();
-  scene.output.state = (folder / "a.state").string();
+  scene.output["csv"] = (folder / "a.csv").string();
+  scene.output["state"] = (folder / "a.state").string();
 }
 
 /// A scene that has run to 0.1 s, whose state is saved, and that ends at 0.2 s.
@@ -35,7 +35,7 @@ Scene first_half(const std::string& text, const char* name) {
   outputs(scene, folder(name));
   scene.end = 0.1;
   run(scene);
-  scene.output.csv.clear();
+  scene.output["csv"].clear();
   scene.end = 0.2;
   return scene;
 }
@@ -55,7 +55,7 @@ void check_cut(Scene scene, double part) {
   REQUIRE(first.failure == "");
   scene.end = end;
   RunOptions options;
-  options.restart = scene.output.state;
+  options.restart = scene.output["state"];
   const RunResult second = run(scene, options);
   CHECK(second.failure == once.failure);
   CHECK(content(whole / "a.csv") == content(cut / "a.csv"));
@@ -155,7 +155,7 @@ TEST_CASE(
   run(scene);
   scene.end = 50;
   RunOptions options;
-  options.restart = scene.output.state;
+  options.restart = scene.output["state"];
   CHECK(run(scene, options).counts.steps < 5500);
 }
 
@@ -172,13 +172,13 @@ TEST_CASE(
 TEST_CASE("saving changes nothing, however often") {
   for (const std::string& text : {chain(2, "index1", 1e-6), tumble(5, 0.4, 0.3, "momentum")}) {
     Scene scene = parse_scene(text, "saved.toml");
-    scene.output.csv = (folder("rarely") / "a.csv").string();
-    const std::string rarely = scene.output.csv;
+    scene.output["csv"] = (folder("rarely") / "a.csv").string();
+    const std::string rarely = scene.output["csv"];
     run(scene);
     outputs(scene, folder("often"));
     scene.output.checkpoint = scene.end / 17;
     run(scene);
-    CHECK(content(rarely) == content(scene.output.csv));
+    CHECK(content(rarely) == content(scene.output["csv"]));
   }
 }
 
@@ -198,7 +198,7 @@ TEST_CASE("a heap at rest stays at rest behind a restart") {
   scene.end = 1.3;
   scene.output.every = 2e-3;
   RunOptions options;
-  options.restart = scene.output.state;
+  options.restart = scene.output["state"];
   double before = 0, fastest = 0;
   options.record = [&](const Engine& engine) {
     double speed = 0;
@@ -215,9 +215,9 @@ TEST_CASE("a saved state that is damaged, cut or longer is refused") {
   for (const std::string& text : {chain(1, "index1", 1e-4), tumble(2, 0.4, 0, "momentum")}) {
     Scene scene = first_half(text, "damaged");
     RunOptions options;
-    options.restart = scene.output.state;
-    const std::string good = content(scene.output.state);
-    scene.output.state.clear();
+    options.restart = scene.output["state"];
+    const std::string good = content(scene.output["state"]);
+    scene.output["state"].clear();
     const auto refused = [&](const std::string& bytes) {
       std::ofstream(options.restart, std::ios::binary) << bytes;
       CHECK_THROWS_AS(run(scene, options), std::runtime_error);
@@ -242,8 +242,8 @@ TEST_CASE("a saved state of another scene is refused unless forced") {
     Scene other = scene;
     change(other);
     RunOptions options;
-    options.restart = scene.output.state;
-    other.output.state.clear();
+    options.restart = scene.output["state"];
+    other.output["state"].clear();
     CHECK_THROWS_WITH(run(other, options), Catch::Contains("another"));
     options.force = true;
     CHECK(run(other, options).failure == "");
@@ -255,11 +255,11 @@ TEST_CASE("a saved state of another scene is refused unless forced") {
   // These do not move it: its name, records, expectations, threads.
   Scene same = scene;
   same.name = "the same";
-  same.output.state.clear();
+  same.output["state"].clear();
   same.output.every = 0.03;
   same.stepping->threads = 2;
   RunOptions options;
-  options.restart = scene.output.state;
+  options.restart = scene.output["state"];
   CHECK(run(same, options).failure == "");
 }
 
@@ -269,7 +269,7 @@ TEST_CASE("rows and frames from behind a checkpoint, and a row that is cut, are 
   scene.output.checkpoint = 0.25;
   const auto film = [&](const fs::path& path) {
     outputs(scene, path);
-    scene.output.vtk = (path / "f.pvd").string();
+    scene.output["vtk"] = (path / "f.pvd").string();
   };
   const fs::path whole = folder("no_crash"), part = folder("crash");
   film(whole);
@@ -280,9 +280,9 @@ TEST_CASE("rows and frames from behind a checkpoint, and a row that is cut, are 
     if (engine.time() > 0.43) throw 1;  // the end of the process: nobody tidies up
   };
   CHECK_THROWS_AS(run(scene, options), int);
-  std::ofstream(scene.output.csv, std::ios::app | std::ios::binary) << "0.2";
+  std::ofstream(scene.output["csv"], std::ios::app | std::ios::binary) << "0.2";
   options = RunOptions{};
-  options.restart = scene.output.state;
+  options.restart = scene.output["state"];
   REQUIRE(run(scene, options).failure == "");
   for (const auto& entry : fs::recursive_directory_iterator(whole))
     if (entry.is_regular_file()) {
@@ -298,11 +298,11 @@ TEST_CASE("rows and frames behind an older checkpoint give way to those of the r
   scene.output.checkpoint = 0.25;
   const fs::path whole = folder("older");
   outputs(scene, whole);
-  scene.output.vtk = (whole / "f.pvd").string();
+  scene.output["vtk"] = (whole / "f.pvd").string();
   const std::string older = (folder("older_state") / "state").string();
   RunOptions options;
   options.record = [&](const Engine& engine) {
-    if (engine.time() > 0.3 && !fs::exists(older)) fs::copy_file(scene.output.state, older);
+    if (engine.time() > 0.3 && !fs::exists(older)) fs::copy_file(scene.output["state"], older);
   };
   REQUIRE(run(scene, options).failure == "");
   REQUIRE(fs::exists(older));
@@ -333,9 +333,9 @@ TEST_CASE("an interrupted run leaves whole files, and goes on with the bits of o
     CHECK(result.failure == "");
     CHECK(result.time > 0);
     CHECK(result.time < scene.end);
-    CHECK(content(scene.output.csv).back() == '\n');
+    CHECK(content(scene.output["csv"]).back() == '\n');
     RunOptions on;
-    on.restart = scene.output.state;
+    on.restart = scene.output["state"];
     CHECK_FALSE(run(scene, on).interrupted);
     CHECK(content(whole / "a.csv") == content(part / "a.csv"));
     CHECK(content(whole / "a.state") == content(part / "a.state"));
@@ -344,12 +344,12 @@ TEST_CASE("an interrupted run leaves whole files, and goes on with the bits of o
 
 TEST_CASE("a state is replaced whole or not at all: on a disk that is full the old one stays") {
   Scene scene = parse_scene(tumble(3, 0.4, 0.2, "momentum"), "full.toml");
-  scene.output.state = (folder("full") / "a.state").string();
+  scene.output["state"] = (folder("full") / "a.state").string();
   scene.end = 0.1;
   run(scene);
-  const std::string before = content(scene.output.state);
+  const std::string before = content(scene.output["state"]);
   RunOptions options;
-  options.restart = scene.output.state;
+  options.restart = scene.output["state"];
   scene.end = 0.2;
   // A limit of file sizes is the full disk of a test.
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
@@ -367,6 +367,6 @@ TEST_CASE("a state is replaced whole or not at all: on a disk that is full the o
   setrlimit(RLIMIT_FSIZE, &usual);
   std::signal(SIGXFSZ, handler);
   CHECK(told);
-  CHECK(content(scene.output.state) == before);
+  CHECK(content(scene.output["state"]) == before);
   CHECK(run(scene, options).failure == "");
 }

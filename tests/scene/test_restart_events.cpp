@@ -22,8 +22,8 @@ Scene ball(const fs::path& folder) {
       "position = [0, 0, 1.1]\nmaterial = \"a\"\n"
       "[[pair]]\nbetween = [\"a\", \"a\"]\nrestitution = 0.5\n",
       "ball.toml");
-  scene.output.csv = (folder / "a.csv").string();
-  scene.output.state = (folder / "a.state").string();
+  scene.output["csv"] = (folder / "a.csv").string();
+  scene.output["state"] = (folder / "a.state").string();
   return scene;
 }
 
@@ -59,8 +59,8 @@ TEST_CASE("events between a record and a checkpoint are in the table of a run th
     }
     if (!killed) break;
     options = RunOptions{};
-    if (fs::exists(scene.output.state)) {
-      options.restart = scene.output.state;
+    if (fs::exists(scene.output["state"])) {
+      options.restart = scene.output["state"];
       ++restarts;
     }
     REQUIRE(run(scene, options).failure == "");
@@ -83,7 +83,7 @@ TEST_CASE("the end of accumulating impacts, found behind a checkpoint, is in the
       fs::copy_file(whole / name, part / name, fs::copy_options::overwrite_existing);
     scene.end = 1.5;
     RunOptions options;
-    options.restart = scene.output.state;
+    options.restart = scene.output["state"];
     REQUIRE(run(scene, options).failure == "");
     check_same_files(whole, part);
   }

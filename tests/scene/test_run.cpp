@@ -133,9 +133,9 @@ TEST_CASE("a run in two parts has the bits and the files of one") {
     INFO(scene.name);
     const fs::path all = folder(scene.name + "_all"), parts = folder(scene.name + "_parts");
     const auto outputs = [&](const fs::path& path) {
-      scene.output.csv = (path / "a.csv").string();
-      scene.output.vtk = (path / "a.pvd").string();
-      scene.output.state = (path / "a.state").string();
+      scene.output["csv"] = (path / "a.csv").string();
+      scene.output["vtk"] = (path / "a.pvd").string();
+      scene.output["state"] = (path / "a.state").string();
       scene.output.every = 0.05;
       scene.output.checkpoint = 0.2;
     };
@@ -148,7 +148,7 @@ TEST_CASE("a run in two parts has the bits and the files of one") {
     REQUIRE(run(scene).failure.empty());
     scene.end = 0.5;
     RunOptions options;
-    options.restart = scene.output.state;
+    options.restart = scene.output["state"];
     REQUIRE(run(scene, options).failure.empty());
 
     CHECK(content(all / "a.csv") == content(parts / "a.csv"));
@@ -167,7 +167,7 @@ TEST_CASE("a run in two parts has the bits and the files of one") {
     CHECK(run(scene, options).failure.empty());
     const Scene other = parse_scene(scene.name == "rod" ? block("") : rod(""), "other.toml");
     CHECK_THROWS_AS(run(other, options), std::runtime_error);
-    std::ofstream(scene.output.state, std::ios::binary) << "tether state 1\nshort";
+    std::ofstream(scene.output["state"], std::ios::binary) << "tether state 1\nshort";
     CHECK_THROWS_AS(run(scene, options), std::runtime_error);
     fs::remove_all(all);
     fs::remove_all(parts);
@@ -202,7 +202,7 @@ TEST_CASE("an effect without strength changes nothing") {
 
 TEST_CASE("what accuracy costs: tighter settings have smaller errors and take more steps") {
   CostOptions options;
-  options.settings = {1e-4, 1e-6, 1e-8};
+  options.tolerances = {1e-4, 1e-6, 1e-8};
   const CostTable smooth = cost(parse_scene(rod(""), "test.toml"), options);
   REQUIRE(smooth.rows.size() == 3);
   CHECK(smooth.smooth);
@@ -219,7 +219,8 @@ TEST_CASE("what accuracy costs: tighter settings have smaller errors and take mo
   CHECK(smooth.cheapest(smooth.rows[2].error)->error <= smooth.rows[2].error);
   CHECK(smooth.cheapest(0) == nullptr);
 
-  options.settings = {1e-3, 8e-3, 4e-3, 2e-3};
+  options.tolerances.clear();
+  options.steps = {1e-3, 8e-3, 4e-3, 2e-3};
   const CostTable stepping = cost(parse_scene(block(""), "test.toml"), options);
   REQUIRE(stepping.rows.size() == 4);
   CHECK_FALSE(stepping.smooth);
@@ -230,7 +231,7 @@ TEST_CASE("what accuracy costs: tighter settings have smaller errors and take mo
     CHECK(ratio > 1.5);  // first order, measured against a step that is not zero either
     CHECK(ratio < 3);
   }
-  options.settings = {0};
+  options.steps = {0};
   CHECK_THROWS_AS(cost(parse_scene(block(""), "test.toml"), options), std::invalid_argument);
 }
 
@@ -241,11 +242,11 @@ TEST_CASE("messages, tables and states are the same in a host whose numbers have
     const auto failure = [&](const std::string& text) {
       try {
         Scene scene = parse_scene(text, "comma.toml");
-        scene.output.csv = file.string();
-        scene.output.state = (file.parent_path() / "a.state").string();
+        scene.output["csv"] = file.string();
+        scene.output["state"] = (file.parent_path() / "a.state").string();
         all.push_back(run(scene).failure);
         all.push_back(content(file));
-        all.push_back(content(scene.output.state));
+        all.push_back(content(scene.output["state"]));
       } catch (const std::exception& e) {
         all.emplace_back(e.what());
       }
@@ -285,18 +286,18 @@ TEST_CASE("messages, tables and states are the same in a host whose numbers have
 
 TEST_CASE("files that cannot be written are reported") {
   Scene scene = parse_scene(rod(""), "test.toml");
-  scene.output.csv = "/proc/nowhere/a.csv";
+  scene.output["csv"] = "/proc/nowhere/a.csv";
   CHECK_THROWS_AS(run(scene), std::runtime_error);
-  scene.output.csv = "/dev/full";
+  scene.output["csv"] = "/dev/full";
   CHECK_THROWS_WITH(run(scene), Catch::Contains("/dev/full"));
-  scene.output.csv.clear();
-  scene.output.svg = "/proc/a.svg";
+  scene.output["csv"].clear();
+  scene.output["svg"] = "/proc/a.svg";
   CHECK_THROWS_WITH(run(scene), Catch::Contains("/proc/a.svg"));
-  scene.output.svg.clear();
+  scene.output["svg"].clear();
   // A state takes the place of another one, never that of a device or a folder.
-  scene.output.state = folder("state").string();
+  scene.output["state"] = folder("state").string();
   CHECK_THROWS_WITH(run(scene), Catch::Contains("no file"));
-  CHECK(fs::is_directory(scene.output.state));
+  CHECK(fs::is_directory(scene.output["state"]));
 }
 
 TEST_CASE("times that no run can have are refused") {
@@ -320,7 +321,7 @@ TEST_CASE("times that no run can have are refused") {
   CostOptions options;
   int begun = 0;
   options.progress = [&](const std::string&, int, int) { ++begun; };
-  options.settings = {1e-2, 1e-300};  // before the first of them is run
+  options.steps = {1e-2, 1e-300};  // before the first of them is run
   CHECK_THROWS_AS(cost(good, options), std::invalid_argument);
   CHECK(begun == 0);
 }

@@ -176,7 +176,7 @@ TEST_CASE("what is no number is never met") {
 TEST_CASE("steps longer than the time between records leave no row twice") {
   Scene scene = parse_scene(falling(""), "rows.toml");
   const fs::path file = folder("rows") / "a.csv";
-  scene.output.csv = file.string();
+  scene.output["csv"] = file.string();
   for (const double step : {1e-3, 7e-3, 0.02}) {
     scene.stepping->step = step;
     scene.output.every = 0;
@@ -211,10 +211,10 @@ TEST_CASE("a restart of a run that is over judges it as that run did") {
                 "within = " +
                 fmt::format("{}", within) + "\n"),
         "over.toml");
-    scene.output.state = (path / "a.state").string();
+    scene.output["state"] = (path / "a.state").string();
     const RunResult first = run(scene);
     RunOptions options;
-    options.restart = scene.output.state;
+    options.restart = scene.output["state"];
     int looks = 0;
     options.record = [&](const Engine& engine) { looks += engine.time() == first.time; };
     const RunResult again = run(scene, options);
@@ -235,7 +235,7 @@ TEST_CASE("the table of many bodies has the first of them, and says so") {
   Scene scene = parse_scene(falling("", 230), "many.toml");
   scene.end = 2e-3;
   const fs::path file = folder("many") / "a.csv";
-  scene.output.csv = file.string();
+  scene.output["csv"] = file.string();
   const RunResult result = run(scene);
   std::ifstream in(file);
   std::string header;
@@ -251,8 +251,8 @@ TEST_CASE("two runs at the same time do not write the same files; one after the 
   const fs::path path = folder("lock");
   const auto with = [&](const char* csv, const char* state) {
     Scene out = scene;
-    out.output.csv = (path / csv).string();
-    out.output.state = (path / state).string();
+    out.output["csv"] = (path / csv).string();
+    out.output["state"] = (path / state).string();
     return out;
   };
   const Scene first = with("a.csv", "a.state");
@@ -284,19 +284,19 @@ TEST_CASE("outputs that collide with each other or with an input are refused") {
     Scene scene = good;
     change(scene.output);
     for (std::string* name :
-         {&scene.output.csv, &scene.output.vtk, &scene.output.svg, &scene.output.state})
+         {&scene.output["csv"], &scene.output["vtk"], &scene.output["svg"], &scene.output["state"]})
       if (!name->empty()) *name = (path / *name).string();
     CHECK_THROWS_AS(run(scene), std::invalid_argument);
     CHECK(fs::is_empty(path));
   };
-  refused([](Output& o) { o.csv = o.svg = "a"; });
-  refused([](Output& o) { o.csv = "a", o.state = "./a"; });
-  refused([](Output& o) { o.csv = "a.pvd", o.vtk = "a.vtu"; });
-  refused([](Output& o) { o.csv = "a", o.vtk = "a.pvd"; });
-  refused([](Output& o) { o.csv = "s.new", o.state = "s"; });
-  refused([](Output& o) { o.svg = "s", o.state = "s.new"; });
-  refused([](Output& o) { o.vtk = "a", o.csv = "a/bodies_000001.vtp"; });
-  refused([](Output& o) { o.csv = "x/.."; });
+  refused([](Output& o) { o["csv"] = o["svg"] = "a"; });
+  refused([](Output& o) { o["csv"] = "a", o["state"] = "./a"; });
+  refused([](Output& o) { o["csv"] = "a.pvd", o["vtk"] = "a.vtu"; });
+  refused([](Output& o) { o["csv"] = "a", o["vtk"] = "a.pvd"; });
+  refused([](Output& o) { o["csv"] = "s.new", o["state"] = "s"; });
+  refused([](Output& o) { o["svg"] = "s", o["state"] = "s.new"; });
+  refused([](Output& o) { o["vtk"] = "a", o["csv"] = "a/bodies_000001.vtp"; });
+  refused([](Output& o) { o["csv"] = "x/.."; });
 
   // The scene itself, under another name, too.
   Scene scene = good;
@@ -304,7 +304,7 @@ TEST_CASE("outputs that collide with each other or with an input are refused") {
   std::ofstream(scene.file) << "precious";
   fs::create_symlink(scene.file, path / "link");
   for (const char* name : {"scene.toml", "link", "./scene.toml"}) {
-    scene.output.csv = (path / name).string();
+    scene.output["csv"] = (path / name).string();
     CHECK_THROWS_AS(run(scene), std::invalid_argument);
   }
   CHECK(content(scene.file) == "precious");
@@ -315,7 +315,7 @@ TEST_CASE("a picture has the name that is asked for, whatever shells make of it"
   const fs::path path = folder("picture");
   const fs::path before = fs::current_path();
   fs::current_path(path);
-  scene.output.svg = "| touch pwned; cat > x";
+  scene.output["svg"] = "| touch pwned; cat > x";
   const auto largest_child = [] {
     rusage used{};
     getrusage(RUSAGE_CHILDREN, &used);
@@ -327,5 +327,5 @@ TEST_CASE("a picture has the name that is asked for, whatever shells make of it"
   fs::current_path(before);
   CHECK_FALSE(fs::exists(path / "pwned"));
   CHECK_FALSE(fs::exists(path / "x"));
-  CHECK(content(path / scene.output.svg).find("<svg") != std::string::npos);
+  CHECK(content(path / scene.output["svg"]).find("<svg") != std::string::npos);
 }

@@ -74,9 +74,7 @@ std::vector<Setting> settings_of(const Scene& scene, const Plan& plan, bool even
   const CostMethod planned = method_of(plan.engine);
   const bool all =
       options.tolerances.empty() && options.steps.empty() && options.accuracies.empty();
-  if (!options.settings.empty()) {
-    add(planned, options.settings);
-  } else if (planned == CostMethod::smooth) {
+  if (planned == CostMethod::smooth) {
     add(planned, all ? default_settings(scene, planned) : options.tolerances);
   } else {
     const auto take = [&](CostMethod method, const std::vector<double>& values) {

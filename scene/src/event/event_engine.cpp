@@ -23,8 +23,7 @@ namespace {
 using namespace event;
 using mechanics::at;
 
-constexpr const char* kDamaged = "the saved state is damaged";
-constexpr char kMagic[8] = {'e', 'v', 'e', 'n', 't', ' ', ' ', '6'};
+constexpr binary::Magic kMagic = {'e', 'v', 'e', 'n', 't', ' ', ' ', '6'};
 
 DriverOptions driver_options(const Scene& scene, double time_unit) {
   const EventOptions o = scene.event.value_or(EventOptions{});
@@ -100,6 +99,7 @@ class EventEngine : public ResumableEngine {
   void look();
   void look_at_contacts() const;
   void look_at_events();
+  void exchange(binary::Archive& io, Driver::Memory& m, double& reached, VectorXd& now) const;
 
   bool far() const { return !origin_.isZero(0); }
   /// Moves a place in SI to the origin of the world.
@@ -289,72 +289,72 @@ void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
   look();
 }
 
-void EventEngine::save(std::ostream& out) const {
-  const Driver::Memory m = driver_->memory();
-  put_bodies(out, time(), bodies_);
-  out.write(kMagic, sizeof kMagic);
-  binary::put(out, static_cast<std::uint64_t>(m.y.size()),
-              static_cast<std::uint64_t>(m.modes.size()), units_.length, units_.time, units_.mass,
-              m.time, driver_->time(), m.kept_energy, m.at_one_time, m.events, m.impacts);
-  binary::put_array(out, origin_, m.y, now_);
-  for (std::size_t i = 0; i < m.modes.size(); ++i) {
-    binary::put(out, static_cast<std::int32_t>(m.modes[i].mode),
-                static_cast<std::int32_t>(m.modes[i].direction.size()));
-    binary::put_array(out, m.modes[i].direction);
-    const Bounces& b = m.bounces[i];
-    for (int k = 0; k < 3; ++k) binary::put(out, b.time[k], b.speed[k]);
-    binary::put(out, m.levels[i], b.count, m.axes[i], bool{m.lifted[i]});
+// The part of a state behind the bodies.
+void EventEngine::exchange(binary::Archive& io, Driver::Memory& m, double& reached,
+                           VectorXd& now) const {
+  const auto contacts = at(model_->contacts());
+  std::uint64_t size = at(static_cast<int>(now_.size())), count = contacts;
+  smooth::Units units = units_;
+  io(size, count, units.length, units.time, units.mass, m.time, reached, m.kept_energy,
+     m.at_one_time, m.events, m.impacts);
+  if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass ||
+      size != static_cast<std::uint64_t>(now_.size()) || count != contacts)
+    throw std::runtime_error("the saved state is of another scene: of another size");
+  Vector3d origin = origin_;
+  m.y.resize(now_.size());
+  now.resize(now_.size());
+  io(origin, m.y, now);
+  if (origin != origin_)
+    throw std::runtime_error("the saved state is of another scene: somewhere else");
+  m.modes.resize(contacts), m.bounces.resize(contacts), m.levels.resize(contacts);
+  m.axes.resize(contacts), m.lifted.resize(contacts);
+  for (std::size_t i = 0; i < contacts; ++i) {
+    ContactMode& each = m.modes[i];
+    auto directions = static_cast<std::int32_t>(each.direction.size());
+    io(each.mode, directions);
+    io.demand(each.mode <= Mode::slide &&
+              (directions == model_->tangents() || (each.mode != Mode::slide && directions == 0)));
+    each.direction.resize(directions);
+    io(each.direction);
+    Bounces& b = m.bounces[i];
+    for (int k = 0; k < 3; ++k) io(b.time[k], b.speed[k]);
+    bool lifted = m.lifted[i];
+    io(m.levels[i], b.count, m.axes[i], lifted);
+    m.lifted[i] = lifted;
   }
 }
 
+void EventEngine::save(std::ostream& out) const {
+  Driver::Memory m = driver_->memory();
+  binary::Archive io(out);
+  double seconds = time(), reached = driver_->time();
+  VectorXd now = now_;
+  out.write(kBodiesFirst, sizeof kBodiesFirst);
+  exchange_bodies(io, seconds, bodies_);
+  out.write(kMagic, sizeof kMagic);
+  exchange(io, m, reached, now);
+}
+
 void EventEngine::restore(std::istream& in, Restore how) {
-  char magic[sizeof kMagic];
+  binary::Archive io(in);
+  binary::Magic magic;
   in.read(magic, sizeof magic);
   if (in && std::equal(magic, magic + sizeof magic, kBodiesFirst)) {
     std::vector<BodyState> bodies(bodies_.size());
-    get_bodies(in, bodies);
+    double seconds = 0;
+    exchange_bodies(io, seconds, bodies);
     in.read(magic, sizeof magic);
   }
   if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
     throw std::runtime_error("this is not a state of the event engine");
-  std::uint64_t size = 0, contacts = 0;
-  smooth::Units units;
   Driver::Memory m;
   double reached = 0;
-  binary::get(in, size, contacts, units.length, units.time, units.mass, m.time, reached,
-              m.kept_energy, m.at_one_time, m.events, m.impacts);
-  if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass ||
-      size != static_cast<std::uint64_t>(now_.size()) ||
-      contacts != static_cast<std::uint64_t>(model_->contacts()))
-    throw std::runtime_error("the saved state is of another scene: of another size");
-  m.y.resize(now_.size());
-  VectorXd saved(now_.size());
-  Vector3d origin;
-  binary::get_array(in, origin, m.y, saved);
-  if (origin != origin_)
-    throw std::runtime_error("the saved state is of another scene: somewhere else");
-  for (std::uint64_t i = 0; i < contacts; ++i) {
-    std::int32_t mode = 0, directions = 0;
-    binary::get(in, mode, directions);
-    ContactMode& each = m.modes.emplace_back();
-    each.mode = static_cast<Mode>(mode);
-    const bool slides = each.mode == Mode::slide;
-    if (mode < 0 || mode > 2 || (directions != model_->tangents() && (slides || directions != 0)))
-      throw std::runtime_error(kDamaged);
-    each.direction.resize(directions);
-    binary::get_array(in, each.direction);
-    Bounces& b = m.bounces.emplace_back();
-    for (int k = 0; k < 3; ++k) binary::get(in, b.time[k], b.speed[k]);
-    bool lifted = false;
-    binary::get(in, m.levels.emplace_back(), b.count, m.axes.emplace_back(), lifted);
-    m.lifted.push_back(lifted);
-  }
+  VectorXd saved;
+  exchange(io, m, reached, saved);
   for (int i = 0; i < model_->contacts(); ++i)
-    if (const int by = model_->law(i).held_by;
-        by >= 0 && m.modes[at(i)].mode != Mode::open && m.modes[at(by)].mode == Mode::open)
-      throw std::runtime_error(kDamaged);
-  if (!m.is_sound() || !saved.allFinite() || !(reached >= m.time) || !std::isfinite(reached))
-    throw std::runtime_error(kDamaged);
+    if (const int by = model_->law(i).held_by; by >= 0)
+      io.demand(m.modes[at(i)].mode == Mode::open || m.modes[at(by)].mode != Mode::open);
+  io.demand(m.is_sound() && reached >= m.time && std::isfinite(reached));
   events_.clear();
   if (how == Restore::near) {
     driver_ = std::make_unique<Driver>(*model_, options_, reached,

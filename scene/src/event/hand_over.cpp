@@ -20,9 +20,7 @@ namespace tether::scene {
 
 namespace {
 
-constexpr char kHandedOver[8] = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '2'};
-constexpr std::uint64_t kLongestWhy = 100000, kMostClosed = 100000;
-constexpr const char* kUnsound = "the saved state is damaged";
+constexpr binary::Magic kHandedOver = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '2'};
 
 // Steps go on until this many of them have left the same contacts closed. It doubles where events
 // have come less far than that before they were given up again.
@@ -144,10 +142,9 @@ class EventsThenSteps final : public Engine {
   void look_back();
   void give_back();
   bool may_give_back() const;
-  void put_hand_overs(std::ostream& out) const;
-  void get_hand_over(std::istream& in);
-  void get_hand_overs(std::istream& in);
-  bool are_sound() const;
+  template <class Self>
+  static void exchange_hand_overs(Self& self, binary::Archive& io);
+  bool are_in_order() const;
 
   double step_;
   Scene scene_, steps_scene_;
@@ -236,75 +233,55 @@ void EventsThenSteps::give_back() {
   tell_events();
 }
 
-void EventsThenSteps::put_hand_overs(std::ostream& out) const {
-  binary::put(out, static_cast<std::uint64_t>(hand_overs_.size()));
-  for (const HandOver& each : hand_overs_) {
-    each_number(each.before, [&](long n) { binary::put(out, static_cast<std::int64_t>(n)); });
-    binary::put(out, each.time, each.back.value_or(-1), each.lost,
-                static_cast<std::uint64_t>(each.why.size()));
-    out << each.why;
-  }
-  binary::put(out, energy_, calm_, enough_, static_cast<std::uint64_t>(closed_.size()));
-  for (const int contact : closed_) binary::put(out, static_cast<std::int32_t>(contact));
+template <class Self>
+void EventsThenSteps::exchange_hand_overs(Self& self, binary::Archive& io) {
+  io.list(self.hand_overs_, [&](auto& each) {
+    each_number(each.before, [&](auto& n) { io(n); });
+    double back = each.back.value_or(-1);
+    io(each.time, back, each.lost, each.why);
+    io.demand(std::isfinite(each.time) && std::isfinite(back) && std::isfinite(each.lost));
+    if constexpr (!std::is_const_v<Self>)
+      if (back >= 0) each.back = back;
+  });
+  io(self.energy_, self.calm_, self.enough_);
+  io.demand(std::isfinite(self.energy_) && self.calm_ >= 0 && self.calm_ <= kMostCalmSteps &&
+            self.enough_ >= kCalmSteps && self.enough_ <= kMostCalmSteps);
+  io.list(self.closed_, [&](auto& contact) { io(contact); });
 }
 
 void EventsThenSteps::save(std::ostream& out) const {
   if (hand_overs_.empty()) return events_->save(out);
-  put_bodies(out, time(), bodies());
+  binary::Archive io(out);
+  double seconds = time();
+  out.write(kBodiesFirst, sizeof kBodiesFirst);
+  exchange_bodies(io, seconds, bodies());
   out.write(kHandedOver, sizeof kHandedOver);
-  put_hand_overs(out);
+  exchange_hand_overs(*this, io);
   now().save(out);
 }
 
-void EventsThenSteps::get_hand_over(std::istream& in) {
-  HandOver& each = hand_overs_.emplace_back();
-  each_number(each.before, [&](long& n) { n = static_cast<long>(binary::get<std::int64_t>(in)); });
-  std::uint64_t length = 0;
-  double back = -1;
-  binary::get(in, each.time, back, each.lost, length);
-  if (length > kLongestWhy || !std::isfinite(each.time) || !std::isfinite(each.lost) ||
-      !std::isfinite(back))
-    throw std::runtime_error(kUnsound);
-  if (back >= 0) each.back = back;
-  each.why.resize(length);
-  in.read(each.why.data(), static_cast<std::streamsize>(length));
-}
-
-void EventsThenSteps::get_hand_overs(std::istream& in) {
-  const auto count = binary::get<std::uint64_t>(in);
-  if (count == 0 || count > kMostHandOvers) throw std::runtime_error(kUnsound);
-  for (std::uint64_t k = 0; k < count; ++k) {
-    if (k > 0 && !hand_overs_.back().back) throw std::runtime_error(kUnsound);
-    get_hand_over(in);
-  }
-  std::uint64_t closed = 0;
-  binary::get(in, energy_, calm_, enough_, closed);
-  if (!std::isfinite(energy_) || calm_ < 0 || enough_ < kCalmSteps || enough_ > kMostCalmSteps ||
-      calm_ > kMostCalmSteps || closed > kMostClosed)
-    throw std::runtime_error(kUnsound);
-  for (std::uint64_t k = 0; k < closed; ++k) closed_.push_back(binary::get<std::int32_t>(in));
-}
-
-// Each begins where the one before has ended, or later, and none after now.
-bool EventsThenSteps::are_sound() const {
-  double since = 0;
-  bool sound = true;
+// Each begins where the one before has ended, or later.
+bool EventsThenSteps::are_in_order() const {
+  bool good = !hand_overs_.empty() && hand_overs_.size() <= kMostHandOvers;
+  std::optional<double> since = 0;
   for (const HandOver& each : hand_overs_) {
-    each_number(each.before, [&](long n) { sound = sound && n >= 0 && n <= kMostCounted; });
-    sound = sound && each.time >= since && each.back.value_or(each.time) >= each.time;
-    since = each.back.value_or(each.time);
+    each_number(each.before, [&](long n) { good = good && n >= 0 && n <= kMostCounted; });
+    good = good && since && each.time >= *since && each.back.value_or(each.time) >= each.time;
+    since = each.back;
   }
-  return sound && since <= time() + step_;  // a boundary may lie shortly before
+  return good;
 }
 
 void EventsThenSteps::restore(std::istream& in, Restore how) {
   const std::string all{std::istreambuf_iterator<char>(in), {}};
   std::istringstream content(all);
-  char magic[sizeof kHandedOver];
+  binary::Archive io(content);
+  binary::Magic magic;
   std::vector<BodyState> bodies(scene_.bodies.size());
+  double seconds = 0;
   content.read(magic, sizeof magic);
   if (content && std::equal(magic, magic + sizeof magic, kBodiesFirst)) {
-    get_bodies(content, bodies);
+    exchange_bodies(io, seconds, bodies);
     content.read(magic, sizeof magic);
   }
   told_.clear();
@@ -318,14 +295,16 @@ void EventsThenSteps::restore(std::istream& in, Restore how) {
     content = std::istringstream(all);
     events_->restore(content, how);
   } else {
-    get_hand_overs(content);
+    exchange_hand_overs(*this, io);
+    io.demand(are_in_order());
     if (hand_overs_.back().back) {
       events_->restore(content, how);
     } else {
       begin_steps();
       steps_->restore(content, how);
     }
-    if (!are_sound()) throw std::runtime_error(kUnsound);
+    io.demand(hand_overs_.back().back.value_or(hand_overs_.back().time) <=
+              time() + step_);  // a boundary may lie shortly before
   }
   if (content.peek() != std::char_traits<char>::eof())
     throw std::runtime_error("the saved state is longer than this scene needs");

@@ -3,11 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <map>
 #include <tether/scene/files.hpp>
 
 #include "effects/list.hpp"
+#include "options.hpp"
 #include "read_stream.hpp"
 #include "record/formats.hpp"
 #include "repeat.hpp"
@@ -28,91 +30,53 @@ void read_scene_table(Fields& root, Reader& r) {
   in.finish();
 }
 
-void read_event(Fields& root, Reader& r) {
-  const Value* event = root.table("event");
-  if (event == nullptr) return;
-  Fields in = r.fields(event, "event");
-  EventOptions o;
-  o.tolerance =
-      in.number("tolerance", o.tolerance, {1e-13, 1e-1, false, "a number from 1e-13 to 0.1"},
-                "relative, and absolute in SI");
-  o.max_step = in.number("max_step", o.max_step, kNotNegative, "s; 0: free");
-  o.max_events = in.count("max_events", o.max_events, 1, 2000000000);
-  o.max_steps = in.count("max_steps", o.max_steps, 1, 2000000000);
-  o.otherwise = in.word("otherwise", o.otherwise);
+/// The table, where it is there; `check(in, options)` says what no single field shows.
+template <class Options, class Check>
+void read_options(Fields& root, Reader& r, const char* key, std::optional<Options>& to,
+                  const Check& check) {
+  const Value* table = root.table(key);
+  if (table == nullptr) return;
+  Fields in = r.fields(table, key);
+  each_field(to.emplace(), ReadField{in});
+  check(in, *to);
   in.finish();
-  r.scene.event = o;
-  if (r.scene.smooth || (r.scene.stepping && o.otherwise != Otherwise::stepping))
-    root.wrong("event",
-               "a scene has one of [smooth], [stepping] and [event]; [stepping] beside [event] is "
-               "for otherwise = \"stepping\"");
 }
 
-void read_engine(Fields& root, Reader& r) {
-  const Value* smooth = root.table("smooth");
-  const Value* stepping = root.table("stepping");
-  if (smooth != nullptr) {
-    Fields in = r.fields(smooth, "smooth");
-    SmoothOptions o;
-    o.tolerance =
-        in.number("tolerance", o.tolerance, {1e-14, 1e-1, false, "a number from 1e-14 to 0.1"},
-                  "relative, and absolute in SI");
-    o.formulation = in.word("formulation", o.formulation);
-    o.projection = in.flag("projection", o.projection);
-    o.max_step = in.number("max_step", o.max_step, kNotNegative, "s; 0: free");
-    o.max_steps = in.count("max_steps", o.max_steps, 1, 2000000000);
-    in.finish();
-    r.scene.smooth = o;
-  }
-  if (stepping == nullptr) return;
-  Fields in = r.fields(stepping, "stepping");
-  SteppingOptions o;
-  o.step = in.number("step", o.step, kPositive, "s");
-  o.accuracy = in.number("accuracy", o.accuracy, {0, 0.1, false, "a number from 0 to 0.1"},
-                         "of the size of each body; 0: none, steps are taken whole");
-  o.law = in.word("law", o.law);
-  o.tolerance = in.number("tolerance", o.tolerance, kPositivePart, "relative residual");
-  o.gyroscopic = in.word("gyroscopic", o.gyroscopic);
-  o.error_reduction = in.number("error_reduction", o.error_reduction, kPart, "");
-  o.max_depenetration_speed =
-      in.number("max_depenetration_speed", o.max_depenetration_speed, kNotNegative, "m/s");
-  o.restitution_law = in.word("restitution_law", o.restitution_law);
-  o.restitution_threshold = in.number("restitution_threshold", o.restitution_threshold,
-                                      kNotNegative, "of sqrt(gravity * size)");
-  o.impact_threshold =
-      in.number("impact_threshold", o.impact_threshold, kNotNegative, "of sqrt(gravity * size)");
-  o.cut_at_impacts = in.flag("cut_at_impacts", o.cut_at_impacts);
-  if (r.scene.simultaneous_impacts == contact::SimultaneousImpacts::in_turn &&
+void check_stepping(Fields& in, const Scene& scene, const SteppingOptions& o) {
+  if (scene.simultaneous_impacts == contact::SimultaneousImpacts::in_turn &&
       (o.accuracy > 0 || !o.cut_at_impacts))
     in.wrong(o.accuracy > 0 ? "accuracy" : "cut_at_impacts",
              "simultaneous_impacts = \"in_turn\" needs steps that are cut at impacts, without an "
              "accuracy");
-  o.sleep = in.number("sleep", o.sleep, kNotNegative, "of sqrt(gravity * size); 0: none sleeps");
-  if (o.sleep > 0 && o.accuracy > 0)
-    in.wrong("sleep", "goes with fixed steps: leave out accuracy, or sleep");
-  if (o.sleep > 0 && !(r.scene.gravity && r.scene.gravity->norm() > 0))
+  if (!(o.sleep > 0)) return;
+  if (o.accuracy > 0) in.wrong("sleep", "goes with fixed steps: leave out accuracy, or sleep");
+  if (!(scene.gravity && scene.gravity->norm() > 0))
     in.wrong("sleep", "is a part of sqrt(gravity * size), and the scene has no gravity");
-  for (const Pair& pair : r.scene.pairs)
-    if (o.sleep > 0 && (pair.rolling > 0 || pair.torsional > 0)) {
-      in.wrong("sleep", "does not go with rolling and torsional friction of pairs");
-      break;
-    }
-  o.acceptance = in.number("acceptance", o.acceptance, {1, 1e12, false, "a number from 1 to 1e12"},
-                           "of the tolerance");
-  o.max_halvings = in.count("max_halvings", o.max_halvings, 0, 30);
-  o.max_sweeps = in.count("max_sweeps", o.max_sweeps, 1, 1000000000);
-  o.on_failure = in.word("on_failure", o.on_failure);
-  o.threads = in.count("threads", o.threads, 1, 256);
-  in.finish();
-  r.scene.stepping = o;
-  if (smooth != nullptr) root.wrong("stepping", "a scene has [smooth] or [stepping], not both");
+  if (std::any_of(scene.pairs.begin(), scene.pairs.end(),
+                  [](const Pair& pair) { return pair.rolling > 0 || pair.torsional > 0; }))
+    in.wrong("sleep", "does not go with rolling and torsional friction of pairs");
+}
+
+void read_engine(Fields& root, Reader& r) {
+  const auto nothing = [](Fields&, const auto&) {};
+  Scene& scene = r.scene;
+  read_options(root, r, "smooth", scene.smooth, nothing);
+  read_options(root, r, "stepping", scene.stepping,
+               [&](Fields& in, const SteppingOptions& o) { check_stepping(in, scene, o); });
+  if (scene.smooth && scene.stepping)
+    root.wrong("stepping", "a scene has [smooth] or [stepping], not both");
+  read_options(root, r, "event", scene.event, nothing);
+  if (scene.event && (scene.smooth || (scene.stepping && !goes_on_in_steps(scene))))
+    root.wrong("event",
+               "a scene has one of [smooth], [stepping] and [event]; [stepping] beside [event] is "
+               "for otherwise = \"stepping\"");
 }
 
 void read_output(Fields& root, Reader& r) {
   Fields in = r.fields(root.table("output"), "output");
   Output& o = r.scene.output;
   for (const formats::Format* each : formats::all())
-    o.*each->file = in.output_name(each->name, each->extension);
+    o[each->name] = in.output_name(each->name, each->extension);
   o.every = in.number("every", o.every, kNotNegative, "s; 0: end / 1000");
   o.checkpoint = in.number("checkpoint", o.checkpoint, kNotNegative, "s; 0: only at the end");
   o.forces = in.flag("forces", o.forces);
@@ -201,7 +165,6 @@ Scene read(Value document, const std::string& name) {
   });
   for (const effects::Effect* each : effects::all()) each->read(root, r);
   read_engine(root, r);
-  read_event(root, r);
   read_output(root, r);
   const Names joints = index_of(r.scene.joints), springs = index_of(r.scene.springs);
   r.each(root, "expect", [&](Fields& in) { read_expect(in, r, joints, springs); });

@@ -7,6 +7,7 @@
 #include <tether/scene/words.hpp>
 
 #include "effects/list.hpp"
+#include "options.hpp"
 #include "record/formats.hpp"
 #include "toml/writer.hpp"
 
@@ -93,48 +94,16 @@ void write_body(const Body& body, Writer& out) {
   for (const effects::Effect* each : effects::all()) each->write_body(body, out);
 }
 
-void write_smooth(const SmoothOptions& o, Writer& out) {
-  out.table("smooth");
-  out.field("tolerance", o.tolerance);
-  out.raw("formulation", toml_word(o.formulation));
-  out.field("projection", o.projection);
-  out.field("max_step", o.max_step, "s; 0: free");
-  out.field("max_steps", o.max_steps, "between two stops");
-}
-
-void write_stepping(const SteppingOptions& o, Writer& out) {
-  out.table("stepping");
-  out.field("step", o.step, "s");
-  out.field("accuracy", o.accuracy, "of the size of each body; 0: steps are taken whole");
-  out.raw("law", toml_word(o.law));
-  out.field("tolerance", o.tolerance);
-  out.raw("gyroscopic", toml_word(o.gyroscopic));
-  out.field("error_reduction", o.error_reduction);
-  out.field("max_depenetration_speed", o.max_depenetration_speed, "m/s");
-  out.raw("restitution_law", toml_word(o.restitution_law));
-  out.field("restitution_threshold", o.restitution_threshold, "of sqrt(gravity * size)");
-  out.field("impact_threshold", o.impact_threshold, "of sqrt(gravity * size)");
-  out.field("cut_at_impacts", o.cut_at_impacts);
-  out.field("sleep", o.sleep, "of sqrt(gravity * size); 0: none sleeps");
-  out.field("acceptance", o.acceptance, "of the tolerance");
-  out.field("max_halvings", o.max_halvings, "of a step");
-  out.field("max_sweeps", o.max_sweeps, "of an island");
-  out.raw("on_failure", toml_word(o.on_failure));
-  out.field("threads", o.threads);
-}
-
-void write_event(const EventOptions& o, Writer& out) {
-  out.table("event");
-  out.field("tolerance", o.tolerance);
-  out.field("max_step", o.max_step, "s; 0: free");
-  out.field("max_events", o.max_events);
-  out.field("max_steps", o.max_steps);
-  out.raw("otherwise", toml_word(o.otherwise));
+template <class Options>
+void write_options(const char* key, std::optional<Options> options, Writer& out) {
+  if (!options) return;
+  out.table(key);
+  files::each_field(*options, files::WriteField{out});
 }
 
 void write_output(const Output& o, Writer& out) {
   out.table("output");
-  for (const formats::Format* each : formats::all()) out.field(each->name, o.*each->file);
+  for (const formats::Format* each : formats::all()) out.field(each->name, o[each->name]);
   out.field("every", o.every, "s; 0: end / 1000");
   out.field("checkpoint", o.checkpoint, "s; 0: only at the end");
   out.field("forces", o.forces);
@@ -166,9 +135,9 @@ std::string write_scene(const Scene& scene) {
   out.raw("engine", toml_word(scene.engine));
   out.raw("simultaneous_impacts", toml_word(scene.simultaneous_impacts));
   for (const effects::Effect* each : effects::all()) each->write_scene(scene, out);
-  if (scene.smooth) write_smooth(*scene.smooth, out);
-  if (scene.stepping) write_stepping(*scene.stepping, out);
-  if (scene.event) write_event(*scene.event, out);
+  write_options("smooth", scene.smooth, out);
+  write_options("stepping", scene.stepping, out);
+  write_options("event", scene.event, out);
   write_output(scene.output, out);
   for (const Body& body : scene.bodies) write_body(body, out);
   for (const Pair& pair : scene.pairs) {

@@ -4,60 +4,98 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
 #include <istream>
 #include <ostream>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
+#include <vector>
 
 namespace tether::scene::binary {
 
-template <class... T>
-void put(std::ostream& out, const T&... values) {
-  static_assert((std::is_arithmetic_v<T> && ...));
-  (out.write(reinterpret_cast<const char*>(&values), sizeof values), ...);
-}
+using Magic = char[8];  ///< The first letters of a part of a state.
 
-/// A bool of any byte but 0 and 1 would be undefined.
-template <class T>
-void get_one(std::istream& in, T& value) {
-  if constexpr (std::is_same_v<T, bool>) {
-    const int byte = in.get();
-    if (in && byte > 1) throw std::runtime_error("the saved state is damaged");
-    value = byte == 1;
-  } else {
-    in.read(reinterpret_cast<char*>(&value), sizeof value);
+/// Writes an object into a state, or reads it: what it consists of is said once.
+class Archive {
+ public:
+  explicit Archive(std::ostream& out) : out_(&out) {}
+  explicit Archive(std::istream& in) : in_(&in) {}
+  bool reads() const { return in_ != nullptr; }
+
+  /// Numbers, enumerators, texts, and vectors of Eigen, which are finite and of a length that
+  /// reader and writer know. Throws std::runtime_error.
+  template <class... T>
+  void operator()(T&&... values) {
+    (one(values), ...);
   }
-}
+  /// A list behind its length. It grows by what is there: a damaged length asks for no memory.
+  template <class List, class Each>
+  void list(List& all, const Each& each) {
+    auto left = static_cast<std::uint64_t>(all.size());
+    one(left);
+    if constexpr (!std::is_const_v<List>) {
+      if (reads()) {
+        for (all.clear(); left > 0; --left) each(all.emplace_back());
+        return;
+      }
+    }
+    for (auto& each_one : all) each(each_one);
+  }
+  /// Throws where a state that is read does not have what every state has: it is damaged.
+  void demand(bool holds, const std::string& why = "") const {
+    if (reads() && !holds)
+      throw std::runtime_error("the saved state is damaged" + (why.empty() ? why : ": " + why));
+  }
 
-template <class... T>
-void get(std::istream& in, T&... values) {
-  static_assert((std::is_arithmetic_v<T> && ...));
-  (get_one(in, values), ...);
-  if (!in) throw std::runtime_error("the saved state is cut off");
-}
+ private:
+  static constexpr std::uint64_t kLongestText = 100000;
 
-template <class T>
-T get(std::istream& in) {
-  T value{};
-  get(in, value);
-  return value;
-}
+  void bytes(char* at, std::size_t size) {
+    if (out_ != nullptr) out_->write(at, static_cast<std::streamsize>(size));
+    if (in_ != nullptr && !in_->read(at, static_cast<std::streamsize>(size)))
+      throw std::runtime_error("the saved state is cut off");
+  }
+  template <class T>
+  void one(T& value) {
+    using Plain = std::remove_const_t<T>;
+    Plain now = value;
+    if constexpr (std::is_same_v<Plain, bool>) {  // of any byte but 0 and 1 it would be undefined
+      char byte = now ? 1 : 0;
+      bytes(&byte, 1);
+      demand(byte == 0 || byte == 1);
+      now = byte == 1;
+    } else if constexpr (std::is_arithmetic_v<Plain>) {
+      bytes(reinterpret_cast<char*>(&now), sizeof now);
+    } else if constexpr (std::is_enum_v<Plain>) {
+      auto number = static_cast<std::int32_t>(now);
+      one(number);
+      now = static_cast<Plain>(number);
+      demand(static_cast<std::int32_t>(now) == number);
+    } else if constexpr (std::is_same_v<Plain, std::string>) {
+      auto size = static_cast<std::uint64_t>(now.size());
+      one(size);
+      demand(size <= kLongestText);
+      now.resize(size);
+      bytes(now.data(), now.size());
+    } else {
+      for (double& x : coefficients(now)) one(x);
+      demand(coefficients(now).allFinite(), "a number in it is not finite");
+    }
+    if constexpr (!std::is_const_v<T>) value = std::move(now);
+  }
+  template <class Derived>
+  static auto& coefficients(Eigen::MatrixBase<Derived>& vector) {
+    return vector.derived();
+  }
+  template <class Derived>
+  static auto& coefficients(Eigen::QuaternionBase<Derived>& quaternion) {
+    return quaternion.coeffs();
+  }
 
-/// Vectors of Eigen, of a length that reader and writer know.
-template <class... Vector>
-void put_array(std::ostream& out, const Vector&... vectors) {
-  const auto each = [&](const auto& v) {
-    for (Eigen::Index i = 0; i < v.size(); ++i) put(out, v[i]);
-  };
-  (each(vectors), ...);
-}
-
-template <class... Vector>
-void get_array(std::istream& in, Vector&&... vectors) {
-  const auto each = [&](auto& v) {
-    for (Eigen::Index i = 0; i < v.size(); ++i) get(in, v[i]);
-  };
-  (each(vectors), ...);
-}
+  std::ostream* out_ = nullptr;
+  std::istream* in_ = nullptr;
+};
 
 }  // namespace tether::scene::binary

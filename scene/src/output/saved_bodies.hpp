@@ -12,27 +12,20 @@
 namespace tether::scene {
 
 /// The first letters of a state that begins with its bodies.
-constexpr char kBodiesFirst[8] = {'b', 'o', 'd', 'i', 'e', 's', ' ', '1'};
+constexpr binary::Magic kBodiesFirst = {'b', 'o', 'd', 'i', 'e', 's', ' ', '1'};
 
-inline void put_bodies(std::ostream& out, double time, const std::vector<BodyState>& bodies) {
-  out.write(kBodiesFirst, sizeof kBodiesFirst);
-  binary::put(out, static_cast<std::uint64_t>(bodies.size()), time);
-  for (const BodyState& b : bodies)
-    binary::put_array(out, b.position, b.orientation.coeffs(), b.velocity, b.angular_velocity);
-}
-
-/// Reads what put_bodies() wrote after its first letters; returns the time. Throws
-/// std::runtime_error on other numbers of bodies and on what is no motion.
-inline double get_bodies(std::istream& in, std::vector<BodyState>& bodies) {
-  if (binary::get<std::uint64_t>(in) != bodies.size())
+/// Their number, the time and what moves them. Throws std::runtime_error on other numbers of bodies
+/// and on what is no motion.
+template <class Bodies>
+void exchange_bodies(binary::Archive& io, double& time, Bodies& bodies) {
+  auto count = static_cast<std::uint64_t>(bodies.size());
+  io(count, time);
+  if (count != bodies.size())
     throw std::runtime_error("the saved state is of another scene: of another size");
-  const double time = binary::get<double>(in);
-  for (BodyState& b : bodies) {
-    binary::get_array(in, b.position, b.orientation.coeffs(), b.velocity, b.angular_velocity);
-    if (!b.is_finite() || !(std::abs(b.orientation.norm() - 1) < 1e-6))
-      throw std::runtime_error("the saved state is damaged");
+  for (auto& b : bodies) {
+    io(b.position, b.orientation, b.velocity, b.angular_velocity);
+    io.demand(std::abs(b.orientation.norm() - 1) < 1e-6);
   }
-  return time;
 }
 
 }  // namespace tether::scene

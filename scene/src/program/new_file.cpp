@@ -1,6 +1,7 @@
 // Tether: files that are not there yet. SPDX-License-Identifier: BSD-3-Clause
 #include "new_file.hpp"
 
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -9,9 +10,15 @@
 #include <stdexcept>
 
 #include "output/whole_file.hpp"
+#include "program/process/signals.hpp"
+#include "program/process/standard_streams.hpp"
+#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
+namespace {
+
+/// Writes a file that is not there, whole or not at all.
 void make_new(const std::string& file, std::string_view content) {
   namespace fs = std::filesystem;
   const std::invalid_argument there(file + " is there already; --force replaces it");
@@ -27,6 +34,18 @@ void make_new(const std::string& file, std::string_view content) {
     return fs::rename(fresh, file);
   fs::remove(fresh, error);
   if (linked != 0) throw there;
+}
+
+}  // namespace
+
+void write_scene_file(const std::string& file, const std::string& text, bool force) {
+  if (file == "-") return StandardOutput(file).write(text);
+  catch_signals();  // the file is whole before they count
+  if (force)
+    write_whole(file, text);
+  else
+    make_new(file, text);
+  fmt::print("written: {0}\nnext: tether run {0}\n", on_terminal(file));
 }
 
 }  // namespace tether::scene

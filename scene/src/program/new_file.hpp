@@ -2,12 +2,12 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 namespace tether::scene {
 
-/// Writes a file that is not there, whole or not at all. std::invalid_argument where it is there
-/// already, std::runtime_error where it cannot be written.
-void make_new(const std::string& file, std::string_view content);
+/// Writes a scene, whole or not at all, and says so; "-" is the standard output. Without `force`
+/// std::invalid_argument where the file is there already, std::runtime_error where it cannot be
+/// written.
+void write_scene_file(const std::string& file, const std::string& text, bool force);
 
 }  // namespace tether::scene

@@ -2,16 +2,15 @@
 // BSD-3-Clause
 #include "scene_text.hpp"
 
-#include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
-#include <optional>
 
 #include "files/read_stream.hpp"
+#include "program/settings.hpp"
 
 namespace tether::scene {
 
@@ -21,12 +20,6 @@ constexpr std::size_t kLargest = std::size_t{256} << 20;  // beyond it parse_sce
 constexpr int kMostValues = 100000;
 
 std::string all_of(std::istream& in) { return files::read_stream(in, kLargest); }
-
-std::optional<double> number(const std::string& text) {
-  double value = 0;
-  if (!CLI::detail::lexical_cast(text, value) || !std::isfinite(value)) return {};
-  return value;
-}
 
 std::vector<std::string> split(const std::string& text, char at) {
   std::vector<std::string> out(1);
@@ -44,8 +37,8 @@ std::vector<std::string> split(const std::string& text, char at) {
 
 std::vector<double> range(const std::string& word, const std::vector<std::string>& parts) {
   const bool logarithmic = parts.size() == 4 && parts[3] == "log";
-  const std::optional<double> from = number(parts[0]), to = number(parts[1]),
-                              count = number(parts[2]);
+  const std::optional<double> from = finite_number(parts[0]), to = finite_number(parts[1]),
+                              count = finite_number(parts[2]);
   if ((parts.size() == 4 && !logarithmic) || !from || !to || !count)
     refuse(word, "a range is FROM:TO:COUNT or FROM:TO:COUNT:log, e.g. 0.1:0.5:9");
   if (*count != std::floor(*count) || *count < 2 || *count > kMostValues)
@@ -58,7 +51,7 @@ std::vector<double> range(const std::string& word, const std::vector<std::string
     // Values have 15 digits, so that 0.1:0.5:9 has 0.15 and not the number beside it.
     const double value =
         logarithmic ? *from * std::pow(*to / *from, share) : *from * (1 - share) + *to * share;
-    values.push_back(number(fmt::format("{:.15g}", value)).value_or(value));
+    values.push_back(finite_number(fmt::format("{:.15g}", value)).value_or(value));
   }
   values.back() = *to;
   return values;
@@ -75,11 +68,9 @@ SceneText read_text(const std::string& file) {
 }
 
 SceneText read_scene_text(const std::string& file) {
-  if (file == "-") return {all_of(std::cin), "standard input"};
-  std::ifstream in(file, std::ios::binary);
-  const std::string text = in ? all_of(in) : "";
-  if (!in.eof() || text.empty()) read_scene(file);  // says what is wrong
-  return {text, file};
+  SceneText out = read_text(file);
+  if (out.text.empty() && file != "-") read_scene(file);  // says what is wrong
+  return out;
 }
 
 Scene read_scene_argument(const std::string& file) {
@@ -117,7 +108,7 @@ VariedNumber read_varied(const std::string& word) {
     return out;
   }
   for (const std::string& each : split(values, ',')) {
-    const std::optional<double> value = number(each);
+    const std::optional<double> value = finite_number(each);
     if (!value) refuse(word, fmt::format("\"{}\" is not a finite number", each));
     out.values.push_back(*value);
   }

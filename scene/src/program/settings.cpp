@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 
 namespace tether::scene {
@@ -15,12 +14,17 @@ namespace {
 constexpr double kMostSettings = 1000;
 
 std::optional<double> positive(const std::string& text) {
-  double value = 0;
-  if (!CLI::detail::lexical_cast(text, value) || !(value > 0) || !std::isfinite(value)) return {};
-  return value;
+  const std::optional<double> value = finite_number(text);
+  return value && *value > 0 ? value : std::nullopt;
 }
 
 }  // namespace
+
+std::optional<double> finite_number(const std::string& text) {
+  double value = 0;
+  if (!CLI::detail::lexical_cast(text, value) || !std::isfinite(value)) return {};
+  return value;
+}
 
 CLI::Validator positive_number() {
   return CLI::Validator(

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace tether::scene {
 
+/// A finite number; nothing else has a value.
+std::optional<double> finite_number(const std::string& text);
 /// Refuses all but finite numbers > 0.
 CLI::Validator positive_number();
 

@@ -121,11 +121,8 @@ void add_tables(const std::string& csv, const formats::Beginning& run, formats::
 namespace formats {
 
 const Format& csv_format() {
-  static const Format format{"csv",
-                             ".csv",
-                             "Table: energies, momenta, errors, states of the bodies",
-                             &Output::csv,
-                             add_tables,
+  static const Format format{"csv", ".csv",
+                             "Table: energies, momenta, errors, states of the bodies", add_tables,
                              [](const std::string& csv, bool forces) {
                                std::vector<std::string> files = {events_of(csv)};
                                if (forces) files.push_back(contacts_of(csv));

@@ -32,7 +32,7 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs)
     if (!input.empty()) taken.emplace(identity(input), "an input of this run: " + input);
   for (const Format* each : all()) {
-    if ((o.*each->file).empty()) continue;
+    if (o[each->name].empty()) continue;
     const std::string main = each->main_file(o);
     const auto refuse = [&](const std::string& file, const std::string& why) {
       throw std::invalid_argument(fmt::format("{} = \"{}\": {}", each->name, file, why));
@@ -53,13 +53,13 @@ void check_names(const Output& o, const std::vector<std::string>& inputs) {
         if (film->is_frame && film->is_frame(other) &&
             one_name(fs::path(other).parent_path()) == one_name(folder))
           throw std::invalid_argument(fmt::format("\"{}\": frames of {} = \"{}\" have such names",
-                                                  other, film->name, o.*film->file));
+                                                  other, film->name, o[film->name]));
 }
 
 std::vector<std::string> names(const Output& o) {
   std::vector<std::string> files;
   for (const Format* each : all())
-    if (!(o.*each->file).empty()) files.push_back(each->main_file(o));
+    if (!o[each->name].empty()) files.push_back(each->main_file(o));
   return files;
 }
 

@@ -27,7 +27,6 @@ using Recorders = std::vector<std::unique_ptr<Recorder>>;
 /// One key of [output] and one option of `tether run`: a name `given`, and the files made of it.
 struct Format {
   const char *name, *extension, *help;
-  std::string Output::*file;
   /// May throw std::runtime_error where the file cannot be written. Null: the run itself writes it.
   void (*add_recorders)(const std::string& given, const Beginning&, Recorders&) = nullptr;
   /// Files and folders besides the main one. `forces`: Output::forces.
@@ -37,9 +36,9 @@ struct Format {
   std::string (*film)(const std::string& given) = nullptr;
   bool (*is_frame)(const std::string& path) = nullptr;
 
-  std::string main_file(const Output& o) const { return film ? film(o.*file) : o.*file; }
+  std::string main_file(const Output& o) const { return film ? film(o[name]) : o[name]; }
   std::vector<std::string> others(const Output& o, bool forces) const {
-    return beside && !(o.*file).empty() ? beside(o.*file, forces) : std::vector<std::string>();
+    return beside && !o[name].empty() ? beside(o[name], forces) : std::vector<std::string>();
   }
 };
 

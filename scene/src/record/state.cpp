@@ -4,8 +4,7 @@
 namespace tether::scene::formats {
 
 const Format& state_format() {
-  static const Format format{"state", ".state", "Saved state: at checkpoints and at the end",
-                             &Output::state};
+  static const Format format{"state", ".state", "Saved state: at checkpoints and at the end"};
   return format;
 }
 

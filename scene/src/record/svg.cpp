@@ -176,7 +176,7 @@ namespace formats {
 
 const Format& svg_format() {
   static const Format format{"svg", ".svg", "Picture: the scene, its energies and errors",
-                             &Output::svg, add_picture};
+                             add_picture};
   return format;
 }
 

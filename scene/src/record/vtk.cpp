@@ -270,7 +270,6 @@ const Format& vtk_format() {
       "vtk",
       ".pvd",
       "Film for ParaView (.pvd, with a folder of .vtp)",
-      &Output::vtk,
       add_film,
       [](const std::string& vtk, bool) { return std::vector<std::string>{frames_of(vtk)}; },
       film_of,

@@ -163,33 +163,35 @@ void Judge::look(double event, bool record, const Engine& engine, double start_e
   }
 }
 
+namespace {
+
+void exchange(binary::Archive io, std::vector<Judgement>& all, std::vector<double>& excess) {
+  std::size_t k = 0;
+  io.list(all, [&](Judgement& j) {
+    if (io.reads()) excess.emplace_back();
+    io(j.judged, j.met, j.time, j.error, excess[k++]);
+    io.list(j.value, [&](double& x) { io(x); });
+    io.demand(j.value.size() <= 4);
+  });
+}
+
+}  // namespace
+
 void Judge::save(std::ostream& out) const {
-  binary::put(out, judgements_.size());
-  for (std::size_t i = 0; i < judgements_.size(); ++i) {
-    const Judgement& j = judgements_[i];
-    binary::put(out, j.judged, j.met, j.time, j.error, excess_[i], j.value.size());
-    for (const double x : j.value) binary::put(out, x);
-  }
+  std::vector<Judgement> all = judgements_;
+  std::vector<double> excess = excess_;
+  exchange(binary::Archive(out), all, excess);
 }
 
 void Judge::restore(std::istream& in) {
-  std::size_t count = 0;
-  binary::get(in, count);
+  std::vector<Judgement> all;
+  std::vector<double> excess;
+  exchange(binary::Archive(in), all, excess);
   // A scene may have gained or lost expectations: the judgements are kept only if none has.
-  const bool same = count == judgements_.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    Judgement j;
-    double excess = 0;
-    std::size_t size = 0;
-    binary::get(in, j.judged, j.met, j.time, j.error, excess, size);
-    if (size > 4) throw std::runtime_error("the saved state is damaged");
-    j.value.resize(size);
-    for (double& x : j.value) binary::get(in, x);
-    if (!same) continue;
-    j.beyond = judgements_[i].beyond;
-    judgements_[i] = j;
-    excess_[i] = excess;
-  }
+  if (all.size() != judgements_.size()) return;
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].beyond = judgements_[i].beyond;
+  judgements_ = std::move(all);
+  excess_ = std::move(excess);
 }
 
 }  // namespace tether::scene

@@ -79,13 +79,13 @@ class Run {
         engine_(engine_of(scene, plan_, options.team)) {
     const Output& o = scene.output;
     std::vector<std::string> inputs = inputs_of(scene);
-    if (o.state != options.restart) inputs.push_back(options.restart);
+    if (o["state"] != options.restart) inputs.push_back(options.restart);
     formats::check_names(o, inputs);
     if (options.among.rank == 0 && !options.force) formats::check_replaceable(o);
     if (options.among.rank == 0)
       for (const std::string& each : formats::names(o)) lock_.take(each);
-    if (!o.state.empty()) check_writable(o.state);
-    if (!o.state.empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene, plan_);
+    if (!o["state"].empty()) check_writable(o["state"]);
+    if (!o["state"].empty() || !options.restart.empty()) scene_hash_ = hash_of_motion(scene, plan_);
     result_.engine = engine_->name();
     if (plan_.engine == EngineKind::stepping)
       step_ = scene.stepping.value_or(SteppingOptions{}).step;
@@ -97,7 +97,7 @@ class Run {
     const formats::Beginning beginning{
         scene, plan_, resume_, options.among, summary().start_energy, engine_->time()};
     for (const formats::Format* each : formats::all())
-      if (const std::string& file = o.*each->file; !file.empty() && each->add_recorders)
+      if (const std::string& file = o[each->name]; !file.empty() && each->add_recorders)
         each->add_recorders(file, beginning, recorders_);
   }
 
@@ -130,18 +130,18 @@ class Run {
   // Steps can go on where events cannot.
   void hand_over() {
     if (plan_.engine != EngineKind::event || engine_->in_steps()) return;
-    if (scene_.output.state.empty()) {
+    if (scene_.output["state"].empty()) {
       result_.remarks.emplace_back(
           "with [event] otherwise = \"stepping\" (--otherwise stepping) the run goes on in steps "
           "where events cannot go on");
       return;
     }
-    save(scene_.output.state);
+    save(scene_.output["state"]);
     result_.remarks.push_back(
         fmt::format("{} has the state at {:g} s: with engine = \"stepping\" the scene goes on from "
                     "its positions "
                     "and velocities (--restart {} --force)",
-                    scene_.output.state, engine_->time(), scene_.output.state));
+                    scene_.output["state"], engine_->time(), scene_.output["state"]));
   }
 
   Summary& summary() { return result_.summary; }
@@ -175,7 +175,8 @@ class Run {
       judge_.look(event.time, event.record, *engine_, summary().start_energy);
     if (options_.record) options_.record(*engine_);
     if (event.record) record();
-    if ((event.checkpoint || event.end) && !scene_.output.state.empty()) save(scene_.output.state);
+    if ((event.checkpoint || event.end) && !scene_.output["state"].empty())
+      save(scene_.output["state"]);
     if (event.end && !event.record) record();
   }
 
@@ -241,7 +242,7 @@ class Run {
     result_.judgements = judge_.judgements();
     for (const auto& recorder : recorders_) recorder->finish(result_.written, result_.remarks);
     result_.warnings = overlaps_;
-    if (saved_) result_.written.push_back(scene_.output.state);
+    if (saved_) result_.written.push_back(scene_.output["state"]);
     // Beyond a radian a step the midpoint rule of rotations is no longer near the motion.
     if (fastest_turn_ > 1)
       result_.warnings.push_back(fmt::format(
@@ -267,13 +268,17 @@ class Run {
                       summary().residual, allowed));
   }
 
+  void exchange(binary::Archive io, std::uint64_t& events) {
+    Summary& s = summary();
+    io(done_, last_record_, s.start_energy, s.end_energy, s.lowest_change, s.largest_change,
+       s.drift, s.penetration, s.residual, s.contacts, events);
+  }
+
   void save(const std::string& file) {
     for (const auto& recorder : recorders_) recorder->keep(*engine_);
     std::ostringstream out;
-    const Summary& s = summary();
-    binary::put(out, done_, last_record_, s.start_energy, s.end_energy, s.lowest_change,
-                s.largest_change, s.drift, s.penetration, s.residual, s.contacts,
-                static_cast<std::uint64_t>(resume_.events + engine_->events().size()));
+    std::uint64_t events = resume_.events + engine_->events().size();
+    exchange(binary::Archive(out), events);
     judge_.save(out);
     engine_->save(out);
     write_state(file, scene_hash_, out.str());
@@ -295,8 +300,7 @@ class Run {
   void restore(const std::string& file, const std::string& content, Engine::Restore how) {
     std::istringstream in(content);
     Summary& s = summary();
-    binary::get(in, done_, last_record_, s.start_energy, s.end_energy, s.lowest_change,
-                s.largest_change, s.drift, s.penetration, s.residual, s.contacts, resume_.events);
+    exchange(binary::Archive(in), resume_.events);
     judge_.restore(in);
     engine_->restore(in, how);
     if (in.peek() != std::char_traits<char>::eof())

@@ -106,11 +106,13 @@ std::uint64_t hash_of_motion(const Scene& scene, const Plan& plan) {
 void write_state(const std::string& file, std::uint64_t scene, const std::string& content) {
   std::ostringstream out;
   out << kThis;
-  binary::put(out, scene, static_cast<std::uint64_t>(content.size()));
+  binary::Archive io(out);
+  io(scene, static_cast<std::uint64_t>(content.size()));
   out << content;
   std::string bytes = out.str();
   std::ostringstream check;
-  binary::put(check, crc32(bytes));
+  binary::Archive sum(check);
+  sum(crc32(bytes));
   write_whole_regular(file, bytes + check.str());
 }
 
@@ -125,10 +127,15 @@ SavedState read_state(const std::string& file, std::uint64_t scene, bool any_sce
   std::istringstream check(bytes.substr(sum.size()));
   if (bytes.compare(0, kFormat.size() + 2, kThis, 0, kFormat.size() + 2) != 0)
     throw std::runtime_error(file + " is a saved state of another version of Tether");
-  if (binary::get<std::uint32_t>(check) != crc32(sum))
+  std::uint32_t told = 0;
+  binary::Archive of_sum(check);
+  of_sum(told);
+  if (told != crc32(sum))
     throw std::runtime_error("the saved state " + file + " is damaged: its check sum is wrong");
   std::istringstream head(bytes.substr(line + 1, kNumbers));
-  const auto of = binary::get<std::uint64_t>(head), length = binary::get<std::uint64_t>(head);
+  std::uint64_t of = 0, length = 0;
+  binary::Archive numbers(head);
+  numbers(of, length);
   if (length != sum.size() - (line + 1 + kNumbers))
     throw std::runtime_error("the saved state " + file + " is damaged: its length is wrong");
   const bool same_version = bytes.compare(0, line + 1, kThis) == 0;

@@ -20,7 +20,7 @@ namespace {
 
 using namespace smooth;
 
-constexpr char kMagic[8] = {'s', 'm', 'o', 'o', 't', 'h', ' ', '2'};
+constexpr binary::Magic kMagic = {'s', 'm', 'o', 'o', 't', 'h', ' ', '2'};
 
 // Figures of a file are rounded, so a start may be off the joints by this much, relative to the
 // scene's size and speed (at least 1 m, 1 m/s). It is moved onto them.
@@ -121,45 +121,47 @@ class SmoothEngine : public Engine {
   }
 
   void save(std::ostream& out) const override {
-    const Eigen::VectorXd now = integrator_->y();
-    const std::vector<double>& kept = system_->kept();
     out.write(kMagic, sizeof kMagic);
-    binary::put(out, static_cast<std::uint64_t>(y_.size()), static_cast<std::uint64_t>(kept.size()),
-                units_.length, units_.time, units_.mass, anchor_, integrator_->time());
-    binary::put_array(out, y_, now);
-    for (const double value : kept) binary::put(out, value);
+    Eigen::VectorXd y = y_, now = integrator_->y();
+    std::vector<double> kept = system_->kept();
+    double from = anchor_, to = integrator_->time();
+    exchange(binary::Archive(out), from, to, y, now, kept);
   }
 
   void restore(std::istream& in, Restore how) override {
-    char magic[sizeof kMagic];
+    binary::Magic magic;
     in.read(magic, sizeof magic);
     if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
       throw std::runtime_error("this is not a state of the smooth engine");
-    std::vector<double> kept = system_->kept();
-    std::uint64_t size = 0, invariants = 0;
     double from = 0, to = 0;
-    Units units;
-    binary::get(in, size, invariants, units.length, units.time, units.mass, from, to);
-    if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass)
-      throw std::runtime_error("the saved state is of another scene: of another size");
-    if (size != static_cast<std::uint64_t>(y_.size()) || invariants != kept.size())
-      throw std::runtime_error("the saved state is of another scene: it has " +
-                               std::to_string(size) + " unknowns, this scene has " +
-                               std::to_string(y_.size()));
     Eigen::VectorXd y(y_.size()), saved(y_.size());
-    binary::get_array(in, y, saved);
-    for (double& value : kept) binary::get(in, value);
-    const bool invariants_are_numbers =
-        std::all_of(kept.begin(), kept.end(), [](double value) { return std::isfinite(value); });
-    if (!y.allFinite() || !saved.allFinite() || !invariants_are_numbers || !(from >= 0) ||
-        !(to >= from) || !std::isfinite(to))
-      throw std::runtime_error("the saved state is damaged");
+    std::vector<double> kept = system_->kept();
+    exchange(binary::Archive(in), from, to, y, saved, kept);
     renew(from, y, kept);
     if (how == Restore::exact) repeat(to, saved);
     if (how == Restore::near) renew(to, saved, kept);
   }
 
  private:
+  void exchange(binary::Archive io, double& from, double& to, Eigen::VectorXd& y,
+                Eigen::VectorXd& now, std::vector<double>& kept) const {
+    auto size = static_cast<std::uint64_t>(y.size()), invariants = std::uint64_t{kept.size()};
+    Units units = units_;
+    io(size, invariants, units.length, units.time, units.mass, from, to);
+    if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass)
+      throw std::runtime_error("the saved state is of another scene: of another size");
+    if (size != static_cast<std::uint64_t>(y.size()) || invariants != kept.size())
+      throw std::runtime_error(
+          fmt::format("the saved state is of another scene: it has {} unknowns, this scene has {}",
+                      size, y.size()));
+    io(y, now);
+    for (double& value : kept) {
+      io(value);
+      io.demand(std::isfinite(value));
+    }
+    io.demand(from >= 0 && to >= from && std::isfinite(to));
+  }
+
   static void add(const Integrator::Seconds& from, Integrator::Seconds& to) {
     for (std::size_t i = 0; i < to.effects.size(); ++i) to.effects[i] += from.effects[i];
     to.jacobian += from.jacobian;

@@ -53,7 +53,7 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 }
 
 // The last letter is the format.
-constexpr char kMagic[8] = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '8'};
+constexpr binary::Magic kMagic = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '9'};
 // Parts of the step, and of the time: a time so near is that of a boundary up to rounding.
 constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
 
@@ -237,12 +237,12 @@ std::vector<EffectCost> SteppingEngine::costs() const {
 
 void SteppingEngine::save(std::ostream& out) const {
   out.write(kMagic, sizeof kMagic);
-  binary::put(out, fingerprint_, static_cast<std::uint64_t>(bodies_.size()), time());
-  const contact::BodySet& b = stepper_.bodies();
-  for (std::size_t i = 0; i < b.position.size(); ++i)
-    binary::put_array(out, b.position[i], b.orientation[i].coeffs(), b.motion[i].velocity,
-                      b.motion[i].angular_velocity);
-  put_memory(out, stepper_.memory());
+  binary::Archive io(out);
+  double now = time();
+  io(fingerprint_);
+  exchange_bodies(io, now, bodies_);
+  contact::StepperMemory memory = stepper_.memory();
+  exchange(io, static_cast<int>(bodies_.size()), memory);
   if (!out) throw std::runtime_error("the state could not be written");
 }
 
@@ -259,7 +259,9 @@ void SteppingEngine::set_bodies(const std::vector<BodyState>& states) {
 // Goes on from what another engine saved.
 void SteppingEngine::take_over(std::istream& in) {
   std::vector<BodyState> states(bodies_.size());
-  const double time = get_bodies(in, states);
+  binary::Archive io(in);
+  double time = 0;
+  exchange_bodies(io, time, states);
   if (!(time >= 0 && time <= kMostSteps * stepper_.options().step))
     throw std::runtime_error("the saved state is damaged: it has no time");
   in.ignore(std::numeric_limits<std::streamsize>::max());
@@ -290,17 +292,17 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
     throw std::runtime_error(std::string("the saved state has format ") + format +
                              ", and this version reads " + kMagic[sizeof magic - 1] +
                              ": read it with the version that wrote it");
-  const bool same = binary::get<std::uint64_t>(in) == fingerprint_;
-  if (binary::get<std::uint64_t>(in) != bodies_.size() || (!same && how == Restore::exact))
+  binary::Archive io(in);
+  std::uint64_t of = 0;
+  io(of);
+  const bool same = of == fingerprint_;
+  if (!same && how == Restore::exact)
     throw std::runtime_error("the saved state is of another scene or another step");
-  const auto time = binary::get<double>(in);
+  double time = 0;
   std::vector<BodyState> states(bodies_.size());
-  for (BodyState& s : states) {
-    binary::get_array(in, s.position, s.orientation.coeffs(), s.velocity, s.angular_velocity);
-    if (!s.is_finite() || !(std::abs(s.orientation.norm() - 1) < 1e-6))
-      throw std::runtime_error("the saved state is damaged");
-  }
-  const contact::StepperMemory memory = get_memory(in, static_cast<int>(bodies_.size()));
+  exchange_bodies(io, time, states);
+  contact::StepperMemory memory;
+  exchange(io, static_cast<int>(bodies_.size()), memory);
   if (!(std::abs(time) <= kMostSteps * stepper_.options().step))
     throw std::runtime_error("the saved state is damaged: it has no time");
   set_bodies(states);

@@ -5,13 +5,10 @@
 
 #include <algorithm>
 #include <numeric>
-#include <tuple>
 
 namespace tether::scene {
 
 namespace {
-
-constexpr std::size_t kShown = 20;
 
 std::string all_messages(const std::vector<Problem>& problems) {
   std::string text;
@@ -38,22 +35,6 @@ SceneError::SceneError(std::vector<Problem> problems)
     : std::runtime_error(all_messages(problems)), problems_(std::move(problems)) {}
 
 namespace files {
-
-void Report::add(const Place& place, std::string field, std::string value, std::string allowed) {
-  // A file of garbage may have a problem on each of a million lines.
-  if (full()) return;
-  problems_.push_back({place, std::move(field), std::move(value), std::move(allowed)});
-}
-
-bool Report::full() const { return problems_.size() >= kShown; }
-
-void Report::finish() {
-  if (problems_.empty()) return;
-  std::stable_sort(problems_.begin(), problems_.end(), [](const Problem& a, const Problem& b) {
-    return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
-  });
-  throw SceneError(std::move(problems_));
-}
 
 void refuse(const Place& place, std::string why) {
   std::vector<Problem> one(1);

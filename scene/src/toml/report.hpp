@@ -1,9 +1,11 @@
 // Tether: what is wrong in a scene file. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 #include <tether/scene/files.hpp>
+#include <tuple>
 #include <vector>
 
 namespace tether::scene::files {
@@ -11,13 +13,25 @@ namespace tether::scene::files {
 /// Collects problems, so that a user sees them in one go; the reader goes on with a default.
 class Report {
  public:
-  void add(const Place& place, std::string field, std::string value, std::string allowed);
+  /// A file of garbage may have a problem on each of a million lines: some are kept.
+  void add(const Place& place, std::string field, std::string value, std::string allowed) {
+    if (full()) return;
+    problems_.push_back({place, std::move(field), std::move(value), std::move(allowed)});
+  }
   bool clean() const { return problems_.empty(); }
-  bool full() const;  ///< no more are shown
+  bool full() const { return problems_.size() >= kShown; }  ///< no more are shown
   /// Throws SceneError if there is a problem.
-  void finish();
+  void finish() {
+    if (clean()) return;
+    std::stable_sort(problems_.begin(), problems_.end(), [](const Problem& a, const Problem& b) {
+      return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
+    });
+    throw SceneError(std::move(problems_));
+  }
 
  private:
+  static constexpr std::size_t kShown = 20;
+
   std::vector<Problem> problems_;
 };
 

@@ -36,8 +36,6 @@ struct CostRow {
 };
 
 struct CostOptions {
-  /// Settings of the engine that the plan names; no other engine runs then.
-  std::vector<double> settings;
   /// Settings of each method. All empty: a range for each method that can run the scene; with
   /// contact: events, where that engine has the scene, steps, and steps with an accuracy.
   std::vector<double> tolerances, steps, accuracies;

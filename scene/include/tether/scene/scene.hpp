@@ -4,8 +4,11 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <tether/contact/shapes.hpp>
 #include <tether/contact/stepping.hpp>
 #include <tether/export.hpp>
@@ -143,10 +146,17 @@ struct EventOptions {
 enum class EngineChoice : std::uint8_t { automatic, smooth, stepping, event };
 
 struct Output {
-  std::string csv, vtk, svg, state;  ///< file names; empty: not written
-  double every = 0;                  ///< s between records; 0: end / 1000
-  double checkpoint = 0;             ///< s between saved states; 0: only at the end
-  bool forces = false;  ///< in the table, in one of contacts beside it, and in the film
+  /// Names of files by their formats: csv, vtk, svg, state; empty: not written.
+  std::map<std::string, std::string, std::less<>> files;
+  std::string& operator[](std::string_view format) { return files[std::string(format)]; }
+  const std::string& operator[](std::string_view format) const {
+    static const std::string none;
+    const auto found = files.find(format);
+    return found != files.end() ? found->second : none;
+  }
+  double every = 0;       ///< s between records; 0: end / 1000
+  double checkpoint = 0;  ///< s between saved states; 0: only at the end
+  bool forces = false;    ///< in the table, in one of contacts beside it, and in the film
 };
 
 enum class Quantity : std::uint8_t {

@@ -5,21 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/contact/cones.hpp>
+#include <tether/contact/solver.hpp>
 #include <tether/linalg/index.hpp>
-#include <tether/linalg/least_squares.hpp>
-
-#include "cone_blocks.hpp"
 
 namespace tether::scene::event {
 
+using contact::Cone;
 using contact::Regime;
 using linalg::at;
 
 namespace {
 
-constexpr double kDependent = 1e-11;
 constexpr double kLocked = 1e-12;  // A_nn of the largest
-constexpr double kSame = 1e-7;     // of the answer's size: the exact one against the library's
 constexpr double kSolve = 1e-12;
 constexpr double kFarAbove = 1e5;
 constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
@@ -27,99 +25,101 @@ constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
 constexpr double kCutBound = 1e3, kMostBound = 1e12;
 constexpr double kNoChange = 3e-9;  // of accelerations or velocities
 
-MatrixXd pseudo_solve(const MatrixXd& S, const MatrixXd& right) {
-  linalg::LeastSquares factor(kDependent);
-  factor.factor(S);
-  return factor.solve(right);
+constexpr double kNear = 1e-8;
+
+template <class Solution>
+bool is_solved(const Solution& answer) {
+  return answer.status == contact::Status::solved || answer.status == contact::Status::round_off ||
+         (answer.error < kNear && answer.status != contact::Status::infeasible);
 }
 
-/// The same regimes without the error of an iteration: stuck rows vanish, and where a contact
-/// slides x_t = -mu x_n d, d the direction of w_t.
-void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, int block,
-             const Holders& holders, FrictionAnswer& answer) {
-  const int n = static_cast<int>(mu.size());
-  const auto slides = [&](int i) {
-    return answer.regimes[static_cast<std::size_t>(i)] == Regime::sliding;
-  };
+/// Row and column 0 of a moment are nobody's, of one about the normal (whose second tangent no
+/// other row moves) the last, too.
+bool is_spin(const MatrixXd& A, int first) {
+  return A.row(first + 2).cwiseAbs().sum() == A(first + 2, first + 2) &&
+         A(first + 2, first + 2) > 0;
+}
+
+/// The cone of a contact with its moments, and where its rows are in blocks of three.
+struct Held {
+  Cone cone;
   std::vector<int> rows;
-  std::vector<VectorXd> directions(static_cast<std::size_t>(n));
+};
+
+Held cone_of(const MatrixXd& A, const VectorXd& mu, const Holders& holders, int contact) {
+  int spin = -1, rolling = -1;
+  for (int k = contact + 1; k < static_cast<int>(holders.size()); ++k)
+    if (holders[at(k)] == contact) (spin < 0 && is_spin(A, 3 * k) ? spin : rolling) = k;
+  Held out;
+  for (int k = 0; k < 3; ++k) out.rows.push_back(3 * contact + k);
+  if (spin >= 0) out.rows.push_back(3 * spin + 1);
+  if (rolling >= 0)
+    for (int k = 1; k < 3; ++k) out.rows.push_back(3 * rolling + k);
+  const double m = mu[contact], r = rolling >= 0 ? mu[rolling] : 0, s = spin >= 0 ? mu[spin] : 0;
+  out.cone = rolling < 0 ? (spin < 0 ? Cone::friction(m) : Cone::with_torsional(m, s))
+             : spin < 0  ? Cone::with_rolling(m, r)
+                         : Cone::with_rolling(m, r, s);
+  return out;
+}
+
+/// Sticking if the rest of the bound, as a velocity, is at least the slip.
+Regime regime_of(double mobility, double left, double slip) {
+  return mobility * left < slip ? Regime::sliding : Regime::sticking;
+}
+
+/// Solves w = A x - b for blocks (normal, tangents): friction cones, and where there are moments
+/// the cones of rolling and torsional friction that these make with the contacts which hold them.
+class ConeBlocks {
+ public:
+  ConeBlocks(const contact::Options& options, const Holders& holders)
+      : contacts_(options), cones_(options), holders_(holders) {}
+  FrictionAnswer solve(const MatrixXd& A, const VectorXd& b, const VectorXd& mu);
+
+ private:
+  FrictionAnswer solve_with_moments(const MatrixXd& A, const VectorXd& b, const VectorXd& mu);
+
+  contact::Solver contacts_;
+  contact::ConeSolver cones_;
+  Holders holders_;
+};
+
+FrictionAnswer ConeBlocks::solve(const MatrixXd& A, const VectorXd& b, const VectorXd& mu) {
+  if (!holders_.empty()) return solve_with_moments(A, b, mu);
+  const contact::Solution found = contacts_.solve(contact::Problem::dense(A, b, mu));
+  return {is_solved(found), found.impulses, found.velocities, found.regimes, found.error};
+}
+
+FrictionAnswer ConeBlocks::solve_with_moments(const MatrixXd& A, const VectorXd& b,
+                                              const VectorXd& mu) {
+  const int n = static_cast<int>(mu.size());
+  std::vector<Cone> cones;
+  std::vector<int> rows;
   for (int i = 0; i < n; ++i) {
-    if (answer.regimes[static_cast<std::size_t>(i)] == Regime::separating) continue;
-    if (!is_held(holders, i)) rows.push_back(block * i);
-    if (slides(i)) {
-      const VectorXd wt = answer.w.segment(block * i + 1, block - 1);
-      const VectorXd xt = answer.x.segment(block * i + 1, block - 1);
-      VectorXd& d = directions[static_cast<std::size_t>(i)];
-      if (wt.norm() > 0)
-        d = wt.normalized();
-      else if (xt.norm() > 0)
-        d = -xt.normalized();
-      else
-        d = VectorXd::Zero(block - 1);
-    } else {
-      for (int k = 1; k < block; ++k) rows.push_back(block * i + k);
-    }
+    if (is_held(holders_, i)) continue;
+    const Held each = cone_of(A, mu, holders_, i);
+    cones.push_back(each.cone);
+    rows.insert(rows.end(), each.rows.begin(), each.rows.end());
   }
-  const auto with_normal_of = [&](int i, auto&& each) {
-    each(i);
-    for (int k = 0; k < static_cast<int>(holders.size()); ++k)
-      if (holders[at(k)] == i) each(k);
-  };
-  if (rows.empty()) {
-    answer.x.setZero();
-    answer.w = -b;
-    return;
-  }
-  const int m = static_cast<int>(rows.size());
-  VectorXd x = answer.x, w = answer.w;
-  for (int pass = 0; pass < 30; ++pass) {
-    MatrixXd columns(A.rows(), m), S(m, m);
-    VectorXd right(m);
-    for (int c = 0; c < m; ++c) {
-      const int row = rows[static_cast<std::size_t>(c)], i = row / block;
-      columns.col(c) = A.col(row);
-      if (row % block == 0)
-        with_normal_of(i, [&](int k) {
-          if (slides(k))
-            columns.col(c) -= mu[k] * A.middleCols(block * k + 1, block - 1) * directions[at(k)];
-        });
-      right[c] = b[row];
-    }
-    for (int r = 0; r < m; ++r) S.row(r) = columns.row(rows[static_cast<std::size_t>(r)]);
-    const VectorXd part = pseudo_solve(S, right);
-    x.setZero();
-    for (int c = 0; c < m; ++c) {
-      const int row = rows[static_cast<std::size_t>(c)], i = row / block;
-      x[row] = part[c];
-      if (row % block == 0)
-        with_normal_of(i, [&](int k) {
-          if (slides(k)) x.segment(block * k + 1, block - 1) = -mu[k] * part[c] * directions[at(k)];
-        });
-    }
-    w = A * x - b;
-    double turned = 0;
-    for (int i = 0; i < n; ++i) {
-      if (!slides(i)) continue;
-      const VectorXd wt = w.segment(block * i + 1, block - 1);
-      VectorXd& d = directions[static_cast<std::size_t>(i)];
-      if (!(wt.norm() > 0)) continue;
-      const VectorXd now = wt.normalized();
-      turned = std::max(turned, (now - d).norm());
-      d = now;
-    }
-    if (turned < 1e-15) break;
-    if (turned > 1) return;  // it does not settle: the library's answer stands
-  }
-  // Still an answer of the law?
-  const double force = answer.x.cwiseAbs().maxCoeff(), speed = b.cwiseAbs().maxCoeff();
+  const SomeRows part(A, b, rows);
+  const contact::ConeSolution found =
+      cones_.solve(contact::ConeProblem::dense(part.A, part.b, std::move(cones)));
+  FrictionAnswer out;
+  out.solved = is_solved(found);
+  out.error = found.error;
+  out.x.setZero(b.size());
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    out.x[rows[r]] = found.impulses[static_cast<Eigen::Index>(r)];
+  out.w = A * out.x - b;
   for (int i = 0; i < n; ++i) {
-    const double xn = x[block * (is_held(holders, i) ? holders[at(i)] : i)], wn = w[block * i];
-    if (xn < -kSame * force || wn < -kSame * speed) return;
-    if (x.segment(block * i + 1, block - 1).norm() > mu[i] * xn + kSame * force) return;
+    const int row = 3 * i, normal = is_held(holders_, i) ? 3 * holders_[at(i)] : row;
+    const double force = out.x[normal], slip = out.w.segment<2>(row + 1).norm();
+    const double left = mu[i] * force - out.x.segment<2>(row + 1).norm();
+    const bool open = !(A(normal, normal) * force > out.w[normal]);
+    out.regimes.push_back(
+        open ? Regime::separating
+             : regime_of(0.5 * (A(row + 1, row + 1) + A(row + 2, row + 2)), left, slip));
   }
-  if ((w - answer.w).cwiseAbs().maxCoeff() > kSame * (speed + 1e-300)) return;
-  answer.x = x;
-  answer.w = w;
+  return out;
 }
 
 /// All stay closed, and stick where they do not slide already.
@@ -379,31 +379,24 @@ FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const Vector
     out.solved = true;
     return out;
   }
-  const int m = static_cast<int>(free.size());
-  MatrixXd part(block * m, block * m);
-  VectorXd right(block * m), friction(m);
-  for (int i = 0; i < m; ++i) {
-    const int from = block * free[static_cast<std::size_t>(i)];
-    friction[i] = mu[free[static_cast<std::size_t>(i)]];
-    right.segment(block * i, block) = b.segment(from, block);
-    for (int j = 0; j < m; ++j)
-      part.block(block * i, block * j, block, block) =
-          A.block(from, block * free[static_cast<std::size_t>(j)], block, block);
+  std::vector<int> rows;
+  VectorXd friction(free.size());
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    friction[static_cast<Eigen::Index>(i)] = mu[free[i]];
+    for (int k = 0; k < block; ++k) rows.push_back(block * free[i] + k);
   }
+  const SomeRows part(A, b, rows);
   contact::Options options;
   options.law = contact::Law::coulomb;
   options.tolerance = kSolve;
   options.strict = true;
-  FrictionAnswer inner = ConeBlocks(options, held).solve(part, right, friction);
-  if (inner.solved) sharpen(part, right, friction, block, held, inner);
+  FrictionAnswer inner = ConeBlocks(options, held).solve(part.A, part.b, friction);
+  if (inner.solved) sharpen(part.A, part.b, friction, held, inner);
   out.solved = inner.solved;
   out.error = inner.error;
-  for (int i = 0; i < m; ++i) {
-    const int to = block * free[static_cast<std::size_t>(i)];
-    out.x.segment(to, block) = inner.x.segment(block * i, block);
-    out.regimes[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])] =
-        inner.regimes[static_cast<std::size_t>(i)];
-  }
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    out.x[rows[r]] = inner.x[static_cast<Eigen::Index>(r)];
+  for (std::size_t i = 0; i < free.size(); ++i) out.regimes[at(free[i])] = inner.regimes[i];
   out.w = A * out.x - b;
   return out;
 }

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "cone_blocks.hpp"
 #include "contact_rows.hpp"
+#include "shared_forces.hpp"
 
 namespace tether::scene::event {
 

@@ -23,6 +23,9 @@ constexpr double kFollow = 0.99;
 constexpr int kConeSteps = 1000;
 constexpr int kTurns = 50;
 constexpr double kSettles = 0.9;
+constexpr int kSharpenings = 30;
+constexpr double kTurnedByRounding = 1e-15;
+constexpr double kSame = 1e-7;  // of the answer's size: the exact one against the library's
 
 /// The closed contacts' unknowns: x_n where it is their own, and x_t where it sticks.
 class HeldRows {
@@ -57,18 +60,24 @@ class HeldRows {
     }
   }
 
+  bool empty() const { return rows_.empty(); }
   bool several() const { return free_.cols() > 0; }
 
   /// False: nothing holds all rows.
   bool solve() {
-    if (rows_.empty()) return false;
+    if (empty()) return false;
     linalg::LeastSquares factor(kSameForces);
     factor.factor(S_);
     x_ = factor.solve(right_);
+    return (S_ * x_ - right_).cwiseAbs().maxCoeff() <= kContradicts * b_.cwiseAbs().maxCoeff();
+  }
+
+  /// Whether other forces hold the rows as well.
+  void look_for_others() {
+    if (empty()) return;
     linalg::PivotedQr of_rows(kSameForces);
     of_rows.factor(S_.transpose());
     free_ = of_rows.left_null_space();
-    return (S_ * x_ - right_).cwiseAbs().maxCoeff() <= kContradicts * b_.cwiseAbs().maxCoeff();
   }
 
   /// They act against what closes the contacts: else contacts that could open as well press
@@ -97,6 +106,26 @@ class HeldRows {
   /// x + N z onto the cones: alternating directions for the shortest z. A few digits of it do: w
   /// is that of any z.
   bool move_into_cones() {
+    if (!find_in_cones()) return false;
+    for (const int normal : normal_) x_[normal] = std::max(0.0, x_[normal]);
+    return true;
+  }
+  VectorXd forces() const {
+    VectorXd x = VectorXd::Zero(b_.size());
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      const int i = contacts_[k];
+      const double normal = x_[normal_[k]];
+      if (!is_held(regimes_.holders, i)) x[block_ * i] = normal;
+      if (slides(i))
+        x.segment(block_ * i + 1, block_ - 1) = -mu_[i] * normal * regimes_.directions[at(i)];
+      else
+        x.segment(block_ * i + 1, block_ - 1) = x_.segment(tangents_[k], block_ - 1);
+    }
+    return x;
+  }
+
+ private:
+  bool find_in_cones() {
     if (is_lawful(x_)) return true;
     if (!several()) return false;
     VectorXd moved = x_, inside, off = VectorXd::Zero(x_.size());
@@ -113,21 +142,6 @@ class HeldRows {
     return false;
   }
 
-  VectorXd forces() const {
-    VectorXd x = VectorXd::Zero(b_.size());
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      const int i = contacts_[k];
-      const double normal = std::max(0.0, x_[normal_[k]]);
-      if (!is_held(regimes_.holders, i)) x[block_ * i] = normal;
-      if (slides(i))
-        x.segment(block_ * i + 1, block_ - 1) = -mu_[i] * normal * regimes_.directions[at(i)];
-      else
-        x.segment(block_ * i + 1, block_ - 1) = x_.segment(tangents_[k], block_ - 1);
-    }
-    return x;
-  }
-
- private:
   /// The nearest point of the cones: those of one normal that its tangents are out of raise it.
   void project(VectorXd& x) const {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -241,6 +255,7 @@ SharedForces share_forces(const MatrixXd& A, const VectorXd& b, const VectorXd& 
   for (int pass = 0; pass < kTurns; ++pass) {
     HeldRows rows(A, b, mu, regimes);
     const bool held = rows.solve();
+    rows.look_for_others();
     out.several = rows.several();
     if (!held || !out.several || !rows.resists() || !rows.move_into_cones()) return out;
     out.x = rows.forces();
@@ -256,6 +271,46 @@ SharedForces share_forces(const MatrixXd& A, const VectorXd& b, const VectorXd& 
   out.lawful = off <= none;
   for (int i = 0; i < n; ++i) out.lawful = out.lawful && out.w[block * i] >= -none;
   return out;
+}
+
+void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, const Holders& holders,
+             FrictionAnswer& answer) {
+  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
+  Regimes regimes{answer.regimes, std::vector<VectorXd>(at(n)), {}, holders};
+  const auto slides = [&](int i) { return regimes.of[at(i)] == Regime::sliding; };
+  for (int i = 0; i < n; ++i) {
+    if (!slides(i)) continue;
+    const VectorXd wt = answer.w.segment(block * i + 1, block - 1);
+    regimes.directions[at(i)] = wt.norm() > 0
+                                    ? wt.normalized()
+                                    : (-answer.x.segment(block * i + 1, block - 1)).normalized();
+  }
+  VectorXd x, w;
+  for (int pass = 0; pass < kSharpenings; ++pass) {
+    HeldRows rows(A, b, mu, regimes);
+    rows.solve();
+    x = rows.empty() ? VectorXd::Zero(b.size()) : rows.forces();
+    w = A * x - b;
+    double turned = 0;
+    for (int i = 0; i < n; ++i) {
+      const VectorXd wt = w.segment(block * i + 1, block - 1);
+      if (!slides(i) || !(wt.norm() > 0)) continue;
+      turned = std::max(turned, (wt.normalized() - regimes.directions[at(i)]).norm());
+      regimes.directions[at(i)] = wt.normalized();
+    }
+    if (turned < kTurnedByRounding) break;
+    if (turned > 1) return;  // it does not settle: the library's answer stands
+  }
+  // Still an answer of the law?
+  const double force = answer.x.cwiseAbs().maxCoeff(), speed = b.cwiseAbs().maxCoeff();
+  for (int i = 0; i < n; ++i) {
+    const double xn = x[block * (is_held(holders, i) ? holders[at(i)] : i)], wn = w[block * i];
+    if (xn < -kSame * force || wn < -kSame * speed) return;
+    if (x.segment(block * i + 1, block - 1).norm() > mu[i] * xn + kSame * force) return;
+  }
+  if ((w - answer.w).cwiseAbs().maxCoeff() > kSame * (speed + 1e-300)) return;
+  answer.x = x;
+  answer.w = w;
 }
 
 }  // namespace tether::scene::event

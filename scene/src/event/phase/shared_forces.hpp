@@ -50,6 +50,19 @@ struct SharedForces {
 SharedForces share_forces(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
                           Regimes& regimes);
 
+/// Answer of a frictional problem w = A x - b.
+struct FrictionAnswer {
+  bool solved = false;
+  VectorXd x, w;
+  std::vector<contact::Regime> regimes;
+  double error = 0;
+};
+
+/// The same regimes without the error of an iteration, where that is an answer of the law, too:
+/// stuck rows vanish, and where a contact slides x_t = -mu x_n d, d the direction of w_t.
+void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, const Holders& holders,
+             FrictionAnswer& answer);
+
 /// b of w = A x - b without what no x can do in these rows, which depend on each other, where that
 /// is at most `band`: the error of a state makes them contradict each other, and an answer that
 /// holds all of them would not exist.

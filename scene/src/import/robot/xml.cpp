@@ -7,15 +7,12 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
-#include <tuple>
-
-#include "toml/report.hpp"
 
 namespace tether::scene::import {
 
 namespace {
 
-constexpr std::size_t kMostShown = 20, kLongestShown = 60;
+constexpr std::size_t kLongestShown = 60;
 constexpr std::size_t kLargestText = std::size_t{64} << 20;
 constexpr int kMostAttributes =
     100;  // of an element; MJCF has 40. The parser compares each with all
@@ -141,21 +138,6 @@ class Inspection : public tinyxml2::XMLVisitor {
 };
 
 }  // namespace
-
-void Problems::add(int line, std::string field, std::string value, std::string allowed) {
-  if (full()) return;
-  problems_.push_back(
-      {{file_, std::max(line, 1), 0}, std::move(field), std::move(value), std::move(allowed)});
-}
-
-bool Problems::full() const { return problems_.size() >= kMostShown; }
-
-void Problems::finish() {
-  if (clean()) return;
-  std::stable_sort(problems_.begin(), problems_.end(),
-                   [](const Problem& a, const Problem& b) { return a.place.line < b.place.line; });
-  throw SceneError(std::move(problems_));
-}
 
 Document::Document(std::string_view text, Problems& problems) {
   const auto line_of = [&](std::size_t place) {

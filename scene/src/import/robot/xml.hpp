@@ -15,24 +15,23 @@
 #include <vector>
 
 #include "import/robot/remarks.hpp"
+#include "toml/report.hpp"
 
 namespace tether::scene::import {
 
 using Node = tinyxml2::XMLElement;
 
 /// Collects what is wrong in a file, each with its line.
-class Problems {
+class Problems : public files::Report {
  public:
   explicit Problems(std::string file) : file_(std::move(file)) {}
-  void add(int line, std::string field, std::string value, std::string allowed);
-  bool full() const;
-  bool clean() const { return problems_.empty(); }
-  /// Throws SceneError if there is a problem.
-  void finish();
+  void add(int line, std::string field, std::string value, std::string allowed) {
+    Report::add({file_, std::max(line, 1), 0}, std::move(field), std::move(value),
+                std::move(allowed));
+  }
 
  private:
   std::string file_;
-  std::vector<Problem> problems_;
 };
 
 /// A document whose text is UTF-8 with at most 64 MiB, 100 elements inside each other, no DOCTYPE

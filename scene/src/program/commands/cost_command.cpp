@@ -77,8 +77,8 @@ void check_settings(const Scene& scene, const CostArguments& arguments) {
 // Files that would be lost are told before the work.
 void check_files(const Scene& scene, const CostArguments& arguments) {
   Output files;
-  files.csv = arguments.csv;
-  files.svg = arguments.svg;
+  files["csv"] = arguments.csv;
+  files["svg"] = arguments.svg;
   std::vector<std::string> others = inputs_of(scene);
   formats::check_names(files, others);
   others.insert(others.end(), {arguments.csv, arguments.svg});

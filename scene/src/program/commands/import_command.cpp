@@ -10,14 +10,10 @@
 
 #include "import/import.hpp"
 #include "output/output_names.hpp"
-#include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/new_file.hpp"
-#include "program/process/signals.hpp"
-#include "program/process/standard_streams.hpp"
 #include "program/scene_text.hpp"
 #include "program/settings.hpp"
-#include "program/terminal_text.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {
@@ -35,12 +31,13 @@ struct ImportArguments {
 /// NAME=VALUE; a name may have an equals sign, a value has none.
 std::pair<std::string, double> read_position(const std::string& word) {
   const std::size_t equals = word.rfind('=');
-  double value = 0;
-  if (equals == std::string::npos || equals == 0 ||
-      !CLI::detail::lexical_cast(word.substr(equals + 1), value) || !std::isfinite(value))
+  const auto value = equals == std::string::npos || equals == 0
+                         ? std::nullopt
+                         : finite_number(word.substr(equals + 1));
+  if (!value)
     throw std::invalid_argument(
         fmt::format("--joint {}: must be NAME=VALUE, a position in rad or m", word));
-  return {word.substr(0, equals), value};
+  return {word.substr(0, equals), *value};
 }
 
 import::ImportOptions options_of(const ImportArguments& a){import::ImportOptions out;
@@ -69,21 +66,13 @@ return out;
 int write_import(const ImportArguments& a) {
   const import::ImportOptions options = options_of(a);
   Output scene;
-  scene.state = a.out == "-" ? "" : a.out;
+  scene["state"] = a.out == "-" ? "" : a.out;
   formats::check_names(scene, {a.file == "-" ? "" : a.file});
   const SceneText robot = read_text(a.file);
   const import::Imported made = import::import_robot(robot.text, robot.name, options);
-  catch_signals();  // the file is whole before they count
-  if (a.out == "-") {
-    StandardOutput(a.out).write(made.toml);
-  } else if (a.force) {
-    write_whole(a.out, made.toml);
-  } else {
-    make_new(a.out, made.toml);
-  }
+  write_scene_file(a.out, made.toml, a.force);
   for (const std::string& remark : made.remarks)
     fmt::print(stderr, "left out or changed: {}\n", remark);
-  if (a.out != "-") fmt::print("written: {0}\nnext: tether run {0}\n", on_terminal(a.out));
   return a.strict && !made.remarks.empty() ? kNotMet : kGood;
 }
 

@@ -4,13 +4,9 @@
 #include <algorithm>
 #include <memory>
 
-#include "output/whole_file.hpp"
 #include "program/commands.hpp"
 #include "program/kinds.hpp"
 #include "program/new_file.hpp"
-#include "program/process/signals.hpp"
-#include "program/process/standard_streams.hpp"
-#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 
@@ -38,17 +34,7 @@ int write_new(const NewArguments& arguments) {
   if (kind == all.end()) throw std::invalid_argument("new: name a KIND; --list shows them");
   const std::string file =
       arguments.file.empty() ? std::string(kind->name) + ".toml" : arguments.file;
-  const std::string text(kind->text);
-  if (file == "-") {
-    StandardOutput(file).write(text);
-    return kGood;
-  }
-  catch_signals();  // the file is whole before they count
-  if (arguments.force)
-    write_whole(file, text);
-  else
-    make_new(file, text);
-  fmt::print("written: {0}\nnext: tether run {0}\n", on_terminal(file));
+  write_scene_file(file, std::string(kind->text), arguments.force);
   return kGood;
 }
 

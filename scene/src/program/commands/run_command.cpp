@@ -64,13 +64,13 @@ void stay_inside(const std::string& folder, const Output& o) {
 void overlay(const RunArguments& arguments, Scene& scene) {
   Output& o = scene.output;
   Output by_scene = o;
-  for (const auto& [format, file] : arguments.files) (by_scene.*format->file).clear();
+  for (const auto& [format, file] : arguments.files) by_scene[format->name].clear();
   stay_inside(arguments.folder, by_scene);
-  for (const auto& [format, file] : arguments.files) o.*format->file = file;
+  for (const auto& [format, file] : arguments.files) o[format->name] = file;
   if (arguments.every) o.every = *arguments.every;
   if (!arguments.folder.empty())
     for (const formats::Format* each : formats::all())
-      if (std::string& file = o.*each->file; !file.empty() && file != "-")
+      if (std::string& file = o[each->name]; !file.empty() && file != "-")
         file = (std::filesystem::path(arguments.folder) / file).string();
   if (arguments.otherwise) {
     if (scene.engine != EngineChoice::event && !scene.event)
@@ -89,7 +89,7 @@ void overlay(const RunArguments& arguments, Scene& scene) {
 /// Leaves a process only its share of a film: the first of several processes writes all else.
 void write_film_alone(Output& o, std::string& html) {
   for (const formats::Format* each : formats::all())
-    if (!each->film) (o.*each->file).clear();
+    if (!each->film) o[each->name].clear();
   html.clear();
 }
 
@@ -150,9 +150,9 @@ int run_scene(const RunArguments& arguments, Ranks* ranks) {
   print_files(result);
   if (result.interrupted)
     fmt::print("interrupted at {:.9g} s of {:g} s{}\n", result.time, scene.end,
-               scene.output.state.empty()
+               scene.output["state"].empty()
                    ? ""
-                   : fmt::format("; to go on: --restart {}", scene.output.state));
+                   : fmt::format("; to go on: --restart {}", scene.output["state"]));
   std::fflush(stdout);
   return code;
 }

@@ -141,7 +141,7 @@ int sweep(const SweepArguments& arguments) {
   catch_signals();
   if (arguments.out != "-") {
     Output table;
-    table.csv = arguments.out;
+    table["csv"] = arguments.out;
     std::vector<std::string> inputs = plain.surface_files;
     if (arguments.file != "-") inputs.push_back(arguments.file);
     formats::check_names(table, inputs);

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 StandardOutputFile::StandardOutputFile(Output& output, std::string& html) {
   std::vector<std::string*> files = {&html};
   for (const formats::Format* each : formats::all()) {
-    files.push_back(&(output.*each->file));
+    files.push_back(&output[each->name]);
     if (each->film && *files.back() == "-")
       throw std::invalid_argument(std::string(each->name) +
                                   " = \"-\": a film has many files and needs a name");
