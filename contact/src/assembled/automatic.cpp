@@ -46,18 +46,17 @@ void Automatic::reset(int contacts, const Options& options, bool proofs) {
   ready_ = looked_for_proof_ = false;
 }
 
-void Automatic::prepare(Search& search) {
+void Automatic::prepare() {
   if (ready_) return;
   sweeps.reset(contacts_);
   newton.reset(contacts_);
   interior.reset(contacts_);
   parts_.reset(contacts_);
-  sweep_work_ = search.counts.work;
   ready_ = true;
 }
 
 Status Automatic::rotate(Search& search, int most_idle) {
-  prepare(search);
+  prepare();
   sweeps.start(search.best.data());
   Round r;
   r.halved = search.best_error;
@@ -83,70 +82,36 @@ Status Automatic::run_part(Search& search, const Packed& start) {
   return search.solved() ? Status::solved : rotate(search, kPatienceBefore);
 }
 
-bool Automatic::replace_contacts(Search& search, double eccentricity, bool only_unconverged) {
-  System& system = search.system;
-  bool any = false;
-  z_.resize(search.best.size());
-  system.blocks(search.best.data(), z_.data());
-  double worst = 0;
-  std::vector<double> defect(z_.size());
-  for (std::size_t i = 0; i < z_.size(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      const double d = z_[i].v[c] - search.best[i].v[c];
-      defect[i] += d * d;
-    }
-    defect[i] = system.weight(static_cast<int>(i)) * std::sqrt(defect[i]);
-    worst = std::max(worst, defect[i]);
-  }
-  for (int i = 0; i < system.size(); ++i) {
-    if (system.problem().local(i).e <= eccentricity || system.replaced(i)) continue;
-    if (only_unconverged && defect[at(i)] < 1e-2 * worst) continue;
-    system.replace(i);
-    any = true;
-  }
-  return any;
-}
-
-namespace {
-
-// First the strongly coupled contacts that do not converge, then all of them, then coupled ones.
-struct Replacement {
-  double eccentricity;  // of the contacts, at least
-  bool only_unconverged;
-  double share;  // of the whole work; 1: all that is left
-};
-constexpr double kShortShare = 0.025;
-constexpr Replacement kReplacements[] = {
-    {kStronglyCoupled, true, kShortShare},
-    {kStronglyCoupled, false, 1},
-    {kCoupled, false, 1},
-};
-
-}  // namespace
-
 Status Automatic::run(Search& search) {
+  constexpr double kShortShare = 0.025;  // of the work, before contacts are replaced
+  System& system = search.system;
+  const auto coupled = [&](int i, double eccentricity) {
+    return system.problem().local(i).e > eccentricity && !system.replaced(i);
+  };
   bool replaceable = false;
-  if (search.system.law().replacement && !options_.strict) {
-    for (int i = 0; i < contacts_; ++i)
-      replaceable = replaceable || search.system.problem().local(i).e > kCoupled;
-  }
+  if (system.law().replacement && !options_.strict)
+    for (int i = 0; i < contacts_; ++i) replaceable = replaceable || coupled(i, kCoupled);
   if (!replaceable) return rotate(search, kPatience);
   search.work_end = kShortShare * options_.max_work;
   Status status = rotate(search, kPatienceBefore);
-  for (const Replacement& next : kReplacements) {
+  for (double eccentricity : {kStronglyCoupled, kCoupled}) {
     if (status == Status::solved || status == Status::infeasible) break;
     search.work_end = options_.max_work;
-    if (next.share < 1)
-      search.work_end =
-          std::min(search.counts.work + next.share * options_.max_work, search.work_end);
     if (search.exhausted()) return Status::work_limit;
-    if (!replace_contacts(search, next.eccentricity, next.only_unconverged)) continue;
+    bool any = false;
+    for (int i = 0; i < contacts_; ++i) {
+      if (!coupled(i, eccentricity)) continue;
+      system.replace(i);
+      any = true;
+    }
+    if (!any) continue;
     x_ = search.best;
     search.best_error = std::numeric_limits<double>::infinity();
     search.test(x_.data(), Method::gauss_seidel);
     ready_ = false;
-    const bool last = &next == std::end(kReplacements) - 1;
-    status = search.solved() ? Status::solved : rotate(search, last ? kPatience : kPatienceBefore);
+    status = search.solved()
+                 ? Status::solved
+                 : rotate(search, eccentricity == kCoupled ? kPatience : kPatienceBefore);
   }
   return status;
 }

@@ -25,7 +25,7 @@ class Automatic {
   const Packed& proof() const { return pressed_; }
 
   // Started on their own by the other methods, after prepare().
-  void prepare(Search& search);
+  void prepare();
   AcceleratedSweeps sweeps;
   ProximalNewton newton;
   InteriorPoint interior;
@@ -58,7 +58,6 @@ class Automatic {
   }
 
   Status rotate(Search& search, int most_idle);
-  bool replace_contacts(Search& search, double eccentricity, bool only_unconverged);
 
   // Rows of the table.
   Status sweep(Search& search, Round& r, int factorisations);
@@ -85,7 +84,6 @@ class Automatic {
   Packed x_, z_, pressed_;
   int contacts_ = 0;
   bool ready_ = false, proofs_ = true, looked_for_proof_ = false;
-  double sweep_work_ = 0;  // of the accelerated sweeps
 };
 
 }  // namespace tether::contact::detail

@@ -38,14 +38,6 @@ void IslandSolves::find_islands(const Search& search) {
   }
 }
 
-// By changes of a sweep, which are not the measure but never far from it.
-bool IslandSolves::looks_solved(const Search& search, const Island& island) const {
-  constexpr double kFar = 1e-2;
-  for (int k = island.first; k < island.first + island.size; ++k)
-    if (!(error_[at(contacts_[at(k)])] <= kFar * search.options.tolerance)) return false;
-  return true;
-}
-
 void IslandSolves::solve(Search& search, Island& island, double budget) {
   const int* contacts = contacts_.data() + island.first;
   const Problem problem =
@@ -77,38 +69,25 @@ Status IslandSolves::run(Search& search, Automatic& stages) {
   AcceleratedSweeps::Leave leave;
   leave.partly = true;
   leave.most_work = kBlock * static_cast<double>(search.system.problem().blocks().size());
-  stages.prepare(search);
+  stages.prepare();
   stages.sweeps.start(search.best.data());
   stages.sweeps.run(search, leave);
   if (search.solved()) return Status::solved;
   if (search.exhausted()) return Status::work_limit;
   find_islands(search);
   x_ = search.best;
-  z_.resize(x_.size());
-  error_.resize(x_.size());
-  search.system.changes(x_.data(), z_.data(), error_.data());
-  search.count_sweep();
   // The small ones first, each with an equal part of the work that is left: what they leave of it
   // is for the larger ones.
   std::vector<Island*> order;
-  for (Island& island : islands_) {
-    island.status = Status::solved;
-    if (!looks_solved(search, island)) order.push_back(&island);
-  }
+  for (Island& island : islands_) order.push_back(&island);
   std::stable_sort(order.begin(), order.end(),
                    [](const Island* p, const Island* q) { return p->size < q->size; });
-  // Islands that an equal part of the work did not solve get a second pass with all that is left.
-  for (int pass = 0; pass < 2 && !order.empty(); ++pass) {
-    for (std::size_t k = 0; k < order.size(); ++k) {
-      const double left = search.options.max_work - search.counts.work;
-      if (left > 0)
-        solve(search, *order[k], left / static_cast<double>(order.size() - k));
-      else
-        order[k]->status = Status::work_limit;
-    }
-    order.erase(std::remove_if(order.begin(), order.end(),
-                               [](const Island* k) { return k->status != Status::work_limit; }),
-                order.end());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const double left = search.options.max_work - search.counts.work;
+    if (left > 0)
+      solve(search, *order[k], left / static_cast<double>(order.size() - k));
+    else
+      order[k]->status = Status::work_limit;
   }
   // Each island is at its best, also beside one that cannot be solved.
   search.best_error = std::numeric_limits<double>::infinity();

@@ -26,13 +26,11 @@ class IslandSolves {
     Status status;
   };
   void find_islands(const Search& search);
-  bool looks_solved(const Search& search, const Island& island) const;
   void solve(Search& search, Island& island, double budget);
 
   std::vector<Island> islands_;
   std::vector<int> contacts_;  // island by island
-  std::vector<double> error_;
-  Packed x_, z_, proof_;
+  Packed x_, proof_;
   Search search_;
   Automatic automatic_;
 };

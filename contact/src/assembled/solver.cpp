@@ -188,7 +188,7 @@ Status Solver::Implementation::run() {
     case Method::anderson: {
       search.test(x.data(), Method::anderson);
       if (search.solved()) return Status::solved;
-      stages.prepare(search);
+      stages.prepare();
       stages.sweeps.start(x.data());
       detail::AcceleratedSweeps::Leave leave;
       leave.most_sweeps = options.max_sweeps;
@@ -197,7 +197,7 @@ Status Solver::Implementation::run() {
     }
     case Method::proximal_newton:
       search.test(x.data(), Method::gauss_seidel);
-      stages.prepare(search);
+      stages.prepare();
       search.system.sweep(x.data());
       search.count_sweep();
       search.test(x.data(), Method::gauss_seidel);
@@ -205,7 +205,7 @@ Status Solver::Implementation::run() {
       break;
     case Method::interior_point:
       search.test(x.data(), Method::interior_point);
-      stages.prepare(search);
+      stages.prepare();
       if (!search.solved()) stages.interior.run(search, options.max_sweeps);
       break;
     case Method::convex_relaxation: {

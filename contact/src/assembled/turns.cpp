@@ -70,17 +70,15 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
   }
 }
 
-// Sweeps for a few factorisations, or for as much as the others have taken meanwhile, and as long
-// as they forecast less than so many.
+// Sweeps for a few factorisations, and as long as they forecast less than so many.
 Status Automatic::sweep(Search& search, Round& r, int factorisations) {
   constexpr double kStay = 3, kStayByBodies = 5, kStayDear = 40;  // factorisations
   const double begin = search.counts.work;
   if (!r.first || r.by_bodies || order_after_sweeps(search)) {
     const double price = interior.cost(search);
     r.dear = !r.by_bodies && price > kDear * search.sweep_cost;
-    const double others = begin - 2 * sweep_work_;
     const double stay = r.by_bodies ? kStayByBodies : r.dear ? kStayDear : kStay;
-    const double until = begin + std::max(others, stay * price);
+    const double until = begin + stay * price;
     if (r.dear) sweep_and_solve_parts(search, until);
     if (!search.solved() && !search.exhausted()) {
       AcceleratedSweeps::Leave leave;
@@ -90,7 +88,6 @@ Status Automatic::sweep(Search& search, Round& r, int factorisations) {
       sweeps.run(search, leave);
     }
   }
-  sweep_work_ += search.counts.work - begin;
   r.swept = search.best_error;
   return Status::unsolved;
 }
@@ -206,7 +203,7 @@ bool Automatic::at_round_off(Search& search, int steps) {
   while (search.explained_by_round_off() && !search.solved()) {
     const double before = search.best_error;
     const auto stuck = [&] { return search.best_error > kGain * before; };
-    prepare(search);
+    prepare();
     interior.run_near(search, search.best.data(), steps);
     const bool near = search.best_error < kNearly * search.options.tolerance;
     if (stuck() && near && search.best_error > kUnits * search.system.rounding(search.best.data()))

@@ -206,7 +206,7 @@ void Embedding::assemble(const ConeProblem& problem, const std::vector<char>& op
   const int n = static_cast<int>(mu_.size());
   std::vector<MatrixBlock> blocks;
   Eigen::VectorXd b = Eigen::VectorXd::Zero(3 * n);
-  std::vector<int> last(at(n), -1), row_of(at(n), -1);
+  std::vector<int> last(at(n), -1);
   std::vector<std::vector<int>> rows(at(n));
   for (int r = 0; r < problem.rows(); ++r)
     if (places_[at(r)].contact >= 0) rows[at(places_[at(r)].contact)].push_back(r);

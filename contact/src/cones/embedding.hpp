@@ -74,7 +74,7 @@ class Embedding {
   Eigen::VectorXd b_, scale_;
   Eigen::SparseMatrix<double> raise_;  // rows to components, in units of scale_
   std::vector<Place> places_;          // by row
-  std::vector<int> block_of_, main_, blocked_, row_of_;
+  std::vector<int> block_of_, main_, blocked_;
   std::vector<Bound> bounds_;
   std::vector<Moments> moments_;
   std::vector<double> mu_;

@@ -69,25 +69,21 @@ void FreeRows::put(const Eigen::VectorXd& free, Eigen::VectorXd& v) const {
   for (std::size_t i = 0; i < rows_.size(); ++i) v[rows_[i]] = free[static_cast<Eigen::Index>(i)];
 }
 
-Eigen::MatrixXd FreeRows::solve(const Eigen::MatrixXd& G) const {
-  Eigen::MatrixXd X(G.rows(), G.cols());
-  for (Eigen::Index k = 0; k < G.cols(); ++k) {
-    const Eigen::VectorXd g = scale_.cwiseProduct(G.col(k));
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(g.size()), r = g, best = x;
-    double least = r.norm();
-    for (int step = 0; step < kSteps && least > 0; ++step) {
-      x += factor_.solve(r);
-      r = g - A_ * x;
-      const double now = r.norm();
-      if (!(now < least)) break;
-      best = x;
-      const bool slow = !(now < 0.5 * least);
-      least = now;
-      if (slow || now <= std::numeric_limits<double>::epsilon() * g.norm()) break;
-    }
-    X.col(k) = scale_.cwiseProduct(best);
+Eigen::VectorXd FreeRows::solve(const Eigen::VectorXd& of) const {
+  const Eigen::VectorXd g = scale_.cwiseProduct(of);
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(g.size()), r = g, best = x;
+  double least = r.norm();
+  for (int step = 0; step < kSteps && least > 0; ++step) {
+    x += factor_.solve(r);
+    r = g - A_ * x;
+    const double now = r.norm();
+    if (!(now < least)) break;
+    best = x;
+    const bool slow = !(now < 0.5 * least);
+    least = now;
+    if (slow || now <= std::numeric_limits<double>::epsilon() * g.norm()) break;
   }
-  return X;
+  return scale_.cwiseProduct(best);
 }
 
 }  // namespace tether::contact::detail

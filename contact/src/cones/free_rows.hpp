@@ -23,8 +23,8 @@ class FreeRows {
   /// The free rows of v, by place; and back, into v.
   Eigen::VectorXd of(const linalg::VectorView& v) const;
   void put(const Eigen::VectorXd& free, Eigen::VectorXd& v) const;
-  /// Columns of G, free rows of it, by place.
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& G) const;
+  /// x for g, by place.
+  Eigen::VectorXd solve(const Eigen::VectorXd& g) const;
   /// The same times A_cf, c the rows that are not free: rows of the problem, zero at free ones.
   Eigen::VectorXd to_cones(const Eigen::VectorXd& x) const { return coupling_ * x; }
   /// A_fc x for x by row of the problem.

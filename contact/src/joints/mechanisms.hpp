@@ -55,7 +55,7 @@ class Mechanisms {
   std::vector<char> moves_;
   std::vector<Matrix6d> root_;
   std::vector<Matrix6d> inverse_mass_;  // that root_ belongs to
-  std::vector<int> pattern_, fresh_;    // of the rows
+  std::vector<int> pattern_;            // of the rows
   std::vector<std::vector<double>> pulls_;
   std::vector<double> b_, u_, x_;
   std::vector<int> contradicting_;

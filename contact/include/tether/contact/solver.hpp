@@ -63,15 +63,12 @@ struct Options {
 };
 
 struct Counts {
-  int sweeps = 0, factorisations = 0, interior_steps = 0, tests = 0, newton_phases = 0;
+  int sweeps = 0, factorisations = 0;
   double work = 0;  ///< estimated nanoseconds
 
   void add(const Counts& other) {
     sweeps += other.sweeps;
     factorisations += other.factorisations;
-    interior_steps += other.interior_steps;
-    tests += other.tests;
-    newton_phases += other.newton_phases;
     work += other.work;
   }
 };

@@ -79,7 +79,6 @@ bool Search::explained_by_round_off() {
 }
 
 double Search::test(const PackedVector* x, Method stage) {
-  ++counts.tests;
   counts.work += test_cost;
   double error;
   if (measure == Measure::fixed_point) {

@@ -141,10 +141,6 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
   const double begin = search.counts.work;
   // A test costs more than a sweep: it may be late by one.
   constexpr double kForeseen = 1.05;
-  // However near they foresee the end: each doubling of the price has to bring it nearer.
-  constexpr double kNearer = 0.7;
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  double look_at = begin + std::max(leave.least_work, leave.price), nearest = kFar, then = kFar;
   double last_error = 0, last_f = 0;
   int next_test = sweeps_ + 1;
   const int first = sweeps_;
@@ -166,18 +162,12 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
     if (sweep >= next_test || last_error * f < kForeseen * search.options.tolerance * last_f) {
       last_error = search.test(g_.data(), Method::anderson);
       last_f = f;
-      nearest = std::min(nearest, last_error);
       if (search.solved()) return;
       next_test = std::max(next_test, sweep + 1 + sweep / 8);
     }
     if (search.exhausted()) return;
     if (leave.most_sweeps > 0 && sweep - first >= leave.most_sweeps) return;
     if (leave.most_work > 0 && search.counts.work - begin >= leave.most_work) return;
-    if (leave.price > 0 && search.counts.work > look_at) {
-      if (nearest > kNearer * then) return;
-      then = nearest;
-      look_at += look_at - begin;
-    }
     if (leave.price > 0 && search.counts.work - begin >= leave.least_work) {
       const double left = forecast(sweep, f, std::log(search.options.tolerance / last_error));
       // Work that is spent already counts as well: at the price of the other stages only a sure end

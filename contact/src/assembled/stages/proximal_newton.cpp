@@ -23,8 +23,7 @@ TETHER_INLINE void multiply(const double* P, const double* B, double scale, doub
 
 void ProximalNewton::reset(int contacts) {
   n_ = contacts;
-  for (Packed* p :
-       {&x_, &z_, &dx_, &trial_, &trial_z_, &swept_, &swept_z_, &anchor_, &rest_, &moved_})
+  for (Packed* p : {&x_, &z_, &dx_, &trial_, &trial_z_, &swept_, &swept_z_, &anchor_})
     p->resize(at(n_));
   regimes_.resize(at(n_));
   derivatives_.resize(at(n_));
@@ -45,7 +44,7 @@ bool ProximalNewton::direction(Search& search, double tau) {
   for (int i = 0; i < n_; ++i)
     for (int c = 0; c < 4; ++c) dx_[at(i)].v[c] = z_[at(i)].v[c] - x_[at(i)].v[c];
   const double scale = 1 / (1 + tau);
-  const bool regular = matrix_.by_bodies() ? direction_by_bodies(search, scale)
+  const bool regular = matrix_.by_bodies() ? direction_by_bodies(search.system.problem(), scale)
                                            : direction_by_contacts(search.system.problem(), scale);
   ++search.counts.factorisations;
   search.counts.work += cost(search);
@@ -88,12 +87,8 @@ bool ProximalNewton::direction_by_contacts(const Problem& p, double scale) {
   return regular;
 }
 
-// (D + L A) dx = -F, L = Phi'/(1+tau) and D = 1 - L A_ii: where a contact sticks D is tau/(1+tau),
-// and the digits that D^-1 costs come back by refinement.
-bool ProximalNewton::direction_by_bodies(Search& search, double scale) {
-  constexpr int kRefinements = 3;
-  constexpr double kExact = 1e-8;
-  const Problem& p = search.system.problem();
+// (D + L A) dx = -F, L = Phi'/(1+tau) and D = 1 - L A_ii
+bool ProximalNewton::direction_by_bodies(const Problem& p, double scale) {
   PackedBlock unit, left, D;
   for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
   matrix_.bodies().begin();
@@ -110,41 +105,8 @@ bool ProximalNewton::direction_by_bodies(Search& search, double scale) {
     matrix_.bodies().add(i, D, left, unit);
   }
   if (!matrix_.bodies().factor()) return false;
-  rest_ = dx_;
   matrix_.bodies().solve(dx_.data());
-  double before = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < kRefinements; ++k) {
-    const double left_over = defect(search.system, scale);
-    search.counts.work += search.sweep_cost;
-    if (!(left_over > kExact && left_over < 0.5 * before)) break;
-    before = left_over;
-    matrix_.bodies().solve(moved_.data());
-    for (int i = 0; i < n_; ++i)
-      for (int c = 0; c < 3; ++c) dx_[at(i)].v[c] += moved_[at(i)].v[c];
-  }
   return true;
-}
-
-// moved_ = rest_ - (1 + L (A - A_ii)) dx_, relative to rest_.
-double ProximalNewton::defect(const System& system, double scale) {
-  const Problem& p = system.problem();
-  system.velocities(dx_.data(), moved_.data());
-  double sum = 0, whole = 0;
-  for (int i = 0; i < n_; ++i) {
-    const LocalBlock& L = p.local(i);
-    const double *P = derivatives_[at(i)].d, *d = dx_[at(i)].v, *b = p.packed_b()[at(i)].v;
-    double* m = moved_[at(i)].v;
-    const double w[3] = {m[0] + b[0] - (L.a * d[0] + L.c[0] * d[1] + L.c[1] * d[2]),
-                         m[1] + b[1] - (L.c[0] * d[0] + L.T[0] * d[1] + L.T[1] * d[2]),
-                         m[2] + b[2] - (L.c[1] * d[0] + L.T[1] * d[1] + L.T[2] * d[2])};
-    for (int c = 0; c < 3; ++c) {
-      const double r = rest_[at(i)].v[c];
-      m[c] = r - d[c] - scale * (P[3 * c] * w[0] + P[3 * c + 1] * w[1] + P[3 * c + 2] * w[2]);
-      sum += m[c] * m[c];
-      whole += r * r;
-    }
-  }
-  return whole > 0 ? std::sqrt(sum / whole) : 0;
 }
 
 int ProximalNewton::inner(Search& search, double tau) {
@@ -218,7 +180,6 @@ int ProximalNewton::correct(Search& search, double tau, const PackedVector* anch
 }
 
 void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
-  ++search.counts.newton_phases;
   std::copy(x, x + n_, x_.begin());
   double tau = 1e-4, tau_failed = 0;
   double reference = search.best_error;

@@ -31,14 +31,13 @@ class ProximalNewton {
   int inner(Search& search, double tau);
   bool direction(Search& search, double tau);
   bool direction_by_contacts(const Problem& p, double scale);
-  bool direction_by_bodies(Search& search, double scale);
-  double defect(const System& system, double scale);
+  bool direction_by_bodies(const Problem& p, double scale);
   double residual(Search& search, const Packed& x, Packed& z, const Proximal& proximal,
                   bool derive);
 
   int n_ = 0;
   NewtonMatrix matrix_{3.5, 0};
-  Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_, rest_, moved_;
+  Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_;
   std::vector<Regime> regimes_;
   std::vector<LocalDerivative> derivatives_;
   std::vector<char> active_;

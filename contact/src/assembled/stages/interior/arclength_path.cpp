@@ -32,27 +32,24 @@ struct InteriorPoint::ArclengthPath {
     Packed z;
     double log_nu = 0;
   };
-  // A point near the curve, with its tangent and the step that was tried from there, in parts of
-  // what changes the first contact's regime.
+  // A point near the curve, with its tangent.
   struct Point {
     SmoothedPairs::Place place;
     Tangent tangent;
-    double step;
   };
 
   InteriorPoint& own;
   Search& search;
   SmoothedPairs pairs;
-  double step = 0.5;
+  double step = 0.5;    // in parts of what changes the first contact's regime
   Packed newton, rate;  // to the curve, with newton_log_nu; d / d log nu along it
   double newton_log_nu = 0;
   Tangent tangent;
-  std::vector<Point> points;  // the last ones
-  int returns = 0;
+  Point last;
 
   void evaluate() {
     pairs.set(own.point_);
-    own.evaluate_with_digits(search);
+    own.equations_.evaluate(search.system, own.point_);
   }
 
   // Newton's direction to the curve, at the present nu or across the tangent, and the tangent.
@@ -92,20 +89,13 @@ struct InteriorPoint::ArclengthPath {
     evaluate();
   }
 
-  // A shorter step from the last point, or from the one before; false: none is left.
+  // A shorter step from the last point; false: none is left.
   bool go_back() {
-    constexpr double kShorter = 0.25, kMuchShorter = 0.1, kLeast = 1e-3, kFinish = 0.05;
-    constexpr int kReturns = 20;
-    if (points.empty()) return false;
+    constexpr double kShorter = 0.25, kLeast = 1e-3;
     step *= kShorter;
-    if (step < kFinish && search.best_error < kNearby) return false;  // Newton's method takes over
-    if (step < kLeast) {
-      if (points.size() < 2 || ++returns > kReturns) return false;
-      points.pop_back();
-      step = kMuchShorter * points.back().step;
-    }
-    pairs.go_to(points.back().place);
-    go_along(points.back().tangent);
+    if (step < kLeast) return false;
+    pairs.go_to(last.place);
+    go_along(last.tangent);
     return true;
   }
 
@@ -121,16 +111,12 @@ struct InteriorPoint::ArclengthPath {
       if (!(longest >= kLeast)) return false;
       pairs.move(newton, std::min(1.0, kInside * longest), 0);
       evaluate();
-      if (longest >= kLast) return keep();
+      if (longest >= kLast) {
+        last = {pairs.place(), tangent};
+        return true;
+      }
     }
     return false;
-  }
-
-  bool keep() {
-    constexpr std::size_t kPoints = 5;
-    if (points.size() == kPoints) points.erase(points.begin());
-    points.push_back({pairs.place(), tangent, step});
-    return true;
   }
 
   // Along the curve and back to it; false: it is lost.
@@ -157,20 +143,14 @@ struct InteriorPoint::ArclengthPath {
       if (!near) continue;
       if (iteration == 1) step = std::min(kLongest, kMore * step);
       if (iteration >= kMany) step *= kFewer;
-      return keep();
+      last = {pairs.place(), tangent};
+      return true;
     }
     return false;
   }
 
-  static constexpr double kNearby = 1e-7, kLast = 4, kInside = 0.9;
+  static constexpr double kLast = 4, kInside = 0.9;
 };
-
-// Close to the end of a path round-off of A x - b would hide what is left of the residual.
-void InteriorPoint::evaluate_with_digits(Search& search) {
-  constexpr double kLate = 1e-4;
-  equations_.set_exact(search.best_error < kLate);
-  equations_.evaluate(search.system, point_);
-}
 
 void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newton) {
   // The shift, relative to A, keeps digits where contacts stick: there 1 / W^2 = x / u grows
@@ -181,6 +161,7 @@ void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newt
   constexpr int kFirstProblems = 3, kLastProblems = 30;
   const int end = search.counts.factorisations + most;
   equations_.set_tau(0);
+  equations_.set_exact(false);
   newton_.set_shift(kShift);
   ArclengthPath path(*this, search);
   double first = 0;
@@ -190,6 +171,7 @@ void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newt
     first = equations_.complementarity(point_);
     on_path = path.begin(first);
   }
+  const bool begun = on_path;
   for (double tried = kTry; on_path; on_path = path.go_on()) {
     if (search.exhausted() || search.counts.factorisations > end) break;
     if (path.pairs.nu() > kTested * first) continue;
@@ -201,8 +183,7 @@ void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newt
     newton.run(search, search.best.data(), kFirstProblems);
     if (search.solved()) return;
   }
-  if (!path.points.empty() && !search.exhausted())
-    newton.run(search, search.best.data(), kLastProblems);
+  if (begun && !search.exhausted()) newton.run(search, search.best.data(), kLastProblems);
 }
 
 }  // namespace tether::contact::detail

@@ -59,7 +59,6 @@ class InteriorPoint {
   double follow(Search& search, int most, double target);
   double aim(const System& system, double mean, double last);
   double test_point(Search& search);
-  void evaluate_with_digits(Search& search);
 
   int n_ = 0;
   InteriorEquations equations_;

@@ -141,7 +141,6 @@ bool InteriorNewton::factor(Search& search, const InteriorEquations& equations,
   const bool regular =
       matrix_.by_bodies() ? factor_bodies(search.system, tau) : factor_contacts(search.system, tau);
   ++search.counts.factorisations;
-  ++search.counts.interior_steps;
   search.counts.work += matrix_.cost(search);
   return regular;
 }

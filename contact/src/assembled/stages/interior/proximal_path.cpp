@@ -10,7 +10,7 @@ namespace tether::contact::detail {
 // solution, x drifts at a constant rate until one of them changes (method, section 6).
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
                                  ProximalNewton& newton, bool whole) {
-  constexpr int kCorrections = 4, kSteps = 20, kPatience = 700, kSweeps = 3;
+  constexpr int kCorrections = 4, kSteps = 20, kSweeps = 3;
   constexpr double kFirst = 1e-2, kLeast = 1e-9, kMost = 1;  // tau, for ordinary loads
   constexpr double kLightest = 1e6, kNear = 1e-4;
   System& system = search.system;
@@ -22,8 +22,6 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
   const double lighter = std::min(kLightest, std::max(1.0, system.load(x) / kOrdinaryLoad));
   const double least = kLeast / lighter;
   double tau = kFirst / lighter;
-  double reference = search.best_error;
-  int gain = 0;
   bool drifting = false;
   for (int outer = 0; outer < most; ++outer) {
     int corrections = 0;
@@ -48,12 +46,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
         newton.correct(search, tau, anchor.data(), point, kCorrections);
       }
     }
-    if (search.best_error < 0.97 * reference) {
-      reference = search.best_error;
-      gain = outer;
-    }
-    if (search.exhausted() || outer - gain > kPatience) break;
-    if (!found && !whole) break;
+    if (search.exhausted() || (!found && !whole)) break;
     if (!found) {
       tau = std::min(kMost, 3 * tau);
       continue;
