@@ -71,16 +71,12 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
   }
   const int n = static_cast<int>(slow.size());
   if (n == 0) return 0;
-  MatrixXd A(n, n);
-  VectorXd b(n), x = VectorXd::Zero(w.size());
-  for (int i = 0; i < n; ++i) {
-    b[i] = -w[slow[at(i)]];
-    for (int j = 0; j < n; ++j) A(i, j) = rows.A()(slow[at(i)], slow[at(j)]);
-  }
+  const SomeRows part(rows.A(), -w, slow);
   linalg::LeastSquares factor;
-  factor.factor(A);
-  const VectorXd part = factor.solve(b);
-  for (int i = 0; i < n; ++i) x[slow[at(i)]] = part[i];
+  factor.factor(part.A);
+  const VectorXd forces = factor.solve(part.b);
+  VectorXd x = VectorXd::Zero(w.size());
+  for (int i = 0; i < n; ++i) x[slow[at(i)]] = forces[i];
   return change_velocities(rows.change(x));
 }
 

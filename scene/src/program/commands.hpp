@@ -1,4 +1,4 @@
-// Tether: the subcommands of the program that work on scene files. SPDX-License-Identifier:
+// Tether: the subcommands of the program. SPDX-License-Identifier:
 // BSD-3-Clause
 //
 // Each sets *status to the exit code of the program.
@@ -18,6 +18,7 @@ enum ExitCode : int {
 };
 
 void add_check_command(CLI::App& app, int* status);
+void add_contact_command(CLI::App& app, int* status);
 void add_cost_command(CLI::App& app, int* status);
 void add_import_command(CLI::App& app, int* status);
 void add_new_command(CLI::App& app, int* status);

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "commands.hpp"
-#include "contact_command.hpp"
 #include "output/whole_file.hpp"
 #include "program/process/signals.hpp"
 #include "program/process/standard_streams.hpp"

@@ -321,3 +321,7 @@ void SteppingEngine::restore(std::istream& in, Restore how) {
 }
 
 }  // namespace tether::scene::stepping
+
+std::unique_ptr<tether::scene::Engine> tether::scene::make_stepping_engine(const Scene& scene) {
+  return std::make_unique<stepping::SteppingEngine>(scene);
+}

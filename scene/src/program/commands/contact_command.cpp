@@ -1,5 +1,5 @@
 // Tether: `tether contact`: solves contact problems in files. SPDX-License-Identifier: BSD-3-Clause
-#include "program/contact_command.hpp"
+#include "program/commands.hpp"
 #include "program/terminal_text.hpp"
 
 #include <cstdio>
