@@ -59,8 +59,7 @@ double amplification(const Case& which) {
     Settings settings;
     settings.limits = {300000, 2.0};
     settings.constraints = problem.recommended_constraints();
-    settings.options.print_fatal = false;
-    settings.options.print_warnings = false;
+    settings.options.print = false;
     const Run still = integrate(problem, 1e-9, settings);
     double worst = std::nan("");
     for (const unsigned seed : {1u, 2u}) {

@@ -53,8 +53,7 @@ class IdaCode : public Code {
     if (variant_ == Variant::projected || variant_ == Variant::smooth) {
       settings.constraints = problem.recommended_constraints();
       settings.options.step_smoothing = variant_ == Variant::smooth;
-      settings.options.print_fatal = false;
-      settings.options.print_warnings = false;
+      settings.options.print = false;
       // Derived from columns of dF/dy' it would cost an F for each unknown.
       settings.give_id = !problem.sparse.starts.empty();
     }

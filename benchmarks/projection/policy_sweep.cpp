@@ -26,12 +26,12 @@ namespace {
 const std::map<std::string, tp::Options> kVariants = [] {
   std::map<std::string, tp::Options> variants;
   variants["default"] = {};
-  variants["no extra iteration"].extra_iterations = 0;
-  variants["no refresh"].refresh_algebraic = false;
-  variants["error weights"].metric = tp::Metric::error_weights;
+  variants["no polish"].advanced.polish = tp::Polished::none;
+  variants["no refresh"].advanced.polish = tp::Polished::differential;
+  variants["error weights"].advanced.metric = tp::Metric::error_weights;
   variants["algebraic tested"].suppress_algebraic = false;
-  variants["error weights, no extra"].metric = tp::Metric::error_weights;
-  variants["error weights, no extra"].extra_iterations = 0;
+  variants["error weights, no polish"].advanced.metric = tp::Metric::error_weights;
+  variants["error weights, no polish"].advanced.polish = tp::Polished::none;
   return variants;
 }();
 

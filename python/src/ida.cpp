@@ -212,7 +212,7 @@ Result solve(const py::object& residual, const Array& times, const py::object& y
   if (!jacobian.is_none()) ida.need(IDASetJacFn(memory, System::jacobian), "IDASetJacFn");
 
   tp::Options options;
-  options.print_warnings = options.print_fatal = false;
+  options.print = false;
   if (!algebraic.is_none()) {
     const Array marks = vector("algebraic", algebraic, n);
     Array id(n);

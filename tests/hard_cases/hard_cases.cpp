@@ -117,8 +117,7 @@ HardCase motion(const std::string& name, const std::string& regime, const std::s
             Settings settings;
             settings.limits = {1000000, 10.0};
             settings.constraints = problem.recommended_constraints();
-            settings.options.print_fatal = false;
-            settings.options.print_warnings = false;
+            settings.options.print = false;
             settings.give_id = !problem.sparse.starts.empty();
             const Run ours = integrate(problem, tolerance, settings);
             return Outcome{describe(plain(problem, tolerance)), describe(ours),

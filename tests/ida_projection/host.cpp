@@ -92,8 +92,7 @@ Host::~Host() {
 }
 
 tp::Projection& Host::attach(tp::Constraints constraints, tp::Options options) {
-  options.print_fatal = false;
-  options.print_warnings = false;
+  options.print = false;
   projection_ = std::make_unique<tp::Projection>(ida, std::move(constraints), std::move(options));
   return *projection_;
 }

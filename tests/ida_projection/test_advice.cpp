@@ -213,7 +213,7 @@ TEST_CASE("a start off the constraints is explained once on stderr") {
   CHECK(contains(end.printed, "make_consistent"));
 
   tp::Options silent;
-  silent.print_warnings = false;
+  silent.print = false;
   CHECK(run(problem, 1e-8, problem.recommended_constraints(), 2000, silent, 0.3).printed.empty());
 }
 

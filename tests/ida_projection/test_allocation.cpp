@@ -83,7 +83,7 @@ TEST_CASE("no allocation with options, differences or gradients") {
   options.group = {0, 0, 1, 1, -1};
   CHECK(in_steady_state(index1, rows, options) == 0);
   options = {};
-  options.metric = tp::Metric::error_weights;
+  options.advanced.metric = tp::Metric::error_weights;
   long reports = 0;
   options.progress = [&](const tp::Progress&) { ++reports; };
   CHECK(in_steady_state(index1, rows, options) == 0);

@@ -192,7 +192,7 @@ TEST_CASE("a Projection that ends before its ida_mem: IDASolve fails, and a new 
     Host host(swing(), 1e-6);
     {
       tp::Options silent;
-      silent.print_fatal = false;
+      silent.print = false;
       tp::Projection local(host.ida, host.problem.recommended_constraints(), silent);
       if (until > 0.0) REQUIRE(host.to(until) >= 0);
     }

@@ -225,6 +225,6 @@ TEST_CASE("energy with a work state: a driven, damped oscillator keeps its balan
                  0.5, 2);
   const Run run = integrate(problem, 1e-6, balance);
   REQUIRE(run.flag >= 0);
-  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(run.distance <= tp::Options().advanced.tolerance);
   CHECK(run.statistics.failures() == 0);
 }

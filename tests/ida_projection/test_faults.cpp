@@ -292,7 +292,7 @@ TEST_CASE("memory that ends at the n-th allocation: a status, no crash, no leak"
       Host host(c.problem, 1e-5);
       tp::Constraints rows = c.rows;
       tp::Options options = c.options;
-      options.print_fatal = options.print_warnings = false;
+      options.print = false;
       // This is made before: SUNDIALS' own N_VClone does not survive the lack of memory.
       SUNNonlinearSolver newton = SUNNonlinSol_Newton(host.y, host.context);
       IDASetId(host.ida, host.vector(c.problem.id));

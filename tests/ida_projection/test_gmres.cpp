@@ -183,7 +183,7 @@ TEST_CASE("GMRES: few rows of a mechanism keep their own metric, the weights are
   const tp::Constraints rows = swing.recommended_constraints();
   const auto end = [&](tp::Metric metric) {
     tp::Options options;
-    options.metric = metric;
+    options.advanced.metric = metric;
     const Run done = integrate_without_matrix(swing, 1e-6, &rows, options);
     REQUIRE(done.flag >= 0);
     return done.y;

@@ -78,7 +78,7 @@ TEST_CASE("g identically zero, with a gradient that is not") {
     compare(robertson(4e5), tolerance, nothing());
   }
   tp::Options options;
-  options.metric = tp::Metric::error_weights;
+  options.advanced.metric = tp::Metric::error_weights;
   compare(pendulum(1.0, 1.0, 20.0, "index 0"), 1e-6, nothing(), options);
 }
 

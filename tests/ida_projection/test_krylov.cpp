@@ -138,7 +138,7 @@ End run(const Burgers& host, double tolerance, int rows) {
   {
     std::unique_ptr<tp::Projection> projection;
     tp::Options options;
-    options.print_fatal = options.print_warnings = false;
+    options.print = false;
     if (rows > 0) projection = std::make_unique<tp::Projection>(ida, kept(y, rows == 2), options);
     sunrealtype t = 0.0;
     while (t < host.end && end.flag >= 0)

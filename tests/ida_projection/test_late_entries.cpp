@@ -101,8 +101,8 @@ Seen run(const tp::Constraints& rows, double from) {
   constexpr double kTolerance = 1e-7;
   Host host(turning(), kTolerance);
   tp::Options options;
-  options.print_warnings = options.print_fatal = false;
-  options.largest_move = 1e3;  // a row that begins finds the error of the run so far
+  options.print = false;
+  options.advanced.largest_move = 1e3;  // a row that begins finds the error of the run so far
   host.attach(rows, options);
   Seen seen;
   while (host.t < kEnd && host.steps() < 3000 && (seen.flag = host.step()) >= 0) {
@@ -169,7 +169,7 @@ TEST_CASE("products that vanish at the start: project() and make_consistent() th
     INFO("kind " << static_cast<int>(kind));
     Host host(turning(), 1e-7);
     tp::Options options;
-    options.print_warnings = options.print_fatal = false;
+    options.print = false;
     tp::Projection& projection = host.attach(one(product, kind) + one(sine, kind), options);
     for (const double t : {0.0, 0.5}) {
       N_VGetArrayPointer(host.y)[0] = 0.01;

@@ -105,7 +105,7 @@ double slide(int points, double h, bool with_sum = false) {
   PointsOnCircles at(points);
   const Constraints rows = rows_of_points(points, with_sum, at.sum);
   Options options;
-  options.metric = Metric::local_correction;
+  options.advanced.metric = Metric::local_correction;
   Statistics statistics;
   const auto mover = make_dense_mover(rows, options, statistics, at.n);
   const Candidate candidate = at.candidate(h);
@@ -124,9 +124,9 @@ long solutions_of_failure(int points, bool sparse) {
   const Constraints dense = rows_of_points(points, false, 0.0);
   const Constraints rows = sparse ? tether::test::as_sparse(dense, at.n) : dense;
   Options options;
-  options.metric = Metric::error_weights;
-  options.maximum_iterations = 1;
-  options.tolerance = 1e-12;
+  options.advanced.metric = Metric::error_weights;
+  options.advanced.maximum_iterations = 1;
+  options.advanced.tolerance = 1e-12;
   Statistics statistics;
   const auto mover =
       (sparse ? make_sparse_mover : make_dense_mover)(rows, options, statistics, at.n, -1);
@@ -157,8 +157,8 @@ double rate_by_nearly_dependent_rows(int points) {
   }};
   const Constraints sparse = tether::test::as_sparse(rows, at.n);
   Options options;
-  options.metric = Metric::local_correction;
-  options.tolerance = 1e-6;
+  options.advanced.metric = Metric::local_correction;
+  options.advanced.tolerance = 1e-6;
   Statistics statistics;
   const auto mover = make_sparse_mover(sparse, options, statistics, at.n, -1);
   const Candidate candidate = at.candidate(1e-12);

@@ -44,24 +44,21 @@ TEST_CASE("bad values: the message names the option and the value") {
     CHECK(contains(text, value));
   };
   using O = tp::Options;
-  check(refusal_of([](O& o) { o.tolerance = -1e-3; }), "tolerance", "= -0.001;");
-  check(refusal_of([](O& o) { o.tolerance = -1e-12; }), "tolerance", "= -1e-12;");
-  check(refusal_of([](O& o) { o.tolerance = 0.0; }), "tolerance", "= 0;");
-  check(refusal_of([](O& o) { o.tolerance = kNaN; }), "tolerance", "nan");
-  check(refusal_of([](O& o) { o.maximum_iterations = 0; }), "maximum_iterations", "0");
-  check(refusal_of([](O& o) { o.largest_move = 0.0; }), "largest_move", "= 0;");
-  check(refusal_of([](O& o) { o.largest_move = 0.001; }), "largest_move", "0.001");
-  check(refusal_of([](O& o) { o.largest_move = kNaN; }), "largest_move", "nan");
-  check(refusal_of([](O& o) { o.extra_iterations = 2; }), "extra_iterations", "2");
-  check(refusal_of([](O& o) { o.extra_iterations = -1; }), "extra_iterations", "-1");
-  check(refusal_of([](O& o) { o.progress_interval = 0; }), "progress_interval", "0");
-  check(refusal_of([](O& o) { o.smoothing_setpoint = 0.0; }), "smoothing_setpoint", "= 0;");
-  check(refusal_of([](O& o) { o.maximum_step = -0.5; }), "maximum_step", "-0.5");
-  check(refusal_of([](O& o) { o.maximum_order = 6; }), "maximum_order", "6");
-  check(refusal_of([](O& o) { o.derive_id_limit = -7; }), "derive_id_limit", "-7");
+  check(refusal_of([](O& o) { o.advanced.tolerance = -1e-3; }), "tolerance", "= -0.001;");
+  check(refusal_of([](O& o) { o.advanced.tolerance = -1e-12; }), "tolerance", "= -1e-12;");
+  check(refusal_of([](O& o) { o.advanced.tolerance = 0.0; }), "tolerance", "= 0;");
+  check(refusal_of([](O& o) { o.advanced.tolerance = kNaN; }), "tolerance", "nan");
+  check(refusal_of([](O& o) { o.advanced.maximum_iterations = 0; }), "maximum_iterations", "0");
+  check(refusal_of([](O& o) { o.advanced.largest_move = 0.0; }), "largest_move", "= 0;");
+  check(refusal_of([](O& o) { o.advanced.largest_move = 0.001; }), "largest_move", "0.001");
+  check(refusal_of([](O& o) { o.advanced.largest_move = kNaN; }), "largest_move", "nan");
+  check(refusal_of([](O& o) { o.advanced.polish = static_cast<tp::Polished>(3); }), "polish", "3");
+  check(refusal_of([](O& o) { o.advanced.maximum_step = -0.5; }), "maximum_step", "-0.5");
+  check(refusal_of([](O& o) { o.advanced.maximum_order = 6; }), "maximum_order", "6");
   check(refusal_of([](O& o) { o.hold = {true, false, false}; }), "hold", "3 entries for 2");
-  check(refusal_of([](O& o) { o.metric = static_cast<tp::Metric>(99); }), "metric", "99");
-  check(refusal_of([](O& o) { o.long_move = static_cast<tp::LongMove>(-1); }), "long_move", "-1");
+  check(refusal_of([](O& o) { o.advanced.metric = static_cast<tp::Metric>(99); }), "metric", "99");
+  check(refusal_of([](O& o) { o.advanced.long_move = static_cast<tp::LongMove>(-1); }), "long_move",
+        "-1");
   check(refusal_of([](O& o) { o.group = {0}; }), "group", "1 entries for 2");
 }
 
@@ -80,7 +77,7 @@ TEST_CASE("bad vectors: id and hold_vector") {
   options.id = host.vector({1.0, 0.5});
   CHECK(contains(refusal(options), "options.id[1] = 0.5"));
   options.id = nullptr;
-  options.hold_vector = host.vector({1.0});
+  options.advanced.hold_vector = host.vector({1.0});
   CHECK(contains(refusal(options), "hold_vector"));
 }
 
@@ -132,11 +129,11 @@ TEST_CASE("hold: a held component is never moved") {
           c[1] = 1.0;
         });
     tp::Options options;
-    options.extra_iterations = 0;
-    options.tolerance = 1e-12;  // makes it look twice
+    options.advanced.polish = tp::Polished::none;
+    options.advanced.tolerance = 1e-12;  // makes it look twice
     Host host(problem, 1e-5);
     if (by_vector)
-      options.hold_vector = host.vector({0.0, 1.0, 1.0});
+      options.advanced.hold_vector = host.vector({0.0, 1.0, 1.0});
     else
       options.hold = {true, false, false};
     host.attach(parabola, options);
@@ -148,7 +145,7 @@ TEST_CASE("hold: a held component is never moved") {
     x_moved = false;
     Host free(problem, 1e-5);
     options.hold.clear();
-    options.hold_vector = nullptr;
+    options.advanced.hold_vector = nullptr;
     free.attach(parabola, options);
     REQUIRE(free.finish() >= 0);
     CHECK(x_moved);  // without the mask it would have been
@@ -171,8 +168,8 @@ TEST_CASE("largest_move: a start too far away is rejected, or approached in capp
   }
   {
     tp::Options options;
-    options.long_move = tp::LongMove::cap;
-    options.largest_move = 0.5;
+    options.advanced.long_move = tp::LongMove::cap;
+    options.advanced.largest_move = 0.5;
     Problem near = far;
     near.y0 = {1.0 + 1e-5, 0.0};
     near.yp0 = {0.0, 1.0 + 1e-5};
@@ -189,7 +186,7 @@ TEST_CASE("largest_move: a start too far away is rejected, or approached in capp
   }
   {
     tp::Options options;
-    options.largest_move = 1e6;  // one jump is allowed, but IDA's error test must like it
+    options.advanced.largest_move = 1e6;  // one jump is allowed, but IDA's error test must like it
     Host host(far, 1e-3);
     host.attach(on_circle(), options);
     REQUIRE(host.finish() >= 0);
@@ -238,10 +235,10 @@ TEST_CASE("messages and counts are the same in a host whose numbers have a comma
   if (!here.of_c()) WARN("in part: C has no locale with a decimal comma here");
 }
 
-TEST_CASE("extra_iterations = 0: no residual is evaluated beside IDA's") {
+TEST_CASE("polish = none: no residual is evaluated beside IDA's") {
   tp::Options options;
-  options.extra_iterations = 0;
-  options.smooth_where_needed = false;  // it looks at F once
+  options.advanced.polish = tp::Polished::none;
+  options.advanced.smooth_where_needed = false;  // it looks at F once
   Host host(tether::test::circle(5.0), 1e-6);
   options.id = host.vector({1.0, 1.0});
   host.attach(on_circle(), options);
@@ -256,8 +253,8 @@ TEST_CASE("extra_iterations = 0: no residual is evaluated beside IDA's") {
 TEST_CASE("capped moves that fall behind are failures of the step, not silent drift") {
   const Problem problem = pendulum(1.0, 1.0, 30.0, "index 1");
   tp::Options options;
-  options.long_move = tp::LongMove::cap;
-  options.largest_move = 0.1;
+  options.advanced.long_move = tp::LongMove::cap;
+  options.advanced.largest_move = 0.1;
   long behind = 0;
   for (const double tolerance : {1e-4, 1e-6}) {
     const Run run = integrate(problem, tolerance, problem.recommended_constraints(), options);
@@ -276,7 +273,7 @@ TEST_CASE("tolerance: what is asked for is what is left") {
   const tp::Constraints rows = problem.recommended_constraints();
   for (const double tolerance : {1e-1, 1e-2, 1e-4, 1e-7}) {
     tp::Options options;
-    options.tolerance = tolerance;
+    options.advanced.tolerance = tolerance;
     const Run run = integrate(problem, 1e-5, rows, options);
     INFO("tolerance " << tolerance);
     REQUIRE(run.flag >= 0);
@@ -287,8 +284,8 @@ TEST_CASE("tolerance: what is asked for is what is left") {
 TEST_CASE("maximum_iterations = 1 with a tight tolerance fails by name, not silently") {
   const Problem problem = pendulum(1.0, 1.0, 20.0, "index 1");
   tp::Options options;
-  options.maximum_iterations = 1;
-  options.tolerance = 1e-13;
+  options.advanced.maximum_iterations = 1;
+  options.advanced.tolerance = 1e-13;
   Host host(problem, 1e-3);
   IDASetMaxNumSteps(host.ida, 1000);
   host.attach(problem.recommended_constraints(), options);
@@ -317,7 +314,7 @@ TEST_CASE("groups: a point's components share one scale") {
   const Run run = integrate(problem, 1e-6, problem.recommended_constraints(), options);
   const Run without = integrate(problem, 1e-6, problem.recommended_constraints());
   REQUIRE(run.flag >= 0);
-  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(run.distance <= tp::Options().advanced.tolerance);
   CHECK(run.error < 2e-5);
   CHECK_FALSE(same_bits(run.y, without.y));
 }
@@ -332,7 +329,7 @@ TEST_CASE("treatment of algebraic variables") {
   };
   const Run derived = run([](tp::Options&) {});
   const Run plain_test = run([](tp::Options& o) { o.suppress_algebraic = false; });
-  const Run stale = run([](tp::Options& o) { o.refresh_algebraic = false; });
+  const Run stale = run([](tp::Options& o) { o.advanced.polish = tp::Polished::differential; });
   for (const Run* r : {&derived, &plain_test, &stale}) REQUIRE(r->flag >= 0);
   CHECK(derived.statistics.refreshes > 0);
   CHECK(stale.statistics.refreshes == 0);
@@ -344,10 +341,6 @@ TEST_CASE("treatment of algebraic variables") {
   given.attach(rows, options);
   REQUIRE(given.finish() >= 0);
   CHECK(same_bits(given.state(), derived.y));  // the derived id is the right one
-
-  const Run none = run([](tp::Options& o) { o.derive_id_limit = 0; });
-  REQUIRE(none.flag >= 0);
-  CHECK(none.statistics.refreshes == 0);
 }
 
 TEST_CASE("an algebraic variable answers the move: its equation holds where the step ends") {
@@ -357,7 +350,7 @@ TEST_CASE("an algebraic variable answers the move: its equation holds where the 
   };
   const auto left = [&](bool refresh) {
     tp::Options options;
-    options.refresh_algebraic = refresh;
+    options.advanced.polish = refresh ? tp::Polished::all : tp::Polished::differential;
     Host host(problem, 1e-7);
     host.attach(problem.select({"position", "velocity"}), options);
     Left out;

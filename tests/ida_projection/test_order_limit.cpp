@@ -71,7 +71,7 @@ TEST_CASE("oscillations of the tolerance's size are not excited: few steps, no l
 
 TEST_CASE("without limit_order they are resolved, and the order is left alone") {
   tp::Options without;
-  without.limit_order = false;
+  without.advanced.limit_order = false;
   const Problem p = driven_oscillators(0.5, 3e-3);
   const Run run = integrate(p, 1e-3, on_circle(), without, false);
   CHECK(run.statistics.order_limited == 0);
@@ -80,7 +80,7 @@ TEST_CASE("without limit_order they are resolved, and the order is left alone") 
 
 TEST_CASE("a motion that is to be resolved keeps its order: the same bits as without the limit") {
   tp::Options without;
-  without.limit_order = false;
+  without.advanced.limit_order = false;
   for (const double tolerance : {1e-3, 1e-5, 1e-8}) {
     INFO("tolerance " << tolerance);
     for (const Problem& p : {kepler(0.6, 30.0), pendulum(1.0, 9.81, 5.0, "index 1"),

@@ -139,7 +139,7 @@ TEST_CASE("full rank: two evaluations, one factorisation for most steps") {
   REQUIRE(run.flag >= 0);
   CHECK(run.statistics.rank_drops == 0);
   CHECK(run.statistics.failures() == 0);
-  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(run.distance <= tp::Options().advanced.tolerance);
   CHECK(run.statistics.factorizations <= run.statistics.projections + 15);
   CHECK(static_cast<double>(run.statistics.value_evaluations) <
         2.5 * static_cast<double>(run.statistics.projections));
@@ -168,7 +168,7 @@ TEST_CASE("redundant rows: the same motion as without them") {
   REQUIRE(redundant.flag >= 0);
   CHECK(redundant.statistics.failures() == 0);
   CHECK(redundant.statistics.rank_drops == redundant.statistics.factorizations);
-  CHECK(redundant.distance <= tp::Options().tolerance);
+  CHECK(redundant.distance <= tp::Options().advanced.tolerance);
   CHECK(std::abs(redundant.steps - full.steps) <= 10);
   CHECK(largest_difference(full.y, redundant.y) < 1e-7);
 }
@@ -197,7 +197,7 @@ TEST_CASE("redundant everywhere: Kepler's four invariants have rank 3") {
   REQUIRE(run.flag >= 0);
   CHECK(run.statistics.rank_drops == run.statistics.factorizations);
   CHECK(run.statistics.failures() == 0);
-  CHECK(run.distance <= tp::Options().tolerance);
+  CHECK(run.distance <= tp::Options().advanced.tolerance);
   CHECK(run.error < 0.1 * plain.error);
   CHECK(run.steps < 1.2 * static_cast<double>(plain.steps));
 }

@@ -36,7 +36,7 @@ tr::Equations equations_of(const Problem& problem, double tolerance, Linear line
   e.rtol = tolerance;
   e.atol = {tolerance};
   e.linear = linear;
-  e.options.print_fatal = e.options.print_warnings = false;
+  e.options.print = false;
   if (projected) e.constraints = problem.recommended_constraints().total_count();
   return e;
 }
@@ -246,7 +246,8 @@ TEST_CASE("reverse communication: calls out of turn and wrong arguments are refu
   CHECK(contains(refused([](tr::Equations& e) { e.y[2] = std::nan(""); }), "y[2]"));
   CHECK(contains(refused([](tr::Equations& e) { e.constraints = -1; }), "constraints = -1"));
   CHECK(contains(refused([](tr::Equations& e) { e.names = {"one"}; }), "names.size() = 1"));
-  CHECK(contains(refused([](tr::Equations& e) { e.options.tolerance = -1; }), "tolerance"));
+  CHECK(
+      contains(refused([](tr::Equations& e) { e.options.advanced.tolerance = -1; }), "tolerance"));
 }
 
 TEST_CASE("reverse communication: a run that is given up in any request leaves nothing behind") {

@@ -347,22 +347,6 @@ TEST_CASE("id where equations share derivatives, with equal coefficients of oppo
   CHECK(same_bits(derived.state(), given.state()));
 }
 
-TEST_CASE("id that is not derived: message() says so as long as nothing else is wrong") {
-  const Problem problem = link_chain(8, 1.0);
-  for (const int limit : {0, 3}) {  // not wanted; too few evaluations
-    INFO("limit " << limit);
-    Host host(problem, 1e-6);
-    tp::Options options;
-    options.derive_id_limit = limit;
-    host.attach(*problem.sparse_constraints, options);
-    for (int i = 0; i < 30; ++i) REQUIRE(host.step() >= 0);
-    REQUIRE(host.projection().statistics().projections > 0);
-    CHECK(host.projection().status() == tp::Status::success);
-    CHECK(contains(host.projection().message(), "derive_id_limit"));
-    CHECK(contains(host.projection().message(), "Options::id"));
-  }
-}
-
 TEST_CASE("sparse rows: check_jacobian names entries that are wrong or missing") {
   const Problem problem = pendulum(1.0, 1.0, 10.0, "index 1");
   tp::Constraints set = sparse(problem, {"position"});

@@ -66,12 +66,14 @@ TEST_CASE("counts agree with each other") {
       CHECK(s.value_evaluations == values);
       CHECK(s.jacobian_evaluations == jacobians);
       CHECK(s.value_evaluations >= s.projections);
-      CHECK(s.factorizations >= s.projections);
-      CHECK(s.factorizations <= s.jacobian_evaluations);
+      const long factored = s.factorizations + s.refactorizations;
+      CHECK(factored >= s.projections);
+      CHECK(factored <= s.jacobian_evaluations);
       CHECK(s.iterations >= s.projections);
       CHECK(s.failures() == 0);
-      CHECK(s.extra_iterations <= s.projections + s.corrections_repeated);
-      CHECK(s.refreshes <= s.projections + s.corrections_repeated);
+      // Before a move, and after a long one.
+      CHECK(s.extra_iterations <= 2 * (s.projections + s.corrections_repeated));
+      CHECK(s.refreshes <= 2 * (s.projections + s.corrections_repeated));
       CHECK((s.refreshes > 0) == (std::string(form) == "index 1"));
       CHECK(s.largest_drift_before > 0.0);
       CHECK(s.largest_drift_after <= s.largest_drift_before);
@@ -105,7 +107,7 @@ TEST_CASE("rows that IDA keeps by itself are looked at, without C in most steps"
   const tp::Statistics moves = begun.projection().statistics();
   CHECK(moves.projections > 0);
   CHECK(moves.projections + moves.skipped >= begun.steps());
-  CHECK(moves.jacobian_evaluations < moves.skipped / 3);
+  CHECK(moves.jacobian_evaluations < moves.skipped);
 }
 
 TEST_CASE("rows that are the equations of F: that nothing joins them takes few evaluations") {

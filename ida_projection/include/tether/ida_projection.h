@@ -118,11 +118,12 @@ int tether_count_rows(const tether_constraints* constraints);
 
 enum { TETHER_METRIC_LOCAL_CORRECTION, TETHER_METRIC_ERROR_WEIGHTS, TETHER_METRIC_AUTOMATIC };
 enum { TETHER_LONG_MOVE_REJECT, TETHER_LONG_MOVE_CAP };
+enum { TETHER_POLISH_ALL, TETHER_POLISH_DIFFERENTIAL, TETHER_POLISH_NONE };
 
 typedef void (*tether_progress_fn)(sunrealtype t, sunrealtype step, int order, sunrealtype drift,
                                    sunrealtype move, long steps, void* user_data);
 
-/* Fields as in tether::ida_projection::Options; flags are 0 or 1. New fields come at the end. */
+/* Fields as in tether::ida_projection::Options and Advanced; flags are 0 or 1. New fields come at the end. */
 typedef struct {
   size_t size; /* sizeof(tether_options), see tether_options_init */
   int metric;  /* TETHER_METRIC_... */
@@ -131,20 +132,19 @@ typedef struct {
   sunrealtype largest_move;
   int long_move; /* TETHER_LONG_MOVE_... */
   N_Vector id;
-  int derive_id_limit;
-  int suppress_algebraic, refresh_algebraic, extra_iterations;
+  int suppress_algebraic;
+  int polish; /* TETHER_POLISH_... */
   int step_smoothing, smooth_where_needed;
-  sunrealtype smoothing_setpoint, maximum_step;
+  sunrealtype maximum_step;
   int maximum_order;
   int limit_order;
   const int* hold; /* 1: component is not moved; N entries, or null. Copied. */
   N_Vector hold_vector;
   const int* group; /* N entries, or null. Copied. */
   SUNNonlinearSolver nonlinear_solver;
-  int print_fatal, print_warnings;
+  int print;
   tether_progress_fn progress; /* or null */
   void* progress_data;
-  int progress_interval;
 } tether_options;
 
 /* The defaults: tether_options options; tether_options_init(&options, sizeof options); */

@@ -8,8 +8,8 @@ namespace tether::ida_projection {
 // Is the metric free, and can answers to moves be had?
 bool Projection::Impl::hears_answers() const {
   return wanted_metric_ == Metric::automatic && options_.group.empty() &&
-         options_.metric == Metric::local_correction && movers_.used == movers_.own.get() &&
-         polish_.hears_answers();
+         options_.advanced.metric == Metric::local_correction &&
+         movers_.used == movers_.own.get() && polish_.hears_answers();
 }
 
 bool Projection::Impl::asks_for_metric() const {
@@ -67,7 +67,8 @@ AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
 Status Projection::Impl::settle_stiff_move(const Candidate& candidate, double cj,
                                            double tolerance) {
   polish_.leave_answers_out();
-  if (options_.extra_iterations > 0 && polish_.add_newton_step(candidate, cj, tolerance))
+  if (options_.advanced.polish != Polished::none &&
+      polish_.add_newton_step(candidate, cj, tolerance))
     N_VLinearSum(1.0, stiff_move_.change(), 1.0, polish_.delta(), stiff_move_.change());
   return movers_.used->settle(candidate, stiff_move_.change());
 }

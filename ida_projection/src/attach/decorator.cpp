@@ -40,7 +40,7 @@ int Projection::Impl::initialize() {
   run_.start = OwnedVector();
   run_.undetermined.clear();
   run_.linear_solver = LinearSolverKind();
-  options_.metric = wanted_metric_;
+  options_.advanced.metric = wanted_metric_;
   attempts_ = Attempts();
   attempts_.left_before = std::numeric_limits<double>::infinity();
   report_.reset();
@@ -253,7 +253,7 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 bool Projection::Impl::polishes_first() {
   if (!in_use(Mechanism::polish_first) ||
       !movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))
-    return false;  // few rows never do
+    return false;
   const bool silent = metric_choice_.calm() || !asks_for_metric();
   return silent && wants_polish(0.0);
 }
@@ -288,7 +288,7 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (!attempts_.repeated && attempts_.pending) {
     attempts_.left_before = attempts_.left;
     movers_.used->accept();
-    if (options_.progress && ++tally_.progress_count % options_.progress_interval == 0) {
+    if (options_.progress) {
       tally_.progress.steps = steps;
       std::string ignored;
       guarded([&] { return options_.progress(tally_.progress), 0; }, ignored);

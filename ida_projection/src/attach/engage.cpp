@@ -34,7 +34,7 @@ void Projection::Impl::look_at_linear_solver() {
   run_.linear_solver.look(ida_, attempts_.steps);
   const bool iterative = run_.linear_solver.iterative();
   if (wanted_metric_ == Metric::automatic)
-    options_.metric =
+    options_.advanced.metric =
         iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;
   polish_.note_linear_solver(iterative);
   movers_.used->expect_no_settle(iterative);
@@ -91,7 +91,7 @@ Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
   return variables_.high_index() && variables_.any() ? engage(candidate) : Status::success;
 }
 
-// By how much more than smoothing_setpoint errors are kept below the tolerance. Those at the end
+// By how much more than usual errors are kept below the tolerance. Those at the end
 // follow (tolerance / s)^(k/(k+1)), k the order; s that grows by its (-1/k)-th power, k = 5, makes
 // them follow the tolerance. Rows that leave few directions free take most of the errors with them.
 // At loose tolerances runs are short, and most of their steps of low orders: there half of it is
@@ -113,7 +113,7 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
   if (options_.nonlinear_solver == nullptr)
     newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
   const StepData step = ida_.step();
-  fast::quicken({candidate.correction, step.residual, polish_.delta()});
+  fast::quicken({candidate.correction, step.residual, polish_.delta(), polish_.corrected()});
   fast::quicken_with_inputs({step.y_predicted, step.yp_predicted, candidate.weights, newton});
 }
 
@@ -142,7 +142,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   if (!variables_.known()) derive_id(candidate);
   const double cj = ida_.step().cj;
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
-  if (options_.smooth_where_needed || (options_.suppress_algebraic && variables_.any()))
+  if (options_.advanced.smooth_where_needed || (options_.suppress_algebraic && variables_.any()))
     variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();

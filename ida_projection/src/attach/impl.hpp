@@ -219,7 +219,6 @@ class Projection::Impl {
     long attempts = 0;  // since moves began
     SampledTime timed;  // of every 16th
     Progress progress;
-    long progress_count = 0;
   };
 
   Constraints constraints_;

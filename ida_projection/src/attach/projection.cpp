@@ -74,7 +74,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       ida_(ida_mem),
       report_(options_, statistics_),
       corrector_(options_.nonlinear_solver, vector_of(ida_mem)),
-      variables_(options_, statistics_),
+      variables_(statistics_),
       polish_(options_, statistics_, corrector_, variables_),
       control_(ida_, options_, statistics_),
       stiff_move_(variables_),
@@ -82,7 +82,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       point_(constraints_, options_),
       watch_{RejectionWatch(constraints_), FirstSteps(constraints_, statistics_),
              BypassWatch(ida_, lifetime_)},
-      wanted_metric_(options_.metric) {
+      wanted_metric_(options_.advanced.metric) {
   N_Vector like = vector_of(ida_mem);
   check_running_indices(like);
   validate(constraints_, options_, like);
@@ -99,8 +99,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       variables_.set(options_.id);
       options_.id = variables_.vector();  // the caller's vector may go
     }
-    if (unknowns_.contiguous && options_.hold_vector != nullptr && options_.hold.empty()) {
-      const double* free = N_VGetArrayPointer(options_.hold_vector);
+    if (unknowns_.contiguous && options_.advanced.hold_vector != nullptr && options_.hold.empty()) {
+      const double* free = N_VGetArrayPointer(options_.advanced.hold_vector);
       for (int j = 0; j < unknowns_.count; ++j) options_.hold.push_back(free[j] == 0.0);
     }
   }
@@ -139,7 +139,7 @@ void Projection::Impl::attach() {
 Projection::Impl::~Impl() {
   std::string ignored;
   guarded([this] { return look_for_bypass(), 0; }, ignored);
-  Operations<Impl>::end(solver_.get(), options_.print_fatal);
+  Operations<Impl>::end(solver_.get(), options_.print);
   lifetime_.free_at_end(solver_.release());
 }
 

@@ -168,24 +168,23 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
       reject(std::string("options.") + name + " = " + std::to_string(value) + "; it must be 0 .. " +
              std::to_string(last));
   };
-  check_kind(static_cast<int>(options.metric), static_cast<int>(Metric::automatic), "metric");
-  check_kind(static_cast<int>(options.long_move), static_cast<int>(LongMove::cap), "long_move");
-  require(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0 (tolerances)");
-  require(options.maximum_iterations >= 1, "maximum_iterations", options.maximum_iterations,
-          ">= 1");
+  check_kind(static_cast<int>(options.advanced.metric), static_cast<int>(Metric::automatic),
+             "metric");
+  check_kind(static_cast<int>(options.advanced.long_move), static_cast<int>(LongMove::cap),
+             "long_move");
+  require(options.advanced.tolerance > 0.0, "tolerance", options.advanced.tolerance,
+          "> 0 (tolerances)");
+  check_kind(static_cast<int>(options.advanced.polish), static_cast<int>(Polished::none), "polish");
+  require(options.advanced.maximum_iterations >= 1, "maximum_iterations",
+          options.advanced.maximum_iterations, ">= 1");
   require(
-      options.largest_move >= 0.1, "largest_move", options.largest_move,
+      options.advanced.largest_move >= 0.1, "largest_move", options.advanced.largest_move,
       ">= 0.1 (tolerances): the drift of a single good step is as long, and shorter limits make "
       "steps short instead");
-  require(options.smoothing_setpoint > 0.0 && std::isfinite(options.smoothing_setpoint),
-          "smoothing_setpoint", options.smoothing_setpoint, "> 0");
-  require(options.maximum_step >= 0.0, "maximum_step", options.maximum_step, ">= 0 (0: no limit)");
-  require(options.maximum_order >= 1 && options.maximum_order <= 5, "maximum_order",
-          options.maximum_order, "1 .. 5 (as IDASetMaxOrd)");
-  require(options.extra_iterations == 0 || options.extra_iterations == 1, "extra_iterations",
-          options.extra_iterations, "0 or 1");
-  require(options.progress_interval >= 1, "progress_interval", options.progress_interval, ">= 1");
-  require(options.derive_id_limit >= 0, "derive_id_limit", options.derive_id_limit, ">= 0");
+  require(options.advanced.maximum_step >= 0.0, "maximum_step", options.advanced.maximum_step,
+          ">= 0 (0: no limit)");
+  require(options.advanced.maximum_order >= 1 && options.advanced.maximum_order <= 5,
+          "maximum_order", options.advanced.maximum_order, "1 .. 5 (as IDASetMaxOrd)");
   if (options.nonlinear_solver != nullptr) {
     const SUNNonlinearSolver_Ops ops = options.nonlinear_solver->ops;
     if (ops->gettype == nullptr || ops->solve == nullptr || ops->setsysfn == nullptr)
@@ -230,7 +229,7 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
              ")");
   };
   check_vector(options.id, "id");
-  check_vector(options.hold_vector, "hold_vector");
+  check_vector(options.advanced.hold_vector, "hold_vector");
   if (options.id != nullptr && contiguous) {
     const double* id = N_VGetArrayPointer(options.id);
     for (sunindextype j = 0; j < length; ++j)

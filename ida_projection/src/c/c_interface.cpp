@@ -35,7 +35,8 @@ static_assert(int(ip::Status::doubtful) == TETHER_DOUBTFUL &&
               int(ip::Status::out_of_memory) == TETHER_OUT_OF_MEMORY &&
               int(ip::Status::misused) == TETHER_MISUSED &&
               int(ip::Metric::automatic) == TETHER_METRIC_AUTOMATIC &&
-              int(ip::LongMove::cap) == TETHER_LONG_MOVE_CAP);
+              int(ip::LongMove::cap) == TETHER_LONG_MOVE_CAP &&
+              int(ip::Polished::none) == TETHER_POLISH_NONE);
 
 int add(tether_constraints& set, const ip::Constraints& rows) {
   set.rows = set.rows + rows;  // a copy: the set stays whole if memory runs out
@@ -252,24 +253,20 @@ int tether_options_init(tether_options* options, size_t size) {
       return ill("tether_options_init: size = " + std::to_string(size) +
                  ", must be sizeof(tether_options)");
     o.size = size;
-    o.metric = static_cast<int>(defaults.metric);
-    o.tolerance = defaults.tolerance;
-    o.maximum_iterations = defaults.maximum_iterations;
-    o.largest_move = defaults.largest_move;
-    o.long_move = static_cast<int>(defaults.long_move);
-    o.derive_id_limit = defaults.derive_id_limit;
+    const ip::Advanced& advanced = defaults.advanced;
+    o.metric = static_cast<int>(advanced.metric);
+    o.tolerance = advanced.tolerance;
+    o.maximum_iterations = advanced.maximum_iterations;
+    o.largest_move = advanced.largest_move;
+    o.long_move = static_cast<int>(advanced.long_move);
     o.suppress_algebraic = defaults.suppress_algebraic;
-    o.refresh_algebraic = defaults.refresh_algebraic;
-    o.extra_iterations = defaults.extra_iterations;
+    o.polish = static_cast<int>(advanced.polish);
     o.step_smoothing = defaults.step_smoothing;
-    o.smooth_where_needed = defaults.smooth_where_needed;
-    o.smoothing_setpoint = defaults.smoothing_setpoint;
-    o.maximum_step = defaults.maximum_step;
-    o.maximum_order = defaults.maximum_order;
-    o.limit_order = defaults.limit_order;
-    o.print_fatal = defaults.print_fatal;
-    o.print_warnings = defaults.print_warnings;
-    o.progress_interval = defaults.progress_interval;
+    o.smooth_where_needed = advanced.smooth_where_needed;
+    o.maximum_step = advanced.maximum_step;
+    o.maximum_order = advanced.maximum_order;
+    o.limit_order = advanced.limit_order;
+    o.print = defaults.print;
     std::memcpy(options, &o, size);
     return 0;
   });

@@ -26,37 +26,34 @@ Options options_of(const tether_options* given, long unknowns) {
         "options->metric", o.metric, "TETHER_METRIC_...");
   check(o.long_move == TETHER_LONG_MOVE_REJECT || o.long_move == TETHER_LONG_MOVE_CAP,
         "options->long_move", o.long_move, "TETHER_LONG_MOVE_...");
+  check(o.polish >= TETHER_POLISH_ALL && o.polish <= TETHER_POLISH_NONE, "options->polish",
+        o.polish, "TETHER_POLISH_...");
   check((o.hold == nullptr && o.group == nullptr) || unknowns > 0, "unknowns", unknowns,
         "the length of options->hold and group");
   Options options;
-  options.metric = static_cast<Metric>(o.metric);
-  options.tolerance = o.tolerance;
-  options.maximum_iterations = o.maximum_iterations;
-  options.largest_move = o.largest_move;
-  options.long_move = static_cast<LongMove>(o.long_move);
+  options.advanced.metric = static_cast<Metric>(o.metric);
+  options.advanced.tolerance = o.tolerance;
+  options.advanced.maximum_iterations = o.maximum_iterations;
+  options.advanced.largest_move = o.largest_move;
+  options.advanced.long_move = static_cast<LongMove>(o.long_move);
   options.id = o.id;
-  options.derive_id_limit = o.derive_id_limit;
   options.suppress_algebraic = o.suppress_algebraic != 0;
-  options.refresh_algebraic = o.refresh_algebraic != 0;
-  options.extra_iterations = o.extra_iterations;
+  options.advanced.polish = static_cast<Polished>(o.polish);
   options.step_smoothing = o.step_smoothing != 0;
-  options.smooth_where_needed = o.smooth_where_needed != 0;
-  options.smoothing_setpoint = o.smoothing_setpoint;
-  options.maximum_step = o.maximum_step;
-  options.maximum_order = o.maximum_order;
-  options.limit_order = o.limit_order != 0;
+  options.advanced.smooth_where_needed = o.smooth_where_needed != 0;
+  options.advanced.maximum_step = o.maximum_step;
+  options.advanced.maximum_order = o.maximum_order;
+  options.advanced.limit_order = o.limit_order != 0;
   if (o.hold != nullptr)
     for (long i = 0; i < unknowns; ++i) options.hold.push_back(o.hold[i] != 0);
-  options.hold_vector = o.hold_vector;
+  options.advanced.hold_vector = o.hold_vector;
   if (o.group != nullptr) options.group.assign(o.group, o.group + unknowns);
   options.nonlinear_solver = o.nonlinear_solver;
-  options.print_fatal = o.print_fatal != 0;
-  options.print_warnings = o.print_warnings != 0;
+  options.print = o.print != 0;
   if (o.progress != nullptr)
     options.progress = [call = o.progress, data = o.progress_data](const Progress& p) {
       call(p.t, p.step, p.order, p.drift, p.move, p.steps, data);
     };
-  options.progress_interval = o.progress_interval;
   return options;
 }
 

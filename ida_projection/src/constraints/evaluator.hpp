@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -52,6 +53,9 @@ bool all_finite(const double* a, std::size_t n);
 /// Room in which a callback may write more than it should without harm, and is found out.
 class GuardedRoom {
  public:
+  void reserve(std::ptrdiff_t count, std::ptrdiff_t more) {
+    room_.resize(static_cast<std::size_t>(count + std::max(more, kLeast)));
+  }
   /// Place for `count` values, which now are `values`; `more`: how many too many do no harm.
   double* begin(const double* values, std::ptrdiff_t count, std::ptrdiff_t more);
   /// Copies them back; false: more were written.
@@ -69,6 +73,8 @@ class Evaluator {
   explicit Evaluator(const Constraints& constraints, Statistics& statistics);
 
   int rows() const { return rows_; }
+  /// So that value() on n unknowns never allocates.
+  void reserve(int n) { g_room_.reserve(rows_, std::max(rows_, n)); }
   bool uses_differences() const { return uses_differences_; }
   /// Are there rows with a function that gives g and C together?
   bool gives_both() const { return gives_both_; }

@@ -14,7 +14,7 @@ namespace tether::ida_projection {
 /// the others: metric, polish, smoothing, limit of the order, index and suppression.
 enum class Mechanism {
   repeated_correction,    ///< where old factors fooled IDA's convergence test
-  polish_first,           ///< of many rows: before the move
+  polish_first,           ///< before the move, where the last one was short
   foretold_polish,        ///< from earlier ones, without an evaluation of F
   followers,              ///< IDA's test waits for algebraic variables that follow
   free_multipliers,       ///< those of index 2 are left out of IDA's convergence test
@@ -27,7 +27,6 @@ enum class Mechanism {
   kept_factors,           ///< factors of many sparse rows serve several steps
   one_pass_move,          ///< few independent rows are factored and solved in one pass
   looks,                  ///< rows that need no move are only evaluated
-  rounding_left_out,      ///< of g, in a start with many rows
   rate_limit,             ///< scales of positions are at most h times those of velocities
   other_metric,           ///< one scale for each level, where stiff components respond to moves
   stiff_moves,            ///< moves by what F makes of them, where that is not enough
@@ -53,7 +52,6 @@ inline constexpr const char* kMechanismNames[] = {"repeated correction",
                                                   "kept factors",
                                                   "one-pass move",
                                                   "looks",
-                                                  "rounding left out",
                                                   "rate limit",
                                                   "other metric",
                                                   "stiff moves",

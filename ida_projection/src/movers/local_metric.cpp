@@ -30,7 +30,7 @@ void LocalMetric::look(const LoadedCandidate& at) {
 
 template <class Block>
 void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
-  const bool local = options_.metric == Metric::local_correction;
+  const bool local = options_.advanced.metric == Metric::local_correction;
   for (Block* block : {&d, &a}) {
     if (block->rows.empty()) continue;
     double* __restrict D = block->D();
@@ -100,7 +100,7 @@ void LocalMetric::limit(const LoadedCandidate& at, Block& block) const {
 }
 
 void LocalMetric::current(const LoadedCandidate& at, double* D) const {
-  const bool local = options_.metric == Metric::local_correction;
+  const bool local = options_.advanced.metric == Metric::local_correction;
   for (std::size_t i = 0; i < scale_.size(); ++i) {
     const double s = trial_scale_[i], weight = at.w[i] > 0.0 ? 1.0 / at.w[i] : s;
     D[i] = local ? std::max(s, kMetricFloor * weight) : weight;

@@ -26,7 +26,8 @@ class LocalMetric {
   void fill_few(const LoadedCandidate& at, int first, int columns, double* __restrict D);
   /// Is D made of each component's own s?
   bool plain() const {
-    return options_.metric == Metric::local_correction && levels_.empty() && options_.group.empty();
+    return options_.advanced.metric == Metric::local_correction && levels_.empty() &&
+           options_.group.empty();
   }
   /// D of every component, by the candidate that look() or fill() saw last.
   void current(const LoadedCandidate& at, double* D) const;

@@ -99,8 +99,8 @@ class Mover {
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 
-  /// May the correction be polished before the next move()? So it is where rows are many, those
-  /// that count are known, and the last move was not longer than this, in tolerances.
+  /// May the correction be polished before the next move()? So it is where the rows that count are
+  /// known, and the last move was not longer than this, in tolerances.
   virtual bool may_polish_first(double /*longest*/) const { return false; }
   /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
   virtual Status finish(const Candidate&, bool /*polished*/) { return Status::success; }
@@ -154,8 +154,8 @@ class Monitor {
   /// After a first move of this length: is it plain, whatever `floor` is, that judge() will call it
   /// done? Then judge() need not be asked.
   bool plainly_done(double length) {
-    const bool done =
-        moves_ == 0 && !measures(length) && 4.0 * theta_ * length * length <= options_->tolerance;
+    const bool done = moves_ == 0 && !measures(length) &&
+                      4.0 * theta_ * length * length <= options_->advanced.tolerance;
     if (done) moves_ = 1;
     return done;
   }

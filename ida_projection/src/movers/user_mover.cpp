@@ -28,7 +28,7 @@ class UserMover final : public Mover {
     std::string thrown;
     const int flag = guarded(
         [&] {
-          return user_.function(candidate.t, y_, change_, options_.tolerance, error_,
+          return user_.function(candidate.t, y_, change_, options_.advanced.tolerance, error_,
                                 user_.user_data);
         },
         thrown);
@@ -50,11 +50,11 @@ class UserMover final : public Mover {
     if (result.status != Status::success) return result;
     result.status = Status::success;
     double factor = 1.0;
-    if (!(result.length <= options_.largest_move)) {
-      const double limit = options_.largest_move *
+    if (!(result.length <= options_.advanced.largest_move)) {
+      const double limit = options_.advanced.largest_move *
                            std::max(1.0, N_VWrmsNorm(candidate.correction, candidate.weights));
       if (!(result.length <= limit)) {
-        if (options_.long_move == LongMove::reject || !std::isfinite(result.length)) {
+        if (options_.advanced.long_move == LongMove::reject || !std::isfinite(result.length)) {
           result.status = std::isfinite(result.length) ? Status::move_too_long : Status::not_finite;
           message_ = "the user's projection moved by " + brief(result.length) +
                      " tolerances, the limit is " + brief(limit) + " (Options::largest_move)";

@@ -132,7 +132,7 @@ class ReverseIda::Implementation {
     }
     if (equations_.constraints > 0) {
       if (id_) equations_.options.id = id_.get();
-      equations_.options.print_fatal = false;  // message() has it
+      equations_.options.print = false;  // message() has it
       projection_.emplace(mem_.get(), constraints(), equations_.options);
     }
     at_rest(Request::reached);

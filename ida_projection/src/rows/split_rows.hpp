@@ -46,15 +46,12 @@ class SplitRows {
  public:
   using Block = BlockOf<Solver>;
   static constexpr bool kDense = std::is_same_v<Solver, linalg::MinimumNorm>;
-  /// Sparse C and its factors cost four solves and more: they serve several steps. Of few rows
-  /// nothing would be gained that makes up for a metric of an earlier step. Dense factors of the
-  /// rows that an earlier step has kept are so cheap that none serve two steps.
-  static bool keeps_factors(int rows) { return !kDense && rows > 64; }
+  /// Sparse C and its factors cost four solves and more: they serve several steps. Dense factors of
+  /// the rows that an earlier step has kept are so cheap that none serve two steps.
+  static constexpr bool kKeepsFactors = !kDense;
   /// Dense factors of rows that are known to be independent cost half of an orthogonal
-  /// factorisation, and a tenth where rows are many. Then what Newton's method leaves is cheap to
-  /// take, too.
+  /// factorisation, and a tenth where rows are many.
   static constexpr bool kKeepsRank = kDense;
-  static bool many(int rows) { return kDense && rows > 16; }
   /// Dense pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = kDense;
 

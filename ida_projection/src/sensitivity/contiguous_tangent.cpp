@@ -126,10 +126,9 @@ class ContiguousTangent final : public TangentRows {
   }
 
   Status factor_rows() {
-    known_ = known_ && Rows::kKeepsRank &&
-             !(blocks_.dropped_rows() && (++age_ % kDecideEvery == 0 || !Rows::many(rows())));
+    known_ = known_ && Rows::kKeepsRank && !(blocks_.dropped_rows() && ++age_ % kDecideEvery == 0);
     if (known_ && blocks_.factor_kept()) {
-      ++(Rows::many(rows()) ? statistics_.refactorizations : statistics_.factorizations);
+      ++statistics_.refactorizations;
       return Status::success;
     }
     ++statistics_.factorizations;

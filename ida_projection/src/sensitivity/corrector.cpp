@@ -91,7 +91,7 @@ SensitivityCorrector::SensitivityCorrector(const State& state, Sensitivities giv
 }
 
 SensitivityCorrector::~SensitivityCorrector() {
-  Operations<SensitivityCorrector>::end(solver_.get(), state_.options.print_fatal);
+  Operations<SensitivityCorrector>::end(solver_.get(), state_.options.print);
   state_.lifetime.free_at_end(solver_.release());
 }
 
@@ -123,7 +123,7 @@ std::string SensitivityCorrector::set_up(N_Vector predicted) {
   idas_.system_data(state_.ida.mem(), &t, &s, &sp, &sn, &spn, &cj, &data);
   const std::string reason = why_not_wrapped(predicted, s, count());
   if (!reason.empty()) return reason;
-  variables_ = std::make_unique<AlgebraicVariables>(state_.options, uncounted_);
+  variables_ = std::make_unique<AlgebraicVariables>(uncounted_);
   polish_ = std::make_unique<Polish>(state_.options, uncounted_, *corrector_, *variables_);
   polish_->allocate(predicted, false);
   checked_ = true;
@@ -304,7 +304,7 @@ Status SensitivityCorrector::find_moves(const Candidate& candidate, double t, bo
 Status SensitivityCorrector::too_long(const Candidate& candidate, int k, double length) {
   const double change =
       N_VWrmsNorm(vectors_of(candidate.correction)[k], vectors_of(candidate.weights)[k]);
-  const double limit = state_.options.largest_move * std::max(1.0, change);
+  const double limit = state_.options.advanced.largest_move * std::max(1.0, change);
   if (length <= limit) return Status::success;
   message_ = "the move of sensitivity " + std::to_string(k) + " onto C s + dg/dp = 0 is " +
              brief(length) + " tolerances long, the limit is " + brief(limit) +
@@ -330,7 +330,7 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
     if (length <= std::max(kOnTangent, floor)) return Status::success;
     engaged_ = true;
   }
-  if (length > state_.options.largest_move)
+  if (length > state_.options.advanced.largest_move)
     for (int k = 0; k < count(); ++k) {
       N_Vector w = vectors_of(candidate.weights)[k];
       status = too_long(candidate, k, N_VWrmsNorm(ds_[static_cast<std::size_t>(k)], w));

@@ -45,7 +45,6 @@ bool others_are_silent(const std::vector<char>& filled, const ColumnSearch::Prob
 std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& corrector,
                                        double cj) {
   if (candidate.base_entries == nullptr) return "vectors without contiguous memory";
-  if (options_.derive_id_limit == 0) return "Options::derive_id_limit is 0";
   const int size = static_cast<int>(N_VGetLength(candidate.base));
   using Near = NearbyResiduals;
   Near small(candidate, corrector, statistics_, Near::irregular_changes(candidate, cj, 1.0)),
@@ -58,7 +57,7 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
     return answered;
   };
   std::vector<char> filled;
-  const long most = 4L * options_.derive_id_limit;
+  constexpr long most = 4L * kLargestAsked;
   const auto search = [&](long probes) {
     return ColumnSearch(size, size, probe, probes).run(&filled);
   };
@@ -73,7 +72,7 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
   }
   if (outcome == ColumnSearch::Outcome::refused) return "F could not be evaluated at other y'";
   if (outcome != ColumnSearch::Outcome::found)
-    return "that takes more evaluations of F than 4 times Options::derive_id_limit";
+    return "that takes more than " + std::to_string(most) + " evaluations of F";
   OwnedVector id(candidate.base);
   for (std::size_t j = 0; j < filled.size(); ++j) N_VGetArrayPointer(id)[j] = filled[j] ? 1.0 : 0.0;
   set(id);

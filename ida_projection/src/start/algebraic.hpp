@@ -11,12 +11,14 @@
 
 namespace tether::ida_projection {
 
+/// Unknowns up to which F is asked about each of them.
+constexpr int kLargestAsked = 2000;
+
 /// The id vector of IDA (1 differential, 0 algebraic), the caller's or derived from F, and whether
 /// F is of index 1 in its own variables.
 class AlgebraicVariables {
  public:
-  AlgebraicVariables(const Options& options, Statistics& statistics)
-      : options_(options), statistics_(statistics) {}
+  explicit AlgebraicVariables(Statistics& statistics) : statistics_(statistics) {}
 
   void set(N_Vector id);
   /// From F itself at the candidate, on contiguous vectors; empty, or why it cannot be had.
@@ -81,7 +83,6 @@ class AlgebraicVariables {
     std::string doubts;
   };
 
-  const Options& options_;
   Statistics& statistics_;
   OwnedVector id_;
   bool any_ = false, all_ = false;

@@ -58,7 +58,7 @@ std::vector<int> AlgebraicVariables::with_derivative(const Candidate& candidate,
     near.notices(algebraic, NearbyResiduals::Of::rates, noticed);
   }
   if (std::count(noticed.begin(), noticed.end(), 1) == 0) return {};
-  AlgebraicVariables derived(options_, statistics_);
+  AlgebraicVariables derived(statistics_);
   std::vector<int> moving;
   if (!derived.derive(candidate, corrector, cj).empty()) return moving;
   std::copy_if(algebraic.begin(), algebraic.end(), std::back_inserter(moving),

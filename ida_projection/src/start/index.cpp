@@ -14,7 +14,7 @@ namespace {
 
 // Unknowns. Beyond the first size the look would be felt, except where each Jacobian of IDA takes
 // as many evaluations as there are unknowns, and dense factors: it costs two of these.
-constexpr int kLargestSize = 200, kLargestDense = 2000;
+constexpr int kLargestSize = 200, kLargestDense = kLargestAsked;
 constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
 
 }  // namespace

@@ -14,10 +14,10 @@ void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hol
   if (has_values(constraints_)) return project_values(t, y, hold, id, weights, report);
   if (!mover_) {
     options_ = given_;
-    options_.metric = Metric::error_weights;
-    options_.largest_move = 1e300;
-    options_.maximum_iterations = 50;
-    options_.tolerance = 1e-8;
+    options_.advanced.metric = Metric::error_weights;
+    options_.advanced.largest_move = 1e300;
+    options_.advanced.maximum_iterations = 50;
+    options_.advanced.tolerance = 1e-8;
     mover_ = make_vector_mover(constraints_, options_, statistics_, y);
   }
   OwnedVector correction(y);

@@ -14,7 +14,6 @@ class Foretold {
     beyond_ = OwnedVector(like);
     work_ = OwnedVector(like);
   }
-  bool allocated() const { return static_cast<bool>(beyond_); }
   void forget() { cj_ = 0.0; }
   /// New factors, made for this cj.
   void renewed(double cj) {

@@ -23,7 +23,7 @@ namespace tether::ida_projection {
 class OrderLimit {
  public:
   OrderLimit(void* ida_mem, const Options& options)
-      : ida_mem_(ida_mem), wanted_(options.limit_order) {}
+      : ida_mem_(ida_mem), wanted_(options.advanced.limit_order) {}
 
   /// Stiff components have answered to moves: oscillations are likely, and looked for at smaller r.
   void expect_oscillations() { stiff_ = true; }

@@ -48,7 +48,7 @@ void Polish::allocate(N_Vector like, bool contiguous) {
 
 bool Polish::wanted(double length, bool smoothing) const {
   if (!corrector_.solves() || iterative_) return false;
-  if (options_.extra_iterations == 0) return variables_.any() && options_.refresh_algebraic;
+  if (options_.advanced.polish == Polished::none) return false;
   // After two iterations of its own the corrector leaves nothing worth another one, unless the move
   // asks for an answer of the algebraic variables. Whether it made them varies from run to run,
   // which smooth step sizes are not meant to, unless they are there for multipliers of index 2:
@@ -137,14 +137,14 @@ bool Polish::add_newton_step(const Candidate& candidate, double cj, double toler
     ++statistics_.residual_evaluations;
   }
   step_known_ = false;
-  iterations_ = 1;
+  ++iterations_;
 
   const double algebraic = algebraic_factor(cj);
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
   const double length = differential_length(candidate, delta_);
   corrector_was_right_ = length <= kMisled * tolerance;
   if (!asked) look_at_pattern(candidate, cj);
-  const bool differential = options_.extra_iterations > 0 && length <= 10.0 * tolerance;
+  const bool differential = length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (variables_.any() && algebraic > 0.0) ++statistics_.refreshes;
@@ -153,9 +153,7 @@ bool Polish::add_newton_step(const Candidate& candidate, double cj, double toler
 
 void Polish::look_at_pattern(const Candidate& candidate, double cj) {
   if (!may_foretell_) return;
-  const bool tells = !variables_.any() && options_.extra_iterations > 0;
-  if (!tells || corrector_.iterations() != 1) return foretold_.forget();
-  if (!foretold_.allocated()) foretold_.allocate(delta_);
+  if (variables_.any() || corrector_.iterations() != 1) return foretold_.forget();
   if (contiguous_)
     foretold_.learn(candidate.weight_entries, corrected_entries_, delta_entries_, size_, cj);
   else

@@ -27,7 +27,10 @@ class Polish {
   }
   void corrector_failed() { foretold_.doubt(); }
   /// Corrections are those of one vector, each of them polished.
-  void may_foretell() { may_foretell_ = true; }
+  void may_foretell() {
+    may_foretell_ = true;
+    foretold_.allocate(delta_);
+  }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
   /// For the iteration of sensitivities, which has the same linear solver.
   void follow(const Polish& other) {
@@ -59,7 +62,7 @@ class Polish {
   /// equations contain y'; algebraic ones take the plain solution.
   double algebraic_factor(double cj) const {
     const double plain = cj_at_setup_ != 0.0 ? 0.5 * (1.0 + cj / cj_at_setup_) : 1.0;
-    return options_.refresh_algebraic ? plain : 0.0;
+    return options_.advanced.polish == Polished::all ? plain : 0.0;
   }
   /// Before the move: keeps the corrector's ycor.
   void keep(const Candidate& candidate);

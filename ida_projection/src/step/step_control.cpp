@@ -117,7 +117,7 @@ bool StepControl::in_trouble(long steps) const {
 }
 
 void StepControl::begin_smoothing(const Care& care) {
-  if (smoother_.on() || !options_.smooth_where_needed) return;
+  if (smoother_.on() || !options_.advanced.smooth_where_needed) return;
   smoother_.begin(care);
   ++statistics_.smoothing_begun;
 }

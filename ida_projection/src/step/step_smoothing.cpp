@@ -21,6 +21,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kFilter = 4.0;     // b
+constexpr double kSetpoint = 4.0;   // errors are steered to its inverse of what is allowed
 constexpr double kFar = 0.5;        // of the setpoint
 constexpr double kOfOrder = 1.348;  // setpoints of neighbouring orders: 6^(1/6)
 
@@ -32,9 +33,8 @@ constexpr double kLowestFixed = 1.0, kHighestFixed = 2.0, kLargest = 2.0, kLow =
 StepSmoother::StepSmoother(void* ida_mem, const Options& options)
     : ida_mem_(ida_mem),
       wanted_(options.step_smoothing),
-      setpoint_(options.smoothing_setpoint),
-      max_step_(options.maximum_step),
-      max_order_(options.maximum_order) {}
+      max_step_(options.advanced.maximum_step),
+      max_order_(options.advanced.maximum_order) {}
 
 void StepSmoother::reset() {
   const bool was_on = on_;
@@ -91,7 +91,7 @@ void StepSmoother::attempt_was_accepted() {
 // runs stay.
 double StepSmoother::setpoint(int order) const {
   const double graded = care_.most * std::pow(kOfOrder, order - max_order_);
-  return setpoint_ * std::max(graded, std::min(care_.least, care_.most));
+  return kSetpoint * std::max(graded, std::min(care_.least, care_.most));
 }
 
 double StepSmoother::filter(double log_c, int order) const {

@@ -9,7 +9,7 @@ namespace tether::ida_projection {
 /// A bound of IDASetEtaFixedStepBounds that no ratio of steps reaches: keep h.
 constexpr double kAnyRatio = 1e30;
 
-/// Factors of Options::smoothing_setpoint: at the largest order, and what is left of it at least
+/// Factors of the setpoint s: at the largest order, and what is left of it at least
 /// below that, see StepSmoother::setpoint().
 struct Care {
   double most = 1.0, least = 1.0;
@@ -35,7 +35,7 @@ class StepSmoother {
   /// Before the first step: on only if Options::step_smoothing says so.
   void reset();
   /// From here on, in the middle of a run; leaves IDASetMaxStep alone, which the host may have
-  /// used. The setpoint is `care.most` times Options::smoothing_setpoint.
+  /// used. The setpoint is `care.most` times the usual one.
   void begin(const Care& care) {
     on_ = true;
     known_to_ida_ = false;
@@ -73,7 +73,7 @@ class StepSmoother {
   Settings set_;               // IDA has these
   bool known_to_ida_ = false;  // if so
   bool wanted_, on_ = false, owns_max_step_ = false;
-  double setpoint_, max_step_;
+  double max_step_;
   Care care_;
   int max_order_;
 

@@ -82,6 +82,7 @@ void FirstSteps::allocate(const Candidate& candidate) {
   for (std::vector<double>* each : {&point_, &slope_, &moved_, &kept_point_, &kept_slope_})
     each->resize(n);
   values_.resize(changes_.size());
+  evaluator_.reserve(static_cast<int>(n));
   for (OwnedVector* each : {&work_, &base_, &ycor_})
     if (!*each) *each = OwnedVector(candidate.base);
 }

@@ -69,7 +69,7 @@ int Report::caught(Status outcome, const char* text) noexcept {
 
 // Once: IDA reports the failure of the run by itself.
 void Report::print_fatal(const char* text) noexcept {
-  if (!options_.print_fatal || printed_) return;
+  if (!options_.print || printed_) return;
   printed_ = true;
   std::fprintf(stderr, "tether: %s: %s\n", to_string(status), text);
 }
@@ -100,7 +100,7 @@ void Report::warn(Status kind, const std::string& text, const std::string& said)
 }
 
 void Report::say(const std::string& text) const {
-  if (options_.print_warnings) std::fprintf(stderr, "tether: %s\n", text.c_str());
+  if (options_.print) std::fprintf(stderr, "tether: %s\n", text.c_str());
 }
 
 void Report::reset() {

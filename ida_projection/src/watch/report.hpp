@@ -33,7 +33,7 @@ class Report {
   /// The reason why IDA rejects most steps, or results are doubtful; `said`: on stderr.
   void warn(Status kind, const std::string& text, const std::string& said);
   void warn(Status kind, const std::string& text) { warn(kind, text, text); }
-  /// On stderr, where Options::print_warnings allows it.
+  /// On stderr, where Options::print allows it.
   void say(const std::string& text) const;
   /// A new run starts.
   void reset();

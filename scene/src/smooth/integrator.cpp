@@ -81,14 +81,16 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     ida_projection::Options projection;
     // Close to dead points F answers to any move, without being stiff: no other metric is to be
     // tried.
-    projection.metric = ida_projection::Metric::local_correction;
+    projection.advanced.metric = ida_projection::Metric::local_correction;
     // Errors then follow the tolerance; by IDA's own rule one tolerance in ten ends twenty times
     // worse than its neighbours where dead points magnify errors.
     projection.step_smoothing = true;
     // Without its refresh the noise of index 1's multipliers grows until Newton fails. Those of
     // index 2 scale with cj, as IDA's own factor does: the refresh with old factors makes errors at
     // tight tolerances up to thirty times larger.
-    projection.refresh_algebraic = options.formulation == Formulation::index1;
+    projection.advanced.polish = options.formulation == Formulation::index1
+                                     ? ida_projection::Polished::all
+                                     : ida_projection::Polished::differential;
     projection.progress = [this](const ida_projection::Progress&) {
       if (system_.look_at_rows()) session_->projection()->rows_changed();
     };

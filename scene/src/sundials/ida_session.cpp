@@ -55,12 +55,11 @@ void IdaSession::use(SUNLinearSolver solver, SUNMatrix matrix, IDALsJacFn jacobi
 void IdaSession::project(const ida_projection::Constraints& constraints,
                          ida_projection::Options options) {
   options.id = id_.get();
-  options.print_fatal = false;
-  options.print_warnings = false;
+  options.print = false;
   // A move that no smaller step makes shorter is part of what IDA's error test judges: rows that
   // come back behind a dead point, what an event left.
-  options.long_move = ida_projection::LongMove::cap;
-  options.maximum_step = max_step_;
+  options.advanced.long_move = ida_projection::LongMove::cap;
+  options.advanced.maximum_step = max_step_;
   projection_.emplace(ida_, constraints, options);
 }
 

@@ -35,6 +35,13 @@ enum class LongMove {
            ///< distance left exceeds both one tolerance and that left by the step before
 };
 
+/// What the polish, the Newton iteration on F at the moved point, changes.
+enum class Polished {
+  all,           ///< algebraic variables answer to the move, and what IDA's test left is removed
+  differential,  ///< the second alone
+  none,          ///< no F is evaluated for it
+};
+
 /// One report of the progress callback.
 struct Progress {
   double t = 0.0;      ///< time of the step that was just corrected
@@ -45,15 +52,15 @@ struct Progress {
   long steps = 0;      ///< accepted steps so far
 };
 
-/// Settings of the projection. "Tolerances" below are units of the error test: the WRMS norm
+/// Settings that few programs need. "Tolerances" are units of the error test: the WRMS norm
 /// sqrt(sum (dy_i / WT_i)^2 / N) with WT_i = rtol |y_i| + atol_i, in which IDA accepts about 1.
-struct Options {
+struct Advanced {
   Metric metric = Metric::automatic;
 
   /// Estimated distance left to the constraints is at most this many tolerances; > 0.
   double tolerance = 1e-4;
 
-  /// Newton moves at most in one step; >= 1.
+  /// Newton moves at most in one step; >= 1. Quadratic convergence takes three.
   int maximum_iterations = 5;
 
   /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in
@@ -61,45 +68,18 @@ struct Options {
   double largest_move = 10.0;
   LongMove long_move = LongMove::reject;
 
-  /// IDA's id vector: 1 differential, 0 algebraic. Copied at attach. Null: derived at the first
-  /// step from the columns of dF/dy' that are exactly zero (contiguous vectors). Where few
-  /// equations share a derivative that takes about 2 log2(N) evaluations of F for each derivative
-  /// in an equation, at most 4 derive_id_limit (0: not derived); Projection::message() tells when
-  /// it cannot be derived.
-  N_Vector id = nullptr;
-  int derive_id_limit = 2000;
-
-  /// Keep algebraic variables of index 2 or more, as multipliers, out of IDA's error test: that of
-  /// the differential ones controls what they do. Statistics::untested counts them. Their values
-  /// between steps have no tolerance; false keeps it. Variables of index 1 stay in the test; the
-  /// tolerance of those that differential variables depend on grows by what moves change them by
-  /// (IDAGetErrWeights shows it). By IDASetId and IDASetSuppressAlg; IDAReInit takes them back
-  /// where `id` is derived. On other than serial vectors F cannot be asked which are which: call
-  /// IDASetSuppressAlg for forms of index 2 there.
-  bool suppress_algebraic = true;
-
-  /// After a move, the algebraic variables follow by one Newton iteration on F at the moved point
-  /// (one F, one back substitution with IDA's own factors).
-  bool refresh_algebraic = true;
-
-  /// 1: that iteration also removes the part of the correction in the differential variables that
-  /// IDA's convergence test left; 0: it does not. Both are skipped in steps where IDA itself made
+  /// One F and one back substitution with IDA's own factors; skipped in steps where IDA itself made
   /// two iterations, unless there are algebraic variables and the move was longer than a tenth of a
   /// tolerance.
-  int extra_iterations = 1;
+  Polished polish = Polished::all;
 
-  /// Choose step sizes with Soederlind's filter H211b instead of IDA's rule "keep h until it can be
-  /// doubled": end errors and step counts then vary smoothly with the tolerance. Error estimates
-  /// are steered to 1 / smoothing_setpoint of what the error test allows (> 0; formulas and limits:
-  /// docs/method/projection.md). Owns IDA's IDASetEta... settings and IDASetMaxStep: give the
-  /// longest step here (0: none), and IDASetMaxOrd's order, if it was called.
-  bool step_smoothing = false;
-  /// Begin step_smoothing during the run where IDA's own rule is known to harm: F is not of index 1
-  /// in its own variables (tested once in serial vectors; above 200 unknowns by equations of F that
-  /// contain neither y' nor algebraic variables), or ten steps in a row had a failed error test.
-  /// IDASetMaxStep is not used then.
+  /// Begin Options::step_smoothing during the run where IDA's own rule is known to harm: F is not
+  /// of index 1 in its own variables (tested once in serial vectors; above 200 unknowns by
+  /// equations of F that contain neither y' nor algebraic variables), or ten steps in a row had a
+  /// failed error test. IDASetMaxStep is not used then.
   bool smooth_where_needed = true;
-  double smoothing_setpoint = 4.0;
+  /// What step_smoothing keeps to, since it owns IDASetMaxStep: the longest step (0: none), and
+  /// IDASetMaxOrd's order, if it was called.
   double maximum_step = 0.0;
   int maximum_order = 5;
 
@@ -110,10 +90,36 @@ struct Options {
   /// order.
   bool limit_order = true;
 
-  /// Components that a move must not change: true = held. Empty, or one entry for each unknown
-  /// (serial vectors). For other vectors use `hold_vector`: 1 free, 0 held.
-  std::vector<bool> hold;
+  /// Options::hold for vectors of any kind: 1 free, 0 held. Copied at attach where contiguous.
   N_Vector hold_vector = nullptr;
+};
+
+/// Settings of the projection.
+struct Options {
+  /// IDA's id vector: 1 differential, 0 algebraic. Copied at attach. Null: derived at the first
+  /// step from the columns of dF/dy' that are exactly zero (contiguous vectors), with about
+  /// 2 log2(N) evaluations of F for each derivative in an equation, 8000 at most;
+  /// Projection::message() tells when it cannot be derived.
+  N_Vector id = nullptr;
+
+  /// Keep algebraic variables of index 2 or more, as multipliers, out of IDA's error test: that of
+  /// the differential ones controls what they do. Statistics::untested counts them. Their values
+  /// between steps have no tolerance; false keeps it. Variables of index 1 stay in the test; the
+  /// tolerance of those that differential variables depend on grows by what moves change them by
+  /// (IDAGetErrWeights shows it). By IDASetId and IDASetSuppressAlg; IDAReInit takes them back
+  /// where `id` is derived. On other than serial vectors F cannot be asked which are which: call
+  /// IDASetSuppressAlg for forms of index 2 there.
+  bool suppress_algebraic = true;
+
+  /// Choose step sizes with Soederlind's filter H211b instead of IDA's rule "keep h until it can be
+  /// doubled": end errors and step counts then vary smoothly with the tolerance. Error estimates
+  /// are steered to a quarter of what the error test allows (docs/method/projection.md). Owns IDA's
+  /// IDASetEta... settings and IDASetMaxStep.
+  bool step_smoothing = false;
+
+  /// Components that a move must not change: true = held. Empty, or one entry for each unknown
+  /// (serial vectors; see Advanced::hold_vector for others).
+  std::vector<bool> hold;
 
   /// Groups of components that share one scale in Metric::local_correction (rms over the group,
   /// in tolerances): group[i] >= 0 is the group of component i, -1 none. Keeps symmetries, such as
@@ -125,15 +131,14 @@ struct Options {
   /// host afterwards.
   SUNNonlinearSolver nonlinear_solver = nullptr;
 
-  /// Print the message of a failure that ends the run to stderr, once.
-  bool print_fatal = true;
+  /// Print to stderr, once each: the message of a failure that ends the run, and the cause found
+  /// where IDA rejects most steps, or one step repeatedly, or results are doubtful.
+  bool print = true;
 
-  /// Print once to stderr the cause found where IDA rejects most steps, or one step repeatedly.
-  bool print_warnings = true;
-
-  /// Called after every `progress_interval`-th accepted step; must not throw.
+  /// Called after every accepted step; must not throw.
   std::function<void(const Progress&)> progress;
-  int progress_interval = 1;
+
+  Advanced advanced;
 };
 
 }  // namespace tether::ida_projection

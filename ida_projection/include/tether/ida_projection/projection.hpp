@@ -85,7 +85,7 @@ struct Consistency {
 /// IDASolve without it fails (IDA_NLS_FAIL, before the first step IDA_NLS_INIT_FAIL).
 /// A nonlinear solver that the host attaches later replaces it silently. status(), message(),
 /// statistics(), IDAFree and the destructor therefore compare IDA's steps with the calls that the
-/// plugin has had; a difference is printed once to stderr (Options::print_warnings).
+/// plugin has had; a difference is printed once to stderr (Options::print).
 ///
 /// One call to add, after IDAInit and before IDACalcIC and the first IDASolve:
 ///

@@ -19,7 +19,7 @@ struct Statistics {
   long jacobian_evaluations = 0;  ///< C, however formed
   long joint_evaluations = 0;     ///< of both: g and C by one call, where rows have such a function
   long factorizations = 0;
-  long refactorizations = 0;  ///< of more than 16 rows, where an earlier one had told which count
+  long refactorizations = 0;  ///< of the rows that an earlier one has kept
   long extra_iterations = 0;  ///< corrector iterations added
   long corrections_repeated =
       0;               ///< corrections redone with fresh factors: the old ones misled IDA

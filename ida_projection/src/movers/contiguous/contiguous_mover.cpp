@@ -20,12 +20,8 @@ constexpr int kQuick = 3;        // moves with a whole C
 
 template <class Rows>
 Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector id) {
-  // Which of many rows are independent costs some ten steps: what a look before the first move has
-  // found out about them stays right where no variable is algebraic.
-  if (takes_rest_ && id == nullptr && looked_at_all_) return Status::success;
   rows_.at.load(candidate);
   const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
-  looked_at_all_ = false;
   return rows_.structure(candidate, mask);
 }
 
@@ -76,7 +72,6 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   if (!rows_.blocks.structured()) {
     result.status = rows_.structure(candidate, nullptr);
     if (result.status != Status::success) return result;
-    looked_at_all_ = true;
   }
   const bool may_do = rows_.factors.there && looks_ < kLooks;  // with g alone
   result.status = may_do ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
@@ -86,7 +81,6 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
   looks_ = 0;
   rows_.set_metric(true);
   rows_.factors.decided = false;
-  if (!takes_rest_) rows_.factors.lasting = false;
   if ((result.status = factor(candidate.t)) != Status::success) return result;
   if (rows_.rounding_only()) return result;
   result.length = first_solve();
@@ -105,7 +99,7 @@ Move ContiguousMover<Rows>::measure(const Candidate& candidate) {
 // Only a long move can be too long: the limit is at least largest_move.
 template <class Rows>
 bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
-  if (length <= options_.largest_move) return false;
+  if (length <= options_.advanced.largest_move) return false;
   double sum = 0.0;
   const auto add = [&](const auto& block) {
     block.for_columns([&](int, int j) {
@@ -115,7 +109,7 @@ bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
   };
   add(rows_.blocks.d);
   if (rows_.levels_split()) add(rows_.blocks.a);
-  limit = options_.largest_move * std::max(1.0, rows_.wrms(sum));
+  limit = options_.advanced.largest_move * std::max(1.0, rows_.wrms(sum));
   return !(length <= limit);
 }
 
@@ -148,7 +142,6 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   rows_.factors.decided = false;
   result.status = reused_ ? rows_.value(candidate.t) : rows_.value_with_rows(candidate.t);
   if (result.status != Status::success) return result;
-  leave_rounding_out();
   start_known_ = false;
   looks_ = 0;
   if (quick_move(candidate, result)) return result;
@@ -184,7 +177,7 @@ bool ContiguousMover<Rows>::quick_move(const Candidate& candidate, Move& result)
   }
   kept_ = {kUnknownSlope, 0};
   monitor_.start();
-  if (!(length <= options_.largest_move) || !monitor_.plainly_done(length)) {
+  if (!(length <= options_.advanced.largest_move) || !monitor_.plainly_done(length)) {
     result = newton(candidate, drift, &length);
     return false;
   }
@@ -257,7 +250,7 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
       result.length = move_length_ = length;
       double limit = 0.0;
       if (!std::isfinite(length) || too_long(length, limit)) {
-        if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
+        if (options_.advanced.long_move == LongMove::reject || !std::isfinite(length)) {
           result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
           message_ = "the move onto the constraints is " + brief(length) +
                      " tolerances long, the limit is " + brief(limit) +

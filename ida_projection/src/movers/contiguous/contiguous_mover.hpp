@@ -17,10 +17,9 @@ namespace tether::ida_projection {
 constexpr double kLargestFloor = 0.1;  // tolerances
 // A move leaves this part where nothing is known yet.
 constexpr double kUnknownSlope = 0.03;
-constexpr double kLong = 1.0;          // tolerances: such a move is made with fresh factors
-constexpr double kNothing = 1e-8;      // tolerances: as good as no move
-constexpr double kBarelyMoved = 1e-4;  // tolerances: rounding of g may be a part of such a move
-constexpr int kLevelsJoined = 16;      // moves, after one that has failed
+constexpr double kLong = 1.0;      // tolerances: such a move is made with fresh factors
+constexpr double kNothing = 1e-8;  // tolerances: as good as no move
+constexpr int kLevelsJoined = 16;  // moves, after one that has failed
 
 /// Factors of an earlier step leave the part slope * age of a move, age in candidates.
 struct SlopeOfFactors {
@@ -38,8 +37,6 @@ class ContiguousMover final : public Mover {
       : options_(options),
         monitor_(options),
         rows_(constraints, options, statistics, size, reported, message_),
-        keeps_factors_(Rows::keeps_factors(rows_.count())),
-        takes_rest_(Rows::many(rows_.count())),
         start_(static_cast<std::size_t>(size), 0.0) {}
 
   Move measure(const Candidate& candidate) override;
@@ -87,17 +84,12 @@ class ContiguousMover final : public Mover {
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
   bool may_polish_first(double longest) const override {
-    const FactorState& at_hand = rows_.factors;
-    // Old factors leave more of what dropped rows ask for.
-    const bool good = takes_rest_ || (keeps_factors_ && !rows_.blocks.dropped_rows());
-    return good && at_hand.lasting && at_hand.there && move_length_ <= std::min(longest, kLong);
+    return rows_.factors.lasting && rows_.factors.there && move_length_ <= std::min(longest, kLong);
   }
   Status finish(const Candidate& candidate, bool polished) override {
-    if (still_) return Status::success;
-    // Newton's method goes on where a move costs little beside the step.
-    if (takes_rest_) return take_rest(candidate, move_length_);
-    if (!keeps_factors()) return Status::success;
-    const bool unseen = move_length_ > kSafe * options_.tolerance || !rows_.dropped_follow();
+    if (still_ || !keeps_factors()) return Status::success;
+    const bool unseen =
+        move_length_ > kSafe * options_.advanced.tolerance || !rows_.dropped_follow();
     return unseen ? take_back(candidate, polished ? by_present_factors_ : -1.0) : Status::success;
   }
   void reset() override {
@@ -105,9 +97,8 @@ class ContiguousMover final : public Mover {
     monitor_.reset();
     staleness_.reset();
     nothing_in_row_ = 0;
-    still_ = looked_at_all_ = false;
+    still_ = false;
     move_length_ = 0.0;
-    begins_ = true;
     levels_joined_ = 0;
     levels_joined_next_ = kLevelsJoined;
   }
@@ -115,7 +106,7 @@ class ContiguousMover final : public Mover {
  private:
   void doubt_levels(Status status);
   bool keeps_factors() const {
-    return in_use(Mechanism::kept_factors) && keeps_factors_ && rows_.factors.lasting;
+    return in_use(Mechanism::kept_factors) && Rows::kKeepsFactors && rows_.factors.lasting;
   }
   Status take_back(const Candidate& candidate, double previous);
   Status take_rest(const Candidate& candidate, double reach);
@@ -123,14 +114,6 @@ class ContiguousMover final : public Mover {
     const Status status = rows_.factor(t);
     if (status == Status::success) kept_ = {kUnknownSlope, 0};
     return status;
-  }
-  // In the first steps IDA chooses the order by errors that are as short as moves which answer the
-  // rounding of many rows: these would keep a run at order 1 until h is long. Later on a dead point
-  // is passed by what such moves are of rows that are about to depend on each other.
-  void leave_rounding_out() {
-    begins_ = begins_ && move_length_ <= kBarelyMoved;
-    if (in_use(Mechanism::rounding_left_out) && keeps_factors_ && begins_)
-      rows_.leave_rounding_out();
   }
   double first_solve() { return rows_.first_solve(); }
   bool contradicts();
@@ -147,13 +130,9 @@ class ContiguousMover final : public Mover {
   FactoredRows<Rows> rows_;
   int levels_joined_ = 0;  // for so many moves
   int levels_joined_next_ = kLevelsJoined;
-  bool keeps_factors_;         // over several steps
-  bool takes_rest_;            // what Newton's method leaves
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;
-  bool looked_at_all_ = false;  // the rows are arranged as if all variables were differential
-  double move_length_ = 0.0;    // of the last first move, in tolerances
-  bool begins_ = true;          // none was longer than kBarelyMoved
+  double move_length_ = 0.0;  // of the last first move, in tolerances
   // Length of the last move, if the factors at hand made it; < 0: others did.
   double by_present_factors_ = -1.0;
   bool reused_ = false;     // factors of an earlier step are in use for this one

@@ -7,8 +7,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-// This part of Options::tolerance is left where a move costs little beside the factors.
-constexpr double kCheapRest = 1e-4;
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
 constexpr double kWorn = 0.06, kSlow = 0.1;
@@ -37,26 +35,21 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
 template <class Rows>
 Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach) {
   const bool measure = staleness_.due(reach);
-  const double enough = (takes_rest_ ? kCheapRest : 1.0) * options_.tolerance;
+  const double enough = options_.advanced.tolerance;
   double previous = 0.0;
-  for (int k = 0; k < options_.maximum_iterations; ++k) {
+  for (int k = 0; k < options_.advanced.maximum_iterations; ++k) {
     const Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
     double length = rows_.solve();
-    const bool lost = takes_rest_ && !rows_.dropped_follow();
-    if (lost || (still_ && kept_.age > 0 && length > kNothing)) {
-      if (lost) rows_.factors.lasting = false;
-      if (still_) rows_.set_metric(true);
+    if (still_ && kept_.age > 0 && length > kNothing) {
+      rows_.set_metric(true);
       const Status made = factor(candidate.t);
       if (made != Status::success) return made;
       length = first_solve();
     }
     rows_.apply(1.0, candidate.correction_entries);
     if (still_ && kept_.age > 0) break;  // by next to nothing, which says nothing about its rate
-    // Only what is seen on this candidate counts where moves are cheap.
-    const double expected = takes_rest_ ? length * (k > 0 ? length / previous : kUnknownSlope)
-                                        : staleness_.left(reach, length);
-    const bool enough_done = (k > 0 || takes_rest_ || !measure) && expected <= enough;
+    const bool enough_done = (k > 0 || !measure) && staleness_.left(reach, length) <= enough;
     if (k == 0 && enough_done) break;
     const double floor = 1e2 * kEpsilon * rows_.at.size();
     const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
@@ -76,11 +69,10 @@ Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach
 template <class Rows>
 Status ContiguousMover<Rows>::take_back(const Candidate& candidate, double previous) {
   const double floor = 1e2 * kEpsilon * rows_.at.size();
-  const double done = std::max(floor, kSafe * options_.tolerance);
-  for (int k = 0; k <= options_.maximum_iterations; ++k) {
+  const double done = std::max(floor, kSafe * options_.advanced.tolerance);
+  for (int k = 0; k <= options_.advanced.maximum_iterations; ++k) {
     Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
-    leave_rounding_out();
     double length = rows_.solve();
     double part = previous > 0.0 && length > floor ? length / previous : 0.0;
     if (part > 0.0 && kept_.age > 0 && k > 0) kept_.slope = part / kept_.age;
@@ -103,8 +95,8 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate, double previ
     rows_.apply(1.0, candidate.correction_entries);
     // The first of two moves may have been left less of than what remains then would be.
     const double leaves = k > 0 ? part : std::max(part, kept_.rate());
-    if (follow &&
-        (length <= done || (part > 0.0 && leaves * length <= kSafe * options_.tolerance))) {
+    if (follow && (length <= done ||
+                   (part > 0.0 && leaves * length <= kSafe * options_.advanced.tolerance))) {
       if (k > 0 && part > kWorn) rows_.factors.there = false;
       return Status::success;
     }
@@ -112,7 +104,7 @@ Status ContiguousMover<Rows>::take_back(const Candidate& candidate, double previ
   }
   rows_.factors.there = false;
   if (previous <= std::min(kLargestFloor, rows_.rounding_length())) return Status::success;
-  message_ = "after " + std::to_string(options_.maximum_iterations) +
+  message_ = "after " + std::to_string(options_.advanced.maximum_iterations) +
              " moves with kept factors the next one still is " + brief(previous) +
              " tolerances long (Options::maximum_iterations)";
   return Status::not_converged;

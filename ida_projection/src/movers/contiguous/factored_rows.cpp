@@ -84,7 +84,7 @@ void FactoredRows<Rows>::join_levels() {
 template <class Rows>
 void FactoredRows<Rows>::look_for_rates() {
   const bool wanted = in_use(Mechanism::rate_limit) &&
-                      options_.metric == Metric::local_correction && at.knows_rates();
+                      options_.advanced.metric == Metric::local_correction && at.knows_rates();
   const bool early = factored_ <= kEarly && rate_looks_ < kLevelLooks;
   if (!wanted || metric.by_rates() || !early) return;
   ++rate_looks_;
@@ -157,7 +157,7 @@ Status FactoredRows<Rows>::factor(double t) {
   factors.there = false;
   if (known && blocks.factor_kept()) {
     factors.thin = false;
-    ++(Rows::many(count()) ? statistics_.refactorizations : statistics_.factorizations);
+    ++statistics_.refactorizations;
   } else if (!decide()) {
     message_ = "the constraint Jacobian C has an entry that is not finite at t = " + brief(t);
     return Status::not_finite;
@@ -184,7 +184,7 @@ Status FactoredRows<Rows>::quick_solve(double t, bool& solved, double& length) {
     metric.fill_few(at, d.first, columns, d.D());
     if (!blocks.factor_kept_few()) return Status::success;
     rows_known_ = factors.thin = factors.foreign = false;
-    ++statistics_.factorizations;
+    ++statistics_.refactorizations;
     ++statistics_.iterations;
     d.solver.solve(g_.data(), d.dy.data());
     const double *dy = d.dy.data(), *w = at.w + d.first;
@@ -279,19 +279,14 @@ bool FactoredRows<Rows>::rounding_only() const {
   return true;
 }
 
-template <class Rows>
-void FactoredRows<Rows>::leave_rounding_out() {
-  for (std::size_t i = 0; i < g_.size(); ++i)
-    if (only_rounding(i)) g_[i] = 0.0;
-}
-
 // Length of the move that the rounding of g asks for in the worst case, with the present factors:
 // at most sum_i |dy_i|, dy_i the move for row i alone. Where that would take many solves it is
 // bounded by sqrt(m sum_i |dy_i|^2), the sum of squares by moves for all rows with random signs.
 template <class Rows>
 double FactoredRows<Rows>::rounding_length() {
-  const std::vector<double> g = g_;
-  std::vector<double> rounding(g.size());
+  kept_g_ = g_;
+  const std::vector<double>& g = kept_g_;
+  std::vector<double>& rounding = rounding_;
   for (int i = 0; i < count(); ++i)
     rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks.terms(i, at.y.data());
   double total = 0.0;

@@ -45,6 +45,7 @@ class FactoredRows {
         reported_(reported >= 0 ? reported : evaluator.rows()),
         inverse_n_(1.0 / size) {
     g_.assign(static_cast<std::size_t>(evaluator.rows()), 0.0);
+    kept_g_ = rounding_ = g_;
   }
 
   Evaluator evaluator;
@@ -130,8 +131,6 @@ class FactoredRows {
   bool contradicts();
   double drift() const;
   bool rounding_only() const;
-  /// g_i = 0 where rounding explains it.
-  void leave_rounding_out();
   double rounding_length();
   void reset() {
     factors.there = false;
@@ -174,7 +173,8 @@ class FactoredRows {
   int reported_;  // the others are equations of F
   double inverse_n_;
   std::vector<double> g_;
-  bool rows_known_ = false;  // C belongs to the present y
+  std::vector<double> kept_g_, rounding_;  // work space of rounding_length()
+  bool rows_known_ = false;                // C belongs to the present y
   int factored_ = 0, rate_looks_ = 0;
   std::vector<int> found_levels_;
   bool levels_known_ = false;            // they are those of the rows as they are arranged
@@ -209,7 +209,7 @@ double FactoredRows<Rows>::left_of_dropped() {
 
 template <class Rows>
 bool FactoredRows<Rows>::dropped_follow() {
-  const double allowed = std::max(kSafe * options_.tolerance, 2.0 * usual_);
+  const double allowed = std::max(kSafe * options_.advanced.tolerance, 2.0 * usual_);
   const double left = left_of_dropped();
   if (factors.decided || left <= allowed) return true;
   return left <= 1e2 * kEpsilon * at.size();

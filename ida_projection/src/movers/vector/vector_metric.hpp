@@ -19,11 +19,12 @@ class VectorMetric {
 
   const OwnedVector& D() const { return D_; }
   const OwnedVector& WT() const { return WT_; }
-  bool local() const { return options_.metric == Metric::local_correction; }
+  bool local() const { return options_.advanced.metric == Metric::local_correction; }
 
   void free_all() {
     N_VConst(1.0, free_);
-    if (options_.hold_vector != nullptr) N_VScale(1.0, options_.hold_vector, free_);
+    if (options_.advanced.hold_vector != nullptr)
+      N_VScale(1.0, options_.advanced.hold_vector, free_);
   }
   /// Components that are zero in `id` do not move.
   void hold_all_but(N_Vector id) { N_VProd(free_, id, free_); }

@@ -51,6 +51,9 @@ class VectorMover final : public Mover {
 
   void expect_no_settle(bool none) override { no_settle_ = none; }
   void accept() override { metric_.accept(); }
+  bool may_polish_first(double longest) const override {
+    return factored_ && rows_.whole() && move_length_ <= std::min(longest, 1.0);
+  }
   bool metric(N_Vector D) const override {
     N_VScale(1.0, metric_.D(), D);
     return factored_;
@@ -119,12 +122,13 @@ class VectorMover final : public Mover {
     Move result;
     if (factors_last() && wear_.usable()) {
       load(candidate);
-      result = chord_moves(candidate, kShort, kSafe * options_.tolerance);
+      result = chord_moves(candidate, kShort, kSafe * options_.advanced.tolerance);
+      move_length_ = result.length;
       if (result.status == Status::success || fatal_) return result;
     }
     const double moved = result.length;
     result = newton(candidate);
-    result.length += moved;
+    move_length_ = result.length += moved;
     return result;
   }
 
@@ -184,12 +188,12 @@ class VectorMover final : public Mover {
       if (++result.moves == 1) {
         result.length = length;
         const double limit =
-            length <= options_.largest_move
-                ? options_.largest_move
-                : options_.largest_move *
+            length <= options_.advanced.largest_move
+                ? options_.advanced.largest_move
+                : options_.advanced.largest_move *
                       std::max(1.0, N_VWrmsNorm(candidate.correction, candidate.weights));
         if (!(length <= limit)) {
-          if (options_.long_move == LongMove::reject || !std::isfinite(length)) {
+          if (options_.advanced.long_move == LongMove::reject || !std::isfinite(length)) {
             result.status = std::isfinite(length) ? Status::move_too_long : Status::not_finite;
             message_ = "the move onto the constraints is " + brief(length) +
                        " tolerances long, the limit is " + brief(limit) +
@@ -208,8 +212,9 @@ class VectorMover final : public Mover {
       const double floor = std::min(0.1, 1e3 * kEpsilon * N_VWrmsNorm(y_, candidate.weights));
       const Monitor::Verdict verdict = monitor_.judge(length, fresh, floor);
       const double left = rows_.left() * length;  // by a solution that is not exact
-      if (verdict == Monitor::Verdict::done && left <= options_.tolerance) break;
-      if (verdict == Monitor::Verdict::failed || result.moves >= options_.maximum_iterations) {
+      if (verdict == Monitor::Verdict::done && left <= options_.advanced.tolerance) break;
+      if (verdict == Monitor::Verdict::failed ||
+          result.moves >= options_.advanced.maximum_iterations) {
         result.status = Status::not_converged;
         message_ = "move " + std::to_string(result.moves) + " onto the constraints still is " +
                    brief(length) + " tolerances long; check C";
@@ -284,6 +289,7 @@ class VectorMover final : public Mover {
   Rows rows_;
   FactorWear wear_;
   bool factored_ = false;
+  double move_length_ = 0.0;  // of the last move, in tolerances
   bool no_settle_ = false;
   N_Vector id_ = nullptr;         // the caller's of set_algebraic()
   bool holds_algebraic_ = false;  // no row has contained one so far
