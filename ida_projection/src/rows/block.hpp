@@ -87,7 +87,7 @@ LeftOfDropped most_left_of_dropped(const BlockOf<Solver>& block, int n, Norm in_
   return most;
 }
 
-/// What that row contradicts, for the caller.
+/// The rows that this one contradicts, for the caller.
 template <class Solver>
 Contradiction contradiction_of(const BlockOf<Solver>& block, const LeftOfDropped& left,
                                const Constraints& constraints) {

@@ -18,7 +18,7 @@ std::vector<double> some_tolerances_away(std::vector<double> y, const std::vecto
   return y;
 }
 
-// Of sparse rows the rank tolerance is the sine of the angle at which a row counts as dependent:
+// The rank tolerance of sparse rows is the sine of the angle at which a row counts as dependent:
 // its square is what A A^T tells from zero.
 template <class Solver>
 SplitRows<Solver>::SplitRows(const Constraints& constraints, const Evaluator& evaluator, int n)

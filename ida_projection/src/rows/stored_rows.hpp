@@ -77,7 +77,7 @@ class StoredRows {
   std::vector<int> columns_;    // of the entries of sparse rows, which come first
   std::vector<double> values_;  // C
   std::vector<char> seen_;      // not to be zero, or not to be constant
-  // Of full rows, while these are all:
+  // While all rows are full:
   linalg::FilledPlaces places_;
   bool by_places_, zero_elsewhere_ = false;
 };

@@ -35,7 +35,7 @@ enum class LongMove {
            ///< distance left exceeds both one tolerance and that left by the step before
 };
 
-/// What the polish, the Newton iteration on F at the moved point, changes.
+/// The parts of y that the polish, a Newton iteration on F beside the move, changes.
 enum class Polished {
   all,           ///< algebraic variables answer to the move, and what IDA's test left is removed
   differential,  ///< the second alone
@@ -78,7 +78,7 @@ struct Advanced {
   /// equations of F that contain neither y' nor algebraic variables), or ten steps in a row had a
   /// failed error test. IDASetMaxStep is not used then.
   bool smooth_where_needed = true;
-  /// What step_smoothing keeps to, since it owns IDASetMaxStep: the longest step (0: none), and
+  /// Limits for step_smoothing, which owns IDASetMaxStep: the longest step (0: none), and
   /// IDASetMaxOrd's order, if it was called.
   double maximum_step = 0.0;
   int maximum_order = 5;
