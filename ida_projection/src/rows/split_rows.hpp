@@ -92,7 +92,8 @@ class SplitRows {
   bool factor_kept();
   /// d.dy and a.dy for the values g, with the C that was factored.
   void solve(const std::vector<double>& g) { solve_to(g, kSolved); }
-  /// The same for sparse rows by one step with the regularised factors, where the next solve takes the rest.
+  /// The same for sparse rows by one step with the regularised factors, where the next solve takes
+  /// the rest.
   void solve_roughly(const std::vector<double>& g) { solve_to(g, 1.0); }
   /// The same as closely as they can be solved.
   void solve_closely(const std::vector<double>& g) {
