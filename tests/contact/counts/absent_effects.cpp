@@ -45,7 +45,9 @@ std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions&, LawU
   absent("rolling friction");
 }
 
-Restitution::Restitution(RestitutionLaw, const BodyOptions&) { absent("restitution"); }
+Restitution::Restitution(RestitutionLaw, const BodyOptions&, IslandMaker*, LawUse) {
+  absent("restitution");
+}
 void Restitution::choose(const Impacts&, const Impacts&, const std::vector<Strike>&, const BodySet&,
                          StepContacts&) {
   absent("restitution");
