@@ -45,7 +45,9 @@ std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions&, LawU
   absent("rolling friction");
 }
 
-Restitution::Restitution(RestitutionLaw, const BodyOptions&, IslandMaker*, LawUse) {
+Restitution::Restitution(RestitutionLaw, const BodyOptions& options, IslandMaker* maker,
+                         LawUse laws)
+    : solver_(options, maker, laws) {
   absent("restitution");
 }
 void Restitution::choose(const Impacts&, const Impacts&, const std::vector<Strike>&, const BodySet&,
