@@ -127,7 +127,8 @@ int main() {
   IDASetMaxNumSteps(ida_mem, 100000);
   tp::Projection projection(ida_mem, rows());
   Motion motion{&projection, point};
-  IDAAdjInit(ida_mem, 100, IDA_HERMITE);
+  // More steps than the run takes: no part of it is repeated from a checkpoint, see the guide.
+  IDAAdjInit(ida_mem, 20000, IDA_HERMITE);
   int which = 0, checkpoints = 0;
   sunrealtype t = 0.0;
   if (failed(IDASolveF(ida_mem, kEnd, &t, y, yp, IDA_NORMAL, &checkpoints), "IDASolveF")) return 1;

@@ -123,7 +123,8 @@ enum { TETHER_POLISH_ALL, TETHER_POLISH_DIFFERENTIAL, TETHER_POLISH_NONE };
 typedef void (*tether_progress_fn)(sunrealtype t, sunrealtype step, int order, sunrealtype drift,
                                    sunrealtype move, long steps, void* user_data);
 
-/* Fields as in tether::ida_projection::Options and Advanced; flags are 0 or 1. New fields come at the end. */
+/* Fields as in tether::ida_projection::Options and Advanced; flags are 0 or 1. New fields come at
+ * the end. */
 typedef struct {
   size_t size; /* sizeof(tether_options), see tether_options_init */
   int metric;  /* TETHER_METRIC_... */

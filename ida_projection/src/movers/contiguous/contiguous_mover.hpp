@@ -84,6 +84,8 @@ class ContiguousMover final : public Mover {
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
   bool may_polish_first(double longest) const override {
+    // Old factors leave more of what dropped rows ask for.
+    if (Rows::kKeepsFactors && rows_.blocks.dropped_rows()) return false;
     return rows_.factors.lasting && rows_.factors.there && move_length_ <= std::min(longest, kLong);
   }
   Status finish(const Candidate& candidate, bool polished) override {
