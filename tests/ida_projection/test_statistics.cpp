@@ -71,9 +71,8 @@ TEST_CASE("counts agree with each other") {
       CHECK(factored <= s.jacobian_evaluations);
       CHECK(s.iterations >= s.projections);
       CHECK(s.failures() == 0);
-      // Before a move, and after a long one.
-      CHECK(s.extra_iterations <= 2 * (s.projections + s.corrections_repeated));
-      CHECK(s.refreshes <= 2 * (s.projections + s.corrections_repeated));
+      CHECK(s.extra_iterations <= (s.projections + s.corrections_repeated));
+      CHECK(s.refreshes <= (s.projections + s.corrections_repeated));
       CHECK((s.refreshes > 0) == (std::string(form) == "index 1"));
       CHECK(s.largest_drift_before > 0.0);
       CHECK(s.largest_drift_after <= s.largest_drift_before);
@@ -107,7 +106,7 @@ TEST_CASE("rows that IDA keeps by itself are looked at, without C in most steps"
   const tp::Statistics moves = begun.projection().statistics();
   CHECK(moves.projections > 0);
   CHECK(moves.projections + moves.skipped >= begun.steps());
-  CHECK(moves.jacobian_evaluations < moves.skipped);
+  CHECK(moves.jacobian_evaluations < 3 * moves.skipped / 5);
 }
 
 TEST_CASE("rows that are the equations of F: that nothing joins them takes few evaluations") {

@@ -19,6 +19,7 @@ namespace {
 
 constexpr long kSampleEvery = 16;
 constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
+constexpr double kShortMove = 1.0;   // tolerances: after a longer one the move comes first
 
 }  // namespace
 
@@ -174,6 +175,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
     candidate.predicted_rate = N_VGetArrayPointer(step.yp_predicted);
   }
   const Candidate& at = candidate;
+  if (watch_.rejections.stands()) return end_standing(step.t);
   const bool false_row = watch_.first_steps.false_row_found();
   if (watch_.rejections.collapsed(false_row) && report_.warning() != Status::collapsed) {
     const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
@@ -251,8 +253,9 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 // The move takes back as well what an iteration before it has added: a solution less. Only where
 // nothing answers to moves: it would be left out.
 bool Projection::Impl::polishes_first() {
-  if (!in_use(Mechanism::polish_first) ||
-      !movers_.used->may_polish_first(polish_.longest_unanswered(control_.smoothing())))
+  const double longest = std::min(kShortMove, polish_.longest_unanswered(control_.smoothing()));
+  if (!in_use(Mechanism::polish_first) || !(attempts_.last_move <= longest) ||
+      !movers_.used->may_polish_first())
     return false;
   const bool silent = metric_choice_.calm() || !asks_for_metric();
   return silent && wants_polish(0.0);
@@ -282,7 +285,9 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (setups != attempts_.setups) polish_.note_setup(step.cj);
   attempts_.setups = setups;
   attempts_.repeated = steps == attempts_.steps;
-  watch_.rejections.count(attempts_.moved > kPartInTest, attempts_.repeated, attempts_.steps);
+  const bool advances = step.t + ida_.step_size() != step.t;
+  watch_.rejections.count(attempts_.moved > kPartInTest, attempts_.repeated, advances,
+                          attempts_.steps);
   attempts_.moved = std::numeric_limits<double>::infinity();
   if (!attempts_.repeated) control_.look_for_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {
@@ -307,6 +312,7 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
   s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
   s.largest_move = std::max(s.largest_move, move.length);
   tally_.move_sum += move.length;
+  attempts_.last_move = move.length;
   attempts_.pending = true;
   attempts_.moved = move.length;
   attempts_.left = move.left;

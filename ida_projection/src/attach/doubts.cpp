@@ -69,15 +69,28 @@ std::string Projection::Impl::too_high_index() const {
          "y' in their place, and give these equations as rows";
 }
 
+std::string Projection::Impl::rounding_of_multipliers() const {
+  return variables_.high_index()
+             ? "; in forms of index 2 or more multipliers carry rounding divided by the step, "
+               "which "
+               "may not allow this tolerance: try a larger one, or a form of index 1 or 0"
+             : "";
+}
+
+int Projection::Impl::end_standing(double t) {
+  report_.warn(Status::collapsed, "t stands at " + brief(t) +
+                                      ": steps are shorter than its rounding" +
+                                      rounding_of_multipliers());
+  return report_.end(Status::collapsed);
+}
+
 int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
   ++statistics_.corrector_failures;
   report_.status = Status::corrector_failed;
   if (flag > 0) control_.corrector_failed(run_.engaged);
   polish_.corrector_failed();
   if (variables_.high_index())
-    report_.message =
-        "IDA's corrector failed; in forms of index 2 or more multipliers carry rounding divided by "
-        "the step, which may not allow this tolerance: try a larger one, or a form of index 1 or 0";
+    report_.message = "IDA's corrector failed" + rounding_of_multipliers();
   if (variables_.high_index() && !run_.undetermined.empty())
     report_.message += "; " + run_.undetermined;
   const std::string index = too_high_index();

@@ -113,6 +113,7 @@ class Projection::Impl {
     long steps = -1, setups = -1;  // IDA's counts at the last attempt
     bool repeated = false;         // IDA rejected it
     double moved = 0.0;            // tolerances; infinity: no point was found
+    double last_move = 0.0;        // that was found, in tolerances
     bool pending = false;          // a projected one that is not yet judged
     // Lengths that capped moves lacked, in tolerances: in the last accepted step, and in this
     // attempt.
@@ -162,6 +163,8 @@ class Projection::Impl {
   void keep_point_before(const Candidate& candidate, OwnedVector& y);
   std::string undetermined_at(const Candidate& candidate, N_Vector y);
   std::string too_high_index() const;
+  std::string rounding_of_multipliers() const;
+  int end_standing(double t);
   int corrector_failed(const Candidate& candidate, int flag);
 
   // choose_metric.cpp

@@ -99,9 +99,9 @@ class Mover {
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 
-  /// May the correction be polished before the next move()? So it is where the rows that count are
-  /// known, and the last move was not longer than this, in tolerances.
-  virtual bool may_polish_first(double /*longest*/) const { return false; }
+  /// May the correction be polished before the next move()? Not where what the move leaves of that
+  /// would be too much.
+  virtual bool may_polish_first() const { return true; }
   /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
   virtual Status finish(const Candidate&, bool /*polished*/) { return Status::success; }
 

@@ -35,17 +35,18 @@ std::string large_tolerances(const Candidate& candidate) {
 }  // namespace
 
 void RejectionWatch::reset() {
-  moved_in_row_ = rejections_ = rejections_before_ = window_begin_ = refused_steps_ = 0;
+  moved_in_row_ = standing_ = rejections_ = rejections_before_ = window_begin_ = refused_steps_ = 0;
   rejected_in_step_ = collapsed_ = false;
 }
 
-void RejectionWatch::count(bool moved, bool repeated, long steps) {
+void RejectionWatch::count(bool moved, bool repeated, bool advances, long steps) {
   if (repeated) {
     ++rejections_;
     rejected_in_step_ |= moved;
     return;
   }
   moved_in_row_ = moved ? moved_in_row_ + 1 : 0;
+  standing_ = advances ? 0 : standing_ + 1;
   if (rejected_in_step_) ++refused_steps_;
   rejected_in_step_ = false;
   if (steps < window_begin_ + kWindow) return;

@@ -17,8 +17,10 @@ class RejectionWatch {
 
   void reset();  ///< a new run starts
   /// At each new attempt: was the last one rejected, and was its move long enough to fail the error
-  /// test? `steps`: accepted before it.
-  void count(bool moved, bool repeated, long steps);
+  /// test? Does t change with this one? `steps`: accepted before it.
+  void count(bool moved, bool repeated, bool advances, long steps);
+  /// Have many accepted steps been shorter than the rounding of t?
+  bool stands() const { return standing_ >= kMostStanding; }
   /// Were there rejections in most steps of a stretch, or such moves in every step of a longer one,
   /// by rows of which one is known to be false?
   bool collapsed(bool false_row) const {
@@ -39,8 +41,10 @@ class RejectionWatch {
 
   static constexpr long kMostMoved = 1000;  // accepted steps; order and h have settled by then
 
+  static constexpr long kMostStanding = 200;  // accepted steps: IDA would go on for ever
+
   const Constraints& constraints_;
-  long moved_in_row_ = 0;
+  long moved_in_row_ = 0, standing_ = 0;         // accepted steps
   long rejections_ = 0, rejections_before_ = 0;  // attempts that IDA repeated
   long window_begin_ = 0;                        // accepted steps when they were last looked at
   long refused_steps_ = 0;                       // of these, steps with a rejection

@@ -83,10 +83,9 @@ class ContiguousMover final : public Mover {
   bool solve_at(const Candidate& candidate, double* dy) override;
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
-  bool may_polish_first(double longest) const override {
-    // Old factors leave more of what dropped rows ask for.
-    if (Rows::kKeepsFactors && rows_.blocks.dropped_rows()) return false;
-    return rows_.factors.lasting && rows_.factors.there && move_length_ <= std::min(longest, kLong);
+  // Old factors leave more of what dropped rows ask for.
+  bool may_polish_first() const override {
+    return !Rows::kKeepsFactors || !rows_.blocks.dropped_rows();
   }
   Status finish(const Candidate& candidate, bool polished) override {
     if (still_ || !keeps_factors()) return Status::success;

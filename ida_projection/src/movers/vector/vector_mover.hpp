@@ -51,9 +51,6 @@ class VectorMover final : public Mover {
 
   void expect_no_settle(bool none) override { no_settle_ = none; }
   void accept() override { metric_.accept(); }
-  bool may_polish_first(double longest) const override {
-    return factored_ && rows_.whole() && move_length_ <= std::min(longest, 1.0);
-  }
   bool metric(N_Vector D) const override {
     N_VScale(1.0, metric_.D(), D);
     return factored_;
@@ -123,12 +120,11 @@ class VectorMover final : public Mover {
     if (factors_last() && wear_.usable()) {
       load(candidate);
       result = chord_moves(candidate, kShort, kSafe * options_.advanced.tolerance);
-      move_length_ = result.length;
       if (result.status == Status::success || fatal_) return result;
     }
     const double moved = result.length;
     result = newton(candidate);
-    move_length_ = result.length += moved;
+    result.length += moved;
     return result;
   }
 
@@ -289,7 +285,6 @@ class VectorMover final : public Mover {
   Rows rows_;
   FactorWear wear_;
   bool factored_ = false;
-  double move_length_ = 0.0;  // of the last move, in tolerances
   bool no_settle_ = false;
   N_Vector id_ = nullptr;         // the caller's of set_algebraic()
   bool holds_algebraic_ = false;  // no row has contained one so far
