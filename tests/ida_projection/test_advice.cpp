@@ -204,6 +204,23 @@ TEST_CASE("a squared row, whose gradient vanishes on the set, is suspected by na
   CHECK(contains(end.message, "double root"));
 }
 
+TEST_CASE("a run that stands still ends by name, after a bounded number of steps") {
+  // z = 1 / (1 - t) has no value at t = 1: IDA goes on there until z overflows.
+  const Problem problem = ode({1.0, 0.0, 1.0}, 2.0, [](double, const double* y, double* f) {
+    f[0] = -y[1];
+    f[1] = y[0];
+    f[2] = y[2] * y[2];
+  });
+  Host host(problem, 1e-6);
+  host.attach(on_circle());
+  int flag = 0;
+  while (flag >= 0 && host.steps() < 20000) flag = host.step();
+  CHECK(flag < 0);
+  CHECK(host.steps() <= 1500);
+  CHECK(host.projection().status() == tp::Status::collapsed);
+  CHECK(contains(host.projection().message(), "shorter than its rounding"));
+}
+
 TEST_CASE("a start off the constraints is explained once on stderr") {
   const Problem problem = swing(20.0);
   const Ended end = run(problem, 1e-8, problem.recommended_constraints(), 2000, {}, 0.3);

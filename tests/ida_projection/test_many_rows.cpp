@@ -88,10 +88,10 @@ TEST_CASE("many redundant rows: which ones count is found out a few times in a r
     CHECK(run.statistics.failures() == 0);
     CHECK(run.statistics.factorizations <= 8);  // also while nothing needs to be moved
     CHECK(run.statistics.jacobian_evaluations <= run.statistics.projections + 20);
-    // The polish comes before the move: one move is enough.
-    CHECK(run.statistics.iterations <= run.statistics.projections + 60);
-    CHECK(run.drift <= 3e-4 * tolerance + 1e-13);
-    CHECK(run.distance <= 0.1 * tp::Options().advanced.tolerance);
+    // The polish comes before the move: one move, and one for what it leaves.
+    CHECK(run.statistics.iterations <= 2 * run.statistics.projections + 40);
+    CHECK(run.drift <= 1e-6 * tolerance + 1e-13);
+    CHECK(run.distance <= 1e-2 * tp::Options().advanced.tolerance);
     CHECK(run.error <= 1.5 * plain.error);
     CHECK(static_cast<double>(run.steps) <= 1.1 * static_cast<double>(plain.steps));
   }

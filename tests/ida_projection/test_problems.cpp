@@ -55,9 +55,9 @@ TEST_CASE("pendulum against its exact motion") {
     check(p, rows, {1e-8, 4e-7, 7400, 1e-14});
   }
   const Problem index0 = pendulum(1.0, 1.0, 100.0, "index 0");
-  check(index0, index0.recommended_constraints(), {1e-6, 6e-6, 2800, 5e-13});
+  check(index0, index0.recommended_constraints(), {1e-6, 4e-6, 2800, 1e-14});
   const Problem seed = pendulum(1.1, 9.80665, 10.0, "index 1");
-  check(seed, seed.recommended_constraints(), {1e-8, 6e-8, 2400, 1e-13});
+  check(seed, seed.recommended_constraints(), {1e-8, 3e-8, 2400, 1e-13});
 }
 
 TEST_CASE("car axis against its reference") {
@@ -68,7 +68,7 @@ TEST_CASE("car axis against its reference") {
     check(p, rows, {1e-8, 1.5e-5, 4000, 2e-14});
   }
   const Problem p = car_axis("index 1");
-  check(p, p.recommended_constraints(), {1e-10, 3e-7, 5000, 1e-14});
+  check(p, p.recommended_constraints(), {1e-10, 3e-7, 4900, 1e-14});
 }
 
 TEST_CASE("Andrews' squeezer with its energy") {

@@ -218,15 +218,14 @@ TEST_CASE("IDA stuck in its first step: few refusals are enough") {
   }
 }
 
-TEST_CASE("forms of index 2 close to rounding: multipliers in the error test fail, and say so") {
+TEST_CASE("forms of index 2 close to rounding: multipliers in Newton's test fail, and say so") {
   const Problem problem = pendulum(1.0, 9.81, 10.0, "GGL");
   const tp::Constraints rows = problem.recommended_constraints();
   tp::Options tested;
   tested.suppress_algebraic = false;
   const Run failed = integrate(problem, 1e-8, rows, tested, false);
   REQUIRE(failed.flag < 0);
-  CHECK(failed.steps <= 5000);
-  CHECK(failed.status == tp::Status::collapsed);
+  CHECK(failed.status == tp::Status::corrector_failed);
   CHECK(failed.message.find("index 1 or 0") != std::string::npos);
   const Run run = integrate(problem, 1e-12, rows, {}, false);
   REQUIRE(run.flag >= 0);

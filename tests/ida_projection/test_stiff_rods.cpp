@@ -204,13 +204,13 @@ TEST_CASE(
   for (const double spring : {2e5, 1e6}) {
     const BentRods rods(spring);
     const Problem problem = rods.problem(0.3);
-    for (const double tolerance : {2.58e-3, 2.35e-3, 2.09e-3, 1.85e-3, 1.8e-3, 1.64e-3}) {
+    for (const double tolerance : {2.58e-3, 1.69e-3, 1.39e-3, 1.27e-3, 8.62e-4, 5.87e-4}) {
       const Run run = integrate(problem, tolerance, rods.rows(), {}, false);
       REQUIRE(run.flag >= 0);
       stiff_moves += run.statistics.stiff_moves;
       repeated += run.statistics.corrections_repeated;
     }
   }
-  CHECK(stiff_moves >= 20);  // 145 and 10 in 48 runs
+  CHECK(stiff_moves >= 20);  // 98 and 6 in 48 runs
   CHECK(repeated >= 1);
 }

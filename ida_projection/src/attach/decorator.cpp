@@ -251,11 +251,11 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 }
 
 // The move takes back as well what an iteration before it has added: a solution less. Only where
-// nothing answers to moves: it would be left out.
+// nothing answers to moves: it would be left out, and IDA's test of algebraic variables needs it.
 bool Projection::Impl::polishes_first() {
   const double longest = std::min(kShortMove, polish_.longest_unanswered(control_.smoothing()));
   if (!in_use(Mechanism::polish_first) || !(attempts_.last_move <= longest) ||
-      !movers_.used->may_polish_first())
+      control_.tests_algebraic() || !movers_.used->may_polish_first())
     return false;
   const bool silent = metric_choice_.calm() || !asks_for_metric();
   return silent && wants_polish(0.0);

@@ -14,7 +14,7 @@ namespace tether::ida_projection {
 /// the others: metric, polish, smoothing, limit of the order, index and suppression.
 enum class Mechanism {
   repeated_correction,    ///< where old factors fooled IDA's convergence test
-  polish_first,           ///< before the move, where the last one was short
+  polish_first,           ///< of many rows: before the move
   foretold_polish,        ///< from earlier ones, without an evaluation of F
   followers,              ///< IDA's test waits for algebraic variables that follow
   free_multipliers,       ///< those of index 2 are left out of IDA's convergence test

@@ -99,9 +99,8 @@ class Mover {
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 
-  /// May the correction be polished before the next move()? Not where what the move leaves of that
-  /// would be too much.
-  virtual bool may_polish_first() const { return true; }
+  /// May the correction be polished before the next move()? So it is where rows are many.
+  virtual bool may_polish_first() const { return false; }
   /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
   virtual Status finish(const Candidate&, bool /*polished*/) { return Status::success; }
 

@@ -103,7 +103,7 @@ void SplitRows<Solver>::rearrange() {
   set_up(d, &gather_d_);
   set_up(a, &gather_a_);
   moved_.assign(a.rows.empty() ? 0 : at(n_), 0.0);
-  few_ = kDense && m_ <= linalg::MinimumNorm::kSmallRows &&
+  few_ = kDense && !many(m_) &&
          static_cast<int>(d.columns.size()) <= linalg::MinimumNorm::kSmallColumns &&
          a.rows.empty() && d.first >= 0 && static_cast<int>(d.rows.size()) == m_;
   watch();

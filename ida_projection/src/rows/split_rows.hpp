@@ -52,6 +52,8 @@ class SplitRows {
   /// Dense factors of rows that are known to be independent cost half of an orthogonal
   /// factorisation, and a tenth where rows are many.
   static constexpr bool kKeepsRank = kDense;
+  /// Then what Newton's method leaves is cheap to take, too.
+  static bool many(int rows) { return kDense && rows > linalg::MinimumNorm::kSmallRows; }
   /// Dense pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = kDense;
 

@@ -33,7 +33,8 @@ class StepControl {
                N_Vector differential);
   /// IDA's error test sees these algebraic variables, widened by the noise of moves.
   void test_algebraic(const std::vector<int>& variables) { algebraic_test_.begin(variables); }
-  /// Before control(); see AlgebraicTest.
+  bool tests_algebraic() const { return algebraic_test_.acts(); }
+  /// Before control(); see AlgebraicTest. The last polish followed the move.
   void widen_test(const Candidate& candidate, Polish& polish, double move, long steps);
   /// In the first step: do they fail the test at every step size?
   bool starts_off_equations(long steps) const;

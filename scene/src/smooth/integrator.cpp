@@ -91,6 +91,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     projection.advanced.polish = options.formulation == Formulation::index1
                                      ? ida_projection::Polished::all
                                      : ida_projection::Polished::differential;
+    projection.suppress_algebraic = false;  // IDASetSuppressAlg above stands
     projection.progress = [this](const ida_projection::Progress&) {
       if (system_.look_at_rows()) session_->projection()->rows_changed();
     };

@@ -37,6 +37,7 @@ class ContiguousMover final : public Mover {
       : options_(options),
         monitor_(options),
         rows_(constraints, options, statistics, size, reported, message_),
+        takes_rest_(Rows::many(rows_.count())),
         start_(static_cast<std::size_t>(size), 0.0) {}
 
   Move measure(const Candidate& candidate) override;
@@ -85,10 +86,13 @@ class ContiguousMover final : public Mover {
   void forget_failure() override { rows_.evaluator.forget(); }
   // Old factors leave more of what dropped rows ask for.
   bool may_polish_first() const override {
-    return !Rows::kKeepsFactors || !rows_.blocks.dropped_rows();
+    return Rows::kKeepsFactors ? !rows_.blocks.dropped_rows() : takes_rest_;
   }
   Status finish(const Candidate& candidate, bool polished) override {
-    if (still_ || !keeps_factors()) return Status::success;
+    if (still_) return Status::success;
+    // Newton's method goes on where a move costs little beside the step.
+    if (takes_rest_) return take_rest(candidate, move_length_);
+    if (!keeps_factors()) return Status::success;
     const bool unseen =
         move_length_ > kSafe * options_.advanced.tolerance || !rows_.dropped_follow();
     return unseen ? take_back(candidate, polished ? by_present_factors_ : -1.0) : Status::success;
@@ -131,6 +135,7 @@ class ContiguousMover final : public Mover {
   FactoredRows<Rows> rows_;
   int levels_joined_ = 0;  // for so many moves
   int levels_joined_next_ = kLevelsJoined;
+  bool takes_rest_;            // that Newton's method leaves
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;
   double move_length_ = 0.0;  // of the last first move, in tolerances

@@ -7,6 +7,8 @@ namespace tether::ida_projection {
 
 namespace {
 
+// This part of Options::tolerance is left where a move costs little beside the factors.
+constexpr double kCheapRest = 1e-4;
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
 constexpr double kWorn = 0.06, kSlow = 0.1;
@@ -35,21 +37,26 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
 template <class Rows>
 Status ContiguousMover<Rows>::take_rest(const Candidate& candidate, double reach) {
   const bool measure = staleness_.due(reach);
-  const double enough = options_.advanced.tolerance;
+  const double enough = (takes_rest_ ? kCheapRest : 1.0) * options_.advanced.tolerance;
   double previous = 0.0;
   for (int k = 0; k < options_.advanced.maximum_iterations; ++k) {
     const Status status = rows_.value(candidate.t);
     if (status != Status::success) return status;
     double length = rows_.solve();
-    if (still_ && kept_.age > 0 && length > kNothing) {
-      rows_.set_metric(true);
+    const bool lost = takes_rest_ && !rows_.dropped_follow();
+    if (lost || (still_ && kept_.age > 0 && length > kNothing)) {
+      if (lost) rows_.factors.lasting = false;
+      if (still_) rows_.set_metric(true);
       const Status made = factor(candidate.t);
       if (made != Status::success) return made;
       length = first_solve();
     }
     rows_.apply(1.0, candidate.correction_entries);
     if (still_ && kept_.age > 0) break;  // by next to nothing, which says nothing about its rate
-    const bool enough_done = (k > 0 || !measure) && staleness_.left(reach, length) <= enough;
+    // Only what is seen on this candidate counts where moves are cheap.
+    const double expected = takes_rest_ ? length * (k > 0 ? length / previous : kUnknownSlope)
+                                        : staleness_.left(reach, length);
+    const bool enough_done = (k > 0 || takes_rest_ || !measure) && expected <= enough;
     if (k == 0 && enough_done) break;
     const double floor = 1e2 * kEpsilon * rows_.at.size();
     const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
