@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stepping/stepper_parts.hpp"
+#include "stepping/step_settings.hpp"
 
 namespace tether::contact {
 namespace detail {

@@ -5,13 +5,13 @@
 #include <utility>
 
 #include "step_joints.hpp"
-#include "stepping/stepper_parts.hpp"
+#include "stepping/stepper.hpp"
 
 namespace tether::contact {
 
 void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
-  Implementation& s = *implementation_;
-  if (s.joints || !s.force.empty())
+  detail::SubStepper& s = implementation_->steps;
+  if (s.joints || s.has_forces)
     throw std::invalid_argument("Stepper::add_joints: once, and before add_force");
   if (!joints || joints->rows() == 0) return;
   if (joints->has_laws() && s.options.law != Law::coulomb)
@@ -23,14 +23,8 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   if (joints->has_laws() && s.options.restitution_law != RestitutionLaw::newton)
     throw std::invalid_argument(
         "Stepper::add_joints: limits, motors and friction of joints need restitution_law = newton");
-  s.joints =
-      std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic);
-  s.make_impacts();
-  s.joints->begin(s.bodies, static_cast<double>(s.counts.steps) * s.options.step);
-  if (s.sleeping) s.sleeping->set_joints(*s.joints);
-  if (s.solver || s.joints->has_laws()) s.make_solvers();
-  s.stages.clear();
-  s.make_stages();
+  s.add_joints(
+      std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic));
 }
 
 }  // namespace tether::contact

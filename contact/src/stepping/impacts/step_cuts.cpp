@@ -116,7 +116,7 @@ bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const Nea
 // Forces and joints may act from body to body: what they act upon is one island.
 bool StepCuts::find_striking(const BodySet& bodies, const StepContacts& contacts,
                              const std::vector<int>& moving, const std::vector<char>& falls,
-                             const std::vector<char>& active, std::vector<char>& striking) {
+                             const SubStep& now, std::vector<char>& striking) {
   islands_.join(bodies, contacts);
   marked_.assign(bodies.motion.size(), 0);
   const auto mark = [&](int body) -> char& { return marked_[at(islands_.root(body))]; };
@@ -129,7 +129,7 @@ bool StepCuts::find_striking(const BodySet& bodies, const StepContacts& contacts
   bool others = false;
   striking.assign(bodies.motion.size(), 0);
   for (const int i : moving) {
-    if (!active.empty() && active[at(i)] == 0) continue;
+    if (!now.has(i)) continue;
     striking[at(i)] = mark(i);
     others = others || mark(i) == 0;
   }

@@ -10,6 +10,7 @@
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/joint_part.hpp"
 #include "stepping/motion/moving_islands.hpp"
+#include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
 
@@ -67,10 +68,10 @@ class StepCuts {
   bool choose(const std::vector<Approach>& impacts, double dt, const NearContacts& near,
               const BodySet& bodies, const StepContacts& contacts);
   /// Marks the bodies of the islands that are to strike. `falls`: bodies that nothing but contacts
-  /// connects to others. False: no other body moves among those that are `active` (empty: all).
+  /// connects to others. False: no other body moves among those that take part in the sub-step.
   bool find_striking(const BodySet& bodies, const StepContacts& contacts,
                      const std::vector<int>& moving, const std::vector<char>& falls,
-                     const std::vector<char>& active, std::vector<char>& striking);
+                     const SubStep& now, std::vector<char>& striking);
   /// From the start of the part to the impact, s; all of it: none before its end.
   double when() const { return when_; }
   bool strikes(const PointContact& c) const;

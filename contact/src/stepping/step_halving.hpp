@@ -1,0 +1,27 @@
+// Tether: sub-steps whole, in halves, or cut. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "stepping/step_cutting.hpp"
+#include "stepping/sub_stepper.hpp"
+
+namespace tether::contact::detail {
+
+/// Takes a sub-step in two halves, and these in halves, where its problem is not solved or its
+/// joints are not met; and has it cut where an impact is on the way.
+class StepHalving {
+ public:
+  explicit StepHalving(SubStepper& stepper)
+      : stepper_(stepper), cutting_(stepper, [this](const SubStep& s) { return advance(s); }) {}
+
+  SubStep whole(double start, double length) const;
+  /// Returns how many cuts are left.
+  int advance(SubStep s);
+
+ private:
+  int take_halves(const SubStep& s);
+
+  SubStepper& stepper_;
+  StepCutting cutting_;
+};
+
+}  // namespace tether::contact::detail

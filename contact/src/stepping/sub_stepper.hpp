@@ -1,0 +1,149 @@
+// Tether: takes the sub-steps of a step. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <tether/contact/stepping.hpp>
+#include <vector>
+
+#include "stepping/detection/near_contacts.hpp"
+#include "stepping/impacts/impacts.hpp"
+#include "stepping/impacts/later_impacts.hpp"
+#include "stepping/impacts/restitution.hpp"
+#include "stepping/impacts/step_cuts.hpp"
+#include "stepping/motion/free_motion.hpp"
+#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/mid_step.hpp"
+#include "stepping/position_correction.hpp"
+#include "stepping/sleeping.hpp"
+#include "stepping/step_contacts.hpp"
+#include "stepping/step_settings.hpp"
+#include "stepping/sub_step.hpp"
+
+namespace tether::contact::detail {
+
+class RollingPart;
+
+/// A sub-step is a list of stages, made once from the options and the bodies. What else may be done
+/// where one cannot be taken at once is decided around it: StepHalving, StepCutting, AccurateSteps.
+struct SubStepper {
+  struct Stage {
+    const char* effect;
+    std::function<void()> run;
+    double seconds = 0;
+  };
+
+  SubStepper(BodySet bodies, std::vector<Surface> surfaces, const std::vector<Meeting>& meetings,
+             const SteppingOptions& options);
+  SubStepper(const SubStepper&) = delete;  // stages refer to it
+  SubStepper& operator=(const SubStepper&) = delete;
+  ~SubStepper();
+  void add_force(const char* effect, Force force);
+  /// Before forces.
+  void add_joints(std::unique_ptr<JointPart> part);
+  /// New ones: nothing of the past is left.
+  void make_solvers();
+
+  /// The sub-step that is taken, or what it consists of.
+  void set_now(const SubStep& s);
+  SubStepEnd take();
+  /// Whether an explicit step of this length is stable for what the joints hold.
+  bool resolves_joints() const;
+  bool is_finite() const;
+
+  void remember(BodiesState& state) const;
+  void restore(const BodiesState& state);
+  StepMark mark() const;
+  void go_back(const StepMark& mark);
+
+  /// Contacts that are found and take no part: of bodies that a joint connects, and of bodies that
+  /// wait.
+  void leave_out_joined();
+  void leave_out_passive();
+
+  BodySet bodies;
+  SteppingOptions options;
+  // With an accuracy or sleep, of bodies, m: the reach of their surfaces or the radius of gyration.
+  std::vector<double> sizes;
+  std::vector<Stage> stages;
+  std::size_t after_forces = 0;  // where the next force goes
+  bool has_forces = false;
+  FreeMotion motion;
+
+  // Only with meetings; impacts also with joints, the solver with laws of these.
+  std::unique_ptr<NearContacts> near;
+  std::unique_ptr<StepSolver> solver;
+  std::unique_ptr<Impacts> impacts;
+  std::unique_ptr<Restitution> restitution;
+  std::unique_ptr<Restitution> bounces_at_once;  // of impacts that a step is cut at
+  std::unique_ptr<LaterImpacts> later;
+  std::unique_ptr<StepCuts> cuts;  // only where asked for
+  std::vector<Approach> approaches;
+  std::unique_ptr<PositionCorrection> positions;  // only with error reduction
+  std::unique_ptr<Sleeping> sleeping;             // only where bodies may sleep
+  StepContacts contacts;
+  MidStep mid_step;
+  std::vector<PointContact> turned;  // contacts as of the middle of the step
+  BodySolution solution;
+  std::unique_ptr<JointPart> joints;     // only where they have been added
+  std::unique_ptr<RollingPart> rolling;  // only where a meeting names it
+
+  SubStep now;
+  SubStepEnd end = SubStepEnd::whole;
+  bool joints_active = true;           // those that joints hold take part
+  bool failed = false;                 // its problem, though it may be used
+  bool unmeetable = false;             // joints, in this step: however short the sub-step
+  bool met = false;                    // islands that were apart, in this step
+  Tally tally, tally_before;           // the latter: before the problem of the sub-step,
+  std::vector<RigidBody> free_motion;  // and what bodies would do without
+  StepCounts counts;                   // but for those of `tally`
+
+ private:
+  void add_stage(const char* effect, void (SubStepper::*method)());
+  void make_stages();
+  void solve_problem();
+  void judge();
+  bool shortest() const;
+  bool nothing_presses() const;
+  bool falls() const { return options.gravity && cuts; }
+
+  void find_contacts();
+  void set_gaps();
+  void look_for_cut();
+  void choose_bounces();
+  void solve_contacts();
+  void take_later_impacts();
+  void meet_others();
+  void hold_sleepers();
+  void end_sleep();
+  void predict_joints();
+  void move_joints();
+  void begin_joints() {
+    if (joints_active) joints->begin(bodies, now.start);
+  }
+  void put_back_joints() {
+    if (joints_active) joints->put_back(bodies, now.start);
+  }
+  void remember_velocities() { impacts->remember(bodies); }
+  void choose_impacts() { impacts->choose(*near, bodies, now.length, contacts); }
+  void rebound() { tally.bounces += restitution->apply(bodies, contacts); }
+  void close_gaps() {
+    positions->close_gaps(*impacts, now.length, contacts, motion.moving(), bodies);
+  }
+  void take_penetrations_back() {
+    positions->take_back(tally.deepest, negligible_depth(options, now.length), now.length, contacts,
+                         motion.moving(), bodies);
+  }
+  void apply_gravity() { motion.accelerate(now.length * *options.gravity, bodies); }
+  void gyrate_explicit() { motion.gyrate_explicit(now.length, bodies); }
+  void gyrate_implicit() { motion.gyrate_implicit(now.length, bodies); }
+  void move() { motion.move(now.length, bodies); }
+  void remember_weight() { motion.remember_weight(bodies); }
+  void find_falling() { motion.find_falling(bodies); }
+  void fall() { motion.fall(*options.gravity, now.length, contacts, bodies); }
+  void turn_round() { motion.turn_round(now.length, bodies); }
+  void turn_plain() { motion.turn_plain(now.length, bodies); }
+  void turn_keeping_momentum() { motion.turn_keeping_momentum(now.length, bodies); }
+};
+
+}  // namespace tether::contact::detail
