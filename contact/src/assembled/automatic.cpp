@@ -30,7 +30,6 @@ const Automatic::Turn Automatic::kTurns[] = {
     {&Automatic::proximal_path_at_best, first_cheap_contacts, 20},  // problems
     {&Automatic::arclength_path, first_and_regular, 800},           // factorisations
     {&Automatic::round_off, always, 8},                             // steps with long sums
-    {&Automatic::proximal_path_at_best, first_cheap_contacts, 80},  // problems
     {&Automatic::end_of_work, always, 0},                           //
     {&Automatic::no_solution, always, 0},                           // once in a solve
     {&Automatic::proximal_newton, always, 12},                      // proximal problems

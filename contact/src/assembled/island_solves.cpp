@@ -66,14 +66,6 @@ void IslandSolves::solve(Search& search, Island& island, double budget) {
 }
 
 Status IslandSolves::run(Search& search, Automatic& stages) {
-  AcceleratedSweeps::Leave leave;
-  leave.partly = true;
-  leave.most_work = kBlock * static_cast<double>(search.system.problem().blocks().size());
-  stages.prepare();
-  stages.sweeps.start(search.best.data());
-  stages.sweeps.run(search, leave);
-  if (search.solved()) return Status::solved;
-  if (search.exhausted()) return Status::work_limit;
   find_islands(search);
   x_ = search.best;
   // The small ones first, each with an equal part of the work that is left: what they leave of it

@@ -41,10 +41,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       equations_.set_tau(0);
       search.test(equations_.impulses().data(), Method::interior_point);
       if (search.solved()) break;
-      if (found) {
-        point = equations_.impulses();
-        newton.correct(search, tau, anchor.data(), point, kCorrections);
-      }
+      if (found) point = equations_.impulses();
     }
     if (search.exhausted() || (!found && !whole)) break;
     if (!found) {
