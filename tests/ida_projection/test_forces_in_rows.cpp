@@ -241,19 +241,19 @@ TEST_CASE("rods in index 0: forces that answer to every move are no stiff compon
   }
 }
 
-TEST_CASE("rods in index 0: forces follow the other unknowns") {
+TEST_CASE("rods in index 0: all unknowns share what rows of forces ask for") {
   const Chain chain(60, 0.1, 1e6);
   const Problem problem = chain.problem(0.1);
-  // If all unknowns share what rows of forces ask for, the first and the last of these runs end
-  // by moves that masses beside the pin make in their place.
+  double mean = 0.0;
   for (const double tolerance : {1e-3, 4e-4, 3.25e-4}) {
     INFO("tolerance " << tolerance);
     const Run run = integrate(problem, tolerance, chain.rows(), {}, false);
     const Run plain = integrate_plain(problem, tolerance);
     REQUIRE(run.flag >= 0);
-    CHECK(static_cast<double>(run.steps) <= 1.2 * static_cast<double>(plain.steps));
-    CHECK(run.statistics.largest_drift_after <= 1e-3 * tolerance);
+    mean += std::log(static_cast<double>(run.steps) / static_cast<double>(plain.steps)) / 3.0;
+    CHECK(run.statistics.largest_drift_after <= tolerance);  // forces are a million times as large
   }
+  CHECK(std::exp(mean) <= 0.6);
 }
 
 TEST_CASE("rods in index 0: forces that their rows do not determine move together with the rest") {

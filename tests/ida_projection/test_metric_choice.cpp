@@ -17,12 +17,13 @@ namespace {
 using Rows = std::vector<std::vector<int>>;
 
 std::vector<int> levels(const Rows& rows, int n) {
-  std::vector<int> starts = {0}, columns;
+  RowPattern pattern;
+  pattern.n = n;
   for (const std::vector<int>& row : rows) {
-    columns.insert(columns.end(), row.begin(), row.end());
-    starts.push_back(static_cast<int>(columns.size()));
+    pattern.columns.insert(pattern.columns.end(), row.begin(), row.end());
+    pattern.starts.push_back(static_cast<int>(pattern.columns.size()));
   }
-  return levels_of_columns(starts, columns, n);
+  return levels_of_columns(pattern);
 }
 
 /// Points on circles of radius 1 with speed 1, y = (q, v): the lengths, their rates, and the sum of

@@ -163,7 +163,6 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   if (movers_.used == nullptr) return flag;
   if (flag != 0) return corrector_failed(candidate, flag);
   if (!run_.linear_solver.known()) look_at_linear_solver();
-  look_for_multipliers(candidate);
 
   const StepData step = ida_.step();
   account_for_previous_attempt(step);

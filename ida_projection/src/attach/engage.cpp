@@ -8,7 +8,6 @@
 #include "attach/impl.hpp"
 #include "fast/quicken.hpp"
 #include "host/mechanisms.hpp"
-#include "start/forces.hpp"
 
 namespace tether::ida_projection {
 
@@ -17,7 +16,6 @@ namespace {
 // Multipliers of index 2: see method, section 7.
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
                  kManyFree = 0.4;
-constexpr long kStart = 16;              // steps
 constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
 constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
 
@@ -66,21 +64,6 @@ void Projection::Impl::test_all_again() {
     IDASetSuppressAlg(ida_.mem(), 0);
     IDASetId(ida_.mem(), variables_.vector());
   }
-}
-
-// IDA raises the order with each step of a start until a first error test fails, and from there on
-// only after k + 2 steps of one size. Multipliers of index 2, which are rounding over h, fail it in
-// the first steps.
-void Projection::Impl::look_for_multipliers(const Candidate& candidate) {
-  const bool may = in_use(Mechanism::early_index) && !run_.engaged && !variables_.index_known() &&
-                   options_.suppress_algebraic && candidate.base_entries != nullptr;
-  if (!may || ida_.steps() >= kStart || ida_.error_test_failures() > 0) return;
-  // IDA multiplies that by less than 1.
-  if (!(N_VWrmsNorm(candidate.correction, candidate.weights) > 1.0)) return;
-  const double cj = ida_.step().cj;
-  if (!variables_.known()) derive_id(candidate);
-  variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
-  if (variables_.high_index() && variables_.any()) leave_out_of_error_test(true);
 }
 
 // Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
@@ -163,14 +146,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   if (in_use(Mechanism::joined_equations)) movers_.joined.join(candidate, cj);
   movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;
-  const N_Vector moved = movers_.joined.moved_id();
-  const Status structured = movers_.used->set_algebraic(candidate, moved);
-  if (in_use(Mechanism::forces_apart) && structured == Status::success && moved == nullptr) {
-    movers_.used->split_forces([&](const RowChain& chain) {
-      return are_forces(chain, candidate, corrector_, cj, statistics_);
-    });
-    if (corrector_.stopped()) return Status::callback_fatal;
-  }
+  const Status structured = movers_.used->set_algebraic(candidate, movers_.joined.moved_id());
   run_.engaged = structured == Status::success;  // else the next attempt looks again
   return structured;
 }

@@ -149,7 +149,6 @@ class Projection::Impl {
   void derive_id(const Candidate& candidate);
   void leave_out_of_error_test(bool coupled);  ///< `coupled`: those of index 1 stay
   void test_all_again();
-  void look_for_multipliers(const Candidate& candidate);
   Status engage_if_index_is_high(const Candidate& candidate);
   Care care_of_high_index(const Candidate& candidate) const;
   void quicken_vectors(const Candidate& candidate);

@@ -19,7 +19,6 @@ enum class Mechanism {
   followers,              ///< IDA's test waits for algebraic variables that follow
   free_multipliers,       ///< those of index 2 are left out of IDA's convergence test
   widened_tolerance,      ///< of algebraic variables that respond to moves
-  early_index,            ///< F is asked for its index at the first long correction
   index_in_trouble,       ///< F is asked for its index where error tests fail
   care,                   ///< smaller errors in index 2, by tolerance and order
   row_trust,              ///< thin rows count only as far as C can be trusted
@@ -31,8 +30,6 @@ enum class Mechanism {
   other_metric,           ///< one scale for each level, where stiff components respond to moves
   stiff_moves,            ///< moves by what F makes of them, where that is not enough
   expected_oscillations,  ///< the order is limited after that
-  forces_apart,           ///< rows with forces are solved for these, once the others have moved
-  joined_levels,          ///< not where such a move has failed
   joined_equations,       ///< of F, to rows that contain their algebraic variables
   false_row_watch,        ///< rows that F does not keep are named
   count
@@ -44,7 +41,6 @@ inline constexpr const char* kMechanismNames[] = {"repeated correction",
                                                   "followers",
                                                   "free multipliers",
                                                   "widened tolerance",
-                                                  "early index",
                                                   "index in trouble",
                                                   "care",
                                                   "row trust",
@@ -56,8 +52,6 @@ inline constexpr const char* kMechanismNames[] = {"repeated correction",
                                                   "other metric",
                                                   "stiff moves",
                                                   "expected oscillations",
-                                                  "forces apart",
-                                                  "joined levels",
                                                   "joined equations",
                                                   "false-row watch"};
 static_assert(sizeof kMechanismNames / sizeof *kMechanismNames ==

@@ -11,7 +11,6 @@
 
 #include "constraints/evaluator.hpp"
 #include "host/candidate.hpp"
-#include "rows/row_chain.hpp"
 
 namespace tether::ida_projection {
 
@@ -71,10 +70,6 @@ class Mover {
   /// Says which components are algebraic (1 differential, 0 algebraic; null: none). Called once,
   /// before the first move() of a run, with the candidate at which the structure is looked at.
   virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;
-
-  /// After set_algebraic() with null: rows with forces are solved for these alone, once the others
-  /// have moved, where `are_forces` says that there are some.
-  virtual void split_forces(const AreForces&) {}
 
   /// The correction was changed by `change` after a successful move(): takes back what leaves the
   /// constraints, with the factors at hand.

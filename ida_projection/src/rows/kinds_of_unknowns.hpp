@@ -26,36 +26,8 @@ struct KindsOfUnknowns {
     held.assign(static_cast<std::size_t>(n), 0);
     for (std::size_t j = 0; j < hold.size(); ++j) held[j] = hold[j] ? 1 : 0;
     id_.assign(id, id != nullptr ? id + n : id);
-    by_level_ = false;
     without.assign(static_cast<std::size_t>(rows), 0);
   }
-  /// If none is algebraic: unknowns from this level on are taken for such, whatever their part
-  /// in a row. False: there are none.
-  bool begin_by_level(const std::vector<int>& levels, int first) {
-    id_.assign(levels.size(), 1.0);
-    for (std::size_t j = 0; j < levels.size(); ++j)
-      if (levels[j] >= first) {
-        id_[j] = 0.0;
-        by_level_ = true;
-      }
-    if (!by_level_) id_.clear();
-    return by_level_;
-  }
-  /// The same where `rearrange` says that rows and unknowns of these levels are as many, else not.
-  template <class Rearrange>
-  bool split_by_level(const std::vector<int>& levels, int first, Rearrange rearrange) {
-    if (!begin_by_level(levels, first)) return false;
-    if (!rearrange()) {
-      end_by_level();
-      rearrange();
-    }
-    return by_level_;
-  }
-  void end_by_level() {
-    id_.clear();
-    by_level_ = false;
-  }
-  bool by_level() const { return by_level_; }
   bool any_algebraic() const { return !id_.empty(); }
   bool algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
   /// Looks at the mixed rows with part(row, squares): the squares of their algebraic and of their
@@ -76,7 +48,6 @@ struct KindsOfUnknowns {
 
  private:
   std::vector<double> id_;  // empty: none algebraic
-  bool by_level_ = false;
 };
 
 }  // namespace tether::ida_projection

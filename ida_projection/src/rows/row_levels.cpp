@@ -9,8 +9,9 @@ namespace tether::ida_projection {
 
 using linalg::at;
 
-std::vector<int> levels_of_columns(const std::vector<int>& starts, const std::vector<int>& columns,
-                                   int n) {
+std::vector<int> levels_of_columns(const RowPattern& rows) {
+  const std::vector<int>&starts = rows.starts, &columns = rows.columns;
+  const int n = rows.n;
   const int m = static_cast<int>(starts.size()) - 1;
   const auto size = [&](int i) { return starts[at(i + 1)] - starts[at(i)]; };
   const auto all_of = [&](int i, auto holds) {

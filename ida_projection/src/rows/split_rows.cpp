@@ -83,20 +83,6 @@ Status SplitRows<Solver>::structure(Evaluator& evaluator, double t, const std::v
 }
 
 template <class Solver>
-bool SplitRows<Solver>::split_by_level(const std::vector<int>& levels, int first) {
-  return kinds_.split_by_level(levels, first, [this] {
-    rearrange();
-    return a.rows.size() == a.columns.size();
-  });
-}
-
-template <class Solver>
-void SplitRows<Solver>::join_levels() {
-  kinds_.end_by_level();
-  rearrange();
-}
-
-template <class Solver>
 void SplitRows<Solver>::rearrange() {
   outgrown_ = false;
   split();
@@ -193,7 +179,7 @@ void SplitRows<Solver>::watch() {
       if (!seen && (!used[at(j)] || (whole[at(i)] != 0 && kinds_.algebraic(j))))
         watched_.push_back(e);
     });
-    if (mixed && split && !kinds_.by_level()) kinds_.mixed.push_back(i);
+    if (mixed && split) kinds_.mixed.push_back(i);
   }
 }
 

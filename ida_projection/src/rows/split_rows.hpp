@@ -69,12 +69,6 @@ class SplitRows {
   bool structured() const { return structured_; }
   /// After structure(): which entries of these rows of C can differ from zero.
   RowPattern pattern(const std::vector<int>& of_rows) const { return C_.pattern(of_rows); }
-  /// If none is algebraic, unknowns of level `first` and above (row_levels.hpp) take the place
-  /// of algebraic ones. False: nothing has changed, they are not as many as their rows.
-  bool split_by_level(const std::vector<int>& levels, int first);
-  /// Back to one block.
-  void join_levels();
-  bool split_levels() const { return kinds_.by_level(); }
   /// Do rows contain variables of both kinds?
   bool mixed() const { return !kinds_.mixed.empty(); }
 

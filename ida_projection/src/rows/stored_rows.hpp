@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "constraints/evaluator.hpp"
-#include "rows/row_chain.hpp"
+#include "rows/row_levels.hpp"
 
 namespace tether::ida_projection {
 

@@ -25,18 +25,6 @@ Status ContiguousMover<Rows>::set_algebraic(const Candidate& candidate, N_Vector
   return rows_.structure(candidate, mask);
 }
 
-// Close to a point where they depend on each other rows of forces magnify what the others leave:
-// there all unknowns are to share it, for some time.
-template <class Rows>
-void ContiguousMover<Rows>::doubt_levels(Status status) {
-  const bool failed = status == Status::not_converged || status == Status::move_too_long ||
-                      status == Status::inconsistent;
-  if (!in_use(Mechanism::joined_levels) || !failed || !rows_.levels_split()) return;
-  rows_.join_levels();
-  levels_joined_ = levels_joined_next_;
-  levels_joined_next_ = std::min(2 * levels_joined_next_, 1 << 20);
-}
-
 template <class Rows>
 bool ContiguousMover<Rows>::must_learn(double length) const {
   if constexpr (Rows::kThinRows)
@@ -101,14 +89,10 @@ template <class Rows>
 bool ContiguousMover<Rows>::too_long(double length, double& limit) const {
   if (length <= options_.advanced.largest_move) return false;
   double sum = 0.0;
-  const auto add = [&](const auto& block) {
-    block.for_columns([&](int, int j) {
-      const double change = rows_.at.ycor[j] * rows_.at.w[j];
-      sum += change * change;
-    });
-  };
-  add(rows_.blocks.d);
-  if (rows_.levels_split()) add(rows_.blocks.a);
+  rows_.blocks.d.for_columns([&](int, int j) {
+    const double change = rows_.at.ycor[j] * rows_.at.w[j];
+    sum += change * change;
+  });
   limit = options_.advanced.largest_move * std::max(1.0, rows_.wrms(sum));
   return !(length <= limit);
 }
@@ -133,7 +117,6 @@ template <class Rows>
 Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   Move result;
   rows_.at.load(candidate);
-  if (levels_joined_ > 0 && --levels_joined_ == 0) rows_.split_levels();
   still_ = false;
   by_present_factors_ = -1.0;
   if (still_nothing(candidate, result)) return result;
@@ -154,7 +137,6 @@ Move ContiguousMover<Rows>::move(const Candidate& candidate) {
   if (rows_.blocks.dropped_rows() && result.status == Status::success && !result.capped &&
       !reused_ && contradicts())
     result.status = Status::inconsistent;
-  doubt_levels(result.status);
   return result;
 }
 
@@ -315,10 +297,6 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   result.status = Status::success;
   return result;
 }
-
-// Called in contiguous_settle.cpp.
-template void ContiguousMover<DenseRows>::doubt_levels(Status);
-template void ContiguousMover<SparseRows>::doubt_levels(Status);
 
 std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
                                         Statistics& statistics, int size, int reported) {

@@ -19,7 +19,6 @@ constexpr double kLargestFloor = 0.1;  // tolerances
 constexpr double kUnknownSlope = 0.03;
 constexpr double kLong = 1.0;      // tolerances: such a move is made with fresh factors
 constexpr double kNothing = 1e-8;  // tolerances: as good as no move
-constexpr int kLevelsJoined = 16;  // moves, after one that has failed
 
 /// Factors of an earlier step leave the part slope * age of a move, age in candidates.
 struct SlopeOfFactors {
@@ -50,11 +49,7 @@ class ContiguousMover final : public Mover {
   double left_of_dropped(const std::vector<double>& WT) override {
     return rows_.blocks.dropped_rows() ? rows_.blocks.left_of_dropped(WT) : 0.0;
   }
-  void rows_changed() override {
-    rows_.factors.foreign = true;
-    rows_.forget_forces();
-  }
-  void split_forces(const AreForces& are_forces) override { rows_.split_forces(are_forces); }
+  void rows_changed() override { rows_.factors.foreign = true; }
   bool solve_with_factors(const std::vector<double>& g, std::vector<double>& dy) override;
   Status set_algebraic(const Candidate& candidate, N_Vector id) override;
   Status settle(const Candidate& candidate, N_Vector change) override;
@@ -104,12 +99,9 @@ class ContiguousMover final : public Mover {
     nothing_in_row_ = 0;
     still_ = false;
     move_length_ = 0.0;
-    levels_joined_ = 0;
-    levels_joined_next_ = kLevelsJoined;
   }
 
  private:
-  void doubt_levels(Status status);
   bool keeps_factors() const {
     return in_use(Mechanism::kept_factors) && Rows::kKeepsFactors && rows_.factors.lasting;
   }
@@ -133,8 +125,6 @@ class ContiguousMover final : public Mover {
   const Options& options_;
   Monitor monitor_;
   FactoredRows<Rows> rows_;
-  int levels_joined_ = 0;  // for so many moves
-  int levels_joined_next_ = kLevelsJoined;
   bool takes_rest_;            // that Newton's method leaves
   std::vector<double> start_;  // the correction before the move, kept where there are thin rows
   bool start_known_ = false;

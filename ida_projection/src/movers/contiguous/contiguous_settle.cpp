@@ -21,15 +21,9 @@ Status ContiguousMover<Rows>::settle(const Candidate& candidate, N_Vector change
   const double *e = N_VGetArrayPointer(change), *w = rows_.at.w;
   double* y = rows_.at.y.data();
   for (int i = 0, n = static_cast<int>(rows_.at.y.size()); i < n; ++i) y[i] += e[i];
-  if (keeps_factors()) {
-    const Status status = take_back(candidate, -1.0);
-    doubt_levels(status);
-    return status;
-  }
+  if (keeps_factors()) return take_back(candidate, -1.0);
   double sum = 0.0;
-  const auto add = [&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); };
-  rows_.blocks.d.for_columns(add);
-  if (rows_.levels_split()) rows_.blocks.a.for_columns(add);
+  rows_.blocks.d.for_columns([&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); });
   return take_rest(candidate, move_length_ + rows_.wrms(sum));
 }
 

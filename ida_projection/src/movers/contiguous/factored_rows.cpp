@@ -32,8 +32,7 @@ Status FactoredRows<Rows>::structure(const Candidate& candidate, const double* i
 template <class Rows>
 const std::vector<int>& FactoredRows<Rows>::levels() {
   if (levels_known_) return found_levels_;
-  const RowPattern pattern = blocks.pattern(blocks.d.rows);
-  found_levels_ = levels_of_columns(pattern.starts, pattern.columns, pattern.n);
+  found_levels_ = levels_of_columns(blocks.pattern(blocks.d.rows));
   if (*std::max_element(found_levels_.begin(), found_levels_.end()) < 1) found_levels_.clear();
   levels_known_ = true;
   return found_levels_;
@@ -49,36 +48,7 @@ bool FactoredRows<Rows>::find_levels() {
 template <class Rows>
 bool FactoredRows<Rows>::has_third_level() {
   const auto third = [](int level) { return level >= kLeastOfForces; };
-  return levels_split() || std::any_of(levels().begin(), levels().end(), third);
-}
-
-template <class Rows>
-void FactoredRows<Rows>::split_forces(const AreForces& are_forces) {
-  forget_forces();
-  if (count() <= kFewForLevels) return;
-  const RowPattern pattern = blocks.pattern(blocks.d.rows);
-  const std::vector<int> levels = levels_of_columns(pattern.starts, pattern.columns, pattern.n);
-  const int highest = *std::max_element(levels.begin(), levels.end());
-  RowChain chain;
-  for (int first = kLeastOfForces; first <= highest && levels_with_forces_.empty(); ++first) {
-    if (!find_chain(pattern, levels, first, &chain) || !are_forces(chain)) continue;
-    levels_with_forces_ = levels;
-    level_of_forces_ = first;
-  }
-  split_levels();
-}
-
-template <class Rows>
-void FactoredRows<Rows>::split_levels() {
-  if (levels_with_forces_.empty() || !blocks.split_by_level(levels_with_forces_, level_of_forces_))
-    return;
-  factors.there = factors.lasting = levels_known_ = false;
-}
-
-template <class Rows>
-void FactoredRows<Rows>::join_levels() {
-  blocks.join_levels();
-  factors.there = factors.lasting = levels_known_ = false;
+  return std::any_of(levels().begin(), levels().end(), third);
 }
 
 template <class Rows>
@@ -127,7 +97,6 @@ Status FactoredRows<Rows>::rows(double t, double* g) {
   Status status = blocks.evaluate(evaluator, t, at.y.data(), WT, g);
   if (status == Status::success && blocks.outgrown()) {
     blocks.rearrange();
-    if (levels_split() && blocks.a.rows.size() != blocks.a.columns.size()) blocks.join_levels();
     factors.there = factors.lasting = levels_known_ = false;
     set_metric(true);
     status = blocks.evaluate(evaluator, t, at.y.data(), WT);
@@ -203,11 +172,6 @@ bool FactoredRows<Rows>::decide() {
   factors.partial = false;
   if (count() > kFewForLevels) look_for_rates();
   if (!blocks.factor()) return false;
-  if (levels_split() && blocks.a.solver.dropped() > 0) {
-    join_levels();
-    set_metric(true);
-    if (!blocks.factor()) return false;
-  }
   if (blocks.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kThinRows)
     factors.thin = in_use(Mechanism::row_trust) && RowTrust::has_thin_rows(blocks.counted().solver);

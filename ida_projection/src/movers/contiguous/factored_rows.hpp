@@ -68,13 +68,6 @@ class FactoredRows {
   bool find_levels();
   /// Are there unknowns of level 2?
   bool has_third_level();
-  /// No variable being algebraic: where rows are many, those with forces, if `are_forces` says that
-  /// there are some, are solved for these alone from now on.
-  void split_forces(const AreForces& are_forces);
-  /// The same as it was split before join_levels().
-  void split_levels();
-  bool levels_split() const { return blocks.split_levels(); }
-  void join_levels();
   /// At the candidate, whose variables are algebraic where `id` is 0.
   Status structure(const Candidate& candidate, const double* id);
   /// g at the present y.
@@ -99,12 +92,6 @@ class FactoredRows {
   double solve_closely() {
     blocks.solve_closely(g_);
     return length_of_solution();
-  }
-  /// f(block) for the blocks whose move is measured in tolerances.
-  template <class Visit>
-  void visit_counted(Visit f) {
-    f(counted());
-    if (levels_split()) f(blocks.a);
   }
   /// The rows whose move is measured in tolerances.
   typename Rows::Block& counted() { return blocks.d.rows.empty() ? blocks.a : blocks.d; }
@@ -139,11 +126,6 @@ class FactoredRows {
     usual_ = 0.0;
     factored_ = rate_looks_ = 0;
     levels_known_ = false;
-    forget_forces();
-  }
-  void forget_forces() {
-    if (levels_split()) join_levels();
-    levels_with_forces_.clear();
   }
 
  private:
@@ -177,22 +159,18 @@ class FactoredRows {
   bool rows_known_ = false;                // C belongs to the present y
   int factored_ = 0, rate_looks_ = 0;
   std::vector<int> found_levels_;
-  bool levels_known_ = false;            // they are those of the rows as they are arranged
-  std::vector<int> levels_with_forces_;  // empty: no forces are known
-  int level_of_forces_ = 0;
-  double usual_ = 0.0;  // left_of_dropped() after the moves, with factors.decided
+  bool levels_known_ = false;  // they are those of the rows as they are arranged
+  double usual_ = 0.0;         // left_of_dropped() after the moves, with factors.decided
 };
 
 template <class Rows>
 double FactoredRows<Rows>::length_of_solution() {
   ++statistics_.iterations;
   double sum = 0.0;
-  visit_counted([&](const Block& block) {
-    const double* dy = block.dy.data();
-    block.for_columns([&sum, dy, w = at.w](int k, int i) {
-      const double move = dy[k] * w[i];
-      sum += move * move;
-    });
+  const Block& block = counted();
+  block.for_columns([&sum, dy = block.dy.data(), w = at.w](int k, int i) {
+    const double move = dy[k] * w[i];
+    sum += move * move;
   });
   return wrms(sum);
 }
