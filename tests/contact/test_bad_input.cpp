@@ -322,10 +322,13 @@ TEST_CASE("bad input: the same words in a host whose numbers have a comma") {
     JointLaws laws;
     return refused_problem([](Good& p) { p.mu[0] = -0.125; }) + "\n" +
            refusal([&] { rows.add(12345, INFINITY); }) + "\n" +
-           refusal([&] { laws.add_bounded(2, 0, -0.25); });
+           refusal([&] { laws.add_bounded(2, 0, -0.25); }) + "\n" +
+           refusal([&] { laws.add_sprung(3, 0, -0.5, 1, 0, 1); }) + "\n" +
+           refusal([&] { laws.add_sprung(4, 0, 0, 0, 0, 1); });
   };
   const std::string plain = said();
-  for (const char* part : {"mu = -0.125", "joint 12345: rate = inf:", "joint 2: bound = -0.25:"})
+  for (const char* part : {"mu = -0.125", "joint 12345: rate = inf:", "joint 2: bound = -0.25:",
+                           "joint 3: stiffness = -0.5:", "joint 4: damping = 0:"})
     CHECK_THAT(plain, Contains(part));
   const tether::test::CommaLocale here;
   CHECK(said() == plain);

@@ -67,6 +67,18 @@ TEST_CASE("cones: free rows against their elimination by least squares") {
   CHECK(pressed >= 5);
 }
 
+TEST_CASE("cones: free rows of any size of velocities are met") {
+  Data d = any_data({Cone::free(2), Cone::free(1)}, 5, 1);
+  for (const double size : {1.0, 1e-100, 1e-200, 1e-290}) {
+    Data small = d;
+    small.b *= size;
+    const ConeSolution s = solve(small.problem());
+    INFO(size);
+    CHECK(s.status == Status::solved);
+    CHECK((s.velocities / size).norm() < 1e-9 * d.b.norm());
+  }
+}
+
 TEST_CASE("cones: ten copies of free rows share their impulse, and change no other") {
   const auto cones = [](int copies) {
     return std::vector<Cone>{Cone::friction(0.5), Cone::free(2 * copies)};

@@ -72,16 +72,16 @@ void FreeRows::put(const Eigen::VectorXd& free, Eigen::VectorXd& v) const {
 Eigen::VectorXd FreeRows::solve(const Eigen::VectorXd& of) const {
   const Eigen::VectorXd g = scale_.cwiseProduct(of);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(g.size()), r = g, best = x;
-  double least = r.norm();
+  double least = r.stableNorm();
   for (int step = 0; step < kSteps && least > 0; ++step) {
     x += factor_.solve(r);
     r = g - A_ * x;
-    const double now = r.norm();
+    const double now = r.stableNorm();
     if (!(now < least)) break;
     best = x;
     const bool slow = !(now < 0.5 * least);
     least = now;
-    if (slow || now <= std::numeric_limits<double>::epsilon() * g.norm()) break;
+    if (slow || now <= std::numeric_limits<double>::epsilon() * g.stableNorm()) break;
   }
   return scale_.cwiseProduct(best);
 }

@@ -123,8 +123,13 @@ void BodyCones::add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::si
   }
 }
 
-void BodyCones::assemble(Mechanisms& mechanisms) {
+void BodyCones::assemble(Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
   A_.clear();
+  for (std::size_t l = 0; l < members_.size(); ++l)
+    if (const BodyCone& c = cones[at(members_[l])]; c.compliance > 0) {
+      const int place = static_cast<int>(l), rows = c.cone.rows;
+      A_.push_back({place, place, c.compliance * Block::Identity(rows, rows)});
+    }
   for (std::size_t begin = 0, end = 0; begin < sides_.size(); begin = end) {
     while (end < sides_.size() && sides_[end].node == sides_[begin].node) ++end;
     if (sides_[begin].node < mechanisms.count()) {
@@ -289,7 +294,7 @@ const BodyCones::Result& BodyCones::solve(Mechanisms& mechanisms,
   for (std::size_t k = 0; k + 1 < start_.size(); ++k) {
     members_.assign(order_.begin() + start_[k], order_.begin() + start_[k + 1]);
     collect_sides(mechanisms, cones);
-    assemble(mechanisms);
+    assemble(mechanisms, cones);
     leave_out_held(cones, v);
     solve_island(cones, v, x);
     apply(mechanisms, x, v);

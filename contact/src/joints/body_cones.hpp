@@ -11,7 +11,8 @@
 
 namespace tether::contact::detail {
 
-/// One factor of the product, by its rows on two bodies: w = J1 v1 + J2 v2 + bias.
+/// One factor of the product, by its rows on two bodies: w = J1 v1 + J2 v2 + bias
+/// + compliance x.
 struct BodyCone {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 6, 6>;
   using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
@@ -23,6 +24,7 @@ struct BodyCone {
   int first = -1, second = -1;  ///< -1: the fixed world
   Rows J1, J2;
   Column bias;
+  double compliance = 0;  ///< velocity over impulse, of every row
 };
 
 /// A contact that may hold moments beside its force: |moment_t| <= rolling x_n about axes in the
@@ -81,7 +83,7 @@ class BodyCones {
   }
   void find_islands(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
   void collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
-  void assemble(Mechanisms& mechanisms);
+  void assemble(Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
   void add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end);
   void leave_out_held(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v);
   Eigen::VectorXd approach(int place, const BodyCone& cone, const std::vector<Vector6d>& v) const;

@@ -37,6 +37,18 @@ void JointLaws::add_bounded(int joint, double rate, double bound) {
   laws_.push_back({joint, false, 0, 0, rate, bound});
 }
 
+void JointLaws::add_sprung(int joint, double stretch, double stiffness, double damping, double rate,
+                           double bound) {
+  demand(std::isfinite(stretch), joint, "stretch", stretch, "finite");
+  demand(stiffness >= 0 && std::isfinite(stiffness), joint, "stiffness", stiffness,
+         ">= 0 and finite");
+  demand(damping >= 0 && std::isfinite(damping) && stiffness + damping > 0, joint, "damping",
+         damping, ">= 0 and finite, and > 0 without stiffness");
+  demand(bound >= 0, joint, "bound", bound, ">= 0");
+  rows_.add(joint, rate);
+  laws_.push_back({joint, false, 0, 0, rate, bound, stretch, stiffness, damping});
+}
+
 void JointLaws::on(int body, const Vector6d& G) {
   const int row = rows_.count() - 1;
   if (row >= 0 && body >= 0 && rows_.end(row) - rows_.begin(row) >= 2)

@@ -45,10 +45,17 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
   plastic.assign(at(laws.count()), 0);
   bias_.assign(at(laws.count()), 0);
   plastic_bias_.assign(at(laws.count()), 0);
+  compliance_.assign(at(laws.count()), 0);
   for (int k = 0; k < laws.count(); ++k) {
     const JointLaws::Law& law = laws[k];
     if (!law.limit) {
+      // s' - rate + compliance x + stretch stiffness / (stiffness dt + damping)
       bias_[at(k)] = plastic_bias_[at(k)] = -law.rate;
+      if (law.is_sprung()) {
+        compliance_[at(k)] = 1 / (dt * (law.stiffness * dt + law.damping));
+        bias_[at(k)] += law.stretch * law.stiffness / (law.stiffness * dt + law.damping);
+        plastic_bias_[at(k)] = bias_[at(k)];
+      }
       continue;
     }
     const double came = -speed(k, coming_), comes = -speed(k, v);
@@ -65,7 +72,10 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
 
 BodyCone LawRows::cone(int law, LawUse use) const {
   const JointLaws::Law& each = laws[law];
-  BodyCone out(each.limit ? Cone::nonnegative() : Cone::bounded(each.bound * dt_));
+  BodyCone out(each.limit                  ? Cone::nonnegative()
+               : std::isfinite(each.bound) ? Cone::bounded(each.bound * dt_)
+                                           : Cone::free());
+  out.compliance = compliance_[at(law)];
   for (const JointRows::Term* t = laws.rows().begin(law); t != laws.rows().end(law); ++t) {
     const bool first = t == laws.rows().begin(law);
     (first ? out.first : out.second) = t->body;

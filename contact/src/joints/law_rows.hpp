@@ -11,7 +11,7 @@
 
 namespace tether::contact::detail {
 
-/// A limit is the cone x >= 0, a bounded law |x| <= bound dt.
+/// A limit is the cone x >= 0, a bounded law |x| <= bound dt, a sprung one a compliant row.
 class LawRows {
  public:
   /// Start of a part of a step: the speeds that bodies come with, before its forces.
@@ -48,7 +48,7 @@ class LawRows {
   double speed(int law, const std::vector<Vector6d>& v) const;
 
   std::vector<Vector6d> coming_;
-  std::vector<double> bias_, plastic_bias_;
+  std::vector<double> bias_, plastic_bias_, compliance_;
   double dt_ = 0;
 };
 

@@ -90,7 +90,7 @@ void AccurateSteps::list_laws(double length, std::vector<Active>& list) const {
   stepper_.joints->list_laws(laws);
   for (std::size_t k = 0; k < laws.size(); ++k) {
     const LawState& law = laws[k];
-    if (law.impulse == 0) continue;
+    if (law.impulse == 0 || std::isinf(law.bound)) continue;  // springs never slip
     list.push_back({~std::uint64_t{0} - k, law.side != 0 ? Does::slips : Does::sticks,
                     law.side * Vector3d::UnitX()});
     Active& a = list.back();

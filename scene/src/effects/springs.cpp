@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "mechanics/effect.hpp"
+#include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
 
@@ -22,6 +23,17 @@ struct Item {
   int first, second;
   Vector3d at_first, at_second;
   double stiffness, damping, rest;
+
+  template <class S>
+  void pull(double, const Frame<S>& A, const Frame<S>& B, bool with_damping, Wrench<S>& on_first,
+            Wrench<S>& on_second) const;
+  double potential(double, const Frame<double>& A, const Frame<double>& B) const {
+    const double stretch = (point<0>(B, at_second).x - point<0>(A, at_first).x).norm() - rest;
+    return 0.5 * stiffness * stretch * stretch;
+  }
+  bool works() const { return damping > 0; }
+  template <class S>
+  S power(double, const Frame<S>& A, const Frame<S>& B) const;
 };
 
 /// Vector from the first to the second point, and its rate.
@@ -36,17 +48,17 @@ struct Span {
 };
 
 template <class S>
-void pull(const Item& each, const Frame<S>& A, const Frame<S>& B, bool with_damping,
-          Wrench<S>& on_first, Wrench<S>& on_second) {
+void Item::pull(double, const Frame<S>& A, const Frame<S>& B, bool with_damping,
+                Wrench<S>& on_first, Wrench<S>& on_second) const {
   using std::sqrt;
-  const Span<S> span(each, A, B);
+  const Span<S> span(*this, A, B);
   // Per length of d; a spring without rest length has no direction at d = 0 and needs none.
-  S factor(each.stiffness);
-  const bool damps = with_damping && each.damping > 0;
-  if (each.rest > 0 || damps) {
+  S factor(stiffness);
+  const bool damps = with_damping && damping > 0;
+  if (rest > 0 || damps) {
     const S square = dot(span.d, span.d);
-    if (each.rest > 0) factor -= each.stiffness * each.rest / sqrt(square);
-    if (damps) factor += each.damping * dot(span.d, span.rate()) / square;
+    if (rest > 0) factor -= stiffness * rest / sqrt(square);
+    if (damps) factor += damping * dot(span.d, span.rate()) / square;
   }
   Vector3<S> force;
   for (int i = 0; i < 3; ++i) force[i] = factor * span.d[i];
@@ -55,14 +67,13 @@ void pull(const Item& each, const Frame<S>& A, const Frame<S>& B, bool with_damp
 }
 
 template <class S>
-S power_of_damper(const Item& each, const Frame<S>& A, const Frame<S>& B) {
-  if (!(each.damping > 0)) return S(0.0);
-  const Span<S> span(each, A, B);
+S Item::power(double, const Frame<S>& A, const Frame<S>& B) const {
+  const Span<S> span(*this, A, B);
   const S along = dot(span.d, span.rate());
-  return S(-each.damping * along * along / dot(span.d, span.d));
+  return S(-damping * along * along / dot(span.d, span.d));
 }
 
-class SpringForces : public Force {
+class SpringForces : public PairForces<Item> {
  public:
   SpringForces(const std::vector<Spring>& springs, const Bodies& bodies) {
     for (const Spring& each : springs) {
@@ -74,47 +85,13 @@ class SpringForces : public Force {
       item.stiffness = each.stiffness;
       item.damping = each.damping;
       item.rest = each.rest ? *each.rest : (each.at_second - each.at).norm();
-      damped_ = damped_ || each.damping > 0;
-      items_.push_back(item);
+      push_back(item);
     }
   }
   const char* name() const override { return "springs"; }
 
-  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
-    for (const Item& each : items_) {
-      const auto [a, b] = pair_of<double>(each, frame_pair(bodies, each), true);
-      put(bodies, each.first, a, loads);
-      put(bodies, each.second, b, loads);
-    }
-  }
-  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
-    for (const Item& each : items_) {
-      const auto frames = seed_pair(bodies, each);
-      const auto [a, b] = pair_of<Dual>(each, frames, true);
-      put(bodies, each, each.first, frames.first, a, J);
-      put(bodies, each, each.second, frames.second, b, J);
-    }
-  }
-  double potential(const Bodies& bodies) const override {
-    double sum = 0;
-    for (const Item& each : items_) {
-      const double stretch = (point<0>(bodies.frames[at(each.second)], each.at_second).x -
-                              point<0>(bodies.frames[at(each.first)], each.at_first).x)
-                                 .norm() -
-                             each.rest;
-      sum += 0.5 * each.stiffness * stretch * stretch;
-    }
-    return sum;
-  }
-  void add_potential_gradient(const Bodies& bodies, double* row) const override {
-    for (const Item& each : items_) {
-      const auto [a, b] = pair_of<double>(each, frame_pair(bodies, each), false);
-      gradient(bodies, each.first, a, row);
-      gradient(bodies, each.second, b, row);
-    }
-  }
   void report(const Bodies& bodies, Forces& forces) const override {
-    for (const Item& each : items_) {
+    for (const Item& each : items()) {
       const Span<double> span(each, bodies.frames[at(each.first)], bodies.frames[at(each.second)]);
       const double length = span.d.norm();
       const double rate = length > 0 ? span.d.dot(span.rate()) / length : 0;
@@ -122,26 +99,6 @@ class SpringForces : public Force {
           {each.stiffness * (length - each.rest) + each.damping * rate, span.a.x, span.b.x});
     }
   }
-  bool has_power() const override { return damped_; }
-  double power(const Bodies& bodies) const override {
-    double sum = 0;
-    for (const Item& each : items_)
-      sum += power_of_damper<double>(each, bodies.frames[at(each.first)],
-                                     bodies.frames[at(each.second)]);
-    return sum;
-  }
-  void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
-    for (const Item& each : items_) {
-      const auto [A, B] = seed_pair(bodies, each);
-      const Dual P = power_of_damper<Dual>(each, A, B);
-      if (bodies.moves(each.first))
-        J.add_directions(J.work_row, bodies.inertia[at(each.first)].slot, P.derivatives(), 0, -1.0);
-      if (bodies.moves(each.second))
-        J.add_directions(J.work_row, bodies.inertia[at(each.second)].slot, P.derivatives(),
-                         kBodyDirections, -1.0);
-    }
-  }
-
   // Explicit springs of a semi-implicit step need dt^2 k / m < 4 and dt c / m < 2; together
   // dt^2 k + 2 dt c < 4 m.
   void check_step(const Scene& scene, const Bodies& bodies, double dt) const override {
@@ -151,8 +108,8 @@ class SpringForces : public Force {
       const Inertia& inertia = bodies.inertia[at(body)];
       return 1 / inertia.mass + where.squaredNorm() * inertia.inverse.trace();
     };
-    for (std::size_t i = 0; i < items_.size(); ++i) {
-      const Item& s = items_[i];
+    for (std::size_t i = 0; i < items().size(); ++i) {
+      const Item& s = items()[i];
       const double inverse = softness(s.first, s.at_first) + softness(s.second, s.at_second);
       if ((dt * s.stiffness + 2 * s.damping) * dt * inverse < 4) continue;
       const double c = 2 * s.damping * inverse, k = s.stiffness * inverse;
@@ -168,70 +125,17 @@ class SpringForces : public Force {
   // other: each sees what the other dampers leave.
   void step(SteppedBodies& stepped, double dt) const override {
     const Bodies& bodies = stepped.before_forces();
-    for (const Item& each : items_) {
+    for (const Item& each : items()) {
       const Frame<double>&A = bodies.frames[at(each.first)], &B = bodies.frames[at(each.second)];
       if (!(Span<double>(each, A, B).d.squaredNorm() > 0)) continue;  // no direction
-      const auto [a, b] = pair_of<double>(each, {A, B}, false);
-      const auto [with_a, with_b] = pair_of<double>(each, {A, B}, true);
+      const auto [a, b] = pair_of<double>(0, each, {A, B}, false);
+      const auto [with_a, with_b] = pair_of<double>(0, each, {A, B}, true);
       stepped.push(each.first, dt, a.force, a.torque);
       stepped.push(each.second, dt, b.force, b.torque);
       stepped.damp(each.first, dt, with_a.force - a.force, with_a.torque - a.torque);
       stepped.damp(each.second, dt, with_b.force - b.force, with_b.torque - b.torque);
     }
   }
-
- private:
-  template <class S>
-  using FramePair = std::pair<const Frame<S>&, const Frame<S>&>;
-
-  static FramePair<double> frame_pair(const Bodies& bodies, const Item& each) {
-    return {bodies.frames[at(each.first)], bodies.frames[at(each.second)]};
-  }
-  static std::pair<Frame<Dual>, Frame<Dual>> seed_pair(const Bodies& bodies, const Item& each) {
-    return {seed(bodies.frames[at(each.first)], bodies.moves(each.first), 0),
-            seed(bodies.frames[at(each.second)], bodies.moves(each.second), kBodyDirections)};
-  }
-  template <class S>
-  static std::pair<Wrench<S>, Wrench<S>> pair_of(const Item& each, const FramePair<S>& frames,
-                                                 bool with_damping) {
-    std::pair<Wrench<S>, Wrench<S>> wrenches{no_wrench<S>(), no_wrench<S>()};
-    pull(each, frames.first, frames.second, with_damping, wrenches.first, wrenches.second);
-    return wrenches;
-  }
-
-  static void put(const Bodies& bodies, int body, const Wrench<double>& wrench,
-                  std::vector<Load6>& loads) {
-    const int slot = bodies.inertia[at(body)].slot;
-    if (slot < 0) return;
-    loads[at(slot)].force += wrench.force;
-    loads[at(slot)].torque_world += wrench.torque;
-  }
-  static void put(const Bodies& bodies, const Item& each, int body, const Frame<Dual>& frame,
-                  const Wrench<Dual>& wrench, JacobianBlocks& J) {
-    const int slot = bodies.inertia[at(body)].slot;
-    if (slot < 0) return;
-    const Vector3<Dual> torque = transposed_times(frame.R, wrench.torque);
-    for (int i = 0; i < 6; ++i) {
-      const Derivatives& d = (i < 3 ? wrench.force[i] : torque[i - 3]).derivatives();
-      const int row = J.motion_row(slot, i);
-      if (bodies.moves(each.first))
-        J.add_directions(row, bodies.inertia[at(each.first)].slot, d, 0, -1.0);
-      if (bodies.moves(each.second))
-        J.add_directions(row, bodies.inertia[at(each.second)].slot, d, kBodyDirections, -1.0);
-    }
-  }
-  static void gradient(const Bodies& bodies, int body, const Wrench<double>& wrench, double* row) {
-    const int slot = bodies.inertia[at(body)].slot;
-    if (slot < 0) return;
-    const Frame<double>& f = bodies.frames[at(body)];
-    for (int k = 0; k < 3; ++k) row[kBody * slot + k] -= wrench.force[k];
-    const Eigen::RowVector4d q =
-        (f.R.transpose() * wrench.torque).transpose() * bodies.turns[at(slot)];
-    for (int k = 0; k < 4; ++k) row[kBody * slot + kQuaternion + k] -= q[k];
-  }
-
-  std::vector<Item> items_;
-  bool damped_ = false;
 };
 
 bool damps(const Spring& spring) { return spring.damping > 0; }

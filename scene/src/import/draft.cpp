@@ -38,7 +38,6 @@ class Drafting {
     draft_.scene.name = clean_title(model_.name);
     draft_.scene.end = options_.end;
     draft_.scene.gravity = model_.gravity;
-    if (model_.step > 0) draft_.step = model_.step;
     add_ground();
     for (const Part& part : parts_) body_of_.push_back(part.gone ? -1 : add_body(part));
     for (std::size_t k = 0; k < parts_.size(); ++k) {

@@ -84,8 +84,11 @@ void name_lost_laws(const Chain& chain, Remarks& remarks) {
     const LinkJoint& law = each.law;
     if (law.limits) remarks.add("limits of joints that are one joint here", law.name);
     if (law.friction > 0) remarks.add("friction of joints that are one joint here", law.name);
-    if (law.damping > 0) remarks.add("damping of joints that are one joint here", law.name);
-    if (law.stiffness > 0) remarks.add("stiffness of joints that are one joint here", law.name);
+    const bool sprung = law.kind == MotionKind::ball && chain.size() == 1;
+    if (law.damping > 0 && !sprung)
+      remarks.add("damping of joints that are one joint here", law.name);
+    if (law.stiffness > 0 && !sprung)
+      remarks.add("stiffness of joints that are one joint here", law.name);
   }
 }
 
@@ -93,30 +96,6 @@ std::string names(const Chain& chain) {
   std::string out;
   for (const PlacedJoint& each : chain) out += (out.empty() ? "" : " + ") + each.law.name;
   return out;
-}
-
-/// A slide along something fixed has its spring and damper between two points of its line, if a
-/// step can be stable with them (springs.cpp): false where it has not.
-bool add_spring(const PlacedJoint& placed, const Joint& joint, Draft& draft) {
-  const LinkJoint& law = placed.law;
-  if (joint.second >= 0 && !draft.scene.bodies[static_cast<std::size_t>(joint.second)].fixed)
-    return false;
-  const Body& body = draft.scene.bodies[static_cast<std::size_t>(joint.first)];
-  Spring spring;
-  spring.name = law.name;
-  spring.first = joint.first;
-  spring.second = joint.second;
-  spring.at = body.position;
-  const double length = law.limits ? 10 * (law.limits->second - law.limits->first) : 1000;
-  spring.at_second = spring.at - length * joint.axis;
-  spring.stiffness = law.stiffness;
-  spring.damping = law.damping;
-  if (law.stiffness > 0) spring.rest = length + law.rest - placed.value;
-  if (spring.rest && !(*spring.rest > 0)) return false;
-  const double step = draft.step;
-  if (!((step * law.stiffness + 2 * law.damping) * step < 2 * body.mass)) return false;
-  draft.scene.springs.push_back(std::move(spring));
-  return true;
 }
 
 void add_laws(const PlacedJoint& placed, const ImportOptions& options, Joint& joint,
@@ -151,17 +130,14 @@ void add_single(const PlacedJoint& placed, int first, int second, const ImportOp
   joint.at = placed.at;
   joint.axis = placed.axis;
   std::string comment = fmt::format("line {}", placed.law.line);
-  const bool turns = placed.law.kind == MotionKind::hinge;
-  if (turns || placed.law.kind == MotionKind::slide) {
+  const LinkJoint& law = placed.law;
+  const bool one_way = law.kind == MotionKind::hinge || law.kind == MotionKind::slide;
+  if (one_way)
     add_laws(placed, options, joint, comment, remarks);
-    const bool damps = placed.law.damping > 0, pulls = placed.law.stiffness > 0;
-    if ((damps || pulls) && (turns || !add_spring(placed, joint, draft))) {
-      if (damps) remarks.add("damping of joints", placed.law.name);
-      if (pulls) remarks.add("stiffness of joints", placed.law.name);
-    }
-  } else {
+  else
     name_lost_laws({placed}, remarks);
-  }
+  if ((one_way || law.kind == MotionKind::ball) && (law.stiffness > 0 || law.damping > 0))
+    joint.spring = JointSpring{law.stiffness, law.damping, one_way ? law.rest - placed.value : 0};
   draft.scene.joints.push_back(std::move(joint));
   draft.joint_comments.push_back(std::move(comment));
 }

@@ -11,7 +11,6 @@ namespace tether::scene::import {
 /// A scene, with a comment for each of its bodies and joints.
 struct Draft {
   Scene scene;
-  double step = 1e-3;  ///< s: the longest that the scene is to be run with
   std::vector<std::string> body_comments, joint_comments;
 };
 

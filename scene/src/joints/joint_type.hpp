@@ -38,6 +38,8 @@ class JointType {
 
   /// Whether that quantity is free without a motion: limits, motors and friction act along it.
   virtual bool is_free() const { return false; }
+  /// Whether it leaves all turns free, against which a spring may act.
+  virtual bool turns_freely() const { return false; }
 
   virtual const Vector3d& point_on_second(const Joint& joint) const { return joint.at; }
   virtual void take_lengths(const Joint&, Largest&) const {}

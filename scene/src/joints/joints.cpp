@@ -28,7 +28,7 @@ void read_one(files::Fields& in, files::Reader& r) {
   r.two_bodies(in, joint.first, joint.second);
   if (!kind)
     return in.pass_over({"at", "axis", "length", "motion", "limits", "limits_deg", "limits_rad",
-                         "limit_restitution", "motor", "friction"});
+                         "limit_restitution", "motor", "friction", "spring"});
   joint.kind = *kind;
   const JointType& type = joints::type(*kind);
   type.read(in, joint);
@@ -37,9 +37,9 @@ void read_one(files::Fields& in, files::Reader& r) {
       files::Fields fields = r.fields(motion, in.path() + ": motion");
       joint.motion = joints::read_motion(fields, type.motion() == JointType::MotionOf::angle);
     }
-  if (type.is_free())
-    for (const Effect* each : all())
-      each->read_joint(in, r, type.motion() == JointType::MotionOf::angle, joint);
+  for (const Effect* each : all())
+    if (type.is_free() || (type.turns_freely() && each->acts_on_turns()))
+      each->read_joint(in, r, type.motion() != JointType::MotionOf::length, joint);
   r.scene.joints.push_back(std::move(joint));
 }
 
@@ -58,9 +58,9 @@ class JointEffect : public Effect {
       type.write(joint, out);
       if (joint.motion)
         joints::write_motion(*joint.motion, type.motion() == JointType::MotionOf::angle, out);
-      if (!type.is_free()) continue;
       for (const Effect* each : all())
-        each->write_joint(joint, type.motion() == JointType::MotionOf::angle, out);
+        if (type.is_free() || (type.turns_freely() && each->acts_on_turns()))
+          each->write_joint(joint, type.motion() != JointType::MotionOf::length, out);
     }
   }
   void check(const Scene& scene, files::Report& report) const override {

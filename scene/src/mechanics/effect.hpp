@@ -28,22 +28,21 @@ using PlannedEffect = scene::Effect;
 /// Laws along the coordinates of joints. `sign`: -1 where the law sees the coordinate backwards.
 struct JointLawList {
   contact::JointLaws& laws;
-  std::vector<double>& signs;
+  double time;                          ///< s
   std::function<void(double sign)> on;  ///< puts the law added last on the bodies of the joint
 
   void limit(int joint, double gap, double restitution, double sign) {
     laws.add_limit(joint, gap, restitution);
-    place(sign);
+    on(sign);
   }
   void bounded(int joint, double rate, double bound) {
     laws.add_bounded(joint, rate, bound);
-    place(1);
+    on(1);
   }
-
- private:
-  void place(double sign) {
-    signs.push_back(sign);
-    on(sign);
+  void sprung(int joint, double stretch, double stiffness, double damping, double rate,
+              double bound) {
+    laws.add_sprung(joint, stretch, stiffness, damping, rate, bound);
+    on(1);
   }
 };
 
@@ -86,8 +85,10 @@ class Effect {
   virtual void read(files::Fields& /*root*/, files::Reader&) const {}
   virtual void read_scene(files::Fields&, Scene&) const {}
   virtual void read_body(files::Fields&, files::Reader&, Body&) const {}
-  /// `angle`: the joint turns; else it slides.
+  /// `angle`: the joint turns; else it slides. Of joints with a free coordinate, and of balls if
+  /// the effect acts on their turns.
   virtual void read_joint(files::Fields&, files::Reader&, bool /*angle*/, Joint&) const {}
+  virtual bool acts_on_turns() const { return false; }
   virtual void read_pair(files::Fields&, files::Reader&, Pair&) const {}
   /// The same, to be read again.
   virtual void write(const Scene&, files::Writer&) const {}
@@ -104,10 +105,10 @@ class Effect {
   /// Adds its columns to the table of a run.
   virtual void add_columns(const Scene&, std::vector<Column>&) const {}
 
-  /// A law along the free coordinate of a joint, which is now at `value`: JointLaws of the contact
+  /// A law along a free coordinate of a joint, which is now at `value`: JointLaws of the contact
   /// library, each with its sign: the coordinate grows by +1.
   virtual void add_laws(const Joint&, int /*joint*/, double /*value*/, JointLawList&) const {}
-  /// Whether the scene names a law of joints, which stepping alone has.
+  /// Whether the scene names a law of joints that the smooth engine does not have.
   virtual bool has_joint_laws(const Scene&) const { return false; }
 
   /// Lengths (m) and rates (1/s) of the scene; `length` and `mass`: its size.

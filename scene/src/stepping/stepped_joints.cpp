@@ -12,7 +12,8 @@ SteppedJoints::SteppedJoints(const Scene& scene)
       reactions_(scene, bodies_.bodies()),
       laws_(scene, bodies_.bodies()) {}
 
-void SteppedJoints::add_laws(const contact::BodySet& bodies, double, contact::JointLaws& out) {
+void SteppedJoints::add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) {
+  bodies_.set_time(t, 0);
   bodies_.read_positions(bodies);
   laws_.add(bodies_.bodies(), out);
 }

@@ -197,9 +197,11 @@ TEST_CASE("limits and friction follow the start; what scenes do not have is said
   CHECK(joint.limits->lower == -1.5);
   CHECK(joint.limits->upper == 1.5);
   CHECK(joint.friction == 0.25);
+  REQUIRE(joint.spring);
+  CHECK(joint.spring->damping == 0.5);
   CHECK(joint.axis.z() == 1);
-  for (const char* words : {"limit effort", "limit velocity", "damping of joints: j", "mimic",
-                            "<strange> in <joint>: j", "<mesh>: b", "<visual>"}) {
+  for (const char* words : {"limit effort", "limit velocity", "mimic", "<strange> in <joint>: j",
+                            "<mesh>: b", "<visual>"}) {
     INFO(words);
     CHECK(says(made.remarks, words));
     CHECK(made.toml.find(words) != std::string::npos);

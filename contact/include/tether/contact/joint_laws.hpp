@@ -13,8 +13,12 @@ namespace tether::contact {
 ///
 ///     limit     x >= 0,  s' >= -gap / dt,  complementary (struck: s' >= -e s'-, method, section 8)
 ///     bounded   |x| <= bound dt,  x opposes s' - rate, and is the bound where that is not 0
+///     sprung    x = -dt (stiffness (stretch + dt (s' - rate)) + damping (s' - rate)), |x| <= bound
+///     dt
 ///
 /// Bounded with rate 0 is Coulomb's friction of a joint, with another one a motor of limited force.
+/// Sprung is a spring and a damper, or a controlled drive, with the stretch and the speed of the
+/// end of the step: stable for any step and gain.
 class JointLaws {
  public:
   struct Law {
@@ -24,6 +28,10 @@ class JointLaws {
     double restitution;  ///< 0 .. 1
     double rate;         ///< m/s or rad/s
     double bound;        ///< N or N m
+    double stretch = 0;  ///< m or rad
+    double stiffness = 0, damping = 0;
+
+    bool is_sprung() const { return stiffness > 0 || damping > 0; }
   };
 
   void clear();
@@ -32,6 +40,9 @@ class JointLaws {
   void add_limit(int joint, double gap, double restitution);
   /// bound >= 0.
   void add_bounded(int joint, double rate, double bound);
+  /// stiffness, damping >= 0, not both 0; bound >= 0, may be infinite.
+  void add_sprung(int joint, double stretch, double stiffness, double damping, double rate,
+                  double bound);
   /// Adds the term G v of one more body to the law added last, which has at most two; body -1, the
   /// world, is ignored.
   void on(int body, const Vector6d& G);

@@ -24,9 +24,22 @@ struct JointLimits {
   double restitution = 0;       ///< 0 .. 1
 };
 
-/// Drives the speed of a hinge or slider towards `rate`, with at most the force `bound`.
+/// Drives the speed of a hinge or slider towards `rate`, with at most the force `bound`. With gains
+/// the force is -stiffness (s - target - rate t) - damping (s' - rate), at most `bound`, which may
+/// be infinite; without them it is what the speed needs.
 struct JointMotor {
-  double rate = 0, bound = 0;  ///< rad/s, N m; m/s, N
+  double rate = 0, bound = 0;         ///< rad/s, N m; m/s, N
+  double stiffness = 0, damping = 0;  ///< N m/rad, N m s/rad; N/m, N s/m
+  double target = 0;                  ///< rad, m
+
+  bool has_gains() const { return stiffness > 0 || damping > 0; }
+};
+
+/// The force -stiffness (s - rest) - damping s' along the angle or way s of a hinge or slider; the
+/// moment -stiffness turn - damping (angular velocity) of a ball, whose rest is that of t = 0.
+struct JointSpring {
+  double stiffness = 0, damping = 0;  ///< N m/rad, N m s/rad; N/m, N s/m
+  double rest = 0;                    ///< rad, m
 };
 
 enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal, planar };
@@ -56,6 +69,7 @@ struct Joint {
   std::optional<Motion> motion;
   std::optional<JointLimits> limits;
   std::optional<JointMotor> motor;
+  std::optional<JointSpring> spring;
   double friction = 0;  ///< of a hinge or slider: Coulomb's, at most this moment (N m) or force (N)
   Place place;
   /// Universal only: the arm of the cross on `second`, at right angles to `axis`, that on `first`.

@@ -10,7 +10,7 @@ LawContacts::LawContacts(const Scene& scene, const mechanics::Bodies& bodies)
   laws_.add(bodies, all);
   for (int law = 0; law < all.count(); ++law) {
     const contact::JointLaws::Law& from = all[law];
-    if (!from.limit && from.bound == 0) continue;
+    if (from.is_sprung() || (!from.limit && from.bound == 0)) continue;
     Entry each{law, {}, 0, 0};
     if (from.limit) {
       each.of.restitution = from.restitution;

@@ -10,6 +10,7 @@ namespace {
 class Ball : public JointType {
  public:
   JointKind kind() const override { return JointKind::ball; }
+  bool turns_freely() const override { return true; }
   void add_rows(RowBuilder& rows) const override { rows.coincide(); }
   // A force through the point.
   void limit_axes(const Joint& joint, Momenta& momenta, const std::string& because) const override {

@@ -2,15 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "coordinate.hpp"
 
-#include <cmath>
-
 #include "joints/list.hpp"
 
 namespace tether::scene::joints {
 
-Coordinate::Coordinate(const Joint& joint, const Bodies& bodies)
-    : what_(type(joint.kind).motion()),
+Coordinate::Coordinate(const Joint& joint, const Bodies& bodies, int component)
+    : what_(component < 0 ? type(joint.kind).motion() : JointType::MotionOf::angle),
       fixed_direction_(joint.kind != JointKind::distance),
+      component_(component),
       first_(bodies.index(joint.first)),
       second_(bodies.index(joint.second)),
       at_first_(point_in(A(bodies), joint.at)),
@@ -21,25 +20,10 @@ Coordinate::Coordinate(const Joint& joint, const Bodies& bodies)
   zero_ = direction_in(B(bodies), x);
   ahead_ = direction_in(B(bodies), y);
   axis_ = direction_in(B(bodies), z);
+  start_ = A(bodies).R.transpose() * B(bodies).R;
 }
 
 Vector3d Coordinate::place(const Bodies& bodies) const { return point<0>(A(bodies), at_first_).x; }
-
-double Coordinate::value(const Bodies& bodies) const {
-  if (what_ == JointType::MotionOf::angle) {
-    const Vector3d u = A(bodies).R * of_first_;
-    return std::atan2(u.dot(B(bodies).R * ahead_), u.dot(B(bodies).R * zero_));
-  }
-  const Vector3d d = place(bodies) - point<0>(B(bodies), at_second_).x;
-  return fixed_direction_ ? d.dot(B(bodies).R * axis_) : d.norm();
-}
-
-double Coordinate::rate(const Bodies& bodies) const {
-  Wrench<double> on_first, on_second;
-  gradient(bodies, on_first, on_second);
-  return on_first.force.dot(A(bodies).v) + on_first.torque.dot(A(bodies).W) +
-         on_second.force.dot(B(bodies).v) + on_second.torque.dot(B(bodies).W);
-}
 
 double Coordinate::rest(const Bodies& bodies) const {
   if (what_ == JointType::MotionOf::angle)
@@ -52,26 +36,6 @@ double Coordinate::rest(const Bodies& bodies) const {
   }
   const double length = d.norm(), along = d.dot(d1) / length;
   return (d1.squaredNorm() - along * along + d.dot(d2)) / length;
-}
-
-Vector3d Coordinate::direction(const Bodies& bodies) const {
-  if (fixed_direction_) return B(bodies).R * axis_;
-  return (place(bodies) - point<0>(B(bodies), at_second_).x).stableNormalized();
-}
-
-void Coordinate::gradient(const Bodies& bodies, Wrench<double>& on_first,
-                          Wrench<double>& on_second) const {
-  const Vector3d u = direction(bodies);
-  on_first = on_second = no_wrench<double>();
-  if (what_ == JointType::MotionOf::angle) {
-    on_first.torque = u;
-    on_second.torque = -u;
-    return;
-  }
-  // A slider's acts on both bodies at the point of the first.
-  const Vector3d p = place(bodies);
-  on_first.add(A(bodies), p, u);
-  on_second.add(B(bodies), fixed_direction_ ? p : point<0>(B(bodies), at_second_).x, Vector3d(-u));
 }
 
 }  // namespace tether::scene::joints

@@ -22,6 +22,11 @@ class JointLawEffect : public Effect {
  protected:
   JointLawEffect(const char* title, bool (*has)(const Joint&)) : title_(title), has_(has) {}
 
+  static void read_gains(files::Fields& in, bool angle, double& stiffness, double& damping) {
+    stiffness = in.number("stiffness", 0, files::kNotNegative, angle ? "N m/rad" : "N/m");
+    damping = in.number("damping", 0, files::kNotNegative, angle ? "N m s/rad" : "N s/m");
+  }
+
  private:
   const char* title_;
   bool (*has_)(const Joint&);

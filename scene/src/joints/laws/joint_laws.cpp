@@ -15,19 +15,33 @@ namespace {
 constexpr double kBeyond = 1e-9;  // m or rad: a start this far beyond a limit is on it
 
 bool has_laws(const Joint& joint) { return joint.limits || joint.motor || joint.friction != 0; }
+bool is_free(const Joint& joint) { return type(joint.kind).is_free() && !joint.motion; }
 
 }  // namespace
+
+std::vector<Coordinate> coordinates_of(const Joint& joint, std::size_t number,
+                                       const Bodies& bodies) {
+  if (is_free(joint)) return {Coordinate(joint, bodies)};
+  if (!type(joint.kind).turns_freely())
+    throw std::invalid_argument("joint \"" + name_of(joint, number) +
+                                "\": a spring acts on balls, and on hinges and sliders that no "
+                                "motion drives");
+  std::vector<Coordinate> out;
+  for (int k = 0; k < 3; ++k) out.emplace_back(joint, bodies, k);
+  return out;
+}
 
 JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
   for (std::size_t j = 0; j < scene.joints.size(); ++j) {
     const Joint& joint = scene.joints[j];
-    if (!has_laws(joint)) continue;
+    if (!has_laws(joint) && !joint.spring) continue;
     const std::string name = "joint \"" + name_of(joint, j) + "\": ";
-    if (!type(joint.kind).is_free() || joint.motion)
+    if (has_laws(joint) && !is_free(joint))
       throw std::invalid_argument(name +
                                   "limits, a motor and friction act on hinges and sliders that no "
                                   "motion drives");
-    joints_.push_back({static_cast<int>(j), joint, Coordinate(joint, bodies)});
+    for (Coordinate& each : coordinates_of(joint, j, bodies))
+      joints_.push_back({static_cast<int>(j), joint, std::move(each)});
     if (joint.limits && (joint.limits->lower > kBeyond || joint.limits->upper < -kBeyond))
       throw std::invalid_argument(name + "it is at 0 at t = 0, which must be between its limits");
   }
@@ -43,9 +57,8 @@ double JointLaws::value(const Item& item, const Bodies& bodies) const {
 }
 
 void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
-  signs_.clear();
-  joint_of_.clear();
-  mechanics::JointLawList list{out, signs_, nullptr};
+  placed_.clear();
+  mechanics::JointLawList list{out, bodies.time, nullptr};
   for (std::size_t k = 0; k < joints_.size(); ++k) {
     const Item& item = joints_[k];
     const double at_now = value(item, bodies);
@@ -54,7 +67,7 @@ void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
     const int body[2] = {item.coordinate.first(), item.coordinate.second()};
     // One law after the other: a term goes to the law added last.
     list.on = [&](double sign) {
-      joint_of_.push_back(static_cast<int>(k));
+      placed_.push_back({static_cast<int>(k), sign, out[out.count() - 1].is_sprung()});
       for (int side = 0; side < 2; ++side) {
         if (!bodies.moves(body[side])) continue;
         contact::Vector6d G;
@@ -70,9 +83,10 @@ void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
 void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
                            std::vector<JointForce>& forces) const {
   if (!(dt > 0)) return;
-  for (std::size_t i = 0; i < impulses.size() && i < signs_.size(); ++i) {
-    const Item& item = joints_[at(joint_of_[i])];
-    const double x = signs_[i] * impulses[i] / dt;
+  for (std::size_t i = 0; i < impulses.size() && i < placed_.size(); ++i) {
+    if (placed_[i].sprung) continue;
+    const Item& item = joints_[at(placed_[i].item)];
+    const double x = placed_[i].sign * impulses[i] / dt;
     JointForce& force = forces[at(item.joint)];
     const bool angle = item.coordinate.what() == JointType::MotionOf::angle;
     (angle ? force.moment : force.force) += x * item.coordinate.direction(bodies);

@@ -1,0 +1,132 @@
+// Tether: forces between two bodies each. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "force.hpp"
+
+namespace tether::scene::mechanics {
+
+/// Values and derivatives of the forces of items from one formula. An Item has
+///
+///   first, second                indices of its bodies in Bodies
+///   pull<S>(t, A, B, all, a, b)  adds to the wrenches of both bodies; not `all`: the part that has
+///                                a potential
+///   potential(t, A, B)           of that part, J
+///   works()                      whether there is another part
+///   power<S>(t, A, B)            of the other part, W
+template <class Item>
+class PairForces : public Force {
+ public:
+  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
+    for (const Item& each : items_) {
+      const auto [a, b] = pair_of<double>(bodies.time, each, frame_pair(bodies, each), true);
+      put(bodies, each.first, a, loads);
+      put(bodies, each.second, b, loads);
+    }
+  }
+  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const Item& each : items_) {
+      const auto frames = seed_pair(bodies, each);
+      const auto [a, b] = pair_of<Dual>(bodies.time, each, frames, true);
+      put(bodies, each, each.first, frames.first, a, J);
+      put(bodies, each, each.second, frames.second, b, J);
+    }
+  }
+  double potential(const Bodies& bodies) const override {
+    double sum = 0;
+    for (const Item& each : items_)
+      sum += each.potential(bodies.time, bodies.frames[at(each.first)],
+                            bodies.frames[at(each.second)]);
+    return sum;
+  }
+  void add_potential_gradient(const Bodies& bodies, double* row) const override {
+    for (const Item& each : items_) {
+      const auto [a, b] = pair_of<double>(bodies.time, each, frame_pair(bodies, each), false);
+      gradient(bodies, each.first, a, row);
+      gradient(bodies, each.second, b, row);
+    }
+  }
+  bool has_power() const override { return works_; }
+  double power(const Bodies& bodies) const override {
+    double sum = 0;
+    for (const Item& each : items_)
+      if (each.works())
+        sum += each.template power<double>(bodies.time, bodies.frames[at(each.first)],
+                                           bodies.frames[at(each.second)]);
+    return sum;
+  }
+  void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const Item& each : items_) {
+      const auto [A, B] = seed_pair(bodies, each);
+      const Dual P = each.works() ? each.template power<Dual>(bodies.time, A, B) : Dual(0.0);
+      if (bodies.moves(each.first))
+        J.add_directions(J.work_row, bodies.inertia[at(each.first)].slot, P.derivatives(), 0, -1.0);
+      if (bodies.moves(each.second))
+        J.add_directions(J.work_row, bodies.inertia[at(each.second)].slot, P.derivatives(),
+                         kBodyDirections, -1.0);
+    }
+  }
+
+ protected:
+  void push_back(const Item& item) {
+    works_ = works_ || item.works();
+    items_.push_back(item);
+  }
+  const std::vector<Item>& items() const { return items_; }
+
+  template <class S>
+  using FramePair = std::pair<const Frame<S>&, const Frame<S>&>;
+  static FramePair<double> frame_pair(const Bodies& bodies, const Item& each) {
+    return {bodies.frames[at(each.first)], bodies.frames[at(each.second)]};
+  }
+  template <class S>
+  static std::pair<Wrench<S>, Wrench<S>> pair_of(double t, const Item& each,
+                                                 const FramePair<S>& frames, bool all) {
+    std::pair<Wrench<S>, Wrench<S>> wrenches{no_wrench<S>(), no_wrench<S>()};
+    each.pull(t, frames.first, frames.second, all, wrenches.first, wrenches.second);
+    return wrenches;
+  }
+
+ private:
+  static std::pair<Frame<Dual>, Frame<Dual>> seed_pair(const Bodies& bodies, const Item& each) {
+    return {seed(bodies.frames[at(each.first)], bodies.moves(each.first), 0),
+            seed(bodies.frames[at(each.second)], bodies.moves(each.second), kBodyDirections)};
+  }
+  static void put(const Bodies& bodies, int body, const Wrench<double>& wrench,
+                  std::vector<Load6>& loads) {
+    const int slot = bodies.inertia[at(body)].slot;
+    if (slot < 0) return;
+    loads[at(slot)].force += wrench.force;
+    loads[at(slot)].torque_world += wrench.torque;
+  }
+  static void put(const Bodies& bodies, const Item& each, int body, const Frame<Dual>& frame,
+                  const Wrench<Dual>& wrench, JacobianBlocks& J) {
+    const int slot = bodies.inertia[at(body)].slot;
+    if (slot < 0) return;
+    const Vector3<Dual> torque = transposed_times(frame.R, wrench.torque);
+    for (int i = 0; i < 6; ++i) {
+      const Derivatives& d = (i < 3 ? wrench.force[i] : torque[i - 3]).derivatives();
+      const int row = J.motion_row(slot, i);
+      if (bodies.moves(each.first))
+        J.add_directions(row, bodies.inertia[at(each.first)].slot, d, 0, -1.0);
+      if (bodies.moves(each.second))
+        J.add_directions(row, bodies.inertia[at(each.second)].slot, d, kBodyDirections, -1.0);
+    }
+  }
+  static void gradient(const Bodies& bodies, int body, const Wrench<double>& wrench, double* row) {
+    const int slot = bodies.inertia[at(body)].slot;
+    if (slot < 0) return;
+    const Frame<double>& f = bodies.frames[at(body)];
+    for (int k = 0; k < 3; ++k) row[kBody * slot + k] -= wrench.force[k];
+    const Eigen::RowVector4d q =
+        (f.R.transpose() * wrench.torque).transpose() * bodies.turns[at(slot)];
+    for (int k = 0; k < 4; ++k) row[kBody * slot + kQuaternion + k] -= q[k];
+  }
+
+  std::vector<Item> items_;
+  bool works_ = false;
+};
+
+}  // namespace tether::scene::mechanics
