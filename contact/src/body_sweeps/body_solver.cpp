@@ -87,24 +87,14 @@ void BodySolver::Implementation::alone(int k, Worker& worker) {
 void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
                                        const std::vector<PointContact>& c, BodySolution& o) {
   out = &o;
-  read(b, c);
-  o.far = 0;
-  if (!options.leave_out_far || !far.leave_out(given, starts) || !solve_near(b, c)) solve_all(b, c);
-  if (options.warm_start) memory.keep(c, o.impulses);
-}
-
-void BodySolver::Implementation::read(const std::vector<RigidBody>& b,
-                                      const std::vector<PointContact>& c) {
   given.read(b, c, options.law);
   find_starts();
-}
-
-void BodySolver::Implementation::solve_all(const std::vector<RigidBody>& b,
-                                           const std::vector<PointContact>& c) {
-  if (options.team && options.team->solve(b, c, starts, options, *out)) return;
-  graph.build(static_cast<int>(b.size()), given.first(), given.second(), given.kinds(),
-              detail::groups_are_served());
-  solve_graph();
+  if (options.team == nullptr || !options.team->solve(b, c, starts, options, o)) {
+    graph.build(static_cast<int>(b.size()), given.first(), given.second(), given.kinds(),
+                detail::groups_are_served());
+    solve_graph();
+  }
+  if (options.warm_start) memory.keep(c, o.impulses);
 }
 
 void BodySolver::Implementation::solve_graph() {

@@ -8,7 +8,6 @@
 
 #include "body_passes/given_problem.hpp"
 #include "body_passes/island_sweeps.hpp"
-#include "body_sweeps/far_contacts.hpp"
 #include "body_sweeps/impulse_memory.hpp"
 #include "body_sweeps/workers.hpp"
 #include "graph/contact_graph.hpp"
@@ -59,22 +58,17 @@ struct BodySolver::Implementation {
   detail::GivenProblem given;     // the caller's bodies and contacts
   detail::ContactGraph graph;     // their islands
   detail::ImpulseHistory memory;  // impulses of earlier solves
-  // Impulses of each contact in the memory; empty: none. If some are far: of those solved next.
-  std::vector<const Vector3d*> starts, all_starts;
+  // Impulses of each contact in the memory; empty: none.
+  std::vector<const Vector3d*> starts;
   detail::IslandSweeps sweeps;                // impulses and velocities of this solve
   std::vector<IslandResult> results;          // of each island
   detail::Workers workers;                    // threads
-  BodySolution* out = nullptr;                // the caller's, or of a part of the contacts
-  detail::FarContacts far;                    // those of large islands that are not swept at first
-  std::vector<PointContact> near;             // the others
-  BodySolution found;                         // of these
+  BodySolution* out = nullptr;                // the caller's
   detail::SweepPartners* partners = nullptr;  // other processes: RankTeam
 
   // A solve, from body_solver.cpp on.
   void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
-  void read(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
   void find_starts();
-  void solve_all(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
   void solve_graph();  // given, starts and graph are known
   void solve_islands(int threads);
   bool here(int k) const { return !partners || partners->here(k); }
@@ -82,14 +76,6 @@ struct BodySolver::Implementation {
   void together(int k, Team& team);
   void alone(int k, Worker& worker);
   void report();
-
-  // near_contacts_first.cpp: where some are far.
-  bool solve_near(const std::vector<RigidBody>& b, const std::vector<PointContact>& c);
-  void solve_group(const std::vector<RigidBody>& b, const std::vector<PointContact>& c,
-                   bool some_far);
-  void solve_next(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, bool again);
-  void take_motion(const std::vector<RigidBody>& b);
-  void take_judgement(int swept);
 
   // block_gauss_seidel.cpp
   void iterate(int k, Team& team);

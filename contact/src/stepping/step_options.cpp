@@ -43,7 +43,6 @@ BodyOptions contact_options(const SteppingOptions& o) {
   if (o.acceptance > 1) {
     b.enough = std::min(accepted_residual(o), std::max(kEnough, o.tolerance));
   }
-  b.leave_out_far = true;
   b.threads = o.threads;
   b.team = o.team;
   return b;
@@ -68,7 +67,6 @@ BodyOptions correction_options(const SteppingOptions& o) {
   b.tolerance = 1e-2;
   b.min_sweeps = 0;
   b.max_sweeps = 10;
-  b.leave_out_far = false;  // as below
   b.max_assembled = 0;
   return b;
 }
@@ -79,14 +77,11 @@ double negligible_depth(const SteppingOptions& o, double dt) {
 
 // Gaps are closed by positions only: an error of the approach is so much of its way in the step,
 // and the next step sees it as a gap or a penetration. A few sweeps do; small islands, which are
-// cheap, are solved, so that a stack that lands does not depend on the order of its boxes. So few
-// sweeps leave no time to look which far contacts close: penetrations were up to twice as deep, in
-// no less time.
+// cheap, are solved, so that a stack that lands does not depend on the order of its boxes.
 BodyOptions closing_options(const SteppingOptions& o) {
   BodyOptions b = contact_options(o);
   b.min_sweeps = 0;
   b.max_sweeps = std::min(60, o.max_sweeps);
-  b.leave_out_far = false;
   b.max_assembled = std::min(128, o.max_assembled);
   return b;
 }

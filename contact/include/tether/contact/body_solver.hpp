@@ -59,10 +59,6 @@ struct BodyOptions {
   bool strict = false;    ///< as Options::strict, for assembled islands
   double max_work = 1e9;  ///< as Options::max_work, for each assembled island; and see max_sweeps
   double enough = 0;      ///< as Options::enough, for each assembled island
-  /// Contacts of islands of 6000 and more that `bias` keeps open by far are swept only where they
-  /// close after all (guide, section 3): for steps of fast bodies, with all contacts that could
-  /// close.
-  bool leave_out_far = false;
   /// Processes that share the work of each solve, all with the same bodies, contacts and options;
   /// null: none. Outlives the solver. See RankTeam.
   SolverTeam* team = nullptr;
@@ -81,7 +77,6 @@ struct BodySolution {
   int islands = 0, assembled_islands = 0, failed_islands = 0;
   int sweeps = 0, colours = 0;  ///< the most of any island
   int warm_started = 0;         ///< contacts whose id was found
-  int far = 0;                  ///< contacts that were left out: open before and after
   std::vector<int> replaced;    ///< as Solution::replaced
   bool spheres = false;  ///< no contact needed the general block: all spheres or frictionless
   std::vector<Eigen::Vector3d> impulses;                        ///< world axes, on `first`
