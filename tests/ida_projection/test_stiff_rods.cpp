@@ -197,20 +197,3 @@ TEST_CASE("many rods: what all of them share is not repaired by the first ones a
   // 17 where the metric begins with each unknown's own scale, 7.7 with one for each level.
   CHECK(std::exp(mean) <= 11.0);
 }
-
-TEST_CASE(
-    "rods with bending springs: stiff moves are made with fresh factors where old ones mislead") {
-  long stiff_moves = 0, repeated = 0;
-  for (const double spring : {2e5, 1e6}) {
-    const BentRods rods(spring);
-    const Problem problem = rods.problem(0.3);
-    for (const double tolerance : {2.58e-3, 1.69e-3, 1.39e-3, 1.27e-3, 8.62e-4, 5.87e-4}) {
-      const Run run = integrate(problem, tolerance, rods.rows(), {}, false);
-      REQUIRE(run.flag >= 0);
-      stiff_moves += run.statistics.stiff_moves;
-      repeated += run.statistics.corrections_repeated;
-    }
-  }
-  CHECK(stiff_moves >= 20);  // 98 and 6 in 48 runs
-  CHECK(repeated >= 1);
-}

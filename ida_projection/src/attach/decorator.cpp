@@ -197,8 +197,7 @@ int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, b
   Move move = move_and_polish(at, step.cj, tolerance, fresh);
   if (move.status == Status::success && in_use(Mechanism::repeated_correction) &&
       !polish_.corrector_was_right() && !fresh) {
-    // Old factors fooled IDA's convergence test, or serve no stiff move: correct again, with fresh
-    // ones.
+    // Old factors fooled IDA's convergence test: correct again, with fresh ones.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, at.correction);
     flag = correct(at, tolerance, true);
@@ -230,22 +229,12 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
     judge_capped(move);
     return move;  // the steps below would make the whole move
   }
-  const bool stiff = choose_metric(candidate, move);
+  choose_metric(candidate, move);
   if (move.status != Status::success) return move;
-  const bool made = stiff && in_use(Mechanism::stiff_moves) &&
-                    stiff_move_.make(candidate, cj, polish_, *movers_.used, !attempts_.repeated);
-  if (stiff && !fresh && !stiff_move_.trusted()) {
-    polish_.doubt_corrector();
-    return move;
-  }
-  if (made) ++statistics_.stiff_moves;
   const bool polishes = first ? move.length > polish_.longest_unanswered(control_.smoothing())
                               : wants_polish(move.length);
-  if (made)
-    move.status = settle_stiff_move(candidate, cj, tolerance);
-  else
-    move.status =
-        polishes ? polish(candidate, cj, tolerance) : movers_.used->finish(candidate, first);
+  move.status =
+      polishes ? polish(candidate, cj, tolerance) : movers_.used->finish(candidate, first);
   return move;
 }
 

@@ -23,7 +23,6 @@
 #include "step/metric_choice.hpp"
 #include "step/polish.hpp"
 #include "step/step_control.hpp"
-#include "step/stiff_move.hpp"
 #include "watch/bypass.hpp"
 #include "watch/collapse.hpp"
 #include "watch/first_steps.hpp"
@@ -137,7 +136,6 @@ class Projection::Impl {
   void judge_capped(Move& move);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   bool polishes_first();
-  bool hears_answers() const;
   bool asks_for_metric() const;
   Status polish(const Candidate& candidate, double cj, double tolerance);
   void account(const Move& move, const StepData& step, bool sampled);
@@ -167,11 +165,10 @@ class Projection::Impl {
   int corrector_failed(const Candidate& candidate, int flag);
 
   // choose_metric.cpp
-  bool choose_metric(const Candidate& candidate, Move& move);
+  void choose_metric(const Candidate& candidate, Move& move);
   Move move_by_levels(const Candidate& candidate, bool by_levels);
   AnsweredMove try_other_metric(const Candidate& candidate, const AnsweredMove& present,
                                 Move& move);
-  Status settle_stiff_move(const Candidate& candidate, double cj, double tolerance);
 
   // consistency.cpp
   struct JointStart;
@@ -233,7 +230,6 @@ class Projection::Impl {
   AlgebraicVariables variables_;
   Polish polish_;
   StepControl control_;
-  StiffMove stiff_move_;
   Movers movers_;
   PointProjection point_;
   Watches watch_;

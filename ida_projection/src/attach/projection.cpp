@@ -77,7 +77,6 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       variables_(statistics_),
       polish_(options_, statistics_, corrector_, variables_),
       control_(ida_, options_, statistics_),
-      stiff_move_(variables_),
       movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),
       watch_{RejectionWatch(constraints_), FirstSteps(constraints_, statistics_),

@@ -28,7 +28,6 @@ enum class Mechanism {
   looks,                  ///< rows that need no move are only evaluated
   rate_limit,             ///< scales of positions are at most h times those of velocities
   other_metric,           ///< one scale for each level, where stiff components respond to moves
-  stiff_moves,            ///< moves by what F makes of them, where that is not enough
   expected_oscillations,  ///< the order is limited after that
   joined_equations,       ///< of F, to rows that contain their algebraic variables
   false_row_watch,        ///< rows that F does not keep are named
@@ -50,7 +49,6 @@ inline constexpr const char* kMechanismNames[] = {"repeated correction",
                                                   "looks",
                                                   "rate limit",
                                                   "other metric",
-                                                  "stiff moves",
                                                   "expected oscillations",
                                                   "joined equations",
                                                   "false-row watch"};

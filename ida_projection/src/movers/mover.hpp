@@ -84,13 +84,6 @@ class Mover {
   /// May answers to moves ask for use_levels()?
   virtual bool may_use_levels() const { return false; }
 
-  /// Are there rows with unknowns of a third level, after positions and velocities?
-  virtual bool has_forces_in_rows() { return false; }
-
-  /// dy, over all unknowns, of one move from the candidate as it is now, with the factors at hand;
-  /// nothing is moved. False: it cannot be had.
-  virtual bool solve_at(const Candidate&, double* /*dy*/) { return false; }
-
   /// Will settle() never be called in this run? Then factors may serve more than one step.
   virtual void expect_no_settle(bool) {}
 

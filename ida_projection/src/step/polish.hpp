@@ -47,17 +47,6 @@ class Polish {
   /// After a move: the length of F's answer to it, -J^-1 F_y dy, over the differential variables
   /// in tolerances; -1: F or the linear solver fails.
   double answer(const Candidate& candidate);
-  /// That answer, until the next one; work space otherwise.
-  const double* answer_entries() const { return work_entries_; }
-  /// Is it that of the candidate as it is now?
-  bool answer_known() const { return step_known_; }
-  /// The next move is not the one that answer() was asked for last.
-  void forget_answer() { step_known_ = false; }
-  /// After a move that the answers are part of: the next add_newton_step() does without them.
-  void leave_answers_out() {
-    N_VScale(1.0, noise_, delta_);
-    step_known_ = true;
-  }
   /// IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
   /// equations contain y'; algebraic ones take the plain solution.
   double algebraic_factor(double cj) const {
@@ -70,7 +59,7 @@ class Polish {
   bool add_newton_step(const Candidate& candidate, double cj, double tolerance);
   /// The corrector's ycor again.
   void restore(const Candidate& candidate) {
-    forget_answer();
+    step_known_ = false;  // that move is not the next one
     N_VScale(1.0, corrected_, candidate.correction);
   }
 
@@ -81,7 +70,6 @@ class Polish {
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor
   /// Was the correction as small as IDA's convergence test predicted?
   bool corrector_was_right() const { return corrector_was_right_; }
-  void doubt_corrector() { corrector_was_right_ = false; }
   long iterations() const { return iterations_; }  ///< in this solve()
 
  private:

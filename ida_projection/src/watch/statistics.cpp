@@ -42,7 +42,6 @@ std::vector<Entry> entries(const Statistics& s) {
       count("algebraic variables out of the error test", "untested", s.untested),
       count("step smoothing begun", "smoothing_begun", s.smoothing_begun),
       count("order limited", "order_limited", s.order_limited),
-      count("moves as stiff components have them", "stiff_moves", s.stiff_moves),
       count("projections of sensitivities", "sensitivity_projections", s.sensitivity_projections),
       count("failures: not converged", "not_converged", s.not_converged),
       count("failures: move too long", "move_too_long", s.move_too_long),

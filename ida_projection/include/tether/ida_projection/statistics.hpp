@@ -27,9 +27,8 @@ struct Statistics {
   long residual_evaluations = 0;  ///< F called by the plugin itself (also in IDA's own count)
   long rank_drops = 0;            ///< factorisations that dropped redundant rows
   long untested = 0;  ///< algebraic variables out of IDA's error test, see suppress_algebraic
-  long smoothing_begun = 0;  ///< runs in which Options::smooth_where_needed acted
-  long order_limited = 0;    ///< times that Options::limit_order acted
-  long stiff_moves = 0;  ///< moves made as F makes them: stiff components answered to the shortest
+  long smoothing_begun = 0;          ///< runs in which Options::smooth_where_needed acted
+  long order_limited = 0;            ///< times that Options::limit_order acted
   long sensitivity_projections = 0;  ///< steps (attempts) whose sensitivities were projected
 
   // Failures by kind; each makes IDA retry with a smaller step unless noted.

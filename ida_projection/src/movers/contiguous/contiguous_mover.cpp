@@ -298,6 +298,21 @@ Move ContiguousMover<Rows>::newton(const Candidate& candidate, double drift_befo
   return result;
 }
 
+template <class Rows>
+bool ContiguousMover<Rows>::solve_with_factors(const std::vector<double>& g,
+                                               std::vector<double>& dy) {
+  if (g.size() != static_cast<std::size_t>(rows_.count())) return false;
+  Rows& blocks = rows_.blocks;
+  blocks.solve_roughly(g);
+  std::fill(dy.begin(), dy.end(), 0.0);
+  for (const auto* block : {&blocks.d, &blocks.a})
+    if (!block->rows.empty())
+      block->for_columns([&dy, from = block->dy.data()](int k, int i) {
+        dy[static_cast<std::size_t>(i)] = from[k];
+      });
+  return true;
+}
+
 std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
                                         Statistics& statistics, int size, int reported) {
   return std::make_unique<ContiguousMover<DenseRows>>(constraints, options, statistics, size,

@@ -75,8 +75,6 @@ class ContiguousMover final : public Mover {
     rows_.factors.there = false;
     return true;
   }
-  bool has_forces_in_rows() override { return rows_.has_third_level(); }
-  bool solve_at(const Candidate& candidate, double* dy) override;
   bool fatal() const override { return rows_.evaluator.fatal(); }
   void forget_failure() override { rows_.evaluator.forget(); }
   // Old factors leave more of what dropped rows ask for.
@@ -137,7 +135,6 @@ class ContiguousMover final : public Mover {
   int nothing_in_row_ = 0;  // moves that were none
   bool still_ = false;      // the last candidate was only looked at
   Staleness staleness_;
-  std::vector<double> elsewhere_;  // work space of solve_at()
 };
 
 }  // namespace tether::ida_projection

@@ -13,9 +13,8 @@ namespace {
 
 constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
 constexpr int kLevelLooks = 16;
-constexpr int kLeastOfForces = 2;  // rates of rates
-constexpr int kEarly = 64;         // factorisations, of a start
-constexpr double kAlike = 0.05;    // of a sum of squares
+constexpr int kEarly = 64;       // factorisations, of a start
+constexpr double kAlike = 0.05;  // of a sum of squares
 
 }  // namespace
 
@@ -43,12 +42,6 @@ bool FactoredRows<Rows>::find_levels() {
   if (levels().empty()) return false;
   metric.use_levels(levels());
   return true;
-}
-
-template <class Rows>
-bool FactoredRows<Rows>::has_third_level() {
-  const auto third = [](int level) { return level >= kLeastOfForces; };
-  return std::any_of(levels().begin(), levels().end(), third);
 }
 
 template <class Rows>

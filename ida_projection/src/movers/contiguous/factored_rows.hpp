@@ -66,8 +66,6 @@ class FactoredRows {
   }
   /// One scale for each level of the columns from now on. False: there is one level only.
   bool find_levels();
-  /// Are there unknowns of level 2?
-  bool has_third_level();
   /// At the candidate, whose variables are algebraic where `id` is 0.
   Status structure(const Candidate& candidate, const double* id);
   /// g at the present y.
