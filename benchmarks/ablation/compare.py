@@ -8,7 +8,7 @@ import sys
 
 BOUND = 1.03
 NOISE = 1e-13  # of an error
-GROUPS = ("small", "mid", "big", "others")
+GROUPS = ("small", "mid", "big", "others", "rods")
 
 
 def table(lines):

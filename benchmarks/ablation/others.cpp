@@ -1,6 +1,9 @@
 // Tether: problems that no mechanism was made for. SPDX-License-Identifier: BSD-3-Clause
 #include "ablation/others.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 
 #include "projection/run.hpp"
@@ -189,7 +192,72 @@ problems::Problem toda() {
   return p;
 }
 
+/// Masses of 1 kg in the plane on rods of 0.1 m, level and at rest at first, from the origin: q, v,
+/// the rods' forces by length. Springs keep joints straight, spring |q_{i+1} - 2 q_i + q_{i-1}|^2 /
+/// 2 each. Lengths and their rates are kept.
+problems::Problem rods(const char* name, double spring, int index, double t_end) {
+  static constexpr int N = 60;
+  static constexpr double kRod = 0.1, kGravity = 9.81;
+  const auto along = [](const double* x, int a) { return a >= 2 ? x[a] - x[a - 2] : x[a]; };
+  Vectors y0(5 * N, 0.0), yp0 = y0, id(5 * N, 1.0);
+  for (std::size_t i = 0; i < N; ++i) {
+    y0[2 * i] = static_cast<double>(i + 1) * kRod;
+    yp0[2 * N + 2 * i + 1] = -kGravity;
+    id[4 * N + i] = 0.0;
+  }
+  problems::Problem p = problem(name, t_end, y0, yp0, id);
+  p.index = index;
+  p.form = fmt::format("index {}", index);
+  p.error_components = 4 * N;
+  p.residual = [=](double, const double* y, const double* yp, double* r) {
+    const double *v = y + 2 * N, *pull = y + 4 * N;
+    double* const force = r + 2 * N;
+    for (int a = 0; a < 2 * N; ++a) {
+      r[a] = yp[a] - v[a];
+      force[a] = yp[2 * N + a] + (a % 2 == 1 ? kGravity : 0.0);
+    }
+    for (int a = 0; a + 2 < 2 * N; ++a) {
+      const double moment = spring * (along(y, a + 2) - along(y, a));
+      force[a + 2] += moment;
+      force[a] -= 2.0 * moment;
+      if (a >= 2) force[a - 2] += moment;
+    }
+    for (int i = 0; i < N; ++i) {
+      double rate = 0.0, second = 0.0;
+      for (int a = 2 * i; a < 2 * i + 2; ++a) {
+        const double d = along(y, a), w = along(v, a);
+        force[a] += d * pull[i];
+        if (a >= 2) force[a - 2] -= d * pull[i];
+        rate += d * w;
+        second += w * w + d * along(yp + 2 * N, a);
+      }
+      r[4 * N + i] = index == 1 ? second : rate;
+    }
+  };
+  keep(&p, 2 * N, [=](double, const double* y, double* g) {
+    std::fill(g, g + 2 * N, 0.0);
+    for (int a = 0; a < 2 * N; ++a) {
+      const double d = along(y, a);
+      g[a / 2] += d * d / 2;
+      g[N + a / 2] += d * along(y + 2 * N, a);
+    }
+  });
+  return p;
+}
+
 }  // namespace
+
+std::vector<problems::Problem> chains_of_rods() {
+  constexpr double kReference = 1e-9;
+  std::vector<problems::Problem> all = {rods("rods with bending springs", 1e6, 1, 0.3),
+                                        rods("loose rods", 0.0, 1, 0.2),
+                                        rods("loose rods", 0.0, 2, 0.2)};
+  for (problems::Problem& p : all) {
+    p.reference.assign(p.y0.size(), 0.0);
+    p.reference = p.index == 1 ? integrate(p, kReference).y : all[1].reference;
+  }
+  return all;
+}
 
 std::vector<problems::Problem> others() {
   std::vector<problems::Problem> all = {arm(), titration(), three_bodies(), top(), toda()};

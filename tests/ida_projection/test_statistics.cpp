@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "host.hpp"
-#include "host/sampled_time.hpp"
 #include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
@@ -24,17 +23,6 @@ std::vector<std::string> split(const std::string& line) {
 }
 
 }  // namespace
-
-TEST_CASE("time by samples: neither the first one nor a disturbed one is multiplied") {
-  tp::SampledTime time;
-  CHECK(time.total(0) == 0.0);
-  time.add(1e-3);
-  CHECK(time.total(1) == 1e-3);
-  for (int i = 0; i < 10; ++i) time.add(1e-6);
-  CHECK(time.total(176) == Approx(1e-3 + 175e-6));
-  time.add(5e-3);
-  CHECK(time.total(192) == Approx(6e-3 + 190e-6));
-}
 
 TEST_CASE("counts agree with each other") {
   for (const char* form : {"index 1", "index 0"})

@@ -66,7 +66,11 @@ class Projection::Impl::Stopwatch {
   }
   ~Stopwatch() {
     if (!running_) return;
-    owner_.tally_.timed.add(std::chrono::duration<double>(Clock::now() - begin_).count());
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+    Tally& tally = owner_.tally_;
+    const bool first = tally.attempts == 1;
+    (first ? tally.first_seconds : tally.seconds) += seconds;
+    if (!first) ++tally.timed;
   }
   bool running() const { return running_; }
   void start() {
@@ -282,9 +286,9 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
     attempts_.left_before = attempts_.left;
     movers_.used->accept();
     if (options_.progress) {
-      tally_.progress.steps = steps;
+      attempts_.progress.steps = steps;
       std::string ignored;
-      guarded([&] { return options_.progress(tally_.progress), 0; }, ignored);
+      guarded([&] { return options_.progress(attempts_.progress), 0; }, ignored);
     }
   }
   attempts_.steps = steps;
@@ -305,7 +309,8 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
   attempts_.moved = move.length;
   attempts_.left = move.left;
   if (options_.progress) {
-    tally_.progress = {step.t, ida_.step_size(), ida_.order(), move.drift_before, move.length, 0};
+    attempts_.progress = {step.t, ida_.step_size(), ida_.order(), move.drift_before, move.length,
+                          0};
   }
 }
 

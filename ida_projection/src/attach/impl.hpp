@@ -14,7 +14,6 @@
 #include "host/ida_lifetime.hpp"
 #include "host/linear_solver.hpp"
 #include "host/owned_vector.hpp"
-#include "host/sampled_time.hpp"
 #include "movers/mover.hpp"
 #include "sensitivity/corrector.hpp"
 #include "start/algebraic.hpp"
@@ -113,6 +112,7 @@ class Projection::Impl {
     bool repeated = false;         // IDA rejected it
     double moved = 0.0;            // tolerances; infinity: no point was found
     double last_move = 0.0;        // that was found, in tolerances
+    Progress progress;             // what the caller is told once it is accepted
     bool pending = false;          // a projected one that is not yet judged
     // Lengths that capped moves lacked, in tolerances: in the last accepted step, and in this
     // attempt.
@@ -216,8 +216,9 @@ class Projection::Impl {
   struct Tally {
     double move_sum = 0.0;
     long attempts = 0;  // since moves began
-    SampledTime timed;  // of every 16th
-    Progress progress;
+    // Of every 16th attempt. The first one finds out what the others keep.
+    double first_seconds = 0.0, seconds = 0.0;
+    long timed = 0;  // after the first
   };
 
   Constraints constraints_;

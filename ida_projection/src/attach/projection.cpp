@@ -181,15 +181,16 @@ Statistics Projection::Impl::statistics() {
   s.steps_without_plugin = watch_.bypass.steps();
   const long moved = s.projections - s.failures();
   s.mean_move = moved > 0 ? tally_.move_sum / static_cast<double>(moved) : 0.0;
-  s.seconds = tally_.timed.total(tally_.attempts);
+  s.seconds = tally_.first_seconds;
+  if (tally_.timed > 0)
+    s.seconds += tally_.seconds / static_cast<double>(tally_.timed) *
+                 static_cast<double>(tally_.attempts - 1);
   return s;
 }
 
 void Projection::Impl::reset_statistics() {
   statistics_ = Statistics{};
-  tally_.move_sum = 0.0;
-  tally_.attempts = 0;
-  tally_.timed = SampledTime();
+  tally_ = Tally();
 }
 
 Projection::Projection(void* ida_mem, Constraints constraints, Options options,
