@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <tether/contact_mpi.hpp>
@@ -119,6 +118,7 @@ void Solver::Implementation::place_body(int rank, int number, const double* numb
 
 void Solver::Implementation::gather_bodies(const Share& share) {
   std::vector<double> mine;
+  mine.reserve(kBody * share.bodies.size());
   by_all(messages.comm(), [&] {
     if (share.numbers.size() != share.bodies.size())
       throw std::invalid_argument(std::to_string(share.numbers.size()) +
@@ -179,6 +179,7 @@ void Solver::Implementation::check_contacts(const Share& share) const {
 void Solver::Implementation::gather_contacts(const Share& share) {
   by_all(messages.comm(), [&] { check_contacts(share); });
   std::vector<double> mine;
+  mine.reserve(kContact * share.contacts.size());
   for (const PointContact& c : share.contacts) {
     double id = 0;
     std::memcpy(&id, &c.id, sizeof(id));
@@ -199,17 +200,19 @@ void Solver::Implementation::gather_contacts(const Share& share) {
     c.bias = in[4];
     get(in + 5, c.r1, c.r2, c.normal, c.slip);
   }
-  std::vector<int> order(given.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int i, int j) {
-    return moving_first(given[at(i)]) < moving_first(given[at(j)]);
-  });
+  std::vector<std::pair<std::pair<int, int>, int>> order;
+  order.reserve(given.size());
+  for (std::size_t i = 0; i < given.size(); ++i)
+    order.emplace_back(moving_first(given[i]), static_cast<int>(i));
+  if (!std::is_sorted(order.begin(), order.end())) std::sort(order.begin(), order.end());
   const int rank = messages.rank();
   const int first = (rank > 0 ? ends[at(rank - 1)] : 0) / static_cast<int>(kContact);
   const int count = static_cast<int>(share.contacts.size());
   own_contacts.resize(share.contacts.size());
   contacts.clear();
-  for (const int i : order) {
+  contacts.reserve(given.size());
+  for (const auto& each : order) {
+    const int i = each.second;
     if (i >= first && i < first + count)
       own_contacts[at(i - first)] = static_cast<int>(contacts.size());
     contacts.push_back(given[at(i)]);

@@ -15,15 +15,12 @@ namespace {
 
 using linalg::at;
 
-// By velocities that are not kept. The angular velocity turns with the body: so its energy stays.
+// By velocities that are not kept.
 void shift(BodySet& bodies, int body, double dt, const Vector3d& v, const Vector3d& w) {
   bodies.position[at(body)] += dt * v;
-  if (w.isZero(0)) return;
-  const linalg::Quaternion turn = exponential(dt * w);
-  linalg::Quaternion& q = bodies.orientation[at(body)];
-  q = (turn * q).normalized();
-  Vector3d& spin = bodies.motion[at(body)].angular_velocity;
-  spin = turn * spin;
+  if (!w.isZero(0))
+    turn_with_velocity(dt * w, bodies.orientation[at(body)],
+                       bodies.motion[at(body)].angular_velocity);
 }
 
 }  // namespace

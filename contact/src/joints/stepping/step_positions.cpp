@@ -66,15 +66,12 @@ bool StepJoints::is_rounding(const BodySet& bodies) const {
   return true;
 }
 
-// As PositionCorrection: the angular velocity turns with the body.
 void StepJoints::turn_back(BodySet& bodies, int body, const Vector3d& turn) const {
   if (turn.isZero(0)) return;
-  const linalg::Quaternion by = exponential(turn);
+  RigidBody& motion = bodies.motion[at(body)];
   linalg::Quaternion& q = bodies.orientation[at(body)];
-  q = (by * q).normalized();
-  Vector3d& w = bodies.motion[at(body)].angular_velocity;
-  w = by * w;
-  bodies.motion[at(body)].inverse_inertia = turned(bodies.inverse_inertia[at(body)], q);
+  turn_with_velocity(turn, q, motion.angular_velocity);
+  motion.inverse_inertia = turned(bodies.inverse_inertia[at(body)], q);
 }
 
 bool StepJoints::project_positions(BodySet& bodies, double t) {

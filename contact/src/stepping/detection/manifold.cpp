@@ -6,6 +6,8 @@
 #include <cmath>
 #include <tether/linalg/index.hpp>
 
+#include "stepping/detection/clip.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
@@ -20,22 +22,19 @@ constexpr double kLow = 1e-6;  // above the lowest point
 
 // Clips a line or a face to another face, seen along n; cuts have the identities of the edge and of
 // the side that cuts it.
-void clip(const Flat& face, const Vector3d& n, Flat& subject) {
+void clip_to_face(const Flat& face, const Vector3d& n, Flat& subject) {
   const double turn = face.normal.dot(n) < 0 ? -1 : 1;
   for (int k = 0; k < face.count && subject.count > 0; ++k) {
     const Vector3d& from = face.point[at(k)];
     const Vector3d inward = turn * n.cross(Vector3d(face.point[at((k + 1) % face.count)] - from));
     Flat kept;
-    for (int j = 0; j < subject.count; ++j) {
-      const int next = (j + 1) % subject.count;
-      const Vector3d &p = subject.point[at(j)], &q = subject.point[at(next)];
-      const double d = inward.dot(p - from), e = inward.dot(q - from);
-      if (d >= 0) kept.add(p, subject.id[at(j)]);
-      if ((d >= 0) == (e >= 0)) continue;
-      if (subject.count == 2 && j == 1) continue;  // the same edge, back
-      kept.add(p + d / (d - e) * (q - p),
-               0x800 + (subject.id[at(j)] * 61 + face.id[at(k)]) % 0x7000);
-    }
+    cut_polygon(
+        at(subject.count), inward, from,
+        [&](std::size_t j) -> const Vector3d& { return subject.point[j]; },
+        [&](std::size_t j) { kept.add(subject.point[j], subject.id[j]); },
+        [&](std::size_t j, std::size_t, const Vector3d& x, bool) {
+          kept.add(x, 0x800 + (subject.id[j] * 61 + face.id[at(k)]) % 0x7000);
+        });
     kept.normal = subject.normal;
     subject = kept;
   }
@@ -44,7 +43,7 @@ void clip(const Flat& face, const Vector3d& n, Flat& subject) {
 // Points of `subject` over (or, for_a, of a under) the face of the other shape.
 void over_face(const ConvexPair& pair, const Flat& face, Flat& subject, bool subject_is_a) {
   const Vector3d& n = pair.apart.normal;
-  clip(face, n, subject);
+  clip_to_face(face, n, subject);
   const double along = face.normal.dot(n);
   for (int k = 0; k < subject.count; ++k) {
     const Vector3d& x = subject.point[at(k)];

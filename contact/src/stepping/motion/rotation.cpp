@@ -4,18 +4,14 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "problem/contact_side.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 namespace {
-
-Matrix3d skew(const Vector3d& r) {
-  Matrix3d X;
-  X << 0, -r[2], r[1], r[2], 0, -r[0], -r[1], r[0], 0;
-  return X;
-}
 
 // d exp(phi) = (jacobian d phi) x exp(phi).
 Matrix3d left_jacobian(const Vector3d& phi) {
@@ -81,6 +77,12 @@ linalg::Quaternion exponential(const Vector3d& rotation) {
   // sin(a/2)/a by its series where the quotient would lose digits.
   const double s = a < 1e-3 ? 0.5 - a2 / 48 + a2 * a2 / 3840 : std::sin(0.5 * a) / a;
   return {std::cos(0.5 * a), s * rotation[0], s * rotation[1], s * rotation[2]};
+}
+
+void turn_with_velocity(const Vector3d& rotation, linalg::Quaternion& q, Vector3d& w) {
+  const linalg::Quaternion by = exponential(rotation);
+  q = (by * q).normalized();
+  w = by * w;
 }
 
 Vector3d gyroscopic_explicit(const Matrix3d& inertia, const Matrix3d& inverse_inertia,

@@ -19,6 +19,9 @@ Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const linalg::Quaternion& q
 /// Unit quaternion of the rotation vector.
 linalg::Quaternion exponential(const Eigen::Vector3d& rotation);
 
+/// Turns a body, and its angular velocity with it: so its energy stays.
+void turn_with_velocity(const Eigen::Vector3d& rotation, linalg::Quaternion& q, Eigen::Vector3d& w);
+
 /// Change of the angular velocity (world axes) by the gyroscopic term over dt.
 Eigen::Vector3d gyroscopic_explicit(const Eigen::Matrix3d& inertia,
                                     const Eigen::Matrix3d& inverse_inertia,

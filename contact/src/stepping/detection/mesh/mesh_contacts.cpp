@@ -5,6 +5,7 @@
 #include <cmath>
 #include <tether/linalg/index.hpp>
 
+#include "stepping/detection/clip.hpp"
 #include "stepping/detection/collide.hpp"
 
 namespace tether::contact::detail {
@@ -48,14 +49,13 @@ struct Cuts {
 
 void cut(const Vector3d& from, const Vector3d& inward, int edge, Cuts& all) {
   Cuts kept;
-  for (int j = 0; j < all.count; ++j) {
-    const Cut &p = all.corner[at(j)], &q = all.corner[at((j + 1) % all.count)];
-    const double d = inward.dot(p.point - from), e = inward.dot(q.point - from);
-    if (d >= 0) kept.add(p);
-    if ((d >= 0) == (e >= 0)) continue;
-    if (all.count == 2 && j == 1) continue;  // the same line, back
-    kept.add({p.point + d / (d - e) * (q.point - p.point), p.id, edge});
-  }
+  cut_polygon(
+      at(all.count), inward, from,
+      [&](std::size_t j) -> const Vector3d& { return all.corner[j].point; },
+      [&](std::size_t j) { kept.add(all.corner[j]); },
+      [&](std::size_t j, std::size_t, const Vector3d& x, bool) {
+        kept.add({x, all.corner[j].id, edge});
+      });
   all = kept;
 }
 

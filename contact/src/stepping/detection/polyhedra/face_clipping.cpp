@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "stepping/detection/clip.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
@@ -63,26 +65,21 @@ void FaceClipper::clip(const Placed& reference, int face, const Placed& other, d
   }
 }
 
-// Keeps inward . (x - on_plane) >= 0. Signs and cut parameters are of the same two numbers, so
-// that a cut lies between the ends of its edge however flat the edge lies in the plane. A cut
-// within `same` of a corner takes over its feature: faces of equal size do not flicker.
+// A cut within `same` of a corner takes over its feature: faces of equal size do not flicker.
 void FaceClipper::clip_to(const Vector3d& inward, const Vector3d& on_plane, int plane,
                           double same) {
   clipped_.clear();
-  const std::size_t n = polygon_.size();
-  for (std::size_t k = 0; k < n; ++k) {
-    const Corner &c = polygon_[k], &next = polygon_[k + 1 == n ? 0 : k + 1];
-    const double d = inward.dot(c.point - on_plane), e = inward.dot(next.point - on_plane);
-    const bool in = d >= 0, next_in = e >= 0;
-    if (in) clipped_.push_back(c);
-    if (in == next_in) continue;
-    const Vector3d point = c.point + d / (d - e) * (next.point - c.point);
-    int feature = 2048 + (c.edge * 181 + plane) % 30000;
-    if ((point - c.point).squaredNorm() < same * same) feature = c.feature;
-    if ((point - next.point).squaredNorm() < same * same) feature = next.feature;
-    // Going out, the side plane follows; coming in, the rest of the edge.
-    clipped_.push_back({point, feature, in ? 128 + plane : c.edge});
-  }
+  cut_polygon(
+      polygon_.size(), inward, on_plane,
+      [&](std::size_t k) -> const Vector3d& { return polygon_[k].point; },
+      [&](std::size_t k) { clipped_.push_back(polygon_[k]); },
+      [&](std::size_t k, std::size_t next, const Vector3d& x, bool leaves) {
+        int feature = 2048 + (polygon_[k].edge * 181 + plane) % 30000;
+        for (const Corner* end : {&polygon_[k], &polygon_[next]})
+          if ((x - end->point).squaredNorm() < same * same) feature = end->feature;
+        // Going out, the side plane follows; coming in, the rest of the edge.
+        clipped_.push_back({x, feature, leaves ? 128 + plane : polygon_[k].edge});
+      });
   polygon_.swap(clipped_);
 }
 
