@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tether/linalg/symmetric_eigen.hpp>
 
 #include "geometry/mass.hpp"
 #include "read.hpp"
@@ -130,15 +129,6 @@ std::vector<Shape> read_shapes(Fields& in, Reader& r) {
     shapes.push_back(std::move(shape));
   }
   return shapes;
-}
-
-// Principal moments of anything solid are positive and each at most the sum of the others.
-bool is_inertia(const Matrix3d& inertia) {
-  if (!inertia.allFinite()) return false;
-  const double scale = inertia.cwiseAbs().maxCoeff();
-  if (!(scale > 0)) return false;
-  const Vector3d moment = linalg::symmetric_eigenvalues(inertia / scale);  // ascending
-  return moment[0] > 0 && moment[2] <= (moment[0] + moment[1]) * (1 + 1e-9);
 }
 
 void read_mass(Fields& in, Body& body) {

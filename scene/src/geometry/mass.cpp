@@ -6,6 +6,7 @@
 #include <cmath>
 #include <tether/linalg/convex_hull.hpp>
 #include <tether/linalg/pi.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 namespace tether::scene {
 
@@ -147,6 +148,15 @@ MassProperties mass_properties(const std::vector<Shape>& shapes) {
   for (const MassProperties& part : parts)
     all.inertia += part.inertia + part.volume * point_inertia(part.centre - all.centre);
   return all;
+}
+
+bool is_inertia(const Matrix3d& inertia, bool inside) {
+  if (!inertia.allFinite()) return false;
+  const double scale = inertia.cwiseAbs().maxCoeff();
+  if (!(scale > (inside ? 1e-300 : 0))) return false;
+  const Vector3d moment = linalg::symmetric_eigenvalues(inertia / scale);  // ascending
+  return moment[0] > (inside ? 1e-13 : 0) &&
+         moment[2] <= (moment[0] + moment[1]) * (1 + (inside ? 0.5e-9 : 1e-9));
 }
 
 }  // namespace tether::scene

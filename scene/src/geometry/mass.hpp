@@ -19,4 +19,8 @@ MassProperties mass_properties(const Shape& shape);
 /// Properties of shapes that do not overlap, in the axes of their body.
 MassProperties mass_properties(const std::vector<Shape>& shapes);
 
+/// Whether the principal moments are > 0 and each at most the sum of the others, but for rounding;
+/// inside: by so much that rounding on the way to a scene does no harm.
+bool is_inertia(const Eigen::Matrix3d& inertia, bool inside = false);
+
 }  // namespace tether::scene

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/mass.hpp"
 #include "import/robot/geometry.hpp"
 #include "import/start.hpp"
 
@@ -152,7 +153,7 @@ void check_part(Part& part, bool mend, Remarks& remarks, Problems& problems) {
     return problems.add(part.line, called, "", "has a mass or inertia beyond the range of numbers");
   if (!(part.mass > 0))
     return problems.add(part.line, called + ": mass", "", "must be > 0: the link has inertia");
-  if (is_inertia(part.inertia)) return;
+  if (is_inertia(part.inertia, true)) return;
   if (mend && part.inertia.isZero(0)) {
     part.inertia = kSmallRadius * kSmallRadius * part.mass * Matrix3d::Identity();
     return remarks.add(
@@ -160,7 +161,7 @@ void check_part(Part& part, bool mend, Remarks& remarks, Problems& problems) {
         part.name);
   }
   const Matrix3d mended = mended_inertia(part.inertia);
-  if (mend && is_inertia(mended)) {
+  if (mend && is_inertia(mended, true)) {
     part.inertia = mended;
     return remarks.add("inertias that no body has, changed to the nearest ones", part.name);
   }

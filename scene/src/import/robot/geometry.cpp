@@ -20,15 +20,6 @@ Eigen::Isometry3d placed(const Eigen::Quaterniond& orientation, const Eigen::Vec
   return out;
 }
 
-bool is_inertia(const Eigen::Matrix3d& inertia) {
-  if (!inertia.allFinite()) return false;
-  const double scale = inertia.cwiseAbs().maxCoeff();
-  if (!(scale > 1e-300)) return false;
-  const Eigen::Vector3d moment = linalg::symmetric_eigenvalues(inertia / scale);  // ascending
-  // Inside the bounds of scenes, so that rounding on the way there does no harm.
-  return moment[0] > 1e-13 && moment[2] <= (moment[0] + moment[1]) * (1 + 0.5e-9);
-}
-
 Eigen::Matrix3d mended_inertia(const Eigen::Matrix3d& inertia) {
   const double scale = inertia.cwiseAbs().maxCoeff();
   const linalg::SymmetricEigen<3> eigen = linalg::symmetric_eigen(inertia / scale);

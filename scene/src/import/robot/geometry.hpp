@@ -15,11 +15,8 @@ Eigen::Isometry3d placed(const Eigen::Quaterniond& orientation, const Eigen::Vec
 /// Shapes must have no larger or smaller numbers: m.
 constexpr double kLargestLength = 1e9;
 
-/// Whether the principal moments are > 0 and each at most the sum of the others, as scenes want
-/// them.
-bool is_inertia(const Eigen::Matrix3d& inertia);
-/// The nearest matrix that is one: negative and vanishing moments become small ones, then the
-/// smaller two of the moments grow alike until they carry the largest.
+/// The nearest inertia that a body may have: negative and vanishing moments become small ones, then
+/// the smaller two of the moments grow alike until they carry the largest.
 Eigen::Matrix3d mended_inertia(const Eigen::Matrix3d& inertia);
 
 /// Adds a part to a sum of parts: masses, their common centre, inertias about it.
