@@ -49,9 +49,22 @@ void check_names(const Model& model, const ImportOptions& options) {
   for (const std::string& name : options.held) look("--hold", name);
 }
 
-double value_of(const LinkJoint& joint, const ImportOptions& options, Remarks& remarks) {
+const LinkJoint* find_joint(const Model& model, const std::string& name) {
+  for (const Link& link : model.links)
+    for (const LinkJoint& joint : link.joints)
+      if (joint.name == name) return &joint;
+  return nullptr;
+}
+
+// `depth`: of joints that follow each other in a circle the last one stands as if alone.
+double value_of(const LinkJoint& joint, const ImportOptions& options, const Model& model,
+                Remarks& remarks, std::size_t depth = 0) {
   for (const auto& [name, value] : options.positions)
     if (name == joint.name) return value;
+  if (joint.mimic && depth < model.links.size())
+    if (const LinkJoint* of = find_joint(model, joint.mimic->of))
+      return joint.mimic->multiplier * value_of(*of, options, model, remarks, depth + 1) +
+             joint.mimic->offset;
   if (!joint.limits || !options.joint_laws || !has_coordinate(joint)) return joint.reference;
   const auto [lower, upper] = *joint.limits;
   if (joint.reference < lower || joint.reference > upper)
@@ -98,7 +111,7 @@ std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
     for (const LinkJoint& joint : base ? base_joints(link, options.base) : link.joints) {
       PlacedJoint placed{joint, pose.linear() * joint.axis, pose * joint.at, 0};
       if (has_coordinate(joint)) {
-        placed.value = value_of(joint, options, model.remarks);
+        placed.value = value_of(joint, options, model, model.remarks);
         const double way = placed.value - joint.reference;
         // Turning by nothing would only add rounding.
         if (way != 0) {

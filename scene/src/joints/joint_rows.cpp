@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <tether/scene/words.hpp>
 
+#include "couplings.hpp"
 #include "list.hpp"
 
 namespace tether::scene::joints {
@@ -37,6 +38,53 @@ JointRows::JointRows(const Scene& scene, const Bodies& bodies) {
                        bodies.frames[at(row.second)], now);
     kind.add_rows(builder);
   }
+  couple(scene, bodies);
+  place_bodies(bodies);
+}
+
+void JointRows::couple(const Scene& scene, const Bodies& bodies) {
+  for (const Coupling& coupling : scene.couplings) {
+    const std::vector<std::vector<double>> parts = couplings::polynomials(scene, coupling);
+    turns_.push_back({count_, couplings::turn(scene, coupling, parts)});
+    const bool slides = !is_angle(scene.joints[at(coupling.joints[0])]);
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      const int j = coupling.joints[k];
+      Relation part(Coordinate(scene.joints[at(j)], bodies));
+      part.first = part.coordinate.first();
+      part.second = part.coordinate.second();
+      part.joint = j;
+      part.row = count_;
+      part.has_length = slides;
+      part.is_first = k == 0;
+      part.polynomial = parts[k];
+      std::get<std::vector<Relation>>(rows_).push_back(std::move(part));
+    }
+    ++count_;
+  }
+}
+
+void JointRows::place_bodies(const Bodies& bodies) {
+  std::vector<std::vector<int>> slots(at(count_));
+  const auto slot = [&](int body) { return bodies.inertia[at(body)].slot; };
+  each([&](const auto& row) {
+    for (const int body : {row.first, row.second})
+      if (slot(body) >= 0) slots[at(row.row)].push_back(slot(body));
+  });
+  for (std::vector<int>& each : slots) {
+    std::sort(each.begin(), each.end());
+    each.erase(std::unique(each.begin(), each.end()), each.end());
+  }
+  const auto place = [&](auto& kind) {
+    for (auto& row : kind) {
+      const std::vector<int>& of = slots[at(row.row)];
+      const auto before = [&](int body) {
+        return static_cast<int>(std::lower_bound(of.begin(), of.end(), slot(body)) - of.begin());
+      };
+      row.place_first = before(row.first);
+      row.place_second = before(row.second);
+    }
+  };
+  std::apply([&](auto&... kinds) { (place(kinds), ...); }, rows_);
 }
 
 void JointRows::set_time(double t) {

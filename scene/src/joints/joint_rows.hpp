@@ -1,8 +1,10 @@
 // Tether: the rows of all joints of a scene. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <tether/scene/scene.hpp>
+#include <type_traits>
 #include <vector>
 
 #include "mechanics/bodies.hpp"
@@ -22,6 +24,8 @@ class JointRows {
 
   int count() const { return count_; }
   bool has_motion() const { return !motions_.empty(); }
+  bool has_couplings() const { return !turns_.empty(); }
+  const std::vector<Relation>& couplings() const { return std::get<std::vector<Relation>>(rows_); }
   const std::string& name(int joint) const { return names_[at(joint)]; }
   const std::string& joint_of(int row) const;
 
@@ -33,6 +37,9 @@ class JointRows {
   void each(const F& f) const {
     std::apply([&](const auto&... kinds) { (each_of(kinds, f), ...); }, rows_);
   }
+  /// The order-th time derivative of every g.
+  template <int order>
+  void values(const Bodies& bodies, double* g) const;
   /// Calls f(i, body, force, torque in body axes) for the multiplier i of `row` being 1, the others
   /// 0, and each moving body that it acts on.
   template <class Row, class F>
@@ -45,8 +52,18 @@ class JointRows {
     for (const auto& row : rows) f(row);
   }
 
+  void couple(const Scene& scene, const Bodies& bodies);
+  void place_bodies(const Bodies& bodies);
+
+  /// Angles once around change the g of a coupling by a multiple of this, 0: they do not.
+  struct Turn {
+    int row;
+    double change;
+  };
+
   int count_ = 0;
   AllRows rows_;
+  std::vector<Turn> turns_;         // of the couplings
   std::vector<std::string> names_;  // of the joints
   std::vector<Motion> motions_;
   std::vector<Now> now_;
@@ -90,6 +107,23 @@ class RowBuilder {
   const Now* now_;
   Vector3d z_, x_, y_;
 };
+
+template <int order>
+void JointRows::values(const Bodies& bodies, double* g) const {
+  each([&](const auto& row) {
+    const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
+    if constexpr (std::is_same_v<std::decay_t<decltype(row)>, Relation>) {
+      const double before = row.is_first ? 0 : g[row.row];
+      row.template rows<order>(A, B, g + row.row);
+      g[row.row] += before;
+    } else {
+      row.template rows<order>(A, B, g + row.row);
+    }
+  });
+  if constexpr (order == 0)
+    for (const Turn& each : turns_)
+      if (each.change > 0) g[each.row] = std::remainder(g[each.row], each.change);
+}
 
 template <class Row, class F>
 void JointRows::each_unit_load(const Row& row, const Bodies& bodies, const F& f) {

@@ -9,6 +9,7 @@
 #include "joint_rows.hpp"
 #include "mechanics/momenta.hpp"
 #include "mechanics/units.hpp"
+#include "motion_of.hpp"
 #include "toml/fields.hpp"
 #include "toml/writer.hpp"
 
@@ -33,7 +34,7 @@ class JointType {
   virtual void add_rows(RowBuilder& rows) const = 0;
 
   /// The quantity that a motion prescribes.
-  enum class MotionOf { nothing, angle, length };
+  using MotionOf = joints::MotionOf;
   virtual MotionOf motion() const { return MotionOf::nothing; }
 
   /// Whether that quantity is free without a motion: limits, motors and friction act along it.

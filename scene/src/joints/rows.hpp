@@ -4,14 +4,17 @@
 //   rows<order>(A, B, g)        the order-th time derivative of its g
 //   pull(A, B, lambda, a, b)    adds G^T lambda to the wrenches of its two bodies
 //   rate_by_time(g_t)           the part of the velocity row that does not come from velocities
+// A row is the sum of its parts where several have its number (Relation).
 // for any scalar, so that the derivatives come from the same formulas. `first` and `second` index
 // the frames of the bodies, `row` is the first row, `has_length` tells a g in m from one in rad.
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <vector>
 
+#include "laws/coordinate.hpp"
 #include "mechanics/frames.hpp"
 #include "prescribed_motion.hpp"
 
@@ -21,6 +24,7 @@ using namespace mechanics;
 
 struct Row {
   int first = 0, second = 0, row = 0, joint = 0;
+  int place_first = 0, place_second = 0;  // of its moving bodies, by slot
 };
 
 /// A point of the first body coincides with a point of the second: 3 rows.
@@ -44,24 +48,6 @@ struct Coincidence : Row {
   }
   void rate_by_time(double* g_t) const { g_t[0] = g_t[1] = g_t[2] = 0.0; }
 };
-
-/// u . v with u = (u_k) of the first and v of the second body, k = 1 .. order.
-template <int order, class S>
-S product(const Jet<S>& u, const Jet<S>& v) {
-  if constexpr (order == 0) {
-    return dot(u.x, v.x);
-  } else if constexpr (order == 1) {
-    S sum = dot(u.x1, v.x);
-    sum += dot(u.x, v.x1);
-    return sum;
-  } else {
-    S sum = dot(u.x1, v.x1);
-    sum += sum;
-    sum += dot(u.x2, v.x);
-    sum += dot(u.x, v.x2);
-    return sum;
-  }
-}
 
 /// A direction of the first body stays at right angles to one of the second.
 struct RightAngle : Row {
@@ -188,8 +174,62 @@ struct Distance : Row {
   }
 };
 
+/// A part of a coupling: a polynomial without a constant of one coordinate.
+struct Relation : Row {
+  static constexpr int count = 1;
+  bool has_length = false;
+  bool is_first = true;  // of the parts of its row
+  Coordinate coordinate;
+  std::vector<double> polynomial;  // from degree 1 on
+
+  explicit Relation(const Coordinate& along) : coordinate(along) {}
+
+  template <int order, class S>
+  void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
+    S s[order + 1];
+    coordinate.derivatives<order>(A, B, s);
+    if constexpr (order == 0) {
+      g[0] = S(0.0);
+      for (auto c = polynomial.rbegin(); c != polynomial.rend(); ++c) g[0] = S((g[0] + *c) * s[0]);
+    } else {
+      g[0] = S(slope(s[0]) * s[1]);
+    }
+    if constexpr (order == 2) {
+      g[0] = S(slope(s[0]) * s[2]);
+      if (polynomial.size() > 1) g[0] += S(bend(s[0]) * s[1] * s[1]);
+    }
+  }
+  template <class S>
+  void pull(const Frame<S>& A, const Frame<S>& B, const double* lambda, Wrench<S>& on_first,
+            Wrench<S>& on_second) const {
+    S force(polynomial[0]);
+    if (polynomial.size() > 1) force = slope(coordinate.value(A, B));
+    // Structures are taken from entries that are not zero (event::RowIslands).
+    if (force == 0.0) force += std::numeric_limits<double>::min();
+    force *= lambda[0];
+    coordinate.pull(A, B, force, on_first, on_second);
+  }
+  void rate_by_time(double* g_t) const { g_t[0] = 0.0; }
+
+ private:
+  template <class S>
+  S slope(const S& s) const {
+    S sum(0.0);
+    for (std::size_t k = polynomial.size(); k > 0; --k)
+      sum = S(sum * s + polynomial[k - 1] * static_cast<double>(k));
+    return sum;
+  }
+  template <class S>
+  S bend(const S& s) const {
+    S sum(0.0);
+    for (std::size_t k = polynomial.size(); k > 1; --k)
+      sum = S(sum * s + polynomial[k - 1] * static_cast<double>(k * (k - 1)));
+    return sum;
+  }
+};
+
 /// All kinds of rows, in the order in which they are visited.
 using AllRows = std::tuple<std::vector<Coincidence>, std::vector<RightAngle>, std::vector<Angle>,
-                           std::vector<Plane>, std::vector<Distance>>;
+                           std::vector<Plane>, std::vector<Distance>, std::vector<Relation>>;
 
 }  // namespace tether::scene::joints

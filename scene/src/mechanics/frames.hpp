@@ -124,6 +124,24 @@ Jet<S> point(const Frame<S>& f, const Vector3d& local) {
   return u;
 }
 
+/// The order-th derivative of u . v.
+template <int order, class S>
+S product(const Jet<S>& u, const Jet<S>& v) {
+  if constexpr (order == 0) {
+    return dot(u.x, v.x);
+  } else if constexpr (order == 1) {
+    S sum = dot(u.x1, v.x);
+    sum += dot(u.x, v.x1);
+    return sum;
+  } else {
+    S sum = dot(u.x1, v.x1);
+    sum += sum;
+    sum += dot(u.x2, v.x);
+    sum += dot(u.x, v.x2);
+    return sum;
+  }
+}
+
 /// A direction that moves in the axes of the body: local, its rate and second rate.
 template <int order, class S>
 Jet<S> moving_direction(const Frame<S>& f, const Vector3d& local, const Vector3d& local1,

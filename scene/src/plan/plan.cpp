@@ -195,6 +195,7 @@ Plan make_plan(const Scene& scene) {
     plan.shapes += static_cast<int>(body.shapes.size());
   }
   for (const Joint& joint : scene.joints) plan.rows += joint_rows(joint);
+  plan.rows += static_cast<int>(scene.couplings.size());
   for (const Invariant& each : scene.invariants)
     if (each.project) plan.invariants += each.kind == InvariantKind::energy ? 1 : 3;
   plan.unknowns = plan.engine == EngineKind::stepping ? 6 * plan.moving

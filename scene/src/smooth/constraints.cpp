@@ -12,12 +12,8 @@ int System::constraint_count() const {
 
 void System::joint_values(double t, const double* y, double* g) {
   update(t, y);
-  const Bodies& bodies = bodies_.all();
-  rows_.each([&](const auto& row) {
-    const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
-    row.template rows<0>(A, B, g + row.row);
-    row.template rows<1>(A, B, g + rows() + row.row);
-  });
+  rows_.values<0>(bodies_.all(), g);
+  rows_.values<1>(bodies_.all(), g + rows());
 }
 
 void System::constraint_values(double t, const double* y, double* g) {
@@ -41,18 +37,18 @@ void System::row_values(double t, const double* y, double* g) {
         0.5 * (Eigen::Map<const Eigen::Vector4d>(y + kBody * k + kQuaternion).squaredNorm() - 1.0);
 }
 
-// `entries(row, slot, other)`: where the derivatives by the coordinates of body `slot` begin, from
-// its position on; `other` is the slot of the row's second body, -1 without.
+// `entries(row, slot, place)`: where the derivatives by the coordinates of body `slot` begin, from
+// its position on; `place`: among the moving bodies of the row.
 template <class Place>
 void System::row_jacobian(double t, const double* y, const Place& entries) {
   update(t, y);
   bodies_.set_turns(y);
   const Bodies& bodies = bodies_.all();
   const int p = in_use_.count();
-  const auto put = [&](int row, const Inertia& inertia, const Inertia& other, const Derivatives& d,
+  const auto put = [&](int row, const Inertia& inertia, int place, const Derivatives& d,
                        int first) {
     if (inertia.slot < 0) return;
-    double* to = entries(row, inertia.slot, other.slot);
+    double* to = entries(row, inertia.slot, place);
     Eigen::Map<Eigen::RowVector3d>(to + kPosition) += d.segment<3>(first);
     Eigen::Map<Eigen::RowVector4d>(to + kQuaternion) +=
         d.segment<3>(first + 3).transpose() * bodies.turns[at(inertia.slot)];
@@ -69,14 +65,14 @@ void System::row_jacobian(double t, const double* y, const Place& entries) {
     for (int i = 0; i < row.count; ++i) {
       const int place = in_use_.place_of(row.row + i);
       if (!in_use_.keeps(row.row + i)) continue;
-      put(place, ia, ib, g[i].derivatives(), 0);
-      put(place, ib, ia, g[i].derivatives(), kBodyDirections);
-      put(p + place, ia, ib, rate[i].derivatives(), 0);
-      put(p + place, ib, ia, rate[i].derivatives(), kBodyDirections);
+      put(place, ia, row.place_first, g[i].derivatives(), 0);
+      put(place, ib, row.place_second, g[i].derivatives(), kBodyDirections);
+      put(p + place, ia, row.place_first, rate[i].derivatives(), 0);
+      put(p + place, ib, row.place_second, rate[i].derivatives(), kBodyDirections);
     }
   });
   for (int k = 0; k < moving(); ++k)
-    Eigen::Map<Eigen::RowVector4d>(entries(2 * p + k, k, -1) + kQuaternion) =
+    Eigen::Map<Eigen::RowVector4d>(entries(2 * p + k, k, 0) + kQuaternion) =
         Eigen::Map<const Eigen::RowVector4d>(y + kBody * k + kQuaternion);
 }
 
@@ -112,14 +108,16 @@ ida_projection::SparseJacobian System::sparse_row_jacobian() {
   jacobian.starts.push_back(0);
   for (int row = 0; row < first_invariant(); ++row) {
     std::sort(slots[at(row)].begin(), slots[at(row)].end());
+    slots[at(row)].erase(std::unique(slots[at(row)].begin(), slots[at(row)].end()),
+                         slots[at(row)].end());
     for (const int slot : slots[at(row)])
       for (int j = 0; j < width(row); ++j) jacobian.columns.push_back(kBody * slot + j);
     jacobian.starts.push_back(static_cast<int>(jacobian.columns.size()));
   }
   jacobian.fill = [this, width, starts = jacobian.starts](double t, ida_projection::ConstVector y,
                                                           ida_projection::Vector entries) {
-    row_jacobian(t, y.data(), [&](int row, int slot, int other) {
-      return entries.data() + starts[at(row)] + (other >= 0 && other < slot ? width(row) : 0);
+    row_jacobian(t, y.data(), [&](int row, int, int place) {
+      return entries.data() + starts[at(row)] + place * width(row);
     });
   };
   return jacobian;

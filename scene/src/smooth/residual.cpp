@@ -84,22 +84,15 @@ void System::add_motion_residual(const double* y, const double* yp, double* r) c
 }
 
 void System::add_row_residual(const double* y, const double* yp, double* r) {
-  const Bodies& bodies = bodies_.all();
   double* out = r + first_multiplier();
   if (form_ == Formulation::stabilised_index2) {
     double* positions = r + first_eta();
-    rows_.each([&](const auto& row) {
-      const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
-      row.template rows<1>(A, B, out + row.row);
-      row.template rows<0>(A, B, positions + row.row);
-    });
+    rows_.values<1>(bodies_.all(), out);
+    rows_.values<0>(bodies_.all(), positions);
     pin_multipliers(y + first_eta(), positions);
   } else {
     bodies_.set_accelerations(yp);
-    rows_.each([&](const auto& row) {
-      row.template rows<2>(bodies.frames[at(row.first)], bodies.frames[at(row.second)],
-                           out + row.row);
-    });
+    rows_.values<2>(bodies_.all(), out);
   }
   pin_multipliers(y + first_multiplier(), out);
 }

@@ -49,7 +49,9 @@ Mapped map_scene(const Scene& scene) {
     }
     const auto found = material.find(body.material);
     if (found == material.end()) continue;
-    for (const Shape& shape : body.shapes) out.surfaces.push_back({index, shape, found->second});
+    const SurfaceSpeed speed = body.surface.value_or(SurfaceSpeed{});
+    for (const Shape& shape : body.shapes)
+      out.surfaces.push_back({index, shape, found->second, speed.velocity, speed.angular_velocity});
   }
   for (const Pair& pair : scene.pairs) {
     if (!pair.touch) continue;

@@ -38,6 +38,8 @@ class SteppedJoints final : public contact::JointEquations {
     double rate;
     mechanics::Wrench<double> on_first, on_second;
   };
+  void add_couplings(contact::JointRows& out) const;
+
   mechanics::SteppedBodies bodies_;
   joints::JointRows rows_;
   joints::Reactions reactions_;

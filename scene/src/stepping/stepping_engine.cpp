@@ -80,6 +80,9 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
     joints_ = joints.get();
     stepper_.add_joints(std::move(joints));
   }
+  if (std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                  [](const Body& body) { return body.surface.has_value(); }))
+    for (const Body& body : scene.bodies) surface_.push_back(body.surface.value_or(SurfaceSpeed{}));
   add_forces(scene);
   read_bodies();
 }
@@ -181,6 +184,13 @@ Diagnostics SteppingEngine::diagnostics() const {
   return d;
 }
 
+Vector3d SteppingEngine::surface_velocity(int body, const Vector3d& r) const {
+  if (body < 0) return Vector3d::Zero();
+  const SurfaceSpeed& s = surface_[static_cast<std::size_t>(body)];
+  const linalg::Quaternion& q = stepper_.bodies().orientation[static_cast<std::size_t>(body)];
+  return q * s.velocity + (q * s.angular_velocity).cross(r);
+}
+
 const std::vector<ContactState>& SteppingEngine::contacts() const {
   if (contacts_of_ == stepper_.counts().steps) return contacts_;
   contacts_of_ = stepper_.counts().steps;
@@ -200,6 +210,8 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
     s.gap = c.gaps[k];
     s.force = dt > 0 ? Vector3d(s.impulse / dt) : Vector3d::Zero();
     s.slip = velocity(b, p.first, p.r1) - velocity(b, p.second, p.r2);
+    if (!surface_.empty())
+      s.slip += surface_velocity(p.first, p.r1) - surface_velocity(p.second, p.r2);
     s.slip -= p.normal.dot(s.slip) * p.normal;
     s.moment = k < moments.size() && dt > 0 ? Vector3d(moments[k] / dt) : Vector3d::Zero();
   }

@@ -41,6 +41,7 @@ class SteppingEngine final : public Engine {
   void take_over(std::istream& in);
 
   void add_forces(const Scene& scene);
+  Eigen::Vector3d surface_velocity(int body, const Eigen::Vector3d& r) const;
 
   mutable mechanics::SteppedBodies stepped_;  // the view of the forces
   std::vector<std::unique_ptr<mechanics::Force>> forces_;
@@ -49,6 +50,7 @@ class SteppingEngine final : public Engine {
   contact::Stepper stepper_;
   std::uint64_t fingerprint_;  // of the scene, in saved states
   std::vector<BodyState> bodies_;
+  std::vector<SurfaceSpeed> surface_;  // by body; empty: none moves on its body
   mutable std::vector<ContactState> contacts_;
   mutable long contacts_of_ = -1;  // step that contacts_ belongs to
 };

@@ -182,6 +182,36 @@ TEST_CASE("an imported walker falls on its feet and stays on the ground") {
   CHECK(result.summary.penetration < 1e-3);
 }
 
+TEST_CASE("a joint that mimics another one starts where it follows it, and is coupled to it") {
+  const std::string inertial =
+      "<inertial><mass value='2'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' "
+      "izz='1'/></inertial>";
+  const auto link = [&](const std::string& name) {
+    return "<link name='" + name + "'>" + inertial + "</link>\n";
+  };
+  const auto joint = [](const std::string& name, const std::string& child,
+                        const std::string& more) {
+    return "<joint name='" + name + "' type='prismatic'><parent link='a'/><child link='" + child +
+           "'/><axis xyz='1 0 0'/><limit lower='-1' upper='1'/>" + more + "</joint>\n";
+  };
+  const std::string text = "<robot name='r'>\n" + link("a") + link("b") + link("c") + link("d") +
+                           joint("j", "b", "<mimic joint='k' multiplier='-0.5' offset='0.1'/>") +
+                           joint("k", "c", "") + joint("l", "d", "<mimic joint='gone'/>") +
+                           "</robot>\n";
+  ImportOptions options;
+  options.positions = {{"k", 0.4}};
+  const import::Imported made = import_robot(text, "robot.urdf", options);
+  const Scene scene = parse_scene(made.toml, "robot.toml");
+  REQUIRE(scene.couplings.size() == 1);
+  const auto& pair = scene.couplings[0].joints;
+  CHECK(scene.joints[static_cast<std::size_t>(pair[0])].name == "j");
+  CHECK(scene.joints[static_cast<std::size_t>(pair[1])].name == "k");
+  CHECK(scene.couplings[0].polynomial == std::vector<double>{-0.5});
+  const int body = scene.joints[static_cast<std::size_t>(pair[0])].first;
+  CHECK(scene.bodies[static_cast<std::size_t>(body)].position.x() == Approx(-0.1));
+  CHECK(says(made.remarks, "mimic of joints that are not there"));
+}
+
 TEST_CASE("limits and friction follow the start; what scenes do not have is said by name") {
   const std::string text =
       two_links("revolute",

@@ -80,6 +80,11 @@ struct Surface {
   int body = 0;
   Shape shape;
   int material = 0;
+  /// The velocity of the surface against its body, m/s and rad/s about the centre of mass, in body
+  /// axes: of a belt, a turntable. Friction acts against it.
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+  bool moves_on_body() const { return !velocity.isZero(0) || !angular_velocity.isZero(0); }
 };
 
 /// How two materials meet. Materials that no Meeting names pass through each other.

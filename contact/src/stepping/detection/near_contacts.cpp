@@ -24,6 +24,12 @@ bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; 
 int first_surface(const PointContact& c) { return static_cast<int>(c.id >> 40); }
 int second_surface(const PointContact& c) { return static_cast<int>(c.id >> 16 & 0xffffff); }
 
+// World axes, at r from the centre of the body.
+Vector3d surface_velocity(const BodySet& bodies, const Surface& s, const Vector3d& r) {
+  const linalg::Quaternion& q = bodies.orientation[at(s.body)];
+  return q * s.velocity + (q * s.angular_velocity).cross(r);
+}
+
 void check(const Meeting& m) {
   if (m.first < 0 || m.second < 0 || !(m.friction >= 0) || !std::isfinite(m.friction) ||
       !(m.restitution >= 0 && m.restitution <= 1))
@@ -58,6 +64,8 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     if (s.body < 0 || s.body >= bodies.size())
       throw std::invalid_argument(where + "names a body that does not exist");
     if (s.material < 0) throw std::invalid_argument(where + "material must be >= 0");
+    if (!s.velocity.allFinite() || !s.angular_velocity.allFinite())
+      throw std::invalid_argument(where + "velocity and angular_velocity must be finite");
     check(s.shape);
     const bool plane = s.shape.kind == ShapeKind::plane;
     const bool mesh = s.shape.kind == ShapeKind::mesh;
@@ -209,6 +217,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
   // would change their common angular momentum.
   const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;
+  const bool conveys = near_.count > 0 && (s.moves_on_body() || t.moves_on_body());
   for (int k = 0; k < near_.count; ++k) {
     const NearPoint& p = near_.point[k];
     if (!std::isfinite(p.gap))
@@ -226,6 +235,10 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
                            : Vector3d(p.on_second - half - bodies.position[at(t.body)]);
     c.normal = p.normal;
     c.mu = law_ == Law::frictionless ? 0 : m->friction;
+    if (conveys) {
+      c.slip = surface_velocity(bodies, s, c.r1) - surface_velocity(bodies, t, c.r2);
+      c.slip -= c.normal.dot(c.slip) * c.normal;
+    }
     c.id = contact_id(i, j, p.feature);
     out.points.push_back(c);
     out.gaps.push_back(p.gap);

@@ -95,7 +95,7 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
     now.bias += held(now.first) || held(now.second)
                     ? now.normal.dot(bend(now.second, now.r2) - bend(now.first, now.r1))
                     : then->normal.dot(v) - now.normal.dot(u);
-    now.slip = v - u - now.normal.dot(v - u) * now.normal;
+    now.slip += v - u - now.normal.dot(v - u) * now.normal;
   }
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <tether/scene/place.hpp>
 #include <utility>
+#include <vector>
 
 namespace tether::scene {
 
@@ -40,6 +41,15 @@ struct JointMotor {
 struct JointSpring {
   double stiffness = 0, damping = 0;  ///< N m/rad, N m s/rad; N/m, N s/m
   double rest = 0;                    ///< rad, m
+};
+
+/// Couples the angles and ways s of hinges and sliders, which are 0 at t = 0: the sum of weight s
+/// is 0, or, of two joints, s_1 = polynomial(s_2), coefficients from degree 1 on.
+struct Coupling {
+  std::string name;
+  std::vector<int> joints;
+  std::vector<double> weights, polynomial;
+  Place place;
 };
 
 enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal, planar };

@@ -32,6 +32,12 @@ struct Drag {
 
 /// Position of the centre of mass and orientation (body to world) at t = 0, velocities in world
 /// axes.
+/// How the surface of a body moves against it: m/s, rad/s about the centre of mass, body axes.
+struct SurfaceSpeed {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+};
+
 struct Body {
   std::string name;
   std::vector<Shape> shapes;
@@ -44,6 +50,7 @@ struct Body {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
   std::string material;
   std::optional<Drag> drag;
+  std::optional<SurfaceSpeed> surface;
   Place place;
 };
 
@@ -239,6 +246,7 @@ struct Scene {
   std::vector<Body> bodies;
   std::vector<Pair> pairs;  ///< none: bodies do not touch
   std::vector<Joint> joints;
+  std::vector<Coupling> couplings;
   std::vector<Spring> springs;
   std::vector<Load> loads;
   std::vector<CentralGravity> central_gravity;

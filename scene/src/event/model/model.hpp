@@ -31,6 +31,7 @@ struct ContactLaw {
   /// length: of rolling, across the normal, along both tangents; `spin`: about it, along the first.
   int held_by = -1;
   bool spin = false;
+  bool conveys = false;  ///< one of its surfaces moves on its body
 
   bool is_bounded() const { return bound >= 0; }
   bool is_moment() const { return held_by >= 0; }

@@ -52,6 +52,11 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
   for (const Body& each : scene.bodies) body_names_.push_back(each.name);
   for (const Joint& each : scene.joints) joint_names_.push_back(each.name);
   bodies_.set_state(y_.data());
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    if (!scene.bodies[b].surface) continue;
+    surface_.resize(bodies_.all().frames.size());
+    surface_[b] = scene.bodies[b].surface;
+  }
   axes_.assign(pairs_.size(), Vector3d::Zero());
   add_moments();
   settle();
@@ -156,10 +161,9 @@ void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest
   W.setZero(rows_.count(), velocities());
   rate.resize(rows_.count());
   rest.resize(rows_.count());
+  rows_.values<0>(bodies, g.data());
+  rows_.values<2>(bodies, rest.data());
   rows_.each([&](const auto& row) {
-    const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
-    row.template rows<0>(A, B, g.data() + row.row);
-    row.template rows<2>(A, B, rest.data() + row.row);
     row.rate_by_time(rate.data() + row.row);
     joints::JointRows::each_unit_load(
         row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
@@ -178,7 +182,13 @@ void SceneModel::look(int contact, ContactLook& out) {
   const Touch touch = p.look(bodies);
   const Material a(bodies.frames[at(p.first)], touch.point_velocity);
   const Material b(bodies.frames[at(p.second)], touch.point_velocity);
-  const Vector3d rest = a.rest - b.rest;
+  Vector3d rest = a.rest - b.rest, convey = Vector3d::Zero();
+  if (!surface_.empty()) {
+    const Jet<double> first = surface_velocity(p.first, touch),
+                      second = surface_velocity(p.second, touch);
+    convey = first.x - second.x;
+    rest += first.x1 - second.x1;
+  }
   out.gap = touch.gap;
   out.normal.setZero(velocities());
   add_force(bodies, p.first, touch.point, touch.normal, 1, out.normal);
@@ -195,8 +205,21 @@ void SceneModel::look(int contact, ContactLook& out) {
     add_force(bodies, p.first, touch.point, tangent[at(k)], 1, row);
     add_force(bodies, p.second, touch.point, tangent[at(k)], -1, row);
     out.tangents.row(k) = row;
+    out.slip_rate[k] = tangent[at(k)].dot(convey);
     out.slip_rest[k] = tangent[at(k)].dot(rest);
   }
+}
+
+Jet<double> SceneModel::surface_velocity(int body, const Touch& touch) const {
+  Jet<double> out;
+  out.x = out.x1 = Vector3d::Zero();
+  if (!conveys(body)) return out;
+  const SurfaceSpeed& s = *surface_[at(body)];
+  const Frame<double>& f = bodies_.all().frames[at(body)];
+  const Vector3d r = touch.point - f.x, spin = f.R * s.angular_velocity;
+  out.x = f.R * s.velocity + spin.cross(r);
+  out.x1 = f.W.cross(out.x) + spin.cross(touch.point_velocity - f.v - f.W.cross(r));
+  return out;
 }
 
 // Slip e.w of the turning w of one body against the other, e a tangent, or the normal; where it
@@ -258,7 +281,7 @@ void SceneModel::add_law_force(int contact, const VectorXd& parts, Forces& out) 
   const bool bounded = this->law(contact).is_bounded();
   JointForce& force = out.joints[at(joint_laws().joint(law))];
   const double x = bounded ? parts[1] : parts[0];
-  const bool angle = joint_laws().coordinate(law).what() == joints::JointType::MotionOf::angle;
+  const bool angle = joint_laws().coordinate(law).what() == joints::MotionOf::angle;
   (angle ? force.moment : force.force) += x * law_direction(contact);
   force.drive += joint_laws().sign(law) * x;
 }

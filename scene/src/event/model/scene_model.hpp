@@ -39,7 +39,9 @@ class SceneModel final : public Model {
   ContactLaw law(int contact) const override {
     if (is_law(contact)) return laws_.law(contact - pairs());
     if (is_moment(contact)) return law_of(moment(contact));
-    return {pair(contact).friction, pair(contact).restitution};
+    ContactLaw law{pair(contact).friction, pair(contact).restitution};
+    law.conveys = conveys(pair(contact).first) || conveys(pair(contact).second);
+    return law;
   }
 
   void set(double t, const double* q, const double* u) override;
@@ -124,6 +126,9 @@ class SceneModel final : public Model {
     return {moment.length, 0, -1, moment.pair, moment.spin};
   }
   void add_moments();
+  bool conveys(int body) const { return !surface_.empty() && surface_[at(body)].has_value(); }
+  /// Velocity of the surface of a body at a point, and its rate where the point moves.
+  Jet<double> surface_velocity(int body, const Touch& touch) const;
   void look(const Moment& moment, ContactLook& out);
   double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
@@ -134,6 +139,7 @@ class SceneModel final : public Model {
   std::vector<std::unique_ptr<Force>> forces_;
   std::vector<double> kinks_;  // of forces, by time
   std::vector<FeaturePair> pairs_;
+  std::vector<std::optional<SurfaceSpeed>> surface_;  // by body, of Bodies; empty: none
   std::vector<std::string> body_names_, joint_names_;
   LawContacts laws_;
   std::vector<Moment> moments_;

@@ -107,7 +107,9 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   }
   works_ = model_.does_work();
   for (std::size_t k = 0; k < closed_.size(); ++k)
-    works_ = works_ || is_bounded(k) || (!sticks(k) && model_.law(closed_[k]).friction > 0);
+    works_ =
+        works_ || is_bounded(k) ||
+        ((!sticks(k) || model_.law(closed_[k]).conveys) && model_.law(closed_[k]).friction > 0);
   R_.setZero(rows_, nu_);
   C_.setZero(nu_, rows_);
   r_.setZero(rows_);
@@ -289,10 +291,9 @@ void Motion::finish_rate(double* y_rate) {
   double power = model_.power();
   for (int i = 0; i < joints_; ++i) power -= lambda_[i] * joint_rate_[i];
   for (std::size_t k = 0; k < closed_.size(); ++k)
-    if (is_bounded(k))  // on the bodies: a motor works at its speed, too
+    // On the bodies: a motor and a belt work at their speeds, too.
+    if (is_bounded(k) || !sticks(k) || !looks_[k].slip_rate.isZero(0))
       power += friction_force(static_cast<int>(k)).dot(looks_[k].tangents * u_);
-    else if (!sticks(k))
-      power += friction_force(static_cast<int>(k)).dot(slip_of(looks_[k]));
   y_rate[work()] = power;
 }
 

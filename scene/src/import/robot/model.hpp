@@ -20,6 +20,12 @@ namespace tether::scene::import {
 
 enum class MotionKind { hinge, slide, ball, free, planar };
 
+/// A joint follows another one: multiplier (its coordinate) + offset.
+struct Mimic {
+  std::string of;
+  double multiplier = 1, offset = 0;
+};
+
 /// One joint; its coordinate is the angle (rad) or way (m) that the file means, `reference` where
 /// the link stands at `pose`.
 struct LinkJoint {
@@ -32,6 +38,7 @@ struct LinkJoint {
   double friction = 0;                ///< N m, N
   double stiffness = 0, damping = 0;  ///< N/m, N s/m: of slides; N m/rad, N m s: of hinges
   double rest = 0;                    ///< of the stiffness
+  std::optional<Mimic> mimic;
   int line = 0;
 };
 

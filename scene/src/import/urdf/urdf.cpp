@@ -196,9 +196,12 @@ void read_joint_parts(const Node& node, const std::string& type, LinkJoint& join
     joint.friction = tag.not_negative("friction", 0);
     tag.finish(remarks);
   }
-  if (node.FirstChildElement("mimic") != nullptr)
-    remarks.add("mimic (scenes have no gears: these joints move freely; --hold NAME fixes one)",
-                joint.name);
+  if (const Node* const mimic = only_child(node, "mimic", problems)) {
+    Tag tag(*mimic, problems);
+    joint.mimic = Mimic{tag.name("joint", "the name of a joint"), tag.number("multiplier", 1),
+                        tag.number("offset", 0)};
+    tag.finish(remarks);
+  }
   name_children(node, {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"}, remarks);
 }
 

@@ -7,7 +7,7 @@
 namespace tether::scene::joints {
 
 Coordinate::Coordinate(const Joint& joint, const Bodies& bodies, int component)
-    : what_(component < 0 ? type(joint.kind).motion() : JointType::MotionOf::angle),
+    : what_(component < 0 ? type(joint.kind).motion() : MotionOf::angle),
       fixed_direction_(joint.kind != JointKind::distance),
       component_(component),
       first_(bodies.index(joint.first)),
@@ -26,7 +26,7 @@ Coordinate::Coordinate(const Joint& joint, const Bodies& bodies, int component)
 Vector3d Coordinate::place(const Bodies& bodies) const { return point<0>(A(bodies), at_first_).x; }
 
 double Coordinate::rest(const Bodies& bodies) const {
-  if (what_ == JointType::MotionOf::angle)
+  if (what_ == MotionOf::angle)
     return B(bodies).W.cross(direction(bodies)).dot(A(bodies).W - B(bodies).W);
   const Jet<double> a = point<2>(A(bodies), at_first_), b = point<2>(B(bodies), at_second_);
   const Vector3d d = a.x - b.x, d1 = a.x1 - b.x1, d2 = a.x2 - b.x2;

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <tether/scene/scene.hpp>
 
-#include "joints/joint_type.hpp"
+#include "joints/motion_of.hpp"
 #include "mechanics/bodies.hpp"
 
 namespace tether::scene::joints {
+
+using namespace mechanics;
 
 /// Hinge: the angle of the first body against the second about the axis, rad, in (-pi, pi]; slider:
 /// the way of the first body along the axis, m; distance: the distance of both points, m; ball: a
@@ -18,7 +20,7 @@ class Coordinate {
   /// `bodies`: at t = 0. `component`: x, y, z as 0, 1, 2 of the turn of a ball; else none.
   Coordinate(const Joint& joint, const Bodies& bodies, int component = -1);
 
-  JointType::MotionOf what() const { return what_; }
+  MotionOf what() const { return what_; }
   bool is_component() const { return component_ >= 0; }
   int first() const { return first_; }  ///< of Bodies
   int second() const { return second_; }
@@ -43,6 +45,10 @@ class Coordinate {
   S value(const Frame<S>& A, const Frame<S>& B) const;
   template <class S>
   S rate(const Frame<S>& A, const Frame<S>& B) const;
+  /// Its value and derivatives up to `order` with the accelerations of the frames: of hinges and
+  /// sliders.
+  template <int order, class S>
+  void derivatives(const Frame<S>& A, const Frame<S>& B, S* s) const;
   template <class S>
   Vector3<S> direction(const Frame<S>& A, const Frame<S>& B) const;
   /// Adds a force along it.
@@ -64,7 +70,7 @@ class Coordinate {
   template <class S>
   static S angle_over_sine(const S& cosine);
 
-  JointType::MotionOf what_;
+  MotionOf what_;
   bool fixed_direction_;  // in the axes of the second body
   int component_;
   int first_, second_;
@@ -79,13 +85,45 @@ S Coordinate::value(const Frame<S>& A, const Frame<S>& B) const {
   using std::atan2;
   using std::sqrt;
   if (is_component()) return turn(A, B);
-  if (what_ == JointType::MotionOf::angle) {
+  if (what_ == MotionOf::angle) {
     const Vector3<S> u = times(A.R, of_first_);
     const S sine = dot(u, times(B.R, ahead_)), cosine = dot(u, times(B.R, zero_));
     return S(atan2(sine, cosine));
   }
   const Vector3<S> d = span(A, B);
   return fixed_direction_ ? S(dot(d, times(B.R, axis_))) : S(sqrt(dot(d, d)));
+}
+
+// s = atan2(y, x), r s' = x y' - y x', r s'' = x y'' - y x'' - r' s', r = x^2 + y^2
+template <int order, class S>
+void Coordinate::derivatives(const Frame<S>& A, const Frame<S>& B, S* s) const {
+  s[0] = value(A, B);
+  if constexpr (order == 0) return;
+  if (what_ == MotionOf::length) {
+    Jet<S> d = point<order>(A, at_first_);
+    const Jet<S> b = point<order>(B, at_second_), u = mechanics::direction<order>(B, axis_);
+    d.x -= b.x;
+    if constexpr (order >= 1) d.x1 -= b.x1;
+    if constexpr (order >= 2) d.x2 -= b.x2;
+    if constexpr (order >= 1) s[1] = product<1>(u, d);
+    if constexpr (order >= 2) s[2] = product<2>(u, d);
+    return;
+  }
+  const Jet<S> u = mechanics::direction<order>(A, of_first_),
+               along = mechanics::direction<order>(B, zero_),
+               ahead = mechanics::direction<order>(B, ahead_);
+  const S x = product<0>(u, along), y = product<0>(u, ahead);
+  const S r = S(x * x + y * y);
+  if constexpr (order >= 1) {
+    const S x1 = product<1>(u, along), y1 = product<1>(u, ahead);
+    const S turned = S(x * y1 - y * x1);
+    s[1] = S(turned / r);
+    if constexpr (order >= 2) {
+      const S x2 = product<2>(u, along), y2 = product<2>(u, ahead);
+      const S r1 = S(x * x1 + y * y1);
+      s[2] = S((x * y2 - y * x2 - 2.0 * r1 * s[1]) / r);
+    }
+  }
 }
 
 template <class S>
@@ -121,7 +159,7 @@ void Coordinate::pull(const Frame<S>& A, const Frame<S>& B, const S& force, Wren
                       Wrench<S>& on_second) const {
   Vector3<S> u = direction(A, B);
   for (int i = 0; i < 3; ++i) u[i] *= force;
-  if (what_ == JointType::MotionOf::angle) {
+  if (what_ == MotionOf::angle) {
     for (int i = 0; i < 3; ++i) {
       on_first.torque[i] += u[i];
       on_second.torque[i] -= u[i];

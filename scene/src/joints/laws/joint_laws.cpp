@@ -50,7 +50,7 @@ JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
 // The turn of a hinge whose angle is nearest to the middle between its limits.
 double JointLaws::value(const Item& item, const Bodies& bodies) const {
   const double value = item.coordinate.value(bodies);
-  if (!item.law.limits || item.coordinate.what() != JointType::MotionOf::angle) return value;
+  if (!item.law.limits || item.coordinate.what() != MotionOf::angle) return value;
   const double middle = 0.5 * (item.law.limits->lower + item.law.limits->upper);
   const double turn = 2 * linalg::kPi;
   return value + turn * std::round((middle - value) / turn);
@@ -88,7 +88,7 @@ void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impu
     const Item& item = joints_[at(placed_[i].item)];
     const double x = placed_[i].sign * impulses[i] / dt;
     JointForce& force = forces[at(item.joint)];
-    const bool angle = item.coordinate.what() == JointType::MotionOf::angle;
+    const bool angle = item.coordinate.what() == MotionOf::angle;
     (angle ? force.moment : force.force) += x * item.coordinate.direction(bodies);
     force.drive += x;
   }

@@ -121,7 +121,7 @@ class JointSprings : public PairForces<Sprung> {
       const auto frames = frame_pair(bodies, each);
       const double x = each.force(bodies.time, frames.first, frames.second, true);
       JointForce& force = forces.joints[each.joint];
-      const bool angle = each.coordinate.what() == joints::JointType::MotionOf::angle;
+      const bool angle = each.coordinate.what() == joints::MotionOf::angle;
       (angle ? force.moment : force.force) += x * each.coordinate.direction(bodies);
       if (!each.coordinate.is_component()) force.drive += x;
     }

@@ -22,9 +22,9 @@ std::vector<JointForce> Reactions::find(const JointRows& rows, const Bodies& bod
     JointForce& each = out[j];
     each.at = joint.place(bodies);
     each.moment -= (each.at - bodies.frames[at(joint.first())].x).cross(each.force);
-    if (joint.what() == JointType::MotionOf::nothing) continue;
-    each.drive = joint.direction(bodies).dot(
-        joint.what() == JointType::MotionOf::angle ? each.moment : each.force);
+    if (joint.what() == MotionOf::nothing) continue;
+    each.drive =
+        joint.direction(bodies).dot(joint.what() == MotionOf::angle ? each.moment : each.force);
   }
   return out;
 }

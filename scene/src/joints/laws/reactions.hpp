@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "coordinate.hpp"
+#include "joints/joint_rows.hpp"
 
 namespace tether::scene::joints {
 

@@ -77,7 +77,7 @@ bool RowsInUse::independent_by_structure() const {
     return slot < 0 ? bodies_.count() : slot;
   };
   std::vector<char> seen;
-  bool forest = true;
+  bool forest = !rows_.has_couplings();
   rows_.each([&](const auto& row) {
     if (row.joint >= static_cast<int>(seen.size())) seen.resize(at(row.joint) + 1, 0);
     if (seen[at(row.joint)]) return;
@@ -116,11 +116,7 @@ int RowsInUse::count_needed_beyond(const Eigen::VectorXd& length, const linalg::
       f.W = f.R * v.segment<3>(6 * k + 3);
       f.a = f.alpha = Vector3d::Zero();
     }
-    const Bodies& bodies = bodies_.all();
-    rows_.each([&](const auto& row) {
-      row.template rows<2>(bodies.frames[at(row.first)], bodies.frames[at(row.second)],
-                           values.data() + row.row);
-    });
+    rows_.values<2>(bodies_.all(), values.data());
     const Eigen::VectorXd gamma = values.cwiseQuotient(length);
     second.col(trial) = N.transpose() * gamma / std::max(gamma.norm(), 1e-12);
   }

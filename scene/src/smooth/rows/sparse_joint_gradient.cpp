@@ -23,11 +23,10 @@ template <class Put>
 void SparseJointGradient::each_entry(const Put& put) const {
   const Bodies& bodies = bodies_.all();
   rows_.each([&](const auto& row) {
-    const int a = bodies.inertia[at(row.first)].slot, b = bodies.inertia[at(row.second)].slot;
     JointRows::each_unit_load(
         row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
-          const int slot = bodies.inertia[at(body)].slot, other = body == row.first ? b : a;
-          put(row.row + i, other >= 0 && other < slot ? 6 : 0, slot, force, torque);
+          const int place = body == row.first ? row.place_first : row.place_second;
+          put(row.row + i, 6 * place, bodies.inertia[at(body)].slot, force, torque);
         });
   });
 }
@@ -44,6 +43,7 @@ SparseJointGradient::SparseJointGradient(const JointRows& rows, const MovingBodi
   starts_.push_back(0);
   for (std::vector<int>& of_row : slots) {
     std::sort(of_row.begin(), of_row.end());
+    of_row.erase(std::unique(of_row.begin(), of_row.end()), of_row.end());
     for (const int slot : of_row)
       for (int j = 0; j < 6; ++j) columns.push_back(6 * slot + j);
     starts_.push_back(static_cast<int>(columns.size()));

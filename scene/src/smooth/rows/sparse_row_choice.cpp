@@ -157,11 +157,7 @@ void SparseRowChoice::close(std::vector<double>& y) {
   v.setZero();
   for (int k = 0; k <= kCloseMoves; ++k) {
     bodies_.set_state(y.data());
-    const Bodies& bodies = bodies_.all();
-    rows_.each([&](const auto& row) {
-      row.template rows<0>(bodies.frames[at(row.first)], bodies.frames[at(row.second)],
-                           g.data() + row.row);
-    });
+    rows_.values<0>(bodies_.all(), g.data());
     if (k == kCloseMoves || g.cwiseAbs().maxCoeff() <= closed) return;
     gradient_.factor(all_, kDependentByEntries);
     gradient_.solve(g, v, multipliers);

@@ -62,11 +62,7 @@ void ForwardDynamics::solve(const std::vector<Load6>& loads) {
   }
   a_ = free_;
   if (rows_.count() == 0) return;
-  const Bodies& bodies = bodies_.all();
-  rows_.each([&](const auto& row) {
-    row.template rows<2>(bodies.frames[at(row.first)], bodies.frames[at(row.second)],
-                         gamma_.data() + row.row);
-  });
+  rows_.values<2>(bodies_.all(), gamma_.data());
   if (sparse_)
     solve_sparse();
   else
