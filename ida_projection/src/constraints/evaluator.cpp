@@ -90,12 +90,8 @@ void Evaluator::flatten(const Constraints& set) {
   if (set.count > 0) {
     parts_.push_back({&set, rows_});
     rows_ += set.count;
-    all_dense_ &= std::holds_alternative<DenseJacobian>(set.jacobian);
-    if (std::holds_alternative<FiniteDifferences>(set.jacobian)) uses_differences_ = true;
-    if (const auto* given = std::get_if<DenseJacobian>(&set.jacobian))
-      gives_both_ |= static_cast<bool>(given->fill_with_value);
-    if (const auto* given = std::get_if<SparseJacobian>(&set.jacobian))
-      gives_both_ |= static_cast<bool>(given->fill_with_value);
+    uses_differences_ |= std::holds_alternative<FiniteDifferences>(set.jacobian);
+    gives_both_ |= parts_.back().gives_both;
   }
   for (const Constraints& part : set.joined) flatten(part);
 }
@@ -127,6 +123,12 @@ Status Evaluator::checked(int flag, const char* what, const Part& part) {
   return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
 }
 
+int Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
+  return write(part, n, g, nullptr, 0, [&](double* to, double*) {
+    return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
+  });
+}
+
 Status Evaluator::value(double t, const double* y, int n, double* g) {
   if (fatal_) return Status::callback_fatal;
   ++statistics_.value_evaluations;
@@ -136,33 +138,13 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
         int told = 0;
         for (const Part& part : parts_) {
           at = &part;
-          told = write(part, n, g + part.first_row, nullptr, 0, [&](double* to, double*) {
-            return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
-          });
+          told = value_of(part, t, y, n, g + part.first_row);
           if (told != 0) break;
         }
         return told;
       },
       thrown_);
   return flag == 0 ? finite(t, g) : checked(flag, "value", *at);
-}
-
-Status Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
-  const int flag = guarded(
-      [&] {
-        return write(part, n, g + part.first_row, nullptr, 0, [&](double* to, double*) {
-          return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
-        });
-      },
-      thrown_);
-  return flag == 0 ? Status::success : checked(flag, "value", part);
-}
-
-void Evaluator::count(bool with_value) {
-  ++statistics_.jacobian_evaluations;
-  if (!with_value) return;
-  ++statistics_.value_evaluations;
-  if (gives_both_) ++statistics_.joint_evaluations;
 }
 
 Status Evaluator::not_finite(double t, const double* g) {
@@ -173,121 +155,52 @@ Status Evaluator::not_finite(double t, const double* g) {
   return Status::not_finite;
 }
 
-// Entries that are not finite are found by the factors, which scan them anyway.
-Status Evaluator::dense(const Part& part, double t, const double* y, int n, const double* scale,
-                        const std::vector<int>& columns, double* C, double* g) {
-  const DenseJacobian* given = part.dense;
+// `what`: the callback under way. Entries that are not finite are found by the factors, which scan
+// them anyway.
+int Evaluator::rows_of(const Part& part, double t, const double* y, int n, const double* scale,
+                       const std::vector<int>& columns, double* C, double* g, const char** what) {
   const int count = part.set->count;
-  const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(count) * n;
-  if (g != nullptr && given != nullptr && given->fill_with_value) {
-    const int flag = guarded(
-        [&] {
-          return write(part, n, g + part.first_row, C, size, [&](double* to, double* entries) {
-            return given->fill_with_value(t, ConstVector(y, n), Vector(to, count),
-                                          Matrix(entries, count, n));
-          });
-        },
-        thrown_);
-    return flag == 0 ? Status::success : checked(flag, "value with jacobian", part);
+  const bool both = g != nullptr && part.gives_both;
+  if (g != nullptr && !both) {
+    *what = "value";
+    const int told = value_of(part, t, y, n, g);
+    if (told != 0) return told;
   }
-  if (g != nullptr) {
-    const Status status = value_of(part, t, y, n, g);
-    if (status != Status::success) return status;
+  if (part.dense == nullptr && part.sparse == nullptr) {
+    *what = "value (differences)";
+    return differences(part, t, y, n, scale, columns, C);
   }
-  if (given == nullptr) return differences(part, t, y, n, scale, columns, C);
-  const int flag = guarded(
-      [&] {
-        return write(part, n, nullptr, C, size, [&](double*, double* entries) {
-          return given->fill(t, ConstVector(y, n), Matrix(entries, count, n));
-        });
-      },
-      thrown_);
-  return flag == 0 ? Status::success : checked(flag, "jacobian", part);
+  *what = both ? "value with jacobian" : "jacobian";
+  const std::ptrdiff_t size = part.entries(n);
+  const ConstVector point(y, n);
+  return write(part, n, both ? g : nullptr, C, size, [&](double* to, double* entries) {
+    if (part.sparse != nullptr) {
+      const Vector into(entries, size);
+      return both ? part.sparse->fill_with_value(t, point, Vector(to, count), into)
+                  : part.sparse->fill(t, point, into);
+    }
+    const Matrix into(entries, count, n);
+    return both ? part.dense->fill_with_value(t, point, Vector(to, count), into)
+                : part.dense->fill(t, point, into);
+  });
 }
 
-Status Evaluator::sparse(const Part& part, double t, const double* y, int n, double* entries,
-                         double* g) {
-  const SparseJacobian& given = *part.sparse;
-  const auto count = static_cast<Eigen::Index>(given.columns.size());
-  if (g != nullptr && given.fill_with_value) {
-    const int flag = guarded(
-        [&] {
-          return write(part, n, g + part.first_row, entries, count, [&](double* to, double* C) {
-            return given.fill_with_value(t, ConstVector(y, n), Vector(to, part.set->count),
-                                         Vector(C, count));
-          });
-        },
-        thrown_);
-    return flag == 0 ? Status::success : checked(flag, "value with jacobian", part);
-  }
-  if (g != nullptr) {
-    const Status status = value_of(part, t, y, n, g);
-    if (status != Status::success) return status;
-  }
-  const int flag = guarded(
-      [&] {
-        return write(part, n, nullptr, entries, count, [&](double*, double* C) {
-          return given.fill(t, ConstVector(y, n), Vector(C, count));
-        });
-      },
-      thrown_);
-  return flag == 0 ? Status::success : checked(flag, "jacobian", part);
-}
-
-Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
-                           const std::vector<int>& columns, double* C, double* value) {
-  std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
-  return jacobian_into_zeros(t, y, n, scale, columns, C, value);
-}
-
-Status Evaluator::jacobian_into_zeros(double t, const double* y, int n, const double* scale,
-                                      const std::vector<int>& columns, double* C, double* value) {
+template <class Place>
+Status Evaluator::all_rows(double t, const double* y, int n, const double* scale,
+                           const std::vector<int>& columns, double* g, Place place) {
   if (fatal_) return Status::callback_fatal;
-  count(value != nullptr);
-  if (all_dense_) return dense_parts(t, y, n, C, value);
-  for (const Part& part : parts_) {
-    double* block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
-    const Status status = part.sparse != nullptr
-                              ? spread(part, t, y, n, block, value)
-                              : dense(part, t, y, n, scale, columns, block, value);
-    if (status != Status::success) return status;
-  }
-  return value == nullptr ? Status::success : finite(t, value);
-}
-
-// The parts one after the other, as dense() does each, under one guard.
-Status Evaluator::dense_parts(double t, const double* y, int n, double* C, double* g) {
+  ++statistics_.jacobian_evaluations;
+  if (g != nullptr) ++statistics_.value_evaluations;
+  if (g != nullptr && gives_both_) ++statistics_.joint_evaluations;
   const Part* at = nullptr;
   const char* what = "";
-  const ConstVector point(y, n);
   const int flag = guarded(
       [&] {
         int told = 0;
         for (const Part& part : parts_) {
           at = &part;
-          const int count = part.set->count;
-          const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(count) * n;
-          double* const block = C + static_cast<std::ptrdiff_t>(part.first_row) * n;
-          double* const value = g != nullptr ? g + part.first_row : nullptr;
-          if (g != nullptr && part.dense->fill_with_value) {
-            what = "value with jacobian";
-            told = write(part, n, value, block, size, [&](double* to, double* entries) {
-              return part.dense->fill_with_value(t, point, Vector(to, count),
-                                                 Matrix(entries, count, n));
-            });
-          } else {
-            if (g != nullptr) {
-              what = "value";
-              told = write(part, n, value, nullptr, 0, [&](double* to, double*) {
-                return part.set->value(t, point, Vector(to, count));
-              });
-              if (told != 0) break;
-            }
-            what = "jacobian";
-            told = write(part, n, nullptr, block, size, [&](double*, double* entries) {
-              return part.dense->fill(t, point, Matrix(entries, count, n));
-            });
-          }
+          told = rows_of(part, t, y, n, scale, columns, place(part),
+                         g != nullptr ? g + part.first_row : nullptr, &what);
           if (told != 0) break;
         }
         return told;
@@ -297,54 +210,56 @@ Status Evaluator::dense_parts(double t, const double* y, int n, double* C, doubl
   return g == nullptr ? Status::success : finite(t, g);
 }
 
-// Sparse rows as full ones.
-Status Evaluator::spread(const Part& part, double t, const double* y, int n, double* block,
-                         double* g) {
-  const SparseJacobian& given = *part.sparse;
-  entries_.assign(given.columns.size(), 0.0);
-  const Status status = sparse(part, t, y, n, entries_.data(), g);
-  if (status != Status::success) return status;
-  for (int i = 0; i < part.set->count; ++i)
-    for (int e = given.starts[static_cast<std::size_t>(i)];
-         e < given.starts[static_cast<std::size_t>(i) + 1]; ++e)
-      block[static_cast<std::ptrdiff_t>(i) * n + given.columns[static_cast<std::size_t>(e)]] =
-          entries_[static_cast<std::size_t>(e)];
+Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
+                           const std::vector<int>& columns, double* C, double* value) {
+  std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
+  return jacobian_into_zeros(t, y, n, scale, columns, C, value);
+}
+
+// Sparse rows are spread where all have been evaluated.
+Status Evaluator::jacobian_into_zeros(double t, const double* y, int n, const double* scale,
+                                      const std::vector<int>& columns, double* C, double* value) {
+  std::ptrdiff_t sparse = 0;
+  for (const Part& part : parts_) sparse += part.sparse != nullptr ? part.entries(n) : 0;
+  entries_.assign(static_cast<std::size_t>(sparse), 0.0);
+  double* entry = entries_.data();
+  const Status status =
+      all_rows(t, y, n, scale, columns, value, [&, next = entry](const Part& part) mutable {
+        if (part.sparse == nullptr) return C + static_cast<std::ptrdiff_t>(part.first_row) * n;
+        double* const place = next;
+        next += part.entries(n);
+        return place;
+      });
+  for (const Part& part : parts_) {
+    if (part.sparse == nullptr) continue;
+    for (int i = 0; i < part.set->count; ++i) {
+      double* const row = C + static_cast<std::ptrdiff_t>(part.first_row + i) * n;
+      for (int e = part.sparse->starts[static_cast<std::size_t>(i)];
+           e < part.sparse->starts[static_cast<std::size_t>(i) + 1]; ++e)
+        row[part.sparse->columns[static_cast<std::size_t>(e)]] = *entry++;
+    }
+  }
   return status;
 }
 
 Status Evaluator::entries(double t, const double* y, int n, const double* scale,
                           const std::vector<int>& columns, double* entries, double* full,
                           double* value) {
-  if (fatal_) return Status::callback_fatal;
-  count(value != nullptr);
-  for (const Part& part : parts_) {
-    const SparseJacobian* given = part.sparse;
-    double*& at = given != nullptr ? entries : full;
-    const std::ptrdiff_t size = given != nullptr
-                                    ? static_cast<std::ptrdiff_t>(given->columns.size())
-                                    : static_cast<std::ptrdiff_t>(part.set->count) * n;
-    std::fill(at, at + size, 0.0);
-    const Status status = given != nullptr ? sparse(part, t, y, n, at, value)
-                                           : dense(part, t, y, n, scale, columns, at, value);
-    if (status != Status::success) return status;
-    at += size;
-  }
-  return value == nullptr ? Status::success : finite(t, value);
+  return all_rows(t, y, n, scale, columns, value, [&](const Part& part) {
+    double*& next = part.sparse != nullptr ? entries : full;
+    double* const place = next;
+    next += part.entries(n);
+    std::fill(place, next, 0.0);
+    return place;
+  });
 }
 
-Status Evaluator::differences(const Part& part, double t, const double* y, int n,
-                              const double* scale, const std::vector<int>& columns, double* C) {
+int Evaluator::differences(const Part& part, double t, const double* y, int n, const double* scale,
+                           const std::vector<int>& columns, double* C) {
   const int m = part.set->count;
   const auto evaluate = [&](const double* at, double* g) {
     ++statistics_.value_evaluations;
-    const int flag = guarded(
-        [&] {
-          return write(part, n, g, nullptr, 0, [&](double* to, double*) {
-            return part.set->value(t, ConstVector(at, n), Vector(to, m));
-          });
-        },
-        thrown_);
-    return checked(flag, "value (differences)", part);
+    return value_of(part, t, at, n, g);
   };
 
   const double kRootEpsilon = std::sqrt(std::numeric_limits<double>::epsilon());
@@ -354,8 +269,8 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
     if (scale[j] > 0.0) relative = std::max(relative, std::abs(y[j]) / scale[j]);
   }
   y_shifted_.assign(y, y + n);
-  Status status = evaluate(y, g_base_.data());
-  for (std::size_t k = 0; k < columns.size() && status == Status::success; ++k) {
+  int told = evaluate(y, g_base_.data());
+  for (std::size_t k = 0; k < columns.size() && told == 0; ++k) {
     const auto j = static_cast<std::size_t>(columns[k]);
     // About one tolerance, or the root of rounding of atol / rtol: less would drown in the rounding
     // of g where y_j passes zero.
@@ -364,14 +279,14 @@ Status Evaluator::differences(const Part& part, double t, const double* y, int n
     if (increment == 0.0) increment = kRootEpsilon;
     y_shifted_[j] = y[j] + increment;
     increment = y_shifted_[j] - y[j];  // the increment after rounding
-    status = evaluate(y_shifted_.data(), g_shifted_.data());
+    told = evaluate(y_shifted_.data(), g_shifted_.data());
     y_shifted_[j] = y[j];
     for (int i = 0; i < m; ++i)
       C[static_cast<std::size_t>(i) * static_cast<std::size_t>(n) + j] =
           (g_shifted_[static_cast<std::size_t>(i)] - g_base_[static_cast<std::size_t>(i)]) /
           increment;
   }
-  return status;
+  return told;
 }
 
 void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
@@ -384,13 +299,7 @@ void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
     const auto evaluate = [&](double* g) {
       if (fatal_) return false;
       ++statistics_.value_evaluations;
-      const int flag = guarded(
-          [&] {
-            return write(part, n, g, nullptr, 0, [&](double* to, double*) {
-              return part.set->value(t, ConstVector(y_shifted_.data(), n), Vector(to, m));
-            });
-          },
-          thrown_);
+      const int flag = guarded([&] { return value_of(part, t, y_shifted_.data(), n, g); }, thrown_);
       return checked(flag, "value", part) == Status::success;
     };
     y_shifted_.assign(y, y + n);

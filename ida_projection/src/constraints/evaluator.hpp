@@ -103,7 +103,14 @@ class Evaluator {
     int first_row;
     const DenseJacobian* dense = std::get_if<DenseJacobian>(&set->jacobian);
     const SparseJacobian* sparse = std::get_if<SparseJacobian>(&set->jacobian);
+    bool gives_both = (dense != nullptr && static_cast<bool>(dense->fill_with_value)) ||
+                      (sparse != nullptr && static_cast<bool>(sparse->fill_with_value));
     mutable bool C_looked_at = false;
+    /// Of C, on n unknowns.
+    std::ptrdiff_t entries(int n) const {
+      return sparse != nullptr ? static_cast<std::ptrdiff_t>(sparse->columns.size())
+                               : static_cast<std::ptrdiff_t>(set->count) * n;
+    }
   };
   const std::vector<Part>& parts() const { return parts_; }
 
@@ -129,19 +136,20 @@ class Evaluator {
     return std::isfinite(sum) ? Status::success : not_finite(t, g);
   }
   Status not_finite(double t, const double* g);
-  Status dense_parts(double t, const double* y, int n, double* C, double* g);
   /// A callback that writes g, C (`entries` of it) or both, with room behind them for what it
   /// writes too much, which ends the run. C, whose copy would cost, is looked at the first time.
   template <class Fill>
   int write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries, Fill&& fill);
-  Status value_of(const Part& part, double t, const double* y, int n, double* g);
-  void count(bool with_value);
-  Status dense(const Part& part, double t, const double* y, int n, const double* scale,
-               const std::vector<int>& columns, double* C, double* g);
-  Status sparse(const Part& part, double t, const double* y, int n, double* entries, double* g);
-  Status spread(const Part& part, double t, const double* y, int n, double* block, double* g);
-  Status differences(const Part& part, double t, const double* y, int n, const double* scale,
-                     const std::vector<int>& columns, double* C);
+  // What the callbacks say of one set, g and C at its places.
+  int value_of(const Part& part, double t, const double* y, int n, double* g);
+  int rows_of(const Part& part, double t, const double* y, int n, const double* scale,
+              const std::vector<int>& columns, double* C, double* g, const char** what);
+  int differences(const Part& part, double t, const double* y, int n, const double* scale,
+                  const std::vector<int>& columns, double* C);
+  /// The rows of all sets, the C of each at place(set).
+  template <class Place>
+  Status all_rows(double t, const double* y, int n, const double* scale,
+                  const std::vector<int>& columns, double* g, Place place);
 
   const Constraints& constraints_;
   Statistics& statistics_;
@@ -151,7 +159,6 @@ class Evaluator {
   std::string message_, thrown_;
   int rows_ = 0;
   bool uses_differences_ = false, gives_both_ = false;
-  bool all_dense_ = true;  // each part has a DenseJacobian
   bool fatal_ = false;
   bool overrun_ = false;
 };

@@ -135,15 +135,8 @@ std::string RejectionWatch::wrong_entry(const Candidate& candidate) const {
   std::vector<double> y(static_cast<std::size_t>(length));
   for (std::size_t j = 0; j < y.size(); ++j)
     y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
-  try {
-    const JacobianReport report = check_jacobian(constraints_, candidate.t, y, 1e-3);
-    if (report.correct) return {};
-    const bool kink =
-        has_kink(constraints_, report.row, report.column, report.given, candidate.t, y);
-    return "check_jacobian finds there: " + report.message + (kink ? kKink : "");
-  } catch (const std::exception&) {  // g refuses a point nearby: nothing is known
-    return {};
-  }
+  const std::string found = ida_projection::wrong_entry(constraints_, candidate.t, y);
+  return found.empty() ? found : "check_jacobian finds there: " + found;
 }
 
 // A row that F does not keep: C y' + g_t, term by term from differences of g.

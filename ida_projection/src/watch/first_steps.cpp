@@ -237,22 +237,10 @@ std::string FirstSteps::false_row(int row, Change& change, double noticed,
   if (std::abs(tangency_.rate[i] + in_time - without_C) > kNoInvariant * terms &&
       searched_ + size <= kSearchLimit) {
     searched_ += size;  // C at hand may be of an earlier step: mostly nothing is wrong
-    const std::string found = wrong_entry(step.t);
+    const std::string found = wrong_entry(constraints_, step.t, point_);
     if (!found.empty()) return "check_jacobian finds at t = " + brief(step.t) + ": " + found;
   }
   return {};
-}
-
-// The wrong entry of C by check_jacobian at the corrector's point; empty: none.
-std::string FirstSteps::wrong_entry(double t) const {
-  try {
-    const JacobianReport report = check_jacobian(constraints_, t, point_, 1e-3);
-    if (report.correct) return {};
-    const bool kink = has_kink(constraints_, report.row, report.column, report.given, t, point_);
-    return report.message + (kink ? kKink : "");
-  } catch (const std::invalid_argument&) {  // g refuses a point nearby: nothing is known
-    return {};
-  }
 }
 
 }  // namespace tether::ida_projection

@@ -58,7 +58,6 @@ class FirstSteps {
   std::string false_row(int row, Change& change, double noticed, const Candidate& candidate,
                         const StepData& step, const double* id, N_Vector corrected,
                         Corrector& corrector);
-  std::string wrong_entry(double t) const;
 
   const Constraints& constraints_;
   Evaluator evaluator_;

@@ -16,6 +16,7 @@ const char* const kKink =
 namespace {
 
 constexpr double kReach = 1e-4, kDiffer = 0.1;  // of y; of the slopes
+constexpr double kWrong = 1e-3;                 // of the row's largest entry
 
 }  // namespace
 
@@ -37,6 +38,17 @@ bool has_kink(const Constraints& constraints, int row, int column, double given,
   const double size = kDiffer * std::max(std::abs(left), std::abs(right));
   return std::abs(left - right) > size &&
          std::min(std::abs(given - left), std::abs(given - right)) <= size;
+}
+
+std::string wrong_entry(const Constraints& constraints, double t, const std::vector<double>& y) {
+  try {
+    const JacobianReport report = check_jacobian(constraints, t, y, kWrong);
+    if (report.correct) return {};
+    const bool kink = has_kink(constraints, report.row, report.column, report.given, t, y);
+    return report.message + (kink ? kKink : "");
+  } catch (const std::exception&) {  // g refuses a point nearby: nothing is known
+    return {};
+  }
 }
 
 bool has_kink(const Constraints& constraints, int row, double t, std::vector<double> y) {
