@@ -30,14 +30,14 @@ struct Drag {
   double rotational = 0;             ///< torque -rotational w: N m s
 };
 
-/// Position of the centre of mass and orientation (body to world) at t = 0, velocities in world
-/// axes.
 /// How the surface of a body moves against it: m/s, rad/s about the centre of mass, body axes.
 struct SurfaceSpeed {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
 };
 
+/// Position of the centre of mass and orientation (body to world) at t = 0, velocities in world
+/// axes.
 struct Body {
   std::string name;
   std::vector<Shape> shapes;
