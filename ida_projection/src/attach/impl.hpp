@@ -216,7 +216,7 @@ class Projection::Impl {
   struct Tally {
     double move_sum = 0.0;
     long attempts = 0;  // since moves began
-    // Of every 16th attempt. The first one finds out what the others keep.
+    // Every 16th attempt is timed. The first one finds out what the others keep.
     double first_seconds = 0.0, seconds = 0.0;
     long timed = 0;  // after the first
   };

@@ -106,7 +106,7 @@ class Evaluator {
     bool gives_both = (dense != nullptr && static_cast<bool>(dense->fill_with_value)) ||
                       (sparse != nullptr && static_cast<bool>(sparse->fill_with_value));
     mutable bool C_looked_at = false;
-    /// Of C, on n unknowns.
+    /// How many entries of C it has, on n unknowns.
     std::ptrdiff_t entries(int n) const {
       return sparse != nullptr ? static_cast<std::ptrdiff_t>(sparse->columns.size())
                                : static_cast<std::ptrdiff_t>(set->count) * n;
@@ -140,7 +140,7 @@ class Evaluator {
   /// writes too much, which ends the run. C, whose copy would cost, is looked at the first time.
   template <class Fill>
   int write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries, Fill&& fill);
-  // What the callbacks say of one set, g and C at its places.
+  // The answers of the callbacks of one set, g and C at its places.
   int value_of(const Part& part, double t, const double* y, int n, double* g);
   int rows_of(const Part& part, double t, const double* y, int n, const double* scale,
               const std::vector<int>& columns, double* C, double* g, const char** what);
