@@ -20,8 +20,8 @@ namespace {
 
 constexpr double kTolerances[] = {1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8};
 constexpr long kMostSteps = 40000,
-               kMostStepsOfRods = 4000;      // twice those of the longest run that ends
-constexpr double kTightestOfRods = 1e-5;     // dense factors of 300 unknowns
+               kMostStepsOfRods = 1000;      // twice those of the longest run that ends
+constexpr double kTightestOfRods = 1e-4;     // dense factors of 300 unknowns
 constexpr int kMiddling = 12, kLarge = 100;  // unknowns
 
 using ida_projection::Options;
