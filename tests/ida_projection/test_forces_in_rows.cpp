@@ -250,9 +250,11 @@ TEST_CASE("rods in index 0: all unknowns share what rows of forces ask for") {
     const Run plain = integrate_plain(problem, tolerance);
     REQUIRE(run.flag >= 0);
     mean += std::log(static_cast<double>(run.steps) / static_cast<double>(plain.steps)) / 3.0;
-    CHECK(run.statistics.largest_drift_after <= tolerance);  // forces are a million times as large
+    CHECK(static_cast<double>(run.steps) <= 1.7 * static_cast<double>(plain.steps));
+    // Forces are a million times as large.
+    CHECK(run.statistics.largest_drift_after <= 0.25 * tolerance);
   }
-  CHECK(std::exp(mean) <= 0.6);
+  CHECK(std::exp(mean) <= 0.5);
 }
 
 TEST_CASE("rods in index 0: forces that their rows do not determine move together with the rest") {

@@ -204,5 +204,7 @@ TEST_CASE("couplings are written, read again and refused by name") {
     }
     INFO(each.joints << " " << each.values << " " << said);
     CHECK(said.find(each.words) != std::string::npos);
+    const std::size_t named = said.find("coupling \"");
+    CHECK((named == std::string::npos || said.find("coupling \"", named + 1) == std::string::npos));
   }
 }

@@ -54,7 +54,7 @@ void AccurateSteps::advance(double time, double length) {
   halving_.advance(halving_.whole(time, length));
 }
 
-// Lists what stepper_.contacts have done in the part just taken.
+// Lists what contacts have done in the part just taken.
 void AccurateSteps::list_active(double length, std::vector<Active>& list) const {
   list.clear();
   if (stepper_.joints) list_laws(length, list);
@@ -84,7 +84,7 @@ void AccurateSteps::list_active(double length, std::vector<Active>& list) const 
   });
 }
 
-// As stepper_.contacts, behind all of them: limits that press stick, laws at their bound slip.
+// As contacts, behind all of them: limits that press stick, laws at their bound slip.
 void AccurateSteps::list_laws(double length, std::vector<Active>& list) const {
   std::vector<LawState> laws;
   stepper_.joints->list_laws(laws);
@@ -206,9 +206,8 @@ double AccurateSteps::first_switch(double length) const {
   return first;
 }
 
-// Difference of the halves, in the stepper_.bodies, from the whole part; 1: the accuracy. It is
-// relative to the size of each body; velocities, where they are smooth, count by what they move it
-// in the part.
+// Difference of the halves, in the bodies, from the whole part; 1: the accuracy. It is relative to
+// the size of each body; velocities, where they are smooth, count by what they move it in the part.
 double AccurateSteps::error(double length, bool smooth) const {
   double most = 0;
   for (const int k : stepper_.motion.moving()) {
@@ -225,7 +224,7 @@ double AccurateSteps::error(double length, bool smooth) const {
   return most / (kSafety * stepper_.options.accuracy);
 }
 
-// 2 halves - whole_. A body that no moment acts on keeps its momentum exactly, and its halves.
+// 2 halves - whole. A body that no moment acts on keeps its momentum exactly, and its halves.
 void AccurateSteps::extrapolate() {
   for (const int k : stepper_.motion.moving()) {
     const std::size_t i = at(k);

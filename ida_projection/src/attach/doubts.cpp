@@ -72,8 +72,7 @@ std::string Projection::Impl::too_high_index() const {
 std::string Projection::Impl::rounding_of_multipliers() const {
   return variables_.high_index()
              ? "; in forms of index 2 or more multipliers carry rounding divided by the step, "
-               "which "
-               "may not allow this tolerance: try a larger one, or a form of index 1 or 0"
+               "which may not allow this tolerance: try a larger one, or a form of index 1 or 0"
              : "";
 }
 

@@ -163,13 +163,13 @@ class CouplingEffect : public Effect {
   void check(const Scene& scene, files::Report& report) const override {
     std::set<std::string> names;
     for (const Coupling& coupling : scene.couplings) {
-      const std::string path = fmt::format("coupling \"{}\"", coupling.name);
       if (!names.insert(coupling.name).second)
-        report.add(coupling.place, path + ": name", "", "another one has it already");
+        report.add(coupling.place, fmt::format("coupling \"{}\": name", coupling.name), "",
+                   "another one has it already");
       try {
         couplings::polynomials(scene, coupling);
       } catch (const std::invalid_argument& e) {
-        report.add(coupling.place, path, "", e.what());
+        report.add(coupling.place, "", "", e.what());
       }
     }
   }
