@@ -3,7 +3,8 @@
 
     python3 benchmarks/results.py [NAME...]      # all of them take an hour; --list names them
 
-Programs are those of build/release. Contact problems are looked for in TETHER_CONTACT_DATA."""
+Programs are those of build/release. Contact problems are looked for in TETHER_CONTACT_DATA. Comparisons of codes run with
+the SUNDIALS of TETHER_SUNDIALS or build/sundials, at -O3."""
 import datetime
 import os
 import pathlib
@@ -17,24 +18,49 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 BUILT = "build/release/benchmarks"
 TETHER = "build/release/scene/tether"
-# Name: title, command from the root of the project.
+# SUNDIALS at -O3, which codes of one method are compared with: the distribution's is not optimised.
+OPTIMISED = pathlib.Path(os.environ.get("TETHER_SUNDIALS") or ROOT / "build" / "sundials")
+COMPARED = {"accuracy_cost", "crossover", "stability", "chain_cost"}
+# Name: title, how to read it, command from the root of the project.
 COMMANDS = {
-    "pendulum": ("The pendulum of Hanson and Krogh", "build/release/examples/pendulum/pendulum"),
+    "pendulum": ("The pendulum of Hanson and Krogh",
+                 "End error, drift, steps and processor time of two pendulums in index 1 and index 0, with and without "
+                 "constraints. \"never\": plain IDA fails, or does not become that accurate.",
+                 "build/release/examples/pendulum/pendulum --quick"),
     "ablation": ("What each mechanism of the projection is worth", "python3 benchmarks/ablation/ablation.py"),
     "accuracy_cost": ("Error against processor time of every code",
-                      f"{BUILT}/accuracy/accuracy_cost --count 5 --repeats 2 --no-drift --no-reach --skip four_bar,long,chain_of_100"),
-    "crossover": ("Where RADAU5's advantage on small smooth problems ends", f"{BUILT}/accuracy/crossover --repeats 3"),
+                      "Columns: [how to read accuracy_cost](../README.md#how-to-read-accuracy_cost). Below 1 Tether is faster.",
+                      f"{BUILT}/accuracy/accuracy_cost --count 5 --repeats 2 --seconds 0.1 --no-drift --no-reach "
+                      "--skip four_bar,long,chain_of_100"),
+    "crossover": ("Where RADAU5's advantage on small smooth problems ends",
+                  "Time and evaluations of F of Tether over those of RADAU5: below 1 Tether needs less.",
+                  f"{BUILT}/accuracy/crossover --repeats 2"),
+    "stability": ("Scatter of errors and steps over tolerances",
+                  "The rms distance of log10 error and of log10 steps from a straight line over log10 tolerance.",
+                  f"{BUILT}/accuracy/stability --count 30 --problem pendulum,car_axis,andrews --skip of_100,of_10,of_5,long"),
     "projection_cost": ("One projection step", f"{BUILT}/projection/projection_cost"),
-    "chain_cost": ("Long chains", f"{BUILT}/projection/chain_cost"),
-    "contact_collection": ("Contact problems in files", f"{BUILT}/contact/contact_collection $TETHER_CONTACT_DATA"),
-    "contact_scale": ("A sweep over many contacts", f"{BUILT}/contact/contact_scale --spheres 1 --threads 2"),
-    "iftomm": ("The IFToMM mechanisms under `tether`", f"python3 benchmarks/mechanisms/iftomm.py {TETHER}"),
-    "clearance": ("A slider-crank with clearance", f"python3 benchmarks/clearance/clearance.py {TETHER}"),
+    "chain_cost": ("Long chains beside plain IDA",
+                   "Plain IDA in two forms: algebraic variables in its error test, and suppressed as the projection has them.",
+                   f"{BUILT}/projection/chain_cost --links 100,1000 --tolerances 1e-4,1e-6 --end 0.1 --repeats 1"),
+    "contact_collection": ("Contact problems in files", "Time to a residual, beside the solvers of Siconos.",
+                           f"{BUILT}/contact/contact_collection $TETHER_CONTACT_DATA --law coulomb --time-limit 1"),
+    "contact_scale": ("A sweep over many contacts", "Nanoseconds of a contact and sweep by size and threads.",
+                      f"{BUILT}/contact/contact_scale --spheres 1 --threads 2 --most 100000"),
+    "settling": ("Spheres that fall and settle, beside Bullet", "Residuals by `evaluate`, depth in parts of a radius.",
+                 f"{BUILT}/contact/settling 3000 1 0"),
+    "iftomm": ("The IFToMM mechanisms under `tether`",
+               "Error at the times of the scene's reference, energy where it is kept, processor time of the whole program.",
+               f"python3 benchmarks/mechanisms/iftomm.py {TETHER}"),
+    "clearance": ("A slider-crank with clearance", "Work and error of the largest of three angles, rad, at the end.",
+                  f"python3 benchmarks/clearance/clearance.py {TETHER}"),
+    "woodpecker": ("Glocker's woodpecker: events and steps at equal error",
+                   "The largest distance (m) or angle (rad) of any body from a run with events at the least tolerance.",
+                   f"{TETHER} cost examples/scenes/woodpecker.toml"),
 }
 
 
-def printed(*command):
-    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+def printed(*command, environment=None):
+    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True, env=environment).stdout.strip()
 
 
 def processor():
@@ -42,33 +68,45 @@ def processor():
     return f"{found.group(1) if found else platform.processor()}, {os.cpu_count()} cores"
 
 
-def sundials():
+def sundials(name):
+    if name in COMPARED:
+        return f"{OPTIMISED.relative_to(ROOT) if OPTIMISED.is_relative_to(ROOT) else OPTIMISED}, at -O3"
     cache = ROOT / "build" / "release" / "CMakeCache.txt"
     found = re.search(r"^SUNDIALS_DIR:PATH=(.*)", cache.read_text(), re.M) if cache.exists() else None
-    return found.group(1) if found else "as found"
+    return f"of the distribution, {found.group(1)}" if found else "as found"
+
+
+def commit():
+    changed = printed("git", "status", "--porcelain", "--untracked-files=no", "--", ".", ":!benchmarks/results", ":!*.md")
+    return printed("git", "rev-parse", "--short", "HEAD") + (" with local changes" if changed else "")
 
 
 def write(name):
-    title, command = COMMANDS[name]
+    title, *reading, command = COMMANDS[name]
     if "$TETHER_CONTACT_DATA" in command and not os.environ.get("TETHER_CONTACT_DATA"):
         return print(f"{name}: skipped, TETHER_CONTACT_DATA names no folder")
+    how = " ".join(reading)
+    environment = dict(os.environ)
+    if name in COMPARED:
+        if not (OPTIMISED / "lib").is_dir():
+            return print(f"{name}: skipped, no SUNDIALS at -O3; sh benchmarks/optimised_sundials.sh build/sundials makes it")
+        environment["LD_LIBRARY_PATH"] = f"{OPTIMISED}/lib:" + environment.get("LD_LIBRARY_PATH", "")
     words = [os.path.expandvars(word) for word in shlex.split(command)]
     print(f"{name}: {command}", flush=True)
-    text = printed(*words)
-    lines = text.splitlines()
-    if not any(line.startswith("|") for line in lines):
+    text = printed(*words, environment=environment)
+    if not any(line.startswith("|") for line in text.splitlines()):
         text = "```\n" + text + "\n```"
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"{name}.md").write_text(
-        f"# {title}\n\nWritten by `python3 benchmarks/results.py {name}`.\n\n"
-        f"- Command: `{command}`\n- Commit: {printed('git', 'describe', '--always', '--dirty')}\n"
-        f"- Machine: {processor()}; {printed('c++', '--version').splitlines()[0]}; SUNDIALS: {sundials()}\n"
+        f"# {title}\n\nWritten by `python3 benchmarks/results.py {name}`. {how}\n\n"
+        f"- Command: `{command}`\n- Commit: {commit()}\n"
+        f"- Machine: {processor()}; {printed('c++', '--version').splitlines()[0]}; SUNDIALS {sundials(name)}\n"
         f"- Date: {datetime.date.today().isoformat()}\n\n{text}\n")
 
 
 def main(names):
     if names == ["--list"]:
-        return print("\n".join(f"{name:20} {command}" for name, (_, command) in COMMANDS.items()))
+        return print("\n".join(f"{name:20} {command}" for name, (*_, command) in COMMANDS.items()))
     unknown = [name for name in names if name not in COMMANDS]
     if unknown:
         return f"results.py: no result is called {unknown[0]}; there are {', '.join(COMMANDS)}"

@@ -1,9 +1,12 @@
-# Tether: `cmake --build <build> --target docs`: the API reference by Doxygen, a warning is an error.
-# SPDX-License-Identifier: BSD-3-Clause
+# Tether: `cmake --build <build> --target docs`: the site of all documents, with the API reference by Doxygen, in which a
+# warning is an error. SPDX-License-Identifier: BSD-3-Clause
+find_package(Python3 3.9 QUIET COMPONENTS Interpreter)
+find_program(TETHER_MKDOCS mkdocs)
 find_package(Doxygen 1.9 QUIET)
-if(NOT DOXYGEN_FOUND)
+mark_as_advanced(TETHER_MKDOCS)
+if(NOT Python3_FOUND OR NOT TETHER_MKDOCS OR NOT DOXYGEN_FOUND)
   add_custom_target(docs
-    COMMAND ${CMAKE_COMMAND} -E echo "Doxygen was not found (Debian: doxygen); install it and configure again"
+    COMMAND ${CMAKE_COMMAND} -E echo "The site needs packages of Debian: apt-get install mkdocs-material python3-pymdownx libjs-katex doxygen; then configure again"
     COMMAND ${CMAKE_COMMAND} -E false)
   return()
 endif()
@@ -19,6 +22,19 @@ set(DOXYGEN_PREDEFINED TETHER_EXPORT_BEGIN= TETHER_EXPORT_END=)
 set(DOXYGEN_EXTRACT_ALL YES)
 set(DOXYGEN_STRIP_FROM_PATH ${CMAKE_CURRENT_SOURCE_DIR})
 set(DOXYGEN_STRIP_FROM_INC_PATH linalg/include ida_projection/include contact/include scene/include)
-set(DOXYGEN_USE_MDFILE_AS_MAINPAGE ${CMAKE_CURRENT_SOURCE_DIR}/ARCHITECTURE.md)
-doxygen_add_docs(docs ARCHITECTURE.md CONTRIBUTING.md SECURITY.md linalg/include ida_projection/include contact/include
-  scene/include COMMENT "API reference in ${CMAKE_CURRENT_BINARY_DIR}/html")
+set(DOXYGEN_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/docs)
+set(first ${CMAKE_CURRENT_BINARY_DIR}/docs/classes.md)
+file(CONFIGURE OUTPUT ${first} CONTENT "# Tether: classes and functions
+
+Each library has a header that includes all of its public ones: tether/linalg.hpp, tether/ida_projection.hpp,
+tether/contact.hpp, tether/scene.hpp. Their namespaces are tether::linalg, tether::ida_projection, tether::contact and
+tether::scene. The [guides and tutorials](../index.html) tell how to use them.
+")
+set(DOXYGEN_USE_MDFILE_AS_MAINPAGE ${first})
+doxygen_add_docs(reference ${first} linalg/include ida_projection/include contact/include scene/include
+  COMMENT "API reference")
+add_custom_target(docs
+  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/docs/pages.py ${CMAKE_CURRENT_BINARY_DIR}/docs
+    ${CMAKE_CURRENT_BINARY_DIR}/docs/html
+  COMMENT "The site, with every link checked")
+add_dependencies(docs reference)
