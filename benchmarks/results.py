@@ -28,6 +28,7 @@ COMMANDS = {
                  "constraints. \"never\": plain IDA fails, or does not become that accurate.",
                  "build/release/examples/pendulum/pendulum --quick"),
     "ablation": ("What each mechanism of the projection is worth", "python3 benchmarks/ablation/ablation.py"),
+    "instructions": ("Instructions of a step", "python3 benchmarks/instructions/instructions.py"),
     "accuracy_cost": ("Error against processor time of every code",
                       "Columns: [how to read accuracy_cost](../README.md#how-to-read-accuracy_cost). Below 1 Tether is faster.",
                       f"{BUILT}/accuracy/accuracy_cost --count 5 --repeats 2 --seconds 0.1 --no-drift --no-reach "
