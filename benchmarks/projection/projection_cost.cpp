@@ -46,7 +46,7 @@ void measure(const Problem& problem, int batches, int moves) {
   tp::Candidate candidate{problem.t0, base, correction, weights};
   candidate.with_entries();
   perturb();
-  mover->set_algebraic(candidate, id);
+  mover->rows().set_algebraic(candidate, id);
 
   double best = 1e300;
   bool success = true;

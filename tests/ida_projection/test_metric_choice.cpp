@@ -110,7 +110,7 @@ double slide(int points, double h, bool with_sum = false) {
   Statistics statistics;
   const auto mover = make_dense_mover(rows, options, statistics, at.n);
   const Candidate candidate = at.candidate(h);
-  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->rows().set_algebraic(candidate, nullptr) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::success);
   CHECK(mover->remaining_drift(candidate) <= 1e-12);
   double largest = 0.0;
@@ -132,7 +132,7 @@ long solutions_of_failure(int points, bool sparse) {
   const auto mover =
       (sparse ? make_sparse_mover : make_dense_mover)(rows, options, statistics, at.n, -1);
   const Candidate candidate = at.candidate(1e-4);
-  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->rows().set_algebraic(candidate, nullptr) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::not_converged);
   return statistics.iterations;
 }
@@ -163,7 +163,7 @@ double rate_by_nearly_dependent_rows(int points) {
   Statistics statistics;
   const auto mover = make_sparse_mover(sparse, options, statistics, at.n, -1);
   const Candidate candidate = at.candidate(1e-12);
-  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->rows().set_algebraic(candidate, nullptr) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::success);
   CHECK(mover->finish(candidate, false) == Status::success);
   const auto y = [&](int i) { return candidate.base_entries[i] + candidate.correction_entries[i]; };

@@ -7,7 +7,7 @@ namespace tether::ida_projection {
 
 // Is the metric free, and can answers to moves be had?
 bool Projection::Impl::asks_for_metric() const {
-  return in_use(Mechanism::other_metric) && movers_.used->may_use_levels() &&
+  return in_use(Mechanism::other_metric) && movers_.used->rows().may_use_levels() &&
          wanted_metric_ == Metric::automatic && options_.group.empty() &&
          options_.advanced.metric == Metric::local_correction &&
          movers_.used == movers_.own.get() && polish_.hears_answers();
@@ -26,7 +26,7 @@ void Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
 
 // The move from where the corrector was, one scale for each level, or each its own, from now on.
 Move Projection::Impl::move_by_levels(const Candidate& candidate, bool by_levels) {
-  movers_.used->use_levels(by_levels);
+  movers_.used->rows().use_levels(by_levels);
   polish_.restore(candidate);
   return movers_.used->move(candidate);
 }
@@ -34,7 +34,7 @@ Move Projection::Impl::move_by_levels(const Candidate& candidate, bool by_levels
 AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
                                                 const AnsweredMove& present, Move& move) {
   const bool by_levels = metric_choice_.by_levels();
-  if (!movers_.used->use_levels(!by_levels)) {
+  if (!movers_.used->rows().use_levels(!by_levels)) {
     metric_choice_.found_none();
     return present;
   }

@@ -106,11 +106,12 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (unknowns_.contiguous) candidate.with_entries();
   movers_.joined.begin(candidate);
   corrector_.begin(mem);
-  if (movers_.used != nullptr) movers_.used->forget_failure();
+  if (movers_.used != nullptr) movers_.used->rows().forget_failure();
   control_.restore_weights(weights, attempts_.steps);
   int flag = attempt(candidate, tolerance, call_setup);
   // Evaluations that only look around may fail, but what asks for the end of the run ends it.
-  const bool ended = corrector_.stopped() || (movers_.used != nullptr && movers_.used->fatal());
+  const bool ended =
+      corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().fatal());
   if (flag >= 0 && ended) flag = finish(Status::callback_fatal, movers_.used->message());
   return corrector_.stopped() ? corrector_.stop_flag() : flag;
 }
@@ -247,7 +248,7 @@ Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, do
 bool Projection::Impl::polishes_first() {
   const double longest = std::min(kShortMove, polish_.longest_unanswered(control_.smoothing()));
   if (!in_use(Mechanism::polish_first) || !(attempts_.last_move <= longest) ||
-      control_.tests_algebraic() || !movers_.used->may_polish_first())
+      control_.tests_algebraic() || !movers_.used->rows().may_polish_first())
     return false;
   const bool silent = metric_choice_.calm() || !asks_for_metric();
   return silent && wants_polish(0.0);
@@ -284,7 +285,7 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (!attempts_.repeated) control_.look_for_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {
     attempts_.left_before = attempts_.left;
-    movers_.used->accept();
+    movers_.used->rows().accept();
     if (options_.progress) {
       attempts_.progress.steps = steps;
       std::string ignored;

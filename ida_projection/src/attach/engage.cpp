@@ -35,7 +35,7 @@ void Projection::Impl::look_at_linear_solver() {
     options_.advanced.metric =
         iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;
   polish_.note_linear_solver(iterative);
-  movers_.used->expect_no_settle(iterative);
+  movers_.used->rows().expect_no_settle(iterative);
 }
 
 // Readable through message() as long as nothing else is wrong.
@@ -146,7 +146,8 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   if (in_use(Mechanism::joined_equations)) movers_.joined.join(candidate, cj);
   movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;
-  const Status structured = movers_.used->set_algebraic(candidate, movers_.joined.moved_id());
+  const Status structured =
+      movers_.used->rows().set_algebraic(candidate, movers_.joined.moved_id());
   run_.engaged = structured == Status::success;  // else the next attempt looks again
   return structured;
 }

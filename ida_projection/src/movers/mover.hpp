@@ -11,16 +11,10 @@
 
 #include "constraints/evaluator.hpp"
 #include "host/candidate.hpp"
+#include "movers/curvature.hpp"
+#include "movers/rows_at.hpp"
 
 namespace tether::ida_projection {
-
-/// How far y' points out of the constraints.
-struct Tangency {
-  std::vector<double> rate;       ///< sum_j C_ij y'_j
-  std::vector<double> terms;      ///< sum_j |C_ij y'_j|; < 0: the row contains algebraic variables
-  std::vector<double> size;       ///< sum_j |C_ij| max(1, |y_j|), of differential y_j
-  std::vector<double> tolerance;  ///< |row_i(C WT)|, a move of one tolerance
-};
 
 struct Move {
   Status status = Status::unused;
@@ -34,96 +28,8 @@ struct Move {
   double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
 };
 
-/// Moves candidates onto the constraints and keeps the data of the metric.
-class Mover {
- public:
-  virtual ~Mover() = default;
-
-  /// Length of the first Newton move from the candidate; the candidate is not changed.
-  virtual Move measure(const Candidate& candidate) = 0;
-
-  /// Moves the candidate: correction <- correction - dy.
-  virtual Move move(const Candidate& candidate) = 0;
-
-  /// Rank of the factors for solve_with_factors(); -1: there are none.
-  virtual int rank_of_factors() const { return -1; }
-  /// The caller's rows are others than those of the factors at hand.
-  virtual void rows_changed() {}
-  /// dy (N entries) for g, near a hundredth, by the factors at hand. The moves that follow are the
-  /// same with it and without. False: not known.
-  virtual bool solve_with_factors(const std::vector<double>& /*g*/, std::vector<double>& /*dy*/) {
-    return false;
-  }
-  /// After that: what rows that the factors leave out ask for beyond the others, in tolerances; 0
-  /// where there are none.
-  virtual double left_of_dropped(const std::vector<double>& /*WT*/) { return 0.0; }
-
-  /// C y' row by row with C as it was evaluated last, over the first `reported` rows. False: not
-  /// known. `id` as in set_algebraic().
-  virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {
-    return false;
-  }
-
-  /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
-  virtual double remaining_drift(const Candidate& candidate) = 0;
-
-  /// Says which components are algebraic (1 differential, 0 algebraic; null: none). Called once,
-  /// before the first move() of a run, with the candidate at which the structure is looked at.
-  virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;
-
-  /// The correction was changed by `change` after a successful move(): takes back what leaves the
-  /// constraints, with the factors at hand.
-  virtual Status settle(const Candidate& candidate, N_Vector change) = 0;
-
-  /// D as the last candidate had it, of every component; false: there is none.
-  virtual bool metric(N_Vector /*D*/) const { return false; }
-
-  /// One scale for all unknowns of a level (row_levels.hpp) in the local metric, from the next move
-  /// on, or each its own again. False: nothing changes, there are too few rows or levels.
-  virtual bool use_levels(bool) { return false; }
-  /// May answers to moves ask for use_levels()?
-  virtual bool may_use_levels() const { return false; }
-
-  /// Will settle() never be called in this run? Then factors may serve more than one step.
-  virtual void expect_no_settle(bool) {}
-
-  /// May the correction be polished before the next move()? So it is where rows are many.
-  virtual bool may_polish_first() const { return false; }
-  /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
-  virtual Status finish(const Candidate&, bool /*polished*/) { return Status::success; }
-
-  /// The attempt that used the last candidate was accepted: keep its effect on the metric.
-  virtual void accept() {}
-  /// A new run starts: reset the metric.
-  virtual void reset() {}
-
-  /// Did a callback ask for the end of the run since forget_failure(), in any evaluation?
-  virtual bool fatal() const { return fatal_; }
-  virtual void forget_failure() { fatal_ = false; }
-
-  const std::string& message() const { return message_; }
-  const std::vector<int>& contradicting_rows() const { return contradicting_rows_; }
-
- protected:
-  std::string message_;
-  bool fatal_ = false;
-  std::vector<int> contradicting_rows_;
-};
-
-/// Factories; `size` is N. The options and statistics outlive the mover. Drift is that of the first
-/// `reported` rows (-1: of all).
-std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size,
-                                        int reported = -1);
-std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size,
-                                         int reported = -1);
-/// For rows without has_values(), which need no more of a vector than its operations.
-std::unique_ptr<Mover> make_vector_mover(const Constraints&, const Options&, Statistics&,
-                                         N_Vector like);
-std::unique_ptr<Mover> make_user_mover(const Constraints&, const Options&, Statistics&,
-                                       N_Vector like);
-
-/// Watches a sequence of Newton moves: is it done, still converging, or broken?
-/// Lengths are in tolerances. Rates below are squares of distances: theta bounds d_{k+1}/d_k^2.
+/// Watches a sequence of Newton moves: is it done, still converging, or broken? Lengths are in
+/// tolerances.
 class Monitor {
  public:
   enum class Verdict { done, go_on, refactor, failed };
@@ -137,34 +43,98 @@ class Monitor {
     moves_ = 0;
     ++candidates_;
   }
-
   /// After a first move of this length: is it plain, whatever `floor` is, that judge() will call it
   /// done? Then judge() need not be asked.
   bool plainly_done(double length) {
-    const bool done = moves_ == 0 && !measures(length) &&
-                      4.0 * theta_ * length * length <= options_->advanced.tolerance;
+    const bool done = moves_ == 0 && leaves_little(length);
     if (done) moves_ = 1;
     return done;
   }
-
   /// After a move of this length; `fresh`: the factors belong to the point that was left;
   /// `floor`: length below which rounding of y rules.
   Verdict judge(double length, bool fresh, double floor);
 
  private:
-  // Newton's second move is about theta d^2. It is asked for only when it could matter; the factor
-  // 4 pays for theta being measured now and then, not at every step.
-  bool measures(double length) const {
-    return theta_ < 0.0 || !(length <= 4.0 * measured_) || candidates_ % kMeasureEvery == 0;
+  // Newton's second move is about kappa d^2.
+  bool leaves_little(double length) const {
+    return !curvature_.due(length, candidates_) &&
+           curvature_.left(length, length) <= options_->advanced.tolerance;
   }
 
   const Options* options_;
-  double theta_ = -1.0;    // largest d_2 / d_1^2 seen; < 0: not measured yet
-  double measured_ = 0.0;  // longest first move at which theta was looked for: no rounding there
+  Curvature curvature_;
   double previous_ = -1.0;
   int moves_ = 0;
   long candidates_ = 0;
-  static constexpr long kMeasureEvery = 64;
 };
+
+/// Newton's method onto the constraints, one loop for all storages of their rows. The notation is
+/// that of docs/method/projection.md: N unknowns, m rows, C = dg/dy, D the metric, WT = 1/w the
+/// error weights, s the size of the corrector's changes.
+class Mover {
+ public:
+  Mover(const Options& options, std::unique_ptr<RowsAt> rows)
+      : options_(options), monitor_(options), rows_(std::move(rows)) {}
+
+  RowsAt& rows() { return *rows_; }
+  const RowsAt& rows() const { return *rows_; }
+  const std::string& message() const { return rows_->message; }
+  /// A new run starts.
+  void reset();
+
+  /// Length of the first Newton move from the candidate; the candidate is not changed.
+  Move measure(const Candidate& candidate);
+  /// Moves the candidate: correction <- correction - dy.
+  Move move(const Candidate& candidate);
+  /// The correction was changed by `change` after a successful move(): takes back what leaves the
+  /// constraints, with the factors at hand.
+  Status settle(const Candidate& candidate, N_Vector change);
+  /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
+  Status finish(const Candidate& candidate, bool polished);
+  /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
+  double remaining_drift(const Candidate& candidate);
+  /// RowsAt::tangency(), unless C is that of an earlier candidate.
+  bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) {
+    return wear_.age == 0 && rows_->tangency(yp, id, out);
+  }
+
+ private:
+  Status factor(double t, bool refill);
+  bool plainly_nothing();
+  bool still_nothing(const Candidate& candidate, Move& result);
+  Move newton(const Candidate& candidate);
+  bool allowed(const Candidate& candidate, double length, Move& result);
+  bool done(const Candidate& candidate, const Solution& solution, bool fresh, Move& result,
+            Monitor::Verdict& verdict);
+  Status take_rest(const Candidate& candidate, double reach);
+  Status take_back(const Candidate& candidate, double previous);
+
+  const Options& options_;
+  Monitor monitor_;
+  std::unique_ptr<RowsAt> rows_;
+  double move_length_ = 0.0;  // of the last first move, in tolerances
+  bool follows_ = true;       // dropped rows, at the last solution
+  // Length of the last move, if the factors at hand made it; < 0: others did.
+  double by_present_factors_ = -1.0;
+  bool reused_ = false;     // factors of an earlier step are in use for this one
+  WearOfFactors wear_;      // of the factors at hand
+  int looks_ = 0;           // with the factors of an earlier candidate
+  int nothing_in_row_ = 0;  // moves that were none
+  bool still_ = false;      // the last candidate was only looked at
+  Curvature curvature_;     // for what a polish moves
+  long settles_ = 0;
+};
+
+/// Factories; `size` is N. The options and statistics outlive the mover. Drift is that of the first
+/// `reported` rows (-1: of all).
+std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size,
+                                        int reported = -1);
+std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size,
+                                         int reported = -1);
+/// For rows without has_values(), which need no more of a vector than its operations.
+std::unique_ptr<Mover> make_vector_mover(const Constraints&, const Options&, Statistics&,
+                                         N_Vector like);
+std::unique_ptr<RowsAt> make_user_rows(const Constraints&, const Options&, Statistics&,
+                                       N_Vector like);
 
 }  // namespace tether::ida_projection

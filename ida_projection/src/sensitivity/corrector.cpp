@@ -224,7 +224,7 @@ Status SensitivityCorrector::evaluate(const StepData& step) {
   Status status = rows_->evaluate(step.t, y_, weights_, id);
   if (status == Status::success && metrics_.empty()) {
     Mover* mover = state_.joined.mover() != nullptr ? state_.joined.mover() : state_.own.get();
-    if (!mover->metric(D_)) N_VInv(weights_, D_);
+    if (!mover->rows().metric(D_)) N_VInv(weights_, D_);
     status = rows_->factor(D_);
   }
   if (status != Status::success) message_ = rows_->message();

@@ -252,9 +252,9 @@ bool GaussNewtonOn<Rows>::follow(double t, std::vector<double>& y0, const std::v
   double previous = kNear / kShrinks;
   if (!evaluate(t, y, report)) return false;
   report.drift_before = largest(g_);
-  report.rank = near.rank_of_factors();
+  report.rank = near.rows().rank_of_factors();
   for (report.iterations = 0; report.iterations < kSimplifiedSteps;) {
-    if (!near.solve_with_factors(g_, dy)) return false;
+    if (!near.rows().solve_with_factors(g_, dy)) return false;
     double sum = 0.0;
     for (std::size_t i = 0; i < y.size(); ++i) sum += dy[i] / WT_[i] * (dy[i] / WT_[i]);
     const double length = std::sqrt(sum / n_), rate = length / previous;
@@ -263,9 +263,9 @@ bool GaussNewtonOn<Rows>::follow(double t, std::vector<double>& y0, const std::v
     if (!evaluate(t, y, report)) return false;
     if (length <= enough || (++report.iterations > 1 && rate * length <= enough)) {
       report.drift_after = largest(g_);
-      if (near.left_of_dropped(WT_) > 0.0 &&
-          (!near.solve_with_factors(g_, dy) ||
-           near.left_of_dropped(WT_) > kAside * std::max(kConverged, floor)))
+      if (near.rows().left_of_dropped(WT_) > 0.0 &&
+          (!near.rows().solve_with_factors(g_, dy) ||
+           near.rows().left_of_dropped(WT_) > kAside * std::max(kConverged, floor)))
         return false;
       y0 = y;
       return true;

@@ -23,7 +23,7 @@ void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hol
   OwnedVector correction(y);
   N_VConst(0.0, correction);
   const Candidate candidate{t, y, correction, weights};
-  mover_->forget_failure();
+  mover_->rows().forget_failure();
   const Move move = mover_->move(candidate);
   report.status = move.status;
   report.iterations = move.moves;
@@ -31,7 +31,7 @@ void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hol
   report.drift_after = move.drift_after;
   if (move.status != Status::success) {
     report.message = mover_->message();
-    report.contradicting_rows = mover_->contradicting_rows();
+    report.contradicting_rows = mover_->rows().contradicting;
     return;
   }
   N_VLinearSum(1.0, y, 1.0, correction, y);
@@ -60,7 +60,7 @@ GaussNewton& PointProjection::nearest(N_Vector y) {
 
 bool PointProjection::follow(double t, N_Vector y, N_Vector weights, Mover& near,
                              ConsistencyReport& report) {
-  if (!has_values(constraints_) || near.rank_of_factors() < 0) return false;
+  if (!has_values(constraints_) || near.rows().rank_of_factors() < 0) return false;
   double* values = N_VGetArrayPointer(y);
   std::vector<double> point(values, values + N_VGetLength(y));
   ConsistencyReport found;

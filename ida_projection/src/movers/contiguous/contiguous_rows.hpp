@@ -1,0 +1,168 @@
+// Tether: g, C and its factors at a candidate, on contiguous vectors. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "constraints/evaluator.hpp"
+#include "host/mechanisms.hpp"
+#include "movers/loaded_candidate.hpp"
+#include "movers/local_metric.hpp"
+#include "movers/mover.hpp"
+#include "rows/rounding.hpp"
+#include "rows/split_rows.hpp"
+
+namespace tether::ida_projection {
+
+constexpr int kFewForLevels = 16;  // rows
+constexpr double kFollows = 0.25;  // of Options::tolerance, by rows that are left out
+
+/// `Rows` keeps C and its factors: DenseRows or SparseRows.
+template <class Rows>
+class ContiguousRows final : public RowsAt {
+ public:
+  /// Drift is that of the first `reported` rows (-1: of all).
+  ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
+                 int size, int reported)
+      : evaluator_(constraints, statistics),
+        blocks_(constraints, evaluator_, size),
+        at_(size),
+        metric_(options, size),
+        options_(options),
+        statistics_(statistics),
+        reported_(reported >= 0 ? reported : evaluator_.rows()),
+        inverse_n_(1.0 / size) {
+    g_.assign(static_cast<std::size_t>(evaluator_.rows()), 0.0);
+    kept_g_ = rounding_ = g_;
+  }
+
+  Status load(const Candidate& candidate) override;
+  Status value(double t, bool with_rows) override;
+  Status factor(double t, bool refill) override;
+  Solution solve(Solve how) override;
+  Status apply(double share, const Candidate& candidate) override;
+  double size() const override { return at_.size(); }
+  double change() const override;
+  bool rounding_only() override;
+  double rounding_length() override;
+
+  void shift(N_Vector change) override;
+  double length_of(N_Vector change) const override;
+  void restart(const Candidate& candidate) override { at_.restart(candidate); }
+  double drift() const override;
+  bool has_factors() const override { return uses_.there; }
+  void forget_factors() override { uses_.there = false; }
+  bool keeps_factors() const override {
+    return in_use(Mechanism::kept_factors) && Rows::kKeepsFactors && uses_.lasting;
+  }
+  bool may_look() const override { return uses_.there && !uses_.thin && !blocks_.dropped_rows(); }
+  bool decided() const override { return uses_.decided; }
+  void forget_rank() override { uses_.lasting = false; }
+  bool measures_rest() const override { return Rows::many(count()); }
+  // Old factors leave more of what dropped rows ask for.
+  bool may_polish_first() const override {
+    return Rows::kKeepsFactors ? !blocks_.dropped_rows() : measures_rest();
+  }
+  bool contradicts() override;
+  void look_again_soon() override { blocks_.look_again_soon(); }
+
+  Status set_algebraic(const Candidate& candidate, N_Vector id) override {
+    at_.load(candidate);
+    return structure(candidate, id != nullptr ? N_VGetArrayPointer(id) : nullptr);
+  }
+  bool metric(N_Vector D) const override {
+    if (at_.w == nullptr) return false;
+    metric_.current(at_, N_VGetArrayPointer(D));
+    return true;
+  }
+  void accept() override { metric_.accept(); }
+  void reset() override;
+  bool use_levels(bool on) override;
+  // Few rows make no rough moves. Where rows are about to depend on each other, at dead points, F
+  // answers to any move, stiff or not.
+  bool may_use_levels() const override {
+    return count() > kFewForLevels && !uses_.thin && !blocks_.dropped_rows();
+  }
+
+  int rank_of_factors() const override {
+    const bool serve = uses_.there && !uses_.thin && !uses_.partial && !uses_.foreign;
+    return serve ? blocks_.rank() : -1;
+  }
+  void rows_changed() override { uses_.foreign = true; }
+  bool solve_with_factors(const std::vector<double>& g, std::vector<double>& dy) override;
+  double left_of_dropped(const std::vector<double>& WT) override {
+    return blocks_.dropped_rows() ? blocks_.left_of_dropped(WT) : 0.0;
+  }
+  bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
+  bool fatal() const override { return evaluator_.fatal(); }
+  void forget_failure() override { evaluator_.forget(); }
+
+ private:
+  using Block = typename Rows::Block;
+  /// The uses of the factors at hand.
+  struct Uses {
+    bool there = false;    ///< of this candidate or of an earlier one
+    bool thin = false;     ///< the last factor() found rows that need RowTrust
+    bool lasting = false;  ///< which rows it has kept is right for the next steps, too
+    bool decided = false;  ///< it found that out for this candidate
+    bool partial = false;  ///< independent rows are left out, too thin to be trusted
+    bool foreign = false;  ///< the caller's rows are others now
+  };
+
+  int count() const { return static_cast<int>(g_.size()); }
+  int unknowns() const { return static_cast<int>(at_.y.size()); }
+  double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
+  void fill_metric() { metric_.fill(at_, blocks_.d, blocks_.a); }
+  Block& counted() { return blocks_.d.rows.empty() ? blocks_.a : blocks_.d; }
+  Status told(Status status) {
+    if (status != Status::success) message = evaluator_.message();
+    return status;
+  }
+  const double* WT_of_differences() {
+    return evaluator_.uses_differences() ? at_.WT().data() : nullptr;
+  }
+
+  Status structure(const Candidate& candidate, const double* id);
+  Status rows(double t, double* g);
+  bool decide();
+  double length_of_solution();
+  double judge_thin_rows(double length);
+  Status learn_trust(double length);
+  const std::vector<int>& levels();
+  void look_for_rates();
+  bool first_are_rates_of_zeroth(const std::vector<int>& levels);
+  bool dropped_follow();
+  bool only_rounding(std::size_t i) const;
+  static void take(double share, const double* __restrict dy, int n, double* __restrict ycor,
+                   double* __restrict y) {
+    for (int k = 0; k < n; ++k) {
+      const double move = share * dy[k];
+      ycor[k] -= move;
+      y[k] -= move;
+    }
+  }
+
+  Evaluator evaluator_;
+  Rows blocks_;
+  LoadedCandidate at_;
+  LocalMetric metric_;
+  Uses uses_;
+  const Options& options_;
+  Statistics& statistics_;
+  int reported_;  // the others are equations of F
+  double inverse_n_;
+  double t_ = 0.0, length_ = 0.0;  // of the last evaluation and solution
+  std::vector<double> g_;
+  std::vector<double> kept_g_, rounding_;  // work space of rounding_length()
+  bool rows_known_ = false;                // C belongs to the present y
+  bool moved_ = false;                     // this candidate
+  int factored_ = 0, rate_looks_ = 0;
+  std::vector<int> found_levels_;
+  bool levels_known_ = false;  // they are those of the rows as they are arranged
+  double usual_ = 0.0;         // asked for by dropped rows after the moves, when that was decided
+};
+
+}  // namespace tether::ida_projection

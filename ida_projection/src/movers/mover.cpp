@@ -1,0 +1,348 @@
+// Tether: Newton's method onto the constraints. SPDX-License-Identifier: BSD-3-Clause
+#include "movers/mover.hpp"
+
+#include <cmath>
+
+#include "attach/shortest.hpp"
+#include "host/mechanisms.hpp"
+#include "rows/rounding.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+constexpr double kNothing = 1e-8;      // tolerances: as good as no move
+constexpr double kLargestFloor = 0.1;  // tolerances
+constexpr double kLong = 1.0;          // tolerances: such a move is made with fresh factors
+// Factors of an earlier step leave at most so much for settle(), in tolerances.
+constexpr double kForLater = 0.1;
+constexpr double kTurned = 4.0;  // by so much C of an earlier look may mislead
+constexpr int kLooks = 16;       // looks with the factors of one
+constexpr int kQuiet = 8;        // moves that were none, then looks begin again
+constexpr int kQuick = 3;        // moves with a whole C
+// This part of Options::tolerance is left where a move costs little beside the factors.
+constexpr double kCheapRest = 1e-4;
+constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
+// Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
+// moves would not be enough.
+constexpr double kWorn = 0.06, kSlow = 0.1;
+constexpr double kHalving = 0.5;  // moves that leave more of each other do not converge
+
+}  // namespace
+
+Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
+  ++moves_;
+  if (!std::isfinite(length)) return Verdict::failed;
+  const double tolerance = options_->advanced.tolerance;
+  const bool last = moves_ >= options_->advanced.maximum_iterations;
+
+  if (moves_ == 1) {
+    previous_ = length;
+    if (length <= floor || leaves_little(length)) return Verdict::done;
+    if (last) return length <= tolerance ? Verdict::done : Verdict::failed;
+    return Verdict::go_on;
+  }
+
+  const double ratio = length / previous_;
+  // Only a clean second move says something about curvature: not one made of rounding.
+  if (moves_ == 2) curvature_.measured(previous_, previous_, length > 10.0 * floor ? length : 0.0);
+  previous_ = length;
+
+  // The rest is at most about length * ratio, and no more than length while ratio <= 1/2.
+  if (ratio <= 0.5) {
+    if (length * ratio <= tolerance) return Verdict::done;
+    return last ? Verdict::failed : Verdict::go_on;
+  }
+  // No longer halving: rounding (then nothing can be gained) or a broken iteration.
+  if (length <= std::max({floor, 1e-5, 0.1 * std::min(1.0, tolerance)})) return Verdict::done;
+  if (!fresh && !last) return Verdict::refactor;
+  return Verdict::failed;
+}
+
+void Mover::reset() {
+  rows_->reset();
+  monitor_.reset();
+  curvature_.reset();
+  settles_ = nothing_in_row_ = 0;
+  still_ = false;
+  move_length_ = 0.0;
+}
+
+Status Mover::factor(double t, bool refill) {
+  const Status status = rows_->factor(t, refill);
+  if (status == Status::success) wear_ = WearOfFactors();
+  return status;
+}
+
+double Mover::remaining_drift(const Candidate& candidate) {
+  if (!rows_->gives_g()) return -1.0;
+  rows_->restart(candidate);
+  return rows_->value(candidate.t, false) == Status::success ? rows_->drift() : -1.0;
+}
+
+// Do C and the factors of an earlier look show that there is nothing to do? A run whose constraints
+// IDA keeps by itself looks at every step and finds rounding: g alone tells, while what its factors
+// make of it is far below the length at which moves begin.
+bool Mover::plainly_nothing() {
+  if (!in_use(Mechanism::looks) || !rows_->may_look() || looks_ >= kLooks) return false;
+  ++looks_;
+  ++wear_.age;
+  return rows_->rounding_only() || kTurned * rows_->solve(Solve::look).length <= kNothing;
+}
+
+Move Mover::measure(const Candidate& candidate) {
+  Move result;
+  if ((result.status = rows_->load(candidate)) != Status::success) return result;
+  const bool may_do = rows_->has_factors() && looks_ < kLooks;  // with g alone
+  result.status = rows_->value(candidate.t, !may_do);
+  if (result.status != Status::success) return result;
+  result.drift_before = result.drift_after = rows_->drift();
+  if (rows_->gives_g() && (result.drift_before == 0.0 || plainly_nothing())) return result;
+  looks_ = 0;
+  if ((result.status = factor(candidate.t, true)) != Status::success) return result;
+  if (rows_->rounding_only()) return result;
+  Solution first = rows_->solve(Solve::first);
+  // That there is nothing to do the rows that an earlier look has kept tell as well.
+  if (first.status == Status::success && !rows_->decided() && first.length > kNothing) {
+    rows_->forget_rank();
+    if ((result.status = factor(candidate.t, false)) != Status::success) return result;
+    first = rows_->solve(Solve::first);
+  }
+  result.status = first.status;
+  result.length = first.length;
+  result.floor = 4.0 * kEpsilon * rows_->size();
+  if (result.status == Status::success && rows_->contradicts())
+    result.status = Status::inconsistent;
+  return result;
+}
+
+// The same where moves have begun, after some that were none: rows that F contains, or that IDA
+// keeps by itself between the steps that need them.
+bool Mover::still_nothing(const Candidate& candidate, Move& result) {
+  if (!in_use(Mechanism::looks) || nothing_in_row_ < kQuiet) return false;
+  result.status = rows_->value(candidate.t, false);
+  if (result.status != Status::success) return true;
+  result.looked = still_ = plainly_nothing();
+  if (!still_) return false;
+  result.drift_before = result.drift_after = rows_->drift();
+  move_length_ = 0.0;
+  reused_ = false;
+  return true;
+}
+
+Move Mover::move(const Candidate& candidate) {
+  Move result;
+  still_ = false;
+  by_present_factors_ = -1.0;
+  if ((result.status = rows_->load(candidate)) != Status::success) return result;
+  if (still_nothing(candidate, result)) return result;
+  reused_ = rows_->keeps_factors() && rows_->has_factors();
+  ++wear_.age;
+  result.status = rows_->value(candidate.t, !reused_);
+  if (result.status != Status::success) return result;
+  looks_ = 0;
+  result = newton(candidate);
+  const bool nothing = result.status == Status::success && result.length <= kNothing;
+  nothing_in_row_ = nothing && !rows_->keeps_factors() ? nothing_in_row_ + 1 : 0;
+  const bool broken =
+      result.status == Status::not_converged || result.status == Status::move_too_long;
+  if (broken || result.moves > kQuick) rows_->look_again_soon();
+  // Kept factors are in use only while dropped rows ask for less than that.
+  if (result.status == Status::success && !result.capped && !reused_ && rows_->contradicts())
+    result.status = Status::inconsistent;
+  return result;
+}
+
+// Newton's method from the candidate, with g known there.
+Move Mover::newton(const Candidate& candidate) {
+  Move result;
+  result.drift_before = result.drift_after = rows_->drift();
+  monitor_.start();
+  bool renew = !reused_, refill = true, fresh = false;  // fresh: factors belong to the present y
+  for (;;) {
+    if (renew && (result.status = factor(candidate.t, refill)) != Status::success) return result;
+    fresh = fresh || renew;
+    const Solution found = rows_->solve(renew ? Solve::first : Solve::again);
+    if ((result.status = found.status) != Status::success) return result;
+    renew = refill = false;
+    follows_ = found.follows;
+    if (reused_ && !(found.length <= kLong && found.follows)) {
+      reused_ = false;
+      renew = refill = true;
+      continue;
+    }
+    if (++result.moves == 1 && !allowed(candidate, found.length, result)) return result;
+    if ((result.status = rows_->apply(1.0, candidate)) != Status::success) return result;
+    by_present_factors_ = found.length;
+    if (reused_) {
+      if (2.0 * wear_.rate() * found.length <= kForLater) break;
+      reused_ = false;
+      renew = refill = true;
+    } else {
+      Monitor::Verdict verdict = Monitor::Verdict::done;
+      if (done(candidate, found, fresh, result, verdict)) break;
+      if (result.status != Status::success) return result;
+      fresh = false;
+      renew = verdict == Monitor::Verdict::refactor;
+    }
+    if ((result.status = rows_->value(candidate.t, false)) != Status::success) return result;
+    result.drift_after = rows_->drift();
+  }
+  result.status = Status::success;
+  return result;
+}
+
+// Is this length of a first move? Only a long one can be too long: the limit is at least
+// largest_move. False: it was refused, or made as far as is allowed.
+bool Mover::allowed(const Candidate& candidate, double length, Move& result) {
+  result.length = move_length_ = length;
+  const double largest = options_.advanced.largest_move;
+  const double limit = length <= largest ? largest : largest * std::max(1.0, rows_->change());
+  if (length <= limit) return true;
+  const bool finite = std::isfinite(length);
+  if (options_.advanced.long_move == LongMove::reject || !finite) {
+    result.status = finite ? Status::move_too_long : Status::not_finite;
+    rows_->message = "the move onto the constraints is " + brief(length) +
+                     " tolerances long, the limit is " + brief(limit) +
+                     " (Options::largest_move); start closer with make_consistent, or use a "
+                     "smaller step";
+    return false;
+  }
+  result.left = length - limit;
+  result.length = limit;
+  result.capped = true;
+  result.status = rows_->apply(limit / length, candidate);
+  return false;
+}
+
+// After a move with factors of this step. Another status than success: it will not be done.
+bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, Move& result,
+                 Monitor::Verdict& verdict) {
+  const double length = found.length;
+  if (!rows_->gives_g()) return true;
+  if (result.moves == 1 && found.left == 0.0 && monitor_.plainly_done(length)) return true;
+  // A first move longer than the largest floor need not know it.
+  const double floor = result.moves == 1 && length > kLargestFloor
+                           ? 0.0
+                           : std::min(kLargestFloor, 1e3 * kEpsilon * rows_->size());
+  verdict = monitor_.judge(length, fresh, floor);
+  // Almost parallel rows magnify rounding: a move that it explains has converged.
+  if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
+      length <= std::min(kLargestFloor, rows_->rounding_length()))
+    verdict = Monitor::Verdict::done;
+  // One that answers nothing but rounding of g leads nowhere, however long it is.
+  if (verdict == Monitor::Verdict::failed && rows_->rounding_only()) {
+    by_present_factors_ = -1.0;
+    result.status = rows_->apply(-1.0, candidate);
+    return result.status == Status::success;
+  }
+  if (verdict == Monitor::Verdict::done && found.left * length <= options_.advanced.tolerance)
+    return true;
+  if (verdict == Monitor::Verdict::failed || result.moves >= options_.advanced.maximum_iterations) {
+    result.status = Status::not_converged;
+    rows_->message =
+        "move " + std::to_string(result.moves) + " onto the constraints still is " + brief(length) +
+        " tolerances long; check the constraint Jacobian with check_jacobian, or whether "
+        "the rows have a common solution here; rows written as squares have none but double "
+        "roots, and rows with |.| or max no derivative: neither lets Newton's moves shrink";
+  }
+  return false;
+}
+
+Status Mover::settle(const Candidate& candidate, N_Vector change) {
+  rows_->shift(change);
+  if (rows_->keeps_factors()) return take_back(candidate, -1.0);
+  return take_rest(candidate, move_length_ + rows_->length_of(change));
+}
+
+Status Mover::finish(const Candidate& candidate, bool polished) {
+  if (still_ || !rows_->gives_g()) return Status::success;
+  // Newton's method goes on where a move costs little beside the step.
+  if (rows_->measures_rest()) return take_rest(candidate, move_length_);
+  if (!rows_->keeps_factors()) return Status::success;
+  const bool unseen = move_length_ > kSafe * options_.advanced.tolerance || !follows_;
+  return unseen ? take_back(candidate, polished ? by_present_factors_ : -1.0) : Status::success;
+}
+
+// With factors that belong to a point `reach` tolerances away.
+Status Mover::take_rest(const Candidate& candidate, double reach) {
+  const bool cheap = rows_->measures_rest(),
+             measure = curvature_.due(reach, ++settles_);
+  const double enough = (cheap ? kCheapRest : 1.0) * options_.advanced.tolerance;
+  double previous = 0.0;
+  for (int k = 0; k < options_.advanced.maximum_iterations; ++k) {
+    Status status = rows_->value(candidate.t, false);
+    if (status != Status::success) return status;
+    Solution found = rows_->solve(Solve::rest);
+    if (still_ && wear_.age > 0 && found.length > kNothing) {
+      if ((status = factor(candidate.t, true)) != Status::success) return status;
+      found = rows_->solve(Solve::first);
+    }
+    if (found.status != Status::success) return found.status;
+    if ((status = rows_->apply(1.0, candidate)) != Status::success) return status;
+    if ((still_ && wear_.age > 0) || !rows_->gives_g())
+      break;  // by next to nothing, which says nothing about its rate
+    const double length = found.length;
+    // Only what is seen on this candidate counts where moves are cheap.
+    const double expected = cheap ? length * (k > 0 ? length / previous : WearOfFactors::kUnknown)
+                                  : curvature_.left(reach, length);
+    const bool enough_done = (k > 0 || cheap || !measure) && expected <= enough;
+    if (k == 0 && enough_done) break;
+    const double floor = 1e2 * kEpsilon * rows_->size();
+    const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);
+    if (k > 0) curvature_.measured(reach, previous, rounding ? 0.0 : length);
+    if (rounding || enough_done) break;
+    previous = length;
+  }
+  return Status::success;
+}
+
+// The same with kept factors, which leave a part of each move that grows with their age. Only what
+// is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
+// two moves with the same factors, that makes the next one so; and dropped rows that follow the
+// others. Where too much is left, also of dropped rows, or a move is long, factors are made anew.
+// `previous`: length of the move before, by the same factors and with nothing in between; < 0:
+// there is none.
+Status Mover::take_back(const Candidate& candidate, double previous) {
+  const double floor = 1e2 * kEpsilon * rows_->size();
+  const double done = std::max(floor, kSafe * options_.advanced.tolerance);
+  for (int k = 0; k <= options_.advanced.maximum_iterations; ++k) {
+    Status status = rows_->value(candidate.t, false);
+    if (status != Status::success) return status;
+    Solution found = rows_->solve(Solve::rest);
+    double part = previous > 0.0 && found.length > floor ? found.length / previous : 0.0;
+    if (part > 0.0 && wear_.age > 0 && k > 0) wear_.slope = part / wear_.age;
+    if (wear_.age > 0 &&
+        ((k > 0 && part > kSlow) || found.length > kLong || (k > 0 && !found.follows))) {
+      if ((status = factor(candidate.t, true)) != Status::success) return status;
+      found = rows_->solve(Solve::first);
+      part = 0.0;
+      previous = -1.0;
+    }
+    // Almost parallel rows magnify rounding: moves would follow it without end.
+    if (k > 0 && part > kHalving && rows_->rounding_only()) return Status::success;
+    // One solution leaves most of what rows ask for that nearly depend on the others.
+    if (k > 0 && part > kHalving && wear_.age == 0) {
+      found.length = rows_->solve(Solve::closely).length;
+      part = 0.0;
+    }
+    if ((status = rows_->apply(1.0, candidate)) != Status::success) return status;
+    // The first of two moves may have been left less of than what remains then would be.
+    const double leaves = k > 0 ? part : std::max(part, wear_.rate());
+    const double length = found.length;
+    if (found.follows && (length <= done ||
+                          (part > 0.0 && leaves * length <= kSafe * options_.advanced.tolerance))) {
+      if (k > 0 && part > kWorn) rows_->forget_factors();
+      return Status::success;
+    }
+    previous = length;
+  }
+  rows_->forget_factors();
+  if (previous <= std::min(kLargestFloor, rows_->rounding_length())) return Status::success;
+  rows_->message = "after " + std::to_string(options_.advanced.maximum_iterations) +
+                   " moves with kept factors the next one still is " + brief(previous) +
+                   " tolerances long (Options::maximum_iterations)";
+  return Status::not_converged;
+}
+
+}  // namespace tether::ida_projection

@@ -1,0 +1,128 @@
+// Tether: the rows at a candidate, as Newton's method onto them wants them.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <sundials/sundials_nvector.h>
+#include <tether/ida_projection/projection.hpp>
+#include <vector>
+
+#include "host/candidate.hpp"
+
+namespace tether::ida_projection {
+
+/// How far y' points out of the constraints.
+struct Tangency {
+  std::vector<double> rate;       ///< sum_j C_ij y'_j
+  std::vector<double> terms;      ///< sum_j |C_ij y'_j|; < 0: the row contains algebraic variables
+  std::vector<double> size;       ///< sum_j |C_ij| max(1, |y_j|), of differential y_j
+  std::vector<double> tolerance;  ///< |row_i(C WT)|, a move of one tolerance
+};
+
+/// The move dy for the present g by the factors at hand.
+struct Solution {
+  Status status = Status::success;
+  double length = 0.0;  ///< WRMS, in tolerances, of what the error test sees
+  double left = 0.0;    ///< the part of it that an iterative solution has left
+  bool follows = true;  ///< do the rows that the factors leave out follow from the others?
+};
+
+/// What a solution is for.
+enum class Solve {
+  first,    ///< the factors are new: which of the rows are to be trusted is decided
+  again,    ///< the same rows as before
+  rest,     ///< what a move or a polish has left
+  closely,  ///< as closely as nearly dependent rows can be solved
+  look      ///< no move follows
+};
+
+/// g, C and its factors in one storage, for the candidate that was loaded last. Newton's loop asks
+/// for load, value, factor, solve, apply and the sizes that rounding explains; the rest of the
+/// functions says what the storage is good for.
+class RowsAt {
+ public:
+  virtual ~RowsAt() = default;
+
+  /// y = base + correction, and the metric's scale there.
+  virtual Status load(const Candidate& candidate) = 0;
+  /// g at y; `with_rows`: C will be wanted, too.
+  virtual Status value(double t, bool with_rows) = 0;
+  /// C at y and its factors; `refill`: in the metric of the correction as it is now.
+  virtual Status factor(double t, bool refill) = 0;
+  virtual Solution solve(Solve how) = 0;
+  /// y and the correction move by -share dy.
+  virtual Status apply(double share, const Candidate& candidate) = 0;
+  /// WRMS of y and of the corrector's change, in tolerances.
+  virtual double size() const = 0;
+  virtual double change() const = 0;
+  /// Does the rounding of its own terms explain every g_i? The length of a move that it explains.
+  virtual bool rounding_only() { return false; }
+  virtual double rounding_length() { return 0.0; }
+
+  /// y moves with a correction that was changed.
+  virtual void shift(N_Vector change) = 0;
+  /// Length of such a change over the variables that the error test sees, in tolerances.
+  virtual double length_of(N_Vector change) const = 0;
+  /// y for the correction as it is.
+  virtual void restart(const Candidate& candidate) = 0;
+  /// Largest |g_i| as evaluated last.
+  virtual double drift() const = 0;
+  /// Is there a g? A projection of the caller's own tells none, and one solution is all of it.
+  virtual bool gives_g() const { return true; }
+
+  virtual bool has_factors() const = 0;
+  virtual void forget_factors() = 0;
+  /// May factors of a step serve the next ones, and do those at hand?
+  virtual bool keeps_factors() const { return false; }
+  /// May they tell that there is nothing to move?
+  virtual bool may_look() const { return has_factors(); }
+  /// Was it found out for this candidate which rows are independent?
+  virtual bool decided() const { return true; }
+  virtual void forget_rank() {}
+  /// Are second moves cheap beside the factors? Then what is left is seen on each candidate.
+  virtual bool measures_rest() const { return false; }
+  /// May the correction be polished before the move?
+  virtual bool may_polish_first() const { return false; }
+  /// Rows that a solution leaves out contradict the others: `message` and `contradicting` say it.
+  virtual bool contradicts() = 0;
+  /// Moves were broken or many: perhaps for want of entries that g could not fill before.
+  virtual void look_again_soon() {}
+
+  /// Which components are algebraic (1 differential, 0 algebraic; null: none), at a candidate.
+  virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;
+  /// D as the last candidate had it, of every component; false: there is none.
+  virtual bool metric(N_Vector /*D*/) const { return false; }
+  /// The attempt that used the last candidate was accepted: its scale is kept.
+  virtual void accept() {}
+  virtual void reset() = 0;
+  /// Will no polish be taken back in this run? Then factors may serve more than one step.
+  virtual void expect_no_settle(bool) {}
+  /// One scale for all unknowns of a level (row_levels.hpp) from the next move on, or each its own
+  /// again. False: nothing changes, there are too few rows or levels.
+  virtual bool use_levels(bool) { return false; }
+  virtual bool may_use_levels() const { return false; }
+
+  /// Rank of the factors for solve_with_factors(); -1: there are none.
+  virtual int rank_of_factors() const { return -1; }
+  /// The caller's rows are others than those of the factors at hand.
+  virtual void rows_changed() {}
+  /// dy (N entries) for other values g, near a hundredth. False: not known.
+  virtual bool solve_with_factors(const std::vector<double>& /*g*/, std::vector<double>& /*dy*/) {
+    return false;
+  }
+  /// After that: what rows that the factors leave out ask for beyond the others, in tolerances.
+  virtual double left_of_dropped(const std::vector<double>& /*WT*/) { return 0.0; }
+  /// C y' row by row with C as it was evaluated last. False: not known.
+  virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {
+    return false;
+  }
+
+  /// Did a callback ask for the end of the run since forget_failure(), in any evaluation?
+  virtual bool fatal() const = 0;
+  virtual void forget_failure() = 0;
+
+  std::string message;             ///< of what failed
+  std::vector<int> contradicting;  ///< rows
+};
+
+}  // namespace tether::ida_projection
