@@ -108,7 +108,9 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   corrector_.begin(mem);
   if (movers_.used != nullptr) movers_.used->rows().forget_failure();
   control_.restore_weights(weights, attempts_.steps);
-  int flag = attempt(candidate, tolerance, call_setup);
+  const bool asked = inquiry_.probe != Probe::none;
+  int flag = asked ? look_around(candidate) : step(candidate, tolerance, call_setup);
+  if (flag == 0 && !asked) choose_step(candidate);
   // Evaluations that only look around may fail, but what asks for the end of the run ends it.
   const bool ended =
       corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().fatal());
@@ -116,24 +118,23 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   return corrector_.stopped() ? corrector_.stop_flag() : flag;
 }
 
-int Projection::Impl::attempt(Candidate& candidate, double tolerance, bool call_setup) {
-  if (inquiry_.probe != Probe::none) {  // make_consistent wants to look around, not to step
-    N_VScale(1.0, candidate.weights, unknowns_.weights);
-    if (!variables_.known()) derive_id(candidate);
-    candidate.t = ida_.step().t;
-    project_jointly(candidate);
-    inquiry_.probe = Probe::answered;
-    return 0;
-  }
-  const int flag = correct_and_move(candidate, tolerance, call_setup);
-  if (flag != 0) return flag;
+// For make_consistent, which wants no step.
+int Projection::Impl::look_around(Candidate& candidate) {
+  N_VScale(1.0, candidate.weights, unknowns_.weights);
+  if (!variables_.known()) derive_id(candidate);
+  candidate.t = ida_.step().t;
+  project_jointly(candidate);
+  inquiry_.probe = Probe::answered;
+  return 0;
+}
+
+void Projection::Impl::choose_step(const Candidate& candidate) {
   const long steps = movers_.used != nullptr ? attempts_.steps : ida_.steps();
   const bool suppressed = run_.suppressed;
   if (in_use(Mechanism::widened_tolerance) && suppressed)
     control_.widen_test(candidate, polish_, attempts_.moved, steps);
   control_.control(candidate, steps, run_.engaged, suppressed ? variables_.tested() : nullptr,
                    suppressed ? variables_.id() : nullptr);
-  return 0;
 }
 
 int Projection::Impl::caught(Status outcome, const char* text) noexcept {
@@ -153,94 +154,87 @@ int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool
       may_leave_out && in_use(Mechanism::free_multipliers) ? variables_.undetermined() : none);
 }
 
-int Projection::Impl::correct_and_move(Candidate& candidate, double tolerance, bool call_setup) {
-  if (attempts_.steps < 0 && movers_.used != nullptr) {
-    quicken_vectors(candidate);
-    if (unknowns_.contiguous) keep_point_before(candidate, run_.start);
-  }
-  const bool may_be_high = !variables_.index_known() || variables_.high_index();
-  if (movers_.used != nullptr && !run_.engaged && may_be_high &&
-      in_use(Mechanism::index_in_trouble) && control_.in_trouble(attempts_.steps)) {
-    const Status engaged = engage_if_index_is_high(candidate);
-    if (engaged != Status::success) return finish(engaged, movers_.used->message());
-  }
+// One attempt at a step: the corrector, the move of its candidate onto the constraints, the polish.
+int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_setup) {
+  if (const std::optional<int> failed = engage_in_trouble(candidate)) return *failed;
   int flag = correct(candidate, tolerance, call_setup);
   if (movers_.used == nullptr) return flag;
   if (flag != 0) return corrector_failed(candidate, flag);
-  if (!run_.linear_solver.known()) look_at_linear_solver();
-
   const StepData step = ida_.step();
-  account_for_previous_attempt(step);
-  candidate.t = step.t;
-  if (control_.starts_off_equations(attempts_.steps)) leave_out_of_error_test(false);
-  if (unknowns_.contiguous) {
-    candidate.h = std::abs(ida_.step_size());
-    candidate.cj = step.cj;
-    candidate.predicted_rate = N_VGetArrayPointer(step.yp_predicted);
-  }
-  const Candidate& at = candidate;
-  if (watch_.rejections.stands()) return end_standing(step.t);
-  const bool false_row = watch_.first_steps.false_row_found();
-  if (watch_.rejections.collapsed(false_row) && report_.warning() != Status::collapsed) {
-    const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
-    const std::string cause = watch_.rejections.cause(at, step, variables_, corrector_, doubt);
-    report_.warn(Status::collapsed, cause,
-                 doubt.empty() ? cause : cause.substr(0, cause.rfind("; " + doubt)));
-    if (false_row) return report_.end(Status::collapsed);
-  }
+  begin_move(candidate, step);
+  if (const std::optional<int> ended = watch_rejections(candidate, step)) return *ended;
   Stopwatch stopwatch(*this);
   if (!run_.engaged) {
-    bool done = false;
-    const int outcome = look_before_moving(at, done);
-    if (done) return outcome;
+    if (const std::optional<int> done = look_before_moving(candidate)) return *done;
     stopwatch.start();
-    const Status engaged = engage(at);
+    const Status engaged = engage(candidate);
     if (engaged != Status::success) return finish(engaged, movers_.used->message());
   }
-
-  const bool fresh = call_setup || !corrector_.has_setup();
-  Move move = move_and_polish(at, step.cj, tolerance, fresh);
-  if (move.status == Status::success && in_use(Mechanism::repeated_correction) &&
-      !polish_.corrector_was_right() && !fresh) {
+  bool fresh = call_setup || !corrector_.has_setup();  // of IDA's factors there are no better ones
+  Moved move = move_and_polish(candidate, step.cj, tolerance, fresh);
+  while (move.status == Status::success && !move.corrector_was_right && !fresh &&
+         in_use(Mechanism::repeated_correction)) {
     // Old factors fooled IDA's convergence test: correct again, with fresh ones.
     ++statistics_.corrections_repeated;
-    N_VConst(0.0, at.correction);
-    flag = correct(at, tolerance, true);
+    N_VConst(0.0, candidate.correction);
+    flag = correct(candidate, tolerance, true);
     if (flag != 0) return corrector_failed(candidate, flag);
     polish_.note_setup(step.cj);
-    move = move_and_polish(at, step.cj, tolerance, true);
+    fresh = true;
+    move = move_and_polish(candidate, step.cj, tolerance, fresh);
   }
-  if (stopwatch.running()) move.drift_after = movers_.used->remaining_drift(at);
+  if (stopwatch.running()) move.drift_after = movers_.used->remaining_drift(candidate);
   account(move, step, stopwatch.running());
   if (move.status == Status::success) {
     look_at_start(move);
-    look_for_doubts(at, step);
+    look_for_doubts(candidate, step);
   }
   if (move.status == Status::not_converged)
-    return finish(move.status, with_suspicion(movers_.used->message(), at));
+    return finish(move.status, with_suspicion(movers_.used->message(), candidate));
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
+// The corrector has found the candidate.
+void Projection::Impl::begin_move(Candidate& candidate, const StepData& step) {
+  if (!run_.linear_solver.known()) look_at_linear_solver();
+  account_for_previous_attempt(step);
+  candidate.t = step.t;
+  if (control_.starts_off_equations(attempts_.steps)) leave_out_of_error_test(false);
+  if (!unknowns_.contiguous) return;
+  candidate.h = std::abs(ida_.step_size());
+  candidate.cj = step.cj;
+  candidate.predicted_rate = N_VGetArrayPointer(step.yp_predicted);
+}
+
 // `fresh`: of IDA's factors there are no better ones.
-Move Projection::Impl::move_and_polish(const Candidate& candidate, double cj, double tolerance,
-                                       bool fresh) {
+Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candidate, double cj,
+                                                          double tolerance, bool fresh) {
+  Moved moved;
   polish_.keep(candidate);
-  const bool first = polishes_first() && polish_.add_newton_step(candidate, cj, tolerance);
-  if (in_use(Mechanism::repeated_correction) && first && !fresh && !polish_.corrector_was_right())
-    return {Status::success};
-  if (first) polish_.keep(candidate);
-  Move move = movers_.used->move(candidate);
-  if (move.capped) {
-    judge_capped(move);
-    return move;  // the steps below would make the whole move
+  const Fix before = polishes_first() ? polish_.add_newton_step(candidate, cj, tolerance) : Fix();
+  if (in_use(Mechanism::repeated_correction) && !before.corrector_was_right && !fresh) {
+    moved.status = Status::success;
+    moved.corrector_was_right = false;
+    return moved;
   }
-  choose_metric(candidate, move);
-  if (move.status != Status::success) return move;
-  const bool polishes = first ? move.length > polish_.longest_unanswered(control_.smoothing())
-                              : wants_polish(move.length);
-  move.status =
-      polishes ? polish(candidate, cj, tolerance) : movers_.used->finish(candidate, first);
-  return move;
+  if (before.made) polish_.keep(candidate);
+  static_cast<Move&>(moved) = movers_.used->move(candidate);
+  if (moved.capped) {
+    judge_capped(moved);
+    return moved;  // the steps below would make the whole move
+  }
+  choose_metric(candidate, moved);
+  if (moved.status != Status::success) return moved;
+  const bool polishes = before.made
+                            ? moved.length > polish_.longest_unanswered(control_.smoothing())
+                            : wants_polish(moved.length);
+  // A refinement: where F or the linear solver fails here, the move itself stands, unless the
+  // failure is to end the run; then the corrector has kept it.
+  const Fix after = polishes ? polish_.add_newton_step(candidate, cj, tolerance) : Fix();
+  moved.corrector_was_right = after.corrector_was_right;
+  moved.status = after.made ? movers_.used->settle(candidate, polish_.delta())
+                            : movers_.used->finish(candidate, before.made && !polishes);
+  return moved;
 }
 
 // The move takes back as well what an iteration before it has added: a solution less. Only where
@@ -252,14 +246,6 @@ bool Projection::Impl::polishes_first() {
     return false;
   const bool silent = metric_choice_.calm() || !asks_for_metric();
   return silent && wants_polish(0.0);
-}
-
-Status Projection::Impl::polish(const Candidate& candidate, double cj, double tolerance) {
-  // A refinement: where F or the linear solver fails here, the move itself stands, unless the
-  // failure is to end the run; then the corrector has kept it.
-  return polish_.add_newton_step(candidate, cj, tolerance)
-             ? movers_.used->settle(candidate, polish_.delta())
-             : movers_.used->finish(candidate, false);
 }
 
 // A cap is meant for a start off the constraints, which is approached step by step. A step that
@@ -316,9 +302,9 @@ void Projection::Impl::account(const Move& move, const StepData& step, bool samp
 }
 
 int Projection::Impl::finish(Status outcome, const std::string& text) {
+  if (outcome == Status::success) return report_.finish(outcome, text, attempts_.steps);
   const bool stopped = outcome == Status::callback_fatal && corrector_.stopped();
-  const std::string index =
-      outcome != Status::success && !stopped ? too_high_index() : std::string();
+  const std::string index = stopped ? std::string() : too_high_index();
   if (!index.empty()) return report_.finish(outcome, text + "; " + index, attempts_.steps);
   return report_.finish(outcome, stopped ? corrector_.stop_text() : text, attempts_.steps);
 }

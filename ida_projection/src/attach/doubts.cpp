@@ -42,8 +42,9 @@ void Projection::Impl::look_at_start(const Move& move) {
 }
 
 void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {
-  if (attempts_.repeated || report_.warning() != Status::success) return;
-  if (!in_use(Mechanism::false_row_watch)) return;
+  if (!FirstSteps::looks(attempts_.steps) || attempts_.repeated ||
+      report_.warning() != Status::success || !in_use(Mechanism::false_row_watch))
+    return;
   const std::string doubt =
       watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
                               polish_.corrected(), variables_, *movers_.used, corrector_);
@@ -76,11 +77,22 @@ std::string Projection::Impl::rounding_of_multipliers() const {
              : "";
 }
 
-int Projection::Impl::end_standing(double t) {
-  report_.warn(Status::collapsed, "t stands at " + brief(t) +
-                                      ": steps are shorter than its rounding" +
-                                      rounding_of_multipliers());
-  return report_.end(Status::collapsed);
+// Ends a run that goes nowhere; the code that IDA wants then.
+std::optional<int> Projection::Impl::watch_rejections(const Candidate& candidate,
+                                                      const StepData& step) {
+  if (watch_.rejections.stands()) {
+    report_.warn(Status::collapsed, "t stands at " + brief(step.t) +
+                                        ": steps are shorter than its rounding" +
+                                        rounding_of_multipliers());
+    return report_.end(Status::collapsed);
+  }
+  const bool false_row = watch_.first_steps.false_row_found();
+  if (!watch_.rejections.collapsed(false_row) || report_.warning() == Status::collapsed) return {};
+  const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
+  const std::string cause = watch_.rejections.cause(candidate, step, variables_, corrector_, doubt);
+  report_.warn(Status::collapsed, cause,
+               doubt.empty() ? cause : cause.substr(0, cause.rfind("; " + doubt)));
+  return false_row ? std::optional<int>(report_.end(Status::collapsed)) : std::nullopt;
 }
 
 int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {

@@ -68,10 +68,25 @@ void Projection::Impl::test_all_again() {
 
 // Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
 // corrector fail: too late for the policy to begin.
-Status Projection::Impl::engage_if_index_is_high(const Candidate& candidate) {
+std::optional<int> Projection::Impl::engage_in_trouble(const Candidate& candidate) {
+  if (movers_.used == nullptr) return {};
+  if (attempts_.steps < 0) begin_run(candidate);
+  const bool may_be_high = !variables_.index_known() || variables_.high_index();
+  if (run_.engaged || !may_be_high || !in_use(Mechanism::index_in_trouble) ||
+      !control_.in_trouble(attempts_.steps))
+    return {};
   if (!variables_.known()) derive_id(candidate);
   variables_.look_at_index(candidate, corrector_, ida_.step().cj, ida_.evaluations_for_jacobian());
-  return variables_.high_index() && variables_.any() ? engage(candidate) : Status::success;
+  if (!variables_.high_index() || !variables_.any()) return {};
+  const Status engaged = engage(candidate);
+  if (engaged == Status::success) return {};
+  return finish(engaged, movers_.used->message());
+}
+
+// Before its first attempt.
+void Projection::Impl::begin_run(const Candidate& candidate) {
+  quicken_vectors(candidate);
+  if (unknowns_.contiguous) keep_point_before(candidate, run_.start);
 }
 
 // By how much more than usual errors are kept below the tolerance. Those at the end
@@ -100,10 +115,10 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
   fast::quicken_with_inputs({step.y_predicted, step.yp_predicted, candidate.weights, newton});
 }
 
-// Until a first move is needed IDA is left alone, bit for bit. `done`: this attempt is finished.
-int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done) {
+// Until a first move is needed IDA is left alone, bit for bit: then this attempt is finished, and
+// the code for IDA is known.
+std::optional<int> Projection::Impl::look_before_moving(const Candidate& candidate) {
   const Move first = movers_.used->measure(candidate);
-  done = true;
   if (first.status != Status::success) {
     const int code = finish(first.status, movers_.used->message());
     // Before the first step a smaller step cannot cure rows that contradict each other.
@@ -116,8 +131,7 @@ int Projection::Impl::look_before_moving(const Candidate& candidate, bool& done)
     statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, first.drift_before);
     return finish(Status::success, "");
   }
-  done = false;
-  return 0;
+  return {};
 }
 
 // The first move that is needed switches the policy on; until then IDA runs as it would alone.

@@ -3,6 +3,7 @@
 
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <string>
 #include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/projection.hpp>
@@ -128,16 +129,20 @@ class Projection::Impl {
   void look_for_bypass() { watch_.bypass.look(attempts_.steps, run_.initialized, report_); }
 
   // decorator.cpp: the stages of a projected step
-  int attempt(Candidate& candidate, double tolerance, bool call_setup);
+  int step(Candidate& candidate, double tolerance, bool call_setup);
+  int look_around(Candidate& candidate);
+  void choose_step(const Candidate& candidate);
   int correct(const Candidate& candidate, double tolerance, bool call_setup);
-  int correct_and_move(Candidate& candidate, double tolerance, bool call_setup);
+  void begin_move(Candidate& candidate, const StepData& step);
   void account_for_previous_attempt(const StepData& step);
-  Move move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
+  struct Moved : Move {
+    bool corrector_was_right = true;  ///< as its convergence test predicted
+  };
+  Moved move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
   void judge_capped(Move& move);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   bool polishes_first();
   bool asks_for_metric() const;
-  Status polish(const Candidate& candidate, double cj, double tolerance);
   void account(const Move& move, const StepData& step, bool sampled);
   int finish(Status outcome, const std::string& text);
 
@@ -147,10 +152,11 @@ class Projection::Impl {
   void derive_id(const Candidate& candidate);
   void leave_out_of_error_test(bool coupled);  ///< `coupled`: those of index 1 stay
   void test_all_again();
-  Status engage_if_index_is_high(const Candidate& candidate);
+  std::optional<int> engage_in_trouble(const Candidate& candidate);
   Care care_of_high_index(const Candidate& candidate) const;
+  void begin_run(const Candidate& candidate);
   void quicken_vectors(const Candidate& candidate);
-  int look_before_moving(const Candidate& candidate, bool& done);
+  std::optional<int> look_before_moving(const Candidate& candidate);
   Status engage(const Candidate& candidate);
 
   // doubts.cpp
@@ -161,7 +167,7 @@ class Projection::Impl {
   std::string undetermined_at(const Candidate& candidate, N_Vector y);
   std::string too_high_index() const;
   std::string rounding_of_multipliers() const;
-  int end_standing(double t);
+  std::optional<int> watch_rejections(const Candidate& candidate, const StepData& step);
   int corrector_failed(const Candidate& candidate, int flag);
 
   // choose_metric.cpp

@@ -92,6 +92,7 @@ void Evaluator::flatten(const Constraints& set) {
     rows_ += set.count;
     uses_differences_ |= std::holds_alternative<FiniteDifferences>(set.jacobian);
     gives_both_ |= parts_.back().gives_both;
+    has_sparse_ |= parts_.back().sparse != nullptr;
   }
   for (const Constraints& part : set.joined) flatten(part);
 }
@@ -219,6 +220,10 @@ Status Evaluator::jacobian(double t, const double* y, int n, const double* scale
 // Sparse rows are spread where all have been evaluated.
 Status Evaluator::jacobian_into_zeros(double t, const double* y, int n, const double* scale,
                                       const std::vector<int>& columns, double* C, double* value) {
+  if (!has_sparse_)
+    return all_rows(t, y, n, scale, columns, value, [&](const Part& part) {
+      return C + static_cast<std::ptrdiff_t>(part.first_row) * n;
+    });
   std::ptrdiff_t sparse = 0;
   for (const Part& part : parts_) sparse += part.sparse != nullptr ? part.entries(n) : 0;
   entries_.assign(static_cast<std::size_t>(sparse), 0.0);

@@ -158,7 +158,7 @@ class Evaluator {
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string message_, thrown_;
   int rows_ = 0;
-  bool uses_differences_ = false, gives_both_ = false;
+  bool uses_differences_ = false, gives_both_ = false, has_sparse_ = false;
   bool fatal_ = false;
   bool overrun_ = false;
 };

@@ -40,6 +40,7 @@ int Corrector::correct(const Candidate& candidate, double tolerance, bool call_s
   }
   const int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, weights,
                                      tolerance, call_setup, mem_);
+  SUNNonlinSolGetNumIters(inner_, &iterations_);
   failures_in_row_ = flag == 0 ? 0 : failures_in_row_ + 1;
   if (failures_in_row_ >= 2) rounding_fails_ = true;
   return flag;
@@ -96,12 +97,6 @@ bool Corrector::solve_linear(N_Vector rhs) {
   const int flag = linear_solve_(rhs, mem_);
   if (flag < 0) stop(flag, "IDA's linear solver failed for good, flag " + std::to_string(flag));
   return flag == 0;
-}
-
-long Corrector::iterations() const {
-  long n = 0;
-  SUNNonlinSolGetNumIters(inner_, &n);
-  return n;
 }
 
 void Corrector::stop(int flag, const std::string& text) {

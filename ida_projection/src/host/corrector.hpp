@@ -48,7 +48,7 @@ class Corrector {
   /// evaluated. Once it asked for the end of the run it is not called again.
   int residual(N_Vector ycor, N_Vector into);
   bool solve_linear(N_Vector rhs);
-  long iterations() const;  ///< of the last correction
+  long iterations() const { return iterations_; }  ///< of the last correction
   int failures_in_row() const { return failures_in_row_; }
 
   bool has_setup() const { return has_setup_; }
@@ -84,6 +84,7 @@ class Corrector {
   void* test_data_ = nullptr;
   N_Vector differential_ = nullptr;
   OwnedVector before_;
+  long iterations_ = 0;
   int failures_in_row_ = 0;
   bool rounding_fails_ = false;
   OwnedVector weights_;  // without those that rounding fails

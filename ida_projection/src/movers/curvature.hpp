@@ -20,7 +20,7 @@ class Curvature {
     measured_ = std::max(measured_, reach);
     kappa_ = std::max({kappa_, 0.0, left / (reach * move)});
   }
-  /// What a move of this length leaves.
+  /// The rest that a move of this length leaves.
   double left(double reach, double length) const { return 4.0 * kappa_ * reach * length; }
 
  private:

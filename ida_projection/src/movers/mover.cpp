@@ -75,7 +75,7 @@ Status Mover::factor(double t, bool refill) {
 }
 
 double Mover::remaining_drift(const Candidate& candidate) {
-  if (!rows_->gives_g()) return -1.0;
+  if (!rows_->traits.gives_g) return -1.0;
   rows_->restart(candidate);
   return rows_->value(candidate.t, false) == Status::success ? rows_->drift() : -1.0;
 }
@@ -92,12 +92,12 @@ bool Mover::plainly_nothing() {
 
 Move Mover::measure(const Candidate& candidate) {
   Move result;
-  if ((result.status = rows_->load(candidate)) != Status::success) return result;
+  if ((result.status = rows_->load(candidate, true)) != Status::success) return result;
   const bool may_do = rows_->has_factors() && looks_ < kLooks;  // with g alone
   result.status = rows_->value(candidate.t, !may_do);
   if (result.status != Status::success) return result;
   result.drift_before = result.drift_after = rows_->drift();
-  if (rows_->gives_g() && (result.drift_before == 0.0 || plainly_nothing())) return result;
+  if (rows_->traits.gives_g && (result.drift_before == 0.0 || plainly_nothing())) return result;
   looks_ = 0;
   if ((result.status = factor(candidate.t, true)) != Status::success) return result;
   if (rows_->rounding_only()) return result;
@@ -134,14 +134,14 @@ Move Mover::move(const Candidate& candidate) {
   Move result;
   still_ = false;
   by_present_factors_ = -1.0;
-  if ((result.status = rows_->load(candidate)) != Status::success) return result;
-  if (still_nothing(candidate, result)) return result;
   reused_ = rows_->keeps_factors() && rows_->has_factors();
+  result.status = rows_->load(candidate, !reused_ && nothing_in_row_ < kQuiet);
+  if (result.status != Status::success || still_nothing(candidate, result)) return result;
   ++wear_.age;
   result.status = rows_->value(candidate.t, !reused_);
   if (result.status != Status::success) return result;
   looks_ = 0;
-  result = newton(candidate);
+  newton(candidate, result);
   const bool nothing = result.status == Status::success && result.length <= kNothing;
   nothing_in_row_ = nothing && !rows_->keeps_factors() ? nothing_in_row_ + 1 : 0;
   const bool broken =
@@ -154,16 +154,15 @@ Move Mover::move(const Candidate& candidate) {
 }
 
 // Newton's method from the candidate, with g known there.
-Move Mover::newton(const Candidate& candidate) {
-  Move result;
+void Mover::newton(const Candidate& candidate, Move& result) {
   result.drift_before = result.drift_after = rows_->drift();
   monitor_.start();
   bool renew = !reused_, refill = true, fresh = false;  // fresh: factors belong to the present y
   for (;;) {
-    if (renew && (result.status = factor(candidate.t, refill)) != Status::success) return result;
+    if (renew && (result.status = factor(candidate.t, refill)) != Status::success) return;
     fresh = fresh || renew;
     const Solution found = rows_->solve(renew ? Solve::first : Solve::again);
-    if ((result.status = found.status) != Status::success) return result;
+    if ((result.status = found.status) != Status::success) return;
     renew = refill = false;
     follows_ = found.follows;
     if (reused_ && !(found.length <= kLong && found.follows)) {
@@ -171,8 +170,8 @@ Move Mover::newton(const Candidate& candidate) {
       renew = refill = true;
       continue;
     }
-    if (++result.moves == 1 && !allowed(candidate, found.length, result)) return result;
-    if ((result.status = rows_->apply(1.0, candidate)) != Status::success) return result;
+    if (++result.moves == 1 && !allowed(candidate, found.length, result)) return;
+    if ((result.status = rows_->apply(1.0, candidate)) != Status::success) return;
     by_present_factors_ = found.length;
     if (reused_) {
       if (2.0 * wear_.rate() * found.length <= kForLater) break;
@@ -181,15 +180,14 @@ Move Mover::newton(const Candidate& candidate) {
     } else {
       Monitor::Verdict verdict = Monitor::Verdict::done;
       if (done(candidate, found, fresh, result, verdict)) break;
-      if (result.status != Status::success) return result;
+      if (result.status != Status::success) return;
       fresh = false;
       renew = verdict == Monitor::Verdict::refactor;
     }
-    if ((result.status = rows_->value(candidate.t, false)) != Status::success) return result;
+    if ((result.status = rows_->value(candidate.t, false)) != Status::success) return;
     result.drift_after = rows_->drift();
   }
   result.status = Status::success;
-  return result;
 }
 
 // Is this length of a first move? Only a long one can be too long: the limit is at least
@@ -219,7 +217,7 @@ bool Mover::allowed(const Candidate& candidate, double length, Move& result) {
 bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, Move& result,
                  Monitor::Verdict& verdict) {
   const double length = found.length;
-  if (!rows_->gives_g()) return true;
+  if (!rows_->traits.gives_g) return true;
   if (result.moves == 1 && found.left == 0.0 && monitor_.plainly_done(length)) return true;
   // A first move longer than the largest floor need not know it.
   const double floor = result.moves == 1 && length > kLargestFloor
@@ -250,15 +248,15 @@ bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, 
 }
 
 Status Mover::settle(const Candidate& candidate, N_Vector change) {
-  rows_->shift(change);
+  const double moved = rows_->shift(change);
   if (rows_->keeps_factors()) return take_back(candidate, -1.0);
-  return take_rest(candidate, move_length_ + rows_->length_of(change));
+  return take_rest(candidate, move_length_ + moved);
 }
 
 Status Mover::finish(const Candidate& candidate, bool polished) {
-  if (still_ || !rows_->gives_g()) return Status::success;
+  if (still_ || !rows_->traits.gives_g) return Status::success;
   // Newton's method goes on where a move costs little beside the step.
-  if (rows_->measures_rest()) return take_rest(candidate, move_length_);
+  if (rows_->traits.measures_rest) return take_rest(candidate, move_length_);
   if (!rows_->keeps_factors()) return Status::success;
   const bool unseen = move_length_ > kSafe * options_.advanced.tolerance || !follows_;
   return unseen ? take_back(candidate, polished ? by_present_factors_ : -1.0) : Status::success;
@@ -266,8 +264,7 @@ Status Mover::finish(const Candidate& candidate, bool polished) {
 
 // With factors that belong to a point `reach` tolerances away.
 Status Mover::take_rest(const Candidate& candidate, double reach) {
-  const bool cheap = rows_->measures_rest(),
-             measure = curvature_.due(reach, ++settles_);
+  const bool cheap = rows_->traits.measures_rest, measure = curvature_.due(reach, ++settles_);
   const double enough = (cheap ? kCheapRest : 1.0) * options_.advanced.tolerance;
   double previous = 0.0;
   for (int k = 0; k < options_.advanced.maximum_iterations; ++k) {
@@ -280,7 +277,7 @@ Status Mover::take_rest(const Candidate& candidate, double reach) {
     }
     if (found.status != Status::success) return found.status;
     if ((status = rows_->apply(1.0, candidate)) != Status::success) return status;
-    if ((still_ && wear_.age > 0) || !rows_->gives_g())
+    if ((still_ && wear_.age > 0) || !rows_->traits.gives_g)
       break;  // by next to nothing, which says nothing about its rate
     const double length = found.length;
     // Only what is seen on this candidate counts where moves are cheap.

@@ -102,7 +102,7 @@ class Mover {
   Status factor(double t, bool refill);
   bool plainly_nothing();
   bool still_nothing(const Candidate& candidate, Move& result);
-  Move newton(const Candidate& candidate);
+  void newton(const Candidate& candidate, Move& result);
   bool allowed(const Candidate& candidate, double length, Move& result);
   bool done(const Candidate& candidate, const Solution& solution, bool fresh, Move& result,
             Monitor::Verdict& verdict);

@@ -27,7 +27,7 @@ struct Solution {
   bool follows = true;  ///< do the rows that the factors leave out follow from the others?
 };
 
-/// What a solution is for.
+/// The purpose of a solution.
 enum class Solve {
   first,    ///< the factors are new: which of the rows are to be trusted is decided
   again,    ///< the same rows as before
@@ -41,10 +41,21 @@ enum class Solve {
 /// functions says what the storage is good for.
 class RowsAt {
  public:
+  /// The same for a storage's whole life.
+  struct Traits {
+    /// Is there a g? A projection of the caller's own tells none, and one solution is all of it.
+    bool gives_g = true;
+    /// Are second moves cheap beside the factors? Then what is left is seen on each candidate.
+    bool measures_rest = false;
+  };
+  explicit RowsAt(const Traits& these) : traits(these) {}
   virtual ~RowsAt() = default;
 
-  /// y = base + correction, and the metric's scale there.
-  virtual Status load(const Candidate& candidate) = 0;
+  const Traits traits;
+
+  /// y = base + correction. `refills`: factors of this candidate's metric follow; else its scale is
+  /// looked at.
+  virtual Status load(const Candidate& candidate, bool refills) = 0;
   /// g at y; `with_rows`: C will be wanted, too.
   virtual Status value(double t, bool with_rows) = 0;
   /// C at y and its factors; `refill`: in the metric of the correction as it is now.
@@ -59,16 +70,13 @@ class RowsAt {
   virtual bool rounding_only() { return false; }
   virtual double rounding_length() { return 0.0; }
 
-  /// y moves with a correction that was changed.
-  virtual void shift(N_Vector change) = 0;
-  /// Length of such a change over the variables that the error test sees, in tolerances.
-  virtual double length_of(N_Vector change) const = 0;
+  /// y moves with a correction that was changed; the length of that over the variables that the
+  /// error test sees, in tolerances.
+  virtual double shift(N_Vector change) = 0;
   /// y for the correction as it is.
   virtual void restart(const Candidate& candidate) = 0;
   /// Largest |g_i| as evaluated last.
   virtual double drift() const = 0;
-  /// Is there a g? A projection of the caller's own tells none, and one solution is all of it.
-  virtual bool gives_g() const { return true; }
 
   virtual bool has_factors() const = 0;
   virtual void forget_factors() = 0;
@@ -79,8 +87,6 @@ class RowsAt {
   /// Was it found out for this candidate which rows are independent?
   virtual bool decided() const { return true; }
   virtual void forget_rank() {}
-  /// Are second moves cheap beside the factors? Then what is left is seen on each candidate.
-  virtual bool measures_rest() const { return false; }
   /// May the correction be polished before the move?
   virtual bool may_polish_first() const { return false; }
   /// Rows that a solution leaves out contradict the others: `message` and `contradicting` say it.

@@ -10,14 +10,15 @@ class UserRows final : public RowsAt {
  public:
   UserRows(const Constraints& constraints, const Options& options, Statistics& statistics,
            N_Vector like)
-      : user_(std::get<UserProjection>(constraints.jacobian)),
+      : RowsAt({false, false}),
+        user_(std::get<UserProjection>(constraints.jacobian)),
         options_(options),
         statistics_(statistics),
         y_(like),
         change_(like),
         error_(like) {}
 
-  Status load(const Candidate& candidate) override {
+  Status load(const Candidate& candidate, bool) override {
     at_ = candidate;
     return Status::success;
   }
@@ -52,11 +53,9 @@ class UserRows final : public RowsAt {
   }
   double size() const override { return 0.0; }
   double change() const override { return N_VWrmsNorm(at_.correction, at_.weights); }
-  void shift(N_Vector) override {}
-  double length_of(N_Vector change) const override { return N_VWrmsNorm(change, at_.weights); }
+  double shift(N_Vector change) override { return N_VWrmsNorm(change, at_.weights); }
   void restart(const Candidate&) override {}
   double drift() const override { return 0.0; }
-  bool gives_g() const override { return false; }
   bool has_factors() const override { return false; }
   void forget_factors() override {}
   bool contradicts() override { return false; }

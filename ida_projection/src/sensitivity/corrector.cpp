@@ -154,15 +154,16 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
   rows_->forget_failure();
   accept();
   Status status = evaluate(step);
-  if (status == Status::success) status = move_and_polish(candidate, step, tolerance);
-  if (status == Status::success && engaged_ && !polish_->corrector_was_right() && !call_setup &&
+  Fix fix;
+  if (status == Status::success) status = move_and_polish(candidate, step, tolerance, fix);
+  if (status == Status::success && !fix.corrector_was_right && !call_setup &&
       corrector_->has_setup()) {
     // As for the state: old factors fooled IDAS' convergence test.
     N_VConst(0.0, correction);
     flag = corrector_->correct(candidate, tolerance, true, none);
     note_setups(step.cj);
     if (flag != 0) return flag;
-    status = move_and_polish(candidate, step, tolerance);
+    status = move_and_polish(candidate, step, tolerance, fix);
   }
   if (corrector_->stopped()) return corrector_->stop_flag();
   flag = finish(status, message_);
@@ -320,7 +321,7 @@ void SensitivityCorrector::apply(const Candidate& candidate) {
 }
 
 Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const StepData& step,
-                                             double tolerance) {
+                                             double tolerance, Fix& fix) {
   double length = 0.0;
   Status status = find_moves(candidate, step.t, true, &length);
   if (moved_ != &state_.constraints) state_.joined.restore_ida();
@@ -340,7 +341,8 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
   apply(candidate);
   ++state_.statistics.sensitivity_projections;
   if (!polish_->wanted(length, false)) return Status::success;
-  if (!polish_->add_newton_step(candidate, step.cj, tolerance)) return Status::success;
+  fix = polish_->add_newton_step(candidate, step.cj, tolerance);
+  if (!fix.made) return Status::success;
   status = find_moves(candidate, step.t, false, &length);
   if (status == Status::success) apply(candidate);
   return status;

@@ -85,7 +85,8 @@ class SensitivityCorrector {
   Status evaluate(const StepData& step);
   Status factor(const Candidate& candidate, int k, bool first);
   void accept();
-  Status move_and_polish(const Candidate& candidate, const StepData& step, double tolerance);
+  Status move_and_polish(const Candidate& candidate, const StepData& step, double tolerance,
+                         Fix& fix);
   Status find_moves(const Candidate& candidate, double t, bool first, double* longest);
   Status too_long(const Candidate& candidate, int k, double length);
   void apply(const Candidate& candidate);

@@ -64,7 +64,6 @@ double Polish::longest_unanswered(bool smoothing) const {
 }
 
 void Polish::keep(const Candidate& candidate) {
-  corrector_was_right_ = true;
   noise_known_ = step_known_ = false;
   if (contiguous_)
     for (int j = 0; j < size_; ++j) corrected_entries_[j] = candidate.correction_entries[j];
@@ -128,12 +127,12 @@ const double* Polish::response(const StepData& step) {
   return work_entries_;
 }
 
-bool Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
+Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
   if (in_use(Mechanism::foretold_polish) && may_foretell_ && foretell(candidate, cj, tolerance))
-    return true;
+    return {true, true};
   const bool asked = step_known_;
   if (!asked) {
-    if (!newton_step_at_moved_point(candidate)) return false;
+    if (!newton_step_at_moved_point(candidate)) return {};
     ++statistics_.residual_evaluations;
   }
   step_known_ = false;
@@ -142,13 +141,12 @@ bool Polish::add_newton_step(const Candidate& candidate, double cj, double toler
   const double algebraic = algebraic_factor(cj);
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
   const double length = differential_length(candidate, delta_);
-  corrector_was_right_ = length <= kMisled * tolerance;
   if (!asked) look_at_pattern(candidate, cj);
   const bool differential = length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (variables_.any() && algebraic > 0.0) ++statistics_.refreshes;
-  return true;
+  return {true, length <= kMisled * tolerance};
 }
 
 void Polish::look_at_pattern(const Candidate& candidate, double cj) {

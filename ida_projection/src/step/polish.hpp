@@ -10,6 +10,13 @@
 
 namespace tether::ida_projection {
 
+/// The answer to one iteration after the corrector's.
+struct Fix {
+  bool made = false;  ///< false: F or the linear solver fails, or none is to be had
+  /// Was the correction as small as IDA's convergence test predicted?
+  bool corrector_was_right = true;
+};
+
 /// Removes the noise that IDA's convergence test leaves and lets the algebraic variables answer to
 /// the move; see polish.cpp.
 class Polish {
@@ -55,8 +62,8 @@ class Polish {
   }
   /// Before the move: keeps the corrector's ycor.
   void keep(const Candidate& candidate);
-  /// After it: ycor <- ycor + delta, as far as delta is to be trusted. False: there is none.
-  bool add_newton_step(const Candidate& candidate, double cj, double tolerance);
+  /// After it: ycor <- ycor + delta, as far as delta is to be trusted.
+  Fix add_newton_step(const Candidate& candidate, double cj, double tolerance);
   /// The corrector's ycor again.
   void restore(const Candidate& candidate) {
     step_known_ = false;  // that move is not the next one
@@ -68,9 +75,7 @@ class Polish {
   const double* response(const StepData& step);
   N_Vector delta() const { return delta_; }          ///< of add_newton_step()
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor
-  /// Was the correction as small as IDA's convergence test predicted?
-  bool corrector_was_right() const { return corrector_was_right_; }
-  long iterations() const { return iterations_; }  ///< in this solve()
+  long iterations() const { return iterations_; }    ///< in this solve()
 
  private:
   bool know_noise();
@@ -91,7 +96,6 @@ class Polish {
   bool step_known_ = false;   // delta_ is that of the present moved point
   double *delta_entries_ = nullptr, *corrected_entries_ = nullptr, *work_entries_ = nullptr;
   bool iterative_ = false;  // IDA's linear solver is a Krylov method
-  bool corrector_was_right_ = true;
   double cj_at_setup_ = 0.0;
   Foretold foretold_;
   bool may_foretell_ = false;

@@ -13,13 +13,11 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr long kSettled = 2;        // accepted steps: before, y' is still that of the start
 constexpr double kOffItsSet = 2.0;  // tolerances that F has taken a row off its set
 constexpr int kRefinements = 3;
 constexpr double kSettles = 0.1;                      // changes of the rate in the last of them
 constexpr double kRounding = 1e-9;                    // of the terms: differences of g know no less
 constexpr double kConfirmed = 0.5;                    // of it, by a better y'
-constexpr long kEvery = 16;                           // steps, after the first ones
 constexpr long kFreeLooks = 20, kStepsForLook = 100;  // into doubts
 constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C
 constexpr int kVanished = 3;         // steps in which a row of C is zero
@@ -44,11 +42,10 @@ std::string FirstSteps::look(const Candidate& candidate, const StepData& step, l
                              N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
                              Corrector& corrector) {
   std::string found;
-  if (steps < kSettled) return found;
   if (largest_ < 1.0 && steps <= kSteps) found = look_at_tolerances(candidate, step, h, corrected);
   // In forms of index 2 and more y' and multipliers carry the error of derivatives that F lacks.
   if (!found.empty() || variables.high_index() || !variables.index_known()) return found;
-  const bool due = steps <= kSteps ? steps % 2 == 0 : steps % kEvery == 0;
+  const bool due = steps > kSteps || steps % 2 == 0;
   const bool may = looks_ < kFreeLooks + steps / kStepsForLook;
   if (!due || !may || candidate.base_entries == nullptr || !has_values(constraints_)) return found;
   const double span = h * static_cast<double>(std::max(1L, steps - looked_at_));

@@ -21,13 +21,17 @@ constexpr const char* kRowAdvice =
 /// Rows that F does not keep, wrong entries of C, tolerances above the solution.
 class FirstSteps {
  public:
-  static constexpr long kSteps =
-      100;  ///< accepted steps in which rows and tolerances are looked at
+  /// Accepted steps in which rows and tolerances are looked at.
+  static constexpr long kSteps = 100;
 
   FirstSteps(const Constraints& constraints, Statistics& statistics)
       : constraints_(constraints), evaluator_(constraints, statistics) {}
 
   void reset();  ///< a new run starts
+  /// Is there anything to look at in the step after so many?
+  static bool looks(long steps) {
+    return steps >= kSettled && (steps <= kSteps || steps % kEvery == 0);
+  }
   /// Has a row been named that F does not keep?
   bool false_row_found() const { return false_row_found_; }
   /// Names a row that moves nothing but algebraic variables that F determines; empty: none.
@@ -39,6 +43,9 @@ class FirstSteps {
                    Corrector& corrector);
 
  private:
+  static constexpr long kSettled = 2;  // accepted steps: before, y' is still that of the start
+  static constexpr long kEvery = 16;   // steps, after the first ones
+
   std::string look_at_tolerances(const Candidate& candidate, const StepData& step, double h,
                                  N_Vector corrected);
   std::string look_for_false_rows(const Candidate& candidate, const StepData& step, double h,

@@ -20,9 +20,9 @@ constexpr double kAlike = 0.05;  // of a sum of squares
 }  // namespace
 
 template <class Rows>
-Status ContiguousRows<Rows>::load(const Candidate& candidate) {
+Status ContiguousRows<Rows>::load(const Candidate& candidate, bool refills) {
   at_.load(candidate);
-  metric_.look(at_);
+  if (!refills) metric_.look(at_);
   uses_.decided = moved_ = false;
   return blocks_.structured() ? Status::success : structure(candidate, nullptr);
 }
@@ -216,8 +216,8 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
       found.length = judge_thin_rows(length_of_solution());
     }
   }
-  // What a polish moves out of few rows is too little to tell.
-  const bool tells = how != Solve::rest || Rows::kKeepsFactors || measures_rest();
+  // A polish moves few rows by too little to tell.
+  const bool tells = how != Solve::rest || Rows::kKeepsFactors || traits.measures_rest;
   found.follows = !tells || dropped_follow();
   if (!found.follows && Rows::kKeepsRank) {
     uses_.lasting = false;
@@ -289,6 +289,13 @@ bool ContiguousRows<Rows>::contradicts() {
 template <class Rows>
 Status ContiguousRows<Rows>::apply(double share, const Candidate& candidate) {
   double* const correction = candidate.correction_entries;
+  const bool learns = uses_.thin && !moved_ && share == 1.0;
+  moved_ = true;
+  if (const Block& d = blocks_.d; blocks_.a.rows.empty() && d.first >= 0) {
+    take(share, d.dy.data(), static_cast<int>(d.columns.size()), correction + d.first,
+         at_.y.data() + d.first);
+    return learns ? learn_trust(length_) : Status::success;
+  }
   for (const Block* block : {&blocks_.d, &blocks_.a}) {
     if (block->rows.empty()) continue;
     if (block->first >= 0)
@@ -300,8 +307,6 @@ Status ContiguousRows<Rows>::apply(double share, const Candidate& candidate) {
         y[i] -= share * dy[k];
       });
   }
-  const bool learns = uses_.thin && !moved_ && share == 1.0;
-  moved_ = true;
   return learns ? learn_trust(length_) : Status::success;
 }
 
@@ -316,14 +321,10 @@ double ContiguousRows<Rows>::change() const {
 }
 
 template <class Rows>
-void ContiguousRows<Rows>::shift(N_Vector change) {
-  const double* e = N_VGetArrayPointer(change);
-  for (int i = 0, n = unknowns(); i < n; ++i) at_.y[static_cast<std::size_t>(i)] += e[i];
-}
-
-template <class Rows>
-double ContiguousRows<Rows>::length_of(N_Vector change) const {
+double ContiguousRows<Rows>::shift(N_Vector change) {
   const double *e = N_VGetArrayPointer(change), *w = at_.w;
+  double* y = at_.y.data();
+  for (int i = 0, n = unknowns(); i < n; ++i) y[i] += e[i];
   double sum = 0.0;
   blocks_.d.for_columns([&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); });
   return wrms(sum);

@@ -27,7 +27,8 @@ class ContiguousRows final : public RowsAt {
   /// Drift is that of the first `reported` rows (-1: of all).
   ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
                  int size, int reported)
-      : evaluator_(constraints, statistics),
+      : RowsAt({true, Rows::many(constraints.total_count())}),
+        evaluator_(constraints, statistics),
         blocks_(constraints, evaluator_, size),
         at_(size),
         metric_(options, size),
@@ -39,7 +40,7 @@ class ContiguousRows final : public RowsAt {
     kept_g_ = rounding_ = g_;
   }
 
-  Status load(const Candidate& candidate) override;
+  Status load(const Candidate& candidate, bool refills) override;
   Status value(double t, bool with_rows) override;
   Status factor(double t, bool refill) override;
   Solution solve(Solve how) override;
@@ -49,8 +50,7 @@ class ContiguousRows final : public RowsAt {
   bool rounding_only() override;
   double rounding_length() override;
 
-  void shift(N_Vector change) override;
-  double length_of(N_Vector change) const override;
+  double shift(N_Vector change) override;
   void restart(const Candidate& candidate) override { at_.restart(candidate); }
   double drift() const override;
   bool has_factors() const override { return uses_.there; }
@@ -61,10 +61,9 @@ class ContiguousRows final : public RowsAt {
   bool may_look() const override { return uses_.there && !uses_.thin && !blocks_.dropped_rows(); }
   bool decided() const override { return uses_.decided; }
   void forget_rank() override { uses_.lasting = false; }
-  bool measures_rest() const override { return Rows::many(count()); }
   // Old factors leave more of what dropped rows ask for.
   bool may_polish_first() const override {
-    return Rows::kKeepsFactors ? !blocks_.dropped_rows() : measures_rest();
+    return Rows::kKeepsFactors ? !blocks_.dropped_rows() : traits.measures_rest;
   }
   bool contradicts() override;
   void look_again_soon() override { blocks_.look_again_soon(); }

@@ -25,7 +25,8 @@ class VectorRows final : public RowsAt {
  public:
   VectorRows(const Constraints& constraints, const Options& options, Statistics& statistics,
              N_Vector like)
-      : statistics_(statistics),
+      : RowsAt({}),
+        statistics_(statistics),
         y_(like),
         dy_(like),
         work_(like),
@@ -35,7 +36,7 @@ class VectorRows final : public RowsAt {
     reset();
   }
 
-  Status load(const Candidate& candidate) override {
+  Status load(const Candidate& candidate, bool) override {
     at_ = candidate;
     restart(candidate);
     metric_.look(candidate, work_, dy_);
@@ -76,8 +77,10 @@ class VectorRows final : public RowsAt {
   double change() const override { return N_VWrmsNorm(at_.correction, at_.weights); }
   bool rounding_only() override { return rows_.rounding_only(); }
 
-  void shift(N_Vector change) override { N_VLinearSum(1.0, y_, 1.0, change, y_); }
-  double length_of(N_Vector change) const override { return N_VWrmsNorm(change, at_.weights); }
+  double shift(N_Vector change) override {
+    N_VLinearSum(1.0, y_, 1.0, change, y_);
+    return N_VWrmsNorm(change, at_.weights);
+  }
   void restart(const Candidate& candidate) override {
     N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
   }
@@ -99,7 +102,7 @@ class VectorRows final : public RowsAt {
     moves_ = true;
     free_all();
     if (id == nullptr) return Status::success;
-    (void)load(candidate);
+    (void)load(candidate, true);
     if (fatal_) return Status::callback_fatal;
     const Status status = told(rows_.fill(candidate.t, y_));
     if (status != Status::success) return status;
