@@ -10,7 +10,6 @@ import os
 import pathlib
 import platform
 import re
-import shlex
 import subprocess
 import sys
 
@@ -44,7 +43,8 @@ COMMANDS = {
                    "Plain IDA in two forms: algebraic variables in its error test, and suppressed as the projection has them.",
                    f"{BUILT}/projection/chain_cost --links 100,1000 --tolerances 1e-4,1e-6 --end 0.1 --repeats 1"),
     "contact_collection": ("Contact problems in files", "Time to a residual, beside the solvers of Siconos.",
-                           f"{BUILT}/contact/contact_collection $TETHER_CONTACT_DATA --law coulomb --time-limit 1"),
+                           f"{BUILT}/contact/contact_collection $TETHER_CONTACT_DATA --law coulomb --time-limit 1"
+                           " | grep -E 'natural_map  |^tolerance|^unsolved'"),
     "contact_scale": ("A sweep over many contacts", "Nanoseconds of a contact and sweep by size and threads.",
                       f"{BUILT}/contact/contact_scale --spheres 1 --threads 2 --most 100000"),
     "settling": ("Spheres that fall and settle, beside Bullet", "Residuals by `evaluate`, depth in parts of a radius.",
@@ -56,12 +56,13 @@ COMMANDS = {
                   f"python3 benchmarks/clearance/clearance.py {TETHER}"),
     "woodpecker": ("Glocker's woodpecker: events and steps at equal error",
                    "The largest distance (m) or angle (rad) of any body from a run with events at the least tolerance.",
-                   f"{TETHER} cost examples/scenes/woodpecker.toml"),
+                   f"{TETHER} cost examples/scenes/woodpecker.toml --tolerances 1e-3:1e-9 --accuracies 1e-3:1e-4"),
 }
 
 
-def printed(*command, environment=None):
-    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True, env=environment).stdout.strip()
+def printed(*command, shell=False, environment=None):
+    return subprocess.run(command[0] if shell else command, shell=shell, cwd=ROOT, check=True, capture_output=True, text=True,
+                          env=environment).stdout.strip("\n")
 
 
 def processor():
@@ -86,22 +87,22 @@ def write(name):
     title, *reading, command = COMMANDS[name]
     if "$TETHER_CONTACT_DATA" in command and not os.environ.get("TETHER_CONTACT_DATA"):
         return print(f"{name}: skipped, TETHER_CONTACT_DATA names no folder")
-    how = " ".join(reading)
+    how = "".join(" " + each for each in reading)
     environment = dict(os.environ)
     if name in COMPARED:
         if not (OPTIMISED / "lib").is_dir():
             return print(f"{name}: skipped, no SUNDIALS at -O3; sh benchmarks/optimised_sundials.sh build/sundials makes it")
         environment["LD_LIBRARY_PATH"] = f"{OPTIMISED}/lib:" + environment.get("LD_LIBRARY_PATH", "")
-    words = [os.path.expandvars(word) for word in shlex.split(command)]
     print(f"{name}: {command}", flush=True)
-    text = printed(*words, environment=environment)
-    if not any(line.startswith("|") for line in text.splitlines()):
+    load = os.getloadavg()[0]
+    text = printed(command, shell=True, environment=environment)
+    if "\n|---" not in text:
         text = "```\n" + text + "\n```"
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"{name}.md").write_text(
-        f"# {title}\n\nWritten by `python3 benchmarks/results.py {name}`. {how}\n\n"
+        f"# {title}\n\nWritten by `python3 benchmarks/results.py {name}`.{how}\n\n"
         f"- Command: `{command}`\n- Commit: {commit()}\n"
-        f"- Machine: {processor()}; {printed('c++', '--version').splitlines()[0]}; SUNDIALS {sundials(name)}\n"
+        f"- Machine: {processor()}; {printed('c++', '--version').splitlines()[0]}; SUNDIALS {sundials(name)}; load {load:.1f}\n"
         f"- Date: {datetime.date.today().isoformat()}\n\n{text}\n")
 
 

@@ -45,8 +45,8 @@ scene::CostTable measure(const scene::Scene& scene, std::string& note) {
   scene::CostOptions options;
   const double step = scene.stepping.value_or(scene::SteppingOptions{}).step;
   for (const double finest : {step / 4, step, 4 * step}) {
-    options.settings.clear();
-    for (double s = finest; s < 40 * finest; s *= 2) options.settings.push_back(s);
+    options.steps.clear();
+    for (double s = finest; s < 40 * finest; s *= 2) options.steps.push_back(s);
     try {
       return scene::cost(scene, options);
     } catch (const std::runtime_error& e) {

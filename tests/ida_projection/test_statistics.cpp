@@ -152,13 +152,31 @@ TEST_CASE("table and CSV hold the same numbers") {
   std::ostringstream streamed;
   streamed << s;
   CHECK(streamed.str() == s.table());
-  std::istringstream lines(s.table());
-  std::size_t count = 0;
-  for (std::string line; std::getline(lines, line);) {
-    CHECK(contains(line, " = "));
-    ++count;
-  }
-  CHECK(count == names.size());
   CHECK(contains(s.table(), "1234567"));
-  CHECK(contains(tp::Statistics{}.table(), "not called the plugin"));
+}
+
+TEST_CASE("the table begins with a verdict and leaves out what is zero") {
+  tp::Statistics s;
+  CHECK(contains(s.table(), "not called the plugin"));
+  CHECK(s.table().find('\n') == s.table().size() - 1);
+  s.solver_calls = 10;
+  CHECK(contains(s.table(), "No step needed a projection"));
+  s.projections = 9;
+  s.largest_drift_after = 2e-13;
+  s.mean_move = 0.25;
+  CHECK(
+      contains(s.table(), "The constraints hold: |g| is at most 2e-13, steps were moved by 0.25 "));
+  CHECK_FALSE(contains(s.table(), "repeated: "));
+  std::istringstream lines(s.table());
+  std::string line;
+  std::getline(lines, line);
+  std::size_t count = 0;
+  for (; std::getline(lines, line); ++count) CHECK(contains(line, " = "));
+  CHECK(count == 4);
+  s.not_finite = 2;
+  CHECK(contains(s.table(), "failed and were repeated: 2."));
+  s.mean_move = 3;
+  CHECK(contains(s.table(), "may not belong together: steps were moved by 3 "));
+  s.steps_without_plugin = 1;
+  CHECK(contains(s.table(), "another nonlinear solver was attached"));
 }

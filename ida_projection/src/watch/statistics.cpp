@@ -66,20 +66,39 @@ void write(std::ostream& out, const Entry& entry) {
     out << std::setprecision(6) << std::scientific << entry.value << std::defaultfloat;
 }
 
+// The numbers together, in one line. A mean move of a tolerance is as long as an error
+// that IDA's test accepts: constraints that F keeps need less.
+std::string verdict(const Statistics& s) {
+  if (s.solver_calls == 0)
+    return "IDA has not called the plugin. If IDASolve was called, another nonlinear solver was "
+           "attached after it.";
+  if (s.steps_without_plugin > 0)
+    return "IDA took steps without the plugin: another nonlinear solver was attached after it.";
+  PlainText out;
+  out << std::setprecision(2);
+  if (s.projections == 0)
+    out << "No step needed a projection: IDA kept the constraints.";
+  else if (s.mean_move > 1)
+    out << "F and the constraints may not belong together: steps were moved by " << s.mean_move
+        << " tolerances in the mean.";
+  else
+    out << "The constraints hold: |g| is at most " << s.largest_drift_after
+        << ", steps were moved by " << s.mean_move << " tolerances in the mean.";
+  if (s.failures() > 0) out << " Attempts that failed and were repeated: " << s.failures() << ".";
+  return out.str();
+}
+
 }  // namespace
 
 std::string Statistics::table() const {
   PlainText out;
+  out << verdict(*this) << '\n';
   for (const Entry& entry : entries(*this)) {
+    if (entry.value == 0) continue;
     out << std::left << std::setw(34) << entry.label << " = ";
     write(out, entry);
     out << '\n';
   }
-  if (steps_without_plugin > 0 && solver_calls > 0)
-    out << "IDA took steps without the plugin: another nonlinear solver was attached after it.\n";
-  if (solver_calls == 0)
-    out << "IDA has not called the plugin. If IDASolve was called, another nonlinear solver was "
-           "attached after it.\n";
   return out.str();
 }
 

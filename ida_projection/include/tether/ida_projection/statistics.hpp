@@ -51,8 +51,9 @@ struct Statistics {
     return not_converged + move_too_long + inconsistent + not_finite + callback_recoverable +
            callback_fatal;
   }
-  /// Two columns, one quantity a line.
+  /// A verdict of one line, then two columns: each quantity that is not zero.
   std::string table() const;
+  /// Names of all quantities, and their values, separated by commas.
   static std::string csv_header();
   std::string csv_row() const;
   /// The number in that column of csv_header(); NaN if there is none.
