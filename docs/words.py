@@ -4,7 +4,8 @@
     python3 docs/words.py FILE_OR_FOLDER...
 
 Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
-phrase that the glossary replaces, no document above its length. Sources (a folder: all below it): no comment line that begins with Of, What or Where.
+phrase that the glossary replaces, no document above its length. Sources (a folder: all below it): no comment line that begins with Of, What or Where,
+no such phrase in a comment, and sections and equations of a method that its paper has.
 """
 import pathlib
 import re
@@ -16,8 +17,12 @@ LENGTHS = {"README.md": 900, "benchmarks/README.md": 1500, "docs/method": 4000, 
            "ida_projection/README.md": 2500, "contact/README.md": 2500, "scene/README.md": 2500}
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 GLOSSARY = ROOT / "docs" / "glossary.md"
-SOURCES = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".m"}
+SOURCES = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".m", ".js"}
 BLOCK = re.compile(r"^```.*?^```[ \t]*$", re.M | re.S)
+REMARK = re.compile(r"//.*|/\*.*|(?:^|\s)#(?!\s*(?:include|define|undef|if|el|end|pragma|error|warning)).*|^\s*\*.*")
+# The paper that a comment means by "method", by the folder of its source.
+PAPERS = {"linalg": "projection", "ida_projection": "projection", "contact": "contact", "scene": "events"}
+REFERENCE = re.compile(r"\b(method|detection), (section|eq)s?[. ]+(\d+(?:\.\d+)?(?:, \d+)*)")
 COMMENT = re.compile(r"^\s*(?://+[!<]*|#)\s*(Of|What|Where)\b")
 
 
@@ -95,10 +100,29 @@ def check_document(path, replaced):
         yield f"{path}: {problem}"
 
 
-def check_source(path):
+def paper(name, known={}):
+    """Numbers of the sections and of the equations of a method paper."""
+    if name not in known:
+        text = (ROOT / "docs" / "method" / f"{name}.md").read_text()
+        known[name] = {"section": set(re.findall(r"^##+ (\d+(?:\.\d+)?)", text, re.M)), "eq": set(re.findall(r"\\tag\{(\d+)\}", text))}
+    return known[name]
+
+
+def check_source(path, replaced):
+    room = path.relative_to(ROOT).parts[0] if path.is_relative_to(ROOT) else ""
     for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
         if COMMENT.match(line):
             yield f"{path}:{number}: a comment that begins with {COMMENT.match(line).group(1)}"
+        remark = REMARK.search(line)
+        if not remark or path == pathlib.Path(__file__).resolve():
+            continue
+        for phrase, instead in replaced:
+            if re.search(rf"\b{re.escape(phrase)}\b", remark.group(), re.I):
+                yield f"{path}:{number}: say \"{instead}\", not \"{phrase}\""
+        for place, kind, numbers in REFERENCE.findall(remark.group()) if room in PAPERS else ():
+            named = PAPERS[room] if place == "method" else place
+            for which in set(numbers.split(", ")) - paper(named)[kind]:
+                yield f"{path}:{number}: docs/method/{named}.md has no {kind} {which}"
 
 
 def main(names):
@@ -117,7 +141,7 @@ def main(names):
             if file.suffix == ".md":
                 problems += check_document(file, replaced)
             elif file.suffix in SOURCES and file.is_file():
-                problems += check_source(file)
+                problems += check_source(file, replaced)
             else:
                 continue
             count += 1

@@ -38,8 +38,8 @@ struct Results {
   std::vector<Result> runs;
 };
 
-/// Every case once with a look at every step, then the timed runs in rounds over all cases, so that
-/// a busy machine disturbs all of them alike. What fails is not timed.
+/// Every case once with a measurement at every step, then the timed runs in rounds over all cases,
+/// so that a busy machine disturbs all of them alike. What fails is not timed.
 Results measure(const Experiment& experiment, tether::Progress& progress);
 
 }  // namespace pendulum

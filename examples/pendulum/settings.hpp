@@ -11,7 +11,7 @@ struct Settings {
   std::vector<double> tolerances = {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
   std::vector<double> long_tolerances = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8};  ///< of the long runs
   bool long_runs = true;                                                 ///< 1000 s as well
-  bool quick = false;                       ///< a look in a second instead of a measurement
+  bool quick = false;                       ///< short runs, for a first view
   std::filesystem::path output = "output";  ///< folder of the CSV and SVG files
 };
 

@@ -113,7 +113,7 @@ std::vector<double> velocities(long double th, long double speed) {
 
 }  // namespace
 
-// The others have no unique solution at the dead points.
+// The others have no unique solution at the singular positions.
 std::vector<std::string> slider_crank_equal_forms() { return {"index 1", "index 1 w", "index 2"}; }
 
 Problem slider_crank_equal(const SliderCrankMotion& motion, double t_end, const std::string& form) {

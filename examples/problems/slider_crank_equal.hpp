@@ -13,11 +13,11 @@ std::vector<std::string> slider_crank_equal_forms();
 struct SliderCrankMotion {
   double angle, speed, gravity;
 };
-/// Turns through the dead points without gravity, E = 11/6.
+/// Turns through the singular positions without gravity, E = 11/6.
 constexpr SliderCrankMotion kSliderCrankSlow{0.78539816339744830962, 1.0, 0.0};
 /// The same four times as fast, E = 88/3.
 constexpr SliderCrankMotion kSliderCrankFast{0.78539816339744830962, 4.0, 0.0};
-/// From rest; swings through the lower dead point and back.
+/// From rest; swings through the lower singular position and back.
 constexpr SliderCrankMotion kSliderCrankSwing{0.78539816339744830962, 0.0, 9.81};
 /// Turns against gravity, E = 12.
 constexpr SliderCrankMotion kSliderCrankTurn{0.0, 6.0, 9.81};

@@ -1,4 +1,4 @@
-// Steps in parts that keep an accuracy: Glocker's woodpecker, bouncing balls, stick-slip, tops.
+// Sub-steps that keep an accuracy: Glocker's woodpecker, bouncing balls, stick-slip, tops.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>

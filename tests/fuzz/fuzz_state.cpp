@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kSaved = 0.03, kEnd = 0.05;
 
-// One for each engine, and for what a state of it holds: joints, laws, moments, parts of steps,
+// One for each engine, and for what a state of it holds: joints, laws, moments, sub-steps,
 // hand-overs.
 const char* const kScenes[] = {
     R"([scene]

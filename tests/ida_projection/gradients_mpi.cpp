@@ -173,8 +173,8 @@ int main(int argc, char** argv) {
         apart, std::abs(spread.own[i] - alone.own[4 * static_cast<std::size_t>(share.first) + i]));
   double worst = 0;
   PMPI_Allreduce(&apart, &worst, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
-  // Sums in another order differ in their last bits, which the step control magnifies to about a
-  // tolerance.
+  // Sums in another order differ in their last bits, which the step-size controller magnifies to
+  // about a tolerance.
   const bool good = alone.flag >= 0 && spread.flag >= 0 && worst < 1e-5 && spread.drift < 1e-10;
   const double added = spread.reductions_per_step - plain.reductions_per_step;
   if (rank == 0)

@@ -1,4 +1,4 @@
-// Tether: residuals of any answer. SPDX-License-Identifier: BSD-3-Clause
+// Tether: residuals of any answer (method, eq. 14). SPDX-License-Identifier: BSD-3-Clause
 #include <tether/contact/evaluate.hpp>
 
 #include <algorithm>

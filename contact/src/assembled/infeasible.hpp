@@ -1,4 +1,5 @@
-// Tether: the proof that a contact problem has no solution. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the proof that a contact problem has no solution (method, section 3.4).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "assembled/search/search.hpp"

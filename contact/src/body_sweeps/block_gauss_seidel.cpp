@@ -1,4 +1,5 @@
-// Tether: block Gauss-Seidel over an island, with momentum. SPDX-License-Identifier: BSD-3-Clause
+// Tether: block Gauss-Seidel over an island, with momentum (method, eq. 16).
+// SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,5 @@
-// Tether: a problem over cones as one of 3-D friction cones. SPDX-License-Identifier: BSD-3-Clause
+// Tether: a problem over cones as one of 3-D friction cones (method, section 8).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/contact/cones.hpp>

@@ -1,6 +1,6 @@
 // Tether: derivatives with respect to the data of a problem. SPDX-License-Identifier: BSD-3-Clause
 //
-// method, section 8. A enters through w = A x - b, where dA does what -dA x does to b, and, under
+// method, section 9. A enters through w = A x - b, where dA does what -dA x does to b, and, under
 // maximum dissipation, through gamma of each contact's own block.
 #include <tether/contact/derivative.hpp>
 

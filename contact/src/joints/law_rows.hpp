@@ -14,7 +14,7 @@ namespace tether::contact::detail {
 /// A limit is the cone x >= 0, a bounded law |x| <= bound dt, a sprung one a compliant row.
 class LawRows {
  public:
-  /// Start of a part of a step: the speeds that bodies come with, before its forces.
+  /// Start of a sub-step: the speeds that bodies come with, before its forces.
   void remember(const std::vector<Vector6d>& v) { coming_ = v; }
   /// Afterwards: the laws at its start, and the velocities that its forces leave.
   void prepare(const std::vector<Vector6d>& v, double dt, const Mechanisms& mechanisms);

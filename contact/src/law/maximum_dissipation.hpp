@@ -1,4 +1,5 @@
-// Tether: Preclik and Ruede's one-contact MPCC. SPDX-License-Identifier: BSD-3-Clause
+// Tether: Preclik and Ruede's one-contact MPCC (method, eq. 4, 10). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <limits>

@@ -1,4 +1,5 @@
-// Tether: the Delassus matrix of bodies in contact. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the Delassus matrix of bodies in contact (method, eq. 1). SPDX-License-Identifier:
+// BSD-3-Clause
 #include <tether/contact/bodies.hpp>
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-// Tether: steps in parts that keep an accuracy. SPDX-License-Identifier: BSD-3-Clause
+// Tether: sub-steps that keep an accuracy. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <array>

@@ -5,7 +5,7 @@
 
 namespace tether::ida_projection {
 
-// Is the metric free, and can answers to moves be had?
+// Is the metric free, and can the response of F be had?
 bool Projection::Impl::asks_for_metric() const {
   return in_use(Mechanism::other_metric) && movers_.used->rows().may_use_levels() &&
          wanted_metric_ == Metric::automatic && options_.group.empty() &&

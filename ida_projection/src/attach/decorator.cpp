@@ -58,7 +58,8 @@ int Projection::Impl::initialize() {
 }
 
 // Times the first projection and every 16th: reading the clock costs as much as a small one, and
-// more than a look at rows that need none. What drift is left is looked at on the same ones.
+// more than an evaluation of g where none is needed. The residual that is left is measured on the
+// same ones.
 class Projection::Impl::Stopwatch {
  public:
   explicit Stopwatch(Impl& owner) : owner_(owner) {
@@ -174,7 +175,7 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
   Moved move = move_and_polish(candidate, step.cj, tolerance, fresh);
   while (move.status == Status::success && !move.corrector_was_right && !fresh &&
          in_use(Mechanism::repeated_correction)) {
-    // Old factors fooled IDA's convergence test: correct again, with fresh ones.
+    // A stale Jacobian fooled IDA's convergence test: correct again, with fresh ones.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, candidate.correction);
     flag = correct(candidate, tolerance, true);
@@ -238,7 +239,7 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
 }
 
 // The move takes back as well what an iteration before it has added: a solution less. Only where
-// nothing answers to moves: it would be left out, and IDA's test of algebraic variables needs it.
+// F has no response: it would be left out, and IDA's test of algebraic variables needs it.
 bool Projection::Impl::polishes_first() {
   const double longest = std::min(kShortMove, polish_.longest_unanswered(control_.smoothing()));
   if (!in_use(Mechanism::polish_first) || !(attempts_.last_move <= longest) ||

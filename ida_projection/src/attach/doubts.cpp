@@ -62,7 +62,7 @@ std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vect
   return undetermined_multipliers(candidate, y, variables_, corrector_, constraints_, statistics_);
 }
 
-// Empty: it is not. Close to a dead point the multipliers are what is to be named.
+// Empty: it is not. Close to a singular position the multipliers are what is to be named.
 std::string Projection::Impl::too_high_index() const {
   if (variables_.index() <= 2 || !run_.undetermined.empty()) return {};
   return "F is of index " + std::to_string(variables_.index()) +

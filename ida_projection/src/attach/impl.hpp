@@ -1,4 +1,5 @@
-// Tether: the decorator of IDA's nonlinear solver. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the decorator of IDA's nonlinear solver (method, eq. 5). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <initializer_list>

@@ -1,4 +1,5 @@
-// Tether: the nonlinear solver that the plugin decorates. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the nonlinear solver that the plugin decorates (method, section 2).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <memory>
@@ -69,7 +70,8 @@ class Corrector {
   SUNNonlinearSolver inner_ = nullptr;
   SUNNonlinSolSysFn system_ = nullptr;
   SUNNonlinSolLSolveFn linear_solve_ = nullptr;
-  bool has_setup_ = false;  // IDA's linear solver has factors, or a preconditioner, to be made anew
+  bool has_setup_ =
+      false;  // IDA's linear solver has factors, or a preconditioner, that can be renewed
   int maximum_iterations_ = 4;
   bool heard_ = false;
   void* mem_ = nullptr;

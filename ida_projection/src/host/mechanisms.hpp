@@ -13,7 +13,7 @@ namespace tether::ida_projection {
 /// Each has its row in benchmarks/results/ablation.md: what a run loses without it. Options switch
 /// the others: metric, polish, smoothing, limit of the order, index and suppression.
 enum class Mechanism {
-  repeated_correction,    ///< where old factors fooled IDA's convergence test
+  repeated_correction,    ///< where a stale Jacobian fooled IDA's convergence test
   polish_first,           ///< of many rows: before the move
   foretold_polish,        ///< from earlier ones, without an evaluation of F
   followers,              ///< IDA's test waits for algebraic variables that follow

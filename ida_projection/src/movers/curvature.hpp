@@ -1,4 +1,5 @@
-// Tether: what old factors of C leave of a move. SPDX-License-Identifier: BSD-3-Clause
+// Tether: what stale factors of C leave of a move (method, section 10). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <algorithm>

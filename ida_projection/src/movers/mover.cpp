@@ -22,7 +22,7 @@ constexpr int kQuiet = 8;        // moves that were none, then looks begin again
 constexpr int kQuick = 3;        // moves with a whole C
 // This part of Options::tolerance is left where a move costs little beside the factors.
 constexpr double kCheapRest = 1e-4;
-constexpr double kSafe = 0.25;  // of Options::tolerance, where old factors tell what is left
+constexpr double kSafe = 0.25;  // of Options::tolerance, where stale factors tell what is left
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
 constexpr double kWorn = 0.06, kSlow = 0.1;
@@ -297,7 +297,7 @@ Status Mover::take_rest(const Candidate& candidate, double reach) {
 // The same with kept factors, which leave a part of each move that grows with their age. Only what
 // is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
 // two moves with the same factors, that makes the next one so; and dropped rows that follow the
-// others. Where too much is left, also of dropped rows, or a move is long, factors are made anew.
+// others. Where too much is left, also of dropped rows, or a move is long, C is refactorised.
 // `previous`: length of the move before, by the same factors and with nothing in between; < 0:
 // there is none.
 Status Mover::take_back(const Candidate& candidate, double previous) {

@@ -1,5 +1,5 @@
-// Tether: the move of a point onto the constraints, for every storage of their rows.
-// SPDX-License-Identifier: BSD-3-Clause
+// Tether: the move of a point onto the constraints, for every storage of their rows (method, eq. 6,
+// 8). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <memory>
@@ -87,7 +87,7 @@ class Mover {
   /// Moves the candidate: correction <- correction - dy.
   Move move(const Candidate& candidate);
   /// The correction was changed by `change` after a successful move(): takes back what leaves the
-  /// constraints, with the factors at hand.
+  /// constraints, with the current factors.
   Status settle(const Candidate& candidate, N_Vector change);
   /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
   Status finish(const Candidate& candidate, bool polished);
@@ -114,10 +114,10 @@ class Mover {
   std::unique_ptr<RowsAt> rows_;
   double move_length_ = 0.0;  // of the last first move, in tolerances
   bool follows_ = true;       // dropped rows, at the last solution
-  // Length of the last move, if the factors at hand made it; < 0: others did.
+  // Length of the last move, if the current factors made it; < 0: others did.
   double by_present_factors_ = -1.0;
   bool reused_ = false;     // factors of an earlier step are in use for this one
-  WearOfFactors wear_;      // of the factors at hand
+  WearOfFactors wear_;      // of the current factors
   int looks_ = 0;           // with the factors of an earlier candidate
   int nothing_in_row_ = 0;  // moves that were none
   bool still_ = false;      // the last candidate was only looked at

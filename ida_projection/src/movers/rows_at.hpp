@@ -1,4 +1,4 @@
-// Tether: the rows at a candidate, as Newton's method onto them wants them.
+// Tether: the rows at a candidate, as Newton's method onto them wants them (method, section 3).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
@@ -19,7 +19,7 @@ struct Tangency {
   std::vector<double> tolerance;  ///< |row_i(C WT)|, a move of one tolerance
 };
 
-/// The move dy for the present g by the factors at hand.
+/// The move dy for the present g by the current factors.
 struct Solution {
   Status status = Status::success;
   double length = 0.0;  ///< WRMS, in tolerances, of what the error test sees
@@ -110,7 +110,7 @@ class RowsAt {
 
   /// Rank of the factors for solve_with_factors(); -1: there are none.
   virtual int rank_of_factors() const { return -1; }
-  /// The caller's rows are others than those of the factors at hand.
+  /// The caller's rows are others than those of the current factors.
   virtual void rows_changed() {}
   /// dy (N entries) for other values g, near a hundredth. False: not known.
   virtual bool solve_with_factors(const std::vector<double>& /*g*/, std::vector<double>& /*dy*/) {

@@ -1,4 +1,5 @@
-// Tether: which directions of C can be trusted. SPDX-License-Identifier: BSD-3-Clause
+// Tether: which directions of C can be trusted (method, eq. 19). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <tether/linalg/minimum_norm.hpp>

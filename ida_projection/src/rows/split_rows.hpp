@@ -1,5 +1,5 @@
-// Tether: the rows of C split into those for differential and for algebraic variables.
-// SPDX-License-Identifier: BSD-3-Clause
+// Tether: the rows of C split into those for differential and for algebraic variables (method, eq.
+// 14). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <string>

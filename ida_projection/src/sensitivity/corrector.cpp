@@ -158,7 +158,7 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
   if (status == Status::success) status = move_and_polish(candidate, step, tolerance, fix);
   if (status == Status::success && !fix.corrector_was_right && !call_setup &&
       corrector_->has_setup()) {
-    // As for the state: old factors fooled IDAS' convergence test.
+    // As for the state: a stale Jacobian fooled IDAS' convergence test.
     N_VConst(0.0, correction);
     flag = corrector_->correct(candidate, tolerance, true, none);
     note_setups(step.cj);

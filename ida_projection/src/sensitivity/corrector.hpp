@@ -1,4 +1,5 @@
-// Tether: the decorator of IDAS' staggered corrector. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the decorator of IDAS' staggered corrector (method, eq. 22). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// Tether: the index of a linear system. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the index of a linear system (method, eq. 15). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <Eigen/Core>

@@ -207,7 +207,7 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
     }
     report.message.clear();
     y = trial;
-    // Seen with the factors at hand: others would only confirm it, where no row waits to come back.
+    // Seen with the current factors: others would only confirm it, where no row waits to come back.
     const bool all_seen =
         !blocks_.dropped_rows() ||
         (length <= kNear && blocks_.left_of_dropped(WT_) <= kAside * std::max(kConverged, floor));

@@ -1,4 +1,5 @@
-// Tether: a point far from the constraints onto them. SPDX-License-Identifier: BSD-3-Clause
+// Tether: a point far from the constraints onto them (method, section 11). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <memory>

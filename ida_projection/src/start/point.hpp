@@ -1,4 +1,4 @@
-// Tether: the nearest point on the constraints, for starts and output points.
+// Tether: the nearest point on the constraints, for starts and output points (method, section 11).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 

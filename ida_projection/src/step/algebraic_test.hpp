@@ -1,4 +1,5 @@
-// Tether: IDA's error test of algebraic variables. SPDX-License-Identifier: BSD-3-Clause
+// Tether: IDA's error test of algebraic variables (method, section 6). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <vector>

@@ -3,12 +3,12 @@
 
 namespace tether::ida_projection {
 
-/// A move and what F answers to it over the differential variables, in tolerances.
+/// A move and the response of F to it over the differential variables, in tolerances.
 struct AnsweredMove {
   double move = 0.0, answer = 0.0;
 };
 
-/// When to look at what F answers to moves, and when to try the other metric (method, section 4).
+/// When to measure the response of F, and when to try the other metric (method, section 4).
 class MetricChoice {
  public:
   void reset() { *this = MetricChoice(); }
@@ -18,7 +18,7 @@ class MetricChoice {
   bool calm() const { return calm_ && pause_ > 1; }
   /// Do stiff components answer to it so much that it harms?
   bool stiff(const AnsweredMove& at) const;
-  /// After a look: do they, and is it time to try the other metric?
+  /// After a measurement: do they, and is it time to try the other metric?
   bool doubts(const AnsweredMove& at);
   /// After that trial: is the other one taken from now on?
   bool prefers(const AnsweredMove& other, const AnsweredMove& present);

@@ -1,4 +1,5 @@
-// Tether: keeps IDA off the orders that excite oscillations. SPDX-License-Identifier: BSD-3-Clause
+// Tether: keeps IDA off the orders that excite oscillations (method, eq. 17).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/ida_projection/options.hpp>

@@ -1,4 +1,5 @@
-// Tether: one Newton iteration after the move. SPDX-License-Identifier: BSD-3-Clause
+// Tether: one Newton iteration after the move (method, eq. 13). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include "host/candidate.hpp"

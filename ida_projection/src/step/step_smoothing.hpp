@@ -1,4 +1,5 @@
-// Tether: smooth step sizes through IDA's public settings. SPDX-License-Identifier: BSD-3-Clause
+// Tether: smooth step sizes through IDA's public settings (method, eq. 16).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <array>

@@ -73,7 +73,7 @@ std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const Ste
   return out.str();
 }
 
-// All that a look takes, so that none allocates.
+// All that a comparison needs, so that none allocates.
 void FirstSteps::allocate(const Candidate& candidate) {
   const auto n = static_cast<std::size_t>(N_VGetLength(candidate.base));
   for (std::vector<double>* each : {&point_, &slope_, &moved_, &kept_point_, &kept_slope_})

@@ -1,4 +1,5 @@
-// Tether: doubts in rows and tolerances, in the first steps. SPDX-License-Identifier: BSD-3-Clause
+// Tether: doubts in rows and tolerances, in the first steps (method, section 9).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <string>

@@ -39,7 +39,7 @@ bool MinimumNorm::factor_split(double rank_tolerance) {
   return true;
 }
 
-// Other rows than the factors at hand have.
+// Other rows than the current factors have.
 void MinimumNorm::limit_rank() {
   Large& large = *large_;
   if (large.split && rank_ >= large.firm) {

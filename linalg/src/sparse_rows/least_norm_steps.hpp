@@ -1,5 +1,5 @@
-// Tether: minimum-norm solutions and multipliers by repeated steps with regularised factors.
-// SPDX-License-Identifier: BSD-3-Clause
+// Tether: minimum-norm solutions and multipliers by repeated steps with regularised factors
+// (method, eq. 20). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <vector>

@@ -32,7 +32,7 @@ Scene projected(const Scene& scene, double tolerance) {
 std::optional<Reference> tightest(Scene (*make)(const Scene&, double), const Scene& scene,
                                   const char* name, double tolerance, const Times& times,
                                   const CostOptions& options) {
-  // Each ten times as loose; a mechanism at a dead point may get through from 1e-8 on only.
+  // Each ten times as loose; a mechanism at a singular position may get through from 1e-8 on only.
   constexpr int kTries = 8;
   std::optional<Reference> best;
   for (int k = 0; k < kTries && tolerance < 0.1; ++k, tolerance *= 10) {

@@ -1,4 +1,4 @@
-// Tether: impacts that accumulate. SPDX-License-Identifier: BSD-3-Clause
+// Tether: impacts that accumulate (method, eq. 10). SPDX-License-Identifier: BSD-3-Clause
 //
 // Impacts k of one contact at times t_k with approach speeds w_k: where the ratios r of intervals
 // and of speeds agree and stay below 1, the last of them is over at

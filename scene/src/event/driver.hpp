@@ -1,4 +1,5 @@
-// Tether: event-driven motion of a model with contacts. SPDX-License-Identifier: BSD-3-Clause
+// Tether: event-driven motion of a model with contacts (method, section 3).
+// SPDX-License-Identifier: BSD-3-Clause
 //
 //   while t < end:  step of IDA;  the first zero of a watched function in it?
 //   at a zero:      impacts of closing contacts through joints and closed contacts

@@ -1,4 +1,5 @@
-// Tether: events, and steps where they cannot go on. SPDX-License-Identifier: BSD-3-Clause
+// Tether: events, and steps where they cannot go on (method, section 11). SPDX-License-Identifier:
+// BSD-3-Clause
 //
 // Steps stand in until they have brought the bodies to where the same contacts stay closed: what
 // events could not decide or end (accumulation, a storm) is over then.

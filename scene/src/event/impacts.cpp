@@ -1,4 +1,4 @@
-// Tether: impacts of contacts that close. SPDX-License-Identifier: BSD-3-Clause
+// Tether: impacts of contacts that close (method, eq. 7). SPDX-License-Identifier: BSD-3-Clause
 //
 // Newton's law w_n+ = -e w_n- where impulses act, and Coulomb's cone, in one problem of all
 // contacts that touch.

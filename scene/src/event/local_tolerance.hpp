@@ -1,4 +1,5 @@
-// Tether: what of a tolerance IDA gets between events. SPDX-License-Identifier: BSD-3-Clause
+// Tether: what of a tolerance IDA gets between events (method, eq. 12). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// Tether: which contacts stay closed, stick and slide. SPDX-License-Identifier: BSD-3-Clause
+// Tether: which contacts stay closed, stick and slide (method, section 6). SPDX-License-Identifier:
+// BSD-3-Clause
 //
 // By Coulomb's law for accelerations, see solve_accelerations.
 #include <algorithm>

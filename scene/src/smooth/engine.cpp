@@ -25,8 +25,8 @@ constexpr binary::Magic kMagic = {'s', 'm', 'o', 'o', 't', 'h', ' ', '2'};
 // Figures of a file are rounded, so a start may be off the joints by this much, relative to the
 // scene's size and speed (at least 1 m, 1 m/s). It is moved onto them.
 constexpr double kStartTolerance = 1e-4;
-// Errors that may be left then; velocities may have more, since weak rows near a dead point leave
-// it.
+// Errors that may be left then; velocities may have more, since weak rows near a singular position
+// leave it.
 constexpr double kLeft = 1e-7, kSpeedLeft = 1e-5;
 // Closed to rounding already, of the largest unknown: thin rows magnify it into moves that lead
 // nowhere.
@@ -248,7 +248,7 @@ class SmoothEngine : public Engine {
   Units units_;
   Scene scene_;  // in these units, as everything here but bodies_
   SmoothOptions options_;
-  std::unique_ptr<System> system_;  // its workspace changes in a look, too
+  std::unique_ptr<System> system_;  // its workspace changes in diagnostics, too
   double anchor_ = 0;
   Eigen::VectorXd y_, yp_;  // at the anchor
   std::unique_ptr<Integrator> integrator_;

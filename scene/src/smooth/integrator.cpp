@@ -25,7 +25,7 @@ double local_tolerance(const SmoothOptions& options) {
   return std::max({tighter * wanted, std::min(wanted, rounding), smallest});
 }
 
-// Newton's test, of the local tolerance: IDA's 0.33 leaves noise that dead points and the
+// Newton's test, of the local tolerance: IDA's 0.33 leaves noise that singular positions and the
 // multipliers of index 2 magnify.
 constexpr double kNewton = 0.1, kNewtonIndex2 = 0.02;
 constexpr double kNewtonRounding = 2e-13;  // no less of it
@@ -33,8 +33,8 @@ constexpr double kNewtonRounding = 2e-13;  // no less of it
 // Noise of velocities across the joints, times pivot^2; see weights().
 constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3, kSmallestPivotIndex2 = 1e-3;
 
-// Steps from one anchor to the next, see SmoothEngine; not close to a dead point, where y' and the
-// multipliers are badly known.
+// Steps from one anchor to the next, see SmoothEngine; not close to a singular position, where y'
+// and the multipliers are badly known.
 constexpr long kAnchor = 5000;
 constexpr double kAnchorPivot = 0.01;
 
@@ -79,15 +79,15 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   session_->set_newton(index2 ? std::max(kNewtonIndex2, kNewtonRounding / tolerance_) : kNewton);
   if (options.projection) {
     ida_projection::Options projection;
-    // Close to dead points F answers to any move, without being stiff: no other metric is to be
-    // tried.
+    // Close to singular positions F answers to any move, without being stiff: no other metric is to
+    // be tried.
     projection.advanced.metric = ida_projection::Metric::local_correction;
     // Errors then follow the tolerance; by IDA's own rule one tolerance in ten ends twenty times
-    // worse than its neighbours where dead points magnify errors.
+    // worse than its neighbours where singular positions magnify errors.
     projection.step_smoothing = true;
     // Without its refresh the noise of index 1's multipliers grows until Newton fails. Those of
-    // index 2 scale with cj, as IDA's own factor does: the refresh with old factors makes errors at
-    // tight tolerances up to thirty times larger.
+    // index 2 scale with cj, as IDA's own factor does: the refresh with stale factors makes errors
+    // at tight tolerances up to thirty times larger.
     projection.advanced.polish = options.formulation == Formulation::index1
                                      ? ida_projection::Polished::all
                                      : ida_projection::Polished::differential;
@@ -112,7 +112,7 @@ int Integrator::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* se
   return std::isfinite(sum) ? 0 : 1;  // IDA tries a smaller step
 }
 
-// 1 / (rtol |y| + atol). Near a dead point velocities across the joints are known to
+// 1 / (rtol |y| + atol). Near a singular position velocities across the joints are known to
 // round-off / pivot^2 only, and no step size makes them better: what cannot be had is not asked
 // for.
 int Integrator::weights(N_Vector y, N_Vector weights, void* self) {

@@ -23,7 +23,7 @@ namespace tether::scene::smooth {
 namespace {
 
 // SUNDIALS calls KLU's singular matrix unrecoverable, and its next setups want the factors that
-// were not made. A predictor may meet a dead point exactly; another step passes by.
+// were not made. A predictor may meet a singular position exactly; another step passes by.
 int factor_or_try_smaller_step(SUNLinearSolver solver, SUNMatrix matrix) {
   if (SUNLinSolSetup_KLU(solver, matrix) == 0) return 0;
   SUNLinSol_KLUReInit(solver, matrix, 0, SUNKLU_REINIT_PARTIAL);

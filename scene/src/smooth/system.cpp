@@ -31,7 +31,7 @@ System::System(const Scene& scene, const Units& units)
 
 double System::absolute_tolerance(int i, double tolerance) const {
   // Multipliers follow the state; where rows depend on each other they are known to round-off / eps
-  // only, and at a dead point they have a pole. Newton's test is left to the state.
+  // only, and at a singular position they have a pole. Newton's test is left to the state.
   return i < first_multiplier() ? tolerance : 1e10 * tolerance;
 }
 

@@ -11,8 +11,8 @@
 // Rows may depend on each other, everywhere (planar linkages of 3-D hinges, Bricard's) or at a dead
 // point. So index 1 and 2 give multipliers to as many rows as are independent along the motion, and
 // hold the others at 0; see rows_in_use.cpp. A diagonal term eps lambda in their place acts through
-// eps / pivot^2: at tight tolerances it bends the motion at a dead point, and IDA does not get
-// through. Index 0 has it (eps = 1e-11 of the diagonal, refined three times, so to the third
+// eps / pivot^2: at tight tolerances it bends the motion at a singular position, and IDA does not
+// get through. Index 0 has it (eps = 1e-11 of the diagonal, refined three times, so to the third
 // power).
 #pragma once
 
@@ -68,7 +68,8 @@ class System {
   /// After a step. True: constraints() give other rows from here on.
   bool look_at_rows() { return in_use_.look(); }
   double weakest_pivot() const { return in_use_.weakest_pivot(); }
-  /// At a state near a dead point: joints whose rows depend on each other there. Empty elsewhere.
+  /// At a state near a singular position: joints whose rows depend on each other there. Empty
+  /// elsewhere.
   std::vector<std::string> dependent_joints(double t, const double* y);
   int multiplier_choices() const { return in_use_.multiplier_choices(); }
   int constraint_count() const;

@@ -57,7 +57,7 @@ void IdaSession::project(const ida_projection::Constraints& constraints,
   options.id = id_.get();
   options.print = false;
   // A move that no smaller step makes shorter is part of what IDA's error test judges: rows that
-  // come back behind a dead point, what an event left.
+  // come back behind a singular position, what an event left.
   options.advanced.long_move = ida_projection::LongMove::cap;
   options.advanced.maximum_step = max_step_;
   projection_.emplace(ida_, constraints, options);

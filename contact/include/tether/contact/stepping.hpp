@@ -186,7 +186,7 @@ constexpr std::uint64_t contact_id(int first_surface, int second_surface, int fe
 struct StepCounts {
   long steps = 0, contact_problems = 0, sweeps = 0, assembled_islands = 0, bounces = 0;
   long accepted = 0;  ///< problems above the tolerance that were accepted
-  long halved = 0;    ///< steps, or parts of steps, that were taken in two halves
+  long halved = 0;    ///< steps and sub-steps that were taken in two halves
   long parts = 0;     ///< with an accuracy: parts that steps were taken in
   long rejected = 0;  ///< and parts that were not accurate enough, or had an impact on the way
   long unsolved = 0;  ///< problems that were used though above what is accepted

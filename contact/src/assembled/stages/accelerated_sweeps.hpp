@@ -1,5 +1,5 @@
-// Tether: Gauss-Seidel sweeps with safeguarded Anderson acceleration. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: Gauss-Seidel sweeps with safeguarded Anderson acceleration (method, eq. 16).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "assembled/stages/momentum.hpp"

@@ -1,5 +1,5 @@
-// Tether: Newton matrices of many contacts between few bodies. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: Newton matrices of many contacts between few bodies (method, eq. 20).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/linalg/block_lu.hpp>

@@ -1,4 +1,4 @@
-// Tether: sweeps with momentum. SPDX-License-Identifier: BSD-3-Clause
+// Tether: sweeps with momentum (method, section 4). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "assembled/search/system.hpp"

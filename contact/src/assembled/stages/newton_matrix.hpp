@@ -1,5 +1,5 @@
-// Tether: the factorised matrix of Newton steps, by contacts or by bodies. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: the factorised matrix of Newton steps, by contacts or by bodies (method, eq. 18).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/linalg/block_lu.hpp>

@@ -1,5 +1,5 @@
-// Tether: how fast bodies vibrate across the forces of their joints. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: how fast bodies vibrate across the forces of their joints (method, section 7.1).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <functional>

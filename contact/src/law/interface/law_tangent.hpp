@@ -1,5 +1,5 @@
-// Tether: the linear relation between changes of one contact's impulse and velocity under a law.
-// SPDX-License-Identifier: BSD-3-Clause
+// Tether: the linear relation between changes of one contact's impulse and velocity under a law
+// (method, eq. 19). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <algorithm>

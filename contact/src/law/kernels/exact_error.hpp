@@ -1,5 +1,5 @@
-// Tether: errors of contacts below the round-off of double sums. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: errors of contacts below the round-off of double sums (method, section 3.2).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <algorithm>

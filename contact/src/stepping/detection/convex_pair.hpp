@@ -1,4 +1,5 @@
-// Tether: ellipsoids and cylinders against convex shapes. SPDX-License-Identifier: BSD-3-Clause
+// Tether: ellipsoids and cylinders against convex shapes (detection, section 3).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/contact/shapes.hpp>

@@ -1,5 +1,5 @@
-// Tether: the direction in which two convex shapes lie farthest apart. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: the direction in which two convex shapes lie farthest apart (detection, section 1).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "stepping/detection/convex_shape.hpp"

@@ -1,4 +1,5 @@
-// Tether: where a point is nearest to a shape. SPDX-License-Identifier: BSD-3-Clause
+// Tether: where a point is nearest to a shape (detection, section 5). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <tether/contact/shapes.hpp>

@@ -16,7 +16,7 @@ namespace {
 using linalg::at;
 
 constexpr double kSameTime = 1e-10;  // of a part
-// Contacts that strike within this part of a step strike together: the corners of an edge that
+// Contacts that strike within this sub-step strike together: the corners of an edge that
 // rounding has turned would else be struck one by one, and turn it.
 constexpr double kTogether = 1e-3;
 constexpr double kTouches = 1e-10;  // of the size: a gap that rounding makes of none

@@ -18,7 +18,7 @@ namespace tether::contact::detail {
 /// leaves, came < 0, needs more > 0.
 double closing_time(double gap, double came, double more);
 
-/// A contact that may close in a part of a step, m/s: with forces its approach grows from `came` to
+/// A contact that may close in a sub-step, m/s: with forces its approach grows from `came` to
 /// `comes`. `falls`: how much of that the weight of falling bodies adds, whose positions have half
 /// of it.
 struct Approach {

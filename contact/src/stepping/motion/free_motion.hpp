@@ -1,5 +1,5 @@
-// Tether: the motion of bodies in a step, without contacts and joints. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: the motion of bodies in a step, without contacts and joints (method, eq. 26).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/contact/stepping.hpp>

@@ -17,7 +17,7 @@ class NearContacts;
 /// correction of positions: limits; impacts: none.
 enum class LawUse { all, plastic, closing, limits, none };
 
-/// A limit of a joint that is struck within a part of a step.
+/// A limit of a joint that is struck within a sub-step.
 struct Strike {
   double gap;          ///< m or rad, at the start of the part
   double came, comes;  ///< approach before and with the forces of the part, > 0
@@ -26,7 +26,7 @@ struct Strike {
   double restitution;  ///< of the limit
 };
 
-/// Record of what a law of a joint has done in a part of a step.
+/// Record of what a law of a joint has done in a sub-step.
 struct LawState {
   int side = 0;                   ///< sign of the impulse that its bound allows no more of; else 0
   bool limit = false;             ///< else bounded

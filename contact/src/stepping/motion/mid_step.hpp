@@ -1,4 +1,5 @@
-// Tether: contacts in the middle of a step. SPDX-License-Identifier: BSD-3-Clause
+// Tether: contacts in the middle of a step (method, section 7.1). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// Tether: rotation of one rigid body over one step. SPDX-License-Identifier: BSD-3-Clause
+// Tether: rotation of one rigid body over one step (method, eq. 28). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <Eigen/Core>

@@ -61,7 +61,7 @@ class ContiguousRows final : public RowsAt {
   bool may_look() const override { return uses_.there && !uses_.thin && !blocks_.dropped_rows(); }
   bool decided() const override { return uses_.decided; }
   void forget_rank() override { uses_.lasting = false; }
-  // Old factors leave more of what dropped rows ask for.
+  // Stale factors leave more of what dropped rows ask for.
   bool may_polish_first() const override {
     return Rows::kKeepsFactors ? !blocks_.dropped_rows() : traits.measures_rest;
   }
@@ -80,8 +80,8 @@ class ContiguousRows final : public RowsAt {
   void accept() override { metric_.accept(); }
   void reset() override;
   bool use_levels(bool on) override;
-  // Few rows make no rough moves. Where rows are about to depend on each other, at dead points, F
-  // answers to any move, stiff or not.
+  // Few rows make no rough moves. Where rows are about to depend on each other, at singular
+  // positions, F answers to any move, stiff or not.
   bool may_use_levels() const override {
     return count() > kFewForLevels && !uses_.thin && !blocks_.dropped_rows();
   }
@@ -101,7 +101,7 @@ class ContiguousRows final : public RowsAt {
 
  private:
   using Block = typename Rows::Block;
-  /// The uses of the factors at hand.
+  /// The uses of the current factors.
   struct Uses {
     bool there = false;    ///< of this candidate or of an earlier one
     bool thin = false;     ///< the last factor() found rows that need RowTrust

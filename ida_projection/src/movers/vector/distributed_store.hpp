@@ -1,4 +1,4 @@
-// Tether: rows that are spread over processes, as VectorMover wants them.
+// Tether: rows that are spread over processes, as VectorMover wants them (method, eq. 21).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 

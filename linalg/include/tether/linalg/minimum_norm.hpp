@@ -1,4 +1,4 @@
-// Tether: minimum-norm solution of C dy = g in a diagonal metric.
+// Tether: minimum-norm solution of C dy = g in a diagonal metric (method, eq. 7).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 

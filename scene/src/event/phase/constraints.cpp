@@ -1,5 +1,5 @@
-// Tether: the constraints of the projection between events. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: the constraints of the projection between events (method, eq. 3).
+// SPDX-License-Identifier: BSD-3-Clause
 //
 // Gaps and joints, their rates, the slips of stuck contacts, the rows of the model itself, and
 // energy less work.

@@ -1,5 +1,5 @@
-// Tether: impacts and modes of contacts as problems of the contact library, through the joints.
-// SPDX-License-Identifier: BSD-3-Clause
+// Tether: impacts and modes of contacts as problems of the contact library, through the joints
+// (method, eq. 7, 8). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <vector>

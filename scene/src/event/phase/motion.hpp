@@ -1,4 +1,4 @@
-// Tether: the motion of a model while its closed contacts stay as they are.
+// Tether: the motion of a model while its closed contacts stay as they are (method, eq. 2).
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Unknowns y = (q, u, E_w), E_w the work of forces without potential. Each closed contact is stuck

@@ -1,5 +1,5 @@
-// Tether: one smooth phase in the hands of IDA and the projection. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: one smooth phase in the hands of IDA and the projection (method, eq. 5).
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
-// Tether: forces of contacts that share them in more than one way. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: forces of contacts that share them in more than one way (method, section 6.3).
+// SPDX-License-Identifier: BSD-3-Clause
 //
 // Feet of one body on a plane, corners of one face on another: accelerations may be unique, forces
 // are not, and with friction several sets of regimes may obey Coulomb's law. An iteration ends at

@@ -1,4 +1,5 @@
-// Tether: the functions of the state whose zeros are events. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the functions of the state whose zeros are events (method, section 4).
+// SPDX-License-Identifier: BSD-3-Clause
 //
 //   open     gap
 //   closed   normal force; mu times it less |friction| where it sticks; slip along its direction

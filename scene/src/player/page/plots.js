@@ -16,7 +16,7 @@ function ticks(low, high, most) {
   return out;
 }
 
-// What a run has to show: curves that are zero throughout are left out.
+// Curves of a run: those that are zero throughout are left out.
 function plotsOf(data) {
   const sum = data.kinetic.map((k, i) => k === null || data.potential[i] === null ? null : k + data.potential[i]);
   const change = sum.map(e => e === null ? null : Math.abs(e - data.start_energy));

@@ -79,7 +79,7 @@ class Camera {
   }
 }
 
-// Where a point of the view is on a canvas of the size given; null: behind the eye.
+// Place of a point of the view on a canvas of the size given; null: behind the eye.
 function onScreen(matrix, p, width, height) {
   const at = i => matrix[i] * p[0] + matrix[4 + i] * p[1] + matrix[8 + i] * p[2] + matrix[12 + i];
   const w = at(3);

@@ -3,7 +3,7 @@
 // A combination n of rows with n^T G = 0 at the start is one of three things:
 //  - implied for good: with the other rows at zero, its g stays zero. To second order that means
 //    n^T gamma(v) = 0 for every velocity v that the joints allow (G v = 0);
-//  - a dead point: some v has n^T gamma(v) != 0. Its rows are needed later;
+//  - a singular position: some v has n^T gamma(v) != 0. Its rows are needed later;
 //  - a contradiction, which shows in g.
 //
 // The projection gets as many rows as there are without the first kind. Off the constraints n^T G
@@ -11,10 +11,11 @@
 // nothing has to move (Bricard's linkage, tolerance 1e-7: 60820 steps; this way 514). Which rows
 // these are is chosen along the motion, those with the longest pivots.
 //
-// Near a dead point g says almost nothing about one direction, and its rounding, magnified by
-// 1 / pivot, exceeds what a tight tolerance allows. For these few steps rows with such pivots are
-// not used; another one stands twice in the place of each. No more steps than that: a slider-crank
-// whose lengths differ by 1e-6 turns back at a pivot of 1.4e-3, and the rows must see it.
+// Near a singular position g says almost nothing about one direction, and its rounding, magnified
+// by 1 / pivot, exceeds what a tight tolerance allows. For these few steps rows with such pivots
+// are not used; another one stands twice in the place of each. No more steps than that: a
+// slider-crank whose lengths differ by 1e-6 turns back at a pivot of 1.4e-3, and the rows must see
+// it.
 #include "rows_in_use.hpp"
 
 #include <algorithm>
@@ -88,7 +89,8 @@ bool RowsInUse::independent_by_structure() const {
   return forest;
 }
 
-// Counts the combinations n that are dead points: n^T gamma(v) != 0 for some of a few velocities.
+// Counts the combinations n that are singular positions: n^T gamma(v) != 0 for some of a few
+// velocities.
 int RowsInUse::count_needed_beyond(const Eigen::VectorXd& length, const linalg::PivotedQr& qr) {
   const int m = rows_.count(), r = qr.rank();
   const Eigen::Index dependent = m - r, n = gradient_.G.cols(), freedoms = n - r;

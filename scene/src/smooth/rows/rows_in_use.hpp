@@ -18,7 +18,8 @@ class RowsInUse {
   /// Counts independent rows at the start of the scene; leaves `bodies` in some other state.
   RowsInUse(JointRows& rows, MovingBodies& bodies);
 
-  /// Rows that the projection keeps, in `used()`, one of them in several places near a dead point.
+  /// Rows that the projection keeps, in `used()`, one of them in several places near a singular
+  /// position.
   int count() const { return count_; }
   const std::vector<int>& used() const { return used_; }
   int place_of(int row) const { return place_of_used_[at(row)]; }  ///< first in used(), or -1
@@ -31,7 +32,7 @@ class RowsInUse {
   /// Grows when other rows carry multipliers: the matrix has other zeros then.
   int multiplier_choices() const { return multiplier_choices_; }
   /// How far the rows in use are from depending on each other: the length of what the last one adds
-  /// to the others, rows of unit length; 0 at a dead point, 1 without joints.
+  /// to the others, rows of unit length; 0 at a singular position, 1 without joints.
   double weakest_pivot() const { return weakest_; }
 
   /// Chooses at the state that is set, for this local tolerance from now on.

@@ -2,15 +2,15 @@
 //
 // The factor of G M^-1 G^T + eps tells of each row what those before it leave of it, shrunk by eps:
 // a row that hardly stands out of the others counts for little in the rows behind it, so that one
-// of these can be chosen in its place. Where rows are independent but for a dead point at the start
-// is seen a little way off: behind a free move of length s they have pivots of order s, and rows
-// that are implied for good, once the loops are closed again, have none.
+// of these can be chosen in its place. Where rows are independent but for a singular position at
+// the start is seen a little way off: behind a free move of length s they have pivots of order s,
+// and rows that are implied for good, once the loops are closed again, have none.
 //
 // Closed nets have rows that are independent for good and yet thin: n x n balls, both diagonals,
 // are one rigid body down to singular values of n^-4. Who leaves them out of the equations has
 // another mechanism, whose joints drift. The factors tell them from dependent ones to about
 // sqrt(eps) times the coefficients; the rest show in velocities that the others allow. What is thin
-// all along is no dead point: that is where pivots are much smaller than elsewhere.
+// all along is no singular position: that is where pivots are much smaller than elsewhere.
 #include "sparse_row_choice.hpp"
 
 #include <algorithm>
@@ -138,7 +138,7 @@ void SparseRowChoice::move(std::vector<double>& y, const Eigen::VectorXd& v) con
   }
 }
 
-// Along velocities without a pattern, less what the joints forbid; by the factors at hand.
+// Along velocities without a pattern, less what the joints forbid; by the current factors.
 void SparseRowChoice::move_freely(std::vector<double>& y) {
   const int n = 6 * bodies_.count();
   const double length = reach();

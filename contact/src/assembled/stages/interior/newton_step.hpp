@@ -1,4 +1,5 @@
-// Tether: the Newton step of interior points. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the Newton step of interior points (method, eq. 24). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <tether/linalg/cone_scaling.hpp>

@@ -1,4 +1,5 @@
-// Tether: convex shapes on a mesh of triangles. SPDX-License-Identifier: BSD-3-Clause
+// Tether: convex shapes on a mesh of triangles (detection, section 4). SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <array>

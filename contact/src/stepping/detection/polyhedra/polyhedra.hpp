@@ -1,4 +1,4 @@
-// Tether: collision of polyhedra. SPDX-License-Identifier: BSD-3-Clause
+// Tether: collision of polyhedra (detection, section 2). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include "stepping/detection/polyhedra/face_clipping.hpp"
