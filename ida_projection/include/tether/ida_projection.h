@@ -248,7 +248,8 @@ int tether_get_status(const tether_projection* projection);
 const char* tether_get_message(const tether_projection* projection);
 /* A number of tether::ida_projection::Statistics by the name of its field, e.g. "projections". */
 int tether_get_statistic(const tether_projection* projection, const char* name, double* value);
-/* A verdict of one line, and those that are not zero, one a line. Valid until the next call with this projection; null without memory. */
+/* A verdict of one line, and those that are not zero, one a line. Valid until the next call with
+ * this projection; null without memory. */
 const char* tether_get_statistics_table(const tether_projection* projection);
 int tether_reset_statistics(tether_projection* projection);
 
