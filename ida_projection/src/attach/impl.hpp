@@ -17,7 +17,6 @@
 #include "host/linear_solver.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
-#include "sensitivity/corrector.hpp"
 #include "start/algebraic.hpp"
 #include "start/joined_rows.hpp"
 #include "start/point.hpp"
@@ -36,6 +35,13 @@ namespace tether::ida_projection {
 /// Rejects values that cannot work, naming the option, its value and the allowed ones.
 void validate(const Constraints& constraints, const Options& options, N_Vector like);
 
+/// State of an add-on, beside that of the run; it hears of new runs.
+class Companion {
+ public:
+  virtual ~Companion() = default;
+  virtual void forget_run() {}
+};
+
 /// The decorator of IDA's nonlinear solver: puts the parts of a projected step together.
 class Projection::Impl {
  public:
@@ -52,7 +58,7 @@ class Projection::Impl {
   }
   int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
 
-  // sensitivities.cpp
+  // sensitivity/attach.cpp: a program that asks for none links none of it
   void project_sensitivities(Sensitivities given, const tether_idas_functions& idas);
   ConsistencyReport make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp, N_Vector* s,
                                                   N_Vector* sp);
@@ -242,8 +248,7 @@ class Projection::Impl {
   PointProjection point_;
   Watches watch_;
   std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeSolver> solver_;  // IDA sees it
-  std::unique_ptr<SensitivityCorrector> sensitivities_;
-  std::unique_ptr<TangentRows> tangent_;  // of project_gradient()
+  std::unique_ptr<Companion> sensitivities_, gradient_;
   Unknowns unknowns_;
   Metric wanted_metric_;
   MetricChoice metric_choice_;

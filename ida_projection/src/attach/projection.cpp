@@ -215,19 +215,6 @@ ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
 int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask) {
   return impl_->solve_and_project(tout, tret, yret, ypret, itask);
 }
-void Projection::project_sensitivities(Sensitivities sensitivities,
-                                       const tether_idas_functions& idas) {
-  impl_->project_sensitivities(std::move(sensitivities), idas);
-}
-ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp,
-                                                            N_Vector* s, N_Vector* sp) {
-  return impl_->answer("make_sensitivities_consistent", {yy, yp},
-                       [&] { return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp); });
-}
-ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v) {
-  return impl_->answer("project_gradient", {yy, v},
-                       [&] { return impl_->project_gradient(t, yy, v); });
-}
 Statistics Projection::statistics() const { return impl_->statistics(); }
 void Projection::reset_statistics() { impl_->reset_statistics(); }
 Status Projection::status() const { return impl_->status(); }

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "attach/impl.hpp"
 #include "host/corrector.hpp"
 #include "host/ida.hpp"
 #include "host/ida_lifetime.hpp"
@@ -30,7 +31,7 @@ namespace tether::ida_projection {
 ///
 /// Few rows have factors that cost so little that each sensitivity has a metric of its own, from
 /// the size of its own corrections: errors are 1.2 to 2.4 times smaller than in that of the state.
-class SensitivityCorrector {
+class SensitivityCorrector final : public Companion {
  public:
   /// The half of the plugin that moves the state.
   struct State {
@@ -50,12 +51,12 @@ class SensitivityCorrector {
   /// `like`: a vector of the state. Throws std::invalid_argument.
   SensitivityCorrector(const State& state, Sensitivities given, const tether_idas_functions& idas,
                        N_Vector like, bool contiguous);
-  ~SensitivityCorrector();
+  ~SensitivityCorrector() override;
   SensitivityCorrector(const SensitivityCorrector&) = delete;
   SensitivityCorrector& operator=(const SensitivityCorrector&) = delete;
 
   /// A new run of the state begins.
-  void forget_run();
+  void forget_run() override;
   int count() const { return g_p_.given().count; }
   /// Onto the rows at (t, y), then sp; consistency.cpp.
   void make_consistent(double t, N_Vector y, N_Vector yp, N_Vector weights, N_Vector* s,

@@ -7,6 +7,29 @@
 
 namespace tether::ida_projection {
 
+namespace {
+
+/// C at one point, for gradients across it.
+struct GradientProjection final : Companion {
+  std::unique_ptr<TangentRows> rows;
+};
+
+}  // namespace
+
+void Projection::project_sensitivities(Sensitivities sensitivities,
+                                       const tether_idas_functions& idas) {
+  impl_->project_sensitivities(std::move(sensitivities), idas);
+}
+ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp,
+                                                            N_Vector* s, N_Vector* sp) {
+  return impl_->answer("make_sensitivities_consistent", {yy, yp},
+                       [&] { return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp); });
+}
+ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v) {
+  return impl_->answer("project_gradient", {yy, v},
+                       [&] { return impl_->project_gradient(t, yy, v); });
+}
+
 void Projection::Impl::project_sensitivities(Sensitivities given,
                                              const tether_idas_functions& idas) {
   if (movers_.used == nullptr) return;  // no constraints
@@ -28,13 +51,14 @@ ConsistencyReport Projection::Impl::make_sensitivities_consistent(double t0, N_V
     reject("make_sensitivities_consistent: call project_sensitivities before, which knows dg/dp");
   if (yy == nullptr || yp == nullptr || s == nullptr)
     reject("make_sensitivities_consistent: yy, yp and s must not be null");
-  for (int k = 0; k < sensitivities_->count(); ++k)
+  auto& sensitivities = static_cast<SensitivityCorrector&>(*sensitivities_);
+  for (int k = 0; k < sensitivities.count(); ++k)
     for (N_Vector v : {s[k], sp != nullptr ? sp[k] : s[k]})
       if (v == nullptr || !why_unlike_y(v).empty())
         reject("make_sensitivities_consistent: vector " + std::to_string(k) + " of s or sp " +
                (v == nullptr ? "is null" : "is unlike y: " + why_unlike_y(v)));
   current_weights(yy);
-  sensitivities_->make_consistent(t0, yy, yp, unknowns_.weights, s, sp, report);
+  sensitivities.make_consistent(t0, yy, yp, unknowns_.weights, s, sp, report);
   report_.status = report.status;
   report_.message = report.message;
   return report;
@@ -50,21 +74,22 @@ ConsistencyReport Projection::Impl::project_gradient(double t, N_Vector yy, N_Ve
   if (std::holds_alternative<DistributedRows>(constraints_.jacobian))
     reject("project_gradient: DistributedRows are not taken");
   current_weights(yy);
-  if (!tangent_)
-    tangent_ = make_tangent_rows(constraints_, options_, statistics_, unknowns_.weights);
+  if (!gradient_) gradient_ = std::make_unique<GradientProjection>();
+  std::unique_ptr<TangentRows>& tangent = static_cast<GradientProjection&>(*gradient_).rows;
+  if (!tangent) tangent = make_tangent_rows(constraints_, options_, statistics_, unknowns_.weights);
   OwnedVector unit(yy), across(yy);
   N_VConst(1.0, unit);
-  std::vector<double> r(static_cast<std::size_t>(tangent_->rows()), 0.0);
-  tangent_->forget_failure();
-  report.status = tangent_->evaluate(t, yy, unknowns_.weights, nullptr);
-  if (report.status == Status::success) report.status = tangent_->factor(unit);
-  if (report.status == Status::success) report.status = tangent_->product(v, r.data());
+  std::vector<double> r(static_cast<std::size_t>(tangent->rows()), 0.0);
+  tangent->forget_failure();
+  report.status = tangent->evaluate(t, yy, unknowns_.weights, nullptr);
+  if (report.status == Status::success) report.status = tangent->factor(unit);
+  if (report.status == Status::success) report.status = tangent->product(v, r.data());
   if (report.status == Status::success) {
-    tangent_->solve(r, across);
+    tangent->solve(r, across);
     N_VLinearSum(1.0, v, -1.0, across, v);
     for (const double rate : r) report.drift_before = std::max(report.drift_before, std::abs(rate));
   } else {
-    report.message = tangent_->message();
+    report.message = tangent->message();
   }
   report_.status = report.status;
   report_.message = report.message;
