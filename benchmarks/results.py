@@ -31,7 +31,7 @@ COMMANDS = {
     "accuracy_cost": ("Error against processor time of every code",
                       "Columns: [how to read accuracy_cost](../README.md#how-to-read-accuracy_cost). Below 1 Tether is faster.",
                       f"{BUILT}/accuracy/accuracy_cost --count 5 --repeats 2 --seconds 0.1 --no-drift --no-reach "
-                      "--skip four_bar,long,chain_of_100"),
+                      "--skip four_bar,long,chain_of_100 | sed -n '/^CPU at equal error/,$p'"),
     "crossover": ("Where RADAU5's advantage on small smooth problems ends",
                   "Time and evaluations of F of Tether over those of RADAU5: below 1 Tether needs less.",
                   f"{BUILT}/accuracy/crossover --repeats 2"),
@@ -94,14 +94,14 @@ def write(name):
             return print(f"{name}: skipped, no SUNDIALS at -O3; sh benchmarks/optimised_sundials.sh build/sundials makes it")
         environment["LD_LIBRARY_PATH"] = f"{OPTIMISED}/lib:" + environment.get("LD_LIBRARY_PATH", "")
     print(f"{name}: {command}", flush=True)
-    load = os.getloadavg()[0]
+    load, revision = os.getloadavg()[0], commit()
     text = printed(command, shell=True, environment=environment)
     if "\n|---" not in text:
         text = "```\n" + text + "\n```"
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"{name}.md").write_text(
         f"# {title}\n\nWritten by `python3 benchmarks/results.py {name}`.{how}\n\n"
-        f"- Command: `{command}`\n- Commit: {commit()}\n"
+        f"- Command: `{command}`\n- Commit: {revision}\n"
         f"- Machine: {processor()}; {printed('c++', '--version').splitlines()[0]}; SUNDIALS {sundials(name)}; load {load:.1f}\n"
         f"- Date: {datetime.date.today().isoformat()}\n\n{text}\n")
 

@@ -10,7 +10,7 @@ bool Projection::Impl::asks_for_metric() const {
   return in_use(Mechanism::other_metric) && movers_.used->rows().may_use_levels() &&
          wanted_metric_ == Metric::automatic && options_.group.empty() &&
          options_.advanced.metric == Metric::local_correction &&
-         movers_.used == movers_.own.get() && polish_.hears_answers();
+         movers_.used == movers_.own.get() && polish_.is_response_available();
 }
 
 // Moves to which stiff components answer excite them, and scales made of what they then do make

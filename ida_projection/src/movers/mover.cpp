@@ -16,10 +16,10 @@ constexpr double kLargestFloor = 0.1;  // tolerances
 constexpr double kLong = 1.0;          // tolerances: such a move is made with fresh factors
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
 constexpr double kForLater = 0.1;
-constexpr double kTurned = 4.0;  // by so much C of an earlier look may mislead
-constexpr int kLooks = 16;       // looks with the factors of one
-constexpr int kQuiet = 8;        // moves that were none, then looks begin again
-constexpr int kQuick = 3;        // moves with a whole C
+constexpr double kStaleRowsSafety = 4.0;  // by so much C of an earlier step may mislead
+constexpr int kLooks = 16;                // looks with the factors of one
+constexpr int kQuiet = 8;                 // moves that were none, then looks begin again
+constexpr int kQuick = 3;                 // moves with a whole C
 // This part of Options::tolerance is left where a move costs little beside the factors.
 constexpr double kCheapRest = 1e-4;
 constexpr double kSafe = 0.25;  // of Options::tolerance, where stale factors tell what is left
@@ -87,7 +87,7 @@ bool Mover::plainly_nothing() {
   if (!in_use(Mechanism::looks) || !rows_->may_look() || looks_ >= kLooks) return false;
   ++looks_;
   ++wear_.age;
-  return rows_->rounding_only() || kTurned * rows_->solve(Solve::look).length <= kNothing;
+  return rows_->rounding_only() || kStaleRowsSafety * rows_->solve(Solve::look).length <= kNothing;
 }
 
 Move Mover::measure(const Candidate& candidate) {

@@ -51,7 +51,7 @@ class Polish {
   /// Longer moves want an answer of the algebraic variables; infinity where there are none.
   double longest_unanswered(bool smoothing) const;
   /// Can answer() be had?
-  bool hears_answers() const { return contiguous_ && corrector_.solves() && !iterative_; }
+  bool is_response_available() const { return contiguous_ && corrector_.solves() && !iterative_; }
   /// After a move: the length of F's answer to it, -J^-1 F_y dy, over the differential variables
   /// in tolerances; -1: F or the linear solver fails.
   double answer(const Candidate& candidate);
