@@ -2,7 +2,7 @@
 // BSD-3-Clause
 //
 //   contact_collection FOLDER [--law coulomb] [--tolerances 1e-3,1e-6,1e-9] [--csv FILE]
-//                      [--permutations N] [--no-siconos] [--methods] [--time-limit s]
+//                      [--permutations N] [--no-siconos] [--time-limit s]
 //
 // CPU milliseconds: median over repeated cold solves, zero start. Ratio: ours / best Siconos
 // solver.
@@ -31,7 +31,7 @@ struct Settings {
   Law law = Law::coulomb;
   std::vector<double> tolerances{1e-3, 1e-6, 1e-9};
   int permutations = 0;
-  bool siconos = has_siconos(), methods = false;
+  bool siconos = has_siconos();
   double time_limit = 10;
 };
 
@@ -44,25 +44,23 @@ class Table {
     if (file_)
       std::fprintf(file_.get(),
                    "problem,contacts,law,tolerance,measure,solver,status,sweeps,factorisations,"
-                   "replaced,ms,error,natural_map,natural_map_data,fixed_point,ratio\n");
+                   "replaced,ms,error,natural_map,fixed_point,ratio\n");
   }
   void add(const std::string& label, const Problem& problem, Law law, double tolerance,
            const SiconosRun& run, bool good, const Residuals& r) const {
     if (!file_) return;
-    std::fprintf(file_.get(),
-                 "%s,%d,%s,%g,natural_map,siconos_%s,%s,%d,0,0,%.6g,%.3e,%.3e,%.3e,%.3e,\n",
+    std::fprintf(file_.get(), "%s,%d,%s,%g,natural_map,siconos_%s,%s,%d,0,0,%.6g,%.3e,%.3e,%.3e,\n",
                  label.c_str(), problem.contacts(), name(law), tolerance, run.solver.c_str(),
                  good ? "solved" : "failed", run.iterations, run.milliseconds, run.error,
-                 r.natural_map, r.natural_map_data, r.fixed_point);
+                 r.natural_map, r.fixed_point);
   }
   void add(const std::string& label, const Problem& problem, const Options& o, const Solution& s,
            double ms, const Residuals& r, double ratio) const {
     if (!file_) return;
-    std::fprintf(file_.get(), "%s,%d,%s,%g,%s,%s,%s,%d,%d,%zu,%.6g,%.3e,%.3e,%.3e,%.3e,%.4g\n",
+    std::fprintf(file_.get(), "%s,%d,%s,%g,%s,tether,%s,%d,%d,%zu,%.6g,%.3e,%.3e,%.3e,%.4g\n",
                  label.c_str(), problem.contacts(), name(o.law), o.tolerance, name(o.measure),
-                 name(o.method), name(s.status), s.counts.sweeps, s.counts.factorisations,
-                 s.replaced.size(), ms, s.error, r.natural_map, r.natural_map_data, r.fixed_point,
-                 ratio);
+                 name(s.status), s.counts.sweeps, s.counts.factorisations, s.replaced.size(), ms,
+                 s.error, r.natural_map, r.fixed_point, ratio);
     std::fflush(file_.get());
   }
 
@@ -102,7 +100,7 @@ Best best_siconos(const Settings& settings, const std::string& label, const Prob
   return best;
 }
 
-void run_method(const std::string& label, const Problem& problem, const Options& options,
+void run_solver(const std::string& label, const Problem& problem, const Options& options,
                 const Best& best, const Table& table, Totals& totals) {
   Solution s;
   const double ms = timed(options, problem, s);
@@ -110,18 +108,16 @@ void run_method(const std::string& label, const Problem& problem, const Options&
   const bool compared =
       best.ms > 0 && options.measure == Measure::natural_map && s.status == Status::solved;
   const double ratio = compared ? ms / best.ms : 0;
-  if (options.method == Method::automatic) {
-    totals.unsolved += s.status != Status::solved;
-    if (compared) {
-      totals.log_ratio += std::log(ratio);
-      ++totals.ratios;
-      totals.slower += std::max(ms, best.ms) > 0.05 && ratio > 1.2;
-    }
+  totals.unsolved += s.status != Status::solved;
+  if (compared) {
+    totals.log_ratio += std::log(ratio);
+    ++totals.ratios;
+    totals.slower += std::max(ms, best.ms) > 0.05 && ratio > 1.2;
   }
-  std::printf("%-44s %4d %-7g %-16s %-15s %-10s %10.5f ms  error %.2e  %d/%d  replaced %zu",
+  std::printf("%-44s %4d %-7g %-16s %-10s %10.5f ms  error %.2e  %d/%d  replaced %zu",
               label.c_str(), problem.contacts(), options.tolerance, name(options.measure),
-              name(options.method), name(s.status), ms, s.error, s.counts.sweeps,
-              s.counts.factorisations, s.replaced.size());
+              name(s.status), ms, s.error, s.counts.sweeps, s.counts.factorisations,
+              s.replaced.size());
   if (compared)
     std::printf("  best Siconos %s %.5f ms, ratio %.3f", best.solver.c_str(), best.ms, ratio);
   std::printf("\n");
@@ -163,12 +159,8 @@ void run_problem(const Settings& settings, const std::string& file, double toler
     return;
   }
   // Siconos is compared at its own measure; the last one is the default.
-  std::vector<Measure> measures{Measure::natural_map, Measure::natural_map_data,
-                                Measure::fixed_point};
+  std::vector<Measure> measures{Measure::natural_map, Measure::fixed_point};
   if (settings.law == Law::maximum_dissipation) measures = {Measure::fixed_point};
-  std::vector<Method> methods{Method::automatic};
-  if (settings.methods)
-    methods = {Method::automatic, Method::gauss_seidel, Method::anderson, Method::proximal_newton};
   Best best;
   if (settings.siconos && settings.law == Law::coulomb && problem.dimension() == 3)
     best = best_siconos(settings, label, problem, tolerance, table);
@@ -177,13 +169,7 @@ void run_problem(const Settings& settings, const std::string& file, double toler
     options.law = settings.law;
     options.tolerance = tolerance;
     options.measure = measure;
-    for (Method method : methods) {
-      options.method = method;
-      options.max_work = method == Method::automatic ? Options().max_work : 1e9;
-      run_method(label, problem, options, best, table, totals);
-    }
-    options.method = Method::automatic;
-    options.max_work = Options().max_work;
+    run_solver(label, problem, options, best, table, totals);
     run_permutations(label, problem, options, settings.permutations, totals);
   }
 }
@@ -238,7 +224,6 @@ int main(int argc, char** argv) {
   app.add_option("--time-limit", settings.time_limit, "Seconds for each of Siconos' solvers")
       ->check(CLI::PositiveNumber);
   app.add_flag("--no-siconos", no_siconos, "Without Siconos");
-  app.add_flag("--methods", settings.methods, "Each method of ours beside automatic");
   CLI11_PARSE(app, argc, argv);
   settings.siconos = settings.siconos && !no_siconos;
   try {

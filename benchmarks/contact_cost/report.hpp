@@ -16,7 +16,7 @@ struct Report {
   std::vector<std::pair<std::string, std::string>> pictures;  ///< file name, SVG
 };
 
-/// Every problem of a folder by every method that can be forced and by Siconos' solvers.
+/// Every problem of a folder by ours and by Siconos' solvers.
 struct SolverPlan {
   std::string folder;
   std::vector<double> tolerances;

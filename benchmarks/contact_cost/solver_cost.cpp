@@ -22,7 +22,6 @@ namespace tether::bench {
 namespace {
 
 using contact::Law;
-using contact::Method;
 
 struct Run {
   std::string problem, solver;
@@ -33,9 +32,7 @@ struct Run {
   bool solved = false;
 };
 
-// convex_relaxation solves another problem.
-const Method kMethods[] = {Method::automatic, Method::gauss_seidel, Method::anderson,
-                           Method::proximal_newton, Method::interior_point};
+const char* const kOurs = "tether";
 const char* const kBest = "best of Siconos";
 
 // The same yardstick for everybody: the natural map over max(|b|, |x|, |w|) under `coulomb`, which
@@ -50,24 +47,21 @@ class Comparison {
   explicit Comparison(const SolverPlan& plan) : plan_(plan) {}
 
   void ours(const std::string& name, const contact::Problem& problem, Law law) {
-    for (const Method method : kMethods) {
-      int unsolved = 0;
-      for (const double tolerance : plan_.tolerances) {
-        if (unsolved == 2) break;  // it will not reach tighter ones
-        contact::Options options;
-        options.law = law;
-        // Siconos stops by its natural map, which hangs on units: ours does here, too.
-        if (law == Law::coulomb) options.measure = contact::Measure::natural_map;
-        options.tolerance = tolerance;
-        options.method = method;
-        options.max_work = 1e9 * plan_.limit;
-        contact::Solution s;
-        const double ms = contact::timed(options, problem, s, std::min(0.01, 0.1 * plan_.limit));
-        const bool solved = s.status == contact::Status::solved;
-        unsolved += !solved;
-        runs.push_back({name, contact::name(method), problem.contacts(), law, tolerance, ms,
-                        error_of(problem, law, s.impulses), contact::name(s.status), solved});
-      }
+    int unsolved = 0;
+    for (const double tolerance : plan_.tolerances) {
+      if (unsolved == 2) break;  // it will not reach tighter ones
+      contact::Options options;
+      options.law = law;
+      // Siconos stops by its natural map, which hangs on units: ours does here, too.
+      if (law == Law::coulomb) options.measure = contact::Measure::natural_map;
+      options.tolerance = tolerance;
+      options.max_work = 1e9 * plan_.limit;
+      contact::Solution s;
+      const double ms = contact::timed(options, problem, s, std::min(0.01, 0.1 * plan_.limit));
+      const bool solved = s.status == contact::Status::solved;
+      unsolved += !solved;
+      runs.push_back({name, kOurs, problem.contacts(), law, tolerance, ms,
+                      error_of(problem, law, s.impulses), contact::name(s.status), solved});
     }
   }
 
@@ -114,22 +108,19 @@ class Comparison {
   const SolverPlan& plan_;
 };
 
-// Solved problems, and time over that of `automatic` where both solved it.
+// Solved problems, and time over ours where both solved it.
 Table summary(const std::vector<Run>& runs, Law law, const std::vector<double>& tolerances) {
-  std::map<std::pair<std::string, double>, const Run*> automatic;
+  std::map<std::pair<std::string, double>, const Run*> ours;
   std::set<std::string> problems;
   for (const Run& r : runs) {
     if (r.law != law) continue;
     problems.insert(r.problem);
-    if (r.solver == name(Method::automatic)) automatic[{r.problem, r.tolerance}] = &r;
+    if (r.solver == kOurs) ours[{r.problem, r.tolerance}] = &r;
   }
   Table table;
-  table.head = {fmt::format("{}: solved, time / automatic", name(law))};
+  table.head = {fmt::format("{}: solved, time / tether", name(law))};
   for (const double t : tolerances) table.head.push_back(fmt::format("{:.0e}", t));
-  std::vector<std::string> names;
-  for (const Method m : kMethods) names.emplace_back(name(m));
-  names.emplace_back(kBest);
-  for (const std::string& solver : names) {
+  for (const std::string solver : {kOurs, kBest}) {
     std::vector<std::string> row{solver};
     bool any = false;
     for (const double t : tolerances) {
@@ -138,8 +129,8 @@ Table summary(const std::vector<Run>& runs, Law law, const std::vector<double>& 
       for (const Run& r : runs) {
         if (r.law != law || r.solver != solver || r.tolerance != t || !r.solved) continue;
         ++solved;
-        const auto own = automatic.find({r.problem, t});
-        if (own != automatic.end() && own->second->solved) ratio.add(r.ms / own->second->ms);
+        const auto own = ours.find({r.problem, t});
+        if (own != ours.end() && own->second->solved) ratio.add(r.ms / own->second->ms);
       }
       any = any || solved > 0;
       row.push_back(ratio.count()

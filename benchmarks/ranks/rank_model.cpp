@@ -4,8 +4,8 @@
 //   smpirun -np RANKS -platform FILE rank_model CONTACTS_A_RANK NS_A_CONTACT [SWEEPS]
 //
 // Compiled by SimGrid's smpicxx (rank_model.sh). A cube of spheres, owned in blocks. The plan (who
-// sweeps which chunks, who tells whom after which colour) is contact::detail::RankPlan's, as
-// contact_mpi::Solver has it, and so are the messages and the sum after a sweep: detail::Messages.
+// sweeps which chunks, who tells whom after which colour) is contact::detail::RankPlan's,
+// and so are the messages and the sum after a sweep: contact_mpi::Messages.
 // Only the sweeping itself is time that passes: NS_A_CONTACT for each contact of a colour. All
 // ranks are threads of one process, which share the graph of all contacts.
 #include <mpi.h>
@@ -15,9 +15,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
+#include <tether/contact_mpi.hpp>
 #include <vector>
 
-#include "messages.hpp"
 #include "ranks/rank_plan.hpp"
 
 namespace {
@@ -155,7 +155,7 @@ int main(int argc, char** argv) {
   // time.
   static const Model shared = model(ranks, side);
   const std::vector<Colour>& mine = shared.of[at(rank)];
-  tether::contact_mpi::detail::Messages messages(MPI_COMM_WORLD);
+  tether::contact_mpi::Messages messages(MPI_COMM_WORLD);
   std::vector<std::vector<RankMessages::With>> with;
   for (const Colour& colour : mine) {
     std::map<int, RankMessages::With> of;

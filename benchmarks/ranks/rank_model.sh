@@ -24,7 +24,7 @@ contact=$(archive contact libtether_contact.a) linalg=$(archive linalg libtether
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 smpicxx -std=c++17 -O2 -pthread -I"$root/contact/include" -I"$root/contact/src" \
-  -I"$root/contact/mpi/include" -I"$root/contact/mpi/src" -I"$root/linalg/include" \
+  -I"$root/contact/mpi/include" -I"$root/linalg/include" \
   -I/usr/include/eigen3 \
   "$root/benchmarks/ranks/rank_model.cpp" "$root/contact/mpi/src/messages.cpp" \
   "$contact" $linalg -o "$folder/rank_model"

@@ -8,11 +8,13 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <tether/contact_mpi.hpp>
 
-#include "shares.hpp"
+#include "packing.hpp"
 
 int main(int argc, char** argv) {
-  using namespace tether::contact_mpi;
+  using namespace tether::contact;
+  using tether::contact_mpi::Messages;
   MPI_Init(&argc, &argv);
   int ranks = 1, rank = 0;
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
@@ -23,25 +25,28 @@ int main(int argc, char** argv) {
     MPI_Finalize();
     return 2;
   }
-  tether::contact::random::Packing p = tether::contact::random::packing(side, true, 1);
-  sort_contacts(p);
-  std::vector<int> owner(p.bodies.size());
-  for (std::size_t b = 0; b < owner.size(); ++b)
-    owner[b] = static_cast<int>(b * static_cast<std::size_t>(ranks) / owner.size());
-  const Shares mine = share_of(p, owner, rank);
+  const tether::contact::random::Packing p = tether::contact::random::packing(side, true, 1);
+  std::vector<Eigen::Vector3d> positions;
+  for (std::size_t b = 0; b < p.bodies.size(); ++b)
+    positions.emplace_back(static_cast<double>(b), 0, 0);
   const std::array<int, 2> sweeps = {20, 220};
   std::array<double, 2> least = {1e9, 1e9};
-  Solution s;
+  BodySolution s;
+  Messages messages(MPI_COMM_WORLD);
+  RankTeam team(messages);
+  team.place(positions);
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t k = 0; k < 2; ++k) {
-      Options o;
+      BodyOptions o;
       o.tolerance = 1e-300;
       o.max_assembled = 0;
       o.max_sweeps = sweeps[k];
-      Solver solver(MPI_COMM_WORLD, o);
+      o.team = &team;
+      BodySolver solver(o);
+      messages.traffic = {};
       MPI_Barrier(MPI_COMM_WORLD);
       const double begin = MPI_Wtime();
-      solver.solve(mine.share, s);
+      solver.solve(p.bodies, p.contacts, s);
       MPI_Barrier(MPI_COMM_WORLD);
       least[k] = std::min(least[k], MPI_Wtime() - begin);
     }
@@ -52,7 +57,7 @@ int main(int argc, char** argv) {
         "%d ranks, %zu contacts: %.1f us a sweep, %.1f ns a contact; rank 0 sends %lld messages, "
         "%lld bytes\n",
         ranks, p.contacts.size(), 1e6 * sweep, 1e9 * sweep / static_cast<double>(p.contacts.size()),
-        s.traffic.messages / s.sweeps, s.traffic.bytes / s.sweeps);
+        messages.traffic.messages / s.sweeps, messages.traffic.bytes / s.sweeps);
   MPI_Finalize();
   return 0;
 }

@@ -41,10 +41,9 @@ py::dict residuals_of(const tc::ConeResiduals& r) {
 }
 
 tc::ConeSolution solve(const tc::ConeProblem& problem, const std::string& law, double tolerance,
-                       const std::string& method, const py::object& start, double max_work) {
+                       const py::object& start, double max_work) {
   tc::Options options;
   options.law = named<tc::Law>("law", law, tc::laws());
-  options.method = named<tc::Method>("method", method, kMethods);
   options.tolerance = tolerance;
   options.max_work = max_work;
   tc::ConeSolver solver(options);
@@ -154,7 +153,7 @@ cone that has it.)")
 tolerance: largest error of a solution that is taken; kink: cones nearer to another regime than
 this (relative) are listed. Raises ValueError where the impulses are no solution.)")
       .def("solve", &solve, "law"_a = "coulomb", py::kw_only(), "tolerance"_a = 1e-9,
-           "method"_a = "automatic", "start"_a = py::none(), "max_work"_a = 1e10,
+           "start"_a = py::none(), "max_work"_a = 1e10,
            R"(The impulses that obey the law: a ConeSolution.
 
 law: coulomb takes every cone, frictionless no bounds and moments, maximum_dissipation no free rows

@@ -68,11 +68,9 @@ py::dict residuals(const tc::Problem& problem, const std::string& law, const Arr
 }
 
 tc::Solution solve(const tc::Problem& problem, const std::string& law, double tolerance,
-                   const std::string& method, const py::object& start, double max_work,
-                   bool strict) {
+                   const py::object& start, double max_work, bool strict) {
   tc::Options options;
   options.law = named<tc::Law>("law", law, tc::laws());
-  options.method = named<tc::Method>("method", method, kMethods);
   options.tolerance = tolerance;
   options.max_work = max_work;
   options.strict = strict;
@@ -138,8 +136,7 @@ w = A x - b. Raises ValueError on sizes that do not match and values that are no
 tolerance: largest error of a solution that is taken; kink: contacts nearer to another regime than
 this (relative) are listed. Raises ValueError where the impulses are no solution.)")
       .def("solve", &solve, "law"_a = "maximum_dissipation", py::kw_only(), "tolerance"_a = 1e-9,
-           "method"_a = "automatic", "start"_a = py::none(), "max_work"_a = 1e10,
-           "strict"_a = false,
+           "start"_a = py::none(), "max_work"_a = 1e10, "strict"_a = false,
            R"(The impulses that obey the law: a Solution.
 
 law: maximum_dissipation (Preclik and Ruede), coulomb or frictionless. tolerance: of the relative

@@ -1,7 +1,6 @@
 // Tether: what the bindings of contact problems share. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 #include <tether/contact.hpp>
@@ -11,10 +10,6 @@
 namespace tether::python {
 
 namespace tc = tether::contact;
-
-inline constexpr std::array kMethods = {tc::Method::automatic,      tc::Method::gauss_seidel,
-                                        tc::Method::anderson,       tc::Method::proximal_newton,
-                                        tc::Method::interior_point, tc::Method::convex_relaxation};
 
 using View = Eigen::Map<const Eigen::VectorXd>;
 

@@ -179,7 +179,6 @@ class Refusals(unittest.TestCase):
             (lambda: ConeProblem([[1.0]], [1], [Cone.free()], [-1]), "compliance"),
             (lambda: ConeProblem.saddle(np.eye(2), np.eye(3), [0, 0], [0], [Cone.free()]), "J is 3 x 3"),
             (lambda: p.solve("maximum"), "coulomb"),
-            (lambda: p.solve(method="magic"), "gauss_seidel"),
             (lambda: p.solve(tolerance=-1), "tolerance"),
             (lambda: p.solve(start=[1, 2]), "start has 2"),
             (lambda: p.residuals([1, 2]), "impulses has 2"),

@@ -165,7 +165,6 @@ class Refusals(unittest.TestCase):
             (lambda: contact.Problem("A", b, mu), "A has entries of type <U1"),
             (lambda: contact.Problem(object(), b, mu), "A has entries of type object"),
             (lambda: contact.Problem(A, b, mu).solve("columb"), "coulomb"),
-            (lambda: contact.Problem(A, b, mu).solve(method="magic"), "gauss_seidel"),
             (lambda: contact.Problem(A, b, mu).solve(tolerance=-1), "tolerance"),
             (lambda: contact.Problem(A, b, mu).solve(start=[1, 2]), "start has 2"),
             (lambda: contact.Problem(A, b, mu).residuals([1, 2]), "impulses has 2"),

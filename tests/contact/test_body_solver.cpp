@@ -79,7 +79,6 @@ TEST_CASE("evaluate of bodies is evaluate of the Delassus problem") {
       CHECK(near(a.energy_change, b.energy_change));
       CHECK(near(a.fixed_point, b.fixed_point));
       CHECK(near(a.natural_map, b.natural_map));
-      CHECK(near(a.natural_map_data, b.natural_map_data));
       CHECK(near(s.error, b.fixed_point));
     }
   }

@@ -50,8 +50,7 @@ bool hard(const std::string& path) { return path.find("RockPile") != std::string
 void solve_under_coulomb(const Paths& paths) {
   for (const std::string& path : paths) {
     const Problem p = read_problem(path);
-    for (Measure measure :
-         {Measure::natural_map, Measure::natural_map_data, Measure::fixed_point}) {
+    for (Measure measure : {Measure::natural_map, Measure::fixed_point}) {
       Options o;
       o.law = Law::coulomb;
       o.measure = measure;
@@ -60,9 +59,7 @@ void solve_under_coulomb(const Paths& paths) {
       const Residuals r = evaluate(p, o.law, s.impulses);
       INFO(path << ", " << name(measure) << ": " << name(s.status) << " " << s.error);
       CHECK(s.status == Status::solved);
-      CHECK((measure == Measure::natural_map        ? r.natural_map
-             : measure == Measure::natural_map_data ? r.natural_map_data
-                                                    : r.fixed_point) <= o.tolerance);
+      CHECK((measure == Measure::natural_map ? r.natural_map : r.fixed_point) <= o.tolerance);
       CHECK(r.cone <= 1e-12 * (1 + s.impulses.norm()));
     }
   }

@@ -3,18 +3,21 @@
 // mpiexec -n N ranks [side of the packings]
 #include <array>
 #include <cmath>
-#include <limits>
+#include <cstring>
+#include <tether/contact_mpi.hpp>
 
 #include "check.hpp"
-#include "shares.hpp"
+#include "packing.hpp"
 
 namespace {
 
 using namespace tether::contact_mpi;
 using tether::contact::BodySolution;
 using tether::contact::BodySolver;
+using Options = tether::contact::BodyOptions;
 using tether::contact::Law;
 using tether::contact::PointContact;
+using tether::contact::RankTeam;
 using tether::contact::Status;
 using tether::contact::random::Generator;
 using tether::contact::random::Packing;
@@ -40,22 +43,35 @@ Packing mixed(int side, std::uint64_t seed) {
   }
   for (std::size_t b = 0; b < round.bodies.size(); ++b)
     if (b % 3 != 0) p.bodies[b] = round.bodies[b];
-  sort_contacts(p);
   return p;
 }
 
-// Slabs, or anywhere, such that neighbours are mostly on other ranks.
-std::vector<int> slabs(std::size_t bodies) {
-  std::vector<int> owner(bodies);
-  for (std::size_t b = 0; b < bodies; ++b)
-    owner[b] = static_cast<int>(b * static_cast<std::size_t>(ranks) / bodies);
-  return owner;
+// Along a line, or anywhere, such that neighbours are mostly on other ranks.
+std::vector<Eigen::Vector3d> in_line(std::size_t bodies) {
+  std::vector<Eigen::Vector3d> out;
+  for (std::size_t b = 0; b < bodies; ++b) out.emplace_back(static_cast<double>(b), 0, 0);
+  return out;
 }
-std::vector<int> anywhere(std::size_t bodies, std::uint64_t seed) {
+std::vector<Eigen::Vector3d> anywhere(std::size_t bodies, std::uint64_t seed) {
   Generator g(seed);
-  std::vector<int> owner(bodies);
-  for (int& r : owner) r = std::min(ranks - 1, static_cast<int>(g.uniform(0, ranks)));
-  return owner;
+  std::vector<Eigen::Vector3d> out(bodies);
+  for (Eigen::Vector3d& x : out) x = g.vector();
+  return out;
+}
+
+// All that one process finds, bit by bit.
+bool same(const BodySolution& one, const BodySolution& s) {
+  const auto same_bits = [](const std::vector<Eigen::Vector3d>& a,
+                            const std::vector<Eigen::Vector3d>& b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), 24 * a.size()) == 0;
+  };
+  return s.status == one.status && s.error == one.error && s.sweeps == one.sweeps &&
+         s.islands == one.islands && s.colours == one.colours &&
+         s.assembled_islands == one.assembled_islands && s.failed_islands == one.failed_islands &&
+         s.warm_started == one.warm_started && s.regimes == one.regimes &&
+         same_bits(s.velocities, one.velocities) &&
+         same_bits(s.angular_velocities, one.angular_velocities) &&
+         same_bits(s.impulses, one.impulses);
 }
 
 void everywhere(std::vector<Eigen::Vector3d>& list, std::size_t n) {
@@ -88,35 +104,54 @@ BodySolution alone(BodySolver& solver, const Packing& p) {
   return out;
 }
 
-// A problem of one island: a rank sends velocities alone, one sum ends each pass, and all sweep
-// alike many contacts.
-void check_shares(const Solution& s, std::size_t contacts) {
-  CHECK(s.shared_islands == (ranks > 1 ? 1 : 0));
-  CHECK(s.swept_contacts * ranks <= 1.1 * static_cast<double>(contacts) + 400 * (ranks - 1));
-  if (ranks == 1) return;
-  CHECK(s.traffic.messages >= s.sweeps && s.traffic.bytes % 48 == 0);
-  CHECK(s.traffic.reductions > s.sweeps && s.traffic.reductions < 2 * s.sweeps + 6);
+// The ranks as a team, with its messages.
+struct Shared {
+  explicit Shared(const Options& o, const std::vector<Eigen::Vector3d>& positions)
+      : messages(MPI_COMM_WORLD), team(messages, 0) {
+    team.place(positions);
+    options = o;
+    options.team = &team;
+  }
+  Messages messages;
+  RankTeam team;
+  Options options;
+};
+
+BodySolution by_all(const Packing& p, const Options& o,
+                    const std::vector<Eigen::Vector3d>& positions) {
+  Shared shared(o, positions);
+  return BodySolver(shared.options).solve(p.bodies, p.contacts);
 }
 
 void same_bits_as_one_process(int side) {
   for (Law law : {Law::coulomb, Law::maximum_dissipation}) {
-    Options o;
-    o.law = law;
-    o.max_sweeps = law == Law::coulomb ? 100 : 25;
-    o.max_assembled = 0;
-    Packing p = mixed(side, 7);
-    BodySolver one(o);
-    Solver solver(MPI_COMM_WORLD, o);
-    // Bodies change their ranks between solves; impulses are found all the same.
-    for (int solve = 0; solve < 2; ++solve) {
-      const BodySolution expected = alone(one, p);
+    for (const bool near : {true, false}) {
+      Options o;
+      o.law = law;
+      o.max_sweeps = law == Law::coulomb ? 100 : 25;
+      o.max_assembled = 0;
+      Packing p = mixed(side, 7);
+      BodySolver one(o);
       const std::size_t n = p.bodies.size();
-      const Shares shares = share_of(p, solve == 0 ? slabs(n) : anywhere(n, 3), rank);
-      const Solution s = solver.solve(shares.share);
-      CHECK(same(expected, s, shares));
-      CHECK(s.warm_started == (solve == 0 ? 0 : static_cast<int>(p.contacts.size())));
-      check_shares(s, p.contacts.size());
-      for (std::size_t k = 0; k < p.contacts.size(); ++k) p.contacts[k].bias = 1e-3;
+      Shared shared(o, near ? in_line(n) : anywhere(n, 3));
+      BodySolver solver(shared.options);
+      for (int solve = 0; solve < 2; ++solve) {
+        shared.messages.traffic = {};
+        const long before = shared.team.swept_contacts();
+        const BodySolution expected = alone(one, p);
+        const BodySolution s = solver.solve(p.bodies, p.contacts);
+        CHECK(same(expected, s));
+        CHECK(s.warm_started == (solve == 0 ? 0 : static_cast<int>(p.contacts.size())));
+        for (PointContact& c : p.contacts) c.bias = 1e-3;
+        if (ranks == 1) continue;
+        // A problem of one island: a rank sends velocities alone, one sum ends each pass, and all
+        // sweep about alike many contacts.
+        CHECK(static_cast<double>(shared.team.swept_contacts() - before) * ranks <=
+              1.1 * static_cast<double>(p.contacts.size()) + 400 * (ranks - 1));
+        const Traffic& traffic = shared.messages.traffic;
+        CHECK(traffic.messages >= s.sweeps && traffic.bytes % 48 == 0);
+        CHECK(traffic.reductions > s.sweeps && traffic.reductions < 2 * s.sweeps + 6);
+      }
     }
   }
 }
@@ -129,15 +164,13 @@ void same_bits_with_threads(int side) {
   BodySolver one(o);
   const BodySolution expected = alone(one, p);
   o.threads = 2;
-  const Shares shares = share_of(p, slabs(p.bodies.size()), rank);
-  CHECK(same(expected, Solver(MPI_COMM_WORLD, o).solve(shares.share), shares));
+  CHECK(same(expected, by_all(p, o, in_line(p.bodies.size()))));
 }
 
 // Sweeps end early, and one rank goes on with all of it.
 void islands_of_several_ranks_are_assembled() {
   Packing p = tether::contact::random::packing(9, true, 5);
   for (PointContact& c : p.contacts) c.mu = 0.7;
-  sort_contacts(p);
   Options o;
   o.tolerance = 1e-7;
   o.max_sweeps = 20;
@@ -145,10 +178,7 @@ void islands_of_several_ranks_are_assembled() {
   BodySolver one(o);
   const BodySolution expected = alone(one, p);
   CHECK(expected.assembled_islands == 1);
-  const Shares shares = share_of(p, anywhere(p.bodies.size(), 1), rank);
-  const Solution s = Solver(MPI_COMM_WORLD, o).solve(shares.share);
-  CHECK(same(expected, s, shares));
-  CHECK(s.shared_islands == (ranks > 1 ? 1 : 0));
+  CHECK(same(expected, by_all(p, o, anywhere(p.bodies.size(), 1))));
 }
 
 void islands_of_one_rank_need_no_sweep_messages() {
@@ -164,22 +194,22 @@ void islands_of_one_rank_need_no_sweep_messages() {
       p.contacts.push_back(c);
     }
   }
-  sort_contacts(p);
   const Options o;
   BodySolver one(o);
   const BodySolution expected = alone(one, p);
-  const Shares shares = share_of(p, anywhere(p.bodies.size(), 2), rank);
-  const Solution s = Solver(MPI_COMM_WORLD, o).solve(shares.share);
-  CHECK(same(expected, s, shares));
+  Shared shared(o, anywhere(p.bodies.size(), 2));
+  const BodySolution s = BodySolver(shared.options).solve(p.bodies, p.contacts);
+  CHECK(same(expected, s));
   CHECK(expected.status == Status::solved);
-  CHECK(s.islands == 40 && s.shared_islands == 0);
-  CHECK(s.traffic.messages == 0 && s.traffic.bytes == 0);
+  CHECK(s.islands == 40);
+  CHECK(shared.messages.traffic.messages == 0 && shared.messages.traffic.bytes == 0);
 }
 
+// None at all; one that falls onto a floor, which is a body.
 void few_bodies() {
-  Solver solver(MPI_COMM_WORLD);
-  // None at all; one that falls onto a floor, which another rank owns.
-  CHECK(solver.solve(Share{}).status == Status::solved);
+  Shared shared(Options(), {});
+  BodySolver solver(shared.options);
+  CHECK(solver.solve({}, {}).status == Status::solved);
   Packing p;
   p.bodies.resize(2);
   p.bodies[1].inverse_mass = 1;
@@ -192,120 +222,16 @@ void few_bodies() {
   c.r2 = {0, 0, -1};
   c.mu = 0.5;
   p.contacts.push_back(c);
-  for (int on : {0, ranks - 1}) {
-    const Shares shares = share_of(p, {ranks - 1 - on, on}, rank);
-    const Solution s = solver.solve(shares.share);
-    CHECK(s.status == Status::solved && s.islands == 1);
-    for (std::size_t k = 0; k < shares.share.numbers.size(); ++k)
-      CHECK(s.velocities[k].norm() < 1e-15);
-    for (const auto& x : s.impulses) CHECK((x - Eigen::Vector3d(0, 0, -1)).norm() < 1e-15);
-  }
-}
-
-// Wrong input of the last rank makes all throw, and the solver goes on to serve.
-void bad_input_is_refused_by_all() {
-  const Packing good = mixed(3, 1);
-  const std::vector<int> owner = slabs(good.bodies.size());
-  const int last = ranks - 1;
-  Solver solver(MPI_COMM_WORLD);
-  const auto refused = [&](const std::string& text, auto&& spoil) {
-    Shares s = share_of(good, owner, rank);
-    if (rank == last) spoil(s.share);
-    CHECK(contains(thrown<std::invalid_argument>([&] { solver.solve(s.share); }), text));
-  };
-  const std::string who = "rank " + std::to_string(last) + ": ";
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  refused(who + "body 26: velocity(0) = nan",
-          [&](Share& s) { s.bodies[s.bodies.size() - 2].velocity[0] = nan; });
-  refused("contact 0: bias = nan", [&](Share& s) {
-    s.contacts.assign(1, PointContact{});
-    s.contacts[0].first = s.numbers[0];
-    s.contacts[0].bias = nan;
-  });
-  refused("must be finite and >= 0", [&](Share& s) {
-    s.contacts.assign(1, PointContact{});
-    s.contacts[0].first = s.numbers[0];
-    s.contacts[0].mu = -1;
-  });
-  refused("number of a body = 1000: the 28 bodies of all ranks have the numbers 0 .. 27",
-          [](Share& s) { s.numbers[0] = 1000; });
-  refused("number of a body = -1", [](Share& s) { s.numbers[0] = -1; });
-  refused("is on rank", [](Share& s) { s.numbers[0] = s.numbers[1]; });
-  refused("numbers of bodies, but", [](Share& s) { s.numbers.pop_back(); });
-  refused("joins fixed bodies", [](Share& s) {
-    s.contacts.assign(1, PointContact{});
-    s.contacts[0].first = 27;
-  });
-  if (ranks > 1) {
-    refused("belongs to rank 0, which owns body 0", [](Share& s) {
-      s.contacts.assign(1, PointContact{});
-      s.contacts[0].first = 0;
-    });
-  }
-  const Shares shares = share_of(good, owner, rank);
-  BodySolver one;
-  CHECK(same(alone(one, good), solver.solve(shares.share), shares));
-  // Options, too.
-  Options o;
-  if (rank == last) o.tolerance = -1;
-  CHECK(contains(thrown<std::invalid_argument>([&] { Solver(MPI_COMM_WORLD, o); }),
-                 "rank " + std::to_string(last) + ": tolerance = -1"));
-  o.tolerance = rank == last ? 1e-3 : 1e-4;
-  if (ranks > 1) {
-    CHECK(contains(thrown<std::invalid_argument>([&] { Solver(MPI_COMM_WORLD, o); }),
-                   "tolerance is 0.000100 on one rank and 0.001000 on another"));
-  }
-  // Whatever one rank throws.
-  const auto failure =
-      rank == last ? std::make_exception_ptr(std::bad_alloc()) : std::exception_ptr();
-  CHECK(contains(thrown<std::runtime_error>([&] { agree(MPI_COMM_WORLD, failure); }),
-                 "rank " + std::to_string(last) + ": std::bad_alloc"));
-}
-
-void items_go_to_their_ranks() {
-  // Each rank sends its number and the receiver's to all, the highest rank first.
-  std::vector<double> items;
-  std::vector<int> to;
-  for (int r = ranks; r-- > 0;) {
-    items.insert(items.end(), {static_cast<double>(rank), static_cast<double>(r)});
-    to.push_back(r);
-  }
-  const std::vector<double> come = send(MPI_COMM_WORLD, 2, items, to);
-  CHECK(come.size() == 2 * at(ranks));
-  for (int r = 0; r < ranks; ++r) CHECK(come[2 * at(r)] == r && come[2 * at(r) + 1] == rank);
-  CHECK(send(MPI_COMM_WORLD, 3, {}, {}).empty());
-  if (rank == ranks - 1) to[0] = ranks;
-  CHECK(contains(
-      thrown<std::invalid_argument>([&] { send(MPI_COMM_WORLD, 2, items, to); }),
-      "to[0] = " + std::to_string(ranks) + ": must lie in 0 .. " + std::to_string(ranks - 1)));
-}
-
-// Half of the weight in a corner: each rank has its part of it.
-void bodies_are_spread_by_weight() {
-  std::vector<int> numbers;
-  std::vector<Eigen::Vector3d> centres;
-  std::vector<double> weights;
-  constexpr int kSide = 24;
-  double sum = 0, own = 0;
-  for (int k = 0; k < kSide * kSide * kSide; ++k) {
-    const Eigen::Vector3d centre(k % kSide, k / kSide % kSide, k / kSide / kSide);
-    const double weight = centre.maxCoeff() < 12 ? 7 : 1;
-    sum += weight;
-    if (k % ranks != rank) continue;
-    numbers.push_back(k);
-    centres.push_back(centre);
-    weights.push_back(weight);
-  }
-  const std::vector<int> to = partition(MPI_COMM_WORLD, numbers, centres, weights);
-  std::vector<double> loads(at(ranks), 0);
-  for (std::size_t k = 0; k < to.size(); ++k) loads[at(to[k])] += weights[k];
-  MPI_Allreduce(MPI_IN_PLACE, loads.data(), ranks, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
-  own = loads[at(rank)];
-  CHECK(own <= 1.12 * sum / ranks && own >= 0.88 * sum / ranks);
-  if (rank == ranks - 1) weights[0] = -1;
-  CHECK(contains(
-      thrown<std::invalid_argument>([&] { partition(MPI_COMM_WORLD, numbers, centres, weights); }),
-      "weight must lie in 0 .. 1e30"));
+  const BodySolution s = solver.solve(p.bodies, p.contacts);
+  CHECK(s.status == Status::solved && s.islands == 1);
+  for (const auto& v : s.velocities) CHECK(v.norm() < 1e-15);
+  for (const auto& x : s.impulses) CHECK((x - Eigen::Vector3d(0, 0, -1)).norm() < 1e-15);
+  // Wrong input makes all throw, and the solver goes on to serve.
+  p.contacts[0].mu = -1;
+  CHECK(contains(thrown<std::invalid_argument>([&] { solver.solve(p.bodies, p.contacts); }),
+                 "must be finite and >= 0"));
+  p.contacts[0].mu = 0.5;
+  CHECK(solver.solve(p.bodies, p.contacts).status == Status::solved);
 }
 
 }  // namespace
@@ -321,9 +247,6 @@ int main(int argc, char** argv) {
     islands_of_several_ranks_are_assembled();
     islands_of_one_rank_need_no_sweep_messages();
     few_bodies();
-    bad_input_is_refused_by_all();
-    bodies_are_spread_by_weight();
-    items_go_to_their_ranks();
   } catch (const std::exception& e) {
     check_failed(__FILE__, __LINE__, e.what());
   }

@@ -1,4 +1,4 @@
-// Tether: all contact problems of folders and generated ones, solved by Method::automatic.
+// Tether: all contact problems of folders and generated ones, solved.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <CLI/CLI.hpp>
 #include <cmath>

@@ -1,10 +1,21 @@
 // Tether: messages between ranks by MPI. SPDX-License-Identifier: BSD-3-Clause
-#include "messages.hpp"
-
 #include <cstdio>
 #include <cstdlib>
+#include <tether/contact_mpi.hpp>
 
-namespace tether::contact_mpi::detail {
+namespace tether::contact_mpi {
+
+Messages::Messages(MPI_Comm comm) {
+  MPI_Comm_dup(comm, &comm_);
+  MPI_Comm_size(comm_, &size_);
+  MPI_Comm_rank(comm_, &rank_);
+}
+
+Messages::~Messages() {
+  int over = 0;
+  MPI_Finalized(&over);
+  if (!over) MPI_Comm_free(&comm_);
+}
 
 void Messages::exchange(std::vector<With>& with) {
   constexpr int kTag = 1;
@@ -59,4 +70,4 @@ void Messages::give_up(const char* why) {
   std::abort();
 }
 
-}  // namespace tether::contact_mpi::detail
+}  // namespace tether::contact_mpi

@@ -1,9 +1,11 @@
-// Tether: Method::automatic: stages by their prices. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the stages of a solve and the order of their turns. SPDX-License-Identifier: BSD-3-Clause
 #include "assembled/automatic.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "assembled/infeasible.hpp"
 
 namespace tether::contact::detail {
 namespace {
@@ -16,26 +18,21 @@ constexpr double kCoupled = 0.8;
 // Rounds that do not halve the error before the solve ends, and before contacts are replaced.
 constexpr int kPatience = 6, kPatienceBefore = 2;
 
-}  // namespace
+// Sweeps that a factorisation costs, from which on sweeps go on before stages that take many of
+// them.
+constexpr double kDear = 30;
 
-// The stages in the order of their turns, each until its budget is spent; method, section 10. All
-// start from the best point, the sweeps and the proximal path from the sweeps' own.
-const Automatic::Turn Automatic::kTurns[] = {
-    // stage, when, budget
-    {&Automatic::sweep, always, 20},                             // factorisations it may forecast
-    {&Automatic::end_of_work, always, 0},                        //
-    {&Automatic::proximal_path, regular_and_dear, 100},          // problems
-    {&Automatic::interior_points, first_regular_and_cheap, 40},  // steps, from sticking
-    {&Automatic::round_off, always, 8},                          // steps with long sums
-    {&Automatic::proximal_path_at_best, first_cheap_contacts, 20},  // problems
-    {&Automatic::arclength_path, first_and_regular, 800},           // factorisations
-    {&Automatic::round_off, always, 8},                             // steps with long sums
-    {&Automatic::end_of_work, always, 0},                           //
-    {&Automatic::no_solution, always, 0},                           // once in a solve
-    {&Automatic::proximal_newton, always, 12},                      // proximal problems
-    {&Automatic::end_of_work, always, 0},                           //
-    {&Automatic::end_of_round, always, 0},                          //
-};
+// The slip is differentiable at every contact.
+bool is_regular(const System& system) {
+  for (int i = 0; i < system.size(); ++i) {
+    double gamma[2];
+    system.gamma(i, gamma);
+    if (!(std::hypot(gamma[0], gamma[1]) < kStronglyCoupled)) return false;
+  }
+  return true;
+}
+
+}  // namespace
 
 void Automatic::reset(int contacts, const Options& options, bool proofs) {
   contacts_ = contacts;
@@ -47,37 +44,56 @@ void Automatic::reset(int contacts, const Options& options, bool proofs) {
 
 void Automatic::prepare() {
   if (ready_) return;
-  sweeps.reset(contacts_);
-  newton.reset(contacts_);
-  interior.reset(contacts_);
+  sweeps_.reset(contacts_);
+  newton_.reset(contacts_);
+  interior_.reset(contacts_);
   parts_.reset(contacts_);
   ready_ = true;
 }
 
+// All stages start from the best point, the sweeps and the proximal path from the sweeps' own.
 Status Automatic::rotate(Search& search, int most_idle) {
+  constexpr int kFactorisations = 800;  // of the path by its arclength
+  constexpr int kProblems = 12;         // of proximal Newton
   prepare();
-  sweeps.start(search.best.data());
-  Round r;
-  r.halved = search.best_error;
-  r.most_idle = most_idle;
-  for (int i = 0; i < contacts_; ++i) {
-    double gamma[2];
-    search.system.gamma(i, gamma);
-    r.regular = r.regular && std::hypot(gamma[0], gamma[1]) < kStronglyCoupled;
-  }
-  r.by_bodies = r.regular && interior.order_bodies(search);
-  for (;; r.first = false) {
-    for (const Turn& turn : kTurns) {
-      if (!turn.admitted(r)) continue;
-      const Status status = (this->*turn.stage)(search, r, turn.budget);
-      if (search.confirmed()) return Status::solved;
-      if (status != Status::unsolved && status != Status::solved) return status;
-    }
+  sweeps_.start(search.best.data());
+  const bool regular = is_regular(search.system);
+  const bool by_bodies = regular && interior_.order_bodies(search);
+  double halved = search.best_error;
+  bool first = true, solved = false, dear = false, rounding = false;
+  const auto turn = [&](bool due, const auto& stage) {
+    if (solved || rounding || !due) return;
+    stage();
+    solved = search.confirmed();
+  };
+  for (int idle = 0;; first = false) {
+    turn(true, [&] { dear = sweep(search, first, by_bodies); });
+    const double swept = search.best_error;
+    if (!solved && search.exhausted()) return Status::work_limit;
+    turn(regular && dear, [&] { proximal_path(search); });
+    turn(regular && !dear && first, [&] { interior_points(search, by_bodies); });
+    turn(true, [&] { rounding = at_round_off(search); });
+    turn(regular && !dear && first && !by_bodies, [&] { proximal_path_at_best(search); });
+    turn(regular && first, [&] { interior_.run_arclength(search, kFactorisations, newton_); });
+    turn(true, [&] { rounding = at_round_off(search); });
+    if (solved) return Status::solved;
+    if (!rounding && search.exhausted()) return Status::work_limit;
+    if (infeasible(search)) return Status::infeasible;
+    if (rounding) return Status::round_off;
+    turn(true, [&] { newton_.run(search, search.best.data(), kProblems); });
+    if (solved) return Status::solved;
+    if (search.exhausted()) return Status::work_limit;
+    // Sweeps start anew where the others have gained.
+    if (search.best_error < 0.9 * swept) sweeps_.start(search.best.data());
+    const bool gains = !(search.best_error > 0.5 * halved);
+    if (gains) halved = search.best_error;
+    idle = gains ? 0 : idle + 1;
+    if (idle >= most_idle) return give_up(search);
   }
 }
 
 Status Automatic::run_part(Search& search, const Packed& start) {
-  search.test(start.data(), Method::gauss_seidel);
+  search.test(start.data(), By::sweeps);
   return search.solved() ? Status::solved : rotate(search, kPatienceBefore);
 }
 
@@ -106,13 +122,153 @@ Status Automatic::run(Search& search) {
     if (!any) continue;
     x_ = search.best;
     search.best_error = std::numeric_limits<double>::infinity();
-    search.test(x_.data(), Method::gauss_seidel);
+    search.test(x_.data(), By::sweeps);
     ready_ = false;
     status = search.solved()
                  ? Status::solved
                  : rotate(search, eccentricity == kCoupled ? kPatience : kPatienceBefore);
   }
   return status;
+}
+
+// Half a factorisation of sweeps by a guess of the fill, then its exact price, for which the matrix
+// is ordered. False: solved, or no work is left.
+bool Automatic::order_after_sweeps(Search& search) {
+  constexpr double kLook = 0.5, kWorth = 3;  // factorisations
+  const double price = interior_.cost(search);
+  AcceleratedSweeps::Leave leave;
+  leave.price = kWorth * price;
+  leave.least_work = kLook * price;
+  sweeps_.run(search, leave);
+  if (search.solved() || search.exhausted()) return false;
+  interior_.order(search);
+  return true;
+}
+
+// Sweeps in turn with solves of the parts where they do not settle, until so much work is done. A
+// round that does not halve the error, once the sweeps have spread it, is followed by more sweeps:
+// those that need no help are soon left alone.
+void Automatic::sweep_and_solve_parts(Search& search, double until) {
+  constexpr double kShare = 0.5, kCheap = 0.1, kPartShare = 0.1;      // of the work before
+  constexpr double kBetween = 50, kMostBetween = 400, kGrowth = 1.4;  // sweeps
+  const double begin = search.counts.work;
+  double in_parts = 0, halved = search.best_error, between = kBetween;
+  while (!search.solved() && !search.exhausted() && search.counts.work < until) {
+    AcceleratedSweeps::Leave leave;
+    leave.price = search.counts.work;
+    leave.least_work = between * search.sweep_cost;
+    leave.most_work = until - search.counts.work;
+    sweeps_.run(search, leave);
+    if (search.solved()) return;
+    if (search.best_error < 0.7 * halved) {
+      halved = search.best_error;
+      in_parts = 0;
+      between = kBetween;
+      continue;
+    }
+    const double before = search.counts.work;
+    if (in_parts > kShare * (before - begin)) continue;
+    x_.assign(sweeps_.point(), sweeps_.point() + contacts_);
+    const bool changed = parts_.run(search, x_, kPartShare * before);
+    in_parts += search.counts.work - before;
+    if (!changed || in_parts > kCheap * (before - begin))
+      between = std::min(kMostBetween, kGrowth * between);
+    if (!changed) continue;
+    search.test(x_.data(), By::sweeps);
+    sweeps_.replace(x_.data());
+  }
+}
+
+// Sweeps for a few factorisations, and as long as they forecast less than kWorth. Returns whether a
+// factorisation costs many of them.
+bool Automatic::sweep(Search& search, bool first, bool by_bodies) {
+  constexpr double kStay = 3, kStayByBodies = 5, kStayDear = 40, kWorth = 20;  // factorisations
+  const double begin = search.counts.work;
+  if (first && !interior_.ordered() && !order_after_sweeps(search)) return false;
+  const double price = interior_.cost(search);
+  const bool dear = !by_bodies && price > kDear * search.sweep_cost;
+  const double until = begin + (by_bodies ? kStayByBodies : dear ? kStayDear : kStay) * price;
+  if (dear) sweep_and_solve_parts(search, until);
+  if (search.solved() || search.exhausted()) return dear;
+  AcceleratedSweeps::Leave leave;
+  leave.price = kWorth * price;
+  leave.least_work = until - search.counts.work;
+  sweeps_.run(search, leave);
+  return dear;
+}
+
+// Sweeps pass by a solution that repels them, and proximal problems from where they are may lead to
+// it. If one of these is not solved it was the wrong place, and sweeps go on to another.
+void Automatic::proximal_path(Search& search) {
+  constexpr int kProblems = 100;
+  const double end = search.work_end;
+  search.work_end = std::min(end, 2 * search.counts.work);
+  interior_.run_proximal(search, sweeps_.point(), kProblems, newton_);
+  search.work_end = end;
+}
+
+// By bodies the path of interior points ends where sweeps were, or further away.
+void Automatic::interior_points(Search& search, bool by_bodies) {
+  constexpr int kSteps = 40;
+  interior_.stick(search);
+  if (!by_bodies && !search.solved()) interior_.run(search, kSteps);
+}
+
+// A few proximal problems lead to a solution near which the path of interior points has ended. One
+// that is not solved says that they do not.
+void Automatic::proximal_path_at_best(Search& search) {
+  constexpr double kRough = 1e-2;
+  constexpr int kProblems = 20;
+  if (search.best_error > kRough) return;
+  x_ = search.best;
+  interior_.run_proximal(search, x_.data(), kProblems, newton_);
+}
+
+// Looked for once in a solve, where the quick stages have failed.
+bool Automatic::infeasible(Search& search) {
+  if (proofs_ && !looked_for_proof_) {
+    looked_for_proof_ = true;
+    if (!proves_infeasible(search, pressed_)) pressed_.clear();
+  }
+  return !pressed_.empty();
+}
+
+// Whether what is left is what round-off makes of A x - b: its bound explains the error, and steps
+// with long sums gain nothing any more.
+bool Automatic::at_round_off(Search& search) {
+  constexpr int kSteps = 8;
+  constexpr double kGain = 0.7;  // of the error: steps that leave more of it do not get on
+  while (search.explained_by_round_off() && !search.solved()) {
+    const double before = search.best_error;
+    prepare();
+    interior_.run_near(search, search.best.data(), kSteps);
+    if (search.best_error > kGain * before) return true;
+    if (search.exhausted()) return false;
+  }
+  return false;
+}
+
+// Plain sweeps from the best point that keep moving are a cycle (or a wander), those that come to
+// rest above the tolerance are a stall.
+Status Automatic::give_up(Search& search) {
+  constexpr int kSweeps = 100;
+  if (infeasible(search)) return Status::infeasible;
+  if (at_round_off(search)) return Status::round_off;
+  if (search.solved()) return Status::solved;
+  if (search.exhausted()) return Status::work_limit;
+  x_ = search.best;
+  double change = 0, size = 0;
+  for (int k = 0; k < kSweeps; ++k) {
+    z_ = x_;
+    search.system.sweep(x_.data());
+    search.count_sweep();
+  }
+  for (std::size_t i = 0; i < x_.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      change += (x_[i].v[c] - z_[i].v[c]) * (x_[i].v[c] - z_[i].v[c]);
+      size += x_[i].v[c] * x_[i].v[c];
+    }
+  return change > 1e-8 * size ? Status::cycling : Status::stalled;
 }
 
 }  // namespace tether::contact::detail

@@ -80,9 +80,10 @@ bool proves_infeasible(Search& search, Packed& d) {
   const std::size_t n = at(problem.contacts());
   Options options = search.options;
   options.law = Law::frictionless;
+  options.measure = Measure::fixed_point;
   options.tolerance = std::numeric_limits<double>::min();
   Search smooth;
-  smooth.reset(problem, options, Measure::fixed_point);
+  smooth.reset(problem, options);
   // A search that has spent its work may spend a little more: a proof is worth it.
   smooth.work_end = std::max(search.work_end - search.counts.work,
                              std::min(40 * search.sweep_cost * kSteps, kBeyond * options.max_work));

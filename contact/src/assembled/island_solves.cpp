@@ -14,7 +14,7 @@ constexpr double kBlock = 20;  // ns that it takes to take a block out of the pr
 
 bool IslandSolves::serve(const Search& search) {
   constexpr double kNearlyAll = 0.9;
-  if (search.measure != Measure::fixed_point || search.system.islands() < 2) return false;
+  if (search.options.measure != Measure::fixed_point || search.system.islands() < 2) return false;
   std::vector<int> size(at(search.system.islands()));
   for (int k : search.system.problem().islands()) ++size[at(k)];
   return *std::max_element(size.begin(), size.end()) <= kNearlyAll * search.system.size();
@@ -45,14 +45,14 @@ void IslandSolves::solve(Search& search, Island& island, double budget) {
   search.counts.work += kBlock * static_cast<double>(problem.blocks().size());
   Options options = search.options;
   options.max_work = budget;
-  search_.reset(problem, options, search.measure);
+  search_.reset(problem, options);
   search_.system.belong_to(search.system, contacts);
   search_.system.share_as(search.system, contacts);
   Packed start(at(island.size));
   for (int r = 0; r < island.size; ++r) start[at(r)] = x_[at(contacts[r])];
   search_.system.to_own_units(start.data());
   automatic_.reset(island.size, options);
-  search_.test(start.data(), Method::interior_point);
+  search_.test(start.data(), By::factors);
   island.status = search_.solved() ? Status::solved : automatic_.run(search_);
   search.counts.add(search_.counts);
   search_.system.to_given_units(search_.best.data());
@@ -83,7 +83,7 @@ Status IslandSolves::run(Search& search, Automatic& stages) {
   }
   // Each island is at its best, also beside one that cannot be solved.
   search.best_error = std::numeric_limits<double>::infinity();
-  search.test(x_.data(), Method::interior_point);
+  search.test(x_.data(), By::factors);
   if (search.solved()) return Status::solved;
   // The last status of this list that an island has is the one that says most.
   Status out = Status::solved;

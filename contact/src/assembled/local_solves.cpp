@@ -142,10 +142,11 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x)
   if (!b.allFinite()) return false;
   const Problem problem = Problem::sparse(3, std::move(blocks), b, mu);
   Options options = search.options;
+  options.measure = Measure::fixed_point;
   options.tolerance = std::max(kGain * most_, kEnough * search.options.tolerance);
   options.max_work = budget;
   Search& local = part_->search;
-  local.reset(problem, options, Measure::fixed_point);
+  local.reset(problem, options);
   local.system.belong_to(system, contacts);
   local.system.share_as(system, contacts);
   local.system.to_own_units(start.data());

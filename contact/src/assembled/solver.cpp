@@ -5,17 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <unordered_map>
 
 #include "assembled/island_solves.hpp"
-#include "assembled/solver_words.hpp"
-#include "assembled/stages/convex_relaxation.hpp"
 #include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
 
 using detail::at;
+using detail::By;
 using detail::Packed;
 
 namespace {
@@ -23,18 +21,72 @@ namespace {
 void check(const Options& o) {
   using detail::require;
   static_cast<void>(detail::traits(o.law));  // refuses what is no law
-  require(o.method <= Method::convex_relaxation, "method", static_cast<double>(o.method),
-          "is none of those of tether::contact::Method");
-  require(o.measure <= Measure::fixed_point, "measure", static_cast<double>(o.measure),
+  require(o.measure <= Measure::natural_map, "measure", static_cast<double>(o.measure),
           "is none of those of tether::contact::Measure");
   require(o.tolerance > 0 && std::isfinite(o.tolerance), "tolerance", o.tolerance,
           "must be finite and > 0");
-  require(o.max_sweeps >= 1, "max_sweeps", o.max_sweeps, "must be >= 1");
   require(o.max_work > 0, "max_work", o.max_work, "must be > 0");
   require(o.enough >= 0, "enough", o.enough, "must be >= 0");
 }
 
+const char* advice(Status status, const Options& options) {
+  switch (status) {
+    case Status::solved:
+      return "";
+    case Status::cycling:
+      return detail::kernels(options.law).replacement != nullptr && options.strict
+                 ? "no fixed point was found; try strict = false, or Law::coulomb"
+                 : "no fixed point was found; try another start or a shorter time step";
+    case Status::stalled:
+      return "no further progress: round-off or ill-conditioned data, or no solution of the law is "
+             "near; error is what was reached; try a larger tolerance";
+    case Status::round_off:
+      return "error is what rounding leaves of A x - b at impulses of this size: the tolerance "
+             "cannot "
+             "be reached; use a larger one, or smaller ratios of mass";
+    case Status::work_limit:
+      return "error is what was reached; raise max_work";
+    case Status::infeasible:
+      return "bodies are pressed between contacts that close and cannot yield "
+             "(infeasible_direction): "
+             "lower the closing velocities, or let one of the contacts go";
+    case Status::unsolved:
+      return "the impulses lie outside of the range of doubles: use other units";
+  }
+  return "";
+}
+
 }  // namespace
+
+const char* name(Measure measure) {
+  switch (measure) {
+    case Measure::fixed_point:
+      return "fixed_point";
+    case Measure::natural_map:
+      return "natural_map";
+  }
+  return "?";
+}
+
+const char* name(Status status) {
+  switch (status) {
+    case Status::unsolved:
+      return "unsolved";
+    case Status::solved:
+      return "solved";
+    case Status::stalled:
+      return "stalled";
+    case Status::cycling:
+      return "cycling";
+    case Status::work_limit:
+      return "work_limit";
+    case Status::round_off:
+      return "round_off";
+    case Status::infeasible:
+      return "infeasible";
+  }
+  return "?";
+}
 
 struct Solver::Implementation {
   Options options;
@@ -42,13 +94,10 @@ struct Solver::Implementation {
   detail::Automatic stages;
   detail::IslandSolves islands;
   Packed x, z;
-  std::unordered_map<std::uint64_t, PackedVector> memory;
 
   void solve(const Problem& problem, const linalg::VectorView* start, Solution& out);
   void begin(const Problem& problem, const linalg::VectorView* start);
   Status run();
-  Status automatic();
-  Status plain();
   void to_given_units(Status& status);
   void finish(const Problem& problem, Status status, Solution& out);
 };
@@ -71,42 +120,20 @@ void Solver::Implementation::to_given_units(Status& status) {
   if (std::equal(x.begin(), x.end(), z.begin(), same)) return;
   z = search.best;
   search.best_error = std::numeric_limits<double>::infinity();
-  search.test(x.data(), options.method);
+  search.test(x.data(), By::sweeps);
   search.best = z;
   if (status == Status::solved && !search.solved()) status = Status::unsolved;
 }
 
-Status Solver::Implementation::automatic() {
+Status Solver::Implementation::run() {
   // Nothing is allocated before a first sweep has failed.
-  search.test(x.data(), Method::gauss_seidel);
+  search.test(x.data(), By::sweeps);
   if (search.solved()) return Status::solved;
   search.system.sweep(x.data());
   search.count_sweep();
-  search.test(x.data(), Method::gauss_seidel);
+  search.test(x.data(), By::sweeps);
   if (search.solved()) return Status::solved;
   return detail::IslandSolves::serve(search) ? islands.run(search, stages) : stages.run(search);
-}
-
-Status Solver::Implementation::plain() {
-  search.test(x.data(), options.method);
-  int next_test = 1, window = 2000, window_end = 2000;
-  double window_error = search.best_error;
-  for (int sweep = 1; sweep <= options.max_sweeps && !search.solved(); ++sweep) {
-    search.count_sweep();
-    search.system.sweep(x.data());
-    if (sweep >= next_test || sweep == options.max_sweeps) {
-      search.test(x.data(), options.method);
-      next_test = sweep + 1 + sweep / 8;
-    }
-    if (search.exhausted()) return Status::work_limit;
-    if (sweep >= window_end) {
-      if (search.best_error > 0.999 * window_error) return stages.give_up(search);
-      window_error = search.best_error;
-      window *= 2;
-      window_end = sweep + window;
-    }
-  }
-  return search.solved() ? Status::solved : Status::work_limit;
 }
 
 void Solver::Implementation::finish(const Problem& problem, Status status, Solution& out) {
@@ -114,7 +141,7 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   const std::size_t n = x.size();
   out.status = status;
   out.error = search.best_error;
-  if (status != Status::solved && search.measure == Measure::fixed_point) {
+  if (status != Status::solved && options.measure == Measure::fixed_point) {
     x = search.best;
     system.to_own_units(x.data());
     out.error = std::min(out.error, system.judged_fixed_point(x.data()));
@@ -142,14 +169,13 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
       out.replaced.push_back(static_cast<int>(i));
     }
   }
-  out.advice = detail::advice(status, options);
+  out.advice = advice(status, options);
 }
 
 // x becomes where the solve starts.
 void Solver::Implementation::begin(const Problem& problem, const linalg::VectorView* start) {
   const std::size_t n = static_cast<std::size_t>(problem.contacts());
-  search.reset(problem, options,
-               options.measure == Measure::automatic ? Measure::fixed_point : options.measure);
+  search.reset(problem, options);
   stages.reset(problem.contacts(), options);
   islands.reset();
   if (start) {
@@ -159,12 +185,6 @@ void Solver::Implementation::begin(const Problem& problem, const linalg::VectorV
     x = problem.pack(*start);
   } else {
     x.assign(n, PackedVector());
-    if (options.warm_start) {
-      for (std::size_t i = 0; i < n; ++i) {
-        const auto found = memory.find(problem.id(static_cast<int>(i)));
-        if (found != memory.end()) x[i] = found->second;
-      }
-    }
   }
   search.system.to_own_units(x.data());
   for (std::size_t i = 0; i < n; ++i) {
@@ -179,54 +199,11 @@ void Solver::Implementation::begin(const Problem& problem, const linalg::VectorV
   }
 }
 
-Status Solver::Implementation::run() {
-  switch (options.method) {
-    case Method::automatic:
-      return automatic();
-    case Method::gauss_seidel:
-      return plain();
-    case Method::anderson: {
-      search.test(x.data(), Method::anderson);
-      if (search.solved()) return Status::solved;
-      stages.prepare();
-      stages.sweeps.start(x.data());
-      detail::AcceleratedSweeps::Leave leave;
-      leave.most_sweeps = options.max_sweeps;
-      stages.sweeps.run(search, leave);
-      break;
-    }
-    case Method::proximal_newton:
-      search.test(x.data(), Method::gauss_seidel);
-      stages.prepare();
-      search.system.sweep(x.data());
-      search.count_sweep();
-      search.test(x.data(), Method::gauss_seidel);
-      if (!search.solved()) stages.newton.run(search, x.data(), 60);
-      break;
-    case Method::interior_point:
-      search.test(x.data(), Method::interior_point);
-      stages.prepare();
-      if (!search.solved()) stages.interior.run(search, options.max_sweeps);
-      break;
-    case Method::convex_relaxation: {
-      const bool done = detail::solve_convex_relaxation(search, x);
-      search.test(x.data(), Method::convex_relaxation);
-      return search.solved() ? Status::solved : done ? Status::relaxed : Status::work_limit;
-    }
-  }
-  return search.solved() ? Status::solved : stages.give_up(search);
-}
-
 void Solver::Implementation::solve(const Problem& problem, const linalg::VectorView* start,
                                    Solution& out) {
   begin(problem, start);
   Status status = run();
   to_given_units(status);
-  if (options.warm_start) {
-    memory.clear();
-    for (std::size_t i = 0; i < x.size(); ++i)
-      memory[problem.id(static_cast<int>(i))] = search.best[i];
-  }
   finish(problem, status, out);
 }
 

@@ -15,7 +15,6 @@ namespace {
 Options solver_options(const BodyOptions& options, double work) {
   Options o;
   o.law = options.law;
-  o.measure = Measure::fixed_point;
   o.tolerance = 0.9 * options.tolerance;  // the two forms round differently
   o.strict = options.strict;
   o.max_work = work;

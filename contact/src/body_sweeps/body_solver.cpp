@@ -31,9 +31,10 @@ int severity(Status s) {
       return 3;
     case Status::infeasible:
       return 5;
-    default:
-      return 4;
+    case Status::unsolved:
+      break;
   }
+  return 4;
 }
 
 void check(const BodyOptions& o) {

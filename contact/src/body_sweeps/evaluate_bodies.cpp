@@ -140,9 +140,8 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
     }
     r.alignment = std::max(r.alignment, misfit);
   }
-  const auto over = [](double p, double q) { return q > 0 ? p / q : p; };
-  r.natural_map = over(std::sqrt(map), std::sqrt(std::max({bb, xx, ww})));
-  r.natural_map_data = over(std::sqrt(map), std::sqrt(bb));
+  const double size = std::max({bb, xx, ww});
+  r.natural_map = size > 0 ? std::sqrt(map) / std::sqrt(size) : std::sqrt(map);
   return r;
 }
 

@@ -20,11 +20,6 @@ constexpr double kContradiction = 1e-7;
 // scale is theirs after elimination, was too loose.
 constexpr int kTries = 3;
 
-Options for_contacts(Options options) {
-  options.measure = Measure::automatic;
-  return options;
-}
-
 // Islands in which nothing approaches have no impulses, however small those are that a start has.
 Eigen::VectorXd without_idle(const ConeProblem& problem, Eigen::VectorXd x) {
   const std::vector<int> island = detail::islands(problem);
@@ -41,8 +36,8 @@ Eigen::VectorXd without_idle(const ConeProblem& problem, Eigen::VectorXd x) {
 }  // namespace
 
 struct ConeSolver::Implementation {
-  explicit Implementation(const Options& given)
-      : options(for_contacts(given)), solver(for_contacts(given)) {}
+  explicit Implementation(Options given)
+      : options((given.measure = Measure::fixed_point, given)), solver(options) {}
 
   ConeSolution solve(const ConeProblem& problem, const linalg::VectorView* start);
   void judge(const ConeProblem& problem, const detail::Embedding& embedding, ConeSolution& out);

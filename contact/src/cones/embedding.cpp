@@ -43,6 +43,65 @@ Embedding::Embedding(const ConeProblem& problem, double tolerance, const std::ve
   assemble(problem, open);
 }
 
+// Rows that see each part of the free ones, ascending.
+std::vector<std::vector<int>> Embedding::rows_seeing_parts() const {
+  std::vector<std::vector<int>> seeing(at(free_.part_count()));
+  const Eigen::SparseMatrix<double>& C = free_.coupling();
+  for (int f = 0; f < C.outerSize(); ++f)
+    for (Eigen::SparseMatrix<double>::InnerIterator it(C, f); it; ++it)
+      if (it.value() != 0) seeing[at(free_.parts()[at(f)])].push_back(static_cast<int>(it.row()));
+  for (std::vector<int>& rows : seeing) {
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  }
+  return seeing;
+}
+
+// Column k of each part, where it has so many, less what the free rows take; the columns of
+// different parts are solved together, each of length 1.
+void Embedding::eliminate_columns(const ConeProblem& problem,
+                                  const std::vector<std::vector<int>>& seeing, std::size_t k,
+                                  std::vector<Eigen::Triplet<double>>& entries) const {
+  const Eigen::SparseMatrix<double>&B = free_.back(), &C = free_.coupling();
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(B.rows());
+  std::vector<double> length(seeing.size(), 0);
+  for (std::size_t p = 0; p < seeing.size(); ++p) {
+    if (k >= seeing[p].size()) continue;
+    const auto each = [&](const auto& take) {
+      for (Eigen::SparseMatrix<double>::InnerIterator it(B, seeing[p][k]); it; ++it)
+        if (at(free_.parts()[at(static_cast<int>(it.row()))]) == p) take(it);
+    };
+    double sum = 0;
+    each([&](const auto& it) {
+      const double v =
+          it.value() * problem.row_scale()[at(free_.rows()[at(static_cast<int>(it.row()))])];
+      sum += v * v;
+    });
+    length[p] = std::sqrt(sum);
+    if (!(length[p] > 0)) continue;
+    each([&](const auto& it) { g[it.row()] = it.value() / length[p]; });
+  }
+  const Eigen::VectorXd y = free_.solve(g);
+  for (std::size_t p = 0; p < seeing.size(); ++p) {
+    if (k >= seeing[p].size() || !(length[p] > 0)) continue;
+    const int column = seeing[p][k];
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(seeing[p].size()));
+    for (int f = 0; f < C.outerSize(); ++f) {
+      if (at(free_.parts()[at(f)]) != p) continue;
+      for (Eigen::SparseMatrix<double>::InnerIterator it(C, f); it; ++it) {
+        const auto row =
+            std::lower_bound(seeing[p].begin(), seeing[p].end(), static_cast<int>(it.row()));
+        if (row != seeing[p].end() && *row == it.row())
+          sum[row - seeing[p].begin()] += it.value() * y[f];
+      }
+    }
+    for (std::size_t i = 0; i < seeing[p].size(); ++i)
+      entries.emplace_back(
+          seeing[p][i], column,
+          -length[p] * sum[static_cast<Eigen::Index>(i)] * scale_[seeing[p][i]] * scale_[column]);
+  }
+}
+
 void Embedding::eliminate(const ConeProblem& problem) {
   const int n = problem.rows();
   std::vector<Eigen::Triplet<double>> entries;
@@ -52,60 +111,10 @@ void Embedding::eliminate(const ConeProblem& problem) {
   b_ = problem.b();
   if (!free_.empty()) {
     b_ -= free_.to_cones(free_.solve(free_.of(b_)));
-    // Rows that see a part of the free ones; columns of different parts are solved together, each
-    // of length 1.
-    std::vector<std::vector<int>> seeing(at(free_.part_count()));
-    const Eigen::SparseMatrix<double>& C = free_.coupling();
-    for (int f = 0; f < C.outerSize(); ++f)
-      for (Eigen::SparseMatrix<double>::InnerIterator it(C, f); it; ++it)
-        if (it.value() != 0) seeing[at(free_.parts()[at(f)])].push_back(static_cast<int>(it.row()));
+    const std::vector<std::vector<int>> seeing = rows_seeing_parts();
     std::size_t columns = 0;
-    for (std::vector<int>& rows : seeing) {
-      std::sort(rows.begin(), rows.end());
-      rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-      columns = std::max(columns, rows.size());
-    }
-    const Eigen::SparseMatrix<double>& B = free_.back();
-    for (std::size_t k = 0; k < columns; ++k) {
-      Eigen::VectorXd g = Eigen::VectorXd::Zero(B.rows());
-      std::vector<double> length(seeing.size(), 0);
-      for (std::size_t p = 0; p < seeing.size(); ++p) {
-        if (k >= seeing[p].size()) continue;
-        const int column = seeing[p][k];
-        const auto each = [&](const auto& take) {
-          for (Eigen::SparseMatrix<double>::InnerIterator it(B, column); it; ++it)
-            if (at(free_.parts()[at(static_cast<int>(it.row()))]) == p) take(it);
-        };
-        double sum = 0;
-        each([&](const auto& it) {
-          const double v =
-              it.value() * problem.row_scale()[at(free_.rows()[at(static_cast<int>(it.row()))])];
-          sum += v * v;
-        });
-        length[p] = std::sqrt(sum);
-        if (!(length[p] > 0)) continue;
-        each([&](const auto& it) { g[it.row()] = it.value() / length[p]; });
-      }
-      const Eigen::VectorXd y = free_.solve(g);
-      for (std::size_t p = 0; p < seeing.size(); ++p) {
-        if (k >= seeing[p].size() || !(length[p] > 0)) continue;
-        const int column = seeing[p][k];
-        Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(seeing[p].size()));
-        for (int f = 0; f < C.outerSize(); ++f) {
-          if (at(free_.parts()[at(f)]) != p) continue;
-          for (Eigen::SparseMatrix<double>::InnerIterator it(C, f); it; ++it) {
-            const auto row =
-                std::lower_bound(seeing[p].begin(), seeing[p].end(), static_cast<int>(it.row()));
-            if (row != seeing[p].end() && *row == it.row())
-              sum[row - seeing[p].begin()] += it.value() * y[f];
-          }
-        }
-        for (std::size_t i = 0; i < seeing[p].size(); ++i)
-          entries.emplace_back(seeing[p][i], column,
-                               -length[p] * sum[static_cast<Eigen::Index>(i)] *
-                                   scale_[seeing[p][i]] * scale_[column]);
-      }
-    }
+    for (const std::vector<int>& rows : seeing) columns = std::max(columns, rows.size());
+    for (std::size_t k = 0; k < columns; ++k) eliminate_columns(problem, seeing, k, entries);
   }
   b_ = b_.cwiseProduct(scale_).eval();
   A_.resize(n, n);

@@ -66,6 +66,9 @@ class Embedding {
     int contact = -1, component = 0;
   };
   void eliminate(const ConeProblem& problem);
+  std::vector<std::vector<int>> rows_seeing_parts() const;
+  void eliminate_columns(const ConeProblem& problem, const std::vector<std::vector<int>>& seeing,
+                         std::size_t k, std::vector<Eigen::Triplet<double>>& entries) const;
   void place_rows(const ConeProblem& problem, double tolerance);
   void clear_held(const ConeProblem& problem);
   void assemble(const ConeProblem& problem, const std::vector<char>& open);

@@ -70,8 +70,7 @@ SolutionDerivative::SolutionDerivative(const Problem& problem, Law law,
 }
 
 void SolutionDerivative::accept(const DerivativeOptions& options) {
-  report_.error =
-      system_.measure({0, system_.judged_fixed_point(x_.data()), 0, 0, 0}, Measure::fixed_point);
+  report_.error = system_.judged_fixed_point(x_.data());
   if (report_.error <= options.tolerance) return;
   const std::string wanted =
       "must be at most DerivativeOptions::tolerance = " + shown(options.tolerance);

@@ -183,14 +183,6 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const li
   return out;
 }
 
-void Problem::set_ids(std::vector<std::uint64_t> ids) {
-  if (ids.size() != local_.size()) {
-    detail::refuse_size("ids", static_cast<Eigen::Index>(ids.size()), contacts(),
-                        "one for each contact");
-  }
-  ids_ = std::move(ids);
-}
-
 Problem Problem::rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const {
   const std::size_t islands =
       islands_.empty() ? 0 : at(*std::max_element(islands_.begin(), islands_.end()) + 1);
@@ -232,7 +224,6 @@ Problem Problem::part(const std::vector<int>& contacts) const {
     out.row_start_.push_back(static_cast<int>(out.columns_.size()));
     out.local_.push_back(local_[at(i)]);
     out.packed_b_.push_back(packed_b_[at(i)]);
-    if (!ids_.empty()) out.ids_.push_back(ids_[at(i)]);
   }
   out.islands_ =
       find_islands(static_cast<int>(contacts.size()), out.row_start_, out.columns_, out.blocks_);

@@ -66,8 +66,8 @@ class Bisection {
   std::vector<int>& owner_;
 };
 
-}  // namespace
-
+// The part, 0 .. parts - 1, of each position: recursive bisection across the longest side, with
+// about the same work in each part.
 std::vector<int> bisect(const std::vector<Vector3d>& positions, const std::vector<double>& work,
                         int parts) {
   std::vector<int> order(positions.size()), out(positions.size());
@@ -75,6 +75,8 @@ std::vector<int> bisect(const std::vector<Vector3d>& positions, const std::vecto
   Bisection(positions, work, out).cut(order.begin(), order.end(), 0, parts);
   return out;
 }
+
+}  // namespace
 
 // The part of this process in BodySolver's sweeps over the whole problem.
 struct RankTeam::Implementation final : detail::SweepPartners {
@@ -122,8 +124,8 @@ struct RankTeam::Implementation final : detail::SweepPartners {
 
   std::vector<Vector3d> positions;
   int places = 0;
-  std::vector<int> owner;  // of bodies: given, of the positions, or of a solve without
-  enum class By { number, place, caller } owned_by = By::number;
+  std::vector<int> owner;  // of bodies: by the positions, or by number
+  bool owned_by_place = false;
   long problems = 0, swept = 0;
 
   // Data of a solve:
@@ -180,12 +182,10 @@ PassResult RankTeam::Implementation::total(const std::vector<PassResult>& of_chu
 }
 
 void RankTeam::Implementation::find_owners(std::size_t bodies) {
-  const bool fits = owner.size() == bodies;
-  if (owned_by == By::caller && fits) return;
   const bool placed = positions.size() == bodies;
-  if (placed && owned_by == By::place && fits) return;
+  if (placed && owned_by_place && owner.size() == bodies) return;
   owner.resize(bodies);
-  owned_by = placed ? By::place : By::number;
+  owned_by_place = placed;
   if (!placed) {
     for (std::size_t k = 0; k < bodies; ++k)
       owner[k] = static_cast<int>(k * at(messages.size()) / bodies);
@@ -373,12 +373,7 @@ void RankTeam::place(const std::vector<Vector3d>& positions) {
   Implementation& own = *implementation_;
   if (own.places++ % kPlaces != 0 && positions.size() == own.positions.size()) return;
   own.positions = positions;
-  own.owned_by = Implementation::By::number;
-}
-
-void RankTeam::set_owners(const std::vector<int>& rank_of_body) {
-  implementation_->owner = rank_of_body;
-  implementation_->owned_by = Implementation::By::caller;
+  own.owned_by_place = false;
 }
 
 bool RankTeam::solve(const std::vector<RigidBody>& bodies,
@@ -401,9 +396,5 @@ bool RankTeam::solve(const std::vector<RigidBody>& bodies,
 
 long RankTeam::problems() const { return implementation_->problems; }
 long RankTeam::swept_contacts() const { return implementation_->swept; }
-int RankTeam::shared_islands() const {
-  const std::vector<char>& shared = implementation_->plan.shared;
-  return static_cast<int>(std::count(shared.begin(), shared.end(), 1));
-}
 
 }  // namespace tether::contact

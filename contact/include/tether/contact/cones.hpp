@@ -131,7 +131,7 @@ struct ConeSolution {
 
 /// Solves ConeProblems by a Solver: free rows are eliminated (sparse factors of their part of A,
 /// proximal steps where rows depend on each other), and every other cone is made of 3-D friction
-/// cones. Keeps nothing but what Options::warm_start asks for.
+/// cones.
 class ConeSolver {
  public:
   /// `measure` is not used. Throws std::invalid_argument on illegal values.

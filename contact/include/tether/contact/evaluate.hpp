@@ -20,8 +20,7 @@ struct Residuals {
   /// Largest error in velocity of a contact, over the largest velocity that a contact of its island
   /// needs (method, section 3); at least what round-off makes of A x - b. Changed by no units.
   double fixed_point = kNone;
-  double natural_map = kNone;       ///< |x - P_K(x - w - De Saxce term)| / max(|b|, |x|, |w|)
-  double natural_map_data = kNone;  ///< the same / |b|
+  double natural_map = kNone;  ///< |x - P_K(x - w - De Saxce term)| / max(|b|, |x|, |w|)
 };
 
 /// The same yardstick for every solver. natural_map is the law's own (method, section 3); for

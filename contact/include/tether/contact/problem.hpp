@@ -49,14 +49,6 @@ class Problem {
   const LocalBlock& local(int contact) const { return local_[static_cast<std::size_t>(contact)]; }
   linalg::MatrixX dense_matrix() const;
 
-  /// Identity of each contact, by which a Solver finds its impulse of the previous problem.
-  /// Default: 0 .. n-1.
-  void set_ids(std::vector<std::uint64_t> ids);
-  std::uint64_t id(int contact) const {
-    return ids_.empty() ? static_cast<std::uint64_t>(contact)
-                        : ids_[static_cast<std::size_t>(contact)];
-  }
-
   /// Block rows, columns ascending, pattern symmetric, diagonal present.
   const std::vector<int>& row_start() const { return row_start_; }
   const std::vector<int>& columns() const { return columns_; }
@@ -85,7 +77,6 @@ class Problem {
   std::vector<int> row_start_, columns_, islands_;
   std::vector<PackedBlock> blocks_;
   std::vector<PackedVector> packed_b_;
-  std::vector<std::uint64_t> ids_;
   std::shared_ptr<const detail::BodyForm> body_form_;
 };
 

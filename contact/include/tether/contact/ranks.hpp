@@ -33,11 +33,6 @@ class RankMessages {
   [[noreturn]] virtual void give_up(const char* why) = 0;
 };
 
-/// The part, 0 .. parts - 1, of each position: recursive bisection across the longest side, with
-/// about the same work in each part. work: of each position, >= 0.
-std::vector<int> bisect(const std::vector<Eigen::Vector3d>& positions,
-                        const std::vector<double>& work, int parts);
-
 /// Processes that all have the same bodies and contacts, as a team for BodyOptions::team and
 /// SteppingOptions::team: each sweeps the contacts of its part of the bodies, colour by colour, and
 /// all know the whole result then. Bits are those of one process. Every process makes the same
@@ -49,16 +44,12 @@ class RankTeam final : public SolverTeam {
   ~RankTeam() override;
 
   void place(const std::vector<Eigen::Vector3d>& positions) override;
-  /// The rank that is to sweep most contacts of each body, in place of what positions say.
-  void set_owners(const std::vector<int>& rank_of_body);
   bool solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              const std::vector<const Eigen::Vector3d*>& starts, const BodyOptions& options,
              BodySolution& solution) override;
   /// Problems that were shared, and contacts of them that this process swept.
   long problems() const;
   long swept_contacts() const;
-  /// Islands of the last of these problems that several processes swept.
-  int shared_islands() const;
 
  private:
   struct TETHER_HIDDEN Implementation;

@@ -14,19 +14,8 @@ namespace tether::contact {
 
 /// The number that is compared with Options::tolerance; see Residuals.
 enum class Measure : std::uint8_t {
-  automatic,         ///< fixed_point
-  natural_map,       ///< as Siconos; depends on the units of A and b: for comparisons only
-  natural_map_data,  ///< depends on the units of A
-  fixed_point        ///< independent of units
-};
-
-enum class Method : std::uint8_t {
-  automatic,         ///< sweeps, proximal paths, interior points, proximal Newton in rounds
-  gauss_seidel,      ///< plain sweeps
-  anderson,          ///< Gauss-Seidel with safeguarded Anderson acceleration
-  proximal_newton,   ///< one sweep, then proximal semismooth Newton only
-  interior_point,    ///< interior points of the exact cones only
-  convex_relaxation  ///< min 1/2 x'Ax - b'x over the cones: never chosen by `automatic`
+  fixed_point,  ///< independent of units
+  natural_map   ///< as Siconos; depends on the units of A and b: for comparisons only
 };
 
 enum class Status : std::uint8_t {
@@ -34,32 +23,27 @@ enum class Status : std::uint8_t {
   solved,      ///< measure <= tolerance, and round-off of A x - b does not exceed it
   stalled,     ///< the iteration no longer makes progress
   cycling,     ///< the iterates repeat without progress; often no solution of the law is near
-  work_limit,  ///< max_work or max_sweeps reached while there was progress
-  relaxed,     ///< convex_relaxation converged, but its answer violates the law (see error)
+  work_limit,  ///< max_work reached while there was progress
   round_off,   ///< the remaining error is the round-off of A x - b: a smaller tolerance cannot be
                ///< reached
   infeasible   ///< no impulses keep every w_n >= 0, see Solution::infeasible_direction
 };
 
 const char* name(Measure measure);
-const char* name(Method method);
 const char* name(Status status);
 
 struct Options {
   Law law = Law::maximum_dissipation;
   double tolerance = 1e-9;  ///< measure <= tolerance ends the solve; > 0
-  Measure measure = Measure::automatic;
-  Method method = Method::automatic;
+  Measure measure = Measure::fixed_point;
   /// true: the law is never replaced. false: where maximum_dissipation does not converge, contacts
   /// with eccentricity > 0.98 get the Coulomb rule in a second attempt; Solution::replaced lists
   /// them.
   bool strict = false;
-  int max_sweeps = 200000;  ///< of gauss_seidel and anderson
-  double max_work = 1e10;   ///< automatic: estimated nanoseconds, counted from operations
+  double max_work = 1e10;  ///< estimated nanoseconds, counted from operations
   /// Once 3/4 of max_work are spent, an error of at most this ends the solve, as work_limit:
   /// a hard problem then does not use all of max_work. 0: off.
   double enough = 0;
-  bool warm_start = false;  ///< start from the impulses of the previous solve, found by contact id
 };
 
 struct Counts {
@@ -87,8 +71,7 @@ struct Solution {
 };
 
 /// Solves Problems and keeps its workspace between them. Results depend only on the problem, the
-/// options and, with warm_start, the previous solution, never on timing. Not for use by two threads
-/// at once.
+/// options and the start, never on timing. Not for use by two threads at once.
 class Solver {
  public:
   explicit Solver(const Options& options = {});  ///< throws std::invalid_argument on illegal values

@@ -10,9 +10,8 @@ constexpr double kExactCost = 5;  // tests
 
 }  // namespace
 
-void Search::reset(const Problem& problem, const Options& o, Measure m) {
+void Search::reset(const Problem& problem, const Options& o) {
   options = o;
-  measure = m;
   system.reset(problem, o.law);
   counts = Counts();
   work_end = o.max_work;
@@ -22,21 +21,19 @@ void Search::reset(const Problem& problem, const Options& o, Measure m) {
   best.resize(n);
   scratch_.resize(n);
   sweep_cost = 2.2 * static_cast<double>(problem.blocks().size()) + 30.0 * problem.contacts();
-  test_cost = m == Measure::fixed_point ? 1.2 * sweep_cost : 0.8 * sweep_cost;
+  test_cost = o.measure == Measure::fixed_point ? 1.2 * sweep_cost : 0.8 * sweep_cost;
 }
 
 // Never below what round-off of x makes of it: impulses that swallow b leave a small residual by
-// chance. Long sums are taken where those of doubles may decide. Sweeps do not ask for them first:
-// what is to be solved down to round-off between light and heavy bodies they do not solve.
-double Search::fixed_point_error(const PackedVector* x, Method stage) {
+// chance. Long sums are taken where those of doubles may decide. Sweeps do not ask for them first.
+double Search::fixed_point_error(const PackedVector* x, By by) {
   constexpr double kLook = 1e3;  // tolerances
   const double tolerance = options.tolerance;
   const Test test = system.fixed_point(x);
   // The block fixed point leads the search, also where it has jumped away: `least` ends it.
   const double fast = test.least <= tolerance ? test.least : test.fixed;
-  const bool factorised = stage == Method::interior_point || stage == Method::proximal_newton;
   double rounding = 0;
-  if (fast <= tolerance || (factorised && fast <= kLook * tolerance)) {
+  if (fast <= tolerance || (by == By::factors && fast <= kLook * tolerance)) {
     rounding = system.rounding(x);
     hidden_ = kSumUnits * rounding;
   }
@@ -62,7 +59,7 @@ bool Search::confirmed() {
   system.forget_slips();
   const Packed found = best;
   best_error = std::numeric_limits<double>::infinity();
-  test(found.data(), Method::interior_point);
+  test(found.data(), By::factors);
   return solved();
 }
 
@@ -71,20 +68,20 @@ bool Search::explained_by_round_off() {
   hidden_ = kSumUnits * rounding;
   // Impulses that grow without an end swallow b: what they leave of it is no round-off.
   if (!(best_error <= hidden_) || best_error >= 1) return false;
-  if (measure == Measure::fixed_point) {
+  if (options.measure == Measure::fixed_point) {
     counts.work += kExactCost * test_cost;
     best_error = std::min(best_error, std::max(system.exact_fixed_point(best.data()), rounding));
   }
   return true;
 }
 
-double Search::test(const PackedVector* x, Method stage) {
+double Search::test(const PackedVector* x, By by) {
   counts.work += test_cost;
   double error;
-  if (measure == Measure::fixed_point) {
-    error = fixed_point_error(x, stage);
+  if (options.measure == Measure::fixed_point) {
+    error = fixed_point_error(x, by);
   } else {
-    error = system.measure(system.natural_map(x, scratch_.data()), measure);
+    error = system.natural_map(x, scratch_.data());
     // Impulses that swallow b leave a small residual by round-off.
     if (error <= options.tolerance) error = std::max(error, system.rounding(x));
   }

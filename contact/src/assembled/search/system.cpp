@@ -34,6 +34,11 @@ View view(const Problem& p, const char* rule, double* lambda, const double* weig
           nullptr};
 }
 
+double relative(const Norms& n, double norm_b) {
+  const double size = std::max({norm_b, n.x, n.w});
+  return size > 0 ? n.map / size : n.map;
+}
+
 }  // namespace
 
 // Powers of two that bring the largest trace of a block and the largest component of b near 1, if
@@ -150,11 +155,6 @@ void System::sweep(PackedVector* x, const Proximal& proximal) {
   kernels().sweep(s, x);
 }
 
-void System::sweep(PackedVector* x, const std::vector<int>& list) {
-  const View s = view(*problem_, rule_.data(), lambda_.data(), weight_.data());
-  kernels().sweep_some(s, list.data(), static_cast<int>(list.size()), x);
-}
-
 double System::blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal,
                       Regime* regimes, LocalDerivative* derivatives) {
   const View s = view(*problem_, rule_.data(), lambda_.data(), weight_.data(), proximal);
@@ -199,10 +199,11 @@ void System::exact_velocities(const PackedVector* x, PackedVector* w) const {
   detail::exact_velocities(*problem_, x, w);
 }
 
-Test System::natural_map(const PackedVector* x, PackedVector* scratch) {
+double System::natural_map(const PackedVector* x, PackedVector* scratch) const {
   if (!mass_.empty()) return natural_map_given(x, scratch);
   const View s = view(*problem_, any_replaced_ ? rule_.data() : nullptr, nullptr, nullptr);
-  return kernels().natural_map(s, x, scratch);
+  const Norms n = kernels().natural_map(s, x, scratch);
+  return relative(n, norm_b_);
 }
 
 Test System::fixed_point(const PackedVector* x) { return kernels().error(error_view(), x); }
@@ -226,7 +227,7 @@ View System::error_view() {
 
 // The map hangs on the units, those given are meant. It is homogeneous in x and w together: all is
 // divided by what makes the largest of them 1.
-Test System::natural_map_given(const PackedVector* x, PackedVector* scratch) {
+double System::natural_map_given(const PackedVector* x, PackedVector* scratch) const {
   const View s = view(*problem_, any_replaced_ ? rule_.data() : nullptr, nullptr, nullptr);
   multiply(s, x, scratch);
   int most = std::numeric_limits<int>::min();
@@ -256,8 +257,7 @@ Test System::natural_map_given(const PackedVector* x, PackedVector* scratch) {
       ww += wi[c] * wi[c];
     }
   }
-  norm_b_ = std::sqrt(bb);  // in the same unit
-  return {std::sqrt(map), 0, std::sqrt(xx), std::sqrt(ww)};
+  return relative({std::sqrt(map), std::sqrt(xx), std::sqrt(ww)}, std::sqrt(bb));
 }
 
 double System::rounding(const PackedVector* x) const {
@@ -274,18 +274,6 @@ double System::rounding(const PackedVector* x) const {
     most = std::max(most, std::max({sum[0], sum[1], sum[2]}) * inverse_scale_[at(i)]);
   }
   return kRoundOff * most;
-}
-
-double System::measure(const Test& t, Measure measure) const {
-  const auto over = [](double p, double q) { return q > 0 ? p / q : p; };
-  switch (measure) {
-    case Measure::fixed_point:
-      return t.fixed;
-    case Measure::natural_map_data:
-      return over(t.natural, norm_b_);
-    default:
-      return over(t.natural, std::max({norm_b_, t.x, t.w}));
-  }
 }
 
 }  // namespace tether::contact::detail

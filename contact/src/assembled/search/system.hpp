@@ -26,9 +26,6 @@ struct Proximal {
   const PackedVector* anchor = nullptr;
 };
 
-// Loads (System::load) above this are those of heavy bodies on light ones.
-constexpr double kOrdinaryLoad = 1e3;
-
 // A problem together with the law for each contact. Kernels are built for the machine at hand.
 class System {
  public:
@@ -70,8 +67,6 @@ class System {
 
   // One Gauss-Seidel sweep on x in place, contacts in the given order.
   void sweep(PackedVector* x, const Proximal& proximal = {});
-  // The same sweep over the contacts of a list alone, in its order.
-  void sweep(PackedVector* x, const std::vector<int>& list);
   // out_i = block solution of contact i with all others as in x (Jacobi). Regimes and, if asked
   // for, derivatives dx/db of each block; returns (sum weight^2 |out - x|^2)^1/2.
   double blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal = {},
@@ -83,10 +78,9 @@ class System {
   void velocities(const PackedVector* x, PackedVector* w) const;
   // The same for another b: changes keep digits that b would take.
   void velocities(const PackedVector* x, const PackedVector* b, PackedVector* w) const;
-  // Natural map with the norms of x and w (scratch is overwritten), or the block fixed point alone.
-  Test natural_map(const PackedVector* x, PackedVector* scratch);
+  // Natural map over the norms (scratch is overwritten), or the block fixed point.
+  double natural_map(const PackedVector* x, PackedVector* scratch) const;
   Test fixed_point(const PackedVector* x);
-  double measure(const Test& test, Measure measure) const;
   // Both with long sums (law/exact_error.hpp): where rounding() is not far below what counts.
   void exact_velocities(const PackedVector* x, PackedVector* w) const;
   // Null, or where the errors of all contacts go.
@@ -96,8 +90,6 @@ class System {
   // Rounding of w = A x - b, relative to the velocity scale of the island: the largest component of
   // u |A| |x|. A residual below it says nothing.
   double rounding(const PackedVector* x) const;
-  // |A| |x| relative to the velocity scale: 10 to 1000 between bodies of similar masses.
-  double load(const PackedVector* x) const { return rounding(x) / kRoundOff; }
   // 1 / velocity scale of the island of contact i.
   double inverse_scale(int i) const { return inverse_scale_[at(i)]; }
   int islands() const { return static_cast<int>(needed_.size()); }
@@ -116,7 +108,7 @@ class System {
  private:
   void choose_units(const Problem& problem);
   View error_view();
-  Test natural_map_given(const PackedVector* x, PackedVector* scratch);
+  double natural_map_given(const PackedVector* x, PackedVector* scratch) const;
   const LawKernels& law_of(int i) const { return replaced(i) ? *law_->replacement : *law_; }
   const AssembledKernels& kernels() const { return any_replaced_ ? *law_->mixed : law_->assembled; }
 

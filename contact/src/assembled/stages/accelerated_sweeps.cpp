@@ -15,7 +15,6 @@ void AcceleratedSweeps::reset(int contacts) {
   f_.resize(at(n_));
   regime_.assign(at(n_), -1);
   anderson_.reset(n_, kDepth);
-  partial_.reset(n_);
   momentum_.reset(n_);
 }
 
@@ -25,8 +24,7 @@ void AcceleratedSweeps::start(const PackedVector* x) {
   momentum_.rest();
   sweeps_ = quiet_ = slow_ = 0;
   quiet_asked_ = kLeastQuiet;
-  partial_.start();
-  accelerate_ = n_ <= kFew;
+  accelerate_ = !carried();
   eager_ = accelerate_;
   earlier_ = {};
   later_ = {kRecent / 2, 0};
@@ -63,7 +61,7 @@ int AcceleratedSweeps::toggles(const System& system) {
 // back, and where they toggle for good it keeps them toggling. So it begins after a few quiet
 // sweeps and ends with the quiet; each failure doubles the quiet that is asked for, a tenth of |f|
 // pays it back.
-bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled, bool carried) {
+bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
   const bool calm = toggled <= std::max(kToggles, static_cast<int>(kToggledShare * n_));
   quiet_ = calm ? quiet_ + 1 : 0;
   if (eager_ && sweep == 1) {
@@ -82,7 +80,7 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled, bool carr
   if (eager_) window_f_ = std::numeric_limits<double>::infinity();
   eager_ = false;
   if (!accelerate_) {
-    if (quiet_ < (carried ? std::max(kCarriedQuiet, quiet_asked_) : quiet_asked_)) return false;
+    if (quiet_ < (carried() ? std::max(kCarriedQuiet, quiet_asked_) : quiet_asked_)) return false;
     accelerate_ = true;
     anderson_.clear();
     least_f_ = begun_f_ = window_f_ = f;
@@ -125,8 +123,8 @@ double AcceleratedSweeps::forecast(int sweep, double f, double log_gain) const {
   return best;
 }
 
-void AcceleratedSweeps::carry_on(Search& search, double f, bool carried) {
-  if (carried) {
+void AcceleratedSweeps::carry_on(Search& search, double f) {
+  if (carried()) {
     search.counts.work += Momentum::kCost * n_;
     momentum_.step(search.system.problem(), f, g_, x_);
   } else {
@@ -136,14 +134,12 @@ void AcceleratedSweeps::carry_on(Search& search, double f, bool carried) {
 
 void AcceleratedSweeps::run(Search& search, const Leave& leave) {
   System& system = search.system;
-  const bool carried = leave.partly && n_ > kFew;
   const double accelerated_cost = 0.8 * 4 * n_ * kDepth;
   const double begin = search.counts.work;
   // A test costs more than a sweep: it may be late by one.
   constexpr double kForeseen = 1.05;
   double last_error = 0, last_f = 0;
   int next_test = sweeps_ + 1;
-  const int first = sweeps_;
   for (;;) {
     const int sweep = ++sweeps_;
     std::copy(x_.begin(), x_.end(), g_.begin());
@@ -160,15 +156,14 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
     }
     const double f = std::sqrt(f2);
     if (sweep >= next_test || last_error * f < kForeseen * search.options.tolerance * last_f) {
-      last_error = search.test(g_.data(), Method::anderson);
+      last_error = search.test(g_.data(), By::sweeps);
       last_f = f;
       if (search.solved()) return;
       next_test = std::max(next_test, sweep + 1 + sweep / 8);
     }
     if (search.exhausted()) return;
-    if (leave.most_sweeps > 0 && sweep - first >= leave.most_sweeps) return;
     if (leave.most_work > 0 && search.counts.work - begin >= leave.most_work) return;
-    if (leave.price > 0 && search.counts.work - begin >= leave.least_work) {
+    if (search.counts.work - begin >= leave.least_work) {
       const double left = forecast(sweep, f, std::log(search.options.tolerance / last_error));
       // Work that is spent already counts as well: at the price of the other stages only a sure end
       // is waited for.
@@ -184,21 +179,8 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
       earlier_ = later_;
       later_ = {sweep, f};
     }
-    if (carried && partial_.due(sweep)) {
-      swept_ = g_;
-      const PartialSweeps::Outcome outcome = partial_.run(search, sweep, g_, f_);
-      if (outcome != PartialSweeps::Outcome::none) {
-        if (partial_.to_tolerance()) search.test(g_.data(), Method::anderson);
-        if (search.solved() || search.exhausted()) return;
-        if (outcome == PartialSweeps::Outcome::gained) replace(g_.data());
-        anderson_.clear();
-        momentum_.rest_where_changed(g_, swept_);
-        carry_on(search, f, carried);
-        continue;
-      }
-    }
-    if (!extrapolates(sweep, f, toggles(system), carried)) {
-      carry_on(search, f, carried);
+    if (!extrapolates(sweep, f, toggles(system))) {
+      carry_on(search, f);
       continue;
     }
     momentum_.rest();

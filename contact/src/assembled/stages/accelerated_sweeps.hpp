@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "assembled/search/search.hpp"
 #include "assembled/stages/momentum.hpp"
-#include "assembled/stages/partial_sweeps.hpp"
 #include <tether/linalg/anderson.hpp>
 
 namespace tether::contact::detail {
@@ -16,14 +16,12 @@ class AcceleratedSweeps {
   const PackedVector* point() const { return g_.data(); }
 
   struct Leave {            // conditions under which the stage gives way; work in estimated ns
-    double price = 0;       // of the other stages: leave if the predicted rest costs more; 0: stay
+    double price = 0;       // of the other stages: leave if the predicted rest costs more
     double least_work = 0;  // spent here before leaving is considered
     double most_work = 0;   // > 0: leave after so much
-    int most_sweeps = 0;    // > 0: leave after so many
-    bool partly = false;    // of many contacts: those that have not settled may be swept alone, and
-                            // sweeps have momentum until all have been quiet for long
   };
-  // Until solved, exhausted, or the conditions hold.
+  // Until solved, exhausted, or the conditions hold. Sweeps of many contacts have momentum until
+  // all have been quiet for long.
   void run(Search& search, const Leave& leave);
 
  private:
@@ -32,13 +30,13 @@ class AcceleratedSweeps {
   static constexpr double kToggledShare = 0.003;
 
   int toggles(const System& system);
-  bool extrapolates(int sweep, double f, int toggled, bool carried);
-  void carry_on(Search& search, double f, bool carried);
+  bool carried() const { return n_ > kFew; }
+  bool extrapolates(int sweep, double f, int toggled);
+  void carry_on(Search& search, double f);
   double forecast(int sweep, double f, double log_gain) const;
 
   int n_ = 0;
   Anderson anderson_;
-  PartialSweeps partial_;
   Momentum momentum_;
   std::vector<char> regime_;  // of each contact after the last sweep
   // f: weighted change of a sweep.
@@ -51,7 +49,7 @@ class AcceleratedSweeps {
     double f = 0;
   };
   Mark earlier_, later_;
-  Packed x_, g_, f_, swept_;
+  Packed x_, g_, f_;
 };
 
 }  // namespace tether::contact::detail

@@ -6,11 +6,6 @@
 
 namespace tether::contact::detail {
 
-void Momentum::rest_where_changed(const Packed& g, const Packed& was) {
-  for (std::size_t i = 0; i < g.size(); ++i)
-    if (!std::equal(g[i].v, g[i].v + 3, was[i].v)) before_[i] = g[i];
-}
-
 void Momentum::step(const Problem& problem, double f, Packed& g, Packed& x) {
   double beta = 0;
   if (grown_ > 1 && f > last_f_) {

@@ -15,8 +15,6 @@ class Momentum {
   void reset(int contacts) { before_.resize(at(contacts)); }
   /// The next step has none.
   void rest() { grown_ = 1; }
-  /// Nor has what differs between g and `was`, at the next step.
-  void rest_where_changed(const Packed& g, const Packed& was);
   /// The next x; f: size of the change from x to g, which is given away.
   void step(const Problem& problem, double f, Packed& g, Packed& x);
 

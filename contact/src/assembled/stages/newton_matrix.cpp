@@ -8,8 +8,8 @@
 namespace tether::contact::detail {
 namespace {
 
-constexpr double kClearly = 0.5;      // of the price by contacts: the digits cost refinements
-constexpr double kOrderBodies = 500;  // ns a contact
+constexpr double kClearly = 0.5;  // of the price by contacts: the digits cost refinements
+constexpr double kOrderBodies = 500, kOrderContacts = 100;  // ns a contact, a block
 
 }  // namespace
 
@@ -20,38 +20,6 @@ double NewtonMatrix::cost(const Search& search) const {
       ordered_ ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
   return 4 * operations + sweeps_ * search.sweep_cost + 25 * blocks +
          per_contact_ * search.system.size();
-}
-
-// Breadth-first levels, whose ends separate the graph: a front of a nested elimination is as wide
-// as a level, and the widest front takes most of the work.
-double NewtonMatrix::cost_by_width(const Search& search) const {
-  constexpr double kOfBand =
-      0.1;  // of the work of eliminating level by level, as measured on packings
-  const linalg::BlockPattern p = pattern(search.system.problem());
-  const int n = p.size;
-  std::vector<int> reached;
-  std::vector<char> seen(at(n), 0);
-  reached.reserve(at(n));
-  double operations = 0;
-  for (int seed = 0; seed < n; ++seed) {
-    if (seen[at(seed)]) continue;
-    seen[at(seed)] = 1;
-    reached.push_back(seed);
-    std::size_t begin = reached.size() - 1;
-    while (begin < reached.size()) {
-      const std::size_t end = reached.size();
-      const double width = static_cast<double>(end - begin);
-      operations += width * width * width;
-      for (; begin < end; ++begin)
-        for (int k = p.starts[reached[begin]]; k < p.starts[reached[begin] + 1]; ++k) {
-          const int j = p.columns[k];
-          if (seen[at(j)]) continue;
-          seen[at(j)] = 1;
-          reached.push_back(j);
-        }
-    }
-  }
-  return 4 * kOfBand * operations;
 }
 
 bool NewtonMatrix::order_by_bodies(Search& search) {
@@ -66,14 +34,11 @@ bool NewtonMatrix::order_by_bodies(Search& search) {
   return true;
 }
 
-double NewtonMatrix::order_cost(const Search& search) const {
-  return 100 * static_cast<double>(search.system.problem().blocks().size());
-}
-
 void NewtonMatrix::order(Search& search) {
   if (ordered_ || order_by_bodies(search)) return;
   const linalg::BlockPattern blocks = pattern(search.system.problem());
-  search.counts.work += order_cost(search);
+  search.counts.work +=
+      kOrderContacts * static_cast<double>(search.system.problem().blocks().size());
   lu_.order(blocks);
   lu_.analyse(blocks, nullptr);
   ordered_ = true;

@@ -21,14 +21,10 @@ class NewtonMatrix {
   bool by_bodies() const { return by_bodies_; }
   /// Estimated ns of a step; by a guess of the fill before the matrix is ordered.
   double cost(const Search& search) const;
-  /// A guess of it that no order is needed for, from the width of the graph.
-  double cost_by_width(const Search& search) const;
 
   /// True, and ordered, where bodies have so many contacts that a guess of the fill by contacts
   /// decides for equations of bodies.
   bool order_by_bodies(Search& search);
-  /// Estimated ns of order().
-  double order_cost(const Search& search) const;
   /// By what costs less, with the fill of both known.
   void order(Search& search);
   /// By bodies where the guess says so, else by contacts, which are analysed for each step.

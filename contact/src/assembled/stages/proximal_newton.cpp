@@ -141,7 +141,7 @@ int ProximalNewton::inner(Search& search, double tau) {
     if (!accepted) return -1;
     res = residual(search, x_, z_, proximal, true);
     // x may be outside of the cone by round-off; the block solutions z never are.
-    search.test(z_.data(), Method::proximal_newton);
+    search.test(z_.data(), By::factors);
     if (search.solved() || search.exhausted()) return iteration;
     if (res <= target) return iteration;
   }

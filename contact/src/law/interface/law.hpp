@@ -43,19 +43,21 @@ struct View {
   const double* inverse_scale;
 };
 
-// Results of a test: norms, and the largest error of a contact relative to its island.
+// The largest error of a contact relative to its island.
 struct Test {
-  double natural = 0, fixed = 0, x = 0, w = 0;
+  double fixed = 0;
   double least = 0;  // fixed, or less where contacts stick or slide as they do with b changed by it
+};
+struct Norms {
+  double map = 0, x = 0, w = 0;  // of the natural map, of impulses and velocities
 };
 
 struct AssembledKernels {
   void (*sweep)(const View&, PackedVector* x);
-  void (*sweep_some)(const View&, const int* list, int size, PackedVector* x);
   double (*blocks)(const View&, const PackedVector* x, PackedVector* out, Regime*,
                    LocalDerivative*);
-  Test (*natural_map)(const View&, const PackedVector* x, PackedVector* w);
-  Test (*error)(const View&, const PackedVector* x);                        // fixed and least
+  Norms (*natural_map)(const View&, const PackedVector* x, PackedVector* w);
+  Test (*error)(const View&, const PackedVector* x);
   double (*exact_error)(const View&, const PackedVector* x, double* each);  // exact_error.hpp
 };
 struct BodyKernels {

@@ -81,20 +81,6 @@ TETHER_INLINE void sweep(const View& s, PackedVector* x) {
   }
 }
 
-// The contacts of a list alone.
-template <class Rule>
-TETHER_INLINE void sweep_some(const View& s, const int* list, int size, PackedVector* x) {
-  int count = 0;
-  alignas(32) double w[4];
-  for (int k = 0; k < size; ++k) {
-    const int i = list[k];
-    double r[3];
-    row(s, x, i, w);
-    block_rhs(s, x, i, w, r);
-    Rule::solve(s.rule, i, s.local[i], r[0], r[1], r[2], x[i].v, s.lambda[i], count);
-  }
-}
-
 template <class Rule>
 TETHER_INLINE double blocks(const View& s, const PackedVector* x, PackedVector* out,
                             Regime* regimes, LocalDerivative* derivatives) {
@@ -121,7 +107,7 @@ TETHER_INLINE double blocks(const View& s, const PackedVector* x, PackedVector* 
 }
 
 template <class Rule>
-TETHER_INLINE Test natural_map(const View& s, const PackedVector* x, PackedVector* w) {
+TETHER_INLINE Norms natural_map(const View& s, const PackedVector* x, PackedVector* w) {
   double map = 0, xx = 0, ww = 0;
   for (int i = 0; i < s.n; ++i) {
     row(s, x, i, w[i].v);
@@ -135,7 +121,7 @@ TETHER_INLINE Test natural_map(const View& s, const PackedVector* x, PackedVecto
       ww += wi[c] * wi[c];
     }
   }
-  return {std::sqrt(map), 0, std::sqrt(xx), std::sqrt(ww), 0};
+  return {std::sqrt(map), std::sqrt(xx), std::sqrt(ww)};
 }
 
 // Largest error of a contact, relative to the velocity scale of its island; infinite if one is not
@@ -194,15 +180,11 @@ TETHER_INLINE Test worst_error(const View& s, const PackedVector* x) {
 #define TETHER_ASSEMBLED_KERNELS(name, ...)                                                     \
   using name##_rule = __VA_ARGS__;                                                              \
   TETHER_CLONES void name##_sweep(const View& s, PackedVector* x) { sweep<name##_rule>(s, x); } \
-  TETHER_CLONES void name##_sweep_some(const View& s, const int* list, int size,                \
-                                       PackedVector* x) {                                       \
-    sweep_some<name##_rule>(s, list, size, x);                                                  \
-  }                                                                                             \
   TETHER_CLONES double name##_blocks(const View& s, const PackedVector* x, PackedVector* out,   \
                                      Regime* regimes, LocalDerivative* derivatives) {           \
     return blocks<name##_rule>(s, x, out, regimes, derivatives);                                \
   }                                                                                             \
-  TETHER_CLONES Test name##_natural(const View& s, const PackedVector* x, PackedVector* w) {    \
+  TETHER_CLONES Norms name##_natural(const View& s, const PackedVector* x, PackedVector* w) {   \
     return natural_map<name##_rule>(s, x, w);                                                   \
   }                                                                                             \
   TETHER_CLONES Test name##_error(const View& s, const PackedVector* x) {                       \
@@ -211,5 +193,5 @@ TETHER_INLINE Test worst_error(const View& s, const PackedVector* x) {
   double name##_exact_error(const View& s, const PackedVector* x, double* each) {               \
     return exact_error<name##_rule>(s, x, each);                                                \
   }                                                                                             \
-  constexpr AssembledKernels name = {name##_sweep,   name##_sweep_some, name##_blocks,          \
-                                     name##_natural, name##_error,      name##_exact_error};
+  constexpr AssembledKernels name = {name##_sweep, name##_blocks, name##_natural, name##_error, \
+                                     name##_exact_error};

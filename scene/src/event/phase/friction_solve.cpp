@@ -69,6 +69,7 @@ Regime regime_of(double mobility, double left, double slip) {
 
 /// Solves w = A x - b for blocks (normal, tangents): friction cones, and where there are moments
 /// the cones of rolling and torsional friction that these make with the contacts which hold them.
+/// Starts where the last solve ended.
 class ConeBlocks {
  public:
   ConeBlocks(const contact::Options& options, const Holders& holders)
@@ -81,11 +82,14 @@ class ConeBlocks {
   contact::Solver contacts_;
   contact::ConeSolver cones_;
   Holders holders_;
+  VectorXd last_;
 };
 
 FrictionAnswer ConeBlocks::solve(const MatrixXd& A, const VectorXd& b, const VectorXd& mu) {
   if (!holders_.empty()) return solve_with_moments(A, b, mu);
-  const contact::Solution found = contacts_.solve(contact::Problem::dense(A, b, mu));
+  if (last_.size() == 0) last_.setZero(b.size());
+  const contact::Solution found = contacts_.solve(contact::Problem::dense(A, b, mu), last_);
+  last_ = found.impulses;
   return {is_solved(found), found.impulses, found.velocities, found.regimes, found.error};
 }
 
@@ -101,8 +105,10 @@ FrictionAnswer ConeBlocks::solve_with_moments(const MatrixXd& A, const VectorXd&
     rows.insert(rows.end(), each.rows.begin(), each.rows.end());
   }
   const SomeRows part(A, b, rows);
+  const auto problem = contact::ConeProblem::dense(part.A, part.b, std::move(cones));
   const contact::ConeSolution found =
-      cones_.solve(contact::ConeProblem::dense(part.A, part.b, std::move(cones)));
+      last_.size() > 0 ? cones_.solve(problem, last_) : cones_.solve(problem);
+  last_ = found.impulses;
   FrictionAnswer out;
   out.solved = is_solved(found);
   out.error = found.error;
@@ -195,7 +201,6 @@ bool solve_compliant(const std::vector<bool>& closed, double none, const MatrixX
   options.law = contact::Law::coulomb;
   options.tolerance = kSolve;
   options.strict = true;
-  options.warm_start = true;
   options.max_work = kCompliantWork;
   ConeBlocks solver(options, held.holders);
   FrictionAnswer answer;

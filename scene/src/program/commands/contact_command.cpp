@@ -28,17 +28,8 @@ std::map<std::string, Law> laws_by_name() {
   return out;
 }
 
-const std::map<std::string, Measure> kMeasures = {{"automatic", Measure::automatic},
-                                                  {"natural_map", Measure::natural_map},
-                                                  {"natural_map_data", Measure::natural_map_data},
-                                                  {"fixed_point", Measure::fixed_point}};
-
-std::map<std::string, Method> methods() {
-  std::map<std::string, Method> out;
-  for (int k = 0; name(static_cast<Method>(k)) != std::string("?"); ++k)
-    out[name(static_cast<Method>(k))] = static_cast<Method>(k);
-  return out;
-}
+const std::map<std::string, Measure> kMeasures = {{"fixed_point", Measure::fixed_point},
+                                                  {"natural_map", Measure::natural_map}};
 
 // Words, not values: CLI11 would print those of an enumeration of bytes as characters. `value` has
 // to outlive the parsing.
@@ -68,9 +59,9 @@ Status run_cones(const ContactArguments& arguments, const std::string& file,
   const double energy_change = 0.5 * s.impulses.dot(s.velocities - problem.b());
   if (arguments.csv) {
     // The other measures are of contacts of one kind: empty.
-    std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,,,,,%.3e,%.3e,%.3e,,\n", table_field(file).c_str(),
-                blocks, name(o.law), name(o.method), o.tolerance, name(s.status), s.error,
-                s.counts.sweeps, s.counts.factorisations, dissipation, energy_change, s.error);
+    std::printf("%s,%d,%s,%g,%s,%.3e,%d,%d,,,,,%.3e,%.3e,%.3e,\n", table_field(file).c_str(),
+                blocks, name(o.law), o.tolerance, name(s.status), s.error, s.counts.sweeps,
+                s.counts.factorisations, dissipation, energy_change, s.error);
     return s.status;
   }
   std::printf("%s: %d cones of %d rows, %s\n", on_terminal(file).c_str(), blocks, problem.rows(),
@@ -98,9 +89,8 @@ int run(const ContactArguments& arguments) {
   int status = 0;
   if (arguments.csv) {
     std::printf(
-        "file,contacts,law,method,tolerance,status,error,sweeps,factorisations,replaced,"
-        "signorini,cone,"
-        "alignment,dissipation,energy_change,fixed_point,natural_map,natural_map_data\n");
+        "file,contacts,law,tolerance,status,error,sweeps,factorisations,replaced,signorini,cone,"
+        "alignment,dissipation,energy_change,fixed_point,natural_map\n");
   }
   for (const std::string& file : arguments.files) {
     try {
@@ -118,11 +108,11 @@ int run(const ContactArguments& arguments) {
       const Residuals r = evaluate(problem, o.law, s.impulses);
       if (s.status != Status::solved && status == 0) status = 1;
       if (arguments.csv) {
-        std::printf("%s,%d,%s,%s,%g,%s,%.3e,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e\n",
-                    table_field(file).c_str(), problem.contacts(), name(o.law), name(o.method),
-                    o.tolerance, name(s.status), s.error, s.counts.sweeps, s.counts.factorisations,
+        std::printf("%s,%d,%s,%g,%s,%.3e,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e\n",
+                    table_field(file).c_str(), problem.contacts(), name(o.law), o.tolerance,
+                    name(s.status), s.error, s.counts.sweeps, s.counts.factorisations,
                     s.replaced.size(), r.signorini, r.cone, r.alignment, r.dissipation,
-                    r.energy_change, r.fixed_point, r.natural_map, r.natural_map_data);
+                    r.energy_change, r.fixed_point, r.natural_map);
         continue;
       }
       int count[3] = {0, 0, 0};
@@ -133,9 +123,8 @@ int run(const ContactArguments& arguments) {
                   s.counts.sweeps, s.counts.factorisations);
       std::printf("  separating %d, sticking %d, sliding %d\n", count[0], count[1], count[2]);
       std::printf(
-          "  fixed point %.3e, natural map %.3e, over data %.3e, Signorini %.3e, cone %.3e, "
-          "alignment %.3e\n",
-          r.fixed_point, r.natural_map, r.natural_map_data, r.signorini, r.cone, r.alignment);
+          "  fixed point %.3e, natural map %.3e, Signorini %.3e, cone %.3e, alignment %.3e\n",
+          r.fixed_point, r.natural_map, r.signorini, r.cone, r.alignment);
       std::printf("  energy change %.9e\n", r.energy_change);
       if (!s.replaced.empty()) {
         std::printf("  the Coulomb rule replaces the law at %zu contacts:", s.replaced.size());
@@ -161,7 +150,6 @@ void add_contact_command(CLI::App& app, int* status) {
   add_choice(*command, "--law", "Friction law", laws_by_name(), arguments->options.law);
   command->add_option("--tolerance", arguments->options.tolerance, "The measure ends below it")
       ->capture_default_str();
-  add_choice(*command, "--method", "Solution method", methods(), arguments->options.method);
   add_choice(*command, "--measure", "What is compared with the tolerance", kMeasures,
              arguments->options.measure);
   command->add_flag("--strict", arguments->options.strict, "Never replace the law");

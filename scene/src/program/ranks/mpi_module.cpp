@@ -5,9 +5,9 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <tether/contact_mpi.hpp>
 #include <thread>
 
-#include "messages.hpp"  // of contact_mpi
 #include "program/ranks/ranks.hpp"
 
 namespace tether::scene {
@@ -19,7 +19,7 @@ constexpr std::chrono::seconds kPatience(1);
 
 class MpiRanks final : public Ranks {
  public:
-  MpiRanks() : messages_(std::make_unique<contact_mpi::detail::Messages>(MPI_COMM_WORLD)) {}
+  MpiRanks() : messages_(std::make_unique<contact_mpi::Messages>(MPI_COMM_WORLD)) {}
   ~MpiRanks() override {
     messages_.reset();
     MPI_Finalize();
@@ -70,7 +70,7 @@ class MpiRanks final : public Ranks {
     std::fflush(stderr);
   }
 
-  std::unique_ptr<contact_mpi::detail::Messages> messages_;
+  std::unique_ptr<contact_mpi::Messages> messages_;
 };
 
 }  // namespace

@@ -83,7 +83,7 @@ void StickingPoint::refine(Search& search, NewtonMatrix& matrix, const std::vect
       if (flat[at(i)]) z_[at(i)].v[1] = z_[at(i)].v[2] = 0;
       clip_cone(p.local(i).mu, z_[at(i)].v);
     }
-    const double error = search.test(z_.data(), Method::interior_point);
+    const double error = search.test(z_.data(), By::factors);
     const bool exact = search.near_round_off();
     // Errors of many contacts on each other add up: near round-off all digits are taken that cost
     // a solve each.
