@@ -19,7 +19,7 @@ BUILT = "build/release/benchmarks"
 TETHER = "build/release/scene/tether"
 # SUNDIALS at -O3, which codes of one method are compared with: the distribution's is not optimised.
 OPTIMISED = pathlib.Path(os.environ.get("TETHER_SUNDIALS") or ROOT / "build" / "sundials")
-COMPARED = {"accuracy_cost", "crossover", "stability", "chain_cost"}
+COMPARED = {"instructions", "accuracy_cost", "crossover", "stability", "chain_cost"}
 # Name: title, how to read it, command from the root of the project.
 COMMANDS = {
     "pendulum": ("The pendulum of Hanson and Krogh",
