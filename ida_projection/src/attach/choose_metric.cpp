@@ -7,9 +7,9 @@ namespace tether::ida_projection {
 
 // Is the metric free, and can the response of F be had?
 bool Projection::Impl::asks_for_metric() const {
-  return in_use(Mechanism::other_metric) && movers_.used->rows().may_use_levels() &&
-         wanted_metric_ == Metric::automatic && options_.group.empty() &&
-         options_.advanced.metric == Metric::local_correction &&
+  return in_use(Mechanism::other_metric) && movers_.used->rows().traits.many &&
+         movers_.used->rows().may_use_levels() && wanted_metric_ == Metric::automatic &&
+         options_.group.empty() && options_.advanced.metric == Metric::local_correction &&
          movers_.used == movers_.own.get() && polish_.is_response_available();
 }
 

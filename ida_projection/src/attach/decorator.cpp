@@ -105,7 +105,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
 
   Candidate candidate{0.0, y_predicted, ycor, weights};
   if (unknowns_.contiguous) candidate.with_entries();
-  movers_.joined.begin(candidate);
+  if (!run_.engaged || movers_.joined.mover() != nullptr) movers_.joined.begin(candidate);
   corrector_.begin(mem);
   if (movers_.used != nullptr) movers_.used->rows().forget_failure();
   control_.restore_weights(weights, attempts_.steps);
@@ -241,6 +241,7 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
 // The move takes back as well what an iteration before it has added: a solution less. Only where
 // F has no response: it would be left out, and IDA's test of algebraic variables needs it.
 bool Projection::Impl::polishes_first() {
+  if (!movers_.used->rows().traits.many) return false;
   const double longest = std::min(kShortMove, polish_.longest_unanswered(control_.smoothing()));
   if (!in_use(Mechanism::polish_first) || !(attempts_.last_move <= longest) ||
       control_.tests_algebraic() || !movers_.used->rows().may_polish_first())

@@ -170,14 +170,19 @@ void Mover::newton(const Candidate& candidate, Move& result) {
       renew = refill = true;
       continue;
     }
-    if (++result.moves == 1 && !allowed(candidate, found.length, result)) return;
+    if (++result.moves == 1) {
+      result.length = move_length_ = found.length;
+      if (!(found.length <= options_.advanced.largest_move) && !allowed(candidate, result)) return;
+    }
     if ((result.status = rows_->apply(1.0, candidate)) != Status::success) return;
     by_present_factors_ = found.length;
+    if (!rows_->traits.gives_g) break;
     if (reused_) {
       if (2.0 * wear_.rate() * found.length <= kForLater) break;
       reused_ = false;
       renew = refill = true;
     } else {
+      if (result.moves == 1 && found.left == 0.0 && monitor_.plainly_done(found.length)) break;
       Monitor::Verdict verdict = Monitor::Verdict::done;
       if (done(candidate, found, fresh, result, verdict)) break;
       if (result.status != Status::success) return;
@@ -190,12 +195,11 @@ void Mover::newton(const Candidate& candidate, Move& result) {
   result.status = Status::success;
 }
 
-// Is this length of a first move? Only a long one can be too long: the limit is at least
-// largest_move. False: it was refused, or made as far as is allowed.
-bool Mover::allowed(const Candidate& candidate, double length, Move& result) {
-  result.length = move_length_ = length;
-  const double largest = options_.advanced.largest_move;
-  const double limit = length <= largest ? largest : largest * std::max(1.0, rows_->change());
+// Is a first move of that length, which is no short one? False: it was refused, or made as far as
+// is allowed.
+bool Mover::allowed(const Candidate& candidate, Move& result) {
+  const double length = result.length;
+  const double limit = options_.advanced.largest_move * std::max(1.0, rows_->change());
   if (length <= limit) return true;
   const bool finite = std::isfinite(length);
   if (options_.advanced.long_move == LongMove::reject || !finite) {
@@ -217,8 +221,6 @@ bool Mover::allowed(const Candidate& candidate, double length, Move& result) {
 bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, Move& result,
                  Monitor::Verdict& verdict) {
   const double length = found.length;
-  if (!rows_->traits.gives_g) return true;
-  if (result.moves == 1 && found.left == 0.0 && monitor_.plainly_done(length)) return true;
   // A first move longer than the largest floor need not know it.
   const double floor = result.moves == 1 && length > kLargestFloor
                            ? 0.0

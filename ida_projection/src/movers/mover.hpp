@@ -103,7 +103,7 @@ class Mover {
   bool plainly_nothing();
   bool still_nothing(const Candidate& candidate, Move& result);
   void newton(const Candidate& candidate, Move& result);
-  bool allowed(const Candidate& candidate, double length, Move& result);
+  bool allowed(const Candidate& candidate, Move& result);
   bool done(const Candidate& candidate, const Solution& solution, bool fresh, Move& result,
             Monitor::Verdict& verdict);
   Status take_rest(const Candidate& candidate, double reach);

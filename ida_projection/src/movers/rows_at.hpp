@@ -47,6 +47,8 @@ class RowsAt {
     bool gives_g = true;
     /// Are second moves cheap beside the factors? Then what is left is seen on each candidate.
     bool measures_rest = false;
+    /// Are there so many rows that moves in the metric may be rough, or be polished before?
+    bool many = false;
   };
   explicit RowsAt(const Traits& these) : traits(these) {}
   virtual ~RowsAt() = default;

@@ -27,7 +27,8 @@ class ContiguousRows final : public RowsAt {
   /// Drift is that of the first `reported` rows (-1: of all).
   ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
                  int size, int reported)
-      : RowsAt({true, Rows::many(constraints.total_count())}),
+      : RowsAt({true, Rows::many(constraints.total_count()),
+                constraints.total_count() > kFewForLevels || Rows::kKeepsFactors}),
         evaluator_(constraints, statistics),
         blocks_(constraints, evaluator_, size),
         at_(size),
