@@ -19,7 +19,7 @@ using namespace tether;
 namespace {
 
 constexpr double kTolerances[] = {1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8};
-// Runs that get stuck end: the longest ones that do not take 18 141 steps, and 510 of large
+// Runs that get stuck end: the longest ones that do not take 18 141 steps, and 2375 of large
 // problems.
 constexpr long kMostSteps = 20000, kMostStepsOfLarge = 3000;
 constexpr int kLongRuns = 30;                // unknowns; beyond them runs are short
