@@ -57,8 +57,10 @@ Scene everything() {
   s.bodies[2].drag->linear = 0.3;
   s.bodies[2].drag->quadratic = 0.2;
   s.bodies[2].drag->rotational = 0.1;
-  s.central_gravity.push_back({Vector3d(-1, 2, 3), 1.5, {}});
+  s.central_gravity.push_back({Vector3d(-1, 2, 3), 1.5, {}, true});
+  s.wind = Vector3d(0.4, -0.3, 0.2);
   s.loads.push_back({3, Vector3d(1, 2, 3), Vector3d(3, -2, 1), {}});
+  s.loads.push_back({1, Vector3d(2, -1, 1), Vector3d(1, 2, -1), {}, {}, true});
   keep_energy(s);
   return s;
 }

@@ -4,8 +4,8 @@
 //
 //   force -GM m r / |r|^3 at the centre of mass,   potential -GM m / |r|
 //
-// A body is attracted as if all of its mass were at its centre: the torque by the gradient of
-// gravity, of the order of (size of the body / |r|)^2, is left out.
+// A body is attracted as if all of its mass were at its centre; gravity_gradient.cpp has what its
+// extent adds.
 #include <cmath>
 
 #include "mechanics/effect.hpp"
@@ -81,6 +81,7 @@ class CentralGravityEffect : public Effect {
         in.missing("gravitational_parameter", "G times the mass of the centre, m^3/s^2");
       centre.gravitational_parameter =
           in.number("gravitational_parameter", 0, files::kNotNegative, "m^3/s^2");
+      centre.gradient = in.flag("gradient", centre.gradient);
       r.scene.central_gravity.push_back(centre);
     });
   }
@@ -89,6 +90,7 @@ class CentralGravityEffect : public Effect {
       out.item("central_gravity");
       out.field("at", centre.at, "m");
       out.field("gravitational_parameter", centre.gravitational_parameter, "m^3/s^2");
+      out.field("gradient", centre.gradient);
     }
   }
   void check(const Scene& scene, files::Report& report) const override {

@@ -2,6 +2,8 @@
 //
 //   force -(linear + quadratic |v|) v at the centre of mass,   torque -rotational w
 //
+// v: the velocity against the wind.
+//
 // The stepping engine takes it implicitly, so that any strength is stable.
 #include <Eigen/LU>
 
@@ -23,14 +25,15 @@ double resistance(const Drag& drag, double speed) { return drag.linear + drag.qu
 
 class DragForce : public Force {
  public:
-  explicit DragForce(std::vector<Dragged> bodies) : bodies_(std::move(bodies)) {}
+  DragForce(std::vector<Dragged> bodies, const Vector3d& wind)
+      : bodies_(std::move(bodies)), wind_(wind) {}
   const char* name() const override { return "drag"; }
   Stepping stepping() const override { return Stepping::implicit; }
 
   void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
     for (const Dragged& each : bodies_) {
       Load6& load = loads[at(bodies.inertia[at(each.body)].slot)];
-      const Vector3d& v = bodies.frames[at(each.body)].v;
+      const Vector3d v = bodies.frames[at(each.body)].v - wind_;
       load.force -= resistance(each.drag, v.norm()) * v;
       load.torque_body -= each.drag.rotational * bodies.w[at(each.body)];
     }
@@ -38,10 +41,7 @@ class DragForce : public Force {
   void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Dragged& each : bodies_) {
       const int slot = bodies.inertia[at(each.body)].slot;
-      const Vector3d& v = bodies.frames[at(each.body)].v;
-      const double speed = v.norm();
-      Matrix3d D = resistance(each.drag, speed) * Matrix3d::Identity();
-      if (speed > 0) D += each.drag.quadratic / speed * v * v.transpose();
+      const Matrix3d D = slope(each.drag, bodies.frames[at(each.body)].v - wind_);
       J.add_block(J.motion_row(slot, 0), kBody * slot + kVelocity, D);
       J.add_block(J.motion_row(slot, 3), kBody * slot + kSpin,
                   each.drag.rotational * Matrix3d::Identity());
@@ -52,7 +52,8 @@ class DragForce : public Force {
     double sum = 0;
     for (const Dragged& each : bodies_) {
       const Vector3d& v = bodies.frames[at(each.body)].v;
-      sum -= resistance(each.drag, v.norm()) * v.squaredNorm() +
+      const Vector3d against = v - wind_;
+      sum -= resistance(each.drag, against.norm()) * against.dot(v) +
              each.drag.rotational * bodies.w[at(each.body)].squaredNorm();
     }
     return sum;
@@ -61,21 +62,24 @@ class DragForce : public Force {
     for (const Dragged& each : bodies_) {
       const int column = kBody * bodies.inertia[at(each.body)].slot;
       const Vector3d& v = bodies.frames[at(each.body)].v;
+      const Vector3d against = v - wind_;
+      const Vector3d by_v =
+          resistance(each.drag, against.norm()) * against + slope(each.drag, against) * v;
       for (int k = 0; k < 3; ++k) {
-        J.add(J.work_row, column + kVelocity + k,
-              (2 * each.drag.linear + 3 * each.drag.quadratic * v.norm()) * v[k]);
+        J.add(J.work_row, column + kVelocity + k, by_v[k]);
         J.add(J.work_row, column + kSpin + k,
               2 * each.drag.rotational * bodies.w[at(each.body)][k]);
       }
     }
   }
-  // (m + dt resistance) v+ = m v,   (I + dt rotational) w+ = I w in body axes.
+  // (m + dt resistance) v+ = m v against the wind,   (I + dt rotational) w+ = I w in body axes.
   void step(SteppedBodies& stepped, double dt) const override {
     const Bodies& bodies = stepped.bodies();
     for (const Dragged& each : bodies_) {
       const contact::RigidBody& motion = stepped.motion(each.body);
-      const double force = resistance(each.drag, motion.velocity.norm());
-      const Vector3d v = motion.velocity / (1 + dt * motion.inverse_mass * force);
+      const Vector3d before = motion.velocity - wind_;
+      const double force = resistance(each.drag, before.norm());
+      const Vector3d v = wind_ + before / (1 + dt * motion.inverse_mass * force);
       Vector3d w = motion.angular_velocity;
       if (each.drag.rotational != 0) {
         const Matrix3d& I = bodies.inertia[at(each.body)].inertia;
@@ -87,11 +91,33 @@ class DragForce : public Force {
   }
 
  private:
+  // d(resistance v) / dv
+  static Matrix3d slope(const Drag& drag, const Vector3d& v) {
+    const double speed = v.norm();
+    Matrix3d D = resistance(drag, speed) * Matrix3d::Identity();
+    if (speed > 0) D += drag.quadratic / speed * v * v.transpose();
+    return D;
+  }
+
   std::vector<Dragged> bodies_;
+  Vector3d wind_;
 };
 
 class DragEffect : public Effect {
  public:
+  void read_scene(files::Fields& in, Scene& scene) const override {
+    if (in.has("wind")) scene.wind = in.vector("wind", Vector3d::Zero(), files::kAny, "m/s");
+  }
+  void write_scene(const Scene& scene, files::Writer& out) const override {
+    if (scene.wind) out.field("wind", *scene.wind, "m/s");
+  }
+  void check(const Scene& scene, files::Report& report) const override {
+    if (scene.wind && !does_work(scene))
+      report.add({scene.file, 1, 1}, "scene: wind", "", "has no meaning: no body has drag");
+  }
+  void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
+    if (scene.wind) rate.take(scene.wind->norm() / length);
+  }
   void read_body(files::Fields& in, files::Reader& r, Body& body) const override {
     const files::Value* table = in.table("drag");
     if (table == nullptr) return;
@@ -118,9 +144,11 @@ class DragEffect : public Effect {
     int count = 0;
     for (const Body& body : scene.bodies) count += body.drag.has_value();
     if (count > 0)
-      lines.push_back({"drag", fmt::format("{} {}", count, count == 1 ? "body" : "bodies")});
+      lines.push_back({"drag", fmt::format("{} {}{}", count, count == 1 ? "body" : "bodies",
+                                           scene.wind ? ", in a wind" : "")});
   }
   void convert(Scene& scene, const Units& units) const override {
+    if (scene.wind) *scene.wind /= units.speed();
     for (Body& body : scene.bodies) {
       if (!body.drag) continue;
       body.drag->linear /= units.force() / units.speed();
@@ -143,7 +171,9 @@ class DragEffect : public Effect {
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies&) const override {
     std::vector<Dragged> bodies = dragged(scene);
-    return bodies.empty() ? nullptr : std::make_unique<DragForce>(std::move(bodies));
+    return bodies.empty() ? nullptr
+                          : std::make_unique<DragForce>(std::move(bodies),
+                                                        scene.wind.value_or(Vector3d::Zero()));
   }
 
  private:

@@ -1,6 +1,7 @@
 // Tether: given forces and torques. SPDX-License-Identifier: BSD-3-Clause
 //
-//   force at the centre of mass and torque in world axes, both constant or with a factor
+//   force at the centre of mass and torque, in world axes or in those of the body, both constant
+//   or with a factor
 //   mean + sin(2 pi f t + phase), or that of a table, straight between its times
 //
 // Steps take the mean of the factor over their length: impulses of given forces are exact.
@@ -64,16 +65,20 @@ class LoadForce : public Force {
     for (const Load& each : loads_) {
       Load6& load = loads[at(bodies.inertia[at(each.body)].slot)];
       const double factor = factor_of(each, bodies);
-      load.force += factor * each.force;
-      load.torque_world += factor * each.torque;
+      load.force += factor * in_world(each, each.force, bodies);
+      load.torque_world += factor * in_world(each, each.torque, bodies);
     }
   }
-  // d(R^T torque) = [R^T torque]x turn
+  // d(R^T torque) = [R^T torque]x turn; in body axes d(R force) = -R [force]x turn
   void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Load& each : loads_) {
       const int slot = bodies.inertia[at(each.body)].slot;
       const Matrix3d& R = bodies.frames[at(each.body)].R;
-      J.add_turn(J.motion_row(slot, 3), slot, -skew(R.transpose() * torque_of(each, bodies)));
+      const double factor = factor_of(each, bodies);
+      if (each.in_body)
+        J.add_turn(J.motion_row(slot, 0), slot, factor * R * skew(each.force));
+      else
+        J.add_turn(J.motion_row(slot, 3), slot, -factor * skew(R.transpose() * each.torque));
     }
   }
   bool has_power() const override { return true; }
@@ -81,28 +86,33 @@ class LoadForce : public Force {
     double sum = 0;
     for (const Load& each : loads_) {
       const Frame<double>& f = bodies.frames[at(each.body)];
-      sum += factor_of(each, bodies) * (each.force.dot(f.v) + each.torque.dot(f.W));
+      sum += factor_of(each, bodies) * (in_world(each, each.force, bodies).dot(f.v) +
+                                        in_world(each, each.torque, bodies).dot(f.W));
     }
     return sum;
   }
   void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Load& each : loads_) {
       const int slot = bodies.inertia[at(each.body)].slot;
-      const Vector3d torque = bodies.frames[at(each.body)].R.transpose() * torque_of(each, bodies);
-      const Vector3d force = factor_of(each, bodies) * each.force;
+      const Frame<double>& f = bodies.frames[at(each.body)];
+      const double factor = factor_of(each, bodies);
+      const Vector3d force = factor * in_world(each, each.force, bodies);
+      const Vector3d torque = factor * f.R.transpose() * in_world(each, each.torque, bodies);
       for (int k = 0; k < 3; ++k) {
         J.add(J.work_row, kBody * slot + kVelocity + k, -force[k]);
         J.add(J.work_row, kBody * slot + kSpin + k, -torque[k]);
       }
-      const Vector3d turn = bodies.w[at(each.body)].cross(torque);
+      const Vector3d turn = each.in_body
+                                ? Vector3d(factor * each.force.cross(f.R.transpose() * f.v))
+                                : bodies.w[at(each.body)].cross(torque);
       const Eigen::RowVector4d q = turn.transpose() * bodies.turns[at(slot)];
       for (int k = 0; k < 4; ++k) J.add(J.work_row, kBody * slot + kQuaternion + k, -q[k]);
     }
   }
 
  private:
-  static Vector3d torque_of(const Load& load, const Bodies& bodies) {
-    return factor_of(load, bodies) * load.torque;
+  static Vector3d in_world(const Load& load, const Vector3d& u, const Bodies& bodies) {
+    return load.in_body ? Vector3d(bodies.frames[at(load.body)].R * u) : u;
   }
 
   std::vector<Load> loads_;  // on bodies that move
@@ -150,6 +160,7 @@ class LoadEffect : public Effect {
       load.torque = in.vector("torque", load.torque, files::kAny, "N m");
       if (!in.has("force") && !in.has("torque"))
         in.missing("force", "give force (N), torque (N m) or both");
+      load.in_body = in.choice("axes", {"world", "body"}) == 1;
       if (in.has("sine") && in.has("table")) {
         in.wrong("table", "give sine or table, not both");
       } else if (in.has("sine")) {
@@ -167,6 +178,7 @@ class LoadEffect : public Effect {
       out.field("body", scene.bodies[at(load.body)].name);
       out.field("force", load.force, "N");
       out.field("torque", load.torque, "N m");
+      out.field("axes", std::string(load.in_body ? "body" : "world"));
       if (load.history) write_history(*load.history, out);
     }
   }
@@ -196,10 +208,13 @@ class LoadEffect : public Effect {
     const std::size_t count = scene.loads.size();
     const auto in_time = std::count_if(scene.loads.begin(), scene.loads.end(),
                                        [](const Load& load) { return load.history.has_value(); });
+    const auto in_body = std::count_if(scene.loads.begin(), scene.loads.end(),
+                                       [](const Load& load) { return load.in_body; });
     if (count > 0)
       lines.push_back(
           {"loads",
            counted(count, "load") +
+               (in_body > 0 ? fmt::format(", {} of them in axes of bodies", in_body) : "") +
                (in_time > 0 ? fmt::format(", {} of them change with time", in_time) : "")});
   }
   void take_rates(const Scene& scene, double length, double mass, Largest& rate) const override {
@@ -228,6 +243,8 @@ class LoadEffect : public Effect {
     for (const Load& load : momenta.scene.loads) {
       if (load.history)
         momenta.push("a load that changes with time");
+      else if (load.in_body)
+        momenta.push("a load that turns with its body");
       else if (!momenta.is_outside(load.body))
         momenta.steady_force += load.force;
       momenta.axes.none("a load");

@@ -41,6 +41,10 @@ struct JointMotor {
 struct JointSpring {
   double stiffness = 0, damping = 0;  ///< N m/rad, N m s/rad; N/m, N s/m
   double rest = 0;                    ///< rad, m
+
+  /// In place of them: rows of stretch or speed, above 0, and the force against it, straight
+  /// between and constant after them; on the other side the opposite.
+  std::vector<std::array<double, 2>> stiffness_table = {}, damping_table = {};
 };
 
 /// Couples the angles and ways s of hinges and sliders, which are 0 at t = 0: the sum of weight s

@@ -26,8 +26,9 @@ using contact::Shape;
 using contact::ShapeKind;
 
 struct Drag {
-  double linear = 0, quadratic = 0;  ///< force -(linear + quadratic |v|) v: N s/m, N s^2/m^2
-  double rotational = 0;             ///< torque -rotational w: N m s
+  /// Force -(linear + quadratic |v|) v, v against the wind: N s/m, N s^2/m^2.
+  double linear = 0, quadratic = 0;
+  double rotational = 0;  ///< torque -rotational w: N m s
 };
 
 /// How the surface of a body moves against it: m/s, rad/s about the centre of mass, body axes.
@@ -87,12 +88,13 @@ struct LoadHistory {
   std::vector<Knot> table;
 };
 
-/// A force at the centre and torque on one body, world axes; constant without a history.
+/// A force at the centre and torque on one body; constant without a history.
 struct Load {
   int body = 0;
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
   Place place;
   std::optional<LoadHistory> history = {};
+  bool in_body = false;  ///< the axes are those of the body, else the world's
 };
 
 /// A point at rest that attracts every body: force -GM m r / |r|^3 at the centre of mass, r from
@@ -101,6 +103,7 @@ struct CentralGravity {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< m
   double gravitational_parameter = 0;            ///< GM, m^3/s^2
   Place place;
+  bool gradient = false;  ///< with the torque and force of second order in (size / |r|)
 };
 
 enum class InvariantKind : std::uint8_t { energy, momentum, angular_momentum };
@@ -243,6 +246,7 @@ struct Scene {
   std::string name, file;
   double end = 1;                          ///< s
   std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: none
+  std::optional<Eigen::Vector3d> wind;     ///< m/s: drag is that of the speed against it
   std::vector<Body> bodies;
   std::vector<Pair> pairs;  ///< none: bodies do not touch
   std::vector<Joint> joints;

@@ -6,6 +6,11 @@
 //   spring   -k (s - rest) - c s',   potential k (s - rest)^2 / 2,   power -c s'^2
 //   motor    -k (s - target - rate t) - c (s' - rate), within its bound
 //
+// A table is a sum of bounded springs or dampers, two for each of its pieces (one for the first):
+//
+//   between s_a and s_b, with the rise F    -F/2 ... F/2 around (s_a + s_b) / 2, and around minus
+//   that
+//
 // An angle is the one of its turns that is nearest to its rest or target. Steps take the stretch
 // and the speed of their end (contact::JointLaws), which is stable for all gains.
 #include <cmath>
@@ -27,8 +32,10 @@ namespace {
 struct Gains {
   double stiffness, damping, rest;
   double rate = 0, bound = std::numeric_limits<double>::infinity();
+  double offset = 0;    // of the stretch
   bool drives = false;  // its force has no potential
 
+  Gains() : stiffness(0), damping(0), rest(0) {}
   explicit Gains(const JointSpring& s) : stiffness(s.stiffness), damping(s.damping), rest(s.rest) {}
   explicit Gains(const JointMotor& m)
       : stiffness(m.stiffness),
@@ -41,12 +48,52 @@ struct Gains {
 
 bool has_spring(const Joint& joint) { return joint.spring.has_value(); }
 
+using Table = std::vector<std::array<double, 2>>;
+
+// f(slope, middle, bound) of each part.
+template <class F>
+void each_part(const Table& table, const F& f) {
+  std::array<double, 2> last{0, 0};
+  for (const std::array<double, 2>& row : table) {
+    const double rise = row[1] - last[1], slope = rise / (row[0] - last[0]);
+    const double middle = (row[0] + last[0]) / 2;
+    if (rise > 0 && last[0] > 0) {
+      f(slope, middle, rise / 2);
+      f(slope, -middle, rise / 2);
+    } else if (rise > 0) {
+      f(slope, 0.0, rise);
+    }
+    last = row;
+  }
+}
+
+// f(gains)
+template <class F>
+void each_of(const JointSpring& spring, const F& f) {
+  if (spring.stiffness > 0 || spring.damping > 0) f(Gains(spring));
+  each_part(spring.stiffness_table, [&](double slope, double middle, double bound) {
+    Gains part;
+    part.stiffness = slope;
+    part.rest = spring.rest;
+    part.offset = middle;
+    part.bound = bound;
+    f(part);
+  });
+  each_part(spring.damping_table, [&](double slope, double middle, double bound) {
+    Gains part;
+    part.damping = slope;
+    part.rate = middle;
+    part.bound = bound;
+    f(part);
+  });
+}
+
 // f(joint, its number, gains)
 template <class F>
 void each_gains(const Scene& scene, const F& f) {
   for (std::size_t j = 0; j < scene.joints.size(); ++j) {
     const Joint& joint = scene.joints[j];
-    if (joint.spring) f(joint, j, Gains(*joint.spring));
+    if (joint.spring) each_of(*joint.spring, [&](const Gains& gains) { f(joint, j, gains); });
     if (joint.motor && joint.motor->has_gains()) f(joint, j, Gains(*joint.motor));
   }
 }
@@ -74,6 +121,7 @@ struct Sprung : Gains {
   S stretch(double t, const Frame<S>& A, const Frame<S>& B) const {
     S out = S(coordinate.value(A, B) - (rest + rate * t));
     if (turns) out += nearest_turn(number_of(out));
+    out -= offset;
     return out;
   }
   template <class S>
@@ -93,14 +141,17 @@ struct Sprung : Gains {
   }
   double potential(double t, const Frame<double>& A, const Frame<double>& B) const {
     if (drives || !(stiffness > 0)) return 0;
-    const double s = stretch(t, A, B);
-    return 0.5 * stiffness * s * s;
+    return stored(stretch(t, A, B)) - stored(offset);
+  }
+  double stored(double s) const {
+    const double x = std::abs(s), most = bound / stiffness;
+    return x < most ? 0.5 * stiffness * x * x : bound * (x - most / 2);
   }
   bool works() const { return drives || damping > 0; }
   template <class S>
   S power(double t, const Frame<S>& A, const Frame<S>& B) const {
     const S speed = coordinate.rate(A, B);
-    if (drives) return S(force(t, A, B, true) * speed);
+    if (drives || !(stiffness > 0)) return S(force(t, A, B, true) * speed);
     return S(-damping * speed * speed);
   }
 };
@@ -128,6 +179,39 @@ class JointSprings : public PairForces<Sprung> {
   }
 };
 
+constexpr std::size_t kMostRows = 100;
+
+// Rows of numbers above 0 that grow, and forces that do not fall.
+bool is_table(const files::Value& value, Table& table) {
+  using Kind = files::Value::Kind;
+  if (value.kind() != Kind::array || value.items().size() > kMostRows) return false;
+  std::array<double, 2> last{0, 0};
+  for (const files::Value& row : value.items()) {
+    if (row.kind() != Kind::array || row.items().size() != 2) return false;
+    const files::Value &s = row.items()[0], &force = row.items()[1];
+    if (s.kind() != Kind::number || force.kind() != Kind::number) return false;
+    const std::array<double, 2> next{s.number(), force.number()};
+    if (!files::kAny.holds(next[0]) || !files::kAny.holds(next[1])) return false;
+    if (!(next[0] > last[0] && next[1] >= last[1])) return false;
+    table.push_back(last = next);
+  }
+  return last[1] > 0;
+}
+
+void read_table(files::Fields& in, const char* gain, const Joint& joint, Table& out) {
+  const std::string key = std::string(gain) + "_table";
+  if (!in.has(key)) return;
+  if (!joints::type(joint.kind).is_free()) return in.wrong(key, "is of hinges and sliders");
+  if (in.has(gain)) return in.wrong(key, fmt::format("give {} or {}, not both", gain, key));
+  Table table;
+  if (is_table(*in.find(key), table))
+    out = table;
+  else
+    in.wrong(key, fmt::format("must be an array of up to {} [number above 0, force], numbers that "
+                              "grow, forces that do not fall, the last above 0",
+                              kMostRows));
+}
+
 class JointSpringEffect : public JointLawEffect {
  public:
   JointSpringEffect() : JointLawEffect("joint springs", has_spring) {}
@@ -140,7 +224,10 @@ class JointSpringEffect : public JointLawEffect {
     files::Fields fields = r.fields(table, in.path() + ": spring");
     JointSpring& spring = joint.spring.emplace();
     read_gains(fields, angle, spring.stiffness, spring.damping);
-    if (!(spring.stiffness > 0 || spring.damping > 0))
+    read_table(fields, "stiffness", joint, spring.stiffness_table);
+    read_table(fields, "damping", joint, spring.damping_table);
+    if (!(spring.stiffness > 0 || spring.damping > 0) && !fields.has("stiffness_table") &&
+        !fields.has("damping_table"))
       fields.missing("stiffness", angle ? "give stiffness (N m/rad), damping (N m s/rad) or both"
                                         : "give stiffness (N/m), damping (N s/m) or both");
     if (joints::type(joint.kind).is_free())
@@ -150,8 +237,18 @@ class JointSpringEffect : public JointLawEffect {
   void write_joint(const Joint& joint, bool angle, files::Writer& out) const override {
     if (!joint.spring) return;
     const JointSpring& s = *joint.spring;
-    std::string text = fmt::format("{{ stiffness = {}, damping = {}", files::toml(s.stiffness),
-                                   files::toml(s.damping));
+    std::string text;
+    const auto add = [&](const char* key, double gain, const Table& table) {
+      std::string rows;
+      for (const std::array<double, 2>& row : table)
+        rows += fmt::format("{}[{}, {}]", rows.empty() ? "" : ", ", files::toml(row[0]),
+                            files::toml(row[1]));
+      text += text.empty() ? "{ " : ", ";
+      text += table.empty() ? fmt::format("{} = {}", key, files::toml(gain))
+                            : fmt::format("{}_table = [{}]", key, rows);
+    };
+    add("stiffness", s.stiffness, s.stiffness_table);
+    add("damping", s.damping, s.damping_table);
     if (joints::type(joint.kind).is_free())
       text += fmt::format(", rest{} = {}", angle ? "_rad" : "", files::toml(s.rest));
     out.raw("spring", text + " }");
@@ -175,6 +272,15 @@ class JointSpringEffect : public JointLawEffect {
       joint.spring->stiffness /= stiffness;
       joint.spring->damping /= stiffness * units.time;
       if (slides) joint.spring->rest /= units.length;
+      const double length = slides ? units.length : 1;
+      for (std::array<double, 2>& row : joint.spring->stiffness_table) {
+        row[0] /= length;
+        row[1] /= stiffness * length;
+      }
+      for (std::array<double, 2>& row : joint.spring->damping_table) {
+        row[0] /= length / units.time;
+        row[1] /= stiffness * length;
+      }
     }
   }
   void limit_momenta(Momenta& momenta) const override {
@@ -200,9 +306,10 @@ class JointSpringEffect : public JointLawEffect {
     const auto add = [&](const Gains& gains) {
       double stretch = value - gains.rest - gains.rate * out.time;
       if (joints::is_angle(joint)) stretch += nearest_turn(stretch);
+      stretch -= gains.offset;
       out.sprung(number, stretch, gains.stiffness, gains.damping, gains.rate, gains.bound);
     };
-    if (joint.spring) add(Gains(*joint.spring));
+    if (joint.spring) each_of(*joint.spring, add);
     if (joint.motor && joint.motor->has_gains()) add(Gains(*joint.motor));
   }
 };
