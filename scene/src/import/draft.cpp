@@ -10,6 +10,7 @@
 #include <set>
 #include <tether/scene/plan.hpp>
 
+#include "import/closures.hpp"
 #include "toml/report.hpp"
 
 namespace tether::scene::import {
@@ -47,6 +48,7 @@ class Drafting {
       add_joints(part, body_of_[k], on, options_, draft_, remarks_);
     }
     add_couplings();
+    add_closures(model_, parts_, body_of_, draft_, remarks_);
     add_contacts();
     make_unique();
     const Scene& scene = draft_.scene;

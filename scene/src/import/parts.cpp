@@ -26,6 +26,7 @@ std::size_t at(int k) { return static_cast<std::size_t>(k); }
 /// Takes a link in, `place`: its frame in that of the part.
 void weld(const Link& link, const Isometry3d& place, Part& part) {
   part.links.push_back(link.name);
+  part.places.push_back(place);
   const Matrix3d R = place.linear(), turned = R * link.inertia * R.transpose();
   // Turning by the identity would only add rounding.
   const Matrix3d inertia =

@@ -18,8 +18,9 @@ struct PlacedJoint {
 struct Part {
   std::string name;
   std::vector<std::string> links;
-  int line = 0, parent = -1;        ///< an earlier part; -1: the world
-  std::vector<PlacedJoint> joints;  ///< none: fixed
+  std::vector<Eigen::Isometry3d> places;  ///< of the links, in the frame of the first
+  int line = 0, parent = -1;              ///< an earlier part; -1: the world
+  std::vector<PlacedJoint> joints;        ///< none: fixed
   bool fixed() const { return joints.empty(); }
   bool gone = false;  ///< folded into another one, or left out
   bool scenery = false;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/pi.hpp>
+#include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 
 #include "import/import.hpp"
@@ -266,6 +267,54 @@ TEST_CASE("MJCF: balanceinertia replaces the moments that no body has by their m
   CHECK((scene.bodies[0].inertia - 5.0 / 3 * Eigen::Matrix3d::Identity()).norm() < 1e-14);
   CHECK(scene.bodies[1].inertia(1, 1) == 2);
   CHECK(said(world(body, balance), "mean (balanceinertia): b"));
+}
+
+TEST_CASE("MJCF: loops close by connect and weld, and joints follow each other by equality") {
+  // A parallelogram of three bars of 1 kg: a crank on each side turns as the other.
+  const std::string arm = "<inertial mass='1' pos='0.5 0 0' diaginertia='0.01 0.08 0.08'/>";
+  const std::string loop =
+      world("<body name='a'><joint name='ja' axis='0 1 0'/>" + arm +
+            "<body name='b' pos='1 0 0' euler='0 90 0'><joint name='jb' axis='0 1 0'/>" + arm +
+            "<body name='tip' pos='1 0 0'/></body></body>\n"
+            "<body name='c' pos='0 0 -1'><joint name='jc' axis='0 1 0'/>" +
+            arm + "</body>\n");
+  const auto with = [&](const std::string& equality) {
+    return loop.substr(0, loop.size() - std::string("</mujoco>\n").size()) + "<equality>" +
+           equality + "</equality></mujoco>\n";
+  };
+  // body b hangs down from the end of a; its tip is the end of c.
+  const Scene scene =
+      mjcf_scene(with("<connect name='close' body1='tip' body2='c' anchor='0 0 0'/>"));
+  REQUIRE(scene.joints.size() == 4);
+  CHECK(scene.joints[3].kind == JointKind::ball);
+  CHECK(scene.joints[3].name == "close");
+  CHECK((scene.joints[3].at - Eigen::Vector3d(1, 0, -1)).norm() < 1e-12);
+  const auto engine = make_engine(scene);
+  engine->advance(0.3);
+  CHECK(engine->diagnostics().drift < 1e-5);
+  // Before they pass the bar, the cranks turn as one, and the bar does not.
+  CHECK((engine->bodies()[0].angular_velocity - engine->bodies()[2].angular_velocity).norm() <
+        1e-4);
+  CHECK(engine->bodies()[1].angular_velocity.norm() < 1e-4);
+
+  const Scene welded = mjcf_scene(with("<weld body1='c' body2='b' anchor='1 0 0'/>"));
+  REQUIRE(welded.joints.size() == 4);
+  CHECK(welded.joints[3].kind == JointKind::fixed);
+  CHECK((welded.joints[3].at - Eigen::Vector3d(1, 0, -1)).norm() < 1e-12);
+  const Scene to_world = mjcf_scene(with("<connect body1='c' anchor='1 0 0'/>"));
+  CHECK(to_world.joints[3].second == -1);
+
+  const Scene follows = mjcf_scene(with("<joint joint1='jc' joint2='ja' polycoef='0 2 0 0 0'/>"));
+  REQUIRE(follows.couplings.size() == 1);
+  CHECK(follows.couplings[0].polynomial == std::vector<double>{2});
+
+  CHECK(said(with("<joint joint1='jc' joint2='ja' polycoef='0 1 1 0 0'/>"), "degree 2 to 4"));
+  CHECK(said(with("<joint joint1='jc'/>"), "not there, or of one joint"));
+  CHECK(said(with("<connect name='x' body1='none' anchor='0 0 0'/>"),
+             "do not move against each other: x"));
+  CHECK(said(with("<connect active='false' body1='c' anchor='0 0 0'/>"), "not active"));
+  CHECK(said(with("<tendon tendon1='t'/>"), "<tendon> in <equality>"));
+  CHECK(mjcf_refusal(with("<connect body1='c'/>")).find("anchor") != std::string::npos);
 }
 
 TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with its line") {

@@ -10,6 +10,7 @@
 #include <set>
 #include <tether/linalg/symmetric_eigen.hpp>
 
+#include "equalities.hpp"
 #include "geoms.hpp"
 #include "import/robot/geometry.hpp"
 
@@ -253,6 +254,7 @@ Model read_mjcf(const Node& root, Problems& problems) {
   const Settings settings = mjcf::read_settings(root, model, problems);
   Reader reader(model, settings, problems);
   bool has_world = false;
+  std::vector<const Node*> equalities;
   for (const Node* each = root.FirstChildElement(); each != nullptr;
        each = each->NextSiblingElement()) {
     if (is(*each, "worldbody")) {
@@ -266,11 +268,17 @@ Model read_mjcf(const Node& root, Problems& problems) {
            part = part->NextSiblingElement())
         if (is(*each, "contact") && is(*part, "exclude"))
           read_excluded(*part, model, problems);
+        else if (is(*each, "equality"))
+          equalities.push_back(part);
         else
           model.remarks.add(fmt::format("<{}> in <{}>", part->Name(), each->Name()),
                             part->Attribute("name") != nullptr ? name_or_line(*part) : "");
     }
   }
+  for (const Node* each : equalities)
+    if (!mjcf::read_equality(*each, model, problems))
+      model.remarks.add(fmt::format("<{}> in <equality>", each->Name()),
+                        each->Attribute("name") != nullptr ? name_or_line(*each) : "");
   if (!has_world) problems.add(root.GetLineNum(), "mujoco: worldbody", "", "is missing");
   if (settings.balance_inertia && problems.clean()) balance_inertia(model);
   set_total_mass(settings.total_mass, model);

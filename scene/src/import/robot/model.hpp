@@ -76,6 +76,14 @@ struct Link {
   int line = 0;
 };
 
+/// Two links that are held to each other beside the tree; "world": the world.
+struct Closure {
+  std::string name, first, second;
+  bool weld = false;                             ///< false: at one point
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in the frame of the first, m
+  int line = 0;
+};
+
 struct Model {
   std::string name, format;
   std::vector<Link> links;  ///< parents before children
@@ -83,6 +91,7 @@ struct Model {
   double step = 0;              ///< s; 0: not said
   bool base_is_said = true;     ///< false: whether the base is fixed is up to who uses the file
   bool touches_itself = false;  ///< moving links touch each other, but for neighbours in the tree
+  std::vector<Closure> closures;
   std::vector<std::pair<std::string, std::string>> excluded;  ///< names of links that do not
   Remarks remarks;
 };

@@ -1,0 +1,83 @@
+// Tether: <equality> of MJCF. SPDX-License-Identifier: BSD-3-Clause
+//
+// An equality of two joints, y - y0 = a0 + a1 (x - x0), is y = a1 x + (y0 + a0 - a1 x0).
+#include "equalities.hpp"
+
+#include <algorithm>
+
+namespace tether::scene::import::mjcf {
+
+namespace {
+
+LinkJoint* joint_of(Model& model, const std::string& name) {
+  for (Link& link : model.links)
+    for (LinkJoint& joint : link.joints)
+      if (joint.name == name) return &joint;
+  return nullptr;
+}
+
+// Softness of the solver, which rows do not have, and classes, which have nothing else here.
+void finish(Tag& tag, Model& model) {
+  tag.finish(model.remarks, {"name", "class", "solref", "solimp", "active", "torquescale"});
+}
+
+void read_joints(Tag& tag, const std::string& name, Model& model) {
+  LinkJoint* const first = joint_of(model, tag.text("joint1"));
+  LinkJoint* const second = joint_of(model, tag.text("joint2"));
+  std::vector<double> a = tag.numbers("polycoef", 1, 5);
+  finish(tag, model);
+  if (a.empty()) a = {0, 1};
+  a.resize(5, 0.0);
+  if (a[2] != 0 || a[3] != 0 || a[4] != 0)
+    return model.remarks.add("equalities of joints by polynomials of degree 2 to 4", name);
+  if (first == nullptr || second == nullptr || first == second)
+    return model.remarks.add("equalities of joints that are not there, or of one joint", name);
+  if (first->mimic) return model.remarks.add("second equalities of a joint", name);
+  first->mimic = Mimic{second->name, a[1], first->reference + a[0] - a[1] * second->reference};
+}
+
+// 0 0 0 and a quaternion of zeros, or nothing: the bodies keep their places.
+bool is_said(const std::vector<double>& place) {
+  return place.size() == 7 &&
+         std::any_of(place.begin() + 3, place.end(), [](double x) { return x != 0; });
+}
+
+void read_closure(Tag& tag, bool weld, const std::string& name, Model& model) {
+  if (tag.has("site1") || tag.has("site2"))
+    return model.remarks.add("equalities between sites", name);
+  Closure out;
+  out.name = name;
+  out.line = tag.line();
+  out.weld = weld;
+  out.first = tag.text("body1");
+  out.second = tag.text("body2", "world");
+  if (out.first.empty()) tag.missing("body1", "the name of a body");
+  if (!weld && !tag.has("anchor")) tag.missing("anchor", "a point of body1, m");
+  out.at = tag.vector("anchor", Eigen::Vector3d::Zero());
+  if (weld) {
+    if (is_said(tag.numbers("relpose", 7, 7)))
+      model.remarks.add("relpose of welds, which hold the bodies as they start", name);
+    std::swap(out.first, out.second);  // the anchor is of body2
+  }
+  finish(tag, model);
+  model.closures.push_back(std::move(out));
+}
+
+}  // namespace
+
+bool read_equality(const Node& node, Model& model, Problems& problems) {
+  const bool weld = is(node, "weld"), joints = is(node, "joint");
+  if (!weld && !joints && !is(node, "connect")) return false;
+  Tag tag(node, problems);
+  const std::string name = tag.has("name") ? tag.name("name", "")
+                                           : std::string(node.Name()) + " of " + name_or_line(node);
+  if (!tag.flag("active", true))
+    model.remarks.add("equalities that are not active", name);
+  else if (joints)
+    read_joints(tag, name, model);
+  else
+    read_closure(tag, weld, name, model);
+  return true;
+}
+
+}  // namespace tether::scene::import::mjcf
